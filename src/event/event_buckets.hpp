@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "src/event/event.hpp"
+
+namespace eventcamera {
+
+/// The events of one interval, as kernels leave them: a bucket for each step and, within a step,
+/// for each band of rows. Threads fill buckets of their own; read in order, the buckets are the
+/// sorted events of the interval.
+class EventBuckets {
+ public:
+  /// Empties the buckets, keeps their memory.
+  void reset(int steps, int bands) {
+    bands_ = static_cast<std::size_t>(bands);
+    count_ = static_cast<std::size_t>(steps) * bands_;
+    if (buckets_.size() < count_) buckets_.resize(count_);
+    for (auto& bucket : buckets_) bucket.clear();
+  }
+
+  /// Step 1 ... steps, band 0 ... bands - 1.
+  std::vector<Event>& bucket(int step, int band) {
+    return buckets_[static_cast<std::size_t>(step - 1) * bands_ + static_cast<std::size_t>(band)];
+  }
+
+  std::span<const std::vector<Event>> buckets() const { return {buckets_.data(), count_}; }
+
+  /// How many events there are in all.
+  std::size_t size() const;
+
+  /// Writes size() events, sorted by time and within a time in raster order.
+  void copy_to(Event* out) const;
+
+ private:
+  std::vector<std::vector<Event>> buckets_;
+  std::size_t count_ = 0;
+  std::size_t bands_ = 1;
+};
+
+}  // namespace eventcamera

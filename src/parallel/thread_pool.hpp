@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <vector>
+
+namespace eventcamera {
+
+/// A few threads that wait for loops to share. Its owner calls from one thread at a time.
+///
+/// Which thread runs which round of a loop is left to chance, so a round may write only what is
+/// its own; then the result is the same for any number of threads.
+class ThreadPool {
+ public:
+  ThreadPool() = default;
+  ~ThreadPool();
+  ThreadPool(const ThreadPool&) = delete;
+  ThreadPool& operator=(const ThreadPool&) = delete;
+
+  /// How many threads the next loops use, this one counted in; 0 = one for each processor.
+  void set_threads(int threads);
+  int threads() const { return static_cast<int>(workers_.size()) + 1; }
+
+  /// Runs body(i, thread) for i = 0 ... count - 1 and returns when all are done; `thread` tells
+  /// the threads apart (0 ... threads() - 1). What a body throws is thrown here, after the loop.
+  template <class Body>
+  void for_each(int count, const Body& body) {
+    run(
+        count, [](const void* b, int i, int thread) { (*static_cast<const Body*>(b))(i, thread); },
+        &body);
+  }
+
+ private:
+  using Round = void (*)(const void* body, int i, int thread);
+
+  void run(int count, Round round, const void* body);
+  void take_rounds(int thread);
+  void work(int thread);
+  void join_workers();
+
+  std::vector<std::thread> workers_;
+
+  // The loop under way: written under the mutex while no worker is in it.
+  Round round_ = nullptr;
+  const void* body_ = nullptr;
+  int count_ = 0;
+  std::atomic<int> next_ = 0;
+
+  std::mutex mutex_;  // guards what follows
+  std::condition_variable wake_;
+  std::condition_variable done_;
+  unsigned loop_ = 0;  // counts the loops, so that a worker takes part in each once
+  int busy_ = 0;       // workers still in the loop
+  bool stop_ = false;
+  std::exception_ptr thrown_;
+};
+
+}  // namespace eventcamera
