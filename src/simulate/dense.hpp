@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <memory>
+
+#include "src/flow/dense_flow.hpp"
+#include "src/simulate/simulator.hpp"
+
+namespace eventcamera {
+
+/// How dense flow makes the frame I(a) between I(i-1) and I(i), 0 < a < 1.
+enum class Interpolation {
+  forward,  ///< I(i-1)(x - a F(x))
+  blend,    ///< (1 - a) I(i-1)(x - a F(x)) + a I(i)(x + (1 - a) F(x))
+};
+
+/// Dense frame interpolation (paper, section III-A): flow F from I(i-1) to I(i), interpolated
+/// frames sampled bilinearly with the border continued, I(1) = I(i); then each difference of
+/// neighbours is thresholded, at the time of its later frame.
+class DenseSimulator : public Simulator {
+ public:
+  void set_flow(FlowMethod flow) { flow_ = flow; }
+  void set_interpolation(Interpolation interpolation) { interpolation_ = interpolation; }
+
+ protected:
+  using Simulator::Simulator;
+  FlowMethod flow_ = FlowMethod::dis_lq;
+  Interpolation interpolation_ = Interpolation::forward;
+};
+
+/// Neither side of `format` may exceed longest_side.
+std::unique_ptr<DenseSimulator> make_dense_simulator(const LumaFormat& format);
+
+}  // namespace eventcamera

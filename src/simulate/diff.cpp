@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/simulate/diff.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdlib>
+#include <utility>
+#include <vector>
+
+#include "src/simulate/difference.hpp"
+#include "src/simulate/moving_point.hpp"
+
+namespace eventcamera {
+namespace {
+
+/// A difference frame, ON and OFF apart: pixels that exceeded the threshold, in raster order.
+struct Kept {
+  std::vector<Point> places;
+  std::vector<int> differences;  ///< I(i) - I(i-1) at each of them
+
+  void clear() {
+    places.clear();
+    differences.clear();
+  }
+};
+
+/// A kept pixel of the last difference frame on its way into this one.
+struct MovingDifference {
+  MovingPoint point;
+  int difference;
+};
+
+/// One polarity of the difference frames.
+struct Part {
+  Part(int width, int height) : picture(width, height) {}
+
+  Kept last;
+  Kept now;
+  Plane<std::uint8_t> picture;  ///< now as a picture in 8 bits, 0 where nothing is kept
+  PointTracker tracker;
+
+  void begin_next() {
+    for (const auto& place : now.places) picture.at(place.x, place.y) = 0;
+    std::swap(last, now);
+    now.clear();
+  }
+
+  void keep(const Point& place, int difference, int shift) {
+    now.places.push_back(place);
+    now.differences.push_back(difference);
+    picture.at(place.x, place.y) =
+        static_cast<std::uint8_t>(std::max(1, std::abs(difference) >> shift));
+  }
+
+  /// Whether this difference frame keeps anything within a pixel of a place.
+  bool keeps_near(const Point& place) const {
+    const int bottom = std::min(place.y + 1, picture.height() - 1);
+    const int right = std::min(place.x + 1, picture.width() - 1);
+    for (int y = std::max(place.y - 1, 0); y <= bottom; ++y)
+      for (int x = std::max(place.x - 1, 0); x <= right; ++x)
+        if (picture.at(x, y) != 0) return true;
+    return false;
+  }
+};
+
+/// What fires in one interpolated difference frame.
+class Landings {
+ public:
+  Landings(int width, int height)
+      : strongest_(width, height),
+        words_((width + 63) / 64),
+        taken_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)) {}
+
+  /// Of the differences that land on a pixel the largest wins, and ON where ON and OFF are equal.
+  void add(const Point& place, int difference) {
+    int& strongest = strongest_.at(place.x, place.y);
+    if (std::abs(difference) > std::abs(strongest) || difference == -strongest)
+      strongest = difference == -strongest ? std::abs(difference) : difference;
+    taken_[word(place)] |= std::uint64_t{1} << (place.x % 64);
+  }
+
+  /// Fires all that has landed, in raster order, and is empty again.
+  void fire(std::uint32_t t, std::vector<Event>& out) {
+    for (int y = 0; y < strongest_.height(); ++y) {
+      for (int x = 0; x < strongest_.width(); x += 64) {
+        for (auto bits = std::exchange(taken_[word({x, y})], 0); bits != 0; bits &= bits - 1) {
+          const int at = x + std::countr_zero(bits);
+          const int difference = std::exchange(strongest_.at(at, y), 0);
+          out.push_back(Event::at(at, y, t, difference > 0 ? Polarity::on : Polarity::off));
+        }
+      }
+    }
+  }
+
+ private:
+  std::size_t word(const Point& place) const {
+    return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(words_) +
+           static_cast<std::size_t>(place.x / 64);
+  }
+
+  Plane<int> strongest_;
+  int words_;                         ///< of 64 pixels, in a row
+  std::vector<std::uint64_t> taken_;  ///< a bit a pixel: something has landed
+};
+
+template <class Pixel>
+class DiffSimulator final : public Simulator {
+ public:
+  explicit DiffSimulator(const LumaFormat& format)
+      : Simulator(format),
+        last_(format.width, format.height),
+        on_(format.width, format.height),
+        off_(format.width, format.height) {}
+
+ private:
+  void start(const LumaView& frame) override {
+    last_.assign(frame.as<Pixel>());
+    has_difference_ = false;
+  }
+
+  void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
+                EventBuckets& events) override {
+    const auto now = frame.as<Pixel>();
+    const auto thresholds = Thresholds::of(settings, format().bits);
+    events.reset(steps.count(), 1);
+    take_difference(now, thresholds);
+    on_.tracker.push(on_.picture.view(), threads().threads());
+    off_.tracker.push(off_.picture.view(), threads().threads());
+    if (has_difference_ && steps.count() > 1) {
+      moving_.clear();
+      follow(on_, steps.count());
+      follow(off_, steps.count());
+      fire_between(steps, events);
+    }
+    for (int y = 0; y < now.height; ++y)
+      fire_differences(last_.row(y), now.row(y), now.width, y, steps.microseconds(steps.count()),
+                       thresholds, events.bucket(steps.count(), 0));
+    has_difference_ = true;
+    last_.assign(now);
+  }
+
+  /// D(i) = I(i) - I(i-1), its parts kept where they exceed the thresholds.
+  void take_difference(const PlaneView<Pixel>& now, const Thresholds& thresholds) {
+    on_.begin_next();
+    off_.begin_next();
+    const int shift = format().bits - 8;
+    for (int y = 0; y < now.height; ++y) {
+      for (int x = 0; x < now.width; ++x) {
+        const int difference = now.row(y)[x] - last_.at(x, y);
+        if (difference > thresholds.positive)
+          on_.keep({x, y}, difference, shift);
+        else if (-difference > thresholds.negative)
+          off_.keep({x, y}, difference, shift);
+      }
+    }
+  }
+
+  /// Sets the kept pixels of the last difference frame moving towards this one.
+  void follow(Part& part, int steps) {
+    const auto& places = part.last.places;
+    const auto tracks = part.tracker.track(places, threads().threads());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const auto point = moving_point(places[i], tracks[i], steps, format().width, format().height);
+      if (point && part.keeps_near(point->at(steps)))
+        moving_.push_back({*point, part.last.differences[i]});
+    }
+  }
+
+  void fire_between(const StepTimes& steps, EventBuckets& events) {
+    while (static_cast<int>(landings_.size()) < threads().threads())
+      landings_.emplace_back(format().width, format().height);
+    threads().for_each(steps.count() - 1, [&](int i, int thread) {
+      const int j = i + 1;
+      auto& landings = landings_[static_cast<std::size_t>(thread)];
+      for (const auto& moving : moving_) landings.add(moving.point.at(j), moving.difference);
+      landings.fire(steps.microseconds(j), events.bucket(j, 0));
+    });
+  }
+
+  Plane<Pixel> last_;
+  bool has_difference_ = false;
+  Part on_;
+  Part off_;
+  std::vector<MovingDifference> moving_;
+  std::vector<Landings> landings_;  // one a thread
+};
+
+}  // namespace
+
+std::unique_ptr<Simulator> make_diff_simulator(const LumaFormat& format) {
+  if (format.bits > 8) return std::make_unique<DiffSimulator<std::uint16_t>>(format);
+  return std::make_unique<DiffSimulator<std::uint8_t>>(format);
+}
+
+}  // namespace eventcamera

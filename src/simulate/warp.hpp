@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <type_traits>
+
+#include "src/flow/fixed_point.hpp"
+#include "src/picture/plane.hpp"
+#include "src/simulate/dense.hpp"
+
+namespace eventcamera {
+
+/// The bilinear sample of a picture at (x, y), which are in 1/65536 of a pixel and rounded to 1/64;
+/// the border goes on for ever. In 1/4096 of a grey level, exactly.
+template <class Pixel>
+std::int32_t sample(const PlaneView<Pixel>& picture, std::int32_t x, std::int32_t y) {
+  const int qx = std::clamp((x + 512) >> 10, 0, (picture.width - 1) * 64);
+  const int qy = std::clamp((y + 512) >> 10, 0, (picture.height - 1) * 64);
+  const int x0 = qx >> 6;
+  const int y0 = qy >> 6;
+  const int x1 = std::min(x0 + 1, picture.width - 1);
+  const Pixel* upper = picture.row(y0);
+  const Pixel* lower = picture.row(std::min(y0 + 1, picture.height - 1));
+  const int right = qx & 63;
+  const int down = qy & 63;
+  return (upper[x0] * (64 - right) + upper[x1] * right) * (64 - down) +
+         (lower[x0] * (64 - right) + lower[x1] * right) * down;
+}
+
+/// The pixel (x, y) of the interpolated frames between two frames.
+template <class Pixel>
+struct Warp {
+  PlaneView<Pixel> last;
+  PlaneView<Pixel> now;
+  int steps;
+
+  /// Step j = 1 ... steps - 1 of a pixel that moves by (dx, dy) a step; rounded to a grey level.
+  template <Interpolation interpolation>
+  Pixel at(int x, int y, Motion dx, Motion dy, int j) const {
+    const std::int32_t px = x << 16;
+    const std::int32_t py = y << 16;
+    const std::int32_t from_last = sample(last, px - j * dx, py - j * dy);
+    if constexpr (interpolation == Interpolation::forward) {
+      return static_cast<Pixel>((from_last + 2048) >> 12);
+    } else {
+      using Sum = std::conditional_t<sizeof(Pixel) == 1, std::int32_t, std::int64_t>;
+      const int left = steps - j;
+      const std::int32_t from_now = sample(now, px + left * dx, py + left * dy);
+      const int weight = (j * 256 + steps / 2) / steps;  // a, in 1/256
+      return static_cast<Pixel>(
+          (Sum{from_last} * (256 - weight) + Sum{from_now} * weight + (1 << 19)) >> 20);
+    }
+  }
+};
+
+}  // namespace eventcamera
