@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/eventcamera/eventcamera.h"
+
+#include <cstddef>
+
+#include "src/event/event.hpp"
+
+static_assert(sizeof(GstEventCameraEvent) == sizeof(eventcamera::Event) &&
+                  offsetof(GstEventCameraEvent, x) == offsetof(eventcamera::Event, x) &&
+                  offsetof(GstEventCameraEvent, y_p) == offsetof(eventcamera::Event, y_p),
+              "the core's events are handed to applications as they are");
+
+GType gst_event_camera_palette_get_type(void) {
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {GST_EVENT_CAMERA_PALETTE_LIGHT, "On white: ON blue, OFF dark, both dark blue", "light"},
+        {GST_EVENT_CAMERA_PALETTE_DARK, "On the dark: ON white, OFF blue, both light blue", "dark"},
+        {GST_EVENT_CAMERA_PALETTE_GREY, "On grey: ON white, OFF black, both dark grey", "grey"},
+        {GST_EVENT_CAMERA_PALETTE_RED_BLUE, "On white: ON blue, OFF red, both purple", "red-blue"},
+        {0, nullptr, nullptr},
+    };
+    return g_enum_register_static("GstEventCameraPalette", values);
+  }();
+  return type;
+}
+
+static GstEventCameraInfo* gst_event_camera_info_copy(const GstEventCameraInfo* info) {
+  return static_cast<GstEventCameraInfo*>(g_memdup2(info, sizeof *info));
+}
+
+static void gst_event_camera_info_free(GstEventCameraInfo* info) {
+  g_free(info);
+}
+
+G_DEFINE_BOXED_TYPE(GstEventCameraInfo, gst_event_camera_info, gst_event_camera_info_copy,
+                    gst_event_camera_info_free)
+
+gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps* caps) {
+  g_return_val_if_fail(info != nullptr, FALSE);
+  g_return_val_if_fail(gst_caps_is_fixed(caps), FALSE);
+
+  const GstStructure* structure = gst_caps_get_structure(caps, 0);
+  GstEventCameraInfo found = {0, 0, 0, 1};
+  if (!gst_structure_has_name(structure, GST_EVENT_CAMERA_MEDIA_TYPE) ||
+      g_strcmp0(gst_structure_get_string(structure, "format"), "XYTP") != 0 ||
+      !gst_structure_get_int(structure, "width", &found.width) ||
+      !gst_structure_get_int(structure, "height", &found.height) || found.width < 1 ||
+      found.width > GST_EVENT_CAMERA_MAX_WIDTH || found.height < 1 ||
+      found.height > GST_EVENT_CAMERA_MAX_HEIGHT)
+    return FALSE;
+  if (gst_structure_has_field(structure, "framerate") &&
+      !gst_structure_get_fraction(structure, "framerate", &found.fps_n, &found.fps_d))
+    return FALSE;
+  *info = found;
+  return TRUE;
+}
+
+GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info) {
+  g_return_val_if_fail(info != nullptr, nullptr);
+  return gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING, "XYTP", "width",
+                             G_TYPE_INT, info->width, "height", G_TYPE_INT, info->height,
+                             "framerate", GST_TYPE_FRACTION, info->fps_n, info->fps_d, nullptr);
+}
+
+gboolean gst_event_camera_map(GstEventCameraMap* map, GstBuffer* buffer) {
+  g_return_val_if_fail(map != nullptr, FALSE);
+  g_return_val_if_fail(GST_IS_BUFFER(buffer), FALSE);
+
+  if (!GST_BUFFER_PTS_IS_VALID(buffer) ||
+      gst_buffer_get_size(buffer) % sizeof(GstEventCameraEvent) != 0)
+    return FALSE;
+  *map = {};
+  if (!gst_buffer_map(buffer, &map->map, GST_MAP_READ)) return FALSE;
+  map->buffer = gst_buffer_ref(buffer);
+  map->events = reinterpret_cast<const GstEventCameraEvent*>(map->map.data);
+  map->n_events = map->map.size / sizeof(GstEventCameraEvent);
+  map->start = GST_BUFFER_PTS(buffer) / GST_USECOND;
+  return TRUE;
+}
+
+void gst_event_camera_unmap(GstEventCameraMap* map) {
+  g_return_if_fail(map != nullptr);
+  gst_buffer_unmap(map->buffer, &map->map);
+  gst_buffer_unref(map->buffer);
+}

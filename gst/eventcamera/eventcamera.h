@@ -1,0 +1,191 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:eventcamera
+ * @title: GstEventCamera
+ * @short_description: the event streams of event cameras
+ *
+ * Events travel in buffers with the caps `application/x-event-camera`:
+ *
+ * - `format`: `XYTP`, events as they lie in memory (#GstEventCameraEvent);
+ * - `width`, `height`: of the sensor, in pixels; every x < width, every y < height;
+ * - `framerate`: buffers a second, 0/1 where it varies.
+ *
+ * A buffer holds the events of the interval (t0, t1] that it stands for: its PTS is t0, its
+ * duration t1 - t0, and its memory an array of events sorted by time, ties in raster order. The
+ * time of an event is floor(PTS / 1000) + t microseconds. Intervals never overlap. An interval
+ * without events is a GAP event.
+ */
+#pragma once
+
+#include <gst/gst.h>
+
+G_BEGIN_DECLS
+
+#ifndef GST_EVENT_CAMERA_API
+#define GST_EVENT_CAMERA_API __attribute__((visibility("default")))
+#endif
+
+/**
+ * GST_EVENT_CAMERA_MEDIA_TYPE:
+ *
+ * The name of the caps of event streams.
+ */
+#define GST_EVENT_CAMERA_MEDIA_TYPE "application/x-event-camera"
+
+/**
+ * GST_EVENT_CAMERA_MAX_WIDTH:
+ *
+ * The widest sensor whose x fits into an event.
+ */
+#define GST_EVENT_CAMERA_MAX_WIDTH 65535
+
+/**
+ * GST_EVENT_CAMERA_MAX_HEIGHT:
+ *
+ * The tallest sensor whose y fits into an event.
+ */
+#define GST_EVENT_CAMERA_MAX_HEIGHT 32768
+
+typedef struct _GstEventCameraEvent GstEventCameraEvent;
+typedef struct _GstEventCameraInfo GstEventCameraInfo;
+typedef struct _GstEventCameraMap GstEventCameraMap;
+
+/**
+ * GstEventCameraEvent:
+ * @t: microseconds after the buffer's PTS, rounded down
+ * @x: column, from the left
+ * @y_p: row from the top in bits 0 to 14; bit 15 is the polarity: 1 = ON (brighter), 0 = OFF
+ *
+ * One event as it lies in a buffer of format XYTP: 8 bytes, little-endian.
+ */
+struct _GstEventCameraEvent {
+  guint32 t;
+  guint16 x;
+  guint16 y_p;
+};
+
+/**
+ * gst_event_camera_event_get_y:
+ * @event: an event
+ *
+ * Returns: the row, from the top
+ */
+static inline guint gst_event_camera_event_get_y(const GstEventCameraEvent *event) {
+  return event->y_p & 0x7fffu;
+}
+
+/**
+ * gst_event_camera_event_is_on:
+ * @event: an event
+ *
+ * Returns: %TRUE for ON (brighter), %FALSE for OFF (darker)
+ */
+static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent *event) {
+  return (event->y_p & 0x8000u) != 0;
+}
+
+/**
+ * GstEventCameraPalette:
+ * @GST_EVENT_CAMERA_PALETTE_LIGHT: on white: ON blue, OFF dark, both dark blue
+ * @GST_EVENT_CAMERA_PALETTE_DARK: on the dark: ON white, OFF blue, both light blue
+ * @GST_EVENT_CAMERA_PALETTE_GREY: on grey: ON white, OFF black, both dark grey
+ * @GST_EVENT_CAMERA_PALETTE_RED_BLUE: on white: ON blue, OFF red, both purple
+ *
+ * The colours of accumulated events: of a pixel without events, with ON events, with OFF events,
+ * and with both.
+ */
+typedef enum {
+  GST_EVENT_CAMERA_PALETTE_LIGHT,
+  GST_EVENT_CAMERA_PALETTE_DARK,
+  GST_EVENT_CAMERA_PALETTE_GREY,
+  GST_EVENT_CAMERA_PALETTE_RED_BLUE,
+} GstEventCameraPalette;
+
+#define GST_TYPE_EVENT_CAMERA_PALETTE (gst_event_camera_palette_get_type())
+GST_EVENT_CAMERA_API
+GType gst_event_camera_palette_get_type(void);
+
+#define GST_TYPE_EVENT_CAMERA_INFO (gst_event_camera_info_get_type())
+GST_EVENT_CAMERA_API
+GType gst_event_camera_info_get_type(void);
+
+/**
+ * GstEventCameraInfo:
+ * @width: of the sensor, in pixels
+ * @height: of the sensor, in pixels
+ * @fps_n: buffers a second, numerator; 0 where it varies
+ * @fps_d: buffers a second, denominator
+ *
+ * What the caps of a stream of format XYTP say.
+ */
+struct _GstEventCameraInfo {
+  gint width;
+  gint height;
+  gint fps_n;
+  gint fps_d;
+};
+
+/**
+ * gst_event_camera_info_from_caps:
+ * @info: (out caller-allocates): is filled in
+ * @caps: fixed caps
+ *
+ * Reads the caps of an event stream of format XYTP. A framerate that is missing counts as 0/1.
+ *
+ * Returns: %FALSE where @caps are anything else; @info is then left alone
+ */
+GST_EVENT_CAMERA_API
+gboolean gst_event_camera_info_from_caps(GstEventCameraInfo *info, const GstCaps *caps);
+
+/**
+ * gst_event_camera_info_to_caps:
+ * @info: what the caps shall say
+ *
+ * Returns: (transfer full): the caps of an event stream of format XYTP
+ */
+GST_EVENT_CAMERA_API
+GstCaps *gst_event_camera_info_to_caps(const GstEventCameraInfo *info);
+
+/**
+ * GstEventCameraMap:
+ * @events: (array length=n_events): the events of the buffer, sorted by time
+ * @n_events: how many there are
+ * @start: the time in microseconds from which each event's t counts, floor(PTS / 1000)
+ *
+ * The events of a mapped buffer.
+ */
+struct _GstEventCameraMap {
+  const GstEventCameraEvent *events;
+  gsize n_events;
+  guint64 start;
+
+  /*< private >*/
+  GstBuffer *buffer;
+  GstMapInfo map;
+  gpointer _gst_reserved[GST_PADDING];
+};
+
+/**
+ * gst_event_camera_map:
+ * @map: (out caller-allocates): is filled in; gst_event_camera_unmap() it when done
+ * @buffer: a buffer of an event stream of format XYTP, with a PTS
+ *
+ * Maps a buffer for reading its events. Nothing is copied where the buffer is one memory. Events
+ * are not looked at: whoever uses x and y as indices checks them against the caps.
+ *
+ * Returns: %FALSE where @buffer cannot be mapped, has no PTS, or is no whole number of events;
+ *     @map is then not to be unmapped
+ */
+GST_EVENT_CAMERA_API
+gboolean gst_event_camera_map(GstEventCameraMap *map, GstBuffer *buffer);
+
+/**
+ * gst_event_camera_unmap:
+ * @map: a map that gst_event_camera_map() filled in
+ *
+ * Gives the buffer free again. The events may not be read any more.
+ */
+GST_EVENT_CAMERA_API
+void gst_event_camera_unmap(GstEventCameraMap *map);
+
+G_END_DECLS

@@ -1,0 +1,648 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/simulate/eventsimulator.hpp"
+
+#include <gst/video/gstvideopool.h>
+#include <gst/video/video.h>
+
+#include <exception>
+#include <new>
+#include <optional>
+#include <utility>
+
+#include "gst/eventcamera/eventcamera.h"
+#include "gst/simulate/output_caps.hpp"
+#include "gst/simulate/picture_formats.hpp"
+#include "gst/simulate/video_frame.hpp"
+#include "src/flow/fixed_point.hpp"
+#include "src/render/accumulator.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
+#define GST_CAT_DEFAULT event_simulator_debug
+
+using eventcamera::Accumulator;
+using eventcamera::EventBuckets;
+using eventcamera::LumaView;
+using eventcamera::Nanoseconds;
+using eventcamera::PaletteName;
+using eventcamera::Plane;
+using eventcamera::Simulator;
+
+namespace {
+
+enum Property {
+  prop_0,
+  prop_positive_threshold,
+  prop_negative_threshold,
+  prop_interpolated_frames,
+  prop_n_threads,
+  prop_palette,
+};
+
+constexpr guint max_interpolated_frames = 255;
+constexpr guint default_interpolated_frames = 10;
+
+/// Where the framerate is unknown, the latency is the longest interval seen, up to this.
+constexpr GstClockTime longest_guessed_latency = GST_SECOND;
+
+/// What the application sets, copied once per buffer.
+struct Settings {
+  eventcamera::Settings simulation;
+  GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
+};
+
+/// What exists between caps and stop.
+struct State {
+  GstVideoInfo video;                 ///< what comes in
+  std::optional<GstVideoInfo> drawn;  ///< what goes out, unless events do
+  std::unique_ptr<Simulator> simulator;
+  Accumulator accumulator;     ///< for drawing
+  Plane<guint8> gathered;      ///< luma that was packed
+  bool discontinuous = false;  ///< the next buffer does not follow on the last one
+};
+
+PaletteName core_palette(GstEventCameraPalette palette) {
+  switch (palette) {
+    case GST_EVENT_CAMERA_PALETTE_LIGHT:
+      return PaletteName::light;
+    case GST_EVENT_CAMERA_PALETTE_DARK:
+      return PaletteName::dark;
+    case GST_EVENT_CAMERA_PALETTE_GREY:
+      return PaletteName::grey;
+    case GST_EVENT_CAMERA_PALETTE_RED_BLUE:
+      return PaletteName::red_blue;
+  }
+  return PaletteName::dark;
+}
+
+}  // namespace
+
+struct GstEventSimulatorPrivate {
+  // Guarded by the object lock.
+  Settings settings;
+  GstClockTime latency = 0;
+
+  // The streaming thread's, or nobody's while there is none.
+  std::optional<State> state;
+  bool warned_of_times = false;
+};
+
+G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventSimulator, gst_event_simulator, GST_TYPE_BASE_TRANSFORM,
+                                 GST_DEBUG_CATEGORY_INIT(event_simulator_debug, "eventsim", 0,
+                                                         "event simulators"))
+#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_simulator_parent_class)
+
+/* properties */
+
+void gst_event_simulator_set_property(GObject* object, guint id, const GValue* value,
+                                      GParamSpec* spec) {
+  auto& settings = GST_EVENT_SIMULATOR(object)->priv->settings;
+  GST_OBJECT_LOCK(object);
+  switch (id) {
+    case prop_positive_threshold:
+      settings.simulation.positive_threshold = g_value_get_double(value);
+      break;
+    case prop_negative_threshold:
+      settings.simulation.negative_threshold = g_value_get_double(value);
+      break;
+    case prop_interpolated_frames:
+      settings.simulation.interpolated_frames = static_cast<int>(g_value_get_uint(value));
+      break;
+    case prop_n_threads:
+      settings.simulation.threads = static_cast<int>(g_value_get_uint(value));
+      break;
+    case prop_palette:
+      settings.palette = static_cast<GstEventCameraPalette>(g_value_get_enum(value));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+      break;
+  }
+  GST_OBJECT_UNLOCK(object);
+}
+
+void gst_event_simulator_get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
+  const auto& settings = GST_EVENT_SIMULATOR(object)->priv->settings;
+  GST_OBJECT_LOCK(object);
+  switch (id) {
+    case prop_positive_threshold:
+      g_value_set_double(value, settings.simulation.positive_threshold);
+      break;
+    case prop_negative_threshold:
+      g_value_set_double(value, settings.simulation.negative_threshold);
+      break;
+    case prop_interpolated_frames:
+      g_value_set_uint(value, static_cast<guint>(settings.simulation.interpolated_frames));
+      break;
+    case prop_n_threads:
+      g_value_set_uint(value, static_cast<guint>(settings.simulation.threads));
+      break;
+    case prop_palette:
+      g_value_set_enum(value, settings.palette);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+      break;
+  }
+  GST_OBJECT_UNLOCK(object);
+}
+
+static constexpr auto property_flags = static_cast<GParamFlags>(
+    G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+
+void gst_event_simulator_class_install_thresholds(GstEventSimulatorClass* klass,
+                                                  double grey_levels) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  if (object_class->set_property == nullptr) {  // GObject lets no class inherit these
+    object_class->set_property = gst_event_simulator_set_property;
+    object_class->get_property = gst_event_simulator_get_property;
+  }
+  g_object_class_install_property(
+      object_class, prop_positive_threshold,
+      g_param_spec_double("positive-threshold", "Positive threshold",
+                          "An ON event needs a rise in brightness of more than this "
+                          "(8-bit grey levels, whatever the depth of the video)",
+                          0, 255, grey_levels, property_flags));
+  g_object_class_install_property(
+      object_class, prop_negative_threshold,
+      g_param_spec_double("negative-threshold", "Negative threshold",
+                          "An OFF event needs a fall in brightness of more than this "
+                          "(8-bit grey levels, a magnitude, whatever the depth of the video)",
+                          0, 255, grey_levels, property_flags));
+}
+
+void gst_event_simulator_class_install_interpolated_frames(GstEventSimulatorClass* klass) {
+  g_object_class_install_property(
+      G_OBJECT_CLASS(klass), prop_interpolated_frames,
+      g_param_spec_uint("interpolated-frames", "Interpolated frames",
+                        "How many frames to make between two frames of the video; events get "
+                        "the times of these (no more are made than there are microseconds)",
+                        0, max_interpolated_frames, default_interpolated_frames, property_flags));
+}
+
+/* time */
+
+/// The latency is what the caps or the frames say; sinks are told when it changes.
+static void set_latency(GstEventSimulator* self, GstClockTime latency) {
+  GST_OBJECT_LOCK(self);
+  const bool changed = self->priv->latency != latency;
+  self->priv->latency = latency;
+  GST_OBJECT_UNLOCK(self);
+  if (!changed) return;
+  GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(latency));
+  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+}
+
+static void learn_latency(GstEventSimulator* self, GstClockTime interval) {
+  if (GST_VIDEO_INFO_FPS_N(&self->priv->state->video) > 0) return;
+  GST_OBJECT_LOCK(self);
+  const GstClockTime known = self->priv->latency;
+  GST_OBJECT_UNLOCK(self);
+  if (interval > known && known < longest_guessed_latency)
+    set_latency(self, MIN(interval, longest_guessed_latency));
+}
+
+/// Makes the next frame a first frame.
+static void forget_frames(GstEventSimulator* self) {
+  auto& state = self->priv->state;
+  if (!state || !state->simulator->last_time()) return;
+  state->simulator->reset();
+  state->discontinuous = true;
+}
+
+/// Bad times come in droves: the first is reported to the application, all to the log.
+static void warn_of_times(GstEventSimulator* self, const char* what) {
+  GST_WARNING_OBJECT(self, "%s", what);
+  if (std::exchange(self->priv->warned_of_times, true)) return;
+  GST_ELEMENT_WARNING(self, STREAM, FORMAT,
+                      ("The timestamps of the video are broken: %s. No events are made across "
+                       "such a place.",
+                       what),
+                      ("An interval needs a PTS at both ends; videorate or a parser in front of "
+                       "this element can repair them."));
+}
+
+/// Whether a frame with this PTS can become the last frame, and readies the simulator for it.
+static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
+  const GstClockTime pts = GST_BUFFER_PTS(buffer);
+  if (GST_BUFFER_IS_DISCONT(buffer)) forget_frames(self);
+  if (!GST_CLOCK_TIME_IS_VALID(pts) || pts > G_MAXINT64) {
+    warn_of_times(self, "a frame has no PTS");
+    forget_frames(self);
+    return false;
+  }
+  const auto last = self->priv->state->simulator->last_time();
+  if (!last) return true;
+  const auto time = static_cast<Nanoseconds>(pts);
+  if (time <= *last) {
+    warn_of_times(self, "a frame is not later than the one before");
+    forget_frames(self);
+  } else if (time - *last > eventcamera::longest_interval) {
+    warn_of_times(self, "two frames lie more than 71 minutes apart");
+    forget_frames(self);
+  }
+  return true;
+}
+
+/* negotiation */
+
+static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection direction, GstCaps* caps,
+                               GstCaps* filter) {
+  GstCaps* other = direction == GST_PAD_SINK ? event_simulator_output_caps(caps)
+                                             : event_simulator_input_caps(caps);
+  if (filter == nullptr) return other;
+  GstCaps* filtered = gst_caps_intersect_full(filter, other, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref(other);
+  return filtered;
+}
+
+static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCaps*,
+                            GstCaps* other) {
+  if (direction == GST_PAD_SRC || gst_caps_is_empty(other)) return gst_caps_fixate(other);
+  return event_simulator_fixate_output(other);
+}
+
+static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  auto& state = self->priv->state;
+  GstVideoInfo video;
+  GstVideoInfo drawn;
+  const bool draws =
+      !gst_structure_has_name(gst_caps_get_structure(out, 0), GST_EVENT_CAMERA_MEDIA_TYPE);
+  if (!gst_video_info_from_caps(&video, in) || (draws && !gst_video_info_from_caps(&drawn, out))) {
+    GST_ERROR_OBJECT(self, "cannot make %" GST_PTR_FORMAT " of %" GST_PTR_FORMAT, out, in);
+    return FALSE;
+  }
+  if (GST_VIDEO_INFO_INTERLACE_MODE(&video) != GST_VIDEO_INTERLACE_MODE_PROGRESSIVE)
+    GST_ELEMENT_WARNING(self, STREAM, FORMAT,
+                        ("The video is interlaced: every moving edge will fire line by line. Put "
+                         "a deinterlace element in front."),
+                        (nullptr));
+
+  const auto luma = luma_format_of(video);
+  try {
+    if (!state || luma_format_of(state->video) != luma) {
+      state.reset();  // before the next is made: frames can be large
+      state.emplace(State{.video = video,
+                          .drawn = std::nullopt,
+                          .simulator = GST_EVENT_SIMULATOR_GET_CLASS(self)->create(self, luma),
+                          .accumulator = Accumulator(luma.width, luma.height),
+                          .gathered = {}});
+    }
+    state->video = video;
+    state->drawn = draws ? std::optional(drawn) : std::nullopt;
+    state->gathered =
+        has_packed_luma(video) ? Plane<guint8>(luma.width, luma.height) : Plane<guint8>();
+  } catch (const std::exception& error) {
+    state.reset();
+    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
+                      ("There is not enough memory for frames of %dx%d.", luma.width, luma.height),
+                      ("%s", error.what()));
+    return FALSE;
+  }
+  if (GST_VIDEO_INFO_FPS_N(&video) > 0)
+    set_latency(self, gst_util_uint64_scale_int(GST_SECOND, GST_VIDEO_INFO_FPS_D(&video),
+                                                GST_VIDEO_INFO_FPS_N(&video)));
+  return TRUE;
+}
+
+/* memory */
+
+static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide, GstQuery* query) {
+  gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr);  // any stride is welcome
+  return PARENT_TRANSFORM_CLASS->propose_allocation(transform, decide, query);
+}
+
+/// Pictures come from downstream's pool, or one of ours; events are of any size and come from none.
+static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  while (!self->priv->state->drawn && gst_query_get_n_allocation_pools(query) > 0)
+    gst_query_remove_nth_allocation_pool(query, 0);
+  if (!self->priv->state->drawn) return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
+
+  GstCaps* caps = nullptr;
+  gst_query_parse_allocation(query, &caps, nullptr);
+  GstBufferPool* pool = nullptr;
+  guint size = 0;
+  guint min = 0;
+  guint max = 0;
+  const bool offered = gst_query_get_n_allocation_pools(query) > 0;
+  if (offered) gst_query_parse_nth_allocation_pool(query, 0, &pool, &size, &min, &max);
+  if (pool == nullptr) pool = gst_video_buffer_pool_new();
+  size = MAX(size, static_cast<guint>(GST_VIDEO_INFO_SIZE(&*self->priv->state->drawn)));
+
+  GstStructure* config = gst_buffer_pool_get_config(pool);
+  gst_buffer_pool_config_set_params(config, caps, size, min, max);
+  if (gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr))
+    gst_buffer_pool_config_add_option(config, GST_BUFFER_POOL_OPTION_VIDEO_META);
+  gst_buffer_pool_set_config(pool, config);
+  if (offered)
+    gst_query_set_nth_allocation_pool(query, 0, pool, size, min, max);
+  else
+    gst_query_add_allocation_pool(query, pool, size, min, max);
+  gst_object_unref(pool);
+  return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
+}
+
+static gboolean transform_size(GstBaseTransform* transform, GstPadDirection direction, GstCaps*,
+                               gsize, GstCaps*, gsize* other_size) {
+  const auto& drawn = GST_EVENT_SIMULATOR(transform)->priv->state->drawn;
+  if (direction != GST_PAD_SINK || !drawn) return FALSE;
+  *other_size = GST_VIDEO_INFO_SIZE(&*drawn);
+  return TRUE;
+}
+
+/* frames in, intervals out */
+
+/// The events between the last frame and this one, or nullptr for a first frame. May throw.
+static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& frame,
+                                    Nanoseconds time, const Settings& settings) {
+  auto& state = *self->priv->state;
+  LumaView luma{luma_format_of(state.video), frame.component(0), frame.stride(0)};
+  if (has_packed_luma(state.video)) {
+    eventcamera::unpack_luma(static_cast<const guint8*>(luma.data), luma.stride, state.gathered);
+    luma.data = state.gathered.row(0);
+    luma.stride = state.gathered.stride();
+  }
+  if (const auto configure = GST_EVENT_SIMULATOR_GET_CLASS(self)->configure)
+    configure(self, *state.simulator);
+  return state.simulator->push(luma, time, settings.simulation);
+}
+
+static GstFlowReturn refuse_buffer(GstEventSimulator* self, const char* what) {
+  GST_ELEMENT_ERROR(self, RESOURCE, FAILED, ("A buffer could not be %s.", what), (nullptr));
+  return GST_FLOW_ERROR;
+}
+
+/// A buffer of the interval's events; none where there are no events.
+static GstFlowReturn write_events(GstEventSimulator* self, const EventBuckets& events,
+                                  GstBuffer** out) {
+  const gsize size = events.size() * sizeof(eventcamera::Event);
+  if (size == 0) return GST_FLOW_OK;
+  GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
+  GstMapInfo map;
+  if (buffer == nullptr || !gst_buffer_map(buffer, &map, GST_MAP_WRITE)) {
+    gst_clear_buffer(&buffer);
+    return refuse_buffer(self, "allocated for the events");
+  }
+  events.copy_to(reinterpret_cast<eventcamera::Event*>(map.data));
+  gst_buffer_unmap(buffer, &map);
+  *out = buffer;
+  return GST_FLOW_OK;
+}
+
+/// A picture of the interval's events.
+static GstFlowReturn draw_events(GstEventSimulator* self, const EventBuckets& events,
+                                 GstEventCameraPalette palette, GstBuffer* in, GstBuffer** out) {
+  auto& state = *self->priv->state;
+  GstBuffer* buffer = nullptr;
+  const GstFlowReturn result =
+      PARENT_TRANSFORM_CLASS->prepare_output_buffer(GST_BASE_TRANSFORM(self), in, &buffer);
+  if (result != GST_FLOW_OK) return result;
+  GST_BUFFER_FLAG_UNSET(buffer, GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
+  {
+    const VideoFrame picture(*state.drawn, buffer, GST_MAP_WRITE);
+    if (!picture) {
+      gst_buffer_unref(buffer);
+      return refuse_buffer(self, "mapped for drawing");
+    }
+    for (const auto& bucket : events.buckets()) state.accumulator.add(bucket);
+    state.accumulator.draw(eventcamera::palette(core_palette(palette)),
+                           pixel_layout_of(*state.drawn), static_cast<std::byte*>(picture.plane(0)),
+                           picture.stride(0));
+  }
+  *out = buffer;
+  return GST_FLOW_OK;
+}
+
+static void push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
+  gst_pad_push_event(
+      GST_BASE_TRANSFORM_SRC_PAD(self),
+      gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start)));
+}
+
+/// Takes a frame and hands out the interval that it ends, if it ends one.
+static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffer** out) {
+  auto& state = *self->priv->state;
+  GST_OBJECT_LOCK(self);
+  const Settings settings = self->priv->settings;
+  GST_OBJECT_UNLOCK(self);
+
+  if (!check_time(self, in)) return GST_FLOW_OK;
+  const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
+  const auto start = state.simulator->last_time();
+  const VideoFrame frame(state.video, in, GST_MAP_READ);
+  if (!frame) return refuse_buffer(self, "read as video of the negotiated format");
+  const EventBuckets* events = simulate(self, frame, end, settings);
+  if (events == nullptr) return GST_FLOW_OK;
+  learn_latency(self, static_cast<GstClockTime>(end - *start));
+  GST_LOG_OBJECT(self,
+                 "%" G_GSIZE_FORMAT " events in the interval from %" GST_TIME_FORMAT
+                 " to %" GST_TIME_FORMAT,
+                 events->size(), GST_TIME_ARGS(static_cast<GstClockTime>(*start)),
+                 GST_TIME_ARGS(static_cast<GstClockTime>(end)));
+
+  const GstFlowReturn result = state.drawn ? draw_events(self, *events, settings.palette, in, out)
+                                           : write_events(self, *events, out);
+  if (result != GST_FLOW_OK) return result;
+  if (*out == nullptr) {
+    push_gap(self, *start, end);
+    return GST_FLOW_OK;
+  }
+  GST_BUFFER_PTS(*out) = static_cast<GstClockTime>(*start);
+  GST_BUFFER_DTS(*out) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION(*out) = static_cast<GstClockTime>(end - *start);
+  if (std::exchange(state.discontinuous, false)) GST_BUFFER_FLAG_SET(*out, GST_BUFFER_FLAG_DISCONT);
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  *out = nullptr;
+  GstBuffer* in = std::exchange(transform->queued_buf, nullptr);
+  if (in == nullptr) return GST_FLOW_OK;
+  GstFlowReturn result = GST_FLOW_ERROR;
+  if (!self->priv->state) {
+    result = GST_FLOW_NOT_NEGOTIATED;
+  } else {
+    try {
+      result = take_frame(self, in, out);
+    } catch (const std::bad_alloc&) {
+      GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
+                        ("There is not enough memory for the events of a frame. Raise the "
+                         "thresholds, or lower interpolated-frames."),
+                        (nullptr));
+    } catch (const std::exception& error) {
+      GST_ELEMENT_ERROR(self, STREAM, FAILED, ("The simulation failed."), ("%s", error.what()));
+    }
+  }
+  gst_buffer_unref(in);
+  return result;
+}
+
+/* events, queries, states */
+
+static bool take_segment(GstEventSimulator* self, GstEvent* event) {
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event, &segment);
+  if (segment->rate < 0) {
+    GST_ELEMENT_ERROR(self, STREAM, FAILED, ("Events cannot be simulated backwards."),
+                      ("The segment has rate %g; play with a positive rate.", segment->rate));
+    return false;
+  }
+  const GstSegment& current = GST_BASE_TRANSFORM(self)->segment;
+  if (current.format != segment->format || current.rate != segment->rate ||
+      current.base != segment->base || current.start != segment->start ||
+      current.time != segment->time)
+    forget_frames(self);
+  return true;
+}
+
+/// Upstream has no frames for a while: the last one stands until then. Tells whether the event is
+/// to be sent on.
+static bool take_gap(GstEventSimulator* self, GstEvent* event) {
+  GstClockTime pts = GST_CLOCK_TIME_NONE;
+  gst_event_parse_gap(event, &pts, nullptr);
+  auto& state = self->priv->state;
+  const auto start = state ? state->simulator->last_time() : std::nullopt;
+  if (!start) return true;
+  if (pts <= G_MAXINT64 && static_cast<Nanoseconds>(pts) > *start) {
+    const auto end = static_cast<Nanoseconds>(pts);
+    state->simulator->hold_until(end);
+    push_gap(self, *start, end);
+  }
+  return false;
+}
+
+static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_SEGMENT:
+      if (!take_segment(self, event)) {
+        gst_event_unref(event);
+        return FALSE;
+      }
+      break;
+    case GST_EVENT_GAP:
+      if (!take_gap(self, event)) {
+        gst_event_unref(event);
+        return TRUE;
+      }
+      break;
+    case GST_EVENT_STREAM_START:
+    case GST_EVENT_FLUSH_STOP:
+      forget_frames(self);
+      break;
+    default:
+      break;
+  }
+  return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
+}
+
+static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
+    gdouble rate = 1;
+    gst_event_parse_seek(event, &rate, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
+    if (rate < 0) {
+      GST_WARNING_OBJECT(transform,
+                         "refused to seek at rate %g: events cannot be simulated "
+                         "backwards",
+                         rate);
+      gst_event_unref(event);
+      return FALSE;
+    }
+  }
+  return PARENT_TRANSFORM_CLASS->src_event(transform, event);
+}
+
+static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
+  if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
+    return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
+
+  if (!gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(transform), query)) return FALSE;
+  gboolean live = FALSE;
+  GstClockTime min = 0;
+  GstClockTime max = 0;
+  gst_query_parse_latency(query, &live, &min, &max);
+  GST_OBJECT_LOCK(transform);
+  const GstClockTime own = GST_EVENT_SIMULATOR(transform)->priv->latency;
+  GST_OBJECT_UNLOCK(transform);
+  gst_query_set_latency(query, live, min + own,
+                        GST_CLOCK_TIME_IS_VALID(max) ? max + own : GST_CLOCK_TIME_NONE);
+  return TRUE;
+}
+
+static gboolean stop(GstBaseTransform* transform) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  self->priv->state.reset();
+  self->priv->warned_of_times = false;
+  GST_OBJECT_LOCK(self);
+  self->priv->latency = 0;
+  GST_OBJECT_UNLOCK(self);
+  return TRUE;
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  delete GST_EVENT_SIMULATOR(object)->priv;
+  G_OBJECT_CLASS(gst_event_simulator_parent_class)->finalize(object);
+}
+
+static void gst_event_simulator_init(GstEventSimulator* self) {
+  self->priv = new GstEventSimulatorPrivate();
+  // A class that has generate_output but no transform passes buffers through unless told not to.
+  gst_base_transform_set_passthrough(GST_BASE_TRANSFORM(self), FALSE);
+  gst_base_transform_set_in_place(GST_BASE_TRANSFORM(self), FALSE);
+  // Frames that are late are simulated all the same: leaving one out would change the events.
+  gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
+}
+
+static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->set_property = gst_event_simulator_set_property;
+  object_class->get_property = gst_event_simulator_get_property;
+  object_class->finalize = finalize;
+  g_object_class_install_property(
+      object_class, prop_n_threads,
+      g_param_spec_uint("n-threads", "Threads",
+                        "The most threads to use for one frame (0 = one for each processor); the "
+                        "events are the same for any number",
+                        0, G_MAXINT, 0, property_flags));
+  g_object_class_install_property(
+      object_class, prop_palette,
+      g_param_spec_enum("palette", "Palette", "The colours of accumulated-event video",
+                        GST_TYPE_EVENT_CAMERA_PALETTE, GST_EVENT_CAMERA_PALETTE_DARK,
+                        property_flags));
+
+  static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE(
+      "sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+      GST_STATIC_CAPS("video/x-raw, format = (string) " EVENT_SIMULATOR_INPUT_FORMATS
+                      ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
+                      "framerate = (fraction) [ 0, max ]"));
+  static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
+      "src", GST_PAD_SRC, GST_PAD_ALWAYS,
+      GST_STATIC_CAPS(GST_EVENT_CAMERA_MEDIA_TYPE
+                      ", format = (string) XYTP, width = (int) [ 1, 16384 ], "
+                      "height = (int) [ 1, 16384 ], framerate = (fraction) [ 0, max ]; "
+                      "video/x-raw, format = (string) " EVENT_SIMULATOR_OUTPUT_FORMATS
+                      ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
+                      "framerate = (fraction) [ 0, max ]"));
+  static_assert(eventcamera::longest_side == 16384);
+  gst_element_class_add_static_pad_template(GST_ELEMENT_CLASS(klass), &sink_template);
+  gst_element_class_add_static_pad_template(GST_ELEMENT_CLASS(klass), &src_template);
+
+  GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
+  transform_class->transform_caps = transform_caps;
+  transform_class->fixate_caps = fixate_caps;
+  transform_class->set_caps = set_caps;
+  transform_class->propose_allocation = propose_allocation;
+  transform_class->decide_allocation = decide_allocation;
+  transform_class->transform_size = transform_size;
+  transform_class->generate_output = generate_output;
+  transform_class->sink_event = sink_event;
+  transform_class->src_event = src_event;
+  transform_class->query = query;
+  transform_class->stop = stop;
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_SIMULATOR, static_cast<GstPluginAPIFlags>(0));
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
+}
