@@ -12,7 +12,7 @@ namespace eventcamera {
 namespace {
 
 /// OpenCV's flows need a few patches on each side; smaller pictures are continued beyond their
-/// border to this many pixels.
+/// border to this many pixels. They need rows without gaps, too.
 constexpr int smallest_side = 64;
 
 class OpenCvFlow : public DenseFlow {
@@ -20,7 +20,7 @@ class OpenCvFlow : public DenseFlow {
   PlaneView<Flow> find(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
                        int threads) final {
     const OpenCvThreads limit(threads);
-    calculate(grown(from, from_), grown(to, to_));
+    calculate(prepared(from, from_), prepared(to, to_));
     static_assert(sizeof(Flow) == 2 * sizeof(float));
     return {flow_.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow_.step[0]), from.width, from.height};
   }
@@ -30,9 +30,9 @@ class OpenCvFlow : public DenseFlow {
   cv::Mat flow_;
 
  private:
-  static cv::Mat grown(const PlaneView<std::uint8_t>& picture, cv::Mat& buffer) {
+  static cv::Mat prepared(const PlaneView<std::uint8_t>& picture, cv::Mat& buffer) {
     const cv::Mat mat = opencv_picture(picture);
-    if (mat.cols >= smallest_side && mat.rows >= smallest_side) return mat;
+    if (mat.cols >= smallest_side && mat.rows >= smallest_side && mat.isContinuous()) return mat;
     cv::copyMakeBorder(mat, buffer, 0, std::max(0, smallest_side - mat.rows), 0,
                        std::max(0, smallest_side - mat.cols), cv::BORDER_REPLICATE);
     return buffer;
@@ -62,7 +62,10 @@ class DisFlow final : public OpenCvFlow {
   }
 
  private:
-  void calculate(const cv::Mat& from, const cv::Mat& to) override { dis_->calc(from, to, flow_); }
+  void calculate(const cv::Mat& from, const cv::Mat& to) override {
+    flow_.release();  // else the last flow would be where the search begins
+    dis_->calc(from, to, flow_);
+  }
 
   cv::Ptr<cv::DISOpticalFlow> dis_ = cv::DISOpticalFlow::create();
 };

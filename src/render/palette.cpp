@@ -11,7 +11,7 @@ constexpr Palette dark = {
 constexpr Palette grey = {
     .none = {128, 128, 128}, .off = {0, 0, 0}, .on = {255, 255, 255}, .both = {64, 64, 64}};
 constexpr Palette red_blue = {
-    .none = {255, 255, 255}, .off = {224, 40, 40}, .on = {40, 72, 232}, .both = {128, 0, 128}};
+    .none = {255, 255, 255}, .off = {232, 56, 56}, .on = {32, 64, 224}, .both = {110, 0, 110}};
 
 }  // namespace
 

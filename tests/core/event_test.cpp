@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/event/event.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "src/event/event_buckets.hpp"
+#include "src/event/step_times.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+TEST(Event, LiesInMemoryAsXytpHasIt) {
+  const auto event = Event::at(0x0102, 0x0304, 0x05060708, Polarity::on);
+  const unsigned char expected[] = {0x08, 0x07, 0x06, 0x05, 0x02, 0x01, 0x04, 0x83};
+  EXPECT_EQ(std::memcmp(&event, expected, sizeof event), 0);
+  EXPECT_EQ(event.y(), 0x0304);
+  EXPECT_EQ(event.polarity(), Polarity::on);
+  EXPECT_EQ(Event::at(0, 32767, 0, Polarity::off).y_p, 0x7fff);
+}
+
+TEST(EventBuckets, ReadStepByStepAndBandByBand) {
+  EventBuckets buckets;
+  buckets.reset(2, 3);
+  buckets.bucket(2, 0).push_back(Event::at(3, 0, 2, Polarity::on));
+  buckets.bucket(1, 2).push_back(Event::at(2, 0, 1, Polarity::on));
+  buckets.bucket(1, 0).push_back(Event::at(1, 0, 1, Polarity::off));
+  ASSERT_EQ(buckets.size(), 3U);
+  Event events[3];
+  buckets.copy_to(events);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(events[i].x, i + 1);
+  buckets.reset(1, 1);
+  EXPECT_EQ(buckets.size(), 0U);
+  EXPECT_EQ(buckets.buckets().size(), 1U);
+}
+
+TEST(StepTimes, ShareOutTheInterval) {
+  const StepTimes steps(33'333'333, 11);
+  EXPECT_EQ(steps.count(), 11);
+  EXPECT_EQ(steps.microseconds(1), 3030U);
+  EXPECT_EQ(steps.microseconds(11), 33'333U);
+}
+
+TEST(StepTimes, HaveAMicrosecondEach) {
+  EXPECT_EQ(StepTimes(5'000, 11).count(), 5);
+  EXPECT_EQ(StepTimes(5'999, 11).count(), 5);
+  EXPECT_EQ(StepTimes(1, 11).count(), 1);
+  EXPECT_EQ(StepTimes(1, 11).microseconds(1), 0U);
+  const StepTimes steps(5'500, 11);
+  for (int j = 2; j <= steps.count(); ++j)
+    EXPECT_GT(steps.microseconds(j), steps.microseconds(j - 1));
+}
+
+TEST(StepTimes, ReachOverTheLongestInterval) {
+  const StepTimes steps(longest_interval, 256);
+  EXPECT_EQ(steps.microseconds(256), 0xffffffffU);
+  EXPECT_EQ(steps.microseconds(128), 0x7fffffffU);
+}
+
+}  // namespace

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstring>
+#include <opencv2/core/utility.hpp>
+#include <thread>
+
+#include "src/flow/dense_flow.hpp"
+#include "src/flow/fixed_point.hpp"
+#include "src/flow/opencv_threads.hpp"
+#include "src/flow/point_tracker.hpp"
+#include "tests/core/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+class EveryFlow : public testing::TestWithParam<FlowMethod> {};
+
+INSTANTIATE_TEST_SUITE_P(, EveryFlow,
+                         testing::Values(FlowMethod::dis_lq, FlowMethod::dis_hq,
+                                         FlowMethod::farneback));
+
+TEST_P(EveryFlow, PointsFromTheEarlierFrameToTheLater) {
+  const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
+  const auto to = scene::texture<std::uint8_t>(320, 240, 8, -3, 2);  // moves right and up
+  const auto flow = make_dense_flow(GetParam(), 320, 240)->find(from.view(), to.view(), 0);
+  double x = 0;
+  double y = 0;
+  for (int v = 40; v < 200; ++v) {
+    for (int u = 40; u < 280; ++u) {
+      x += flow.row(v)[u].x;
+      y += flow.row(v)[u].y;
+    }
+  }
+  EXPECT_NEAR(x / (160 * 240), 3, 0.3);
+  EXPECT_NEAR(y / (160 * 240), -2, 0.3);
+}
+
+TEST_P(EveryFlow, TakesPicturesOfAnySize) {
+  for (const auto& [width, height] : {std::pair(1, 1), {1, 40}, {40, 1}, {13, 7}, {63, 65}}) {
+    const auto from = scene::noise<std::uint8_t>(width, height, 8, 1);
+    const auto to = scene::noise<std::uint8_t>(width, height, 8, 2);
+    const auto flow = make_dense_flow(GetParam(), width, height)->find(from.view(), to.view(), 0);
+    EXPECT_EQ(flow.width, width);
+    EXPECT_EQ(flow.height, height);
+  }
+}
+
+TEST_P(EveryFlow, DoesNotDependOnThreads) {
+  const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
+  const auto to = scene::texture<std::uint8_t>(320, 240, 8, 2.3, 1.9);
+  const auto one = make_dense_flow(GetParam(), 320, 240);
+  const auto many = make_dense_flow(GetParam(), 320, 240);
+  const auto a = one->find(from.view(), to.view(), 1);
+  for (int threads = 2; threads <= cv::getNumberOfCPUs(); ++threads) {
+    const auto b = many->find(from.view(), to.view(), threads);
+    for (int y = 0; y < 240; ++y)
+      ASSERT_EQ(std::memcmp(a.row(y), b.row(y), 320 * sizeof(Flow)), 0) << threads << " threads";
+  }
+}
+
+TEST(PointTracker, FollowsATexture) {
+  const auto from = scene::texture<std::uint8_t>(160, 120, 8, 0, 0);
+  const auto to = scene::texture<std::uint8_t>(160, 120, 8, -4, 2);
+  PointTracker tracker;
+  tracker.push(from.view(), 0);
+  tracker.push(to.view(), 0);
+  const Point points[] = {{60, 50}, {80, 70}, {100, 40}};
+  for (const auto& track : tracker.track(points, 0)) {
+    EXPECT_TRUE(track.found);
+    EXPECT_NEAR(track.flow.x, 4, 0.1);
+    EXPECT_NEAR(track.flow.y, -2, 0.1);
+  }
+  EXPECT_TRUE(tracker.track({}, 0).empty());
+}
+
+TEST(PointTracker, LosesWhatHasNoTexture) {
+  const auto picture = scene::flat<std::uint8_t>(60, 40, 90);
+  PointTracker tracker;
+  tracker.push(picture.view(), 0);
+  tracker.push(picture.view(), 0);
+  const Point points[] = {{30, 20}};
+  EXPECT_FALSE(tracker.track(points, 0)[0].found);
+}
+
+TEST(FixedPoint, SharesAFlowOutOverTheSteps) {
+  EXPECT_EQ(motion_per_step(8, 4), 2 << 16);
+  EXPECT_EQ(motion_per_step(-1, 2), -(1 << 15));
+  EXPECT_EQ(motion_per_step(std::nanf(""), 3), 0);
+  EXPECT_EQ(motion_per_step(INFINITY, 1), longest_side << 16);
+  EXPECT_EQ(motion_per_step(-1e30F, 1), -longest_side * (1 << 16));
+}
+
+TEST(FixedPoint, RoundsToTheNearestPixel) {
+  const Motion motion = motion_per_step(10, 4);  // 2.5 a step
+  EXPECT_EQ(moved(100, motion, 1), 103);
+  EXPECT_EQ(moved(100, motion, 2), 105);
+  EXPECT_EQ(moved(100, -motion, 1), 98);
+  EXPECT_EQ(moved(100, -motion, 4), 90);
+}
+
+TEST(OpenCvThreads, PutsBackWhatTheApplicationHadSet) {
+  const int before = cv::getNumThreads();
+  {
+    const OpenCvThreads one(1);
+    EXPECT_EQ(cv::getNumThreads(), 1);
+    const OpenCvThreads one_more(1);
+    EXPECT_EQ(cv::getNumThreads(), 1);
+  }
+  EXPECT_EQ(cv::getNumThreads(), before);
+}
+
+TEST(OpenCvThreads, LetsOnlyEqualsInTogether) {
+  const int processors = cv::getNumberOfCPUs();
+  std::vector<std::thread> threads;
+  std::atomic<int> wrong = 0;
+  for (int i = 0; i < 8; ++i) {
+    threads.emplace_back([&, wanted = 1 + i % processors] {
+      for (int k = 0; k < 50; ++k) {
+        const OpenCvThreads limit(wanted);
+        wrong += cv::getNumThreads() != wanted;
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
+}
+
+}  // namespace

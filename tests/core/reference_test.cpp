@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Every method equals its plain scalar reference, event for event: sizes down to one pixel, depths,
+// strides, steps, thresholds, textures and noise, motion over the border, numbers of threads.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "src/picture/grey8.hpp"
+#include "src/reference/dense.hpp"
+#include "src/reference/diff.hpp"
+#include "src/reference/sparse.hpp"
+#include "src/simulate/dense.hpp"
+#include "src/simulate/diff.hpp"
+#include "src/simulate/frame.hpp"
+#include "src/simulate/sparse.hpp"
+#include "tests/core/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+struct Case {
+  int width;
+  int height;
+  int bits;
+  int interpolated_frames;
+  bool noise;
+  int threads;
+};
+
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.width << "x" << c.height << " " << c.bits << " bits, n = " << c.interpolated_frames
+       << (c.noise ? ", noise" : ", texture") << ", " << c.threads << " threads";
+}
+
+/// A picture in memory whose rows lie apart, with rubbish between them.
+template <class Pixel>
+class Padded {
+ public:
+  explicit Padded(const Plane<Pixel>& picture)
+      : stride_((picture.width() + 13) * static_cast<std::ptrdiff_t>(sizeof(Pixel))),
+        bytes_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(picture.height()),
+               0xab),
+        width_(picture.width()),
+        height_(picture.height()) {
+    for (int y = 0; y < height_; ++y)
+      std::memcpy(bytes_.data() + y * stride_, picture.row(y),
+                  static_cast<std::size_t>(picture.stride()));
+  }
+  LumaView luma(int bits) const { return {{width_, height_, bits}, bytes_.data(), stride_}; }
+
+ private:
+  std::ptrdiff_t stride_;
+  std::vector<std::uint8_t> bytes_;
+  int width_;
+  int height_;
+};
+
+template <class Pixel>
+Plane<std::uint8_t> grey8(const Plane<Pixel>& picture, int bits) {
+  Grey8 grey;
+  Plane<std::uint8_t> copy(picture.width(), picture.height());
+  copy.assign(grey.of(scene::luma(picture.view(), bits)));
+  return copy;
+}
+
+class Equality : public testing::TestWithParam<Case> {
+ protected:
+  template <class Pixel>
+  void hold() {
+    const auto c = GetParam();
+    settings.interpolated_frames = c.interpolated_frames;
+    settings.threads = c.threads;
+    format = {c.width, c.height, c.bits};
+    const StepTimes steps(scene::frame_time, c.interpolated_frames + 1);
+    std::vector<Plane<Pixel>> frames;
+    for (int i = 0; i < 3; ++i) {
+      frames.push_back(c.noise
+                           ? scene::noise<Pixel>(c.width, c.height, c.bits, 7 + i)
+                           : scene::texture<Pixel>(c.width, c.height, c.bits, 2.6 * i, -1.3 * i));
+    }
+    std::vector<Padded<Pixel>> padded(frames.begin(), frames.end());
+    for (const auto& frame : padded) views.push_back(frame.luma(c.bits));
+    const auto& last = frames[1];
+    const auto& now = frames[2];
+
+    settings.positive_threshold = 9;
+    settings.negative_threshold = 14;
+    const auto thresholds = Thresholds::of(settings, c.bits);
+    check(*make_frame_simulator(format),
+          reference::differences<Pixel>({last, now}, StepTimes(scene::frame_time, 1), thresholds));
+    hold_sparse(last, now, steps, thresholds);
+    hold_diff(frames, steps, thresholds);
+
+    settings.positive_threshold = 2;
+    settings.negative_threshold = 3;
+    hold_dense(last, now, steps, Thresholds::of(settings, c.bits));
+  }
+
+ private:
+  template <class Pixel>
+  void hold_dense(const Plane<Pixel>& last, const Plane<Pixel>& now, const StepTimes& steps,
+                  const Thresholds& thresholds) {
+    for (const auto method : {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback}) {
+      const auto finder = make_dense_flow(method, format.width, format.height);
+      const auto from = grey8(last, format.bits);
+      const auto to = grey8(now, format.bits);
+      const auto flow = finder->find(from.view(), to.view(), 1);
+      for (const auto interpolation : {Interpolation::forward, Interpolation::blend}) {
+        SCOPED_TRACE(testing::Message() << "dense, flow " << static_cast<int>(method)
+                                        << ", interpolation " << static_cast<int>(interpolation));
+        const auto simulator = make_dense_simulator(format);
+        simulator->set_flow(method);
+        simulator->set_interpolation(interpolation);
+        check(*simulator, reference::dense(last, now, flow, interpolation, steps, thresholds));
+      }
+    }
+  }
+
+  template <class Pixel>
+  void hold_sparse(const Plane<Pixel>& last, const Plane<Pixel>& now, const StepTimes& steps,
+                   const Thresholds& thresholds) {
+    SCOPED_TRACE("sparse");
+    const auto points =
+        reference::changed(last, now, std::min(thresholds.positive, thresholds.negative));
+    PointTracker tracker;
+    tracker.push(grey8(last, format.bits).view(), 1);
+    tracker.push(grey8(now, format.bits).view(), 1);
+    check(*make_sparse_simulator(format),
+          reference::sparse(last, now, points, tracker.track(points, 1), steps, thresholds));
+  }
+
+  template <class Pixel>
+  void hold_diff(const std::vector<Plane<Pixel>>& frames, const StepTimes& steps,
+                 const Thresholds& thresholds) {
+    SCOPED_TRACE("diff");
+    const auto before = reference::difference_frame(frames[0], frames[1], thresholds);
+    const auto now = reference::difference_frame(frames[1], frames[2], thresholds);
+    const auto follow = [&](int sign) {
+      const auto from = reference::part_of(before, sign, format.bits);
+      const auto to = reference::part_of(now, sign, format.bits);
+      PointTracker tracker;
+      tracker.push(from.view(), 1);
+      tracker.push(to.view(), 1);
+      reference::Tracked tracked{reference::points_of(from), {}};
+      const auto tracks = tracker.track(tracked.points, 1);
+      tracked.tracks.assign(tracks.begin(), tracks.end());
+      return tracked;
+    };
+    check(*make_diff_simulator(format), reference::diff(before, now, follow(1), follow(-1), steps));
+  }
+
+  void check(Simulator& simulator, const std::vector<Event>& expected) {
+    const auto events = scene::last_interval(simulator, settings, views);
+    EXPECT_TRUE(scene::sorted(events));
+    EXPECT_TRUE(events == expected) << events.size() << " events instead of " << expected.size();
+  }
+
+  Settings settings;
+  LumaFormat format;
+  std::vector<LumaView> views;
+};
+
+TEST_P(Equality, WithTheReference) {
+  if (GetParam().bits > 8)
+    hold<std::uint16_t>();
+  else
+    hold<std::uint8_t>();
+}
+
+INSTANTIATE_TEST_SUITE_P(Small, Equality,
+                         testing::Values(Case{1, 1, 8, 10, true, 1}, Case{1, 9, 8, 10, true, 1},
+                                         Case{9, 1, 8, 10, true, 1}, Case{2, 3, 16, 4, true, 2},
+                                         Case{17, 5, 8, 0, true, 2}, Case{15, 16, 8, 1, true, 1},
+                                         Case{16, 17, 10, 10, true, 2},
+                                         Case{65, 33, 8, 10, true, 1}));
+INSTANTIATE_TEST_SUITE_P(
+    Textures, Equality,
+    testing::Values(Case{97, 61, 8, 10, false, 1}, Case{97, 61, 8, 10, false, 2},
+                    Case{128, 64, 8, 20, false, 2}, Case{131, 50, 16, 10, false, 2},
+                    Case{90, 70, 12, 3, false, 1}, Case{75, 49, 8, 255, false, 2},
+                    Case{320, 240, 8, 10, false, 2}));
+
+}  // namespace

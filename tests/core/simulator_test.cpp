@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Scenes whose events are known beforehand.
+#include "src/simulate/simulator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+
+#include "src/simulate/dense.hpp"
+#include "src/simulate/diff.hpp"
+#include "src/simulate/frame.hpp"
+#include "src/simulate/sparse.hpp"
+#include "tests/core/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using scene::frame_time;
+
+struct Method {
+  const char* name;
+  std::function<std::unique_ptr<Simulator>(const LumaFormat&)> make;
+  double threshold;
+};
+
+template <FlowMethod flow, Interpolation interpolation>
+std::unique_ptr<Simulator> make_dense(const LumaFormat& format) {
+  auto simulator = make_dense_simulator(format);
+  simulator->set_flow(flow);
+  simulator->set_interpolation(interpolation);
+  return simulator;
+}
+
+const Method methods[] = {
+    {"frame", make_frame_simulator, 20},
+    {"dense_dis_lq", make_dense<FlowMethod::dis_lq, Interpolation::forward>, 2},
+    {"dense_dis_hq", make_dense<FlowMethod::dis_hq, Interpolation::forward>, 2},
+    {"dense_farneback", make_dense<FlowMethod::farneback, Interpolation::forward>, 2},
+    {"dense_blend", make_dense<FlowMethod::dis_hq, Interpolation::blend>, 2},
+    {"sparse", make_sparse_simulator, 10},
+    {"diff", make_diff_simulator, 20},
+};
+
+void PrintTo(const Method& method, std::ostream* out) {
+  *out << method.name;
+}
+
+class EveryMethod : public testing::TestWithParam<Method> {
+ protected:
+  Settings settings() const {
+    Settings settings;
+    settings.positive_threshold = settings.negative_threshold =
+        GetParam().threshold + half_a_level_more;
+    return settings;
+  }
+
+  double half_a_level_more = 0;
+
+  std::vector<Event> events_of(const std::vector<Plane<std::uint8_t>>& frames) {
+    std::vector<LumaView> views;
+    for (const auto& frame : frames) views.push_back(scene::luma(frame));
+    const auto simulator = GetParam().make(views.front().format);
+    auto events = scene::last_interval(*simulator, settings(), views);
+    EXPECT_TRUE(scene::sorted(events));
+    return events;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(, EveryMethod, testing::ValuesIn(methods),
+                         [](const auto& test) { return test.param.name; });
+
+TEST_P(EveryMethod, SeesNothingWhereNothingMoves) {
+  const auto picture = scene::texture<std::uint8_t>(120, 80, 8, 3, 7);
+  EXPECT_TRUE(events_of({picture, picture, picture}).empty());
+}
+
+TEST_P(EveryMethod, SeesNothingOnceASquareHasStopped) {
+  const auto at = [](int left) { return scene::square(160, 90, left, 30, 20, 200, 40); };
+  EXPECT_TRUE(events_of({at(40), at(48), at(48)}).empty());
+}
+
+TEST_P(EveryMethod, FiresEverywhereWhenTheLightGoesOn) {
+  const auto events =
+      events_of({scene::flat<std::uint8_t>(70, 50, 50), scene::flat<std::uint8_t>(70, 50, 200)});
+  // Blending brightens in steps; the others know no motion, and change with the new frame.
+  const std::size_t steps = std::string(GetParam().name) == "dense_blend" ? 11 : 1;
+  EXPECT_EQ(events.size(), 70U * 50U * steps);
+  for (const auto& event : events) ASSERT_EQ(event.polarity(), Polarity::on);
+  EXPECT_EQ(events.back().t, frame_time / 1000);
+}
+
+TEST_P(EveryMethod, FiresEverywhereWhenTheLightGoesOff) {
+  const auto events =
+      events_of({scene::flat<std::uint8_t>(70, 50, 200), scene::flat<std::uint8_t>(70, 50, 50)});
+  EXPECT_GE(events.size(), 70U * 50U);
+  for (const auto& event : events) ASSERT_EQ(event.polarity(), Polarity::off);
+}
+
+TEST_P(EveryMethod, WorksOnOnePixel) {
+  const auto events =
+      events_of({scene::flat<std::uint8_t>(1, 1, 10), scene::flat<std::uint8_t>(1, 1, 90)});
+  ASSERT_FALSE(events.empty());
+  EXPECT_EQ(events.back(), Event::at(0, 0, frame_time / 1000, Polarity::on));
+}
+
+TEST_P(EveryMethod, DrawsTheOutlineOfAMovingSquare) {
+  const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
+  // It moves 8 pixels an interval to the right: the band that it enters, [72, 80), turns on,
+  // the one that it leaves, [48, 56), turns off.
+  std::map<Polarity, double> sum_x;
+  std::map<Polarity, int> count;
+  for (const auto& event : events_of({at(40), at(48), at(56)})) {
+    sum_x[event.polarity()] += event.x;
+    ++count[event.polarity()];
+  }
+  ASSERT_GE(count[Polarity::on], 24 * 8);
+  ASSERT_GE(count[Polarity::off], 24 * 8);
+  EXPECT_NEAR(sum_x[Polarity::on] / count[Polarity::on], 75.5, 6);
+  EXPECT_NEAR(sum_x[Polarity::off] / count[Polarity::off], 51.5, 6);
+}
+
+TEST_P(EveryMethod, HasNoFrameOfBorderEvents) {
+  const int width = 160;
+  const int height = 120;
+  const auto looking_at = [&](double left) {
+    return scene::texture<std::uint8_t>(width, height, 8, left, left / 2);
+  };
+  const auto events = events_of({looking_at(0), looking_at(3), looking_at(6)});
+  ASSERT_GT(events.size(), 1000U);
+  int border = 0;
+  for (const auto& e : events)
+    border += e.x < 4 || e.x >= width - 4 || e.y() < 4 || e.y() >= height - 4;
+  const double border_area = 1.0 - (width - 8.0) * (height - 8.0) / (width * height);
+  EXPECT_LT(border / static_cast<double>(events.size()), 1.6 * border_area);
+}
+
+TEST_P(EveryMethod, DoesNotDependOnThreadsOrOnTheFramesBeforeAReset) {
+  const auto looking_at = [](double left) {
+    return scene::texture<std::uint8_t>(200, 150, 8, left, -left);
+  };
+  const auto a = looking_at(0);
+  const auto b = looking_at(2.5);
+  const auto c = looking_at(5);
+  const auto elsewhere = scene::noise<std::uint8_t>(200, 150, 8, 3);
+  auto one = settings();
+  one.threads = 1;
+  auto all = settings();
+  all.threads = 0;
+  const auto simulator = GetParam().make({200, 150, 8});
+  const auto views = {scene::luma(a), scene::luma(b), scene::luma(c)};
+  const auto expected = scene::last_interval(*simulator, one, views);
+  scene::last_interval(*simulator, all, {scene::luma(elsewhere), scene::luma(a)});
+  EXPECT_TRUE(scene::last_interval(*simulator, all, views) == expected);
+  EXPECT_TRUE(scene::last_interval(*simulator, one, views) == expected);
+}
+
+TEST_P(EveryMethod, GivesTheSameIn16Bits) {
+  const auto widened = [](const Plane<std::uint8_t>& narrow) {
+    Plane<std::uint16_t> wide(narrow.width(), narrow.height());
+    for (int y = 0; y < wide.height(); ++y)
+      for (int x = 0; x < wide.width(); ++x)
+        wide.at(x, y) = static_cast<std::uint16_t>(narrow.at(x, y) * 257);
+    return wide;
+  };
+  const auto at = [](int left) { return scene::square(90, 60, left, 20, 16, 200, 60); };
+  const auto narrow = {at(20), at(24), at(28)};
+  std::vector<Plane<std::uint16_t>> wide;
+  std::vector<LumaView> views;
+  for (const auto& frame : narrow) wide.push_back(widened(frame));
+  for (const auto& frame : wide) views.push_back(scene::luma(frame.view(), 16));
+  const auto simulator = GetParam().make({90, 60, 16});
+  // Interpolated frames round to a finer grey level; half-way between two of the coarser ones, a
+  // threshold parts nearly the same steps.
+  half_a_level_more = 0.5;
+  const auto in_16_bits = scene::last_interval(*simulator, settings(), views);
+  const auto in_8_bits = events_of(narrow);
+  EXPECT_NEAR(static_cast<double>(in_16_bits.size()), static_cast<double>(in_8_bits.size()),
+              0.1 * static_cast<double>(in_8_bits.size()));
+  if (std::string(GetParam().name) == "frame") {
+    EXPECT_TRUE(in_16_bits == in_8_bits);
+  }
+}
+
+TEST_P(EveryMethod, TakesSettingsFromFrameToFrame) {
+  const auto dark = scene::flat<std::uint8_t>(40, 30, 100);
+  const auto bright = scene::flat<std::uint8_t>(40, 30, 130);
+  const auto simulator = GetParam().make({40, 30, 8});
+  auto changing = settings();
+  EXPECT_EQ(simulator->push(scene::luma(dark), 0, changing), nullptr);
+  changing.positive_threshold = 30;  // 30 does not exceed 30
+  EXPECT_EQ(simulator->push(scene::luma(bright), frame_time, changing)->size(), 0U);
+  changing.negative_threshold = 1;
+  EXPECT_GE(simulator->push(scene::luma(dark), 2 * frame_time, changing)->size(), 40U * 30U);
+  changing.positive_threshold = 1;
+  EXPECT_GE(simulator->push(scene::luma(bright), 3 * frame_time, changing)->size(), 40U * 30U);
+}
+
+TEST_P(EveryMethod, HoldsTheLastFrame) {
+  const auto dark = scene::flat<std::uint8_t>(40, 30, 50);
+  const auto bright = scene::flat<std::uint8_t>(40, 30, 230);
+  const auto simulator = GetParam().make({40, 30, 8});
+  simulator->hold_until(5);  // nothing to hold yet
+  EXPECT_FALSE(simulator->last_time());
+  simulator->push(scene::luma(dark), 0, settings());
+  simulator->hold_until(30'000'000);
+  const auto events = scene::copy(*simulator->push(scene::luma(bright), frame_time, settings()));
+  EXPECT_EQ(events.back().t, 10'000U);
+}
+
+TEST(FrameSimulator, NeedsAChangeOfMoreThanTheThreshold) {
+  Plane<std::uint8_t> last(5, 1);
+  Plane<std::uint8_t> now(5, 1);
+  for (int x = 0; x < 5; ++x) last.at(x, 0) = 100;
+  now.at(0, 0) = 120;
+  now.at(1, 0) = 121;
+  now.at(2, 0) = 100;
+  now.at(3, 0) = 90;
+  now.at(4, 0) = 89;
+  Settings settings;
+  settings.positive_threshold = 20;
+  settings.negative_threshold = 10;
+  const auto simulator = make_frame_simulator({5, 1, 8});
+  const auto events =
+      scene::last_interval(*simulator, settings, {scene::luma(last), scene::luma(now)});
+  const std::vector<Event> expected = {Event::at(1, 0, 40'000, Polarity::on),
+                                       Event::at(4, 0, 40'000, Polarity::off)};
+  EXPECT_EQ(events, expected);
+}
+
+TEST(DiffSimulator, MovesTheEdgesOfASquareEvenly) {
+  Settings settings;
+  settings.interpolated_frames = 3;
+  const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
+  const auto a = at(40);
+  const auto b = at(48);
+  const auto c = at(56);
+  const auto simulator = make_diff_simulator({160, 90, 8});
+  const auto events =
+      scene::last_interval(*simulator, settings, {scene::luma(a), scene::luma(b), scene::luma(c)});
+  // D(i-1) is ON in [64, 72) and OFF in [40, 48); each step moves both by two pixels.
+  for (int j = 1; j <= 4; ++j) {
+    double sum = 0;
+    int count = 0;
+    for (const auto& event : events) {
+      if (event.t != 10'000U * j || event.polarity() != Polarity::on) continue;
+      sum += event.x;
+      ++count;
+    }
+    ASSERT_GE(count, 24 * 5) << "step " << j;
+    EXPECT_NEAR(sum / count, 67.5 + 2 * j, 0.75) << "step " << j;
+  }
+}
+
+TEST(SparseSimulator, CarriesATexturedPatchAlong) {
+  // A textured patch moves 8 pixels to the right before a flat ground.
+  const auto patch = scene::texture<std::uint8_t>(24, 24, 8, 5, 9);
+  const auto at = [&](int left) {
+    auto picture = scene::flat<std::uint8_t>(120, 80, 128);
+    for (int y = 0; y < 24; ++y)
+      for (int x = 0; x < 24; ++x) picture.at(left + x, 28 + y) = patch.at(x, y);
+    return picture;
+  };
+  Settings settings;
+  settings.positive_threshold = settings.negative_threshold = 10;
+  settings.interpolated_frames = 7;
+  const auto a = at(40);
+  const auto b = at(48);
+  const auto simulator = make_sparse_simulator({120, 80, 8});
+  const auto events = scene::last_interval(*simulator, settings, {scene::luma(a), scene::luma(b)});
+  // The columns that the patch leaves show the ground from the step after which nothing of it
+  // stands there any more: column 40 from step 1, column 41 from step 2, and so on.
+  for (int column = 0; column < 8; ++column) {
+    std::map<int, int> last_step;
+    for (const auto& event : events)
+      if (event.x == 40 + column) last_step[event.y()] = static_cast<int>(event.t / 5'000);
+    ASSERT_GT(last_step.size(), 12U) << "column " << column;
+    double sum = 0;
+    for (const auto& [y, step] : last_step) sum += step;
+    EXPECT_NEAR(sum / static_cast<double>(last_step.size()), column + 1, 1) << "column " << column;
+  }
+}
+
+TEST(Thresholds, ScaleWithTheDepth) {
+  Settings settings;
+  settings.positive_threshold = 20;
+  settings.negative_threshold = 0.5;
+  EXPECT_EQ(Thresholds::of(settings, 8).positive, 20);
+  EXPECT_EQ(Thresholds::of(settings, 8).negative, 0);
+  EXPECT_EQ(Thresholds::of(settings, 10).positive, 80);
+  EXPECT_EQ(Thresholds::of(settings, 16).positive, 20 * 257);
+  EXPECT_EQ(Thresholds::of(settings, 16).negative, 128);
+}
+
+}  // namespace
