@@ -25,7 +25,8 @@ INSTANTIATE_TEST_SUITE_P(, EveryFlow,
 TEST_P(EveryFlow, PointsFromTheEarlierFrameToTheLater) {
   const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(320, 240, 8, -3, 2);  // moves right and up
-  const auto flow = make_dense_flow(GetParam(), 320, 240)->find(from.view(), to.view(), 0);
+  const auto finder = make_dense_flow(GetParam(), 320, 240);
+  const auto flow = finder->find(from.view(), to.view(), 0);
   double x = 0;
   double y = 0;
   for (int v = 40; v < 200; ++v) {
@@ -42,7 +43,8 @@ TEST_P(EveryFlow, TakesPicturesOfAnySize) {
   for (const auto& [width, height] : {std::pair(1, 1), {1, 40}, {40, 1}, {13, 7}, {63, 65}}) {
     const auto from = scene::noise<std::uint8_t>(width, height, 8, 1);
     const auto to = scene::noise<std::uint8_t>(width, height, 8, 2);
-    const auto flow = make_dense_flow(GetParam(), width, height)->find(from.view(), to.view(), 0);
+    const auto finder = make_dense_flow(GetParam(), width, height);
+    const auto flow = finder->find(from.view(), to.view(), 0);
     EXPECT_EQ(flow.width, width);
     EXPECT_EQ(flow.height, height);
   }
