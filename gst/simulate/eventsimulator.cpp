@@ -84,6 +84,7 @@ struct GstEventSimulatorPrivate {
   // The streaming thread's, or nobody's while there is none.
   std::optional<State> state;
   bool warned_of_times = false;
+  bool backwards = false;  // the segment is one that was refused
 };
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventSimulator, gst_event_simulator, GST_TYPE_BASE_TRANSFORM,
@@ -461,7 +462,9 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   GstBuffer* in = std::exchange(transform->queued_buf, nullptr);
   if (in == nullptr) return GST_FLOW_OK;
   GstFlowReturn result = GST_FLOW_ERROR;
-  if (!self->priv->state) {
+  if (self->priv->backwards) {
+    GST_DEBUG_OBJECT(self, "dropping a frame of a segment that was refused");
+  } else if (!self->priv->state) {
     result = GST_FLOW_NOT_NEGOTIATED;
   } else {
     try {
@@ -479,12 +482,19 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   return result;
 }
 
+/// Never called: generate_output() does it all. But only a class that has one gets buffers of its
+/// own to write to, instead of its input's.
+static GstFlowReturn transform_not_in_place(GstBaseTransform*, GstBuffer*, GstBuffer*) {
+  return GST_FLOW_NOT_SUPPORTED;
+}
+
 /* events, queries, states */
 
 static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
-  if (segment->rate < 0) {
+  self->priv->backwards = segment->rate < 0;
+  if (self->priv->backwards) {
     GST_ELEMENT_ERROR(self, STREAM, FAILED, ("Events cannot be simulated backwards."),
                       ("The segment has rate %g; play with a positive rate.", segment->rate));
     return false;
@@ -575,6 +585,7 @@ static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   self->priv->state.reset();
   self->priv->warned_of_times = false;
+  self->priv->backwards = false;
   GST_OBJECT_LOCK(self);
   self->priv->latency = 0;
   GST_OBJECT_UNLOCK(self);
@@ -590,9 +601,6 @@ static void finalize(GObject* object) {
 
 static void gst_event_simulator_init(GstEventSimulator* self) {
   self->priv = new GstEventSimulatorPrivate();
-  // A class that has generate_output but no transform passes buffers through unless told not to.
-  gst_base_transform_set_passthrough(GST_BASE_TRANSFORM(self), FALSE);
-  gst_base_transform_set_in_place(GST_BASE_TRANSFORM(self), FALSE);
   // Frames that are late are simulated all the same: leaving one out would change the events.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }
@@ -638,6 +646,7 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->propose_allocation = propose_allocation;
   transform_class->decide_allocation = decide_allocation;
   transform_class->transform_size = transform_size;
+  transform_class->transform = transform_not_in_place;
   transform_class->generate_output = generate_output;
   transform_class->sink_event = sink_event;
   transform_class->src_event = src_event;

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/check/gstharness.h>
+#include <gst/video/video.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gst/eventcamera/eventcamera.h"
+
+/// A simulator element between a source and a sink that the test plays.
+namespace harness {
+
+struct Unref {
+  void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
+  void operator()(GstEvent* event) const { gst_event_unref(event); }
+  void operator()(GstCaps* caps) const { gst_caps_unref(caps); }
+  void operator()(GstMessage* message) const { gst_message_unref(message); }
+  void operator()(GstElement* element) const { gst_object_unref(element); }
+  void operator()(GstBus* bus) const { gst_object_unref(bus); }
+  void operator()(GstHarness* h) const { gst_harness_teardown(h); }
+};
+template <class Type>
+using Owned = std::unique_ptr<Type, Unref>;
+
+using Buffer = Owned<GstBuffer>;
+
+inline const char* const elements[] = {"eventsim-frame", "eventsim-dense", "eventsim-sparse",
+                                       "eventsim-diff"};
+
+class Harness {
+ public:
+  /// For example "eventsim-dense flow=dis-hq".
+  explicit Harness(const std::string& launch) {
+    gst_init(nullptr, nullptr);
+    h_.reset(gst_harness_new_parse(launch.c_str()));
+    bus_.reset(gst_bus_new());
+    gst_element_set_bus(h_->element, bus_.get());
+  }
+  ~Harness() {
+    // The test's bus is the element's until the end.
+    gst_element_set_bus(h_->element, nullptr);
+  }
+
+  GstHarness* operator->() const { return h_.get(); }
+  GstHarness* get() const { return h_.get(); }
+  GstElement* element() const { return h_->element; }
+
+  void caps(const std::string& in, const std::string& out = GST_EVENT_CAMERA_MEDIA_TYPE) {
+    gst_harness_set_sink_caps_str(h_.get(), out.c_str());
+    gst_harness_set_src_caps_str(h_.get(), in.c_str());
+    GstCaps* caps = gst_caps_from_string(in.c_str());
+    gst_video_info_from_caps(&info_, caps);
+    gst_caps_unref(caps);
+  }
+
+  /// A frame whose luma is what `grey` says, in the negotiated format; `padding` bytes lie behind
+  /// each row, told by a GstVideoMeta.
+  GstBuffer* frame(GstClockTime pts, const std::function<int(int x, int y)>& grey,
+                   int padding = 0) const {
+    gsize size = GST_VIDEO_INFO_SIZE(&info_);
+    gsize offsets[GST_VIDEO_MAX_PLANES] = {};
+    gint strides[GST_VIDEO_MAX_PLANES] = {};
+    if (padding > 0) {
+      size = 0;
+      for (guint i = 0; i < GST_VIDEO_INFO_N_PLANES(&info_); ++i) {
+        offsets[i] = size;
+        strides[i] = GST_VIDEO_INFO_PLANE_STRIDE(&info_, i) + padding;
+        size += static_cast<gsize>(strides[i] * GST_VIDEO_INFO_HEIGHT(&info_));
+      }
+    }
+    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
+    gst_buffer_memset(buffer, 0, 0xa5, size);
+    if (padding > 0)
+      gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE,
+                                     GST_VIDEO_INFO_FORMAT(&info_),
+                                     static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info_)),
+                                     static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info_)),
+                                     GST_VIDEO_INFO_N_PLANES(&info_), offsets, strides);
+    GstVideoFrame video;
+    EXPECT_TRUE(gst_video_frame_map(&video, &info_, buffer, GST_MAP_WRITE));
+    const int step = GST_VIDEO_FRAME_COMP_PSTRIDE(&video, 0);
+    const guint shift = GST_VIDEO_FORMAT_INFO_SHIFT(info_.finfo, 0);
+    const guint depth = GST_VIDEO_INFO_COMP_DEPTH(&info_, 0);
+    for (int y = 0; y < GST_VIDEO_INFO_HEIGHT(&info_); ++y) {
+      auto* row = static_cast<guint8*>(GST_VIDEO_FRAME_COMP_DATA(&video, 0)) +
+                  y * GST_VIDEO_FRAME_COMP_STRIDE(&video, 0);
+      for (int x = 0; x < GST_VIDEO_INFO_WIDTH(&info_); ++x) {
+        if (depth == 8) {
+          row[x * step] = static_cast<guint8>(grey(x, y));
+        } else {
+          const guint value = static_cast<guint>(grey(x, y)) * ((1U << depth) - 1) / 255 << shift;
+          GST_WRITE_UINT16_LE(row + x * step, static_cast<guint16>(value));
+        }
+      }
+    }
+    gst_video_frame_unmap(&video);
+    GST_BUFFER_PTS(buffer) = pts;
+    return buffer;
+  }
+
+  GstBuffer* flat(GstClockTime pts, int grey) const {
+    return frame(pts, [grey](int, int) { return grey; });
+  }
+
+  GstFlowReturn push(GstBuffer* buffer) { return gst_harness_push(h_.get(), buffer); }
+
+  /// The next buffer that came out, or none.
+  Buffer pull() { return Buffer(gst_harness_try_pull(h_.get())); }
+
+  /// The next event of this type that came out, or none; others before it are dropped.
+  Owned<GstEvent> pull_event(GstEventType type) {
+    while (Owned<GstEvent> event{gst_harness_try_pull_event(h_.get())})
+      if (GST_EVENT_TYPE(event.get()) == type) return event;
+    return nullptr;
+  }
+
+  /// The next message of this type on the bus, or none; others before it stay.
+  Owned<GstMessage> message(GstMessageType type) {
+    return Owned<GstMessage>(gst_bus_pop_filtered(bus_.get(), type));
+  }
+
+  std::string out_caps() const {
+    GstCaps* caps = gst_pad_get_current_caps(h_->sinkpad);
+    if (caps == nullptr) return "";
+    gchar* text = gst_caps_to_string(caps);
+    std::string result = text;
+    g_free(text);
+    gst_caps_unref(caps);
+    return result;
+  }
+
+ private:
+  Owned<GstHarness> h_;
+  Owned<GstBus> bus_;
+  GstVideoInfo info_{};
+};
+
+inline std::vector<GstEventCameraEvent> events_of(GstBuffer* buffer) {
+  GstEventCameraMap map;
+  EXPECT_TRUE(gst_event_camera_map(&map, buffer));
+  std::vector<GstEventCameraEvent> events(map.events, map.events + map.n_events);
+  gst_event_camera_unmap(&map);
+  return events;
+}
+
+inline std::string bytes_of(GstBuffer* buffer) {
+  std::string bytes(gst_buffer_get_size(buffer), '\0');
+  gst_buffer_extract(buffer, 0, bytes.data(), bytes.size());
+  return bytes;
+}
+
+inline std::string text_of(GstMessage* message) {
+  GError* error = nullptr;
+  if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR)
+    gst_message_parse_error(message, &error, nullptr);
+  else
+    gst_message_parse_warning(message, &error, nullptr);
+  std::string text = error->message;
+  g_error_free(error);
+  return text;
+}
+
+}  // namespace harness

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Which video goes in, what comes out, and in whose memory.
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+
+const std::string size = ", width=32, height=24, framerate=25/1";
+
+class EveryElement : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+
+TEST_P(EveryElement, MakesEventsWhereDownstreamTakesAnything) {
+  Harness h(GetParam());
+  h.caps("video/x-raw, format=GRAY8" + size, "ANY");
+  EXPECT_EQ(h.out_caps(),
+            "application/x-event-camera, width=(int)32, height=(int)24, framerate=(fraction)25/1, "
+            "format=(string)XYTP");
+}
+
+TEST_P(EveryElement, MakesEventsWhereDownstreamPrefersVideoButTakesBoth) {
+  Harness h(GetParam());
+  h.caps("video/x-raw, format=GRAY8" + size, "video/x-raw; application/x-event-camera");
+  EXPECT_EQ(h.out_caps().rfind("application/x-event-camera", 0), 0U) << h.out_caps();
+}
+
+TEST_P(EveryElement, MakesVideoWhereDownstreamTakesOnlyThat) {
+  Harness h(GetParam());
+  h.caps("video/x-raw, format=I420, pixel-aspect-ratio=4/3, interlace-mode=progressive" + size,
+         "video/x-raw");
+  const auto caps = h.out_caps();
+  EXPECT_NE(caps.find("format=(string)BGRx"), std::string::npos) << caps;
+  EXPECT_NE(caps.find("width=(int)32, height=(int)24"), std::string::npos) << caps;
+  EXPECT_NE(caps.find("framerate=(fraction)25/1"), std::string::npos) << caps;
+  EXPECT_NE(caps.find("pixel-aspect-ratio=(fraction)4/3"), std::string::npos) << caps;
+}
+
+TEST(Negotiation, RefusesWhatItCannotRead) {
+  Harness h("eventsim-frame");
+  gst_harness_set_sink_caps_str(h.get(), "ANY");
+  gst_harness_set_src_caps_str(h.get(), ("video/x-raw, format=RGB" + size).c_str());
+  EXPECT_EQ(h.push(gst_buffer_new_allocate(nullptr, 32 * 24 * 3, nullptr)),
+            GST_FLOW_NOT_NEGOTIATED);
+}
+
+TEST(Negotiation, AsksUpstreamForTheSizeThatDownstreamWants) {
+  Harness h("eventsim-frame");
+  gst_harness_set_sink_caps_str(h.get(), "application/x-event-camera, width=640, height=480");
+  GstCaps* caps = gst_pad_peer_query_caps(h->srcpad, nullptr);
+  for (guint i = 0; i < gst_caps_get_size(caps); ++i) {
+    int width = 0;
+    EXPECT_TRUE(gst_structure_get_int(gst_caps_get_structure(caps, i), "width", &width));
+    EXPECT_EQ(width, 640);
+  }
+  gst_caps_unref(caps);
+}
+
+std::vector<std::string> formats(const char* pad) {
+  gst_init(nullptr, nullptr);
+  Owned<GstElement> element(gst_element_factory_make("eventsim-frame", nullptr));
+  GstCaps* caps = gst_pad_template_get_caps(
+      gst_element_class_get_pad_template(GST_ELEMENT_GET_CLASS(element.get()), pad));
+  const GValue* list =
+      gst_structure_get_value(gst_caps_get_structure(caps, gst_caps_get_size(caps) - 1), "format");
+  std::vector<std::string> names;
+  for (guint i = 0; i < gst_value_list_get_size(list); ++i)
+    names.emplace_back(g_value_get_string(gst_value_list_get_value(list, i)));
+  gst_caps_unref(caps);
+  return names;
+}
+
+class EveryInputFormat : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(, EveryInputFormat, testing::ValuesIn(formats("sink")),
+                         [](const auto& test) { return test.param; });
+
+/// A step of 100 grey levels on the left half, of 15 on the right; odd sizes and padded rows.
+TEST_P(EveryInputFormat, HasItsLumaReadWhereItLies) {
+  for (const int padding : {0, 24}) {
+    for (const auto& [width, height] : {std::pair(32, 24), {31, 23}}) {
+      Harness h("eventsim-frame");
+      h.caps("video/x-raw, format=" + GetParam() + ", framerate=25/1, width=" +
+             std::to_string(width) + ", height=" + std::to_string(height));
+      const int half = width / 2;
+      ASSERT_EQ(h.push(h.frame(
+                    0, [](int, int) { return 60; }, padding)),
+                GST_FLOW_OK);
+      ASSERT_EQ(h.push(h.frame(
+                    40 * GST_MSECOND, [&](int x, int) { return x < half ? 160 : 75; }, padding)),
+                GST_FLOW_OK);
+      const auto buffer = h.pull();
+      ASSERT_TRUE(buffer);
+      const auto events = events_of(buffer.get());
+      EXPECT_EQ(events.size(), static_cast<std::size_t>(half * height));
+      for (const auto& event : events) {
+        ASSERT_LT(event.x, half);
+        ASSERT_TRUE(gst_event_camera_event_is_on(&event));
+      }
+    }
+  }
+}
+
+class EveryOutputFormat : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(, EveryOutputFormat, testing::ValuesIn(formats("src")),
+                         [](const auto& test) { return test.param; });
+
+/// ON in the left column, OFF in the right one; palette grey looks the same in every format.
+TEST_P(EveryOutputFormat, IsDrawn) {
+  Harness h("eventsim-frame palette=grey");
+  h.caps("video/x-raw, format=GRAY8, width=5, height=3, framerate=25/1",
+         "video/x-raw, format=" + GetParam());
+  h.push(h.flat(0, 100));
+  h.push(h.frame(40 * GST_MSECOND, [](int x, int) { return x == 0 ? 200 : x == 4 ? 0 : 100; }));
+  const auto buffer = h.pull();
+  ASSERT_TRUE(buffer);
+  GstCaps* caps = gst_pad_get_current_caps(h->sinkpad);
+  GstVideoInfo info;
+  ASSERT_TRUE(gst_video_info_from_caps(&info, caps));
+  gst_caps_unref(caps);
+  EXPECT_EQ(gst_buffer_get_size(buffer.get()), GST_VIDEO_INFO_SIZE(&info));
+  GstVideoFrame frame;
+  ASSERT_TRUE(gst_video_frame_map(&frame, &info, buffer.get(), GST_MAP_READ));
+  const int expected[] = {255, 128, 128, 128, 0};
+  for (int y = 0; y < 3; ++y) {
+    for (int x = 0; x < 5; ++x) {
+      for (guint c = 0; c < GST_VIDEO_INFO_N_COMPONENTS(&info); ++c) {
+        const auto* byte = static_cast<guint8*>(GST_VIDEO_FRAME_COMP_DATA(&frame, c)) +
+                           y * GST_VIDEO_FRAME_COMP_STRIDE(&frame, c) +
+                           x * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, c);
+        EXPECT_EQ(*byte, c == GST_VIDEO_COMP_A ? 255 : expected[x]) << x << "," << y;
+      }
+    }
+  }
+  gst_video_frame_unmap(&frame);
+}
+
+TEST(Allocation, TellsUpstreamThatAnyStrideIsWelcome) {
+  Harness h("eventsim-frame");
+  h.caps("video/x-raw, format=GRAY8" + size);
+  GstCaps* caps = gst_pad_get_current_caps(h->srcpad);
+  GstQuery* query = gst_query_new_allocation(caps, TRUE);
+  EXPECT_TRUE(gst_pad_peer_query(h->srcpad, query));
+  EXPECT_TRUE(gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr));
+  gst_query_unref(query);
+  gst_caps_unref(caps);
+}
+
+TEST(Allocation, TakesPicturesFromAPool) {
+  Harness h("eventsim-frame");
+  h.caps("video/x-raw, format=GRAY8" + size, "video/x-raw, format=GRAY8");
+  h.push(h.flat(0, 50));
+  h.push(h.flat(40 * GST_MSECOND, 50));
+  const auto buffer = h.pull();
+  ASSERT_TRUE(buffer);
+  EXPECT_NE(buffer->pool, nullptr);
+}
+
+}  // namespace

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Every element through its states, again and again, with and without data.
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+
+class EveryElement : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+
+TEST_P(EveryElement, GoesThroughAllStates) {
+  gst_init(nullptr, nullptr);
+  Owned<GstElement> element(gst_element_factory_make(GetParam(), nullptr));
+  ASSERT_TRUE(element);
+  for (int times = 0; times < 3; ++times) {
+    for (const auto state : {GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_PLAYING, GST_STATE_PAUSED,
+                             GST_STATE_READY, GST_STATE_NULL})
+      EXPECT_NE(gst_element_set_state(element.get(), state), GST_STATE_CHANGE_FAILURE);
+  }
+  gst_element_set_state(element.get(), GST_STATE_PLAYING);
+  gst_element_set_state(element.get(), GST_STATE_NULL);
+}
+
+TEST_P(EveryElement, PlaysAgainAfterAStop) {
+  gst_init(nullptr, nullptr);
+  const std::string launch =
+      "videotestsrc name=source pattern=ball num-buffers=6 ! video/x-raw,width=80,height=60 ! " +
+      std::string(GetParam()) + " ! fakesink name=sink signal-handoffs=true";
+  Owned<GstElement> pipeline(gst_parse_launch(launch.c_str(), nullptr));
+  ASSERT_TRUE(pipeline);
+  int buffers = 0;
+  Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
+  g_signal_connect(sink.get(), "handoff",
+                   G_CALLBACK(+[](GstElement*, GstBuffer*, GstPad*, int* count) { ++*count; }),
+                   &buffers);
+  Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  for (int times = 1; times <= 3; ++times) {
+    gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+    Owned<GstMessage> message(gst_bus_timed_pop_filtered(
+        bus.get(), 20 * GST_SECOND,
+        static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
+    ASSERT_TRUE(message);
+    EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS);
+    gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+    EXPECT_EQ(buffers, 5 * times);
+  }
+}
+
+TEST_P(EveryElement, IsFreedWhileInUse) {
+  for (int frames = 0; frames < 4; ++frames) {
+    Harness h(GetParam());
+    h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1");
+    for (int i = 0; i < frames; ++i) h.push(h.flat(i * 40 * GST_MSECOND, 60 * i));
+  }
+}
+
+}  // namespace

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// What stays the same while the stream changes: caps, memory, load.
+#include <atomic>
+#include <thread>
+
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+
+std::string video(int width, int height, const char* format = "GRAY8", int fps = 25) {
+  return std::string("video/x-raw, format=") + format + ", width=" + std::to_string(width) +
+         ", height=" + std::to_string(height) + ", framerate=" + std::to_string(fps) + "/1";
+}
+
+/// A bright square on its way to the right.
+int moving_square(int x, int y, int frame) {
+  return x >= 4 + 3 * frame && x < 14 + 3 * frame && y >= 6 && y < 16 ? 220 : 40 + (x * 7 + y) % 9;
+}
+
+std::vector<std::string> intervals(Harness& h, int frames, int padding = 0) {
+  std::vector<std::string> bytes;
+  for (int i = 0; i < frames; ++i) {
+    EXPECT_EQ(
+        h.push(h.frame(
+            i * 40 * GST_MSECOND, [i](int x, int y) { return moving_square(x, y, i); }, padding)),
+        GST_FLOW_OK);
+    if (const auto buffer = h.pull()) bytes.push_back(bytes_of(buffer.get()));
+  }
+  return bytes;
+}
+
+class EveryElement : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+
+TEST_P(EveryElement, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
+  Harness h(GetParam());
+  h.caps(video(61, 43));
+  const auto expected = intervals(h, 4);
+  ASSERT_EQ(expected.size(), 3U);
+  Harness padded(std::string(GetParam()) + " n-threads=1");
+  padded.caps(video(61, 43));
+  EXPECT_EQ(intervals(padded, 4, 19), expected);
+}
+
+TEST_P(EveryElement, GivesEventsWithinThePictureSorted) {
+  Harness h(GetParam());
+  h.caps(video(61, 43));
+  for (int i = 0; i < 4; ++i) {
+    h.push(h.frame(i * 40 * GST_MSECOND, [i](int x, int y) { return moving_square(x, y, i); }));
+    const auto buffer = h.pull();
+    if (!buffer) continue;
+    const auto events = events_of(buffer.get());
+    for (std::size_t k = 0; k < events.size(); ++k) {
+      ASSERT_LT(events[k].x, 61);
+      ASSERT_LT(gst_event_camera_event_get_y(&events[k]), 43U);
+      ASSERT_LE(events[k].t, 40'000U);
+      if (k > 0) {
+        ASSERT_LT(std::tuple(events[k - 1].t, gst_event_camera_event_get_y(&events[k - 1]),
+                             events[k - 1].x),
+                  std::tuple(events[k].t, gst_event_camera_event_get_y(&events[k]), events[k].x));
+      }
+    }
+  }
+}
+
+TEST_P(EveryElement, BeginsAnewWhenTheSizeChanges) {
+  Harness h(GetParam());
+  h.caps(video(61, 43));
+  ASSERT_EQ(intervals(h, 4).size(), 3U);
+  h.caps(video(33, 29));
+  h.push(h.flat(160 * GST_MSECOND, 10));
+  EXPECT_FALSE(h.pull());
+  h.push(h.flat(200 * GST_MSECOND, 210));
+  const auto buffer = h.pull();
+  ASSERT_TRUE(buffer);
+  EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 160 * GST_MSECOND);
+  const auto events = events_of(buffer.get());
+  EXPECT_EQ(events.size(), 33U * 29U);
+  EXPECT_NE(h.out_caps().find("width=(int)33"), std::string::npos);
+}
+
+TEST_P(EveryElement, LosesNoIntervalWhenOnlyTheFormatOrTheFramerateChanges) {
+  Harness h(GetParam());
+  h.caps(video(32, 24, "GRAY8"));
+  h.push(h.flat(0, 50));
+  h.caps(video(32, 24, "NV12", 30));
+  h.push(h.flat(40 * GST_MSECOND, 200));
+  EXPECT_TRUE(h.pull());
+  h.caps(video(32, 24, "YUY2", 30));
+  h.push(h.flat(80 * GST_MSECOND, 50));
+  EXPECT_TRUE(h.pull());
+}
+
+TEST_P(EveryElement, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
+  Harness h(GetParam());
+  h.caps(video(32, 24));
+  h.push(h.flat(0, 50));
+  h.push(h.flat(40 * GST_MSECOND, 200));
+  EXPECT_EQ(events_of(h.pull().get()).back().t, 40'000U);
+  gst_harness_set_sink_caps_str(h.get(), "video/x-raw, format=GRAY8");
+  gst_harness_push_upstream_event(h.get(), gst_event_new_reconfigure());
+  h.push(h.flat(80 * GST_MSECOND, 50));
+  const auto picture = h.pull();
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 40 * GST_MSECOND);
+  EXPECT_EQ(gst_buffer_get_size(picture.get()), 32U * 24U);
+}
+
+TEST_P(EveryElement, StandsBesideItsLikes) {
+  Harness h(GetParam());
+  h.caps(video(61, 43));
+  const auto expected = intervals(h, 6);
+  std::vector<std::thread> threads;
+  std::atomic<int> equal = 0;
+  for (int i = 0; i < 10; ++i) {
+    threads.emplace_back([&, i] {
+      Harness other(std::string(GetParam()) + " n-threads=" + std::to_string(i % 3));
+      other.caps(video(61, 43));
+      equal += intervals(other, 6) == expected;
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(equal, 10);
+}
+
+TEST_P(EveryElement, TakesPropertiesWhilePlaying) {
+  Harness h(GetParam());
+  h.caps(video(61, 43));
+  std::atomic<bool> done = false;
+  std::thread application([&] {
+    for (int i = 0; !done; ++i) {
+      g_object_set(h.element(), "positive-threshold", i % 50 + 1.5, "negative-threshold",
+                   i % 40 + 0.0, "n-threads", i % 3, "palette", i % 4, nullptr);
+      if (std::string(GetParam()) != "eventsim-frame")
+        g_object_set(h.element(), "interpolated-frames", i % 20, nullptr);
+      if (std::string(GetParam()) == "eventsim-dense")
+        g_object_set(h.element(), "flow", i % 3, "interpolation", i % 2, nullptr);
+    }
+  });
+  intervals(h, 40);
+  done = true;
+  application.join();
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+}
+
+TEST(Stream, RefusesFramesThatAreTooSmall) {
+  Harness h("eventsim-frame");
+  h.caps(video(61, 43));
+  GstBuffer* buffer = gst_buffer_new_allocate(nullptr, 100, nullptr);
+  GST_BUFFER_PTS(buffer) = 0;
+  EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR);
+  EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
+}
+
+TEST(Stream, WarnsOfInterlacedVideo) {
+  Harness h("eventsim-frame");
+  h.caps(video(61, 43, "I420") + ", interlace-mode=interleaved");
+  const auto warning = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(text_of(warning.get()).find("deinterlace"), std::string::npos);
+}
+
+}  // namespace

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Intervals: their times, their order, and what breaks the thread between two frames.
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+
+const std::string video = "video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1";
+const std::string uneven = "video/x-raw, format=GRAY8, width=32, height=24, framerate=0/1";
+
+class EveryElement : public testing::TestWithParam<const char*> {
+ protected:
+  EveryElement() : h(GetParam()) {}
+
+  /// A frame that differs from the one before.
+  GstFlowReturn flash(GstClockTime pts, guint flags = 0) {
+    bright = !bright;
+    GstBuffer* buffer = h.flat(pts, bright ? 200 : 50);
+    GST_BUFFER_FLAG_SET(buffer, flags);
+    return h.push(buffer);
+  }
+
+  void expect_interval(GstClockTime start, GstClockTime end) {
+    const auto buffer = h.pull();
+    ASSERT_TRUE(buffer);
+    EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), start);
+    EXPECT_EQ(GST_BUFFER_DURATION(buffer.get()), end - start);
+    EXPECT_EQ(GST_BUFFER_DTS(buffer.get()), GST_CLOCK_TIME_NONE);
+    for (const auto& event : events_of(buffer.get())) ASSERT_LE(event.t, (end - start) / 1000);
+  }
+
+  Harness h;
+  bool bright = false;
+};
+INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+
+TEST_P(EveryElement, MakesOneIntervalLessThanThereAreFrames) {
+  h.caps(video);
+  for (int i = 0; i < 5; ++i) ASSERT_EQ(flash(i * 40 * GST_MSECOND), GST_FLOW_OK);
+  for (int i = 1; i < 5; ++i) expect_interval((i - 1) * 40 * GST_MSECOND, i * 40 * GST_MSECOND);
+  EXPECT_FALSE(h.pull());
+}
+
+TEST_P(EveryElement, StampsIntervalsOfUnevenFrames) {
+  h.caps(uneven);
+  const GstClockTime times[] = {7, 33'333'340, 40'000'000, 140'000'123};
+  for (const auto time : times) flash(time);
+  for (int i = 1; i < 4; ++i) expect_interval(times[i - 1], times[i]);
+}
+
+TEST_P(EveryElement, SendsAGapForAnIntervalWithoutEvents) {
+  h.caps(video);
+  h.push(h.flat(0, 90));
+  h.push(h.flat(40 * GST_MSECOND, 90));
+  EXPECT_FALSE(h.pull());
+  const auto gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(gap.get(), &start, &duration);
+  EXPECT_EQ(start, 0U);
+  EXPECT_EQ(duration, 40 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, DrawsAPictureOfAnIntervalWithoutEvents) {
+  h.caps(video, "video/x-raw, format=GRAY8");
+  h.push(h.flat(0, 90));
+  GstBuffer* repeated = h.flat(40 * GST_MSECOND, 90);
+  GST_BUFFER_FLAG_SET(repeated, GST_BUFFER_FLAG_GAP);  // as videorate marks its copies
+  h.push(repeated);
+  const auto buffer = h.pull();
+  ASSERT_TRUE(buffer);
+  EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 0U);
+  EXPECT_FALSE(GST_BUFFER_FLAG_IS_SET(buffer.get(), GST_BUFFER_FLAG_GAP));
+  EXPECT_FALSE(h.pull_event(GST_EVENT_GAP));
+}
+
+TEST_P(EveryElement, BeginsAnewAfterADiscontinuity) {
+  h.caps(video);
+  flash(0);
+  flash(40 * GST_MSECOND);
+  expect_interval(0, 40 * GST_MSECOND);
+  flash(80 * GST_MSECOND, GST_BUFFER_FLAG_DISCONT);
+  EXPECT_FALSE(h.pull());
+  flash(120 * GST_MSECOND);
+  const auto buffer = h.pull();
+  ASSERT_TRUE(buffer);
+  EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 80 * GST_MSECOND);
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(buffer.get()));
+  flash(160 * GST_MSECOND);
+  EXPECT_FALSE(GST_BUFFER_IS_DISCONT(h.pull().get()));
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST_P(EveryElement, BeginsAnewAfterAFlush) {
+  h.caps(video);
+  flash(0);
+  gst_harness_push_event(h.get(), gst_event_new_flush_start());
+  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  flash(40 * GST_MSECOND);
+  EXPECT_FALSE(h.pull());
+  flash(80 * GST_MSECOND);
+  expect_interval(40 * GST_MSECOND, 80 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, BeginsAnewInAnotherSegmentButNotInTheSame) {
+  h.caps(video);
+  flash(0);
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  flash(40 * GST_MSECOND);
+  expect_interval(0, 40 * GST_MSECOND);
+  segment.start = segment.time = 5 * GST_SECOND;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  flash(5 * GST_SECOND);
+  EXPECT_FALSE(h.pull());
+  flash(5 * GST_SECOND + 40 * GST_MSECOND);
+  expect_interval(5 * GST_SECOND, 5 * GST_SECOND + 40 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, WarnsOnceOfFramesWithoutPts) {
+  h.caps(video);
+  flash(0);
+  EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
+  EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
+  flash(120 * GST_MSECOND);
+  EXPECT_FALSE(h.pull());
+  flash(160 * GST_MSECOND);
+  expect_interval(120 * GST_MSECOND, 160 * GST_MSECOND);
+  const auto warning = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(text_of(warning.get()).find("no PTS"), std::string::npos);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST_P(EveryElement, WarnsOfTimeThatRunsBackwards) {
+  h.caps(video);
+  flash(100 * GST_MSECOND);
+  EXPECT_EQ(flash(60 * GST_MSECOND), GST_FLOW_OK);
+  EXPECT_FALSE(h.pull());
+  flash(140 * GST_MSECOND);
+  expect_interval(60 * GST_MSECOND, 140 * GST_MSECOND);
+  EXPECT_EQ(flash(140 * GST_MSECOND), GST_FLOW_OK);  // standing still is no better
+  EXPECT_FALSE(h.pull());
+  const auto warning = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(text_of(warning.get()).find("not later"), std::string::npos);
+}
+
+TEST_P(EveryElement, CutsIntervalsThatEventsCannotCount) {
+  h.caps(uneven);
+  flash(0);
+  const GstClockTime longest = GstClockTime{0xffffffff} * 1000;
+  flash(longest);
+  expect_interval(0, longest);
+  flash(2 * longest + 1);
+  EXPECT_FALSE(h.pull());
+  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST_P(EveryElement, HoldsTheLastFrameThroughAGapOfTheVideo) {
+  h.caps(video);
+  gst_harness_push_event(h.get(), gst_event_new_gap(0, 10 * GST_MSECOND));
+  EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));  // nothing has begun: sent on as it is
+  flash(10 * GST_MSECOND);
+  gst_harness_push_event(h.get(), gst_event_new_gap(50 * GST_MSECOND, 100 * GST_MSECOND));
+  const auto gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(gap.get(), &start, &duration);
+  EXPECT_EQ(start, 10 * GST_MSECOND);
+  EXPECT_EQ(duration, 40 * GST_MSECOND);
+  flash(150 * GST_MSECOND);
+  expect_interval(50 * GST_MSECOND, 150 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, RefusesToRunBackwards) {
+  h.caps(video);
+  flash(0);
+  EXPECT_FALSE(gst_element_seek(h.element(), -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, GST_SECOND));
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.rate = -1;
+  segment.stop = GST_SECOND;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  const auto error = h.message(GST_MESSAGE_ERROR);
+  ASSERT_TRUE(error);
+  EXPECT_NE(text_of(error.get()).find("backwards"), std::string::npos);
+  EXPECT_EQ(flash(40 * GST_MSECOND), GST_FLOW_ERROR);
+}
+
+TEST_P(EveryElement, SendsEosAfterTheLastInterval) {
+  h.caps(video);
+  flash(0);
+  flash(40 * GST_MSECOND);
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  expect_interval(0, 40 * GST_MSECOND);
+  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+  EXPECT_FALSE(h.pull());
+}
+
+TEST_P(EveryElement, IsOneFrameLate) {
+  h.caps(video);
+  EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
+  gst_harness_set_upstream_latency(h.get(), 5 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 45 * GST_MSECOND);
+  h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=50/1");
+  EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 25 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, LearnsItsLatencyWhereTheFramerateVaries) {
+  h.caps(uneven);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 0U);
+  flash(0);
+  flash(30 * GST_MSECOND);
+  EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 30 * GST_MSECOND);
+  flash(50 * GST_MSECOND);
+  EXPECT_FALSE(h.message(GST_MESSAGE_LATENCY));
+  flash(10 * GST_SECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), GST_SECOND);
+}
+
+}  // namespace
