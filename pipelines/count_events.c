@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later
+ *
+ * How an application reads events: runs a pipeline and counts the events that come to its appsink.
+ *
+ *   count_events "videotestsrc pattern=ball num-buffers=90 ! eventsim-diff ! appsink name=events"
+ *
+ * To build it outside of this project:
+ *   cc count_events.c $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
+ */
+#include <gst/app/gstappsink.h>
+#include <gst/eventcamera/eventcamera.h>
+#include <signal.h>
+
+typedef struct {
+  guint64 events;
+  guint64 on;
+} Count;
+
+static void print(const char *what, const Count *count, gdouble seconds) {
+  g_print("%s %9" G_GUINT64_FORMAT " events, %.2f million a second, %2.0f %% ON\n", what,
+          count->events, seconds > 0 ? (gdouble)count->events / seconds / 1e6 : 0.0,
+          count->events > 0 ? 100.0 * (gdouble)count->on / (gdouble)count->events : 0.0);
+}
+
+static void count_buffer(Count *count, GstBuffer *buffer) {
+  GstEventCameraMap map;
+  if (!gst_event_camera_map(&map, buffer)) return;
+  /* map.events is an array; the time of an event in microseconds is map.start + t. */
+  for (gsize i = 0; i < map.n_events; ++i)
+    count->on += gst_event_camera_event_is_on(&map.events[i]) ? 1 : 0;
+  count->events += map.n_events;
+  gst_event_camera_unmap(&map);
+}
+
+/* Prints the error that ended the pipeline, if one did. */
+static gboolean failed(GstBus *bus) {
+  GstMessage *message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
+  GError *error = NULL;
+  if (message == NULL) return FALSE;
+  gst_message_parse_error(message, &error, NULL);
+  g_printerr("%s: %s\n", GST_OBJECT_NAME(GST_MESSAGE_SRC(message)), error->message);
+  g_clear_error(&error);
+  gst_message_unref(message);
+  return TRUE;
+}
+
+/* Counts until the stream ends, printing a line for each second of it. */
+static gboolean count_stream(GstAppSink *sink, GstBus *bus) {
+  Count all = {0, 0};
+  Count second = {0, 0};
+  GstClockTime start = GST_CLOCK_TIME_NONE;
+  GstClockTime printed = 0;
+  GstClockTime end = 0;
+
+  while (!gst_app_sink_is_eos(sink)) {
+    GstSample *sample = gst_app_sink_try_pull_sample(sink, GST_SECOND / 10);
+    GstBuffer *buffer;
+    if (sample == NULL) {
+      if (failed(bus)) return FALSE;
+      continue;
+    }
+    buffer = gst_sample_get_buffer(sample);
+    if (start == GST_CLOCK_TIME_NONE) {
+      GstEventCameraInfo info;
+      if (gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample)))
+        g_print("Events of a sensor of %d x %d pixels\n", info.width, info.height);
+      start = printed = GST_BUFFER_PTS(buffer);
+    }
+    count_buffer(&second, buffer);
+    end = GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer);
+    if (end - printed >= GST_SECOND) {
+      print("  ", &second, (gdouble)(end - printed) / GST_SECOND);
+      all.events += second.events;
+      all.on += second.on;
+      second = (Count){0, 0};
+      printed = end;
+    }
+    gst_sample_unref(sample);
+  }
+  all.events += second.events;
+  all.on += second.on;
+  print("In all", &all, start == GST_CLOCK_TIME_NONE ? 0 : (gdouble)(end - start) / GST_SECOND);
+  return !failed(bus);
+}
+
+static GstElement *pipeline;
+
+/* Ctrl-C ends the stream, so that files are finished. */
+static gpointer wait_for_interrupt(gpointer signals) {
+  int caught;
+  if (sigwait(signals, &caught) == 0) gst_element_send_event(pipeline, gst_event_new_eos());
+  return NULL;
+}
+
+int main(int argc, char **argv) {
+  static sigset_t signals;
+  GError *error = NULL;
+  GstElement *sink;
+  GstBus *bus;
+  gboolean ok;
+
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, NULL);
+  gst_init(&argc, &argv);
+  if (argc != 2) {
+    g_printerr("usage: %s PIPELINE, with an appsink name=events in it\n", argv[0]);
+    return 2;
+  }
+  pipeline = gst_parse_launch_full(argv[1], NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
+  if (pipeline == NULL) {
+    g_printerr("%s\n", error->message);
+    g_clear_error(&error);
+    return 2;
+  }
+  sink = GST_IS_BIN(pipeline) ? gst_bin_get_by_name(GST_BIN(pipeline), "events") : NULL;
+  if (sink == NULL || !GST_IS_APP_SINK(sink)) {
+    g_printerr("The pipeline has no appsink name=events\n");
+    gst_clear_object(&sink);
+    gst_object_unref(pipeline);
+    return 2;
+  }
+  g_thread_unref(g_thread_new("interrupt", wait_for_interrupt, &signals));
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  bus = gst_element_get_bus(pipeline);
+  ok = count_stream(GST_APP_SINK(sink), bus);
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(bus);
+  gst_object_unref(sink);
+  gst_object_unref(pipeline);
+  return ok ? 0 : 1;
+}
