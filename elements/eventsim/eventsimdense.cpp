@@ -19,6 +19,8 @@
  */
 #include "elements/eventsim/eventsimdense.hpp"
 
+#include <atomic>
+
 #include "gst/simulate/eventsimulator.hpp"
 #include "src/simulate/dense.hpp"
 
@@ -39,10 +41,8 @@ enum Property {
 
 struct GstEventSimDense {
   GstEventSimulator parent;
-
-  // Guarded by the object lock.
-  FlowMethod flow;
-  Interpolation interpolation;
+  std::atomic<FlowMethod> flow;
+  std::atomic<Interpolation> interpolation;
 };
 
 struct GstEventSimDenseClass {
@@ -92,29 +92,21 @@ static std::unique_ptr<eventcamera::Simulator> create(GstEventSimulator*,
   return eventcamera::make_dense_simulator(format);
 }
 
-static void configure(GstEventSimulator* simulator_element, eventcamera::Simulator& simulator) {
-  auto* self = dense(simulator_element);
-  GST_OBJECT_LOCK(self);
-  const FlowMethod flow = self->flow;
-  const Interpolation interpolation = self->interpolation;
-  GST_OBJECT_UNLOCK(self);
+static void configure(GstEventSimulator* element, eventcamera::Simulator& simulator) {
+  const auto* self = dense(element);
   auto& dense_simulator = static_cast<DenseSimulator&>(simulator);
-  dense_simulator.set_flow(flow);
-  dense_simulator.set_interpolation(interpolation);
+  dense_simulator.set_flow(self->flow);
+  dense_simulator.set_interpolation(self->interpolation);
 }
 
 static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
   auto* self = dense(object);
   switch (id) {
     case prop_flow:
-      GST_OBJECT_LOCK(self);
       self->flow = static_cast<FlowMethod>(g_value_get_enum(value));
-      GST_OBJECT_UNLOCK(self);
       break;
     case prop_interpolation:
-      GST_OBJECT_LOCK(self);
       self->interpolation = static_cast<Interpolation>(g_value_get_enum(value));
-      GST_OBJECT_UNLOCK(self);
       break;
     default:
       gst_event_simulator_set_property(object, id, value, spec);
@@ -126,14 +118,10 @@ static void get_property(GObject* object, guint id, GValue* value, GParamSpec* s
   auto* self = dense(object);
   switch (id) {
     case prop_flow:
-      GST_OBJECT_LOCK(self);
-      g_value_set_enum(value, static_cast<int>(self->flow));
-      GST_OBJECT_UNLOCK(self);
+      g_value_set_enum(value, static_cast<int>(self->flow.load()));
       break;
     case prop_interpolation:
-      GST_OBJECT_LOCK(self);
-      g_value_set_enum(value, static_cast<int>(self->interpolation));
-      GST_OBJECT_UNLOCK(self);
+      g_value_set_enum(value, static_cast<int>(self->interpolation.load()));
       break;
     default:
       gst_event_simulator_get_property(object, id, value, spec);

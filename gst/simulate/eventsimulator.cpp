@@ -5,6 +5,7 @@
 #include <gst/video/video.h>
 
 #include <exception>
+#include <mutex>
 #include <new>
 #include <optional>
 #include <utility>
@@ -77,7 +78,7 @@ PaletteName core_palette(GstEventCameraPalette palette) {
 }  // namespace
 
 struct GstEventSimulatorPrivate {
-  // Guarded by the object lock.
+  std::mutex mutex;  // guards what follows; nothing is called under it
   Settings settings;
   GstClockTime latency = 0;
 
@@ -97,7 +98,7 @@ G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventSimulator, gst_event_simulator, GST_TYP
 void gst_event_simulator_set_property(GObject* object, guint id, const GValue* value,
                                       GParamSpec* spec) {
   auto& settings = GST_EVENT_SIMULATOR(object)->priv->settings;
-  GST_OBJECT_LOCK(object);
+  const std::lock_guard lock(GST_EVENT_SIMULATOR(object)->priv->mutex);
   switch (id) {
     case prop_positive_threshold:
       settings.simulation.positive_threshold = g_value_get_double(value);
@@ -118,12 +119,11 @@ void gst_event_simulator_set_property(GObject* object, guint id, const GValue* v
       G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
       break;
   }
-  GST_OBJECT_UNLOCK(object);
 }
 
 void gst_event_simulator_get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
   const auto& settings = GST_EVENT_SIMULATOR(object)->priv->settings;
-  GST_OBJECT_LOCK(object);
+  const std::lock_guard lock(GST_EVENT_SIMULATOR(object)->priv->mutex);
   switch (id) {
     case prop_positive_threshold:
       g_value_set_double(value, settings.simulation.positive_threshold);
@@ -144,7 +144,11 @@ void gst_event_simulator_get_property(GObject* object, guint id, GValue* value, 
       G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
       break;
   }
-  GST_OBJECT_UNLOCK(object);
+}
+
+static Settings settings_of(GstEventSimulator* self) {
+  const std::lock_guard lock(self->priv->mutex);
+  return self->priv->settings;
 }
 
 static constexpr auto property_flags = static_cast<GParamFlags>(
@@ -182,24 +186,25 @@ void gst_event_simulator_class_install_interpolated_frames(GstEventSimulatorClas
 
 /* time */
 
+static GstClockTime latency_of(GstEventSimulator* self) {
+  const std::lock_guard lock(self->priv->mutex);
+  return self->priv->latency;
+}
+
 /// The latency is what the caps or the frames say; sinks are told when it changes.
 static void set_latency(GstEventSimulator* self, GstClockTime latency) {
-  GST_OBJECT_LOCK(self);
-  const bool changed = self->priv->latency != latency;
-  self->priv->latency = latency;
-  GST_OBJECT_UNLOCK(self);
-  if (!changed) return;
+  {
+    const std::lock_guard lock(self->priv->mutex);
+    if (std::exchange(self->priv->latency, latency) == latency) return;
+  }
   GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(latency));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
 static void learn_latency(GstEventSimulator* self, GstClockTime interval) {
   if (GST_VIDEO_INFO_FPS_N(&self->priv->state->video) > 0) return;
-  GST_OBJECT_LOCK(self);
-  const GstClockTime known = self->priv->latency;
-  GST_OBJECT_UNLOCK(self);
-  if (interval > known && known < longest_guessed_latency)
-    set_latency(self, MIN(interval, longest_guessed_latency));
+  const GstClockTime seen = MIN(interval, longest_guessed_latency);
+  if (seen > latency_of(self)) set_latency(self, seen);
 }
 
 /// Makes the next frame a first frame.
@@ -424,9 +429,7 @@ static void push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end
 /// Takes a frame and hands out the interval that it ends, if it ends one.
 static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffer** out) {
   auto& state = *self->priv->state;
-  GST_OBJECT_LOCK(self);
-  const Settings settings = self->priv->settings;
-  GST_OBJECT_UNLOCK(self);
+  const Settings settings = settings_of(self);
 
   if (!check_time(self, in)) return GST_FLOW_OK;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
@@ -573,9 +576,7 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   GstClockTime min = 0;
   GstClockTime max = 0;
   gst_query_parse_latency(query, &live, &min, &max);
-  GST_OBJECT_LOCK(transform);
-  const GstClockTime own = GST_EVENT_SIMULATOR(transform)->priv->latency;
-  GST_OBJECT_UNLOCK(transform);
+  const GstClockTime own = latency_of(GST_EVENT_SIMULATOR(transform));
   gst_query_set_latency(query, live, min + own,
                         GST_CLOCK_TIME_IS_VALID(max) ? max + own : GST_CLOCK_TIME_NONE);
   return TRUE;
@@ -586,9 +587,8 @@ static gboolean stop(GstBaseTransform* transform) {
   self->priv->state.reset();
   self->priv->warned_of_times = false;
   self->priv->backwards = false;
-  GST_OBJECT_LOCK(self);
+  const std::lock_guard lock(self->priv->mutex);
   self->priv->latency = 0;
-  GST_OBJECT_UNLOCK(self);
   return TRUE;
 }
 

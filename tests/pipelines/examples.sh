@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# The examples of pipelines/, as applications run them; both count the same events.
+set -eu
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+line="videotestsrc pattern=ball num-buffers=40 ! eventsim-diff ! appsink name=events sync=false"
+
+"$BUILD/pipelines/count_events" "$line" | tee "$work/c"
+counted=$(sed -n 's/^In all *\([0-9]*\) events.*/\1/p' "$work/c")
+[ "$counted" -gt 10000 ]
+
+if "$BUILD/pipelines/count_events" "filesrc location=/nowhere ! decodebin ! eventsim-diff ! appsink name=events"; then
+  echo "FAILED: a file that is not there was read"
+  exit 1
+fi
+
+if [ ! -f "$GI_TYPELIB_PATH/GstEventCamera-1.0.typelib" ]; then
+  echo "built without introspection: no Python"
+  exit 77
+fi
+"$PYTHON" "$SOURCE/pipelines/events_to_numpy.py" "$line" "$work/events.npy" | tee "$work/python"
+grep -q "^$counted events" "$work/python"
+"$PYTHON" - "$work/events.npy" <<'PYTHON'
+import sys
+import numpy as np
+events = np.load(sys.argv[1])
+assert (np.diff(events["t"]) >= 0).all(), "not sorted"
+assert events["x"].max() < 320 and events["y"].max() < 240, "beyond the sensor"
+assert 0.3 < events["p"].mean() < 0.7, "polarities are unequal"
+PYTHON

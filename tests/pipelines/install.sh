@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# What is installed is complete: the plugin, the library, its header, pkg-config file and GIR. The
+# C example is built against it as an application would be.
+set -eu
+root=$(mktemp -d)
+trap 'rm -rf "$root"' EXIT
+meson install -C "$BUILD" --no-rebuild --destdir "$root" --quiet
+(cd "$root" && find . -type f -o -type l | sort)
+
+library=$(dirname "$(find "$root" -name libgsteventcamera-1.0.so)")
+plugins=$library/gstreamer-1.0
+# Debian's GStreamer looks for plugins here, unless it is told to look elsewhere.
+[ "${plugins#"$root"}" = "$(pkg-config --variable=pluginsdir gstreamer-1.0)" ]
+
+# As if the root were /.
+sed -i "s#^prefix=.*#prefix=$root/usr#" "$library/pkgconfig/gsteventcamera-1.0.pc"
+export PKG_CONFIG_PATH=$library/pkgconfig
+# shellcheck disable=SC2046
+cc -Wall -Werror -o "$root/count_events" "$SOURCE/pipelines/count_events.c" \
+  $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
+
+export LD_LIBRARY_PATH=$library GST_PLUGIN_PATH=$plugins GST_REGISTRY=$root/registry.bin
+"$root/count_events" "videotestsrc num-buffers=5 pattern=ball ! eventsim-frame ! appsink name=events"

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Real pictures: every event of every element on two videos, and whether interpolation moves
+// things the right way. Skips what is not there.
+#include <gst/app/gstappsink.h>
+#include <gst/gst.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include "gst/eventcamera/eventcamera.h"
+#include "src/flow/dense_flow.hpp"
+#include "src/reference/dense.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+std::string variable(const char* name) {
+  const char* value = g_getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+std::string video(const std::string& name) {
+  return variable("SHARED_DATA") + "/video/" + name;
+}
+
+const std::string driving = "driving-1280x720-25fps.mp4";
+const std::string cars = "cars-768x432-12fps.mp4";
+
+/// Runs a pipeline and shows the first `count` samples of its appsink, called sink.
+template <class Visit>
+void for_each_sample(const std::string& launch, int count, const Visit& visit) {
+  gst_init(nullptr, nullptr);
+  GError* error = nullptr;
+  GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
+  ASSERT_EQ(error, nullptr) << error->message;
+  GstElement* sink = gst_bin_get_by_name(GST_BIN(pipeline), "sink");
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  for (int i = 0; i < count; ++i) {
+    GstSample* sample = gst_app_sink_pull_sample(GST_APP_SINK(sink));
+    if (sample == nullptr) break;
+    visit(sample);
+    gst_sample_unref(sample);
+  }
+  GstBus* bus = gst_element_get_bus(pipeline);
+  GstMessage* message = gst_bus_pop_filtered(
+      bus, static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_WARNING));
+  if (message != nullptr) {
+    gst_message_parse_warning(message, &error, nullptr);
+    ADD_FAILURE() << launch << ": " << error->message;
+    g_error_free(error);
+    gst_message_unref(message);
+  }
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(bus);
+  gst_object_unref(sink);
+  gst_object_unref(pipeline);
+}
+
+/// The first `count` frames, in grey, of a width and height.
+std::vector<Plane<std::uint8_t>> frames_of(const std::string& path, int count, int width,
+                                           int height) {
+  std::vector<Plane<std::uint8_t>> frames;
+  const std::string size = "width=" + std::to_string(width) + ",height=" + std::to_string(height);
+  for_each_sample("filesrc location=" + path + " ! decodebin ! videoconvert ! videoscale ! " +
+                      "video/x-raw,format=GRAY8,pixel-aspect-ratio=1/1," + size +
+                      " ! appsink name=sink sync=false max-buffers=4",
+                  count, [&](GstSample* sample) {
+                    GstMapInfo map;
+                    gst_buffer_map(gst_sample_get_buffer(sample), &map, GST_MAP_READ);
+                    frames.emplace_back(width, height);
+                    frames.back().assign({map.data, GST_ROUND_UP_4(width), width, height});
+                    gst_buffer_unmap(gst_sample_get_buffer(sample), &map);
+                  });
+  return frames;
+}
+
+/// The grey pictures of the hand-held sequence in Debian's package visp-images-data.
+std::vector<Plane<std::uint8_t>> castel_frames(int count) {
+  std::vector<Plane<std::uint8_t>> frames;
+  for (int i = 0; i < count; ++i) {
+    char name[32];
+    std::snprintf(name, sizeof name, "/image_%04d.pgm", i);
+    std::ifstream file(variable("CASTEL") + name, std::ios::binary);
+    std::string type;
+    int width = 0;
+    int height = 0;
+    int white = 0;
+    file >> type >> width >> height >> white;
+    file.get();
+    if (!file || type != "P5" || white != 255) return {};
+    frames.emplace_back(width, height);
+    for (int y = 0; y < height; ++y)
+      file.read(reinterpret_cast<char*>(frames.back().row(y)), width);
+  }
+  return frames;
+}
+
+double psnr(const Plane<std::uint8_t>& a, const Plane<std::uint8_t>& b) {
+  double sum = 0;
+  for (int y = 0; y < a.height(); ++y)
+    for (int x = 0; x < a.width(); ++x) sum += std::pow(a.at(x, y) - b.at(x, y), 2);
+  return 10 * std::log10(255.0 * 255.0 * a.width() * a.height() / sum);
+}
+
+constexpr FlowMethod flows[] = {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback};
+constexpr Interpolation interpolations[] = {Interpolation::forward, Interpolation::blend};
+
+/// The warp of I(i-1) with all of its flow.
+Plane<std::uint8_t> warped(const Plane<std::uint8_t>& last, const PlaneView<Flow>& flow) {
+  Plane<std::uint8_t> result(last.width(), last.height());
+  for (int y = 0; y < last.height(); ++y)
+    for (int x = 0; x < last.width(); ++x)
+      result.at(x, y) = static_cast<std::uint8_t>(
+          reference::bilinear(last, x - flow.row(y)[x].x, y - flow.row(y)[x].y) + 0.5);
+  return result;
+}
+
+TEST(Dense, WarpsTheRightWayRound) {
+  if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
+  const auto frames = frames_of(video(driving), 38, 1280, 720);
+  ASSERT_GE(frames.size(), 37U);
+  for (const auto method : flows) {
+    const auto finder = make_dense_flow(method, 1280, 720);
+    double with_warp = 0;
+    double without = 0;
+    int pairs = 0;
+    for (std::size_t i = 1; i < frames.size(); i += 4, ++pairs) {
+      const auto flow = finder->find(frames[i - 1].view(), frames[i].view(), 0);
+      const double moved = psnr(warped(frames[i - 1], flow), frames[i]);
+      const double unmoved = psnr(frames[i - 1], frames[i]);
+      EXPECT_GT(moved, unmoved) << "flow " << static_cast<int>(method) << ", pair " << i;
+      with_warp += moved;
+      without += unmoved;
+    }
+    std::printf("driving, flow %d: warp %.2f dB, none %.2f dB\n", static_cast<int>(method),
+                with_warp / pairs, without / pairs);
+  }
+}
+
+struct Agreement {
+  double pixels = 0;  ///< that differ by more than 10 grey levels
+  double fired = 0;   ///< of these, those whose polarities do not add up to 0
+  double right = 0;   ///< of these, those whose sum has the sign of the difference
+};
+
+void add_agreement(const Plane<std::uint8_t>& last, const Plane<std::uint8_t>& now,
+                   const std::vector<Event>& events, Agreement& agreement) {
+  Plane<int> sum(now.width(), now.height());
+  for (const auto& e : events) sum.at(e.x, e.y()) += e.polarity() == Polarity::on ? 1 : -1;
+  for (int y = 0; y < now.height(); ++y) {
+    for (int x = 0; x < now.width(); ++x) {
+      const int difference = now.at(x, y) - last.at(x, y);
+      if (std::abs(difference) <= 10) continue;
+      ++agreement.pixels;
+      agreement.fired += sum.at(x, y) != 0;
+      agreement.right += sum.at(x, y) * difference > 0;
+    }
+  }
+}
+
+/// How often the polarities of a pixel's events add up to the sign of its change, at the default
+/// settings.
+Agreement agreement_of(const std::vector<Plane<std::uint8_t>>& frames, FlowMethod method,
+                       Interpolation interpolation) {
+  const int width = frames.front().width();
+  const int height = frames.front().height();
+  const auto simulator = make_dense_simulator({width, height, 8});
+  simulator->set_flow(method);
+  simulator->set_interpolation(interpolation);
+  Settings settings;
+  settings.positive_threshold = settings.negative_threshold = 2;
+  Agreement agreement;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const LumaView luma{{width, height, 8}, frames[i].row(0), frames[i].stride()};
+    const auto* made = simulator->push(luma, static_cast<Nanoseconds>(i) * 40'000'000, settings);
+    if (made == nullptr) continue;
+    std::vector<Event> events(made->size());
+    made->copy_to(events.data());
+    add_agreement(frames[i - 1], frames[i], events, agreement);
+  }
+  return agreement;
+}
+
+void expect_agreement(const char* name, const std::vector<Plane<std::uint8_t>>& frames,
+                      double forward, double blend) {
+  for (const auto method : flows) {
+    for (const auto interpolation : interpolations) {
+      const auto agreement = agreement_of(frames, method, interpolation);
+      const double share = agreement.right / agreement.fired;
+      std::printf(
+          "%s, flow %d, interpolation %d: of %.0f pixels %.1f %% fired one way, %.2f %% "
+          "of them the right one\n",
+          name, static_cast<int>(method), static_cast<int>(interpolation), agreement.pixels,
+          100 * agreement.fired / agreement.pixels, 100 * share);
+      EXPECT_GE(share, interpolation == Interpolation::forward ? forward : blend);
+    }
+  }
+}
+
+TEST(Dense, FiresThePolarityOfTheChange) {
+  const auto frames = castel_frames(10);
+  if (frames.empty()) GTEST_SKIP() << "no pictures in " << variable("CASTEL");
+  expect_agreement("castel", frames, 0.95, 0.95);
+}
+
+/// Here things move 20 pixels and more a frame: a pixel sees several of them pass within one
+/// interval, and its polarities, which do not weigh the changes, need not add up to their sum.
+TEST(Dense, FiresThePolarityOfTheChangeWhereMuchPassesBy) {
+  if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
+  expect_agreement("driving", frames_of(video(driving), 9, 1280, 720), 0.83, 0.86);
+}
+
+struct Case {
+  std::string element;
+  std::string name;
+  int intervals;
+};
+
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.element << " on " << c.name;
+}
+
+class EveryElement : public testing::TestWithParam<Case> {};
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const char* element :
+       {"eventsim-frame", "eventsim-dense", "eventsim-sparse", "eventsim-diff"}) {
+    all.push_back({element, driving, 9});
+    all.push_back({element, cars, 99});
+  }
+  return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(cases()));
+
+/// Order, bounds, interval and polarity of every event.
+TEST_P(EveryElement, MakesSoundEventsOfRealVideo) {
+  const auto path = video(GetParam().name);
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
+  GstClockTime end = 0;
+  double events = 0;
+  double on = 0;
+  double fast = 0;
+  int buffers = 0;
+  for_each_sample(
+      "filesrc location=" + path + " ! decodebin ! " + GetParam().element +
+          " ! application/x-event-camera ! appsink name=sink sync=false max-buffers=4",
+      GetParam().intervals, [&](GstSample* sample) {
+        GstEventCameraInfo info;
+        ASSERT_TRUE(gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample)));
+        GstBuffer* buffer = gst_sample_get_buffer(sample);
+        ASSERT_GE(GST_BUFFER_PTS(buffer), end);
+        end = GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer);
+        GstEventCameraMap map;
+        ASSERT_TRUE(gst_event_camera_map(&map, buffer));
+        for (gsize i = 0; i < map.n_events; ++i) {
+          const auto& e = map.events[i];
+          ASSERT_LT(e.x, info.width);
+          ASSERT_LT(gst_event_camera_event_get_y(&e), static_cast<guint>(info.height));
+          ASSERT_LE(e.t, GST_BUFFER_DURATION(buffer) / 1000);
+          on += gst_event_camera_event_is_on(&e);
+          if (i == 0) continue;
+          const auto& last = map.events[i - 1];
+          ASSERT_LT(std::tuple(last.t, gst_event_camera_event_get_y(&last), last.x),
+                    std::tuple(e.t, gst_event_camera_event_get_y(&e), e.x));
+        }
+        events += static_cast<double>(map.n_events);
+        fast = std::max(fast, static_cast<double>(map.n_events));
+        ++buffers;
+        gst_event_camera_unmap(&map);
+      });
+  std::printf("%s on %s: %.0f events an interval, at most %.0f, %.1f %% ON\n",
+              GetParam().element.c_str(), GetParam().name.c_str(), events / buffers, fast,
+              100 * on / events);
+  EXPECT_EQ(buffers, GetParam().intervals);
+  EXPECT_GT(on / events, 0.2);
+  EXPECT_LT(on / events, 0.8);
+}
+
+}  // namespace
