@@ -10,19 +10,20 @@
 #include <gst/app/gstappsink.h>
 #include <gst/eventcamera/eventcamera.h>
 #include <signal.h>
+#include <unistd.h>
 
 typedef struct {
   guint64 events;
   guint64 on;
 } Count;
 
-static void print(const char *what, const Count *count, gdouble seconds) {
+static void print(const char* what, const Count* count, gdouble seconds) {
   g_print("%s %9" G_GUINT64_FORMAT " events, %.2f million a second, %2.0f %% ON\n", what,
           count->events, seconds > 0 ? (gdouble)count->events / seconds / 1e6 : 0.0,
           count->events > 0 ? 100.0 * (gdouble)count->on / (gdouble)count->events : 0.0);
 }
 
-static void count_buffer(Count *count, GstBuffer *buffer) {
+static void count_buffer(Count* count, GstBuffer* buffer) {
   GstEventCameraMap map;
   if (!gst_event_camera_map(&map, buffer)) return;
   /* map.events is an array; the time of an event in microseconds is map.start + t. */
@@ -33,9 +34,9 @@ static void count_buffer(Count *count, GstBuffer *buffer) {
 }
 
 /* Prints the error that ended the pipeline, if one did. */
-static gboolean failed(GstBus *bus) {
-  GstMessage *message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
-  GError *error = NULL;
+static gboolean failed(GstBus* bus) {
+  GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
+  GError* error = NULL;
   if (message == NULL) return FALSE;
   gst_message_parse_error(message, &error, NULL);
   g_printerr("%s: %s\n", GST_OBJECT_NAME(GST_MESSAGE_SRC(message)), error->message);
@@ -45,7 +46,7 @@ static gboolean failed(GstBus *bus) {
 }
 
 /* Counts until the stream ends, printing a line for each second of it. */
-static gboolean count_stream(GstAppSink *sink, GstBus *bus) {
+static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
   Count all = {0, 0};
   Count second = {0, 0};
   GstClockTime start = GST_CLOCK_TIME_NONE;
@@ -53,8 +54,8 @@ static gboolean count_stream(GstAppSink *sink, GstBus *bus) {
   GstClockTime end = 0;
 
   while (!gst_app_sink_is_eos(sink)) {
-    GstSample *sample = gst_app_sink_try_pull_sample(sink, GST_SECOND / 10);
-    GstBuffer *buffer;
+    GstSample* sample = gst_app_sink_try_pull_sample(sink, GST_SECOND / 10);
+    GstBuffer* buffer;
     if (sample == NULL) {
       if (failed(bus)) return FALSE;
       continue;
@@ -83,20 +84,23 @@ static gboolean count_stream(GstAppSink *sink, GstBus *bus) {
   return !failed(bus);
 }
 
-static GstElement *pipeline;
+static GstElement* pipeline;
 
 /* Ctrl-C ends the stream, so that files are finished. */
 static gpointer wait_for_interrupt(gpointer signals) {
   int caught;
-  if (sigwait(signals, &caught) == 0) gst_element_send_event(pipeline, gst_event_new_eos());
+  if (sigwait(signals, &caught) != 0) return NULL;
+  gst_element_send_event(pipeline, gst_event_new_eos());
+  pthread_sigmask(SIG_UNBLOCK, signals, NULL); /* a second one ends the program */
+  pause();
   return NULL;
 }
 
-int main(int argc, char **argv) {
+int main(int argc, char** argv) {
   static sigset_t signals;
-  GError *error = NULL;
-  GstElement *sink;
-  GstBus *bus;
+  GError* error = NULL;
+  GstElement* sink;
+  GstBus* bus;
   gboolean ok;
 
   sigemptyset(&signals);
@@ -120,6 +124,7 @@ int main(int argc, char **argv) {
     gst_object_unref(pipeline);
     return 2;
   }
+  gst_object_ref(pipeline); /* the thread's, until the program ends */
   g_thread_unref(g_thread_new("interrupt", wait_for_interrupt, &signals));
   gst_element_set_state(pipeline, GST_STATE_PLAYING);
   bus = gst_element_get_bus(pipeline);

@@ -40,7 +40,8 @@ gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps
   g_return_val_if_fail(gst_caps_is_fixed(caps), FALSE);
 
   const GstStructure* structure = gst_caps_get_structure(caps, 0);
-  GstEventCameraInfo found = {0, 0, 0, 1};
+  GstEventCameraInfo found = {};
+  found.fps_d = 1;
   if (!gst_structure_has_name(structure, GST_EVENT_CAMERA_MEDIA_TYPE) ||
       g_strcmp0(gst_structure_get_string(structure, "format"), "XYTP") != 0 ||
       !gst_structure_get_int(structure, "width", &found.width) ||
@@ -72,6 +73,15 @@ gboolean gst_event_camera_map(GstEventCameraMap* map, GstBuffer* buffer) {
   *map = {};
   if (!gst_buffer_map(buffer, &map->map, GST_MAP_READ)) return FALSE;
   map->buffer = gst_buffer_ref(buffer);
+  if (GPOINTER_TO_SIZE(map->map.data) % alignof(GstEventCameraEvent) != 0) {
+    gst_buffer_unmap(map->buffer, &map->map);
+    gst_buffer_unref(map->buffer);
+    map->buffer = gst_buffer_copy_deep(buffer);
+    if (!gst_buffer_map(map->buffer, &map->map, GST_MAP_READ)) {
+      gst_clear_buffer(&map->buffer);
+      return FALSE;
+    }
+  }
   map->events = reinterpret_cast<const GstEventCameraEvent*>(map->map.data);
   map->n_events = map->map.size / sizeof(GstEventCameraEvent);
   map->start = GST_BUFFER_PTS(buffer) / GST_USECOND;

@@ -70,7 +70,7 @@ struct _GstEventCameraEvent {
  *
  * Returns: the row, from the top
  */
-static inline guint gst_event_camera_event_get_y(const GstEventCameraEvent *event) {
+static inline guint gst_event_camera_event_get_y(const GstEventCameraEvent* event) {
   return event->y_p & 0x7fffu;
 }
 
@@ -80,7 +80,7 @@ static inline guint gst_event_camera_event_get_y(const GstEventCameraEvent *even
  *
  * Returns: %TRUE for ON (brighter), %FALSE for OFF (darker)
  */
-static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent *event) {
+static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent* event) {
   return (event->y_p & 0x8000u) != 0;
 }
 
@@ -123,6 +123,9 @@ struct _GstEventCameraInfo {
   gint height;
   gint fps_n;
   gint fps_d;
+
+  /*< private >*/
+  gpointer _gst_reserved[GST_PADDING];
 };
 
 /**
@@ -135,7 +138,7 @@ struct _GstEventCameraInfo {
  * Returns: %FALSE where @caps are anything else; @info is then left alone
  */
 GST_EVENT_CAMERA_API
-gboolean gst_event_camera_info_from_caps(GstEventCameraInfo *info, const GstCaps *caps);
+gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps* caps);
 
 /**
  * gst_event_camera_info_to_caps:
@@ -144,7 +147,7 @@ gboolean gst_event_camera_info_from_caps(GstEventCameraInfo *info, const GstCaps
  * Returns: (transfer full): the caps of an event stream of format XYTP
  */
 GST_EVENT_CAMERA_API
-GstCaps *gst_event_camera_info_to_caps(const GstEventCameraInfo *info);
+GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info);
 
 /**
  * GstEventCameraMap:
@@ -155,12 +158,12 @@ GstCaps *gst_event_camera_info_to_caps(const GstEventCameraInfo *info);
  * The events of a mapped buffer.
  */
 struct _GstEventCameraMap {
-  const GstEventCameraEvent *events;
+  const GstEventCameraEvent* events;
   gsize n_events;
   guint64 start;
 
   /*< private >*/
-  GstBuffer *buffer;
+  GstBuffer* buffer;
   GstMapInfo map;
   gpointer _gst_reserved[GST_PADDING];
 };
@@ -170,14 +173,15 @@ struct _GstEventCameraMap {
  * @map: (out caller-allocates): is filled in; gst_event_camera_unmap() it when done
  * @buffer: a buffer of an event stream of format XYTP, with a PTS
  *
- * Maps a buffer for reading its events. Nothing is copied where the buffer is one memory. Events
+ * Maps a buffer for reading its events. Nothing is copied where the buffer is one memory at
+ * an address that is a multiple of 4. Events
  * are not looked at: whoever uses x and y as indices checks them against the caps.
  *
  * Returns: %FALSE where @buffer cannot be mapped, has no PTS, or is no whole number of events;
  *     @map is then not to be unmapped
  */
 GST_EVENT_CAMERA_API
-gboolean gst_event_camera_map(GstEventCameraMap *map, GstBuffer *buffer);
+gboolean gst_event_camera_map(GstEventCameraMap* map, GstBuffer* buffer);
 
 /**
  * gst_event_camera_unmap:
@@ -186,6 +190,6 @@ gboolean gst_event_camera_map(GstEventCameraMap *map, GstBuffer *buffer);
  * Gives the buffer free again. The events may not be read any more.
  */
 GST_EVENT_CAMERA_API
-void gst_event_camera_unmap(GstEventCameraMap *map);
+void gst_event_camera_unmap(GstEventCameraMap* map);
 
 G_END_DECLS

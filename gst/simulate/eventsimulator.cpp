@@ -42,8 +42,8 @@ enum Property {
 constexpr guint max_interpolated_frames = 255;
 constexpr guint default_interpolated_frames = 10;
 
-/// Where the framerate is unknown, the latency is the longest interval seen, up to this.
-constexpr GstClockTime longest_guessed_latency = GST_SECOND;
+/// The latency is that of the framerate, or the longest interval seen, up to this.
+constexpr GstClockTime longest_latency = GST_SECOND;
 
 /// What the application sets, copied once per buffer.
 struct Settings {
@@ -84,7 +84,9 @@ struct GstEventSimulatorPrivate {
 
   // The streaming thread's, or nobody's while there is none.
   std::optional<State> state;
+  std::optional<Nanoseconds> handed_out_until;  // where the last interval of the segment ended
   bool warned_of_times = false;
+  bool warned_of_interlacing = false;
   bool backwards = false;  // the segment is one that was refused
 };
 
@@ -191,7 +193,7 @@ static GstClockTime latency_of(GstEventSimulator* self) {
   return self->priv->latency;
 }
 
-/// The latency is what the caps or the frames say; sinks are told when it changes.
+/// Sinks are told when it changes.
 static void set_latency(GstEventSimulator* self, GstClockTime latency) {
   {
     const std::lock_guard lock(self->priv->mutex);
@@ -201,9 +203,9 @@ static void set_latency(GstEventSimulator* self, GstClockTime latency) {
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
+/// Frames come as they come, whatever the caps say.
 static void learn_latency(GstEventSimulator* self, GstClockTime interval) {
-  if (GST_VIDEO_INFO_FPS_N(&self->priv->state->video) > 0) return;
-  const GstClockTime seen = MIN(interval, longest_guessed_latency);
+  const GstClockTime seen = MIN(interval, longest_latency);
   if (seen > latency_of(self)) set_latency(self, seen);
 }
 
@@ -213,6 +215,12 @@ static void forget_frames(GstEventSimulator* self) {
   if (!state || !state->simulator->last_time()) return;
   state->simulator->reset();
   state->discontinuous = true;
+}
+
+/// Where time begins anew, so do intervals.
+static void begin_anew(GstEventSimulator* self) {
+  forget_frames(self);
+  self->priv->handed_out_until.reset();
 }
 
 /// Bad times come in droves: the first is reported to the application, all to the log.
@@ -227,26 +235,26 @@ static void warn_of_times(GstEventSimulator* self, const char* what) {
                        "this element can repair them."));
 }
 
-/// Whether a frame with this PTS can become the last frame, and readies the simulator for it.
+/// Whether a frame with this PTS can be taken, and readies the simulator for it.
 static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
-  if (GST_BUFFER_IS_DISCONT(buffer)) forget_frames(self);
+  if (GST_BUFFER_IS_DISCONT(buffer)) begin_anew(self);
   if (!GST_CLOCK_TIME_IS_VALID(pts) || pts > G_MAXINT64) {
     warn_of_times(self, "a frame has no PTS");
     forget_frames(self);
     return false;
   }
-  const auto last = self->priv->state->simulator->last_time();
-  if (!last) return true;
   const auto time = static_cast<Nanoseconds>(pts);
-  if (time <= *last) {
+  const auto last = self->priv->state->simulator->last_time();
+  if (last && time <= *last) {
     warn_of_times(self, "a frame is not later than the one before");
     forget_frames(self);
-  } else if (time - *last > eventcamera::longest_interval) {
+  } else if (last && time - *last > eventcamera::longest_interval) {
     warn_of_times(self, "two frames lie more than 71 minutes apart");
     forget_frames(self);
   }
-  return true;
+  // An interval that begins with this frame would overlap the last one.
+  return !(self->priv->handed_out_until && time < *self->priv->handed_out_until);
 }
 
 /* negotiation */
@@ -267,35 +275,49 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCap
   return event_simulator_fixate_output(other);
 }
 
+/// Whether output caps are those of accumulated-event video, and not of events.
+static bool draws(GstCaps* out) {
+  return !gst_structure_has_name(gst_caps_get_structure(out, 0), GST_EVENT_CAMERA_MEDIA_TYPE);
+}
+
+/// Fields of two moments in one frame: reported once.
+static void warn_of_interlacing(GstEventSimulator* self, GstBuffer* frame) {
+  const auto mode = GST_VIDEO_INFO_INTERLACE_MODE(&self->priv->state->video);
+  if (mode == GST_VIDEO_INTERLACE_MODE_PROGRESSIVE ||
+      (mode == GST_VIDEO_INTERLACE_MODE_MIXED &&
+       !GST_BUFFER_FLAG_IS_SET(frame, GST_VIDEO_BUFFER_FLAG_INTERLACED)) ||
+      std::exchange(self->priv->warned_of_interlacing, true))
+    return;
+  GST_ELEMENT_WARNING(self, STREAM, FORMAT,
+                      ("The video is interlaced: every moving edge will fire line by line. Put a "
+                       "deinterlace element in front."),
+                      (nullptr));
+}
+
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   auto& state = self->priv->state;
   GstVideoInfo video;
   GstVideoInfo drawn;
-  const bool draws =
-      !gst_structure_has_name(gst_caps_get_structure(out, 0), GST_EVENT_CAMERA_MEDIA_TYPE);
-  if (!gst_video_info_from_caps(&video, in) || (draws && !gst_video_info_from_caps(&drawn, out))) {
+  if (!gst_video_info_from_caps(&video, in) ||
+      (draws(out) && !gst_video_info_from_caps(&drawn, out))) {
     GST_ERROR_OBJECT(self, "cannot make %" GST_PTR_FORMAT " of %" GST_PTR_FORMAT, out, in);
     return FALSE;
   }
-  if (GST_VIDEO_INFO_INTERLACE_MODE(&video) != GST_VIDEO_INTERLACE_MODE_PROGRESSIVE)
-    GST_ELEMENT_WARNING(self, STREAM, FORMAT,
-                        ("The video is interlaced: every moving edge will fire line by line. Put "
-                         "a deinterlace element in front."),
-                        (nullptr));
-
   const auto luma = luma_format_of(video);
   try {
     if (!state || luma_format_of(state->video) != luma) {
+      const bool follows = state && (state->discontinuous || state->simulator->last_time());
       state.reset();  // before the next is made: frames can be large
       state.emplace(State{.video = video,
                           .drawn = std::nullopt,
                           .simulator = GST_EVENT_SIMULATOR_GET_CLASS(self)->create(self, luma),
                           .accumulator = Accumulator(luma.width, luma.height),
-                          .gathered = {}});
+                          .gathered = {},
+                          .discontinuous = follows});
     }
     state->video = video;
-    state->drawn = draws ? std::optional(drawn) : std::nullopt;
+    state->drawn = draws(out) ? std::optional(drawn) : std::nullopt;
     state->gathered =
         has_packed_luma(video) ? Plane<guint8>(luma.width, luma.height) : Plane<guint8>();
   } catch (const std::exception& error) {
@@ -311,6 +333,19 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   return TRUE;
 }
 
+/// Whether there is a state to work with. An error drops it whole, while the pads keep their caps:
+/// where the application goes on all the same, these make a new one.
+static bool is_ready(GstEventSimulator* self) {
+  if (self->priv->state) return true;
+  auto* transform = GST_BASE_TRANSFORM(self);
+  GstCaps* in = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SINK_PAD(transform));
+  GstCaps* out = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform));
+  const bool ready = in != nullptr && out != nullptr && set_caps(transform, in, out);
+  gst_clear_caps(&in);
+  gst_clear_caps(&out);
+  return ready;
+}
+
 /* memory */
 
 static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide, GstQuery* query) {
@@ -320,13 +355,15 @@ static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide
 
 /// Pictures come from downstream's pool, or one of ours; events are of any size and come from none.
 static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) {
-  auto* self = GST_EVENT_SIMULATOR(transform);
-  while (!self->priv->state->drawn && gst_query_get_n_allocation_pools(query) > 0)
-    gst_query_remove_nth_allocation_pool(query, 0);
-  if (!self->priv->state->drawn) return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
-
   GstCaps* caps = nullptr;
+  GstVideoInfo drawn;
   gst_query_parse_allocation(query, &caps, nullptr);
+  if (!draws(caps)) {
+    while (gst_query_get_n_allocation_pools(query) > 0)
+      gst_query_remove_nth_allocation_pool(query, 0);
+    return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
+  }
+  if (!gst_video_info_from_caps(&drawn, caps)) return FALSE;
   GstBufferPool* pool = nullptr;
   guint size = 0;
   guint min = 0;
@@ -334,7 +371,7 @@ static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) 
   const bool offered = gst_query_get_n_allocation_pools(query) > 0;
   if (offered) gst_query_parse_nth_allocation_pool(query, 0, &pool, &size, &min, &max);
   if (pool == nullptr) pool = gst_video_buffer_pool_new();
-  size = MAX(size, static_cast<guint>(GST_VIDEO_INFO_SIZE(&*self->priv->state->drawn)));
+  size = MAX(size, static_cast<guint>(GST_VIDEO_INFO_SIZE(&drawn)));
 
   GstStructure* config = gst_buffer_pool_get_config(pool);
   gst_buffer_pool_config_set_params(config, caps, size, min, max);
@@ -349,11 +386,17 @@ static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) 
   return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
 }
 
-static gboolean transform_size(GstBaseTransform* transform, GstPadDirection direction, GstCaps*,
-                               gsize, GstCaps*, gsize* other_size) {
-  const auto& drawn = GST_EVENT_SIMULATOR(transform)->priv->state->drawn;
-  if (direction != GST_PAD_SINK || !drawn) return FALSE;
-  *other_size = GST_VIDEO_INFO_SIZE(&*drawn);
+static gboolean transform_size(GstBaseTransform*, GstPadDirection direction, GstCaps*, gsize,
+                               GstCaps* other, gsize* other_size) {
+  GstVideoInfo drawn;
+  if (direction != GST_PAD_SINK || !draws(other) || !gst_video_info_from_caps(&drawn, other))
+    return FALSE;
+  *other_size = GST_VIDEO_INFO_SIZE(&drawn);
+  return TRUE;
+}
+
+/// The picture of an interval has nothing of the frame that ends it.
+static gboolean copy_no_metadata(GstBaseTransform*, GstBuffer*, GstBuffer*) {
   return TRUE;
 }
 
@@ -363,7 +406,7 @@ static gboolean transform_size(GstBaseTransform* transform, GstPadDirection dire
 static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& frame,
                                     Nanoseconds time, const Settings& settings) {
   auto& state = *self->priv->state;
-  LumaView luma{luma_format_of(state.video), frame.component(0), frame.stride(0)};
+  LumaView luma{luma_format_of(state.video), frame.first_component(), frame.stride()};
   if (has_packed_luma(state.video)) {
     eventcamera::unpack_luma(static_cast<const guint8*>(luma.data), luma.stride, state.gathered);
     luma.data = state.gathered.row(0);
@@ -379,21 +422,15 @@ static GstFlowReturn refuse_buffer(GstEventSimulator* self, const char* what) {
   return GST_FLOW_ERROR;
 }
 
-/// A buffer of the interval's events; none where there are no events.
-static GstFlowReturn write_events(GstEventSimulator* self, const EventBuckets& events,
-                                  GstBuffer** out) {
+/// A buffer of the interval's events; none where there are no events. May throw.
+static GstBuffer* write_events(const EventBuckets& events) {
   const gsize size = events.size() * sizeof(eventcamera::Event);
-  if (size == 0) return GST_FLOW_OK;
-  GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
-  GstMapInfo map;
-  if (buffer == nullptr || !gst_buffer_map(buffer, &map, GST_MAP_WRITE)) {
-    gst_clear_buffer(&buffer);
-    return refuse_buffer(self, "allocated for the events");
-  }
-  events.copy_to(reinterpret_cast<eventcamera::Event*>(map.data));
-  gst_buffer_unmap(buffer, &map);
-  *out = buffer;
-  return GST_FLOW_OK;
+  if (size == 0) return nullptr;
+  // GStreamer's own allocation would end the process where memory is short.
+  auto* memory = static_cast<eventcamera::Event*>(g_try_malloc(size));
+  if (memory == nullptr) throw std::bad_alloc();
+  events.copy_to(memory);
+  return gst_buffer_new_wrapped(memory, size);
 }
 
 /// A picture of the interval's events.
@@ -404,7 +441,6 @@ static GstFlowReturn draw_events(GstEventSimulator* self, const EventBuckets& ev
   const GstFlowReturn result =
       PARENT_TRANSFORM_CLASS->prepare_output_buffer(GST_BASE_TRANSFORM(self), in, &buffer);
   if (result != GST_FLOW_OK) return result;
-  GST_BUFFER_FLAG_UNSET(buffer, GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
   {
     const VideoFrame picture(*state.drawn, buffer, GST_MAP_WRITE);
     if (!picture) {
@@ -413,17 +449,20 @@ static GstFlowReturn draw_events(GstEventSimulator* self, const EventBuckets& ev
     }
     for (const auto& bucket : events.buckets()) state.accumulator.add(bucket);
     state.accumulator.draw(eventcamera::palette(core_palette(palette)),
-                           pixel_layout_of(*state.drawn), static_cast<std::byte*>(picture.plane(0)),
-                           picture.stride(0));
+                           pixel_layout_of(*state.drawn), picture.data(), picture.stride());
   }
   *out = buffer;
   return GST_FLOW_OK;
 }
 
-static void push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
-  gst_pad_push_event(
-      GST_BASE_TRANSFORM_SRC_PAD(self),
-      gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start)));
+/// Says downstream that nothing happens in an interval.
+static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
+                              guint32 seqnum) {
+  GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(self);
+  GstEvent* gap =
+      gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start));
+  if (seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(gap, seqnum);
+  return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
 }
 
 /// Takes a frame and hands out the interval that it ends, if it ends one.
@@ -431,6 +470,7 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   auto& state = *self->priv->state;
   const Settings settings = settings_of(self);
 
+  warn_of_interlacing(self, in);
   if (!check_time(self, in)) return GST_FLOW_OK;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
   const auto start = state.simulator->last_time();
@@ -445,12 +485,13 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
                  events->size(), GST_TIME_ARGS(static_cast<GstClockTime>(*start)),
                  GST_TIME_ARGS(static_cast<GstClockTime>(end)));
 
-  const GstFlowReturn result = state.drawn ? draw_events(self, *events, settings.palette, in, out)
-                                           : write_events(self, *events, out);
-  if (result != GST_FLOW_OK) return result;
-  if (*out == nullptr) {
-    push_gap(self, *start, end);
-    return GST_FLOW_OK;
+  self->priv->handed_out_until = end;
+  if (state.drawn) {
+    const GstFlowReturn result = draw_events(self, *events, settings.palette, in, out);
+    if (result != GST_FLOW_OK) return result;
+  } else {
+    *out = write_events(*events);
+    if (*out == nullptr) return push_gap(self, *start, end, GST_SEQNUM_INVALID);
   }
   GST_BUFFER_PTS(*out) = static_cast<GstClockTime>(*start);
   GST_BUFFER_DTS(*out) = GST_CLOCK_TIME_NONE;
@@ -465,19 +506,19 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   GstBuffer* in = std::exchange(transform->queued_buf, nullptr);
   if (in == nullptr) return GST_FLOW_OK;
   GstFlowReturn result = GST_FLOW_ERROR;
-  if (self->priv->backwards) {
-    GST_DEBUG_OBJECT(self, "dropping a frame of a segment that was refused");
-  } else if (!self->priv->state) {
+  if (!is_ready(self)) {
     result = GST_FLOW_NOT_NEGOTIATED;
   } else {
     try {
       result = take_frame(self, in, out);
     } catch (const std::bad_alloc&) {
+      self->priv->state.reset();
       GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
                         ("There is not enough memory for the events of a frame. Raise the "
                          "thresholds, or lower interpolated-frames."),
                         (nullptr));
     } catch (const std::exception& error) {
+      self->priv->state.reset();
       GST_ELEMENT_ERROR(self, STREAM, FAILED, ("The simulation failed."), ("%s", error.what()));
     }
   }
@@ -496,33 +537,37 @@ static GstFlowReturn transform_not_in_place(GstBaseTransform*, GstBuffer*, GstBu
 static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
-  self->priv->backwards = segment->rate < 0;
-  if (self->priv->backwards) {
+  if (segment->rate < 0) {
+    if (std::exchange(self->priv->backwards, true)) return false;  // sent again, and still refused
     GST_ELEMENT_ERROR(self, STREAM, FAILED, ("Events cannot be simulated backwards."),
                       ("The segment has rate %g; play with a positive rate.", segment->rate));
     return false;
   }
+  self->priv->backwards = false;
   const GstSegment& current = GST_BASE_TRANSFORM(self)->segment;
   if (current.format != segment->format || current.rate != segment->rate ||
       current.base != segment->base || current.start != segment->start ||
       current.time != segment->time)
-    forget_frames(self);
+    begin_anew(self);
   return true;
 }
 
-/// Upstream has no frames for a while: the last one stands until then. Tells whether the event is
-/// to be sent on.
+/// Upstream has no frames for a while: the last one stands until a frame's length before the end of
+/// it, where the next interval can begin. Tells whether the event is to be sent on.
 static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   GstClockTime pts = GST_CLOCK_TIME_NONE;
-  gst_event_parse_gap(event, &pts, nullptr);
+  GstClockTime duration = GST_CLOCK_TIME_NONE;
+  gst_event_parse_gap(event, &pts, &duration);
   auto& state = self->priv->state;
   const auto start = state ? state->simulator->last_time() : std::nullopt;
   if (!start) return true;
-  if (pts <= G_MAXINT64 && static_cast<Nanoseconds>(pts) > *start) {
-    const auto end = static_cast<Nanoseconds>(pts);
-    state->simulator->hold_until(end);
-    push_gap(self, *start, end);
-  }
+  if (GST_CLOCK_TIME_IS_VALID(duration) && duration > latency_of(self))
+    pts += duration - latency_of(self);
+  if (pts > G_MAXINT64 || static_cast<Nanoseconds>(pts) <= *start) return false;
+  const auto end = static_cast<Nanoseconds>(pts);
+  state->simulator->hold_until(end);
+  self->priv->handed_out_until = end;
+  push_gap(self, *start, end, gst_event_get_seqnum(event));
   return false;
 }
 
@@ -543,7 +588,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       break;
     case GST_EVENT_STREAM_START:
     case GST_EVENT_FLUSH_STOP:
-      forget_frames(self);
+      begin_anew(self);
       break;
     default:
       break;
@@ -552,6 +597,11 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 }
 
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
+    // Upstream would leave frames out, and the events would hang on how busy the machine is.
+    gst_event_unref(event);
+    return TRUE;
+  }
   if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
     gdouble rate = 1;
     gst_event_parse_seek(event, &rate, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
@@ -585,7 +635,9 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
 static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   self->priv->state.reset();
+  self->priv->handed_out_until.reset();
   self->priv->warned_of_times = false;
+  self->priv->warned_of_interlacing = false;
   self->priv->backwards = false;
   const std::lock_guard lock(self->priv->mutex);
   self->priv->latency = 0;
@@ -646,6 +698,7 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->propose_allocation = propose_allocation;
   transform_class->decide_allocation = decide_allocation;
   transform_class->transform_size = transform_size;
+  transform_class->copy_metadata = copy_no_metadata;
   transform_class->transform = transform_not_in_place;
   transform_class->generate_output = generate_output;
   transform_class->sink_event = sink_event;

@@ -40,6 +40,8 @@ GstCaps* event_simulator_output_caps(const GstCaps* video) {
     const GstStructure* in = gst_caps_get_structure(video, i);
     GstStructure* pictures =
         with_fields_of(in, "video/x-raw", {"width", "height", "framerate", "pixel-aspect-ratio"});
+    if (gst_caps_is_fixed(video) && !gst_structure_has_field(pictures, "pixel-aspect-ratio"))
+      gst_structure_set(pictures, "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, nullptr);
     set_formats(pictures, EVENT_SIMULATOR_OUTPUT_FORMATS);
     output = gst_caps_merge_structure(output, pictures);
   }

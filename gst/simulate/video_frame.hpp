@@ -4,28 +4,49 @@
 #include <gst/video/video.h>
 
 #include <cstddef>
+#include <cstdint>
 
-/// A buffer mapped as video while it lives; strides are those of its GstVideoMeta, if it has one.
+/// The first plane of a buffer mapped as video, while it lives; its stride is that of the buffer's
+/// GstVideoMeta, if it has one.
 class VideoFrame {
  public:
   VideoFrame(const GstVideoInfo& info, GstBuffer* buffer, GstMapFlags flags)
-      : mapped_(gst_video_frame_map(&frame_, &info, buffer, flags)) {}
+      : mapped_(gst_video_frame_map(&frame_, &info, buffer, flags)),
+        fits_(mapped_ && rows_fit(info)) {}
   ~VideoFrame() {
     if (mapped_) gst_video_frame_unmap(&frame_);
   }
   VideoFrame(const VideoFrame&) = delete;
   VideoFrame& operator=(const VideoFrame&) = delete;
 
-  /// Whether the buffer could be mapped; nothing else may be asked where it could not.
-  explicit operator bool() const { return mapped_; }
+  /// Whether the buffer could be mapped and its rows are where it says. Nothing else may be asked
+  /// where this is false.
+  explicit operator bool() const { return fits_; }
 
-  void* plane(int i) const { return GST_VIDEO_FRAME_PLANE_DATA(&frame_, i); }
-  /// The first byte of component i, within its plane.
-  void* component(int i) const { return GST_VIDEO_FRAME_COMP_DATA(&frame_, i); }
-  /// Bytes from one row of component i to the next.
-  std::ptrdiff_t stride(int i) const { return GST_VIDEO_FRAME_COMP_STRIDE(&frame_, i); }
+  std::byte* data() const {
+    return static_cast<std::byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0));
+  }
+  /// Where the first component begins: not at the first byte in some packed formats.
+  std::byte* first_component() const {
+    return reinterpret_cast<std::byte*>(GST_VIDEO_FRAME_COMP_DATA(&frame_, 0));
+  }
+  /// Bytes from one row to the next.
+  std::ptrdiff_t stride() const { return GST_VIDEO_FRAME_PLANE_STRIDE(&frame_, 0); }
 
  private:
+  /// GStreamer believes what a GstVideoMeta says of stride and offset; we look first.
+  bool rows_fit(const GstVideoInfo& info) const {
+    const std::ptrdiff_t row =
+        std::ptrdiff_t{GST_VIDEO_INFO_WIDTH(&info)} * GST_VIDEO_INFO_COMP_PSTRIDE(&info, 0);
+    const std::ptrdiff_t sample = GST_VIDEO_INFO_COMP_DEPTH(&info, 0) > 8 ? 2 : 1;
+    const GstMapInfo& map = frame_.map[0];
+    const auto offset = data() - reinterpret_cast<std::byte*>(map.data);
+    const std::ptrdiff_t end = offset + stride() * (GST_VIDEO_INFO_HEIGHT(&info) - 1) + row;
+    return stride() >= row && offset >= 0 && end <= static_cast<std::ptrdiff_t>(map.size) &&
+           stride() % sample == 0 && reinterpret_cast<std::uintptr_t>(data()) % sample == 0;
+  }
+
   GstVideoFrame frame_{};
   bool mapped_;
+  bool fits_;
 };

@@ -17,8 +17,7 @@ class EventBuckets {
   /// Empties the buckets, keeps their memory.
   void reset(int steps, int bands) {
     bands_ = static_cast<std::size_t>(bands);
-    count_ = static_cast<std::size_t>(steps) * bands_;
-    if (buckets_.size() < count_) buckets_.resize(count_);
+    buckets_.resize(static_cast<std::size_t>(steps) * bands_);
     for (auto& bucket : buckets_) bucket.clear();
   }
 
@@ -27,7 +26,7 @@ class EventBuckets {
     return buckets_[static_cast<std::size_t>(step - 1) * bands_ + static_cast<std::size_t>(band)];
   }
 
-  std::span<const std::vector<Event>> buckets() const { return {buckets_.data(), count_}; }
+  std::span<const std::vector<Event>> buckets() const { return buckets_; }
 
   /// How many events there are in all.
   std::size_t size() const;
@@ -37,7 +36,6 @@ class EventBuckets {
 
  private:
   std::vector<std::vector<Event>> buckets_;
-  std::size_t count_ = 0;
   std::size_t bands_ = 1;
 };
 

@@ -31,7 +31,7 @@ class OpenCvFlow : public DenseFlow {
 
  private:
   static cv::Mat prepared(const PlaneView<std::uint8_t>& picture, cv::Mat& buffer) {
-    const cv::Mat mat = opencv_picture(picture);
+    cv::Mat mat = opencv_picture(picture);
     if (mat.cols >= smallest_side && mat.rows >= smallest_side && mat.isContinuous()) return mat;
     cv::copyMakeBorder(mat, buffer, 0, std::max(0, smallest_side - mat.rows), 0,
                        std::max(0, smallest_side - mat.cols), cv::BORDER_REPLICATE);
@@ -73,7 +73,7 @@ class DisFlow final : public OpenCvFlow {
 /// The scale at which OpenCV's DIS starts.
 int coarsest_scale(int width, int height, int patch) {
   const auto [shorter, longer] = std::minmax({width, height});
-  return std::min(static_cast<int>(std::log2(longer / (4.0 * patch)) + 0.5),
+  return std::min(static_cast<int>(std::lround(std::log2(longer / (4.0 * patch)))),
                   static_cast<int>(std::log2(shorter / patch)));
 }
 

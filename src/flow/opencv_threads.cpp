@@ -10,6 +10,8 @@ namespace {
 
 std::mutex mutex;  // guards what follows, and OpenCV's thread count
 std::condition_variable changed;
+unsigned next_ticket = 0;  // first come, first served: none waits for ever
+unsigned serving = 0;
 int calls = 0;
 int in_force = 0;
 int before = 0;
@@ -18,7 +20,10 @@ int before = 0;
 
 OpenCvThreads::OpenCvThreads(int threads) {
   std::unique_lock lock(mutex);
-  changed.wait(lock, [&] { return calls == 0 || in_force == threads; });
+  const unsigned ticket = next_ticket++;
+  changed.wait(lock, [&] { return ticket == serving && (calls == 0 || in_force == threads); });
+  ++serving;
+  changed.notify_all();
   if (calls++ > 0) return;
   in_force = threads;
   before = cv::getNumThreads();

@@ -7,7 +7,7 @@ void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Plane<std::uin
   for (int y = 0; y < out.height(); ++y) {
     const std::uint8_t* in = data + y * stride;
     std::uint8_t* row = out.row(y);
-    for (int x = 0; x < out.width(); ++x) row[x] = in[2 * x];
+    for (int x = 0; x < out.width(); ++x) row[x] = in[std::ptrdiff_t{2} * x];
   }
 }
 

@@ -29,7 +29,8 @@ PixelBytes encode(const Colour& colour, const PixelLayout& layout) {
 template <int bytes>
 void draw_row(std::uint8_t* fired, int width, const std::array<PixelBytes, 4>& pixels,
               std::byte* out) {
-  for (int x = 0; x < width; ++x) std::memcpy(out + x * bytes, pixels[fired[x]].data(), bytes);
+  for (int x = 0; x < width; ++x)
+    std::memcpy(out + std::ptrdiff_t{x} * bytes, pixels[fired[x]].data(), bytes);
   std::fill_n(fired, width, std::uint8_t{0});
 }
 

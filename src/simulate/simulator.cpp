@@ -8,18 +8,17 @@ namespace eventcamera {
 const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
                                     const Settings& settings) {
   assert(frame.format == format_);
-  const auto last_time = last_time_;
-  last_time_.reset();  // stays so if something is thrown
   threads_.set_threads(settings.threads);
-  if (last_time) {
-    assert(time > *last_time && time - *last_time <= longest_interval);
-    simulate(frame, StepTimes(time - *last_time, settings.interpolated_frames + 1), settings,
-             events_);
-  } else {
+  const bool is_first = !last_time_;
+  if (is_first) {
     start(frame);
+  } else {
+    assert(time > *last_time_ && time - *last_time_ <= longest_interval);
+    simulate(frame, StepTimes(time - *last_time_, settings.interpolated_frames + 1), settings,
+             events_);
   }
   last_time_ = time;
-  return last_time ? &events_ : nullptr;
+  return is_first ? nullptr : &events_;
 }
 
 void Simulator::hold_until(Nanoseconds time) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "src/event/event_buckets.hpp"
@@ -26,7 +27,7 @@ struct Thresholds {
   /// Thresholds scale with the depth, so that a picture in 16 bits fires like its 8-bit twin.
   static Thresholds of(const Settings& settings, int bits) {
     const auto scale = [bits](double grey_levels) {
-      return static_cast<int>(grey_levels * ((1 << bits) - 1) / 255);
+      return static_cast<int>(std::max(0.0, grey_levels) * ((1 << bits) - 1) / 255);
     };
     return {scale(settings.positive_threshold), scale(settings.negative_threshold)};
   }
@@ -45,7 +46,8 @@ class Simulator {
   /// of the last frame, by longest_interval at most.
   /// Returns the sorted events of (time of the last frame, time], good until the next call; or
   /// nullptr for the first frame, to which the next is compared.
-  /// Throws std::bad_alloc, or what OpenCV throws; the simulator is then as after reset().
+  /// Throws std::bad_alloc, or what OpenCV throws; the simulator is then good for nothing but being
+  /// destroyed.
   const EventBuckets* push(const LumaView& frame, Nanoseconds time, const Settings& settings);
 
   /// The time of the last frame, if there is one.

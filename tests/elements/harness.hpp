@@ -41,6 +41,7 @@ class Harness {
     h_.reset(gst_harness_new_parse(launch.c_str()));
     bus_.reset(gst_bus_new());
     gst_element_set_bus(h_->element, bus_.get());
+    element_.reset(gst_harness_find_element(h_.get(), launch.substr(0, launch.find(' ')).c_str()));
   }
   ~Harness() {
     // The test's bus is the element's until the end.
@@ -49,7 +50,8 @@ class Harness {
 
   GstHarness* operator->() const { return h_.get(); }
   GstHarness* get() const { return h_.get(); }
-  GstElement* element() const { return h_->element; }
+  /// The simulator itself.
+  GstElement* element() const { return element_.get(); }
 
   void caps(const std::string& in, const std::string& out = GST_EVENT_CAMERA_MEDIA_TYPE) {
     gst_harness_set_sink_caps_str(h_.get(), out.c_str());
@@ -138,6 +140,7 @@ class Harness {
  private:
   Owned<GstHarness> h_;
   Owned<GstBus> bus_;
+  Owned<GstElement> element_;
   GstVideoInfo info_{};
 };
 

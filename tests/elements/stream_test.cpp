@@ -76,6 +76,7 @@ TEST_P(EveryElement, BeginsAnewWhenTheSizeChanges) {
   const auto buffer = h.pull();
   ASSERT_TRUE(buffer);
   EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 160 * GST_MSECOND);
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(buffer.get()));
   const auto events = events_of(buffer.get());
   EXPECT_EQ(events.size(), 33U * 29U);
   EXPECT_NE(h.out_caps().find("width=(int)33"), std::string::npos);
@@ -154,12 +155,132 @@ TEST(Stream, RefusesFramesThatAreTooSmall) {
   EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
 }
 
-TEST(Stream, WarnsOfInterlacedVideo) {
+/// A frame whose meta says what is not so.
+GstFlowReturn push_with_meta(const char* format, int stride, gsize offset, gsize size) {
+  GstFlowReturn last = GST_FLOW_OK;
+  for (const char* element : elements) {
+    Harness h(element);
+    h.caps(video(320, 240, format));
+    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
+    gst_buffer_memset(buffer, 0, 100, size);
+    GST_BUFFER_PTS(buffer) = 0;
+    gsize offsets[GST_VIDEO_MAX_PLANES] = {offset};
+    gint strides[GST_VIDEO_MAX_PLANES] = {stride};
+    gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE,
+                                   gst_video_format_from_string(format), 320, 240, 1, offsets,
+                                   strides);
+    const GstFlowReturn flow = h.push(buffer);
+    EXPECT_EQ(flow != GST_FLOW_OK, h.message(GST_MESSAGE_ERROR) != nullptr);
+    if (element != elements[0]) {
+      EXPECT_EQ(flow, last) << element;
+    }
+    last = flow;
+  }
+  return last;
+}
+
+TEST(Stream, RefusesMetasThatLie) {
+  EXPECT_EQ(push_with_meta("GRAY8", 320, 0, 76800), GST_FLOW_OK);
+  EXPECT_EQ(push_with_meta("GRAY8", 400, 80, 96000), GST_FLOW_OK);
+  EXPECT_EQ(push_with_meta("GRAY8", 4096, 0, 76800), GST_FLOW_ERROR);  // beyond the buffer
+  EXPECT_EQ(push_with_meta("GRAY8", 320, 80, 76800), GST_FLOW_ERROR);
+  EXPECT_EQ(push_with_meta("GRAY8", 319, 0, 76800), GST_FLOW_ERROR);  // rows that overlap
+  EXPECT_EQ(push_with_meta("GRAY8", 0, 0, 400), GST_FLOW_ERROR);
+  EXPECT_EQ(push_with_meta("GRAY8", -320, 76480, 76800), GST_FLOW_ERROR);
+  EXPECT_EQ(push_with_meta("GRAY16_LE", 643, 0, 200000), GST_FLOW_ERROR);  // words at odd places
+  EXPECT_EQ(push_with_meta("GRAY16_LE", 642, 1, 200000), GST_FLOW_ERROR);
+}
+
+TEST(Stream, GivesPicturesNothingOfTheFrameThatEndsThem) {
+  Harness h("eventsim-frame");
+  h.caps(video(32, 24), "video/x-raw, format=GRAY8");
+  h.push(h.flat(0, 50));
+  GstBuffer* frame = h.flat(40 * GST_MSECOND, 200);
+  GST_BUFFER_OFFSET(frame) = 77;
+  GST_BUFFER_FLAG_SET(frame, GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_MARKER);
+  GstCaps* clock = gst_caps_new_empty_simple("timestamp/x-test");
+  gst_buffer_add_reference_timestamp_meta(frame, clock, 40 * GST_MSECOND, 0);
+  gst_caps_unref(clock);
+  h.push(frame);
+  const auto picture = h.pull();
+  ASSERT_TRUE(picture);
+  EXPECT_FALSE(GST_BUFFER_OFFSET_IS_VALID(picture.get()));
+  EXPECT_FALSE(
+      GST_BUFFER_FLAG_IS_SET(picture.get(), GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_MARKER));
+  EXPECT_EQ(gst_buffer_get_reference_timestamp_meta(picture.get(), nullptr), nullptr);
+}
+
+TEST(Stream, WarnsOnceOfInterlacedVideo) {
   Harness h("eventsim-frame");
   h.caps(video(61, 43, "I420") + ", interlace-mode=interleaved");
+  h.push(h.flat(0, 50));
+  h.push(h.flat(40 * GST_MSECOND, 50));
   const auto warning = h.message(GST_MESSAGE_WARNING);
   ASSERT_TRUE(warning);
   EXPECT_NE(text_of(warning.get()).find("deinterlace"), std::string::npos);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST(Stream, WarnsOfMixedVideoOnlyWhereItIsInterlaced) {
+  Harness h("eventsim-frame");
+  h.caps(video(61, 43, "I420") + ", interlace-mode=mixed");
+  h.push(h.flat(0, 50));
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+  GstBuffer* frame = h.flat(40 * GST_MSECOND, 50);
+  GST_BUFFER_FLAG_SET(frame, GST_VIDEO_BUFFER_FLAG_INTERLACED);
+  h.push(frame);
+  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST(EventCamera, MapsEventsAtAnyAddress) {
+  gst_init(nullptr, nullptr);
+  const guint8 bytes[] = {0, 1, 0, 0, 0, 2, 0, 3, 0x80};
+  GstBuffer* whole = gst_buffer_new_memdup(bytes, sizeof bytes);
+  GstBuffer* odd = gst_buffer_copy_region(whole, GST_BUFFER_COPY_MEMORY, 1, 8);
+  GST_BUFFER_PTS(odd) = 5 * GST_MSECOND + 999;
+  GstEventCameraMap map;
+  ASSERT_TRUE(gst_event_camera_map(&map, odd));
+  ASSERT_EQ(map.n_events, 1U);
+  EXPECT_EQ(map.start, 5000U);
+  EXPECT_EQ(GPOINTER_TO_SIZE(map.events) % alignof(GstEventCameraEvent), 0U);
+  EXPECT_EQ(map.events[0].t, 1U);
+  EXPECT_EQ(map.events[0].x, 2);
+  EXPECT_EQ(gst_event_camera_event_get_y(&map.events[0]), 3U);
+  EXPECT_TRUE(gst_event_camera_event_is_on(&map.events[0]));
+  gst_event_camera_unmap(&map);
+  gst_buffer_set_size(odd, 7);
+  EXPECT_FALSE(gst_event_camera_map(&map, odd));  // no whole number of events
+  gst_buffer_unref(odd);
+  GST_BUFFER_PTS(whole) = GST_CLOCK_TIME_NONE;
+  gst_buffer_set_size(whole, 8);
+  EXPECT_FALSE(gst_event_camera_map(&map, whole));  // no time
+  gst_buffer_unref(whole);
+}
+
+TEST(EventCamera, ReadsAndWritesCaps) {
+  gst_init(nullptr, nullptr);
+  const auto read = [](const char* text, GstEventCameraInfo* info) {
+    Owned<GstCaps> caps(gst_caps_from_string(text));
+    return gst_event_camera_info_from_caps(info, caps.get()) == TRUE;
+  };
+  GstEventCameraInfo info;
+  ASSERT_TRUE(
+      read("application/x-event-camera,format=XYTP,width=640,height=480,framerate=30/1", &info));
+  EXPECT_EQ(info.width, 640);
+  EXPECT_EQ(info.height, 480);
+  EXPECT_EQ(info.fps_n, 30);
+  Owned<GstCaps> caps(gst_event_camera_info_to_caps(&info));
+  GstEventCameraInfo back;
+  ASSERT_TRUE(gst_event_camera_info_from_caps(&back, caps.get()));
+  EXPECT_EQ(back.height, 480);
+  EXPECT_TRUE(read("application/x-event-camera,format=XYTP,width=1,height=1", &info));
+  EXPECT_EQ(info.fps_n, 0);
+  EXPECT_EQ(info.fps_d, 1);
+  EXPECT_FALSE(read("application/x-event-camera,format=EVT3,width=640,height=480", &info));
+  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=640", &info));
+  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=0,height=480", &info));
+  EXPECT_FALSE(read("application/x-event-camera,format=XYTP,width=1,height=32769", &info));
+  EXPECT_FALSE(read("video/x-raw,format=GRAY8,width=640,height=480", &info));
 }
 
 }  // namespace

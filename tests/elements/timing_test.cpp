@@ -152,6 +152,22 @@ TEST_P(EveryElement, WarnsOfTimeThatRunsBackwards) {
   EXPECT_NE(text_of(warning.get()).find("not later"), std::string::npos);
 }
 
+TEST_P(EveryElement, LetsNoIntervalsOverlap) {
+  h.caps(video);
+  flash(0);
+  flash(100 * GST_MSECOND);
+  expect_interval(0, 100 * GST_MSECOND);
+  flash(60 * GST_MSECOND);  // neither begins an interval
+  flash(90 * GST_MSECOND);
+  flash(140 * GST_MSECOND);
+  EXPECT_FALSE(h.pull());
+  flash(180 * GST_MSECOND);
+  expect_interval(140 * GST_MSECOND, 180 * GST_MSECOND);
+  flash(0, GST_BUFFER_FLAG_DISCONT);  // time begins anew
+  flash(40 * GST_MSECOND);
+  expect_interval(0, 40 * GST_MSECOND);
+}
+
 TEST_P(EveryElement, CutsIntervalsThatEventsCannotCount) {
   h.caps(uneven);
   flash(0);
@@ -175,9 +191,10 @@ TEST_P(EveryElement, HoldsTheLastFrameThroughAGapOfTheVideo) {
   GstClockTime duration = 0;
   gst_event_parse_gap(gap.get(), &start, &duration);
   EXPECT_EQ(start, 10 * GST_MSECOND);
-  EXPECT_EQ(duration, 40 * GST_MSECOND);
+  // The gap ends at 150 ms; a frame's length before that, the next interval begins.
+  EXPECT_EQ(start + duration, 110 * GST_MSECOND);
   flash(150 * GST_MSECOND);
-  expect_interval(50 * GST_MSECOND, 150 * GST_MSECOND);
+  expect_interval(110 * GST_MSECOND, 150 * GST_MSECOND);
 }
 
 TEST_P(EveryElement, RefusesToRunBackwards) {
@@ -195,6 +212,11 @@ TEST_P(EveryElement, RefusesToRunBackwards) {
   ASSERT_TRUE(error);
   EXPECT_NE(text_of(error.get()).find("backwards"), std::string::npos);
   EXPECT_EQ(flash(40 * GST_MSECOND), GST_FLOW_ERROR);
+  EXPECT_EQ(flash(80 * GST_MSECOND), GST_FLOW_ERROR);
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));  // one is enough
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  EXPECT_EQ(flash(120 * GST_MSECOND), GST_FLOW_OK);
 }
 
 TEST_P(EveryElement, SendsEosAfterTheLastInterval) {
@@ -215,6 +237,26 @@ TEST_P(EveryElement, IsOneFrameLate) {
   h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=50/1");
   EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
   EXPECT_EQ(gst_harness_query_latency(h.get()), 25 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, LearnsThatFramesComeSlowerThanTheCapsSay) {
+  h.caps(video);
+  flash(0);
+  flash(40 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 40 * GST_MSECOND);
+  flash(120 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 80 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, KeepsLatenessFromUpstream) {
+  h.caps(video);
+  flash(0);
+  gst_harness_push_upstream_event(
+      h.get(), gst_event_new_qos(GST_QOS_TYPE_UNDERFLOW, 2, 80 * GST_MSECOND, 0));
+  while (GstEvent* event = gst_harness_try_pull_upstream_event(h.get())) {
+    EXPECT_NE(GST_EVENT_TYPE(event), GST_EVENT_QOS);
+    gst_event_unref(event);
+  }
 }
 
 TEST_P(EveryElement, LearnsItsLatencyWhereTheFramerateVaries) {
