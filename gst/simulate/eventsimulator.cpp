@@ -561,10 +561,12 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   auto& state = self->priv->state;
   const auto start = state ? state->simulator->last_time() : std::nullopt;
   if (!start) return true;
-  if (GST_CLOCK_TIME_IS_VALID(duration) && duration > latency_of(self))
-    pts += duration - latency_of(self);
-  if (pts > G_MAXINT64 || static_cast<Nanoseconds>(pts) <= *start) return false;
-  const auto end = static_cast<Nanoseconds>(pts);
+  const GstClockTime frame = latency_of(self);
+  const GstClockTime rest =
+      GST_CLOCK_TIME_IS_VALID(duration) && duration > frame ? duration - frame : 0;
+  if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
+  const auto end = static_cast<Nanoseconds>(pts + rest);
+  if (end <= *start) return false;
   state->simulator->hold_until(end);
   self->priv->handed_out_until = end;
   push_gap(self, *start, end, gst_event_get_seqnum(event));

@@ -47,7 +47,14 @@ launch videotestsrc pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! mixer
 
 # Interrupted with -e, it ends in order.
 echo "gst-launch-1.0 -e, interrupted"
-timeout --signal=INT 2 "$GST_LAUNCH" -q -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink location=interrupted.mp4 || true
+timeout 60 "$GST_LAUNCH" -q -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4 &
+launched=$!
+for _ in $(seq 300); do
+  [ "$(stat -c %s interrupted.mp4 2>/dev/null || echo 0)" -gt 10000 ] && break
+  sleep 0.1
+done
+pkill -INT -P $launched
+wait $launched || true
 launch filesrc location=interrupted.mp4 ! decodebin ! fakesink
 
 # Refused, with a reason.
