@@ -19,8 +19,8 @@ using Motion = std::int32_t;
 inline Motion motion_per_step(float flow, int steps) {
   if (!(flow == flow)) return 0;
   constexpr float longest = longest_side;
-  const double pixels = std::clamp(flow, -longest, longest);
-  return static_cast<Motion>(std::lrint(pixels * 65536 / steps));
+  return static_cast<Motion>(
+      std::lrint(std::clamp(flow, -longest, longest) * (65536.0F / static_cast<float>(steps))));
 }
 
 /// Where a pixel at p stands after j steps, rounded to whole pixels.

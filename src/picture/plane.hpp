@@ -21,14 +21,18 @@ struct PlaneView {
   }
 };
 
-/// A picture of one channel that owns its pixels.
+/// A picture of one channel that owns its pixels. Some bytes behind the last one may be read too
+/// (they are 0), so that SIMD code need not care where the picture ends.
 template <class Pixel>
 class Plane {
  public:
+  static constexpr std::size_t readable_behind = 64;  ///< bytes
+
   Plane() = default;
   /// All pixels 0.
   Plane(int width, int height)
-      : pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
+      : pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) +
+                readable_behind / sizeof(Pixel)),
         width_(width),
         height_(height) {}
 

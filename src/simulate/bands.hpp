@@ -5,8 +5,8 @@
 
 namespace eventcamera {
 
-/// A picture is worked on in bands of this many rows, however many threads share them, so that a
-/// band's pictures stay in a processor's cache and the result does not hang on the threads.
+/// A picture is worked on in bands of this many rows, however many threads share them, so that the
+/// result does not hang on the threads.
 inline constexpr int rows_per_band = 16;
 
 inline int band_count(int height) {

@@ -28,6 +28,11 @@ std::int32_t sample(const PlaneView<Pixel>& picture, std::int32_t x, std::int32_
          (lower[x0] * (64 - right) + lower[x1] * right) * down;
 }
 
+/// The weight of the later frame in step j of a blend, in 1/256.
+inline int blend_weight(int j, int steps) {
+  return (j * 256 + steps / 2) / steps;
+}
+
 /// The pixel (x, y) of the interpolated frames between two frames.
 template <class Pixel>
 struct Warp {
@@ -47,7 +52,7 @@ struct Warp {
       using Sum = std::conditional_t<sizeof(Pixel) == 1, std::int32_t, std::int64_t>;
       const int left = steps - j;
       const std::int32_t from_now = sample(now, px + left * dx, py + left * dy);
-      const int weight = (j * 256 + steps / 2) / steps;  // a, in 1/256
+      const int weight = blend_weight(j, steps);
       return static_cast<Pixel>(
           (Sum{from_last} * (256 - weight) + Sum{from_now} * weight + (1 << 19)) >> 20);
     }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Every method equals its plain scalar reference, event for event: sizes down to one pixel, depths,
-// strides, steps, thresholds, textures and noise, motion over the border, numbers of threads.
+// strides, steps, thresholds, textures and noise, motion over the border, numbers of threads; and
+// on every SIMD target that this processor has.
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
+#include <hwy/targets.h>
 
 #include <cstring>
 
@@ -151,15 +154,32 @@ class Equality : public testing::TestWithParam<Case> {
   }
 
   void check(Simulator& simulator, const std::vector<Event>& expected) {
-    const auto events = scene::last_interval(simulator, settings, views);
-    EXPECT_TRUE(scene::sorted(events));
-    EXPECT_TRUE(events == expected) << events.size() << " events instead of " << expected.size();
+    for (const auto target : hwy::SupportedAndGeneratedTargets()) {
+      choose(target);
+      const auto events = scene::last_interval(simulator, settings, views);
+      EXPECT_TRUE(scene::sorted(events));
+      EXPECT_TRUE(events == expected) << events.size() << " events instead of " << expected.size()
+                                      << " on " << hwy::TargetName(target);
+      choose(0);
+    }
+  }
+
+  /// 0: whichever is best.
+  static void choose(std::int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   }
 
   Settings settings;
   LumaFormat format;
   std::vector<LumaView> views;
 };
+
+TEST(Targets, AreTestedOneByOne) {
+  const auto targets = hwy::SupportedAndGeneratedTargets();
+  ASSERT_FALSE(targets.empty());
+  for (const auto target : targets) std::printf("%s\n", hwy::TargetName(target));
+}
 
 TEST_P(Equality, WithTheReference) {
   if (GetParam().bits > 8)

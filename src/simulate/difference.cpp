@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/simulate/difference.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/simulate/difference.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants to come after that.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <limits>
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class Pixel>
+void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint32_t t,
+              const Thresholds& thresholds, std::vector<Event>& out) {
+  const hn::ScalableTag<Pixel> pixels;
+  const int lanes = static_cast<int>(hn::Lanes(pixels));
+  const auto in_range = [](int threshold) {
+    return static_cast<Pixel>(
+        std::min(threshold, static_cast<int>(std::numeric_limits<Pixel>::max())));
+  };
+  const auto positive = hn::Set(pixels, in_range(thresholds.positive));
+  const auto negative = hn::Set(pixels, in_range(thresholds.negative));
+  const auto zero = hn::Zero(pixels);
+  const auto fire = [&](int x) {
+    const int difference = now[x] - before[x];
+    if (difference > thresholds.positive)
+      out.push_back(Event::at(x, y, t, Polarity::on));
+    else if (-difference > thresholds.negative)
+      out.push_back(Event::at(x, y, t, Polarity::off));
+  };
+  int x = 0;
+  for (; x + lanes <= width; x += lanes) {
+    const auto a = hn::LoadU(pixels, before + x);
+    const auto b = hn::LoadU(pixels, now + x);
+    // What is left of a rise or a fall beyond its threshold; one of the two is always 0.
+    const auto beyond = hn::Or(hn::SaturatedSub(hn::SaturatedSub(b, a), positive),
+                               hn::SaturatedSub(hn::SaturatedSub(a, b), negative));
+    const auto fired = hn::Ne(beyond, zero);
+    if (hn::AllFalse(pixels, fired)) continue;
+    std::uint64_t words[8] = {};
+    hn::StoreMaskBits(pixels, fired, reinterpret_cast<std::uint8_t*>(words));
+    for (int i = 0; i * 64 < lanes; ++i)
+      for (auto bits = words[i]; bits != 0; bits &= bits - 1)
+        fire(x + 64 * i + std::countr_zero(bits));
+  }
+  for (; x < width; ++x) fire(x);
+}
+
+void fire_row_8(const std::uint8_t* before, const std::uint8_t* now, int width, int y,
+                std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out) {
+  fire_row(before, now, width, y, t, thresholds, out);
+}
+
+void fire_row_16(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
+                 std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out) {
+  fire_row(before, now, width, y, t, thresholds, out);
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(fire_row_8);
+HWY_EXPORT(fire_row_16);
+
+void fire_differences(const std::uint8_t* before, const std::uint8_t* now, int width, int y,
+                      std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out) {
+  HWY_DYNAMIC_DISPATCH(fire_row_8)(before, now, width, y, t, thresholds, out);
+}
+
+void fire_differences(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
+                      std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out) {
+  HWY_DYNAMIC_DISPATCH(fire_row_16)(before, now, width, y, t, thresholds, out);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE

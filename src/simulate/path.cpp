@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/simulate/path.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/simulate/path.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants to come after that.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "src/simulate/bands.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Words = hn::ScalableTag<std::int32_t>;
+using Floats = hn::ScalableTag<float>;
+using Bytes = hn::Rebind<std::uint8_t, Words>;
+using Vector = hn::Vec<Words>;
+
+/// sample() of warp.hpp, for many places at once.
+class Sampler {
+ public:
+  explicit Sampler(const PlaneView<std::uint8_t>& picture)
+      : pixels_(reinterpret_cast<const std::int32_t*>(picture.data)),
+        stride_(hn::Set(Words(), static_cast<std::int32_t>(picture.stride))),
+        right_end_(hn::Set(Words(), (picture.width - 1) * 64)),
+        lower_end_(hn::Set(Words(), (picture.height - 1) * 64)),
+        last_row_(hn::Set(Words(), picture.height - 1)) {}
+
+  /// At places in 1/65536 of a pixel; in 1/4096 of a grey level.
+  Vector at(Vector x, Vector y) const {
+    const auto zero = hn::Zero(Words());
+    const auto one = hn::Set(Words(), 1);
+    const auto half = hn::Set(Words(), 512);
+    const auto low_bits = hn::Set(Words(), 63);
+    const auto qx = hn::Min(hn::Max(hn::ShiftRight<10>(hn::Add(x, half)), zero), right_end_);
+    const auto qy = hn::Min(hn::Max(hn::ShiftRight<10>(hn::Add(y, half)), zero), lower_end_);
+    const auto x0 = hn::ShiftRight<6>(qx);
+    const auto y0 = hn::ShiftRight<6>(qy);
+    const auto y1 = hn::Min(hn::Add(y0, one), last_row_);
+    const auto right = hn::And(qx, low_bits);
+    const auto down = hn::And(qy, low_bits);
+    const auto upper = between(hn::Add(hn::Mul(y0, stride_), x0), right);
+    const auto lower = between(hn::Add(hn::Mul(y1, stride_), x0), right);
+    return hn::Add(hn::ShiftLeft<6>(upper), hn::Mul(hn::Sub(lower, upper), down));
+  }
+
+ private:
+  /// Between a pixel and its right neighbour (whose weight is 0 where there is none), in 1/64.
+  Vector between(Vector offset, Vector right) const {
+    const auto byte = hn::Set(Words(), 255);
+    const auto pixels = hn::GatherOffset(Words(), pixels_, offset);
+    const auto a = hn::And(pixels, byte);
+    const auto b = hn::And(hn::ShiftRight<8>(pixels), byte);
+    return hn::Add(hn::ShiftLeft<6>(a), hn::Mul(hn::Sub(b, a), right));
+  }
+
+  const std::int32_t* pixels_;
+  Vector stride_;
+  Vector right_end_;
+  Vector lower_end_;
+  Vector last_row_;
+};
+
+/// motion_per_step(), for many flows at once.
+Vector motions(hn::Vec<Floats> flow, float scale) {
+  const auto longest = hn::Set(Floats(), static_cast<float>(longest_side));
+  const auto number = hn::IfThenElseZero(hn::Eq(flow, flow), flow);
+  const auto cut = hn::Min(hn::Max(number, hn::Neg(longest)), longest);
+  return hn::NearestInt(hn::Mul(cut, hn::Set(Floats(), scale)));
+}
+
+template <Interpolation interpolation>
+void fire_row(const Path<std::uint8_t>& path, int y, int band, EventBuckets& events) {
+  const Words words;
+  const int lanes = static_cast<int>(hn::Lanes(words));
+  const int width = path.flow.width;
+  const int steps = path.steps.count();
+  const float scale = 65536.0F / static_cast<float>(steps);
+  const Sampler last(path.warp.last);
+  const Sampler now(path.warp.now);
+  const std::uint8_t* last_row = path.warp.last.row(y);
+  const std::uint8_t* now_row = path.warp.now.row(y);
+  const auto positive = hn::Set(words, path.thresholds.positive);
+  const auto negative = hn::Set(words, path.thresholds.negative);
+  const auto py = hn::Set(words, y << 16);
+
+  for (int x = 0; x < width; x += lanes) {
+    const int count = std::min(lanes, width - x);
+    const auto within = hn::FirstN(words, static_cast<std::size_t>(count));
+    HWY_ALIGN float flows[2 * hn::MaxLanes(Floats())] = {};
+    std::copy_n(&path.flow.row(y)[x].x, 2 * count, flows);
+    hn::Vec<Floats> flow_x;
+    hn::Vec<Floats> flow_y;
+    hn::LoadInterleaved2(Floats(), flows, flow_x, flow_y);
+    const auto dx = motions(flow_x, scale);
+    const auto dy = motions(flow_y, scale);
+    const auto px = hn::ShiftLeft<16>(hn::Iota(words, x));
+
+    const auto fire = [&](Vector before, Vector after, int j) {
+      const auto difference = hn::Sub(after, before);
+      const auto on = hn::Gt(difference, positive);
+      const auto fired = hn::And(hn::Or(on, hn::Gt(hn::Neg(difference), negative)), within);
+      if (hn::AllFalse(words, fired)) return;
+      std::uint64_t fired_bits = 0;
+      std::uint64_t on_bits = 0;
+      hn::StoreMaskBits(words, fired, reinterpret_cast<std::uint8_t*>(&fired_bits));
+      hn::StoreMaskBits(words, on, reinterpret_cast<std::uint8_t*>(&on_bits));
+      auto& out = events.bucket(j, band);
+      const auto t = path.steps.microseconds(j);
+      for (; fired_bits != 0; fired_bits &= fired_bits - 1) {
+        const int lane = std::countr_zero(fired_bits);
+        out.push_back(
+            Event::at(x + lane, y, t, (on_bits >> lane & 1) != 0 ? Polarity::on : Polarity::off));
+      }
+    };
+
+    auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
+    auto from_x = px;
+    auto from_y = py;
+    for (int j = 1; j < steps; ++j) {
+      from_x = hn::Sub(from_x, dx);
+      from_y = hn::Sub(from_y, dy);
+      auto value = last.at(from_x, from_y);
+      if constexpr (interpolation == Interpolation::forward) {
+        value = hn::ShiftRight<12>(hn::Add(value, hn::Set(words, 2048)));
+      } else {
+        const auto left = hn::Set(words, steps - j);
+        const auto later = now.at(hn::Add(px, hn::Mul(left, dx)), hn::Add(py, hn::Mul(left, dy)));
+        const int weight = blend_weight(j, steps);
+        value = hn::Add(hn::Mul(value, hn::Set(words, 256 - weight)),
+                        hn::Mul(later, hn::Set(words, weight)));
+        value = hn::ShiftRight<20>(hn::Add(value, hn::Set(words, 1 << 19)));
+      }
+      fire(before, value, j);
+      before = value;
+    }
+    fire(before, hn::PromoteTo(words, hn::LoadU(Bytes(), now_row + x)), steps);
+  }
+}
+
+void fire_row_forward(const Path<std::uint8_t>& path, int y, int band, EventBuckets& events) {
+  fire_row<Interpolation::forward>(path, y, band, events);
+}
+
+void fire_row_blend(const Path<std::uint8_t>& path, int y, int band, EventBuckets& events) {
+  fire_row<Interpolation::blend>(path, y, band, events);
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+namespace {
+
+template <Interpolation interpolation>
+void fire_row_16(const Path<std::uint16_t>& path, int y, int band, EventBuckets& events) {
+  const int steps = path.steps.count();
+  for (int x = 0; x < path.flow.width; ++x) {
+    const Flow& flow = path.flow.row(y)[x];
+    const Motion dx = motion_per_step(flow.x, steps);
+    const Motion dy = motion_per_step(flow.y, steps);
+    int before = path.warp.last.row(y)[x];
+    for (int j = 1; j <= steps; ++j) {
+      const int value = j < steps ? path.warp.template at<interpolation>(x, y, dx, dy, j)
+                                  : path.warp.now.row(y)[x];
+      const int difference = value - before;
+      if (difference > path.thresholds.positive || -difference > path.thresholds.negative)
+        events.bucket(j, band).push_back(Event::at(x, y, path.steps.microseconds(j),
+                                                   difference > 0 ? Polarity::on : Polarity::off));
+      before = value;
+    }
+  }
+}
+
+HWY_EXPORT(fire_row_forward);
+HWY_EXPORT(fire_row_blend);
+
+template <class Pixel, class Row>
+void fire_rows(const Path<Pixel>& path, ThreadPool& threads, EventBuckets& events, Row row) {
+  const int height = path.flow.height;
+  const int bands = band_count(height);
+  events.reset(path.steps.count(), bands);
+  threads.for_each(bands, [&](int band, int) {
+    const BandRows rows(band, height);
+    for (int y = rows.first; y < rows.last; ++y) row(path, y, band, events);
+  });
+}
+
+}  // namespace
+
+void fire_along(const Path<std::uint8_t>& path, ThreadPool& threads, EventBuckets& events) {
+  fire_rows(path, threads, events,
+            path.interpolation == Interpolation::forward ? HWY_DYNAMIC_DISPATCH(fire_row_forward)
+                                                         : HWY_DYNAMIC_DISPATCH(fire_row_blend));
+}
+
+void fire_along(const Path<std::uint16_t>& path, ThreadPool& threads, EventBuckets& events) {
+  fire_rows(path, threads, events,
+            path.interpolation == Interpolation::forward ? fire_row_16<Interpolation::forward>
+                                                         : fire_row_16<Interpolation::blend>);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE
