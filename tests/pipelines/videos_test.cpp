@@ -14,10 +14,13 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/flow/dense_flow.hpp"
 #include "src/reference/dense.hpp"
+#include "tests/pipelines/video_frames.hpp"
 
 namespace {
 
 using namespace eventcamera;
+using video_frames::for_each_sample;
+using video_frames::frames_of;
 
 std::string variable(const char* name) {
   const char* value = g_getenv(name);
@@ -30,54 +33,6 @@ std::string video(const std::string& name) {
 
 const std::string driving = "driving-1280x720-25fps.mp4";
 const std::string cars = "cars-768x432-12fps.mp4";
-
-/// Runs a pipeline and shows the first `count` samples of its appsink, called sink.
-template <class Visit>
-void for_each_sample(const std::string& launch, int count, const Visit& visit) {
-  gst_init(nullptr, nullptr);
-  GError* error = nullptr;
-  GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
-  ASSERT_EQ(error, nullptr) << error->message;
-  GstElement* sink = gst_bin_get_by_name(GST_BIN(pipeline), "sink");
-  gst_element_set_state(pipeline, GST_STATE_PLAYING);
-  for (int i = 0; i < count; ++i) {
-    GstSample* sample = gst_app_sink_pull_sample(GST_APP_SINK(sink));
-    if (sample == nullptr) break;
-    visit(sample);
-    gst_sample_unref(sample);
-  }
-  GstBus* bus = gst_element_get_bus(pipeline);
-  GstMessage* message = gst_bus_pop_filtered(
-      bus, static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_WARNING));
-  if (message != nullptr) {
-    gst_message_parse_warning(message, &error, nullptr);
-    ADD_FAILURE() << launch << ": " << error->message;
-    g_error_free(error);
-    gst_message_unref(message);
-  }
-  gst_element_set_state(pipeline, GST_STATE_NULL);
-  gst_object_unref(bus);
-  gst_object_unref(sink);
-  gst_object_unref(pipeline);
-}
-
-/// The first `count` frames, in grey, of a width and height.
-std::vector<Plane<std::uint8_t>> frames_of(const std::string& path, int count, int width,
-                                           int height) {
-  std::vector<Plane<std::uint8_t>> frames;
-  const std::string size = "width=" + std::to_string(width) + ",height=" + std::to_string(height);
-  for_each_sample("filesrc location=" + path + " ! decodebin ! videoconvert ! videoscale ! " +
-                      "video/x-raw,format=GRAY8,pixel-aspect-ratio=1/1," + size +
-                      " ! appsink name=sink sync=false max-buffers=4",
-                  count, [&](GstSample* sample) {
-                    GstMapInfo map;
-                    gst_buffer_map(gst_sample_get_buffer(sample), &map, GST_MAP_READ);
-                    frames.emplace_back(width, height);
-                    frames.back().assign({map.data, GST_ROUND_UP_4(width), width, height});
-                    gst_buffer_unmap(gst_sample_get_buffer(sample), &map);
-                  });
-  return frames;
-}
 
 /// The grey pictures of the hand-held sequence in Debian's package visp-images-data.
 std::vector<Plane<std::uint8_t>> castel_frames(int count) {
