@@ -161,8 +161,9 @@ void register_all(const Scene& scene) {
                                       Interpolation::forward,
                                       steps,
                                       thresholds};
+        PathWalker walker;
         interval(state, threads,
-                 [&](ThreadPool& pool, EventBuckets& events) { fire_along(path, pool, events); });
+                 [&](ThreadPool& pool, EventBuckets& events) { walker.fire(path, pool, events); });
       });
     });
     add_whole("dense-dis-lq", 3, dense(FlowMethod::dis_lq));

@@ -28,7 +28,7 @@ class InterpolatingSimulator final : public DenseSimulator {
                            interpolation_,
                            steps,
                            Thresholds::of(settings, format().bits)};
-    fire_along(path, threads(), events);
+    walker_.fire(path, threads(), events);
     std::swap(last_, now_);
   }
 
@@ -45,6 +45,7 @@ class InterpolatingSimulator final : public DenseSimulator {
 
   Plane<Pixel> last_;
   Plane<Pixel> now_;
+  PathWalker walker_;
   std::unique_ptr<DenseFlow> finder_;
   FlowMethod finder_method_{};
   Grey8 last_grey_;

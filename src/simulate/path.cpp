@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "src/simulate/bands.hpp"
 
@@ -18,8 +19,9 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Words = hn::ScalableTag<std::int32_t>;
-using Floats = hn::ScalableTag<float>;
+// No vector is wider than a tile.
+using Words = hn::CappedTag<std::int32_t, Steepness::tile>;
+using Floats = hn::CappedTag<float, Steepness::tile>;
 using Bytes = hn::Rebind<std::uint8_t, Words>;
 using Vector = hn::Vec<Words>;
 
@@ -77,7 +79,8 @@ Vector motions(hn::Vec<Floats> flow, float scale) {
 }
 
 template <Interpolation interpolation>
-void fire_row(const Path<std::uint8_t>& path, int y, int band, EventBuckets& events) {
+void fire_row(const Path<std::uint8_t>& path, int y, int band, const bool* quiet,
+              EventBuckets& events) {
   const Words words;
   const int lanes = static_cast<int>(hn::Lanes(words));
   const int width = path.flow.width;
@@ -122,9 +125,12 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, EventBuckets& eve
     };
 
     auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
-    auto from_x = px;
-    auto from_y = py;
-    for (int j = 1; j < steps; ++j) {
+    // In a quiet tile nothing fires before the last step, which begins at the last but one.
+    const bool is_quiet = quiet != nullptr && quiet[x / Steepness::tile];
+    const int first = is_quiet ? std::max(1, steps - 1) : 1;
+    auto from_x = hn::Sub(px, hn::Mul(dx, hn::Set(words, first - 1)));
+    auto from_y = hn::Sub(py, hn::Mul(dy, hn::Set(words, first - 1)));
+    for (int j = first; j < steps; ++j) {
       from_x = hn::Sub(from_x, dx);
       from_y = hn::Sub(from_y, dy);
       auto value = last.at(from_x, from_y);
@@ -138,19 +144,78 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, EventBuckets& eve
                         hn::Mul(later, hn::Set(words, weight)));
         value = hn::ShiftRight<20>(hn::Add(value, hn::Set(words, 1 << 19)));
       }
-      fire(before, value, j);
+      if (!is_quiet) fire(before, value, j);
       before = value;
     }
     fire(before, hn::PromoteTo(words, hn::LoadU(Bytes(), now_row + x)), steps);
   }
 }
 
-void fire_row_forward(const Path<std::uint8_t>& path, int y, int band, EventBuckets& events) {
-  fire_row<Interpolation::forward>(path, y, band, events);
+/// The longest flow, each way, of a tile's part of some rows.
+Flow longest_flow(const PlaneView<Flow>& flow, const BandRows& rows, int left, int right) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  const int count = 2 * (right - left);
+  HWY_ALIGN float longest[2 * hn::MaxLanes(Floats())] = {};
+  auto all = hn::Zero(floats);
+  for (int y = rows.first; y < rows.last; ++y) {
+    const float* row = &flow.row(y)[left].x;
+    int i = 0;
+    for (; i + lanes <= count; i += lanes) {
+      const auto length = hn::Abs(hn::LoadU(floats, row + i));
+      // What is no number does not move.
+      all = hn::Max(all, hn::IfThenElseZero(hn::Eq(length, length), length));
+    }
+    for (; i < count; ++i)
+      if (std::fabs(row[i]) > longest[i % 2]) longest[i % 2] = std::fabs(row[i]);
+  }
+  HWY_ALIGN float lane[hn::MaxLanes(Floats())];
+  hn::Store(all, floats, lane);
+  for (int i = 0; i < lanes; ++i) longest[i % 2] = std::max(longest[i % 2], lane[i]);
+  return {longest[0], longest[1]};
 }
 
-void fire_row_blend(const Path<std::uint8_t>& path, int y, int band, EventBuckets& events) {
-  fire_row<Interpolation::blend>(path, y, band, events);
+/// Finds the tiles of a band in which nothing can fire before the last step of a forward path.
+void find_quiet(const Path<std::uint8_t>& path, const Steepness& steepness, int band, bool* quiet) {
+  const int width = path.flow.width;
+  const int steps = path.steps.count();
+  const std::int64_t threshold = std::min(path.thresholds.positive, path.thresholds.negative);
+  const BandRows rows(band, path.flow.height);
+  for (int left = 0; left < width; left += Steepness::tile) {
+    const int right = std::min(left + Steepness::tile, width);
+    const Flow longest = longest_flow(path.flow, rows, left, right);
+    // A sample's place is rounded to 1/64 of a pixel, so a step may be that much longer.
+    constexpr std::int64_t rounding = 1024;
+    const std::int64_t dx = motion_per_step(longest.x, steps) + rounding;
+    const std::int64_t dy = motion_per_step(longest.y, steps) + rounding;
+    const int reach_x = static_cast<int>((dx * steps >> 16) + 1);
+    const int reach_y = static_cast<int>((dy * steps >> 16) + 1);
+    // Where things come from afar, looking for the steepest place on the way costs more than it
+    // saves.
+    constexpr int far = 4 * Steepness::tile;
+    if (reach_x > far || reach_y > far) {
+      quiet[left / Steepness::tile] = false;
+      continue;
+    }
+    const auto bound = steepness.within(left - reach_x, rows.first - reach_y, right + reach_x,
+                                        rows.last + reach_y);
+    quiet[left / Steepness::tile] = dx * bound.x + dy * bound.y <= threshold << 16;
+  }
+}
+
+void fire_band_forward(const Path<std::uint8_t>& path, const Steepness& steepness, int band,
+                       EventBuckets& events) {
+  bool quiet[longest_side / Steepness::tile];
+  find_quiet(path, steepness, band, quiet);
+  const BandRows rows(band, path.flow.height);
+  for (int y = rows.first; y < rows.last; ++y)
+    fire_row<Interpolation::forward>(path, y, band, quiet, events);
+}
+
+void fire_band_blend(const Path<std::uint8_t>& path, int band, EventBuckets& events) {
+  const BandRows rows(band, path.flow.height);
+  for (int y = rows.first; y < rows.last; ++y)
+    fire_row<Interpolation::blend>(path, y, band, nullptr, events);
 }
 
 }  // namespace
@@ -181,32 +246,41 @@ void fire_row_16(const Path<std::uint16_t>& path, int y, int band, EventBuckets&
   }
 }
 
-HWY_EXPORT(fire_row_forward);
-HWY_EXPORT(fire_row_blend);
-
-template <class Pixel, class Row>
-void fire_rows(const Path<Pixel>& path, ThreadPool& threads, EventBuckets& events, Row row) {
-  const int height = path.flow.height;
-  const int bands = band_count(height);
-  events.reset(path.steps.count(), bands);
-  threads.for_each(bands, [&](int band, int) {
-    const BandRows rows(band, height);
-    for (int y = rows.first; y < rows.last; ++y) row(path, y, band, events);
-  });
+template <Interpolation interpolation>
+void fire_band_16(const Path<std::uint16_t>& path, int band, EventBuckets& events) {
+  const BandRows rows(band, path.flow.height);
+  for (int y = rows.first; y < rows.last; ++y) fire_row_16<interpolation>(path, y, band, events);
 }
+
+HWY_EXPORT(fire_band_forward);
+HWY_EXPORT(fire_band_blend);
 
 }  // namespace
 
-void fire_along(const Path<std::uint8_t>& path, ThreadPool& threads, EventBuckets& events) {
-  fire_rows(path, threads, events,
-            path.interpolation == Interpolation::forward ? HWY_DYNAMIC_DISPATCH(fire_row_forward)
-                                                         : HWY_DYNAMIC_DISPATCH(fire_row_blend));
+void PathWalker::fire(const Path<std::uint8_t>& path, ThreadPool& threads, EventBuckets& events) {
+  const int bands = band_count(path.flow.height);
+  events.reset(path.steps.count(), bands);
+  if (path.interpolation == Interpolation::forward) {
+    steepness_.measure(path.warp.last, threads);
+    threads.for_each(bands, [&](int band, int) {
+      HWY_DYNAMIC_DISPATCH(fire_band_forward)(path, steepness_, band, events);
+    });
+  } else {
+    threads.for_each(bands, [&](int band, int) {
+      HWY_DYNAMIC_DISPATCH(fire_band_blend)(path, band, events);
+    });
+  }
 }
 
-void fire_along(const Path<std::uint16_t>& path, ThreadPool& threads, EventBuckets& events) {
-  fire_rows(path, threads, events,
-            path.interpolation == Interpolation::forward ? fire_row_16<Interpolation::forward>
-                                                         : fire_row_16<Interpolation::blend>);
+void PathWalker::fire(const Path<std::uint16_t>& path, ThreadPool& threads, EventBuckets& events) {
+  const int bands = band_count(path.flow.height);
+  events.reset(path.steps.count(), bands);
+  threads.for_each(bands, [&](int band, int) {
+    if (path.interpolation == Interpolation::forward)
+      fire_band_16<Interpolation::forward>(path, band, events);
+    else
+      fire_band_16<Interpolation::blend>(path, band, events);
+  });
 }
 
 }  // namespace eventcamera

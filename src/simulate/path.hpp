@@ -9,6 +9,7 @@
 #include "src/parallel/thread_pool.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/simulator.hpp"
+#include "src/simulate/steepness.hpp"
 #include "src/simulate/warp.hpp"
 
 namespace eventcamera {
@@ -24,9 +25,21 @@ struct Path {
 };
 
 /// Takes all pixels through all steps, each pixel's whole path at once, with no frame in between
-/// written down. Replaces what `events` held.
-/// The frames of the 8-bit warp must be Planes: SIMD code reads behind their ends.
-void fire_along(const Path<std::uint8_t>& path, ThreadPool& threads, EventBuckets& events);
-void fire_along(const Path<std::uint16_t>& path, ThreadPool& threads, EventBuckets& events);
+/// written down.
+///
+/// Most pixels cannot fire before the last step, and that can be known beforehand, exactly: a step
+/// of (dx, dy) pixels changes a bilinear sample by no more than |dx| gx + |dy| gy, where gx and gy
+/// are the largest differences of neighbours within reach. Tiles of pixels for which that does not
+/// exceed the thresholds skip to the last step.
+class PathWalker {
+ public:
+  /// Replaces what `events` held. The frames of the 8-bit warp must be Planes: SIMD code reads
+  /// behind their ends.
+  void fire(const Path<std::uint8_t>& path, ThreadPool& threads, EventBuckets& events);
+  void fire(const Path<std::uint16_t>& path, ThreadPool& threads, EventBuckets& events);
+
+ private:
+  Steepness steepness_;
+};
 
 }  // namespace eventcamera
