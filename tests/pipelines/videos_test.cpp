@@ -167,7 +167,7 @@ TEST(Dense, FiresThePolarityOfTheChange) {
 /// interval, and its polarities, which do not weigh the changes, need not add up to their sum.
 TEST(Dense, FiresThePolarityOfTheChangeWhereMuchPassesBy) {
   if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
-  expect_agreement("driving", frames_of(video(driving), 9, 1280, 720), 0.83, 0.86);
+  expect_agreement("driving", frames_of(video(driving), 5, 1280, 720), 0.83, 0.86);
 }
 
 struct Case {
@@ -186,7 +186,7 @@ std::vector<Case> cases() {
   std::vector<Case> all;
   for (const char* element :
        {"eventsim-frame", "eventsim-dense", "eventsim-sparse", "eventsim-diff"}) {
-    all.push_back({element, driving, 9});
+    all.push_back({element, driving, 5});
     all.push_back({element, cars, 99});
   }
   return all;
