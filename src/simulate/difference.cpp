@@ -8,15 +8,18 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <bit>
-#include <cstring>
 #include <limits>
+
+#include "src/simulate/fired_bits.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
+
+/// In words of 64 pixels.
+constexpr int longest_vector = (hn::MaxLanes(hn::ScalableTag<std::uint8_t>()) + 63) / 64;
 
 template <class Pixel>
 void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint32_t t,
@@ -30,29 +33,29 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint
   const auto positive = hn::Set(pixels, in_range(thresholds.positive));
   const auto negative = hn::Set(pixels, in_range(thresholds.negative));
   const auto zero = hn::Zero(pixels);
-  const auto fire = [&](int x) {
+  int x = 0;
+  for (; x + lanes <= width; x += lanes) {
+    const auto a = hn::LoadU(pixels, before + x);
+    const auto b = hn::LoadU(pixels, now + x);
+    // What is left of a rise or a fall beyond its threshold.
+    const auto rise = hn::SaturatedSub(hn::SaturatedSub(b, a), positive);
+    const auto fall = hn::SaturatedSub(hn::SaturatedSub(a, b), negative);
+    const auto fired = hn::Ne(hn::Or(rise, fall), zero);
+    if (hn::AllFalse(pixels, fired)) continue;
+    std::uint64_t fired_bits[longest_vector] = {};
+    std::uint64_t on_bits[longest_vector] = {};
+    hn::StoreMaskBits(pixels, fired, reinterpret_cast<std::uint8_t*>(fired_bits));
+    hn::StoreMaskBits(pixels, hn::Ne(rise, zero), reinterpret_cast<std::uint8_t*>(on_bits));
+    for (int i = 0; i * 64 < lanes; ++i)
+      append_fired(fired_bits[i], on_bits[i], x + 64 * i, y, t, out);
+  }
+  for (; x < width; ++x) {
     const int difference = now[x] - before[x];
     if (difference > thresholds.positive)
       out.push_back(Event::at(x, y, t, Polarity::on));
     else if (-difference > thresholds.negative)
       out.push_back(Event::at(x, y, t, Polarity::off));
-  };
-  int x = 0;
-  for (; x + lanes <= width; x += lanes) {
-    const auto a = hn::LoadU(pixels, before + x);
-    const auto b = hn::LoadU(pixels, now + x);
-    // What is left of a rise or a fall beyond its threshold; one of the two is always 0.
-    const auto beyond = hn::Or(hn::SaturatedSub(hn::SaturatedSub(b, a), positive),
-                               hn::SaturatedSub(hn::SaturatedSub(a, b), negative));
-    const auto fired = hn::Ne(beyond, zero);
-    if (hn::AllFalse(pixels, fired)) continue;
-    std::uint64_t words[8] = {};
-    hn::StoreMaskBits(pixels, fired, reinterpret_cast<std::uint8_t*>(words));
-    for (int i = 0; i * 64 < lanes; ++i)
-      for (auto bits = words[i]; bits != 0; bits &= bits - 1)
-        fire(x + 64 * i + std::countr_zero(bits));
   }
-  for (; x < width; ++x) fire(x);
 }
 
 void fire_row_8(const std::uint8_t* before, const std::uint8_t* now, int width, int y,

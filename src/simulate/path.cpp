@@ -8,10 +8,10 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "src/simulate/bands.hpp"
+#include "src/simulate/fired_bits.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -115,13 +115,7 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, const bool* quiet
       std::uint64_t on_bits = 0;
       hn::StoreMaskBits(words, fired, reinterpret_cast<std::uint8_t*>(&fired_bits));
       hn::StoreMaskBits(words, on, reinterpret_cast<std::uint8_t*>(&on_bits));
-      auto& out = events.bucket(j, band);
-      const auto t = path.steps.microseconds(j);
-      for (; fired_bits != 0; fired_bits &= fired_bits - 1) {
-        const int lane = std::countr_zero(fired_bits);
-        out.push_back(
-            Event::at(x + lane, y, t, (on_bits >> lane & 1) != 0 ? Polarity::on : Polarity::off));
-      }
+      append_fired(fired_bits, on_bits, x, y, path.steps.microseconds(j), events.bucket(j, band));
     };
 
     auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
