@@ -8,6 +8,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "src/simulate/bands.hpp"
@@ -78,8 +79,12 @@ Vector motions(hn::Vec<Floats> flow, float scale) {
   return hn::NearestInt(hn::Mul(cut, hn::Set(Floats(), scale)));
 }
 
+/// For each tile of a band the step at which to begin, where nothing can fire before the last one:
+/// at the last but one, or at the last where that shows the last frame itself. Else 1.
+using FirstSteps = std::array<int, longest_side / Steepness::tile>;
+
 template <Interpolation interpolation>
-void fire_row(const Path<std::uint8_t>& path, int y, int band, const bool* quiet,
+void fire_row(const Path<std::uint8_t>& path, int y, int band, const FirstSteps& first_steps,
               EventBuckets& events) {
   const Words words;
   const int lanes = static_cast<int>(hn::Lanes(words));
@@ -97,15 +102,6 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, const bool* quiet
   for (int x = 0; x < width; x += lanes) {
     const int count = std::min(lanes, width - x);
     const auto within = hn::FirstN(words, static_cast<std::size_t>(count));
-    HWY_ALIGN float flows[2 * hn::MaxLanes(Floats())] = {};
-    std::copy_n(&path.flow.row(y)[x].x, 2 * count, flows);
-    hn::Vec<Floats> flow_x;
-    hn::Vec<Floats> flow_y;
-    hn::LoadInterleaved2(Floats(), flows, flow_x, flow_y);
-    const auto dx = motions(flow_x, scale);
-    const auto dy = motions(flow_y, scale);
-    const auto px = hn::ShiftLeft<16>(hn::Iota(words, x));
-
     const auto fire = [&](Vector before, Vector after, int j) {
       const auto difference = hn::Sub(after, before);
       const auto on = hn::Gt(difference, positive);
@@ -119,9 +115,21 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, const bool* quiet
     };
 
     auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
-    // In a quiet tile nothing fires before the last step, which begins at the last but one.
-    const bool is_quiet = quiet != nullptr && quiet[x / Steepness::tile];
-    const int first = is_quiet ? std::max(1, steps - 1) : 1;
+    const auto end = hn::PromoteTo(words, hn::LoadU(Bytes(), now_row + x));
+    const int first = first_steps[static_cast<std::size_t>(x / Steepness::tile)];
+    if (first == steps) {
+      fire(before, end, steps);
+      continue;
+    }
+    HWY_ALIGN float flows[2 * hn::MaxLanes(Floats())] = {};
+    std::copy_n(&path.flow.row(y)[x].x, 2 * count, flows);
+    hn::Vec<Floats> flow_x;
+    hn::Vec<Floats> flow_y;
+    hn::LoadInterleaved2(Floats(), flows, flow_x, flow_y);
+    const auto dx = motions(flow_x, scale);
+    const auto dy = motions(flow_y, scale);
+    const auto px = hn::ShiftLeft<16>(hn::Iota(words, x));
+
     auto from_x = hn::Sub(px, hn::Mul(dx, hn::Set(words, first - 1)));
     auto from_y = hn::Sub(py, hn::Mul(dy, hn::Set(words, first - 1)));
     for (int j = first; j < steps; ++j) {
@@ -138,10 +146,10 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, const bool* quiet
                         hn::Mul(later, hn::Set(words, weight)));
         value = hn::ShiftRight<20>(hn::Add(value, hn::Set(words, 1 << 19)));
       }
-      if (!is_quiet) fire(before, value, j);
+      if (first == 1) fire(before, value, j);
       before = value;
     }
-    fire(before, hn::PromoteTo(words, hn::LoadU(Bytes(), now_row + x)), steps);
+    fire(before, end, steps);
   }
 }
 
@@ -169,47 +177,48 @@ Flow longest_flow(const PlaneView<Flow>& flow, const BandRows& rows, int left, i
   return {longest[0], longest[1]};
 }
 
-/// Finds the tiles of a band in which nothing can fire before the last step of a forward path.
-void find_quiet(const Path<std::uint8_t>& path, const Steepness& steepness, int band, bool* quiet) {
-  const int width = path.flow.width;
+/// The first step of a forward path at which a tile must be looked at.
+int first_step(const Path<std::uint8_t>& path, const Steepness& steepness, const BandRows& rows,
+               int left, int right) {
   const int steps = path.steps.count();
+  const Flow longest = longest_flow(path.flow, rows, left, right);
+  std::int64_t dx = motion_per_step(longest.x, steps);
+  std::int64_t dy = motion_per_step(longest.y, steps);
+  // Places are rounded to 1/64 of a pixel: nearer than half of that to where it began, a sample is
+  // the pixel itself.
+  if (std::max(dx, dy) * (steps - 1) < 512) return steps;
+  // And a step may be that much longer.
+  dx += 1024;
+  dy += 1024;
+  const int reach_x = static_cast<int>((dx * steps >> 16) + 1);
+  const int reach_y = static_cast<int>((dy * steps >> 16) + 1);
+  // Where things come from afar, looking for the steepest place on the way costs more than it
+  // saves.
+  constexpr int far = 4 * Steepness::tile;
+  if (reach_x > far || reach_y > far) return 1;
+  const auto bound =
+      steepness.within(left - reach_x, rows.first - reach_y, right + reach_x, rows.last + reach_y);
   const std::int64_t threshold = std::min(path.thresholds.positive, path.thresholds.negative);
-  const BandRows rows(band, path.flow.height);
-  for (int left = 0; left < width; left += Steepness::tile) {
-    const int right = std::min(left + Steepness::tile, width);
-    const Flow longest = longest_flow(path.flow, rows, left, right);
-    // A sample's place is rounded to 1/64 of a pixel, so a step may be that much longer.
-    constexpr std::int64_t rounding = 1024;
-    const std::int64_t dx = motion_per_step(longest.x, steps) + rounding;
-    const std::int64_t dy = motion_per_step(longest.y, steps) + rounding;
-    const int reach_x = static_cast<int>((dx * steps >> 16) + 1);
-    const int reach_y = static_cast<int>((dy * steps >> 16) + 1);
-    // Where things come from afar, looking for the steepest place on the way costs more than it
-    // saves.
-    constexpr int far = 4 * Steepness::tile;
-    if (reach_x > far || reach_y > far) {
-      quiet[left / Steepness::tile] = false;
-      continue;
-    }
-    const auto bound = steepness.within(left - reach_x, rows.first - reach_y, right + reach_x,
-                                        rows.last + reach_y);
-    quiet[left / Steepness::tile] = dx * bound.x + dy * bound.y <= threshold << 16;
-  }
+  return dx * bound.x + dy * bound.y <= threshold << 16 ? std::max(1, steps - 1) : 1;
 }
 
 void fire_band_forward(const Path<std::uint8_t>& path, const Steepness& steepness, int band,
                        EventBuckets& events) {
-  bool quiet[longest_side / Steepness::tile];
-  find_quiet(path, steepness, band, quiet);
   const BandRows rows(band, path.flow.height);
+  FirstSteps first_steps;
+  for (int left = 0; left < path.flow.width; left += Steepness::tile)
+    first_steps[static_cast<std::size_t>(left / Steepness::tile)] =
+        first_step(path, steepness, rows, left, std::min(left + Steepness::tile, path.flow.width));
   for (int y = rows.first; y < rows.last; ++y)
-    fire_row<Interpolation::forward>(path, y, band, quiet, events);
+    fire_row<Interpolation::forward>(path, y, band, first_steps, events);
 }
 
 void fire_band_blend(const Path<std::uint8_t>& path, int band, EventBuckets& events) {
   const BandRows rows(band, path.flow.height);
+  FirstSteps first_steps;
+  first_steps.fill(1);
   for (int y = rows.first; y < rows.last; ++y)
-    fire_row<Interpolation::blend>(path, y, band, nullptr, events);
+    fire_row<Interpolation::blend>(path, y, band, first_steps, events);
 }
 
 }  // namespace
