@@ -46,6 +46,14 @@ inline void dense(const Plane<std::uint8_t>& last, const Plane<std::uint8_t>& no
                   ThreadPool& threads, EventBuckets& events) {
   const int m = steps.count();
   const Warp<std::uint8_t> warp{last.view(), now.view(), m};
+  Plane<Motion> dx(now.width(), now.height());
+  Plane<Motion> dy(now.width(), now.height());
+  threads.for_each(now.height(), [&](int y, int) {
+    for (int x = 0; x < now.width(); ++x) {
+      dx.at(x, y) = motion_per_step(flow.row(y)[x].x, m);
+      dy.at(x, y) = motion_per_step(flow.row(y)[x].y, m);
+    }
+  });
   auto before = last;
   Plane<std::uint8_t> between(now.width(), now.height());
   events.reset(m, band_count(now.height()));
@@ -54,11 +62,8 @@ inline void dense(const Plane<std::uint8_t>& last, const Plane<std::uint8_t>& no
       between = now;
     } else {
       threads.for_each(now.height(), [&](int y, int) {
-        for (int x = 0; x < now.width(); ++x) {
-          const Flow& f = flow.row(y)[x];
-          between.at(x, y) = warp.at<Interpolation::forward>(x, y, motion_per_step(f.x, m),
-                                                             motion_per_step(f.y, m), j);
-        }
+        for (int x = 0; x < now.width(); ++x)
+          between.at(x, y) = warp.at<Interpolation::forward>(x, y, dx.at(x, y), dy.at(x, y), j);
       });
     }
     fire(before, between, j, steps.microseconds(j), thresholds, threads, events);
