@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <opencv2/core.hpp>
+#include <cstdint>
 #include <span>
 #include <vector>
 
-#include "src/flow/dense_flow.hpp"
+#include "src/flow/lucas_kanade.hpp"
+#include "src/flow/pyramid.hpp"
 
 namespace eventcamera {
 
@@ -20,24 +21,51 @@ struct Track {
   bool found;  ///< false: the point was lost
 };
 
-/// Pyramidal Lucas-Kanade from the last picture to the next: 15x15 pixels on 4 levels, at most 10
-/// iterations down to 0.03 pixels, as in the paper's code. 8-bit pictures of one size, any size.
+/// Pyramidal Lucas-Kanade from the last picture to the next: 15x15 pixels on 4 levels, as in the
+/// paper's code. 8-bit pictures of one size, any size.
+///
+/// The windows of neighbours are nearly the same. On each level one search serves a cell of 2x2
+/// pixels, and a point's flow is interpolated between the cells about it. Only where those
+/// disagree, at the outlines of what moves and where there is little to hold on to, is each point
+/// searched for on its own.
 class PointTracker {
  public:
   /// Makes the next picture the one tracked to, and what was the next the one tracked from.
-  void push(const PlaneView<std::uint8_t>& picture, int threads);
+  void push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads);
 
-  /// Follows points of the last picture into the next, after two push(). A track for each point,
-  /// good until the next call, the same for any number of threads.
-  std::span<const Track> track(std::span<const Point> points, int threads);
+  /// Follows points of the last picture, in raster order, into the next, after two push(). A track
+  /// for each point, good until the next call, the same for any number of threads.
+  std::span<const Track> track(std::span<const Point> points, ThreadPool& threads);
 
  private:
-  std::vector<cv::Mat> last_;
-  std::vector<cv::Mat> next_;
-  std::vector<cv::Point2f> from_;
-  std::vector<cv::Point2f> to_;
-  std::vector<unsigned char> status_;
-  std::vector<float> error_;
+  /// 2x2 pixels of a level.
+  struct Cell {
+    Flow flow;
+    bool found;
+    std::uint32_t call = 0;  ///< the last track() that wanted it
+  };
+  struct CellGrid {
+    int width;
+    int height;
+    std::vector<Cell> cells;
+    std::vector<Point> wanted;  ///< by this call, in no order that matters
+  };
+
+  void want_cells(std::span<const Point> points);
+  void search_cells(std::size_t level, ThreadPool& threads);
+  Flow guess(const CellGrid& above, const Point& cell) const;
+  const Cell* wanted_cell(const CellGrid& grid, int x, int y) const;
+  bool interpolate(const Point& point, Track& track) const;
+  void search_alone(std::span<const Point> points, ThreadPool& threads);
+
+  Pyramid last_;
+  Pyramid next_;
+  bool has_slopes_ = false;
+  std::vector<CellGrid> grids_;  ///< one a level
+  std::uint32_t call_ = 0;
+  std::vector<Search> searches_;
+  std::vector<std::uint8_t> agreed_;
+  std::vector<std::size_t> alone_;
   std::vector<Track> tracks_;
 };
 

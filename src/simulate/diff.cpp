@@ -122,35 +122,32 @@ class DiffSimulator final : public Simulator {
                 EventBuckets& events) override {
     const auto now = frame.as<Pixel>();
     const auto thresholds = Thresholds::of(settings, format().bits);
-    events.reset(steps.count(), 1);
-    take_difference(now, thresholds);
-    on_.tracker.push(on_.picture.view(), threads().threads());
-    off_.tracker.push(off_.picture.view(), threads().threads());
-    if (has_difference_ && steps.count() > 1) {
+    const int m = steps.count();
+    events.reset(m, band_count(now.height));
+    fire_differences(last_.view(), now, m, steps.microseconds(m), thresholds, threads(), events);
+    keep_difference(now, m, events);
+    on_.tracker.push(on_.picture.view(), threads());
+    off_.tracker.push(off_.picture.view(), threads());
+    if (has_difference_ && m > 1) {
       moving_.clear();
-      follow(on_, steps.count());
-      follow(off_, steps.count());
+      follow(on_, m);
+      follow(off_, m);
       fire_between(steps, events);
     }
-    for (int y = 0; y < now.height; ++y)
-      fire_differences(last_.row(y), now.row(y), now.width, y, steps.microseconds(steps.count()),
-                       thresholds, events.bucket(steps.count(), 0));
     has_difference_ = true;
     last_.assign(now);
   }
 
-  /// D(i) = I(i) - I(i-1), its parts kept where they exceed the thresholds.
-  void take_difference(const PlaneView<Pixel>& now, const Thresholds& thresholds) {
+  /// D(i) = I(i) - I(i-1), kept where it fires, each polarity apart.
+  void keep_difference(const PlaneView<Pixel>& now, int last_step, EventBuckets& events) {
     on_.begin_next();
     off_.begin_next();
     const int shift = format().bits - 8;
-    for (int y = 0; y < now.height; ++y) {
-      for (int x = 0; x < now.width; ++x) {
-        const int difference = now.row(y)[x] - last_.at(x, y);
-        if (difference > thresholds.positive)
-          on_.keep({x, y}, difference, shift);
-        else if (-difference > thresholds.negative)
-          off_.keep({x, y}, difference, shift);
+    for (int band = 0; band < band_count(now.height); ++band) {
+      for (const auto& event : events.bucket(last_step, band)) {
+        const Point place{event.x, event.y()};
+        const int difference = now.row(place.y)[place.x] - last_.at(place.x, place.y);
+        (event.polarity() == Polarity::on ? on_ : off_).keep(place, difference, shift);
       }
     }
   }
@@ -158,7 +155,7 @@ class DiffSimulator final : public Simulator {
   /// Sets the kept pixels of the last difference frame moving towards this one.
   void follow(Part& part, int steps) {
     const auto& places = part.last.places;
-    const auto tracks = part.tracker.track(places, threads().threads());
+    const auto tracks = part.tracker.track(places, threads());
     for (std::size_t i = 0; i < places.size(); ++i) {
       const auto point = moving_point(places[i], tracks[i], steps, format().width, format().height);
       if (point && part.keeps_near(point->at(steps)))

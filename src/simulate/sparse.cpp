@@ -2,17 +2,82 @@
 #include "src/simulate/sparse.hpp"
 
 #include <algorithm>
-#include <cstdlib>
+#include <cstring>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "src/picture/grey8.hpp"
-#include "src/simulate/bands.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/moving_point.hpp"
 
 namespace eventcamera {
 namespace {
+
+/// A tracked pixel on its way, with the brightness that it carries.
+template <class Pixel>
+struct MovingPixel {
+  MovingPoint point;
+  Pixel brightness;
+};
+
+/// What lies between two frames.
+template <class Pixel>
+struct Interval {
+  PlaneView<Pixel> last;
+  PlaneView<Pixel> now;
+  std::span<const MovingPixel<Pixel>> pixels;  ///< in raster order of where they start
+  const std::vector<char>& touched;            ///< rows that a pixel leaves or crosses
+};
+
+/// Paints the interpolated frames of an interval, one after another.
+template <class Pixel>
+class Painter {
+ public:
+  Painter(int width, int height) : between_(width, height), before_(width, height) {}
+
+  /// The events of steps first ... last of the interval, into those steps' buckets.
+  void fire(const Interval<Pixel>& interval, int first, int last, const StepTimes& steps,
+            const Thresholds& thresholds, EventBuckets& events) {
+    paint(interval, first - 1);
+    for (int j = first; j <= last; ++j) {
+      std::swap(before_, between_);
+      const bool ends = j == steps.count();
+      if (!ends) paint(interval, j);
+      auto& out = events.bucket(j, 0);
+      for (int y = 0; y < interval.now.height; ++y) {
+        const bool touched = interval.touched[static_cast<std::size_t>(y)] != 0;
+        if (!touched && !ends) continue;
+        fire_differences(touched ? before_.row(y) : interval.last.row(y),
+                         ends ? interval.now.row(y) : between_.row(y), interval.now.width, y,
+                         steps.microseconds(j), thresholds, out);
+      }
+    }
+  }
+
+ private:
+  /// The touched rows of the frame of step j, into between_.
+  void paint(const Interval<Pixel>& interval, int j) {
+    for (int y = 0; y < between_.height(); ++y)
+      if (interval.touched[static_cast<std::size_t>(y)] != 0)
+        std::memcpy(between_.row(y), interval.last.row(y),
+                    static_cast<std::size_t>(between_.stride()));
+    places_.resize(interval.pixels.size());
+    auto* place = places_.data();
+    for (const auto& pixel : interval.pixels) {
+      const auto [x, y] = pixel.point.start;
+      const auto [to_x, to_y] = pixel.point.at(j);
+      *place++ = &between_.at(to_x, to_y);
+      if (to_x != x || to_y != y) between_.at(x, y) = interval.now.row(y)[x];
+    }
+    place = places_.data();
+    for (const auto& pixel : interval.pixels) **place++ = pixel.brightness;
+  }
+
+  Plane<Pixel> between_;
+  Plane<Pixel> before_;
+  std::vector<Pixel*> places_;  ///< of the pixels, in between_
+};
 
 template <class Pixel>
 class SparseSimulator final : public Simulator {
@@ -20,13 +85,12 @@ class SparseSimulator final : public Simulator {
   explicit SparseSimulator(const LumaFormat& format)
       : Simulator(format),
         last_(format.width, format.height),
-        before_(format.width, format.height),
-        between_(format.width, format.height) {}
+        touched_(static_cast<std::size_t>(format.height)) {}
 
  private:
   void start(const LumaView& frame) override {
     last_.assign(frame.as<Pixel>());
-    tracker_.push(grey_.of(frame), threads().threads());
+    tracker_.push(grey_.of(frame), threads());
   }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
@@ -34,68 +98,55 @@ class SparseSimulator final : public Simulator {
     const auto now = frame.as<Pixel>();
     const auto thresholds = Thresholds::of(settings, format().bits);
     find_changed(now, std::min(thresholds.positive, thresholds.negative));
-    tracker_.push(grey_.of(frame), threads().threads());
+    tracker_.push(grey_.of(frame), threads());
     follow_changed(steps.count());
 
-    const int bands = band_count(now.height);
-    events.reset(steps.count(), bands);
-    before_.assign(last_.view());
-    for (int j = 1; j <= steps.count(); ++j) {
-      auto after = now;
-      if (j < steps.count()) {
-        interpolate(now, j);
-        after = between_.view();
-      }
-      threads().for_each(bands, [&](int band, int) {
-        const BandRows rows(band, now.height);
-        for (int y = rows.first; y < rows.last; ++y)
-          fire_differences(before_.row(y), after.row(y), now.width, y, steps.microseconds(j),
-                           thresholds, events.bucket(j, band));
-      });
-      std::swap(before_, between_);
-    }
+    const int m = steps.count();
+    events.reset(m, 1);
+    const Interval<Pixel> interval{last_.view(), now, pixels_, touched_};
+    // Each thread paints steps that follow each other, so that all but the first frame serve twice.
+    const int runs = std::min(threads().threads(), m);
+    while (static_cast<int>(painters_.size()) < runs)
+      painters_.emplace_back(format().width, format().height);
+    threads().for_each(runs, [&](int run, int) {
+      painters_[static_cast<std::size_t>(run)].fire(
+          interval, m * run / runs + 1, m * (run + 1) / runs, steps, thresholds, events);
+    });
     last_.assign(now);
   }
 
   /// The pixels whose change exceeds `threshold`, in raster order.
   void find_changed(const PlaneView<Pixel>& now, int threshold) {
+    changes_.reset(1, band_count(now.height));
+    fire_differences(last_.view(), now, 1, 0, {threshold, threshold}, threads(), changes_);
     changed_.clear();
-    for (int y = 0; y < now.height; ++y)
-      for (int x = 0; x < now.width; ++x)
-        if (std::abs(now.row(y)[x] - last_.at(x, y)) > threshold) changed_.push_back({x, y});
+    for (const auto& bucket : changes_.buckets())
+      for (const auto& change : bucket) changed_.push_back({change.x, change.y()});
   }
 
   /// Sets the changed pixels moving towards this frame.
   void follow_changed(int steps) {
-    points_.clear();
-    const auto tracks = tracker_.track(changed_, threads().threads());
-    for (std::size_t i = 0; i < changed_.size(); ++i)
-      if (const auto point =
-              moving_point(changed_[i], tracks[i], steps, format().width, format().height))
-        points_.push_back(*point);
-  }
-
-  /// The interpolated frame of step j, into between_.
-  void interpolate(const PlaneView<Pixel>& now, int j) {
-    between_.assign(last_.view());
-    for (const auto& point : points_) {
-      const auto [x, y] = point.start;
-      const auto [to_x, to_y] = point.at(j);
-      if (to_x != x || to_y != y) between_.at(x, y) = now.row(y)[x];
-    }
-    for (const auto& point : points_) {
-      const auto [to_x, to_y] = point.at(j);
-      between_.at(to_x, to_y) = last_.at(point.start.x, point.start.y);
+    pixels_.clear();
+    std::fill(touched_.begin(), touched_.end(), 0);
+    const auto tracks = tracker_.track(changed_, threads());
+    for (std::size_t i = 0; i < changed_.size(); ++i) {
+      const auto point =
+          moving_point(changed_[i], tracks[i], steps, format().width, format().height);
+      if (!point) continue;
+      pixels_.push_back({*point, last_.at(point->start.x, point->start.y)});
+      const auto [top, bottom] = std::minmax({point->start.y, point->at(steps).y});
+      for (int y = top; y <= bottom; ++y) touched_[static_cast<std::size_t>(y)] = 1;
     }
   }
 
   Plane<Pixel> last_;
   PointTracker tracker_;
   Grey8 grey_;
+  EventBuckets changes_;
   std::vector<Point> changed_;
-  std::vector<MovingPoint> points_;
-  Plane<Pixel> before_;
-  Plane<Pixel> between_;
+  std::vector<MovingPixel<Pixel>> pixels_;
+  std::vector<char> touched_;
+  std::vector<Painter<Pixel>> painters_;  ///< one a thread
 };
 
 }  // namespace

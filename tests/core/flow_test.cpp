@@ -68,25 +68,27 @@ TEST_P(EveryFlow, DoesNotDependOnThreads) {
 TEST(PointTracker, FollowsATexture) {
   const auto from = scene::texture<std::uint8_t>(160, 120, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(160, 120, 8, -4, 2);
+  ThreadPool threads;
   PointTracker tracker;
-  tracker.push(from.view(), 0);
-  tracker.push(to.view(), 0);
+  tracker.push(from.view(), threads);
+  tracker.push(to.view(), threads);
   const Point points[] = {{60, 50}, {80, 70}, {100, 40}};
-  for (const auto& track : tracker.track(points, 0)) {
+  for (const auto& track : tracker.track(points, threads)) {
     EXPECT_TRUE(track.found);
     EXPECT_NEAR(track.flow.x, 4, 0.1);
     EXPECT_NEAR(track.flow.y, -2, 0.1);
   }
-  EXPECT_TRUE(tracker.track({}, 0).empty());
+  EXPECT_TRUE(tracker.track({}, threads).empty());
 }
 
 TEST(PointTracker, LosesWhatHasNoTexture) {
   const auto picture = scene::flat<std::uint8_t>(60, 40, 90);
+  ThreadPool threads;
   PointTracker tracker;
-  tracker.push(picture.view(), 0);
-  tracker.push(picture.view(), 0);
+  tracker.push(picture.view(), threads);
+  tracker.push(picture.view(), threads);
   const Point points[] = {{30, 20}};
-  EXPECT_FALSE(tracker.track(points, 0)[0].found);
+  EXPECT_FALSE(tracker.track(points, threads)[0].found);
 }
 
 TEST(FixedPoint, SharesAFlowOutOverTheSteps) {

@@ -141,11 +141,12 @@ class Equality : public testing::TestWithParam<Case> {
     SCOPED_TRACE("sparse");
     const auto points =
         reference::changed(last, now, std::min(thresholds.positive, thresholds.negative));
+    ThreadPool threads;
     PointTracker tracker;
-    tracker.push(grey8(last, format.bits).view(), 1);
-    tracker.push(grey8(now, format.bits).view(), 1);
+    tracker.push(grey8(last, format.bits).view(), threads);
+    tracker.push(grey8(now, format.bits).view(), threads);
     check(*make_sparse_simulator(format),
-          reference::sparse(last, now, points, tracker.track(points, 1), steps, thresholds));
+          reference::sparse(last, now, points, tracker.track(points, threads), steps, thresholds));
   }
 
   template <class Pixel>
@@ -157,11 +158,12 @@ class Equality : public testing::TestWithParam<Case> {
     const auto follow = [&](int sign) {
       const auto from = reference::part_of(before, sign, format.bits);
       const auto to = reference::part_of(now, sign, format.bits);
+      ThreadPool threads;
       PointTracker tracker;
-      tracker.push(from.view(), 1);
-      tracker.push(to.view(), 1);
+      tracker.push(from.view(), threads);
+      tracker.push(to.view(), threads);
       reference::Tracked tracked{reference::points_of(from), {}};
-      const auto tracks = tracker.track(tracked.points, 1);
+      const auto tracks = tracker.track(tracked.points, threads);
       tracked.tracks.assign(tracks.begin(), tracks.end());
       return tracked;
     };

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/flow/pyramid.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/pyramid.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants to come after that.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstring>
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Words = hn::CappedTag<std::uint16_t, 16>;
+using Slopes = hn::CappedTag<std::int16_t, 16>;
+template <class Lanes>
+using BytesFor = hn::Rebind<std::uint8_t, Lanes>;
+
+/// The longest blurred row: a picture's, two pixels more each side, and a vector's rest.
+constexpr int longest_row = 16384 + 64;
+
+/// A row of the next level, from the rows about row 2y of this one. Writes up to a vector more.
+void halve_row(const PlaneWithMargin<std::uint8_t>& picture, int y, std::uint8_t* out, int width) {
+  const Words words;
+  const BytesFor<Words> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(words));
+  HWY_ALIGN std::uint16_t blurred[longest_row];
+  const auto load = [&](int row, int x) {
+    return hn::PromoteTo(words, hn::LoadU(bytes, picture.row(row) + x));
+  };
+  constexpr int before = 2;
+  const int columns = before + 2 * width + 2;
+  for (int i = 0; i < columns; i += lanes) {
+    const int x = i - before;
+    const auto outer = hn::Add(load(2 * y - 2, x), load(2 * y + 2, x));
+    const auto inner = hn::Add(load(2 * y - 1, x), load(2 * y + 1, x));
+    const auto middle = load(2 * y, x);
+    const auto sum =
+        hn::Add(hn::Add(outer, hn::ShiftLeft<2>(hn::Add(inner, middle))), hn::ShiftLeft<1>(middle));
+    hn::StoreU(sum, words, blurred + i);
+  }
+  for (int x = 0; x < width; x += lanes) {
+    const std::uint16_t* at = blurred + 2 * x;
+    hn::Vec<Words> left2;
+    hn::Vec<Words> left1;
+    hn::Vec<Words> middle;
+    hn::Vec<Words> right1;
+    hn::Vec<Words> right2;
+    hn::Vec<Words> unused;
+    hn::LoadInterleaved2(words, at, left2, left1);
+    hn::LoadInterleaved2(words, at + 2, middle, right1);
+    hn::LoadInterleaved2(words, at + 4, right2, unused);
+    const auto inner = hn::ShiftLeft<2>(hn::Add(hn::Add(left1, right1), middle));
+    const auto sum = hn::Add(hn::Add(hn::Add(left2, right2), inner), hn::ShiftLeft<1>(middle));
+    const auto rounded = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 128)));
+    hn::StoreU(hn::DemoteTo(bytes, hn::BitCast(Slopes(), rounded)), bytes, out + x);
+  }
+}
+
+/// A row of both slopes; up to a vector of 0 more.
+void slope_row(const PlaneWithMargin<std::uint8_t>& picture, int y, std::int16_t* out_x,
+               std::int16_t* out_y) {
+  const Slopes slopes;
+  const BytesFor<Slopes> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(slopes));
+  const auto ten = hn::Set(slopes, 10);
+  const auto three = hn::Set(slopes, 3);
+  for (int x = 0; x < picture.width(); x += lanes) {
+    const auto load = [&](int row, int column) {
+      return hn::PromoteTo(slopes, hn::LoadU(bytes, picture.row(row) + column));
+    };
+    const auto weigh = [&](auto outer, auto middle) {
+      return hn::Add(hn::Mul(outer, three), hn::Mul(middle, ten));
+    };
+    const auto difference = [&](int row) { return hn::Sub(load(row, x + 1), load(row, x - 1)); };
+    const auto smooth = [&](int row) {
+      return weigh(hn::Add(load(row, x - 1), load(row, x + 1)), load(row, x));
+    };
+    const auto within =
+        hn::FirstN(slopes, static_cast<std::size_t>(std::min(lanes, picture.width() - x)));
+    const auto dx = weigh(hn::Add(difference(y - 1), difference(y + 1)), difference(y));
+    const auto dy = hn::Sub(smooth(y + 1), smooth(y - 1));
+    hn::StoreU(hn::IfThenElseZero(within, dx), slopes, out_x + x);
+    hn::StoreU(hn::IfThenElseZero(within, dy), slopes, out_y + x);
+  }
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(halve_row);
+HWY_EXPORT(slope_row);
+
+namespace {
+
+constexpr int rows_per_round = 32;
+
+template <class Body>
+void for_each_row(ThreadPool& threads, int rows, const Body& body) {
+  threads.for_each((rows + rows_per_round - 1) / rows_per_round, [&](int round, int) {
+    const int end = std::min(rows, (round + 1) * rows_per_round);
+    for (int y = round * rows_per_round; y < end; ++y) body(y);
+  });
+}
+
+/// Where a position beyond the border is reflected to: the border pixel itself is not repeated.
+int reflected(int p, int size) {
+  if (size == 1) return 0;
+  const int period = 2 * (size - 1);
+  const int q = ((p % period) + period) % period;
+  return std::min(q, period - q);
+}
+
+void reflect_sides(PlaneWithMargin<std::uint8_t>& picture, int y) {
+  std::uint8_t* row = picture.row(y);
+  const int width = picture.width();
+  for (int i = 1; i <= picture.margin; ++i) row[-i] = row[reflected(-i, width)];
+  for (int i = 0; i < picture.right_margin; ++i) row[width + i] = row[reflected(width + i, width)];
+}
+
+void reflect_ends(PlaneWithMargin<std::uint8_t>& picture) {
+  const int height = picture.height();
+  const auto bytes =
+      static_cast<std::size_t>(picture.width() + picture.margin + picture.right_margin);
+  const auto copy_row = [&](int to) {
+    std::memcpy(picture.row(to) - picture.margin,
+                picture.row(reflected(to, height)) - picture.margin, bytes);
+  };
+  for (int i = 1; i <= picture.margin; ++i) {
+    copy_row(-i);
+    copy_row(height - 1 + i);
+  }
+}
+
+}  // namespace
+
+void Pyramid::shape(int width, int height) {
+  if (!levels_.empty() && levels_[0].picture.width() == width &&
+      levels_[0].picture.height() == height)
+    return;
+  levels_.clear();
+  while (levels_.empty() ||
+         (std::min(width, height) > shortest_side && levels_.size() < most_levels)) {
+    levels_.push_back({PlaneWithMargin<std::uint8_t>(width, height),
+                       PlaneWithMargin<std::int16_t>(width, height),
+                       PlaneWithMargin<std::int16_t>(width, height)});
+    width = (width + 1) / 2;
+    height = (height + 1) / 2;
+  }
+}
+
+void Pyramid::build(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) {
+  shape(picture.width, picture.height);
+  auto& base = levels_[0].picture;
+  for_each_row(threads, picture.height, [&](int y) {
+    std::memcpy(base.row(y), picture.row(y), static_cast<std::size_t>(picture.width));
+    reflect_sides(base, y);
+  });
+  reflect_ends(base);
+  for (std::size_t level = 1; level < levels_.size(); ++level) {
+    const auto& from = levels_[level - 1].picture;
+    auto& to = levels_[level].picture;
+    for_each_row(threads, to.height(), [&](int y) {
+      HWY_DYNAMIC_DISPATCH(halve_row)(from, y, to.row(y), to.width());
+      reflect_sides(to, y);
+    });
+    reflect_ends(to);
+  }
+}
+
+void Pyramid::build_slopes(ThreadPool& threads) {
+  for (auto& level : levels_)
+    for_each_row(threads, level.picture.height(), [&](int y) {
+      HWY_DYNAMIC_DISPATCH(slope_row)
+      (level.picture, y, level.slope_x.row(y), level.slope_y.row(y));
+    });
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE
