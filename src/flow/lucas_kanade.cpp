@@ -277,7 +277,7 @@ namespace eventcamera {
 
 HWY_EXPORT(search_all);
 
-void search(const PyramidLevel& from, const PyramidLevel& to, std::span<Search> searches) {
+void search_level(const PyramidLevel& from, const PyramidLevel& to, std::span<Search> searches) {
   HWY_DYNAMIC_DISPATCH(search_all)(from, to, searches);
 }
 

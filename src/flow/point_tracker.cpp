@@ -9,8 +9,6 @@ namespace eventcamera {
 namespace {
 
 constexpr int cell_side = 2;
-/// Neighbouring cells whose flows differ by more have not found the same motion, pixels.
-constexpr float disagreement = 1;
 /// Cells whose flow differs by more than this do not share in a point's, pixels.
 constexpr float similar = 1;
 
@@ -139,8 +137,8 @@ void PointTracker::search_cells(std::size_t level, ThreadPool& threads) {
       const Flow start = level + 1 < grids_.size() ? guess(grids_[level + 1], cell) : Flow{0, 0};
       searches_[i] = {static_cast<float>(x), static_cast<float>(y), start, false};
     }
-    search(last_.levels()[level], next_.levels()[level],
-           std::span(searches_).subspan(first, last - first));
+    search_level(last_.levels()[level], next_.levels()[level],
+                 std::span(searches_).subspan(first, last - first));
     for (std::size_t i = first; i < last; ++i) {
       const auto& cell = grid.wanted[i];
       auto& found =
@@ -160,7 +158,7 @@ bool PointTracker::interpolate(const Point& point, Track& track) const {
   for (int y = home.y - 1; y <= home.y + 1; ++y)
     for (int x = home.x - 1; x <= home.x + 1; ++x)
       if (const auto* cell = wanted_cell(grid, x, y))
-        if (!cell->found || distance(cell->flow, own.flow) > disagreement) return false;
+        if (!cell->found || distance(cell->flow, own.flow) > disagreement_) return false;
   // The second pixel of a cell is its middle; the first lies half way to the cell before.
   Mean mean;
   for (int y = point.y % 2 == 0 ? home.y - 1 : home.y; y <= home.y; ++y)
@@ -185,7 +183,7 @@ void PointTracker::search_alone(std::span<const Point> points, ThreadPool& threa
         search.y = static_cast<float>(point.y) * scale;
         search.flow = {2 * search.flow.x, 2 * search.flow.y};
       }
-      search(last_.levels()[level], next_.levels()[level], part);
+      search_level(last_.levels()[level], next_.levels()[level], part);
     }
     for (std::size_t i = first; i < last; ++i)
       tracks_[alone_[i]] = {searches_[i].flow, searches_[i].found};

@@ -21,6 +21,12 @@ struct Track {
   bool found;  ///< false: the point was lost
 };
 
+/// What PointTracker is to take for disagreement, in pixels, so that its tracks end within 0.1
+/// pixel of OpenCV's on average where there is texture: between frames, and between difference
+/// frames, in which there is less to hold on to.
+inline constexpr float disagreement_of_frames = 2;
+inline constexpr float disagreement_of_differences = 0.35F;
+
 /// Pyramidal Lucas-Kanade from the last picture to the next: 15x15 pixels on 4 levels, as in the
 /// paper's code. 8-bit pictures of one size, any size.
 ///
@@ -30,6 +36,10 @@ struct Track {
 /// searched for on its own.
 class PointTracker {
  public:
+  /// Neighbouring cells disagree where their flows differ by more than this, in pixels: the less,
+  /// the more points are searched for on their own.
+  explicit PointTracker(float disagreement) : disagreement_(disagreement) {}
+
   /// Makes the next picture the one tracked to, and what was the next the one tracked from.
   void push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads);
 
@@ -58,6 +68,7 @@ class PointTracker {
   bool interpolate(const Point& point, Track& track) const;
   void search_alone(std::span<const Point> points, ThreadPool& threads);
 
+  float disagreement_;
   Pyramid last_;
   Pyramid next_;
   bool has_slopes_ = false;

@@ -10,10 +10,16 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
 
 #include "gst/eventcamera/eventcamera.h"
 #include "src/flow/dense_flow.hpp"
+#include "src/flow/opencv_picture.hpp"
+#include "src/flow/point_tracker.hpp"
 #include "src/reference/dense.hpp"
+#include "src/reference/diff.hpp"
+#include "src/reference/sparse.hpp"
 #include "tests/pipelines/video_frames.hpp"
 
 namespace {
@@ -95,6 +101,98 @@ TEST(Dense, WarpsTheRightWayRound) {
     std::printf("driving, flow %d: warp %.2f dB, none %.2f dB\n", static_cast<int>(method),
                 with_warp / pairs, without / pairs);
   }
+}
+
+/// The 8-bit difference frame of one polarity (1 or -1).
+Plane<std::uint8_t> part(const Plane<std::uint8_t>& last, const Plane<std::uint8_t>& now, int sign,
+                         int threshold) {
+  Plane<std::uint8_t> result(now.width(), now.height());
+  for (int y = 0; y < now.height(); ++y)
+    for (int x = 0; x < now.width(); ++x)
+      if (const int rise = sign * (now.at(x, y) - last.at(x, y)); rise > threshold)
+        result.at(x, y) = static_cast<std::uint8_t>(rise);
+  return result;
+}
+
+/// The slope about each pixel (15x15, root of the mean square, grey levels a pixel) in the
+/// direction in which it is least.
+cv::Mat least_slopes(const Plane<std::uint8_t>& picture) {
+  cv::Mat x;
+  cv::Mat y;
+  cv::Scharr(opencv_picture(picture.view()), x, CV_32F, 1, 0, 1 / 32.0);
+  cv::Scharr(opencv_picture(picture.view()), y, CV_32F, 0, 1, 1 / 32.0);
+  const auto mean = [](const cv::Mat& products) {
+    cv::Mat result;
+    cv::boxFilter(products, result, -1, {15, 15});
+    return result;
+  };
+  const cv::Mat xx = mean(x.mul(x));
+  const cv::Mat xy = mean(x.mul(y));
+  const cv::Mat yy = mean(y.mul(y));
+  cv::Mat root;
+  cv::sqrt((xx - yy).mul(xx - yy) + 4 * xy.mul(xy), root);
+  cv::Mat slopes;
+  cv::sqrt(cv::max((xx + yy - root) / 2, 0), slopes);
+  return slopes;
+}
+
+/// How far our tracks end from OpenCV's, where there is texture: 3 grey levels a pixel.
+struct TrackErrors {
+  float disagreement;
+  double sum = 0;
+  int tracks = 0;
+  int found_by_one = 0;
+
+  void add(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to,
+           const std::vector<Point>& points) {
+    PointTracker tracker(disagreement);
+    ThreadPool threads;
+    tracker.push(from.view(), threads);
+    tracker.push(to.view(), threads);
+    const auto ours = tracker.track(points, threads);
+    std::vector<cv::Point2f> starts;
+    for (const auto& point : points)
+      starts.emplace_back(static_cast<float>(point.x), static_cast<float>(point.y));
+    std::vector<cv::Point2f> ends;
+    std::vector<unsigned char> status;
+    std::vector<float> error;
+    cv::calcOpticalFlowPyrLK(opencv_picture(from.view()), opencv_picture(to.view()), starts, ends,
+                             status, error, {15, 15}, 3, {3, 10, 0.03});
+    const auto texture = least_slopes(from);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (texture.at<float>(points[i].y, points[i].x) < 3) continue;
+      ++tracks;
+      if ((status[i] != 0) != ours[i].found)
+        ++found_by_one;
+      else if (ours[i].found)
+        sum += std::hypot(ours[i].flow.x - (ends[i].x - starts[i].x),
+                          ours[i].flow.y - (ends[i].y - starts[i].y));
+    }
+  }
+};
+
+TEST(Tracks, AreThoseOfOpenCv) {
+  if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
+  const auto frames = frames_of(video(driving), 38, 640, 480);
+  ASSERT_GE(frames.size(), 37U);
+  TrackErrors sparse{disagreement_of_frames};
+  TrackErrors diff{disagreement_of_differences};
+  for (std::size_t i = 1; i + 1 < frames.size(); i += 4) {
+    sparse.add(frames[i], frames[i + 1], reference::changed(frames[i], frames[i + 1], 6));
+    for (const int sign : {1, -1}) {
+      const auto last = part(frames[i - 1], frames[i], sign, 19);
+      diff.add(last, part(frames[i], frames[i + 1], sign, 19), reference::points_of(last));
+    }
+  }
+  const auto check = [](const char* method, const TrackErrors& errors) {
+    const double mean = errors.sum / (errors.tracks - errors.found_by_one);
+    std::printf("driving, %s: %d tracks, mean end-point error %.3f pixel, %d found by one only\n",
+                method, errors.tracks, mean, errors.found_by_one);
+    EXPECT_LT(mean, 0.1) << method;
+    EXPECT_LT(errors.found_by_one, errors.tracks / 200) << method;
+  };
+  check("sparse", sparse);
+  check("diff", diff);
 }
 
 struct Agreement {

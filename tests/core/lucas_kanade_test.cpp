@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Pyramids and searches equal their plain references on every SIMD target of this processor, and
+// tracks are no further from the truth than those of OpenCV, which searches for each point on its
+// own. How close they come to OpenCV's on real pictures is measured in tests/pipelines.
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+#include <hwy/targets.h>
+
+#include <bit>
+#include <cmath>
+#include <opencv2/video/tracking.hpp>
+
+#include "src/flow/opencv_picture.hpp"
+#include "src/flow/point_tracker.hpp"
+#include "src/reference/lucas_kanade.hpp"
+#include "tests/core/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+template <class Body>
+void on_every_target(const Body& body) {
+  const auto choose = [](std::int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  };
+  for (const auto target : hwy::SupportedAndGeneratedTargets()) {
+    choose(target);
+    body(hwy::TargetName(target));
+  }
+  choose(0);
+}
+
+struct Size {
+  int width;
+  int height;
+};
+
+class EverySize : public testing::TestWithParam<Size> {};
+
+INSTANTIATE_TEST_SUITE_P(, EverySize,
+                         testing::Values(Size{1, 1}, Size{1, 40}, Size{40, 1}, Size{2, 2},
+                                         Size{16, 16}, Size{17, 33}, Size{63, 65}, Size{131, 70}));
+
+TEST_P(EverySize, PyramidsEqualTheReference) {
+  const auto [width, height] = GetParam();
+  const auto picture = scene::noise<std::uint8_t>(width, height, 8, 3);
+  ThreadPool threads;
+  threads.set_threads(0);
+  on_every_target([&](const char* target) {
+    Pyramid pyramid;
+    pyramid.build(picture.view(), threads);
+    pyramid.build_slopes(threads);
+    auto expected = picture;
+    for (const auto& level : pyramid.levels()) {
+      ASSERT_EQ(level.picture.width(), expected.width());
+      ASSERT_EQ(level.picture.height(), expected.height());
+      const reference::Mirrored mirrored{expected};
+      for (int y = -16; y < expected.height() + 16; ++y) {
+        for (int x = -16; x < expected.width() + 16; ++x) {
+          ASSERT_EQ(level.picture.row(y)[x], mirrored(x, y)) << target << " " << x << "," << y;
+          ASSERT_EQ(level.slope_x.row(y)[x], reference::slope(expected, x, y, true)) << target;
+          ASSERT_EQ(level.slope_y.row(y)[x], reference::slope(expected, x, y, false)) << target;
+        }
+      }
+      expected = reference::halved(expected);
+    }
+  });
+}
+
+TEST_P(EverySize, SearchesEqualTheReference) {
+  const auto [width, height] = GetParam();
+  for (const bool noisy : {true, false}) {
+    const auto from = noisy ? scene::noise<std::uint8_t>(width, height, 8, 3)
+                            : scene::texture<std::uint8_t>(width, height, 8, 0, 0);
+    const auto to = noisy ? scene::noise<std::uint8_t>(width, height, 8, 4)
+                          : scene::texture<std::uint8_t>(width, height, 8, -1.3, 0.8);
+    std::vector<Search> searches;
+    for (int i = 0; i < 60; ++i) {
+      const float x = static_cast<float>(i * 37 % (8 * width)) / 8;
+      const float y = static_cast<float>(i * 53 % (8 * height)) / 8;
+      searches.push_back({x, y, {static_cast<float>(i % 5 - 2), static_cast<float>(i % 3)}, true});
+    }
+    searches.push_back({0, 0, {1e30F, 0}, true});
+    searches.push_back({0, 0, {std::nanf(""), 0}, true});
+    auto expected = searches;
+    for (auto& search : expected) reference::search(from, to, search);
+    ThreadPool threads;
+    Pyramid from_levels;
+    Pyramid to_levels;
+    from_levels.build(from.view(), threads);
+    from_levels.build_slopes(threads);
+    to_levels.build(to.view(), threads);
+    on_every_target([&](const char* target) {
+      auto found = searches;
+      search_level(from_levels.levels()[0], to_levels.levels()[0], found);
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        const auto bits = [](float value) { return std::bit_cast<std::uint32_t>(value); };
+        EXPECT_EQ(found[i].found, expected[i].found) << target << ", search " << i;
+        EXPECT_EQ(bits(found[i].flow.x), bits(expected[i].flow.x)) << target << ", search " << i;
+        EXPECT_EQ(bits(found[i].flow.y), bits(expected[i].flow.y)) << target << ", search " << i;
+      }
+    });
+  }
+}
+
+TEST(PointTracker, IsAsTrueAsOpenCv) {
+  const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
+  const auto to = scene::texture<std::uint8_t>(320, 240, 8, 2.3, 1.9);
+  std::vector<Point> points;
+  std::vector<cv::Point2f> starts;
+  for (int y = 0; y < 240; ++y) {
+    for (int x = y % 3; x < 320; x += 2) {
+      points.push_back({x, y});
+      starts.emplace_back(static_cast<float>(x), static_cast<float>(y));
+    }
+  }
+  ThreadPool threads;
+  PointTracker tracker(disagreement_of_frames);
+  tracker.push(from.view(), threads);
+  tracker.push(to.view(), threads);
+  const auto tracks = tracker.track(points, threads);
+  std::vector<cv::Point2f> ends;
+  std::vector<unsigned char> status;
+  std::vector<float> error;
+  cv::calcOpticalFlowPyrLK(opencv_picture(from.view()), opencv_picture(to.view()), starts, ends,
+                           status, error, {15, 15}, 3, {3, 10, 0.03});
+  const auto error_of = [](float x, float y) { return std::hypot(x + 2.3F, y + 1.9F); };
+  double ours = 0;
+  double opencv = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    ours += error_of(tracks[i].flow.x, tracks[i].flow.y);
+    opencv += error_of(ends[i].x - starts[i].x, ends[i].y - starts[i].y);
+  }
+  EXPECT_LT(ours / static_cast<double>(points.size()), 0.1);
+  EXPECT_LE(ours, opencv);
+}
+
+TEST(PointTracker, DoesNotDependOnThreads) {
+  const auto from = scene::noise<std::uint8_t>(200, 150, 8, 1);
+  const auto to = scene::noise<std::uint8_t>(200, 150, 8, 2);
+  std::vector<Point> points;
+  for (int y = 0; y < 150; ++y)
+    for (int x = 0; x < 200; ++x) points.push_back({x, y});
+  const auto tracks = [&](int count) {
+    ThreadPool threads;
+    threads.set_threads(count);
+    PointTracker tracker(disagreement_of_frames);
+    tracker.push(from.view(), threads);
+    tracker.push(to.view(), threads);
+    const auto found = tracker.track(points, threads);
+    return std::vector<Track>(found.begin(), found.end());
+  };
+  const auto one = tracks(1);
+  const auto all = tracks(0);
+  ASSERT_EQ(one.size(), all.size());
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    ASSERT_EQ(one[i].found, all[i].found);
+    ASSERT_EQ(one[i].flow.x, all[i].flow.x);
+    ASSERT_EQ(one[i].flow.y, all[i].flow.y);
+  }
+}
+
+}  // namespace
