@@ -5,6 +5,20 @@
 #include <utility>
 
 namespace eventcamera {
+namespace {
+
+/// Whether a condition comes true within some 50 microseconds of yielding.
+template <class Condition>
+bool soon(const Condition& condition) {
+  constexpr int tries = 100;
+  for (int i = 0; i < tries; ++i) {
+    if (condition()) return true;
+    std::this_thread::yield();
+  }
+  return condition();
+}
+
+}  // namespace
 
 ThreadPool::~ThreadPool() {
   join_workers();
@@ -28,24 +42,47 @@ void ThreadPool::join_workers() {
   for (auto& worker : workers_) worker.join();
   workers_.clear();
   stop_ = false;
-  loop_ = 0;
 }
 
 void ThreadPool::run(int count, Round round, const void* body) {
-  {
-    const std::lock_guard lock(mutex_);
-    round_ = round;
-    body_ = body;
-    count_ = count;
-    next_ = 0;
-    busy_ = static_cast<int>(workers_.size());
-    ++loop_;
+  round_ = round;
+  body_ = body;
+  count_ = count;
+  next_ = 0;
+  if (workers_.empty() || count < 2) {
+    take_rounds(0);
+  } else {
+    inside_ = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      ++loops_;
+    }
+    wake_.notify_all();
+    take_rounds(0);
+    if (!soon([this] { return close(); })) {
+      std::unique_lock lock(mutex_);
+      done_.wait(lock, [this] { return close(); });
+    }
   }
-  wake_.notify_all();
-  take_rounds(0);
-  std::unique_lock lock(mutex_);
-  done_.wait(lock, [this] { return busy_ == 0; });
   if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+}
+
+bool ThreadPool::enter() {
+  int inside = inside_;
+  while (inside != closed)
+    if (inside_.compare_exchange_weak(inside, inside + 1)) return true;
+  return false;
+}
+
+void ThreadPool::leave() {
+  if (--inside_ > 0) return;
+  const std::lock_guard lock(mutex_);
+  done_.notify_one();
+}
+
+bool ThreadPool::close() {
+  int nobody = 0;
+  return inside_.compare_exchange_strong(nobody, closed);
 }
 
 void ThreadPool::take_rounds(int thread) {
@@ -60,15 +97,17 @@ void ThreadPool::take_rounds(int thread) {
 
 void ThreadPool::work(int thread) {
   unsigned seen = 0;
-  std::unique_lock lock(mutex_);
   for (;;) {
-    wake_.wait(lock, [&] { return stop_ || loop_ != seen; });
+    const auto called = [&] { return stop_ || loops_ != seen; };
+    if (!soon(called)) {
+      std::unique_lock lock(mutex_);
+      wake_.wait(lock, called);
+    }
     if (stop_) return;
-    seen = loop_;
-    lock.unlock();
+    seen = loops_;
+    if (!enter()) continue;
     take_rounds(thread);
-    lock.lock();
-    if (--busy_ == 0) done_.notify_one();
+    leave();
   }
 }
 

@@ -12,6 +12,10 @@ namespace eventcamera {
 
 /// A few threads that wait for loops to share. Its owner calls from one thread at a time.
 ///
+/// The loops of a frame follow each other closely and may be shorter than it takes to wake a
+/// thread. So before a thread sleeps it yields for a while, and a loop does not wait for threads
+/// that come too late for it.
+///
 /// Which thread runs which round of a loop is left to chance, so a round may write only what is
 /// its own; then the result is the same for any number of threads.
 class ThreadPool {
@@ -40,22 +44,27 @@ class ThreadPool {
   void run(int count, Round round, const void* body);
   void take_rounds(int thread);
   void work(int thread);
+  bool enter();
+  void leave();
+  bool close();
   void join_workers();
 
   std::vector<std::thread> workers_;
 
-  // The loop under way: written under the mutex while no worker is in it.
+  // The loop under way: written while it is closed.
   Round round_ = nullptr;
   const void* body_ = nullptr;
   int count_ = 0;
   std::atomic<int> next_ = 0;
 
-  std::mutex mutex_;  // guards what follows
+  static constexpr int closed = -1;
+  std::atomic<int> inside_ = closed;  ///< workers in the loop under way
+  std::atomic<unsigned> loops_ = 0;   ///< begun so far; tells workers of the next
+  std::atomic<bool> stop_ = false;
+
+  std::mutex mutex_;  ///< held to change what a sleeper waits for, and guards thrown_
   std::condition_variable wake_;
   std::condition_variable done_;
-  unsigned loop_ = 0;  // counts the loops, so that a worker takes part in each once
-  int busy_ = 0;       // workers still in the loop
-  bool stop_ = false;
   std::exception_ptr thrown_;
 };
 

@@ -40,6 +40,16 @@ TEST(ThreadPool, ThrowsWhatABodyThrows) {
   }
 }
 
+TEST(ThreadPool, RunsShortLoopsOneAfterAnother) {
+  ThreadPool pool;
+  pool.set_threads(0);
+  for (int loop = 0; loop < 20'000; ++loop) {
+    int rounds[4] = {};
+    pool.for_each(4, [&](int i, int) { rounds[i] += loop; });
+    for (const int value : rounds) ASSERT_EQ(value, loop);
+  }
+}
+
 TEST(ThreadPool, HasNoMoreThreadsThanProcessors) {
   ThreadPool pool;
   pool.set_threads(1'000'000);
