@@ -18,7 +18,10 @@ class InterpolatingSimulator final : public DenseSimulator {
         now_(format.width, format.height) {}
 
  private:
-  void start(const LumaView& frame) override { last_.assign(frame.as<Pixel>()); }
+  void start(const LumaView& frame) override {
+    last_.assign(frame.as<Pixel>());
+    finder_.reset();
+  }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                 EventBuckets& events) override {
@@ -33,22 +36,23 @@ class InterpolatingSimulator final : public DenseSimulator {
   }
 
   PlaneView<Flow> find_flow() {
+    const auto push = [this](const Plane<Pixel>& frame) {
+      finder_->push(grey_.of({format(), frame.view().data, frame.stride()}), threads());
+    };
     if (!finder_ || finder_method_ != flow_) {
       finder_ = make_dense_flow(flow_, format().width, format().height);
       finder_method_ = flow_;
+      push(last_);
     }
-    const auto luma = [this](const Plane<Pixel>& frame) {
-      return LumaView{format(), frame.view().data, frame.stride()};
-    };
-    return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), threads().threads());
+    push(now_);
+    return finder_->flow(threads());
   }
 
   Plane<Pixel> last_;
   Plane<Pixel> now_;
   PathWalker walker_;
-  std::unique_ptr<DenseFlow> finder_;
+  std::unique_ptr<DenseFlow> finder_;  ///< knows the last frame
   FlowMethod finder_method_{};
-  Grey8 last_grey_;
   Grey8 grey_;
 };
 

@@ -17,7 +17,10 @@ namespace {
 
 using namespace eventcamera;
 
-class EveryFlow : public testing::TestWithParam<FlowMethod> {};
+class EveryFlow : public testing::TestWithParam<FlowMethod> {
+ protected:
+  ThreadPool threads;
+};
 
 INSTANTIATE_TEST_SUITE_P(, EveryFlow,
                          testing::Values(FlowMethod::dis_lq, FlowMethod::dis_hq,
@@ -27,7 +30,7 @@ TEST_P(EveryFlow, PointsFromTheEarlierFrameToTheLater) {
   const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(320, 240, 8, -3, 2);  // moves right and up
   const auto finder = make_dense_flow(GetParam(), 320, 240);
-  const auto flow = finder->find(from.view(), to.view(), 0);
+  const auto flow = finder->find(from.view(), to.view(), threads);
   double x = 0;
   double y = 0;
   for (int v = 40; v < 200; ++v) {
@@ -46,7 +49,7 @@ TEST_P(EveryFlow, TakesPicturesOfAnySize) {
     const auto from = scene::noise<std::uint8_t>(width, height, 8, 1);
     const auto to = scene::noise<std::uint8_t>(width, height, 8, 2);
     const auto finder = make_dense_flow(GetParam(), width, height);
-    const auto flow = finder->find(from.view(), to.view(), 0);
+    const auto flow = finder->find(from.view(), to.view(), threads);
     EXPECT_EQ(flow.width, width);
     EXPECT_EQ(flow.height, height);
   }
@@ -57,12 +60,27 @@ TEST_P(EveryFlow, DoesNotDependOnThreads) {
   const auto to = scene::texture<std::uint8_t>(320, 240, 8, 2.3, 1.9);
   const auto one = make_dense_flow(GetParam(), 320, 240);
   const auto many = make_dense_flow(GetParam(), 320, 240);
-  const auto a = one->find(from.view(), to.view(), 1);
-  for (int threads = 2; threads <= cv::getNumberOfCPUs(); ++threads) {
+  const auto a = one->find(from.view(), to.view(), threads);
+  for (int count = 2; count <= cv::getNumberOfCPUs(); ++count) {
+    threads.set_threads(count);
     const auto b = many->find(from.view(), to.view(), threads);
     for (int y = 0; y < 240; ++y)
-      ASSERT_EQ(std::memcmp(a.row(y), b.row(y), 320 * sizeof(Flow)), 0) << threads << " threads";
+      ASSERT_EQ(std::memcmp(a.row(y), b.row(y), 320 * sizeof(Flow)), 0) << count << " threads";
   }
+}
+
+TEST_P(EveryFlow, KnowsThePicturesThatWerePushedBefore) {
+  const auto first = scene::texture<std::uint8_t>(200, 150, 8, 0, 0);
+  const auto second = scene::texture<std::uint8_t>(200, 150, 8, 1.4, 0.8);
+  const auto third = scene::texture<std::uint8_t>(200, 150, 8, 2.5, -0.6);
+  const auto kept = make_dense_flow(GetParam(), 200, 150);
+  const auto fresh = make_dense_flow(GetParam(), 200, 150);
+  kept->find(first.view(), second.view(), threads);
+  kept->push(third.view(), threads);
+  const auto a = kept->flow(threads);
+  const auto b = fresh->find(second.view(), third.view(), threads);
+  for (int y = 0; y < 150; ++y)
+    ASSERT_EQ(std::memcmp(a.row(y), b.row(y), 200 * sizeof(Flow)), 0) << "row " << y;
 }
 
 TEST(PointTracker, FollowsATexture) {

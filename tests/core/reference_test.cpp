@@ -123,7 +123,8 @@ class Equality : public testing::TestWithParam<Case> {
       const auto finder = make_dense_flow(method, format.width, format.height);
       const auto from = grey8(last, format.bits);
       const auto to = grey8(now, format.bits);
-      const auto flow = finder->find(from.view(), to.view(), 1);
+      ThreadPool one;
+      const auto flow = finder->find(from.view(), to.view(), one);
       for (const auto interpolation : {Interpolation::forward, Interpolation::blend}) {
         SCOPED_TRACE(testing::Message() << "dense, flow " << static_cast<int>(method)
                                         << ", interpolation " << static_cast<int>(interpolation));

@@ -79,13 +79,15 @@ TEST(Dense, WarpsTheRightWayRound) {
   if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
   const auto frames = frames_of(video(driving), 38, 1280, 720);
   ASSERT_GE(frames.size(), 37U);
+  ThreadPool threads;
+  threads.set_threads(0);
   for (const auto method : flows) {
     const auto finder = make_dense_flow(method, 1280, 720);
     double with_warp = 0;
     double without = 0;
     int pairs = 0;
     for (std::size_t i = 1; i < frames.size(); i += 4, ++pairs) {
-      const auto flow = finder->find(frames[i - 1].view(), frames[i].view(), 0);
+      const auto flow = finder->find(frames[i - 1].view(), frames[i].view(), threads);
       const double moved = psnr(warped(frames[i - 1], flow), frames[i]);
       const double unmoved = psnr(frames[i - 1], frames[i]);
       EXPECT_GT(moved, unmoved) << "flow " << static_cast<int>(method) << ", pair " << i;
