@@ -5,6 +5,8 @@
 #include <cassert>
 #include <utility>
 
+#include "src/flow/room.hpp"
+
 namespace eventcamera {
 namespace {
 
@@ -12,22 +14,20 @@ constexpr int halvings = 3;
 constexpr int iterations = 3;
 constexpr int shortest_side = 32;  ///< of a shrunk picture
 
-/// A band of polynomials needs some more rows of the picture on both sides, a band of flow some
-/// more rows of equations: they are worked out twice. So the bands are not few, and not thin.
+/// A band of polynomials needs some more rows of the picture on both sides, which are worked out
+/// twice: bands are not thin.
 constexpr int rows_per_expansion = 32;
-constexpr int rows_per_update = 32;
 
-int parts(int length, int part) {
-  return (length + part - 1) / part;
+int expansion_bands(int height) {
+  return (height + rows_per_expansion - 1) / rows_per_expansion;
 }
 
-/// So many bands of flow: the fewer threads, the fewer rows are worked out twice.
-int update_bands(int height, int threads) {
-  return std::clamp(height / rows_per_update, 1, threads == 1 ? 1 : 2 * threads);
-}
-
-PlaneView<Flow> view(const Plane<Flow>& plane, int width) {
-  return {plane.row(0), plane.stride(), width, plane.height()};
+/// A band of flow goes through all iterations while its polynomials are in the cache, and needs
+/// some more rows for each: bands are thick, but so that each thread has some.
+int flow_bands(int height, int threads) {
+  constexpr int thinnest = 60;
+  constexpr int thickest = 160;
+  return std::clamp(height / thinnest, 1, std::max(2 * threads, height / thickest));
 }
 
 }  // namespace
@@ -37,8 +37,7 @@ FarnebackFlow::Level::Level(int width, int height, int level)
       last(pyramid.width(), pyramid.height()),
       next(pyramid.width(), pyramid.height()),
       update(pyramid.width(), pyramid.height()),
-      flow(pyramid.width() + Resampling::spare, pyramid.height()),
-      better(pyramid.width() + Resampling::spare, pyramid.height()) {}
+      flow(pyramid.width() + Resampling::spare, pyramid.height()) {}
 
 void FarnebackFlow::start(int width, int height) {
   width_ = width;
@@ -60,11 +59,11 @@ void FarnebackFlow::push(const PlaneView<std::uint8_t>& picture, ThreadPool& thr
   int bands = 0;
   for (auto& level : levels_) {
     std::swap(level.last, level.next);
-    bands += parts(level.pyramid.height(), rows_per_expansion);
+    bands += expansion_bands(level.pyramid.height());
   }
   threads.for_each(bands, [&](int band, int thread) {
     for (auto& level : levels_) {
-      const int here = parts(level.pyramid.height(), rows_per_expansion);
+      const int here = expansion_bands(level.pyramid.height());
       if (band < here) return expand(picture, level, band, scratch_[thread]);
       band -= here;
     }
@@ -77,18 +76,17 @@ void FarnebackFlow::expand(const PlaneView<std::uint8_t>& picture, Level& level,
   const int first = band * rows_per_expansion;
   const int last = std::min(first + rows_per_expansion, level.pyramid.height());
   const int end = level.pyramid.height() - 1;
-  for (auto& row : scratch.rows)
-    row.resize(static_cast<std::size_t>(level.pyramid.width()) + Resampling::spare);
-  const auto slot = [&](int y) -> std::vector<float>& {
-    return scratch.rows[static_cast<std::size_t>(y) % scratch.rows.size()];
+  const auto row = [&](int y) {
+    return room_in(scratch.rows[static_cast<std::size_t>(y) % scratch.rows.size()],
+                   static_cast<std::size_t>(level.pyramid.width()) + Resampling::spare);
   };
   int known = std::max(0, first - reach);
   for (int y = first; y < last; ++y) {
     for (; known <= std::min(y + reach, end); ++known)
-      level.pyramid.row(picture, known, scratch.pyramid, slot(known).data());
+      level.pyramid.row(picture, known, scratch.pyramid, row(known));
     PolynomialExpansion::Window window;
     for (int k = -reach; k <= reach; ++k)
-      window[static_cast<std::size_t>(reach + k)] = slot(std::clamp(y + k, 0, end)).data();
+      window[static_cast<std::size_t>(reach + k)] = row(std::clamp(y + k, 0, end));
     level.next.fit(y, window, scratch.expansion);
   }
 }
@@ -96,46 +94,60 @@ void FarnebackFlow::expand(const PlaneView<std::uint8_t>& picture, Level& level,
 PlaneView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
   assert(!levels_.empty());
   scratch_.resize(static_cast<std::size_t>(threads.threads()));
-  for (std::size_t level = levels_.size(); level-- > 0;) {
-    find_first(level, threads);
-    for (int i = 0; i < iterations; ++i) iterate(levels_[level], threads);
+  const Level* coarser = nullptr;
+  for (std::size_t i = levels_.size(); i-- > 0;) {
+    Level& level = levels_[i];
+    const int height = level.flow.height();
+    const int bands = flow_bands(height, threads.threads());
+    threads.for_each(bands, [&](int band, int thread) {
+      find_rows(coarser, level, height * band / bands, height * (band + 1) / bands,
+                scratch_[thread]);
+    });
+    coarser = &level;
   }
-  return view(levels_.front().flow, width_);
+  const auto& finest = levels_.front().flow;
+  return {finest.row(0), finest.stride(), width_, height_};
 }
 
-/// Where a level begins: at the flow of the coarser one, or at no motion.
-void FarnebackFlow::find_first(std::size_t level, ThreadPool& threads) {
-  Level& here = levels_[level];
-  if (level + 1 == levels_.size()) {
-    for (int y = 0; y < here.flow.height(); ++y)
-      std::fill_n(here.flow.row(y), here.flow.width(), Flow{0, 0});
+/// Rows [first, last) of a level's flow.
+void FarnebackFlow::find_rows(const Level* coarser, Level& level, int first, int last,
+                              Scratch& scratch) {
+  const int height = level.flow.height();
+  const auto stride = static_cast<std::size_t>(level.flow.width());
+  const auto first_of = [&](int iteration) {
+    return std::max(0, first - FlowUpdate::reach * (iterations - iteration));
+  };
+  const auto last_of = [&](int iteration) {
+    return std::min(height, last + FlowUpdate::reach * (iterations - iteration));
+  };
+  const auto rows_of = [&](int iteration) -> FlowRows {
+    if (iteration == iterations) return {level.flow.row(0), static_cast<std::ptrdiff_t>(stride), 0};
+    auto& flow = scratch.flows[static_cast<std::size_t>(iteration) % 2];
+    Flow* rows = room_in(flow, stride * static_cast<std::size_t>(last_of(0) - first_of(0)));
+    return {rows, static_cast<std::ptrdiff_t>(stride), first_of(iteration)};
+  };
+  start_rows(coarser, level, last_of(0), scratch, rows_of(0));
+  for (int i = 1; i <= iterations; ++i)
+    level.update.run(level.last, level.next, rows_of(i - 1), first_of(i), last_of(i),
+                     scratch.update, rows_of(i));
+}
+
+/// Where the rows up to `last` begin: at the flow of the coarser level, or at no motion.
+void FarnebackFlow::start_rows(const Level* coarser, const Level& level, int last, Scratch& scratch,
+                               const FlowRows& out) {
+  if (coarser == nullptr) {
+    std::fill_n(out.row(out.first), (last - out.first) * out.stride, Flow{0, 0});
     return;
   }
-  const Level& coarser = levels_[level + 1];
-  const int height = here.flow.height();
-  threads.for_each(parts(height, rows_per_update), [&](int band, int thread) {
-    auto& between = scratch_[thread].flow_row;
-    between.resize(2 * static_cast<std::size_t>(coarser.flow.width()));
-    const int last = std::min((band + 1) * rows_per_update, height);
-    for (int y = band * rows_per_update; y < last; ++y) {
-      const int upper = here.rows.first()[y];
-      const int lower = std::min(upper + 1, coarser.flow.height() - 1);
-      resample_pairs(&coarser.flow.row(upper)->x, &coarser.flow.row(lower)->x,
-                     here.rows.weight()[y], coarser.pyramid.width(), here.columns, 2,
-                     between.data(), &here.flow.row(y)->x);
-    }
-  });
-}
-
-void FarnebackFlow::iterate(Level& level, ThreadPool& threads) {
-  const int height = level.flow.height();
-  const int bands = update_bands(height, threads.threads());
-  threads.for_each(bands, [&](int band, int thread) {
-    level.update.run(level.last, level.next, view(level.flow, level.pyramid.width()),
-                     height * band / bands, height * (band + 1) / bands, scratch_[thread].update,
-                     level.better);
-  });
-  std::swap(level.flow, level.better);
+  float* between =
+      room_in(scratch.coarser_row, 2 * static_cast<std::size_t>(coarser->flow.width()));
+  for (int y = out.first; y < last; ++y) {
+    const int upper = level.rows.first()[y];
+    const int lower = std::min(upper + 1, coarser->flow.height() - 1);
+    resample_pairs(&coarser->flow.row(upper)->x, &coarser->flow.row(lower)->x,
+                   level.rows.weight()[y], coarser->pyramid.width(), level.columns, 2, between,
+                   &out.row(y)->x);
+  }
 }
 
 }  // namespace eventcamera

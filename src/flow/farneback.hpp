@@ -26,8 +26,7 @@ class FarnebackFlow final : public DenseFlow {
     PolynomialExpansion last;
     PolynomialExpansion next;
     FlowUpdate update;
-    Plane<Flow> flow;
-    Plane<Flow> better;
+    Plane<Flow> flow;    ///< with Resampling::spare pixels behind its rows
     Resampling columns;  ///< from the coarser level
     Resampling rows;
   };
@@ -37,15 +36,17 @@ class FarnebackFlow final : public DenseFlow {
     PyramidLevel::Scratch pyramid;
     std::array<std::vector<float>, 2 * PolynomialExpansion::reach + 1> rows;
     PolynomialExpansion::Scratch expansion;
-    std::vector<float> flow_row;
+    std::vector<float> coarser_row;
+    std::array<std::vector<Flow>, 2> flows;
     FlowUpdate::Scratch update;
   };
 
   void start(int width, int height);
   static void expand(const PlaneView<std::uint8_t>& picture, Level& level, int band,
                      Scratch& scratch);
-  void find_first(std::size_t level, ThreadPool& threads);
-  void iterate(Level& level, ThreadPool& threads);
+  static void start_rows(const Level* coarser, const Level& level, int last, Scratch& scratch,
+                         const FlowRows& out);
+  static void find_rows(const Level* coarser, Level& level, int first, int last, Scratch& scratch);
 
   int width_ = 0;
   int height_ = 0;

@@ -10,6 +10,7 @@
 #include <algorithm>
 
 #include "src/flow/resampling.hpp"
+#include "src/flow/room.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -118,9 +119,11 @@ struct Rows {
   float* three_row(int i) const { return threes + std::ptrdiff_t{i % 13} * equations * room; }
 };
 
-/// The i-th row of equations, those of row y; and if it completes a window, the sums over its rows.
+/// The i-th row of equations, those of row y, and the sums over the last fifteen rows, which mean
+/// something once there are as many.
 void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
-             int y, float row_weight, const float* column_weights, int i, const Rows& rows) {
+             int y, float row_weight, const float* column_weights, int i, const Rows& rows,
+             Chunk& pixels) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   float* tensor = rows.tensor_row(i);
@@ -129,8 +132,8 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
   float* three = rows.three_row(i);
   const float* earlier_threes[4];
   for (int k = 0; k < 4; ++k) earlier_threes[k] = rows.three_row(i + 13 - 3 * (4 - k));
-  const bool complete = i >= 2 * FlowUpdate::reach;
-  Chunk pixels{};
+  float* window = rows.window + FlowUpdate::reach;
+  const std::ptrdiff_t room = rows.room;
   for (int left = 0; left < from.width(); left += chunk) {
     const int count = std::min(chunk, from.width() - left);
     follow(to, flow, left, y, count, pixels);
@@ -161,16 +164,15 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
       b_x = hn::Mul(b_x, weight);
       const auto xy_squared = hn::Mul(a_xy, a_xy);
       const auto put = [&](int equation, Vector value) {
-        const std::ptrdiff_t at = std::ptrdiff_t{equation} * rows.room + x;
+        // All of a vector's pixels side by side: one address for the five.
+        const std::ptrdiff_t at = std::ptrdiff_t{equations} * x + equation * lanes;
+        const auto recent = [&](const float* row) { return hn::LoadU(floats, row + at); };
+        const auto sum = hn::Add(hn::Add(recent(tensor_2), recent(tensor_1)), value);
         hn::StoreU(value, floats, tensor + at);
-        const auto sum = hn::Add(
-            hn::Add(hn::LoadU(floats, tensor_2 + at), hn::LoadU(floats, tensor_1 + at)), value);
         hn::StoreU(sum, floats, three + at);
-        if (!complete) return;
-        const auto earlier = [&](int k) { return hn::LoadU(floats, earlier_threes[k] + at); };
-        hn::StoreU(
-            hn::Add(hn::Add(hn::Add(hn::Add(earlier(0), earlier(1)), earlier(2)), earlier(3)), sum),
-            floats, rows.window + at + FlowUpdate::reach);
+        auto all = hn::Add(recent(earlier_threes[0]), recent(earlier_threes[1]));
+        all = hn::Add(hn::Add(all, recent(earlier_threes[2])), recent(earlier_threes[3]));
+        hn::StoreU(hn::Add(all, sum), floats, window + equation * room + x);
       };
       put(0, hn::Add(hn::Mul(a_yy, a_yy), xy_squared));
       put(1, hn::Mul(hn::Add(a_yy, a_xx), a_xy));
@@ -237,22 +239,20 @@ void solve_window(const Rows& rows, int width, float* threes, Flow* flow) {
 }
 
 void update_rows(const PolynomialExpansion& from, const PolynomialExpansion& to,
-                 const PlaneView<Flow>& flow, int first, int last, const float* column_weights,
-                 const float* row_weights, FlowUpdate::Scratch& scratch, Plane<Flow>& out) {
+                 const FlowRows& flow, int first, int last, const float* column_weights,
+                 const float* row_weights, FlowUpdate::Scratch& scratch, const FlowRows& out) {
   const int room = from.width() + 2 * FlowUpdate::reach + Resampling::spare;
   const auto row_size = static_cast<std::size_t>(equations) * static_cast<std::size_t>(room);
-  scratch.tensors.resize(3 * row_size);
-  scratch.threes.resize(13 * row_size);
-  scratch.window_rows.resize(row_size);
-  scratch.row_threes.resize(row_size);
-  const Rows rows{room, scratch.tensors.data(), scratch.threes.data(), scratch.window_rows.data()};
+  const Rows rows{room, room_in(scratch.tensors, 3 * row_size),
+                  room_in(scratch.threes, 13 * row_size), room_in(scratch.window_rows, row_size)};
+  float* row_threes = room_in(scratch.row_threes, row_size);
+  Chunk pixels{};
   const int before = first - FlowUpdate::reach;
   for (int i = 0; before + i < last + FlowUpdate::reach; ++i) {
     const int y = std::clamp(before + i, 0, from.height() - 1);  // the border goes on
-    add_row(from, to, flow.row(y), y, row_weights[y], column_weights, i, rows);
+    add_row(from, to, flow.row(y), y, row_weights[y], column_weights, i, rows, pixels);
     if (i >= 2 * FlowUpdate::reach)
-      solve_window(rows, from.width(), scratch.row_threes.data(),
-                   out.row(before + i - FlowUpdate::reach));
+      solve_window(rows, from.width(), row_threes, out.row(before + i - FlowUpdate::reach));
   }
 }
 
@@ -280,14 +280,11 @@ std::vector<float> border_weights(int length) {
 }  // namespace
 
 FlowUpdate::FlowUpdate(int width, int height)
-    : width_(width),
-      height_(height),
-      column_weights_(border_weights(width)),
-      row_weights_(border_weights(height)) {}
+    : column_weights_(border_weights(width)), row_weights_(border_weights(height)) {}
 
 void FlowUpdate::run(const PolynomialExpansion& from, const PolynomialExpansion& to,
-                     const PlaneView<Flow>& flow, int first, int last, Scratch& scratch,
-                     Plane<Flow>& out) const {
+                     const FlowRows& flow, int first, int last, Scratch& scratch,
+                     const FlowRows& out) const {
   HWY_DYNAMIC_DISPATCH(update_rows)
   (from, to, flow, first, last, column_weights_.data(), row_weights_.data(), scratch, out);
 }

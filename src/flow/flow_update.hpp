@@ -1,12 +1,22 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "src/flow/dense_flow.hpp"
 #include "src/flow/polynomial_expansion.hpp"
 
 namespace eventcamera {
+
+/// The rows of a flow from `first` on, with Resampling::spare pixels behind each.
+struct FlowRows {
+  Flow* data;
+  std::ptrdiff_t stride;  ///< pixels from one row to the next
+  int first;
+
+  Flow* row(int y) const { return data + (y - first) * stride; }
+};
 
 /// One iteration of Farneback's method: from a flow to a better one.
 ///
@@ -30,15 +40,12 @@ class FlowUpdate {
   FlowUpdate() = default;
   FlowUpdate(int width, int height);
 
-  /// Fills the rows [first, last) of `out`. Both flows have room for Resampling::spare pixels
-  /// behind their rows.
-  void run(const PolynomialExpansion& from, const PolynomialExpansion& to,
-           const PlaneView<Flow>& flow, int first, int last, Scratch& scratch,
-           Plane<Flow>& out) const;
+  /// Fills the rows [first, last) of `out`. That takes `reach` more rows of `flow` on both sides,
+  /// as far as there are any.
+  void run(const PolynomialExpansion& from, const PolynomialExpansion& to, const FlowRows& flow,
+           int first, int last, Scratch& scratch, const FlowRows& out) const;
 
  private:
-  int width_ = 0;
-  int height_ = 0;
   std::vector<float> column_weights_;
   std::vector<float> row_weights_;
 };

@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "src/flow/resampling.hpp"
+#include "src/flow/room.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -126,17 +127,14 @@ void PolynomialExpansion::fit(int y, const Window& window, Scratch& scratch) {
   static const FitKernels kernels;
   const auto room = static_cast<std::size_t>(width_) + 2 * reach + Resampling::spare;
   std::array<float*, 3> rows;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    scratch.column_sums[i].resize(room);
-    rows[i] = scratch.column_sums[i].data() + reach;
-  }
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = room_in(scratch.column_sums[i], room) + reach;
   HWY_DYNAMIC_DISPATCH(fit_columns)(window, width_, kernels, rows[0], rows[1], rows[2]);
   for (float* row : rows) {
     std::fill_n(row - reach, reach, row[0]);
     std::fill_n(row + width_, reach, row[width_ - 1]);
   }
-  scratch.coefficients.resize(coefficients * room);
-  float* four = scratch.coefficients.data();
+  float* four = room_in(scratch.coefficients, coefficients * room);
   HWY_DYNAMIC_DISPATCH(fit_row)
   (rows[0], rows[1], rows[2], width_, kernels, four, four + 4 * room,
    data_.data() + std::ptrdiff_t{y} * stride());

@@ -10,7 +10,9 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <cstdlib>
+#include <cstddef>
+
+#include "src/flow/room.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -112,8 +114,7 @@ void PyramidLevel::row(const PlaneView<std::uint8_t>& picture, int y, Scratch& s
   const int count = static_cast<int>(kernel_.size());
   const int reach = count / 2;
   const int width = picture.width;
-  scratch.column_sums.resize(width + 2 * reach + Resampling::spare);
-  scratch.blurred.resize(width + Resampling::spare);
+  const auto room = static_cast<std::size_t>(width) + Resampling::spare;
 
   // Blurred rows are mixed before they are summed: one kernel, longer by a row.
   std::array<const std::uint8_t*, longest_kernel + 1> rows;
@@ -125,7 +126,7 @@ void PyramidLevel::row(const PlaneView<std::uint8_t>& picture, int y, Scratch& s
   }
   for (int t = 0; t <= count; ++t)
     rows[t] = picture.row(mirrored(rows_.first()[y] - reach + t, picture.height));
-  float* sums = scratch.column_sums.data() + reach;
+  float* sums = room_in(scratch.column_sums, room + 2 * static_cast<std::size_t>(reach)) + reach;
   HWY_DYNAMIC_DISPATCH(add_rows)
   (rows.data(), weights.data(), lower > 0 ? count + 1 : count, width, sums);
 
@@ -133,7 +134,7 @@ void PyramidLevel::row(const PlaneView<std::uint8_t>& picture, int y, Scratch& s
     sums[-k] = sums[mirrored(-k, width)];
     sums[width - 1 + k] = sums[mirrored(width - 1 + k, width)];
   }
-  float* blurred = full_size_ ? out : scratch.blurred.data();
+  float* blurred = full_size_ ? out : room_in(scratch.blurred, room);
   HWY_DYNAMIC_DISPATCH(blur_row)(sums - reach, kernel_.data(), reach, width, blurred);
   if (!full_size_) resample_row(blurred, columns_, out);
 }

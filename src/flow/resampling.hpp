@@ -28,12 +28,11 @@ class Resampling {
   std::vector<float> weight_;
 };
 
-/// Resamples a row of one number a pixel. Behind its end lies one more number, which does not
-/// count.
+/// Resamples a row. Behind its end lies one more number, which does not count.
 void resample_row(const float* row, const Resampling& resampling, float* out);
 
-/// Resamples a row of pairs between two rows of pairs, whose first pixels `lines` tells for its
-/// place `line`, and multiplies it. `between` has room for a row of the source and its spare.
+/// Resamples a row of pairs that lies between two others, by `weight` nearer to the lower one, and
+/// multiplies it. It is worked out in `between`, which is as long as one of them with its spare.
 void resample_pairs(const float* upper, const float* lower, float weight, int width,
                     const Resampling& resampling, float factor, float* between, float* out);
 
