@@ -76,17 +76,17 @@ void FarnebackFlow::expand(const PlaneView<std::uint8_t>& picture, Level& level,
   const int first = band * rows_per_expansion;
   const int last = std::min(first + rows_per_expansion, level.pyramid.height());
   const int end = level.pyramid.height() - 1;
+  const auto room = static_cast<std::size_t>(level.pyramid.width()) + Resampling::spare;
   const auto row = [&](int y) {
-    return room_in(scratch.rows[static_cast<std::size_t>(y) % scratch.rows.size()],
-                   static_cast<std::size_t>(level.pyramid.width()) + Resampling::spare);
+    return room_in(scratch.rows[static_cast<std::size_t>(y) % scratch.rows.size()], room);
   };
   int known = std::max(0, first - reach);
   for (int y = first; y < last; ++y) {
     for (; known <= std::min(y + reach, end); ++known)
       level.pyramid.row(picture, known, scratch.pyramid, row(known));
     PolynomialExpansion::Window window;
-    for (int k = -reach; k <= reach; ++k)
-      window[static_cast<std::size_t>(reach + k)] = row(std::clamp(y + k, 0, end));
+    for (std::size_t k = 0; k < window.size(); ++k)
+      window[k] = row(std::clamp(y - reach + static_cast<int>(k), 0, end));
     level.next.fit(y, window, scratch.expansion);
   }
 }
@@ -139,8 +139,8 @@ void FarnebackFlow::start_rows(const Level* coarser, const Level& level, int las
     std::fill_n(out.row(out.first), (last - out.first) * out.stride, Flow{0, 0});
     return;
   }
-  float* between =
-      room_in(scratch.coarser_row, 2 * static_cast<std::size_t>(coarser->flow.width()));
+  const auto room = static_cast<std::size_t>(coarser->flow.width()) * 2;
+  float* between = room_in(scratch.coarser_row, room);
   for (int y = out.first; y < last; ++y) {
     const int upper = level.rows.first()[y];
     const int lower = std::min(upper + 1, coarser->flow.height() - 1);

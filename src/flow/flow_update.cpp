@@ -90,7 +90,7 @@ void combine(const float* from, const PolynomialExpansion& to, int count, Chunk&
     const auto right =
         between(hn::LoadU(tag, upper + coefficients), hn::LoadU(tag, lower + coefficients), down);
     const auto there = between(left, right, hn::Set(tag, result.right[i]));
-    return hn::Add(hn::LoadU(tag, from + coefficients * i + k),
+    return hn::Add(hn::LoadU(tag, from + std::ptrdiff_t{coefficients} * i + k),
                    hn::Mul(hn::LoadU(tag, signs + k), there));
   };
   const hn::CappedTag<float, 8> eight;
@@ -137,7 +137,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
   for (int left = 0; left < from.width(); left += chunk) {
     const int count = std::min(chunk, from.width() - left);
     follow(to, flow, left, y, count, pixels);
-    combine(from.row(y) + coefficients * left, to, count, pixels);
+    combine(from.row(y) + std::ptrdiff_t{coefficients} * left, to, count, pixels);
     for (int j = 0; j < count; j += lanes) {
       const int x = left + j;
       Vector b_y;
@@ -146,7 +146,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
       Vector a_xx;
       Vector dx;
       Vector dy;
-      hn::LoadInterleaved4(floats, pixels.four + 4 * j, b_y, b_x, a_yy, a_xx);
+      hn::LoadInterleaved4(floats, pixels.four + std::ptrdiff_t{4} * j, b_y, b_x, a_yy, a_xx);
       hn::LoadInterleaved2(floats, &flow[x].x, dx, dy);
       const auto half = hn::Set(floats, 0.5F);
       const auto weight =
@@ -165,7 +165,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
       const auto xy_squared = hn::Mul(a_xy, a_xy);
       const auto put = [&](int equation, Vector value) {
         // All of a vector's pixels side by side: one address for the five.
-        const std::ptrdiff_t at = std::ptrdiff_t{equations} * x + equation * lanes;
+        const std::ptrdiff_t at = std::ptrdiff_t{equations} * x + std::ptrdiff_t{equation} * lanes;
         const auto recent = [&](const float* row) { return hn::LoadU(floats, row + at); };
         const auto sum = hn::Add(hn::Add(recent(tensor_2), recent(tensor_1)), value);
         hn::StoreU(value, floats, tensor + at);

@@ -70,12 +70,12 @@ void fit_row(const float* smooth, const float* slope, const float* bend, int wid
       a_xx = hn::Add(a_xx, hn::Mul(set(kernels.bend[k]), hn::Add(left, right)));
       a_xy = hn::Add(a_xy, hn::Mul(set(kernels.slope[k]), hn::Sub(right_slope, left_slope)));
     }
-    hn::StoreInterleaved4(b_y, b_x, a_yy, a_xx, floats, four + 4 * x);
+    hn::StoreInterleaved4(b_y, b_x, a_yy, a_xx, floats, four + std::ptrdiff_t{4} * x);
     hn::StoreU(a_xy, floats, fifth + x);
   }
   for (int x = 0; x < width; ++x) {
-    float* polynomial = out + PolynomialExpansion::coefficients * x;
-    std::copy_n(four + 4 * x, 4, polynomial);
+    float* polynomial = out + std::ptrdiff_t{PolynomialExpansion::coefficients} * x;
+    std::copy_n(four + std::ptrdiff_t{4} * x, 4, polynomial);
     polynomial[4] = fifth[x];
   }
 }
@@ -125,7 +125,7 @@ PolynomialExpansion::PolynomialExpansion(int width, int height)
 
 void PolynomialExpansion::fit(int y, const Window& window, Scratch& scratch) {
   static const FitKernels kernels;
-  const auto room = static_cast<std::size_t>(width_) + 2 * reach + Resampling::spare;
+  const auto room = static_cast<std::size_t>(width_) + std::size_t{2} * reach + Resampling::spare;
   std::array<float*, 3> rows;
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i] = room_in(scratch.column_sums[i], room) + reach;

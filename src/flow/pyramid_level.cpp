@@ -78,15 +78,12 @@ std::vector<float> kernel_of(int level) {
   if (level == 0) return {0.25F, 0.5F, 0.25F};
   const double sigma = ((1 << level) - 1) * 0.5;
   const int reach = static_cast<int>(std::lrint(sigma * 5)) / 2;
-  std::vector<double> weights;
-  double sum = 0;
-  for (int k = -reach; k <= reach; ++k) {
-    weights.push_back(std::exp(-k * k / (2 * sigma * sigma)));
-    sum += weights.back();
-  }
-  std::vector<float> kernel;
-  for (const double weight : weights) kernel.push_back(static_cast<float>(weight / sum));
+  std::vector<float> kernel(2 * static_cast<std::size_t>(reach) + 1);
   assert(kernel.size() <= longest_kernel);
+  const auto weight = [&](int k) { return std::exp(-k * k / (2 * sigma * sigma)); };
+  double sum = 0;
+  for (int k = -reach; k <= reach; ++k) sum += weight(k);
+  for (int k = -reach; k <= reach; ++k) kernel[reach + k] = static_cast<float>(weight(k) / sum);
   return kernel;
 }
 

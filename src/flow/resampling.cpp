@@ -8,6 +8,7 @@
 #include <hwy/highway.h>
 
 #include <cmath>
+#include <cstddef>
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -47,14 +48,15 @@ void resample_two(const float* upper, const float* lower, float weight, int widt
     const auto b = hn::LoadU(floats, lower + i);
     hn::StoreU(hn::Mul(between(a, b, down), times), floats, row + i);
   }
-  row[2 * width] = row[2 * width - 2];
-  row[2 * width + 1] = row[2 * width - 1];
+  float* end = row + std::ptrdiff_t{2} * width;
+  end[0] = end[-2];
+  end[1] = end[-1];
   for (int x = 0; x < resampling.size(); x += lanes) {
     const auto first = hn::ShiftLeft<1>(hn::LoadU(words, resampling.first() + x));
     const auto right = hn::LoadU(floats, resampling.weight() + x);
     const auto at = [&](int i) { return hn::GatherIndex(floats, row + i, first); };
     hn::StoreInterleaved2(between(at(0), at(2), right), between(at(1), at(3), right), floats,
-                          out + 2 * x);
+                          out + std::ptrdiff_t{2} * x);
   }
 }
 

@@ -16,8 +16,8 @@ namespace eventcamera::reference {
 
 /// The weights at -reach ... reach of a Gaussian cut off there, whose sum is 1.
 inline std::vector<double> gaussian(double sigma, int reach) {
-  std::vector<double> weights;
-  for (int k = -reach; k <= reach; ++k) weights.push_back(std::exp(-k * k / (2 * sigma * sigma)));
+  std::vector<double> weights(2 * static_cast<std::size_t>(reach) + 1);
+  for (int k = -reach; k <= reach; ++k) weights[reach + k] = std::exp(-k * k / (2 * sigma * sigma));
   const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
   for (auto& weight : weights) weight /= sum;
   return weights;

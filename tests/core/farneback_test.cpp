@@ -116,7 +116,8 @@ TEST_P(Farneback, DoesNotDependOnWhatCameBefore) {
 
 /// Nothing outside of the view is read: not beside it, and nothing at all behind its end.
 TEST_P(Farneback, TakesAPartOfAPictureWhereItLies) {
-  const auto [width, height, noise] = GetParam();
+  const int width = GetParam().width;
+  const int height = GetParam().height;
   const int stride = width + 13;
   const auto part_of = [&](const Picture& picture, std::uint8_t elsewhere) {
     std::vector<std::uint8_t> bytes(static_cast<std::size_t>(stride * (height - 1) + width),
