@@ -145,7 +145,8 @@ void register_all(const Scene& scene) {
     const Thresholds thresholds{3, 3};
     const auto with_flow = [&last, &now](const auto& body) {
       const auto finder = make_dense_flow(FlowMethod::dis_hq, now.width(), now.height());
-      body(finder->find(last.view(), now.view(), 0));
+      ThreadPool pool;
+      body(finder->find(last.view(), now.view(), pool));
     };
     add("dense-after-flow/plain", [=, &last, &now](benchmark::State& state) {
       with_flow([&](const PlaneView<Flow>& flow) {

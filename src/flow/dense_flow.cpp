@@ -5,46 +5,20 @@
 #include <cmath>
 #include <opencv2/video/tracking.hpp>
 
+#include "src/flow/farneback.hpp"
 #include "src/flow/opencv_picture.hpp"
 #include "src/flow/opencv_threads.hpp"
 
 namespace eventcamera {
 namespace {
 
-/// OpenCV's flows need a few patches on each side; smaller pictures are continued beyond their
-/// border to this many pixels. They need rows without gaps, too.
+/// OpenCV's DIS needs a few patches on each side; smaller pictures are continued beyond their
+/// border to this many pixels.
 constexpr int smallest_side = 64;
-
-class OpenCvFlow : public DenseFlow {
- public:
-  PlaneView<Flow> find(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
-                       int threads) final {
-    const OpenCvThreads limit(threads);
-    calculate(prepared(from, from_), prepared(to, to_));
-    static_assert(sizeof(Flow) == 2 * sizeof(float));
-    return {flow_.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow_.step[0]), from.width, from.height};
-  }
-
- protected:
-  virtual void calculate(const cv::Mat& from, const cv::Mat& to) = 0;
-  cv::Mat flow_;
-
- private:
-  static cv::Mat prepared(const PlaneView<std::uint8_t>& picture, cv::Mat& buffer) {
-    cv::Mat mat = opencv_picture(picture);
-    if (mat.cols >= smallest_side && mat.rows >= smallest_side && mat.isContinuous()) return mat;
-    cv::copyMakeBorder(mat, buffer, 0, std::max(0, smallest_side - mat.rows), 0,
-                       std::max(0, smallest_side - mat.cols), cv::BORDER_REPLICATE);
-    return buffer;
-  }
-
-  cv::Mat from_;
-  cv::Mat to_;
-};
 
 /// Dense inverse search (Kroeger et al., ECCV 2016). Spatial propagation is OpenCV's addition and
 /// stays off: the paper's code has none.
-class DisFlow final : public OpenCvFlow {
+class DisFlow final : public DenseFlow {
  public:
   struct Quality {
     int patch;
@@ -61,13 +35,30 @@ class DisFlow final : public OpenCvFlow {
     dis_->setUseSpatialPropagation(false);
   }
 
- private:
-  void calculate(const cv::Mat& from, const cv::Mat& to) override {
-    flow_.release();  // else the last flow would be where the search begins
-    dis_->calc(from, to, flow_);
+  void push(const PlaneView<std::uint8_t>& picture, ThreadPool& /*threads*/) override {
+    cv::swap(last_, next_);
+    cv::copyMakeBorder(opencv_picture(picture), next_, 0,
+                       std::max(0, smallest_side - picture.height), 0,
+                       std::max(0, smallest_side - picture.width), cv::BORDER_REPLICATE);
+    width_ = picture.width;
+    height_ = picture.height;
   }
 
+  PlaneView<Flow> flow(ThreadPool& threads) override {
+    const OpenCvThreads limit(threads.threads());
+    flow_.release();  // else the last flow would be where the search begins
+    dis_->calc(last_, next_, flow_);
+    static_assert(sizeof(Flow) == 2 * sizeof(float));
+    return {flow_.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow_.step[0]), width_, height_};
+  }
+
+ private:
   cv::Ptr<cv::DISOpticalFlow> dis_ = cv::DISOpticalFlow::create();
+  cv::Mat last_;
+  cv::Mat next_;
+  cv::Mat flow_;
+  int width_ = 0;
+  int height_ = 0;
 };
 
 /// The scale at which OpenCV's DIS starts.
@@ -86,13 +77,6 @@ DisFlow::Quality low_quality(int width, int height) {
 }
 
 constexpr DisFlow::Quality high_quality = {8, 4, 32, 1};
-
-/// Farneback (SCIA 2003), with the parameters of the paper's code.
-class FarnebackFlow final : public OpenCvFlow {
-  void calculate(const cv::Mat& from, const cv::Mat& to) override {
-    cv::calcOpticalFlowFarneback(from, to, flow_, 0.5, 3, 15, 3, 5, 1.2, 0);
-  }
-};
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "src/parallel/thread_pool.hpp"
 #include "src/picture/plane.hpp"
 
 namespace eventcamera {
@@ -20,13 +21,27 @@ enum class FlowMethod {
   farneback,  ///< Farneback: 3 levels, window 15, 3 iterations, polynomials of 5 pixels
 };
 
-/// Dense optical flow between two 8-bit pictures of one size, any size.
+/// Dense optical flow between 8-bit pictures of any size. What can be told from one picture alone
+/// is told once, though a picture is the later one first, then the earlier one.
 class DenseFlow {
  public:
   virtual ~DenseFlow() = default;
-  /// The result is good until the next call, and the same for any number of threads.
-  virtual PlaneView<Flow> find(const PlaneView<std::uint8_t>& from,
-                               const PlaneView<std::uint8_t>& to, int threads) = 0;
+
+  /// Makes the next picture the later one, and what was so the earlier one. It need not outlive the
+  /// call.
+  virtual void push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) = 0;
+
+  /// The flow from the earlier picture to the later one, after two push() of one size. It is good
+  /// until the next call, and the same for any number of threads.
+  virtual PlaneView<Flow> flow(ThreadPool& threads) = 0;
+
+  /// The flow between two pictures, whatever came before.
+  PlaneView<Flow> find(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
+                       ThreadPool& threads) {
+    push(from, threads);
+    push(to, threads);
+    return flow(threads);
+  }
 };
 
 std::unique_ptr<DenseFlow> make_dense_flow(FlowMethod method, int width, int height);

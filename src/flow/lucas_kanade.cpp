@@ -150,7 +150,7 @@ struct Window {
   std::int64_t grey_x = 0;  ///< of the slopes and the grey levels
   std::int64_t grey_y = 0;
 
-  Window(const PyramidLevel& level, const Corner& corner) {
+  Window(const Pyramid::Level& level, const Corner& corner) {
     if (corner.right == 0 && corner.down == 0)
       read<PixelRows>(level, corner);
     else
@@ -193,7 +193,7 @@ struct Window {
 
  private:
   template <template <class> class Rows>
-  void read(const PyramidLevel& level, const Corner& corner) {
+  void read(const Pyramid::Level& level, const Corner& corner) {
     const Values values;
     const int lanes = static_cast<int>(hn::Lanes(values));
     std::int64_t total_xx = 0;
@@ -234,7 +234,7 @@ struct Window {
   }
 };
 
-void search_one(const PyramidLevel& from, const PyramidLevel& to, Search& search) {
+void search_one(const Pyramid::Level& from, const Pyramid::Level& to, Search& search) {
   search.found = false;
   const float left = search.x - half_window;
   const float top = search.y - half_window;
@@ -264,7 +264,7 @@ void search_one(const PyramidLevel& from, const PyramidLevel& to, Search& search
   search.found = inside();
 }
 
-void search_all(const PyramidLevel& from, const PyramidLevel& to, std::span<Search> searches) {
+void search_all(const Pyramid::Level& from, const Pyramid::Level& to, std::span<Search> searches) {
   for (auto& search : searches) search_one(from, to, search);
 }
 
@@ -277,7 +277,8 @@ namespace eventcamera {
 
 HWY_EXPORT(search_all);
 
-void search_level(const PyramidLevel& from, const PyramidLevel& to, std::span<Search> searches) {
+void search_level(const Pyramid::Level& from, const Pyramid::Level& to,
+                  std::span<Search> searches) {
   HWY_DYNAMIC_DISPATCH(search_all)(from, to, searches);
 }
 

@@ -20,6 +20,6 @@ struct Search {
 /// moved until its squared difference no longer falls; at most 10 times, or until a move is shorter
 /// than 0.03 pixel or turns back. Needs `from`'s slopes. In integers but for the 2x2 system: the
 /// same on every processor.
-void search_level(const PyramidLevel& from, const PyramidLevel& to, std::span<Search> searches);
+void search_level(const Pyramid::Level& from, const Pyramid::Level& to, std::span<Search> searches);
 
 }  // namespace eventcamera

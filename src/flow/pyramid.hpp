@@ -39,18 +39,18 @@ class PlaneWithMargin {
   std::vector<Pixel> pixels_;
 };
 
-/// One level: the picture, reflected about its border pixels beyond them, and its slopes by
-/// Scharr's operator, 32 times a grey level a pixel, 0 beyond the border.
-struct PyramidLevel {
-  PlaneWithMargin<std::uint8_t> picture;
-  PlaneWithMargin<std::int16_t> slope_x;
-  PlaneWithMargin<std::int16_t> slope_y;
-};
-
 /// A picture and its halves, blurred with (1 4 6 4 1) / 16 each way and every second pixel taken,
 /// as long as both sides are longer than `shortest_side`; at most `most_levels`.
 class Pyramid {
  public:
+  /// The picture, reflected about its border pixels beyond them, and its slopes by Scharr's
+  /// operator, 32 times a grey level a pixel, 0 beyond the border.
+  struct Level {
+    PlaneWithMargin<std::uint8_t> picture;
+    PlaneWithMargin<std::int16_t> slope_x;
+    PlaneWithMargin<std::int16_t> slope_y;
+  };
+
   static constexpr int most_levels = 4;
   static constexpr int shortest_side = 15;
 
@@ -60,12 +60,12 @@ class Pyramid {
   /// Makes the slopes, which only a picture tracked from needs.
   void build_slopes(ThreadPool& threads);
 
-  const std::vector<PyramidLevel>& levels() const { return levels_; }
+  const std::vector<Level>& levels() const { return levels_; }
 
  private:
   void shape(int width, int height);
 
-  std::vector<PyramidLevel> levels_;
+  std::vector<Level> levels_;
 };
 
 }  // namespace eventcamera

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
+#include <cstdlib>
 #include <vector>
 
 #include "src/event/event.hpp"
 #include "src/event/step_times.hpp"
+#include "src/picture/box.hpp"
 #include "src/picture/plane.hpp"
 #include "src/simulate/simulator.hpp"
 
@@ -35,6 +38,20 @@ std::vector<Event> differences(const Sequence<Pixel>& sequence, const StepTimes&
     }
   }
   return events;
+}
+
+/// The smallest box that holds the pixels with |now - last| over the threshold.
+template <class Pixel>
+Box changed_box(const Plane<Pixel>& last, const Plane<Pixel>& now, int threshold) {
+  Box box;
+  for (int y = 0; y < now.height(); ++y) {
+    for (int x = 0; x < now.width(); ++x) {
+      if (std::abs(now.at(x, y) - last.at(x, y)) <= threshold) continue;
+      if (box.empty()) box = {x, y, x + 1, y + 1};
+      box = {std::min(box.left, x), box.top, std::max(box.right, x + 1), y + 1};
+    }
+  }
+  return box;
 }
 
 }  // namespace eventcamera::reference

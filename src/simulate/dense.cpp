@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/simulate/dense.hpp"
 
+#include <algorithm>
+#include <optional>
 #include <utility>
 
+#include "src/flow/flow_of_changes.hpp"
 #include "src/picture/grey8.hpp"
+#include "src/simulate/difference.hpp"
 #include "src/simulate/path.hpp"
 
 namespace eventcamera {
@@ -18,36 +22,40 @@ class InterpolatingSimulator final : public DenseSimulator {
         now_(format.width, format.height) {}
 
  private:
-  void start(const LumaView& frame) override { last_.assign(frame.as<Pixel>()); }
+  void start(const LumaView& frame) override {
+    last_.assign(frame.as<Pixel>());
+    finder_.reset();
+  }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                 EventBuckets& events) override {
     now_.assign(frame.as<Pixel>());
+    const auto thresholds = Thresholds::of(settings, format().bits);
     const Path<Pixel> path{{last_.view(), now_.view(), steps.count()},
-                           find_flow(),
+                           find_flow(thresholds),
                            interpolation_,
                            steps,
-                           Thresholds::of(settings, format().bits)};
+                           thresholds};
     walker_.fire(path, threads(), events);
     std::swap(last_, now_);
   }
 
-  PlaneView<Flow> find_flow() {
-    if (!finder_ || finder_method_ != flow_) {
-      finder_ = make_dense_flow(flow_, format().width, format().height);
-      finder_method_ = flow_;
-    }
+  /// What has not changed by more than a threshold does not fire, so it need not move.
+  PlaneView<Flow> find_flow(const Thresholds& thresholds) {
+    if (!finder_ || finder_->method() != flow_)
+      finder_.emplace(flow_, format().width, format().height);
     const auto luma = [this](const Plane<Pixel>& frame) {
       return LumaView{format(), frame.view().data, frame.stride()};
     };
-    return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), threads().threads());
+    const Box changed =
+        changed_box(last_.view(), now_.view(), std::min(thresholds.positive, thresholds.negative));
+    return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), changed, threads());
   }
 
   Plane<Pixel> last_;
   Plane<Pixel> now_;
   PathWalker walker_;
-  std::unique_ptr<DenseFlow> finder_;
-  FlowMethod finder_method_{};
+  std::optional<FlowOfChanges> finder_;
   Grey8 last_grey_;
   Grey8 grey_;
 };

@@ -8,6 +8,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <limits>
 
 #include "src/simulate/fired_bits.hpp"
@@ -68,6 +69,39 @@ void fire_row_16(const std::uint16_t* before, const std::uint16_t* now, int widt
   fire_row(before, now, width, y, t, thresholds, out);
 }
 
+template <class Pixel>
+ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int threshold) {
+  const hn::ScalableTag<Pixel> pixels;
+  const int lanes = static_cast<int>(hn::Lanes(pixels));
+  const auto limit = hn::Set(
+      pixels,
+      static_cast<Pixel>(std::min(threshold, static_cast<int>(std::numeric_limits<Pixel>::max()))));
+  const auto none = [&](int x) {
+    const auto a = hn::LoadU(pixels, before + x);
+    const auto b = hn::LoadU(pixels, now + x);
+    const auto difference = hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
+    return hn::AllTrue(pixels, hn::Eq(hn::SaturatedSub(difference, limit), hn::Zero(pixels)));
+  };
+  const auto one = [&](int x) { return std::abs(now[x] - before[x]) > threshold; };
+  int first = 0;
+  while (first + lanes <= width && none(first)) first += lanes;
+  while (first < width && !one(first)) ++first;
+  int last = width;
+  while (last - lanes >= first && none(last - lanes)) last -= lanes;
+  while (last > first && !one(last - 1)) --last;
+  return {first, last};
+}
+
+ChangedColumns changed_8(const std::uint8_t* before, const std::uint8_t* now, int width,
+                         int threshold) {
+  return changed(before, now, width, threshold);
+}
+
+ChangedColumns changed_16(const std::uint16_t* before, const std::uint16_t* now, int width,
+                          int threshold) {
+  return changed(before, now, width, threshold);
+}
+
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -77,6 +111,8 @@ namespace eventcamera {
 
 HWY_EXPORT(fire_row_8);
 HWY_EXPORT(fire_row_16);
+HWY_EXPORT(changed_8);
+HWY_EXPORT(changed_16);
 
 void fire_differences(const std::uint8_t* before, const std::uint8_t* now, int width, int y,
                       std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out) {
@@ -86,6 +122,16 @@ void fire_differences(const std::uint8_t* before, const std::uint8_t* now, int w
 void fire_differences(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
                       std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out) {
   HWY_DYNAMIC_DISPATCH(fire_row_16)(before, now, width, y, t, thresholds, out);
+}
+
+ChangedColumns changed_columns(const std::uint8_t* before, const std::uint8_t* now, int width,
+                               int threshold) {
+  return HWY_DYNAMIC_DISPATCH(changed_8)(before, now, width, threshold);
+}
+
+ChangedColumns changed_columns(const std::uint16_t* before, const std::uint16_t* now, int width,
+                               int threshold) {
+  return HWY_DYNAMIC_DISPATCH(changed_16)(before, now, width, threshold);
 }
 
 }  // namespace eventcamera

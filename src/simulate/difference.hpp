@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "src/event/event_buckets.hpp"
 #include "src/parallel/thread_pool.hpp"
+#include "src/picture/box.hpp"
 #include "src/picture/plane.hpp"
 #include "src/simulate/bands.hpp"
 #include "src/simulate/simulator.hpp"
@@ -19,7 +21,31 @@ void fire_differences(const std::uint8_t* before, const std::uint8_t* now, int w
 void fire_differences(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
                       std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out);
 
-/// The same for whole pictures, into the buckets of one step, which has their bands.
+/// The pixels of a row that changed by more than a threshold all lie in [first, last), which is
+/// empty where there are none.
+struct ChangedColumns {
+  int first;
+  int last;
+};
+ChangedColumns changed_columns(const std::uint8_t* before, const std::uint8_t* now, int width,
+                               int threshold);
+ChangedColumns changed_columns(const std::uint16_t* before, const std::uint16_t* now, int width,
+                               int threshold);
+
+/// The smallest box that holds those of a picture.
+template <class Pixel>
+Box changed_box(const PlaneView<Pixel>& before, const PlaneView<Pixel>& now, int threshold) {
+  Box box;
+  for (int y = 0; y < now.height; ++y) {
+    const auto columns = changed_columns(before.row(y), now.row(y), now.width, threshold);
+    if (columns.first >= columns.last) continue;
+    if (box.empty()) box = {columns.first, y, columns.last, y + 1};
+    box = {std::min(box.left, columns.first), box.top, std::max(box.right, columns.last), y + 1};
+  }
+  return box;
+}
+
+/// fire_differences() for whole pictures, into the buckets of one step, which has their bands.
 template <class Pixel>
 void fire_differences(const PlaneView<Pixel>& before, const PlaneView<Pixel>& now, int step,
                       std::uint32_t t, const Thresholds& thresholds, ThreadPool& threads,

@@ -9,15 +9,20 @@
 
 #include "src/flow/dense_flow.hpp"
 #include "src/flow/fixed_point.hpp"
+#include "src/flow/flow_of_changes.hpp"
 #include "src/flow/opencv_threads.hpp"
 #include "src/flow/point_tracker.hpp"
+#include "src/simulate/difference.hpp"
 #include "tests/core/scene.hpp"
 
 namespace {
 
 using namespace eventcamera;
 
-class EveryFlow : public testing::TestWithParam<FlowMethod> {};
+class EveryFlow : public testing::TestWithParam<FlowMethod> {
+ protected:
+  ThreadPool threads;
+};
 
 INSTANTIATE_TEST_SUITE_P(, EveryFlow,
                          testing::Values(FlowMethod::dis_lq, FlowMethod::dis_hq,
@@ -27,7 +32,7 @@ TEST_P(EveryFlow, PointsFromTheEarlierFrameToTheLater) {
   const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(320, 240, 8, -3, 2);  // moves right and up
   const auto finder = make_dense_flow(GetParam(), 320, 240);
-  const auto flow = finder->find(from.view(), to.view(), 0);
+  const auto flow = finder->find(from.view(), to.view(), threads);
   double x = 0;
   double y = 0;
   for (int v = 40; v < 200; ++v) {
@@ -46,7 +51,7 @@ TEST_P(EveryFlow, TakesPicturesOfAnySize) {
     const auto from = scene::noise<std::uint8_t>(width, height, 8, 1);
     const auto to = scene::noise<std::uint8_t>(width, height, 8, 2);
     const auto finder = make_dense_flow(GetParam(), width, height);
-    const auto flow = finder->find(from.view(), to.view(), 0);
+    const auto flow = finder->find(from.view(), to.view(), threads);
     EXPECT_EQ(flow.width, width);
     EXPECT_EQ(flow.height, height);
   }
@@ -57,11 +62,88 @@ TEST_P(EveryFlow, DoesNotDependOnThreads) {
   const auto to = scene::texture<std::uint8_t>(320, 240, 8, 2.3, 1.9);
   const auto one = make_dense_flow(GetParam(), 320, 240);
   const auto many = make_dense_flow(GetParam(), 320, 240);
-  const auto a = one->find(from.view(), to.view(), 1);
-  for (int threads = 2; threads <= cv::getNumberOfCPUs(); ++threads) {
+  const auto a = one->find(from.view(), to.view(), threads);
+  for (int count = 2; count <= cv::getNumberOfCPUs(); ++count) {
+    threads.set_threads(count);
     const auto b = many->find(from.view(), to.view(), threads);
     for (int y = 0; y < 240; ++y)
-      ASSERT_EQ(std::memcmp(a.row(y), b.row(y), 320 * sizeof(Flow)), 0) << threads << " threads";
+      ASSERT_EQ(std::memcmp(a.row(y), b.row(y), 320 * sizeof(Flow)), 0) << count << " threads";
+  }
+}
+
+TEST_P(EveryFlow, KnowsThePicturesThatWerePushedBefore) {
+  const auto first = scene::texture<std::uint8_t>(200, 150, 8, 0, 0);
+  const auto second = scene::texture<std::uint8_t>(200, 150, 8, 1.4, 0.8);
+  const auto third = scene::texture<std::uint8_t>(200, 150, 8, 2.5, -0.6);
+  const auto kept = make_dense_flow(GetParam(), 200, 150);
+  const auto fresh = make_dense_flow(GetParam(), 200, 150);
+  kept->find(first.view(), second.view(), threads);
+  kept->push(third.view(), threads);
+  const auto a = kept->flow(threads);
+  const auto b = fresh->find(second.view(), third.view(), threads);
+  for (int y = 0; y < 150; ++y)
+    ASSERT_EQ(std::memcmp(a.row(y), b.row(y), 200 * sizeof(Flow)), 0) << "row " << y;
+}
+
+/// A square of texture that moves by (3, 1) over a still, textured ground.
+struct MovingPatch {
+  MovingPatch() : from(picture(0, 0)), to(picture(3, 1)) {}
+  static Plane<std::uint8_t> picture(int dx, int dy) {
+    auto result = scene::texture<std::uint8_t>(640, 480, 8, 0, 0);
+    const auto patch = scene::texture<std::uint8_t>(60, 60, 8, 900, 900);
+    for (int y = 0; y < 60; ++y)
+      for (int x = 0; x < 60; ++x) result.at(200 + dx + x, 150 + dy + y) = patch.at(x, y);
+    return result;
+  }
+  const Plane<std::uint8_t> from;
+  const Plane<std::uint8_t> to;
+};
+
+TEST_P(EveryFlow, OfChangesIsNotSoughtWhereNothingChanged) {
+  const MovingPatch patch;
+  FlowOfChanges finder(GetParam(), 640, 480);
+  const auto check = [&](const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to, int sign) {
+    const auto flow =
+        finder.find(from.view(), to.view(), changed_box(from.view(), to.view(), 2), threads);
+    double x = 0;
+    double y = 0;
+    for (int v = 0; v < 480; ++v) {
+      for (int u = 0; u < 640; ++u) {
+        const auto here = flow.row(v)[u];
+        if (u < 100 || v < 50 || u > 363 || v > 311) {
+          ASSERT_TRUE(here.x == 0 && here.y == 0);
+        }
+        if (u >= 215 && u < 245 && v >= 165 && v < 195) {
+          x += here.x / 900;
+          y += here.y / 900;
+        }
+      }
+    }
+    EXPECT_NEAR(x, 3 * sign, 0.3);
+    EXPECT_NEAR(y, 1 * sign, 0.3);
+  };
+  check(patch.from, patch.to, 1);
+  check(patch.to, patch.from, -1);
+  const auto still = finder.find(patch.from.view(), patch.from.view(), {}, threads);
+  for (int v = 0; v < 480; ++v)
+    for (int u = 0; u < 640; ++u) ASSERT_EQ(still.row(v)[u].x, 0);
+}
+
+TEST_P(EveryFlow, OfChangesIsThatOfTheWholeWhereAllChanges) {
+  const auto a = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
+  const auto b = scene::texture<std::uint8_t>(320, 240, 8, 2.3, 1.9);
+  FlowOfChanges finder(GetParam(), 320, 240);
+  const Box all{0, 0, 320, 240};
+  const Plane<std::uint8_t>* sequence[] = {&a, &b, &b, &a, &b};
+  for (int i = 1; i < 5; ++i) {
+    const auto& from = *sequence[i - 1];
+    const auto& to = *sequence[i];
+    const auto flow = finder.find(from.view(), to.view(), i == 2 ? Box{} : all, threads);
+    if (i == 2) continue;
+    const auto whole = make_dense_flow(GetParam(), 320, 240);
+    const auto expected = whole->find(from.view(), to.view(), threads);
+    for (int y = 0; y < 240; ++y)
+      ASSERT_EQ(std::memcmp(flow.row(y), expected.row(y), 320 * sizeof(Flow)), 0) << i;
   }
 }
 

@@ -85,13 +85,15 @@ TEST(Dense, WarpsTheRightWayRound) {
   if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
   const auto frames = frames_of(video(driving), 38, 1280, 720);
   ASSERT_GE(frames.size(), 37U);
+  ThreadPool threads;
+  threads.set_threads(0);
   for (const auto method : flows) {
     const auto finder = make_dense_flow(method, 1280, 720);
     double with_warp = 0;
     double without = 0;
     int pairs = 0;
     for (std::size_t i = 1; i < frames.size(); i += 4, ++pairs) {
-      const auto flow = finder->find(frames[i - 1].view(), frames[i].view(), 0);
+      const auto flow = finder->find(frames[i - 1].view(), frames[i].view(), threads);
       const double moved = psnr(warped(frames[i - 1], flow), frames[i]);
       const double unmoved = psnr(frames[i - 1], frames[i]);
       EXPECT_GT(moved, unmoved) << "flow " << static_cast<int>(method) << ", pair " << i;
@@ -193,6 +195,52 @@ TEST(Tracks, AreThoseOfOpenCv) {
   };
   check("sparse", sparse);
   check("diff", diff);
+}
+
+/// OpenCV's function of the same method, with the same parameters.
+Plane<Flow> opencv_farneback(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to) {
+  Plane<Flow> flow(from.width(), from.height());
+  cv::Mat mat(from.height(), from.width(), CV_32FC2, flow.row(0));
+  cv::calcOpticalFlowFarneback(opencv_picture(from.view()), opencv_picture(to.view()), mat, 0.5, 3,
+                               15, 3, 5, 1.2, 0);
+  return flow;
+}
+
+/// The mean distance between two flows where the picture has texture: a gradient of 4 grey levels
+/// a pixel.
+double distance(const Plane<std::uint8_t>& picture, const PlaneView<Flow>& a,
+                const PlaneView<Flow>& b) {
+  double sum = 0;
+  int count = 0;
+  for (int y = 1; y < picture.height() - 1; ++y) {
+    for (int x = 1; x < picture.width() - 1; ++x) {
+      if (std::hypot(picture.at(x + 1, y) - picture.at(x - 1, y),
+                     picture.at(x, y + 1) - picture.at(x, y - 1)) < 8)
+        continue;
+      sum += std::hypot(a.row(y)[x].x - b.row(y)[x].x, a.row(y)[x].y - b.row(y)[x].y);
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
+TEST(Farneback, IsWhatOpenCvFinds) {
+  if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
+  const auto frames = frames_of(video(driving), 8, 640, 480);
+  ASSERT_EQ(frames.size(), 8U);
+  const auto finder = make_dense_flow(FlowMethod::farneback, 640, 480);
+  ThreadPool threads;
+  threads.set_threads(0);
+  finder->push(frames[0].view(), threads);
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    finder->push(frames[i].view(), threads);
+    const auto ours = finder->flow(threads);
+    const auto theirs = opencv_farneback(frames[i - 1], frames[i]);
+    EXPECT_LT(distance(frames[i - 1], ours, theirs.view()), 0.01) << "pair " << i;
+    EXPECT_NEAR(psnr(warped(frames[i - 1], ours), frames[i]),
+                psnr(warped(frames[i - 1], theirs.view()), frames[i]), 0.01)
+        << "pair " << i;
+  }
 }
 
 struct Agreement {

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "src/flow/dense_flow.hpp"
+#include "src/flow/flow_update.hpp"
+#include "src/flow/polynomial_expansion.hpp"
+#include "src/flow/pyramid_level.hpp"
+#include "src/flow/resampling.hpp"
+
+namespace eventcamera {
+
+/// Farneback's flow (SCIA 2003), from coarse to fine. Between two equal pictures it is 0.
+class FarnebackFlow final : public DenseFlow {
+ public:
+  void push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) override;
+  PlaneView<Flow> flow(ThreadPool& threads) override;
+
+ private:
+  struct Level {
+    Level(int width, int height, int level);
+
+    PyramidLevel pyramid;
+    PolynomialExpansion last;
+    PolynomialExpansion next;
+    FlowUpdate update;
+    Plane<Flow> flow;    ///< with Resampling::spare pixels behind its rows
+    Resampling columns;  ///< from the coarser level
+    Resampling rows;
+  };
+
+  /// What one thread works with.
+  struct Scratch {
+    PyramidLevel::Scratch pyramid;
+    std::array<std::vector<float>, 2 * PolynomialExpansion::reach + 1> rows;
+    PolynomialExpansion::Scratch expansion;
+    std::vector<float> coarser_row;
+    std::array<std::vector<Flow>, 2> flows;
+    FlowUpdate::Scratch update;
+  };
+
+  void start(int width, int height);
+  static void expand(const PlaneView<std::uint8_t>& picture, Level& level, int band,
+                     Scratch& scratch);
+  static void start_rows(const Level* coarser, const Level& level, int last, Scratch& scratch,
+                         const FlowRows& out);
+  static void find_rows(const Level* coarser, Level& level, int first, int last, Scratch& scratch);
+
+  int width_ = 0;
+  int height_ = 0;
+  std::vector<Level> levels_;  ///< the finest is the first
+  std::vector<Scratch> scratch_;
+};
+
+}  // namespace eventcamera

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/flow/flow_of_changes.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace eventcamera {
+namespace {
+
+/// What moves carries its surroundings along this far, in pixels: the reach of a window on a coarse
+/// scale.
+constexpr int surroundings = 48;
+
+/// Sides are multiples of this, so that the same finder serves what grows and shrinks a little.
+constexpr int side_step = 64;
+
+/// A range of at least first ... last and its surroundings, as the sides of a part are.
+struct Range {
+  int first;
+  int last;
+
+  Range(int from, int to, int size) {
+    const int wanted = to - from + 2 * surroundings;
+    const int length = std::min((wanted + side_step - 1) / side_step * side_step, size);
+    first = std::clamp(from - (length - (to - from)) / 2, 0, size - length);
+    last = first + length;
+  }
+};
+
+PlaneView<std::uint8_t> cut_out(const PlaneView<std::uint8_t>& picture, const Box& part) {
+  return {picture.row(part.top) + part.left, picture.stride, part.width(), part.height()};
+}
+
+}  // namespace
+
+FlowOfChanges::FlowOfChanges(FlowMethod method, int width, int height)
+    : method_(method), width_(width), height_(height), flow_(width, height) {}
+
+PlaneView<Flow> FlowOfChanges::find(const PlaneView<std::uint8_t>& from,
+                                    const PlaneView<std::uint8_t>& to, const Box& changed,
+                                    ThreadPool& threads) {
+  if (changed.empty()) {
+    whole_knows_last_ = false;
+    clear();
+    return flow_.view();
+  }
+  const Range columns(changed.left, changed.right, width_);
+  const Range rows(changed.top, changed.bottom, height_);
+  const Box part{columns.first, rows.first, columns.last, rows.last};
+  // More than half of a picture is sought through as a whole: what is known of `to` then serves the
+  // next call.
+  if (2 * static_cast<std::int64_t>(part.width()) * part.height() >
+      static_cast<std::int64_t>(width_) * height_)
+    return find_in_whole(from, to, threads);
+  whole_knows_last_ = false;
+  find_in_part(from, to, part, threads);
+  return flow_.view();
+}
+
+PlaneView<Flow> FlowOfChanges::find_in_whole(const PlaneView<std::uint8_t>& from,
+                                             const PlaneView<std::uint8_t>& to,
+                                             ThreadPool& threads) {
+  if (!whole_) whole_ = make_dense_flow(method_, width_, height_);
+  if (!whole_knows_last_) whole_->push(from, threads);
+  whole_->push(to, threads);
+  whole_knows_last_ = true;
+  return whole_->flow(threads);
+}
+
+void FlowOfChanges::find_in_part(const PlaneView<std::uint8_t>& from,
+                                 const PlaneView<std::uint8_t>& to, const Box& part,
+                                 ThreadPool& threads) {
+  if (!part_ || part_width_ != part.width() || part_height_ != part.height()) {
+    part_ = make_dense_flow(method_, part.width(), part.height());
+    part_width_ = part.width();
+    part_height_ = part.height();
+  }
+  const auto found = part_->find(cut_out(from, part), cut_out(to, part), threads);
+  clear();
+  for (int y = 0; y < part.height(); ++y)
+    std::copy_n(found.row(y), part.width(), flow_.row(part.top + y) + part.left);
+  filled_ = part;
+}
+
+void FlowOfChanges::clear() {
+  for (int y = filled_.top; y < filled_.bottom; ++y)
+    std::fill_n(flow_.row(y) + filled_.left, filled_.width(), Flow{});
+  filled_ = {};
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <memory>
+
+#include "src/flow/dense_flow.hpp"
+#include "src/picture/box.hpp"
+
+namespace eventcamera {
+
+/// Dense flow between the pictures of a sequence, sought only around what has changed: elsewhere
+/// it is 0. A still camera sees little change, and then most of the work falls away.
+class FlowOfChanges {
+ public:
+  /// Of pictures of this size.
+  FlowOfChanges(FlowMethod method, int width, int height);
+
+  FlowMethod method() const { return method_; }
+
+  /// The flow from a picture, which must be the `to` of the call before if there was one, to the
+  /// next, where `changed` holds all that has changed between them. Good until the next call, and
+  /// the same for any number of threads.
+  PlaneView<Flow> find(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
+                       const Box& changed, ThreadPool& threads);
+
+ private:
+  PlaneView<Flow> find_in_whole(const PlaneView<std::uint8_t>& from,
+                                const PlaneView<std::uint8_t>& to, ThreadPool& threads);
+  void find_in_part(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
+                    const Box& part, ThreadPool& threads);
+  void clear();
+
+  FlowMethod method_;
+  int width_;
+  int height_;
+  std::unique_ptr<DenseFlow> whole_;
+  bool whole_knows_last_ = false;
+  std::unique_ptr<DenseFlow> part_;
+  int part_width_ = 0;
+  int part_height_ = 0;
+  Plane<Flow> flow_;  ///< 0 outside of filled_
+  Box filled_;
+};
+
+}  // namespace eventcamera

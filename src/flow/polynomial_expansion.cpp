@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/flow/polynomial_expansion.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/polynomial_expansion.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants to come after that.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/flow/resampling.hpp"
+#include "src/flow/room.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Floats = hn::CappedTag<float, Resampling::spare>;
+constexpr int reach = PolynomialExpansion::reach;
+
+void fit_columns(const PolynomialExpansion::Window& window, int width, const FitKernels& kernels,
+                 float* smooth, float* slope, float* bend) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  for (int x = 0; x < width; x += lanes) {
+    const auto middle = hn::LoadU(floats, window[reach] + x);
+    auto sum0 = hn::Mul(hn::Set(floats, kernels.smooth[0]), middle);
+    auto sum1 = hn::Zero(floats);
+    auto sum2 = hn::Mul(hn::Set(floats, kernels.bend[0]), middle);
+    for (int k = 1; k <= reach; ++k) {
+      const auto above = hn::LoadU(floats, window[reach - k] + x);
+      const auto below = hn::LoadU(floats, window[reach + k] + x);
+      const auto both = hn::Add(above, below);
+      sum0 = hn::Add(sum0, hn::Mul(hn::Set(floats, kernels.smooth[k]), both));
+      sum1 = hn::Add(sum1, hn::Mul(hn::Set(floats, kernels.slope[k]), hn::Sub(below, above)));
+      sum2 = hn::Add(sum2, hn::Mul(hn::Set(floats, kernels.bend[k]), both));
+    }
+    hn::StoreU(sum0, floats, smooth + x);
+    hn::StoreU(sum1, floats, slope + x);
+    hn::StoreU(sum2, floats, bend + x);
+  }
+}
+
+/// `four` has room for four coefficients a pixel, `fifth` for the last.
+void fit_row(const float* smooth, const float* slope, const float* bend, int width,
+             const FitKernels& kernels, float* four, float* fifth, float* out) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  for (int x = 0; x < width; x += lanes) {
+    const auto set = [&](float value) { return hn::Set(floats, value); };
+    const auto at = [&](const float* row, int k) { return hn::LoadU(floats, row + x + k); };
+    auto b_y = hn::Mul(set(kernels.smooth[0]), at(slope, 0));
+    auto b_x = hn::Zero(floats);
+    auto a_yy = hn::Mul(set(kernels.smooth[0]), at(bend, 0));
+    auto a_xx = hn::Mul(set(kernels.bend[0]), at(smooth, 0));
+    auto a_xy = hn::Zero(floats);
+    for (int k = 1; k <= reach; ++k) {
+      const auto left = at(smooth, -k);
+      const auto right = at(smooth, k);
+      const auto left_slope = at(slope, -k);
+      const auto right_slope = at(slope, k);
+      const auto weight = set(kernels.smooth[k]);
+      b_y = hn::Add(b_y, hn::Mul(weight, hn::Add(left_slope, right_slope)));
+      b_x = hn::Add(b_x, hn::Mul(set(kernels.slope[k]), hn::Sub(right, left)));
+      a_yy = hn::Add(a_yy, hn::Mul(weight, hn::Add(at(bend, -k), at(bend, k))));
+      a_xx = hn::Add(a_xx, hn::Mul(set(kernels.bend[k]), hn::Add(left, right)));
+      a_xy = hn::Add(a_xy, hn::Mul(set(kernels.slope[k]), hn::Sub(right_slope, left_slope)));
+    }
+    hn::StoreInterleaved4(b_y, b_x, a_yy, a_xx, floats, four + std::ptrdiff_t{4} * x);
+    hn::StoreU(a_xy, floats, fifth + x);
+  }
+  for (int x = 0; x < width; ++x) {
+    float* polynomial = out + std::ptrdiff_t{PolynomialExpansion::coefficients} * x;
+    std::copy_n(four + std::ptrdiff_t{4} * x, 4, polynomial);
+    polynomial[4] = fifth[x];
+  }
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+namespace {
+
+HWY_EXPORT(fit_columns);
+HWY_EXPORT(fit_row);
+
+}  // namespace
+
+FitKernels::FitKernels() {
+  constexpr double sigma = 1.2;
+  double weight[count];
+  double sum = 0;
+  for (int k = 0; k < count; ++k) {
+    weight[k] = std::exp(-k * k / (2 * sigma * sigma));
+    sum += k == 0 ? weight[k] : 2 * weight[k];
+  }
+  double second = 0;  // moments of the weight
+  double fourth = 0;
+  for (int k = 0; k < count; ++k) {
+    weight[k] /= sum;
+    second += 2 * weight[k] * k * k;
+    fourth += 2 * weight[k] * k * k * k * k;
+  }
+  // The normal equations fall apart: x, y and x y are orthogonal to all else, and x^2 - second is,
+  // too.
+  for (int k = 0; k < count; ++k) {
+    smooth[k] = static_cast<float>(weight[k]);
+    slope[k] = static_cast<float>(weight[k] * k / second);
+    bend[k] = static_cast<float>(weight[k] * (k * k - second) / (fourth - second * second));
+  }
+}
+
+PolynomialExpansion::PolynomialExpansion(int width, int height)
+    : width_(width),
+      height_(height),
+      data_(static_cast<std::size_t>(stride()) * (static_cast<std::size_t>(height) + 2) +
+            Resampling::spare) {}
+
+void PolynomialExpansion::fit(int y, const Window& window, Scratch& scratch) {
+  static const FitKernels kernels;
+  const auto room = static_cast<std::size_t>(width_) + std::size_t{2} * reach + Resampling::spare;
+  std::array<float*, 3> rows;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = room_in(scratch.column_sums[i], room) + reach;
+  HWY_DYNAMIC_DISPATCH(fit_columns)(window, width_, kernels, rows[0], rows[1], rows[2]);
+  for (float* row : rows) {
+    std::fill_n(row - reach, reach, row[0]);
+    std::fill_n(row + width_, reach, row[width_ - 1]);
+  }
+  float* four = room_in(scratch.coefficients, coefficients * room);
+  HWY_DYNAMIC_DISPATCH(fit_row)
+  (rows[0], rows[1], rows[2], width_, kernels, four, four + 4 * room,
+   data_.data() + std::ptrdiff_t{y} * stride());
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/flow/pyramid_level.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/pyramid_level.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants to come after that.
+#include <hwy/highway.h>
+
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+
+#include "src/flow/room.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Floats = hn::CappedTag<float, Resampling::spare>;
+using Words = hn::Rebind<std::int32_t, Floats>;
+using Bytes = hn::Rebind<std::uint8_t, Floats>;
+
+/// out = the sum of weight[t] rows[t]
+void add_rows(const std::uint8_t* const* rows, const float* weights, int count, int width,
+              float* out) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  int x = 0;
+  for (; x + lanes <= width; x += lanes) {
+    auto sum = hn::Zero(floats);
+    for (int t = 0; t < count; ++t) {
+      const auto pixels = hn::PromoteTo(Words(), hn::LoadU(Bytes(), rows[t] + x));
+      sum = hn::Add(sum, hn::Mul(hn::Set(floats, weights[t]), hn::ConvertTo(floats, pixels)));
+    }
+    hn::StoreU(sum, floats, out + x);
+  }
+  for (; x < width; ++x) {  // not one byte further: the picture is somebody else's
+    float sum = 0;
+    for (int t = 0; t < count; ++t) sum += weights[t] * static_cast<float>(rows[t][x]);
+    out[x] = sum;
+  }
+}
+
+/// out[x] = the sum of kernel[t] row[x + t], with a symmetric kernel
+void blur_row(const float* row, const float* kernel, int reach, int width, float* out) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  row += reach;
+  kernel += reach;
+  for (int x = 0; x < width; x += lanes) {
+    auto sum = hn::Mul(hn::Set(floats, kernel[0]), hn::LoadU(floats, row + x));
+    for (int k = 1; k <= reach; ++k) {
+      const auto both = hn::Add(hn::LoadU(floats, row + x - k), hn::LoadU(floats, row + x + k));
+      sum = hn::Add(sum, hn::Mul(hn::Set(floats, kernel[k]), both));
+    }
+    hn::StoreU(sum, floats, out + x);
+  }
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+namespace {
+
+HWY_EXPORT(add_rows);
+HWY_EXPORT(blur_row);
+
+constexpr int longest_kernel = 19;
+
+std::vector<float> kernel_of(int level) {
+  if (level == 0) return {0.25F, 0.5F, 0.25F};
+  const double sigma = ((1 << level) - 1) * 0.5;
+  const int reach = static_cast<int>(std::lrint(sigma * 5)) / 2;
+  std::vector<float> kernel(2 * static_cast<std::size_t>(reach) + 1);
+  assert(kernel.size() <= longest_kernel);
+  const auto weight = [&](int k) { return std::exp(-k * k / (2 * sigma * sigma)); };
+  double sum = 0;
+  for (int k = -reach; k <= reach; ++k) sum += weight(k);
+  for (int k = -reach; k <= reach; ++k) kernel[reach + k] = static_cast<float>(weight(k) / sum);
+  return kernel;
+}
+
+int shrunk(int length, int level) {
+  return static_cast<int>(std::lrint(std::ldexp(length, -level)));
+}
+
+/// The place of a pixel beyond the border: mirrored in the outermost one.
+int mirrored(int i, int length) {
+  if (length == 1) return 0;
+  while (i < 0 || i >= length) i = i < 0 ? -i : 2 * (length - 1) - i;
+  return i;
+}
+
+}  // namespace
+
+PyramidLevel::PyramidLevel(int width, int height, int level)
+    : full_size_(level == 0),
+      kernel_(kernel_of(level)),
+      columns_(width, shrunk(width, level)),
+      rows_(height, shrunk(height, level)) {}
+
+void PyramidLevel::row(const PlaneView<std::uint8_t>& picture, int y, Scratch& scratch,
+                       float* out) const {
+  const int count = static_cast<int>(kernel_.size());
+  const int reach = count / 2;
+  const int width = picture.width;
+  const auto room = static_cast<std::size_t>(width) + Resampling::spare;
+
+  // Blurred rows are mixed before they are summed: one kernel, longer by a row.
+  std::array<const std::uint8_t*, longest_kernel + 1> rows;
+  std::array<float, longest_kernel + 1> weights{};
+  const float lower = rows_.weight()[y];
+  for (int t = 0; t < count; ++t) {
+    weights[t] += (1 - lower) * kernel_[t];
+    weights[t + 1] += lower * kernel_[t];
+  }
+  for (int t = 0; t <= count; ++t)
+    rows[t] = picture.row(mirrored(rows_.first()[y] - reach + t, picture.height));
+  float* sums = room_in(scratch.column_sums, room + 2 * static_cast<std::size_t>(reach)) + reach;
+  HWY_DYNAMIC_DISPATCH(add_rows)
+  (rows.data(), weights.data(), lower > 0 ? count + 1 : count, width, sums);
+
+  for (int k = 1; k <= reach; ++k) {
+    sums[-k] = sums[mirrored(-k, width)];
+    sums[width - 1 + k] = sums[mirrored(width - 1 + k, width)];
+  }
+  float* blurred = full_size_ ? out : room_in(scratch.blurred, room);
+  HWY_DYNAMIC_DISPATCH(blur_row)(sums - reach, kernel_.data(), reach, width, blurred);
+  if (!full_size_) resample_row(blurred, columns_, out);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE
