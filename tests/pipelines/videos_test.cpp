@@ -15,11 +15,15 @@
 
 #include "gst/eventcamera/eventcamera.h"
 #include "src/flow/dense_flow.hpp"
+#include "src/flow/flow_of_changes.hpp"
 #include "src/flow/opencv_picture.hpp"
 #include "src/flow/point_tracker.hpp"
 #include "src/reference/dense.hpp"
 #include "src/reference/diff.hpp"
 #include "src/reference/sparse.hpp"
+#include "src/simulate/dense.hpp"
+#include "src/simulate/diff.hpp"
+#include "src/simulate/sparse.hpp"
 #include "tests/pipelines/video_frames.hpp"
 
 namespace {
@@ -61,11 +65,15 @@ std::vector<Plane<std::uint8_t>> castel_frames(int count) {
   return frames;
 }
 
-double psnr(const Plane<std::uint8_t>& a, const Plane<std::uint8_t>& b) {
+double square_error(const Plane<std::uint8_t>& a, const Plane<std::uint8_t>& b) {
   double sum = 0;
   for (int y = 0; y < a.height(); ++y)
     for (int x = 0; x < a.width(); ++x) sum += std::pow(a.at(x, y) - b.at(x, y), 2);
-  return 10 * std::log10(255.0 * 255.0 * a.width() * a.height() / sum);
+  return sum / (a.width() * a.height());
+}
+
+double psnr(const Plane<std::uint8_t>& a, const Plane<std::uint8_t>& b) {
+  return 10 * std::log10(255.0 * 255.0 / square_error(a, b));
 }
 
 constexpr FlowMethod flows[] = {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback};
@@ -138,6 +146,22 @@ cv::Mat least_slopes(const Plane<std::uint8_t>& picture) {
   return slopes;
 }
 
+std::vector<Track> opencv_tracks(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to,
+                                 const std::vector<Point>& points) {
+  std::vector<cv::Point2f> starts;
+  for (const auto& point : points)
+    starts.emplace_back(static_cast<float>(point.x), static_cast<float>(point.y));
+  std::vector<cv::Point2f> ends;
+  std::vector<unsigned char> status;
+  std::vector<float> error;
+  cv::calcOpticalFlowPyrLK(opencv_picture(from.view()), opencv_picture(to.view()), starts, ends,
+                           status, error, {15, 15}, 3, {3, 10, 0.03});
+  std::vector<Track> tracks;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    tracks.push_back({{ends[i].x - starts[i].x, ends[i].y - starts[i].y}, status[i] != 0});
+  return tracks;
+}
+
 /// How far our tracks end from OpenCV's, where there is texture: 3 grey levels a pixel.
 struct TrackErrors {
   float disagreement;
@@ -152,23 +176,15 @@ struct TrackErrors {
     tracker.push(from.view(), threads);
     tracker.push(to.view(), threads);
     const auto ours = tracker.track(points, threads);
-    std::vector<cv::Point2f> starts;
-    for (const auto& point : points)
-      starts.emplace_back(static_cast<float>(point.x), static_cast<float>(point.y));
-    std::vector<cv::Point2f> ends;
-    std::vector<unsigned char> status;
-    std::vector<float> error;
-    cv::calcOpticalFlowPyrLK(opencv_picture(from.view()), opencv_picture(to.view()), starts, ends,
-                             status, error, {15, 15}, 3, {3, 10, 0.03});
+    const auto theirs = opencv_tracks(from, to, points);
     const auto texture = least_slopes(from);
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (texture.at<float>(points[i].y, points[i].x) < 3) continue;
       ++tracks;
-      if ((status[i] != 0) != ours[i].found)
+      if (theirs[i].found != ours[i].found)
         ++found_by_one;
       else if (ours[i].found)
-        sum += std::hypot(ours[i].flow.x - (ends[i].x - starts[i].x),
-                          ours[i].flow.y - (ends[i].y - starts[i].y));
+        sum += std::hypot(ours[i].flow.x - theirs[i].flow.x, ours[i].flow.y - theirs[i].flow.y);
     }
   }
 };
@@ -240,6 +256,165 @@ TEST(Farneback, IsWhatOpenCvFinds) {
     EXPECT_NEAR(psnr(warped(frames[i - 1], ours), frames[i]),
                 psnr(warped(frames[i - 1], theirs.view()), frames[i]), 0.01)
         << "pair " << i;
+  }
+}
+
+/// The share of events that have a partner among others: of the same polarity, within a pixel and a
+/// step.
+class Partners {
+ public:
+  Partners(const std::vector<Event>& events, int width, int height, const StepTimes& steps)
+      : width_(width), height_(height), steps_(steps) {
+    fired_.resize(static_cast<std::size_t>(steps.count()) * width * height);
+    for (const auto& event : events) fired_[place(event.x, event.y(), step(event))] |= bit(event);
+  }
+
+  double share(const std::vector<Event>& events) const {
+    const auto found = std::count_if(events.begin(), events.end(),
+                                     [this](const Event& event) { return has_partner(event); });
+    return static_cast<double>(found) /
+           static_cast<double>(std::max<std::size_t>(1, events.size()));
+  }
+
+ private:
+  static unsigned char bit(const Event& event) { return event.polarity() == Polarity::on ? 1 : 2; }
+  int step(const Event& event) const {
+    int j = 1;
+    while (steps_.microseconds(j) < event.t) ++j;
+    return j;
+  }
+  std::size_t place(int x, int y, int j) const {
+    return (static_cast<std::size_t>(j - 1) * height_ + y) * width_ + x;
+  }
+  bool has_partner(const Event& event) const {
+    const int at = step(event);
+    for (int j = std::max(1, at - 1); j <= std::min(steps_.count(), at + 1); ++j)
+      for (int y = std::max(0, event.y() - 1); y <= std::min(height_ - 1, event.y() + 1); ++y)
+        for (int x = std::max(0, event.x - 1); x <= std::min(width_ - 1, event.x + 1); ++x)
+          if ((fired_[place(x, y, j)] & bit(event)) != 0) return true;
+    return false;
+  }
+
+  int width_;
+  int height_;
+  StepTimes steps_;
+  std::vector<unsigned char> fired_;
+};
+
+constexpr Nanoseconds interval = 40'000'000;
+
+/// The events that a simulator makes of the last of a few frames.
+std::vector<Event> events_of(Simulator& simulator,
+                             const std::vector<const Plane<std::uint8_t>*>& frames,
+                             double threshold, int interpolated_frames) {
+  Settings settings;
+  settings.positive_threshold = settings.negative_threshold = threshold;
+  settings.interpolated_frames = interpolated_frames;
+  std::vector<Event> events;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const auto& frame = *frames[i];
+    const LumaView luma{{frame.width(), frame.height(), 8}, frame.row(0), frame.stride()};
+    const auto* made = simulator.push(luma, static_cast<Nanoseconds>(i) * interval, settings);
+    if (made == nullptr) continue;
+    events.resize(made->size());
+    made->copy_to(events.data());
+  }
+  return events;
+}
+
+/// Where ours replaces OpenCV's: nearly all events have a partner, both ways.
+void expect_partners(const char* name, const std::vector<Event>& ours,
+                     const std::vector<Event>& theirs, int width, int height,
+                     const StepTimes& steps) {
+  const double of_ours = Partners(theirs, width, height, steps).share(ours);
+  const double of_theirs = Partners(ours, width, height, steps).share(theirs);
+  std::printf("%s: %zu events, %.2f %% of them among OpenCV's %zu, of which %.2f %% are ours\n",
+              name, ours.size(), 100 * of_ours, theirs.size(), 100 * of_theirs);
+  EXPECT_GE(of_ours, 0.95) << name;
+  EXPECT_GE(of_theirs, 0.95) << name;
+}
+
+TEST(Events, AreThoseOfOpenCvsFlows) {
+  if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
+  const auto frames = frames_of(video(driving), 38, 640, 480);
+  ASSERT_GE(frames.size(), 37U);
+  constexpr int n = 20;
+  const StepTimes steps(interval, n + 1);
+  const LumaFormat format{640, 480, 8};
+  for (const std::size_t i : {2U, 12U, 22U, 32U}) {
+    SCOPED_TRACE(i);
+    const auto& before = frames[i - 1];
+    const auto& last = frames[i];
+    const auto& now = frames[i + 1];
+    const auto points = reference::changed(last, now, 6);
+    expect_partners(
+        "sparse", events_of(*make_sparse_simulator(format), {&last, &now}, 6, n),
+        reference::sparse(last, now, points, opencv_tracks(last, now, points), steps, {6, 6}), 640,
+        480, steps);
+    const auto d_last = reference::difference_frame(before, last, {19, 19});
+    const auto d_now = reference::difference_frame(last, now, {19, 19});
+    const auto tracked = [&](int sign) {
+      const auto from = reference::part_of(d_last, sign, 8);
+      const auto kept = reference::points_of(from);
+      return reference::Tracked{kept,
+                                opencv_tracks(from, reference::part_of(d_now, sign, 8), kept)};
+    };
+    expect_partners("diff", events_of(*make_diff_simulator(format), {&before, &last, &now}, 19, n),
+                    reference::diff(d_last, d_now, tracked(1), tracked(-1), steps), 640, 480,
+                    steps);
+    const auto dense = make_dense_simulator(format);
+    dense->set_flow(FlowMethod::farneback);
+    expect_partners("farneback", events_of(*dense, {&last, &now}, 3, n),
+                    reference::dense(last, now, opencv_farneback(last, now).view(),
+                                     Interpolation::forward, steps, {3, 3}),
+                    640, 480, steps);
+  }
+}
+
+/// Bottles pass under a still camera: where flow is sought only around them, it shows as much and
+/// as true as that of the whole picture.
+TEST(Events, AreThoseOfTheFlowOfTheWhole) {
+  const auto bottles = video("bottles-640x360-30fps.mp4");
+  if (!std::filesystem::exists(bottles)) GTEST_SKIP() << "no " << bottles;
+  const auto frames = frames_of(bottles, 400, 640, 360);
+  ASSERT_EQ(frames.size(), 400U);
+  const StepTimes steps(interval, 11);
+  ThreadPool threads;
+  for (const auto method : flows) {
+    double of_part = 0;
+    double of_whole = 0;
+    double part_events = 0;
+    double whole_events = 0;
+    double part_error = 0;
+    double whole_error = 0;
+    for (std::size_t i = 20; i < frames.size(); i += 40) {
+      const auto& last = frames[i - 1];
+      const auto& now = frames[i];
+      FlowOfChanges finder(method, 640, 360);
+      const auto changed = reference::changed_box(last, now, 3);
+      const auto part = finder.find(last.view(), now.view(), changed, threads);
+      const auto whole_finder = make_dense_flow(method, 640, 360);
+      const auto whole = whole_finder->find(last.view(), now.view(), threads);
+      part_error += square_error(warped(last, part), now);
+      whole_error += square_error(warped(last, whole), now);
+      const auto events = [&](const PlaneView<Flow>& flow) {
+        return reference::dense(last, now, flow, Interpolation::forward, steps, {3, 3});
+      };
+      const auto a = events(part);
+      const auto b = events(whole);
+      part_events += static_cast<double>(a.size());
+      whole_events += static_cast<double>(b.size());
+      of_part += Partners(b, 640, 360, steps).share(a) * static_cast<double>(a.size());
+      of_whole += Partners(a, 640, 360, steps).share(b) * static_cast<double>(b.size());
+    }
+    std::printf(
+        "bottles, flow %d: of %.0f events %.2f %% are among the whole's %.0f, of which %.2f %% are "
+        "among these; warp %+.2f dB\n",
+        static_cast<int>(method), part_events, 100 * of_part / part_events, whole_events,
+        100 * of_whole / whole_events, 10 * std::log10(whole_error / part_error));
+    EXPECT_GE(of_part / part_events, 0.95);
+    EXPECT_GE(of_whole / whole_events, 0.95);
+    EXPECT_GE(10 * std::log10(whole_error / part_error), -0.1);
   }
 }
 
