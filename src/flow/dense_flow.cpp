@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/video/tracking.hpp>
 
-#include "src/flow/farneback.hpp"
+#include "src/flow/farneback/farneback.hpp"
 #include "src/flow/opencv_picture.hpp"
 #include "src/flow/opencv_threads.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "src/flow/lucas_kanade.hpp"
+#include "src/flow/lucas_kanade/search.hpp"
 
 namespace eventcamera::reference {
 

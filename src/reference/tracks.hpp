@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "src/flow/fixed_point.hpp"
-#include "src/flow/point_tracker.hpp"
+#include "src/flow/lucas_kanade/point_tracker.hpp"
 
 namespace eventcamera::reference {
 

@@ -2,7 +2,7 @@
 // Farneback's flow equals its plain reference: sizes down to one pixel and up to four levels,
 // strides, textures and noise; it is the same bit for bit on every SIMD target that this processor
 // has, for any number of threads, and whatever came before.
-#include "src/flow/farneback.hpp"
+#include "src/flow/farneback/farneback.hpp"
 
 #include <gtest/gtest.h>
 

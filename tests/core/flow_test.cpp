@@ -10,8 +10,8 @@
 #include "src/flow/dense_flow.hpp"
 #include "src/flow/fixed_point.hpp"
 #include "src/flow/flow_of_changes.hpp"
+#include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/opencv_threads.hpp"
-#include "src/flow/point_tracker.hpp"
 #include "src/simulate/difference.hpp"
 #include "tests/core/scene.hpp"
 

@@ -10,8 +10,8 @@
 #include <cmath>
 #include <opencv2/video/tracking.hpp>
 
+#include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/opencv_picture.hpp"
-#include "src/flow/point_tracker.hpp"
 #include "src/reference/lucas_kanade.hpp"
 #include "tests/core/scene.hpp"
 

@@ -71,8 +71,8 @@ INSTANTIATE_TEST_SUITE_P(, EveryMethod, testing::ValuesIn(methods),
                          [](const auto& test) { return test.param.name; });
 
 TEST_P(EveryMethod, SeesNothingWhereNothingMoves) {
-  for (const auto& picture : {scene::texture<std::uint8_t>(120, 80, 8, 3, 7),
-                              scene::noise<std::uint8_t>(120, 80, 8, 1)})
+  for (const auto& picture :
+       {scene::texture<std::uint8_t>(120, 80, 8, 3, 7), scene::noise<std::uint8_t>(120, 80, 8, 1)})
     EXPECT_TRUE(events_of({picture, picture, picture}).empty());
 }
 

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "src/flow/lucas_kanade.hpp"
-#include "src/flow/pyramid.hpp"
+#include "src/flow/lucas_kanade/pyramid.hpp"
+#include "src/flow/lucas_kanade/search.hpp"
 
 namespace eventcamera {
 

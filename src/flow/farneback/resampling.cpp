@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/resampling.hpp"
+#include "src/flow/farneback/resampling.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/resampling.cpp"
+#define HWY_TARGET_INCLUDE "src/flow/farneback/resampling.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants to come after that.
 #include <hwy/highway.h>

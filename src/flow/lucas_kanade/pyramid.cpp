@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/pyramid.hpp"
+#include "src/flow/lucas_kanade/pyramid.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/pyramid.cpp"
+#define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/pyramid.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants to come after that.
 #include <hwy/highway.h>

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/polynomial_expansion.hpp"
+#include "src/flow/farneback/polynomial_expansion.hpp"
 
 namespace eventcamera {
 

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/pyramid.hpp"
+#include "src/flow/lucas_kanade/pyramid.hpp"
 
 namespace eventcamera {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/point_tracker.hpp"
+#include "src/flow/lucas_kanade/point_tracker.hpp"
 
 #include <algorithm>
 #include <cmath>

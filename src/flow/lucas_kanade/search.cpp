@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/lucas_kanade.hpp"
+#include "src/flow/lucas_kanade/search.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/lucas_kanade.cpp"
+#define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants to come after that.
 #include <hwy/highway.h>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/farneback.hpp"
+#include "src/flow/farneback/farneback.hpp"
 
 #include <algorithm>
 #include <cassert>
 #include <utility>
 
-#include "src/flow/room.hpp"
+#include "src/flow/farneback/room.hpp"
 
 namespace eventcamera {
 namespace {

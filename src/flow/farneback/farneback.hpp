@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/flow_update.hpp"
-#include "src/flow/polynomial_expansion.hpp"
-#include "src/flow/pyramid_level.hpp"
-#include "src/flow/resampling.hpp"
+#include "src/flow/farneback/flow_update.hpp"
+#include "src/flow/farneback/polynomial_expansion.hpp"
+#include "src/flow/farneback/pyramid_level.hpp"
+#include "src/flow/farneback/resampling.hpp"
 
 namespace eventcamera {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/pyramid_level.hpp"
+#include "src/flow/farneback/pyramid_level.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/pyramid_level.cpp"
+#define HWY_TARGET_INCLUDE "src/flow/farneback/pyramid_level.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants to come after that.
 #include <hwy/highway.h>
@@ -12,7 +12,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "src/flow/room.hpp"
+#include "src/flow/farneback/room.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {

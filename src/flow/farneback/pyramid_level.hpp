@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/flow/resampling.hpp"
+#include "src/flow/farneback/resampling.hpp"
 #include "src/picture/plane.hpp"
 
 namespace eventcamera {

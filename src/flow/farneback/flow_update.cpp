@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/flow_update.hpp"
+#include "src/flow/farneback/flow_update.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/flow_update.cpp"
+#define HWY_TARGET_INCLUDE "src/flow/farneback/flow_update.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants to come after that.
 #include <hwy/highway.h>
 
 #include <algorithm>
 
-#include "src/flow/resampling.hpp"
-#include "src/flow/room.hpp"
+#include "src/flow/farneback/resampling.hpp"
+#include "src/flow/farneback/room.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {

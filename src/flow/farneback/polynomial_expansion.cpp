@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/polynomial_expansion.hpp"
+#include "src/flow/farneback/polynomial_expansion.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/polynomial_expansion.cpp"
+#define HWY_TARGET_INCLUDE "src/flow/farneback/polynomial_expansion.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants to come after that.
 #include <hwy/highway.h>
@@ -10,8 +10,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/flow/resampling.hpp"
-#include "src/flow/room.hpp"
+#include "src/flow/farneback/resampling.hpp"
+#include "src/flow/farneback/room.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
