@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "src/simulate/bands.hpp"
 #include "src/simulate/fired_bits.hpp"
@@ -20,9 +19,13 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// No vector is wider than a tile.
-using Words = hn::CappedTag<std::int32_t, Steepness::tile>;
-using Floats = hn::CappedTag<float, Steepness::tile>;
+/// Pixels that are skipped together or not at all. No vector is wider.
+constexpr int tile_width = 16;
+constexpr int tile_height = 4;
+static_assert(rows_per_band % tile_height == 0);
+
+using Words = hn::CappedTag<std::int32_t, tile_width>;
+using Floats = hn::CappedTag<float, tile_width>;
 using Bytes = hn::Rebind<std::uint8_t, Words>;
 using Vector = hn::Vec<Words>;
 
@@ -79,9 +82,9 @@ Vector motions(hn::Vec<Floats> flow, float scale) {
   return hn::NearestInt(hn::Mul(cut, hn::Set(Floats(), scale)));
 }
 
-/// For each tile of a band the step at which to begin, where nothing can fire before the last one:
-/// at the last but one, or at the last where that shows the last frame itself. Else 1.
-using FirstSteps = std::array<int, longest_side / Steepness::tile>;
+/// For each tile of a row of tiles the step at which to begin, where nothing can fire before the
+/// last one: at the last but one, or at the last where that shows the last frame itself. Else 1.
+using FirstSteps = std::array<int, longest_side / tile_width>;
 
 template <Interpolation interpolation>
 void fire_row(const Path<std::uint8_t>& path, int y, int band, const FirstSteps& first_steps,
@@ -116,7 +119,7 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, const FirstSteps&
 
     auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
     const auto end = hn::PromoteTo(words, hn::LoadU(Bytes(), now_row + x));
-    const int first = first_steps[static_cast<std::size_t>(x / Steepness::tile)];
+    const int first = first_steps[static_cast<std::size_t>(x / tile_width)];
     if (first == steps) {
       fire(before, end, steps);
       continue;
@@ -153,51 +156,65 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, const FirstSteps&
   }
 }
 
-/// The longest flow, each way, of a tile's part of some rows.
-Flow longest_flow(const PlaneView<Flow>& flow, const BandRows& rows, int left, int right) {
+/// How far the pixels of a tile move, at most and at least, pixels.
+struct FlowRange {
+  float least[2];  ///< x, y
+  float most[2];
+};
+
+FlowRange flow_range(const PlaneView<Flow>& flow, const Box& tile) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
-  const int count = 2 * (right - left);
-  HWY_ALIGN float longest[2 * hn::MaxLanes(Floats())] = {};
-  auto all = hn::Zero(floats);
-  for (int y = rows.first; y < rows.last; ++y) {
-    const float* row = &flow.row(y)[left].x;
+  const int count = 2 * tile.width();
+  auto least = hn::Zero(floats);
+  auto most = hn::Zero(floats);
+  FlowRange range{};
+  for (int y = tile.top; y < tile.bottom; ++y) {
+    const float* row = &flow.row(y)[tile.left].x;
     int i = 0;
     for (; i + lanes <= count; i += lanes) {
-      const auto length = hn::Abs(hn::LoadU(floats, row + i));
+      const auto here = hn::LoadU(floats, row + i);
       // What is no number does not move.
-      all = hn::Max(all, hn::IfThenElseZero(hn::Eq(length, length), length));
+      const auto number = hn::IfThenElseZero(hn::Eq(here, here), here);
+      least = hn::Min(least, number);
+      most = hn::Max(most, number);
     }
-    for (; i < count; ++i)
-      if (std::fabs(row[i]) > longest[i % 2]) longest[i % 2] = std::fabs(row[i]);
+    for (; i < count; ++i) {
+      if (row[i] < range.least[i % 2]) range.least[i % 2] = row[i];
+      if (row[i] > range.most[i % 2]) range.most[i % 2] = row[i];
+    }
   }
   HWY_ALIGN float lane[hn::MaxLanes(Floats())];
-  hn::Store(all, floats, lane);
-  for (int i = 0; i < lanes; ++i) longest[i % 2] = std::max(longest[i % 2], lane[i]);
-  return {longest[0], longest[1]};
+  hn::Store(least, floats, lane);
+  for (int i = 0; i < lanes; ++i) range.least[i % 2] = std::min(range.least[i % 2], lane[i]);
+  hn::Store(most, floats, lane);
+  for (int i = 0; i < lanes; ++i) range.most[i % 2] = std::max(range.most[i % 2], lane[i]);
+  return range;
 }
 
 /// The first step of a forward path at which a tile must be looked at.
-int first_step(const Path<std::uint8_t>& path, const Steepness& steepness, const BandRows& rows,
-               int left, int right) {
+int first_step(const Path<std::uint8_t>& path, const Steepness& steepness, const Box& tile) {
   const int steps = path.steps.count();
-  const Flow longest = longest_flow(path.flow, rows, left, right);
-  std::int64_t dx = motion_per_step(longest.x, steps);
-  std::int64_t dy = motion_per_step(longest.y, steps);
+  const auto range = flow_range(path.flow, tile);
+  const auto motion = [steps](float flow) { return std::int64_t{motion_per_step(flow, steps)}; };
+  std::int64_t dx = std::max(motion(range.most[0]), -motion(range.least[0]));
+  std::int64_t dy = std::max(motion(range.most[1]), -motion(range.least[1]));
   // Places are rounded to 1/64 of a pixel: nearer than half of that to where it began, a sample is
   // the pixel itself.
   if (std::max(dx, dy) * (steps - 1) < 512) return steps;
   // And a step may be that much longer.
   dx += 1024;
   dy += 1024;
-  const int reach_x = static_cast<int>((dx * steps >> 16) + 1);
-  const int reach_y = static_cast<int>((dy * steps >> 16) + 1);
   // Where things come from afar, looking for the steepest place on the way costs more than it
   // saves.
-  constexpr int far = 4 * Steepness::tile;
-  if (reach_x > far || reach_y > far) return 1;
-  const auto bound =
-      steepness.within(left - reach_x, rows.first - reach_y, right + reach_x, rows.last + reach_y);
+  constexpr int far = 64;
+  const auto reach = [&](float flow) {
+    return static_cast<int>(((motion(flow) + 1024) * steps >> 16) + 1);
+  };
+  const Box reached{tile.left - reach(range.most[0]), tile.top - reach(range.most[1]),
+                    tile.right + reach(-range.least[0]), tile.bottom + reach(-range.least[1])};
+  if (reached.width() > tile_width + 2 * far || reached.height() > tile_height + 2 * far) return 1;
+  const auto bound = steepness.within(reached);
   const std::int64_t threshold = std::min(path.thresholds.positive, path.thresholds.negative);
   return dx * bound.x + dy * bound.y <= threshold << 16 ? std::max(1, steps - 1) : 1;
 }
@@ -205,12 +222,16 @@ int first_step(const Path<std::uint8_t>& path, const Steepness& steepness, const
 void fire_band_forward(const Path<std::uint8_t>& path, const Steepness& steepness, int band,
                        EventBuckets& events) {
   const BandRows rows(band, path.flow.height);
+  const int width = path.flow.width;
   FirstSteps first_steps;
-  for (int left = 0; left < path.flow.width; left += Steepness::tile)
-    first_steps[static_cast<std::size_t>(left / Steepness::tile)] =
-        first_step(path, steepness, rows, left, std::min(left + Steepness::tile, path.flow.width));
-  for (int y = rows.first; y < rows.last; ++y)
-    fire_row<Interpolation::forward>(path, y, band, first_steps, events);
+  for (int top = rows.first; top < rows.last; top += tile_height) {
+    const int bottom = std::min(top + tile_height, rows.last);
+    for (int left = 0; left < width; left += tile_width)
+      first_steps[static_cast<std::size_t>(left / tile_width)] =
+          first_step(path, steepness, {left, top, std::min(left + tile_width, width), bottom});
+    for (int y = top; y < bottom; ++y)
+      fire_row<Interpolation::forward>(path, y, band, first_steps, events);
+  }
 }
 
 void fire_band_blend(const Path<std::uint8_t>& path, int band, EventBuckets& events) {

@@ -15,41 +15,48 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Bytes = hn::CappedTag<std::uint8_t, Steepness::tile>;
+/// Columns are looked at this many at once, and no vector is wider.
+constexpr int columns_at_once = 16;
+using Bytes = hn::CappedTag<std::uint8_t, columns_at_once>;
 
 /// The largest |a - b| of some rows, column by column.
 class LargestDifference {
  public:
   void add(const std::uint8_t* a, const std::uint8_t* b) {
-    for (int x = 0; x < Steepness::tile; x += static_cast<int>(hn::Lanes(Bytes()))) {
+    for (int x = 0; x < columns_at_once; x += static_cast<int>(hn::Lanes(Bytes()))) {
       const auto p = hn::LoadU(Bytes(), a + x);
       const auto q = hn::LoadU(Bytes(), b + x);
       const auto difference = hn::Or(hn::SaturatedSub(p, q), hn::SaturatedSub(q, p));
       hn::Store(hn::Max(hn::Load(Bytes(), columns_ + x), difference), Bytes(), columns_ + x);
     }
   }
-  std::uint8_t of_all() const { return *std::max_element(columns_, columns_ + Steepness::tile); }
+  std::uint8_t of_cell(int cell) const {
+    const auto* c = columns_ + 4 * cell;
+    return std::max(std::max(c[0], c[1]), std::max(c[2], c[3]));
+  }
 
  private:
-  HWY_ALIGN std::uint8_t columns_[Steepness::tile] = {};
+  HWY_ALIGN std::uint8_t columns_[columns_at_once] = {};
 };
 
-/// A band of tiles. Behind the right border stands the next row, and behind the last one 0: what is
-/// measured there is too large at worst.
-void measure_band(const PlaneView<std::uint8_t>& picture, int band, std::uint8_t* x_out,
-                  std::uint8_t* y_out) {
-  const BandRows rows(band, picture.height);
-  for (int left = 0; left < picture.width; left += Steepness::tile) {
+/// A row of 4x4 cells, from row `top` of the picture on. Behind the right border stands the next
+/// row, and behind the last one 0: what is measured there is too large at worst.
+void measure_row(const PlaneView<std::uint8_t>& picture, int top, std::uint8_t* x_out,
+                 std::uint8_t* y_out) {
+  const int bottom = std::min(top + 4, picture.height);
+  for (int left = 0; left < picture.width; left += columns_at_once) {
     LargestDifference x;
     LargestDifference y;
-    for (int row = rows.first; row < rows.last; ++row) {
+    for (int row = top; row < bottom; ++row) {
       const std::uint8_t* here = picture.row(row) + left;
       const std::uint8_t* below = picture.row(std::min(row + 1, picture.height - 1)) + left;
       x.add(here, here + 1);
       y.add(here, below);
     }
-    x_out[left / Steepness::tile] = x.of_all();
-    y_out[left / Steepness::tile] = y.of_all();
+    for (int cell = 0; cell < 4; ++cell) {
+      x_out[left / 4 + cell] = x.of_cell(cell);
+      y_out[left / 4 + cell] = y.of_cell(cell);
+    }
   }
 }
 
@@ -59,35 +66,63 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace eventcamera {
+namespace {
 
-HWY_EXPORT(measure_band);
+HWY_EXPORT(measure_row);
+
+/// The largest of 4x4 small cells makes a large one.
+void gather_row(const Plane<std::uint8_t>& small, int row, Plane<std::uint8_t>& large) {
+  for (int column = 0; column < large.width(); ++column) {
+    std::uint8_t largest = 0;
+    for (int y = 4 * row; y < 4 * row + 4; ++y)
+      for (int x = 4 * column; x < 4 * column + 4; ++x) largest = std::max(largest, small.at(x, y));
+    large.at(column, row) = largest;
+  }
+}
+
+}  // namespace
+
+void Steepness::Cells::shape(int cell_side, int columns, int rows) {
+  side = cell_side;
+  if (x.width() == columns && x.height() == rows) return;
+  x = Plane<std::uint8_t>(columns, rows);
+  y = Plane<std::uint8_t>(columns, rows);
+}
 
 void Steepness::measure(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) {
-  const int columns = (picture.width + tile - 1) / tile;
-  const int bands = band_count(picture.height);
-  if (x_.width() != columns || x_.height() != bands) {
-    x_ = Plane<std::uint8_t>(columns, bands);
-    y_ = Plane<std::uint8_t>(columns, bands);
-  }
-  threads.for_each(bands, [&](int band, int) {
-    HWY_DYNAMIC_DISPATCH(measure_band)(picture, band, x_.row(band), y_.row(band));
+  const int columns = (picture.width + 15) / 16;
+  const int rows = (picture.height + 15) / 16;
+  far_.shape(16, columns, rows);
+  near_.shape(4, 4 * columns, 4 * rows);
+  threads.for_each(rows, [&](int row, int) {
+    for (int y = 4 * row; y < 4 * row + 4 && 4 * y < picture.height; ++y)
+      HWY_DYNAMIC_DISPATCH(measure_row)(picture, 4 * y, near_.x.row(y), near_.y.row(y));
+    gather_row(near_.x, row, far_.x);
+    gather_row(near_.y, row, far_.y);
   });
 }
 
-Steepness::Bound Steepness::within(int left, int top, int right, int bottom) const {
-  const auto tiles = [](int first, int last, int count) {
-    return std::pair(std::clamp(first / tile, 0, count - 1), std::clamp(last / tile, 0, count - 1));
-  };
-  const auto [first_column, last_column] = tiles(left, right, x_.width());
-  const auto [first_row, last_row] = tiles(top, bottom, x_.height());
-  Bound bound{0, 0};
-  for (int row = first_row; row <= last_row; ++row) {
-    for (int column = first_column; column <= last_column; ++column) {
-      bound.x = std::max(bound.x, static_cast<int>(x_.at(column, row)));
-      bound.y = std::max(bound.y, static_cast<int>(y_.at(column, row)));
+Steepness::Bound Steepness::within(const Box& box) const {
+  constexpr int near = 40;
+  return box.width() <= near && box.height() <= near ? near_.within(box) : far_.within(box);
+}
+
+Steepness::Bound Steepness::Cells::within(const Box& box) const {
+  const int left = std::clamp(box.left / side, 0, x.width() - 1);
+  const int right = std::clamp((box.right - 1) / side, 0, x.width() - 1);
+  const int top = std::clamp(box.top / side, 0, x.height() - 1);
+  const int bottom = std::clamp((box.bottom - 1) / side, 0, x.height() - 1);
+  std::uint8_t largest_x = 0;
+  std::uint8_t largest_y = 0;
+  for (int row = top; row <= bottom; ++row) {
+    const auto* x_row = x.row(row);
+    const auto* y_row = y.row(row);
+    for (int column = left; column <= right; ++column) {
+      largest_x = std::max(largest_x, x_row[column]);
+      largest_y = std::max(largest_y, y_row[column]);
     }
   }
-  return bound;
+  return {largest_x, largest_y};
 }
 
 }  // namespace eventcamera

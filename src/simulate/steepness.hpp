@@ -4,17 +4,15 @@
 #include <cstdint>
 
 #include "src/parallel/thread_pool.hpp"
+#include "src/picture/box.hpp"
 #include "src/picture/plane.hpp"
-#include "src/simulate/bands.hpp"
 
 namespace eventcamera {
 
-/// How much neighbouring pixels of a picture differ at most, tile by tile. A tile is as high as a
-/// band, and as wide.
+/// How much neighbouring pixels of a picture differ at most, cell by cell: 4x4 pixels for looking
+/// near, 16x16 for looking far.
 class Steepness {
  public:
-  static constexpr int tile = rows_per_band;
-
   /// `picture` must be a Plane: SIMD code reads behind its end.
   void measure(const PlaneView<std::uint8_t>& picture, ThreadPool& threads);
 
@@ -23,12 +21,22 @@ class Steepness {
     int y;  ///< of a pixel and the one below it
   };
 
-  /// The largest of the pixels [left, right] x [top, bottom], which may reach beyond the picture.
-  Bound within(int left, int top, int right, int bottom) const;
+  /// The largest in a box, which may reach beyond the picture, or in a little more.
+  Bound within(const Box& box) const;
 
  private:
-  Plane<std::uint8_t> x_;
-  Plane<std::uint8_t> y_;
+  /// Square cells of one size.
+  struct Cells {
+    int side = 0;
+    Plane<std::uint8_t> x;
+    Plane<std::uint8_t> y;
+
+    void shape(int cell_side, int columns, int rows);
+    Bound within(const Box& box) const;
+  };
+
+  Cells near_;
+  Cells far_;
 };
 
 }  // namespace eventcamera
