@@ -89,7 +89,7 @@ def main():
     ]
     machine = (
         f"Run on {context['date'][:10]} on {context['num_cpus']} processors"
-        f" of {context['mhz_per_cpu']} MHz.\n"
+        f" of {context['mhz_per_cpu']} MHz; load average as it began {context['load_avg'][0]:.1f}.\n"
     )
     text = "\n".join([machine] + [each for each in tables if each])
     print(text)
