@@ -1,33 +1,107 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Prints a table of a benchmark's JSON: a row a method, a column a scene and number of threads;
-milliseconds a frame and, where the plain formulation was timed too, how many times faster."""
+"""Prints the tables of a run of the benchmarks: a row a method, a column a scene; how many times
+as fast as the plain formulation, and milliseconds a frame.
+
+  table.py BENCHMARKS.json [PAGE.md]
+
+With a page, the tables also replace what it has between its markers."""
 import json
+import re
+import statistics
 import sys
 
-with open(sys.argv[1], encoding="utf-8") as file:
-    runs = json.load(file)["benchmarks"]
+SCENES = {
+    "driving-640x480": "driving, 640x480, n = 20",
+    "cars-1280x720": "cars, 1280x720, n = 10",
+    "ball-1280x720": "ball, 1280x720, n = 10",
+}
+METHODS = {
+    "frame": "frame",
+    "dense-after-flow": "dense, after the flow",
+    "dense-dis-lq": "dense, `dis-lq`, whole",
+    "dense-dis-hq": "dense, `dis-hq`, whole",
+    "dense-farneback": "dense, `farneback`, whole",
+    "sparse": "sparse, whole",
+    "diff": "diff, whole",
+}
+COPIES = {
+    "events-to-buffer": "events → buffer",
+    "buffer-to-grey-picture": "buffer → grey picture",
+    "buffer-to-rgbx-picture": "buffer → RGBx picture",
+}
 
-times = {}
-for run in runs:
-    scene, method, formulation, threads = run["name"].split("/")[:4]
-    times[scene, method, formulation, threads.split(":")[1]] = run["real_time"]
 
-columns = list(dict.fromkeys((scene, threads) for scene, _, _, threads in times))
-methods = list(dict.fromkeys(method for _, method, _, _ in times))
+def times_of(run):
+    """Milliseconds by (scene, method, formulation, threads); the median where one ran repeatedly."""
+    times = {}
+    for benchmark in run["benchmarks"]:
+        parts = benchmark["name"].split("/")
+        if benchmark["run_type"] == "iteration" and parts[0] in SCENES:
+            scene, method, formulation, threads = parts[:4]
+            key = (scene, method, formulation, threads.split(":")[1])
+            times.setdefault(key, []).append(benchmark["real_time"])
+    return {key: statistics.median(values) for key, values in times.items()}
 
 
-def cell(scene, method, threads):
-    ours = times.get((scene, method, "ours", threads)) or times.get(
-        (scene, method, "frame", threads)
-    )
-    if ours is None:
+def milliseconds(time):
+    return f"{time:.3g}" if time < 100 else f"{time:.0f}"
+
+
+def table(times, rows, threads, header, cell):
+    scenes = [scene for scene in SCENES if any(key[0] == scene for key in times)]
+    lines = []
+    for method, label in rows.items():
+        cells = [cell(times, scene, method, threads) for scene in scenes]
+        if any(cells):
+            lines.append(f"| {label} | " + " | ".join(cells) + " |")
+    if not lines:
         return ""
+    head = [f"| {header} | " + " | ".join(SCENES[scene] for scene in scenes) + " |"]
+    return "\n".join(head + ["|---" * (len(scenes) + 1) + "|"] + lines) + "\n"
+
+
+def beside_plain(times, scene, method, threads):
+    ours = times.get((scene, method, "ours", threads))
     plain = times.get((scene, method, "plain", threads))
-    return f"{ours:.2f} ms" + (f", {plain / ours:.1f}x" if plain else "")
+    if ours is None or plain is None:
+        return ""
+    return f"**{plain / ours:.1f}×** {milliseconds(ours)} ms (plain {milliseconds(plain)})"
 
 
-print("| method | " + " | ".join(f"{s}, {t} thread(s)" for s, t in columns) + " |")
-print("|---" * (len(columns) + 1) + "|")
-for method in methods:
-    print(f"| {method} | " + " | ".join(cell(s, method, t) for s, t in columns) + " |")
+def beside_memcpy(times, scene, method, threads):
+    ours = times.get((scene, method, "ours", threads))
+    memcpy = times.get((scene, method, "memcpy", threads))
+    if ours is None or memcpy is None:
+        return ""
+    return f"**{ours / memcpy:.1f}** memcpy, {milliseconds(ours)} ms"
+
+
+def main():
+    with open(sys.argv[1], encoding="utf-8") as file:
+        run = json.load(file)
+    times = times_of(run)
+    context = run["context"]
+    tables = [
+        table(times, METHODS, "2", "two threads", beside_plain),
+        table(times, METHODS, "1", "one thread", beside_plain),
+        table(times, COPIES, "1", "one thread", beside_memcpy),
+    ]
+    machine = (
+        f"Run on {context['date'][:10]} on {context['num_cpus']} processors"
+        f" of {context['mhz_per_cpu']} MHz; load average as it began {context['load_avg'][0]:.1f}.\n"
+    )
+    text = "\n".join([machine] + [each for each in tables if each])
+    print(text)
+    if len(sys.argv) > 2:
+        with open(sys.argv[2], encoding="utf-8") as file:
+            page = file.read()
+        begin, end = "<!-- tables of bench/run -->\n", "<!-- end of the tables -->\n"
+        between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
+        if not between.search(page):
+            sys.exit(f"{sys.argv[2]} has no place for the tables")
+        with open(sys.argv[2], "w", encoding="utf-8") as file:
+            file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", page))
+
+
+main()

@@ -31,7 +31,7 @@ class LargestDifference {
     }
   }
   std::uint8_t of_cell(int cell) const {
-    const auto* c = columns_ + 4 * cell;
+    const auto* c = columns_ + std::ptrdiff_t{4} * cell;
     return std::max(std::max(c[0], c[1]), std::max(c[2], c[3]));
   }
 

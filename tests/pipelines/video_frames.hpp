@@ -55,10 +55,10 @@ void for_each_sample(const std::string& launch, int count, const Visit& visit) {
   complain(error);
 }
 
-/// The first `count` frames of a file, in grey, scaled to a width (a multiple of 4) and height.
-inline std::vector<eventcamera::Plane<std::uint8_t>> frames_of(const std::string& path, int count,
-                                                               int width, int height) {
-  std::vector<eventcamera::Plane<std::uint8_t>> frames;
+/// Shows the first `count` frames of a file, in grey, scaled to a width (a multiple of 4) and
+/// height.
+template <class Visit>
+void for_each_frame(const std::string& path, int count, int width, int height, const Visit& visit) {
   for_each_sample(
       "filesrc location=\"" + path + "\" ! decodebin ! videoconvert ! videoscale ! " +
           "video/x-raw,format=GRAY8,pixel-aspect-ratio=1/1,width=" + std::to_string(width) +
@@ -66,10 +66,19 @@ inline std::vector<eventcamera::Plane<std::uint8_t>> frames_of(const std::string
       count, [&](GstSample* sample) {
         GstMapInfo map;
         gst_buffer_map(gst_sample_get_buffer(sample), &map, GST_MAP_READ);
-        frames.emplace_back(width, height);
-        frames.back().assign({map.data, width, width, height});
+        visit(eventcamera::PlaneView<std::uint8_t>{map.data, width, width, height});
         gst_buffer_unmap(gst_sample_get_buffer(sample), &map);
       });
+}
+
+/// All of them.
+inline std::vector<eventcamera::Plane<std::uint8_t>> frames_of(const std::string& path, int count,
+                                                               int width, int height) {
+  std::vector<eventcamera::Plane<std::uint8_t>> frames;
+  for_each_frame(path, count, width, height, [&](const auto& frame) {
+    frames.emplace_back(width, height);
+    frames.back().assign(frame);
+  });
   return frames;
 }
 

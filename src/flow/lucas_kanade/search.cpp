@@ -211,11 +211,12 @@ struct Window {
       const auto within =
           hn::FirstN(values, static_cast<std::size_t>(std::min(lanes, window - column)));
       for (int y = 0; y < window; ++y) {
+        const int at = y * row_values + column;
         const auto dx = hn::IfThenElseZero(within, rows_x.next());
         const auto dy = hn::IfThenElseZero(within, rows_y.next());
         const auto grey = greys.next();
-        hn::Store(dx, values, slope_x + y * row_values + column);
-        hn::Store(dy, values, slope_y + y * row_values + column);
+        hn::Store(dx, values, slope_x + at);
+        hn::Store(dy, values, slope_y + at);
         sum_xx.add(dx, dx);
         sum_xy.add(dx, dy);
         sum_yy.add(dy, dy);

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "bench/plain/dense.hpp"
+#include "bench/plain/diff.hpp"
+#include "bench/plain/frame.hpp"
+#include "bench/plain/sparse.hpp"
+#include "src/simulate/dense.hpp"
+#include "src/simulate/diff.hpp"
+#include "src/simulate/frame.hpp"
+#include "src/simulate/sparse.hpp"
+
+namespace bench {
+
+using namespace eventcamera;
+
+using MakeSimulator = std::function<std::unique_ptr<Simulator>(const LumaFormat&)>;
+
+/// A method, written plainly and ours.
+struct Method {
+  std::string name;
+  double threshold;
+  MakeSimulator plain;
+  MakeSimulator ours;
+};
+
+template <class PlainSimulator>
+MakeSimulator make_plain() {
+  return [](const LumaFormat& format) { return std::make_unique<PlainSimulator>(format); };
+}
+
+inline Method dense_method(const std::string& name, FlowMethod flow) {
+  return {name, 3,
+          [flow](const LumaFormat& format) {
+            return std::make_unique<plain::DenseSimulator>(format, flow);
+          },
+          [flow](const LumaFormat& format) {
+            auto simulator = make_dense_simulator(format);
+            simulator->set_flow(flow);
+            return simulator;
+          }};
+}
+
+inline const Method frame_method{"frame", 20, make_plain<plain::FrameSimulator>(),
+                                 make_frame_simulator};
+inline const Method dis_lq_method = dense_method("dense-dis-lq", FlowMethod::dis_lq);
+inline const Method dis_hq_method = dense_method("dense-dis-hq", FlowMethod::dis_hq);
+inline const Method farneback_method = dense_method("dense-farneback", FlowMethod::farneback);
+inline const Method sparse_method{"sparse", 6, make_plain<plain::SparseSimulator>(),
+                                  make_sparse_simulator};
+inline const Method diff_method{"diff", 19, make_plain<plain::DiffSimulator>(),
+                                make_diff_simulator};
+
+}  // namespace bench

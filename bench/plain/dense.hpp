@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include "bench/plain/opencv.hpp"
+#include "bench/plain/pixels.hpp"
+#include "src/simulate/warp.hpp"
+
+namespace plain {
+
+/// Dense interpolation, after the flow is found: forward.
+class DenseInterpolation {
+ public:
+  DenseInterpolation(int width, int height)
+      : dx_(width, height),
+        dy_(width, height),
+        between_{Plane<std::uint8_t>(width, height), Plane<std::uint8_t>(width, height)} {}
+
+  void fire(const Picture& last, const Picture& now, const PlaneView<Flow>& flow,
+            const StepTimes& steps, const Thresholds& thresholds, ThreadPool& threads,
+            EventBuckets& events) {
+    const int m = steps.count();
+    const Warp<std::uint8_t> warp{last, now, m};
+    threads.for_each(now.height, [&](int y, int) {
+      for (int x = 0; x < now.width; ++x) {
+        dx_.at(x, y) = motion_per_step(flow.row(y)[x].x, m);
+        dy_.at(x, y) = motion_per_step(flow.row(y)[x].y, m);
+      }
+    });
+    events.reset(m, band_count(now.height));
+    auto before = last;
+    for (int j = 1; j < m; ++j) {
+      auto& between = between_[j % 2];
+      threads.for_each(now.height, [&](int y, int) {
+        for (int x = 0; x < now.width; ++x)
+          between.at(x, y) = warp.at<Interpolation::forward>(x, y, dx_.at(x, y), dy_.at(x, y), j);
+      });
+      plain::fire(before, between.view(), j, steps.microseconds(j), thresholds, threads, events);
+      before = between.view();
+    }
+    plain::fire(before, now, m, steps.microseconds(m), thresholds, threads, events);
+  }
+
+ private:
+  Plane<Motion> dx_;
+  Plane<Motion> dy_;
+  Plane<std::uint8_t> between_[2];
+};
+
+/// Dense interpolation, the flow counted in. The frames' rows lie without gaps.
+class DenseSimulator final : public Simulator {
+ public:
+  DenseSimulator(const LumaFormat& format, FlowMethod method)
+      : Simulator(format),
+        last_(format.width, format.height),
+        flow_(method, format.width, format.height),
+        interpolation_(format.width, format.height) {}
+
+ private:
+  void start(const LumaView& frame) override { last_.assign(frame.as<std::uint8_t>()); }
+
+  void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
+                EventBuckets& events) override {
+    const auto now = frame.as<std::uint8_t>();
+    interpolation_.fire(last_.view(), now, flow_.find(last_.view(), now, threads().threads()),
+                        steps, Thresholds::of(settings, 8), threads(), events);
+    copy(now, last_, threads());
+  }
+
+  Plane<std::uint8_t> last_;
+  OpenCvFlow flow_;
+  DenseInterpolation interpolation_;
+};
+
+}  // namespace plain

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <utility>
+#include <vector>
+
+#include "src/flow/dense_flow.hpp"
+
+/// OpenCV's optical flow, with the parameters of the simulators.
+namespace plain {
+
+using namespace eventcamera;
+
+inline cv::Mat opencv_picture(const PlaneView<std::uint8_t>& picture) {
+  return {picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
+          static_cast<std::size_t>(picture.stride)};
+}
+
+inline void set_opencv_threads(int threads) {
+  if (cv::getNumThreads() != threads) cv::setNumThreads(threads);
+}
+
+/// Dense flow between pictures of at least 64x64 pixels without gaps between their rows.
+class OpenCvFlow {
+ public:
+  OpenCvFlow(FlowMethod method, int width, int height) : method_(method) {
+    if (method == FlowMethod::farneback) return;
+    const bool high = method == FlowMethod::dis_hq;
+    const int patch = high ? 8 : 4;
+    dis_->setPatchSize(patch);
+    dis_->setPatchStride(high ? 4 : 3);
+    dis_->setGradientDescentIterations(high ? 32 : 8);
+    dis_->setFinestScale(high ? 1 : std::max(0, coarsest_scale(width, height, patch) - 2));
+    dis_->setUseSpatialPropagation(false);
+  }
+
+  /// Good until the next call.
+  PlaneView<Flow> find(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
+                       int threads) {
+    set_opencv_threads(threads);
+    if (method_ == FlowMethod::farneback) {
+      cv::calcOpticalFlowFarneback(opencv_picture(from), opencv_picture(to), flow_, 0.5, 3, 15, 3,
+                                   5, 1.2, 0);
+    } else {
+      flow_.release();  // else the last flow would be where the search begins
+      dis_->calc(opencv_picture(from), opencv_picture(to), flow_);
+    }
+    return {flow_.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow_.step[0]), from.width, from.height};
+  }
+
+ private:
+  /// The scale at which OpenCV's DIS starts.
+  static int coarsest_scale(int width, int height, int patch) {
+    const auto [shorter, longer] = std::minmax({width, height});
+    return std::min(static_cast<int>(std::lround(std::log2(longer / (4.0 * patch)))),
+                    static_cast<int>(std::log2(shorter / patch)));
+  }
+
+  FlowMethod method_;
+  cv::Ptr<cv::DISOpticalFlow> dis_ = cv::DISOpticalFlow::create();
+  cv::Mat flow_;
+};
+
+/// Where points went.
+struct Tracks {
+  std::vector<cv::Point2f> ends;
+  std::vector<unsigned char> found;
+};
+
+/// Pyramidal Lucas-Kanade from the last picture to the next.
+class OpenCvTracker {
+ public:
+  void push(const PlaneView<std::uint8_t>& picture, int threads) {
+    set_opencv_threads(threads);
+    std::swap(last_, next_);
+    cv::buildOpticalFlowPyramid(opencv_picture(picture), next_, window, coarsest_level, true,
+                                cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
+  }
+
+  /// Good until the next call.
+  const Tracks& track(const std::vector<cv::Point2f>& points, int threads) {
+    set_opencv_threads(threads);
+    tracks_.ends.clear();
+    tracks_.found.clear();
+    if (!points.empty())
+      cv::calcOpticalFlowPyrLK(last_, next_, points, tracks_.ends, tracks_.found, cv::noArray(),
+                               window, coarsest_level,
+                               {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.03});
+    return tracks_;
+  }
+
+ private:
+  static constexpr int coarsest_level = 3;
+  const cv::Size window{15, 15};
+  std::vector<cv::Mat> last_;
+  std::vector<cv::Mat> next_;
+  Tracks tracks_;
+};
+
+}  // namespace plain

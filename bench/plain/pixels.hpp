@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstring>
+
+#include "src/event/event_buckets.hpp"
+#include "src/parallel/thread_pool.hpp"
+#include "src/picture/plane.hpp"
+#include "src/simulate/bands.hpp"
+#include "src/simulate/simulator.hpp"
+
+/// The methods as anyone would write them: OpenCV's optical flow, one picture after another, and
+/// simple loops over its pixels, shared out over the threads. 8-bit pictures. What the simulators'
+/// speed is a ratio to.
+namespace plain {
+
+using namespace eventcamera;
+using Picture = PlaneView<std::uint8_t>;
+
+/// The events of a difference, band by band.
+inline void fire(const Picture& before, const Picture& now, int step, std::uint32_t t,
+                 const Thresholds& thresholds, ThreadPool& threads, EventBuckets& events) {
+  threads.for_each(band_count(now.height), [&](int band, int) {
+    auto& out = events.bucket(step, band);
+    const BandRows rows(band, now.height);
+    for (int y = rows.first; y < rows.last; ++y) {
+      const auto* before_row = before.row(y);
+      const auto* now_row = now.row(y);
+      for (int x = 0; x < now.width; ++x) {
+        const int difference = now_row[x] - before_row[x];
+        if (difference > thresholds.positive)
+          out.push_back(Event::at(x, y, t, Polarity::on));
+        else if (-difference > thresholds.negative)
+          out.push_back(Event::at(x, y, t, Polarity::off));
+      }
+    }
+  });
+}
+
+/// Copies a picture of the same size, band by band.
+inline void copy(const Picture& from, Plane<std::uint8_t>& to, ThreadPool& threads) {
+  threads.for_each(band_count(from.height), [&](int band, int) {
+    const BandRows rows(band, from.height);
+    for (int y = rows.first; y < rows.last; ++y)
+      std::memcpy(to.row(y), from.row(y), static_cast<std::size_t>(from.width));
+  });
+}
+
+}  // namespace plain

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "bench/methods.hpp"
+#include "bench/scenes.hpp"
+
+namespace bench {
+
+/// A simulator that is shown a clip forwards and backwards for ever.
+class Playback {
+ public:
+  Playback(const Clip& clip, std::unique_ptr<Simulator> simulator, const Settings& settings)
+      : clip_(clip), simulator_(std::move(simulator)), settings_(settings) {
+    // The first interval is special, and memory grows in those after it.
+    while (pushed_ < period()) push();
+  }
+
+  /// How many frames there and back are.
+  int period() const { return 2 * (static_cast<int>(clip_.size()) - 1); }
+
+  const EventBuckets* push() {
+    const int at = pushed_ % period();
+    const auto& frame = clip_[static_cast<std::size_t>(std::min(at, period() - at))];
+    return simulator_->push({{frame.width(), frame.height(), 8}, frame.row(0), frame.stride()},
+                            pushed_++ * frame_time, settings_);
+  }
+
+ private:
+  const Clip& clip_;
+  std::unique_ptr<Simulator> simulator_;
+  Settings settings_;
+  int pushed_ = std::max(0, period() - 3);
+};
+
+/// Times a simulator frame after frame, every frame of every clip as often as any other.
+inline void time_simulator(benchmark::State& state, const std::vector<Clip>& clips,
+                           const MakeSimulator& make, const Settings& settings) {
+  std::vector<std::unique_ptr<Playback>> playbacks;
+  int frames = 0;
+  for (const auto& clip : clips) {
+    const LumaFormat format{clip.front().width(), clip.front().height(), 8};
+    playbacks.push_back(std::make_unique<Playback>(clip, make(format), settings));
+    frames += playbacks.back()->period();
+  }
+  double events = 0;
+  while (state.KeepRunningBatch(frames))
+    for (const auto& playback : playbacks)
+      for (int i = 0; i < playback->period(); ++i)
+        events += static_cast<double>(playback->push()->size());
+  state.counters["events"] = events / static_cast<double>(state.iterations());
+}
+
+}  // namespace bench

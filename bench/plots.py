@@ -1,0 +1,225 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Draws the plots of a run of the benchmarks:
+
+  plots.py BENCHMARKS.json DIRECTORY
+
+DIRECTORY/runtimes.png: the runtimes of the paper, beside the plain formulation and ours here.
+DIRECTORY/growth.png: how the methods' cost grows."""
+import json
+import os
+import statistics
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+
+INK = "#262b36"
+PAPER = "#b9bec9"
+PLAIN = "#e0a458"
+OURS = "#2f6fb5"
+COLOURS = {
+    "frame": "#6a6f7a",
+    "dense-dis-lq": "#2f6fb5",
+    "sparse": "#3a9a68",
+    "diff": "#d0573e",
+}
+LABELS = {"frame": "frame", "dense-dis-lq": "dense, dis-lq", "sparse": "sparse", "diff": "diff"}
+
+# The coordinates of the paper's two runtime figures, in milliseconds (Ziegler et al., ICRA 2023):
+# on a car's camera at 640x480, and on a table-tennis ball at 1280x720.
+PAPER_RUNTIMES = [
+    # label, our name of the method or None, car, ball
+    ("difference frame", "frame", 0.43, 0.45),
+    ("dense, DIS lq", "dense-dis-lq", 17.69, 43.51),
+    ("dense, DIS hq", "dense-dis-hq", 58.30, 72.37),
+    ("dense, Farneback", "dense-farneback", 72.81, 186.06),
+    ("sparse, LK", "sparse", 144.99, 4.88),
+    ("difference, LK", "diff", 67.64, 3.02),
+    ("dense, Farneback (GPU)", None, 20.22, 49.30),
+    ("sparse, LK (GPU)", None, 22.45, 4.66),
+    ("difference, LK (GPU)", None, 10.07, 2.87),
+    ("v2e (GPU)", None, 71741.58, 49934.16),
+    ("vid2e (GPU)", None, 1420506.78, 43040.42),
+]
+REAL_TIME = 30  # milliseconds, the paper's line
+ON_WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+
+plt.rcParams.update(
+    {
+        "font.family": "DejaVu Sans",
+        "font.size": 10,
+        "text.color": INK,
+        "axes.labelcolor": INK,
+        "axes.edgecolor": "#9aa0ac",
+        "xtick.color": INK,
+        "ytick.color": INK,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.titlesize": 11,
+        "axes.titleweight": "bold",
+        "axes.titlelocation": "left",
+    }
+)
+
+
+def short(value):
+    """Three digits, and no more zeros than that."""
+    if value >= 1e6:
+        return f"{value / 1e6:.3g} M"
+    if value >= 1e4:
+        return f"{value / 1e3:.0f} k"
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def runs_of(benchmarks):
+    """The benchmarks by name; of one that ran repeatedly the median."""
+    runs = {}
+    for benchmark in benchmarks:
+        if benchmark["run_type"] == "iteration":
+            runs.setdefault(benchmark["name"].replace("/real_time", ""), []).append(benchmark)
+    return {
+        name: {**same[0], "real_time": statistics.median(run["real_time"] for run in same)}
+        for name, same in runs.items()
+    }
+
+
+def draw_runtimes(runs, path):
+    panels = [
+        ("Many events: from a moving car, 640x480", "driving-640x480", 2),
+        ("Few events: a ball, 1280x720", "ball-1280x720", 3),
+    ]
+    figure, all_axes = plt.subplots(1, 2, figsize=(13, 8), sharey=True)
+    for axes, (title, scene, column) in zip(all_axes, panels):
+        top = 0.0
+        ticks = []
+        for row in PAPER_RUNTIMES:
+            bars = [(row[column], PAPER)]
+            for formulation, colour in (("plain", PLAIN), ("ours", OURS)):
+                run = runs.get(f"{scene}/{row[1]}/{formulation}/threads:2")
+                if run:
+                    bars.append((run["real_time"], colour))
+            ticks.append(top + (len(bars) - 1) / 2)
+            for value, colour in bars:
+                axes.barh(top, value, height=0.86, color=colour)
+                axes.text(value * 1.12, top, short(value), va="center", fontsize=8.5, bbox=ON_WHITE)
+                top += 1
+            top += 0.7
+        axes.axvline(REAL_TIME, color="#5a62d8", linewidth=1, linestyle=(0, (4, 3)), zorder=0)
+        axes.text(
+            REAL_TIME,
+            -1.1,
+            f"{REAL_TIME} ms",
+            color="#5a62d8",
+            ha="center",
+            va="center",
+            fontsize=8.5,
+            bbox=ON_WHITE,
+        )
+        axes.set_xscale("log")
+        axes.set_xlim(0.02, 2e7)
+        axes.set_ylim(top - 0.3, -1.3)
+        axes.set_yticks(ticks)
+        axes.set_yticklabels([row[0] for row in PAPER_RUNTIMES])
+        axes.tick_params(axis="y", length=0)
+        axes.xaxis.set_major_locator(LogLocator(10, numticks=20))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.grid(axis="x", color="#e8eaee", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.set_xlabel("milliseconds a frame")
+        axes.set_title(title, pad=14)
+    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, PLAIN, OURS)]
+    figure.legend(
+        handles,
+        [
+            "the paper's figures: its footage, measured on its machine (i7-9700, RTX 2080 Ti)",
+            "plain formulation: our footage, our machine, two threads",
+            "ours: the same footage, machine and threads",
+        ],
+        loc="lower center",
+        ncol=3,
+        frameon=False,
+        fontsize=9,
+        handlelength=1.2,
+    )
+    figure.tight_layout(rect=(0, 0.045, 1, 1), w_pad=2)
+    figure.savefig(path, dpi=110)
+
+
+def draw_growth(runs, path):
+    panels = [
+        ("pixels", "pixels", "size of the picture (by its pixels)", "A tenth of the picture moves, n = 10"),
+        ("n", "n", "n, interpolated frames", "A tenth of 640x480 moves"),
+        ("changed", "changed", "share of changed pixels", "640x480, n = 10"),
+        ("events", "events", "events a frame", "Thresholds; a third of 640x480 moves, n = 10"),
+    ]
+    figure, all_axes = plt.subplots(2, 2, figsize=(12, 9))
+    for axes, (axis, counter, label, title) in zip(all_axes.flat, panels):
+        for method, colour in COLOURS.items():
+            for formulation, style in (("plain", ":"), ("ours", "-")):
+                prefix = f"growth/{axis}/{method}/{formulation}/"
+                points = sorted(
+                    (run[counter], run["real_time"])
+                    for name, run in runs.items()
+                    if name.startswith(prefix)
+                )
+                if not points:
+                    continue
+                axes.plot(
+                    *zip(*points),
+                    style,
+                    color=colour,
+                    linewidth=1.9 if formulation == "ours" else 1.4,
+                    marker="o" if formulation == "ours" else None,
+                    markersize=4,
+                )
+        axes.set_yscale("log")
+        if axis == "changed":
+            axes.set_xscale("symlog", linthresh=0.01, linscale=0.5)
+            axes.set_xlim(0, 1.1)
+            axes.set_xticks([0, 0.01, 0.03, 0.1, 0.3, 1])
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{100 * x:g} %"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        elif axis == "n":
+            axes.set_xlim(left=0)
+        elif axis == "pixels":
+            sizes = {
+                run["pixels"]: name.rsplit("/", 1)[1]
+                for name, run in runs.items()
+                if name.startswith("growth/pixels/")
+            }
+            axes.set_xscale("log")
+            axes.set_xticks(list(sizes), list(sizes.values()), fontsize=8)
+            axes.xaxis.set_minor_formatter(NullFormatter())
+            axes.xaxis.set_minor_locator(NullLocator())
+        else:
+            axes.set_xscale("log")
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: short(x)))
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
+        axes.grid(color="#e8eaee", linewidth=0.8)
+        axes.set_xlabel(label)
+        axes.set_ylabel("milliseconds a frame")
+        axes.set_title(title, pad=8)
+    lines = [plt.Line2D([], [], color=colour, linewidth=2) for colour in COLOURS.values()]
+    lines += [
+        plt.Line2D([], [], color=INK, linewidth=1.9, marker="o", markersize=4),
+        plt.Line2D([], [], color=INK, linewidth=1.4, linestyle=":"),
+    ]
+    names = [LABELS[method] for method in COLOURS] + ["ours", "plain formulation"]
+    figure.legend(lines, names, loc="lower center", ncol=6, frameon=False)
+    figure.tight_layout(rect=(0, 0.04, 1, 1), h_pad=2.5, w_pad=2.5)
+    figure.savefig(path, dpi=110)
+
+
+def main():
+    with open(sys.argv[1], encoding="utf-8") as file:
+        runs = runs_of(json.load(file)["benchmarks"])
+    draw_runtimes(runs, os.path.join(sys.argv[2], "runtimes.png"))
+    draw_growth(runs, os.path.join(sys.argv[2], "growth.png"))
+
+
+main()

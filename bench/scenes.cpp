@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "bench/scenes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+
+#include "tests/core/scene.hpp"
+#include "tests/pipelines/video_frames.hpp"
+
+namespace bench {
+namespace {
+
+/// Frames first ... first + count - 1 of a video.
+struct Span {
+  int first;
+  int count;
+};
+
+struct Video {
+  std::string name;
+  std::string file;
+  std::vector<Span> spans;  ///< in order
+  int width;
+  int height;
+  int interpolated_frames;
+};
+
+Scene read(const Video& video, const std::string& path) {
+  Scene scene{video.name, std::vector<Clip>(video.spans.size()), video.interpolated_frames};
+  const int end = video.spans.back().first + video.spans.back().count;
+  int i = 0;
+  video_frames::for_each_frame(path, end, video.width, video.height, [&](const auto& frame) {
+    for (std::size_t clip = 0; clip < video.spans.size(); ++clip) {
+      const auto& [first, count] = video.spans[clip];
+      if (i < first || i >= first + count) continue;
+      scene.clips[clip].emplace_back(video.width, video.height).assign(frame);
+    }
+    ++i;
+  });
+  if (i < end) throw std::runtime_error(path + " is too short");
+  return scene;
+}
+
+/// A ball of 40 pixels that flies over a still, textured picture.
+Scene ball(int count) {
+  constexpr int radius = 20;
+  const auto ground = scene::texture<std::uint8_t>(1280, 720, 8, 0, 0);
+  Clip clip;
+  for (int i = 0; i < count; ++i) {
+    auto& picture = clip.emplace_back(ground);
+    for (int y = -radius; y < radius; ++y)
+      for (int x = -radius; x < radius; ++x)
+        if (x * x + y * y < radius * radius) picture.at(200 + 30 * i + x, 300 + 8 * i + y) = 240;
+  }
+  return {"ball-1280x720", {std::move(clip)}, 10};
+}
+
+}  // namespace
+
+std::vector<Scene> scenes(bool few_frames) {
+  // From the cars' video, three times when cars drive through.
+  const Video videos[] = {
+      {"driving-640x480", "driving-1280x720-25fps.mp4", {{0, 4}, {17, 4}, {34, 4}}, 640, 480, 20},
+      {"cars-1280x720", "cars-768x432-12fps.mp4", {{66, 4}, {205, 4}, {325, 4}}, 1280, 720, 10},
+  };
+  std::vector<Scene> scenes;
+  const char* shared = std::getenv("SHARED_DATA");
+  for (auto video : videos) {
+    const auto path = std::string(shared != nullptr ? shared : "") + "/video/" + video.file;
+    if (!std::filesystem::exists(path)) {
+      std::fprintf(stderr, "no %s: %s is left out\n", path.c_str(), video.name.c_str());
+      continue;
+    }
+    if (few_frames) video.spans = {{video.spans.front().first, 3}};
+    scenes.push_back(read(video, path));
+  }
+  scenes.push_back(ball(few_frames ? 3 : 7));
+  return scenes;
+}
+
+Clip moving_patch(int width, int height, double share, int count) {
+  const auto ground = scene::texture<std::uint8_t>(width, height, 8, 0, 0);
+  const int patch_width = static_cast<int>(std::lround(width * std::sqrt(share)));
+  const int patch_height = static_cast<int>(std::lround(height * std::sqrt(share)));
+  Clip clip;
+  for (int i = 0; i < count; ++i) {
+    const int left = std::min((width - patch_width) / 2 + 4 * i, width - patch_width);
+    const int top = std::min((height - patch_height) / 2 + 2 * i, height - patch_height);
+    // Where the patch cannot move, the camera that looks at it does.
+    const auto patch = scene::texture<std::uint8_t>(
+        patch_width, patch_height, 8, 1000 + (left == width - patch_width ? -4.0 * i : 0.0),
+        500 + (top == height - patch_height ? -2.0 * i : 0.0));
+    auto& picture = clip.emplace_back(ground);
+    for (int y = 0; y < patch_height; ++y)
+      std::copy_n(patch.row(y), patch_width, picture.row(top + y) + left);
+  }
+  return clip;
+}
+
+}  // namespace bench
