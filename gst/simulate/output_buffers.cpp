@@ -111,7 +111,7 @@ GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform, const Eve
                         (nullptr));
       return GST_FLOW_ERROR;
     }
-    for (const auto& bucket : events.buckets()) drawing.accumulator.add(bucket);
+    drawing.accumulator.add(events);
     drawing.accumulator.draw(palette, pixel_layout_of(drawing.video), picture.data(),
                              picture.stride());
   }
