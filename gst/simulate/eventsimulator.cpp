@@ -400,7 +400,7 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
         event_simulator_draw_events(transform, *events, *state.drawing,
                                     eventcamera::palette(core_palette(settings.palette)), in, out);
   } else if (events->size() > 0) {
-    result = event_simulator_write_events(*events, out);
+    result = event_simulator_write_events(transform, *events, in, out);
   } else {
     return push_gap(self, *start, end, GST_SEQNUM_INVALID);
   }

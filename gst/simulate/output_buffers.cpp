@@ -5,6 +5,7 @@
 
 #include <new>
 
+#include "gst/simulate/event_pool.hpp"
 #include "gst/simulate/output_caps.hpp"
 #include "gst/simulate/picture_formats.hpp"
 #include "gst/simulate/video_frame.hpp"
@@ -23,17 +24,19 @@ static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide
   return base_class()->propose_allocation(transform, decide, query);
 }
 
-/// Pictures come from downstream's pool, or one of ours; events are of any size and come from none.
-static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) {
-  GstCaps* caps = nullptr;
+/// Events come from a pool of ours, whatever downstream has: their buffers are of any size.
+static void decide_on_event_pool(GstQuery* query) {
+  while (gst_query_get_n_allocation_pools(query) > 0)
+    gst_query_remove_nth_allocation_pool(query, 0);
+  GstBufferPool* pool = event_pool_new();
+  gst_query_add_allocation_pool(query, pool, 0, 0, 0);
+  gst_object_unref(pool);
+}
+
+/// Pictures come from downstream's pool, or one of ours.
+static bool decide_on_video_pool(GstQuery* query, GstCaps* caps) {
   GstVideoInfo drawn;
-  gst_query_parse_allocation(query, &caps, nullptr);
-  if (!event_simulator_draws(caps)) {
-    while (gst_query_get_n_allocation_pools(query) > 0)
-      gst_query_remove_nth_allocation_pool(query, 0);
-    return base_class()->decide_allocation(transform, query);
-  }
-  if (!gst_video_info_from_caps(&drawn, caps)) return FALSE;
+  if (!gst_video_info_from_caps(&drawn, caps)) return false;
   GstBufferPool* pool = nullptr;
   guint size = 0;
   guint min = 0;
@@ -53,6 +56,16 @@ static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) 
   else
     gst_query_add_allocation_pool(query, pool, size, min, max);
   gst_object_unref(pool);
+  return true;
+}
+
+static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) {
+  GstCaps* caps = nullptr;
+  gst_query_parse_allocation(query, &caps, nullptr);
+  if (!event_simulator_draws(caps))
+    decide_on_event_pool(query);
+  else if (!decide_on_video_pool(query, caps))
+    return FALSE;
   return base_class()->decide_allocation(transform, query);
 }
 
@@ -87,13 +100,20 @@ void event_simulator_class_install_buffers(GstBaseTransformClass* klass) {
 
 /* intervals */
 
-GstFlowReturn event_simulator_write_events(const EventBuckets& events, GstBuffer** out) {
-  const gsize size = events.size() * sizeof(eventcamera::Event);
-  // GStreamer's own allocation would end the process where memory is short.
-  auto* memory = static_cast<eventcamera::Event*>(g_try_malloc(size));
-  if (memory == nullptr) throw std::bad_alloc();
-  events.copy_to(memory);
-  *out = gst_buffer_new_wrapped(memory, size);
+GstFlowReturn event_simulator_write_events(GstBaseTransform* transform, const EventBuckets& events,
+                                           GstBuffer* in, GstBuffer** out) {
+  GstBuffer* buffer = nullptr;
+  const GstFlowReturn result = base_class()->prepare_output_buffer(transform, in, &buffer);
+  if (result != GST_FLOW_OK) return result;
+  GstMapInfo map;
+  if (!event_pool_make_room(buffer, events.size() * sizeof(eventcamera::Event)) ||
+      !gst_buffer_map(buffer, &map, GST_MAP_WRITE)) {
+    gst_buffer_unref(buffer);
+    throw std::bad_alloc();
+  }
+  events.copy_to(reinterpret_cast<eventcamera::Event*>(map.data));
+  gst_buffer_unmap(buffer, &map);
+  *out = buffer;
   return GST_FLOW_OK;
 }
 

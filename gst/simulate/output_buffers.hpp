@@ -16,11 +16,13 @@ struct Drawing {
   eventcamera::Accumulator accumulator;
 };
 
-/// Makes a buffer of an interval's events, of which there must be some. May throw.
-GstFlowReturn event_simulator_write_events(const eventcamera::EventBuckets& events,
+/// Makes a buffer of an interval's events, of which there must be some. `in` is the frame that ends
+/// the interval. Throws std::bad_alloc.
+GstFlowReturn event_simulator_write_events(GstBaseTransform* transform,
+                                           const eventcamera::EventBuckets& events, GstBuffer* in,
                                            GstBuffer** out);
 
-/// Makes a picture of an interval's events. `in` is the frame that ends the interval.
+/// Makes a picture of an interval's events.
 GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform,
                                           const eventcamera::EventBuckets& events, Drawing& drawing,
                                           const eventcamera::Palette& palette, GstBuffer* in,

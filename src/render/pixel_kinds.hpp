@@ -34,7 +34,7 @@ struct PixelKinds {
   }
 
   /// Byte by byte of a pixel, what it is for each kind. As long as a table that SIMD code shuffles.
-  std::array<std::array<std::uint8_t, 16>, 4> bytes{};
+  alignas(16) std::array<std::array<std::uint8_t, 16>, 4> bytes{};
 
  private:
   /// Brightness as BT.601 weighs it.
