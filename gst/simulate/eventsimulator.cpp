@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulate/eventsimulator.hpp"
 
-#include <gst/video/gstvideopool.h>
 #include <gst/video/video.h>
 
 #include <exception>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "gst/eventcamera/eventcamera.h"
+#include "gst/simulate/output_buffers.hpp"
 #include "gst/simulate/output_caps.hpp"
 #include "gst/simulate/picture_formats.hpp"
 #include "gst/simulate/video_frame.hpp"
@@ -53,10 +53,9 @@ struct Settings {
 
 /// What exists between caps and stop.
 struct State {
-  GstVideoInfo video;                 ///< what comes in
-  std::optional<GstVideoInfo> drawn;  ///< what goes out, unless events do
+  GstVideoInfo video;              ///< what comes in
+  std::optional<Drawing> drawing;  ///< what goes out, unless events do
   std::unique_ptr<Simulator> simulator;
-  Accumulator accumulator;     ///< for drawing
   Plane<guint8> gathered;      ///< luma that was packed
   bool discontinuous = false;  ///< the next buffer does not follow on the last one
 };
@@ -275,11 +274,6 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCap
   return event_simulator_fixate_output(other);
 }
 
-/// Whether output caps are those of accumulated-event video, and not of events.
-static bool draws(GstCaps* out) {
-  return !gst_structure_has_name(gst_caps_get_structure(out, 0), GST_EVENT_CAMERA_MEDIA_TYPE);
-}
-
 /// Fields of two moments in one frame: reported once.
 static void warn_of_interlacing(GstEventSimulator* self, GstBuffer* frame) {
   const auto mode = GST_VIDEO_INFO_INTERLACE_MODE(&self->priv->state->video);
@@ -300,7 +294,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   GstVideoInfo video;
   GstVideoInfo drawn;
   if (!gst_video_info_from_caps(&video, in) ||
-      (draws(out) && !gst_video_info_from_caps(&drawn, out))) {
+      (event_simulator_draws(out) && !gst_video_info_from_caps(&drawn, out))) {
     GST_ERROR_OBJECT(self, "cannot make %" GST_PTR_FORMAT " of %" GST_PTR_FORMAT, out, in);
     return FALSE;
   }
@@ -310,14 +304,15 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
       const bool follows = state && (state->discontinuous || state->simulator->last_time());
       state.reset();  // before the next is made: frames can be large
       state.emplace(State{.video = video,
-                          .drawn = std::nullopt,
+                          .drawing = std::nullopt,
                           .simulator = GST_EVENT_SIMULATOR_GET_CLASS(self)->create(self, luma),
-                          .accumulator = Accumulator(luma.width, luma.height),
                           .gathered = {},
                           .discontinuous = follows});
     }
     state->video = video;
-    state->drawn = draws(out) ? std::optional(drawn) : std::nullopt;
+    state->drawing.reset();
+    if (event_simulator_draws(out))
+      state->drawing = Drawing{drawn, Accumulator(luma.width, luma.height)};
     state->gathered =
         has_packed_luma(video) ? Plane<guint8>(luma.width, luma.height) : Plane<guint8>();
   } catch (const std::exception& error) {
@@ -346,60 +341,6 @@ static bool is_ready(GstEventSimulator* self) {
   return ready;
 }
 
-/* memory */
-
-static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide, GstQuery* query) {
-  gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr);  // any stride is welcome
-  return PARENT_TRANSFORM_CLASS->propose_allocation(transform, decide, query);
-}
-
-/// Pictures come from downstream's pool, or one of ours; events are of any size and come from none.
-static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) {
-  GstCaps* caps = nullptr;
-  GstVideoInfo drawn;
-  gst_query_parse_allocation(query, &caps, nullptr);
-  if (!draws(caps)) {
-    while (gst_query_get_n_allocation_pools(query) > 0)
-      gst_query_remove_nth_allocation_pool(query, 0);
-    return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
-  }
-  if (!gst_video_info_from_caps(&drawn, caps)) return FALSE;
-  GstBufferPool* pool = nullptr;
-  guint size = 0;
-  guint min = 0;
-  guint max = 0;
-  const bool offered = gst_query_get_n_allocation_pools(query) > 0;
-  if (offered) gst_query_parse_nth_allocation_pool(query, 0, &pool, &size, &min, &max);
-  if (pool == nullptr) pool = gst_video_buffer_pool_new();
-  size = MAX(size, static_cast<guint>(GST_VIDEO_INFO_SIZE(&drawn)));
-
-  GstStructure* config = gst_buffer_pool_get_config(pool);
-  gst_buffer_pool_config_set_params(config, caps, size, min, max);
-  if (gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr))
-    gst_buffer_pool_config_add_option(config, GST_BUFFER_POOL_OPTION_VIDEO_META);
-  gst_buffer_pool_set_config(pool, config);
-  if (offered)
-    gst_query_set_nth_allocation_pool(query, 0, pool, size, min, max);
-  else
-    gst_query_add_allocation_pool(query, pool, size, min, max);
-  gst_object_unref(pool);
-  return PARENT_TRANSFORM_CLASS->decide_allocation(transform, query);
-}
-
-static gboolean transform_size(GstBaseTransform*, GstPadDirection direction, GstCaps*, gsize,
-                               GstCaps* other, gsize* other_size) {
-  GstVideoInfo drawn;
-  if (direction != GST_PAD_SINK || !draws(other) || !gst_video_info_from_caps(&drawn, other))
-    return FALSE;
-  *other_size = GST_VIDEO_INFO_SIZE(&drawn);
-  return TRUE;
-}
-
-/// The picture of an interval has nothing of the frame that ends it.
-static gboolean copy_no_metadata(GstBaseTransform*, GstBuffer*, GstBuffer*) {
-  return TRUE;
-}
-
 /* frames in, intervals out */
 
 /// The events between the last frame and this one, or nullptr for a first frame. May throw.
@@ -417,44 +358,6 @@ static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& f
   return state.simulator->push(luma, time, settings.simulation);
 }
 
-static GstFlowReturn refuse_buffer(GstEventSimulator* self, const char* what) {
-  GST_ELEMENT_ERROR(self, RESOURCE, FAILED, ("A buffer could not be %s.", what), (nullptr));
-  return GST_FLOW_ERROR;
-}
-
-/// A buffer of the interval's events; none where there are no events. May throw.
-static GstBuffer* write_events(const EventBuckets& events) {
-  const gsize size = events.size() * sizeof(eventcamera::Event);
-  if (size == 0) return nullptr;
-  // GStreamer's own allocation would end the process where memory is short.
-  auto* memory = static_cast<eventcamera::Event*>(g_try_malloc(size));
-  if (memory == nullptr) throw std::bad_alloc();
-  events.copy_to(memory);
-  return gst_buffer_new_wrapped(memory, size);
-}
-
-/// A picture of the interval's events.
-static GstFlowReturn draw_events(GstEventSimulator* self, const EventBuckets& events,
-                                 GstEventCameraPalette palette, GstBuffer* in, GstBuffer** out) {
-  auto& state = *self->priv->state;
-  GstBuffer* buffer = nullptr;
-  const GstFlowReturn result =
-      PARENT_TRANSFORM_CLASS->prepare_output_buffer(GST_BASE_TRANSFORM(self), in, &buffer);
-  if (result != GST_FLOW_OK) return result;
-  {
-    const VideoFrame picture(*state.drawn, buffer, GST_MAP_WRITE);
-    if (!picture) {
-      gst_buffer_unref(buffer);
-      return refuse_buffer(self, "mapped for drawing");
-    }
-    for (const auto& bucket : events.buckets()) state.accumulator.add(bucket);
-    state.accumulator.draw(eventcamera::palette(core_palette(palette)),
-                           pixel_layout_of(*state.drawn), picture.data(), picture.stride());
-  }
-  *out = buffer;
-  return GST_FLOW_OK;
-}
-
 /// Says downstream that nothing happens in an interval.
 static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
                               guint32 seqnum) {
@@ -467,6 +370,7 @@ static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanose
 
 /// Takes a frame and hands out the interval that it ends, if it ends one.
 static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffer** out) {
+  auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *self->priv->state;
   const Settings settings = settings_of(self);
 
@@ -475,7 +379,11 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
   const auto start = state.simulator->last_time();
   const VideoFrame frame(state.video, in, GST_MAP_READ);
-  if (!frame) return refuse_buffer(self, "read as video of the negotiated format");
+  if (!frame) {
+    GST_ELEMENT_ERROR(self, RESOURCE, FAILED,
+                      ("A buffer could not be read as video of the negotiated format."), (nullptr));
+    return GST_FLOW_ERROR;
+  }
   const EventBuckets* events = simulate(self, frame, end, settings);
   if (events == nullptr) return GST_FLOW_OK;
   learn_latency(self, static_cast<GstClockTime>(end - *start));
@@ -486,13 +394,17 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
                  GST_TIME_ARGS(static_cast<GstClockTime>(end)));
 
   self->priv->handed_out_until = end;
-  if (state.drawn) {
-    const GstFlowReturn result = draw_events(self, *events, settings.palette, in, out);
-    if (result != GST_FLOW_OK) return result;
+  GstFlowReturn result = GST_FLOW_OK;
+  if (state.drawing) {
+    result =
+        event_simulator_draw_events(transform, *events, *state.drawing,
+                                    eventcamera::palette(core_palette(settings.palette)), in, out);
+  } else if (events->size() > 0) {
+    result = event_simulator_write_events(transform, *events, in, out);
   } else {
-    *out = write_events(*events);
-    if (*out == nullptr) return push_gap(self, *start, end, GST_SEQNUM_INVALID);
+    return push_gap(self, *start, end, GST_SEQNUM_INVALID);
   }
+  if (result != GST_FLOW_OK) return result;
   GST_BUFFER_PTS(*out) = static_cast<GstClockTime>(*start);
   GST_BUFFER_DTS(*out) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION(*out) = static_cast<GstClockTime>(end - *start);
@@ -524,12 +436,6 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   }
   gst_buffer_unref(in);
   return result;
-}
-
-/// Never called: generate_output() does it all. But only a class that has one gets buffers of its
-/// own to write to, instead of its input's.
-static GstFlowReturn transform_not_in_place(GstBaseTransform*, GstBuffer*, GstBuffer*) {
-  return GST_FLOW_NOT_SUPPORTED;
 }
 
 /* events, queries, states */
@@ -697,11 +603,7 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->transform_caps = transform_caps;
   transform_class->fixate_caps = fixate_caps;
   transform_class->set_caps = set_caps;
-  transform_class->propose_allocation = propose_allocation;
-  transform_class->decide_allocation = decide_allocation;
-  transform_class->transform_size = transform_size;
-  transform_class->copy_metadata = copy_no_metadata;
-  transform_class->transform = transform_not_in_place;
+  event_simulator_class_install_buffers(transform_class);
   transform_class->generate_output = generate_output;
   transform_class->sink_event = sink_event;
   transform_class->src_event = src_event;

@@ -69,3 +69,7 @@ GstCaps* event_simulator_fixate_output(GstCaps* caps) {
   gst_caps_unref(caps);
   return gst_caps_fixate(fixed);
 }
+
+bool event_simulator_draws(const GstCaps* output) {
+  return !gst_structure_has_name(gst_caps_get_structure(output, 0), GST_EVENT_CAMERA_MEDIA_TYPE);
+}

@@ -13,3 +13,6 @@ GstCaps* event_simulator_input_caps(const GstCaps* output);
 /// What a simulator makes where downstream leaves it the choice among these caps (not empty):
 /// events, if they are among them. Takes the caps.
 GstCaps* event_simulator_fixate_output(GstCaps* caps);
+
+/// Whether output caps are those of accumulated-event video, and not of events.
+bool event_simulator_draws(const GstCaps* output);

@@ -27,6 +27,7 @@ class EventBuckets {
   }
 
   std::span<const std::vector<Event>> buckets() const { return buckets_; }
+  int bands() const { return static_cast<int>(bands_); }
 
   /// How many events there are in all.
   std::size_t size() const;

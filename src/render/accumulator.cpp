@@ -1,54 +1,149 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/render/accumulator.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cstring>
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/render/accumulator.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants to come after that.
+#include <hwy/highway.h>
 
+#include "src/render/pixel_kinds.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Bytes = hn::ScalableTag<std::uint8_t>;
+using Vector = hn::Vec<Bytes>;
+
+/// Draws pixels of so many bytes.
+template <int bytes>
+class RowPainter {
+ public:
+  explicit RowPainter(const PixelKinds& kinds) : kinds_(kinds) {
+    store(hn::Zero(Bytes()), silent_);
+  }
+
+  /// Draws a row, and makes it as if nothing had fired.
+  void draw(std::uint8_t* fired, int width, std::uint8_t* out) const {
+    const int lanes = static_cast<int>(hn::Lanes(Bytes()));
+    if (HWY_TARGET == HWY_SCALAR || width < lanes) {  // a vector of one pixel shuffles no tables
+      draw_pixels(fired, width, out);
+      return;
+    }
+    // Where the width is no multiple of a vector, the last one begins within the last but one.
+    const int end = width - lanes;
+    const auto last = hn::LoadU(Bytes(), fired + end);
+    for (int x = 0; x < end; x += lanes)
+      draw_vector(hn::LoadU(Bytes(), fired + x), fired + x, out + std::ptrdiff_t{x} * bytes);
+    draw_vector(last, fired + end, out + std::ptrdiff_t{end} * bytes);
+  }
+
+ private:
+  void draw_vector(Vector which, std::uint8_t* fired, std::uint8_t* out) const {
+    const Bytes pixels;
+    const auto zero = hn::Zero(pixels);
+    if (hn::AllTrue(pixels, hn::Eq(which, zero))) {
+      const auto lanes = hn::Lanes(pixels);
+      for (std::size_t i = 0; i < bytes; ++i)
+        hn::StoreU(hn::Load(pixels, silent_ + i * lanes), pixels, out + i * lanes);
+      return;
+    }
+    store(which, out);
+    hn::StoreU(zero, pixels, fired);
+  }
+
+  void store(Vector which, std::uint8_t* out) const {
+    const Bytes pixels;
+    const auto byte = [&](std::size_t i) {
+      return hn::TableLookupBytes(hn::LoadDup128(pixels, kinds_.bytes[i].data()), which);
+    };
+    if constexpr (bytes == 1)
+      hn::StoreU(byte(0), pixels, out);
+    else if constexpr (bytes == 3)
+      hn::StoreInterleaved3(byte(0), byte(1), byte(2), pixels, out);
+    else
+      hn::StoreInterleaved4(byte(0), byte(1), byte(2), byte(3), pixels, out);
+  }
+
+  void draw_pixels(std::uint8_t* fired, int width, std::uint8_t* out) const {
+    for (int x = 0; x < width; ++x) {
+      for (std::size_t i = 0; i < bytes; ++i) *out++ = kinds_.bytes[i][fired[x]];
+      fired[x] = 0;
+    }
+  }
+
+  const PixelKinds& kinds_;
+  HWY_ALIGN std::uint8_t silent_[bytes * hn::MaxLanes(Bytes())];  ///< a vector of them
+};
+
+template <int bytes>
+void draw_rows(Plane<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+               std::ptrdiff_t stride) {
+  const RowPainter<bytes> painter(kinds);
+  for (int y = 0; y < fired.height(); ++y)
+    painter.draw(fired.row(y), fired.width(), out + y * stride);
+}
+
+void draw_pixels_of_1(Plane<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+                      std::ptrdiff_t stride) {
+  draw_rows<1>(fired, kinds, out, stride);
+}
+
+void draw_pixels_of_3(Plane<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+                      std::ptrdiff_t stride) {
+  draw_rows<3>(fired, kinds, out, stride);
+}
+
+void draw_pixels_of_4(Plane<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+                      std::ptrdiff_t stride) {
+  draw_rows<4>(fired, kinds, out, stride);
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace eventcamera {
 namespace {
 
-using PixelBytes = std::array<std::byte, 4>;
-
-/// Brightness as BT.601 weighs it.
-std::uint8_t luma(const Colour& colour) {
-  return static_cast<std::uint8_t>(
-      (299 * colour.red + 587 * colour.green + 114 * colour.blue + 500) / 1000);
-}
-
-PixelBytes encode(const Colour& colour, const PixelLayout& layout) {
-  if (layout.bytes == 1) return {std::byte{luma(colour)}};
-  PixelBytes pixel;
-  pixel.fill(std::byte{255});
-  pixel[static_cast<std::size_t>(layout.red)] = std::byte{colour.red};
-  pixel[static_cast<std::size_t>(layout.green)] = std::byte{colour.green};
-  pixel[static_cast<std::size_t>(layout.blue)] = std::byte{colour.blue};
-  return pixel;
-}
-
-template <int bytes>
-void draw_row(std::uint8_t* fired, int width, const std::array<PixelBytes, 4>& pixels,
-              std::byte* out) {
-  for (int x = 0; x < width; ++x)
-    std::memcpy(out + std::ptrdiff_t{x} * bytes, pixels[fired[x]].data(), bytes);
-  std::fill_n(fired, width, std::uint8_t{0});
-}
+HWY_EXPORT(draw_pixels_of_1);
+HWY_EXPORT(draw_pixels_of_3);
+HWY_EXPORT(draw_pixels_of_4);
 
 }  // namespace
 
 void Accumulator::add(std::span<const Event> events) {
-  for (const auto& event : events)
-    fired_.at(event.x, event.y()) |= event.polarity() == Polarity::on ? 2 : 1;
+  // In locals: a byte that is written might else be any of these.
+  std::uint8_t* const fired = fired_.row(0);
+  const auto width = static_cast<std::size_t>(fired_.width());
+  for (const auto event : events)
+    fired[static_cast<std::size_t>(event.y()) * width + event.x] |=
+        static_cast<std::uint8_t>(1 + static_cast<int>(event.polarity()));
+}
+
+void Accumulator::add(const EventBuckets& events) {
+  // Band by band, so that the rows stay in the cache from step to step.
+  const auto buckets = events.buckets();
+  const auto bands = static_cast<std::size_t>(events.bands());
+  for (std::size_t band = 0; band < bands; ++band)
+    for (std::size_t i = band; i < buckets.size(); i += bands) add(buckets[i]);
 }
 
 void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
                        std::ptrdiff_t stride) {
-  const std::array<PixelBytes, 4> pixels = {encode(palette.none, layout),
-                                            encode(palette.off, layout), encode(palette.on, layout),
-                                            encode(palette.both, layout)};
-  const auto row = layout.bytes == 1 ? draw_row<1> : layout.bytes == 3 ? draw_row<3> : draw_row<4>;
-  for (int y = 0; y < fired_.height(); ++y)
-    row(fired_.row(y), fired_.width(), pixels, out + y * stride);
+  const PixelKinds kinds(palette, layout);
+  auto* bytes = reinterpret_cast<std::uint8_t*>(out);
+  if (layout.bytes == 1)
+    HWY_DYNAMIC_DISPATCH(draw_pixels_of_1)(fired_, kinds, bytes, stride);
+  else if (layout.bytes == 3)
+    HWY_DYNAMIC_DISPATCH(draw_pixels_of_3)(fired_, kinds, bytes, stride);
+  else
+    HWY_DYNAMIC_DISPATCH(draw_pixels_of_4)(fired_, kinds, bytes, stride);
 }
 
 }  // namespace eventcamera
+#endif  // HWY_ONCE

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
+#include <hwy/targets.h>
 
 #include <algorithm>
 #include <array>
+#include <random>
 #include <vector>
 
 #include "src/picture/luma.hpp"
@@ -12,12 +15,12 @@ namespace {
 
 using namespace eventcamera;
 
-const Event events[] = {Event::at(1, 0, 5, Polarity::off), Event::at(2, 0, 5, Polarity::on),
-                        Event::at(0, 1, 6, Polarity::on), Event::at(0, 1, 7, Polarity::off)};
+const Event few_events[] = {Event::at(1, 0, 5, Polarity::off), Event::at(2, 0, 5, Polarity::on),
+                            Event::at(0, 1, 6, Polarity::on), Event::at(0, 1, 7, Polarity::off)};
 
 std::vector<int> draw(const PixelLayout& layout, PaletteName name) {
   Accumulator accumulator(3, 2);
-  accumulator.add(events);
+  accumulator.add(few_events);
   const int stride = 3 * layout.bytes + 5;
   std::vector<std::byte> out(static_cast<std::size_t>(stride) * 2, std::byte{7});
   accumulator.draw(palette(name), layout, out.data(), stride);
@@ -50,11 +53,96 @@ TEST(Accumulator, DrawsColoursWhereTheLayoutHasThem) {
 
 TEST(Accumulator, BeginsAnewAfterDrawing) {
   Accumulator accumulator(3, 2);
-  accumulator.add(events);
+  accumulator.add(few_events);
   std::vector<std::byte> out(6);
   accumulator.draw(palette(PaletteName::grey), {}, out.data(), 3);
   accumulator.draw(palette(PaletteName::grey), {}, out.data(), 3);
   EXPECT_TRUE(std::ranges::all_of(out, [](std::byte b) { return b == std::byte{128}; }));
+}
+
+/// Events by chance in buckets of some steps and bands; `share` of the pixels fire in a step.
+EventBuckets events_by_chance(int width, int height, double share) {
+  std::minstd_rand random(static_cast<unsigned>(width));
+  std::bernoulli_distribution fires(share);
+  std::bernoulli_distribution is_on(0.5);
+  EventBuckets buckets;
+  buckets.reset(3, 2);
+  for (int step = 1; step <= 3; ++step)
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        if (fires(random))
+          buckets.bucket(step, 2 * y / height)
+              .push_back(Event::at(x, y, 1, is_on(random) ? Polarity::on : Polarity::off));
+  return buckets;
+}
+
+/// The picture of events, pixel by pixel.
+std::vector<std::byte> plainly_drawn(const EventBuckets& events, int width, int height, int stride,
+                                     const Palette& palette, const PixelLayout& layout) {
+  std::vector<std::byte> out(static_cast<std::size_t>(stride * height), std::byte{7});
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      bool on = false;
+      bool off = false;
+      for (const auto& bucket : events.buckets())
+        for (const auto& event : bucket)
+          if (event.x == x && event.y() == y) (event.polarity() == Polarity::on ? on : off) = true;
+      const auto& colour = on && off ? palette.both
+                           : on      ? palette.on
+                           : off     ? palette.off
+                                     : palette.none;
+      auto* pixel = out.data() + y * stride + x * layout.bytes;
+      std::fill_n(pixel, layout.bytes, std::byte{255});
+      if (layout.bytes == 1) {
+        *pixel =
+            std::byte((299 * colour.red + 587 * colour.green + 114 * colour.blue + 500) / 1000);
+      } else {
+        pixel[layout.red] = std::byte{colour.red};
+        pixel[layout.green] = std::byte{colour.green};
+        pixel[layout.blue] = std::byte{colour.blue};
+      }
+    }
+  }
+  return out;
+}
+
+const PixelLayout layouts[] = {{},
+                               {.bytes = 3},
+                               {.bytes = 4, .red = 2, .green = 1, .blue = 0},
+                               {.bytes = 4, .red = 1, .green = 2, .blue = 3}};
+
+/// Pictures that are narrower than any vector, a vector, and somewhat wider.
+void expect_pictures_as_drawn_plainly() {
+  for (const int width : {1, 7, 15, 16, 17, 31, 32, 33, 63, 64, 65, 100, 129}) {
+    for (const auto& layout : layouts) {
+      for (const double share : {0.01, 0.3}) {
+        constexpr int height = 5;
+        const int stride = width * layout.bytes + 3;
+        const auto events = events_by_chance(width, height, share);
+        const auto& colours = palette(PaletteName::red_blue);
+        Accumulator accumulator(width, height);
+        std::vector<std::byte> out(static_cast<std::size_t>(stride * height), std::byte{7});
+        accumulator.add(events);
+        accumulator.draw(colours, layout, out.data(), stride);
+        ASSERT_EQ(out, plainly_drawn(events, width, height, stride, colours, layout))
+            << width << " pixels of " << layout.bytes << " bytes, share " << share;
+        accumulator.draw(colours, layout, out.data(), stride);
+        ASSERT_EQ(out, plainly_drawn({}, width, height, stride, colours, layout))
+            << "the second of " << width << " pixels of " << layout.bytes << " bytes";
+      }
+    }
+  }
+}
+
+TEST(Accumulator, DrawsThePlainPictureOnEveryTarget) {
+  for (const auto target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    SCOPED_TRACE(hwy::TargetName(target));
+    expect_pictures_as_drawn_plainly();
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 TEST(Palette, TellsFourKindsOfPixelApartInGreyToo) {

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Once a simulator has seen what its video is like, a frame costs no allocation any more. Counts
+// what the process asks of the heap, operator new included, whichever thread asks.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+#include <new>
+
+#include "src/render/accumulator.hpp"
+#include "src/simulate/dense.hpp"
+#include "src/simulate/diff.hpp"
+#include "src/simulate/frame.hpp"
+#include "src/simulate/path.hpp"
+#include "src/simulate/sparse.hpp"
+#include "tests/core/scene.hpp"
+
+namespace {
+
+std::atomic<int> allocations = 0;
+
+}  // namespace
+
+// In front of glibc's own, which they call by its other names.
+extern "C" {
+
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* memory, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+__attribute__((visibility("default"))) void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+
+__attribute__((visibility("default"))) void* calloc(std::size_t count, std::size_t size) {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+
+__attribute__((visibility("default"))) void* realloc(void* memory, std::size_t size) {
+  ++allocations;
+  return __libc_realloc(memory, size);
+}
+
+__attribute__((visibility("default"))) void* aligned_alloc(std::size_t alignment,
+                                                           std::size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+
+__attribute__((visibility("default"))) int posix_memalign(void** memory, std::size_t alignment,
+                                                          std::size_t size) {
+  ++allocations;
+  *memory = __libc_memalign(alignment, size);
+  return *memory == nullptr ? ENOMEM : 0;
+}
+}
+
+namespace {
+
+using namespace eventcamera;
+
+constexpr int width = 160;
+constexpr int height = 120;
+constexpr int threads = 2;
+
+/// Seen again and again, frame by frame: what a simulator has to get used to.
+constexpr int frames_a_round = 6;
+
+/// The allocations of some rounds, after some in which everything has found its size.
+template <class Frame>
+int allocations_in_steady_state(const Frame& take_frame) {
+  const auto rounds = [&](int count) {
+    for (int i = 0; i < count * frames_a_round; ++i) take_frame(i % frames_a_round);
+  };
+  rounds(3);
+  const int before = allocations;
+  rounds(5);
+  return allocations - before;
+}
+
+template <class Pixel>
+std::vector<Plane<Pixel>> frames_of_a_drift(int bits) {
+  std::vector<Plane<Pixel>> frames;
+  for (int i = 0; i < frames_a_round; ++i)
+    frames.push_back(scene::texture<Pixel>(width, height, bits, 1.7 * i, 0.6 * i));
+  return frames;
+}
+
+/// The allocations of a simulator's frames; `make` makes it.
+template <class Pixel>
+int allocations_of(std::unique_ptr<Simulator> (*make)(const LumaFormat&), int bits) {
+  const auto frames = frames_of_a_drift<Pixel>(bits);
+  const auto simulator = make({width, height, bits});
+  const Settings settings{.positive_threshold = 5, .negative_threshold = 5, .threads = threads};
+  Nanoseconds time = 0;
+  std::size_t events = 0;
+  const int counted = allocations_in_steady_state([&](int i) {
+    const auto luma = scene::luma(frames[static_cast<std::size_t>(i)].view(), bits);
+    if (const auto* made = simulator->push(luma, time += scene::frame_time, settings))
+      events += made->size();
+  });
+  EXPECT_GT(events, 10'000U);
+  return counted;
+}
+
+TEST(Allocations, AreCounted) {
+  const int before = allocations;
+  free(malloc(1));
+  EXPECT_EQ(allocations - before, 1);
+  std::vector<int> vector(100'000);
+  EXPECT_EQ(allocations - before, 2);
+  vector.push_back(0);
+  EXPECT_EQ(allocations - before, 3);
+}
+
+TEST(Allocations, AreNotMadeByTheDifferenceFrame) {
+  EXPECT_EQ(allocations_of<std::uint8_t>(make_frame_simulator, 8), 0);
+  EXPECT_EQ(allocations_of<std::uint16_t>(make_frame_simulator, 12), 0);
+}
+
+TEST(Allocations, AreNotMadeByMethodsThatTrackPixels) {
+  EXPECT_EQ(allocations_of<std::uint8_t>(make_sparse_simulator, 8), 0);
+  EXPECT_EQ(allocations_of<std::uint16_t>(make_sparse_simulator, 12), 0);
+  EXPECT_EQ(allocations_of<std::uint8_t>(make_diff_simulator, 8), 0);
+  EXPECT_EQ(allocations_of<std::uint16_t>(make_diff_simulator, 12), 0);
+}
+
+TEST(Allocations, AreNotMadeByDenseInterpolationWithOurOwnFlow) {
+  const auto with_farneback = [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
+    auto simulator = make_dense_simulator(format);
+    simulator->set_flow(FlowMethod::farneback);
+    return simulator;
+  };
+  EXPECT_EQ(allocations_of<std::uint8_t>(with_farneback, 8), 0);
+  EXPECT_EQ(allocations_of<std::uint16_t>(with_farneback, 12), 0);
+}
+
+/// Paths along a flow that turns, so that tiles differ from frame to frame.
+template <class Pixel>
+int allocations_of_paths(int bits, Interpolation interpolation) {
+  const auto frames = frames_of_a_drift<Pixel>(bits);
+  std::vector<Plane<Flow>> flows;
+  for (int i = 0; i < frames_a_round; ++i) {
+    flows.emplace_back(width, height);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        flows.back().at(x, y) = {0.1F * static_cast<float>(x * i % 30),
+                                 0.02F * static_cast<float>(y)};
+  }
+  ThreadPool pool;
+  pool.set_threads(threads);
+  PathWalker walker;
+  EventBuckets events;
+  return allocations_in_steady_state([&](int i) {
+    const auto& last = frames[static_cast<std::size_t>(i)];
+    const auto& now = frames[static_cast<std::size_t>((i + 1) % frames_a_round)];
+    const StepTimes steps(scene::frame_time, 11);
+    walker.fire(Path<Pixel>{{last.view(), now.view(), steps.count()},
+                            flows[static_cast<std::size_t>(i)].view(),
+                            interpolation,
+                            steps,
+                            {3 << (bits - 8), 3 << (bits - 8)}},
+                pool, events);
+    EXPECT_GT(events.size(), 1000U);
+  });
+}
+
+TEST(Allocations, AreNotMadeByDenseInterpolationOnceTheFlowIsFound) {
+  for (const auto interpolation : {Interpolation::forward, Interpolation::blend}) {
+    EXPECT_EQ(allocations_of_paths<std::uint8_t>(8, interpolation), 0);
+    EXPECT_EQ(allocations_of_paths<std::uint16_t>(12, interpolation), 0);
+  }
+}
+
+TEST(Allocations, AreNotMadeByCopyingOrDrawingEvents) {
+  const auto frames = frames_of_a_drift<std::uint8_t>(8);
+  const auto simulator = make_frame_simulator({width, height, 8});
+  const Settings settings{.positive_threshold = 5, .negative_threshold = 5, .threads = threads};
+  simulator->push(scene::luma(frames[0]), 0, settings);
+  const auto* events = simulator->push(scene::luma(frames[1]), scene::frame_time, settings);
+  std::vector<Event> copied(events->size());
+  Accumulator accumulator(width, height);
+  std::vector<std::byte> picture(std::size_t{width} * height);
+  EXPECT_EQ(allocations_in_steady_state([&](int) {
+              events->copy_to(copied.data());
+              accumulator.add(*events);
+              accumulator.draw(palette(PaletteName::dark), {}, picture.data(), width);
+            }),
+            0);
+}
+
+}  // namespace

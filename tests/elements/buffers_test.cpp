@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Where the buffers of intervals come from, and what their memory is.
+#include <set>
+#include <tuple>
+
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+
+class EveryOutput : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
+INSTANTIATE_TEST_SUITE_P(, EveryOutput,
+                         testing::Combine(testing::ValuesIn(elements),
+                                          testing::Values(GST_EVENT_CAMERA_MEDIA_TYPE,
+                                                          "video/x-raw, format=BGRx")));
+
+TEST_P(EveryOutput, ComesFromAPool) {
+  const auto& [element, out] = GetParam();
+  Harness h(element);
+  h.caps("video/x-raw, format=GRAY8, width=64, height=48, framerate=25/1", out);
+  std::set<GstBuffer*> buffers;
+  for (int i = 0; i < 40; ++i) {
+    h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 == 0 ? 50 : 200));
+    const auto buffer = h.pull();
+    ASSERT_EQ(buffer != nullptr, i > 0);
+    if (!buffer) continue;
+    EXPECT_NE(buffer->pool, nullptr);
+    buffers.insert(buffer.get());
+  }
+  EXPECT_LE(buffers.size(), 2U);
+}
+
+/// Frames of which so many rows change, one by one.
+class Rows {
+ public:
+  explicit Rows(Harness& h) : h_(h) {}
+
+  /// Pushes a frame and returns what comes out.
+  Buffer change(int rows) {
+    for (int y = 0; y < rows; ++y) bright_[y] = !bright_[y];
+    EXPECT_EQ(h_.push(h_.frame(40 * GST_MSECOND * static_cast<GstClockTime>(count_++),
+                               [this](int, int y) { return bright_[y] ? 200 : 50; })),
+              GST_FLOW_OK);
+    return h_.pull();
+  }
+
+ private:
+  Harness& h_;
+  bool bright_[1000] = {};
+  int count_ = 0;
+};
+
+gsize room_of(const Buffer& buffer) {
+  gsize room = 0;
+  gst_buffer_get_sizes(buffer.get(), nullptr, &room);
+  return room;
+}
+
+constexpr const char* large_video =
+    "video/x-raw, format=GRAY8, width=1000, height=1000, framerate=25/1";
+
+TEST(EventBuffers, AreAsLongAsTheirEvents) {
+  Harness h("eventsim-frame");
+  h.caps(large_video);
+  Rows rows(h);
+  EXPECT_FALSE(rows.change(0));
+  for (const int count : {1, 3, 1000, 2, 999, 1}) {
+    const auto buffer = rows.change(count);
+    ASSERT_TRUE(buffer);
+    const auto events = events_of(buffer.get());
+    ASSERT_EQ(events.size(), static_cast<std::size_t>(count) * 1000);
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      ASSERT_EQ(events[i].x, i % 1000);
+      ASSERT_EQ(gst_event_camera_event_get_y(&events[i]), i / 1000);
+    }
+  }
+}
+
+TEST(EventBuffers, GiveBackTheMemoryOfOneExtremeFrame) {
+  Harness h("eventsim-frame");
+  h.caps(large_video);
+  Rows rows(h);
+  rows.change(0);
+  EXPECT_GE(room_of(rows.change(1000)), 8'000'000U);
+  EXPECT_GE(room_of(rows.change(1)), 8'000'000U);  // it may come again
+  gsize room = 0;
+  for (int i = 0; i < 300; ++i) room = room_of(rows.change(1));
+  EXPECT_LE(room, 300'000U);
+}
+
+TEST(EventBuffers, AreNotKeptWithoutBound) {
+  Harness h("eventsim-frame");
+  h.caps(large_video);
+  Rows rows(h);
+  rows.change(0);
+  const GQuark seen = g_quark_from_static_string("seen by the test");
+  std::vector<Buffer> held;
+  for (int i = 0; i < 30; ++i) {
+    held.push_back(rows.change(1000));
+    gst_mini_object_set_qdata(GST_MINI_OBJECT(held.back().get()), seen, &held, nullptr);
+  }
+  held.clear();
+  int kept = 0;
+  for (int i = 0; i < 30; ++i) {
+    held.push_back(rows.change(1000));
+    kept += gst_mini_object_get_qdata(GST_MINI_OBJECT(held.back().get()), seen) != nullptr;
+  }
+  EXPECT_GE(kept, 2);
+  EXPECT_LE(kept, 8);
+}
+
+TEST(EventBuffers, AreTheReadersOwnForAsLongAsItWants) {
+  Buffer kept;
+  {
+    Harness h("eventsim-frame");
+    h.caps(large_video);
+    Rows rows(h);
+    rows.change(0);
+    kept = rows.change(3);
+    const Buffer part(gst_buffer_copy_region(kept.get(), GST_BUFFER_COPY_MEMORY, 8, 16));
+    const auto whole = bytes_of(kept.get());
+    kept.reset();
+    for (int i = 0; i < 5; ++i) rows.change(100);
+    EXPECT_EQ(bytes_of(part.get()), whole.substr(8, 16));
+    kept = rows.change(2);
+  }
+  EXPECT_EQ(events_of(kept.get()).size(), 2000U);
+}
+
+}  // namespace
