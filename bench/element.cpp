@@ -238,7 +238,7 @@ EventBuckets events_by_chance(int count, int width, int height) {
         .push_back(Event::at(x, y, static_cast<std::uint32_t>(step), polarity));
   }
   for (const auto& bucket : events.buckets()) {
-    auto& sorted = const_cast<std::vector<Event>&>(bucket);
+    auto& sorted = const_cast<EventBuckets::Bucket&>(bucket);
     std::ranges::sort(sorted, {}, [](const Event& e) { return std::pair(e.y(), e.x); });
   }
   return events;

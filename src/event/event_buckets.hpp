@@ -14,6 +14,9 @@ namespace eventcamera {
 /// sorted events of the interval.
 class EventBuckets {
  public:
+  /// On a cache line of its own: threads fill neighbours at the same time.
+  struct alignas(64) Bucket : std::vector<Event> {};
+
   /// Empties the buckets, keeps their memory.
   void reset(int steps, int bands) {
     bands_ = static_cast<std::size_t>(bands);
@@ -26,7 +29,7 @@ class EventBuckets {
     return buckets_[static_cast<std::size_t>(step - 1) * bands_ + static_cast<std::size_t>(band)];
   }
 
-  std::span<const std::vector<Event>> buckets() const { return buckets_; }
+  std::span<const Bucket> buckets() const { return buckets_; }
   int bands() const { return static_cast<int>(bands_); }
 
   /// How many events there are in all.
@@ -36,7 +39,7 @@ class EventBuckets {
   void copy_to(Event* out) const;
 
  private:
-  std::vector<std::vector<Event>> buckets_;
+  std::vector<Bucket> buckets_;
   std::size_t bands_ = 1;
 };
 
