@@ -120,7 +120,7 @@ def draw_runtimes(runs, path):
             bbox=ON_WHITE,
         )
         axes.set_xscale("log")
-        axes.set_xlim(0.02, 2e7)
+        axes.set_xlim(0.01, 2e7)
         axes.set_ylim(top - 0.3, -1.3)
         axes.set_yticks(ticks)
         axes.set_yticklabels([row[0] for row in PAPER_RUNTIMES])
