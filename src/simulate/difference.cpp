@@ -22,17 +22,20 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// In words of 64 pixels.
 constexpr int longest_vector = (hn::MaxLanes(hn::ScalableTag<std::uint8_t>()) + 63) / 64;
 
+/// A threshold in all lanes; one that no difference exceeds is cut to what a pixel can be.
+template <class Pixel>
+auto in_lanes(hn::ScalableTag<Pixel> pixels, int threshold) {
+  return hn::Set(pixels, static_cast<Pixel>(std::min(
+                             threshold, static_cast<int>(std::numeric_limits<Pixel>::max()))));
+}
+
 template <class Pixel>
 void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint32_t t,
               const Thresholds& thresholds, std::vector<Event>& out) {
   const hn::ScalableTag<Pixel> pixels;
   const int lanes = static_cast<int>(hn::Lanes(pixels));
-  const auto in_range = [](int threshold) {
-    return static_cast<Pixel>(
-        std::min(threshold, static_cast<int>(std::numeric_limits<Pixel>::max())));
-  };
-  const auto positive = hn::Set(pixels, in_range(thresholds.positive));
-  const auto negative = hn::Set(pixels, in_range(thresholds.negative));
+  const auto positive = in_lanes<Pixel>(pixels, thresholds.positive);
+  const auto negative = in_lanes<Pixel>(pixels, thresholds.negative);
   const auto zero = hn::Zero(pixels);
   int x = 0;
   for (; x + lanes <= width; x += lanes) {
@@ -73,9 +76,7 @@ template <class Pixel>
 ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int threshold) {
   const hn::ScalableTag<Pixel> pixels;
   const int lanes = static_cast<int>(hn::Lanes(pixels));
-  const auto limit = hn::Set(
-      pixels,
-      static_cast<Pixel>(std::min(threshold, static_cast<int>(std::numeric_limits<Pixel>::max()))));
+  const auto limit = in_lanes<Pixel>(pixels, threshold);
   const auto none = [&](int x) {
     const auto a = hn::LoadU(pixels, before + x);
     const auto b = hn::LoadU(pixels, now + x);

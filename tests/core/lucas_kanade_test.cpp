@@ -3,8 +3,6 @@
 // tracks are no further from the truth than those of OpenCV, which searches for each point on its
 // own. How close they come to OpenCV's on real pictures is measured in tests/pipelines.
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
-#include <hwy/targets.h>
 
 #include <bit>
 #include <cmath>
@@ -14,23 +12,11 @@
 #include "src/flow/opencv_picture.hpp"
 #include "src/reference/lucas_kanade.hpp"
 #include "tests/core/scene.hpp"
+#include "tests/core/targets.hpp"
 
 namespace {
 
 using namespace eventcamera;
-
-template <class Body>
-void on_every_target(const Body& body) {
-  const auto choose = [](std::int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  };
-  for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-    choose(target);
-    body(hwy::TargetName(target));
-  }
-  choose(0);
-}
 
 struct Size {
   int width;
@@ -48,7 +34,7 @@ TEST_P(EverySize, PyramidsEqualTheReference) {
   const auto picture = scene::noise<std::uint8_t>(width, height, 8, 3);
   ThreadPool threads;
   threads.set_threads(0);
-  on_every_target([&](const char* target) {
+  targets::for_each([&](const char* target) {
     Pyramid pyramid;
     pyramid.build(picture.view(), threads);
     pyramid.build_slopes(threads);
@@ -92,7 +78,7 @@ TEST_P(EverySize, SearchesEqualTheReference) {
     from_levels.build(from.view(), threads);
     from_levels.build_slopes(threads);
     to_levels.build(to.view(), threads);
-    on_every_target([&](const char* target) {
+    targets::for_each([&](const char* target) {
       auto found = searches;
       search_level(from_levels.levels()[0], to_levels.levels()[0], found);
       for (std::size_t i = 0; i < found.size(); ++i) {

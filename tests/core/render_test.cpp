@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +8,7 @@
 
 #include "src/picture/luma.hpp"
 #include "src/render/accumulator.hpp"
+#include "tests/core/targets.hpp"
 
 namespace {
 
@@ -135,14 +134,10 @@ void expect_pictures_as_drawn_plainly() {
 }
 
 TEST(Accumulator, DrawsThePlainPictureOnEveryTarget) {
-  for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    SCOPED_TRACE(hwy::TargetName(target));
+  targets::for_each([](const char* target) {
+    SCOPED_TRACE(target);
     expect_pictures_as_drawn_plainly();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  });
 }
 
 TEST(Palette, TellsFourKindsOfPixelApartInGreyToo) {

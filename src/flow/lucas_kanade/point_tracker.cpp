@@ -91,10 +91,7 @@ void PointTracker::want_cells(std::span<const Point> points) {
   if (++call_ == 0) ++call_;  // 0: never
   for (auto& grid : grids_) grid.wanted.clear();
   const auto want = [this](CellGrid& grid, const Point& cell) {
-    auto& wanted =
-        grid.cells[static_cast<std::size_t>(cell.y) * static_cast<std::size_t>(grid.width) +
-                   static_cast<std::size_t>(cell.x)];
-    if (std::exchange(wanted.call, call_) != call_) grid.wanted.push_back(cell);
+    if (std::exchange(grid.at(cell).call, call_) != call_) grid.wanted.push_back(cell);
   };
   for (const auto& point : points) want(grids_[0], {point.x / cell_side, point.y / cell_side});
   for (std::size_t level = 1; level < grids_.size(); ++level)
@@ -103,8 +100,7 @@ void PointTracker::want_cells(std::span<const Point> points) {
 
 const PointTracker::Cell* PointTracker::wanted_cell(const CellGrid& grid, int x, int y) const {
   if (x < 0 || x >= grid.width || y < 0 || y >= grid.height) return nullptr;
-  const auto& cell = grid.cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
-                                static_cast<std::size_t>(x)];
+  const Cell& cell = grid.at({x, y});
   return cell.call == call_ ? &cell : nullptr;
 }
 
@@ -140,12 +136,9 @@ void PointTracker::search_cells(std::size_t level, ThreadPool& threads) {
     search_level(last_.levels()[level], next_.levels()[level],
                  std::span(searches_).subspan(first, last - first));
     for (std::size_t i = first; i < last; ++i) {
-      const auto& cell = grid.wanted[i];
-      auto& found =
-          grid.cells[static_cast<std::size_t>(cell.y) * static_cast<std::size_t>(grid.width) +
-                     static_cast<std::size_t>(cell.x)];
-      found.flow = searches_[i].flow;
-      found.found = searches_[i].found;
+      Cell& cell = grid.at(grid.wanted[i]);
+      cell.flow = searches_[i].flow;
+      cell.found = searches_[i].found;
     }
   });
 }

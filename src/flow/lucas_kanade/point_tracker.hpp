@@ -59,6 +59,14 @@ class PointTracker {
     int height;
     std::vector<Cell> cells;
     std::vector<Point> wanted;  ///< by this call, in no order that matters
+
+    Cell& at(const Point& cell) { return cells[index(cell)]; }
+    const Cell& at(const Point& cell) const { return cells[index(cell)]; }
+
+    std::size_t index(const Point& cell) const {
+      return static_cast<std::size_t>(cell.y) * static_cast<std::size_t>(width) +
+             static_cast<std::size_t>(cell.x);
+    }
   };
 
   void want_cells(std::span<const Point> points);
