@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "src/event/event.hpp"
+#include "src/parallel/thread_pool.hpp"
 
 namespace eventcamera {
 
@@ -37,8 +38,12 @@ class EventBuckets {
 
   /// Writes size() events, sorted by time and within a time in raster order.
   void copy_to(Event* out) const;
+  void copy_to(Event* out, ThreadPool& threads) const;
 
  private:
+  /// Those from `first` up to `last` of the sorted events.
+  void copy_part(std::size_t first, std::size_t last, Event* out) const;
+
   std::vector<Bucket> buckets_;
   std::size_t bands_ = 1;
 };

@@ -24,6 +24,7 @@ class StepTimes {
         count_(static_cast<int>(
             std::clamp<Nanoseconds>(duration / 1000, 1, static_cast<Nanoseconds>(wanted)))) {}
 
+  Nanoseconds duration() const { return duration_; }
   int count() const { return count_; }
   /// Microseconds from t0 to step j (1 ... count), rounded down.
   std::uint32_t microseconds(int j) const {

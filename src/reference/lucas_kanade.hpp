@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
+#include <vector>
 
-#include "src/flow/lucas_kanade/search.hpp"
+#include "src/flow/lucas_kanade/point_tracker.hpp"
 
 namespace eventcamera::reference {
 
@@ -54,31 +56,30 @@ inline int slope(const Plane<std::uint8_t>& picture, int x, int y, bool across) 
 }
 
 /// Lucas-Kanade on one level, pixel by pixel.
-inline void search(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to, Search& search) {
-  struct Corner {
-    Corner(float left, float top)
-        : x(static_cast<int>(std::floor(left))),
-          y(static_cast<int>(std::floor(top))),
-          right(fraction(left - std::floor(left))),
-          down(fraction(top - std::floor(top))) {}
-    static int fraction(float part) {
-      return static_cast<int>(std::min(part * 32768 + 0.5F, 32767.0F));
-    }
-    int x, y, right, down;
-  };
+inline void search(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to, const Tile& tile,
+                   Search& search) {
+  const int left = tile.left + search.x - 7;
+  const int top = tile.top + search.y - 7;
+  const float right = static_cast<float>(tile.right) / 8;
+  const float down = static_cast<float>(tile.down) / 8;
   /// Bilinear, rounded after each way as the hardware does it.
-  const auto sample = [](const Corner& c, int x, int y, auto&& at) {
-    const auto between = [](int a, int b, int part) {
-      return a + (((b - a) * part + 16384) >> 15);
+  const auto here = [&](int x, int y, auto&& at) {
+    const auto between = [](int a, int b, int eighths) {
+      return a + (((b - a) * eighths + 4) >> 3);
     };
-    const auto across = [&](int v) { return between(at(c.x + x, v), at(c.x + x + 1, v), c.right); };
-    return between(across(c.y + y), across(c.y + y + 1), c.down);
+    const auto across = [&](int v) {
+      return between(at(left + x, v), at(left + x + 1, v), tile.right);
+    };
+    return between(across(top + y), across(top + y + 1), tile.down);
   };
-  const auto grey = [](const Plane<std::uint8_t>& picture) {
-    return [at = Mirrored{picture}](int x, int y) { return 64 * at(x, y); };
+  const auto slope_x = [&](int x, int y) {
+    return here(x, y, [&](int u, int v) { return slope(from, u, v, true); });
   };
-  const auto slope_of = [&](bool across) {
-    return [&from, across](int x, int y) { return slope(from, x, y, across); };
+  const auto slope_y = [&](int x, int y) {
+    return here(x, y, [&](int u, int v) { return slope(from, u, v, false); });
+  };
+  const auto grey = [&](int x, int y) {
+    return here(x, y, [at = Mirrored{from}](int u, int v) { return 4 * at(u, v); });
   };
   const auto sum = [](auto&& term) {
     std::int64_t total = 0;
@@ -86,40 +87,45 @@ inline void search(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& t
       for (int x = 0; x < 15; ++x) total += std::int64_t{term(x, y)};
     return static_cast<float>(total);
   };
-  const auto reachable = [](const Corner& c, const Plane<std::uint8_t>& picture) {
-    return c.x >= -15 && c.x < picture.width() && c.y >= -15 && c.y < picture.height();
-  };
 
   search.found = false;
-  const Corner start(search.x - 7, search.y - 7);
-  if (!reachable(start, from)) return;
-  const auto sx = [&](int x, int y) { return sample(start, x, y, slope_of(true)); };
-  const auto sy = [&](int x, int y) { return sample(start, x, y, slope_of(false)); };
   const float scale = 1.0F / (1 << 20);
-  const float xx = sum([&](int x, int y) { return sx(x, y) * sx(x, y); }) * scale;
-  const float xy = sum([&](int x, int y) { return sx(x, y) * sy(x, y); }) * scale;
-  const float yy = sum([&](int x, int y) { return sy(x, y) * sy(x, y); }) * scale;
-  const float least = (xx + yy - std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy)) / 450;
+  const float xx = sum([&](int x, int y) { return slope_x(x, y) * slope_x(x, y); }) * scale;
+  const float xy = sum([&](int x, int y) { return slope_x(x, y) * slope_y(x, y); }) * scale;
+  const float yy = sum([&](int x, int y) { return slope_y(x, y) * slope_y(x, y); }) * scale;
+  const float least = (xx + yy - std::sqrt((xx - yy) * (xx - yy) + 4 * (xy * xy))) / 450;
   const float determinant = xx * yy - xy * xy;
   if (least < 1e-4F || determinant < std::numeric_limits<float>::epsilon()) return;
 
   auto& flow = search.flow;
-  const auto corner = [&] { return Corner(search.x - 7 + flow.x, search.y - 7 + flow.y); };
   const auto inside = [&] {
-    return std::abs(flow.x) <= from.width() && std::abs(flow.y) <= from.height() &&
-           reachable(corner(), to);
+    const float x = static_cast<float>(left) + std::floor(flow.x + right);
+    const float y = static_cast<float>(top) + std::floor(flow.y + down);
+    return x >= -15 && x < static_cast<float>(to.width()) && y >= -15 &&
+           y < static_cast<float>(to.height());
   };
   Flow before{};
   for (int i = 0; i < 10; ++i) {
     if (!inside()) return;
-    const auto here = corner();
-    const auto mismatch = [&](int x, int y) {
-      return sample(here, x, y, grey(to)) - sample(start, x, y, grey(from));
+    const float cell_x = std::floor(flow.x + right);
+    const float cell_y = std::floor(flow.y + down);
+    const auto mismatch = [&](auto&& weight) {
+      const auto there = [&](int u, int v) {
+        return sum([&](int x, int y) {
+          const int there_x = left + static_cast<int>(cell_x) + u + x;
+          const int there_y = top + static_cast<int>(cell_y) + v + y;
+          return (4 * Mirrored{to}(there_x, there_y) - grey(x, y)) * weight(x, y);
+        });
+      };
+      const auto between = [](float a, float b, float part) { return a + (b - a) * part; };
+      const auto across = [&](int v) {
+        return between(there(0, v), there(1, v), flow.x + right - cell_x);
+      };
+      return between(across(0), across(1), flow.y + down - cell_y) * (8 * scale);
     };
-    const float bx = sum([&](int x, int y) { return mismatch(x, y) * sx(x, y); }) * (scale / 2);
-    const float by = sum([&](int x, int y) { return mismatch(x, y) * sy(x, y); }) * (scale / 2);
-    const Flow move{(xy * by - yy * bx) * (1 / determinant),
-                    (xy * bx - xx * by) * (1 / determinant)};
+    const float x = mismatch(slope_x);
+    const float y = mismatch(slope_y);
+    const Flow move{(xy * y - yy * x) * (1 / determinant), (xy * x - xx * y) * (1 / determinant)};
     flow = {flow.x + move.x, flow.y + move.y};
     if (move.x * move.x + move.y * move.y <= 0.03F * 0.03F) break;
     if (i > 0 && std::abs(move.x + before.x) < 0.01F && std::abs(move.y + before.y) < 0.01F) {
@@ -129,6 +135,26 @@ inline void search(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& t
     before = move;
   }
   search.found = inside();
+}
+
+/// A point's track: its flow on one level, twice as long, is where its search on the next begins.
+inline Track track(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to,
+                   const Point& point) {
+  std::vector<std::pair<Plane<std::uint8_t>, Plane<std::uint8_t>>> levels{{from, to}};
+  while (levels.size() < 4) {
+    const auto& [a, b] = levels.back();
+    if (std::min(a.width(), a.height()) <= 30) break;  // half of it is no longer than a window
+    levels.emplace_back(halved(a), halved(b));
+  }
+  Search result{0, 0, {0, 0}, false};
+  for (int level = static_cast<int>(levels.size()) - 1; level >= 0; --level) {
+    const auto eighths = [level](int position) { return (position << 3 >> level) & 7; };
+    const Tile pixel{point.x >> level, point.y >> level, eighths(point.x), eighths(point.y)};
+    result.flow = {2 * result.flow.x, 2 * result.flow.y};
+    const auto& [a, b] = levels[static_cast<std::size_t>(level)];
+    search(a, b, pixel, result);
+  }
+  return {result.flow, result.found};
 }
 
 }  // namespace eventcamera::reference

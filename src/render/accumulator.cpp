@@ -126,11 +126,20 @@ void Accumulator::add(std::span<const Event> events) {
 }
 
 void Accumulator::add(const EventBuckets& events) {
-  // Band by band, so that the rows stay in the cache from step to step.
+  for (int band = 0; band < events.bands(); ++band)
+    add_band(events, static_cast<std::size_t>(band));
+}
+
+void Accumulator::add(const EventBuckets& events, ThreadPool& threads) {
+  threads.for_each(events.bands(),
+                   [&](int band, int) { add_band(events, static_cast<std::size_t>(band)); });
+}
+
+/// A band after the other, so that its rows stay in the cache from step to step.
+void Accumulator::add_band(const EventBuckets& events, std::size_t band) {
   const auto buckets = events.buckets();
-  const auto bands = static_cast<std::size_t>(events.bands());
-  for (std::size_t band = 0; band < bands; ++band)
-    for (std::size_t i = band; i < buckets.size(); i += bands) add(buckets[i]);
+  for (std::size_t i = band; i < buckets.size(); i += static_cast<std::size_t>(events.bands()))
+    add(buckets[i]);
 }
 
 void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,

@@ -19,12 +19,15 @@ class Accumulator {
   /// Events outside the picture must not occur.
   void add(std::span<const Event> events);
   void add(const EventBuckets& events);
+  void add(const EventBuckets& events, ThreadPool& threads);
 
   /// Draws what was collected and begins anew. `stride` in bytes.
   void draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
 
  private:
+  void add_band(const EventBuckets& events, std::size_t band);
+
   Plane<std::uint8_t> fired_;  // bit 0: OFF, bit 1: ON
 };
 

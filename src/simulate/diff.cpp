@@ -37,7 +37,7 @@ struct Part {
   Kept last;
   Kept now;
   Plane<std::uint8_t> picture;  ///< now as a picture in 8 bits, 0 where nothing is kept
-  PointTracker tracker{disagreement_of_differences};
+  PointTracker tracker;
 
   void begin_next() {
     for (const auto& place : now.places) picture.at(place.x, place.y) = 0;

@@ -8,10 +8,11 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstdlib>
 #include <limits>
 
-#include "src/simulate/fired_bits.hpp"
+#include "src/simulate/fired_lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -29,6 +30,42 @@ auto in_lanes(hn::ScalableTag<Pixel> pixels, int threshold) {
                              threshold, static_cast<int>(std::numeric_limits<Pixel>::max()))));
 }
 
+/// Gathers events of a row without a branch for each, and hands them on many at a time.
+class RowEvents {
+ public:
+  RowEvents(int y, std::uint32_t t, std::vector<Event>& out) : y_(y), t_(t), out_(out) {}
+
+  /// Bit i of `fired` is the pixel x + i, and bit i of `on` tells whether it is ON.
+  void add(std::uint64_t fired, std::uint64_t on, int x) {
+    if (size_ + 64 > room) flush();
+    const FiredLanes tag;
+    const int lanes = static_cast<int>(hn::Lanes(tag));
+    const auto mask = [&](std::uint64_t bits) {
+      return hn::LoadMaskBits(tag, reinterpret_cast<const std::uint8_t*>(&bits));
+    };
+    auto place = off_events(x, y_);
+    for (; fired != 0; fired >>= lanes, on >>= lanes) {
+      store_fired(place, mask(fired), mask(on), t_, events_ + size_);
+      size_ += std::popcount(fired & ((std::uint64_t{1} << lanes) - 1));
+      place = hn::Add(place, hn::Set(tag, static_cast<std::uint32_t>(lanes)));
+    }
+  }
+
+  void flush() {
+    out_.insert(out_.end(), events_, events_ + size_);
+    size_ = 0;
+  }
+
+ private:
+  static constexpr int room = 512;
+
+  int y_;
+  std::uint32_t t_;
+  std::vector<Event>& out_;
+  int size_ = 0;
+  Event events_[room + 16];
+};
+
 template <class Pixel>
 void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint32_t t,
               const Thresholds& thresholds, std::vector<Event>& out) {
@@ -37,6 +74,7 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint
   const auto positive = in_lanes<Pixel>(pixels, thresholds.positive);
   const auto negative = in_lanes<Pixel>(pixels, thresholds.negative);
   const auto zero = hn::Zero(pixels);
+  RowEvents events(y, t, out);
   int x = 0;
   for (; x + lanes <= width; x += lanes) {
     const auto a = hn::LoadU(pixels, before + x);
@@ -50,9 +88,9 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint
     std::uint64_t on_bits[longest_vector] = {};
     hn::StoreMaskBits(pixels, fired, reinterpret_cast<std::uint8_t*>(fired_bits));
     hn::StoreMaskBits(pixels, hn::Ne(rise, zero), reinterpret_cast<std::uint8_t*>(on_bits));
-    for (int i = 0; i * 64 < lanes; ++i)
-      append_fired(fired_bits[i], on_bits[i], x + 64 * i, y, t, out);
+    for (int i = 0; i * 64 < lanes; ++i) events.add(fired_bits[i], on_bits[i], x + 64 * i);
   }
+  events.flush();
   for (; x < width; ++x) {
     const int difference = now[x] - before[x];
     if (difference > thresholds.positive)

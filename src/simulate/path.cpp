@@ -11,7 +11,8 @@
 #include <array>
 
 #include "src/simulate/bands.hpp"
-#include "src/simulate/fired_bits.hpp"
+#include "src/simulate/fired_lanes-inl.hpp"
+#include "src/simulate/sampler-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -21,80 +22,45 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Pixels that are skipped together or not at all. No vector is wider.
 constexpr int tile_width = 16;
+static_assert(tile_width == most_sampled_lanes);
 constexpr int tile_height = 4;
 static_assert(rows_per_band % tile_height == 0);
 
-using Words = hn::CappedTag<std::int32_t, tile_width>;
-using Floats = hn::CappedTag<float, tile_width>;
-using Bytes = hn::Rebind<std::uint8_t, Words>;
-using Vector = hn::Vec<Words>;
-
-/// sample() of warp.hpp, for many places at once.
-class Sampler {
- public:
-  explicit Sampler(const PlaneView<std::uint8_t>& picture)
-      : pixels_(reinterpret_cast<const std::int32_t*>(picture.data)),
-        stride_(hn::Set(Words(), static_cast<std::int32_t>(picture.stride))),
-        right_end_(hn::Set(Words(), (picture.width - 1) * 64)),
-        lower_end_(hn::Set(Words(), (picture.height - 1) * 64)),
-        last_row_(hn::Set(Words(), picture.height - 1)) {}
-
-  /// At places in 1/65536 of a pixel; in 1/4096 of a grey level.
-  Vector at(Vector x, Vector y) const {
-    const auto zero = hn::Zero(Words());
-    const auto one = hn::Set(Words(), 1);
-    const auto half = hn::Set(Words(), 512);
-    const auto low_bits = hn::Set(Words(), 63);
-    const auto qx = hn::Min(hn::Max(hn::ShiftRight<10>(hn::Add(x, half)), zero), right_end_);
-    const auto qy = hn::Min(hn::Max(hn::ShiftRight<10>(hn::Add(y, half)), zero), lower_end_);
-    const auto x0 = hn::ShiftRight<6>(qx);
-    const auto y0 = hn::ShiftRight<6>(qy);
-    const auto y1 = hn::Min(hn::Add(y0, one), last_row_);
-    const auto right = hn::And(qx, low_bits);
-    const auto down = hn::And(qy, low_bits);
-    const auto upper = between(hn::Add(hn::Mul(y0, stride_), x0), right);
-    const auto lower = between(hn::Add(hn::Mul(y1, stride_), x0), right);
-    return hn::Add(hn::ShiftLeft<6>(upper), hn::Mul(hn::Sub(lower, upper), down));
-  }
-
- private:
-  /// Between a pixel and its right neighbour (whose weight is 0 where there is none), in 1/64.
-  Vector between(Vector offset, Vector right) const {
-    const auto byte = hn::Set(Words(), 255);
-    const auto pixels = hn::GatherOffset(Words(), pixels_, offset);
-    const auto a = hn::And(pixels, byte);
-    const auto b = hn::And(hn::ShiftRight<8>(pixels), byte);
-    return hn::Add(hn::ShiftLeft<6>(a), hn::Mul(hn::Sub(b, a), right));
-  }
-
-  const std::int32_t* pixels_;
-  Vector stride_;
-  Vector right_end_;
-  Vector lower_end_;
-  Vector last_row_;
-};
-
-/// motion_per_step(), for many flows at once.
-Vector motions(hn::Vec<Floats> flow, float scale) {
-  const auto longest = hn::Set(Floats(), static_cast<float>(longest_side));
-  const auto number = hn::IfThenElseZero(hn::Eq(flow, flow), flow);
-  const auto cut = hn::Min(hn::Max(number, hn::Neg(longest)), longest);
-  return hn::NearestInt(hn::Mul(cut, hn::Set(Floats(), scale)));
-}
+/// So many steps are sampled before what fires in them is looked for.
+constexpr int steps_at_once = 16;
 
 /// For each tile of a row of tiles the step at which to begin, where nothing can fire before the
 /// last one: at the last but one, or at the last where that shows the last frame itself. Else 1.
 using FirstSteps = std::array<int, longest_side / tile_width>;
 
-template <Interpolation interpolation>
-void fire_row(const Path<std::uint8_t>& path, int y, int band, const FirstSteps& first_steps,
-              EventBuckets& events) {
+/// Sets each pixel of some rows beside the one below it, the lowest beside itself.
+void pair_rows(const PlaneView<std::uint8_t>& picture, int first, int last,
+               Plane<std::uint16_t>& pairs) {
+  const hn::CappedTag<std::uint16_t, 32> words;
+  const hn::Rebind<std::uint8_t, decltype(words)> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(words));
+  for (int y = first; y < last; ++y) {
+    const std::uint8_t* here = picture.row(y);
+    const std::uint8_t* below = picture.row(std::min(y + 1, picture.height - 1));
+    std::uint16_t* out = pairs.row(y);
+    int x = 0;
+    for (; x + lanes <= picture.width; x += lanes) {
+      const auto low = hn::PromoteTo(words, hn::LoadU(bytes, here + x));
+      const auto high = hn::PromoteTo(words, hn::LoadU(bytes, below + x));
+      hn::StoreU(hn::Or(low, hn::ShiftLeft<8>(high)), words, out + x);
+    }
+    for (; x < picture.width; ++x) out[x] = static_cast<std::uint16_t>(here[x] | below[x] << 8);
+  }
+}
+
+template <Interpolation interpolation, class LastSampler>
+void fire_row(const Path<std::uint8_t>& path, const LastSampler& last, int y, int band,
+              const FirstSteps& first_steps, EventBuckets& events) {
   const Words words;
   const int lanes = static_cast<int>(hn::Lanes(words));
   const int width = path.flow.width;
   const int steps = path.steps.count();
   const float scale = 65536.0F / static_cast<float>(steps);
-  const Sampler last(path.warp.last);
   const Sampler now(path.warp.now);
   const std::uint8_t* last_row = path.warp.last.row(y);
   const std::uint8_t* now_row = path.warp.now.row(y);
@@ -105,16 +71,18 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, const FirstSteps&
   for (int x = 0; x < width; x += lanes) {
     const int count = std::min(lanes, width - x);
     const auto within = hn::FirstN(words, static_cast<std::size_t>(count));
+    const auto off = off_events(x, y);
     const auto fire = [&](Vector before, Vector after, int j) {
       const auto difference = hn::Sub(after, before);
       const auto on = hn::Gt(difference, positive);
       const auto fired = hn::And(hn::Or(on, hn::Gt(hn::Neg(difference), negative)), within);
       if (hn::AllFalse(words, fired)) return;
-      std::uint64_t fired_bits = 0;
-      std::uint64_t on_bits = 0;
-      hn::StoreMaskBits(words, fired, reinterpret_cast<std::uint8_t*>(&fired_bits));
-      hn::StoreMaskBits(words, on, reinterpret_cast<std::uint8_t*>(&on_bits));
-      append_fired(fired_bits, on_bits, x, y, path.steps.microseconds(j), events.bucket(j, band));
+      const FiredLanes tag;
+      Event here[hn::MaxLanes(tag)];
+      store_fired(off, hn::RebindMask(tag, fired), hn::RebindMask(tag, on),
+                  path.steps.microseconds(j), here);
+      auto& out = events.bucket(j, band);
+      out.insert(out.end(), here, here + hn::CountTrue(words, fired));
     };
 
     auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
@@ -135,22 +103,36 @@ void fire_row(const Path<std::uint8_t>& path, int y, int band, const FirstSteps&
 
     auto from_x = hn::Sub(px, hn::Mul(dx, hn::Set(words, first - 1)));
     auto from_y = hn::Sub(py, hn::Mul(dy, hn::Set(words, first - 1)));
-    for (int j = first; j < steps; ++j) {
+    const auto value_at = [&](int j) {
       from_x = hn::Sub(from_x, dx);
       from_y = hn::Sub(from_y, dy);
-      auto value = last.at(from_x, from_y);
+      const auto value = last.at(from_x, from_y);
       if constexpr (interpolation == Interpolation::forward) {
-        value = hn::ShiftRight<12>(hn::Add(value, hn::Set(words, 2048)));
+        return hn::ShiftRight<12>(hn::Add(value, hn::Set(words, 2048)));
       } else {
         const auto left = hn::Set(words, steps - j);
         const auto later = now.at(hn::Add(px, hn::Mul(left, dx)), hn::Add(py, hn::Mul(left, dy)));
         const int weight = blend_weight(j, steps);
-        value = hn::Add(hn::Mul(value, hn::Set(words, 256 - weight)),
-                        hn::Mul(later, hn::Set(words, weight)));
-        value = hn::ShiftRight<20>(hn::Add(value, hn::Set(words, 1 << 19)));
+        const auto sum = hn::Add(hn::Mul(value, hn::Set(words, 256 - weight)),
+                                 hn::Mul(later, hn::Set(words, weight)));
+        return hn::ShiftRight<20>(hn::Add(sum, hn::Set(words, 1 << 19)));
       }
-      if (first == 1) fire(before, value, j);
-      before = value;
+    };
+    if (first > 1) {
+      before = value_at(first);
+    } else {
+      // Many samples before what fires, which is hard to foretell: none waits for that.
+      HWY_ALIGN std::int32_t values[steps_at_once * hn::MaxLanes(words)];
+      for (int begin = 1; begin < steps; begin += steps_at_once) {
+        const int count_here = std::min(steps_at_once, steps - begin);
+        for (int k = 0; k < count_here; ++k)
+          hn::Store(value_at(begin + k), words, values + std::ptrdiff_t{k} * lanes);
+        for (int k = 0; k < count_here; ++k) {
+          const auto value = hn::Load(words, values + std::ptrdiff_t{k} * lanes);
+          fire(before, value, begin + k);
+          before = value;
+        }
+      }
     }
     fire(before, end, steps);
   }
@@ -219,8 +201,9 @@ int first_step(const Path<std::uint8_t>& path, const Steepness& steepness, const
   return dx * bound.x + dy * bound.y <= threshold << 16 ? std::max(1, steps - 1) : 1;
 }
 
-void fire_band_forward(const Path<std::uint8_t>& path, const Steepness& steepness, int band,
-                       EventBuckets& events) {
+void fire_band_forward(const Path<std::uint8_t>& path, const PlaneView<std::uint16_t>& last_pairs,
+                       const Steepness& steepness, int band, EventBuckets& events) {
+  const PairSampler last(last_pairs);
   const BandRows rows(band, path.flow.height);
   const int width = path.flow.width;
   FirstSteps first_steps;
@@ -230,16 +213,17 @@ void fire_band_forward(const Path<std::uint8_t>& path, const Steepness& steepnes
       first_steps[static_cast<std::size_t>(left / tile_width)] =
           first_step(path, steepness, {left, top, std::min(left + tile_width, width), bottom});
     for (int y = top; y < bottom; ++y)
-      fire_row<Interpolation::forward>(path, y, band, first_steps, events);
+      fire_row<Interpolation::forward>(path, last, y, band, first_steps, events);
   }
 }
 
 void fire_band_blend(const Path<std::uint8_t>& path, int band, EventBuckets& events) {
+  const Sampler last(path.warp.last);
   const BandRows rows(band, path.flow.height);
   FirstSteps first_steps;
   first_steps.fill(1);
   for (int y = rows.first; y < rows.last; ++y)
-    fire_row<Interpolation::blend>(path, y, band, first_steps, events);
+    fire_row<Interpolation::blend>(path, last, y, band, first_steps, events);
 }
 
 }  // namespace
@@ -276,6 +260,7 @@ void fire_band_16(const Path<std::uint16_t>& path, int band, EventBuckets& event
   for (int y = rows.first; y < rows.last; ++y) fire_row_16<interpolation>(path, y, band, events);
 }
 
+HWY_EXPORT(pair_rows);
 HWY_EXPORT(fire_band_forward);
 HWY_EXPORT(fire_band_blend);
 
@@ -286,8 +271,14 @@ void PathWalker::fire(const Path<std::uint8_t>& path, ThreadPool& threads, Event
   events.reset(path.steps.count(), bands);
   if (path.interpolation == Interpolation::forward) {
     steepness_.measure(path.warp.last, threads);
+    if (last_pairs_.width() != path.flow.width || last_pairs_.height() != path.flow.height)
+      last_pairs_ = Plane<std::uint16_t>(path.flow.width, path.flow.height);
     threads.for_each(bands, [&](int band, int) {
-      HWY_DYNAMIC_DISPATCH(fire_band_forward)(path, steepness_, band, events);
+      const BandRows rows(band, path.flow.height);
+      HWY_DYNAMIC_DISPATCH(pair_rows)(path.warp.last, rows.first, rows.last, last_pairs_);
+    });
+    threads.for_each(bands, [&](int band, int) {
+      HWY_DYNAMIC_DISPATCH(fire_band_forward)(path, last_pairs_.view(), steepness_, band, events);
     });
   } else {
     threads.for_each(bands, [&](int band, int) {

@@ -40,6 +40,7 @@ class PathWalker {
 
  private:
   Steepness steepness_;
+  Plane<std::uint16_t> last_pairs_;  ///< the last frame, each pixel beside the one below it
 };
 
 }  // namespace eventcamera

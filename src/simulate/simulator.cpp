@@ -21,9 +21,14 @@ const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
   return is_first ? nullptr : &events_;
 }
 
-void Simulator::hold_until(Nanoseconds time) {
+const EventBuckets* Simulator::hold_until(Nanoseconds time, const Settings& settings) {
   assert(!last_time_ || time >= *last_time_);
-  if (last_time_) last_time_ = time;
+  if (!last_time_) return nullptr;
+  const Nanoseconds duration = time - *last_time_;
+  last_time_ = time;
+  if (duration <= 0 || duration > longest_interval) return nullptr;
+  threads_.set_threads(settings.threads);
+  return hold(StepTimes(duration, 1), settings, events_) ? &events_ : nullptr;
 }
 
 void Simulator::reset() {

@@ -55,23 +55,28 @@ class Simulator {
 
   /// Says that the last frame still stood at `time`, which must not lie before it: the events up
   /// to the next frame are those of (time, time of the next frame]. Without effect where there is
-  /// no last frame.
-  void hold_until(Nanoseconds time);
+  /// no last frame. Returns what fired in (time of the last frame, time] although nothing changed,
+  /// sorted and good until the next call; or nullptr where that cannot be.
+  const EventBuckets* hold_until(Nanoseconds time, const Settings& settings = {});
 
   /// Forgets all frames: the next one is a first frame.
   void reset();
+
+  /// What it works with, for what is done with its events between its calls.
+  ThreadPool& threads() { return threads_; }
 
  protected:
   explicit Simulator(LumaFormat format) : format_(format) {}
 
   const LumaFormat& format() const { return format_; }
-  ThreadPool& threads() { return threads_; }
 
   /// Keeps the first frame.
   virtual void start(const LumaView& frame) = 0;
   /// Fills `events` from the last frame and this one, and keeps this one.
   virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                         EventBuckets& events) = 0;
+  /// Fills `events` with what the pixels do of themselves while the last frame stands, if they do.
+  virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
 
  private:
   LumaFormat format_;

@@ -140,7 +140,7 @@ class SparseSimulator final : public Simulator {
   }
 
   Plane<Pixel> last_;
-  PointTracker tracker_{disagreement_of_frames};
+  PointTracker tracker_;
   Grey8 grey_;
   EventBuckets changes_;
   std::vector<Point> changed_;

@@ -36,6 +36,29 @@ TEST(EventBuckets, ReadStepByStepAndBandByBand) {
   EXPECT_EQ(buckets.buckets().size(), 1U);
 }
 
+TEST(EventBuckets, AreCopiedAlikeByAnyNumberOfThreads) {
+  EventBuckets buckets;
+  buckets.reset(3, 4);
+  int x = 0;
+  for (int step = 1; step <= 3; ++step)
+    for (int band = 0; band < 4; ++band)
+      for (int i = 0; i < 5000 * ((step + band) % 3); ++i)
+        buckets.bucket(step, band).push_back(Event::at(x++, band, step, Polarity::on));
+  const auto count = static_cast<std::size_t>(x);
+  ASSERT_EQ(buckets.size(), count);
+  std::vector<Event> expected(count);
+  buckets.copy_to(expected.data());
+  ThreadPool threads;
+  for (const int most : {1, 2, 0}) {
+    threads.set_threads(most);
+    std::vector<Event> events(count);
+    buckets.copy_to(events.data(), threads);
+    EXPECT_TRUE(events == expected) << most << " threads";
+  }
+  buckets.reset(1, 1);
+  buckets.copy_to(nullptr, threads);
+}
+
 TEST(StepTimes, ShareOutTheInterval) {
   const StepTimes steps(33'333'333, 11);
   EXPECT_EQ(steps.count(), 11);

@@ -152,7 +152,7 @@ TEST(PointTracker, FollowsATexture) {
   const auto from = scene::texture<std::uint8_t>(160, 120, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(160, 120, 8, -4, 2);
   ThreadPool threads;
-  PointTracker tracker(disagreement_of_frames);
+  PointTracker tracker;
   tracker.push(from.view(), threads);
   tracker.push(to.view(), threads);
   const Point points[] = {{60, 50}, {80, 70}, {100, 40}};
@@ -167,7 +167,7 @@ TEST(PointTracker, FollowsATexture) {
 TEST(PointTracker, LosesWhatHasNoTexture) {
   const auto picture = scene::flat<std::uint8_t>(60, 40, 90);
   ThreadPool threads;
-  PointTracker tracker(disagreement_of_frames);
+  PointTracker tracker;
   tracker.push(picture.view(), threads);
   tracker.push(picture.view(), threads);
   const Point points[] = {{30, 20}};

@@ -2,51 +2,33 @@
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <utility>
 
 namespace eventcamera {
 namespace {
 
-constexpr int cell_side = 2;
-/// Cells whose flow differs by more than this do not share in a point's, pixels.
-constexpr float similar = 1;
-
-constexpr int per_round = 256;
-
-float distance(const Flow& a, const Flow& b) {
-  return std::hypot(a.x - b.x, a.y - b.y);
-}
-
-/// Calls body(first, last) for parts of 0 ... count.
-template <class Body>
-void for_each_part(ThreadPool& threads, std::size_t count, const Body& body) {
-  threads.for_each(static_cast<int>((count + per_round - 1) / per_round), [&](int round, int) {
-    const std::size_t first = static_cast<std::size_t>(round) * per_round;
-    body(first, std::min(first + per_round, count));
-  });
-}
-
-/// The neighbour next nearest to a position that lies off the middle of a cell.
-int other(int position) {
-  return position / 2 + (position % 2 == 0 ? -1 : 1);
-}
-
-/// Adds up flows by their weights.
-class Mean {
+/// Where a point of a block lies on a level, in one direction.
+class Place {
  public:
-  void add(const Flow& flow, float weight) {
-    x_ += weight * flow.x;
-    y_ += weight * flow.y;
-    weights_ += weight;
-  }
+  Place(int position, std::size_t level) : position_(position), level_(static_cast<int>(level)) {}
 
-  Flow flow() const { return {x_ / weights_, y_ / weights_}; }
+  /// In eighths of a pixel.
+  int fraction() const { return (position_ & mask(level_)) << (top_level - level_); }
+  int tile() const { return position_ >> level_ >> bits_of_tile; }
+  int within_tile() const { return position_ >> level_ & mask(bits_of_tile); }
+  /// Its tile and its fraction together: on every level as many.
+  int group() const { return tile() << level_ | (position_ & mask(level_)); }
 
  private:
-  float x_ = 0;
-  float y_ = 0;
-  float weights_ = 0;
+  static constexpr int top_level = Pyramid::most_levels - 1;
+  static constexpr int bits_of_tile = 4;
+  static_assert(1 << bits_of_tile == Tile::side && 1 << top_level == Tile::fractions);
+
+  static int mask(int bits) { return (1 << bits) - 1; }
+
+  int position_;
+  int level_;
 };
 
 }  // namespace
@@ -55,132 +37,90 @@ void PointTracker::push(const PlaneView<std::uint8_t>& picture, ThreadPool& thre
   std::swap(last_, next_);
   next_.build(picture, threads);
   has_slopes_ = false;
-  const auto& levels = next_.levels();
-  if (grids_.size() == levels.size()) return;
-  for (const auto& level : levels) {
-    const int width = (level.picture.width() + cell_side - 1) / cell_side;
-    const int height = (level.picture.height() + cell_side - 1) / cell_side;
-    grids_.push_back(
-        {width,
-         height,
-         std::vector<Cell>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
-         {}});
-  }
 }
 
 std::span<const Track> PointTracker::track(std::span<const Point> points, ThreadPool& threads) {
   tracks_.resize(points.size());
   if (points.empty()) return tracks_;
   if (!std::exchange(has_slopes_, true)) last_.build_slopes(threads);
-  want_cells(points);
-  for (std::size_t level = grids_.size(); level-- > 0;) search_cells(level, threads);
-
-  agreed_.resize(points.size());
-  for_each_part(threads, points.size(), [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i)
-      agreed_[i] = interpolate(points[i], tracks_[i]) ? 1 : 0;
+  const auto& picture = last_.levels()[0].picture;
+  find_rows(points, picture.height());
+  constexpr std::size_t most = std::size_t{block_side} * block_side;
+  while (static_cast<int>(blocks_.size()) < threads.threads())
+    blocks_.push_back({std::vector<std::uint32_t>(most), std::vector<std::uint32_t>(most)});
+  const int across = (picture.width() + block_side - 1) / block_side;
+  const int down = (picture.height() + block_side - 1) / block_side;
+  threads.for_each(across * down, [&](int i, int thread) {
+    follow(points, i % across * block_side, i / across * block_side,
+           blocks_[static_cast<std::size_t>(thread)]);
   });
-  alone_.clear();
-  for (std::size_t i = 0; i < points.size(); ++i)
-    if (agreed_[i] == 0) alone_.push_back(i);
-  search_alone(points, threads);
   return tracks_;
 }
 
-void PointTracker::want_cells(std::span<const Point> points) {
-  if (++call_ == 0) ++call_;  // 0: never
-  for (auto& grid : grids_) grid.wanted.clear();
-  const auto want = [this](CellGrid& grid, const Point& cell) {
-    if (std::exchange(grid.at(cell).call, call_) != call_) grid.wanted.push_back(cell);
+void PointTracker::find_rows(std::span<const Point> points, int height) {
+  rows_.clear();
+  for (std::size_t i = 0; i < points.size(); ++i)
+    while (static_cast<int>(rows_.size()) <= points[i].y) rows_.push_back(i);
+  rows_.resize(static_cast<std::size_t>(height) + 1, points.size());
+}
+
+void PointTracker::follow(std::span<const Point> points, int left, int top, Block& block) {
+  block.points.clear();
+  const int bottom = std::min(top + block_side, static_cast<int>(rows_.size()) - 1);
+  for (int y = top; y < bottom; ++y) {
+    const auto row =
+        points.subspan(rows_[static_cast<std::size_t>(y)],
+                       rows_[static_cast<std::size_t>(y) + 1] - rows_[static_cast<std::size_t>(y)]);
+    const auto first = std::lower_bound(row.begin(), row.end(), left,
+                                        [](const Point& p, int x) { return p.x < x; });
+    for (auto it = first; it != row.end() && it->x < left + block_side; ++it) {
+      const auto index = static_cast<std::uint32_t>(&*it - points.data());
+      block.points.push_back(index);
+      tracks_[index].flow = {0, 0};
+    }
+  }
+  if (block.points.empty()) return;
+  block.ordered.resize(block.points.size());
+  for (std::size_t level = last_.levels().size(); level-- > 0;)
+    search(points, level, left, top, block);
+}
+
+void PointTracker::search(std::span<const Point> points, std::size_t level, int left, int top,
+                          Block& block) {
+  const auto group = [&](const Point& point) {
+    constexpr int groups_across = 1 << (Pyramid::most_levels - 1);
+    return static_cast<std::size_t>(Place(point.y - top, level).group() * groups_across +
+                                    Place(point.x - left, level).group());
   };
-  for (const auto& point : points) want(grids_[0], {point.x / cell_side, point.y / cell_side});
-  for (std::size_t level = 1; level < grids_.size(); ++level)
-    for (const auto& cell : grids_[level - 1].wanted) want(grids_[level], {cell.x / 2, cell.y / 2});
-}
+  std::array<std::uint32_t, tiles_a_block> ends{};
+  for (const auto index : block.points) ++ends[group(points[index])];
+  std::uint32_t sum = 0;
+  for (auto& end : ends) sum += std::exchange(end, sum);
+  for (const auto index : block.points) block.ordered[ends[group(points[index])]++] = index;
 
-const PointTracker::Cell* PointTracker::wanted_cell(const CellGrid& grid, int x, int y) const {
-  if (x < 0 || x >= grid.width || y < 0 || y >= grid.height) return nullptr;
-  const Cell& cell = grid.at({x, y});
-  return cell.call == call_ ? &cell : nullptr;
-}
-
-Flow PointTracker::guess(const CellGrid& above, const Point& cell) const {
-  // A cell's middle lies a quarter of a larger cell off that one's middle.
-  constexpr float near = 0.75F;
-  constexpr float far = 0.25F;
-  Mean mean;
-  const auto add = [&](int x, int y, float weight) {
-    if (const auto* neighbour = wanted_cell(above, x, y)) mean.add(neighbour->flow, weight);
-  };
-  const Point parent{cell.x / 2, cell.y / 2};
-  add(parent.x, parent.y, near * near);
-  add(other(cell.x), parent.y, far * near);
-  add(parent.x, other(cell.y), near * far);
-  add(other(cell.x), other(cell.y), far * far);
-  const Flow flow = mean.flow();
-  return {2 * flow.x, 2 * flow.y};
-}
-
-void PointTracker::search_cells(std::size_t level, ThreadPool& threads) {
-  auto& grid = grids_[level];
-  const auto& picture = last_.levels()[level].picture;
-  searches_.resize(grid.wanted.size());
-  for_each_part(threads, grid.wanted.size(), [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      const auto& cell = grid.wanted[i];
-      const int x = std::min(cell.x * cell_side + cell_side / 2, picture.width() - 1);
-      const int y = std::min(cell.y * cell_side + cell_side / 2, picture.height() - 1);
-      const Flow start = level + 1 < grids_.size() ? guess(grids_[level + 1], cell) : Flow{0, 0};
-      searches_[i] = {static_cast<float>(x), static_cast<float>(y), start, false};
+  std::uint32_t first = 0;
+  for (const auto end : ends) {
+    const auto in_tile = std::span<const std::uint32_t>(block.ordered).subspan(first, end - first);
+    first = end;
+    if (in_tile.empty()) continue;
+    const Place x(points[in_tile[0]].x - left, level);
+    const Place y(points[in_tile[0]].y - top, level);
+    const Tile tile{(left >> level) + x.tile() * Tile::side, (top >> level) + y.tile() * Tile::side,
+                    x.fraction(), y.fraction()};
+    std::array<Search, std::size_t{Tile::side} * Tile::side> searches;
+    for (std::size_t i = 0; i < in_tile.size(); ++i) {
+      const auto& point = points[in_tile[i]];
+      const auto& flow = tracks_[in_tile[i]].flow;
+      searches[i] = {Place(point.x - left, level).within_tile(),
+                     Place(point.y - top, level).within_tile(),
+                     {2 * flow.x, 2 * flow.y},
+                     false};
     }
-    search_level(last_.levels()[level], next_.levels()[level],
-                 std::span(searches_).subspan(first, last - first));
-    for (std::size_t i = first; i < last; ++i) {
-      Cell& cell = grid.at(grid.wanted[i]);
-      cell.flow = searches_[i].flow;
-      cell.found = searches_[i].found;
-    }
-  });
-}
-
-bool PointTracker::interpolate(const Point& point, Track& track) const {
-  const auto& grid = grids_[0];
-  const Point home{point.x / cell_side, point.y / cell_side};
-  const Cell& own = *wanted_cell(grid, home.x, home.y);
-  if (!own.found) return false;
-  for (int y = home.y - 1; y <= home.y + 1; ++y)
-    for (int x = home.x - 1; x <= home.x + 1; ++x)
-      if (const auto* cell = wanted_cell(grid, x, y))
-        if (!cell->found || distance(cell->flow, own.flow) > disagreement_) return false;
-  // The second pixel of a cell is its middle; the first lies half way to the cell before.
-  Mean mean;
-  for (int y = point.y % 2 == 0 ? home.y - 1 : home.y; y <= home.y; ++y)
-    for (int x = point.x % 2 == 0 ? home.x - 1 : home.x; x <= home.x; ++x)
-      if (const auto* cell = wanted_cell(grid, x, y))
-        if (distance(cell->flow, own.flow) <= similar) mean.add(cell->flow, 1);
-  track = {mean.flow(), true};
-  return true;
-}
-
-void PointTracker::search_alone(std::span<const Point> points, ThreadPool& threads) {
-  searches_.resize(alone_.size());
-  for_each_part(threads, alone_.size(), [&](std::size_t first, std::size_t last) {
-    const auto part = std::span(searches_).subspan(first, last - first);
-    for (auto& search : part) search.flow = {0, 0};
-    for (std::size_t level = grids_.size(); level-- > 0;) {
-      const float scale = 1.0F / static_cast<float>(1 << level);
-      for (std::size_t i = first; i < last; ++i) {
-        const auto& point = points[alone_[i]];
-        auto& search = searches_[i];
-        search.x = static_cast<float>(point.x) * scale;
-        search.y = static_cast<float>(point.y) * scale;
-        search.flow = {2 * search.flow.x, 2 * search.flow.y};
-      }
-      search_level(last_.levels()[level], next_.levels()[level], part);
-    }
-    for (std::size_t i = first; i < last; ++i)
-      tracks_[alone_[i]] = {searches_[i].flow, searches_[i].found};
-  });
+    search_tile(last_.levels()[level], next_.levels()[level], tile,
+                std::span(searches).first(in_tile.size()));
+    for (std::size_t i = 0; i < in_tile.size(); ++i)
+      tracks_[in_tile[i]] = {searches[i].flow, searches[i].found};
+  }
 }
 
 }  // namespace eventcamera

@@ -8,6 +8,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -18,14 +19,20 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
+/// A row of a window, or a part of it.
 using Values = hn::CappedTag<std::int16_t, 16>;
 using Bytes = hn::Rebind<std::uint8_t, Values>;
 using Sums = hn::Repartition<std::int32_t, Values>;
 using Value = hn::Vec<Values>;
+using Sum = hn::Vec<Sums>;
+
+/// One lane a point.
+using Floats = hn::CappedTag<float, 16>;
+using Ints = hn::RebindToSigned<Floats>;
 
 constexpr int window = 15;
 constexpr int half_window = window / 2;
-/// A row of the window takes up 16 values, the last of them 0 in the slopes.
+/// A row of the window takes up 16 values, the last of them without weight.
 constexpr int row_values = 16;
 constexpr int most_moves = 10;
 constexpr float shortest_move = 0.03F;
@@ -35,238 +42,484 @@ constexpr float turning_back = 0.01F;
 constexpr float least_texture = 1e-4F;
 /// Products of slopes (32 a grey level) in the units of least_texture.
 constexpr float slope_product = 1.0F / (1 << 20);
-/// Products of a slope and a value (64 a grey level), in the same units.
-constexpr float mismatch_product = slope_product / 2;
+/// Products of a slope and a value (4 a grey level), in the same units.
+constexpr float mismatch_product = slope_product * 8;
 
-/// Where a window lies: its upper left pixel, and how far beyond it, in 1/32768 pixel.
-struct Corner {
-  int x;
-  int y;
-  std::int16_t right;
-  std::int16_t down;
-
-  Corner(float left, float top) {
-    const float whole_x = std::floor(left);
-    const float whole_y = std::floor(top);
-    x = static_cast<int>(whole_x);
-    y = static_cast<int>(whole_y);
-    right = fraction(left - whole_x);
-    down = fraction(top - whole_y);
+/// Calls body(row) for the rows of a window; several to a round, so that what goes from one to the
+/// next stays where it is.
+template <class Body>
+HWY_INLINE void for_each_row(const Body& body) {
+  static_assert(window % 5 == 0);
+  for (int row = 0; row < window; row += 5) {
+    body(row);
+    body(row + 1);
+    body(row + 2);
+    body(row + 3);
+    body(row + 4);
   }
-
-  static std::int16_t fraction(float part) {
-    return static_cast<std::int16_t>(std::min(part * 32768.0F + 0.5F, 32767.0F));
-  }
-
-  bool within_margin(const PlaneWithMargin<std::uint8_t>& picture) const {
-    return x >= -window && y >= -window && x < picture.width() && y < picture.height();
-  }
-};
-
-/// Values between two neighbours.
-Value between(Value a, Value b, Value part) {
-  return hn::Add(a, hn::MulFixedPoint15(hn::Sub(b, a), part));
 }
 
-/// The rows of a window, bilinearly, one after another.
-template <class Load>
-class BilinearRows {
+/// What the windows of a tile's points cover of the first picture, bilinearly where the points lie
+/// between pixels.
+class Patch {
  public:
-  BilinearRows(const Corner& corner, Load load)
-      : load_(load),
-        right_(hn::Set(Values(), corner.right)),
-        down_(hn::Set(Values(), corner.down)),
-        upper_(across(0)) {}
+  static constexpr int stride = 2 * row_values;
 
-  Value next() {
-    const auto lower = across(++row_);
-    return between(std::exchange(upper_, lower), lower, down_);
+  /// For points in rows first_row ... last_row of the tile.
+  Patch(const Pyramid::Level& level, const Tile& tile, int first_row, int last_row)
+      : first_row_(first_row) {
+    const int rows = last_row - first_row + window;
+    const int x = tile.left - half_window;
+    const int y = tile.top + first_row - half_window;
+    const Values values;
+    const auto load_grey = [&](int row, int column) {
+      const auto* at = level.picture.row(y + row) + x + column;
+      return hn::ShiftLeft<2>(hn::PromoteTo(values, hn::LoadU(Bytes(), at)));
+    };
+    const auto load_from = [&](const PlaneWithMargin<std::int16_t>& slope) {
+      return
+          [&](int row, int column) { return hn::LoadU(values, slope.row(y + row) + x + column); };
+    };
+    interpolate(tile, rows, load_grey, grey_);
+    interpolate(tile, rows, load_from(level.slope_x), slope_x_);
+    interpolate(tile, rows, load_from(level.slope_y), slope_y_);
   }
+
+  /// Where a point's window begins in these; its rows lie `stride` apart.
+  int index(int x, int y) const { return (y - first_row_) * stride + x; }
+  const std::int16_t* grey() const { return grey_; }
+  const std::int16_t* slope_x() const { return slope_x_; }
+  const std::int16_t* slope_y() const { return slope_y_; }
 
  private:
-  Value across(int row) const { return between(load_(row, 0), load_(row, 1), right_); }
+  static constexpr int most_values = (Tile::side + window) * stride;
 
-  Load load_;
-  Value right_;
-  Value down_;
-  Value upper_;
-  int row_ = 0;
+  template <class Load>
+  static void interpolate(const Tile& tile, int rows, const Load& load, std::int16_t* out) {
+    const Values values;
+    const int lanes = static_cast<int>(hn::Lanes(values));
+    constexpr int fraction = (1 << 15) / Tile::fractions;
+    const auto right = hn::Set(values, static_cast<std::int16_t>(tile.right * fraction));
+    const auto down = hn::Set(values, static_cast<std::int16_t>(tile.down * fraction));
+    const auto between = [](Value a, Value b, Value part) {
+      return hn::Add(a, hn::MulFixedPoint15(hn::Sub(b, a), part));
+    };
+    for (int column = 0; column < stride; column += lanes) {
+      const auto across = [&](int row) {
+        return between(load(row, column), load(row, column + 1), right);
+      };
+      auto upper = across(0);
+      for (int row = 0; row < rows; ++row) {
+        const auto lower = across(row + 1);
+        hn::Store(between(upper, lower, down), values, out + std::ptrdiff_t{row} * stride + column);
+        upper = lower;
+      }
+    }
+  }
+
+  HWY_ALIGN std::int16_t grey_[most_values];
+  HWY_ALIGN std::int16_t slope_x_[most_values];
+  HWY_ALIGN std::int16_t slope_y_[most_values];
+  int first_row_;
 };
-
-/// Grey levels of a picture from a column of a corner on, 64 times.
-auto grey_levels(const PlaneWithMargin<std::uint8_t>& picture, const Corner& corner, int column) {
-  return [&picture, corner, column](int row, int right) {
-    const auto* at = picture.row(corner.y + row) + corner.x + column + right;
-    return hn::ShiftLeft<6>(hn::PromoteTo(Values(), hn::LoadU(Bytes(), at)));
-  };
-}
-
-auto slopes(const PlaneWithMargin<std::int16_t>& slope, const Corner& corner, int column) {
-  return [&slope, corner, column](int row, int right) {
-    return hn::LoadU(Values(), slope.row(corner.y + row) + corner.x + column + right);
-  };
-}
 
 /// A sum of the products of a column of vectors: 32 bits hold 15 of the largest.
+template <class Factors = Values>
 class ProductSum {
  public:
+  using Factor = hn::Vec<Factors>;
+  using Lanes = hn::Repartition<std::int32_t, Factors>;
+
   // Written out, or GCC 12 makes it without the target's instructions.
-  ProductSum() : low_(hn::Zero(Sums())), high_(hn::Zero(Sums())) {}
-  void add(Value a, Value b) { low_ = hn::ReorderWidenMulAccumulate(Sums(), a, b, low_, high_); }
-  std::int64_t total() const {
-    HWY_ALIGN std::int32_t low[hn::MaxLanes(Sums())];
-    HWY_ALIGN std::int32_t high[hn::MaxLanes(Sums())];
-    hn::Store(low_, Sums(), low);
-    hn::Store(high_, Sums(), high);
-    std::int64_t sum = 0;
-    for (std::size_t i = 0; i < hn::Lanes(Sums()); ++i) sum += std::int64_t{low[i]} + high[i];
-    return sum;
-  }
+  ProductSum() : low_(hn::Zero(Lanes())), high_(hn::Zero(Lanes())) {}
+  void add(Factor a, Factor b) { low_ = hn::ReorderWidenMulAccumulate(Lanes(), a, b, low_, high_); }
+  hn::Vec<Lanes> lanes() const { return hn::Add(low_, high_); }
 
  private:
-  hn::Vec<Sums> low_;
-  hn::Vec<Sums> high_;
+  hn::Vec<Lanes> low_;
+  hn::Vec<Lanes> high_;
 };
 
-/// Rows of a window that lies on whole pixels.
-template <class Load>
-class PixelRows {
- public:
-  PixelRows(const Corner&, Load load) : load_(load) {}
-  Value next() { return load_(row_++, 0); }
+/// The parts that a row of a window makes in four sums.
+constexpr std::ptrdiff_t parts = hn::MaxLanes(Sums()) == 8 ? 2 : 1;
 
- private:
-  Load load_;
-  int row_ = 0;
-};
-
-/// The window of the first picture: its slopes, and the sums of their products.
-struct Window {
-  HWY_ALIGN std::int16_t slope_x[window * row_values];
-  HWY_ALIGN std::int16_t slope_y[window * row_values];
-  float xx;
-  float xy;
-  float yy;
-  std::int64_t grey_x = 0;  ///< of the slopes and the grey levels
-  std::int64_t grey_y = 0;
-
-  Window(const Pyramid::Level& level, const Corner& corner) {
-    if (corner.right == 0 && corner.down == 0)
-      read<PixelRows>(level, corner);
-    else
-      read<BilinearRows>(level, corner);
-  }
-
-  float determinant() const { return xx * yy - xy * xy; }
-
-  bool can_be_followed() const {
-    const float root = std::sqrt((xx - yy) * (xx - yy) + 4.0F * xy * xy);
-    const float least = (xx + yy - root) / (2 * window * window);
-    return least >= least_texture && determinant() >= std::numeric_limits<float>::epsilon();
-  }
-
-  /// The move that Newton's method makes from where `corner` lies in the other picture.
-  Flow move(const PlaneWithMargin<std::uint8_t>& picture, const Corner& corner) const {
-    const Values values;
-    const int lanes = static_cast<int>(hn::Lanes(values));
-    // The sums over (there - here) * slope; those over here are known.
-    std::int64_t mismatch_x = -grey_x;
-    std::int64_t mismatch_y = -grey_y;
-    for (int column = 0; column < row_values; column += lanes) {
-      ProductSum sum_x;
-      ProductSum sum_y;
-      BilinearRows greys(corner, grey_levels(picture, corner, column));
-      for (int y = 0; y < window; ++y) {
-        const int at = y * row_values + column;
-        const auto grey = greys.next();
-        sum_x.add(grey, hn::Load(values, slope_x + at));
-        sum_y.add(grey, hn::Load(values, slope_y + at));
-      }
-      mismatch_x += sum_x.total();
-      mismatch_y += sum_y.total();
-    }
-    const float x = static_cast<float>(mismatch_x) * mismatch_product;
-    const float y = static_cast<float>(mismatch_y) * mismatch_product;
-    const float scale = 1.0F / determinant();
-    return {(xy * y - yy * x) * scale, (xy * x - xx * y) * scale};
-  }
-
- private:
-  template <template <class> class Rows>
-  void read(const Pyramid::Level& level, const Corner& corner) {
-    const Values values;
-    const int lanes = static_cast<int>(hn::Lanes(values));
-    std::int64_t total_xx = 0;
-    std::int64_t total_xy = 0;
-    std::int64_t total_yy = 0;
-    for (int column = 0; column < row_values; column += lanes) {
-      ProductSum sum_xx;
-      ProductSum sum_xy;
-      ProductSum sum_yy;
-      ProductSum sum_grey_x;
-      ProductSum sum_grey_y;
-      Rows greys(corner, grey_levels(level.picture, corner, column));
-      Rows rows_x(corner, slopes(level.slope_x, corner, column));
-      Rows rows_y(corner, slopes(level.slope_y, corner, column));
-      const auto within =
-          hn::FirstN(values, static_cast<std::size_t>(std::min(lanes, window - column)));
-      for (int y = 0; y < window; ++y) {
-        const int at = y * row_values + column;
-        const auto dx = hn::IfThenElseZero(within, rows_x.next());
-        const auto dy = hn::IfThenElseZero(within, rows_y.next());
-        const auto grey = greys.next();
-        hn::Store(dx, values, slope_x + at);
-        hn::Store(dy, values, slope_y + at);
-        sum_xx.add(dx, dx);
-        sum_xy.add(dx, dy);
-        sum_yy.add(dy, dy);
-        sum_grey_x.add(grey, dx);
-        sum_grey_y.add(grey, dy);
-      }
-      total_xx += sum_xx.total();
-      total_xy += sum_xy.total();
-      total_yy += sum_yy.total();
-      grey_x += sum_grey_x.total();
-      grey_y += sum_grey_y.total();
-    }
-    xx = static_cast<float>(total_xx) * slope_product;
-    xy = static_cast<float>(total_xy) * slope_product;
-    yy = static_cast<float>(total_yy) * slope_product;
-  }
-};
-
-void search_one(const Pyramid::Level& from, const Pyramid::Level& to, Search& search) {
-  search.found = false;
-  const float left = search.x - half_window;
-  const float top = search.y - half_window;
-  const Corner start(left, top);
-  if (!start.within_margin(from.picture)) return;
-  const Window pattern(from, start);
-  if (!pattern.can_be_followed()) return;
-  auto& flow = search.flow;
-  const auto inside = [&] {
-    // A flow beyond reason is not made an integer.
-    return std::abs(flow.x) <= from.picture.width() && std::abs(flow.y) <= from.picture.height() &&
-           Corner(left + flow.x, top + flow.y).within_margin(to.picture);
+/// Takes the lanes of four sums together: out[4 * part + k] is a part of sum k.
+template <class Factors>
+HWY_INLINE void store_parts(const ProductSum<Factors>& sum0, const ProductSum<Factors>& sum1,
+                            const ProductSum<Factors>& sum2, const ProductSum<Factors>& sum3,
+                            std::int32_t* out) {
+#if HWY_TARGET == HWY_SCALAR
+  for (const auto* sum : {&sum0, &sum1, &sum2, &sum3}) *out++ = hn::GetLane(sum->lanes());
+#else
+  const typename ProductSum<Factors>::Lanes lanes;
+  const hn::Repartition<std::int64_t, decltype(lanes)> pairs;
+  const auto add_pairs = [&](auto a, auto b) {
+    return hn::BitCast(pairs,
+                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
   };
-  Flow before{};
-  for (int i = 0; i < most_moves; ++i) {
-    if (!inside()) return;
-    const auto move = pattern.move(to.picture, Corner(left + flow.x, top + flow.y));
-    flow = {flow.x + move.x, flow.y + move.y};
-    if (move.x * move.x + move.y * move.y <= shortest_move * shortest_move) break;
-    if (i > 0 && std::abs(move.x + before.x) < turning_back &&
-        std::abs(move.y + before.y) < turning_back) {
-      flow = {flow.x - move.x / 2, flow.y - move.y / 2};
-      break;
-    }
-    before = move;
-  }
-  search.found = inside();
+  const auto low = add_pairs(sum0.lanes(), sum1.lanes());
+  const auto high = add_pairs(sum2.lanes(), sum3.lanes());
+  hn::Store(hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
+                    hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high))),
+            lanes, out);
+#endif
 }
 
-void search_all(const Pyramid::Level& from, const Pyramid::Level& to, std::span<Search> searches) {
-  for (auto& search : searches) search_one(from, to, search);
+// A row of both slopes of a window, and a row of pixels to multiply both with.
+#if HWY_MAX_BYTES >= 64
+using BothValues = hn::FixedTag<std::int16_t, 32>;
+using Both = hn::Vec<BothValues>;
+using BothSum = ProductSum<BothValues>;
+
+HWY_INLINE Both load_slopes(const std::int16_t* x, const std::int16_t* y, Value weight) {
+  const Values values;
+  return hn::And(hn::Combine(BothValues(), hn::LoadU(values, y), hn::LoadU(values, x)),
+                 hn::Combine(BothValues(), weight, weight));
+}
+
+HWY_INLINE Both load_pixels(const std::uint8_t* at) {
+  const hn::Rebind<std::uint8_t, BothValues> bytes;
+  return hn::PromoteTo(BothValues(), hn::LoadDup128(bytes, at));
+}
+
+HWY_INLINE void store_both_parts(const BothSum& sum0, const BothSum& sum1, const BothSum& sum2,
+                                 const BothSum& sum3, std::int32_t* out) {
+  store_parts(sum0, sum1, sum2, sum3, out);
+}
+#else
+struct Both {
+  Value x;
+  Value y;
+};
+
+HWY_INLINE Both load_slopes(const std::int16_t* x, const std::int16_t* y, Value weight) {
+  const Values values;
+  return {hn::And(hn::LoadU(values, x), weight), hn::And(hn::LoadU(values, y), weight)};
+}
+
+HWY_INLINE Value load_pixels(const std::uint8_t* at) {
+  return hn::PromoteTo(Values(), hn::LoadU(Bytes(), at));
+}
+
+struct BothSum {
+  ProductSum<> x;
+  ProductSum<> y;
+
+  void add(const Both& slopes, Value pixels) {
+    x.add(slopes.x, pixels);
+    y.add(slopes.y, pixels);
+  }
+};
+
+HWY_INLINE void store_both_parts(const BothSum& sum0, const BothSum& sum1, const BothSum& sum2,
+                                 const BothSum& sum3, std::int32_t* out) {
+  store_parts(sum0.x, sum1.x, sum2.x, sum3.x, out);
+  store_parts(sum0.y, sum1.y, sum2.y, sum3.y, out + 4 * parts);
+}
+#endif
+
+/// The points of a tile on their way, a lane each.
+class Points {
+ public:
+  Points(const Pyramid::Level& to, const Tile& tile, std::span<const Search> searches,
+         const Patch& patch)
+      : to_(to.picture),
+        patch_(patch),
+        count_(static_cast<int>(searches.size())),
+        right_(static_cast<float>(tile.right) / Tile::fractions),
+        down_(static_cast<float>(tile.down) / Tile::fractions) {
+    for (int i = 0; i < count_; ++i) {
+      const auto& search = searches[static_cast<std::size_t>(i)];
+      window_[i] = patch.index(search.x, search.y);
+      left_[i] = static_cast<float>(tile.left + search.x - half_window);
+      top_[i] = static_cast<float>(tile.top + search.y - half_window);
+      flow_x_[i] = search.flow.x;
+      flow_y_[i] = search.flow.y;
+      before_x_[i] = before_y_[i] = 0;
+      cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
+      see(i);
+    }
+    const Floats floats;
+    const int lanes = static_cast<int>(hn::Lanes(floats));
+    for (int i = 0; i < count_; i += lanes) {
+      const auto scale = hn::Set(floats, slope_product);
+      const auto xx = hn::Mul(hn::Load(floats, xx_ + i), scale);
+      const auto xy = hn::Mul(hn::Load(floats, xy_ + i), scale);
+      const auto yy = hn::Mul(hn::Load(floats, yy_ + i), scale);
+      const auto difference = hn::Sub(xx, yy);
+      const auto cross = hn::Mul(xy, xy);
+      const auto root =
+          hn::Sqrt(hn::Add(hn::Mul(difference, difference), hn::Mul(hn::Set(floats, 4.0F), cross)));
+      const auto least = hn::Div(hn::Sub(hn::Add(xx, yy), root),
+                                 hn::Set(floats, static_cast<float>(2 * window * window)));
+      const auto determinant = hn::Sub(hn::Mul(xx, yy), cross);
+      const auto followed =
+          hn::And(hn::Ge(least, hn::Set(floats, least_texture)),
+                  hn::Ge(determinant, hn::Set(floats, std::numeric_limits<float>::epsilon())));
+      const auto present =
+          hn::FirstN(floats, static_cast<std::size_t>(std::min(lanes, count_ - i)));
+      hn::Store(xx, floats, xx_ + i);
+      hn::Store(xy, floats, xy_ + i);
+      hn::Store(yy, floats, yy_ + i);
+      hn::Store(hn::Div(hn::Set(floats, 1.0F), determinant), floats, inverse_ + i);
+      const auto ones = hn::IfThenElseZero(hn::And(followed, present), hn::Set(floats, 1.0F));
+      hn::Store(ones, floats, followed_ + i);
+      hn::Store(ones, floats, active_ + i);
+    }
+  }
+
+  void search() {
+    const Floats floats;
+    const int lanes = static_cast<int>(hn::Lanes(floats));
+    for (int i = 0; i < count_; i += lanes) {
+      const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+      locate(i, active, hn::Load(floats, flow_x_ + i), hn::Load(floats, flow_y_ + i));
+    }
+    for (int round = 0; round < most_moves; ++round) {
+      for (int k = 0; k < moved_count_; ++k) mismatch(moved_[k]);
+      moved_count_ = 0;
+      bool any = false;
+      for (int i = 0; i < count_; i += lanes) {
+        const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+        if (hn::AllFalse(floats, active)) continue;
+        any = true;
+        move(i, active, round > 0);
+      }
+      if (!any) break;
+    }
+  }
+
+  void store(std::span<Search> searches) const {
+    for (int i = 0; i < count_; ++i) {
+      auto& search = searches[static_cast<std::size_t>(i)];
+      search.flow = {flow_x_[i], flow_y_[i]};
+      const float x = left_[i] + std::floor(right_ + flow_x_[i]);
+      const float y = top_[i] + std::floor(down_ + flow_y_[i]);
+      search.found = followed_[i] != 0 && x >= -window && y >= -window &&
+                     x < static_cast<float>(to_.width()) && y < static_cast<float>(to_.height());
+    }
+  }
+
+ private:
+  static constexpr int most = Tile::side * Tile::side;
+
+  /// The sums over a point's window that stay.
+  void see(int i) {
+    const Values values;
+    const int lanes = static_cast<int>(hn::Lanes(values));
+    std::int64_t sums[8] = {};
+    for (int column = 0; column < row_values; column += lanes) {
+      const int begin = window_[i] + column;
+      const auto within = weights(column);
+      ProductSum xx;
+      ProductSum xy;
+      ProductSum yy;
+      ProductSum grey_x;
+      ProductSum grey_y;
+      for_each_row([&](int row) {
+        const int at = begin + row * Patch::stride;
+        const auto dx = hn::And(hn::LoadU(values, patch_.slope_x() + at), within);
+        const auto dy = hn::And(hn::LoadU(values, patch_.slope_y() + at), within);
+        const auto grey = hn::LoadU(values, patch_.grey() + at);
+        xx.add(dx, dx);
+        xy.add(dx, dy);
+        yy.add(dy, dy);
+        grey_x.add(dx, grey);
+        grey_y.add(dy, grey);
+      });
+      HWY_ALIGN std::int32_t part[2 * parts * 4];
+      store_parts(xx, xy, yy, yy, part);
+      store_parts(grey_x, grey_y, grey_x, grey_y, part + 4 * parts);
+      for (int k = 0; k < 4; ++k) {
+        for (std::ptrdiff_t p = 0; p < parts; ++p) {
+          sums[k] += part[4 * p + k];
+          sums[4 + k] += part[4 * (parts + p) + k];
+        }
+      }
+    }
+    xx_[i] = static_cast<float>(sums[0]);
+    xy_[i] = static_cast<float>(sums[1]);
+    yy_[i] = static_cast<float>(sums[2]);
+    here_x_[i] = static_cast<std::int32_t>(sums[4]);
+    here_y_[i] = static_cast<std::int32_t>(sums[5]);
+  }
+
+  /// All ones where a row of a window has weight.
+  static Value weights(int column) {
+    HWY_ALIGN static constexpr std::int16_t weight[row_values] = {-1, -1, -1, -1, -1, -1, -1, -1,
+                                                                  -1, -1, -1, -1, -1, -1, -1, 0};
+    return hn::Load(Values(), weight + column);
+  }
+
+  /// The sums over the products of slope and (there - here), with the window on each of the four
+  /// pixels about where it lies in the other picture.
+  void mismatch(int i) {
+    const Values values;
+    const int lanes = static_cast<int>(hn::Lanes(values));
+    const auto stride = to_.row(1) - to_.row(0);
+    BothSum upper_left;
+    BothSum upper_right;
+    BothSum lower_left;
+    BothSum lower_right;
+    for (int column = 0; column < row_values; column += lanes) {
+      const auto weight = weights(column);
+      const auto* slope_x = patch_.slope_x() + window_[i] + column;
+      const auto* slope_y = patch_.slope_y() + window_[i] + column;
+      const auto* pixels = to_.row(0) + at_[i] + column;
+      auto left = load_pixels(pixels);
+      auto right = load_pixels(pixels + 1);
+      for_each_row([&](int row) {
+        const int at = row * Patch::stride;
+        const auto slopes = load_slopes(slope_x + at, slope_y + at, weight);
+        upper_left.add(slopes, left);
+        upper_right.add(slopes, right);
+        pixels += stride;
+        left = load_pixels(pixels);
+        right = load_pixels(pixels + 1);
+        lower_left.add(slopes, left);
+        lower_right.add(slopes, right);
+      });
+    }
+    HWY_ALIGN std::int32_t part[2 * parts * 4];
+    store_both_parts(upper_left, upper_right, lower_left, lower_right, part);
+    const hn::CappedTag<std::int32_t, 4> four;
+    const auto store = [&](const std::int32_t* first, std::int32_t here, std::int32_t* out) {
+      for (int k = 0; k < 4; k += static_cast<int>(hn::Lanes(four))) {
+        auto sum = hn::Load(four, first + k);
+        if (parts == 2) sum = hn::Add(sum, hn::Load(four, first + 4 + k));
+        hn::Store(hn::Sub(hn::ShiftLeft<2>(sum), hn::Set(four, here)), four, out + k);
+      }
+    };
+    store(part, here_x_[i], mismatch_x_ + std::ptrdiff_t{4} * i);
+    store(part + 4 * parts, here_y_[i], mismatch_y_ + std::ptrdiff_t{4} * i);
+  }
+
+  /// Notes where points are, which of them have come to another pixel, and which have left.
+  template <class Mask>
+  void locate(int i, Mask active, hn::Vec<Floats> flow_x, hn::Vec<Floats> flow_y) {
+    const Floats floats;
+    const auto cell_x = hn::Floor(hn::Add(flow_x, hn::Set(floats, right_)));
+    const auto cell_y = hn::Floor(hn::Add(flow_y, hn::Set(floats, down_)));
+    const auto x = hn::Add(cell_x, hn::Load(floats, left_ + i));
+    const auto y = hn::Add(cell_y, hn::Load(floats, top_ + i));
+    const auto least = hn::Set(floats, -static_cast<float>(window));
+    const auto inside = hn::And(
+        hn::And(hn::Ge(x, least), hn::Lt(x, hn::Set(floats, static_cast<float>(to_.width())))),
+        hn::And(hn::Ge(y, least), hn::Lt(y, hn::Set(floats, static_cast<float>(to_.height())))));
+    active = hn::And(active, inside);
+    const Ints ints;
+    const auto stride = hn::Set(ints, static_cast<std::int32_t>(to_.row(1) - to_.row(0)));
+    hn::Store(hn::Add(hn::Mul(hn::ConvertTo(ints, y), stride), hn::ConvertTo(ints, x)), ints,
+              at_ + i);
+    const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
+                                              hn::Ne(cell_y, hn::Load(floats, cell_y_ + i))));
+    hn::Store(cell_x, floats, cell_x_ + i);
+    hn::Store(cell_y, floats, cell_y_ + i);
+    hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(floats, moved, bytes);
+    for (unsigned bits = bytes[0] | bytes[1] << 8U; bits != 0; bits &= bits - 1)
+      moved_[moved_count_++] = static_cast<std::int16_t>(i + std::countr_zero(bits));
+  }
+
+  /// The moves that Newton's method makes.
+  template <class Mask>
+  void move(int i, Mask active, bool has_before) {
+    const Floats floats;
+    const Ints ints;
+    const auto flow_x = hn::Load(floats, flow_x_ + i);
+    const auto flow_y = hn::Load(floats, flow_y_ + i);
+    const auto beyond_x =
+        hn::Sub(hn::Add(flow_x, hn::Set(floats, right_)), hn::Load(floats, cell_x_ + i));
+    const auto beyond_y =
+        hn::Sub(hn::Add(flow_y, hn::Set(floats, down_)), hn::Load(floats, cell_y_ + i));
+    const auto bilinear = [&](const std::int32_t* mismatch) {
+      hn::Vec<Ints> upper_left;
+      hn::Vec<Ints> upper_right;
+      hn::Vec<Ints> lower_left;
+      hn::Vec<Ints> lower_right;
+      hn::LoadInterleaved4(ints, mismatch + std::ptrdiff_t{4} * i, upper_left, upper_right,
+                           lower_left, lower_right);
+      const auto between = [](auto a, auto b, auto part) {
+        return hn::Add(a, hn::Mul(hn::Sub(b, a), part));
+      };
+      const auto across = [&](auto left, auto right) {
+        return between(hn::ConvertTo(floats, left), hn::ConvertTo(floats, right), beyond_x);
+      };
+      return hn::Mul(
+          between(across(upper_left, upper_right), across(lower_left, lower_right), beyond_y),
+          hn::Set(floats, mismatch_product));
+    };
+    const auto x = bilinear(mismatch_x_);
+    const auto y = bilinear(mismatch_y_);
+    const auto xx = hn::Load(floats, xx_ + i);
+    const auto xy = hn::Load(floats, xy_ + i);
+    const auto yy = hn::Load(floats, yy_ + i);
+    const auto inverse = hn::Load(floats, inverse_ + i);
+    const auto move_x = hn::Mul(hn::Sub(hn::Mul(xy, y), hn::Mul(yy, x)), inverse);
+    const auto move_y = hn::Mul(hn::Sub(hn::Mul(xy, x), hn::Mul(xx, y)), inverse);
+    auto to_x = hn::Add(flow_x, move_x);
+    auto to_y = hn::Add(flow_y, move_y);
+    auto stops = hn::Le(hn::Add(hn::Mul(move_x, move_x), hn::Mul(move_y, move_y)),
+                        hn::Set(floats, shortest_move * shortest_move));
+    if (has_before) {
+      const auto limit = hn::Set(floats, turning_back);
+      const auto turns = hn::AndNot(
+          stops, hn::And(hn::Lt(hn::Abs(hn::Add(move_x, hn::Load(floats, before_x_ + i))), limit),
+                         hn::Lt(hn::Abs(hn::Add(move_y, hn::Load(floats, before_y_ + i))), limit)));
+      const auto half = hn::Set(floats, 0.5F);
+      to_x = hn::IfThenElse(turns, hn::Sub(to_x, hn::Mul(move_x, half)), to_x);
+      to_y = hn::IfThenElse(turns, hn::Sub(to_y, hn::Mul(move_y, half)), to_y);
+      stops = hn::Or(stops, turns);
+    }
+    to_x = hn::IfThenElse(active, to_x, flow_x);
+    to_y = hn::IfThenElse(active, to_y, flow_y);
+    hn::Store(to_x, floats, flow_x_ + i);
+    hn::Store(to_y, floats, flow_y_ + i);
+    hn::Store(move_x, floats, before_x_ + i);
+    hn::Store(move_y, floats, before_y_ + i);
+    locate(i, hn::AndNot(stops, active), to_x, to_y);
+  }
+
+  const PlaneWithMargin<std::uint8_t>& to_;
+  const Patch& patch_;
+  int count_;
+  float right_;
+  float down_;
+  int moved_count_ = 0;
+  int window_[most];  ///< where it begins in the patch
+  HWY_ALIGN float left_[most];
+  HWY_ALIGN float top_[most];
+  HWY_ALIGN float flow_x_[most];
+  HWY_ALIGN float flow_y_[most];
+  HWY_ALIGN float before_x_[most];
+  HWY_ALIGN float before_y_[most];
+  HWY_ALIGN float xx_[most];
+  HWY_ALIGN float xy_[most];
+  HWY_ALIGN float yy_[most];
+  HWY_ALIGN float inverse_[most];
+  HWY_ALIGN float followed_[most];
+  HWY_ALIGN float active_[most];
+  HWY_ALIGN float cell_x_[most];
+  HWY_ALIGN float cell_y_[most];
+  HWY_ALIGN std::int32_t at_[most];  ///< where the window begins in the other picture
+  std::int32_t here_x_[most];
+  std::int32_t here_y_[most];
+  /// With the window on each of the four pixels about it: upper left, upper right, lower left and
+  /// lower right.
+  HWY_ALIGN std::int32_t mismatch_x_[4 * most];
+  HWY_ALIGN std::int32_t mismatch_y_[4 * most];
+  std::int16_t moved_[most];
+};
+
+void search_all(const Pyramid::Level& from, const Pyramid::Level& to, const Tile& tile,
+                std::span<Search> searches) {
+  const auto [first, last] = std::minmax_element(
+      searches.begin(), searches.end(), [](const auto& a, const auto& b) { return a.y < b.y; });
+  const Patch patch(from, tile, first->y, last->y);
+  Points points(to, tile, searches, patch);
+  points.search();
+  points.store(searches);
 }
 
 }  // namespace
@@ -278,9 +531,9 @@ namespace eventcamera {
 
 HWY_EXPORT(search_all);
 
-void search_level(const Pyramid::Level& from, const Pyramid::Level& to,
-                  std::span<Search> searches) {
-  HWY_DYNAMIC_DISPATCH(search_all)(from, to, searches);
+void search_tile(const Pyramid::Level& from, const Pyramid::Level& to, const Tile& tile,
+                 std::span<Search> searches) {
+  HWY_DYNAMIC_DISPATCH(search_all)(from, to, tile, searches);
 }
 
 }  // namespace eventcamera
