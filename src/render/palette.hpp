@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -21,8 +22,21 @@ struct Palette {
   Colour both;  ///< ON and OFF
 };
 
-enum class PaletteName { light, dark, grey, red_blue };
+enum class PaletteName { light, dark, grey, red_blue, viridis, magma };
 
 const Palette& palette(PaletteName name);
+
+/// The colours of values from -1 to 1, by shade().
+using Shades = std::array<Colour, 256>;
+
+/// The shade of a value, which is saturated.
+constexpr std::uint8_t shade(float value) {
+  const float scaled = 127 * std::clamp(value, -1.0F, 1.0F);
+  return static_cast<std::uint8_t>(128.5F + scaled);
+}
+
+/// From the colour of no event to that of OFF below 0 and to that of ON above, in even steps to the
+/// eye. The palettes that are one scale show the magnitude alone.
+const Shades& shades(PaletteName name);
 
 }  // namespace eventcamera

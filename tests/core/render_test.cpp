@@ -133,6 +133,31 @@ void expect_pictures_as_drawn_plainly() {
   }
 }
 
+TEST(Accumulator, CollectsTheSameWithAnyNumberOfThreads) {
+  constexpr int width = 70;
+  constexpr int bands = 9;
+  EventBuckets events;
+  events.reset(3, bands);
+  for (int step = 1; step <= 3; ++step)
+    for (int y = 0; y < bands; ++y)
+      for (int x = step + y; x < width; x += step)
+        events.bucket(step, y).push_back(
+            Event::at(x, y, step, x % 3 == 0 ? Polarity::on : Polarity::off));
+  const auto draw_with = [&](auto&&... threads) {
+    Accumulator accumulator(width, bands);
+    accumulator.add(events, threads...);
+    std::vector<std::byte> out(std::size_t{width} * bands);
+    accumulator.draw(palette(PaletteName::grey), {}, out.data(), width);
+    return out;
+  };
+  const auto expected = draw_with();
+  ThreadPool threads;
+  for (const int most : {1, 2, 0}) {
+    threads.set_threads(most);
+    EXPECT_EQ(draw_with(threads), expected) << most << " threads";
+  }
+}
+
 TEST(Accumulator, DrawsThePlainPictureOnEveryTarget) {
   targets::for_each([](const char* target) {
     SCOPED_TRACE(target);
@@ -141,8 +166,8 @@ TEST(Accumulator, DrawsThePlainPictureOnEveryTarget) {
 }
 
 TEST(Palette, TellsFourKindsOfPixelApartInGreyToo) {
-  for (const auto name :
-       {PaletteName::light, PaletteName::dark, PaletteName::grey, PaletteName::red_blue}) {
+  for (const auto name : {PaletteName::light, PaletteName::dark, PaletteName::grey,
+                          PaletteName::red_blue, PaletteName::viridis, PaletteName::magma}) {
     auto grey = draw({}, name);
     std::vector<int> kinds = {grey[0], grey[1], grey[2], grey[8]};
     std::ranges::sort(kinds);

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/render/overlay.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace eventcamera {
+namespace {
+
+/// The pixels that a sensor's pixel covers along one side of the picture: [first, second), at least
+/// one.
+std::pair<int, int> covered(int at, int sensor, int picture) {
+  const auto place = [sensor, picture](int x) {
+    return static_cast<int>(std::int64_t{x} * picture / sensor);
+  };
+  const int first = place(at);
+  return {first, std::max(first + 1, place(at + 1))};
+}
+
+}  // namespace
+
+Overlay::Overlay(Size sensor, Size picture)
+    : sensor_(sensor),
+      picture_(picture),
+      arrivals_(sensor.width, sensor.height),
+      window_(sensor.width, sensor.height, {}),
+      kinds_(picture.width, picture.height) {}
+
+std::size_t Overlay::add(std::span<const Event> events, Microseconds start) {
+  return arrivals_.take(events, start, [this](const StampedEvent& event) { window_.add(event); });
+}
+
+void Overlay::mark(int x, int y, std::uint8_t kind) {
+  const auto [left, right] = covered(x, sensor_.width, picture_.width);
+  const auto [top, bottom] = covered(y, sensor_.height, picture_.height);
+  for (int row = top; row < bottom; ++row)
+    for (int column = left; column < right; ++column) kinds_.at(column, row) |= kind;
+}
+
+void Overlay::draw(Microseconds start, Microseconds end, const Palette& palette, double opacity,
+                   const PixelLayout& layout, std::byte* picture, std::ptrdiff_t stride) {
+  window_.begin_after(start);
+  arrivals_.pass(end);
+  for (int y = 0; y < sensor_.height; ++y) {
+    const auto* row = window_.row(y);
+    for (int x = 0; x < sensor_.width; ++x)
+      if (const auto kind = kind_of(row[x]); kind != 0) mark(x, y, kind);
+  }
+
+  const std::array colours = {pixel(palette.none, layout), pixel(palette.off, layout),
+                              pixel(palette.on, layout), pixel(palette.both, layout)};
+  const int weight = static_cast<int>(std::lround(256 * opacity));
+  const auto bytes = static_cast<std::size_t>(layout.bytes);
+  for (int y = 0; y < picture_.height; ++y) {
+    auto* out = reinterpret_cast<std::uint8_t*>(picture + y * stride);
+    auto* kinds = kinds_.row(y);
+    for (int x = 0; x < picture_.width; ++x, out += bytes) {
+      if (kinds[x] == 0) continue;
+      const auto& colour = colours[std::exchange(kinds[x], 0)];
+      for (std::size_t i = 0; i < bytes; ++i)
+        out[i] = static_cast<std::uint8_t>(out[i] + (colour[i] - out[i]) * weight / 256);
+    }
+  }
+}
+
+}  // namespace eventcamera

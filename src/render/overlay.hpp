@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "src/event/event.hpp"
+#include "src/picture/plane.hpp"
+#include "src/render/arrivals.hpp"
+#include "src/render/event_window.hpp"
+#include "src/render/palette.hpp"
+#include "src/render/pixel_layout.hpp"
+
+namespace eventcamera {
+
+struct Size {
+  int width;
+  int height;
+
+  friend bool operator==(const Size&, const Size&) = default;
+};
+
+/// Draws the events of a window over pictures, whose size may be another than the sensor's. Events
+/// and pictures come in the order of time.
+class Overlay {
+ public:
+  /// Throws std::bad_alloc, as does add().
+  Overlay(Size sensor, Size picture);
+
+  /// As Renderer's.
+  std::size_t add(std::span<const Event> events, Microseconds start);
+
+  /// Draws the events of (start, end] over a picture; `opacity` from 0 to 1. `stride` in bytes.
+  void draw(Microseconds start, Microseconds end, const Palette& palette, double opacity,
+            const PixelLayout& layout, std::byte* picture, std::ptrdiff_t stride);
+
+ private:
+  void mark(int x, int y, std::uint8_t kind);
+
+  Size sensor_;
+  Size picture_;
+  Arrivals arrivals_;
+  EventWindow window_;
+  Plane<std::uint8_t> kinds_;  ///< of the picture's pixels; all 0 between pictures
+};
+
+}  // namespace eventcamera

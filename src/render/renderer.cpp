@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/render/renderer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+namespace eventcamera {
+namespace {
+
+/// The pixel of each shade or kind.
+using Pixels = std::array<std::array<std::uint8_t, 4>, 256>;
+
+template <std::size_t bytes>
+void draw_row(std::span<const std::uint8_t> row, const Pixels& pixels, std::byte* out) {
+  for (const auto which : row) {
+    std::memcpy(out, pixels[which].data(), bytes);
+    out += bytes;
+  }
+}
+
+Pixels pixels_of(const RenderSettings& settings, const PixelLayout& layout) {
+  Pixels pixels{};
+  if (settings.mode == RenderMode::accumulate) {
+    const auto& colours = palette(settings.palette);
+    std::size_t kind = 0;
+    for (const auto& colour : {colours.none, colours.off, colours.on, colours.both})
+      pixels[kind++] = pixel(colour, layout);
+  } else {
+    std::ranges::transform(shades(settings.palette), pixels.begin(),
+                           [&layout](const Colour& colour) { return pixel(colour, layout); });
+  }
+  return pixels;
+}
+
+}  // namespace
+
+Renderer::Memory Renderer::make_memory(int width, int height, const RenderSettings& settings) {
+  switch (settings.mode) {
+    case RenderMode::decay:
+      return DecayingSums(width, height, settings.time_constant, settings.full_scale);
+    case RenderMode::time_surface:
+      return TimeSurface(width, height, settings.time_constant);
+    case RenderMode::accumulate:
+    case RenderMode::count:
+      break;
+  }
+  return EventWindow(width, height, settings.limits);
+}
+
+Renderer::Renderer(int width, int height, const RenderSettings& settings)
+    : width_(width),
+      height_(height),
+      settings_(settings),
+      memory_(make_memory(width, height, settings)),
+      arrivals_(width, height),
+      row_(static_cast<std::size_t>(width)) {}
+
+void Renderer::configure(const RenderSettings& settings) {
+  auto repainted = settings_;
+  repainted.palette = settings.palette;
+  if (repainted != settings) memory_ = make_memory(width_, height_, settings);
+  settings_ = settings;
+}
+
+void Renderer::reset() {
+  memory_ = make_memory(width_, height_, settings_);
+  arrivals_ = Arrivals(width_, height_);
+}
+
+std::size_t Renderer::add(std::span<const Event> events, Microseconds start) {
+  return std::visit(
+      [&](auto& memory) {
+        return arrivals_.take(events, start,
+                              [&memory](const StampedEvent& event) { memory.add(event); });
+      },
+      memory_);
+}
+
+void Renderer::shade_row(int y, Microseconds time) {
+  const auto take = [this](int x, float value) {
+    row_[static_cast<std::size_t>(x)] = shade(value);
+  };
+  if (const auto* sums = std::get_if<DecayingSums>(&memory_)) {
+    sums->read_row(y, time, take);
+  } else if (const auto* surface = std::get_if<TimeSurface>(&memory_)) {
+    surface->read_row(y, time, take);
+  } else {
+    const auto* counts = std::get<EventWindow>(memory_).row(y);
+    if (settings_.mode == RenderMode::accumulate) {
+      std::transform(counts, counts + width_, row_.begin(), kind_of);
+      return;
+    }
+    const float scale = 1 / settings_.full_scale;
+    for (int x = 0; x < width_; ++x)
+      take(x, (static_cast<float>(counts[x].on) - static_cast<float>(counts[x].off)) * scale);
+  }
+}
+
+void Renderer::draw(Microseconds start, Microseconds end, const PixelLayout& layout, std::byte* out,
+                    std::ptrdiff_t stride) {
+  const auto time = arrivals_.pass(end);
+  if (auto* window = std::get_if<EventWindow>(&memory_)) window->begin_after(start);
+  const auto pixels = pixels_of(settings_, layout);
+  for (int y = 0; y < height_; ++y) {
+    shade_row(y, time);
+    auto* row = out + y * stride;
+    if (layout.bytes == 1)
+      draw_row<1>(row_, pixels, row);
+    else if (layout.bytes == 3)
+      draw_row<3>(row_, pixels, row);
+    else
+      draw_row<4>(row_, pixels, row);
+  }
+}
+
+}  // namespace eventcamera

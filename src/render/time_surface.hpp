@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include "src/event/stamped_event.hpp"
+#include "src/picture/plane.hpp"
+
+namespace eventcamera {
+
+/// How long ago the last event of each pixel was, and its polarity.
+class TimeSurface {
+ public:
+  /// After `longest` an event is forgotten; more than 0.
+  TimeSurface(int width, int height, Microseconds longest)
+      : longest_(longest), last_(width, height) {}
+
+  /// An event inside the picture, not before the last one.
+  void add(const StampedEvent& event) {
+    last_.at(event.x, event.y()) = {event.t, event.polarity() == Polarity::on ? 1.0F : -1.0F};
+  }
+
+  /// How young a row's events are at a time that is not before any of them: from 1, just now, down
+  /// to 0; below 0 where the last event is OFF.
+  template <class Take>
+  void read_row(int y, Microseconds time, const Take& take) const {
+    const auto* row = last_.row(y);
+    const float scale = 1 / static_cast<float>(longest_);
+    for (int x = 0; x < last_.width(); ++x) {
+      const Microseconds left = longest_ - (time - row[x].time);
+      take(x, left > 0 ? row[x].sign * static_cast<float>(left) * scale : 0);
+    }
+  }
+
+ private:
+  struct Last {
+    Microseconds time = 0;
+    float sign = 0;  ///< 0: there was none
+  };
+
+  Microseconds longest_;
+  Plane<Last> last_;
+};
+
+}  // namespace eventcamera
