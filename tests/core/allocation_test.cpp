@@ -11,6 +11,7 @@
 #include "src/render/accumulator.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
+#include "src/simulate/dvs.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/path.hpp"
 #include "src/simulate/sparse.hpp"
@@ -141,6 +142,20 @@ TEST(Allocations, AreNotMadeByDenseInterpolationWithOurOwnFlow) {
   };
   EXPECT_EQ(allocations_of<std::uint8_t>(with_farneback, 8), 0);
   EXPECT_EQ(allocations_of<std::uint16_t>(with_farneback, 12), 0);
+}
+
+TEST(Allocations, AreNotMadeByPhysicalPixels) {
+  const auto ideal = [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
+    return make_dvs_simulator(format);
+  };
+  EXPECT_EQ(allocations_of<std::uint8_t>(ideal, 8), 0);
+  const auto limited = [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
+    auto simulator = make_dvs_simulator(format);
+    // What bounds the readout is always the same.
+    simulator->set({.cutoff_hz = 100, .refractory_period = 100, .max_event_rate = 2e5});
+    return simulator;
+  };
+  EXPECT_EQ(allocations_of<std::uint16_t>(limited, 12), 0);
 }
 
 /// Paths along a flow that turns, so that tiles differ from frame to frame.

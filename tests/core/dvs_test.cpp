@@ -1,0 +1,612 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// A physical pixel against physics, and against its equations in double precision.
+#include "src/simulate/dvs.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numbers>
+#include <random>
+
+#include "src/pixel/course.hpp"
+#include "src/pixel/decay.hpp"
+#include "src/pixel/mismatch.hpp"
+#include "src/pixel/presets.hpp"
+#include "src/reference/dvs.hpp"
+#include "tests/core/scene.hpp"
+#include "tests/core/targets.hpp"
+
+namespace eventcamera {
+
+inline void PrintTo(const DvsSettings& settings, std::ostream* out) {
+  *out << "response " << static_cast<int>(settings.response) << ", cutoff " << settings.cutoff_hz
+       << " Hz, leak " << settings.leak_rate_hz << " Hz, refractory period "
+       << settings.refractory_period << " us, reset "
+       << static_cast<int>(settings.refractory_reset);
+}
+
+}  // namespace eventcamera
+
+namespace {
+
+using namespace eventcamera;
+
+/// An event with the time since the first frame.
+struct Timed {
+  double t;  ///< microseconds
+  int x;
+  int y;
+  Polarity polarity;
+};
+
+/// Plays frames to a simulator and gathers its events.
+class Playback {
+ public:
+  Playback(const LumaFormat& format, const DvsSettings& settings, int threads = 2)
+      : simulator_(make_dvs_simulator(format)) {
+    simulator_->set(settings);
+    common_.threads = threads;
+  }
+
+  template <class Pixel>
+  void push(const Plane<Pixel>& frame, int bits, Nanoseconds time) {
+    const auto last = simulator_->last_time();
+    const auto* made = simulator_->push(scene::luma(frame.view(), bits), time, common_);
+    if (made == nullptr) return;
+    const auto interval = scene::copy(*made);
+    EXPECT_TRUE(scene::sorted(interval));
+    for (const auto& event : interval) {
+      EXPECT_LE(event.t, (time - *last) / 1000);
+      events.push_back(
+          {static_cast<double>(*last) / 1000 + event.t, event.x, event.y(), event.polarity()});
+    }
+  }
+
+  void set(const DvsSettings& settings) { simulator_->set(settings); }
+  DvsSimulator& simulator() { return *simulator_; }
+
+  std::vector<Timed> events;
+
+ private:
+  std::unique_ptr<DvsSimulator> simulator_;
+  Settings common_;
+};
+
+TEST(Decay, IsTheExponentialFunction) {
+  for (double x = 0; x < 690; x += 0.0137 * (1 + x / 10))
+    ASSERT_NEAR(decay(x) / std::exp(-x), 1, 1e-11) << x;
+  EXPECT_EQ(decay(0), 1);
+  EXPECT_GE(decay(1e300), 0);
+  EXPECT_LT(decay(1e300), 1e-300);
+}
+
+/// The first moment, by very small steps, at which a course is beyond a level on either side.
+double plainly_crossed(const Course& course, double lower, double upper, double end) {
+  constexpr int steps = 200'000;
+  for (int i = 0; i <= steps; ++i) {
+    const double value = course.at(end * i / steps);
+    if (value >= upper || value <= lower) return end * i / steps;
+  }
+  return -1;
+}
+
+TEST(Crossings, AreFoundOnEveryCourseOfALowPass) {
+  std::minstd_rand random(5);
+  const auto uniform = [&](double from, double to) {
+    return std::uniform_real_distribution<>(from, to)(random);
+  };
+  constexpr double end = 40'000;
+  int found = 0;
+  for (int i = 0; i < 600; ++i) {
+    const double bandwidth = std::pow(10, uniform(-7, -2));
+    auto course = Course::low_pass(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), end, bandwidth);
+    course.slope += uniform(0, 1) < 0.5 ? 0 : uniform(0, 2e-5);
+    const double reference = course.at(0) + uniform(-0.19, 0.19);
+    const Crossings crossings(course, {end, course.at(end)});
+    const auto first = crossings.first(reference - 0.2, reference + 0.2, {0, course.at(0)});
+    const double plain = plainly_crossed(course, reference - 0.2, reference + 0.2, end);
+    ASSERT_EQ(first.has_value(), plain >= 0) << i;
+    if (!first) continue;
+    ++found;
+    ASSERT_NEAR(first->point.t, plain, 0.3) << i << " " << bandwidth;
+    ASSERT_NEAR(course.at(first->point.t), first->point.value, 1e-6) << i;
+  }
+  EXPECT_GT(found, 200);
+}
+
+TEST(Dvs, EqualsTheRuleOfEsim) {
+  constexpr int width = 101;
+  constexpr int height = 37;
+  Playback playback({width, height, 8}, settings_of(DvsPreset::esim));
+  reference::Esim esim(width, height, 1e-3, 0.2);
+  std::map<std::pair<int, int>, std::vector<reference::EsimEvent>> expected;
+  std::size_t expected_count = 0;
+  for (int i = 0; i < 12; ++i) {
+    const auto frame = scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.4 * i);
+    playback.push(frame, 8, i * scene::frame_time);
+    for (const auto& event : esim.push(frame, i * 40'000.0)) {
+      expected[{event.x, event.y}].push_back(event);
+      ++expected_count;
+    }
+  }
+  EXPECT_GT(expected_count, 20'000U);
+  EXPECT_NEAR(static_cast<double>(playback.events.size()), static_cast<double>(expected_count),
+              0.001 * static_cast<double>(expected_count));
+  std::map<std::pair<int, int>, std::vector<Timed>> found;
+  for (const auto& event : playback.events) found[{event.x, event.y}].push_back(event);
+  std::size_t equal = 0;
+  for (const auto& [place, events] : expected) {
+    const auto& ours = found[place];
+    for (std::size_t i = 0; i < std::min(events.size(), ours.size()); ++i)
+      equal += ours[i].polarity == events[i].polarity && std::abs(ours[i].t - events[i].t) <= 1.5;
+  }
+  EXPECT_GT(static_cast<double>(equal), 0.999 * static_cast<double>(expected_count));
+}
+
+constexpr double second = 1e6;
+
+using Pixels = std::map<std::pair<int, int>, std::vector<Timed>>;
+
+Pixels by_pixel(const std::vector<Timed>& events) {
+  Pixels pixels;
+  for (const auto& event : events) pixels[{event.x, event.y}].push_back(event);
+  return pixels;
+}
+
+Plane<std::uint8_t> flat(int width, int height, int grey) {
+  return scene::flat<std::uint8_t>(width, height, grey);
+}
+
+/// Shows the same picture for so many seconds.
+void stand(Playback& playback, const Plane<std::uint8_t>& picture, int frames,
+           Nanoseconds frame_time) {
+  for (int i = 0; i <= frames; ++i) playback.push(picture, 8, i * frame_time);
+}
+
+class Reference : public testing::TestWithParam<DvsSettings> {};
+INSTANTIATE_TEST_SUITE_P(
+    , Reference,
+    testing::Values(DvsSettings{}, DvsSettings{.response = Response::log, .cutoff_hz = 40},
+                    DvsSettings{.linear_light = true, .cutoff_hz = 200, .negative_threshold = 0.31},
+                    DvsSettings{.response = Response::linear, .cutoff_hz = 15, .leak_rate_hz = 7},
+                    DvsSettings{.leak_rate_hz = 30, .refractory_period = 900},
+                    DvsSettings{.cutoff_hz = 100, .refractory_period = 1500},
+                    DvsSettings{.cutoff_hz = 100,
+                                .leak_rate_hz = 9,
+                                .refractory_period = 1500,
+                                .refractory_reset = RefractoryReset::signal},
+                    DvsSettings{.refractory_period = 15'000,
+                                .refractory_reset = RefractoryReset::signal}));
+
+TEST_P(Reference, IsEqualled) {
+  constexpr int width = 19;
+  constexpr int height = 3;
+  const auto settings = GetParam();
+  Playback playback({width, height, 16}, settings);
+  const Random random(settings.seed);
+  const Mismatch mismatch(settings, random);
+  std::vector<reference::DvsPixel> pixels;
+  Pixels expected;
+  std::size_t count = 0;
+  for (int i = 0; i < 6; ++i) {
+    const auto frame = scene::texture<std::uint16_t>(width, height, 16, 2.3 * i, 1.1 * i);
+    playback.push(frame, 16, i * scene::frame_time);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const auto pixel = static_cast<std::size_t>(y * width + x);
+        const double luma = frame.at(x, y) / 65535.0;
+        if (i == 0) {
+          pixels.emplace_back(settings, luma, mismatch.leaked(pixel, mismatch.of(pixel), 0));
+          continue;
+        }
+        for (auto event : pixels[pixel].push(luma, 40'000)) {
+          expected[{x, y}].push_back({event.t, x, y, event.polarity});
+          ++count;
+        }
+      }
+    }
+  }
+  ASSERT_GT(count, 130U);
+  EXPECT_NEAR(static_cast<double>(playback.events.size()), static_cast<double>(count),
+              std::max(1.0, 0.001 * static_cast<double>(count)));
+  auto found = by_pixel(playback.events);
+  std::size_t equal = 0;
+  for (const auto& [place, events] : expected) {
+    const auto& ours = found[place];
+    for (std::size_t i = 0; i < std::min(events.size(), ours.size()); ++i)
+      equal += ours[i].polarity == events[i].polarity && std::abs(ours[i].t - events[i].t) <= 5;
+  }
+  EXPECT_GT(static_cast<double>(equal), 0.97 * static_cast<double>(count));
+}
+
+TEST(Dvs, LeaksAtItsRate) {
+  const DvsSettings settings{.leak_rate_hz = 5, .leak_spread = 0.1};
+  Playback playback({96, 80, 8}, settings);
+  stand(playback, flat(96, 80, 90), 40, 250'000'000);
+  const double expected = 96 * 80 * 5 * 10.0;
+  EXPECT_NEAR(static_cast<double>(playback.events.size()), expected, 0.02 * expected);
+  for (const auto& event : playback.events) ASSERT_EQ(event.polarity, Polarity::on);
+  // A pixel's own are evenly spaced.
+  for (const auto& [place, events] : by_pixel(playback.events))
+    for (std::size_t i = 2; i < events.size(); ++i)
+      ASSERT_NEAR(events[i].t - events[i - 1].t, events[1].t - events[0].t, 30);
+}
+
+TEST(Dvs, MakesShotNoiseThatIsPoisson) {
+  const DvsSettings settings{.shot_noise_rate_hz = 20};
+  for (const int grey : {0, 128, 255}) {
+    Playback playback({64, 48, 8}, settings);
+    stand(playback, flat(64, 48, grey), 250, 40'000'000);
+    const double rate = 20 * (1 - 0.75 * (grey + 20) / 275);
+    const double expected = 64 * 48 * rate * 10;
+    EXPECT_NEAR(static_cast<double>(playback.events.size()), expected, 0.02 * expected);
+    double on = 0;
+    for (const auto& event : playback.events) on += event.polarity == Polarity::on;
+    EXPECT_NEAR(on / static_cast<double>(playback.events.size()), 0.5, 0.01);
+    // Of the gaps that begin in the first half none is cut off; they are exponential.
+    double gaps = 0;
+    double sum = 0;
+    double squares = 0;
+    double longer_than_mean = 0;
+    for (const auto& [place, events] : by_pixel(playback.events)) {
+      for (std::size_t i = 1; i < events.size() && events[i - 1].t < 5 * second; ++i) {
+        const double gap = (events[i].t - events[i - 1].t) / second * rate;
+        ++gaps;
+        sum += gap;
+        squares += gap * gap;
+        longer_than_mean += gap > 1;
+      }
+    }
+    EXPECT_NEAR(sum / gaps, 1, 0.02);
+    EXPECT_NEAR(squares / gaps, 2, 0.08);
+    EXPECT_NEAR(longer_than_mean / gaps, std::exp(-1), 0.01);
+  }
+}
+
+TEST(Dvs, AnswersAStepWithItsTimeConstant) {
+  for (const double cutoff_hz : {3.0, 30.0, 300.0}) {
+    const DvsSettings settings{.cutoff_hz = cutoff_hz, .positive_threshold = 0.05};
+    Playback playback({4, 3, 8}, settings);
+    playback.push(flat(4, 3, 60), 8, 0);
+    playback.push(flat(4, 3, 200), 8, 1000);  // within a microsecond
+    playback.push(flat(4, 3, 200), 8, 3'000'000'000);
+    const double tau = second / (2 * std::numbers::pi * cutoff_hz * 220 / 275);
+    const double step = std::log(200 / 60.0);
+    for (const auto& [place, events] : by_pixel(playback.events)) {
+      ASSERT_EQ(events.size(), static_cast<std::size_t>(step / 0.05));
+      for (std::size_t i = 0; i < events.size(); ++i) {
+        const double level = 0.05 * (static_cast<double>(i) + 1);
+        const double expected = -tau * std::log(1 - level / step);
+        ASSERT_NEAR(events[i].t, expected, 0.02 * expected + 3);
+      }
+    }
+  }
+}
+
+TEST(Dvs, HasTheSpreadOfThresholdsThatIsSet) {
+  constexpr int side = 150;
+  const DvsSettings settings{.response = Response::linear, .threshold_sigma = 0.03};
+  for (const auto polarity : {Polarity::on, Polarity::off}) {
+    Playback playback({side, side, 8}, settings);
+    const bool is_on = polarity == Polarity::on;
+    playback.push(flat(side, side, is_on ? 100 : 140), 8, 0);
+    playback.push(flat(side, side, is_on ? 140 : 100), 8, 1'000'000'000);
+    const double a_microsecond = 40 / 255.0 * std::log(255) / second;
+    double sum = 0;
+    double squares = 0;
+    for (const auto& [place, events] : by_pixel(playback.events)) {
+      ASSERT_EQ(events[0].polarity, polarity);
+      sum += events[0].t * a_microsecond;
+      squares += std::pow(events[0].t * a_microsecond - 0.2, 2);
+    }
+    EXPECT_NEAR(sum / (side * side), 0.2, 0.001);
+    EXPECT_NEAR(std::sqrt(squares / (side * side)), 0.03, 0.02 * 0.03);
+  }
+}
+
+TEST(Dvs, RestsForTheRefractoryPeriod) {
+  for (const auto reset : {RefractoryReset::level, RefractoryReset::signal}) {
+    DvsSettings settings{.cutoff_hz = 500,
+                         .threshold_jitter = 0.02,
+                         .leak_rate_hz = 50,
+                         .shot_noise_rate_hz = 200,
+                         .refractory_period = 3000,
+                         .refractory_reset = reset,
+                         .latency = 700,
+                         .latency_jitter = 300};
+    Playback playback({40, 30, 8}, settings);
+    for (int i = 0; i < 60; ++i)
+      playback.push(scene::noise<std::uint8_t>(40, 30, 8, static_cast<unsigned>(i)), 8,
+                    i * 7'000'000);
+    ASSERT_GT(playback.events.size(), 40'000U);
+    for (const auto& [place, events] : by_pixel(playback.events))
+      for (std::size_t i = 1; i < events.size(); ++i)
+        ASSERT_GE(events[i].t - events[i - 1].t, 3000);
+  }
+}
+
+TEST(Dvs, AnswersASineOfLightWithAsManyOnAsOff) {
+  for (const double cutoff_hz : {0.0, 50.0}) {
+    Playback playback({8, 8, 16}, DvsSettings{.cutoff_hz = cutoff_hz,
+                                              .positive_threshold = 0.11,
+                                              .negative_threshold = 0.11});
+    for (int i = 0; i <= 400; ++i) {
+      Plane<std::uint16_t> frame(8, 8);
+      for (int y = 0; y < 8; ++y)
+        for (int x = 0; x < 8; ++x)
+          frame.at(x, y) = static_cast<std::uint16_t>(
+              32768 + 24000 * std::sin(2 * std::numbers::pi * i / 40 + x + 8 * y));
+      playback.push(frame, 16, i * 5'000'000);
+    }
+    for (const auto& [place, events] : by_pixel(playback.events)) {
+      int on = 0;
+      for (const auto& event : events) on += event.polarity == Polarity::on ? 1 : -1;
+      ASSERT_GT(events.size(), 200U);
+      // It may end a swing away from where it began, and the first settles.
+      ASSERT_LE(std::abs(on), cutoff_hz > 0 ? 4 : 1);
+    }
+  }
+}
+
+TEST(Dvs, GivesRampsTheirExactTimes) {
+  Playback playback({5, 1, 16}, DvsSettings{.response = Response::linear});
+  playback.push(scene::flat<std::uint16_t>(5, 1, 0), 16, 0);
+  playback.push(scene::flat<std::uint16_t>(5, 1, 65535), 16, 40'000'000);
+  for (const auto& [place, events] : by_pixel(playback.events)) {
+    ASSERT_EQ(events.size(), 27U);
+    for (std::size_t i = 0; i < events.size(); ++i)
+      ASSERT_NEAR(events[i].t + 0.5, 40'000 * 0.2 * (static_cast<double>(i) + 1) / std::log(255),
+                  0.51);
+  }
+}
+
+DvsSettings everything() {
+  return {.response = Response::log,
+          .cutoff_hz = 60,
+          .threshold_sigma = 0.03,
+          .threshold_jitter = 0.02,
+          .leak_rate_hz = 3,
+          .leak_spread = 0.2,
+          .shot_noise_rate_hz = 8,
+          .hot_pixels = 0.01,
+          .dead_pixels = 0.02,
+          .refractory_period = 400,
+          .refractory_reset = RefractoryReset::signal,
+          .latency = 300,
+          .latency_jitter = 100,
+          .max_event_rate = 2e7,
+          .seed = 11};
+}
+
+/// All events of a short film. Its pictures lie in memory with `padding` bytes behind each row.
+template <class Pixel>
+std::vector<std::vector<Event>> film(int width, int height, int bits, const DvsSettings& settings,
+                                     int threads, int padding = 0) {
+  auto simulator = make_dvs_simulator({width, height, bits});
+  simulator->set(settings);
+  std::vector<std::vector<Event>> intervals;
+  const auto stride = width * static_cast<std::ptrdiff_t>(sizeof(Pixel)) + padding;
+  std::vector<std::uint8_t> memory(static_cast<std::size_t>(stride * height), 0xa5);
+  for (int i = 0; i < 4; ++i) {
+    const auto frame = scene::texture<Pixel>(width, height, bits, 2.6 * i, -1.3 * i);
+    for (int y = 0; y < height; ++y)
+      std::memcpy(memory.data() + y * stride, frame.row(y),
+                  static_cast<std::size_t>(frame.stride()));
+    Settings common;
+    common.threads = threads;
+    if (const auto* made = simulator->push({{width, height, bits}, memory.data(), stride},
+                                           i * 33'333'333LL, common)) {
+      intervals.push_back(scene::copy(*made));
+      EXPECT_TRUE(scene::sorted(intervals.back()));
+    }
+  }
+  return intervals;
+}
+
+TEST(Dvs, IsTheSameForAllThreadsStridesAndTargets) {
+  const std::pair<int, int> sizes[] = {{1, 1}, {3, 17}, {31, 33}, {97, 61}, {130, 40}};
+  for (const auto& [width, height] : sizes) {
+    for (const auto upsampling : {Upsampling::linear, Upsampling::motion}) {
+      auto settings = everything();
+      settings.upsampling = upsampling;
+      settings.max_steps = 5;
+      for (const int bits : {8, 10, 12, 16}) {
+        const auto play = [&, w = width, h = height](int threads, int padding) {
+          return bits == 8 ? film<std::uint8_t>(w, h, bits, settings, threads, padding)
+                           : film<std::uint16_t>(w, h, bits, settings, threads, padding);
+        };
+        const auto expected = play(1, 0);
+        EXPECT_TRUE(play(2, 14) == expected);
+        targets::for_each([&](const char* target) {
+          EXPECT_TRUE(play(2, 0) == expected) << target << " " << width << "x" << height;
+        });
+      }
+    }
+  }
+}
+
+TEST(Dvs, IsNearlyTheSameInAllDepths) {
+  const auto count = [](const auto& intervals) {
+    double sum = 0;
+    for (const auto& interval : intervals) sum += static_cast<double>(interval.size());
+    return sum;
+  };
+  const DvsSettings settings;
+  const double in_16_bits = count(film<std::uint16_t>(90, 60, 16, settings, 1));
+  EXPECT_GT(in_16_bits, 3000);
+  EXPECT_NEAR(count(film<std::uint8_t>(90, 60, 8, settings, 1)), in_16_bits, 0.02 * in_16_bits);
+  EXPECT_NEAR(count(film<std::uint16_t>(90, 60, 10, settings, 1)), in_16_bits, 0.02 * in_16_bits);
+  EXPECT_NEAR(count(film<std::uint16_t>(90, 60, 12, settings, 1)), in_16_bits, 0.02 * in_16_bits);
+}
+
+TEST(Dvs, ForgetsAndRepeatsItself) {
+  auto settings = everything();
+  const auto expected = film<std::uint8_t>(60, 40, 8, settings, 2);
+  auto simulator = make_dvs_simulator({60, 40, 8});
+  simulator->set(settings);
+  Settings common;
+  for (int round = 0; round < 2; ++round) {
+    simulator->reset();
+    std::vector<std::vector<Event>> intervals;
+    for (int i = 0; i < 4; ++i) {
+      const auto frame = scene::texture<std::uint8_t>(60, 40, 8, 2.6 * i, -1.3 * i);
+      if (const auto* made = simulator->push(scene::luma(frame), i * 33'333'333LL, common))
+        intervals.push_back(scene::copy(*made));
+    }
+    EXPECT_TRUE(intervals == expected);
+  }
+  settings.seed = 12;
+  EXPECT_FALSE(film<std::uint8_t>(60, 40, 8, settings, 2) == expected);
+}
+
+TEST(Dvs, GoesOnWhileTheLastFrameStands) {
+  const auto grey = flat(50, 40, 100);
+  const DvsSettings settings{.leak_rate_hz = 10};
+  auto simulator = make_dvs_simulator({50, 40, 8});
+  simulator->set(settings);
+  EXPECT_EQ(simulator->hold_until(5), nullptr);
+  simulator->push(scene::luma(grey), 0, {});
+  const auto* held = simulator->hold_until(1'000'000'000);
+  ASSERT_NE(held, nullptr);
+  EXPECT_NEAR(static_cast<double>(held->size()), 50 * 40 * 10, 0.02 * 50 * 40 * 10);
+  const auto* next = simulator->push(scene::luma(grey), 1'500'000'000, {});
+  EXPECT_NEAR(static_cast<double>(next->size()), 50 * 40 * 5, 0.02 * 50 * 40 * 5);
+}
+
+TEST(Dvs, IsBoundedWhateverComes) {
+  auto settings = everything();
+  settings.positive_threshold = settings.negative_threshold = 0;
+  settings.threshold_sigma = settings.threshold_jitter = 0;
+  settings.log_eps = 1e-6;
+  settings.shot_noise_rate_hz = settings.leak_rate_hz = 10'000;
+  settings.refractory_period = settings.latency = settings.latency_jitter = 0;
+  settings.max_event_rate = 0;
+  for (const double cutoff_hz : {0.0, 1e-9, 1e6}) {
+    settings.cutoff_hz = cutoff_hz;
+    Playback playback({20, 10, 8}, settings);
+    Nanoseconds time = 0;
+    const Nanoseconds gaps[] = {1, 999, 1001, 40'000'000, longest_interval};
+    playback.push(flat(20, 10, 0), 8, time);
+    for (int i = 0; i < 10; ++i)
+      playback.push(flat(20, 10, i % 2 == 0 ? 255 : 0), 8, time += gaps[i % 5]);
+    EXPECT_LE(playback.events.size(), 20U * 10U * 512U * 10U);
+    EXPECT_GT(playback.events.size(), 20U * 10U * 100U);
+  }
+}
+
+TEST(Dvs, HasItsSharesOfHotAndDeadPixels) {
+  Playback hot({200, 150, 8}, DvsSettings{.hot_pixels = 0.01});
+  stand(hot, flat(200, 150, 100), 10, 100'000'000);
+  const auto pixels = by_pixel(hot.events);
+  EXPECT_NEAR(static_cast<double>(pixels.size()), 300, 60);
+  for (const auto& [place, events] : pixels) {
+    EXPECT_GE(events.size(), 9U);
+    EXPECT_LE(events.size(), 1001U);
+  }
+  Playback dead({200, 150, 8}, DvsSettings{.shot_noise_rate_hz = 10, .dead_pixels = 0.1});
+  dead.push(flat(200, 150, 10), 8, 0);
+  dead.push(flat(200, 150, 240), 8, 40'000'000);
+  EXPECT_NEAR(static_cast<double>(by_pixel(dead.events).size()), 27'000, 300);
+}
+
+TEST(Dvs, SendsEventsAsLateAsItsLatency) {
+  const auto dark = flat(6, 5, 40);
+  const auto bright = flat(6, 5, 200);
+  const auto play = [&](double latency) {
+    Playback playback({6, 5, 8}, DvsSettings{.positive_threshold = 0.5, .latency = latency});
+    playback.push(dark, 8, 0);
+    playback.push(bright, 8, 40'000'000);
+    playback.push(bright, 8, 80'000'000);
+    playback.push(bright, 8, 120'000'000);
+    return playback.events;
+  };
+  const auto prompt = play(0);
+  const auto late = play(25);
+  ASSERT_EQ(prompt.size(), 6U * 5U * 3U);
+  ASSERT_EQ(late.size(), prompt.size());
+  for (std::size_t i = 0; i < prompt.size(); ++i) EXPECT_NEAR(late[i].t, prompt[i].t + 25, 1);
+  // Behind the end of the interval, none is lost; but a pixel does one thing at a time.
+  const auto later = play(45'000);
+  EXPECT_EQ(later.size(), 6U * 5U);
+  EXPECT_GT(later.front().t, 45'000);
+}
+
+TEST(Dvs, ReadsOutNoMoreThanItCan) {
+  constexpr int width = 40;
+  constexpr int height = 30;
+  const auto play = [&](double rate) {
+    Playback playback({width, height, 8}, DvsSettings{.max_event_rate = rate});
+    for (int i = 0; i < 8; ++i)
+      playback.push(scene::texture<std::uint8_t>(width, height, 8, 3.0 * i, 2.0 * i), 8,
+                    i * scene::frame_time);
+    for (int i = 8; i < 40; ++i)
+      playback.push(scene::texture<std::uint8_t>(width, height, 8, 21, 14), 8,
+                    i * scene::frame_time);
+    return playback.events;
+  };
+  const auto all = play(0);
+  EXPECT_EQ(play(1e12).size(), all.size());
+  const auto fast = play(1e6);
+  EXPECT_GT(static_cast<double>(fast.size()), 0.99 * static_cast<double>(all.size()));
+  const auto slow = play(20'000);
+  EXPECT_LT(slow.size(), all.size());
+  EXPECT_GT(slow.size(), 3000U);
+  // In no stretch of time more than the rate, and the rows under way.
+  for (std::size_t i = 500; i < slow.size(); ++i)
+    ASSERT_GE(slow[i].t - slow[i - 500].t, (500 - 2 * width) / 20'000.0 * second - 1);
+  // What leaves together is of one row.
+  for (std::size_t i = 1; i < slow.size(); ++i)
+    ASSERT_TRUE(slow[i].t != slow[i - 1].t || slow[i].y == slow[i - 1].y);
+}
+
+TEST(Dvs, FollowsMotion) {
+  const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
+  const auto play = [&](Upsampling upsampling) {
+    Playback playback({160, 90, 8}, DvsSettings{.upsampling = upsampling});
+    playback.push(at(40), 8, 0);
+    playback.push(at(48), 8, 40'000'000);
+    return playback.events;
+  };
+  // The right edge passes column 64 + k as k/8 of the interval is over.
+  const auto deviation = [](const std::vector<Timed>& events) {
+    double sum = 0;
+    double count = 0;
+    for (const auto& event : events) {
+      if (event.polarity != Polarity::on || event.y < 36 || event.y >= 48) continue;
+      sum += std::abs(event.t - 5000.0 * (event.x - 64 + 0.5));
+      ++count;
+    }
+    EXPECT_GE(count, 12 * 8 * 9);
+    return sum / count;
+  };
+  EXPECT_LT(deviation(play(Upsampling::motion)), 0.7 * deviation(play(Upsampling::linear)));
+  // Where nothing moves, it changes nothing but how the light goes on its way.
+  Playback still({40, 30, 8}, DvsSettings{.upsampling = Upsampling::motion});
+  stand(still, scene::texture<std::uint8_t>(40, 30, 8, 1, 2), 3, 40'000'000);
+  EXPECT_TRUE(still.events.empty());
+}
+
+TEST(Dvs, TakesSettingsFromFrameToFrame) {
+  Playback playback({30, 20, 8}, DvsSettings{});
+  Nanoseconds time = 0;
+  const auto push = [&](int grey) {
+    playback.events.clear();
+    playback.push(flat(30, 20, grey), 8, time += 40'000'000);
+    return playback.events.size();
+  };
+  push(100);
+  EXPECT_EQ(push(150), 30U * 20U * 2U);
+  playback.set({.positive_threshold = 1});
+  EXPECT_EQ(push(200), 0U);
+  playback.set({.response = Response::log});  // other units: begins anew
+  EXPECT_EQ(push(200), 0U);
+  playback.set({.response = Response::log, .cutoff_hz = 1});
+  EXPECT_EQ(push(220), 0U);
+  playback.set({.response = Response::log, .upsampling = Upsampling::motion});
+  EXPECT_EQ(push(220), 0U);
+  EXPECT_EQ(push(120), 30U * 20U * 2U);  // from the last crossing of 200
+}
+
+}  // namespace
