@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/measure/event_statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace eventcamera {
+namespace {
+
+template <class Pixel>
+void fill(Plane<Pixel>& plane, Pixel value) {
+  for (int y = 0; y < plane.height(); ++y) std::fill_n(plane.row(y), plane.width(), value);
+}
+
+double pixels_of(const EventMap& map) {
+  return static_cast<double>(map.width()) * static_cast<double>(map.height());
+}
+
+double mean_of(const EventMap& map) {
+  double sum = 0;
+  for (int y = 0; y < map.height(); ++y)
+    for (int x = 0; x < map.width(); ++x) sum += map.at(x, y);
+  return sum / pixels_of(map);
+}
+
+}  // namespace
+
+EventStatistics::EventStatistics(int width, int height)
+    : map_(width, height), last_(width, height) {
+  forget_times();
+}
+
+void EventStatistics::restart() {
+  fill(map_, std::uint32_t{0});
+  gaps_.clear();
+  on_ = 0;
+  off_ = 0;
+}
+
+void EventStatistics::forget_times() {
+  fill(last_, never);
+}
+
+StreamFigures EventStatistics::figures(Nanoseconds duration) const {
+  StreamFigures figures;
+  figures.events = on_ + off_;
+  if (figures.events > 0)
+    figures.on_share = static_cast<double>(on_) / static_cast<double>(figures.events);
+  for (std::size_t i = 0; i < gap_shares.size(); ++i)
+    figures.gaps[i] = gaps_.quantile(gap_shares[i]);
+  if (duration <= 0) return figures;
+
+  const double seconds = static_cast<double>(duration) * 1e-9;
+  const double mean = mean_of(map_);
+  double squares = 0;
+  for (int y = 0; y < map_.height(); ++y)
+    for (int x = 0; x < map_.width(); ++x) squares += std::pow(map_.at(x, y) - mean, 2);
+  figures.rate = static_cast<double>(figures.events) / seconds;
+  figures.mean = mean / seconds;
+  figures.deviation = std::sqrt(squares / pixels_of(map_)) / seconds;
+  return figures;
+}
+
+double correlation(const EventMap& a, const EventMap& b) {
+  const double mean_a = mean_of(a);
+  const double mean_b = mean_of(b);
+  double squares_a = 0;
+  double squares_b = 0;
+  double products = 0;
+  for (int y = 0; y < a.height(); ++y) {
+    for (int x = 0; x < a.width(); ++x) {
+      const double off_a = a.at(x, y) - mean_a;
+      const double off_b = b.at(x, y) - mean_b;
+      squares_a += off_a * off_a;
+      squares_b += off_b * off_b;
+      products += off_a * off_b;
+    }
+  }
+  return squares_a > 0 && squares_b > 0 ? products / std::sqrt(squares_a * squares_b) : 0;
+}
+
+}  // namespace eventcamera

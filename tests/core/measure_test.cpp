@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// What is measured of streams, beside the same worked out from all of their events at once.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "src/measure/event_statistics.hpp"
+#include "src/measure/map_picture.hpp"
+#include "src/measure/stream_comparison.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+struct Extent {
+  int width;
+  int height;
+};
+
+using Stream = std::vector<StampedEvent>;
+
+/// Sorted events by chance in (start, end]; some of the times are the same.
+Stream stream_by_chance(Extent extent, std::size_t count, Microseconds start, Microseconds end,
+                        unsigned seed) {
+  std::mt19937 random(seed);
+  const auto between = [&](std::int64_t first, std::int64_t last) {
+    return std::uniform_int_distribution<std::int64_t>(first, last)(random);
+  };
+  Stream stream;
+  for (std::size_t i = 0; i < count; ++i)
+    stream.push_back(StampedEvent::at(static_cast<int>(between(0, extent.width - 1)),
+                                      static_cast<int>(between(0, extent.height - 1)),
+                                      between(start + 1, end),
+                                      between(0, 2) == 0 ? Polarity::off : Polarity::on));
+  std::ranges::sort(stream, {}, &StampedEvent::t);
+  return stream;
+}
+
+/// Hands a stream on in buffers of lengths by chance, whose borders lie on microseconds.
+class Feed {
+ public:
+  Feed(Side side, const Stream& stream, Microseconds start, Microseconds end, unsigned seed)
+      : side_(side), stream_(stream), at_(start), end_(end), random_(seed) {}
+
+  bool done() const { return at_ >= end_; }
+
+  void next(StreamComparison& comparison) {
+    const auto until = std::min(
+        end_, at_ + std::uniform_int_distribution<Microseconds>(1, (end_ - at_) / 4 + 2)(random_));
+    std::vector<Event> events;
+    for (; taken_ < stream_.size() && stream_[taken_].t <= until; ++taken_)
+      events.push_back({static_cast<std::uint32_t>(stream_[taken_].t - at_), stream_[taken_].x,
+                        stream_[taken_].y_p});
+    EXPECT_EQ(comparison.add(side_, events, at_ * 1000, until * 1000), 0U);
+    at_ = until;
+  }
+
+ private:
+  Side side_;
+  const Stream& stream_;
+  std::size_t taken_ = 0;
+  Microseconds at_;
+  Microseconds end_;
+  std::mt19937 random_;
+};
+
+PartnerCounts partnered_plainly(const Stream& of, const Stream& among) {
+  PartnerCounts counts{};
+  for (const auto& event : of) {
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      counts[i] += std::ranges::any_of(among, [&](const StampedEvent& partner) {
+        return partner.polarity() == event.polarity() && std::abs(partner.x - event.x) <= 1 &&
+               std::abs(partner.y() - event.y()) <= 1 &&
+               std::abs(partner.t - event.t) <= partner_distances[i];
+      });
+    }
+  }
+  return counts;
+}
+
+std::vector<double> map_plainly(Extent extent, const Stream& stream) {
+  std::vector<double> map(static_cast<std::size_t>(extent.width * extent.height));
+  for (const auto& event : stream)
+    ++map[static_cast<std::size_t>(event.y() * extent.width + event.x)];
+  return map;
+}
+
+double mean_plainly(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+double covariance_plainly(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    sum += (a[i] - mean_plainly(a)) * (b[i] - mean_plainly(b));
+  return sum / static_cast<double>(a.size());
+}
+
+void expect_figures(const StreamFigures& figures, Extent extent, const Stream& stream,
+                    double seconds) {
+  const auto map = map_plainly(extent, stream);
+  EXPECT_EQ(figures.events, stream.size());
+  EXPECT_NEAR(figures.rate, static_cast<double>(stream.size()) / seconds, 1e-6);
+  EXPECT_NEAR(figures.mean, mean_plainly(map) / seconds, 1e-9);
+  EXPECT_NEAR(figures.deviation, std::sqrt(covariance_plainly(map, map)) / seconds, 1e-6);
+  const auto on = std::ranges::count(stream, Polarity::on, &StampedEvent::polarity);
+  EXPECT_NEAR(figures.on_share,
+              stream.empty() ? 0 : static_cast<double>(on) / static_cast<double>(stream.size()),
+              1e-12);
+
+  std::map<std::pair<int, int>, Microseconds> last;
+  std::vector<Microseconds> gaps;
+  for (const auto& event : stream) {
+    const auto [place, first] = last.try_emplace({event.x, event.y()}, event.t);
+    if (!first) gaps.push_back(event.t - std::exchange(place->second, event.t));
+  }
+  std::ranges::sort(gaps);
+  for (std::size_t i = 0; i < gap_shares.size(); ++i) {
+    const auto rank =
+        static_cast<std::size_t>(std::ceil(gap_shares[i] * static_cast<double>(gaps.size())));
+    const auto expected = gaps.empty() ? 0 : gaps[std::max<std::size_t>(rank, 1) - 1];
+    EXPECT_NEAR(static_cast<double>(figures.gaps[i]), static_cast<double>(expected),
+                static_cast<double>(expected) / 32);
+  }
+}
+
+TEST(GapHistogram, IsExactBelow64AndToAThirtySecondBeyond) {
+  GapHistogram gaps;
+  EXPECT_EQ(gaps.quantile(0.5), 0);
+  for (Microseconds gap = 0; gap < 64; ++gap) {
+    gaps.clear();
+    gaps.add(gap);
+    EXPECT_EQ(gaps.quantile(0.5), gap);
+  }
+  for (Microseconds gap = 64; gap < INT64_MAX / 3; gap += gap / 7) {
+    gaps.clear();
+    gaps.add(gap);
+    EXPECT_NEAR(static_cast<double>(gaps.quantile(1)), static_cast<double>(gap),
+                static_cast<double>(gap) / 32);
+  }
+  gaps.add(INT64_MAX);
+  EXPECT_EQ(gaps.count(), 2U);
+  EXPECT_GT(gaps.quantile(1), INT64_MAX / 33 * 32);
+}
+
+TEST(EventStatistics, RestartsAndRemembersLastTimes) {
+  EventStatistics statistics(3, 2);
+  statistics.add(StampedEvent::at(2, 1, 100, Polarity::on));
+  statistics.restart();
+  statistics.add(StampedEvent::at(2, 1, 130, Polarity::off));
+  auto figures = statistics.figures(1'000'000'000);
+  EXPECT_EQ(figures.events, 1U);
+  EXPECT_EQ(figures.on_share, 0);
+  EXPECT_EQ(figures.gaps[2], 30);
+  EXPECT_EQ(statistics.map().at(2, 1), 1U);
+  statistics.restart();
+  statistics.forget_times();
+  statistics.add(StampedEvent::at(2, 1, 90, Polarity::off));
+  EXPECT_EQ(statistics.figures(1'000'000'000).gaps[2], 0);
+}
+
+TEST(EventStatistics, HasNoRateWithoutTime) {
+  EventStatistics statistics(1, 1);
+  statistics.add(StampedEvent::at(0, 0, 1, Polarity::on));
+  const auto figures = statistics.figures(0);
+  EXPECT_EQ(figures.events, 1U);
+  EXPECT_EQ(figures.rate, 0);
+  EXPECT_EQ(figures.deviation, 0);
+}
+
+TEST(Correlation, IsZeroWhereAMapIsTheSameEverywhere) {
+  EventMap a(2, 1);
+  EventMap b(2, 1);
+  EXPECT_EQ(correlation(a, b), 0);
+  a.at(0, 0) = 3;
+  EXPECT_EQ(correlation(a, b), 0);
+  b.at(1, 0) = 5;
+  EXPECT_DOUBLE_EQ(correlation(a, b), -1);
+  EXPECT_DOUBLE_EQ(correlation(a, a), 1);
+}
+
+TEST(RateCurve, JoinsBinsWhenThereAreTooMany) {
+  RateCurve curve(500);
+  curve.add(Side::reference, 501);
+  curve.add(Side::reference, 1500);
+  curve.add(Side::candidate, 1501);
+  ASSERT_EQ(curve.bins().size(), 2U);
+  EXPECT_EQ(curve.bins()[0][Side::reference], 2U);
+  EXPECT_EQ(curve.bins()[1][Side::candidate], 1U);
+  curve.extend_to(500 + 1000 * static_cast<Microseconds>(RateCurve::most_bins));
+  EXPECT_EQ(curve.bins().size(), RateCurve::most_bins);
+  EXPECT_EQ(curve.bin_length(), 1000);
+  curve.add(Side::candidate, 501 + 1000 * static_cast<Microseconds>(RateCurve::most_bins));
+  EXPECT_EQ(curve.bin_length(), 2000);
+  EXPECT_EQ(curve.bins().size(), RateCurve::most_bins / 2 + 1);
+  EXPECT_EQ(curve.bins()[0][Side::reference], 2U);
+  EXPECT_EQ(curve.bins()[0][Side::candidate], 1U);
+  curve.extend_to(Microseconds{1} << 55);
+  EXPECT_LE(curve.bins().size(), RateCurve::most_bins);
+  std::uint64_t sum = 0;
+  for (const auto& bin : curve.bins()) sum += bin[Side::reference] + bin[Side::candidate];
+  EXPECT_EQ(sum, 4U);
+}
+
+struct Scene {
+  Extent extent;
+  std::size_t reference;
+  std::size_t candidate;
+  Microseconds reference_start;
+  Microseconds candidate_start;
+};
+
+class ComparisonTest : public testing::TestWithParam<std::tuple<Scene, unsigned>> {};
+
+TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
+  const auto& [scene, seed] = GetParam();
+  constexpr Microseconds reference_end = 150'000;
+  constexpr Microseconds candidate_end = 170'000;
+  const auto reference =
+      stream_by_chance(scene.extent, scene.reference, scene.reference_start, reference_end, seed);
+  const auto candidate = stream_by_chance(scene.extent, scene.candidate, scene.candidate_start,
+                                          candidate_end, seed + 100);
+  StreamComparison comparison(scene.extent.width, scene.extent.height);
+  Feed feed_reference(Side::reference, reference, scene.reference_start, reference_end, seed);
+  Feed feed_candidate(Side::candidate, candidate, scene.candidate_start, candidate_end, seed);
+  while (true) {
+    auto& feed = comparison.behind() == Side::reference ? feed_reference : feed_candidate;
+    if (feed.done()) break;
+    feed.next(comparison);
+  }
+
+  const auto start = std::max(scene.reference_start, scene.candidate_start);
+  const auto both = [&](const Stream& stream) {
+    Stream covered;
+    std::ranges::copy_if(stream, std::back_inserter(covered), [&](const StampedEvent& event) {
+      return event.t > start && event.t <= reference_end;
+    });
+    return covered;
+  };
+  const auto covered_reference = both(reference);
+  const auto covered_candidate = both(candidate);
+  const auto figures = comparison.figures();
+  EXPECT_EQ(figures.start, start * 1000);
+  EXPECT_EQ(figures.end, reference_end * 1000);
+  const double seconds = static_cast<double>(reference_end - start) / 1e6;
+  expect_figures(figures.streams[Side::reference], scene.extent, covered_reference, seconds);
+  expect_figures(figures.streams[Side::candidate], scene.extent, covered_candidate, seconds);
+
+  const auto a = map_plainly(scene.extent, covered_reference);
+  const auto b = map_plainly(scene.extent, covered_candidate);
+  const double variances = covariance_plainly(a, a) * covariance_plainly(b, b);
+  EXPECT_NEAR(figures.map_correlation,
+              variances > 0 ? covariance_plainly(a, b) / std::sqrt(variances) : 0, 1e-9);
+
+  const auto expect_partners = [&](Side side, const Stream& of, const Stream& among) {
+    const auto counts = partnered_plainly(of, among);
+    for (std::size_t i = 0; i < counts.size(); ++i)
+      EXPECT_NEAR(figures.partner_shares[side][i],
+                  of.empty() ? 0 : static_cast<double>(counts[i]) / static_cast<double>(of.size()),
+                  1e-12);
+  };
+  expect_partners(Side::reference, covered_reference, covered_candidate);
+  expect_partners(Side::candidate, covered_candidate, covered_reference);
+
+  const auto& curve = comparison.rates();
+  EXPECT_EQ(curve.bins().size(), static_cast<std::size_t>((reference_end - start + 999) / 1000));
+  for (std::size_t i = 0; i < curve.bins().size(); ++i) {
+    const auto in_bin = [&](const Stream& stream) {
+      return std::ranges::count_if(stream, [&](const StampedEvent& event) {
+        return (event.t - start - 1) / 1000 == static_cast<Microseconds>(i);
+      });
+    };
+    EXPECT_EQ(curve.bins()[i][Side::reference],
+              static_cast<std::uint64_t>(in_bin(covered_reference)));
+    EXPECT_EQ(curve.bins()[i][Side::candidate],
+              static_cast<std::uint64_t>(in_bin(covered_candidate)));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Streams, ComparisonTest,
+                         testing::Combine(testing::Values(Scene{{7, 5}, 600, 500, 0, 0},       //
+                                                          Scene{{31, 17}, 1500, 1700, 0, 0},   //
+                                                          Scene{{1, 1}, 300, 40, 0, 0},        //
+                                                          Scene{{1, 9}, 300, 300, 20'000, 0},  //
+                                                          Scene{{13, 3}, 400, 400, 0, 33'333},
+                                                          Scene{{5, 5}, 0, 300, 0, 0},  //
+                                                          Scene{{5, 5}, 300, 0, 0, 0},  //
+                                                          Scene{{5, 5}, 0, 0, 0, 10}),
+                                          testing::Values(1U, 2U, 3U)));
+
+TEST(Comparison, HasNothingToSayOfStreamsThatDoNotMeet) {
+  StreamComparison comparison(4, 4);
+  EXPECT_EQ(comparison.behind(), Side::reference);
+  EXPECT_EQ(comparison.figures().end, 0);
+  const std::vector events = {Event::at(1, 1, 5, Polarity::on)};
+  comparison.add(Side::reference, events, 0, 1'000'000);
+  EXPECT_EQ(comparison.behind(), Side::candidate);
+  comparison.add(Side::candidate, events, 5'000'000, 6'000'000);
+  EXPECT_EQ(comparison.behind(), Side::reference);
+  const auto figures = comparison.figures();
+  EXPECT_EQ(figures.streams[Side::reference].events, 0U);
+  EXPECT_EQ(figures.streams[Side::candidate].events, 0U);
+}
+
+TEST(Comparison, SurvivesEventsBeyondThePictureAndOutOfOrder) {
+  StreamComparison comparison(4, 4);
+  const std::vector events = {Event::at(4, 0, 5, Polarity::on), Event::at(0, 4, 5, Polarity::on),
+                              Event::at(3, 3, 900, Polarity::on), Event::at(0, 0, 2, Polarity::on),
+                              Event::at(0, 0, 4'000'000'000, Polarity::on)};
+  for (const auto side : both_sides) {
+    EXPECT_EQ(comparison.add(side, events, 1'000'000, 2'000'000), 2U);
+    EXPECT_EQ(comparison.add(side, events, 0, 1'000'000), 2U);
+    EXPECT_EQ(comparison.add(side, events, -5'000'000, 9'000'000), 2U);
+  }
+  const auto figures = comparison.figures();
+  EXPECT_EQ(figures.streams[Side::reference].events, figures.streams[Side::candidate].events);
+  EXPECT_EQ(figures.partner_shares[Side::candidate][0], 1);
+}
+
+TEST(MapPicture, ShowsMoreEventsBrighterAndSaysWhatCannotBeWritten) {
+  EventMap few(3, 2);
+  EventMap many(3, 2);
+  few.at(0, 0) = 1;
+  many.at(2, 1) = 9;
+  const auto alone = draw_map(few);
+  EXPECT_EQ(alone.pixels.size(), 3U * 3 * 2);
+  EXPECT_GT(alone.pixels[0], 200);
+  EXPECT_LT(alone.pixels[3], 10);
+  const auto pair = draw_maps(few, many);
+  EXPECT_EQ(pair.width, 9);
+  const auto colour = [&](int x, int y) {
+    const auto* at = &pair.pixels[static_cast<std::size_t>(3 * (y * 9 + x))];
+    return std::vector<int>(at, at + 3);
+  };
+  EXPECT_EQ(colour(7, 1), (std::vector{255, 255, 255}));
+  EXPECT_EQ(colour(8, 1), (std::vector{32, 64, 224}));
+  EXPECT_GT(colour(6, 0)[0], colour(6, 0)[2]);
+
+  const auto directory = std::filesystem::temp_directory_path() / "measure_test";
+  std::filesystem::create_directories(directory);
+  const auto path = directory / "map.png";
+  pair.write_png(path);
+  EXPECT_GT(std::filesystem::file_size(path), 50U);
+  std::filesystem::remove_all(directory);
+  EXPECT_THROW(pair.write_png(path), std::runtime_error);
+}
+
+}  // namespace
