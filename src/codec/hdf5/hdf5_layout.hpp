@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+
+namespace eventcamera {
+
+/// How events lie in an HDF5 file.
+enum class Hdf5Layout : std::uint8_t {
+  dsec,        ///< /events/{t,x,y,p}, /ms_to_idx, /t_offset
+  v2e,         ///< /events, rows of t, x, y, p
+  metavision,  ///< /CD/events and /EXT_TRIGGER/events, compressed with ECF
+};
+
+}  // namespace eventcamera

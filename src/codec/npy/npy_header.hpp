@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace eventcamera {
+
+/// A number in an element of the array.
+struct NpyField {
+  enum class Kind : std::uint8_t { signed_integer, unsigned_integer, floating, boolean };
+
+  Kind kind = Kind::unsigned_integer;
+  bool big_endian = false;
+  std::uint32_t bytes = 0;   ///< 1, 2, 4 or 8
+  std::uint32_t offset = 0;  ///< in the element
+};
+
+/// What a NumPy file's header says of its array of events.
+struct NpyHeader {
+  std::array<NpyField, 4> fields;  ///< by EventColumn
+  std::uint32_t element_bytes = 0;
+  std::uint64_t count = 0;
+};
+
+/// Reads the header's dictionary. Throws NotThisFormat where it is not of a structured array of
+/// one dimension that has fields t, x, y and p.
+NpyHeader read_npy_header(std::string_view dictionary);
+
+}  // namespace eventcamera
