@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// AEDAT4, through the reader that tells AEDAT's versions apart, and its table of packets.
+#include "src/codec/aedat/aedat_reader.hpp"
+#include "src/codec/aedat4/aedat4_table.hpp"
+#include "tests/fuzz/fuzz_decoder.hpp"
+
+namespace {
+
+using namespace fuzz;
+
+/// All of one kind that was read, as a number.
+class Sum {
+ public:
+  void add(std::uint64_t number) { sum_ = (sum_ ^ number) * 0x9E3779B97F4A7C15U + (sum_ >> 29); }
+
+  void add(const Aedat4Events& item) {
+    for (const auto& event : item.events) {
+      add(static_cast<std::uint64_t>(event.t));
+      add(std::uint64_t{event.x} << 16 | event.y_p);
+    }
+  }
+  void add(const Aedat4Picture& item) {
+    const auto& frame = item.frame;
+    add(static_cast<std::uint64_t>(frame.t));
+    for (std::ptrdiff_t i = 0; i < frame.stride * frame.height; ++i) add(frame.pixels[i]);
+  }
+  void add(const Aedat4Triggers& item) {
+    for (const auto& trigger : item.triggers) {
+      add(static_cast<std::uint64_t>(trigger.t));
+      add(std::uint64_t{trigger.id} << 1 | (trigger.rising ? 1U : 0U));
+    }
+  }
+  void add(const Damage& damage) {
+    add(damage.places);
+    add(damage.first_at);
+    add(damage.unsorted);
+    add(damage.outside);
+  }
+
+  friend bool operator==(const Sum&, const Sum&) = default;
+
+ private:
+  std::uint64_t sum_ = 0;
+};
+
+/// Of AEDAT's older versions events and triggers come by turns that how bytes are cut may change.
+struct Sums {
+  Sum events, pictures, triggers, rest;
+  std::vector<Microseconds> latest;  ///< of each stream
+  std::uint64_t unsorted = 0;
+
+  void add(const Aedat4Events& item) {
+    events.add(item);
+    if (latest.size() <= item.stream)
+      latest.resize(item.stream + 1, std::numeric_limits<Microseconds>::min());
+    for (const auto& event : item.events) {
+      unsorted += event.t < latest[item.stream] ? 1 : 0;
+      latest[item.stream] = std::max(latest[item.stream], event.t);
+    }
+  }
+  void add(const Aedat4Picture& item) { pictures.add(item); }
+  void add(const Aedat4Triggers& item) { triggers.add(item); }
+
+  friend bool operator==(const Sums&, const Sums&) = default;
+};
+
+void take(AedatReader& reader, Sums& sums) {
+  while (const auto item = reader.next()) {
+    std::visit([&](const auto& some) { sums.add(some); }, *item);
+    if (const auto* const some = std::get_if<Aedat4Events>(&*item)) {
+      require(some->stream < reader.streams().size(), "events are of a stream");
+      require_within(reader.streams()[some->stream].size, some->events);
+    }
+  }
+}
+
+/// Goes to where the table says that the last events are, or back to the beginning.
+void seek(AedatReader& reader, std::span<const std::uint8_t> bytes) {
+  const auto& decoder = *reader.aedat4();
+  auto position = decoder.packets_at();
+  if (decoder.table_at() && *decoder.table_at() < bytes.size()) {
+    const auto at = static_cast<std::size_t>(*decoder.table_at());
+    const auto table =
+        read_aedat4_table(bytes.subspan(at), decoder.compression(), decoder.packets_at());
+    if (table && !table->empty())
+      position = aedat4_position_of(*table, table->back().end).value_or(position);
+  }
+  reader.resume(position);
+  if (position < bytes.size()) reader.push(bytes.subspan(static_cast<std::size_t>(position)));
+  Sums sums;
+  take(reader, sums);
+  reader.finish();
+  take(reader, sums);
+}
+
+Sums sums_of(std::span<const std::uint8_t> bytes, Pieces pieces) {
+  AedatReader reader;
+  Sums sums;
+  try {
+    in_pieces(bytes, pieces, [&](auto piece) {
+      reader.push(piece);
+      take(reader, sums);
+    });
+    reader.finish();
+    take(reader, sums);
+  } catch (const NotThisFormat&) {
+    sums.rest.add(std::uint64_t{1});
+    return sums;
+  }
+  require(reader.damage().unsorted == sums.unsorted, "disorder is counted");
+  sums.rest.add(reader.damage());
+  sums.rest.add(reader.streams().size());
+  if (reader.version() == 4) {
+    sums.rest.add(reader.aedat4()->skipped().imu_samples);
+    if (pieces.longest == 0) seek(reader, bytes);
+  }
+  return sums;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::span bytes(data, size);
+  require_same_however_cut(bytes, [&](Pieces pieces) { return sums_of(bytes, pieces); });
+  return 0;
+}

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <concepts>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "src/codec/seekable_decoder.hpp"
+
+/// What holds for every decoder and any bytes.
+namespace fuzz {
+
+using namespace eventcamera;
+
+inline void require(bool holds, const char* what) {
+  if (holds) return;
+  std::fprintf(stderr, "does not hold: %s\n", what);
+  std::abort();
+}
+
+/// How bytes are cut: how many a piece has at most, and what chance makes of that.
+struct Pieces {
+  std::size_t longest = 0;  ///< 0: all bytes are one piece
+  std::uint64_t chance = 0;
+};
+
+/// Hands out `bytes` piece by piece. A byte behind a piece cannot be read unseen, nor one of a
+/// piece once it is taken.
+template <class Take>
+void in_pieces(std::span<const std::uint8_t> bytes, Pieces pieces, const Take& take) {
+  const auto longest = pieces.longest == 0 ? bytes.size() : std::min(pieces.longest, bytes.size());
+  std::vector<std::uint8_t> memory(longest);
+  while (!bytes.empty()) {
+    pieces.chance = pieces.chance * 6364136223846793005 + 1442695040888963407;
+    const auto wanted = pieces.longest == 0 ? longest : 1 + (pieces.chance >> 33) % longest;
+    const auto piece = std::span(memory).last(std::min(wanted, bytes.size()));
+    std::ranges::copy(bytes.first(piece.size()), piece.begin());
+    take(std::span<const std::uint8_t>(piece));
+    std::ranges::fill(piece, 0xa5);
+    bytes = bytes.subspan(piece.size());
+  }
+}
+
+/// `outcome_of(pieces)` has to be the same for all bytes at once, for a few pieces and for many.
+template <class OutcomeOf>
+void require_same_however_cut(std::span<const std::uint8_t> bytes, const OutcomeOf& outcome_of) {
+  const auto whole = outcome_of(Pieces{});
+  std::uint64_t chance = bytes.size();
+  for (const auto byte : bytes) chance = chance * 1099511628211 + byte;
+  require(outcome_of(Pieces{bytes.size(), chance}) == whole, "few pieces make the same");
+  const auto small = static_cast<std::size_t>(1 + (chance >> 33) % 40);
+  require(outcome_of(Pieces{small, chance}) == whole, "small pieces make the same");
+}
+
+/// How many events are earlier than one before them.
+inline std::uint64_t unsorted(std::span<const StampedEvent> events) {
+  std::uint64_t count = 0;
+  auto latest = std::numeric_limits<Microseconds>::min();
+  for (const auto& event : events) {
+    count += event.t < latest ? 1 : 0;
+    latest = std::max(latest, event.t);
+  }
+  return count;
+}
+
+inline void require_within(SensorSize size, std::span<const StampedEvent> events) {
+  for (const auto& event : events)
+    require(size.width == 0 || (event.x < size.width && event.y() < size.height),
+            "events are within the sensor");
+}
+
+/// From the landmark before all events, the same events are read once more.
+inline void require_restarts(SeekableDecoder& decoder, std::span<const std::uint8_t> bytes,
+                             const Decoded& before) {
+  const auto landmark = decoder.landmark_before(std::numeric_limits<Microseconds>::min());
+  if (!landmark) return;
+  decoder.restart(*landmark);
+  Decoded again;
+  decoder.decode(bytes.subspan(static_cast<std::size_t>(landmark->position)), again);
+  decoder.finish(again);
+  require(again.events == before.events && again.triggers == before.triggers,
+          "what is read anew is the same");
+}
+
+/// All that a decoder makes of bytes. `events_per_byte`: how many the format can hold at most.
+template <class Make>
+auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces pieces,
+             std::size_t events_per_byte) {
+  const auto decoder = make();
+  Decoded decoded;
+  std::string error;
+  try {
+    in_pieces(bytes, pieces, [&](auto piece) { decoder->decode(piece, decoded); });
+    decoder->finish(decoded);
+  } catch (const NotThisFormat& exception) {
+    error = exception.what();
+    require(!error.empty(), "an error says why");
+  }
+  const auto damage = decoder->damage();
+  require((damage.places == 0) == damage.first.empty(), "damage says what it is");
+  require(damage.first_at <= bytes.size(), "damage is within the file");
+  require(damage.unsorted == unsorted(decoded.events), "disorder is counted");
+  require(decoded.events.size() + decoded.triggers.size() <= bytes.size() * events_per_byte,
+          "memory is bounded");
+  require_within(decoder->size(), decoded.events);
+  if constexpr (std::derived_from<std::remove_cvref_t<decltype(*decoder)>, SeekableDecoder>)
+    if (error.empty() && pieces.longest == 0) require_restarts(*decoder, bytes, decoded);
+  return std::tuple(decoded.events, decoded.triggers, error, decoder->size(), damage.places,
+                    damage.first_at, damage.first, damage.unsorted, damage.outside);
+}
+
+template <class Make>
+int decoder(const Make& make, const std::uint8_t* data, std::size_t size,
+            std::size_t events_per_byte) {
+  const std::span bytes(data, size);
+  require_same_however_cut(
+      bytes, [&](Pieces pieces) { return outcome(make, bytes, pieces, events_per_byte); });
+  return 0;
+}
+
+}  // namespace fuzz

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Events at any times, cut into intervals. Four bytes are an event, or a word to the slicer.
+#include "src/codec/interval_slicer.hpp"
+
+#include <optional>
+
+#include "src/codec/little_endian.hpp"
+#include "tests/fuzz/fuzz_decoder.hpp"
+
+namespace {
+
+using namespace fuzz;
+
+/// Takes what is ready, and returns how many events that were.
+std::uint64_t take(IntervalSlicer& slicer, std::optional<Microseconds>& end) {
+  std::uint64_t count = 0;
+  while (const auto interval = slicer.next()) {
+    require(!end || interval->start == *end, "an interval begins where the last one ended");
+    require(interval->duration > 0, "an interval is not empty");
+    end = interval->start + interval->duration;
+    const Event* before = nullptr;
+    for (const auto& event : interval->events) {
+      require(event.t < interval->duration, "events are within their interval");
+      require(before == nullptr || before->t <= event.t, "events are sorted");
+      before = &event;
+    }
+    count += interval->events.size();
+  }
+  return count;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  IntervalSlicer slicer(1 + size % 2000);
+  std::optional<Microseconds> end;
+  std::vector<StampedEvent> events;
+  std::uint64_t pushed = 0;
+  std::uint64_t taken = 0;
+  std::uint64_t t = 0;
+  for (; size >= 4; data += 4, size -= 4) {
+    const int shift = data[0] % 64;
+    const auto step = static_cast<std::uint64_t>(little_endian<std::int16_t>(data + 1)) << shift;
+    switch (data[3] % 8) {
+      case 0:
+        slicer.push(events);
+        pushed += events.size();
+        events.clear();
+        break;
+      case 1:
+        taken += take(slicer, end);
+        break;
+      case 2:
+        slicer.reach(static_cast<Microseconds>(t + step));
+        break;
+      default:
+        t += step;
+        events.push_back({static_cast<Microseconds>(t), data[0], data[3]});
+    }
+  }
+  slicer.push(events);
+  pushed += events.size();
+  slicer.finish();
+  taken += take(slicer, end);
+  const auto& dropped = slicer.dropped();
+  require(taken + dropped.late + dropped.stray + dropped.repeated == pushed, "no event is lost");
+  return 0;
+}

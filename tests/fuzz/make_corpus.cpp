@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Writes the files that fuzzing starts from: make_corpus DIRECTORY
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tests/codec/formats.hpp"
+#include "tests/codec/recordings.hpp"
+#include "tests/fuzz/aedat_seeds.hpp"
+#include "tests/fuzz/table_seeds.hpp"
+
+namespace {
+
+using namespace fuzz;
+
+/// A format's files: without an event, with few and with more.
+std::vector<Seed> seeds_of(const formats::Format& format) {
+  constexpr SensorSize size{640, 480};
+  recordings::Random random(1);
+  std::vector<Seed> seeds;
+  for (int i = 0; i < 20; ++i) {
+    const auto events = recordings::random_events(random, size, static_cast<std::size_t>(5 * i),
+                                                  i % 2 == 0 ? 1000 : 100'000);
+    seeds.push_back({format.name + "-" + std::to_string(i),
+                     recordings::encode(*format.make_encoder(size), events)});
+  }
+  return seeds;
+}
+
+/// For interval_slicer_fuzz: events at an even pace, and between them a word to hand some out.
+std::vector<Seed> interval_slicer_seeds() {
+  std::vector<Seed> seeds;
+  for (const std::uint8_t shift : {0, 4, 10}) {
+    Seed seed{"pace-" + std::to_string(shift), {}};
+    for (std::uint8_t i = 0; i < 24; ++i)
+      seed.bytes.insert(seed.bytes.end(),
+                        {shift, 9, 0, static_cast<std::uint8_t>(i % 6 < 4 ? 3 : i % 6 - 4)});
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
+void append(const std::vector<Seed>& more, std::vector<Seed>& seeds) {
+  seeds.insert(seeds.end(), more.begin(), more.end());
+}
+
+void write(const std::filesystem::path& directory, const std::vector<Seed>& seeds) {
+  std::filesystem::create_directories(directory);
+  for (const auto& [name, bytes] : seeds) {
+    std::ofstream file(directory / name, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "make_corpus DIRECTORY\n");
+    return 2;
+  }
+  const std::filesystem::path corpus = argv[1];
+  std::map<std::string, std::vector<Seed>> files = {
+      {"aedat2", aedat2_seeds()}, {"aedat3", aedat3_seeds()}, {"aedat4", aedat4_seeds()},
+      {"csv", csv_seeds()},       {"hdf5", hdf5_seeds()},     {"npy", npy_seeds()}};
+  for (const auto& format : formats::all()) {
+    if (format.name.starts_with("evt"))
+      write(corpus / format.name, seeds_of(format));
+    else
+      append(seeds_of(format), files[format.name.starts_with("raw_") ? "raw" : format.name]);
+  }
+  write(corpus / "ecf", ecf_seeds());
+  write(corpus / "hdf5_chunk", hdf5_chunk_seeds());
+  write(corpus / "hdf5_filters", hdf5_filters_seeds());
+  write(corpus / "interval_slicer", interval_slicer_seeds());
+
+  // A typefinder may be asked about any of them.
+  std::vector<Seed> all;
+  for (auto& [target, seeds] : files) {
+    write(corpus / target, seeds);
+    for (auto& seed : seeds) seed.name = target + "-" + seed.name;
+    append(seeds, all);
+  }
+  Seed user_block{"user_block", std::vector<std::uint8_t>(512)};
+  user_block.bytes.insert(user_block.bytes.end(), {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'});
+  all.push_back(user_block);
+  write(corpus / "recognition", all);
+}

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/codec/prophesee/raw.hpp"
+
+#include "tests/fuzz/fuzz_decoder.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  return fuzz::decoder(eventcamera::make_prophesee_raw_decoder, data, size, 6);
+}

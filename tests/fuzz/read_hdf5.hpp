@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include "src/codec/hdf5/hdf5_reader.hpp"
+#include "src/codec/memory_bytes.hpp"
+#include "tests/fuzz/fuzz_decoder.hpp"
+
+namespace fuzz {
+
+/// Reads some of a file, seeks, and reads again.
+inline void read_hdf5(std::span<const std::uint8_t> bytes) {
+  try {
+    Hdf5Reader reader(
+        std::make_unique<MemoryBytes>(std::vector<std::uint8_t>(bytes.begin(), bytes.end())));
+    // A few bytes of gzip can be many events.
+    constexpr std::size_t most = 100'000;
+    std::vector<StampedEvent> events;
+    std::vector<Trigger> triggers;
+    while (events.size() < most && reader.read(10'000, events) > 0) {
+    }
+    require(events.size() <= most + 10'000, "no more is read than is asked for");
+    reader.read_triggers(10'000, triggers);
+    if (const auto range = reader.time_range()) reader.seek(range->first / 2 + range->last / 2);
+    reader.read(1, events);
+    const auto [width, height] = reader.size();
+    for (const auto& event : events)
+      require(width == 0 || (event.x < width && event.y() < height),
+              "events are within the sensor");
+  } catch (const std::runtime_error&) {
+    // It is said what is wrong with the file.
+  }
+}
+
+}  // namespace fuzz

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/codec/recordings.hpp"
+
+namespace fuzz {
+
+using namespace eventcamera;
+
+/// A file that a fuzzer starts from.
+struct Seed {
+  std::string name;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// No more than `count`, so that a file is small.
+inline std::vector<StampedEvent> few_events(unsigned seed, SensorSize size, std::size_t count) {
+  constexpr Microseconds longest_pause = 3'600'000'000;
+  recordings::Random random(seed);
+  auto events = recordings::random_events(random, size, count, longest_pause);
+  events.resize(count);
+  return events;
+}
+
+}  // namespace fuzz
