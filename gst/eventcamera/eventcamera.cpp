@@ -17,6 +17,8 @@ GType gst_event_camera_palette_get_type(void) {
         {GST_EVENT_CAMERA_PALETTE_DARK, "On the dark: ON white, OFF blue, both light blue", "dark"},
         {GST_EVENT_CAMERA_PALETTE_GREY, "On grey: ON white, OFF black, both dark grey", "grey"},
         {GST_EVENT_CAMERA_PALETTE_RED_BLUE, "On white: ON blue, OFF red, both purple", "red-blue"},
+        {GST_EVENT_CAMERA_PALETTE_VIRIDIS, "Purple by green to yellow, uniform", "viridis"},
+        {GST_EVENT_CAMERA_PALETTE_MAGMA, "Black by red to light yellow, uniform", "magma"},
         {0, nullptr, nullptr},
     };
     return g_enum_register_static("GstEventCameraPalette", values);

@@ -90,15 +90,20 @@ static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent* e
  * @GST_EVENT_CAMERA_PALETTE_DARK: on the dark: ON white, OFF blue, both light blue
  * @GST_EVENT_CAMERA_PALETTE_GREY: on grey: ON white, OFF black, both dark grey
  * @GST_EVENT_CAMERA_PALETTE_RED_BLUE: on white: ON blue, OFF red, both purple
+ * @GST_EVENT_CAMERA_PALETTE_VIRIDIS: from purple by green to yellow, perceptually uniform
+ * @GST_EVENT_CAMERA_PALETTE_MAGMA: from black by red to light yellow, perceptually uniform
  *
- * The colours of accumulated events: of a pixel without events, with ON events, with OFF events,
- * and with both.
+ * The colours of drawn events. Where events are accumulated: of a pixel without events, with ON
+ * events, with OFF events, and with both. Where pixels have shades, the first four palettes shade
+ * ON and OFF apart, and the uniform ones show how much, whichever polarity.
  */
 typedef enum {
   GST_EVENT_CAMERA_PALETTE_LIGHT,
   GST_EVENT_CAMERA_PALETTE_DARK,
   GST_EVENT_CAMERA_PALETTE_GREY,
   GST_EVENT_CAMERA_PALETTE_RED_BLUE,
+  GST_EVENT_CAMERA_PALETTE_VIRIDIS,
+  GST_EVENT_CAMERA_PALETTE_MAGMA,
 } GstEventCameraPalette;
 
 #define GST_TYPE_EVENT_CAMERA_PALETTE (gst_event_camera_palette_get_type())

@@ -10,10 +10,12 @@
 #include <utility>
 
 #include "gst/eventcamera/eventcamera.h"
+#include "gst/latency.hpp"
 #include "gst/simulate/output_buffers.hpp"
 #include "gst/simulate/output_caps.hpp"
 #include "gst/simulate/picture_formats.hpp"
-#include "gst/simulate/video_frame.hpp"
+#include "gst/video/drawn_formats.hpp"
+#include "gst/video/video_frame.hpp"
 #include "src/flow/fixed_point.hpp"
 #include "src/render/accumulator.hpp"
 
@@ -24,7 +26,6 @@ using eventcamera::Accumulator;
 using eventcamera::EventBuckets;
 using eventcamera::LumaView;
 using eventcamera::Nanoseconds;
-using eventcamera::PaletteName;
 using eventcamera::Plane;
 using eventcamera::Simulator;
 
@@ -59,20 +60,6 @@ struct State {
   Plane<guint8> gathered;      ///< luma that was packed
   bool discontinuous = false;  ///< the next buffer does not follow on the last one
 };
-
-PaletteName core_palette(GstEventCameraPalette palette) {
-  switch (palette) {
-    case GST_EVENT_CAMERA_PALETTE_LIGHT:
-      return PaletteName::light;
-    case GST_EVENT_CAMERA_PALETTE_DARK:
-      return PaletteName::dark;
-    case GST_EVENT_CAMERA_PALETTE_GREY:
-      return PaletteName::grey;
-    case GST_EVENT_CAMERA_PALETTE_RED_BLUE:
-      return PaletteName::red_blue;
-  }
-  return PaletteName::dark;
-}
 
 }  // namespace
 
@@ -368,6 +355,14 @@ static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanose
   return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
 }
 
+/// Makes a buffer that of an interval.
+static void set_times(GstBuffer* out, Nanoseconds start, Nanoseconds end, State& state) {
+  GST_BUFFER_PTS(out) = static_cast<GstClockTime>(start);
+  GST_BUFFER_DTS(out) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION(out) = static_cast<GstClockTime>(end - start);
+  if (std::exchange(state.discontinuous, false)) GST_BUFFER_FLAG_SET(out, GST_BUFFER_FLAG_DISCONT);
+}
+
 /// Takes a frame and hands out the interval that it ends, if it ends one.
 static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffer** out) {
   auto* transform = GST_BASE_TRANSFORM(self);
@@ -396,20 +391,25 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   self->priv->handed_out_until = end;
   GstFlowReturn result = GST_FLOW_OK;
   if (state.drawing) {
-    result =
-        event_simulator_draw_events(transform, *events, *state.drawing,
-                                    eventcamera::palette(core_palette(settings.palette)), in, out);
+    result = event_simulator_draw_events(transform, *events, *state.drawing,
+                                         eventcamera::palette(palette_name_of(settings.palette)),
+                                         state.simulator->threads(), in, out);
   } else if (events->size() > 0) {
-    result = event_simulator_write_events(transform, *events, in, out);
+    result = event_simulator_write_events(transform, *events, state.simulator->threads(), in, out);
   } else {
     return push_gap(self, *start, end, GST_SEQNUM_INVALID);
   }
   if (result != GST_FLOW_OK) return result;
-  GST_BUFFER_PTS(*out) = static_cast<GstClockTime>(*start);
-  GST_BUFFER_DTS(*out) = GST_CLOCK_TIME_NONE;
-  GST_BUFFER_DURATION(*out) = static_cast<GstClockTime>(end - *start);
-  if (std::exchange(state.discontinuous, false)) GST_BUFFER_FLAG_SET(*out, GST_BUFFER_FLAG_DISCONT);
+  set_times(*out, *start, end, state);
   return GST_FLOW_OK;
+}
+
+static void fail_for_want_of_memory(GstEventSimulator* self) {
+  self->priv->state.reset();
+  GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
+                    ("There is not enough memory for the events of a frame. Raise the "
+                     "thresholds, or lower interpolated-frames."),
+                    (nullptr));
 }
 
 static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
@@ -424,11 +424,7 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
     try {
       result = take_frame(self, in, out);
     } catch (const std::bad_alloc&) {
-      self->priv->state.reset();
-      GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
-                        ("There is not enough memory for the events of a frame. Raise the "
-                         "thresholds, or lower interpolated-frames."),
-                        (nullptr));
+      fail_for_want_of_memory(self);
     } catch (const std::exception& error) {
       self->priv->state.reset();
       GST_ELEMENT_ERROR(self, STREAM, FAILED, ("The simulation failed."), ("%s", error.what()));
@@ -458,6 +454,29 @@ static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   return true;
 }
 
+/// Lets the last frame stand until `end` and sends what fires meanwhile. Where that is nothing, or
+/// pictures are wanted, of which a gap has none, it is a gap downstream too.
+static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum) {
+  auto* transform = GST_BASE_TRANSFORM(self);
+  auto& state = *self->priv->state;
+  const Nanoseconds start = *state.simulator->last_time();
+  if (const auto configure = GST_EVENT_SIMULATOR_GET_CLASS(self)->configure)
+    configure(self, *state.simulator);
+  const EventBuckets* events = state.simulator->hold_until(end, settings_of(self).simulation);
+  self->priv->handed_out_until = end;
+  GstBuffer* out = nullptr;
+  if (events != nullptr && events->size() > 0 && !state.drawing) {
+    const std::unique_ptr<GstBuffer, void (*)(GstBuffer*)> in(gst_buffer_new(), gst_buffer_unref);
+    if (event_simulator_write_events(transform, *events, state.simulator->threads(), in.get(),
+                                     &out) != GST_FLOW_OK)
+      return;
+    set_times(out, start, end, state);
+    gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out);
+  } else {
+    push_gap(self, start, end, seqnum);
+  }
+}
+
 /// Upstream has no frames for a while: the last one stands until a frame's length before the end of
 /// it, where the next interval can begin. Tells whether the event is to be sent on.
 static bool take_gap(GstEventSimulator* self, GstEvent* event) {
@@ -473,9 +492,11 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
   const auto end = static_cast<Nanoseconds>(pts + rest);
   if (end <= *start) return false;
-  state->simulator->hold_until(end);
-  self->priv->handed_out_until = end;
-  push_gap(self, *start, end, gst_event_get_seqnum(event));
+  try {
+    hold_until(self, end, gst_event_get_seqnum(event));
+  } catch (const std::bad_alloc&) {
+    fail_for_want_of_memory(self);
+  }
   return false;
 }
 
@@ -529,15 +550,8 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 
-  if (!gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(transform), query)) return FALSE;
-  gboolean live = FALSE;
-  GstClockTime min = 0;
-  GstClockTime max = 0;
-  gst_query_parse_latency(query, &live, &min, &max);
-  const GstClockTime own = latency_of(GST_EVENT_SIMULATOR(transform));
-  gst_query_set_latency(query, live, min + own,
-                        GST_CLOCK_TIME_IS_VALID(max) ? max + own : GST_CLOCK_TIME_NONE);
-  return TRUE;
+  return answer_latency(GST_BASE_TRANSFORM_SINK_PAD(transform), query,
+                        latency_of(GST_EVENT_SIMULATOR(transform)));
 }
 
 static gboolean stop(GstBaseTransform* transform) {
@@ -592,7 +606,7 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
       GST_STATIC_CAPS(GST_EVENT_CAMERA_MEDIA_TYPE
                       ", format = (string) XYTP, width = (int) [ 1, 16384 ], "
                       "height = (int) [ 1, 16384 ], framerate = (fraction) [ 0, max ]; "
-                      "video/x-raw, format = (string) " EVENT_SIMULATOR_OUTPUT_FORMATS
+                      "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS
                       ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
                       "framerate = (fraction) [ 0, max ]"));
   static_assert(eventcamera::longest_side == 16384);

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulate/output_buffers.hpp"
 
-#include <gst/video/gstvideopool.h>
-
 #include <new>
 
 #include "gst/simulate/event_pool.hpp"
 #include "gst/simulate/output_caps.hpp"
-#include "gst/simulate/picture_formats.hpp"
-#include "gst/simulate/video_frame.hpp"
+#include "gst/video/drawn_formats.hpp"
+#include "gst/video/drawn_pool.hpp"
+#include "gst/video/video_frame.hpp"
 
 using eventcamera::EventBuckets;
+using eventcamera::ThreadPool;
 
 /// GstBaseTransform's own doing.
 static const GstBaseTransformClass* base_class() {
@@ -33,38 +33,12 @@ static void decide_on_event_pool(GstQuery* query) {
   gst_object_unref(pool);
 }
 
-/// Pictures come from downstream's pool, or one of ours.
-static bool decide_on_video_pool(GstQuery* query, GstCaps* caps) {
-  GstVideoInfo drawn;
-  if (!gst_video_info_from_caps(&drawn, caps)) return false;
-  GstBufferPool* pool = nullptr;
-  guint size = 0;
-  guint min = 0;
-  guint max = 0;
-  const bool offered = gst_query_get_n_allocation_pools(query) > 0;
-  if (offered) gst_query_parse_nth_allocation_pool(query, 0, &pool, &size, &min, &max);
-  if (pool == nullptr) pool = gst_video_buffer_pool_new();
-  size = MAX(size, static_cast<guint>(GST_VIDEO_INFO_SIZE(&drawn)));
-
-  GstStructure* config = gst_buffer_pool_get_config(pool);
-  gst_buffer_pool_config_set_params(config, caps, size, min, max);
-  if (gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr))
-    gst_buffer_pool_config_add_option(config, GST_BUFFER_POOL_OPTION_VIDEO_META);
-  gst_buffer_pool_set_config(pool, config);
-  if (offered)
-    gst_query_set_nth_allocation_pool(query, 0, pool, size, min, max);
-  else
-    gst_query_add_allocation_pool(query, pool, size, min, max);
-  gst_object_unref(pool);
-  return true;
-}
-
 static gboolean decide_allocation(GstBaseTransform* transform, GstQuery* query) {
   GstCaps* caps = nullptr;
   gst_query_parse_allocation(query, &caps, nullptr);
   if (!event_simulator_draws(caps))
     decide_on_event_pool(query);
-  else if (!decide_on_video_pool(query, caps))
+  else if (!decide_on_drawn_pool(query, caps))
     return FALSE;
   return base_class()->decide_allocation(transform, query);
 }
@@ -101,7 +75,7 @@ void event_simulator_class_install_buffers(GstBaseTransformClass* klass) {
 /* intervals */
 
 GstFlowReturn event_simulator_write_events(GstBaseTransform* transform, const EventBuckets& events,
-                                           GstBuffer* in, GstBuffer** out) {
+                                           ThreadPool& threads, GstBuffer* in, GstBuffer** out) {
   GstBuffer* buffer = nullptr;
   const GstFlowReturn result = base_class()->prepare_output_buffer(transform, in, &buffer);
   if (result != GST_FLOW_OK) return result;
@@ -111,7 +85,7 @@ GstFlowReturn event_simulator_write_events(GstBaseTransform* transform, const Ev
     gst_buffer_unref(buffer);
     throw std::bad_alloc();
   }
-  events.copy_to(reinterpret_cast<eventcamera::Event*>(map.data));
+  events.copy_to(reinterpret_cast<eventcamera::Event*>(map.data), threads);
   gst_buffer_unmap(buffer, &map);
   *out = buffer;
   return GST_FLOW_OK;
@@ -119,7 +93,7 @@ GstFlowReturn event_simulator_write_events(GstBaseTransform* transform, const Ev
 
 GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform, const EventBuckets& events,
                                           Drawing& drawing, const eventcamera::Palette& palette,
-                                          GstBuffer* in, GstBuffer** out) {
+                                          ThreadPool& threads, GstBuffer* in, GstBuffer** out) {
   GstBuffer* buffer = nullptr;
   const GstFlowReturn result = base_class()->prepare_output_buffer(transform, in, &buffer);
   if (result != GST_FLOW_OK) return result;
@@ -131,7 +105,7 @@ GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform, const Eve
                         (nullptr));
       return GST_FLOW_ERROR;
     }
-    drawing.accumulator.add(events);
+    drawing.accumulator.add(events, threads);
     drawing.accumulator.draw(palette, pixel_layout_of(drawing.video), picture.data(),
                              picture.stride());
   }

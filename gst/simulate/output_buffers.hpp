@@ -5,6 +5,7 @@
 #include <gst/video/video.h>
 
 #include "src/event/event_buckets.hpp"
+#include "src/parallel/thread_pool.hpp"
 #include "src/render/accumulator.hpp"
 
 /// For class_init: what GstBaseTransform asks about buffers, in and out.
@@ -19,11 +20,13 @@ struct Drawing {
 /// Makes a buffer of an interval's events, of which there must be some. `in` is the frame that ends
 /// the interval. Throws std::bad_alloc.
 GstFlowReturn event_simulator_write_events(GstBaseTransform* transform,
-                                           const eventcamera::EventBuckets& events, GstBuffer* in,
+                                           const eventcamera::EventBuckets& events,
+                                           eventcamera::ThreadPool& threads, GstBuffer* in,
                                            GstBuffer** out);
 
 /// Makes a picture of an interval's events.
 GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform,
                                           const eventcamera::EventBuckets& events, Drawing& drawing,
-                                          const eventcamera::Palette& palette, GstBuffer* in,
+                                          const eventcamera::Palette& palette,
+                                          eventcamera::ThreadPool& threads, GstBuffer* in,
                                           GstBuffer** out);

@@ -5,6 +5,7 @@
 
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/simulate/picture_formats.hpp"
+#include "gst/video/drawn_formats.hpp"
 
 namespace {
 
@@ -42,7 +43,7 @@ GstCaps* event_simulator_output_caps(const GstCaps* video) {
         with_fields_of(in, "video/x-raw", {"width", "height", "framerate", "pixel-aspect-ratio"});
     if (gst_caps_is_fixed(video) && !gst_structure_has_field(pictures, "pixel-aspect-ratio"))
       gst_structure_set(pictures, "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, nullptr);
-    set_formats(pictures, EVENT_SIMULATOR_OUTPUT_FORMATS);
+    set_formats(pictures, DRAWN_VIDEO_FORMATS);
     output = gst_caps_merge_structure(output, pictures);
   }
   return output;

@@ -11,14 +11,3 @@ eventcamera::LumaFormat luma_format_of(const GstVideoInfo& info) {
 bool has_packed_luma(const GstVideoInfo& info) {
   return GST_VIDEO_INFO_COMP_DEPTH(&info, 0) == 8 && GST_VIDEO_INFO_COMP_PSTRIDE(&info, 0) == 2;
 }
-
-eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info) {
-  if (GST_VIDEO_INFO_FORMAT(&info) == GST_VIDEO_FORMAT_GRAY8) return {};
-  const auto place = [&info](int component) {
-    return static_cast<int>(GST_VIDEO_INFO_COMP_POFFSET(&info, component));
-  };
-  return {.bytes = GST_VIDEO_INFO_COMP_PSTRIDE(&info, GST_VIDEO_COMP_R),
-          .red = place(GST_VIDEO_COMP_R),
-          .green = place(GST_VIDEO_COMP_G),
-          .blue = place(GST_VIDEO_COMP_B)};
-}

@@ -4,7 +4,6 @@
 #include <gst/video/video.h>
 
 #include "src/picture/luma.hpp"
-#include "src/render/accumulator.hpp"
 
 /// The formats whose brightness is read where it lies: grey, planar and semi-planar YUV. The packed
 /// 4:2:2 formats stand with them because most USB cameras send nothing else; their luma is
@@ -14,15 +13,8 @@
   "YUY2, UYVY, YVYU, VYUY, GRAY16_LE, I420_10LE, I422_10LE, Y444_10LE, A420_10LE, A422_10LE, " \
   "A444_10LE, P010_10LE, I420_12LE, I422_12LE, Y444_12LE, P012_LE, P016_LE, Y444_16LE }"
 
-/// The formats accumulated events can be drawn in, the most usual first.
-#define EVENT_SIMULATOR_OUTPUT_FORMATS \
-  "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, GRAY8 }"
-
 /// How a simulator sees a video of EVENT_SIMULATOR_INPUT_FORMATS.
 eventcamera::LumaFormat luma_format_of(const GstVideoInfo& info);
 
 /// Whether the luma lies between chroma, and is to be gathered.
 bool has_packed_luma(const GstVideoInfo& info);
-
-/// How events are drawn into a video of EVENT_SIMULATOR_OUTPUT_FORMATS.
-eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info);

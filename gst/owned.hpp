@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/gst.h>
+
+#include <memory>
+
+/// GStreamer's objects, with an owner.
+
+struct Unref {
+  void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
+  void operator()(GstCaps* caps) const { gst_caps_unref(caps); }
+};
+
+using OwnedBuffer = std::unique_ptr<GstBuffer, Unref>;
+using OwnedCaps = std::unique_ptr<GstCaps, Unref>;

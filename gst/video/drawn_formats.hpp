@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/video/video.h>
+
+#include "gst/eventcamera/eventcamera.h"
+#include "src/render/palette.hpp"
+#include "src/render/pixel_layout.hpp"
+
+/// The formats events can be drawn in, the most usual first.
+#define DRAWN_VIDEO_FORMATS "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR, GRAY8 }"
+
+/// How events are drawn into a video of DRAWN_VIDEO_FORMATS.
+eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info);
+
+/// What the core calls an application's palette.
+eventcamera::PaletteName palette_name_of(GstEventCameraPalette palette);
