@@ -3,6 +3,7 @@
 
 #include "elements/eventsim/eventsimdense.hpp"
 #include "elements/eventsim/eventsimdiff.hpp"
+#include "elements/eventsim/eventsimdvs.hpp"
 #include "elements/eventsim/eventsimframe.hpp"
 #include "elements/eventsim/eventsimsparse.hpp"
 
@@ -12,6 +13,7 @@ static gboolean plugin_init(GstPlugin* plugin) {
   registered |= GST_ELEMENT_REGISTER(eventsim_dense, plugin);
   registered |= GST_ELEMENT_REGISTER(eventsim_sparse, plugin);
   registered |= GST_ELEMENT_REGISTER(eventsim_diff, plugin);
+  registered |= GST_ELEMENT_REGISTER(eventsim_dvs, plugin);
   return registered;
 }
 

@@ -31,14 +31,34 @@ using Owned = std::unique_ptr<Type, Unref>;
 using Buffer = Owned<GstBuffer>;
 
 inline const char* const elements[] = {"eventsim-frame", "eventsim-dense", "eventsim-sparse",
-                                       "eventsim-diff"};
+                                       "eventsim-diff", "eventsim-dvs"};
 
 class Harness {
  public:
   /// For example "eventsim-dense flow=dis-hq".
-  explicit Harness(const std::string& launch) {
+  explicit Harness(const std::string& launch)
+      : Harness((gst_init(nullptr, nullptr), gst_harness_new_parse(launch.c_str())), launch) {}
+
+  /// Of an element whose source pad appears with its first output.
+  static Harness with_late_pad(const std::string& launch) {
     gst_init(nullptr, nullptr);
-    h_.reset(gst_harness_new_parse(launch.c_str()));
+    static GstStaticPadTemplate src =
+        GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS_ANY);
+    static GstStaticPadTemplate sink =
+        GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS_ANY);
+    GstElement* element = gst_parse_launch(launch.c_str(), nullptr);
+    GstHarness* h = gst_harness_new_full(element, &src, "sink", &sink, nullptr);
+    g_signal_connect(element, "pad-added",
+                     G_CALLBACK(+[](GstElement*, GstPad* pad, GstHarness* to) {
+                       gst_harness_add_element_src_pad(to, pad);
+                     }),
+                     h);
+    gst_object_unref(element);
+    return Harness(h, launch);
+  }
+
+  Harness(GstHarness* h, const std::string& launch) {
+    h_.reset(h);
     bus_.reset(gst_bus_new());
     gst_element_set_bus(h_->element, bus_.get());
     element_.reset(gst_harness_find_element(h_.get(), launch.substr(0, launch.find(' ')).c_str()));

@@ -21,6 +21,7 @@ struct Defaults {
   const char* element;
   double threshold;
   bool interpolates;
+  double unit = 1;  ///< of the thresholds that a test sets
 };
 
 class EveryElement : public testing::TestWithParam<Defaults> {};
@@ -28,7 +29,8 @@ INSTANTIATE_TEST_SUITE_P(, EveryElement,
                          testing::Values(Defaults{"eventsim-frame", 20, false},
                                          Defaults{"eventsim-dense", 2, true},
                                          Defaults{"eventsim-sparse", 10, true},
-                                         Defaults{"eventsim-diff", 20, true}));
+                                         Defaults{"eventsim-diff", 20, true},
+                                         Defaults{"eventsim-dvs", 0.2, false, 0.1}));
 
 TEST_P(EveryElement, HasTheDefaultsOfTheTable) {
   gst_init(nullptr, nullptr);
@@ -46,11 +48,13 @@ TEST_P(EveryElement, HasTheDefaultsOfTheTable) {
 TEST_P(EveryElement, KeepsWhatIsSet) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make(GetParam().element, nullptr));
-  gst_util_set_object_arg(G_OBJECT(element.get()), "positive-threshold", "12.5");
-  gst_util_set_object_arg(G_OBJECT(element.get()), "negative-threshold", "7");
+  const double positive = 12.5 * GetParam().unit;
+  const double negative = 7 * GetParam().unit;
+  g_object_set(element.get(), "positive-threshold", positive, "negative-threshold", negative,
+               nullptr);
   gst_util_set_object_arg(G_OBJECT(element.get()), "palette", "red-blue");
-  EXPECT_EQ(number(element.get(), "positive-threshold"), 12.5);
-  EXPECT_EQ(number(element.get(), "negative-threshold"), 7);
+  EXPECT_EQ(number(element.get(), "positive-threshold"), positive);
+  EXPECT_EQ(number(element.get(), "negative-threshold"), negative);
   gint palette = 0;
   g_object_get(element.get(), "palette", &palette, nullptr);
   EXPECT_EQ(palette, GST_EVENT_CAMERA_PALETTE_RED_BLUE);
@@ -95,6 +99,63 @@ TEST(Dense, NamesItsFlowsAndInterpolations) {
   gint interpolation = 0;
   g_object_get(element.get(), "interpolation", &interpolation, nullptr);
   EXPECT_EQ(interpolation, 1);
+}
+
+TEST(Dvs, TakesWhatIsNotSetFromItsPreset) {
+  gst_init(nullptr, nullptr);
+  for (const bool preset_is_first : {true, false}) {
+    Owned<GstElement> owned(gst_element_factory_make("eventsim-dvs", nullptr));
+    GstElement* element = owned.get();
+    const auto set = [&](const char* property, const char* value) {
+      gst_util_set_object_arg(G_OBJECT(element), property, value);
+    };
+    if (preset_is_first) set("preset", "v2e-noisy");
+    set("threshold-sigma", "0.07");
+    set("refractory-reset", "signal");
+    set("seed", "18446744073709551615");
+    if (!preset_is_first) set("preset", "v2e-noisy");
+    EXPECT_EQ(number(element, "threshold-sigma"), 0.07);
+    EXPECT_EQ(number(element, "cutoff-hz"), 30);
+    EXPECT_EQ(number(element, "shot-noise-rate-hz"), 5);
+    EXPECT_EQ(number(element, "leak-rate-hz"), 0.1);
+    set("preset", "icns");
+    EXPECT_EQ(number(element, "threshold-sigma"), 0.07);
+    EXPECT_EQ(number(element, "positive-threshold"), 0.4);
+    EXPECT_EQ(number(element, "refractory-period"), 100);
+    EXPECT_EQ(number(element, "latency"), 100);
+    gint reset = 0;
+    guint64 seed = 0;
+    g_object_get(element, "refractory-reset", &reset, "seed", &seed, nullptr);
+    EXPECT_EQ(reset, 1);
+    EXPECT_EQ(seed, G_MAXUINT64);
+  }
+}
+
+TEST(Dvs, NamesItsPresetsAndTheirsAreInRange) {
+  gst_init(nullptr, nullptr);
+  Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
+  GObject* object = G_OBJECT(element.get());
+  for (const char* preset :
+       {"ideal", "esim", "v2e-clean", "v2e-noisy", "icns", "davis346", "gen4"}) {
+    gst_util_set_object_arg(object, "preset", preset);
+    GValue value = G_VALUE_INIT;
+    g_value_init(&value,
+                 g_object_class_find_property(G_OBJECT_GET_CLASS(object), "preset")->value_type);
+    g_object_get_property(object, "preset", &value);
+    gchar* back = gst_value_serialize(&value);
+    EXPECT_STREQ(back, preset);
+    g_free(back);
+    g_value_unset(&value);
+    guint count = 0;
+    GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(object), &count);
+    for (guint i = 0; i < count; ++i) {
+      if (!G_IS_PARAM_SPEC_DOUBLE(specs[i])) continue;
+      const double here = number(element.get(), specs[i]->name);
+      EXPECT_GE(here, G_PARAM_SPEC_DOUBLE(specs[i])->minimum) << preset << " " << specs[i]->name;
+      EXPECT_LE(here, G_PARAM_SPEC_DOUBLE(specs[i])->maximum) << preset << " " << specs[i]->name;
+    }
+    g_free(specs);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,556 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-aedatmux
+ * @title: aedatmux
+ * @short_description: writes AEDAT 4, events and frames in one file
+ *
+ * Writes one event stream, video beside it, or both, in the order of their times. The times in the
+ * file are those of the event stream, floor(PTS / 1000) + t microseconds; video is put in sync with
+ * it.
+ *
+ * What is written needs no seeking, and can go through a network. Where downstream can seek, as
+ * filesink can, the file ends with a table of its packets, and its header is made to point there,
+ * so that readers can seek and know the duration.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=in.raw ! decodebin caps="application/x-event-camera,format=XYTP"
+ * ! aedatmux compression=zstd ! filesink location=out.aedat4
+ * ]|
+ */
+#include "elements/eventcam/aedatmux.hpp"
+
+#include <gst/base/gstaggregator.h>
+
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "elements/eventcam/aedatframe.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "gst/owned.hpp"
+#include "src/codec/aedat4/aedat4_encoder.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
+#define GST_CAT_DEFAULT aedat_mux_debug
+
+using eventcamera::Aedat4Compression;
+using eventcamera::Aedat4Encoder;
+using eventcamera::Microseconds;
+using eventcamera::SensorSize;
+using eventcamera::StampedEvent;
+
+namespace {
+
+enum Property : guint { prop_compression = 1 };
+
+constexpr auto default_compression = Aedat4Compression::lz4;
+
+/// Events wait for no more than this to become a packet.
+constexpr Microseconds longest_wait = 100'000;
+
+struct UnrefPad {
+  void operator()(GstAggregatorPad* pad) const { gst_object_unref(pad); }
+};
+using Pad = std::unique_ptr<GstAggregatorPad, UnrefPad>;
+using Bytes = std::vector<guint8>;
+
+/// What is known of the file, and what writes it.
+struct State {
+  SensorSize size;  ///< of the event stream
+  std::optional<GstVideoInfo> video;
+  std::string source;                      ///< the camera's name
+  std::unique_ptr<Aedat4Encoder> encoder;  ///< none before the header
+  gint64 shift = 0;                        ///< nanoseconds from the running time to the file's
+  Microseconds written = 0;                ///< the time of the latest event
+  Microseconds flushed = 0;                ///< when events were last made a packet
+  std::vector<StampedEvent> events;
+  bool warned = false;
+};
+
+}  // namespace
+
+struct GstAedatMuxPrivate {
+  std::mutex mutex;  // guards the property; nothing is called under it
+  Aedat4Compression compression = default_compression;
+
+  // The streaming thread's, or nobody's while there is none.
+  State state;
+};
+
+namespace {
+
+struct GstAedatMux {
+  GstAggregator parent;
+  GstAedatMuxPrivate* priv;
+};
+
+struct GstAedatMuxClass {
+  GstAggregatorClass parent_class;
+};
+
+}  // namespace
+
+G_DEFINE_TYPE_WITH_CODE(GstAedatMux, gst_aedat_mux, GST_TYPE_AGGREGATOR,
+                        GST_DEBUG_CATEGORY_INIT(aedat_mux_debug, "aedatmux", 0, "AEDAT 4 muxer"))
+GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mux_get_type())
+#define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_aedat_mux_parent_class)
+
+static GstAedatMux* mux_of(gpointer object) {
+  return reinterpret_cast<GstAedatMux*>(object);
+}
+
+static constexpr const char* events_name = "events";
+static constexpr const char* video_name = "video";
+
+static GstStaticPadTemplate events_template = GST_STATIC_PAD_TEMPLATE(
+    "events", GST_PAD_SINK, GST_PAD_REQUEST,
+    GST_STATIC_CAPS(GST_EVENT_CAMERA_MEDIA_TYPE
+                    ", format = (string) XYTP, width = (int) [ 1, 32767 ], "
+                    "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"));
+static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
+    "video", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(AEDAT_VIDEO_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS("application/x-aedat, version = (int) 4"));
+
+/* properties */
+
+#define GST_TYPE_AEDAT_COMPRESSION (gst_aedat_compression_get_type())
+static GType gst_aedat_compression_get_type() {
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {static_cast<int>(Aedat4Compression::none), "No compression", "none"},
+        {static_cast<int>(Aedat4Compression::lz4), "LZ4, the fastest", "lz4"},
+        {static_cast<int>(Aedat4Compression::lz4_high), "LZ4, slower and smaller", "lz4-high"},
+        {static_cast<int>(Aedat4Compression::zstd), "Zstandard", "zstd"},
+        {static_cast<int>(Aedat4Compression::zstd_high), "Zstandard, the smallest", "zstd-high"},
+        {0, nullptr, nullptr},
+    };
+    return g_enum_register_static("GstAedatCompression", values);
+  }();
+  return type;
+}
+
+static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
+  auto* priv = mux_of(object)->priv;
+  if (id == prop_compression) {
+    const std::lock_guard lock(priv->mutex);
+    priv->compression = static_cast<Aedat4Compression>(g_value_get_enum(value));
+  } else {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  }
+}
+
+static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
+  auto* priv = mux_of(object)->priv;
+  if (id == prop_compression) {
+    const std::lock_guard lock(priv->mutex);
+    g_value_set_enum(value, static_cast<int>(priv->compression));
+  } else {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  }
+}
+
+/* input */
+
+static Pad pad_named(GstAedatMux* self, const char* name) {
+  GstPad* const pad = gst_element_get_static_pad(GST_ELEMENT(self), name);
+  return Pad(pad == nullptr ? nullptr : GST_AGGREGATOR_PAD(pad));
+}
+
+/// GST_CLOCK_TIME_NONE where it has none.
+static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
+  GST_OBJECT_LOCK(pad);
+  const GstSegment segment = pad->segment;
+  GST_OBJECT_UNLOCK(pad);
+  if (segment.format != GST_FORMAT_TIME) return GST_CLOCK_TIME_NONE;
+  return gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
+}
+
+/// The pad whose next buffer is the earliest; one without a time comes before all. None where no
+/// pad has a buffer.
+static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
+  Pad earliest;
+  for (const char* name : {events_name, video_name}) {
+    Pad pad = pad_named(self, name);
+    if (!pad) continue;
+    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(pad.get()));
+    if (!buffer) continue;
+    const GstClockTime running = running_time(pad.get(), buffer.get());
+    const GstClockTime from = GST_CLOCK_TIME_IS_VALID(running) ? running : 0;
+    if (earliest && from >= *time) continue;
+    *time = from;
+    earliest = std::move(pad);
+  }
+  return earliest;
+}
+
+/// Bad input comes in droves: the first is reported to the application, all to the log.
+static void warn(GstAedatMux* self, const char* what) {
+  GST_WARNING_OBJECT(self, "%s", what);
+  if (std::exchange(self->priv->state.warned, true)) return;
+  GST_ELEMENT_WARNING(self, STREAM, MUX, ("Input was left out: %s.", what), (nullptr));
+}
+
+/* output */
+
+/// Takes what is in `bytes`.
+static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = false) {
+  if (bytes.empty()) return GST_FLOW_OK;
+  auto owner = std::make_unique<Bytes>(std::move(bytes));
+  const gsize size = owner->size();
+  guint8* const data = owner->data();
+  GstBuffer* const buffer = gst_buffer_new_wrapped_full(
+      GST_MEMORY_FLAG_READONLY, data, size, 0, size, owner.release(),
+      [](gpointer vector) { const std::unique_ptr<Bytes> last(static_cast<Bytes*>(vector)); });
+  if (header) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_HEADER);
+  return gst_aggregator_finish_buffer(GST_AGGREGATOR(self), buffer);
+}
+
+/// Sets the output's caps, with the header for those who come in later.
+static void send_caps(GstAedatMux* self, const Bytes& header) {
+  const OwnedCaps caps(
+      gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr));
+  GValue headers = G_VALUE_INIT;
+  GValue value = G_VALUE_INIT;
+  g_value_init(&headers, GST_TYPE_ARRAY);
+  g_value_init(&value, GST_TYPE_BUFFER);
+  GstBuffer* const buffer = gst_buffer_new_memdup(header.data(), header.size());
+  GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_HEADER);
+  gst_value_take_buffer(&value, buffer);
+  gst_value_array_append_and_take_value(&headers, &value);
+  gst_structure_take_value(gst_caps_get_structure(caps.get(), 0), "streamheader", &headers);
+  gst_aggregator_set_src_caps(GST_AGGREGATOR(self), caps.get());
+}
+
+static bool is_seekable(GstAedatMux* self) {
+  GstQuery* query = gst_query_new_seeking(GST_FORMAT_BYTES);
+  gboolean seekable = FALSE;
+  if (gst_pad_peer_query(GST_AGGREGATOR_SRC_PAD(self), query))
+    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
+  gst_query_unref(query);
+  return seekable != FALSE;
+}
+
+/// Lets the next buffer go to `position` of the file.
+static void send_segment(GstAedatMux* self, guint64 position) {
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_BYTES);
+  segment.start = segment.time = segment.position = position;
+  gst_aggregator_update_segment(GST_AGGREGATOR(self), &segment);
+}
+
+/// From the running time to the PTS of the event stream, or of the video where there is none.
+static gint64 shift_of(GstAedatMux* self) {
+  Pad pad = pad_named(self, events_name);
+  if (!pad) pad = pad_named(self, video_name);
+  if (!pad) return 0;
+  GST_OBJECT_LOCK(pad.get());
+  const GstSegment segment = pad->segment;
+  GST_OBJECT_UNLOCK(pad.get());
+  if (segment.format != GST_FORMAT_TIME) return 0;
+  return static_cast<gint64>(segment.start + segment.offset - segment.base);
+}
+
+/// Writes the header. May throw.
+static GstFlowReturn begin_file(GstAedatMux* self) {
+  State& state = self->priv->state;
+  eventcamera::Aedat4Settings settings;
+  settings.size = state.size;
+  if (state.size == SensorSize{} && state.video)
+    settings.size = {GST_VIDEO_INFO_WIDTH(&*state.video), GST_VIDEO_INFO_HEIGHT(&*state.video)};
+  settings.source = state.source;
+  settings.frames = static_cast<bool>(pad_named(self, video_name));
+  settings.table = is_seekable(self);
+  {
+    const std::lock_guard lock(self->priv->mutex);
+    settings.compression = self->priv->compression;
+  }
+  state.shift = shift_of(self);
+  state.encoder = std::make_unique<Aedat4Encoder>(settings);
+  Bytes header;
+  state.encoder->flush(header);
+  send_caps(self, header);
+  send_segment(self, 0);
+  return push_bytes(self, std::move(header), true);
+}
+
+/// Writes what ends the file, and tells the header of it. May throw.
+static GstFlowReturn end_file(GstAedatMux* self) {
+  State& state = self->priv->state;
+  Bytes bytes;
+  state.encoder->finish(bytes);
+  const GstFlowReturn result = push_bytes(self, std::move(bytes));
+  const auto patch = state.encoder->patch();
+  if (result != GST_FLOW_OK || !patch) return result;
+  send_segment(self, patch->position);
+  return push_bytes(self, Bytes(patch->bytes.begin(), patch->bytes.end()));
+}
+
+/// The file's time of a running time, in microseconds.
+static Microseconds file_time(const State& state, GstClockTime running) {
+  return std::max<gint64>(static_cast<gint64>(running) + state.shift, 0) / 1000;
+}
+
+/// Adds the events of a buffer that begins at `start`. May throw.
+static void write_events(GstAedatMux* self, GstBuffer* buffer, Microseconds start, Bytes& out) {
+  State& state = self->priv->state;
+  GstEventCameraMap map;
+  if (!gst_event_camera_map(&map, buffer)) {
+    warn(self, "a buffer is no whole number of events");
+    return;
+  }
+  state.events.clear();
+  const char* wrong = nullptr;
+  for (gsize i = 0; i < map.n_events; ++i) {
+    const auto& event = map.events[i];
+    const StampedEvent stamped{start + event.t, event.x, event.y_p};
+    if (event.x >= state.size.width || stamped.y() >= state.size.height) {
+      wrong = "an event is outside the sensor";
+    } else if (stamped.t < state.written) {
+      wrong = "an event is earlier than the one before";
+    } else {
+      state.written = stamped.t;
+      state.events.push_back(stamped);
+    }
+  }
+  gst_event_camera_unmap(&map);
+  if (wrong != nullptr) warn(self, wrong);
+  state.encoder->encode(state.events, out);
+}
+
+/// Adds a picture. May throw.
+static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, Bytes& out) {
+  State& state = self->priv->state;
+  GstVideoFrame video;
+  if (!state.video || !gst_video_frame_map(&video, &*state.video, buffer, GST_MAP_READ)) {
+    warn(self, "a frame is not of the negotiated format");
+    return;
+  }
+  auto frame = aedat_frame_of(&video);
+  frame.t = frame.begin = frame.end = frame.exposure_begin = frame.exposure_end = t;
+  try {
+    state.encoder->encode(frame, out);
+  } catch (const std::invalid_argument& error) {
+    warn(self, error.what());
+  } catch (...) {
+    gst_video_frame_unmap(&video);
+    throw;
+  }
+  gst_video_frame_unmap(&video);
+}
+
+/// Writes the earliest buffer. May throw.
+static GstFlowReturn write_next(GstAedatMux* self) {
+  State& state = self->priv->state;
+  GstClockTime time = 0;
+  const Pad pad = earliest_pad(self, &time);
+  if (!pad) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pad.get()));
+  if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const GstClockTime running = running_time(pad.get(), buffer.get());
+  if (!GST_CLOCK_TIME_IS_VALID(running)) {
+    warn(self, "a buffer has no time, or lies outside its segment");
+    return GST_FLOW_OK;
+  }
+  Bytes out;
+  const Microseconds t = file_time(state, running);
+  const bool silent = gst_buffer_get_size(buffer.get()) == 0;
+  if (!silent && g_str_equal(GST_PAD_NAME(pad.get()), events_name))
+    write_events(self, buffer.get(), t, out);
+  else if (!silent)
+    write_frame(self, buffer.get(), t, out);
+  if (t - state.flushed >= longest_wait) {
+    state.flushed = t;
+    state.encoder->flush(out);
+  }
+  return push_bytes(self, std::move(out));
+}
+
+static bool is_at_end(GstAedatMux* self, const char* name) {
+  const Pad pad = pad_named(self, name);
+  return !pad || gst_aggregator_pad_is_eos(pad.get());
+}
+
+/// Whether the header can be written.
+static bool is_known(GstAedatMux* self) {
+  const State& state = self->priv->state;
+  if (state.size != SensorSize{}) return true;
+  return is_at_end(self, events_name) && state.video;
+}
+
+static GstFlowReturn aggregate_guarded(GstAedatMux* self) {
+  auto& encoder = self->priv->state.encoder;
+  const bool ended = is_at_end(self, events_name) && is_at_end(self, video_name);
+  if (!encoder) {
+    if (!is_known(self)) {
+      if (!ended) return GST_AGGREGATOR_FLOW_NEED_DATA;
+      GST_ELEMENT_ERROR(self, STREAM, MUX, ("There is nothing to write."),
+                        ("No pad has had caps before the end."));
+      return GST_FLOW_ERROR;
+    }
+    const GstFlowReturn result = begin_file(self);
+    if (result != GST_FLOW_OK) return result;
+  }
+  if (!ended) return write_next(self);
+  const GstFlowReturn result = end_file(self);
+  return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
+}
+
+static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) {
+  auto* self = mux_of(aggregator);
+  try {
+    return aggregate_guarded(self);
+  } catch (const std::bad_alloc&) {
+    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT, ("There is not enough memory to write."),
+                      (nullptr));
+  } catch (const std::exception& error) {
+    GST_ELEMENT_ERROR(self, STREAM, MUX, ("The file cannot be written."), ("%s", error.what()));
+  }
+  return GST_FLOW_ERROR;
+}
+
+/// Live, no pad is waited for longer than until the time of the earliest buffer.
+static GstClockTime get_next_time(GstAggregator* aggregator) {
+  auto* self = mux_of(aggregator);
+  GstClockTime time = GST_CLOCK_TIME_NONE;
+  return earliest_pad(self, &time) ? time : GST_CLOCK_TIME_NONE;
+}
+
+/* events, queries, pads */
+
+static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
+  State& state = self->priv->state;
+  if (!g_str_equal(GST_PAD_NAME(pad), events_name)) {
+    GstVideoInfo video;
+    if (!gst_video_info_from_caps(&video, caps)) return false;
+    state.video = video;
+    return true;
+  }
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+  const SensorSize size{info.width, info.height};
+  if (state.encoder && size != state.size) {
+    GST_ELEMENT_ERROR(self, STREAM, MUX,
+                      ("A file has events of one sensor only, and its size has changed."),
+                      (nullptr));
+    return false;
+  }
+  state.size = size;
+  return true;
+}
+
+static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
+  auto* self = mux_of(aggregator);
+  if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
+    GstCaps* caps = nullptr;
+    gst_event_parse_caps(event, &caps);
+    if (!take_caps(self, pad, caps)) {
+      gst_event_unref(event);
+      return FALSE;
+    }
+  } else if (GST_EVENT_TYPE(event) == GST_EVENT_TAG) {
+    GstTagList* tags = nullptr;
+    gchar* source = nullptr;
+    gst_event_parse_tag(event, &tags);
+    if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source))
+      self->priv->state.source = source;
+    g_free(source);
+  }
+  return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
+}
+
+static gboolean src_event(GstAggregator* aggregator, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) != GST_EVENT_SEEK)
+    return PARENT_AGGREGATOR_CLASS->src_event(aggregator, event);
+  gst_event_unref(event);  // a file is written once, from its beginning
+  return FALSE;
+}
+
+static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
+  if (GST_QUERY_TYPE(query) != GST_QUERY_SEEKING)
+    return PARENT_AGGREGATOR_CLASS->src_query(aggregator, query);
+  GstFormat format = GST_FORMAT_UNDEFINED;
+  gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
+  gst_query_set_seeking(query, format, FALSE, 0, -1);
+  return TRUE;
+}
+
+static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplate* templ,
+                                        const gchar*, const GstCaps*) {
+  auto* self = mux_of(aggregator);
+  const gchar* const name = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
+  if (pad_named(self, name)) {
+    GST_WARNING_OBJECT(self, "there is a pad %s already", name);
+    return nullptr;
+  }
+  if (GST_STATE(self) > GST_STATE_READY && self->priv->state.encoder) {
+    GST_WARNING_OBJECT(self, "the header is written, and has no stream for a pad %s", name);
+    return nullptr;
+  }
+  return static_cast<GstAggregatorPad*>(g_object_new(GST_TYPE_AGGREGATOR_PAD, "name", name,
+                                                     "direction", GST_PAD_SINK, "template", templ,
+                                                     nullptr));
+}
+
+static gboolean start(GstAggregator* aggregator) {
+  send_segment(mux_of(aggregator), 0);
+  return TRUE;
+}
+
+static gboolean stop(GstAggregator* aggregator) {
+  mux_of(aggregator)->priv->state = State();
+  return TRUE;
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  delete mux_of(object)->priv;
+  G_OBJECT_CLASS(gst_aedat_mux_parent_class)->finalize(object);
+}
+
+static void gst_aedat_mux_init(GstAedatMux* self) {
+  self->priv = new GstAedatMuxPrivate();
+}
+
+static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->set_property = set_property;
+  object_class->get_property = get_property;
+  object_class->finalize = finalize;
+  g_object_class_install_property(
+      object_class, prop_compression,
+      g_param_spec_enum("compression", "Compression", "How the file is compressed",
+                        GST_TYPE_AEDAT_COMPRESSION, static_cast<int>(default_compression),
+                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                 GST_PARAM_MUTABLE_READY)));
+  gst_type_mark_as_plugin_api(GST_TYPE_AEDAT_COMPRESSION, static_cast<GstPluginAPIFlags>(0));
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  gst_element_class_add_static_pad_template_with_gtype(element_class, &events_template,
+                                                       GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_add_static_pad_template_with_gtype(element_class, &video_template,
+                                                       GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_add_static_pad_template_with_gtype(element_class, &src_template,
+                                                       GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_set_static_metadata(element_class, "AEDAT 4 muxer", "Codec/Muxer",
+                                        "Writes events and frames into AEDAT 4 files",
+                                        "gst-eventsim");
+
+  GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
+  aggregator_class->aggregate = aggregate;
+  aggregator_class->get_next_time = get_next_time;
+  aggregator_class->sink_event = sink_event;
+  aggregator_class->src_event = src_event;
+  aggregator_class->src_query = src_query;
+  aggregator_class->create_new_pad = create_new_pad;
+  aggregator_class->start = start;
+  aggregator_class->stop = stop;
+  aggregator_class->negotiate = nullptr;  // the caps are the header's
+}

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventhdf5sink
+ * @title: eventhdf5sink
+ * @short_description: writes HDF5 files of events
+ *
+ * Writes events as an HDF5 file, whose arrays h5py and its like read at once, in the layout of DSEC
+ * or of Metavision. The times written are those of the PTS.
+ *
+ * The file is whole at the end of the stream, and where the pipeline is stopped before. A flush
+ * does not begin it anew: it goes on, and events that are earlier than what is written, or lie
+ * outside the sensor, are left out.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventhdf5sink layout=metavision
+ * location=events.h5
+ * ]|
+ */
+#include "elements/eventcam/eventhdf5sink.hpp"
+
+#include <gst/base/gstbasesink.h>
+
+#include <algorithm>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gst/eventcamera/eventcamera.h"
+#include "src/codec/hdf5/hdf5_writer.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
+#define GST_CAT_DEFAULT event_hdf5_sink_debug
+
+using eventcamera::Hdf5Layout;
+using eventcamera::Hdf5Writer;
+using eventcamera::Microseconds;
+using eventcamera::StampedEvent;
+
+namespace {
+
+enum Property : guint { prop_location = 1, prop_layout, prop_compression };
+
+constexpr auto default_layout = Hdf5Layout::dsec;
+constexpr auto default_compression = Hdf5Writer::Compression::gzip;
+
+/// Written at once, so that events stay in the cache.
+constexpr std::size_t written_events = 1 << 14;
+
+/// The file, from caps to stop.
+struct State {
+  GstEventCameraInfo info = {};
+  std::unique_ptr<Hdf5Writer> writer;  ///< none before caps, and after the end
+  bool begun = false;                  ///< there are events in it
+  bool ended = false;
+  Microseconds latest = 0;  ///< time of what is written
+  bool warned = false;
+  std::vector<StampedEvent> events;
+};
+
+}  // namespace
+
+struct GstEventHdf5SinkPrivate {
+  std::mutex mutex;  // guards the properties; nothing is called under it
+  std::string location;
+  Hdf5Layout layout = default_layout;
+  Hdf5Writer::Compression compression = default_compression;
+
+  // The streaming thread's, or nobody's while there is none.
+  State state;
+};
+
+namespace {
+
+struct GstEventHdf5Sink {
+  GstBaseSink parent;
+  GstEventHdf5SinkPrivate* priv;
+};
+
+struct GstEventHdf5SinkClass {
+  GstBaseSinkClass parent_class;
+};
+
+}  // namespace
+
+G_DEFINE_TYPE_WITH_CODE(GstEventHdf5Sink, gst_event_hdf5_sink, GST_TYPE_BASE_SINK,
+                        GST_DEBUG_CATEGORY_INIT(event_hdf5_sink_debug, "eventhdf5sink", 0,
+                                                "writer of HDF5 files of events"))
+GST_ELEMENT_REGISTER_DEFINE(eventhdf5sink, "eventhdf5sink", GST_RANK_NONE,
+                            gst_event_hdf5_sink_get_type())
+
+static GstEventHdf5Sink* sink_of(gpointer object) {
+  return reinterpret_cast<GstEventHdf5Sink*>(object);
+}
+
+static GstStaticPadTemplate sink_template =
+    GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+                            GST_STATIC_CAPS(GST_EVENT_CAMERA_MEDIA_TYPE
+                                            ", format = (string) XYTP, width = (int) [ 1, 32768 ], "
+                                            "height = (int) [ 1, 32768 ]"));
+
+/* properties */
+
+#define GST_TYPE_EVENT_HDF5_LAYOUT (gst_event_hdf5_layout_get_type())
+static GType gst_event_hdf5_layout_get_type() {
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {static_cast<int>(Hdf5Layout::dsec), "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset",
+         "dsec"},
+        {static_cast<int>(Hdf5Layout::metavision),
+         "Metavision: /CD/events, compressed with ECF; at most 2048x2048 pixels", "metavision"},
+        {0, nullptr, nullptr},
+    };
+    return g_enum_register_static("GstEventHdf5Layout", values);
+  }();
+  return type;
+}
+
+#define GST_TYPE_EVENT_HDF5_COMPRESSION (gst_event_hdf5_compression_get_type())
+static GType gst_event_hdf5_compression_get_type() {
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {static_cast<int>(Hdf5Writer::Compression::none), "No compression", "none"},
+        {static_cast<int>(Hdf5Writer::Compression::gzip), "gzip, which every reader has", "gzip"},
+        {0, nullptr, nullptr},
+    };
+    return g_enum_register_static("GstEventHdf5Compression", values);
+  }();
+  return type;
+}
+
+static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
+  auto* priv = sink_of(object)->priv;
+  const std::lock_guard lock(priv->mutex);
+  switch (id) {
+    case prop_location: {
+      const gchar* const location = g_value_get_string(value);
+      priv->location = location == nullptr ? "" : location;
+      break;
+    }
+    case prop_layout:
+      priv->layout = static_cast<Hdf5Layout>(g_value_get_enum(value));
+      break;
+    case prop_compression:
+      priv->compression = static_cast<Hdf5Writer::Compression>(g_value_get_enum(value));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  }
+}
+
+static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
+  auto* priv = sink_of(object)->priv;
+  const std::lock_guard lock(priv->mutex);
+  switch (id) {
+    case prop_location:
+      g_value_set_string(value, priv->location.empty() ? nullptr : priv->location.c_str());
+      break;
+    case prop_layout:
+      g_value_set_enum(value, static_cast<int>(priv->layout));
+      break;
+    case prop_compression:
+      g_value_set_enum(value, static_cast<int>(priv->compression));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  }
+}
+
+/* the file */
+
+/// Runs what may throw; an exception is an error of the element.
+template <class Work>
+static bool guarded(GstEventHdf5Sink* self, const Work& work) {
+  try {
+    work();
+    return true;
+  } catch (const std::bad_alloc&) {
+    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
+                      ("There is not enough memory to write the events."), (nullptr));
+  } catch (const std::invalid_argument& error) {
+    GST_ELEMENT_ERROR(self, STREAM, FORMAT, ("This cannot be written: %s.", error.what()),
+                      (nullptr));
+  } catch (const std::exception& error) {
+    GST_ELEMENT_ERROR(self, RESOURCE, WRITE, ("%s.", error.what()), (nullptr));
+  }
+  // Nothing of it can be saved by writing on.
+  self->priv->state.writer.reset();
+  self->priv->state.ended = true;
+  return false;
+}
+
+/// Writes what is not yet written, and ends the file.
+static bool end_file(GstEventHdf5Sink* self) {
+  State& state = self->priv->state;
+  state.ended = true;
+  const auto writer = std::exchange(state.writer, nullptr);
+  return !writer || guarded(self, [&] { writer->close(); });
+}
+
+static gboolean start(GstBaseSink* sink) {
+  auto* self = sink_of(sink);
+  const std::lock_guard lock(self->priv->mutex);
+  if (!self->priv->location.empty()) return TRUE;
+  GST_ELEMENT_ERROR(self, RESOURCE, NOT_FOUND, ("There is no location to write to."), (nullptr));
+  return FALSE;
+}
+
+static gboolean stop(GstBaseSink* sink) {
+  auto* self = sink_of(sink);
+  const bool ended = end_file(self);
+  self->priv->state = State();
+  return ended;
+}
+
+static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
+  auto* self = sink_of(sink);
+  auto* priv = self->priv;
+  State& state = priv->state;
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) {
+    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are no events", caps);
+    return FALSE;
+  }
+  if (state.ended) return TRUE;
+  if (state.writer && info.width == state.info.width && info.height == state.info.height)
+    return TRUE;
+  if (state.begun) {
+    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+                      ("The size of the sensor changes from %dx%d to %dx%d, but a file has one.",
+                       state.info.width, state.info.height, info.width, info.height),
+                      (nullptr));
+    return FALSE;
+  }
+  std::string location;
+  Hdf5Writer::Settings settings;
+  settings.size = {info.width, info.height};
+  {
+    const std::lock_guard lock(priv->mutex);
+    location = priv->location;
+    settings.layout = priv->layout;
+    settings.compression = priv->compression;
+  }
+  state.info = info;
+  state.writer.reset();  // to the library two open files of one name are one
+  return guarded(self, [&] { state.writer = std::make_unique<Hdf5Writer>(location, settings); });
+}
+
+/* data */
+
+/// May throw.
+static void write(GstEventHdf5Sink* self, const GstEventCameraMap& map) {
+  State& state = self->priv->state;
+  const auto start = static_cast<Microseconds>(map.start);
+  bool dropped = false;
+  for (std::span left(map.events, map.n_events); !left.empty();) {
+    const auto few = left.first(std::min(left.size(), written_events));
+    left = left.subspan(few.size());
+    state.events.clear();
+    for (const auto& event : few) {
+      const StampedEvent stamped{start + event.t, event.x, event.y_p};
+      if (stamped.t < state.latest || event.x >= state.info.width ||
+          stamped.y() >= state.info.height) {
+        dropped = true;
+        continue;
+      }
+      state.latest = stamped.t;
+      state.events.push_back(stamped);
+    }
+    state.begun |= !state.events.empty();
+    state.writer->append(state.events);
+  }
+  if (!dropped) return;
+  GST_WARNING_OBJECT(self, "events left out at %" GST_TIME_FORMAT,
+                     GST_TIME_ARGS(GST_BUFFER_PTS(map.buffer)));
+  if (std::exchange(state.warned, true)) return;
+  GST_ELEMENT_WARNING(self, STREAM, ENCODE,
+                      ("Events outside the sensor, or earlier than ones that are written, are left "
+                       "out."),
+                      (nullptr));
+}
+
+static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
+  auto* self = sink_of(sink);
+  if (self->priv->state.ended) return GST_FLOW_EOS;
+  if (!self->priv->state.writer) return GST_FLOW_NOT_NEGOTIATED;
+  GstEventCameraMap map;
+  if (GST_BUFFER_PTS(buffer) > G_MAXINT64 || !gst_event_camera_map(&map, buffer)) {
+    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+                      ("A buffer is no event buffer: it has no PTS, or no whole number of events."),
+                      (nullptr));
+    return GST_FLOW_ERROR;
+  }
+  const bool written = guarded(self, [&] { write(self, map); });
+  gst_event_camera_unmap(&map);
+  return written ? GST_FLOW_OK : GST_FLOW_ERROR;
+}
+
+/// The file is whole before the application hears of the end.
+static gboolean event(GstBaseSink* sink, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) == GST_EVENT_EOS && !end_file(sink_of(sink))) {
+    gst_event_unref(event);
+    return FALSE;
+  }
+  return GST_BASE_SINK_CLASS(gst_event_hdf5_sink_parent_class)->event(sink, event);
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  delete sink_of(object)->priv;
+  G_OBJECT_CLASS(gst_event_hdf5_sink_parent_class)->finalize(object);
+}
+
+static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
+  self->priv = new GstEventHdf5SinkPrivate();
+  gst_base_sink_set_sync(GST_BASE_SINK(self), FALSE);
+}
+
+static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->set_property = set_property;
+  object_class->get_property = get_property;
+  object_class->finalize = finalize;
+  const auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                              GST_PARAM_MUTABLE_READY);
+  g_object_class_install_property(
+      object_class, prop_location,
+      g_param_spec_string("location", "Location", "The file to write; what is there is overwritten",
+                          nullptr, flags));
+  g_object_class_install_property(
+      object_class, prop_layout,
+      g_param_spec_enum("layout", "Layout", "How events lie in the file",
+                        GST_TYPE_EVENT_HDF5_LAYOUT, static_cast<int>(default_layout), flags));
+  g_object_class_install_property(
+      object_class, prop_compression,
+      g_param_spec_enum("compression", "Compression",
+                        "Of DSEC's layout; that of Metavision is always compressed with ECF",
+                        GST_TYPE_EVENT_HDF5_COMPRESSION, static_cast<int>(default_compression),
+                        flags));
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_HDF5_LAYOUT, static_cast<GstPluginAPIFlags>(0));
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_HDF5_COMPRESSION, static_cast<GstPluginAPIFlags>(0));
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  gst_element_class_add_static_pad_template(element_class, &sink_template);
+  gst_element_class_set_static_metadata(element_class, "HDF5 file sink", "Sink/File",
+                                        "Writes events as HDF5: DSEC or Metavision",
+                                        "gst-eventsim");
+
+  GstBaseSinkClass* sink_class = GST_BASE_SINK_CLASS(klass);
+  sink_class->start = start;
+  sink_class->stop = stop;
+  sink_class->set_caps = set_caps;
+  sink_class->render = render;
+  sink_class->event = event;
+}

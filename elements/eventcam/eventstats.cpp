@@ -1,0 +1,391 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventstats
+ * @title: eventstats
+ * @short_description: measures a stream of events
+ *
+ * Passes events through and posts an element message `eventstats` whenever #GstEventStats:interval
+ * has passed, and at EOS of everything. An interval ends with the buffer in which it is over.
+ *
+ * - `whole` (#gboolean): whether this is of everything;
+ * - `start`, `end` (#gint64): what it is of, in stream time (ns);
+ * - `events` (#guint64), `rate` (#gdouble, events a second);
+ * - `on-share` (#gdouble): of ON events among them;
+ * - `mean`, `deviation` (#gdouble): over all pixels, of events per pixel and second;
+ * - `gap-5`, `gap-25`, `gap-50`, `gap-75`, `gap-95` (#guint64, ns): the quantiles of the time from
+ *   a pixel's event to its next, to 3 %.
+ *
+ * At EOS the same is written to #GstEventStats:location as JSON, and to #GstEventStats:map a
+ * picture of the events of each pixel.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 -m filesrc location=recording.raw ! evtdec ! eventstats map=map.png ! fakesink
+ * ]|
+ */
+#include "elements/eventcam/eventstats.hpp"
+
+#include <gst/base/gstbasetransform.h>
+
+#include <algorithm>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "elements/eventcam/broken_events.hpp"
+#include "elements/eventcam/report.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "gst/video/event_interval.hpp"
+#include "gst/video/mapped_events.hpp"
+#include "src/measure/event_statistics.hpp"
+#include "src/measure/map_picture.hpp"
+#include "src/render/arrivals.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
+#define GST_CAT_DEFAULT event_stats_debug
+
+using eventcamera::Arrivals;
+using eventcamera::EventStatistics;
+using eventcamera::Nanoseconds;
+
+namespace {
+
+enum Property {
+  prop_0,
+  prop_interval,
+  prop_location,
+  prop_map,
+};
+
+/// What the application sets.
+struct Settings {
+  GstClockTime interval = GST_SECOND;
+  ReportPlaces places{};
+};
+
+/// What is measured of some stretch of the stream.
+struct Stretch {
+  EventStatistics statistics;
+  std::optional<Nanoseconds> start{};  ///< in stream time
+  Nanoseconds covered = 0;
+
+  void restart() {
+    statistics.restart();
+    start.reset();
+    covered = 0;
+  }
+};
+
+/// What is measured of one sensor.
+struct Measurement {
+  Measurement(int sensor_width, int sensor_height)
+      : width(sensor_width),
+        height(sensor_height),
+        arrivals(width, height),
+        whole{.statistics = EventStatistics(width, height)},
+        recent{.statistics = EventStatistics(width, height)} {}
+
+  int width;
+  int height;
+  Arrivals arrivals;
+  Stretch whole;
+  Stretch recent;                    ///< since the last message
+  std::optional<Nanoseconds> end{};  ///< in stream time
+};
+
+struct Private {
+  std::mutex mutex;  // guards the settings; nothing is called under it
+  Settings settings;
+
+  // The streaming thread's, or nobody's while there is none.
+  std::optional<Measurement> measurement;
+  BrokenEvents broken{"not counted"};
+};
+
+struct GstEventStats {
+  GstBaseTransform parent;
+  Private* priv;
+};
+
+struct GstEventStatsClass {
+  GstBaseTransformClass parent_class;
+};
+
+GstEventStats* event_stats(gpointer object) {
+  return static_cast<GstEventStats*>(object);
+}
+
+}  // namespace
+
+G_DEFINE_TYPE_WITH_CODE(GstEventStats, gst_event_stats, GST_TYPE_BASE_TRANSFORM,
+                        GST_DEBUG_CATEGORY_INIT(event_stats_debug, "eventstats", 0,
+                                                "what a stream of events is like"))
+#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
+GST_ELEMENT_REGISTER_DEFINE(eventstats, "eventstats", GST_RANK_NONE, gst_event_stats_get_type())
+
+/* properties */
+
+static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
+  auto& priv = *event_stats(object)->priv;
+  const auto text = [value] {
+    const gchar* path = g_value_get_string(value);
+    return std::string(path != nullptr ? path : "");
+  };
+  const std::lock_guard lock(priv.mutex);
+  switch (id) {
+    case prop_interval:
+      priv.settings.interval = g_value_get_uint64(value);
+      break;
+    case prop_location:
+      priv.settings.places.location = text();
+      break;
+    case prop_map:
+      priv.settings.places.map = text();
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+      break;
+  }
+}
+
+static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
+  auto& priv = *event_stats(object)->priv;
+  const std::lock_guard lock(priv.mutex);
+  switch (id) {
+    case prop_interval:
+      g_value_set_uint64(value, priv.settings.interval);
+      break;
+    case prop_location:
+      g_value_set_string(value, priv.settings.places.location.c_str());
+      break;
+    case prop_map:
+      g_value_set_string(value, priv.settings.places.map.c_str());
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+      break;
+  }
+}
+
+static Settings settings_of(GstEventStats* self) {
+  const std::lock_guard lock(self->priv->mutex);
+  return self->priv->settings;
+}
+
+/* figures */
+
+static GstStructure* figures_of(const Stretch& stretch, Nanoseconds end, bool whole) {
+  const Nanoseconds start = stretch.start.value_or(end);
+  GstStructure* structure =
+      gst_structure_new("eventstats", "whole", G_TYPE_BOOLEAN, whole ? TRUE : FALSE, "start",
+                        G_TYPE_INT64, gint64{start}, "end", G_TYPE_INT64, gint64{end}, nullptr);
+  put_figures(structure, stretch.statistics.figures(stretch.covered));
+  return structure;
+}
+
+/// Posts a message; it owns the structure.
+static void post(GstEventStats* self, GstStructure* structure) {
+  gst_element_post_message(GST_ELEMENT(self), gst_message_new_element(GST_OBJECT(self), structure));
+}
+
+/// Of everything so far; what is no stream has no pixel, and no event.
+static void conclude(GstEventStats* self, const ReportPlaces& places) {
+  const Measurement nothing(1, 1);
+  const auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
+  report(self, places, figures_of(measurement.whole, measurement.end.value_or(0), true),
+         [&] { return eventcamera::draw_map(measurement.whole.statistics.map()); });
+}
+
+/* events */
+
+static Nanoseconds stream_time(GstEventStats* self, GstClockTime time) {
+  guint64 result = time;
+  const gint sign = gst_segment_to_stream_time_full(&GST_BASE_TRANSFORM(self)->segment,
+                                                    GST_FORMAT_TIME, time, &result);
+  const auto magnitude = static_cast<Nanoseconds>(std::min<guint64>(result, G_MAXINT64));
+  return sign < 0 ? -magnitude : magnitude;
+}
+
+/// What lies between intervals counts as time without events; where time goes back, it begins anew.
+static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) {
+  if (measurement.end && start + static_cast<Nanoseconds>(event_resolution) < *measurement.end) {
+    measurement.arrivals = Arrivals(measurement.width, measurement.height);
+    for (auto* stretch : {&measurement.whole, &measurement.recent})
+      stretch->statistics.forget_times();
+    measurement.end.reset();
+  }
+  const Nanoseconds from = measurement.end.value_or(start);
+  for (auto* stretch : {&measurement.whole, &measurement.recent}) {
+    if (!stretch->start) stretch->start = from;
+    stretch->covered += std::max(end - from, Nanoseconds{0});
+  }
+  measurement.end = std::max(end, from);
+}
+
+static void post_if_due(GstEventStats* self, Measurement& measurement) {
+  const auto interval = static_cast<Nanoseconds>(settings_of(self).interval);
+  if (interval == 0 || measurement.recent.covered < interval) return;
+  post(self, figures_of(measurement.recent, *measurement.end, false));
+  measurement.recent.restart();
+}
+
+static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buffer,
+                  Nanoseconds start) {
+  const MappedEvents mapped(buffer);
+  if (!mapped) {
+    self->priv->broken.warn(self, "a buffer is no whole number of events");
+    return;
+  }
+  const std::size_t left_out = measurement.arrivals.take(
+      mapped.events(), start / 1000, [&](const eventcamera::StampedEvent& event) {
+        measurement.whole.statistics.add(event);
+        measurement.recent.statistics.add(event);
+      });
+  if (left_out > 0) self->priv->broken.warn(self, "some lie beyond the sensor");
+}
+
+static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
+  auto* self = event_stats(transform);
+  auto& measurement = self->priv->measurement;
+  const auto interval = interval_of(buffer);
+  if (!interval) {
+    self->priv->broken.warn(self, "a buffer has no PTS");
+    return GST_FLOW_OK;
+  }
+  if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
+  const Nanoseconds start = stream_time(self, interval->start);
+  cover(*measurement, start, stream_time(self, interval->end));
+  count(self, *measurement, buffer, start);
+  post_if_due(self, *measurement);
+  return GST_FLOW_OK;
+}
+
+static void take_gap(GstEventStats* self, GstEvent* event) {
+  auto& measurement = self->priv->measurement;
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(event, &start, &duration);
+  if (!measurement || !GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64) return;
+  const GstClockTime end = start + std::min(duration, GstClockTime{G_MAXINT64} - start);
+  cover(*measurement, stream_time(self, start), stream_time(self, end));
+  post_if_due(self, *measurement);
+}
+
+static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
+  auto* self = event_stats(transform);
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_GAP:
+      take_gap(self, event);
+      break;
+    case GST_EVENT_EOS:
+      conclude(self, settings_of(self).places);
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      if (auto& measurement = self->priv->measurement)
+        measurement.emplace(measurement->width, measurement->height);
+      break;
+    default:
+      break;
+  }
+  return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
+}
+
+/* negotiation, states */
+
+static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
+  auto* self = event_stats(transform);
+  auto& measurement = self->priv->measurement;
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
+  if (measurement && measurement->width == info.width && measurement->height == info.height)
+    return TRUE;
+  // Pixels of another sensor are not to be compared: what follows is measured on its own.
+  if (measurement) conclude(self, {});
+  try {
+    measurement.emplace(info.width, info.height);
+  } catch (const std::bad_alloc&) {
+    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
+                      ("There is not enough memory to count the events of %d x %d pixels.",
+                       info.width, info.height),
+                      (nullptr));
+    return FALSE;
+  }
+  return TRUE;
+}
+
+static gboolean start(GstBaseTransform* transform) {
+  auto* self = event_stats(transform);
+  return can_report(self, settings_of(self).places) ? TRUE : FALSE;
+}
+
+static gboolean stop(GstBaseTransform* transform) {
+  auto& priv = *event_stats(transform)->priv;
+  priv.measurement.reset();
+  priv.broken.begin_anew();
+  return TRUE;
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  delete event_stats(object)->priv;
+  G_OBJECT_CLASS(gst_event_stats_parent_class)->finalize(object);
+}
+
+static void gst_event_stats_init(GstEventStats* self) {
+  self->priv = new Private;
+  gst_base_transform_set_passthrough(GST_BASE_TRANSFORM(self), TRUE);
+  gst_base_transform_set_gap_aware(GST_BASE_TRANSFORM(self), TRUE);
+}
+
+static void gst_event_stats_class_init(GstEventStatsClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->set_property = set_property;
+  object_class->get_property = get_property;
+  object_class->finalize = finalize;
+
+  constexpr auto ready_flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                        GST_PARAM_MUTABLE_READY);
+  constexpr auto playing_flags = static_cast<GParamFlags>(
+      G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+  const Settings defaults;
+  g_object_class_install_property(
+      object_class, prop_interval,
+      g_param_spec_uint64("interval", "Interval",
+                          "After how much of the stream figures are posted (ns; 0 = at EOS only)",
+                          0, std::numeric_limits<gint64>::max(), defaults.interval, playing_flags));
+  g_object_class_install_property(
+      object_class, prop_location,
+      g_param_spec_string("location", "Location", "Where the figures are written as JSON at EOS",
+                          "", ready_flags));
+  g_object_class_install_property(
+      object_class, prop_map,
+      g_param_spec_string("map", "Map",
+                          "Where a picture of the events of each pixel is written as PNG at EOS",
+                          "", ready_flags));
+
+#define MEASURED_CAPS         \
+  GST_EVENT_CAMERA_MEDIA_TYPE \
+  ", format = (string) XYTP, width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ]"
+  static GstStaticPadTemplate sink_template =
+      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(MEASURED_CAPS));
+  static GstStaticPadTemplate src_template =
+      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(MEASURED_CAPS));
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  gst_element_class_add_static_pad_template(element_class, &sink_template);
+  gst_element_class_add_static_pad_template(element_class, &src_template);
+  gst_element_class_set_static_metadata(element_class, "Event statistics", "Filter/Analyzer",
+                                        "Measures a stream of events", "gst-eventsim");
+
+  GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
+  transform_class->start = start;
+  transform_class->stop = stop;
+  transform_class->set_caps = set_caps;
+  transform_class->sink_event = sink_event;
+  transform_class->transform_ip = transform_ip;
+}

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "elements/eventcam/report.hpp"
+
+#include <json-glib/json-glib.h>
+
+#include <array>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+using eventcamera::gap_shares;
+using eventcamera::StreamFigures;
+
+namespace {
+
+struct Unref {
+  void operator()(JsonNode* node) const { json_node_unref(node); }
+  void operator()(JsonGenerator* generator) const { g_object_unref(generator); }
+  void operator()(GError* error) const { g_error_free(error); }
+  void operator()(gchar* text) const { g_free(text); }
+};
+template <class Type>
+using Owned = std::unique_ptr<Type, Unref>;
+
+constexpr std::array gap_names = {"gap-5", "gap-25", "gap-50", "gap-75", "gap-95"};
+static_assert(gap_names.size() == gap_shares.size());
+
+JsonNode* node_of(const GstStructure* structure);
+
+/// What these structures hold: numbers and truths, and structures and arrays of them.
+JsonNode* node_of(const GValue* value) {
+  if (GST_VALUE_HOLDS_STRUCTURE(value)) return node_of(gst_value_get_structure(value));
+  if (GST_VALUE_HOLDS_ARRAY(value)) {
+    JsonArray* array = json_array_new();
+    for (guint i = 0; i < gst_value_array_get_size(value); ++i)
+      json_array_add_element(array, node_of(gst_value_array_get_value(value, i)));
+    JsonNode* node = json_node_new(JSON_NODE_ARRAY);
+    json_node_take_array(node, array);
+    return node;
+  }
+  GValue number = G_VALUE_INIT;
+  g_value_init(&number, G_VALUE_HOLDS_UINT64(value) ? G_TYPE_INT64 : G_VALUE_TYPE(value));
+  g_value_transform(value, &number);
+  JsonNode* node = json_node_new(JSON_NODE_VALUE);
+  json_node_set_value(node, &number);
+  g_value_unset(&number);
+  return node;
+}
+
+JsonNode* node_of(const GstStructure* structure) {
+  JsonObject* object = json_object_new();
+  for (gint i = 0; i < gst_structure_n_fields(structure); ++i) {
+    const gchar* name = gst_structure_nth_field_name(structure, static_cast<guint>(i));
+    json_object_set_member(object, name, node_of(gst_structure_get_value(structure, name)));
+  }
+  JsonNode* node = json_node_new(JSON_NODE_OBJECT);
+  json_node_take_object(node, object);
+  return node;
+}
+
+/// Why a file could not be written; nothing where it could, or is not to be.
+std::optional<std::string> obstacle_to(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  const Owned<gchar> folder(g_path_get_dirname(path.c_str()));
+  if (!g_file_test(folder.get(), G_FILE_TEST_IS_DIR))
+    return "There is no folder \"" + std::string(folder.get()) + "\".";
+  if (g_file_test(path.c_str(), G_FILE_TEST_IS_DIR)) return "\"" + path + "\" is a folder.";
+  return std::nullopt;
+}
+
+/// Throws std::runtime_error, which says why it cannot.
+void write_json(const GstStructure* structure, const std::string& path) {
+  const Owned<JsonNode> root(node_of(structure));
+  const Owned<JsonGenerator> generator(json_generator_new());
+  json_generator_set_pretty(generator.get(), TRUE);
+  json_generator_set_root(generator.get(), root.get());
+  gsize length = 0;
+  const Owned<gchar> text(json_generator_to_data(generator.get(), &length));
+  const std::string line = std::string(text.get(), length) + "\n";
+  GError* error = nullptr;
+  if (!g_file_set_contents_full(path.c_str(), line.data(), static_cast<gssize>(line.size()),
+                                G_FILE_SET_CONTENTS_NONE, 0666, &error)) {
+    const Owned<GError> owned(error);
+    throw std::runtime_error(owned->message);
+  }
+}
+
+}  // namespace
+
+void put_figures(GstStructure* structure, const StreamFigures& figures) {
+  gst_structure_set(structure, "events", G_TYPE_UINT64, guint64{figures.events}, "rate",
+                    G_TYPE_DOUBLE, figures.rate, "on-share", G_TYPE_DOUBLE, figures.on_share,
+                    "mean", G_TYPE_DOUBLE, figures.mean, "deviation", G_TYPE_DOUBLE,
+                    figures.deviation, nullptr);
+  for (std::size_t i = 0; i < gap_names.size(); ++i)
+    gst_structure_set(structure, gap_names[i], G_TYPE_UINT64,
+                      static_cast<guint64>(figures.gaps[i]) * GST_USECOND, nullptr);
+}
+
+bool can_report(gpointer element, const ReportPlaces& places) {
+  for (const auto& path : {places.location, places.map}) {
+    const auto obstacle = obstacle_to(path);
+    if (!obstacle) continue;
+    GST_ELEMENT_ERROR(element, RESOURCE, OPEN_WRITE,
+                      ("\"%s\" cannot be written. %s", path.c_str(), obstacle->c_str()), (nullptr));
+    return false;
+  }
+  return true;
+}
+
+void report(gpointer element, const ReportPlaces& places, GstStructure* figures,
+            const std::function<eventcamera::RgbPicture()>& draw) {
+  try {
+    if (!places.location.empty()) write_json(figures, places.location);
+    if (!places.map.empty()) draw().write_png(places.map);
+  } catch (const std::exception& failure) {
+    GST_ELEMENT_ERROR(element, RESOURCE, WRITE,
+                      ("The figures cannot be written: %s", failure.what()), (nullptr));
+  }
+  gst_element_post_message(GST_ELEMENT(element),
+                           gst_message_new_element(GST_OBJECT(element), figures));
+}

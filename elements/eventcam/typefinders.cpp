@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "elements/eventcam/typefinders.hpp"
+
+#include <algorithm>
+
+#include "src/codec/recognition.hpp"
+
+using eventcamera::FileKind;
+
+/// The first bytes, as many as there are up to as many as are looked at.
+static std::span<const guint8> first_bytes(GstTypeFind* find) {
+  constexpr guint64 most = eventcamera::most_recognised_bytes;
+  const guint64 length = gst_type_find_get_length(find);
+  // The length is not always known, and asking for more than there is gives nothing.
+  for (auto count = static_cast<guint>(length > 0 ? std::min(length, most) : most); count > 0;
+       count /= 2)
+    if (const guint8* bytes = gst_type_find_peek(find, 0, count)) return {bytes, count};
+  return {};
+}
+
+template <FileKind kind>
+static void find_kind(GstTypeFind* find, gpointer media_type) {
+  const auto found = eventcamera::recognise(first_bytes(find));
+  if (!found || found->kind != kind) return;
+  const auto probability = found->certain ? GST_TYPE_FIND_MAXIMUM : GST_TYPE_FIND_NEARLY_CERTAIN;
+  const auto* const name = static_cast<const char*>(media_type);
+  if (kind == FileKind::aedat)
+    gst_type_find_suggest_simple(find, probability, name, "version", G_TYPE_INT, found->version,
+                                 nullptr);
+  else
+    gst_type_find_suggest_empty_simple(find, probability, name);
+}
+
+/// Its caps are `media_type`, at most with fields.
+#define REGISTER(name, kind, media_type, extensions)                                           \
+  GST_TYPE_FIND_REGISTER_DEFINE(name, media_type, GST_RANK_PRIMARY, find_kind<FileKind::kind>, \
+                                extensions, nullptr, const_cast<char*>(media_type), nullptr)
+
+REGISTER(aedat, aedat, "application/x-aedat", "aedat,aedat4")
+REGISTER(eventcsv, csv, "application/x-event-csv", "csv,txt")
+REGISTER(eventstream, event_stream, "application/x-es", "es")
+REGISTER(hdf5, hdf5, "application/x-hdf5", "h5,hdf5")
+REGISTER(npy, npy, "application/x-npy", "npy")
+REGISTER(propheseedat, prophesee_dat, "application/x-prophesee-dat", "dat")
+REGISTER(propheseeraw, prophesee_raw, "application/x-prophesee-raw", "raw")

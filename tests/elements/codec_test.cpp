@@ -1,0 +1,641 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The readers and writers of event files: every format there and back, pushed and pulled, whole,
+// in pieces, and broken.
+#include <glib/gstdio.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "src/codec/interval_slicer.hpp"
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Microseconds;
+using eventcamera::Polarity;
+using eventcamera::StampedEvent;
+
+constexpr int width = 320;
+constexpr int height = 240;
+const std::string events_caps =
+    "application/x-event-camera, format=XYTP, width=320, height=240, framerate=0/1";
+
+struct Format {
+  const char* name;
+  const char* writer;
+  const char* reader;
+  const char* caps;
+  std::string end = {};    ///< what is no event; by default the file is cut short
+  bool tells_size = true;  ///< of the sensor
+};
+
+void PrintTo(const Format& format, std::ostream* out) {
+  *out << format.name;
+}
+
+const Format formats[] = {
+    {"evt2", "evtenc format=EVT2", "evtdec", "application/x-prophesee-raw"},
+    {"evt21", "evtenc format=EVT21", "evtdec", "application/x-prophesee-raw"},
+    {"evt3", "evtenc format=EVT3", "evtdec", "application/x-prophesee-raw"},
+    {"evt4", "evtenc format=EVT4", "evtdec", "application/x-prophesee-raw"},
+    {"dat", "datenc", "datdec", "application/x-prophesee-dat"},
+    {"es", "esenc", "esdec", "application/x-es"},
+    {"csv", "csvenc dialect=metavision", "csvdec", "application/x-event-csv", "no\n"},
+    {"npy", "npyenc", "npydec", "application/x-npy", "", false},
+};
+
+std::string element_of(const char* launch) {
+  return std::string(launch).substr(0, std::string(launch).find(' '));
+}
+
+/// Sorted, and no two of one pixel and time: a dot that runs through the rows for a second, from
+/// 2 s on, and again after a silence of three.
+std::vector<StampedEvent> some_events() {
+  std::vector<StampedEvent> events;
+  for (int i = 0; i < 20'000; ++i) {
+    const Microseconds t = 2'000'000 + 50 * i + (i >= 10'000 ? 3'000'000 : 0);
+    events.push_back(
+        StampedEvent::at(i % width, i / width, t, i % 3 == 0 ? Polarity::off : Polarity::on));
+  }
+  return events;
+}
+
+/// A buffer of the events of [start, start + 10 ms).
+GstBuffer* buffer_of(std::span<const StampedEvent> events, Microseconds start) {
+  std::vector<GstEventCameraEvent> stream;
+  for (const auto& event : events)
+    stream.push_back({static_cast<guint32>(event.t - start), event.x, event.y_p});
+  GstBuffer* buffer = gst_buffer_new_memdup(stream.data(), stream.size() * sizeof stream[0]);
+  GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(start) * GST_USECOND;
+  GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
+  return buffer;
+}
+
+std::string pull_bytes(Harness& h) {
+  std::string bytes;
+  while (const auto buffer = h.pull()) bytes += bytes_of(buffer.get());
+  return bytes;
+}
+
+/// The file of these events, written by the element.
+std::string file_of(const Format& format, std::span<const StampedEvent> events) {
+  Harness h(format.writer);
+  gst_harness_set_sink_caps_str(h.get(), format.caps);
+  gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
+  while (!events.empty()) {
+    const auto start = events.front().t / 10'000 * 10'000;
+    const auto end =
+        std::ranges::find_if(events, [&](const auto& event) { return event.t >= start + 10'000; });
+    const auto count = static_cast<std::size_t>(end - events.begin());
+    EXPECT_EQ(h.push(buffer_of(events.first(count), start)), GST_FLOW_OK);
+    events = events.subspan(count);
+  }
+  EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_eos()));
+  return pull_bytes(h);
+}
+
+GstBuffer* bytes(std::string_view text) {
+  return gst_buffer_new_memdup(text.data(), text.size());
+}
+
+void append_events(GstBuffer* buffer, std::vector<StampedEvent>& out) {
+  GstEventCameraMap map;
+  ASSERT_TRUE(gst_event_camera_map(&map, buffer));
+  for (std::size_t i = 0; i < map.n_events; ++i)
+    out.push_back({static_cast<Microseconds>(map.start + map.events[i].t), map.events[i].x,
+                   map.events[i].y_p});
+  gst_event_camera_unmap(&map);
+}
+
+std::vector<StampedEvent> pull_events(Harness& h) {
+  std::vector<StampedEvent> events;
+  while (const auto buffer = h.pull()) append_events(buffer.get(), events);
+  return events;
+}
+
+void begin_file(Harness& h, const Format& format) {
+  gst_harness_set_src_caps_str(h.get(), format.caps);
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_BYTES);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+}
+
+void push_file(Harness& h, std::string_view file, std::size_t piece) {
+  for (std::size_t at = 0; at < file.size(); at += piece) h.push(bytes(file.substr(at, piece)));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+}
+
+/// A file of the test's, gone with it.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& content) {
+    gchar* name = nullptr;
+    const int fd = g_file_open_tmp("events-XXXXXX", &name, nullptr);
+    g_close(fd, nullptr);
+    path_ = name;
+    g_free(name);
+    std::ofstream(path_, std::ios::binary) << content;
+  }
+  ~TemporaryFile() { g_remove(path_.c_str()); }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// A file, read by a pipeline.
+class Player {
+ public:
+  Player(const std::string& path, const std::string& middle) {
+    gst_init(nullptr, nullptr);
+    const auto launch = "filesrc location=" + path + " ! " + middle +
+                        " ! fakesink name=sink sync=false signal-handoffs=true";
+    pipeline_.reset(gst_parse_launch(launch.c_str(), nullptr));
+    bus_.reset(gst_element_get_bus(pipeline_.get()));
+    const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "sink"));
+    g_signal_connect(sink.get(), "handoff",
+                     G_CALLBACK(+[](GstElement*, GstBuffer* buffer, GstPad*, Player* player) {
+                       append_events(buffer, player->events);
+                     }),
+                     this);
+  }
+  ~Player() { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
+
+  GstElement* get() const { return pipeline_.get(); }
+
+  bool pause() { return reaches(GST_STATE_PAUSED); }
+
+  bool seek(GstClockTime start, GstClockTime stop = GST_CLOCK_TIME_NONE, gdouble rate = 1) {
+    const bool done =
+        gst_element_seek(pipeline_.get(), rate, GST_FORMAT_TIME,
+                         static_cast<GstSeekFlags>(GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE),
+                         GST_SEEK_TYPE_SET, static_cast<gint64>(start),
+                         GST_CLOCK_TIME_IS_VALID(stop) ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
+                         static_cast<gint64>(stop));
+    return done && gst_element_get_state(pipeline_.get(), nullptr, nullptr, 20 * GST_SECOND) ==
+                       GST_STATE_CHANGE_SUCCESS;
+  }
+
+  /// The message that ends it: EOS, an error, or none in time.
+  Owned<GstMessage> play() {
+    events.clear();
+    gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING);
+    return Owned<GstMessage>(gst_bus_timed_pop_filtered(
+        bus_.get(), 20 * GST_SECOND,
+        static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
+  }
+
+  bool ends_well() {
+    const auto message = play();
+    return message && GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_EOS;
+  }
+
+  bool reaches(GstState state) {
+    gst_element_set_state(pipeline_.get(), state);
+    return gst_element_get_state(pipeline_.get(), nullptr, nullptr, 20 * GST_SECOND) ==
+           GST_STATE_CHANGE_SUCCESS;
+  }
+
+  GstClockTime duration() const {
+    gint64 duration = -1;
+    gst_element_query_duration(pipeline_.get(), GST_FORMAT_TIME, &duration);
+    return static_cast<GstClockTime>(duration);
+  }
+
+  GstClockTime position() const {
+    gint64 position = -1;
+    gst_element_query_position(pipeline_.get(), GST_FORMAT_TIME, &position);
+    return static_cast<GstClockTime>(position);
+  }
+
+  std::vector<StampedEvent> events;  ///< since play()
+
+ private:
+  Owned<GstElement> pipeline_;
+  Owned<GstBus> bus_;
+};
+
+class EveryFormat : public testing::TestWithParam<Format> {
+ protected:
+  const Format& format() const { return GetParam(); }
+};
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats),
+                         [](const auto& test) { return test.param.name; });
+
+TEST_P(EveryFormat, IsReadAsItWasWrittenHoweverItIsSplit) {
+  const auto events = some_events();
+  const auto file = file_of(format(), events);
+  for (const std::size_t piece : {1UL, 1000UL, 1UL << 24}) {
+    auto h = Harness::with_late_pad(format().reader);
+    begin_file(h, format());
+    push_file(h, file, piece);
+    EXPECT_EQ(pull_events(h), events);
+    if (format().tells_size) {
+      EXPECT_EQ(h.out_caps(),
+                "application/x-event-camera, format=(string)XYTP, width=(int)320, height=(int)240, "
+                "framerate=(fraction)0/1");
+    }
+    EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+    EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+    EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+  }
+}
+
+TEST_P(EveryFormat, BeginsAtTheFirstEventAndTellsSilence) {
+  auto h = Harness::with_late_pad(format().reader);
+  begin_file(h, format());
+  push_file(h, file_of(format(), some_events()), 5000);
+  const auto event = h.pull_event(GST_EVENT_SEGMENT);
+  ASSERT_TRUE(event);
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event.get(), &segment);
+  EXPECT_EQ(segment->format, GST_FORMAT_TIME);
+  EXPECT_EQ(segment->start, 2 * GST_SECOND);
+  EXPECT_EQ(gst_segment_to_running_time(segment, GST_FORMAT_TIME, 2 * GST_SECOND), 0U);
+  EXPECT_EQ(gst_segment_to_stream_time(segment, GST_FORMAT_TIME, 2 * GST_SECOND), 0U);
+
+  const auto gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(gap.get(), &start, &duration);
+  EXPECT_EQ(start, 2500 * GST_MSECOND);
+  EXPECT_GT(duration, 2900 * GST_MSECOND);
+  int gaps = 1;
+  while (h.pull_event(GST_EVENT_GAP)) ++gaps;
+  EXPECT_LE(gaps, 2);
+
+  GstClockTime end = 2 * GST_SECOND;
+  int buffers = 0;
+  while (const auto buffer = h.pull()) {
+    EXPECT_GE(GST_BUFFER_PTS(buffer.get()), end);
+    EXPECT_LE(GST_BUFFER_DURATION(buffer.get()), 10 * GST_MSECOND);
+    end = GST_BUFFER_PTS(buffer.get()) + GST_BUFFER_DURATION(buffer.get());
+    ++buffers;
+  }
+  EXPECT_EQ(buffers, 100);
+}
+
+TEST_P(EveryFormat, CutsByBufferTime) {
+  auto h = Harness::with_late_pad(std::string(format().reader) + " buffer-time=100000000");
+  begin_file(h, format());
+  push_file(h, file_of(format(), some_events()), 5000);
+  int buffers = 0;
+  while (h.pull()) ++buffers;
+  EXPECT_EQ(buffers, 10);
+}
+
+TEST_P(EveryFormat, IsEmptyWhereThereAreNoEvents) {
+  const auto file = file_of(format(), {});
+  EXPECT_FALSE(file.empty());
+  auto h = Harness::with_late_pad(format().reader);
+  begin_file(h, format());
+  push_file(h, file, 5);
+  EXPECT_FALSE(h.pull());
+  EXPECT_NE(h.out_caps().find(format().tells_size ? "width=(int)320" : "width=(int)128"),
+            std::string::npos);
+  EXPECT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
+  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+}
+
+TEST_P(EveryFormat, SaysWhenItIsNotThisFormat) {
+  for (const auto& file : {std::string("a,b\n"), std::string("no events at all, but words\n"),
+                           std::string(100'000, '\0')}) {
+    auto h = Harness::with_late_pad(format().reader);
+    begin_file(h, format());
+    push_file(h, file, 4000);
+    const auto message = h.message(GST_MESSAGE_ERROR);
+    ASSERT_TRUE(message);
+    EXPECT_NE(text_of(message.get()).find("This cannot be read: "), std::string::npos);
+    EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+
+    const TemporaryFile temporary(file);
+    Player player(temporary.path(), format().reader);
+    const auto pulled = player.play();
+    ASSERT_TRUE(pulled);
+    EXPECT_EQ(GST_MESSAGE_TYPE(pulled.get()), GST_MESSAGE_ERROR);
+    EXPECT_NE(text_of(pulled.get()).find("This cannot be read: "), std::string::npos);
+  }
+}
+
+TEST_P(EveryFormat, WarnsOnceOfDamageAndTellsWhere) {
+  const auto events = some_events();
+  auto file = file_of(format(), events);
+  if (format().end.empty())
+    file.pop_back();
+  else
+    file += format().end;
+  auto h = Harness::with_late_pad(format().reader);
+  begin_file(h, format());
+  push_file(h, file, 5000);
+  const auto message = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(message);
+  const auto text = text_of(message.get());
+  const auto found = text.find("damaged at byte ");
+  ASSERT_NE(found, std::string::npos) << text;
+  const auto position = std::stoul(text.substr(found + 16));
+  EXPECT_LT(position, file.size());
+  EXPECT_GE(position + 13, file.size());  // of the longest event
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+  // Nearly all was whole.
+  const auto read = pull_events(h);
+  ASSERT_GT(read.size(), events.size() - 40);
+  EXPECT_TRUE(std::equal(read.begin(), read.end(), events.begin()));
+  GstStructure* stats = nullptr;
+  g_object_get(h.element(), "stats", &stats, nullptr);
+  guint64 places = 0;
+  EXPECT_TRUE(gst_structure_get_uint64(stats, "damaged-places", &places));
+  EXPECT_EQ(places, 1U);
+  gst_structure_free(stats);
+}
+
+TEST_P(EveryFormat, SurvivesNoise) {
+  const auto file = file_of(format(), some_events());
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    auto noisy = file;
+    g_random_set_seed(seed);
+    for (int i = 0; i < 200; ++i)
+      noisy[static_cast<std::size_t>(g_random_int_range(200, static_cast<gint>(noisy.size())))] ^=
+          static_cast<char>(1 << g_random_int_range(0, 8));
+    auto h = Harness::with_late_pad(format().reader);
+    begin_file(h, format());
+    push_file(h, noisy, 3000);
+    for (const auto& event : pull_events(h)) {
+      if (!format().tells_size) break;
+      ASSERT_LT(event.x, width);
+      ASSERT_LT(event.y(), height);
+    }
+  }
+}
+
+TEST_P(EveryFormat, IsPulledAndSoughtIn) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(file.path(), way + format().reader);
+    ASSERT_TRUE(player.pause());
+    if (way.empty()) {
+      EXPECT_EQ(player.duration(), 3'999'951 * GST_USECOND);
+    }
+    EXPECT_EQ(player.position(), 0U);
+    ASSERT_TRUE(player.ends_well());
+    EXPECT_EQ(player.duration() == GST_CLOCK_TIME_NONE, false);
+
+    const Microseconds from = 3'700'000;
+    const Microseconds to = 3'800'000;
+    ASSERT_TRUE(player.pause());
+    ASSERT_TRUE(player.seek(static_cast<GstClockTime>(from) * GST_USECOND));
+    EXPECT_EQ(player.position(), static_cast<GstClockTime>(from) * GST_USECOND);
+    ASSERT_TRUE(player.ends_well());
+    std::vector<StampedEvent> expected;
+    std::ranges::copy_if(events, std::back_inserter(expected),
+                         [](const auto& event) { return event.t >= 2'000'000 + from; });
+    EXPECT_EQ(player.events, expected);
+
+    // Back, and with an end.
+    ASSERT_TRUE(player.pause());
+    ASSERT_TRUE(player.seek(100 * GST_MSECOND));
+    ASSERT_TRUE(player.seek(static_cast<GstClockTime>(from) * GST_USECOND,
+                            static_cast<GstClockTime>(to) * GST_USECOND));
+    ASSERT_TRUE(player.ends_well());
+    std::erase_if(expected, [](const auto& event) { return event.t >= 2'000'000 + to; });
+    EXPECT_EQ(player.events, expected);
+
+    // Beyond the end, and backwards.
+    ASSERT_TRUE(player.pause());
+    EXPECT_FALSE(player.seek(GST_SECOND, GST_CLOCK_TIME_NONE, -1));
+  }
+}
+
+TEST_P(EveryFormat, IsFoundByDecodebin) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  Player player(file.path(), "decodebin caps=application/x-event-camera");
+  ASSERT_TRUE(player.ends_well());
+  EXPECT_EQ(player.events, events);
+}
+
+TEST_P(EveryFormat, GoesThroughAllStates) {
+  const TemporaryFile file(file_of(format(), some_events()));
+  Player player(file.path(), format().reader);
+  for (int times = 0; times < 3; ++times) {
+    EXPECT_TRUE(player.reaches(GST_STATE_PAUSED));
+    EXPECT_TRUE(player.ends_well());
+    EXPECT_EQ(player.events.size(), 20'000U);
+    EXPECT_TRUE(player.reaches(times % 2 == 0 ? GST_STATE_READY : GST_STATE_NULL));
+  }
+  // Without data, and stopped in the middle.
+  for (const auto& name : {element_of(format().reader), element_of(format().writer)}) {
+    const Owned<GstElement> element(gst_element_factory_make(name.c_str(), nullptr));
+    for (const auto state : {GST_STATE_PLAYING, GST_STATE_NULL, GST_STATE_PAUSED, GST_STATE_NULL})
+      EXPECT_NE(gst_element_set_state(element.get(), state), GST_STATE_CHANGE_FAILURE);
+  }
+  EXPECT_TRUE(player.reaches(GST_STATE_PAUSED));
+}
+
+TEST_P(EveryFormat, BeginsAnewAfterAFlush) {
+  const auto events = some_events();
+  const auto file = file_of(format(), events);
+  auto h = Harness::with_late_pad(format().reader);
+  begin_file(h, format());
+  h.push(bytes(file.substr(0, file.size() / 2)));
+  pull_events(h);
+  gst_harness_push_event(h.get(), gst_event_new_flush_start());
+  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_BYTES);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  push_file(h, file, 10'000);
+  EXPECT_EQ(pull_events(h), events);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST_P(EveryFormat, IsFreedWhileInUse) {
+  const auto file = file_of(format(), some_events());
+  for (const std::size_t count : {std::size_t{1}, file.size() / 2}) {
+    auto h = Harness::with_late_pad(format().reader);
+    begin_file(h, format());
+    gst_harness_push_event(h.get(), gst_event_new_tag(gst_tag_list_new_empty()));
+    h.push(bytes(file.substr(0, count)));
+  }
+}
+
+TEST_P(EveryFormat, IsWrittenWithoutWhatCannotBe) {
+  Harness h(format().writer);
+  gst_harness_set_sink_caps_str(h.get(), format().caps);
+  gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
+  const std::vector events = {
+      StampedEvent::at(5, 5, 1000, Polarity::on), StampedEvent::at(width, 5, 1001, Polarity::on),
+      StampedEvent::at(5, height, 1002, Polarity::on), StampedEvent::at(6, 6, 1003, Polarity::off)};
+  EXPECT_EQ(h.push(buffer_of(events, 0)), GST_FLOW_OK);
+  // After a flush, time has gone back.
+  gst_harness_push_event(h.get(), gst_event_new_flush_start());
+  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  auto file = pull_bytes(h);
+  EXPECT_EQ(h.push(buffer_of(std::span(events).first(1), 0)), GST_FLOW_OK);
+  gst_harness_push_event(h.get(), gst_event_new_gap(10 * GST_MSECOND, 10 * GST_MSECOND));
+  EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  file += pull_bytes(h);
+  int warnings = 0;
+  while (const auto message = h.message(GST_MESSAGE_WARNING))
+    warnings += text_of(message.get()).starts_with("Events outside the sensor") ? 1 : 0;
+  EXPECT_EQ(warnings, 1);
+  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+
+  auto reader = Harness::with_late_pad(format().reader);
+  begin_file(reader, format());
+  push_file(reader, file, 1000);
+  EXPECT_EQ(pull_events(reader), (std::vector{events[0], events[3]}));
+}
+
+TEST_P(EveryFormat, IsOfOneSize) {
+  Harness h(format().writer);
+  gst_harness_set_sink_caps_str(h.get(), format().caps);
+  gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
+  const auto event = StampedEvent::at(5, 5, 1000, Polarity::on);
+  EXPECT_EQ(h.push(buffer_of(std::span(&event, 1), 0)), GST_FLOW_OK);
+  gst_harness_set_src_caps_str(
+      h.get(), "application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+  gst_harness_push_event(
+      h.get(),
+      gst_event_new_caps(
+          Owned<GstCaps>(gst_caps_from_string("application/x-event-camera, format=XYTP, width=64, "
+                                              "height=48, framerate=30/1"))
+              .get()));
+  EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
+}
+
+TEST_P(EveryFormat, RefusesBuffersThatAreNoEvents) {
+  Harness h(format().writer);
+  gst_harness_set_sink_caps_str(h.get(), format().caps);
+  gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
+  GstBuffer* buffer = bytes("seven b");
+  GST_BUFFER_PTS(buffer) = 0;
+  EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR);
+  EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
+}
+
+/* EVT words without a header */
+
+class EveryWord : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryWord, testing::Values("EVT2", "EVT21", "EVT3", "EVT4"));
+
+std::string words_caps(const std::string& format) {
+  return "application/x-event-camera, format=" + format + ", width=320, height=240, framerate=0/1";
+}
+
+TEST_P(EveryWord, KeepsTheTimesOfItsBuffers) {
+  // Hours into the stream: further than the words' own clocks go.
+  const GstClockTime late = 5 * 3600 * GST_SECOND;
+  Harness writer("evtenc");
+  gst_harness_set_sink_caps_str(writer.get(), words_caps(GetParam()).c_str());
+  gst_harness_set_src_caps_str(writer.get(), events_caps.c_str());
+  auto reader = Harness::with_late_pad("evtdec");
+  gst_harness_set_src_caps_str(reader.get(), words_caps(GetParam()).c_str());
+  std::vector<StampedEvent> expected;
+  std::vector<StampedEvent> read;
+  for (int i = 0; i < 20; ++i) {
+    const auto start = static_cast<Microseconds>(late / GST_USECOND) + 10'000 * i;
+    const std::vector events = {StampedEvent::at(i, 7, start + 17, Polarity::on),
+                                StampedEvent::at(i, 9, start + 9'999, Polarity::off)};
+    expected.insert(expected.end(), events.begin(), events.end());
+    writer.push(buffer_of(events, start));
+    const auto words = writer.pull();
+    ASSERT_TRUE(words);
+    EXPECT_EQ(GST_BUFFER_PTS(words.get()), static_cast<GstClockTime>(start) * GST_USECOND);
+    reader.push(gst_buffer_ref(words.get()));
+    while (const auto buffer = reader.pull()) append_events(buffer.get(), read);
+    // Nothing is held back for longer than an interval.
+    EXPECT_GE(read.size() + 4, expected.size());
+  }
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  while (const auto buffer = reader.pull()) append_events(buffer.get(), read);
+  EXPECT_EQ(read, expected);
+  EXPECT_EQ(gst_harness_query_latency(reader.get()), 10 * GST_MSECOND);
+}
+
+TEST_P(EveryWord, FollowsGapsAndFlushes) {
+  Harness writer("evtenc");
+  gst_harness_set_sink_caps_str(writer.get(), words_caps(GetParam()).c_str());
+  gst_harness_set_src_caps_str(writer.get(), events_caps.c_str());
+  auto reader = Harness::with_late_pad("evtdec");
+  gst_harness_set_src_caps_str(reader.get(), words_caps(GetParam()).c_str());
+  gst_harness_push_event(reader.get(), gst_event_new_gap(0, 10 * GST_MSECOND));
+  EXPECT_TRUE(reader.pull_event(GST_EVENT_GAP));
+  const auto event = StampedEvent::at(3, 4, 12'000, Polarity::on);
+  writer.push(buffer_of(std::span(&event, 1), 10'000));
+  reader.push(writer.pull().release());
+  gst_harness_push_event(reader.get(), gst_event_new_gap(20 * GST_MSECOND, 30 * GST_MSECOND));
+  EXPECT_EQ(pull_events(reader), std::vector{event});
+  EXPECT_TRUE(reader.pull_event(GST_EVENT_GAP));
+
+  gst_harness_push_event(reader.get(), gst_event_new_flush_start());
+  gst_harness_push_event(reader.get(), gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(reader.get(), gst_event_new_segment(&segment));
+  const auto later = StampedEvent::at(3, 4, 70'000, Polarity::on);
+  writer.push(buffer_of(std::span(&later, 1), 70'000));
+  GstBuffer* words = writer.pull().release();
+  GST_BUFFER_PTS(words) = 5 * GST_MSECOND;
+  reader.push(words);
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  const auto moved = StampedEvent::at(3, 4, 5'000, Polarity::on);
+  EXPECT_EQ(pull_events(reader), std::vector{moved});
+}
+
+TEST(EvtEnc, TakesTheFormatThatDownstreamLeaves) {
+  Harness h("evtenc format=EVT4");
+  gst_harness_set_sink_caps_str(h.get(),
+                                "application/x-event-camera, format=(string){ EVT2, EVT3, EVT4 }");
+  gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
+  EXPECT_NE(h.out_caps().find("EVT4"), std::string::npos);
+  EXPECT_NE(h.out_caps().find("width=(int)320"), std::string::npos);
+}
+
+TEST(EvtDec, AssumesASensorWhereTheFileTellsNone) {
+  const auto file = file_of(formats[0], some_events());
+  const auto words = file.substr(file.find("% end\n") + 6);
+  const auto bare = "% evt 2.0\n% end\n" + words;
+  const TemporaryFile temporary(bare);
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(temporary.path(), way + "evtdec ! capsfilter name=filter");
+    ASSERT_TRUE(player.pause());
+    const Owned<GstElement> filter(gst_bin_get_by_name(GST_BIN(player.get()), "filter"));
+    GstPad* pad = gst_element_get_static_pad(filter.get(), "src");
+    const Owned<GstCaps> caps(gst_pad_get_current_caps(pad));
+    gst_object_unref(pad);
+    int found = 0;
+    gst_structure_get_int(gst_caps_get_structure(caps.get(), 0), "height", &found);
+    EXPECT_EQ(found, 320);
+    Player told(temporary.path(), way + "evtdec ! application/x-event-camera,width=640,height=480");
+    EXPECT_TRUE(told.ends_well());
+    EXPECT_EQ(told.events.size(), 20'000U);
+  }
+}
+
+TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
+  auto file = file_of(formats[0], some_events());
+  const std::string_view size = "height=240;width=320";
+  file.replace(file.find(size), size.size(), "height=240;width=160");
+  auto h = Harness::with_late_pad("evtdec");
+  begin_file(h, formats[0]);
+  push_file(h, file, 1000);
+  EXPECT_EQ(pull_events(h).size(), 10'080U);
+  const auto message = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(message);
+  EXPECT_NE(text_of(message.get()).find("9920 events outside the sensor"), std::string::npos);
+}
+
+}  // namespace

@@ -1,0 +1,447 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// eventhdf5dec, eventhdf5src and eventhdf5sink: files of every layout there and back, pulled and
+// pushed, sought in, broken, and to places where none can be written.
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "src/codec/hdf5/hdf5_reader.hpp"
+#include "src/codec/hdf5/hdf5_writer.hpp"
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Hdf5Layout;
+using eventcamera::Hdf5Reader;
+using eventcamera::Hdf5Writer;
+using eventcamera::Microseconds;
+using eventcamera::Polarity;
+using eventcamera::StampedEvent;
+using Events = std::vector<StampedEvent>;
+
+constexpr int width = 320;
+constexpr int height = 240;
+constexpr const char* events_caps =
+    "application/x-event-camera, format=XYTP, width=320, height=240, framerate=0/1";
+
+/// A dot that runs through the rows for a second, from 2 s on, and again after a silence of three.
+Events some_events() {
+  Events events;
+  for (int i = 0; i < 50'000; ++i) {
+    const Microseconds t = 2'000'000 + 20 * i + (i >= 25'000 ? 3'000'000 : 0);
+    events.push_back(StampedEvent::at(i % width, i / width % height, t,
+                                      i % 3 == 0 ? Polarity::off : Polarity::on));
+  }
+  return events;
+}
+
+Events from(const Events& events, Microseconds start, Microseconds end) {
+  Events found;
+  std::ranges::copy_if(events, std::back_inserter(found),
+                       [&](const auto& event) { return event.t >= start && event.t < end; });
+  return found;
+}
+
+class Folder {
+ public:
+  Folder()
+      : path_(std::filesystem::temp_directory_path() /
+              ("hdf5-test-" + std::to_string(std::random_device()()))) {
+    std::filesystem::create_directories(path_);
+  }
+  ~Folder() { std::filesystem::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  std::string operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+class Hdf5 : public testing::TestWithParam<const char*> {
+ protected:
+  bool is_dsec() const { return std::string(GetParam()).starts_with("dsec"); }
+
+  std::string written(const Events& events) const {
+    const auto path = folder_ / (std::string(GetParam()) + ".h5");
+    Hdf5Writer writer(path, {is_dsec() ? Hdf5Layout::dsec : Hdf5Layout::metavision,
+                             Hdf5Writer::Compression::gzip,
+                             {width, height}});
+    writer.append(events);
+    writer.close();
+    return path;
+  }
+
+  Folder folder_;
+};
+INSTANTIATE_TEST_SUITE_P(, Hdf5, testing::Values("dsec", "metavision"),
+                         [](const auto& test) { return test.param; });
+
+Events read(const std::string& path) {
+  Hdf5Reader reader(path);
+  Events events;
+  while (reader.read(10'000, events) > 0) continue;
+  EXPECT_EQ(reader.damage().places, 0U) << reader.damage().first;
+  EXPECT_EQ(reader.size(), (eventcamera::SensorSize{width, height}));
+  return events;
+}
+
+void append_events(GstBuffer* buffer, Events& out) {
+  const auto start = static_cast<Microseconds>(GST_BUFFER_PTS(buffer) / GST_USECOND);
+  for (const auto& event : events_of(buffer)) out.push_back({start + event.t, event.x, event.y_p});
+}
+
+/// A pipeline that ends in a fakesink of events.
+class Player {
+ public:
+  explicit Player(const std::string& launch) {
+    gst_init(nullptr, nullptr);
+    GError* error = nullptr;
+    pipeline_.reset(gst_parse_launch(
+        (launch + " ! fakesink name=sink sync=false signal-handoffs=true").c_str(), &error));
+    EXPECT_EQ(error, nullptr) << error->message;
+    bus_.reset(gst_element_get_bus(pipeline_.get()));
+    const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "sink"));
+    g_signal_connect(sink.get(), "handoff",
+                     G_CALLBACK(+[](GstElement*, GstBuffer* buffer, GstPad*, Player* self) {
+                       ++self->buffers;
+                       append_events(buffer, self->events);
+                     }),
+                     this);
+  }
+  ~Player() { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
+  Player(const Player&) = delete;
+  Player& operator=(const Player&) = delete;
+
+  GstElement* get() const { return pipeline_.get(); }
+
+  bool reaches(GstState state) {
+    gst_element_set_state(pipeline_.get(), state);
+    return gst_element_get_state(pipeline_.get(), nullptr, nullptr, 20 * GST_SECOND) ==
+           GST_STATE_CHANGE_SUCCESS;
+  }
+
+  Owned<GstMessage> play() {
+    events.clear();
+    buffers = 0;
+    gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING);
+    return wait();
+  }
+
+  Owned<GstMessage> wait() {
+    return Owned<GstMessage>(
+        gst_bus_timed_pop_filtered(bus_.get(), 20 * GST_SECOND,
+                                   static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR |
+                                                               GST_MESSAGE_SEGMENT_DONE)));
+  }
+
+  bool ends_well() {
+    const auto message = play();
+    if (message && GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_ERROR)
+      ADD_FAILURE() << text_of(message.get());
+    return message && GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_EOS;
+  }
+
+  std::string error() {
+    const auto message = play();
+    if (!message || GST_MESSAGE_TYPE(message.get()) != GST_MESSAGE_ERROR) return "";
+    return text_of(message.get());
+  }
+
+  Owned<GstMessage> warning() {
+    return Owned<GstMessage>(gst_bus_pop_filtered(bus_.get(), GST_MESSAGE_WARNING));
+  }
+
+  bool seek(Microseconds start, Microseconds stop, int more_flags = 0) {
+    return gst_element_seek(pipeline_.get(), 1, GST_FORMAT_TIME,
+                            static_cast<GstSeekFlags>(GST_SEEK_FLAG_FLUSH | more_flags),
+                            GST_SEEK_TYPE_SET, start * 1000, GST_SEEK_TYPE_SET,
+                            stop * 1000) != FALSE &&
+           gst_element_get_state(pipeline_.get(), nullptr, nullptr, 20 * GST_SECOND) ==
+               GST_STATE_CHANGE_SUCCESS;
+  }
+
+  gint64 duration() const {
+    gint64 duration = -1;
+    gst_element_query_duration(pipeline_.get(), GST_FORMAT_TIME, &duration);
+    return duration;
+  }
+
+  Events events;
+  int buffers = 0;
+
+ private:
+  Owned<GstElement> pipeline_;
+  Owned<GstBus> bus_;
+};
+
+TEST_P(Hdf5, IsReadPulledPushedAndFromItsSource) {
+  const auto events = some_events();
+  const auto path = written(events);
+  for (const auto& launch :
+       {"filesrc location=" + path + " ! eventhdf5dec",
+        "filesrc location=" + path + " ! queue ! eventhdf5dec",
+        "filesrc blocksize=777 location=" + path + " ! identity ! eventhdf5dec",
+        "eventhdf5src location=" + path}) {
+    SCOPED_TRACE(launch);
+    Player player(launch);
+    for (int times = 0; times < 2; ++times) {
+      ASSERT_TRUE(player.ends_well());
+      EXPECT_TRUE(player.events == events) << player.events.size();
+      EXPECT_EQ(player.buffers, 100);
+      EXPECT_FALSE(player.warning());
+      ASSERT_TRUE(player.reaches(times == 0 ? GST_STATE_READY : GST_STATE_NULL));
+    }
+  }
+}
+
+TEST_P(Hdf5, IsFoundByDecodebin) {
+  const auto events = some_events();
+  Player player("filesrc location=" + written(events) +
+                " ! decodebin caps=application/x-event-camera");
+  ASSERT_TRUE(player.ends_well());
+  EXPECT_TRUE(player.events == events);
+}
+
+TEST_P(Hdf5, CutsByBufferTime) {
+  Player player("eventhdf5src buffer-time=100000000 location=" + written(some_events()));
+  ASSERT_TRUE(player.ends_well());
+  EXPECT_EQ(player.buffers, 10);
+}
+
+TEST_P(Hdf5, IsSoughtIn) {
+  const auto events = some_events();
+  Player player("eventhdf5src location=" + written(events));
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  EXPECT_EQ(player.duration(), (events.back().t - events.front().t + 1) * 1000);
+  for (const Microseconds start : {3'700'000, 100'000, 0, 499'999, 2'000'000, 3'999'000}) {
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    ASSERT_TRUE(player.seek(start, 3'999'990));
+    ASSERT_TRUE(player.ends_well());
+    EXPECT_TRUE(player.events == from(events, 2'000'000 + start, 5'999'990)) << start;
+  }
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  ASSERT_TRUE(player.seek(0, 100'000, GST_SEEK_FLAG_SEGMENT));
+  const auto message = player.play();
+  ASSERT_TRUE(message);
+  EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_SEGMENT_DONE);
+  EXPECT_TRUE(player.events == from(events, 2'000'000, 2'100'000));
+}
+
+TEST_P(Hdf5, IsSoughtInWhilePlaying) {
+  Player player("eventhdf5src location=" + written(some_events()));
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  gst_element_set_state(player.get(), GST_STATE_PLAYING);
+  std::mt19937 random(3);
+  for (int i = 0; i < 60; ++i) {
+    ASSERT_TRUE(gst_element_seek_simple(player.get(), GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                        static_cast<gint64>(random() % 3900) * 1'000'000));
+    if (i % 4 == 0) g_usleep(1000);
+  }
+  const auto message = player.wait();
+  ASSERT_TRUE(message);
+  EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS);
+}
+
+TEST_P(Hdf5, IsEmptyWhereThereAreNoEvents) {
+  const auto path = written({});
+  for (const char* way : {"", "queue ! "}) {
+    Player player("filesrc location=" + path + " ! " + way + "eventhdf5dec");
+    EXPECT_TRUE(player.ends_well());
+    EXPECT_TRUE(player.events.empty());
+  }
+}
+
+TEST_P(Hdf5, SurvivesBrokenFiles) {
+  const auto events = some_events();
+  const auto path = written(events);
+  std::ifstream stream(path, std::ios::binary);
+  const std::string whole(std::istreambuf_iterator<char>(stream), {});
+  // The library itself is not proof against damage in its own structures, so only data is.
+  auto damaged = whole;
+  const auto middle = damaged.size() / 2;
+  for (std::size_t i = 0; i < 64; ++i)
+    damaged[middle + i] = static_cast<char>(~damaged[middle + i]);
+  for (const auto& bytes : {whole.substr(0, whole.size() - 5000), damaged}) {
+    std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
+    for (const char* way : {"", "queue ! "}) {
+      Player player("filesrc location=" + path + " ! " + way + "eventhdf5dec");
+      const auto message = player.play();
+      ASSERT_TRUE(message);
+      if (GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_ERROR)
+        EXPECT_NE(text_of(message.get()).find("This cannot be read: "), std::string::npos);
+      else
+        EXPECT_LE(player.events.size(), events.size());
+    }
+  }
+}
+
+TEST_P(Hdf5, IsWritten) {
+  const auto events = some_events();
+  const auto path = folder_ / "out.h5";
+  Player player("eventhdf5src location=" + written(events) +
+                " ! tee name=t  t. ! queue ! eventhdf5sink layout=" + GetParam() +
+                " location=" + path + "  t. ! queue");
+  ASSERT_TRUE(player.ends_well());
+  // It is whole at the end of the stream, not only after the stop.
+  EXPECT_TRUE(read(path) == events);
+  // Again, over what is there.
+  ASSERT_TRUE(player.reaches(GST_STATE_READY));
+  ASSERT_TRUE(player.ends_well());
+  ASSERT_TRUE(player.reaches(GST_STATE_NULL));
+  EXPECT_TRUE(read(path) == events);
+}
+
+/// The sink, fed by the test.
+class Sink {
+ public:
+  explicit Sink(const std::string& launch) {
+    gst_init(nullptr, nullptr);
+    h_.reset(gst_harness_new_parse(launch.c_str()));
+    bus_.reset(gst_bus_new());
+    gst_element_set_bus(h_->element, bus_.get());
+  }
+  ~Sink() {
+    if (h_) gst_element_set_bus(h_->element, nullptr);
+  }
+  Sink(const Sink&) = delete;
+  Sink& operator=(const Sink&) = delete;
+
+  GstHarness* get() const { return h_.get(); }
+  void caps(const char* caps) { gst_harness_set_src_caps_str(h_.get(), caps); }
+
+  GstFlowReturn push(const Events& events, Microseconds start) {
+    std::vector<GstEventCameraEvent> stream;
+    for (const auto& event : events)
+      stream.push_back({static_cast<guint32>(event.t - start), event.x, event.y_p});
+    GstBuffer* buffer = gst_buffer_new_memdup(stream.data(), stream.size() * sizeof stream[0]);
+    GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(start) * GST_USECOND;
+    GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
+    return gst_harness_push(h_.get(), buffer);
+  }
+
+  void end() { gst_harness_push_event(h_.get(), gst_event_new_eos()); }
+
+  std::string message(GstMessageType type) {
+    const Owned<GstMessage> message(gst_bus_pop_filtered(bus_.get(), type));
+    return message ? text_of(message.get()) : "";
+  }
+
+  void stop() {
+    gst_element_set_bus(h_->element, nullptr);
+    h_.reset();
+  }
+
+ private:
+  Owned<GstHarness> h_;
+  Owned<GstBus> bus_;
+};
+
+TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
+  const auto path = folder_ / "out.h5";
+  const Events events = {StampedEvent::at(5, 6, 1'000'007, Polarity::on),
+                         StampedEvent::at(7, 8, 1'000'009, Polarity::off)};
+  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
+  sink.caps(events_caps);
+  EXPECT_EQ(sink.push(events, 1'000'000), GST_FLOW_OK);
+  sink.stop();
+  EXPECT_TRUE(read(path) == events);
+}
+
+TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
+  const auto path = folder_ / "out.h5";
+  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
+  sink.caps(events_caps);
+  const Events events = {
+      StampedEvent::at(5, 5, 1000, Polarity::on), StampedEvent::at(width, 5, 1001, Polarity::on),
+      StampedEvent::at(5, height, 1002, Polarity::on), StampedEvent::at(6, 6, 1003, Polarity::off)};
+  EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
+  // After a flush, time has gone back.
+  gst_harness_push_event(sink.get(), gst_event_new_flush_start());
+  gst_harness_push_event(sink.get(), gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(sink.get(), gst_event_new_segment(&segment));
+  EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);
+  EXPECT_TRUE(sink.message(GST_MESSAGE_WARNING).starts_with("Events outside the sensor"));
+  EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
+  sink.end();
+  EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
+  EXPECT_TRUE(read(path) == (Events{events[0], events[3]}));
+}
+
+TEST_P(Hdf5, IsOfOneSize) {
+  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) +
+            " location=" + (folder_ / "out.h5"));
+  sink.caps("application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1");
+  sink.caps(events_caps);  // nothing is written yet
+  EXPECT_EQ(sink.push({StampedEvent::at(200, 5, 0, Polarity::on)}, 0), GST_FLOW_OK);
+  sink.caps("application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
+  EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
+  gst_harness_push_event(
+      sink.get(),
+      gst_event_new_caps(
+          Owned<GstCaps>(gst_caps_from_string("application/x-event-camera, format=XYTP, width=64, "
+                                              "height=48, framerate=30/1"))
+              .get()));
+  EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("The size of the sensor changes"),
+            std::string::npos);
+}
+
+TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
+  const Folder folder;
+  gst_init(nullptr, nullptr);
+  {
+    Sink sink("eventhdf5sink location=/no/such/folder/out.h5");
+    sink.caps(events_caps);
+    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("/no/such/folder/out.h5 cannot be written"),
+              std::string::npos);
+  }
+  {
+    Sink sink("eventhdf5sink layout=metavision location=" + (folder / "out.h5"));
+    sink.caps("application/x-event-camera, format=XYTP, width=4000, height=48, framerate=0/1");
+    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("at most 2048 pixels"), std::string::npos);
+  }
+  {
+    Sink sink("eventhdf5sink location=" + (folder / "out.h5"));
+    sink.caps(events_caps);
+    GstBuffer* buffer = gst_buffer_new_memdup("seven b", 7);
+    GST_BUFFER_PTS(buffer) = 0;
+    EXPECT_EQ(gst_harness_push(sink.get(), buffer), GST_FLOW_ERROR);
+    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("no event buffer"), std::string::npos);
+  }
+  const Owned<GstElement> nowhere(gst_element_factory_make("eventhdf5sink", nullptr));
+  EXPECT_EQ(gst_element_set_state(nowhere.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
+  gst_element_set_state(nowhere.get(), GST_STATE_NULL);
+}
+
+TEST(Hdf5Src, SaysWhatCannotBeRead) {
+  const Folder folder;
+  EXPECT_NE(Player("eventhdf5src location=" + (folder / "none.h5")).error(), "");
+  std::ofstream(folder / "text.h5") << "t,x,y,p\n";
+  for (const char* way : {"", "queue ! "})
+    EXPECT_NE(Player("filesrc location=" + (folder / "text.h5") + " ! " + way + "eventhdf5dec")
+                  .error()
+                  .find("not an HDF5 file"),
+              std::string::npos);
+}
+
+TEST(Hdf5Elements, GoThroughAllStates) {
+  gst_init(nullptr, nullptr);
+  const Folder folder;
+  for (const char* name : {"eventhdf5dec", "eventhdf5sink"}) {
+    const Owned<GstElement> element(gst_element_factory_make(name, nullptr));
+    ASSERT_TRUE(element);
+    if (std::string(name) == "eventhdf5sink")
+      g_object_set(element.get(), "location", (folder / "out.h5").c_str(), nullptr);
+    for (int times = 0; times < 3; ++times)
+      for (const auto state : {GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_PLAYING,
+                               GST_STATE_PAUSED, GST_STATE_READY, GST_STATE_NULL})
+        EXPECT_NE(gst_element_set_state(element.get(), state), GST_STATE_CHANGE_FAILURE);
+  }
+}
+
+}  // namespace

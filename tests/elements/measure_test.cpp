@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// eventstats and eventcompare: which events count, when figures come, and what is written.
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "src/event/event.hpp"
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Event;
+using eventcamera::Polarity;
+
+constexpr GstClockTime ms = GST_MSECOND;
+const std::string small_sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
+
+Buffer buffer_of(GstClockTime pts, const std::vector<Event>& list, GstClockTime duration) {
+  Buffer buffer(list.empty() ? gst_buffer_new()
+                             : gst_buffer_new_memdup(list.data(), list.size() * sizeof(Event)));
+  GST_BUFFER_PTS(buffer.get()) = pts;
+  GST_BUFFER_DURATION(buffer.get()) = duration;
+  return buffer;
+}
+
+std::string text_in(const std::filesystem::path& path) {
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+const GstStructure* structure_of(const Owned<GstMessage>& message) {
+  return message ? gst_message_get_structure(message.get()) : nullptr;
+}
+
+guint64 count_in(const GstStructure* figures, const char* field = "events") {
+  guint64 value = G_MAXUINT64;
+  EXPECT_TRUE(gst_structure_get_uint64(figures, field, &value)) << field;
+  return value;
+}
+
+double number_in(const GstStructure* figures, const char* field) {
+  double value = -1;
+  EXPECT_TRUE(gst_structure_get_double(figures, field, &value)) << field;
+  return value;
+}
+
+gint64 time_in(const GstStructure* figures, const char* field) {
+  gint64 value = -1;
+  EXPECT_TRUE(gst_structure_get_int64(figures, field, &value)) << field;
+  return value;
+}
+
+/// A structure that lies in another.
+const GstStructure* within(const GstStructure* structure, const char* field) {
+  const GValue* value = gst_structure_get_value(structure, field);
+  return value != nullptr ? gst_value_get_structure(value) : nullptr;
+}
+
+class MeasureTest : public testing::Test {
+ protected:
+  MeasureTest() {
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directories(folder);
+  }
+  ~MeasureTest() override { std::filesystem::remove_all(folder); }
+
+  /// As text for a launch line.
+  std::string path(const std::string& name) const { return (folder / name).string(); }
+
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() /
+      (std::string("measure_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+/* eventstats */
+
+class StatsTest : public MeasureTest {};
+
+TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
+  Harness h("eventstats interval=" + std::to_string(50 * ms) + " location=" + path("f.json") +
+            " map=" + path("map.png"));
+  h.caps(small_sensor);
+  const std::vector first = {Event::at(1, 0, 0, Polarity::on), Event::at(1, 0, 30, Polarity::off),
+                             Event::at(2, 3, 40, Polarity::on)};
+  h.push(buffer_of(1000 * ms, first, 40 * ms).release());
+  EXPECT_EQ(bytes_of(h.pull().get()).size(), 24U);
+  EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
+  gst_harness_push_event(h.get(), gst_event_new_gap(1040 * ms, 20 * ms));
+  auto message = h.message(GST_MESSAGE_ELEMENT);
+  const auto* recent = structure_of(message);
+  ASSERT_TRUE(recent);
+  EXPECT_TRUE(gst_structure_has_name(recent, "eventstats"));
+  EXPECT_EQ(count_in(recent), 3U);
+  EXPECT_EQ(time_in(recent, "start"), gint64{1000 * ms});
+  EXPECT_EQ(time_in(recent, "end"), gint64{1060 * ms});
+  EXPECT_NEAR(number_in(recent, "rate"), 50, 1e-9);
+  EXPECT_NEAR(number_in(recent, "on-share"), 2.0 / 3, 1e-9);
+  EXPECT_NEAR(number_in(recent, "mean"), 3 / 32.0 / 0.06, 1e-9);
+  EXPECT_EQ(count_in(recent, "gap-50"), 29 * GST_USECOND);
+
+  h.push(buffer_of(1060 * ms, {Event::at(2, 3, 40, Polarity::on)}, 40 * ms).release());
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  message = h.message(GST_MESSAGE_ELEMENT);
+  const auto* whole = structure_of(message);
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(count_in(whole), 4U);
+  EXPECT_EQ(time_in(whole, "end"), gint64{1100 * ms});
+  EXPECT_NEAR(number_in(whole, "rate"), 40, 1e-9);
+  // A pixel with 2, another with 2, and 30 with none, in a tenth of a second.
+  EXPECT_NEAR(number_in(whole, "deviation"), std::sqrt(8 / 32.0 - 1 / 64.0) * 10, 1e-9);
+  EXPECT_NE(text_in(path("f.json")).find("\"events\" : 4"), std::string::npos);
+  EXPECT_NE(text_in(path("f.json")).find("\"whole\" : true"), std::string::npos);
+  EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
+}
+
+TEST_F(StatsTest, CountsASilenceBetweenBuffersAsTime) {
+  Harness h("eventstats");
+  h.caps(small_sensor);
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  h.push(buffer_of(90 * ms, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto message = h.message(GST_MESSAGE_ELEMENT);
+  ASSERT_TRUE(message);
+  EXPECT_NEAR(number_in(structure_of(message), "rate"), 20, 1e-9);
+}
+
+TEST_F(StatsTest, EndsWithoutAnyEvent) {
+  for (const bool with_caps : {true, false}) {
+    Harness h("eventstats location=" + path("f.json") + " map=" + path("map.png"));
+    if (with_caps) h.caps(small_sensor);
+    gst_harness_push_event(h.get(), gst_event_new_eos());
+    const auto message = h.message(GST_MESSAGE_ELEMENT);
+    ASSERT_TRUE(message);
+    EXPECT_EQ(count_in(structure_of(message)), 0U);
+    EXPECT_EQ(number_in(structure_of(message), "rate"), 0);
+    EXPECT_NE(text_in(path("f.json")).find("\"events\" : 0"), std::string::npos);
+    EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+  }
+}
+
+TEST_F(StatsTest, ForgetsWhatLiesBeforeAFlush) {
+  Harness h("eventstats");
+  h.caps(small_sensor);
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  gst_harness_push_event(h.get(), gst_event_new_flush_start());
+  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  h.push(buffer_of(0, {Event::at(2, 0, 5, Polarity::off)}, 10 * ms).release());
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto message = h.message(GST_MESSAGE_ELEMENT);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(count_in(structure_of(message)), 1U);
+  EXPECT_EQ(number_in(structure_of(message), "on-share"), 0);
+}
+
+TEST_F(StatsTest, MeasuresEachSensorOnItsOwn) {
+  Harness h("eventstats");
+  h.caps(small_sensor);
+  h.push(buffer_of(0, {Event::at(7, 3, 5, Polarity::on)}, 10 * ms).release());
+  h.caps("application/x-event-camera, format=XYTP, width=4, height=2");
+  auto message = h.message(GST_MESSAGE_ELEMENT);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(count_in(structure_of(message)), 1U);
+  h.push(buffer_of(10 * ms,
+                   {Event::at(3, 1, 5, Polarity::on), Event::at(3, 1, 6, Polarity::on),
+                    Event::at(7, 3, 7, Polarity::on)},
+                   10 * ms)
+             .release());
+  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  message = h.message(GST_MESSAGE_ELEMENT);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(count_in(structure_of(message)), 2U);
+  EXPECT_NEAR(number_in(structure_of(message), "mean"), 2 / 8.0 / 0.01, 1e-9);
+}
+
+TEST_F(StatsTest, GoesOnWhereTimeGoesBackAndWherePtsAreMissing) {
+  Harness h("eventstats");
+  h.caps(small_sensor);
+  h.push(buffer_of(500 * ms, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  h.push(buffer_of(GST_CLOCK_TIME_NONE, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto message = h.message(GST_MESSAGE_ELEMENT);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(count_in(structure_of(message)), 2U);
+  EXPECT_EQ(count_in(structure_of(message), "gap-50"), 0U);
+  EXPECT_NEAR(number_in(structure_of(message), "rate"), 100, 1e-9);
+}
+
+/// Setting an element to PAUSED, and the error of it.
+std::string refusal_of(const std::string& launch) {
+  gst_init(nullptr, nullptr);
+  Owned<GstElement> element(GST_ELEMENT(gst_object_ref_sink(
+      gst_parse_launch_full(launch.c_str(), nullptr, GST_PARSE_FLAG_NONE, nullptr))));
+  const Owned<GstBus> bus(gst_bus_new());
+  gst_element_set_bus(element.get(), bus.get());
+  EXPECT_EQ(gst_element_set_state(element.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
+  const Owned<GstMessage> message(gst_bus_pop_filtered(bus.get(), GST_MESSAGE_ERROR));
+  gst_element_set_state(element.get(), GST_STATE_NULL);
+  gst_element_set_bus(element.get(), nullptr);
+  return message ? text_of(message.get()) : "no error";
+}
+
+TEST_F(StatsTest, SaysBeforehandThatAFolderIsMissing) {
+  for (const std::string element : {"eventstats", "eventcompare"}) {
+    for (const std::string property : {"location", "map"}) {
+      const auto text = refusal_of(element + " " + property + "=" + path("nowhere/file"));
+      EXPECT_NE(text.find("There is no folder"), std::string::npos) << text;
+      EXPECT_NE(text.find("nowhere"), std::string::npos) << text;
+    }
+    const auto text = refusal_of(element + " location=" + folder.string());
+    EXPECT_NE(text.find("is a folder"), std::string::npos) << text;
+  }
+}
+
+TEST_F(StatsTest, SaysThatAFolderHasGoneMissing) {
+  Harness h("eventstats location=" + path("f.json"));
+  h.caps(small_sensor);
+  std::filesystem::remove_all(folder);
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
+}
+
+/* eventcompare */
+
+class CompareTest : public MeasureTest {
+ protected:
+  void make(const std::string& properties = "") {
+    gst_init(nullptr, nullptr);
+    element_.reset(GST_ELEMENT(gst_object_ref_sink(gst_parse_launch_full(
+        ("eventcompare " + properties).c_str(), nullptr, GST_PARSE_FLAG_NONE, nullptr))));
+    bus_.reset(gst_bus_new());
+    gst_element_set_bus(element_.get(), bus_.get());
+    candidate.reset(gst_harness_new_with_element(element_.get(), "candidate", "src"));
+    reference.reset(gst_harness_new_with_element(element_.get(), "reference", nullptr));
+    for (auto* h : {candidate.get(), reference.get()}) gst_harness_set_live(h, FALSE);
+  }
+  ~CompareTest() override {
+    if (element_) gst_element_set_bus(element_.get(), nullptr);
+  }
+
+  void begin(const std::string& of_reference = small_sensor,
+             const std::string& of_candidate = small_sensor) {
+    gst_harness_set_src_caps_str(reference.get(), of_reference.c_str());
+    gst_harness_set_src_caps_str(candidate.get(), of_candidate.c_str());
+  }
+
+  void end(const Owned<GstHarness>& h) { gst_harness_push_event(h.get(), gst_event_new_eos()); }
+
+  /// The buffers that go on until EOS, and then the figures.
+  const GstStructure* conclude() {
+    GstBuffer* last = nullptr;
+    while (gst_harness_buffers_in_queue(candidate.get()) > 0)
+      passed.emplace_back(gst_harness_pull(candidate.get()));
+    EXPECT_TRUE(gst_harness_pull_until_eos(candidate.get(), &last));
+    while (last != nullptr) {
+      passed.emplace_back(last);
+      EXPECT_TRUE(gst_harness_pull_until_eos(candidate.get(), &last));
+    }
+    message_.reset(gst_bus_pop_filtered(bus_.get(), GST_MESSAGE_ELEMENT));
+    return structure_of(message_);
+  }
+
+  Owned<GstElement> element_;
+  Owned<GstBus> bus_;
+  Owned<GstMessage> message_;
+  Owned<GstHarness> reference;
+  Owned<GstHarness> candidate;
+  std::vector<Buffer> passed;
+};
+
+TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
+  make("location=" + path("f.json") + " map=" + path("map.png"));
+  begin();
+  // The candidate begins 10 ms later; what of the reference lies before that does not count.
+  gst_harness_push(reference.get(), buffer_of(0,
+                                              {Event::at(1, 1, 5'000, Polarity::on),
+                                               Event::at(1, 1, 15'000, Polarity::on),
+                                               Event::at(6, 1, 18'000, Polarity::off)},
+                                              20 * ms)
+                                        .release());
+  gst_harness_push(candidate.get(), buffer_of(10 * ms,
+                                              {Event::at(2, 2, 1'000, Polarity::on),
+                                               Event::at(6, 1, 8'500, Polarity::on)},
+                                              10 * ms)
+                                        .release());
+  gst_harness_push(reference.get(),
+                   buffer_of(20 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms).release());
+  gst_harness_push_event(candidate.get(), gst_event_new_gap(20 * ms, 20 * ms));
+  gst_harness_push(reference.get(),
+                   buffer_of(40 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms).release());
+  end(candidate);
+  end(reference);
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  EXPECT_TRUE(gst_structure_has_name(figures, "eventcompare"));
+  EXPECT_EQ(time_in(figures, "start"), gint64{10 * ms});
+  EXPECT_EQ(time_in(figures, "end"), gint64{40 * ms});
+  EXPECT_EQ(count_in(within(figures, "reference")), 3U);
+  EXPECT_EQ(count_in(within(figures, "candidate")), 2U);
+  const auto* of_reference = within(figures, "reference-partners");
+  EXPECT_NEAR(number_in(of_reference, "within-1ms"), 0, 1e-9);
+  EXPECT_NEAR(number_in(of_reference, "within-5ms"), 2 / 3.0, 1e-9);
+  EXPECT_NEAR(number_in(of_reference, "within-10ms"), 2 / 3.0, 1e-9);
+  EXPECT_NEAR(number_in(within(figures, "candidate-partners"), "within-5ms"), 1, 1e-9);
+  const GValue* curve = gst_structure_get_value(within(figures, "rate-curve"), "reference");
+  ASSERT_TRUE(curve);
+  EXPECT_EQ(gst_value_array_get_size(curve), 30U);
+  EXPECT_EQ(g_value_get_uint64(gst_value_array_get_value(curve, 4)), 1U);
+
+  ASSERT_EQ(passed.size(), 2U);
+  EXPECT_EQ(events_of(passed[0].get()).size(), 2U);
+  EXPECT_EQ(GST_BUFFER_PTS(passed[0].get()), 10 * ms);
+  EXPECT_TRUE(GST_BUFFER_FLAG_IS_SET(passed[1].get(), GST_BUFFER_FLAG_GAP));
+  const auto json = text_in(path("f.json"));
+  for (const char* field : {"map-correlation", "candidate-partners", "rate-curve", "deviation"})
+    EXPECT_NE(json.find(field), std::string::npos) << field;
+  EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
+}
+
+TEST_F(CompareTest, FindsAStreamLikeItself) {
+  make();
+  begin();
+  for (GstClockTime t = 0; t < 100 * ms; t += 10 * ms) {
+    const std::vector events = {Event::at(static_cast<int>(t / ms / 13), 2, 700, Polarity::on),
+                                Event::at(1, 1, 7'000, Polarity::off)};
+    for (auto* h : {reference.get(), candidate.get()})
+      gst_harness_push(h, buffer_of(t, events, 10 * ms).release());
+  }
+  end(reference);
+  end(candidate);
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  EXPECT_EQ(count_in(within(figures, "reference")), 20U);
+  EXPECT_EQ(count_in(within(figures, "candidate")), 20U);
+  EXPECT_DOUBLE_EQ(number_in(figures, "map-correlation"), 1);
+  EXPECT_EQ(number_in(within(figures, "reference-partners"), "within-1ms"), 1);
+  EXPECT_EQ(passed.size(), 10U);
+}
+
+TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
+  make();
+  begin();
+  gst_harness_push(reference.get(),
+                   buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+  end(reference);
+  for (const GstClockTime t : {0 * ms, 10 * ms, 20 * ms})
+    gst_harness_push(candidate.get(),
+                     buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+  end(candidate);
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  EXPECT_EQ(count_in(within(figures, "candidate")), 1U);
+  EXPECT_EQ(time_in(figures, "end"), gint64{10 * ms});
+  EXPECT_EQ(passed.size(), 3U);
+}
+
+TEST_F(CompareTest, EndsWithoutAnyEvent) {
+  make("location=" + path("f.json"));
+  begin();
+  end(reference);
+  end(candidate);
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  EXPECT_EQ(count_in(within(figures, "reference")), 0U);
+  EXPECT_EQ(number_in(figures, "map-correlation"), 0);
+  EXPECT_FALSE(text_in(path("f.json")).empty());
+}
+
+TEST_F(CompareTest, RefusesSensorsOfTwoSizes) {
+  make();
+  begin(small_sensor, "application/x-event-camera, format=XYTP, width=9, height=4");
+  for (auto* h : {reference.get(), candidate.get()})
+    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+  const Owned<GstMessage> message(
+      gst_bus_timed_pop_filtered(bus_.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
+  ASSERT_TRUE(message);
+  EXPECT_NE(text_of(message.get()).find("8 x 4 pixels, the candidate 9 x 4"), std::string::npos);
+}
+
+TEST_F(CompareTest, BeginsAnewAfterAFlush) {
+  make();
+  begin();
+  for (auto* h : {reference.get(), candidate.get()})
+    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+  for (auto* h : {reference.get(), candidate.get()})
+    gst_harness_push_event(h, gst_event_new_flush_start());
+  for (auto* h : {reference.get(), candidate.get()})
+    gst_harness_push_event(h, gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  for (auto* h : {reference.get(), candidate.get()}) {
+    gst_harness_push_event(h, gst_event_new_segment(&segment));
+    gst_harness_push(h, buffer_of(0, {Event::at(2, 1, 5, Polarity::on)}, 10 * ms).release());
+  }
+  end(reference);
+  end(candidate);
+  const auto* figures = conclude();
+  ASSERT_TRUE(figures);
+  EXPECT_EQ(count_in(within(figures, "candidate")), 1U);
+  EXPECT_EQ(count_in(within(figures, "reference")), 1U);
+}
+
+}  // namespace

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// eventoverlay: which events are drawn over which frame, and where.
+#include "src/event/event.hpp"
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Event;
+using eventcamera::Polarity;
+
+constexpr GstClockTime ms = GST_MSECOND;
+
+class OverlayTest : public testing::Test {
+ protected:
+  explicit OverlayTest(const std::string& launch = "eventoverlay palette=grey") {
+    gst_init(nullptr, nullptr);
+    element_.reset(GST_ELEMENT(gst_object_ref_sink(
+        gst_parse_launch_full(launch.c_str(), nullptr, GST_PARSE_FLAG_NONE, nullptr))));
+    bus_.reset(gst_bus_new());
+    gst_element_set_bus(element_.get(), bus_.get());
+    video.reset(gst_harness_new_with_element(element_.get(), "sink", "src"));
+    events.reset(gst_harness_new_with_element(element_.get(), "events", nullptr));
+    gst_harness_set_live(video.get(), FALSE);
+    gst_harness_set_live(events.get(), FALSE);
+  }
+  ~OverlayTest() override { gst_element_set_bus(element_.get(), nullptr); }
+
+  void begin(const std::string& sensor_size, const std::string& format = "GRAY8") {
+    gst_harness_set_src_caps_str(
+        video.get(),
+        ("video/x-raw, format=" + format + ", width=8, height=4, framerate=25/1").c_str());
+    gst_harness_set_src_caps_str(
+        events.get(), ("application/x-event-camera, format=XYTP, " + sensor_size).c_str());
+  }
+
+  void push_frame(GstClockTime pts, GstClockTime duration = 40 * ms) {
+    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, 32, nullptr);
+    gst_buffer_memset(buffer, 0, 100, 32);
+    GST_BUFFER_PTS(buffer) = pts;
+    GST_BUFFER_DURATION(buffer) = duration;
+    gst_harness_push(video.get(), buffer);
+  }
+
+  void push_events(GstClockTime pts, const std::vector<Event>& list,
+                   GstClockTime duration = 40 * ms) {
+    GstBuffer* buffer = gst_buffer_new_memdup(list.data(), list.size() * sizeof(Event));
+    GST_BUFFER_PTS(buffer) = pts;
+    GST_BUFFER_DURATION(buffer) = duration;
+    gst_harness_push(events.get(), buffer);
+  }
+
+  /// The next frame's places that are not grey 100, and what they are.
+  std::vector<std::pair<int, int>> drawn() {
+    const Buffer frame(gst_harness_pull(video.get()));
+    if (!frame) return {{-1, -1}};
+    last_pts = GST_BUFFER_PTS(frame.get());
+    const auto bytes = bytes_of(frame.get());
+    std::vector<std::pair<int, int>> places;
+    for (int i = 0; i < 32; ++i)
+      if (bytes[static_cast<std::size_t>(i)] != 100)
+        places.emplace_back(i, static_cast<guint8>(bytes[static_cast<std::size_t>(i)]));
+    return places;
+  }
+
+  Owned<GstElement> element_;
+  Owned<GstBus> bus_;
+  Owned<GstHarness> video;
+  Owned<GstHarness> events;
+  GstClockTime last_pts = 0;
+};
+
+using Places = std::vector<std::pair<int, int>>;
+
+TEST_F(OverlayTest, DrawsTheEventsOfEachFramesInterval) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0, {Event::at(1, 0, 5, Polarity::on), Event::at(2, 1, 40'000, Polarity::off)});
+  EXPECT_EQ(drawn(), (Places{{1, 255}, {10, 0}}));
+  push_frame(40 * ms);
+  push_events(40 * ms, {Event::at(7, 3, 5, Polarity::on), Event::at(7, 3, 6, Polarity::off)});
+  EXPECT_EQ(drawn(), (Places{{31, 64}}));
+  EXPECT_EQ(last_pts, 40 * ms);
+}
+
+TEST_F(OverlayTest, CutsBuffersOfEventsWhereFramesEnd) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0,
+              {Event::at(0, 0, 40'000, Polarity::on), Event::at(1, 0, 40'001, Polarity::on),
+               Event::at(2, 0, 80'001, Polarity::on)},
+              120 * ms);
+  EXPECT_EQ(drawn(), (Places{{0, 255}}));
+  push_frame(40 * ms);
+  EXPECT_EQ(drawn(), (Places{{1, 255}}));
+  push_frame(80 * ms);
+  EXPECT_EQ(drawn(), (Places{{2, 255}}));
+}
+
+TEST_F(OverlayTest, ScalesTheSensorToTheVideo) {
+  begin("width=4, height=4");
+  push_frame(0);
+  push_events(0, {Event::at(1, 2, 5, Polarity::on)});
+  EXPECT_EQ(drawn(), (Places{{18, 255}, {19, 255}}));
+  gst_harness_set_src_caps_str(events.get(),
+                               "application/x-event-camera, format=XYTP, width=16, height=8");
+  push_frame(40 * ms);
+  push_events(40 * ms, {Event::at(14, 7, 5, Polarity::on), Event::at(15, 6, 5, Polarity::off)});
+  EXPECT_EQ(drawn(), (Places{{31, 64}}));
+}
+
+TEST_F(OverlayTest, GoesOnThroughGapsAndPastTheEndOfEvents) {
+  begin("width=8, height=4");
+  push_frame(0);
+  gst_harness_push_event(events.get(), gst_event_new_gap(0, 40 * ms));
+  EXPECT_EQ(drawn(), Places{});
+  push_frame(40 * ms);
+  gst_harness_push_event(events.get(), gst_event_new_eos());
+  EXPECT_EQ(drawn(), Places{});
+  push_frame(80 * ms);
+  EXPECT_EQ(drawn(), Places{});
+  gst_harness_push_event(video.get(), gst_event_new_eos());
+  GstBuffer* rest = nullptr;
+  EXPECT_TRUE(gst_harness_pull_until_eos(video.get(), &rest));
+  EXPECT_EQ(rest, nullptr);
+}
+
+TEST_F(OverlayTest, LeavesEventsBeyondTheSensorOut) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0, {Event::at(8, 0, 5, Polarity::on), Event::at(0, 4, 6, Polarity::on)});
+  EXPECT_EQ(drawn(), Places{});
+  EXPECT_TRUE(Owned<GstMessage>(gst_bus_pop_filtered(bus_.get(), GST_MESSAGE_WARNING)));
+}
+
+class OverlayHalf : public OverlayTest {
+ protected:
+  OverlayHalf() : OverlayTest("eventoverlay palette=grey opacity=0.5 accumulation-time=80000000") {}
+};
+
+TEST_F(OverlayHalf, MixesAndRemembers) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0, {Event::at(1, 0, 5, Polarity::off)});
+  EXPECT_EQ(drawn(), (Places{{1, 50}}));
+  push_frame(40 * ms);
+  push_events(40 * ms, {Event::at(2, 0, 5, Polarity::off)});
+  EXPECT_EQ(drawn(), (Places{{1, 50}, {2, 50}}));
+  push_frame(80 * ms);
+  gst_harness_push_event(events.get(), gst_event_new_gap(80 * ms, 40 * ms));
+  EXPECT_EQ(drawn(), (Places{{2, 50}}));
+}
+
+TEST_F(OverlayTest, BeginsAnewAfterAFlush) {
+  begin("width=8, height=4");
+  push_events(0, {Event::at(1, 0, 5, Polarity::on)}, 20 * ms);
+  for (auto* h : {video.get(), events.get()})
+    gst_harness_push_event(h, gst_event_new_flush_start());
+  for (auto* h : {video.get(), events.get()})
+    gst_harness_push_event(h, gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  for (auto* h : {video.get(), events.get()})
+    gst_harness_push_event(h, gst_event_new_segment(&segment));
+  push_frame(0);
+  push_events(0, {Event::at(2, 0, 5, Polarity::on)});
+  EXPECT_EQ(drawn(), (Places{{2, 255}}));
+}
+
+}  // namespace

@@ -1,0 +1,533 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// eventrender: which pictures there are, when they are, and what they show.
+#include <algorithm>
+
+#include "gst/video/drawn_formats.hpp"
+#include "src/event/event.hpp"
+#include "src/render/accumulator.hpp"
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Event;
+using eventcamera::Polarity;
+
+constexpr int width = 32;
+constexpr int height = 24;
+constexpr GstClockTime ms = GST_MSECOND;
+const std::string events_caps =
+    "application/x-event-camera, format=XYTP, width=32, height=24, framerate=25/1";
+
+std::string grey_at(const std::string& framerate) {
+  return "video/x-raw, format=GRAY8, framerate=" + framerate;
+}
+
+GstBuffer* buffer_of(GstClockTime pts, GstClockTime duration, const std::vector<Event>& events) {
+  GstBuffer* buffer = gst_buffer_new_memdup(events.data(), events.size() * sizeof(Event));
+  GST_BUFFER_PTS(buffer) = pts;
+  GST_BUFFER_DURATION(buffer) = duration;
+  return buffer;
+}
+
+/// ON in a column, half-way through an interval of 40 ms.
+std::vector<Event> column(int x) {
+  std::vector<Event> events;
+  for (int y = 0; y < height; ++y) events.push_back(Event::at(x, y, 20'000, Polarity::on));
+  return events;
+}
+
+std::string accumulated(const std::vector<Event>& events) {
+  eventcamera::Accumulator accumulator(width, height);
+  accumulator.add(events);
+  std::string picture(width * height, '\0');
+  accumulator.draw(eventcamera::palette(eventcamera::PaletteName::dark), {},
+                   reinterpret_cast<std::byte*>(picture.data()), width);
+  return picture;
+}
+
+const std::string blank = accumulated({});
+
+class Render : public testing::Test {
+ protected:
+  explicit Render(const std::string& launch = "eventrender") : h(launch) {
+    gst_harness_set_live(h.get(), FALSE);
+  }
+
+  void begin(const std::string& video, const std::string& events = events_caps) {
+    gst_harness_set_sink_caps_str(h.get(), video.c_str());
+    gst_harness_set_src_caps_str(h.get(), events.c_str());
+  }
+
+  void segment(GstClockTime start, GstClockTime stop = GST_CLOCK_TIME_NONE, GstClockTime base = 0) {
+    GstSegment s;
+    gst_segment_init(&s, GST_FORMAT_TIME);
+    s.start = s.time = s.position = start;
+    s.stop = stop;
+    s.base = base;
+    gst_harness_push_event(h.get(), gst_event_new_segment(&s));
+  }
+
+  GstFlowReturn push(GstClockTime pts, const std::vector<Event>& events,
+                     GstClockTime duration = 40 * ms) {
+    return h.push(buffer_of(pts, duration, events));
+  }
+
+  /// Ends the stream, and gives all pictures that came out.
+  std::vector<Buffer> finish() {
+    gst_harness_push_event(h.get(), gst_event_new_eos());
+    std::vector<Buffer> pictures;
+    GstBuffer* buffer = nullptr;
+    while (gst_harness_pull_until_eos(h.get(), &buffer) && buffer != nullptr)
+      pictures.emplace_back(buffer);
+    return pictures;
+  }
+
+  Buffer wait_for_picture() { return Buffer(gst_harness_pull(h.get())); }
+
+  Harness h;
+};
+
+struct Picture {
+  GstClockTime pts;
+  GstClockTime duration;
+  std::string bytes;
+};
+
+void expect(const std::vector<Buffer>& found, const std::vector<Picture>& expected) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(GST_BUFFER_PTS(found[i].get()), expected[i].pts) << i;
+    EXPECT_EQ(GST_BUFFER_DURATION(found[i].get()), expected[i].duration) << i;
+    EXPECT_EQ(GST_BUFFER_DTS(found[i].get()), GST_CLOCK_TIME_NONE) << i;
+    EXPECT_TRUE(bytes_of(found[i].get()) == expected[i].bytes) << i;
+  }
+}
+
+TEST_F(Render, DrawsAnIntervalAsSimulatorsDo) {
+  begin(grey_at("25/1"));
+  for (int i = 0; i < 4; ++i) push(i * 40 * ms, column(i));
+  expect(finish(), {{0, 40 * ms, accumulated(column(0))},
+                    {40 * ms, 40 * ms, accumulated(column(1))},
+                    {80 * ms, 40 * ms, accumulated(column(2))},
+                    {120 * ms, 40 * ms, accumulated(column(3))}});
+}
+
+/// Intervals of a third of 100 ms, whose ends are rounded down; all fire at their very end.
+TEST_F(Render, KeepsIntervalsApartThatAreRounded) {
+  begin(grey_at("30/1"));
+  const auto time = [](guint64 i) { return gst_util_uint64_scale(i, GST_SECOND, 30); };
+  constexpr guint64 first = 1;  // where rounding begins
+  for (guint64 i = first; i < 20; ++i) {
+    const auto duration = time(i + 1) - time(i);
+    push(time(i),
+         {Event::at(static_cast<int>(i), 3, static_cast<guint32>(duration / 1000), Polarity::on)},
+         duration);
+  }
+  const auto pictures = finish();
+  ASSERT_EQ(pictures.size(), 19U);
+  for (guint64 i = first; i < 20; ++i)
+    EXPECT_TRUE(bytes_of(pictures[i - first].get()) ==
+                accumulated({Event::at(static_cast<int>(i), 3, 1, Polarity::on)}))
+        << i;
+}
+
+TEST_F(Render, IsIndependentOfHowEventsCome) {
+  begin(grey_at("50/1"));
+  // One column at 20 ms and the next at 60 ms, the limits of pictures.
+  push(0, column(5));
+  push(40 * ms, column(6));
+  expect(finish(), {{0, 20 * ms, accumulated(column(5))},
+                    {20 * ms, 20 * ms, blank},
+                    {40 * ms, 20 * ms, accumulated(column(6))},
+                    {60 * ms, 20 * ms, blank}});
+}
+
+class RenderOverlapping : public Render {
+ protected:
+  RenderOverlapping() : Render("eventrender accumulation-time=60000000") {}
+};
+
+TEST_F(RenderOverlapping, DrawsWindowsThatAreLongerThanPictures) {
+  begin(grey_at("50/1"));
+  push(0, column(5));
+  push(40 * ms, column(6));
+  auto both = column(5);
+  for (const auto& event : column(6)) both.push_back(event);
+  // (0, 60] and so on: column 5 fires at 20 ms, column 6 at 60 ms.
+  expect(finish(), {{0, 20 * ms, accumulated(column(5))},
+                    {20 * ms, 20 * ms, accumulated(column(5))},
+                    {40 * ms, 20 * ms, accumulated(both)},
+                    {60 * ms, 20 * ms, accumulated(column(6))}});
+}
+
+TEST_F(Render, Makes30PicturesASecondWhereNobodyAsks) {
+  begin("video/x-raw");
+  push(0, column(1), GST_SECOND);
+  EXPECT_EQ(finish().size(), 30U);
+  EXPECT_NE(h.out_caps().find("framerate=(fraction)30/1"), std::string::npos);
+  EXPECT_NE(h.out_caps().find("format=(string)BGRx"), std::string::npos);
+}
+
+TEST_F(Render, MakesAPictureOfEachBufferWhereTheFramerateVaries) {
+  begin(grey_at("0/1"));
+  push(7, column(1), 20 * ms);
+  push(20 * ms + 7, column(2), 100 * ms);
+  gst_harness_push_event(h.get(), gst_event_new_gap(120 * ms + 7, 5 * ms));
+  expect(finish(), {{7, 20 * ms, accumulated(column(1))},
+                    {20 * ms + 7, 100 * ms, accumulated(column(2))},
+                    {120 * ms + 7, 5 * ms, blank}});
+}
+
+TEST_F(Render, DrawsThroughGaps) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  gst_harness_push_event(h.get(), gst_event_new_gap(40 * ms, 80 * ms));
+  push(120 * ms, column(2));
+  expect(finish(), {{0, 40 * ms, accumulated(column(1))},
+                    {40 * ms, 40 * ms, blank},
+                    {80 * ms, 40 * ms, blank},
+                    {120 * ms, 40 * ms, accumulated(column(2))}});
+}
+
+TEST_F(Render, DrawsThroughSilencesButNotThroughLeaps) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  push(120 * ms, column(2));
+  const GstClockTime far = 100 * 3600 * GST_SECOND;
+  push(far, column(3));
+  const auto pictures = finish();
+  expect(pictures, {{0, 40 * ms, accumulated(column(1))},
+                    {40 * ms, 40 * ms, blank},
+                    {80 * ms, 40 * ms, blank},
+                    {120 * ms, 40 * ms, accumulated(column(2))},
+                    {far, 40 * ms, accumulated(column(3))}});
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(pictures.back().get()));
+}
+
+TEST_F(Render, DrawsWhatThereIsAtTheEnd) {
+  begin(grey_at("10/1"));
+  push(0, column(1));
+  expect(finish(), {{0, 100 * ms, accumulated(column(1))}});
+}
+
+TEST_F(Render, EndsWithoutEvents) {
+  begin(grey_at("10/1"));
+  EXPECT_TRUE(finish().empty());
+}
+
+TEST_F(Render, TakesBuffersWithoutDuration) {
+  begin(grey_at("50/1"));
+  push(0, column(1), GST_CLOCK_TIME_NONE);
+  push(40 * ms, column(2), GST_CLOCK_TIME_NONE);
+  expect(finish(), {{0, 20 * ms, accumulated(column(1))},
+                    {20 * ms, 20 * ms, blank},
+                    {40 * ms, 20 * ms, accumulated(column(2))}});
+}
+
+TEST_F(Render, BeginsAnewAfterAFlush) {
+  begin(grey_at("10/1"));
+  push(0, column(1));
+  gst_harness_push_event(h.get(), gst_event_new_flush_start());
+  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
+  segment(5 * GST_SECOND);
+  push(5 * GST_SECOND, column(2), 100 * ms);
+  expect(finish(), {{5 * GST_SECOND, 100 * ms, accumulated(column(2))}});
+}
+
+TEST_F(Render, DrainsAndBeginsAnewInAnotherSegment) {
+  begin(grey_at("10/1"));
+  push(0, column(1));
+  segment(0);  // the same
+  push(40 * ms, column(1));
+  segment(5 * GST_SECOND, GST_CLOCK_TIME_NONE, 100 * ms);
+  push(5 * GST_SECOND, column(2), 100 * ms);
+  expect(finish(), {{0, 100 * ms, accumulated(column(1))},
+                    {5 * GST_SECOND, 100 * ms, accumulated(column(2))}});
+}
+
+TEST_F(Render, ShowsNothingFromOutsideTheSegment) {
+  begin(grey_at("25/1"));
+  segment(100 * ms, 180 * ms);
+  push(0, column(1));
+  push(80 * ms, column(2));  // begins before, and fires at the very start
+  push(120 * ms, column(3));
+  push(160 * ms, column(4));
+  const auto pictures = finish();
+  expect(pictures, {{100 * ms, 40 * ms, accumulated(column(3))},
+                    {140 * ms, 40 * ms, accumulated(column(4))}});
+}
+
+TEST_F(Render, RefusesToRunBackwards) {
+  begin(grey_at("25/1"));
+  EXPECT_FALSE(gst_element_seek(h.element(), -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, GST_SECOND));
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+  GstSegment s;
+  gst_segment_init(&s, GST_FORMAT_TIME);
+  s.rate = -1;
+  s.stop = GST_SECOND;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&s));
+  finish();
+  EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
+}
+
+TEST_F(Render, PlaysOnAfterASeekThatUpstreamRefuses) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  for (const auto format : {GST_FORMAT_TIME, GST_FORMAT_BYTES})
+    EXPECT_FALSE(gst_element_seek(h.element(), 1, format, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET, 0,
+                                  GST_SEEK_TYPE_NONE, -1));
+  push(40 * ms, column(2));
+  expect(finish(),
+         {{0, 40 * ms, accumulated(column(1))}, {40 * ms, 40 * ms, accumulated(column(2))}});
+}
+
+TEST_F(Render, DrainsWhenTheSensorChanges) {
+  begin(grey_at("10/1"));
+  push(0, column(1));
+  gst_harness_set_src_caps_str(
+      h.get(), "application/x-event-camera, format=XYTP, width=16, height=8, framerate=25/1");
+  push(100 * ms, {Event::at(15, 7, 5, Polarity::on)}, 100 * ms);
+  const auto pictures = finish();
+  ASSERT_EQ(pictures.size(), 2U);
+  EXPECT_TRUE(bytes_of(pictures[0].get()) == accumulated(column(1)));
+  EXPECT_EQ(gst_buffer_get_size(pictures[1].get()), 16U * 8U);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST_F(Render, LeavesBrokenEventsOutWithAWarning) {
+  begin(grey_at("25/1"));
+  auto events = column(1);
+  events.push_back(Event::at(width, 0, 20'000, Polarity::on));
+  events.push_back(Event::at(0, height, 20'000, Polarity::on));
+  push(0, events);
+  push(40 * ms, events);
+  EXPECT_EQ(push(GST_CLOCK_TIME_NONE, column(2)), GST_FLOW_OK);
+  EXPECT_EQ(h.push(gst_buffer_new_memdup("seven b", 7)), GST_FLOW_OK);
+  expect(finish(),
+         {{0, 40 * ms, accumulated(column(1))}, {40 * ms, 40 * ms, accumulated(column(1))}});
+  const auto beyond = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(beyond);
+  EXPECT_NE(text_of(beyond.get()).find("beyond the sensor"), std::string::npos);
+  const auto timeless = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(timeless);
+  EXPECT_NE(text_of(timeless.get()).find("no PTS"), std::string::npos);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST_F(Render, TakesEventsInAnyOrder) {
+  begin(grey_at("50/1"));
+  push(80 * ms, column(1));
+  push(0, column(2));  // too late for its own picture
+  push(120 * ms, {Event::at(1, 1, 4'000'000, Polarity::on), Event::at(2, 2, 5, Polarity::off)});
+  const auto pictures = finish();
+  for (std::size_t i = 1; i < pictures.size(); ++i)
+    EXPECT_EQ(GST_BUFFER_PTS(pictures[i].get()), GST_BUFFER_PTS(pictures[i - 1].get()) + 20 * ms);
+}
+
+class RenderEachFormat : public Render, public testing::WithParamInterface<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, RenderEachFormat,
+                         testing::Values("BGRx", "RGBx", "xRGB", "xBGR", "BGRA", "RGBA", "ARGB",
+                                         "ABGR", "RGB", "BGR", "GRAY8"));
+
+TEST_P(RenderEachFormat, PutsColoursWhereTheyBelong) {
+  begin("video/x-raw, framerate=25/1, format=" + std::string(GetParam()));
+  push(0, column(3));
+  const auto pictures = finish();
+  ASSERT_EQ(pictures.size(), 1U);
+  GstVideoInfo info;
+  GstCaps* caps = gst_caps_from_string(h.out_caps().c_str());
+  ASSERT_TRUE(gst_video_info_from_caps(&info, caps));
+  gst_caps_unref(caps);
+  GstVideoFrame frame;
+  ASSERT_TRUE(gst_video_frame_map(&frame, &info, pictures[0].get(), GST_MAP_READ));
+  const auto byte = [&frame](guint component, int x) {
+    return static_cast<int>(static_cast<guint8*>(
+        GST_VIDEO_FRAME_COMP_DATA(&frame, component))[x * GST_VIDEO_FRAME_COMP_PSTRIDE(&frame, 0)]);
+  };
+  const auto& colours = eventcamera::palette(eventcamera::PaletteName::dark);
+  if (GST_VIDEO_INFO_N_COMPONENTS(&info) == 1) {
+    EXPECT_EQ(byte(0, 3), eventcamera::luma(colours.on));
+    EXPECT_EQ(byte(0, 4), eventcamera::luma(colours.none));
+  } else {
+    EXPECT_EQ(byte(GST_VIDEO_COMP_R, 3), colours.on.red);
+    EXPECT_EQ(byte(GST_VIDEO_COMP_G, 3), colours.on.green);
+    EXPECT_EQ(byte(GST_VIDEO_COMP_B, 3), colours.on.blue);
+    EXPECT_EQ(byte(GST_VIDEO_COMP_B, 4), colours.none.blue);
+  }
+  gst_video_frame_unmap(&frame);
+}
+
+class RenderEachMode : public Render, public testing::WithParamInterface<const char*> {
+ protected:
+  RenderEachMode() : Render("eventrender palette=grey mode=" + std::string(GetParam())) {}
+};
+INSTANTIATE_TEST_SUITE_P(, RenderEachMode,
+                         testing::Values("accumulate", "decay", "time-surface", "count"));
+
+TEST_P(RenderEachMode, ShowsOnBrighterAndOffDarker) {
+  begin(grey_at("25/1"));
+  push(0, {Event::at(1, 1, 30'000, Polarity::on), Event::at(2, 1, 30'000, Polarity::off)});
+  const auto pictures = finish();
+  ASSERT_EQ(pictures.size(), 1U);
+  const auto bytes = bytes_of(pictures[0].get());
+  const auto grey = [&bytes](int x) { return static_cast<guint8>(bytes[width + x]); };
+  EXPECT_EQ(grey(0), 128);
+  EXPECT_GT(grey(1), 140);
+  EXPECT_LT(grey(2), 100);
+}
+
+TEST_F(Render, TakesSettingsWhilePlaying) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  EXPECT_TRUE(bytes_of(wait_for_picture().get()) == accumulated(column(1)));
+  gst_util_set_object_arg(G_OBJECT(h.element()), "mode", "count");
+  gst_util_set_object_arg(G_OBJECT(h.element()), "palette", "grey");
+  g_object_set(h.element(), "full-scale", 1.0, nullptr);
+  push(40 * ms, column(2));
+  const auto bytes = bytes_of(wait_for_picture().get());
+  EXPECT_EQ(static_cast<guint8>(bytes[1]), 128);
+  EXPECT_EQ(static_cast<guint8>(bytes[2]), 255);
+}
+
+class RenderByCount : public Render {
+ protected:
+  RenderByCount() : Render("eventrender event-count=24") {}
+};
+
+TEST_F(RenderByCount, KeepsTheLastEventsUntilOthersCome) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  gst_harness_push_event(h.get(), gst_event_new_gap(40 * ms, 40 * ms));
+  push(80 * ms, column(2));
+  expect(finish(), {{0, 40 * ms, accumulated(column(1))},
+                    {40 * ms, 40 * ms, accumulated(column(1))},
+                    {80 * ms, 40 * ms, accumulated(column(2))}});
+}
+
+TEST_F(Render, LeavesOutPicturesThatComeTooLate) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  wait_for_picture();
+  gst_harness_push_upstream_event(
+      h.get(), gst_event_new_qos(GST_QOS_TYPE_UNDERFLOW, 2, static_cast<gint64>(20 * ms), 40 * ms));
+  for (int i = 1; i < 4; ++i) push(i * 40 * ms, column(i));
+  expect(finish(),
+         {{80 * ms, 40 * ms, accumulated(column(2))}, {120 * ms, 40 * ms, accumulated(column(3))}});
+  while (Owned<GstEvent> event{gst_harness_try_pull_upstream_event(h.get())})
+    EXPECT_NE(GST_EVENT_TYPE(event.get()), GST_EVENT_QOS);
+}
+
+/// A live source and a clock that the test turns.
+class RenderLive : public Render {
+ protected:
+  RenderLive() {
+    gst_harness_set_live(h.get(), TRUE);
+    gst_harness_use_testclock(h.get());
+    gst_harness_set_upstream_latency(h.get(), 10 * ms);
+  }
+
+  /// Turns the clock to a time for which the element must be waiting.
+  void pass(GstClockTime time) {
+    EXPECT_TRUE(gst_harness_wait_for_clock_id_waits(h.get(), 1, 10));
+    gst_harness_set_time(h.get(), time);
+    gst_harness_crank_single_clock_wait(h.get());
+  }
+};
+
+TEST_F(RenderLive, DrawsByTheClockWhereNothingComes) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  EXPECT_TRUE(bytes_of(wait_for_picture().get()) == accumulated(column(1)));
+  // The picture from 40 to 80 ms is due 10 ms later.
+  pass(90 * ms);
+  auto picture = wait_for_picture();
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 40 * ms);
+  EXPECT_TRUE(bytes_of(picture.get()) == blank);
+  pass(130 * ms);
+  picture = wait_for_picture();
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 80 * ms);
+  // Late, and yet shown.
+  push(40 * ms, column(2));
+  push(120 * ms, column(3));
+  picture = wait_for_picture();
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 120 * ms);
+  EXPECT_FALSE(bytes_of(picture.get()) == accumulated(column(3)));
+}
+
+TEST_F(RenderLive, BeginsWithoutAnyEvent) {
+  begin(grey_at("25/1"));
+  pass(300 * ms);
+  pass(400 * ms);
+  const auto picture = wait_for_picture();
+  ASSERT_TRUE(picture);
+  EXPECT_TRUE(bytes_of(picture.get()) == blank);
+}
+
+TEST(RenderSilence, BeginsWithoutASegment) {
+  GError* error = nullptr;
+  GstElement* pipeline = gst_parse_launch(
+      "appsrc is-live=true format=time "
+      "caps=application/x-event-camera,format=XYTP,width=4,height=4,framerate=0/1 "
+      "! eventrender ! fakesink name=sink",
+      &error);
+  ASSERT_EQ(error, nullptr) << error->message;
+  GstElement* sink = gst_bin_get_by_name(GST_BIN(pipeline), "sink");
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  GstSample* sample = nullptr;
+  for (int i = 0; i < 100 && sample == nullptr; ++i) {
+    g_usleep(50'000);
+    g_object_get(sink, "last-sample", &sample, nullptr);
+  }
+  EXPECT_NE(sample, nullptr);
+  if (sample != nullptr) gst_sample_unref(sample);
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(sink);
+  gst_object_unref(pipeline);
+}
+
+TEST_F(RenderLive, IsOnePictureLate) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  wait_for_picture();
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 50 * ms);
+}
+
+class EveryRenderer : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryRenderer, testing::Values("eventrender", "eventoverlay"));
+
+TEST_P(EveryRenderer, GoesThroughAllStates) {
+  gst_init(nullptr, nullptr);
+  Owned<GstElement> element(gst_element_factory_make(GetParam(), nullptr));
+  ASSERT_TRUE(element);
+  for (int times = 0; times < 3; ++times) {
+    for (const auto state : {GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_PLAYING, GST_STATE_PAUSED,
+                             GST_STATE_READY, GST_STATE_NULL})
+      EXPECT_NE(gst_element_set_state(element.get(), state), GST_STATE_CHANGE_FAILURE);
+  }
+  gst_element_set_state(element.get(), GST_STATE_PLAYING);
+  gst_element_set_state(element.get(), GST_STATE_NULL);
+}
+
+TEST_F(Render, IsFreedWhileInUse) {
+  for (int buffers = 0; buffers < 4; ++buffers) {
+    Harness other("eventrender");
+    gst_harness_set_sink_caps_str(other.get(), grey_at("25/1").c_str());
+    gst_harness_set_src_caps_str(other.get(), events_caps.c_str());
+    for (int i = 0; i < buffers; ++i) other.push(buffer_of(i * 40 * ms, 40 * ms, column(i)));
+  }
+}
+
+/// So that players plug it.
+TEST_F(Render, IsADecoderOfVideo) {
+  GstElementFactory* factory = gst_element_get_factory(h.element());
+  EXPECT_TRUE(gst_element_factory_list_is_type(
+      factory, GST_ELEMENT_FACTORY_TYPE_DECODER | GST_ELEMENT_FACTORY_TYPE_MEDIA_VIDEO));
+  EXPECT_EQ(gst_plugin_feature_get_rank(GST_PLUGIN_FEATURE(factory)), GST_RANK_PRIMARY);
+}
+
+}  // namespace
