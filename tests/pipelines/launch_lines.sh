@@ -17,11 +17,18 @@ fail() {
 }
 
 # Events of every simulator into a file.
-for element in frame dense sparse diff; do
+for element in frame dense sparse diff dvs; do
   launch videotestsrc pattern=ball num-buffers=30 ! eventsim-$element ! application/x-event-camera ! filesink location=ball-$element.xytp
   size=$(stat -c %s ball-$element.xytp)
   [ "$size" -gt 8000 ] && [ $((size % 8)) -eq 0 ] || fail "$element: $size bytes"
 done
+
+# A physical pixel, in each of its presets, and along motion.
+for preset in ideal esim v2e-clean v2e-noisy icns davis346 gen4; do
+  launch videotestsrc pattern=ball num-buffers=10 ! eventsim-dvs preset=$preset threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=$preset.raw
+  [ -s $preset.raw ] || fail "$preset: no events"
+done
+launch videotestsrc pattern=ball num-buffers=10 ! eventsim-dvs upsampling=motion ! videoconvert ! fakesink
 
 # Accumulated events as video, to an encoder and back.
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! videoconvert ! x264enc ! mp4mux ! filesink location=events.mp4
@@ -45,6 +52,26 @@ launch videotestsrc num-buffers=1 ! eventsim-sparse ! fakesink
 # Mixed back into a picture.
 launch videotestsrc pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! mixer.  t. ! queue ! eventsim-diff ! videoconvert ! mixer.  compositor name=mixer sink_1::alpha=0.5 ! fakesink
 
+# Drawn in every mode, at other framerates than the events', from live sources too.
+for mode in accumulate decay time-surface count; do
+  launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! application/x-event-camera ! eventrender mode=$mode ! video/x-raw,framerate=60/1 ! videoconvert ! fakesink
+done
+launch videotestsrc pattern=ball num-buffers=30 ! eventsim-frame ! eventrender palette=viridis ! videoconvert ! x264enc ! mp4mux ! filesink location=rendered.mp4
+[ -s rendered.mp4 ] || fail "no rendered video was written"
+launch videotestsrc is-live=true pattern=ball num-buffers=20 ! eventsim-diff ! eventrender event-count=5000 ! video/x-raw,framerate=50/1 ! fakesink sync=true
+launch videotestsrc is-live=true pattern=black num-buffers=20 ! eventsim-diff ! eventrender ! fakesink sync=true
+launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventrender ! video/x-raw,framerate=0/1 ! fakesink
+launch videotestsrc pattern=ball num-buffers=30 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink  t. ! queue ! eventsim-diff ! overlay.events
+launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink sync=true  t. ! queue ! eventsim-diff ! overlay.events
+
+# Measured on their way, and beside another simulator's.
+launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventstats location=stats.json map=map.png ! eventrender ! fakesink
+launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! eventsim-dense ! compare.reference  t. ! queue ! eventsim-diff ! compare.candidate  eventcompare name=compare location=compare.json map=maps.png ! evtenc ! filesink location=candidate.raw
+grep -q '"deviation" : [0-9]' stats.json || fail "no figures were written"
+grep -q '"map-correlation" : [0-9-]' compare.json || fail "no comparison was written"
+[ -s map.png ] && [ -s maps.png ] && [ -s candidate.raw ] || fail "a picture or the candidate is missing"
+launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null interval=0 ! fakesink
+
 # Interrupted with -e, it ends in order.
 echo "gst-launch-1.0 -e, interrupted"
 timeout 60 "$GST_LAUNCH" -q -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4 &
@@ -57,7 +84,62 @@ pkill -INT -P $launched
 wait $launched || true
 launch filesrc location=interrupted.mp4 ! decodebin ! fakesink
 
+# Events and the frames that they are made of in one file, and from there back into pipelines.
+launch videotestsrc pattern=ball num-buffers=50 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux compression=zstd ! filesink location=ball.aedat4
+launch filesrc location=ball.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! filesink location=ball.xytp  d.video_0 ! queue ! filesink location=ball.grey
+[ "$(stat -c %s ball.xytp)" -gt 8000 ] || fail "no events came back"
+[ "$(stat -c %s ball.grey)" -eq $((50 * 320 * 240)) ] || fail "not every frame came back"
+launch filesrc location=ball.aedat4 ! aedatdemux name=d  d.video_0 ! queue ! eventsim-dense ! application/x-event-camera ! aedatmux ! filesink location=again.aedat4
+launch filesrc location=again.aedat4 ! decodebin caps="application/x-event-camera,format=XYTP" ! aedatmux compression=lz4-high ! aedatdemux ! fakesink
+echo "aedatmux into a pipe"
+timeout 60 "$GST_LAUNCH" -q videotestsrc is-live=true num-buffers=20 ! video/x-raw,format=GRAY8 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! fdsink | cat >live.aedat4
+launch filesrc location=live.aedat4 ! identity ! aedatdemux ! fakesink
+
+discover() { # FILE PATTERN
+  echo "gst-discoverer-1.0 $1"
+  timeout 60 gst-discoverer-1.0 -v "$1" >discovered
+  grep -q "$2" discovered || {
+    cat discovered
+    fail "$1: $2"
+  }
+}
+discover ball.aedat4 "container format: AEDAT 4.0"
+discover ball.aedat4 "Duration: 0:00:01.9"
+discover ball.aedat4 "Seekable: yes"
+discover ball.aedat4 "application/x-event-camera, format=(string)XYTP, width=(int)320, height=(int)240"
+discover ball.aedat4 "video/x-raw, format=(string)GRAY8, width=(int)320, height=(int)240"
+
+echo "gst-play-1.0 ball.aedat4"
+timeout 60 gst-play-1.0 -q --no-interactive --videosink=fakesink --start-position=1 ball.aedat4 >played 2>&1 || fail "gst-play-1.0: $(cat played)"
+
+# Files of events on their way.
+launch videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
+launch filesrc location=out.raw ! decodebin caps="application/x-event-camera,format=XYTP" ! aedatmux compression=zstd ! filesink location=out.aedat4
+launch filesrc location=out.raw ! evtdec ! esenc ! filesink location=out.es
+launch filesrc location=out.es ! esdec ! eventrender mode=decay accumulation-time=20000000 ! video/x-raw,framerate=60/1 ! videoconvert ! fakesink
+launch filesrc location=out.raw ! decodebin ! eventhdf5sink layout=metavision location=out.h5 && fail "pictures were written as events"
+launch filesrc location=out.raw ! decodebin caps=application/x-event-camera ! eventhdf5sink layout=metavision location=out.h5
+launch eventhdf5src location=out.h5 ! evtenc ! filesink location=again.raw
+# Two files with times of their own, side by side.
+launch filesrc location=out.aedat4 ! decodebin ! videoconvert ! mixer.  filesrc location=out.h5 ! decodebin ! videoconvert ! mixer.  compositor name=mixer sink_1::xpos=320 ! fakesink
+davis=$SHARED_DATA/events/davis346-frames-events-imu.aedat4
+[ ! -f "$davis" ] || launch filesrc location="$davis" ! aedatdemux name=d  d.events_0 ! queue ! eventrender ! videoconvert ! fakesink  d.video_0 ! queue ! eventsim-dense ! videoconvert ! fakesink
+
+echo "eventhdf5sink, interrupted"
+timeout 60 "$GST_LAUNCH" -q videotestsrc is-live=true pattern=snow ! eventsim-frame ! eventhdf5sink compression=none location=interrupted.h5 &
+launched=$!
+for _ in $(seq 300); do
+  [ "$(stat -c %s interrupted.h5 2>/dev/null || echo 0)" -gt 300000 ] && break
+  sleep 0.1
+done
+pkill -INT -P $launched
+wait $launched || true
+launch eventhdf5src location=interrupted.h5 ! filesink location=interrupted.xytp
+[ "$(stat -c %s interrupted.xytp)" -gt 300000 ] || fail "what was written before the interruption is lost"
+
 # Refused, with a reason.
+timeout 5 "$GST_LAUNCH" -q filesrc location=ball-frame.xytp ! aedatdemux ! fakesink 2>refusal && fail "a file that is no AEDAT was read"
+grep -q "this is not AEDAT" refusal || fail "the refusal does not name the format"
 if "$GST_LAUNCH" -q videotestsrc num-buffers=2 ! video/x-raw,format=RGB ! eventsim-frame ! fakesink 2>refusal; then
   fail "RGB was taken"
 fi

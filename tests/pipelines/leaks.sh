@@ -20,7 +20,49 @@ for element in frame dense sparse diff; do
   check videotestsrc num-buffers=8 ! eventsim-$element ! fakesink
   check videotestsrc num-buffers=8 ! eventsim-$element ! videoconvert ! fakesink
 done
+# Files of events, written and read, to their end and not.
+work=$(mktemp -d)
+trap 'rm -rf "$log" "$work"' EXIT
+for pair in evtenc:evtdec datenc:datdec esenc:esdec csvenc:csvdec npyenc:npydec; do
+  file=$work/${pair%:*}
+  check videotestsrc num-buffers=8 ! eventsim-frame ! "${pair%:*}" ! filesink location="$file"
+  check filesrc location="$file" ! "${pair#*:}" ! fakesink
+  check filesrc location="$file" ! queue ! "${pair#*:}" ! fakesink num-buffers=1
+  check filesrc location="$file" ! decodebin caps=application/x-event-camera ! fakesink
+  check filesrc location="$0" ! "${pair#*:}" ! fakesink
+done
+for layout in dsec metavision; do
+  file=$work/$layout.h5
+  check videotestsrc num-buffers=8 ! eventsim-frame ! eventhdf5sink layout=$layout location="$file"
+  check eventhdf5src location="$file" ! fakesink
+  check filesrc location="$file" ! queue ! eventhdf5dec ! fakesink num-buffers=1
+  check filesrc location="$file" ! decodebin caps=application/x-event-camera ! fakesink
+  check filesrc location="$file" ! decodebin3 ! fakesink
+  check eventhdf5src location="$file" ! identity error-after=2 ! eventhdf5sink location="$file.out"
+done
+check filesrc location="$0" ! eventhdf5dec ! fakesink
+check videotestsrc num-buffers=8 ! eventsim-frame ! eventhdf5sink location=/nowhere/at/all.h5
+check videotestsrc num-buffers=8 ! eventsim-frame ! evtenc ! application/x-event-camera,format=EVT2 ! evtdec ! fakesink
+aedat=$work/aedat
+video="videotestsrc num-buffers=30 ! video/x-raw,format=GRAY8,framerate=25/1"
+# shellcheck disable=SC2086
+check $video ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location="$aedat"
+for way in identity "queue max-size-bytes=1000"; do
+  # shellcheck disable=SC2086
+  check filesrc location="$aedat" ! $way ! aedatdemux name=d  d.events_0 ! queue ! fakesink  d.video_0 ! queue ! fakesink
+done
+check filesrc location="$aedat" ! aedatdemux ! fakesink
+check filesrc location="$aedat" ! decodebin ! fakesink
+for mode in accumulate decay time-surface count; do
+  check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender mode=$mode ! videoconvert ! fakesink
+done
+check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.events
 # Errors half-way.
+check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! fakesink
+check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! aedatmux ! fakesink
+check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender ! identity error-after=2 ! fakesink
+check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-frame ! eventrender ! fakesink
+check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! identity error-after=2 ! fakesink  t. ! queue ! eventsim-frame ! overlay.events
 check videotestsrc num-buffers=8 ! eventsim-frame ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-dense ! fakesink

@@ -164,14 +164,13 @@ std::vector<Track> opencv_tracks(const Plane<std::uint8_t>& from, const Plane<st
 
 /// How far our tracks end from OpenCV's, where there is texture: 3 grey levels a pixel.
 struct TrackErrors {
-  float disagreement;
   double sum = 0;
   int tracks = 0;
   int found_by_one = 0;
 
   void add(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to,
            const std::vector<Point>& points) {
-    PointTracker tracker(disagreement);
+    PointTracker tracker;
     ThreadPool threads;
     tracker.push(from.view(), threads);
     tracker.push(to.view(), threads);
@@ -193,8 +192,8 @@ TEST(Tracks, AreThoseOfOpenCv) {
   if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
   const auto frames = frames_of(video(driving), 38, 640, 480);
   ASSERT_GE(frames.size(), 37U);
-  TrackErrors sparse{disagreement_of_frames};
-  TrackErrors diff{disagreement_of_differences};
+  TrackErrors sparse;
+  TrackErrors diff;
   for (std::size_t i = 1; i + 1 < frames.size(); i += 4) {
     sparse.add(frames[i], frames[i + 1], reference::changed(frames[i], frames[i + 1], 6));
     for (const int sign : {1, -1}) {

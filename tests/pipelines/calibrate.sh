@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# calibrate finds again what a recording was simulated with.
+set -euo pipefail
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+
+fail() {
+  echo "FAILED: $*"
+  exit 1
+}
+
+calibrate() {
+  echo "calibrate $*"
+  timeout 60 "$PYTHON" "$SOURCE/pipelines/calibrate.py" "$@" 2>progress || {
+    cat progress
+    return 1
+  }
+}
+
+"$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=I420,width=161,height=90,framerate=25/1 ! matroskamux ! filesink location=scene.mkv
+
+recovers() { # POSITIVE NEGATIVE TOLERANCE ELEMENT...
+  local positive=$1 negative=$2 tolerance=$3
+  shift 3
+  "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! "$@" positive-threshold="$positive" negative-threshold="$negative" ! evtenc ! filesink location=recorded.raw
+  calibrate scene.mkv recorded.raw --element "$*" --to 0.3 | tee found
+  grep -q "trial" progress || fail "no progress was told"
+  read -r found_positive found_negative < <(sed -n 's/.* positive-threshold=\([0-9.]*\) negative-threshold=\([0-9.]*\)$/\1 \2/p' found)
+  awk -v p="$found_positive" -v n="$found_negative" -v wp="$positive" -v wn="$negative" -v by="$tolerance" \
+    'BEGIN { exit !(p / wp < 1 + by && wp / p < 1 + by && n / wn < 1 + by && wn / n < 1 + by) }' ||
+    fail "$*: $found_positive and $found_negative instead of $positive and $negative"
+  awk '/map correlation/ { exit !($3 > 0.97) }' found || fail "$*: the maps differ"
+}
+# Of 8 bits, thresholds between two grey levels are the same.
+recovers 12.5 8.5 0.1 eventsim-frame
+recovers 6.5 4.5 0.2 eventsim-dense
+recovers 8.5 12.5 0.12 eventsim-diff
+recovers 0.2 0.3 0.05 eventsim-dvs response=log log-eps=0.02
+
+# A video as a list of pictures, later by a known time.
+"$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! pngenc ! multifilesink location=%02d.png
+for i in $(seq 0 15); do
+  printf '%s %02d.png\n' "$(awk -v i="$i" 'BEGIN { print 0.04 * i + 0.002 }')" "$i"
+done >pictures.txt
+"$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! eventsim-dense positive-threshold=10 ! csvenc ! filesink location=recorded.csv
+calibrate pictures.txt recorded.csv --element eventsim-dense --lag find --to 0.3 --measure-from 0.3 --measure-to 0.5 --map map.png | tee found
+lag=$(sed -n 's/A frame shows the world \(-*[0-9.]*\) ms later.*/\1/p' found)
+awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 1) }' || fail "the pictures are ${lag:-0} ms late"
+[ -s map.png ] || fail "no picture was written"
+
+# What cannot be done is said.
+refused() { # WORDS ARGUMENT...
+  local words=$1
+  shift
+  if timeout 60 "$PYTHON" "$SOURCE/pipelines/calibrate.py" "$@" 2>errors; then fail "calibrate $* went well"; fi
+  cat errors
+  grep -q "$words" errors || fail "no word of it"
+}
+refused "no element" scene.mkv recorded.raw --element eventsim-nothing
+refused "nowhere.mkv" nowhere.mkv recorded.raw
+refused "no time in common" scene.mkv recorded.raw --element eventsim-frame --from 5
+echo "all thresholds were found"

@@ -1,0 +1,179 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Files of events, as users handle them: converted, looked at, and played.
+set -eu
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+
+fail() {
+  echo "FAILED: $*"
+  exit 1
+}
+
+convert() {
+  echo "event_convert $*"
+  timeout 60 "$BUILD/pipelines/event_convert" "$@"
+}
+
+declare -A types=([raw]=application/x-prophesee-raw [dat]=application/x-prophesee-dat
+  [es]=application/x-es [csv]=application/x-event-csv [txt]=application/x-event-csv [npy]=application/x-npy
+  [aedat4]=application/x-aedat [h5]=application/x-hdf5 [hdf5]=application/x-hdf5)
+
+timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=ball.raw
+
+# Into each format, and from there into lines that tell no size: the same events.
+convert ball.raw ball.csv
+for ending in "${!types[@]}"; do
+  [ -f "ball.$ending" ] || convert ball.raw "ball.$ending"
+  gst-typefind-1.0 "ball.$ending" | grep -q " - ${types[$ending]}" || fail "$ending is not found by its type"
+  convert "ball.$ending" "back of $ending.csv"
+  cmp ball.csv "back of $ending.csv" || fail "the events of ball.$ending are others"
+done
+
+# From each into each.
+for in in "${!types[@]}"; do
+  for out in "${!types[@]}"; do
+    convert "ball.$in" "pair.$out"
+    convert "pair.$out" pair.lines.csv
+    cmp ball.csv pair.lines.csv || fail "ball.$in as $out has other events"
+  done
+done
+
+# What eventhdf5sink wrote, to a reader that is none of ours.
+/usr/bin/python3 - ball.h5 ball.hdf5 ball.csv <<'PYTHON'
+import csv
+import sys
+
+import h5py
+import numpy as np
+
+with open(sys.argv[3], encoding="utf-8") as file:
+    lines = np.array([[int(field) for field in line] for line in list(csv.reader(file))[1:]])
+with h5py.File(sys.argv[1]) as dsec:
+    events = dsec["events"]
+    t = events["t"][:].astype(np.int64)
+    read = np.stack([t + dsec["t_offset"][()], events["x"], events["y"], events["p"]], axis=1)
+    assert (read == lines).all(), "the events are others"
+    index = dsec["ms_to_idx"][:]
+    assert (index == np.searchsorted(t, 1000 * np.arange(len(index)))).all(), "the index is wrong"
+    assert len(index) == t[-1] // 1000 + 1, "the index is too short or too long"
+    assert (dsec.attrs["width"], dsec.attrs["height"]) == (320, 240)
+with h5py.File(sys.argv[2]) as metavision:
+    assert metavision["CD/events"].shape == (len(lines),)
+    assert metavision.attrs["geometry"] == "320x240"
+    indexes = metavision["CD/indexes"]
+    assert int(indexes.attrs["offset"]) == -lines[0, 0]
+PYTHON
+
+# v2e's HDF5, which is only read, and a user's block before the file.
+/usr/bin/python3 - ball.csv v2e.h5 <<'PYTHON'
+import csv
+import sys
+
+import h5py
+import numpy as np
+
+with open(sys.argv[1], encoding="utf-8") as file:
+    lines = np.array([[int(field) for field in line] for line in list(csv.reader(file))[1:]])
+with h5py.File(sys.argv[2], "w", userblock_size=1024) as v2e:
+    v2e.create_dataset("events", data=lines.astype(np.uint32), compression="gzip")
+PYTHON
+gst-typefind-1.0 v2e.h5 | grep -q " - application/x-hdf5" || fail "v2e.h5 is not found by its type"
+convert v2e.h5 v2e.csv
+cmp ball.csv v2e.csv || fail "the events of v2e.h5 are others"
+timeout 60 "$GST_LAUNCH" -q filesrc location=v2e.h5 ! queue ! eventhdf5dec ! csvenc ! filesink location=pushed.csv
+cmp ball.csv pushed.csv || fail "the events of v2e.h5 are others where it is pushed"
+
+# What a player and a tool make of them.
+for ending in "${!types[@]}"; do
+  echo "ball.$ending is played"
+  timeout 60 "$GST_LAUNCH" -q filesrc location="ball.$ending" ! decodebin caps=application/x-event-camera ! fakesink sync=true
+  timeout 60 gst-discoverer-1.0 -v "ball.$ending" >discovered || fail "gst-discoverer-1.0 ball.$ending"
+  for found in application/x-event-camera "Duration: 0:00:01.9" "Seekable: yes"; do
+    grep -q "$found" discovered || fail "gst-discoverer-1.0 ball.$ending: $found"
+  done
+  for player in gst-play-1.0 "gst-play-1.0 --use-playbin3"; do
+    echo "$player ball.$ending"
+    timeout 60 $player -q --no-interactive --videosink=fakesink "ball.$ending" >played 2>&1 || fail "$player: $(cat played)"
+    if grep ERROR played; then fail "$player ball.$ending"; fi
+  done
+done
+
+# What is none of them stays what it is.
+"$GST_LAUNCH" -q videotestsrc num-buffers=1 ! pngenc ! filesink location=picture.png
+"$GST_LAUNCH" -q videotestsrc num-buffers=5 ! x264enc ! mp4mux ! filesink location=video.mp4
+"$GST_LAUNCH" -q audiotestsrc num-buffers=5 ! wavenc ! filesink location=sound.wav
+printf 'A text of words.\nAnd 1 2 3 0 in it.\n%.0s' $(seq 40) >words.txt
+seq 1 3000 >numbers.txt
+printf '%% a comment of another tool\n%.0s' $(seq 40) >comments.m
+for file in picture.png video.mp4 sound.wav words.txt numbers.txt comments.m "$SOURCE/README.md" "$SHARED_DATA"/video/*.mp4; do
+  [ -f "$file" ] || continue
+  if gst-typefind-1.0 "$file" | grep -E "prophesee|x-es$|event|npy|hdf5|aedat"; then
+    fail "$file is taken for events"
+  fi
+done
+
+# Errors that say what is wrong.
+refused() { # WORDS IN OUT
+  if convert "$2" "$3" 2>errors; then fail "$2 was converted to $3"; fi
+  cat errors
+  grep -q "$1" errors || fail "no word of it"
+}
+refused "cannot be read" words.txt words.raw
+cp words.txt words.raw
+refused "cannot be read" words.raw out.dat
+refused "not known by its ending" ball.raw ball.mp3
+refused "are only read" ball.raw ball.aedat
+refused "No such file" ball.raw nowhere/at/all.h5
+cp words.txt words.h5
+refused "not an HDF5 file" words.h5 out.dat
+(
+  trap '' XFSZ
+  ulimit -f 20
+  refused "cannot be written: File too large" ball.raw large.h5
+)
+refused "No such file" nowhere.raw out.dat
+refused "the same file" ball.raw ./ball.raw
+head -c 100001 ball.raw >short.raw
+convert short.raw short.dat 2>warnings
+grep -q "damaged at byte " warnings || fail "no warning of a file that is cut short"
+
+# Interrupted, it ends the file in order.
+timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw
+for ending in raw npy aedat4 h5 hdf5; do
+  echo "event_convert long.raw interrupted.$ending"
+  "$BUILD/pipelines/event_convert" long.raw "interrupted.$ending" 2>interruption &
+  converting=$!
+  while kill -0 $converting && [ "$(stat -c %s "interrupted.$ending.part" 2>/dev/null || echo 0)" -lt 10000 ]; do sleep 0.01; done
+  kill -INT $converting || true
+  if wait $converting; then echo "it was done by then"; else grep -q interrupted interruption; fi
+  convert "interrupted.$ending" part.dat 2>warnings | tee count
+  grep -q "^[1-9][0-9]* events" count || fail "nothing is in interrupted.$ending"
+  if grep -q warning: warnings; then fail "interrupted.$ending: $(cat warnings)"; fi
+done
+
+# Recordings of cameras.
+recordings=$SHARED_DATA/events
+if [ ! -d "$recordings" ]; then
+  echo "no $recordings: no recording was read"
+  exit 77
+fi
+counted() { # EVENTS FILE
+  convert "$2" counted.csv | tee count
+  grep -q "^$1 events" count || fail "$2 has $1 events"
+  [ "$(grep -vc t "counted.csv")" = "$1" ] || fail "$1 lines were not written"
+}
+counted 82469 "$recordings/evt3-1280x720-triggers.raw"
+awk -F, 'NR > 1 { t += $1; x += $2; y += $3; on += $4 } END { printf "%.0f %.0f %.0f %.0f\n", t, x, y, on }' counted.csv >sums
+grep -qx "1222326831810 42078718 31656267 41439" sums || fail "the sums are $(cat sums)"
+counted 343474 "$recordings/evt3-640x480-triggers.raw"
+mv counted.csv as-recorded.csv
+for ending in aedat4 h5 hdf5; do
+  convert "$recordings/evt3-640x480-triggers.raw" "recorded.$ending"
+  convert "recorded.$ending" recorded.raw
+  counted 343474 recorded.raw
+  cmp as-recorded.csv counted.csv || fail "as $ending the recording has other times"
+done
+counted 117667 "$recordings/davis346-frames-events-imu.aedat4"
+echo "all files were read and written"

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Files of events in players, which plug our readers and the renderer by themselves: played, sought
+// in while they play, and played to their end.
+#include <gst/gst.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "src/codec/prophesee/raw.hpp"
+#include "tests/codec/aedat_files.hpp"
+
+namespace {
+
+using eventcamera::EvtFormat;
+using eventcamera::Microseconds;
+using eventcamera::Polarity;
+using eventcamera::SensorSize;
+using eventcamera::StampedEvent;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr SensorSize sensor{346, 260};
+constexpr Microseconds length = 5'000'000;
+/// So that a time of the file is none of the player's.
+constexpr Microseconds beginning = 30'000'000;
+
+/// A dot that runs through the rows.
+std::vector<StampedEvent> some_events() {
+  std::vector<StampedEvent> events;
+  constexpr Microseconds step = 100;
+  for (Microseconds t = 0; t < length; t += step) {
+    const auto i = static_cast<int>(t / step);
+    events.push_back(StampedEvent::at(i % sensor.width, i / 7 % sensor.height, beginning + t,
+                                      i % 3 == 0 ? Polarity::on : Polarity::off));
+  }
+  return events;
+}
+
+bool run(const std::string& launch) {
+  GError* error = nullptr;
+  GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
+  if (error != nullptr) {
+    ADD_FAILURE() << launch << ": " << error->message;
+    g_clear_error(&error);
+    return false;
+  }
+  GstBus* bus = gst_element_get_bus(pipeline);
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  GstMessage* message = gst_bus_timed_pop_filtered(
+      bus, 20 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  const bool ended = message != nullptr && GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS;
+  if (message != nullptr) gst_message_unref(message);
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(bus);
+  gst_object_unref(pipeline);
+  return ended;
+}
+
+/// The same events in every format, for as long as the tests run.
+class Files {
+ public:
+  static const Files& get() {
+    static const Files files;
+    return files;
+  }
+
+  std::string path(const std::string& name) const { return folder_ / name; }
+
+  Files(const Files&) = delete;
+  Files& operator=(const Files&) = delete;
+  ~Files() { std::filesystem::remove_all(folder_); }
+
+ private:
+  Files()
+      : folder_(std::filesystem::temp_directory_path() /
+                ("players-test-" + std::to_string(std::random_device()()))) {
+    gst_init(nullptr, nullptr);
+    std::filesystem::create_directories(folder_);
+    const auto events = some_events();
+    for (const auto& [name, format] : {std::pair{"evt2.raw", EvtFormat::evt2},
+                                       {"evt21.raw", EvtFormat::evt21},
+                                       {"evt3.raw", EvtFormat::evt3},
+                                       {"evt4.raw", EvtFormat::evt4}}) {
+      Bytes bytes;
+      const auto encoder = eventcamera::make_prophesee_raw_encoder(format, sensor);
+      encoder->encode(events, bytes);
+      encoder->finish(bytes);
+      save(name, bytes);
+    }
+    save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
+    save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
+    for (const auto& [name, writer] : {std::pair{"a.dat", "datenc ! filesink"},
+                                       {"a.es", "esenc ! filesink"},
+                                       {"a.csv", "csvenc ! filesink"},
+                                       {"a.txt", "csvenc dialect=rpg ! filesink"},
+                                       {"a.npy", "npyenc ! filesink"},
+                                       {"a.aedat4", "aedatmux ! filesink"},
+                                       {"dsec.h5", "eventhdf5sink"},
+                                       {"metavision.hdf5", "eventhdf5sink layout=metavision"}})
+      EXPECT_TRUE(run("filesrc location=" + path("evt3.raw") + " ! evtdec ! " + writer +
+                      " location=" + path(name)));
+  }
+
+  void save(const std::string& name, const Bytes& bytes) const {
+    std::ofstream(folder_ / name, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+  }
+
+  std::filesystem::path folder_;
+};
+
+const char* const files[] = {"evt2.raw",        "evt21.raw",    "evt3.raw", "evt4.raw",
+                             "a.dat",           "a.es",         "a.csv",    "a.txt",
+                             "a.npy",           "aedat2.aedat", "a.aedat4", "aedat3.aedat",
+                             "metavision.hdf5", "dsec.h5"};
+
+std::string test_name(std::string text) {
+  for (auto& c : text)
+    if (g_ascii_isalnum(c) == FALSE) c = '_';
+  return text;
+}
+
+/// playbin or playbin3, with a sink in which pictures take their time.
+class Player {
+ public:
+  Player(const std::string& player, const std::string& path) {
+    pipeline_ = gst_element_factory_make(player.c_str(), nullptr);
+    GstElement* sink = gst_element_factory_make("fakesink", nullptr);
+    g_object_set(sink, "signal-handoffs", TRUE, "sync", TRUE, nullptr);
+    g_signal_connect(sink, "handoff", G_CALLBACK(shown), this);
+    gchar* uri = gst_filename_to_uri(path.c_str(), nullptr);
+    g_object_set(pipeline_, "uri", uri, "video-sink", sink, nullptr);
+    g_free(uri);
+    bus_ = gst_element_get_bus(pipeline_);
+  }
+  ~Player() {
+    gst_element_set_state(pipeline_, GST_STATE_NULL);
+    gst_object_unref(bus_);
+    gst_object_unref(pipeline_);
+  }
+  Player(const Player&) = delete;
+  Player& operator=(const Player&) = delete;
+
+  bool reaches(GstState state) {
+    gst_element_set_state(pipeline_, state);
+    return gst_element_get_state(pipeline_, nullptr, nullptr, 20 * GST_SECOND) ==
+           GST_STATE_CHANGE_SUCCESS;
+  }
+
+  GstClockTime duration() const {
+    gint64 duration = -1;
+    gst_element_query_duration(pipeline_, GST_FORMAT_TIME, &duration);
+    return static_cast<GstClockTime>(duration);
+  }
+
+  bool is_seekable() const {
+    GstQuery* query = gst_query_new_seeking(GST_FORMAT_TIME);
+    gboolean seekable = FALSE;
+    if (gst_element_query(pipeline_, query))
+      gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
+    gst_query_unref(query);
+    return seekable != FALSE;
+  }
+
+  bool seek(GstClockTime to) {
+    last_ = GST_CLOCK_TIME_NONE;
+    const bool sought = gst_element_seek_simple(
+                            pipeline_, GST_FORMAT_TIME,
+                            static_cast<GstSeekFlags>(GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE),
+                            static_cast<gint64>(to)) != FALSE;
+    return sought && gst_element_get_state(pipeline_, nullptr, nullptr, 20 * GST_SECOND) ==
+                         GST_STATE_CHANGE_SUCCESS;
+  }
+
+  /// The stream time of the picture that was shown last, once there is any.
+  GstClockTime last_picture() const {
+    for (int i = 0; i < 2000 && last_ == GST_CLOCK_TIME_NONE; ++i) g_usleep(5000);
+    return last_;
+  }
+
+  /// To the end; false for an error, or where nothing happens any more.
+  bool ends_well() {
+    GstMessage* message = gst_bus_timed_pop_filtered(
+        bus_, 20 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+    const bool ended = message != nullptr && GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS;
+    if (message != nullptr) gst_message_unref(message);
+    return ended;
+  }
+
+ private:
+  static void shown(GstElement*, GstBuffer* buffer, GstPad* pad, Player* self) {
+    GstEvent* event = gst_pad_get_sticky_event(pad, GST_EVENT_SEGMENT, 0);
+    const GstSegment* segment = nullptr;
+    gst_event_parse_segment(event, &segment);
+    self->last_ = gst_segment_to_stream_time(segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
+    gst_event_unref(event);
+  }
+
+  GstElement* pipeline_;
+  GstBus* bus_;
+  std::atomic<GstClockTime> last_ = GST_CLOCK_TIME_NONE;
+};
+
+class EveryPlayer : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
+INSTANTIATE_TEST_SUITE_P(, EveryPlayer,
+                         testing::Combine(testing::Values("playbin", "playbin3"),
+                                          testing::ValuesIn(files)),
+                         [](const auto& test) {
+                           return test_name(std::get<0>(test.param) + std::string("_") +
+                                            std::get<1>(test.param));
+                         });
+
+TEST_P(EveryPlayer, PlaysAndSeeksWhilePlaying) {
+  const auto& [name, file] = GetParam();
+  Player player(name, Files::get().path(file));
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  EXPECT_EQ(player.duration(), (length - 100 + 1) * GST_USECOND);
+  EXPECT_TRUE(player.is_seekable());
+  ASSERT_TRUE(player.reaches(GST_STATE_PLAYING));
+  EXPECT_LT(player.last_picture(), GST_SECOND);
+  for (const GstClockTime to : {3000, 1000, 4500}) {
+    ASSERT_TRUE(player.seek(to * GST_MSECOND));
+    const auto picture = player.last_picture();
+    EXPECT_GE(picture, to * GST_MSECOND);
+    EXPECT_LT(picture, (to + 400) * GST_MSECOND);
+  }
+  EXPECT_TRUE(player.ends_well());
+}
+
+class EveryDecodebin : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
+INSTANTIATE_TEST_SUITE_P(
+    , EveryDecodebin,
+    testing::Combine(testing::Values("decodebin", "decodebin3", "queue ! decodebin"),
+                     testing::ValuesIn(files)),
+    [](const auto& test) {
+      return test_name(std::get<0>(test.param) + std::string("_") + std::get<1>(test.param));
+    });
+
+TEST_P(EveryDecodebin, DrawsTheWholeFile) {
+  const auto& [bin, file] = GetParam();
+  gst_init(nullptr, nullptr);
+  GError* error = nullptr;
+  const auto launch = "filesrc location=" + Files::get().path(file) + " ! " + bin +
+                      " ! video/x-raw ! fakesink name=sink signal-handoffs=true";
+  GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
+  ASSERT_EQ(error, nullptr) << error->message;
+  std::atomic<int> pictures = 0;
+  GstElement* sink = gst_bin_get_by_name(GST_BIN(pipeline), "sink");
+  g_signal_connect(
+      sink, "handoff",
+      G_CALLBACK(+[](GstElement*, GstBuffer*, GstPad*, std::atomic<int>* count) { ++*count; }),
+      &pictures);
+  gst_object_unref(sink);
+  GstBus* bus = gst_element_get_bus(pipeline);
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  GstMessage* message = gst_bus_timed_pop_filtered(
+      bus, 20 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  EXPECT_TRUE(message != nullptr && GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS);
+  if (message != nullptr) gst_message_unref(message);
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(bus);
+  gst_object_unref(pipeline);
+  EXPECT_EQ(pictures, length / 1'000'000 * 30);
+}
+
+}  // namespace
