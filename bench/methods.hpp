@@ -7,10 +7,12 @@
 
 #include "bench/plain/dense.hpp"
 #include "bench/plain/diff.hpp"
+#include "bench/plain/dvs.hpp"
 #include "bench/plain/frame.hpp"
 #include "bench/plain/sparse.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
+#include "src/simulate/dvs.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"
 
@@ -45,6 +47,21 @@ inline Method dense_method(const std::string& name, FlowMethod flow) {
           }};
 }
 
+/// Of the physical pixel; its thresholds are the preset's.
+inline Method dvs_method(const std::string& name, DvsPreset preset, Upsampling upsampling) {
+  auto settings = settings_of(preset);
+  settings.upsampling = upsampling;
+  return {name, 0,
+          [settings](const LumaFormat& format) {
+            return std::make_unique<plain::DvsSimulator>(format, settings);
+          },
+          [settings](const LumaFormat& format) {
+            auto simulator = make_dvs_simulator(format);
+            simulator->set(settings);
+            return simulator;
+          }};
+}
+
 inline const Method frame_method{"frame", 20, make_plain<plain::FrameSimulator>(),
                                  make_frame_simulator};
 inline const Method dis_lq_method = dense_method("dense-dis-lq", FlowMethod::dis_lq);
@@ -54,5 +71,11 @@ inline const Method sparse_method{"sparse", 6, make_plain<plain::SparseSimulator
                                   make_sparse_simulator};
 inline const Method diff_method{"diff", 19, make_plain<plain::DiffSimulator>(),
                                 make_diff_simulator};
+inline const Method dvs_ideal_method =
+    dvs_method("dvs-ideal", DvsPreset::ideal, Upsampling::linear);
+inline const Method dvs_noisy_method =
+    dvs_method("dvs-v2e-noisy", DvsPreset::v2e_noisy, Upsampling::linear);
+inline const Method dvs_motion_method =
+    dvs_method("dvs-motion", DvsPreset::ideal, Upsampling::motion);
 
 }  // namespace bench

@@ -114,6 +114,9 @@ void register_simulators(const Scene& scene) {
     add_method(farneback_method);
     add_method(sparse_method);
     add_method(diff_method);
+    add_method(dvs_ideal_method);
+    add_method(dvs_noisy_method);
+    add_method(dvs_motion_method);
   }
 }
 

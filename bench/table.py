@@ -24,6 +24,9 @@ METHODS = {
     "dense-farneback": "dense, `farneback`, whole",
     "sparse": "sparse, whole",
     "diff": "diff, whole",
+    "dvs-ideal": "dvs, `ideal`",
+    "dvs-v2e-noisy": "dvs, `v2e-noisy`",
+    "dvs-motion": "dvs, `ideal`, `upsampling=motion`, whole",
 }
 COPIES = {
     "events-to-buffer": "events → buffer",

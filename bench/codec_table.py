@@ -1,0 +1,96 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Prints the table of runs of the codecs' benchmarks: a row a format; million events a second on one
+core, and how many times as long that takes as a memcpy of the decoded events.
+
+  codec_table.py PAGE.md RUN.json...
+
+The table replaces what the page has between its markers."""
+import json
+import re
+import sys
+
+# The name of a benchmark, without what it does: the name in the table.
+FORMATS = {
+    "edges/evt2": "EVT2",
+    "edges/evt21": "EVT2.1",
+    "edges/evt3": "EVT3",
+    "edges/evt4": "EVT4",
+    "noise/evt2": "EVT2, noise",
+    "noise/evt21": "EVT2.1, noise",
+    "noise/evt3": "EVT3, noise",
+    "noise/evt4": "EVT4, noise",
+    "noise/dat": "DAT",
+    "noise/es": "Event Stream",
+    "aedat2": "AEDAT 2",
+    "aedat3": "AEDAT 3.1",
+    "aedat4/none": "AEDAT 4, not compressed",
+    "aedat4/lz4": "AEDAT 4, LZ4",
+    "aedat4/zstd": "AEDAT 4, Zstandard",
+    "npy": "NumPy",
+    "csv-names": "CSV, whole microseconds",
+    "csv-rpg": "TXT, seconds with a fraction",
+    "dsec": "HDF5 of DSEC, not compressed",
+    "dsec-gzip": "HDF5 of DSEC, gzip",
+    "metavision": "HDF5 of Metavision",
+    "ecf": "ECF alone",
+}
+VERBS = {"decode": "read", "encode": "write"}
+
+
+def results_of(run):
+    """(million events a second, memcpys) by (format, read or write)."""
+    results = {}
+    benchmarks = [each for each in run["benchmarks"] if not each.get("error_occurred")]
+    memcpy = [each for each in benchmarks if each["name"] == "memcpy"]
+    for each in benchmarks:
+        name, what = each["name"], None
+        if "memcpys" in each:
+            name, what = name.rsplit("/", 1)
+            results[name, what] = each["Mevents/s"], each["memcpys"]
+        elif "_" in name and memcpy:
+            verb, name = name.split("_", 1)
+            rate = each["items_per_second"]
+            results[name, VERBS[verb]] = rate / 1e6, memcpy[0]["items_per_second"] / rate
+    return results
+
+
+def cell(result):
+    if result is None:
+        return ""
+    rate = f"{result[0]:.3g}" if result[0] < 100 else f"{result[0]:.0f}"
+    return f"{rate} ({result[1]:.1f})"
+
+
+def main():
+    page, *runs = sys.argv[1:]
+    results = {}
+    for path in runs:
+        with open(path, encoding="utf-8") as file:
+            run = json.load(file)
+        results |= results_of(run)
+    context = run["context"]
+    lines = [
+        f"Run on {context['date'][:10]} on a processor of {context['mhz_per_cpu']} MHz; load average"
+        f" {context['load_avg'][0]:.1f}.",
+        "",
+        "| format | read | write |",
+        "|---|---|---|",
+    ]
+    for name, label in FORMATS.items():
+        cells = [cell(results.get((name, what))) for what in ("read", "write")]
+        if any(cells):
+            lines.append(f"| {label} | {cells[0]} | {cells[1]} |")
+    text = "\n".join(lines) + "\n"
+    print(text)
+    with open(page, encoding="utf-8") as file:
+        before = file.read()
+    begin, end = "<!-- table of bench/run -->\n", "<!-- end of the table -->\n"
+    between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
+    if not between.search(before):
+        sys.exit(f"{page} has no place for the table")
+    with open(page, "w", encoding="utf-8") as file:
+        file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", before))
+
+
+main()

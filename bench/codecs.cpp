@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// How fast event formats are read and written, on one core: million events a second, and the time
+// as a ratio to that of a memcpy of the decoded events, in the same run. Names are
+// RECORDING/FORMAT/read or write.
+#include <benchmark/benchmark.h>
+
+#include <cstring>
+#include <ctime>
+
+#include "tests/codec/formats.hpp"
+#include "tests/codec/recordings.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+constexpr SensorSize size{1280, 720};
+constexpr std::size_t count = 1 << 20;
+
+struct Recording {
+  std::string name;
+  std::vector<StampedEvent> events;
+};
+
+/// Single pixels all over the sensor, 10 million a second: what formats that save rows and times
+/// like least.
+Recording noise() {
+  recordings::Random random(1);
+  Recording recording{"noise", {}};
+  for (std::size_t i = 0; i < count; ++i)
+    recording.events.push_back(
+        StampedEvent::at(recordings::below(random, size.width),
+                         recordings::below(random, size.height), static_cast<Microseconds>(i / 10),
+                         recordings::below(random, 2) == 0 ? Polarity::off : Polarity::on));
+  return recording;
+}
+
+/// What a simulator makes of moving edges: every 4 ms, row by row, runs of some pixels.
+Recording edges() {
+  recordings::Random random(2);
+  Recording recording{"edges", {}};
+  for (Microseconds t = 4000; recording.events.size() < count; t += 4000) {
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = recordings::below(random, 100); x < size.width;) {
+        const auto polarity = recordings::below(random, 2) == 0 ? Polarity::off : Polarity::on;
+        const int end = std::min(size.width, x + 1 + recordings::below(random, 16));
+        for (; x < end; ++x) recording.events.push_back(StampedEvent::at(x, y, t, polarity));
+        x += recordings::below(random, 200);
+      }
+    }
+  }
+  recording.events.resize(count);
+  return recording;
+}
+
+/// Of this thread: what else the machine does is not counted.
+double seconds_now() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Seconds of a memcpy of these events, the best of some.
+double memcpy_seconds(const std::vector<StampedEvent>& events) {
+  std::vector<StampedEvent> copy(events.size());
+  double best = 1;
+  for (int i = 0; i < 20; ++i) {
+    const double start = seconds_now();
+    std::memcpy(copy.data(), events.data(), events.size() * sizeof events[0]);
+    benchmark::DoNotOptimize(copy.data());
+    benchmark::ClobberMemory();
+    best = std::min(best, seconds_now() - start);
+  }
+  return best;
+}
+
+/// Times `body`, which handles all events of the recording.
+template <class Body>
+void measure(benchmark::State& state, const Recording& recording, const Body& body) {
+  body();
+  double seconds = 0;
+  for (auto _ : state) {
+    const double start = seconds_now();
+    body();
+    seconds += seconds_now() - start;
+  }
+  seconds /= static_cast<double>(state.iterations());
+  state.counters["Mevents/s"] = static_cast<double>(recording.events.size()) / seconds / 1e6;
+  state.counters["memcpys"] = seconds / memcpy_seconds(recording.events);
+}
+
+void register_all(const Recording& recording) {
+  for (const auto& format : formats::all()) {
+    // The header does not matter.
+    if (format.name.rfind("raw_", 0) == 0) continue;
+    const auto bytes = recordings::encode(*format.make_encoder(size), recording.events);
+    const auto add = [&](const char* what, auto&& body) {
+      benchmark::RegisterBenchmark((recording.name + "/" + format.name + "/" + what).c_str(), body)
+          ->Unit(benchmark::kMillisecond);
+    };
+    add("read", [&recording, format, bytes](benchmark::State& state) {
+      Decoded decoded;
+      measure(state, recording, [&] {
+        decoded.events.clear();
+        format.make_decoder(size)->decode(bytes, decoded);
+      });
+      if (decoded.events != recording.events) state.SkipWithError("other events");
+    });
+    add("write", [&recording, format](benchmark::State& state) {
+      std::vector<std::uint8_t> written;
+      measure(state, recording, [&] {
+        written.clear();
+        format.make_encoder(size)->encode(recording.events, written);
+      });
+      state.counters["bytes/event"] =
+          static_cast<double>(written.size()) / static_cast<double>(recording.events.size());
+    });
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  const Recording recordings[] = {noise(), edges()};
+  for (const auto& recording : recordings) register_all(recording);
+  benchmark::RunSpecifiedBenchmarks();
+}

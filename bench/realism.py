@@ -1,0 +1,278 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Calibrates every simulator on the first frame intervals of a recording that has frames and real
+events of the same pixels, and compares it with the real events of the others. Prints the tables.
+
+  realism.py [DOCS]
+
+With a folder, the tables also replace what its realism.md has between its markers, and
+realism-figures.png and realism.png show them, the one as bars, the other the events themselves."""
+import gzip
+import json
+import os
+import re
+import shutil
+import sys
+import tempfile
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
+from calibrate import (  # noqa: E402
+    ON, Gst, Progress, Span, calibrate, compare, delayed, find_lag, read_recording, read_video,
+    refine_lag, simulate, until)
+
+# What each row is called, and the element that makes it.
+ROWS = {
+    "difference frame": "eventsim-frame",
+    "dense, `dis-lq`, `forward`": "eventsim-dense flow=dis-lq interpolation=forward",
+    "dense, `dis-lq`, `blend`": "eventsim-dense flow=dis-lq interpolation=blend",
+    "dense, `dis-hq`, `forward`": "eventsim-dense flow=dis-hq interpolation=forward",
+    "dense, `dis-hq`, `blend`": "eventsim-dense flow=dis-hq interpolation=blend",
+    "dense, `farneback`, `forward`": "eventsim-dense flow=farneback interpolation=forward",
+    "dense, `farneback`, `blend`": "eventsim-dense flow=farneback interpolation=blend",
+    "sparse": "eventsim-sparse",
+    "diff": "eventsim-diff",
+    "`eventsim-dvs preset=esim`": "eventsim-dvs preset=esim response=log log-eps=0.001",
+    "`eventsim-dvs preset=v2e-noisy`": "eventsim-dvs preset=v2e-noisy response=lin-log",
+    "`eventsim-dvs`, linear grey": "eventsim-dvs upsampling=motion response=linear",
+    "`eventsim-dvs`, straight lines": "eventsim-dvs upsampling=linear",
+    "`eventsim-dvs`": "eventsim-dvs upsampling=motion",
+}
+CALIBRATED = "`eventsim-dvs`"
+
+
+@dataclass
+class Scene:
+    """Frames and real events of the same pixels."""
+
+    title: str
+    folder: str
+    video: str
+    recording: str
+    calibrated: int  # frame intervals, the first ones
+    measured: int  # those after them
+
+
+SCENES = {
+    "slider": Scene("slider-depth, a DAVIS240C on a slider, 240x180", "slider-depth", "images.txt",
+                    "events-t-x-y-p.txt.gz", 2, 2),
+    "davis": Scene("a DAVIS346 before a workbench, 346x260", "events",
+                   "davis346-frames-events-imu.aedat4", "davis346-frames-events-imu.aedat4", 1, 1),
+}
+
+
+def unpacked(path, folder):
+    if not path.endswith(".gz"):
+        return path
+    plain = os.path.join(folder, os.path.basename(path)[:-len(".gz")])
+    with gzip.open(path) as packed, open(plain, "wb") as file:
+        shutil.copyfileobj(packed, file)
+    return plain
+
+
+def read(scene, data):
+    folder = os.path.join(data, scene.folder)
+    # By their times, since how many are needed is known but not when they are.
+    video = read_video(os.path.join(folder, scene.video), 0, 10)
+    video.frames = video.frames[:scene.calibrated + scene.measured + 1]
+    with tempfile.TemporaryDirectory() as room:
+        recorded = read_recording(unpacked(os.path.join(folder, scene.recording), room), video)
+    return video, recorded
+
+
+def measure(scene, data, progress):
+    """The rows of a scene. The first interval is the past of the pixels, where there is another one
+    to count."""
+    video, recorded = read(scene, data)
+    past = scene.calibrated - 1
+
+    def spans(delayed_video):
+        times = [frame.time // 1000 for frame in delayed_video.frames]
+        last = scene.calibrated + scene.measured
+        return (Span(times[past], times[scene.calibrated]),
+                Span(times[scene.calibrated], times[last]))
+
+    lag = 0.0
+    if past > 0:
+        lag = find_lag(until(video, video.frames[scene.calibrated].time // 1000), recorded)
+        # As the simulator sees it that is nearest to a camera.
+        early = delayed(video, lag)
+        training, _ = spans(early)
+        early = until(early, training.end)
+        element = calibrate(early, recorded, training, ROWS[CALIBRATED], progress)
+        lag += refine_lag(early, recorded, training, element, progress)
+    video = delayed(video, lag)
+    training, test = spans(video)
+    rows = {}
+    for name, element in ROWS.items():
+        element = calibrate(until(video, training.end), recorded, training, element, progress)
+        rows[name] = measured(video, recorded, test, element)
+        progress.tell(f"{name}: {element}")
+    if lag != 0:
+        punctual = delayed(video, -lag)
+        training, test = spans(punctual)
+        element = calibrate(until(punctual, training.end), recorded, training, ROWS[CALIBRATED],
+                            progress)
+        rows["the same without lag"] = measured(punctual, recorded, test, element)
+    progress.end()
+    return {"title": scene.title, "lag": lag, "calibrated": scene.calibrated,
+            "measured": scene.measured, "rows": rows}
+
+
+def measured(video, recorded, span, element):
+    return {"element": element} | compare(video, recorded, simulate(video, element), span)
+
+
+def thresholds_of(element):
+    values = re.findall(r"(?:positive|negative)-threshold=([0-9.e+-]+)", element)
+    return " / ".join(f"{float(value):.3g}" for value in values)
+
+
+def bold_where(best, text):
+    return f"**{text}**" if best else text
+
+
+def table(result):
+    """A row a simulator; what is nearest to the real camera is bold."""
+    rows = result["rows"]
+    real = next(iter(rows.values()))["reference"]
+    shares = [(side, within) for side in ("reference", "candidate")
+              for within in ("within-1ms", "within-5ms", "within-10ms")]
+
+    def off(row, field):
+        return abs(np.log(max(row["candidate"][field], 1e-9) / real[field]))
+
+    nearest = {field: min(off(row, field) for row in rows.values())
+               for field in ("mean", "deviation")}
+    best_map = max(row["map-correlation"] for row in rows.values())
+    best_share = {share: max(row[f"{share[0]}-partners"][share[1]] for row in rows.values())
+                  for share in shares}
+    lines = [
+        "| | C+ / C− | mean | std. dev. | map correlation"
+        " | real events with a partner within 1, 5, 10 ms | simulated events with one |",
+        "|---|---|---|---|---|---|---|",
+        f"| real events | | {real['mean']:.3f} | {real['deviation']:.3f} | | | |",
+    ]
+    for name, row in rows.items():
+        cells = [name, thresholds_of(row["element"])]
+        for field in ("mean", "deviation"):
+            value = row["candidate"][field]
+            cells.append(bold_where(
+                off(row, field) == nearest[field],
+                f"{value:.3f} ({100 * (value / real[field] - 1):+.0f} %)"))
+        cells.append(bold_where(row["map-correlation"] == best_map,
+                                f"{row['map-correlation']:.3f}"))
+        for side in ("reference", "candidate"):
+            values = []
+            for within in ("within-1ms", "within-5ms", "within-10ms"):
+                value = row[f"{side}-partners"][within]
+                values.append(bold_where(value == best_share[side, within], f"{value:.2f}"))
+            cells.append(", ".join(values))
+        lines.append("| " + " | ".join(cells) + " |")
+    calibrated = rows[CALIBRATED]["element"]
+    lag = f"{1000 * result['lag']:.1f} ms" if result["lag"] != 0 else "not sought"
+    lines += ["", f"Frame intervals: {result['calibrated']} to calibrate, the next"
+              f" {result['measured']} to measure. Lag of the frames: {lag}. What was found:"
+              f" `{calibrated}`.", ""]
+    return "\n".join([f"### {result['title'][0].upper()}{result['title'][1:]}", ""] + lines)
+
+
+def plot(path, rows):
+    """How near each simulator is to the camera, as bars."""
+    real = next(iter(rows.values()))["reference"]
+    names = [name.replace("`", "") for name in rows][::-1]
+    panels = {
+        "standard deviation, beside the camera's": (
+            [row["candidate"]["deviation"] / real["deviation"] for row in rows.values()], 1),
+        "correlation of the maps": ([row["map-correlation"] for row in rows.values()], None),
+        "real events with a partner within 5 ms": (
+            [row["reference-partners"]["within-5ms"] for row in rows.values()], None),
+        "simulated events with one": (
+            [row["candidate-partners"]["within-5ms"] for row in rows.values()], None),
+    }
+    figure, axes = plt.subplots(1, len(panels), figsize=(15, 4.6), sharey=True, dpi=90)
+    for axis, (title, (values, goal)) in zip(axes, panels.items()):
+        axis.barh(names, values[::-1], color="#4080d0")
+        axis.set_title(title, fontsize=10)
+        if goal is not None:
+            axis.axvline(goal, color="#1c2230", linewidth=1)
+        axis.spines[["top", "right"]].set_visible(False)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def draw(path, scene, data, elements):
+    """Where events are in the last interval, side by side: ON blue, OFF dark, both dark blue."""
+    colours = np.array([[255, 255, 255], [28, 34, 48], [64, 128, 208], [46, 81, 128]], np.uint8)
+    video, recorded = read(scene, data)
+    span = Span(video.frames[-2].time // 1000, video.frames[-1].time // 1000)
+    streams = {"real events": span.of(recorded)} | {
+        name: span.of(simulate(video, element)) for name, element in elements.items()}
+    tiles = {"camera, before": video.luma(video.frames[-2])} | {
+        name.replace("`", ""): events for name, events in streams.items()}
+    columns = 5
+    rows = (len(tiles) + columns - 1) // columns
+    figure, axes = plt.subplots(rows, columns, figsize=(columns * 3.5, rows * 2.9), dpi=60)
+    for axis in axes.flat:
+        axis.axis("off")
+    for axis, (name, tile) in zip(axes.flat, tiles.items()):
+        axis.set_title(name, fontsize=10)
+        if tile.dtype.names is None:
+            axis.imshow(tile, cmap="gray", vmin=0, vmax=255)
+            continue
+        kinds = np.zeros((video.height, video.width), np.uint8)
+        rows_of = tile["y_p"] & 0x7FFF
+        on = (tile["y_p"] & ON) != 0
+        kinds[rows_of[~on], tile["x"][~on]] |= 1
+        kinds[rows_of[on], tile["x"][on]] |= 2
+        axis.imshow(colours[kinds])
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def replace_tables(path, text):
+    with open(path, encoding="utf-8") as file:
+        page = file.read()
+    begin, end = "<!-- tables of bench/realism -->\n", "<!-- end of the tables -->\n"
+    between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
+    if not between.search(page):
+        sys.exit(f"{path} has no place for the tables")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", page))
+
+
+def main():
+    data = os.environ.get("SHARED_DATA", os.path.join("..", "shared", "data"))
+    Gst.init(None)
+    progress = Progress()
+    results = {}
+    for key, scene in SCENES.items():
+        if not os.path.exists(os.path.join(data, scene.folder, scene.recording)):
+            print(f"{scene.title}: there is no {os.path.join(data, scene.folder)}, left out",
+                  file=sys.stderr)
+            continue
+        results[key] = measure(scene, data, progress)
+    if not results:
+        print("Without recordings there is nothing to measure.", file=sys.stderr)
+        return
+    if os.path.isdir("bench-output"):
+        with open(os.path.join("bench-output", "realism.json"), "w", encoding="utf-8") as file:
+            json.dump(results, file, indent=1)
+    text = "\n".join(table(result) for result in results.values())
+    print(text)
+    if len(sys.argv) > 1 and len(results) == len(SCENES):
+        replace_tables(os.path.join(sys.argv[1], "realism.md"), text)
+        plot(os.path.join(sys.argv[1], "realism-figures.png"), results["slider"]["rows"])
+        # The licence of the other recording allows measuring only.
+        draw(os.path.join(sys.argv[1], "realism.png"), SCENES["davis"], data,
+             {name: results["davis"]["rows"][name]["element"] for name in ROWS})
+
+
+if __name__ == "__main__":
+    main()

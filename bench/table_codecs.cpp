@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// How fast tables of events are read and written, on one core: million events a second, and the
+// time as a ratio to that of a memcpy of the decoded events, in the same run. Names are
+// FORMAT/read or write.
+#include <benchmark/benchmark.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <random>
+#include <string>
+
+#include "src/codec/csv/csv_decoder.hpp"
+#include "src/codec/csv/csv_encoder.hpp"
+#include "src/codec/hdf5/ecf.hpp"
+#include "src/codec/hdf5/hdf5_reader.hpp"
+#include "src/codec/hdf5/hdf5_writer.hpp"
+#include "src/codec/npy/npy_decoder.hpp"
+#include "src/codec/npy/npy_encoder.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+using Events = std::vector<StampedEvent>;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr SensorSize size{1280, 720};
+constexpr std::size_t count = 1 << 20;
+constexpr std::size_t piece = 1 << 20;  // of a file, in bytes
+
+/// Ten events a microsecond: some of them along rows, some anywhere.
+Events make_events() {
+  std::mt19937 random(1);
+  const auto below = [&](int end) {
+    return static_cast<int>(random() % static_cast<unsigned>(end));
+  };
+  Events events;
+  while (events.size() < count) {
+    const int y = below(size.height);
+    int x = below(size.width);
+    for (int run = below(2) == 0 ? 1 : below(30); run > 0 && x < size.width;
+         --run, x += 1 + below(2))
+      events.push_back(StampedEvent::at(x, y, static_cast<Microseconds>(events.size() / 10),
+                                        below(2) == 0 ? Polarity::off : Polarity::on));
+  }
+  events.resize(count);
+  return events;
+}
+
+const Events& events() {
+  static const Events events = make_events();
+  return events;
+}
+
+/// Of this thread: what else the machine does is not counted.
+double seconds_now() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Seconds of a memcpy of the events, the best of some.
+double memcpy_seconds() {
+  Events copy(count);
+  double best = 1;
+  for (int i = 0; i < 20; ++i) {
+    const double start = seconds_now();
+    std::memcpy(static_cast<void*>(copy.data()), events().data(), count * sizeof(StampedEvent));
+    benchmark::DoNotOptimize(copy.data());
+    benchmark::ClobberMemory();
+    best = std::min(best, seconds_now() - start);
+  }
+  return best;
+}
+
+/// Times `body`, which handles all events.
+template <class Body>
+void measure(benchmark::State& state, const Body& body) {
+  body();
+  double seconds = 0;
+  for (auto _ : state) {
+    const double start = seconds_now();
+    body();
+    seconds += seconds_now() - start;
+  }
+  seconds /= static_cast<double>(state.iterations());
+  state.counters["Mevents/s"] = static_cast<double>(count) / seconds / 1e6;
+  state.counters["memcpys"] = seconds / memcpy_seconds();
+}
+
+template <class Make>
+Bytes encode(const Make& make) {
+  Bytes bytes;
+  auto encoder = make();
+  encoder.encode(events(), bytes);
+  encoder.finish(bytes);
+  return bytes;
+}
+
+template <class MakeEncoder, class MakeDecoder>
+void add(const std::string& name, const MakeEncoder& make_encoder,
+         const MakeDecoder& make_decoder) {
+  benchmark::RegisterBenchmark((name + "/read").c_str(), [=](benchmark::State& state) {
+    const auto bytes = encode(make_encoder);
+    Decoded out;
+    measure(state, [&] {
+      out.events.clear();
+      auto decoder = make_decoder();
+      for (std::size_t at = 0; at < bytes.size(); at += piece)
+        decoder.decode(std::span(bytes).subspan(at, std::min(piece, bytes.size() - at)), out);
+      decoder.finish(out);
+    });
+    if (out.events.size() != count) state.SkipWithError("events are missing");
+  });
+  benchmark::RegisterBenchmark((name + "/write").c_str(), [=](benchmark::State& state) {
+    Bytes bytes;
+    measure(state, [&] {
+      bytes.clear();
+      auto encoder = make_encoder();
+      encoder.encode(events(), bytes);
+      encoder.finish(bytes);
+    });
+  });
+}
+
+void add_csv(const std::string& name) {
+  const auto named = std::ranges::find(csv_dialects(), name, &NamedCsvDialect::name);
+  const auto dialect = named->dialect;
+  add(
+      "csv-" + name, [=] { return CsvEncoder(dialect, size); }, [] { return CsvDecoder(); });
+}
+
+void add_ecf() {
+  constexpr std::size_t chunk = 16384;
+  static_assert(count % chunk == 0);
+  benchmark::RegisterBenchmark("ecf/read", [](benchmark::State& state) {
+    std::vector<Bytes> chunks(count / chunk);
+    for (std::size_t i = 0; i < chunks.size(); ++i)
+      encode_ecf(std::span(events()).subspan(i * chunk, chunk), chunks[i]);
+    Events out;
+    measure(state, [&] {
+      out.clear();
+      for (const auto& bytes : chunks) decode_ecf(bytes, out);
+    });
+    if (out.size() != count) state.SkipWithError("events are missing");
+  });
+  benchmark::RegisterBenchmark("ecf/write", [](benchmark::State& state) {
+    Bytes bytes;
+    measure(state, [&] {
+      bytes.clear();
+      for (std::size_t i = 0; i < count; i += chunk)
+        encode_ecf(std::span(events()).subspan(i, chunk), bytes);
+    });
+  });
+}
+
+void add_hdf5(const std::string& name, Hdf5Layout layout, Hdf5Writer::Compression compression) {
+  const auto path = std::filesystem::temp_directory_path() /
+                    ("table_codecs." + name + "." + std::to_string(getpid()));
+  const auto write = [=] {
+    Hdf5Writer writer(path, {layout, compression, size});
+    writer.append(events());
+    writer.close();
+  };
+  benchmark::RegisterBenchmark((name + "/read").c_str(), [=](benchmark::State& state) {
+    write();
+    Events out;
+    measure(state, [&] {
+      out.clear();
+      Hdf5Reader reader(path);
+      while (reader.read(10'000, out) > 0) {
+      }
+    });
+    std::filesystem::remove(path);
+    if (out.size() != count) state.SkipWithError("events are missing");
+  });
+  benchmark::RegisterBenchmark((name + "/write").c_str(), [=](benchmark::State& state) {
+    measure(state, write);
+    std::filesystem::remove(path);
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  for (const auto* const name : {"names", "metavision", "rpg"}) add_csv(name);
+  add(
+      "npy", [] { return NpyEncoder(); }, [] { return NpyDecoder(size); });
+  add_ecf();
+  add_hdf5("dsec", Hdf5Layout::dsec, Hdf5Writer::Compression::none);
+  add_hdf5("dsec-gzip", Hdf5Layout::dsec, Hdf5Writer::Compression::gzip);
+  add_hdf5("metavision", Hdf5Layout::metavision, Hdf5Writer::Compression::none);
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+}
