@@ -15,6 +15,9 @@
  * a change of light by 22 %; linear has as many units from black to white as lin-log, ln(255) =
  * 5.54, so that 0.2 are 9.2 grey levels of 8-bit video.
  *
+ * What the sensor of a webcam makes of itself is not light: where a still scene fires, or the dark,
+ * denoise keeps its noise away, and its edges where they are.
+ *
  * The same video, settings and seed give the same events, whatever the number of threads.
  *
  * ## Example launch lines
@@ -65,6 +68,10 @@ struct Setting {
 };
 
 const Setting table[] = {
+    {"denoise", "Denoise",
+     "Smooth the frames first, but no difference between neighbours beyond this many grey levels, "
+     "white being 255: a frame's noise is not light (0 = off)",
+     &DvsSettings::denoise, 0, 255},
     {"linear-light", "Linear light",
      "Undo the transfer function of sRGB (IEC 61966-2-1) first, so that light is what the camera "
      "saw; otherwise luma is taken to be light",

@@ -24,8 +24,9 @@ enum class RefractoryReset {
   signal,  ///< at the signal as the refractory period ends
 };
 
-/// All of a pixel array. Every stage but the first two is off where its numbers are 0.
+/// All of a pixel array. Every stage but response and upsampling is off where its numbers are 0.
 struct DvsSettings {
+  double denoise = 0;         ///< of the frames: differences of this size are noise; white is 255
   bool linear_light = false;  ///< undo the transfer function of sRGB first
   Response response = Response::lin_log;
   double log_eps = 1e-3;  ///< of the response log; white is 1

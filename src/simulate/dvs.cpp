@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "src/flow/flow_of_changes.hpp"
+#include "src/picture/denoise.hpp"
 #include "src/picture/grey8.hpp"
 #include "src/pixel/event_collector.hpp"
 #include "src/pixel/light_response.hpp"
@@ -54,7 +55,7 @@ class PixelSimulator final : public DvsSimulator {
 
  private:
   void start(const LumaView& frame) override {
-    last_.assign(frame.as<Pixel>());
+    keep(frame, last_);
     finder_.reset();
     segments_ = 0;
     order_.reset();
@@ -65,7 +66,7 @@ class PixelSimulator final : public DvsSimulator {
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
                 EventBuckets& events) override {
-    now_.assign(frame.as<Pixel>());
+    keep(frame, now_);
     const double duration = begin(interval);
     if (current_.upsampling == Upsampling::motion)
       pass_along_motion(duration);
@@ -81,6 +82,15 @@ class PixelSimulator final : public DvsSimulator {
     pass_straight(duration);
     finish(duration, events);
     return true;
+  }
+
+  void keep(const LumaView& frame, Plane<Pixel>& kept) {
+    const int white = (1 << format().bits) - 1;
+    const int limit = static_cast<int>(std::lround(settings_.denoise / 255 * white));
+    if (limit > 0)
+      denoise(frame.as<Pixel>(), limit, threads(), kept);
+    else
+      kept.assign(frame.as<Pixel>());
   }
 
   /// Returns the duration of the interval, microseconds.

@@ -363,7 +363,8 @@ TEST(Dvs, GivesRampsTheirExactTimes) {
 }
 
 DvsSettings everything() {
-  return {.response = Response::log,
+  return {.denoise = 4,
+          .response = Response::log,
           .cutoff_hz = 60,
           .threshold_sigma = 0.03,
           .threshold_jitter = 0.02,
@@ -494,6 +495,32 @@ TEST(Dvs, IsBoundedWhateverComes) {
     EXPECT_LE(playback.events.size(), 20U * 10U * 512U * 10U);
     EXPECT_GT(playback.events.size(), 20U * 10U * 100U);
   }
+}
+
+TEST(Dvs, DoesNotSeeTheNoiseOfFramesThatAreDenoised) {
+  const auto events_of = [](double denoise) {
+    Playback playback({80, 60, 8}, {.denoise = denoise});
+    std::minstd_rand random(9);
+    std::normal_distribution<> normal(0, 2);
+    for (int i = 0; i < 10; ++i) {
+      // A square moves before a still ground.
+      auto frame = scene::square(80, 60, 10 + 3 * i, 20, 20, 90, 30);
+      for (int y = 0; y < frame.height(); ++y)
+        for (int x = 0; x < frame.width(); ++x)
+          frame.at(x, y) = static_cast<std::uint8_t>(std::lround(frame.at(x, y) + normal(random)));
+      playback.push(frame, 8, i * 40'000'000LL);
+    }
+    const auto on_the_way = [](const Timed& event) {
+      return event.y >= 19 && event.y < 41 && event.x >= 9 && event.x < 60;
+    };
+    const auto seen = std::count_if(playback.events.begin(), playback.events.end(), on_the_way);
+    return std::pair(seen, static_cast<std::ptrdiff_t>(playback.events.size()) - seen);
+  };
+  const auto [seen, made_up] = events_of(0);
+  const auto [seen_still, made_up_still] = events_of(8);
+  EXPECT_GT(made_up, 100);
+  EXPECT_LT(made_up_still, made_up / 50);
+  EXPECT_GT(seen_still, seen * 3 / 4);
 }
 
 TEST(Dvs, HasItsSharesOfHotAndDeadPixels) {
