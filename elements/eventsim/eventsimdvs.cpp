@@ -125,6 +125,15 @@ const Setting table[] = {
      &DvsSettings::refractory_period, 0, 1e6},
     {"refractory-reset", "Refractory reset", "Where the reference of a pixel is after an event",
      &DvsSettings::refractory_reset},
+    {"exposure-pulse", "Exposure pulse",
+     "Cameras that give frames too couple them into their events: all signals rise by this much "
+     "for "
+     "a millisecond as an exposure begins (units of the response)",
+     &DvsSettings::exposure_pulse, 0, 10},
+    {"exposure-lead", "Exposure lead",
+     "From the beginning of a frame's exposure to the frame's time, microseconds, up to the time "
+     "from frame to frame",
+     &DvsSettings::exposure_lead, 0, 1e6},
     {"latency", "Latency",
      "From the crossing of a threshold to the event, microseconds; the refractory period begins "
      "then. What lies behind the last frame is not sent",

@@ -51,6 +51,9 @@ struct DvsSettings {
   double refractory_period = 0;  ///< microseconds
   RefractoryReset refractory_reset = RefractoryReset::level;
 
+  double exposure_pulse = 0;  ///< of all signals as an exposure begins, units of the response
+  double exposure_lead = 0;   ///< microseconds from then to the frame's time
+
   double latency = 0;         ///< microseconds from the crossing to the event
   double latency_jitter = 0;  ///< its deviation, microseconds
   double max_event_rate = 0;  ///< of the readout, events a second; 0 = no limit

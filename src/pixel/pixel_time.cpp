@@ -45,15 +45,15 @@ class Pixel {
         reference_(pixels.reference.at(x, y)),
         positive_(pixels.positive.at(x, y)),
         negative_(pixels.negative.at(x, y)),
+        leak_(pixels.leak.at(x, y) + segment.rise / segment.duration),
         ready_(pixels.rest.at(x, y)),
         released_(ready_),
         held_(settings.refractory_reset == RefractoryReset::signal && ready_ > 0),
         expected_noise_(course.expected_noise),
         quiet_(pixels.quiet.at(x, y)) {
     // That the reference falls, or the signal rises above it, is the same.
-    const double leak = pixels.leak.at(x, y);
-    above_leak_.slope += leak;
-    end_ = {segment.duration, course.last_signal + leak * segment.duration};
+    above_leak_.slope += leak_;
+    end_ = {segment.duration, course.last_signal + leak_ * segment.duration};
   }
 
   void pass() {
@@ -205,8 +205,7 @@ class Pixel {
 
   void keep() {
     // As it lies below the signal when the next segment begins.
-    const double leaked = pixels_.leak.at(x_, y_) * end_.t;
-    pixels_.reference.at(x_, y_) = static_cast<float>(reference_ - leaked);
+    pixels_.reference.at(x_, y_) = static_cast<float>(reference_ - leak_ * end_.t);
     pixels_.positive.at(x_, y_) = static_cast<float>(positive_);
     pixels_.negative.at(x_, y_) = static_cast<float>(negative_);
     const double rest = (held_ ? released_ : ready_) - end_.t;
@@ -230,6 +229,7 @@ class Pixel {
   double reference_;
   double positive_;
   double negative_;
+  double leak_;      ///< a microsecond
   double ready_;     ///< not earlier does it fire again
   double released_;  ///< where the refractory period ends
   bool held_;        ///< in reset until then

@@ -22,6 +22,7 @@ struct Segment {
   double begin;          ///< microseconds after the start of the interval
   double duration;       ///< microseconds
   std::uint64_t number;  ///< of all since the first frame
+  double rise = 0;       ///< of all signals besides, units of the response
 };
 
 /// Takes pixels through segments one by one, exactly: crossings of the thresholds, leak counted

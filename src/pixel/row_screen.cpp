@@ -42,6 +42,8 @@ void pass(const Screen& screen, const Pixel* luma, int y, PixelArray& pixels,
   const auto zero = hn::Zero(floats);
   const auto white = hn::Set(words, screen.response.white());
   const auto duration = hn::Set(floats, screen.duration);
+  const auto share = hn::Set(floats, screen.share);
+  const auto rise = hn::Set(floats, screen.rise);
   float* targets = pixels.target.row(y);
   float* signals = pixels.signal.row(y);
   float* references = pixels.reference.row(y);
@@ -61,9 +63,12 @@ void pass(const Screen& screen, const Pixel* luma, int y, PixelArray& pixels,
     }
     const auto value = hn::Min(load_luma(here), white);
     const auto shade = hn::ShiftRightSame(value, screen.bits - 8);
-    const auto target = hn::GatherIndex(floats, screen.response.values(), value);
+    auto target = hn::GatherIndex(floats, screen.response.values(), value);
     const auto last_target = hn::LoadU(floats, targets + x);
-    const auto leaked = hn::Mul(hn::LoadU(floats, leaks + x), duration);
+    if (screen.share < 1)
+      target = hn::Add(last_target, hn::Mul(hn::Sub(target, last_target), share));
+    // That all signals rise is the same as that all references fall.
+    const auto leaked = hn::Add(hn::Mul(hn::LoadU(floats, leaks + x), duration), rise);
 
     auto last_signal = last_target;
     auto signal = target;

@@ -34,6 +34,8 @@ struct Screen {
   const ShadeTables& tables;
   int bits;        ///< of the luma
   float duration;  ///< microseconds
+  float share;     ///< of the way to the luma's response that the light goes
+  float rise;      ///< of all signals besides, units of the response
   bool has_bandwidth;
   bool has_noise;
 };

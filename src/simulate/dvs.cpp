@@ -11,7 +11,9 @@
 #include "src/picture/denoise.hpp"
 #include "src/picture/grey8.hpp"
 #include "src/pixel/event_collector.hpp"
+#include "src/pixel/exposure_pulse.hpp"
 #include "src/pixel/light_response.hpp"
+#include "src/pixel/passages.hpp"
 #include "src/pixel/pixel_array.hpp"
 #include "src/pixel/pixel_time.hpp"
 #include "src/pixel/readout.hpp"
@@ -71,7 +73,7 @@ class PixelSimulator final : public DvsSimulator {
     if (current_.upsampling == Upsampling::motion)
       pass_along_motion(duration);
     else
-      pass_straight(duration);
+      pass_straight(duration, true);
     finish(duration, events);
     std::swap(last_, now_);
   }
@@ -79,7 +81,7 @@ class PixelSimulator final : public DvsSimulator {
   bool hold(const StepTimes& interval, const Settings&, EventBuckets& events) override {
     now_.assign(last_.view());
     const double duration = begin(interval);
-    pass_straight(duration);
+    pass_straight(duration, false);
     finish(duration, events);
     return true;
   }
@@ -114,18 +116,19 @@ class PixelSimulator final : public DvsSimulator {
     if (!is_limited) readout_.reset();  // now that nothing waits in it
   }
 
-  void pass_straight(double duration) {
+  void pass_straight(double duration, bool is_exposed) {
     finder_.reset();  // what it knows is not the last frame any more
-    tables_.emplace(current_, duration);
-    const Segment segment{0, duration, segments_++};
+    plan(duration, 1, is_exposed);
     for_each_band([&](const BandRows& rows, Scratch& scratch, EventCollector& collector) {
       scratch.luma.resize(static_cast<std::size_t>(format().width));
       for (int y = rows.first; y < rows.last; ++y) {
-        if (luma_bits(current_) == format().bits) {
-          pass_row_of_luma(now_.row(y), y, segment, scratch, collector);
-        } else {
-          widen_row(now_.row(y), format().width, scratch.luma.data());
-          pass_row_of_luma(scratch.luma.data(), y, segment, scratch, collector);
+        const bool is_ready = luma_bits(current_) == format().bits;
+        if (!is_ready) widen_row(now_.row(y), format().width, scratch.luma.data());
+        for (std::size_t i = 0; i < passages_.size(); ++i) {
+          if (is_ready)
+            pass_row_of_luma(now_.row(y), y, i, scratch, collector);
+          else
+            pass_row_of_luma(scratch.luma.data(), y, i, scratch, collector);
         }
       }
     });
@@ -134,23 +137,42 @@ class PixelSimulator final : public DvsSimulator {
   void pass_along_motion(double duration) {
     const auto flow = find_flow();
     const int steps = std::clamp(steps_of(flow), 1, current_.max_steps);
-    tables_.emplace(current_, duration / steps);
+    plan(duration, steps, true);
     const Warp<Pixel> warp{last_.view(), now_.view(), steps};
     for_each_band([&](const BandRows& rows, Scratch& scratch, EventCollector& collector) {
       scratch.luma.resize(static_cast<std::size_t>(format().width));
-      for (int j = 1; j <= steps; ++j) {
-        const Segment segment{duration * (j - 1) / steps, duration / steps,
-                              segments_ + static_cast<std::uint64_t>(j)};
+      for (std::size_t i = 0; i < passages_.size(); ++i) {
+        const int step = passages_[i].step;
         for (int y = rows.first; y < rows.last; ++y) {
-          if (j < steps)
-            interpolate_row(warp, flow, y, j, scratch.luma.data());
+          if (step < steps)
+            interpolate_row(warp, flow, y, step, scratch.luma.data());
           else
             widen_row(now_.row(y), format().width, scratch.luma.data());
-          pass_row_of_luma(scratch.luma.data(), y, segment, scratch, collector);
+          pass_row_of_luma(scratch.luma.data(), y, i, scratch, collector);
         }
       }
     });
-    segments_ += static_cast<std::uint64_t>(steps);
+  }
+
+  /// What is the same for all pixels in the interval to come.
+  void plan(double duration, int steps, bool is_exposed) {
+    cut_into_passages(duration, steps, pulse_.next(current_, duration, is_exposed), passages_);
+    first_segment_ = segments_;
+    segments_ += passages_.size();
+    tables_.clear();
+    table_of_.clear();
+    for (const auto& passage : passages_) {
+      const auto same = std::find_if(passages_.begin(), passages_.end(), [&](const auto& other) {
+        return other.duration == passage.duration;
+      });
+      const auto before = static_cast<std::size_t>(same - passages_.begin());
+      if (before < table_of_.size()) {
+        table_of_.push_back(table_of_[before]);
+      } else {
+        table_of_.push_back(tables_.size());
+        tables_.emplace_back(current_, passage.duration);
+      }
+    }
   }
 
   PlaneView<Flow> find_flow() {
@@ -182,18 +204,23 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   template <class Luma>
-  void pass_row_of_luma(const Luma* luma, int y, const Segment& segment, Scratch& scratch,
+  void pass_row_of_luma(const Luma* luma, int y, std::size_t i, Scratch& scratch,
                         EventCollector& collector) {
+    const Passage& passage = passages_[i];
+    const ShadeTables& tables = tables_[table_of_[i]];
+    const Segment segment{passage.begin, passage.duration, first_segment_ + i, passage.rise};
     const Screen screen{*response_,
-                        *tables_,
+                        tables,
                         luma_bits(current_),
-                        static_cast<float>(segment.duration),
+                        static_cast<float>(passage.duration),
+                        static_cast<float>(passage.share),
+                        static_cast<float>(passage.rise),
                         current_.cutoff_hz > 0,
                         current_.shot_noise_rate_hz > 0};
     auto& candidates = scratch.candidates;
     candidates.clear();
     pass_row(screen, luma, y, pixels_, candidates);
-    PixelTime(current_, random_, segment).pass(pixels_, y, candidates, *tables_, collector);
+    PixelTime(current_, random_, segment).pass(pixels_, y, candidates, tables, collector);
   }
 
   /// Of the luma that the pixels are shown.
@@ -228,6 +255,7 @@ class PixelSimulator final : public DvsSimulator {
 
   /// The last frame has always been there.
   void settle() {
+    pulse_.reset();
     const int widening = luma_bits(current_) == format().bits ? 1 : 257;
     for_each_row([&](int y) {
       for (int x = 0; x < format().width; ++x)
@@ -256,7 +284,11 @@ class PixelSimulator final : public DvsSimulator {
   DvsSettings current_;  ///< what the pixels are made for
   Random random_{0};
   std::optional<LightResponse> response_;
-  std::optional<ShadeTables> tables_;
+  ExposurePulse pulse_;
+  std::vector<Passage> passages_;      ///< of the interval, in the order of time
+  std::vector<ShadeTables> tables_;    ///< for each duration of a passage
+  std::vector<std::size_t> table_of_;  ///< of each passage
+  std::uint64_t first_segment_ = 0;    ///< the number of the first passage
   std::uint64_t segments_ = 0;
   EventOrder order_;
   EventBuckets ordered_;

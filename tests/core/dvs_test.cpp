@@ -375,6 +375,8 @@ DvsSettings everything() {
           .dead_pixels = 0.02,
           .refractory_period = 400,
           .refractory_reset = RefractoryReset::signal,
+          .exposure_pulse = 0.05,
+          .exposure_lead = 9000,
           .latency = 300,
           .latency_jitter = 100,
           .max_event_rate = 2e7,
@@ -536,6 +538,67 @@ TEST(Dvs, HasItsSharesOfHotAndDeadPixels) {
   dead.push(flat(200, 150, 10), 8, 0);
   dead.push(flat(200, 150, 240), 8, 40'000'000);
   EXPECT_NEAR(static_cast<double>(by_pixel(dead.events).size()), 27'000, 300);
+}
+
+TEST(Dvs, FiresAllOverAsExposuresBegin) {
+  // What a still scene sees of the first pulse, up and down by 0.45: ON as it passes 0.2 and 0.4,
+  // OFF as it passes 0.1 again.
+  const auto first_pulse_is_at = [&](double begin, double lead) {
+    Playback playback({9, 3, 8},
+                      {.negative_threshold = 0.3, .exposure_pulse = 0.45, .exposure_lead = lead});
+    stand(playback, flat(9, 3, 90), 3, 40'000'000);
+    const auto pixels = by_pixel(playback.events);
+    ASSERT_EQ(pixels.size(), 27U) << lead;
+    for (const auto& [place, events] : pixels) {
+      ASSERT_GE(events.size(), 3U) << lead;
+      EXPECT_NEAR(events[0].t + 0.5, begin + 44.4, 0.6) << lead;
+      EXPECT_NEAR(events[1].t + 0.5, begin + 88.9, 0.6) << lead;
+      EXPECT_NEAR(events[2].t + 0.5, begin + 900 + 77.8, 0.6) << lead;
+      EXPECT_EQ(events[1].polarity, Polarity::on);
+      EXPECT_EQ(events[2].polarity, Polarity::off);
+    }
+  };
+  first_pulse_is_at(33'000, 7000);
+  first_pulse_is_at(39'400, 600);  // ends after the frame
+  first_pulse_is_at(39'900, 0);    // an edge has to be within the interval
+  first_pulse_is_at(0, 40'000);
+
+  Playback later({9, 3, 8}, {.exposure_pulse = 0.45, .exposure_lead = 40'001});
+  stand(later, flat(9, 3, 90), 3, 40'000'000);
+  EXPECT_TRUE(later.events.empty());
+}
+
+TEST(Dvs, SeesTheSameLightWhereAPulseCutsIt) {
+  for (const auto upsampling : {Upsampling::linear, Upsampling::motion}) {
+    const auto events_with = [&](double pulse) {
+      Playback playback(
+          {90, 40, 8},
+          {.upsampling = upsampling, .exposure_pulse = pulse, .exposure_lead = 21'234});
+      for (int i = 0; i < 5; ++i)
+        playback.push(scene::texture<std::uint8_t>(90, 40, 8, 3.0 * i, i), 8, i * 40'000'000LL);
+      return playback.events;
+    };
+    const auto whole = events_with(0);
+    const auto cut = events_with(1e-9);
+    ASSERT_GT(whole.size(), 10'000U);
+    // Rounding may move an event from one microsecond to the next, and so past another one.
+    EXPECT_NEAR(static_cast<double>(cut.size()), static_cast<double>(whole.size()), 3);
+    double sum = 0;
+    double cut_sum = 0;
+    for (const auto& event : whole) sum += event.t;
+    for (const auto& event : cut) cut_sum += event.t;
+    EXPECT_NEAR(cut_sum / static_cast<double>(cut.size()), sum / static_cast<double>(whole.size()),
+                20);
+    // A pulse makes ON of what was about to be.
+    const auto pulsed = events_with(0.1);
+    const auto on_within = [](const std::vector<Timed>& events) {
+      return std::count_if(events.begin(), events.end(), [](const Timed& event) {
+        const double t = std::fmod(event.t, 40'000) - (40'000 - 21'234);
+        return event.polarity == Polarity::on && t >= 0 && t <= 100;
+      });
+    };
+    EXPECT_GT(on_within(pulsed), 20 * on_within(whole));
+  }
 }
 
 TEST(Dvs, SendsEventsAsLateAsItsLatency) {
