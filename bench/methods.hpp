@@ -47,10 +47,8 @@ inline Method dense_method(const std::string& name, FlowMethod flow) {
           }};
 }
 
-/// Of the physical pixel; its thresholds are the preset's.
-inline Method dvs_method(const std::string& name, DvsPreset preset, Upsampling upsampling) {
-  auto settings = settings_of(preset);
-  settings.upsampling = upsampling;
+/// Of the physical pixel; its thresholds are those of the settings.
+inline Method dvs_method(const std::string& name, const DvsSettings& settings) {
   return {name, 0,
           [settings](const LumaFormat& format) {
             return std::make_unique<plain::DvsSimulator>(format, settings);
@@ -71,11 +69,11 @@ inline const Method sparse_method{"sparse", 6, make_plain<plain::SparseSimulator
                                   make_sparse_simulator};
 inline const Method diff_method{"diff", 19, make_plain<plain::DiffSimulator>(),
                                 make_diff_simulator};
-inline const Method dvs_ideal_method =
-    dvs_method("dvs-ideal", DvsPreset::ideal, Upsampling::linear);
+inline const Method dvs_ideal_method = dvs_method("dvs-ideal", settings_of(DvsPreset::ideal));
+inline const Method dvs_denoised_method = dvs_method("dvs-denoised", {.denoise = 8});
 inline const Method dvs_noisy_method =
-    dvs_method("dvs-v2e-noisy", DvsPreset::v2e_noisy, Upsampling::linear);
+    dvs_method("dvs-v2e-noisy", settings_of(DvsPreset::v2e_noisy));
 inline const Method dvs_motion_method =
-    dvs_method("dvs-motion", DvsPreset::ideal, Upsampling::motion);
+    dvs_method("dvs-motion", {.upsampling = Upsampling::motion});
 
 }  // namespace bench

@@ -38,10 +38,14 @@ ROWS = {
     "dense, `farneback`, `blend`": "eventsim-dense flow=farneback interpolation=blend",
     "sparse": "eventsim-sparse",
     "diff": "eventsim-diff",
-    "`eventsim-dvs preset=esim`": "eventsim-dvs preset=esim response=log log-eps=0.001",
-    "`eventsim-dvs preset=v2e-noisy`": "eventsim-dvs preset=v2e-noisy response=lin-log",
+    "`eventsim-dvs preset=esim`":
+        "eventsim-dvs preset=esim response=log log-eps=0.001 denoise=0 exposure-pulse=0",
+    "`eventsim-dvs preset=v2e-noisy`":
+        "eventsim-dvs preset=v2e-noisy response=lin-log denoise=0 exposure-pulse=0",
     "`eventsim-dvs`, linear grey": "eventsim-dvs upsampling=motion response=linear",
     "`eventsim-dvs`, straight lines": "eventsim-dvs upsampling=linear",
+    "`eventsim-dvs`, noise and all": "eventsim-dvs upsampling=motion denoise=0",
+    "`eventsim-dvs`, without pulses": "eventsim-dvs upsampling=motion exposure-pulse=0",
     "`eventsim-dvs`": "eventsim-dvs upsampling=motion",
 }
 CALIBRATED = "`eventsim-dvs`"
@@ -105,7 +109,9 @@ def measure(scene, data, progress):
         early = delayed(video, lag)
         training, _ = spans(early)
         early = until(early, training.end)
-        element = calibrate(early, recorded, training, ROWS[CALIBRATED], progress)
+        # Pulses have times of their own.
+        element = calibrate(early, recorded, training, ROWS[CALIBRATED] + " exposure-pulse=0",
+                            progress)
         lag += refine_lag(early, recorded, training, element, progress)
     video = delayed(video, lag)
     training, test = spans(video)

@@ -115,6 +115,7 @@ void register_simulators(const Scene& scene) {
     add_method(sparse_method);
     add_method(diff_method);
     add_method(dvs_ideal_method);
+    add_method(dvs_denoised_method);
     add_method(dvs_noisy_method);
     add_method(dvs_motion_method);
   }

@@ -25,6 +25,7 @@ METHODS = {
     "sparse": "sparse, whole",
     "diff": "diff, whole",
     "dvs-ideal": "dvs, `ideal`",
+    "dvs-denoised": "dvs, `ideal`, `denoise=8`",
     "dvs-v2e-noisy": "dvs, `v2e-noisy`",
     "dvs-motion": "dvs, `ideal`, `upsampling=motion`, whole",
 }

@@ -34,8 +34,12 @@ MOST_ROUNDS = 3
 MOST_TRIALS = 60
 # How many frames before a stretch of time are played too: pixels have a past.
 PAST_FRAMES = 5
-# The offset of a logarithmic response, as a share of white.
-LOG_OFFSETS = [0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16]
+# Of eventsim-dvs, the offset of a logarithmic response, as a share of white; how many grey levels of
+# a frame may be noise; and how far an exposure's pulse goes, as a share of the threshold.
+LOG_OFFSETS = [0.0025, 0.0035, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11, 0.16]
+COARSELY = 2
+DENOISE = [0, 2, 4, 8, 12]
+PULSES = [0, 0.04, 0.08, 0.12, 0.16, 0.24]
 
 
 # What simulators read where it lies: the luma of a decoder is left as it is.
@@ -353,37 +357,117 @@ def find_thresholds(video, recorded, span, element, progress):
     return best
 
 
-def choices_of(element):
-    """What else is to be chosen: of eventsim-dvs, the response and the offset within it."""
-    name = element.split()[0]
-    made = Gst.ElementFactory.make(name)
-    if made is None or "response=" in element or made.find_property("response") is None:
-        return [element]
-    choices = []
-    for response in made.find_property("response").enum_class.__enum_values__.values():
-        chosen = f"{element} response={response.value_nick}"
-        if response.value_nick == "log" and "log-eps=" not in element:
-            choices += [f"{chosen} log-eps={offset:g}" for offset in LOG_OFFSETS]
-        else:
-            choices.append(chosen)
-    return choices
+def likeness(figures):
+    """How alike two streams are: the mean of the map correlation and of the shares of events that
+    have a partner, within 1, 5 and 10 ms, on both sides."""
+    shares = [figures[f"{side}-partners"][distance] for side in ("reference", "candidate")
+              for distance in ("within-1ms", "within-5ms", "within-10ms")]
+    return float(np.mean([figures["map-correlation"], *shares]))
+
+
+class Choices:
+    """What else of an element is to be chosen than its thresholds, and how well it does then."""
+
+    def __init__(self, video, recorded, span, element, progress):
+        self.video, self.recorded, self.span = video, recorded, span
+        self.element, self.progress = element, progress
+        self.tried = {}
+
+    def is_free(self, name):
+        made = Gst.ElementFactory.make(self.element.split()[0])
+        return (made is not None and made.find_property(name) is not None
+                and f"{name}=" not in self.element)
+
+    def with_properties(self, chosen):
+        return " ".join([self.element] + [f"{name}={value:g}" if isinstance(value, float)
+                                          else f"{name}={value}" for name, value in chosen.items()])
+
+    def calibrated(self, chosen):
+        """With the thresholds that suit the recording, and how alike the streams are then."""
+        element = self.with_properties(chosen)
+        if element not in self.tried:
+            thresholds = find_thresholds(self.video, self.recorded, self.span, element,
+                                         self.progress)
+            found = with_thresholds(element, thresholds)
+            figures = compare(self.video, self.recorded, simulate(self.video, found), self.span)
+            self.tried[element] = likeness(figures), thresholds, found
+            self.progress.tell(f"{found}: likeness {likeness(figures):.4f}")
+        return self.tried[element]
+
+    def best_response(self):
+        """Coarsely, of the offset."""
+        if not self.is_free("response"):
+            return {}
+        made = Gst.ElementFactory.make(self.element.split()[0])
+        choices = []
+        for response in made.find_property("response").enum_class.__enum_values__.values():
+            if response.value_nick == "log" and self.is_free("log-eps"):
+                choices += [{"response": "log", "log-eps": offset}
+                            for offset in LOG_OFFSETS[::COARSELY]]
+            else:
+                choices.append({"response": response.value_nick})
+        return max(choices, key=lambda chosen: self.calibrated(chosen)[0])
+
+    def climb(self, chosen, axes):
+        """From value to neighbouring value, as long as that makes the streams more alike."""
+        improved = True
+        while improved:
+            improved = False
+            for name, values in axes.items():
+                for step in (1, -1):
+                    while True:
+                        i = values.index(chosen[name]) + step
+                        if not 0 <= i < len(values):
+                            break
+                        other = chosen | {name: values[i]}
+                        if self.calibrated(other)[0] <= self.calibrated(chosen)[0]:
+                            break
+                        chosen, improved = other, True
+        return chosen
 
 
 def calibrate(video, recorded, span, element, progress):
-    """The element with the thresholds, and for eventsim-dvs the response and offset, that suit the
-    recording."""
-    best, best_correlation = None, -2
-    choices = choices_of(element)
-    for choice in choices:
-        thresholds = find_thresholds(video, recorded, span, choice, progress)
-        calibrated = with_thresholds(choice, thresholds)
-        if len(choices) == 1:
-            return calibrated
-        figures = compare(video, recorded, simulate(video, calibrated), span)
-        progress.tell(f"{calibrated}: map correlation {figures['map-correlation']:.3f}")
-        if figures["map-correlation"] > best_correlation:
-            best, best_correlation = calibrated, figures["map-correlation"]
-    return best
+    """The element with the thresholds that suit the recording, and for eventsim-dvs with the
+    response and its offset, denoising, and the pulse of exposures, where the recording has one."""
+    choices = Choices(video, recorded, span, element, progress)
+    chosen = choices.best_response()
+    axes = {}
+    if "log-eps" in chosen:
+        axes["log-eps"] = LOG_OFFSETS
+    if choices.is_free("denoise"):
+        chosen, axes["denoise"] = chosen | {"denoise": 0}, DENOISE
+    if choices.is_free("exposure-pulse") and choices.is_free("exposure-lead"):
+        lead = find_exposure_lead(video, recorded, span)
+        if lead is not None:
+            threshold = choices.calibrated(chosen)[1][0]
+            chosen |= {"exposure-lead": lead, "exposure-pulse": 0.0}
+            axes["exposure-pulse"] = [share * threshold for share in PULSES]
+    if not axes and not chosen:
+        return with_thresholds(element, find_thresholds(video, recorded, span, element, progress))
+    return choices.calibrated(choices.climb(chosen, axes))[2]
+
+
+def find_exposure_lead(video, recorded, span):
+    """How long before a frame's time its exposure begins, in microseconds, if that shows in the
+    recording: the camera then fires ON all over the picture, within a fraction of a millisecond."""
+    times = np.array([frame.time for frame in video.frames]) // 1000
+    on = recorded["t"][(recorded["y_p"] & ON) != 0]
+    seen = [(frame, on[(on > before) & (on <= frame)])
+            for before, frame in zip(times, times[1:])
+            if before >= min(span.start, recorded["t"][0]) and frame <= span.end]
+    if not seen:
+        return None
+    width = 100
+    longest = max(frame - before for before, frame in zip(times, times[1:]))
+    leads = np.concatenate([frame - events for frame, events in seen])
+    counts, edges = np.histogram(leads, np.arange(0, longest + width, width))
+    burst = int(np.argmax(counts))
+    if counts[burst] < 50 * len(seen) or counts[burst] < 10 * np.median(counts):
+        return None
+    # It begins where there are events in plenty first, which is the longest lead.
+    while burst + 1 < len(counts) and counts[burst + 1] > counts.max() / 4:
+        burst += 1
+    return int(edges[burst + 1])
 
 
 def find_lag(video, recorded):

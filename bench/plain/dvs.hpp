@@ -8,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "bench/plain/denoise.hpp"
 #include "bench/plain/opencv.hpp"
 #include "bench/plain/pixels.hpp"
 #include "src/pixel/presets.hpp"
@@ -148,20 +149,27 @@ class DvsSimulator final : public Simulator {
         settings_(settings),
         pixels_(format.width, format.height, settings),
         last_(format.width, format.height),
-        between_(format.width, format.height) {
+        between_(format.width, format.height),
+        denoised_(format.width, format.height) {
     if (settings.upsampling == Upsampling::motion)
       flow_.emplace(FlowMethod::dis_lq, format.width, format.height);
   }
 
  private:
+  PlaneView<std::uint8_t> seen(const LumaView& frame) {
+    if (settings_.denoise == 0) return frame.as<std::uint8_t>();
+    denoise(frame.as<std::uint8_t>(), static_cast<int>(settings_.denoise), threads(), denoised_);
+    return denoised_.view();
+  }
+
   void start(const LumaView& frame) override {
-    last_.assign(frame.as<std::uint8_t>());
+    last_.assign(seen(frame));
     pixels_.start(last_.view());
   }
 
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
                 EventBuckets& events) override {
-    const auto now = frame.as<std::uint8_t>();
+    const auto now = seen(frame);
     const double duration = static_cast<double>(interval.duration()) * 1e-9;
     PlaneView<Flow> flow;
     int steps = 1;
@@ -194,6 +202,7 @@ class DvsSimulator final : public Simulator {
   DvsPixels pixels_;
   Plane<std::uint8_t> last_;
   Plane<std::uint8_t> between_;
+  Plane<std::uint8_t> denoised_;
   std::optional<OpenCvFlow> flow_;
 };
 
