@@ -204,11 +204,11 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   template <class Luma>
-  void pass_row_of_luma(const Luma* luma, int y, std::size_t i, Scratch& scratch,
+  void pass_row_of_luma(const Luma* luma, int y, std::size_t which, Scratch& scratch,
                         EventCollector& collector) {
-    const Passage& passage = passages_[i];
-    const ShadeTables& tables = tables_[table_of_[i]];
-    const Segment segment{passage.begin, passage.duration, first_segment_ + i, passage.rise};
+    const Passage& passage = passages_[which];
+    const ShadeTables& tables = tables_[table_of_[which]];
+    const Segment segment{passage.begin, passage.duration, first_segment_ + which, passage.rise};
     const Screen screen{*response_,
                         tables,
                         luma_bits(current_),
