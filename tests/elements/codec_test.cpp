@@ -324,6 +324,17 @@ TEST_P(EveryFormat, SaysWhenItIsNotThisFormat) {
   }
 }
 
+TEST_P(EveryFormat, IsNoFileWithoutAByte) {
+  const TemporaryFile file("");
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(file.path(), way + format().reader);
+    const auto message = player.play();
+    ASSERT_TRUE(message);
+    ASSERT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_ERROR);
+    EXPECT_TRUE(text_of(message.get()).starts_with("This cannot be read: ")) << way;
+  }
+}
+
 TEST_P(EveryFormat, WarnsOnceOfDamageAndTellsWhere) {
   const auto events = some_events();
   auto file = file_of(format(), events);
