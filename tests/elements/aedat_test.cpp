@@ -549,6 +549,16 @@ TEST(AedatDemux, SeeksWhilePlayingAgainAndAgain) {
   EXPECT_EQ(player.track("video_0").pictures.size(), 50U);
 }
 
+/// Of the first damage, as the decoder finds it without any element.
+std::uint64_t place_of_damage(const Bytes& bytes) {
+  Aedat4Decoder decoder;
+  decoder.push(bytes);
+  decoder.finish();
+  while (decoder.next()) continue;
+  EXPECT_GT(decoder.damage().places, 0U);
+  return decoder.damage().first_at;
+}
+
 TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
   const auto events = steady_events(2'000'000, 50);
   const auto whole = aedat4(events);
@@ -571,11 +581,14 @@ TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
       bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at),
                   bytes.begin() + static_cast<std::ptrdiff_t>(at) + 33);
     const File file(bytes);
+    // Pulled, its table is missed, too; what is told of is the damage that comes first.
+    const auto first_damage = place_of_damage(bytes);
     for (const char* between : {"", "identity"}) {
       Player player(file.path(), between);
       ASSERT_TRUE(player.play()) << player.error;
       ASSERT_FALSE(player.warnings.empty());
-      EXPECT_NE(player.warnings.front().find("damaged at byte "), std::string::npos)
+      EXPECT_TRUE(player.warnings.front().starts_with("The data are damaged at byte " +
+                                                      std::to_string(first_damage) + ": "))
           << player.warnings.front();
       EXPECT_EQ(
           std::count_if(player.warnings.begin(), player.warnings.end(),
@@ -586,6 +599,48 @@ TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
       EXPECT_GT(track.events.size(), events.size() / 3);
       for (const auto& event : track.events) EXPECT_TRUE(expected.contains(event.t));
     }
+  }
+}
+
+TEST(AedatDemux, SaysWhereTheTableIsWrong) {
+  const auto events = steady_events(2'000'000, 50);
+  const auto whole = aedat4(events);
+  Aedat4Decoder decoder;
+  decoder.push(whole);
+  while (decoder.next()) continue;
+  const auto table_at = decoder.table_at().value();
+  Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::lz4, false, true});
+  Bytes ignored;
+  encoder.finish(ignored);
+  const auto field_at = encoder.patch().value().position;
+
+  struct Fault {
+    std::size_t at;
+    const char* what;
+    Bytes bytes;
+  };
+  auto overwritten = whole;
+  for (auto i = table_at + 8; i < overwritten.size(); ++i) overwritten[i] ^= 0x5a;
+  auto cut = whole;
+  cut.resize(table_at);
+  auto far = whole;
+  far[field_at + 5] = 1;
+  auto near = whole;
+  near[field_at] ^= 0x10;
+  const Fault faults[] = {{table_at, "here should be a table", overwritten},
+                          {table_at, "the file ends before its table", cut},
+                          {field_at, "the header names a place without a table", far},
+                          {field_at, "the header names a place without a table", near}};
+  for (const auto& fault : faults) {
+    const File file(fault.bytes);
+    Player player(file.path());
+    ASSERT_TRUE(player.play()) << player.error;
+    ASSERT_EQ(player.warnings.size(), 1U);
+    EXPECT_TRUE(player.warnings.front().starts_with("The data are damaged at byte " +
+                                                    std::to_string(fault.at) + ": " + fault.what))
+        << player.warnings.front();
+    EXPECT_TRUE(player.track("events_0").events == events);
+    EXPECT_EQ(player.stat("damaged-places"), 1U);
   }
 }
 
