@@ -8,6 +8,10 @@
  * file are those of the event stream, floor(PTS / 1000) + t microseconds; video is put in sync with
  * it.
  *
+ * A flush of all pads, as of a seek, begins the file anew, as it does with filesink. Events that
+ * are earlier than what is written, or lie outside the sensor, are left out; a warning says how
+ * many.
+ *
  * What is written needs no seeking, and can go through a network. Where downstream can seek, as
  * filesink can, the file ends with a table of its packets, and its header is made to point there,
  * so that readers can seek and know the duration.
@@ -32,6 +36,7 @@
 #include <vector>
 
 #include "elements/eventcam/aedatframe.hpp"
+#include "gst/codec/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/owned.hpp"
 #include "src/codec/aedat4/aedat4_encoder.hpp"
@@ -43,7 +48,6 @@ using eventcamera::Aedat4Compression;
 using eventcamera::Aedat4Encoder;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
-using eventcamera::StampedEvent;
 
 namespace {
 
@@ -58,6 +62,7 @@ struct UnrefPad {
   void operator()(GstAggregatorPad* pad) const { gst_object_unref(pad); }
 };
 using Pad = std::unique_ptr<GstAggregatorPad, UnrefPad>;
+
 using Bytes = std::vector<guint8>;
 
 /// What is known of the file, and what writes it.
@@ -67,20 +72,21 @@ struct State {
   std::string source;                      ///< the camera's name
   std::unique_ptr<Aedat4Encoder> encoder;  ///< none before the header
   gint64 shift = 0;                        ///< nanoseconds from the running time to the file's
-  Microseconds written = 0;                ///< the time of the latest event
   Microseconds flushed = 0;                ///< when events were last made a packet
-  std::vector<StampedEvent> events;
   bool warned = false;
 };
 
 }  // namespace
 
 struct GstAedatMuxPrivate {
+  explicit GstAedatMuxPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_MUX) {}
+
   std::mutex mutex;  // guards the property; nothing is called under it
   Aedat4Compression compression = default_compression;
 
   // The streaming thread's, or nobody's while there is none.
   State state;
+  WritableEvents writable;
 };
 
 namespace {
@@ -271,6 +277,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
     const std::lock_guard lock(self->priv->mutex);
     settings.compression = self->priv->compression;
   }
+  self->priv->writable.begin_file(state.size);
   state.shift = shift_of(self);
   state.encoder = std::make_unique<Aedat4Encoder>(settings);
   Bytes header;
@@ -283,6 +290,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
 /// Writes what ends the file, and tells the header of it. May throw.
 static GstFlowReturn end_file(GstAedatMux* self) {
   State& state = self->priv->state;
+  self->priv->writable.end_file();
   Bytes bytes;
   state.encoder->finish(bytes);
   const GstFlowReturn result = push_bytes(self, std::move(bytes));
@@ -305,23 +313,9 @@ static void write_events(GstAedatMux* self, GstBuffer* buffer, Microseconds star
     warn(self, "a buffer is no whole number of events");
     return;
   }
-  state.events.clear();
-  const char* wrong = nullptr;
-  for (gsize i = 0; i < map.n_events; ++i) {
-    const auto& event = map.events[i];
-    const StampedEvent stamped{start + event.t, event.x, event.y_p};
-    if (event.x >= state.size.width || stamped.y() >= state.size.height) {
-      wrong = "an event is outside the sensor";
-    } else if (stamped.t < state.written) {
-      wrong = "an event is earlier than the one before";
-    } else {
-      state.written = stamped.t;
-      state.events.push_back(stamped);
-    }
-  }
+  const auto writable = self->priv->writable.pick({map.events, map.n_events}, start);
   gst_event_camera_unmap(&map);
-  if (wrong != nullptr) warn(self, wrong);
-  state.encoder->encode(state.events, out);
+  state.encoder->encode(writable, out);
 }
 
 /// Adds a picture. May throw.
@@ -504,8 +498,19 @@ static gboolean start(GstAggregator* aggregator) {
 }
 
 static gboolean stop(GstAggregator* aggregator) {
-  mux_of(aggregator)->priv->state = State();
+  auto* priv = mux_of(aggregator)->priv;
+  if (priv->state.encoder) priv->writable.end_file();
+  priv->state = State();
   return TRUE;
+}
+
+/// Downstream has let go of the file: filesink has emptied it, and a demuxer expects a header.
+static GstFlowReturn flush(GstAggregator* aggregator) {
+  State& state = mux_of(aggregator)->priv->state;
+  state.encoder.reset();
+  state.flushed = 0;
+  state.warned = false;
+  return GST_FLOW_OK;
 }
 
 /* type */
@@ -516,7 +521,7 @@ static void finalize(GObject* object) {
 }
 
 static void gst_aedat_mux_init(GstAedatMux* self) {
-  self->priv = new GstAedatMuxPrivate();
+  self->priv = new GstAedatMuxPrivate(GST_ELEMENT(self));
 }
 
 static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
@@ -552,5 +557,6 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   aggregator_class->create_new_pad = create_new_pad;
   aggregator_class->start = start;
   aggregator_class->stop = stop;
+  aggregator_class->flush = flush;
   aggregator_class->negotiate = nullptr;  // the caps are the header's
 }

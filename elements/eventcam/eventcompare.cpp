@@ -7,7 +7,8 @@
  * Compares the stream on the pad `candidate`, which it passes through, with the one on the pad
  * `reference`, over the time that both cover: from where the later one begins to where the first
  * one ends. The two are held together by their stream times, and must be of sensors of one size.
- * At EOS of the candidate it posts an element message `eventcompare`:
+ * At EOS of the candidate, or where it is stopped before, it posts an element message
+ * `eventcompare`:
  *
  * - `start`, `end` (#gint64): the time that both cover, in stream time (ns);
  * - `reference`, `candidate` (#GstStructure): the figures of either, as #GstEventStats has them;
@@ -90,6 +91,7 @@ struct Private {
   OfSides<std::optional<Sensor>> sensors;
   OwnedCaps candidate_caps;
   std::optional<StreamComparison> comparison;  // once both sensors are known
+  bool concluded = true;  // there are no events in it that figures do not tell of
   BrokenEvents broken{"not compared"};
 };
 
@@ -214,6 +216,7 @@ static GstStructure* structure_of(const StreamComparison& comparison) {
 /// Tells and writes what has come out. What never began to be compared is a comparison without
 /// events.
 static void conclude(GstEventCompare* self) {
+  self->priv->concluded = true;
   const StreamComparison nothing(1, 1);
   const auto& comparison = self->priv->comparison ? *self->priv->comparison : nothing;
   report(self, places_of(self), structure_of(comparison), [&] {
@@ -242,6 +245,7 @@ static void compare(GstEventCompare* self, Side side, GstBuffer* buffer) {
                      interval ? "a buffer is no whole number of events" : "a buffer has no PTS");
     return;
   }
+  if (!mapped.events().empty()) priv.concluded = false;
   const auto left_out =
       priv.comparison->add(side, mapped.events(), stream_time(priv.pads[side], interval->start),
                            stream_time(priv.pads[side], interval->end));
@@ -258,7 +262,10 @@ static bool begin(GstEventCompare* self) {
   const auto& reference = priv.sensors[Side::reference];
   const auto& candidate = priv.sensors[Side::candidate];
   if (!reference || !candidate || *reference != *candidate) return false;
-  if (!priv.comparison) priv.comparison.emplace(reference->width, reference->height);
+  if (!priv.comparison) {
+    priv.comparison.emplace(reference->width, reference->height);
+    priv.concluded = true;
+  }
   return true;
 }
 
@@ -403,7 +410,9 @@ static gboolean start(GstAggregator* aggregator) {
 }
 
 static gboolean stop(GstAggregator* aggregator) {
-  auto& priv = *event_compare(aggregator)->priv;
+  auto* self = event_compare(aggregator);
+  auto& priv = *self->priv;
+  if (priv.comparison && !priv.concluded) conclude(self);
   priv.comparison.reset();
   priv.candidate_caps.reset();
   priv.sensors = {};
@@ -433,13 +442,15 @@ static void gst_event_compare_class_init(GstEventCompareClass* klass) {
                                                   GST_PARAM_MUTABLE_READY);
   g_object_class_install_property(
       object_class, prop_location,
-      g_param_spec_string("location", "Location", "Where the figures are written as JSON at EOS",
-                          "", flags));
+      g_param_spec_string(
+          "location", "Location",
+          "Where the figures are written as JSON, at EOS or where it is stopped before", "",
+          flags));
   g_object_class_install_property(
       object_class, prop_map,
       g_param_spec_string("map", "Map",
                           "Where a picture of the events of each pixel, of both and of their "
-                          "difference, is written as PNG at EOS",
+                          "difference, is written as PNG, at EOS or where it is stopped before",
                           "", flags));
 
 #define COMPARED_CAPS         \

@@ -7,9 +7,9 @@
  * Writes events as an HDF5 file, whose arrays h5py and its like read at once, in the layout of DSEC
  * or of Metavision. The times written are those of the PTS.
  *
- * The file is whole at the end of the stream, and where the pipeline is stopped before. A flush
- * does not begin it anew: it goes on, and events that are earlier than what is written, or lie
- * outside the sensor, are left out.
+ * The file is whole at the end of the stream, and where the pipeline is stopped before. A flush, as
+ * of a seek, begins it anew, as it does with filesink. Events that are earlier than what is
+ * written, or lie outside the sensor, are left out; a warning says how many.
  *
  * ## Example launch line
  * |[
@@ -30,8 +30,8 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
-#include <vector>
 
+#include "gst/codec/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/codec/hdf5/hdf5_writer.hpp"
 
@@ -41,7 +41,6 @@ GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
 using eventcamera::Hdf5Layout;
 using eventcamera::Hdf5Writer;
 using eventcamera::Microseconds;
-using eventcamera::StampedEvent;
 
 namespace {
 
@@ -59,14 +58,13 @@ struct State {
   std::unique_ptr<Hdf5Writer> writer;  ///< none before caps, and after the end
   bool begun = false;                  ///< there are events in it
   bool ended = false;
-  Microseconds latest = 0;  ///< time of what is written
-  bool warned = false;
-  std::vector<StampedEvent> events;
 };
 
 }  // namespace
 
 struct GstEventHdf5SinkPrivate {
+  explicit GstEventHdf5SinkPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
+
   std::mutex mutex;  // guards the properties; nothing is called under it
   std::string location;
   Hdf5Layout layout = default_layout;
@@ -74,6 +72,7 @@ struct GstEventHdf5SinkPrivate {
 
   // The streaming thread's, or nobody's while there is none.
   State state;
+  WritableEvents writable;
 };
 
 namespace {
@@ -201,7 +200,27 @@ static bool end_file(GstEventHdf5Sink* self) {
   State& state = self->priv->state;
   state.ended = true;
   const auto writer = std::exchange(state.writer, nullptr);
+  if (writer) self->priv->writable.end_file();
   return !writer || guarded(self, [&] { writer->close(); });
+}
+
+/// Begins a file of events of this sensor, in the place of what is there.
+static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
+  auto* priv = self->priv;
+  priv->state = State();  // to the library two open files of one name are one
+  priv->state.info = info;
+  priv->writable.begin_file({info.width, info.height});
+  std::string location;
+  Hdf5Writer::Settings settings;
+  settings.size = {info.width, info.height};
+  {
+    const std::lock_guard lock(priv->mutex);
+    location = priv->location;
+    settings.layout = priv->layout;
+    settings.compression = priv->compression;
+  }
+  return guarded(self,
+                 [&] { priv->state.writer = std::make_unique<Hdf5Writer>(location, settings); });
 }
 
 static gboolean start(GstBaseSink* sink) {
@@ -221,8 +240,7 @@ static gboolean stop(GstBaseSink* sink) {
 
 static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
   auto* self = sink_of(sink);
-  auto* priv = self->priv;
-  State& state = priv->state;
+  const State& state = self->priv->state;
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {
     GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are no events", caps);
@@ -238,18 +256,7 @@ static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
                       (nullptr));
     return FALSE;
   }
-  std::string location;
-  Hdf5Writer::Settings settings;
-  settings.size = {info.width, info.height};
-  {
-    const std::lock_guard lock(priv->mutex);
-    location = priv->location;
-    settings.layout = priv->layout;
-    settings.compression = priv->compression;
-  }
-  state.info = info;
-  state.writer.reset();  // to the library two open files of one name are one
-  return guarded(self, [&] { state.writer = std::make_unique<Hdf5Writer>(location, settings); });
+  return begin_file(self, info);
 }
 
 /* data */
@@ -258,32 +265,13 @@ static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
 static void write(GstEventHdf5Sink* self, const GstEventCameraMap& map) {
   State& state = self->priv->state;
   const auto start = static_cast<Microseconds>(map.start);
-  bool dropped = false;
   for (std::span left(map.events, map.n_events); !left.empty();) {
     const auto few = left.first(std::min(left.size(), written_events));
     left = left.subspan(few.size());
-    state.events.clear();
-    for (const auto& event : few) {
-      const StampedEvent stamped{start + event.t, event.x, event.y_p};
-      if (stamped.t < state.latest || event.x >= state.info.width ||
-          stamped.y() >= state.info.height) {
-        dropped = true;
-        continue;
-      }
-      state.latest = stamped.t;
-      state.events.push_back(stamped);
-    }
-    state.begun |= !state.events.empty();
-    state.writer->append(state.events);
+    const auto writable = self->priv->writable.pick(few, start);
+    state.begun |= !writable.empty();
+    state.writer->append(writable);
   }
-  if (!dropped) return;
-  GST_WARNING_OBJECT(self, "events left out at %" GST_TIME_FORMAT,
-                     GST_TIME_ARGS(GST_BUFFER_PTS(map.buffer)));
-  if (std::exchange(state.warned, true)) return;
-  GST_ELEMENT_WARNING(self, STREAM, ENCODE,
-                      ("Events outside the sensor, or earlier than ones that are written, are left "
-                       "out."),
-                      (nullptr));
 }
 
 static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
@@ -302,9 +290,16 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   return written ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/// The file is whole before the application hears of the end.
+/// The file is whole before the application hears of the end, and begins anew where all that came
+/// is let go.
 static gboolean event(GstBaseSink* sink, GstEvent* event) {
-  if (GST_EVENT_TYPE(event) == GST_EVENT_EOS && !end_file(sink_of(sink))) {
+  auto* self = sink_of(sink);
+  const State& state = self->priv->state;
+  bool done = true;
+  if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
+  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.info.width > 0)
+    done = begin_file(self, GstEventCameraInfo(state.info));
+  if (!done) {
     gst_event_unref(event);
     return FALSE;
   }
@@ -319,7 +314,7 @@ static void finalize(GObject* object) {
 }
 
 static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
-  self->priv = new GstEventHdf5SinkPrivate();
+  self->priv = new GstEventHdf5SinkPrivate(GST_ELEMENT(self));
   gst_base_sink_set_sync(GST_BASE_SINK(self), FALSE);
 }
 

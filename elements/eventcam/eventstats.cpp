@@ -5,7 +5,8 @@
  * @short_description: measures a stream of events
  *
  * Passes events through and posts an element message `eventstats` whenever #GstEventStats:interval
- * has passed, and at EOS of everything. An interval ends with the buffer in which it is over.
+ * has passed, and at EOS, or where it is stopped before, of everything. An interval ends with the
+ * buffer in which it is over.
  *
  * - `whole` (#gboolean): whether this is of everything;
  * - `start`, `end` (#gint64): what it is of, in stream time (ns);
@@ -16,7 +17,8 @@
  *   a pixel's event to its next, to 3 %.
  *
  * At EOS the same is written to #GstEventStats:location as JSON, and to #GstEventStats:map a
- * picture of the events of each pixel.
+ * picture of the events of each pixel. A pipeline that is stopped before, as with Ctrl-C, gives
+ * both of what has come until then.
  *
  * ## Example launch line
  * |[
@@ -96,6 +98,7 @@ struct Measurement {
   Stretch whole;
   Stretch recent;                    ///< since the last message
   std::optional<Nanoseconds> end{};  ///< in stream time
+  bool concluded = true;             ///< there are no events that the figures do not tell of
 };
 
 struct Private {
@@ -195,8 +198,9 @@ static void post(GstEventStats* self, GstStructure* structure) {
 
 /// Of everything so far; what is no stream has no pixel, and no event.
 static void conclude(GstEventStats* self, const ReportPlaces& places) {
-  const Measurement nothing(1, 1);
-  const auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
+  Measurement nothing(1, 1);
+  auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
+  measurement.concluded = true;
   report(self, places, figures_of(measurement.whole, measurement.end.value_or(0), true),
          [&] { return eventcamera::draw_map(measurement.whole.statistics.map()); });
 }
@@ -243,6 +247,7 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
   }
   const std::size_t left_out = measurement.arrivals.take(
       mapped.events(), start / 1000, [&](const eventcamera::StampedEvent& event) {
+        measurement.concluded = false;
         measurement.whole.statistics.add(event);
         measurement.recent.statistics.add(event);
       });
@@ -324,7 +329,9 @@ static gboolean start(GstBaseTransform* transform) {
 }
 
 static gboolean stop(GstBaseTransform* transform) {
-  auto& priv = *event_stats(transform)->priv;
+  auto* self = event_stats(transform);
+  auto& priv = *self->priv;
+  if (priv.measurement && !priv.measurement->concluded) conclude(self, settings_of(self).places);
   priv.measurement.reset();
   priv.broken.begin_anew();
   return TRUE;
@@ -361,12 +368,15 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
                           0, std::numeric_limits<gint64>::max(), defaults.interval, playing_flags));
   g_object_class_install_property(
       object_class, prop_location,
-      g_param_spec_string("location", "Location", "Where the figures are written as JSON at EOS",
-                          "", ready_flags));
+      g_param_spec_string(
+          "location", "Location",
+          "Where the figures are written as JSON, at EOS or where it is stopped before", "",
+          ready_flags));
   g_object_class_install_property(
       object_class, prop_map,
       g_param_spec_string("map", "Map",
-                          "Where a picture of the events of each pixel is written as PNG at EOS",
+                          "Where a picture of the events of each pixel is written as PNG, at EOS "
+                          "or where it is stopped before",
                           "", ready_flags));
 
 #define MEASURED_CAPS         \

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gst/codec/copied_buffer.hpp"
+#include "gst/codec/writable_events.hpp"
 #include "gst/owned.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_encoder_debug);
@@ -16,16 +17,16 @@ GST_DEBUG_CATEGORY_STATIC(event_encoder_debug);
 
 using eventcamera::Encoder;
 using eventcamera::Microseconds;
-using eventcamera::StampedEvent;
 
 namespace {
 
 /// Encoded at once, so that events stay in the cache.
 constexpr std::size_t encoded_events = 1 << 14;
 
-/// What is written, from caps to stop.
+/// The file that is written, from caps to stop.
 struct State {
   GstEventCameraInfo info;
+  OwnedCaps caps;  ///< of the output
   std::unique_ptr<Encoder> encoder;
   bool written = false;
 };
@@ -33,14 +34,14 @@ struct State {
 }  // namespace
 
 struct GstEventEncoderPrivate {
+  explicit GstEventEncoderPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
+
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
   // The streaming thread's, or nobody's while there is none.
   std::unique_ptr<State> state;
-  Microseconds latest = 0;  ///< time of what is written
-  bool warned = false;
-  std::vector<StampedEvent> events;
+  WritableEvents writable;
   std::vector<guint8> bytes;
 };
 
@@ -68,6 +69,16 @@ static GstFlowReturn guarded(GstEventEncoder* self, const Work& work) {
 
 /* negotiation */
 
+/// Begins a file. May throw.
+static void begin_file(GstEventEncoder* self, const GstEventCameraInfo& info, OwnedCaps caps) {
+  auto* priv = self->priv;
+  priv->bytes.clear();
+  priv->writable.begin_file({info.width, info.height});
+  auto encoder = GST_EVENT_ENCODER_GET_CLASS(self)->create(self, info, caps.get());
+  priv->state = std::make_unique<State>(
+      State{.info = info, .caps = std::move(caps), .encoder = std::move(encoder)});
+}
+
 static GstFlowReturn negotiate(GstEventEncoder* self, const GstEventCameraInfo& info) {
   auto* priv = self->priv;
   const auto* klass = GST_EVENT_ENCODER_GET_CLASS(self);
@@ -77,13 +88,12 @@ static GstFlowReturn negotiate(GstEventEncoder* self, const GstEventCameraInfo& 
     caps = gst_caps_truncate(caps);
     if (klass->fixate != nullptr) caps = klass->fixate(self, info, caps);
   }
-  const OwnedCaps fixed(caps);
+  OwnedCaps fixed(caps);
   if (!gst_caps_is_fixed(fixed.get())) return GST_FLOW_NOT_NEGOTIATED;
-  auto state = std::make_unique<State>(
-      State{.info = info, .encoder = klass->create(self, info, fixed.get())});
-  priv->state = std::move(state);
-  return gst_pad_push_event(priv->src, gst_event_new_caps(fixed.get())) ? GST_FLOW_OK
-                                                                        : GST_FLOW_NOT_NEGOTIATED;
+  begin_file(self, info, std::move(fixed));
+  return gst_pad_push_event(priv->src, gst_event_new_caps(priv->state->caps.get()))
+             ? GST_FLOW_OK
+             : GST_FLOW_NOT_NEGOTIATED;
 }
 
 static gboolean take_caps(GstEventEncoder* self, GstEvent* event) {
@@ -122,37 +132,15 @@ static GstFlowReturn push_bytes(GstEventEncoder* self, GstClockTime pts, GstCloc
   return gst_pad_push(self->priv->src, buffer);
 }
 
-static void warn_of_dropped(GstEventEncoder* self, GstClockTime pts) {
-  GST_WARNING_OBJECT(self, "events left out at %" GST_TIME_FORMAT, GST_TIME_ARGS(pts));
-  if (std::exchange(self->priv->warned, true)) return;
-  GST_ELEMENT_WARNING(self, STREAM, ENCODE,
-                      ("Events outside the sensor, or earlier than ones that are written, are left "
-                       "out."),
-                      ("The first lie in the buffer at %" GST_TIME_FORMAT, GST_TIME_ARGS(pts)));
-}
-
 /// Encodes the events of a buffer. May throw.
 static void encode(GstEventEncoder* self, const GstEventCameraMap& map) {
   auto* priv = self->priv;
-  const auto& info = priv->state->info;
   const auto start = static_cast<Microseconds>(map.start);
-  bool dropped = false;
   for (std::span left(map.events, map.n_events); !left.empty();) {
     const auto few = left.first(std::min(left.size(), encoded_events));
     left = left.subspan(few.size());
-    priv->events.clear();
-    for (const auto& event : few) {
-      const StampedEvent stamped{start + event.t, event.x, event.y_p};
-      if (stamped.t < priv->latest || event.x >= info.width || stamped.y() >= info.height) {
-        dropped = true;
-        continue;
-      }
-      priv->latest = stamped.t;
-      priv->events.push_back(stamped);
-    }
-    priv->state->encoder->encode(priv->events, priv->bytes);
+    priv->state->encoder->encode(priv->writable.pick(few, start), priv->bytes);
   }
-  if (dropped) warn_of_dropped(self, GST_BUFFER_PTS(map.buffer));
 }
 
 static GstFlowReturn take_buffer(GstEventEncoder* self, GstBuffer* buffer) {
@@ -207,12 +195,23 @@ static GstFlowReturn push_patch(GstEventEncoder* self, GstEventEncoderPatch patc
 static void finish(GstEventEncoder* self) {
   auto* priv = self->priv;
   if (!priv->state) return;
+  priv->writable.end_file();
   guarded(self, [&] {
     priv->state->encoder->finish(priv->bytes);
     const GstFlowReturn result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
     const auto patch = GST_EVENT_ENCODER_GET_CLASS(self)->patch;
     if (result != GST_FLOW_OK || patch == nullptr) return result;
     return push_patch(self, patch(*priv->state->encoder));
+  });
+}
+
+/// Downstream has let go of the file: filesink has emptied it, and a decoder expects a header.
+static void begin_anew(GstEventEncoder* self) {
+  const auto& state = self->priv->state;
+  if (!state) return;
+  guarded(self, [&] {
+    begin_file(self, state->info, OwnedCaps(gst_caps_ref(state->caps.get())));
+    return GST_FLOW_OK;
   });
 }
 
@@ -227,6 +226,9 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_EOS:
       finish(self);
       break;
+    case GST_EVENT_FLUSH_STOP:
+      begin_anew(self);
+      break;
     default:
       break;
   }
@@ -240,9 +242,8 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
       GST_ELEMENT_CLASS(gst_event_encoder_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     auto* priv = GST_EVENT_ENCODER(element)->priv;
+    if (priv->state) priv->writable.end_file();
     priv->state.reset();
-    priv->latest = 0;
-    priv->warned = false;
     priv->bytes.clear();
   }
   return result;
@@ -285,7 +286,7 @@ static void finalize(GObject* object) {
 }
 
 static void gst_event_encoder_init(GstEventEncoder* self) {
-  self->priv = new GstEventEncoderPrivate();
+  self->priv = new GstEventEncoderPrivate(GST_ELEMENT(self));
 }
 
 static void gst_event_encoder_class_init(GstEventEncoderClass* klass) {

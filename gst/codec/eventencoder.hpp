@@ -12,8 +12,8 @@
 /// The abstract base class of the elements that write event files: an event stream in, bytes out. A
 /// subclass brings an Encoder and its pad templates.
 ///
-/// The times written are those of the PTS. A flush does not begin the file anew: it goes on, and
-/// events that are earlier than what is written, or lie outside the sensor, are left out.
+/// The times written are those of the PTS. A flush begins the file anew, as filesink does. Events
+/// that are earlier than what is written, or lie outside the sensor, are left out, and told of.
 #define GST_TYPE_EVENT_ENCODER (gst_event_encoder_get_type())
 #define GST_EVENT_ENCODER(object) \
   (G_TYPE_CHECK_INSTANCE_CAST((object), GST_TYPE_EVENT_ENCODER, GstEventEncoder))

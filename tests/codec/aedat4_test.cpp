@@ -14,7 +14,6 @@
 
 #include "src/codec/aedat4/aedat4_decoder.hpp"
 #include "src/codec/aedat4/aedat4_encoder.hpp"
-#include "src/codec/aedat4/aedat4_event_decoder.hpp"
 #include "src/codec/aedat4/aedat4_table.hpp"
 #include "tests/codec/aedat4_validator.hpp"
 #include "tests/codec/aedat_files.hpp"
@@ -262,12 +261,9 @@ TEST(Aedat4, StreamsThatTheHeaderDoesNotListAreFound) {
 
 TEST(Aedat4, ReadsThePlainFile) {
   const auto events = some_events(5000);
-  Aedat4EventDecoder decoder;
-  Decoded out;
-  decoder.decode(file_of({events}), out);
-  decoder.finish(out);
-  EXPECT_TRUE(out.events == events);
-  EXPECT_EQ(decoder.size(), (SensorSize{346, 260}));
+  Aedat4Decoder decoder;
+  EXPECT_TRUE(decoded(decoder, file_of({events})).events[0] == events);
+  EXPECT_EQ(decoder.streams()[0].size, (SensorSize{346, 260}));
   EXPECT_EQ(decoder.damage().places, 0U);
 }
 

@@ -193,8 +193,21 @@ TEST(Csv, WhatIsNoTextOfEventsIsRefused) {
         std::string("5,6,7,1\n3,6,6,1\n")}) {
     EXPECT_THROW(read(text), NotThisFormat) << text.substr(0, 40);
   }
-  EXPECT_TRUE(read("").events.empty());
-  EXPECT_TRUE(read("t,x,y,p\n").events.empty());
+}
+
+TEST(Csv, AHeaderAloneIsARecordingWithoutEventsAndAnEmptyFileIsNone) {
+  for (const std::string text :
+       {"t,x,y,p\n", "t,x,y,p", "# t,x,y,p\n", "%geometry:640,480\n", "\n"}) {
+    const auto found = read(text);
+    EXPECT_TRUE(found.events.empty()) << text;
+    EXPECT_EQ(found.damage.places, 0U) << text;
+  }
+  try {
+    read("");
+    ADD_FAILURE() << "an empty file was read";
+  } catch (const NotThisFormat& error) {
+    EXPECT_STREQ(error.what(), "the file is empty");
+  }
 }
 
 TEST(Csv, EveryDialectComesBack) {
@@ -232,7 +245,10 @@ TEST(Csv, NoEventsComeBack) {
   for (const auto& [name, description, dialect] : csv_dialects()) {
     CsvEncoder encoder(dialect, {640, 480});
     CsvDecoder decoder;
-    EXPECT_TRUE(decoded(decoder, encoded(encoder, {})).empty()) << name;
+    const auto bytes = encoded(encoder, {});
+    EXPECT_EQ(bytes.empty(), dialect.header == CsvDialect::Header::none) << name;
+    if (bytes.empty()) continue;
+    EXPECT_TRUE(decoded(decoder, bytes).empty()) << name;
   }
 }
 

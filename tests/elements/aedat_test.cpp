@@ -549,6 +549,16 @@ TEST(AedatDemux, SeeksWhilePlayingAgainAndAgain) {
   EXPECT_EQ(player.track("video_0").pictures.size(), 50U);
 }
 
+/// Of the first damage, as the decoder finds it without any element.
+std::uint64_t place_of_damage(const Bytes& bytes) {
+  Aedat4Decoder decoder;
+  decoder.push(bytes);
+  decoder.finish();
+  while (decoder.next()) continue;
+  EXPECT_GT(decoder.damage().places, 0U);
+  return decoder.damage().first_at;
+}
+
 TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
   const auto events = steady_events(2'000'000, 50);
   const auto whole = aedat4(events);
@@ -571,11 +581,14 @@ TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
       bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at),
                   bytes.begin() + static_cast<std::ptrdiff_t>(at) + 33);
     const File file(bytes);
+    // Pulled, its table is missed, too; what is told of is the damage that comes first.
+    const auto first_damage = place_of_damage(bytes);
     for (const char* between : {"", "identity"}) {
       Player player(file.path(), between);
       ASSERT_TRUE(player.play()) << player.error;
       ASSERT_FALSE(player.warnings.empty());
-      EXPECT_NE(player.warnings.front().find("damaged at byte "), std::string::npos)
+      EXPECT_TRUE(player.warnings.front().starts_with("The data are damaged at byte " +
+                                                      std::to_string(first_damage) + ": "))
           << player.warnings.front();
       EXPECT_EQ(
           std::count_if(player.warnings.begin(), player.warnings.end(),
@@ -586,6 +599,48 @@ TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
       EXPECT_GT(track.events.size(), events.size() / 3);
       for (const auto& event : track.events) EXPECT_TRUE(expected.contains(event.t));
     }
+  }
+}
+
+TEST(AedatDemux, SaysWhereTheTableIsWrong) {
+  const auto events = steady_events(2'000'000, 50);
+  const auto whole = aedat4(events);
+  Aedat4Decoder decoder;
+  decoder.push(whole);
+  while (decoder.next()) continue;
+  const auto table_at = decoder.table_at().value();
+  Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::lz4, false, true});
+  Bytes ignored;
+  encoder.finish(ignored);
+  const auto field_at = encoder.patch().value().position;
+
+  struct Fault {
+    std::size_t at;
+    const char* what;
+    Bytes bytes;
+  };
+  auto overwritten = whole;
+  for (auto i = table_at + 8; i < overwritten.size(); ++i) overwritten[i] ^= 0x5a;
+  auto cut = whole;
+  cut.resize(table_at);
+  auto far = whole;
+  far[field_at + 5] = 1;
+  auto near = whole;
+  near[field_at] ^= 0x10;
+  const Fault faults[] = {{table_at, "here should be a table", overwritten},
+                          {table_at, "the file ends before its table", cut},
+                          {field_at, "the header names a place without a table", far},
+                          {field_at, "the header names a place without a table", near}};
+  for (const auto& fault : faults) {
+    const File file(fault.bytes);
+    Player player(file.path());
+    ASSERT_TRUE(player.play()) << player.error;
+    ASSERT_EQ(player.warnings.size(), 1U);
+    EXPECT_TRUE(player.warnings.front().starts_with("The data are damaged at byte " +
+                                                    std::to_string(fault.at) + ": " + fault.what))
+        << player.warnings.front();
+    EXPECT_TRUE(player.track("events_0").events == events);
+    EXPECT_EQ(player.stat("damaged-places"), 1U);
   }
 }
 
@@ -787,6 +842,7 @@ TEST(AedatMux, NeedsNoSeeking) {
 }
 
 GstBuffer* events_buffer(GstClockTime pts, const std::vector<GstEventCameraEvent>& events) {
+  gst_init(nullptr, nullptr);
   GstBuffer* buffer =
       gst_buffer_new_memdup(events.data(), events.size() * sizeof(GstEventCameraEvent));
   GST_BUFFER_PTS(buffer) = pts;
@@ -797,27 +853,32 @@ GstBuffer* events_buffer(GstClockTime pts, const std::vector<GstEventCameraEvent
 constexpr const char* xytp =
     "application/x-event-camera, format=XYTP, width=346, height=260, framerate=0/1";
 
+/// What is not pulled yet of what comes out until EOS.
+Bytes rest_of_file(GstHarness* h) {
+  Bytes bytes;
+  bool ended = false;
+  while (!ended) {
+    const Owned<GstEvent> event(gst_harness_pull_event(h));
+    if (!event) break;
+    ended = GST_EVENT_TYPE(event.get()) == GST_EVENT_EOS;
+  }
+  EXPECT_TRUE(ended);
+  while (const Buffer buffer{gst_harness_try_pull(h)}) {
+    const auto piece = bytes_of(buffer.get());
+    bytes.insert(bytes.end(), piece.begin(), piece.end());
+  }
+  return bytes;
+}
+
 /// Pushes buffers into the muxer, and gives what comes out.
 Bytes muxed(const std::vector<GstBuffer*>& buffers, std::vector<std::string>* warnings = nullptr) {
-  gst_init(nullptr, nullptr);
   const Owned<GstHarness> h(gst_harness_new_with_padnames("aedatmux", "events", "src"));
   const Owned<GstBus> bus(gst_bus_new());
   gst_element_set_bus(h->element, bus.get());
   gst_harness_set_src_caps_str(h.get(), xytp);
   for (GstBuffer* buffer : buffers) EXPECT_EQ(gst_harness_push(h.get(), buffer), GST_FLOW_OK);
   EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_eos()));
-  Bytes bytes;
-  bool ended = false;
-  while (!ended) {
-    const Owned<GstEvent> event(gst_harness_pull_event(h.get()));
-    if (!event) break;
-    ended = GST_EVENT_TYPE(event.get()) == GST_EVENT_EOS;
-  }
-  EXPECT_TRUE(ended);
-  while (const Buffer buffer{gst_harness_try_pull(h.get())}) {
-    const auto piece = bytes_of(buffer.get());
-    bytes.insert(bytes.end(), piece.begin(), piece.end());
-  }
+  const auto bytes = rest_of_file(h.get());
   while (const Owned<GstMessage> message{gst_bus_pop_filtered(bus.get(), GST_MESSAGE_WARNING)})
     if (warnings != nullptr) warnings->push_back(text_of(message.get()));
   gst_element_set_bus(h->element, nullptr);
@@ -846,7 +907,32 @@ TEST(AedatMux, LeavesOutWhatDoesNotFit) {
                        &warnings));
   EXPECT_TRUE((content.events == Events{StampedEvent::at(6, 7, 1'000'005, Polarity::off),
                                         StampedEvent::at(1, 1, 2'000'000, Polarity::off)}));
-  EXPECT_EQ(warnings.size(), 1U);
+  ASSERT_EQ(warnings.size(), 3U);
+  EXPECT_TRUE(warnings[0].starts_with("Input was left out: a buffer has no time"));
+  EXPECT_TRUE(warnings[1].starts_with("Events left out: 2. They are earlier than"));
+  EXPECT_TRUE(warnings[2].starts_with("Events left out: 2. They lie outside"));
+}
+
+TEST(AedatMux, WritesAnewAfterAFlush) {
+  gst_init(nullptr, nullptr);
+  const Owned<GstHarness> h(gst_harness_new_with_padnames("aedatmux", "events", "src"));
+  gst_harness_set_src_caps_str(h.get(), xytp);
+  EXPECT_EQ(gst_harness_push(h.get(), events_buffer(GST_SECOND, {{0, 1, 2}})), GST_FLOW_OK);
+  EXPECT_TRUE(Buffer(gst_harness_pull(h.get())));  // the header, so the file has begun
+  EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_flush_start()));
+  EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE)));
+  while (Buffer(gst_harness_try_pull(h.get()))) continue;
+  // Where the stream goes on its running time is nought again.
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 500 * GST_MSECOND;
+  EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_segment(&segment)));
+  EXPECT_EQ(gst_harness_push(h.get(), events_buffer(600 * GST_MSECOND, {{0, 3, 4}, {7, 5, 6}})),
+            GST_FLOW_OK);
+  EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_eos()));
+  const auto content = content_of(rest_of_file(h.get()));
+  EXPECT_TRUE((content.events == Events{StampedEvent::at(3, 4, 600'000, Polarity::off),
+                                        StampedEvent::at(5, 6, 600'007, Polarity::off)}));
 }
 
 TEST(AedatMux, HasOnePadOfAKind) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <sstream>
 
 #include "src/codec/interval_slicer.hpp"
 #include "tests/elements/harness.hpp"
@@ -323,6 +324,17 @@ TEST_P(EveryFormat, SaysWhenItIsNotThisFormat) {
   }
 }
 
+TEST_P(EveryFormat, IsNoFileWithoutAByte) {
+  const TemporaryFile file("");
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(file.path(), way + format().reader);
+    const auto message = player.play();
+    ASSERT_TRUE(message);
+    ASSERT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_ERROR);
+    EXPECT_TRUE(text_of(message.get()).starts_with("This cannot be read: ")) << way;
+  }
+}
+
 TEST_P(EveryFormat, WarnsOnceOfDamageAndTellsWhere) {
   const auto events = some_events();
   auto file = file_of(format(), events);
@@ -466,36 +478,124 @@ TEST_P(EveryFormat, IsFreedWhileInUse) {
   }
 }
 
-TEST_P(EveryFormat, IsWrittenWithoutWhatCannotBe) {
-  Harness h(format().writer);
-  gst_harness_set_sink_caps_str(h.get(), format().caps);
-  gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
-  const std::vector events = {
-      StampedEvent::at(5, 5, 1000, Polarity::on), StampedEvent::at(width, 5, 1001, Polarity::on),
-      StampedEvent::at(5, height, 1002, Polarity::on), StampedEvent::at(6, 6, 1003, Polarity::off)};
-  EXPECT_EQ(h.push(buffer_of(events, 0)), GST_FLOW_OK);
-  // After a flush, time has gone back.
-  gst_harness_push_event(h.get(), gst_event_new_flush_start());
-  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
+/// A writer of `format`, with the caps of some events.
+std::unique_ptr<Harness> writer_of(const Format& format) {
+  auto h = std::make_unique<Harness>(format.writer);
+  gst_harness_set_sink_caps_str(h->get(), format.caps);
+  gst_harness_set_src_caps_str(h->get(), events_caps.c_str());
+  return h;
+}
+
+std::vector<StampedEvent> events_in(const Format& format, const std::string& file) {
+  auto reader = Harness::with_late_pad(format.reader);
+  begin_file(reader, format);
+  push_file(reader, file, 1000);
+  return pull_events(reader);
+}
+
+void push_segment(Harness& h) {
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
-  auto file = pull_bytes(h);
-  EXPECT_EQ(h.push(buffer_of(std::span(events).first(1), 0)), GST_FLOW_OK);
-  gst_harness_push_event(h.get(), gst_event_new_gap(10 * GST_MSECOND, 10 * GST_MSECOND));
-  EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  file += pull_bytes(h);
-  int warnings = 0;
-  while (const auto message = h.message(GST_MESSAGE_WARNING))
-    warnings += text_of(message.get()).starts_with("Events outside the sensor") ? 1 : 0;
-  EXPECT_EQ(warnings, 1);
-  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+}
 
-  auto reader = Harness::with_late_pad(format().reader);
-  begin_file(reader, format());
-  push_file(reader, file, 1000);
-  EXPECT_EQ(pull_events(reader), (std::vector{events[0], events[3]}));
+TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
+  const auto h = writer_of(format());
+  const std::vector events = {
+      StampedEvent::at(5, 5, 1000, Polarity::on), StampedEvent::at(width, 5, 1001, Polarity::on),
+      StampedEvent::at(5, height, 1002, Polarity::on), StampedEvent::at(6, 6, 1003, Polarity::off)};
+  EXPECT_EQ(h->push(buffer_of(events, 0)), GST_FLOW_OK);
+  gst_harness_push_event(h->get(), gst_event_new_gap(10 * GST_MSECOND, 10 * GST_MSECOND));
+  EXPECT_TRUE(h->pull_event(GST_EVENT_GAP));
+  auto warning = h->message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_TRUE(text_of(warning.get())
+                  .starts_with("Events left out: 2. They lie outside the sensor, which the caps "
+                               "say has 320x240 pixels"));
+  gst_harness_push_event(h->get(), gst_event_new_eos());
+  while ((warning = h->message(GST_MESSAGE_WARNING)))
+    EXPECT_FALSE(text_of(warning.get()).starts_with("Events left out"));
+  EXPECT_TRUE(h->pull_event(GST_EVENT_EOS));
+  EXPECT_EQ(events_in(format(), pull_bytes(*h)), (std::vector{events[0], events[3]}));
+}
+
+TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
+  const auto h = writer_of(format());
+  const auto push = [&](const std::vector<Microseconds>& times) {
+    std::vector<StampedEvent> events;
+    for (const auto t : times) events.push_back(StampedEvent::at(5, 5, t, Polarity::on));
+    EXPECT_EQ(h->push(buffer_of(events, 0)), GST_FLOW_OK);
+  };
+  push({3000});
+  // Another segment, whose times are earlier.
+  push_segment(*h);
+  for (int times = 0; times < 3; ++times) push({1000, 2000});
+  EXPECT_FALSE(h->message(GST_MESSAGE_WARNING));
+  push({2000, 4000, 5000});
+  auto warning = h->message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_TRUE(text_of(warning.get()).starts_with("Events left out: 7. They are earlier than"));
+  // What is left out then is told of once, at the end.
+  push({1000, 2000, 4999});
+  push({6000});
+  EXPECT_FALSE(h->message(GST_MESSAGE_WARNING));
+  gst_harness_push_event(h->get(), gst_event_new_eos());
+  warning = h->message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_TRUE(text_of(warning.get()).starts_with("Events left out in all: 10. They are earlier"));
+  std::vector<Microseconds> written;
+  for (const auto& event : events_in(format(), pull_bytes(*h))) written.push_back(event.t);
+  EXPECT_EQ(written, (std::vector<Microseconds>{3000, 4000, 5000, 6000}));
+}
+
+TEST_P(EveryFormat, TellsOfEventsLeftOutWhereItIsStopped) {
+  const auto h = writer_of(format());
+  const auto late = StampedEvent::at(5, 5, 1000, Polarity::on);
+  const auto early = StampedEvent::at(5, 5, 10, Polarity::on);
+  EXPECT_EQ(h->push(buffer_of(std::span(&late, 1), 0)), GST_FLOW_OK);
+  EXPECT_EQ(h->push(buffer_of(std::span(&early, 1), 0)), GST_FLOW_OK);
+  EXPECT_FALSE(h->message(GST_MESSAGE_WARNING));
+  gst_element_set_state(h->element(), GST_STATE_READY);
+  const auto warning = h->message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_TRUE(text_of(warning.get()).starts_with("Events left out: 1. They are earlier"));
+}
+
+TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
+  const auto h = writer_of(format());
+  const auto late = StampedEvent::at(5, 5, 1'000'000, Polarity::on);
+  const auto early = StampedEvent::at(6, 6, 1000, Polarity::off);
+  for (const bool ended : {false, true}) {
+    EXPECT_EQ(h->push(buffer_of(std::span(&late, 1), 1'000'000)), GST_FLOW_OK);
+    if (ended) gst_harness_push_event(h->get(), gst_event_new_eos());
+    pull_bytes(*h);
+    gst_harness_push_event(h->get(), gst_event_new_flush_start());
+    gst_harness_push_event(h->get(), gst_event_new_flush_stop(TRUE));
+    push_segment(*h);
+    while (h->message(GST_MESSAGE_WARNING)) continue;
+  }
+  EXPECT_EQ(h->push(buffer_of(std::span(&early, 1), 0)), GST_FLOW_OK);
+  gst_harness_push_event(h->get(), gst_event_new_eos());
+  while (const auto warning = h->message(GST_MESSAGE_WARNING))
+    EXPECT_FALSE(text_of(warning.get()).starts_with("Events left out"));
+  EXPECT_EQ(events_in(format(), pull_bytes(*h)), std::vector{early});
+}
+
+TEST_P(EveryFormat, HoldsWhatComesAfterASeekAlone) {
+  const auto events = some_events();
+  const TemporaryFile in(file_of(format(), events));
+  const TemporaryFile out("");
+  Player player(in.path(), std::string(format().reader) + " ! tee name=t  t. ! queue ! " +
+                               format().writer + " ! filesink location=" + out.path() +
+                               "  t. ! queue");
+  ASSERT_TRUE(player.pause());
+  ASSERT_TRUE(player.seek(3 * GST_SECOND));
+  ASSERT_TRUE(player.ends_well());
+  const std::vector after(std::ranges::find_if(events, [](auto e) { return e.t >= 5'000'000; }),
+                          events.end());
+  std::stringstream file;
+  file << std::ifstream(out.path(), std::ios::binary).rdbuf();
+  EXPECT_EQ(events_in(format(), file.str()), after);
 }
 
 TEST_P(EveryFormat, IsOfOneSize) {

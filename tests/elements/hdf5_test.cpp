@@ -359,18 +359,39 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
       StampedEvent::at(5, 5, 1000, Polarity::on), StampedEvent::at(width, 5, 1001, Polarity::on),
       StampedEvent::at(5, height, 1002, Polarity::on), StampedEvent::at(6, 6, 1003, Polarity::off)};
   EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
-  // After a flush, time has gone back.
-  gst_harness_push_event(sink.get(), gst_event_new_flush_start());
-  gst_harness_push_event(sink.get(), gst_event_new_flush_stop(TRUE));
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  gst_harness_push_event(sink.get(), gst_event_new_segment(&segment));
+  EXPECT_TRUE(
+      sink.message(GST_MESSAGE_WARNING).starts_with("Events left out: 2. They lie outside"));
+  // Time goes back.
   EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);
-  EXPECT_TRUE(sink.message(GST_MESSAGE_WARNING).starts_with("Events outside the sensor"));
   EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
   sink.end();
+  EXPECT_TRUE(
+      sink.message(GST_MESSAGE_WARNING).starts_with("Events left out: 1. They are earlier"));
+  EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
   EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
   EXPECT_TRUE(read(path) == (Events{events[0], events[3]}));
+}
+
+TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
+  const auto path = folder_ / "out.h5";
+  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
+  sink.caps(events_caps);
+  const auto late = StampedEvent::at(5, 5, 1'000'000, Polarity::on);
+  const auto early = StampedEvent::at(6, 6, 1003, Polarity::off);
+  for (const bool ended : {false, true}) {
+    EXPECT_EQ(sink.push({late}, 1'000'000), GST_FLOW_OK);
+    if (ended) sink.end();
+    gst_harness_push_event(sink.get(), gst_event_new_flush_start());
+    gst_harness_push_event(sink.get(), gst_event_new_flush_stop(TRUE));
+    GstSegment segment;
+    gst_segment_init(&segment, GST_FORMAT_TIME);
+    gst_harness_push_event(sink.get(), gst_event_new_segment(&segment));
+  }
+  EXPECT_EQ(sink.push({early}, 0), GST_FLOW_OK);
+  sink.end();
+  EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
+  EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
+  EXPECT_TRUE(read(path) == Events{early});
 }
 
 TEST_P(Hdf5, IsOfOneSize) {

@@ -117,6 +117,32 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
 }
 
+TEST_F(StatsTest, WritesWhatHasComeWhereItIsStopped) {
+  Harness h("eventstats location=" + path("f.json") + " map=" + path("map.png"));
+  h.caps(small_sensor);
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  EXPECT_NE(text_in(path("f.json")).find("\"events\" : 1"), std::string::npos);
+  EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
+  const auto message = h.message(GST_MESSAGE_ELEMENT);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(count_in(structure_of(message)), 1U);
+}
+
+TEST_F(StatsTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
+  for (const bool with_events : {false, true}) {
+    Harness h("eventstats location=" + path("f.json"));
+    h.caps(small_sensor);
+    if (with_events) {
+      h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+      gst_harness_push_event(h.get(), gst_event_new_eos());
+      EXPECT_TRUE(std::filesystem::remove(path("f.json")));
+    }
+    gst_element_set_state(h.element(), GST_STATE_READY);
+    EXPECT_FALSE(std::filesystem::exists(path("f.json")));
+  }
+}
+
 TEST_F(StatsTest, CountsASilenceBetweenBuffersAsTime) {
   Harness h("eventstats");
   h.caps(small_sensor);
@@ -373,6 +399,38 @@ TEST_F(CompareTest, EndsWithoutAnyEvent) {
   EXPECT_EQ(count_in(within(figures, "reference")), 0U);
   EXPECT_EQ(number_in(figures, "map-correlation"), 0);
   EXPECT_FALSE(text_in(path("f.json")).empty());
+}
+
+TEST_F(CompareTest, WritesWhatHasComeWhereItIsStopped) {
+  make("location=" + path("f.json") + " map=" + path("map.png"));
+  begin();
+  for (const GstClockTime t : {0 * ms, 10 * ms})
+    for (auto* h : {reference.get(), candidate.get()})
+      gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+  EXPECT_TRUE(Buffer(gst_harness_pull(candidate.get())));
+  gst_element_set_state(element_.get(), GST_STATE_READY);
+  EXPECT_FALSE(text_in(path("f.json")).empty());
+  EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
+  const Owned<GstMessage> message(gst_bus_pop_filtered(bus_.get(), GST_MESSAGE_ELEMENT));
+  ASSERT_TRUE(message);
+  EXPECT_EQ(time_in(structure_of(message), "start"), 0);
+}
+
+TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
+  for (const bool with_events : {false, true}) {
+    make("location=" + path("f.json"));
+    begin();
+    if (with_events) {
+      for (auto* h : {reference.get(), candidate.get()})
+        gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+      end(reference);
+      end(candidate);
+      EXPECT_TRUE(conclude());
+      EXPECT_TRUE(std::filesystem::remove(path("f.json")));
+    }
+    gst_element_set_state(element_.get(), GST_STATE_READY);
+    EXPECT_FALSE(std::filesystem::exists(path("f.json")));
+  }
 }
 
 TEST_F(CompareTest, RefusesSensorsOfTwoSizes) {

@@ -141,6 +141,7 @@ GstFlowReturn take_end(GstAedatDemux* self) {
     result = push_intervals(self, stream);
   }
   report(self);
+  warn_of_missing_table(self);
   tell_counts(self);
   return result;
 }

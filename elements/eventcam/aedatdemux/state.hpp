@@ -83,6 +83,7 @@ struct State {
   std::vector<Stream> streams;  ///< the reader's, with the same indices
   guint64 pulled = 0;           ///< position of the next byte
   bool table_sought = false;
+  bool table_missing = false;  ///< where the header says that there is one
   std::vector<Aedat4TableEntry> table;
   bool holding = true;
   std::vector<Held> held;

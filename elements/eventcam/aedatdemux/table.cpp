@@ -51,7 +51,25 @@ void seek_table(GstAedatDemux* self) {
     return;
   }
   ++state.counts.damaged_places;
-  self->priv->faults.warn_of_damage(*at, "here should be a table of its packets");
+  state.table_missing = true;
+}
+
+void warn_of_missing_table(GstAedatDemux* self) {
+  const State& state = self->priv->state;
+  // Bytes that are missing before a table have moved it, too.
+  if (!state.table_missing || state.reader.damage().places > 0) return;
+  auto& faults = self->priv->faults;
+  const auto* const aedat4 = state.reader.aedat4();
+  const auto at = aedat4->table_at().value_or(0);
+  const auto found_at = aedat4->table_found_at();
+  const auto end = upstream_bytes(self->priv->sink);
+  if (found_at && *found_at != at)
+    faults.warn_of_damage(aedat4->table_field_at(),
+                          "the header names a place without a table of packets");
+  else if (end <= at)
+    faults.warn_of_damage(end, "the file ends before its table of packets");
+  else
+    faults.warn_of_damage(at, "here should be a table of its packets");
 }
 
 }  // namespace aedatdemux

@@ -180,8 +180,12 @@ bool Aedat4Decoder::read_header() {
   listed_ = !streams_.empty();
   newest_.assign(streams_.size(), std::numeric_limits<Microseconds>::min());
   packets_at_ = before + size;
-  if (header->data_table_position() >= static_cast<std::int64_t>(packets_at_))
+  if (header->data_table_position() >= static_cast<std::int64_t>(packets_at_)) {
     table_at_ = static_cast<std::uint64_t>(header->data_table_position());
+    const auto* const field = reinterpret_cast<const flatbuffers::Table*>(header)->GetAddressOf(
+        aedat4::Header::VT_DATA_TABLE_POSITION);
+    table_field_at_ = size_at + static_cast<std::uint64_t>(field - content.data());
+  }
   queue_.consume(before + size);
   return true;
 }
@@ -232,7 +236,10 @@ bool Aedat4Decoder::read_packet() {
   if (place == Place::more || place == Place::end) return false;
   if (place != Place::packet) {
     // The table ends the packets, but what it may hide is looked for all the same.
-    if (place == Place::noise) damage_.note(queue_.position(), "bytes that are no packet");
+    if (place == Place::noise)
+      damage_.note(queue_.position(), "bytes that are no packet");
+    else if (!table_found_at_)
+      table_found_at_ = queue_.position();
     queue_.consume(1);
     scanning_ = true;
     return true;

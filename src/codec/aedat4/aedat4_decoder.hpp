@@ -74,6 +74,12 @@ class Aedat4Decoder {
   /// Where the table of packets begins, where the header says that there is one.
   std::optional<std::uint64_t> table_at() const { return table_at_; }
 
+  /// Where the header says so.
+  std::uint64_t table_field_at() const { return table_field_at_; }
+
+  /// Where something like a table was come upon.
+  std::optional<std::uint64_t> table_found_at() const { return table_found_at_; }
+
   const Damage& damage() const { return damage_; }
 
   /// What is sound, but not handed over.
@@ -116,6 +122,8 @@ class Aedat4Decoder {
   bool listed_ = false;    ///< the header lists the streams
   std::uint64_t packets_at_ = 0;
   std::optional<std::uint64_t> table_at_;
+  std::uint64_t table_field_at_ = 0;
+  std::optional<std::uint64_t> table_found_at_;
   Aedat4Compression compression_ = Aedat4Compression::none;
   std::vector<Aedat4Stream> streams_;
   std::vector<Microseconds> newest_;  ///< the latest event of each stream

@@ -34,6 +34,8 @@ struct CsvSettings {
 /// - the sensor's size, by %geometry:W,H, by names such as x@W and y@H, or by a first line W H.
 ///
 /// Polarity is 0 or 1, -1 or 1, or false or true.
+///
+/// A header or a comment alone is a recording without events; a file of no bytes is none.
 class CsvDecoder final : public Decoder {
  public:
   explicit CsvDecoder(const CsvSettings& settings = {});
