@@ -48,15 +48,15 @@ void in_pieces(std::span<const std::uint8_t> bytes, Pieces pieces, const Take& t
   }
 }
 
-/// `outcome_of(pieces)` has to be the same for all bytes at once, for a few pieces and for many.
+/// `outcome_of(pieces)` has to be the same for all bytes at once as for pieces, small or large.
 template <class OutcomeOf>
 void require_same_however_cut(std::span<const std::uint8_t> bytes, const OutcomeOf& outcome_of) {
-  const auto whole = outcome_of(Pieces{});
   std::uint64_t chance = bytes.size();
   for (const auto byte : bytes) chance = chance * 1099511628211 + byte;
-  require(outcome_of(Pieces{bytes.size(), chance}) == whole, "few pieces make the same");
-  const auto small = static_cast<std::size_t>(1 + (chance >> 33) % 40);
-  require(outcome_of(Pieces{small, chance}) == whole, "small pieces make the same");
+  const bool small = (chance >> 63) != 0;
+  const Pieces pieces{small ? static_cast<std::size_t>(1 + (chance >> 33) % 40) : bytes.size(),
+                      chance};
+  require(outcome_of(pieces) == outcome_of(Pieces{}), "pieces make the same");
 }
 
 /// How many events are earlier than one before them.
