@@ -9,6 +9,8 @@
 
 #include <algorithm>
 
+#include "src/parallel/rows.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
@@ -82,14 +84,11 @@ HWY_EXPORT(denoise_row_16);
 
 /// Calls denoise_row(above, here, below, y) for each row.
 template <class Pixel, class DenoiseRow>
-void for_each_row(const PlaneView<Pixel>& frame, ThreadPool& threads,
-                  const DenoiseRow& denoise_row) {
-  constexpr int rows_at_once = 32;
-  threads.for_each((frame.height + rows_at_once - 1) / rows_at_once, [&](int part, int) {
-    const int last = std::min((part + 1) * rows_at_once, frame.height);
-    for (int y = part * rows_at_once; y < last; ++y)
-      denoise_row(frame.row(std::max(y - 1, 0)), frame.row(y),
-                  frame.row(std::min(y + 1, frame.height - 1)), y);
+void for_each_row_between(const PlaneView<Pixel>& frame, ThreadPool& threads,
+                          const DenoiseRow& denoise_row) {
+  for_each_row(threads, frame.height, [&](int y) {
+    denoise_row(frame.row(std::max(y - 1, 0)), frame.row(y),
+                frame.row(std::min(y + 1, frame.height - 1)), y);
   });
 }
 
@@ -97,16 +96,18 @@ void for_each_row(const PlaneView<Pixel>& frame, ThreadPool& threads,
 
 void denoise(const PlaneView<std::uint8_t>& frame, int limit, ThreadPool& threads,
              Plane<std::uint8_t>& out) {
-  for_each_row(frame, threads, [&](const auto* above, const auto* here, const auto* below, int y) {
-    HWY_DYNAMIC_DISPATCH(denoise_row_8)(above, here, below, frame.width, limit, out.row(y));
-  });
+  for_each_row_between(
+      frame, threads, [&](const auto* above, const auto* here, const auto* below, int y) {
+        HWY_DYNAMIC_DISPATCH(denoise_row_8)(above, here, below, frame.width, limit, out.row(y));
+      });
 }
 
 void denoise(const PlaneView<std::uint16_t>& frame, int limit, ThreadPool& threads,
              Plane<std::uint16_t>& out) {
-  for_each_row(frame, threads, [&](const auto* above, const auto* here, const auto* below, int y) {
-    HWY_DYNAMIC_DISPATCH(denoise_row_16)(above, here, below, frame.width, limit, out.row(y));
-  });
+  for_each_row_between(
+      frame, threads, [&](const auto* above, const auto* here, const auto* below, int y) {
+        HWY_DYNAMIC_DISPATCH(denoise_row_16)(above, here, below, frame.width, limit, out.row(y));
+      });
 }
 
 }  // namespace eventcamera

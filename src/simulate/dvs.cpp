@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "src/flow/flow_of_changes.hpp"
+#include "src/parallel/rows.hpp"
 #include "src/picture/denoise.hpp"
 #include "src/picture/grey8.hpp"
 #include "src/pixel/event_collector.hpp"
@@ -105,6 +106,7 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   void finish(double duration, EventBuckets& events) {
+    segments_ += passages_.size();
     const bool is_limited = current_.max_event_rate > 0;
     if (!is_limited && !readout_) {
       order_.finish(events, threads());
@@ -157,8 +159,6 @@ class PixelSimulator final : public DvsSimulator {
   /// What is the same for all pixels in the interval to come.
   void plan(double duration, int steps, bool is_exposed) {
     cut_into_passages(duration, steps, pulse_.next(current_, duration, is_exposed), passages_);
-    first_segment_ = segments_;
-    segments_ += passages_.size();
     tables_.clear();
     table_of_.clear();
     for (const auto& passage : passages_) {
@@ -208,7 +208,7 @@ class PixelSimulator final : public DvsSimulator {
                         EventCollector& collector) {
     const Passage& passage = passages_[which];
     const ShadeTables& tables = tables_[table_of_[which]];
-    const Segment segment{passage.begin, passage.duration, first_segment_ + which, passage.rise};
+    const Segment segment{passage.begin, passage.duration, segments_ + which, passage.rise};
     const Screen screen{*response_,
                         tables,
                         luma_bits(current_),
@@ -236,7 +236,8 @@ class PixelSimulator final : public DvsSimulator {
       response_.emplace(settings, luma_bits(settings));
     random_ = Random(settings.seed);
     if (is_first || !have_same_traits(settings, current_) || current_.threshold_jitter > 0)
-      for_each_row([&](int y) { pixels_.draw_traits(y, settings, random_); });
+      for_each_row(threads(), format().height,
+                   [&](int y) { pixels_.draw_traits(y, settings, random_); });
     current_ = settings;
   }
 
@@ -248,7 +249,7 @@ class PixelSimulator final : public DvsSimulator {
     if (!is_comparable)
       settle();
     else if (!had_bandwidth)
-      for_each_row([&](int y) {
+      for_each_row(threads(), format().height, [&](int y) {
         for (int x = 0; x < format().width; ++x) pixels_.signal.at(x, y) = pixels_.target.at(x, y);
       });
   }
@@ -257,17 +258,12 @@ class PixelSimulator final : public DvsSimulator {
   void settle() {
     pulse_.reset();
     const int widening = luma_bits(current_) == format().bits ? 1 : 257;
-    for_each_row([&](int y) {
+    for_each_row(threads(), format().height, [&](int y) {
       for (int x = 0; x < format().width; ++x)
         pixels_.target.at(x, y) =
             response_->values()[std::min(last_.at(x, y) * widening, response_->white())];
       pixels_.settle(y, current_, random_);
     });
-  }
-
-  template <class Body>
-  void for_each_row(const Body& body) {
-    threads().for_each(format().height, [&](int y, int) { body(y); });
   }
 
   template <class Body>
@@ -288,8 +284,7 @@ class PixelSimulator final : public DvsSimulator {
   std::vector<Passage> passages_;      ///< of the interval, in the order of time
   std::vector<ShadeTables> tables_;    ///< for each duration of a passage
   std::vector<std::size_t> table_of_;  ///< of each passage
-  std::uint64_t first_segment_ = 0;    ///< the number of the first passage
-  std::uint64_t segments_ = 0;
+  std::uint64_t segments_ = 0;         ///< that have passed
   EventOrder order_;
   EventBuckets ordered_;
   std::optional<Readout> readout_;

@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "src/parallel/rows.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
@@ -105,16 +107,6 @@ HWY_EXPORT(halve_row);
 HWY_EXPORT(slope_row);
 
 namespace {
-
-constexpr int rows_per_round = 32;
-
-template <class Body>
-void for_each_row(ThreadPool& threads, int rows, const Body& body) {
-  threads.for_each((rows + rows_per_round - 1) / rows_per_round, [&](int round, int) {
-    const int end = std::min(rows, (round + 1) * rows_per_round);
-    for (int y = round * rows_per_round; y < end; ++y) body(y);
-  });
-}
 
 /// Where a position beyond the border is reflected to: the border pixel itself is not repeated.
 int reflected(int p, int size) {
