@@ -37,6 +37,7 @@
 #include "elements/eventcam/aedatdemux/state.hpp"
 #include "elements/eventcam/aedatdemux/statistics.hpp"
 #include "gst/codec/pulling.hpp"
+#include "gst/codec/reading_properties.hpp"
 
 GST_DEBUG_CATEGORY(aedat_demux_debug);
 
@@ -126,13 +127,7 @@ static void gst_aedat_demux_class_init(GstAedatDemuxClass* klass) {
   object_class->set_property = set_property;
   object_class->get_property = get_property;
   object_class->finalize = finalize;
-  g_object_class_install_property(
-      object_class, prop_buffer_time,
-      g_param_spec_uint64("buffer-time", "Buffer time",
-                          "How much time a buffer covers (nanoseconds, in whole microseconds)",
-                          GST_USECOND, 10 * GST_SECOND, aedatdemux::default_buffer_time,
-                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                   GST_PARAM_MUTABLE_READY)));
+  g_object_class_install_property(object_class, prop_buffer_time, buffer_time_spec());
   g_object_class_install_property(
       object_class, prop_stats,
       g_param_spec_boxed(

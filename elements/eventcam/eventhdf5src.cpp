@@ -14,6 +14,7 @@
 #include "elements/eventcam/eventhdf5src.hpp"
 
 #include "gst/codec/file_streams.hpp"
+#include "gst/codec/reading_properties.hpp"
 
 namespace {
 
@@ -98,17 +99,8 @@ static void gst_event_hdf5_src_class_init(GstEventHdf5SrcClass* klass) {
   g_object_class_install_property(
       object_class, prop_location,
       g_param_spec_string("location", "Location", "The file to read", nullptr, flags));
-  g_object_class_install_property(
-      object_class, prop_buffer_time,
-      g_param_spec_uint64("buffer-time", "Buffer time",
-                          "How much time a buffer covers (nanoseconds, in whole microseconds)",
-                          GST_USECOND, 10 * GST_SECOND, 10 * GST_MSECOND, flags));
-  g_object_class_install_property(
-      object_class, prop_stats,
-      g_param_spec_boxed("stats", "Statistics",
-                         "What was read since the start or the last seek, and what was left out",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  g_object_class_install_property(object_class, prop_buffer_time, buffer_time_spec());
+  g_object_class_install_property(object_class, prop_stats, reading_stats_spec());
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;

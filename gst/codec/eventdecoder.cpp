@@ -11,6 +11,7 @@
 #include "gst/codec/eventdecoder/statistics.hpp"
 #include "gst/codec/file_streams.hpp"
 #include "gst/codec/pulling.hpp"
+#include "gst/codec/reading_properties.hpp"
 
 GST_DEBUG_CATEGORY(event_decoder_debug);
 
@@ -112,18 +113,7 @@ static void gst_event_decoder_class_init(GstEventDecoderClass* klass) {
   object_class->constructed = constructed;
   object_class->finalize = finalize;
   GST_ELEMENT_CLASS(klass)->change_state = change_state;
-  g_object_class_install_property(
-      object_class, prop_buffer_time,
-      g_param_spec_uint64("buffer-time", "Buffer time",
-                          "How much time a buffer covers (nanoseconds, in whole microseconds)",
-                          GST_USECOND, 10 * GST_SECOND, eventdecoder::default_buffer_time,
-                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                   GST_PARAM_MUTABLE_READY)));
-  g_object_class_install_property(
-      object_class, prop_stats,
-      g_param_spec_boxed("stats", "Statistics",
-                         "What was read since the start or the last seek, and what was left out",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  g_object_class_install_property(object_class, prop_buffer_time, buffer_time_spec());
+  g_object_class_install_property(object_class, prop_stats, reading_stats_spec());
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_DECODER, static_cast<GstPluginAPIFlags>(0));
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gst/codec/reading_faults.hpp"
+#include "gst/codec/reading_properties.hpp"
 #include "gst/owned.hpp"
 #include "src/codec/aedat/aedat_reader.hpp"
 #include "src/codec/aedat4/aedat4_table.hpp"
@@ -29,8 +30,6 @@ using eventcamera::Microseconds;
 using eventcamera::SensorSize;
 using eventcamera::StampedEvent;
 using eventcamera::UsedPixels;
-
-constexpr GstClockTime default_buffer_time = 10 * GST_MSECOND;
 
 /// Whether a stream has a pad.
 inline bool is_shown(Aedat4Kind kind) {
@@ -104,7 +103,7 @@ struct GstAedatDemuxPrivate {
   GstFlowCombiner* combiner = nullptr;
 
   std::mutex mutex;  // guards what follows; nothing is called under it
-  GstClockTime buffer_time = aedatdemux::default_buffer_time;
+  GstClockTime buffer_time = default_buffer_time;
   GstSegment segment = {};  ///< position is that of the output
   bool pulls = false;
   bool shown = false;  ///< there are pads to seek by

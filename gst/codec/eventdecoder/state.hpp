@@ -10,6 +10,7 @@
 
 #include "gst/codec/eventdecoder.hpp"
 #include "gst/codec/reading_faults.hpp"
+#include "gst/codec/reading_properties.hpp"
 #include "gst/owned.hpp"
 #include "src/codec/interval_slicer.hpp"
 #include "src/codec/seekable_decoder.hpp"
@@ -29,8 +30,6 @@ using eventcamera::Landmark;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
 using eventcamera::UsedPixels;
-
-constexpr GstClockTime default_buffer_time = 10 * GST_MSECOND;
 
 struct Counts {
   guint64 events = 0;
@@ -86,7 +85,7 @@ struct GstEventDecoderPrivate {
   GstPad* src = nullptr;
 
   std::mutex mutex;  // guards what follows; nothing is called under it
-  GstClockTime buffer_time = eventdecoder::default_buffer_time;
+  GstClockTime buffer_time = default_buffer_time;
   GstSegment segment = {};  ///< as if the first event were at 0; position is that of the output
   std::optional<eventcamera::Microseconds> first;  ///< time of the first event
   GstClockTime duration = GST_CLOCK_TIME_NONE;     ///< the file's
