@@ -4,9 +4,7 @@
 // RECORDING/FORMAT/read or write.
 #include <benchmark/benchmark.h>
 
-#include <cstring>
-#include <ctime>
-
+#include "bench/codec_timing.hpp"
 #include "tests/codec/formats.hpp"
 #include "tests/codec/recordings.hpp"
 
@@ -53,42 +51,6 @@ Recording edges() {
   return recording;
 }
 
-/// Of this thread: what else the machine does is not counted.
-double seconds_now() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Seconds of a memcpy of these events, the best of some.
-double memcpy_seconds(const std::vector<StampedEvent>& events) {
-  std::vector<StampedEvent> copy(events.size());
-  double best = 1;
-  for (int i = 0; i < 20; ++i) {
-    const double start = seconds_now();
-    std::memcpy(copy.data(), events.data(), events.size() * sizeof events[0]);
-    benchmark::DoNotOptimize(copy.data());
-    benchmark::ClobberMemory();
-    best = std::min(best, seconds_now() - start);
-  }
-  return best;
-}
-
-/// Times `body`, which handles all events of the recording.
-template <class Body>
-void measure(benchmark::State& state, const Recording& recording, const Body& body) {
-  body();
-  double seconds = 0;
-  for (auto _ : state) {
-    const double start = seconds_now();
-    body();
-    seconds += seconds_now() - start;
-  }
-  seconds /= static_cast<double>(state.iterations());
-  state.counters["Mevents/s"] = static_cast<double>(recording.events.size()) / seconds / 1e6;
-  state.counters["memcpys"] = seconds / memcpy_seconds(recording.events);
-}
-
 void register_all(const Recording& recording) {
   for (const auto& format : formats::all()) {
     // The header does not matter.
@@ -100,7 +62,7 @@ void register_all(const Recording& recording) {
     };
     add("read", [&recording, format, bytes](benchmark::State& state) {
       Decoded decoded;
-      measure(state, recording, [&] {
+      bench::measure(state, recording.events, [&] {
         decoded.events.clear();
         format.make_decoder(size)->decode(bytes, decoded);
       });
@@ -108,7 +70,7 @@ void register_all(const Recording& recording) {
     });
     add("write", [&recording, format](benchmark::State& state) {
       std::vector<std::uint8_t> written;
-      measure(state, recording, [&] {
+      bench::measure(state, recording.events, [&] {
         written.clear();
         format.make_encoder(size)->encode(recording.events, written);
       });

@@ -6,12 +6,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstring>
-#include <ctime>
 #include <filesystem>
 #include <random>
 #include <string>
 
+#include "bench/codec_timing.hpp"
 #include "src/codec/csv/csv_decoder.hpp"
 #include "src/codec/csv/csv_encoder.hpp"
 #include "src/codec/hdf5/ecf.hpp"
@@ -55,42 +54,6 @@ const Events& events() {
   return events;
 }
 
-/// Of this thread: what else the machine does is not counted.
-double seconds_now() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Seconds of a memcpy of the events, the best of some.
-double memcpy_seconds() {
-  Events copy(count);
-  double best = 1;
-  for (int i = 0; i < 20; ++i) {
-    const double start = seconds_now();
-    std::memcpy(static_cast<void*>(copy.data()), events().data(), count * sizeof(StampedEvent));
-    benchmark::DoNotOptimize(copy.data());
-    benchmark::ClobberMemory();
-    best = std::min(best, seconds_now() - start);
-  }
-  return best;
-}
-
-/// Times `body`, which handles all events.
-template <class Body>
-void measure(benchmark::State& state, const Body& body) {
-  body();
-  double seconds = 0;
-  for (auto _ : state) {
-    const double start = seconds_now();
-    body();
-    seconds += seconds_now() - start;
-  }
-  seconds /= static_cast<double>(state.iterations());
-  state.counters["Mevents/s"] = static_cast<double>(count) / seconds / 1e6;
-  state.counters["memcpys"] = seconds / memcpy_seconds();
-}
-
 template <class Make>
 Bytes encode(const Make& make) {
   Bytes bytes;
@@ -106,7 +69,7 @@ void add(const std::string& name, const MakeEncoder& make_encoder,
   benchmark::RegisterBenchmark((name + "/read").c_str(), [=](benchmark::State& state) {
     const auto bytes = encode(make_encoder);
     Decoded out;
-    measure(state, [&] {
+    bench::measure(state, events(), [&] {
       out.events.clear();
       auto decoder = make_decoder();
       for (std::size_t at = 0; at < bytes.size(); at += piece)
@@ -117,7 +80,7 @@ void add(const std::string& name, const MakeEncoder& make_encoder,
   });
   benchmark::RegisterBenchmark((name + "/write").c_str(), [=](benchmark::State& state) {
     Bytes bytes;
-    measure(state, [&] {
+    bench::measure(state, events(), [&] {
       bytes.clear();
       auto encoder = make_encoder();
       encoder.encode(events(), bytes);
@@ -141,7 +104,7 @@ void add_ecf() {
     for (std::size_t i = 0; i < chunks.size(); ++i)
       encode_ecf(std::span(events()).subspan(i * chunk, chunk), chunks[i]);
     Events out;
-    measure(state, [&] {
+    bench::measure(state, events(), [&] {
       out.clear();
       for (const auto& bytes : chunks) decode_ecf(bytes, out);
     });
@@ -149,7 +112,7 @@ void add_ecf() {
   });
   benchmark::RegisterBenchmark("ecf/write", [](benchmark::State& state) {
     Bytes bytes;
-    measure(state, [&] {
+    bench::measure(state, events(), [&] {
       bytes.clear();
       for (std::size_t i = 0; i < count; i += chunk)
         encode_ecf(std::span(events()).subspan(i, chunk), bytes);
@@ -168,7 +131,7 @@ void add_hdf5(const std::string& name, Hdf5Layout layout, Hdf5Writer::Compressio
   benchmark::RegisterBenchmark((name + "/read").c_str(), [=](benchmark::State& state) {
     write();
     Events out;
-    measure(state, [&] {
+    bench::measure(state, events(), [&] {
       out.clear();
       Hdf5Reader reader(path);
       while (reader.read(10'000, out) > 0) {
@@ -178,7 +141,7 @@ void add_hdf5(const std::string& name, Hdf5Layout layout, Hdf5Writer::Compressio
     if (out.size() != count) state.SkipWithError("events are missing");
   });
   benchmark::RegisterBenchmark((name + "/write").c_str(), [=](benchmark::State& state) {
-    measure(state, write);
+    bench::measure(state, events(), write);
     std::filesystem::remove(path);
   });
 }

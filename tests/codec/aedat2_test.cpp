@@ -13,21 +13,11 @@ namespace {
 
 using namespace eventcamera;
 using aedat_files::Bytes;
+using pieces::decoded;
 
 constexpr SensorSize davis346{346, 260};
 constexpr SensorSize dvs128{128, 128};
 constexpr Microseconds hour = 3'600'000'000;
-
-Decoded decoded(Aedat2Decoder& decoder, std::span<const std::uint8_t> bytes,
-                std::size_t piece = std::size_t{1} << 20) {
-  Decoded out;
-  for (const auto part : pieces::of(bytes, piece)) {
-    const Bytes copy(part.begin(), part.end());
-    decoder.decode(copy, out);
-  }
-  decoder.finish(out);
-  return out;
-}
 
 TEST(Aedat2, Davis) {
   const auto events = random_events::make(davis346, 30'000, 1, 0, {hour});

@@ -12,20 +12,10 @@ namespace {
 
 using namespace eventcamera;
 using aedat_files::Bytes;
+using pieces::decoded;
 
 constexpr SensorSize davis346{346, 260};
 constexpr Microseconds hour = 3'600'000'000;
-
-Decoded decoded(Aedat3Decoder& decoder, std::span<const std::uint8_t> bytes,
-                std::size_t piece = std::size_t{1} << 20) {
-  Decoded out;
-  for (const auto part : pieces::of(bytes, piece)) {
-    const Bytes copy(part.begin(), part.end());
-    decoder.decode(copy, out);
-  }
-  decoder.finish(out);
-  return out;
-}
 
 TEST(Aedat3, PolarityEventsOfAllTimes) {
   const auto events = random_events::make(davis346, 30'000, 1, 0, {300 * hour});

@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "src/codec/decoder.hpp"
+
 namespace eventcamera::pieces {
 
 /// Every piece has `size` bytes; 0: sizes at random, many of them tiny.
@@ -22,6 +24,18 @@ inline std::vector<std::span<const std::uint8_t>> of(std::span<const std::uint8_
     bytes = bytes.subspan(count);
   }
   return pieces;
+}
+
+/// All of it, each piece in memory of its own.
+inline Decoded decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
+                       std::size_t piece = std::size_t{1} << 20) {
+  Decoded out;
+  for (const auto part : of(bytes, piece)) {
+    const std::vector<std::uint8_t> copy(part.begin(), part.end());
+    decoder.decode(copy, out);
+  }
+  decoder.finish(out);
+  return out;
 }
 
 }  // namespace eventcamera::pieces

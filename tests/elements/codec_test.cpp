@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "src/codec/interval_slicer.hpp"
+#include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -60,17 +61,6 @@ std::vector<StampedEvent> some_events() {
         StampedEvent::at(i % width, i / width, t, i % 3 == 0 ? Polarity::off : Polarity::on));
   }
   return events;
-}
-
-/// A buffer of the events of [start, start + 10 ms).
-GstBuffer* buffer_of(std::span<const StampedEvent> events, Microseconds start) {
-  std::vector<GstEventCameraEvent> stream;
-  for (const auto& event : events)
-    stream.push_back({static_cast<guint32>(event.t - start), event.x, event.y_p});
-  GstBuffer* buffer = gst_buffer_new_memdup(stream.data(), stream.size() * sizeof stream[0]);
-  GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(start) * GST_USECOND;
-  GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
-  return buffer;
 }
 
 std::string pull_bytes(Harness& h) {

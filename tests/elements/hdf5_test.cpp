@@ -8,6 +8,7 @@
 
 #include "src/codec/hdf5/hdf5_reader.hpp"
 #include "src/codec/hdf5/hdf5_writer.hpp"
+#include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -314,13 +315,7 @@ class Sink {
   void caps(const char* caps) { gst_harness_set_src_caps_str(h_.get(), caps); }
 
   GstFlowReturn push(const Events& events, Microseconds start) {
-    std::vector<GstEventCameraEvent> stream;
-    for (const auto& event : events)
-      stream.push_back({static_cast<guint32>(event.t - start), event.x, event.y_p});
-    GstBuffer* buffer = gst_buffer_new_memdup(stream.data(), stream.size() * sizeof stream[0]);
-    GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(start) * GST_USECOND;
-    GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
-    return gst_harness_push(h_.get(), buffer);
+    return gst_harness_push(h_.get(), buffer_of(events, start));
   }
 
   void end() { gst_harness_push_event(h_.get(), gst_event_new_eos()); }

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cstring>
+#include <ctime>
+#include <vector>
+
+#include "src/event/stamped_event.hpp"
+
+namespace bench {
+
+/// Of this thread: what else the machine does is not counted.
+inline double seconds_now() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Seconds of a memcpy of these events, the best of some.
+inline double memcpy_seconds(const std::vector<eventcamera::StampedEvent>& events) {
+  std::vector<eventcamera::StampedEvent> copy(events.size());
+  double best = 1;
+  for (int i = 0; i < 20; ++i) {
+    const double start = seconds_now();
+    std::memcpy(static_cast<void*>(copy.data()), events.data(), events.size() * sizeof events[0]);
+    benchmark::DoNotOptimize(copy.data());
+    benchmark::ClobberMemory();
+    best = std::min(best, seconds_now() - start);
+  }
+  return best;
+}
+
+/// Times `body`, which handles all of these events: million events a second, and the time as a
+/// ratio to that of a memcpy of them.
+template <class Body>
+void measure(benchmark::State& state, const std::vector<eventcamera::StampedEvent>& events,
+             const Body& body) {
+  body();
+  double seconds = 0;
+  for (auto _ : state) {
+    const double start = seconds_now();
+    body();
+    seconds += seconds_now() - start;
+  }
+  seconds /= static_cast<double>(state.iterations());
+  state.counters["Mevents/s"] = static_cast<double>(events.size()) / seconds / 1e6;
+  state.counters["memcpys"] = seconds / memcpy_seconds(events);
+}
+
+}  // namespace bench

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/gst.h>
+
+#include <span>
+#include <vector>
+
+#include "gst/eventcamera/eventcamera.h"
+#include "src/event/stamped_event.hpp"
+
+/// A buffer of the events of [start, start + 10 ms).
+inline GstBuffer* buffer_of(std::span<const eventcamera::StampedEvent> events,
+                            eventcamera::Microseconds start) {
+  std::vector<GstEventCameraEvent> stream;
+  for (const auto& event : events)
+    stream.push_back({static_cast<guint32>(event.t - start), event.x, event.y_p});
+  GstBuffer* buffer = gst_buffer_new_memdup(stream.data(), stream.size() * sizeof stream[0]);
+  GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(start) * GST_USECOND;
+  GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
+  return buffer;
+}
