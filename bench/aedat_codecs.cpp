@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cstring>
 
-#include "src/codec/aedat2/aedat2_decoder.hpp"
-#include "src/codec/aedat3/aedat3_decoder.hpp"
-#include "src/codec/aedat4/aedat4_decoder.hpp"
-#include "src/codec/aedat4/aedat4_encoder.hpp"
-#include "tests/codec/aedat_files.hpp"
-#include "tests/codec/random_events.hpp"
+#include "src/formats/aedat/aedat2_decoder.hpp"
+#include "src/formats/aedat/aedat3_decoder.hpp"
+#include "src/formats/aedat/aedat4_decoder.hpp"
+#include "src/formats/aedat/aedat4_encoder.hpp"
+#include "tests/formats/aedat_files.hpp"
+#include "tests/formats/random_events.hpp"
 
 namespace {
 

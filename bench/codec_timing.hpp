@@ -8,7 +8,7 @@
 #include <ctime>
 #include <vector>
 
-#include "src/event/stamped_event.hpp"
+#include "src/core/stamped_event.hpp"
 
 namespace bench {
 

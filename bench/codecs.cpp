@@ -5,8 +5,8 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/codec_timing.hpp"
-#include "tests/codec/formats.hpp"
-#include "tests/codec/recordings.hpp"
+#include "tests/formats/formats.hpp"
+#include "tests/formats/recordings.hpp"
 
 namespace {
 

@@ -10,9 +10,9 @@
 #include "bench/plain/dvs.hpp"
 #include "bench/plain/frame.hpp"
 #include "bench/plain/sparse.hpp"
+#include "src/dvs/dvs.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
-#include "src/simulate/dvs.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"
 

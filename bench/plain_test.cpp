@@ -5,11 +5,11 @@
 
 #include "bench/methods.hpp"
 #include "bench/scenes.hpp"
-#include "src/reference/dense.hpp"
-#include "src/reference/diff.hpp"
-#include "src/reference/sparse.hpp"
 #include "src/simulate/path.hpp"
 #include "tests/core/scene.hpp"
+#include "tests/reference/dense.hpp"
+#include "tests/reference/diff.hpp"
+#include "tests/reference/sparse.hpp"
 
 namespace {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "src/event/step_times.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/step_times.hpp"
 
 /// What the methods are timed on.
 namespace bench {

@@ -11,13 +11,13 @@
 #include <string>
 
 #include "bench/codec_timing.hpp"
-#include "src/codec/csv/csv_decoder.hpp"
-#include "src/codec/csv/csv_encoder.hpp"
-#include "src/codec/hdf5/ecf.hpp"
-#include "src/codec/hdf5/hdf5_reader.hpp"
-#include "src/codec/hdf5/hdf5_writer.hpp"
-#include "src/codec/npy/npy_decoder.hpp"
-#include "src/codec/npy/npy_encoder.hpp"
+#include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_writer.hpp"
+#include "src/formats/numpy/npy_decoder.hpp"
+#include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/text/csv_decoder.hpp"
+#include "src/formats/text/csv_encoder.hpp"
 
 namespace {
 

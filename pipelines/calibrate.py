@@ -242,7 +242,7 @@ def read_recording(path, video):
     reader = "decodebin caps=application/x-event-camera name=decoder  decoder. ! identity"
     if os.path.splitext(path)[1].lower() in (".csv", ".txt"):
         # Lines do not say how large the sensor is, so it is asked for.
-        reader = (f"csvdec ! application/x-event-camera,width={video.width},height={video.height}"
+        reader = (f"eventcsvdec ! application/x-event-camera,width={video.width},height={video.height}"
                   " ! identity")
     run(f"filesrc location={quoted(path)} ! {reader} name=decoded ! application/x-event-camera"
         " ! appsink name=out sync=false max-buffers=4", take=take)

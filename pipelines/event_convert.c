@@ -26,11 +26,11 @@ typedef struct {
 
 static const Format formats[] = {
     {".raw", "filesrc name=in ! evtdec", "evtenc ! filesink name=out"},
-    {".dat", "filesrc name=in ! datdec", "datenc ! filesink name=out"},
-    {".es", "filesrc name=in ! esdec", "esenc ! filesink name=out"},
-    {".csv", "filesrc name=in ! csvdec", "csvenc ! filesink name=out"},
-    {".txt", "filesrc name=in ! csvdec", "csvenc dialect=rpg ! filesink name=out"},
-    {".npy", "filesrc name=in ! npydec", "npyenc ! filesink name=out"},
+    {".dat", "filesrc name=in ! eventdatdec", "eventdatenc ! filesink name=out"},
+    {".es", "filesrc name=in ! eventesdec", "eventesenc ! filesink name=out"},
+    {".csv", "filesrc name=in ! eventcsvdec", "eventcsvenc ! filesink name=out"},
+    {".txt", "filesrc name=in ! eventcsvdec", "eventcsvenc dialect=rpg ! filesink name=out"},
+    {".npy", "filesrc name=in ! eventnpydec", "eventnpyenc ! filesink name=out"},
     {".aedat4", AEDAT_READER, "aedatmux ! filesink name=out"},
     {".aedat", AEDAT_READER, NULL},
     {".h5", "eventhdf5src name=in", "eventhdf5sink name=out"},

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "src/parallel/thread_pool.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/thread_pool.hpp"
 
 namespace plain {
 

@@ -3,9 +3,9 @@
 
 #include <cstring>
 
-#include "src/event/event_buckets.hpp"
-#include "src/parallel/thread_pool.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/event_buckets.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/simulate/bands.hpp"
 #include "src/simulate/simulator.hpp"
 

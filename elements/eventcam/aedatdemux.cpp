@@ -27,8 +27,6 @@
  * eventrender ! videoconvert ! autovideosink  d.video_0 ! queue ! videoconvert ! autovideosink
  * ]|
  */
-#include "elements/eventcam/aedatdemux.hpp"
-
 #include <mutex>
 
 #include "elements/eventcam/aedatdemux/pads.hpp"
@@ -36,8 +34,8 @@
 #include "elements/eventcam/aedatdemux/pushed.hpp"
 #include "elements/eventcam/aedatdemux/state.hpp"
 #include "elements/eventcam/aedatdemux/statistics.hpp"
-#include "gst/codec/pulling.hpp"
-#include "gst/codec/reading_properties.hpp"
+#include "gst/base/pulling.hpp"
+#include "gst/base/reading_properties.hpp"
 
 GST_DEBUG_CATEGORY(aedat_demux_debug);
 

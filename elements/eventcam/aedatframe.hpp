@@ -3,7 +3,7 @@
 
 #include <gst/video/video.h>
 
-#include "src/codec/aedat4/aedat4.hpp"
+#include "src/formats/aedat/aedat4.hpp"
 
 /// What AEDAT4's frames are in GStreamer.
 #define AEDAT_VIDEO_CAPS                                                                         \

@@ -22,8 +22,6 @@
  * ! aedatmux compression=zstd ! filesink location=out.aedat4
  * ]|
  */
-#include "elements/eventcam/aedatmux.hpp"
-
 #include <gst/base/gstaggregator.h>
 
 #include <exception>
@@ -36,10 +34,10 @@
 #include <vector>
 
 #include "elements/eventcam/aedatframe.hpp"
-#include "gst/codec/writable_events.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "gst/owned.hpp"
-#include "src/codec/aedat4/aedat4_encoder.hpp"
+#include "src/formats/aedat/aedat4_encoder.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
 #define GST_CAT_DEFAULT aedat_mux_debug

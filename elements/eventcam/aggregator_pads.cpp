@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/aggregator_pads.hpp"
 
-#include "gst/owned.hpp"
+#include "gst/base/owned.hpp"
 
 GstAggregatorPad* add_sink_pad(gpointer aggregator, const char* name) {
   GstPadTemplate* pad_template =

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/aggregator_seeking.hpp"
 
-#include "gst/codec/seek_request.hpp"
+#include "gst/base/seek_request.hpp"
 
 gboolean answer_seeking(GstAggregatorPad* pad, GstQuery* query) {
   return gst_pad_peer_query(GST_PAD(pad), query);

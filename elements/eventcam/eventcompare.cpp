@@ -30,8 +30,6 @@
  * eventsim-dense ! compare.candidate
  * ]|
  */
-#include "elements/eventcam/eventcompare.hpp"
-
 #include <gst/base/gstaggregator.h>
 
 #include <algorithm>
@@ -48,10 +46,10 @@
 #include "elements/eventcam/aggregator_seeking.hpp"
 #include "elements/eventcam/broken_events.hpp"
 #include "elements/eventcam/report.hpp"
+#include "gst/base/event_interval.hpp"
+#include "gst/base/mapped_events.hpp"
+#include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "gst/owned.hpp"
-#include "gst/video/event_interval.hpp"
-#include "gst/video/mapped_events.hpp"
 #include "src/measure/map_picture.hpp"
 #include "src/measure/stream_comparison.hpp"
 

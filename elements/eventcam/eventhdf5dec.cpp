@@ -19,10 +19,8 @@
  * autovideosink
  * ]|
  */
-#include "elements/eventcam/eventhdf5dec.hpp"
-
-#include "gst/codec/eventdecoder.hpp"
-#include "src/codec/hdf5/hdf5_reader.hpp"
+#include "gst/base/eventdecoder.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
 
 namespace {
 

@@ -17,8 +17,6 @@
  * location=events.h5
  * ]|
  */
-#include "elements/eventcam/eventhdf5sink.hpp"
-
 #include <gst/base/gstbasesink.h>
 
 #include <algorithm>
@@ -31,9 +29,9 @@
 #include <string>
 #include <utility>
 
-#include "gst/codec/writable_events.hpp"
+#include "gst/base/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "src/codec/hdf5/hdf5_writer.hpp"
+#include "src/formats/hdf5/hdf5_writer.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
 #define GST_CAT_DEFAULT event_hdf5_sink_debug

@@ -11,10 +11,8 @@
  * gst-launch-1.0 eventhdf5src location=events.h5 ! evtenc ! filesink location=events.raw
  * ]|
  */
-#include "elements/eventcam/eventhdf5src.hpp"
-
-#include "gst/codec/file_streams.hpp"
-#include "gst/codec/reading_properties.hpp"
+#include "gst/base/file_streams.hpp"
+#include "gst/base/reading_properties.hpp"
 
 namespace {
 

@@ -15,8 +15,6 @@
  * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.events
  * ]|
  */
-#include "elements/eventcam/eventoverlay.hpp"
-
 #include <gst/base/gstaggregator.h>
 #include <gst/video/video.h>
 
@@ -32,12 +30,12 @@
 #include "elements/eventcam/aggregator_pads.hpp"
 #include "elements/eventcam/aggregator_seeking.hpp"
 #include "elements/eventcam/broken_events.hpp"
+#include "gst/base/drawn_formats.hpp"
+#include "gst/base/event_interval.hpp"
+#include "gst/base/mapped_events.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/video_frame.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "gst/owned.hpp"
-#include "gst/video/drawn_formats.hpp"
-#include "gst/video/event_interval.hpp"
-#include "gst/video/mapped_events.hpp"
-#include "gst/video/video_frame.hpp"
 #include "src/render/overlay.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_overlay_debug);

@@ -26,8 +26,6 @@
  * video/x-raw,framerate=60/1 ! videoconvert ! autovideosink
  * ]|
  */
-#include "elements/eventcam/eventrender.hpp"
-
 #include <mutex>
 #include <new>
 
@@ -38,7 +36,7 @@
 #include "elements/eventcam/eventrender/pictures.hpp"
 #include "elements/eventcam/eventrender/properties.hpp"
 #include "elements/eventcam/eventrender/state.hpp"
-#include "gst/video/drawn_formats.hpp"
+#include "gst/base/drawn_formats.hpp"
 
 using eventrender::event_render;
 

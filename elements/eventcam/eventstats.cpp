@@ -25,8 +25,6 @@
  * gst-launch-1.0 -m filesrc location=recording.raw ! evtdec ! eventstats map=map.png ! fakesink
  * ]|
  */
-#include "elements/eventcam/eventstats.hpp"
-
 #include <gst/base/gstbasetransform.h>
 
 #include <algorithm>
@@ -41,12 +39,12 @@
 
 #include "elements/eventcam/broken_events.hpp"
 #include "elements/eventcam/report.hpp"
+#include "gst/base/event_interval.hpp"
+#include "gst/base/mapped_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "gst/video/event_interval.hpp"
-#include "gst/video/mapped_events.hpp"
+#include "src/core/arrivals.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/measure/map_picture.hpp"
-#include "src/render/arrivals.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 #define GST_CAT_DEFAULT event_stats_debug

@@ -10,14 +10,13 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! datenc ! filesink location=recording.dat
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventdatenc ! filesink
+ * location=recording.dat
  * ]|
  */
-#include "elements/eventcam/evtdec.hpp"
-
 #include "elements/eventcam/evtformat.hpp"
-#include "gst/codec/eventdecoder.hpp"
-#include "src/codec/prophesee/raw.hpp"
+#include "gst/base/eventdecoder.hpp"
+#include "src/formats/evt/raw.hpp"
 
 namespace {
 

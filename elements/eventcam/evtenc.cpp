@@ -13,13 +13,11 @@
  * gst-launch-1.0 v4l2src ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
  * ]|
  */
-#include "elements/eventcam/evtenc.hpp"
-
 #include <atomic>
 
 #include "elements/eventcam/evtformat.hpp"
-#include "gst/codec/eventencoder.hpp"
-#include "src/codec/prophesee/raw.hpp"
+#include "gst/base/eventencoder.hpp"
+#include "src/formats/evt/raw.hpp"
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "src/codec/prophesee/raw.hpp"
+#include "src/formats/evt/raw.hpp"
 
 /// The caps of words without a header.
 #define EVT_WORDS_CAPS                                                             \

@@ -1,55 +1,40 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <gst/gst.h>
 
-#include "elements/eventcam/aedatdemux.hpp"
-#include "elements/eventcam/aedatmux.hpp"
-#include "elements/eventcam/csvdec.hpp"
-#include "elements/eventcam/csvenc.hpp"
-#include "elements/eventcam/datdec.hpp"
-#include "elements/eventcam/datenc.hpp"
-#include "elements/eventcam/esdec.hpp"
-#include "elements/eventcam/esenc.hpp"
-#include "elements/eventcam/eventcompare.hpp"
-#include "elements/eventcam/eventhdf5dec.hpp"
-#include "elements/eventcam/eventhdf5sink.hpp"
-#include "elements/eventcam/eventhdf5src.hpp"
-#include "elements/eventcam/eventoverlay.hpp"
-#include "elements/eventcam/eventrender.hpp"
-#include "elements/eventcam/eventstats.hpp"
-#include "elements/eventcam/evtdec.hpp"
-#include "elements/eventcam/evtenc.hpp"
-#include "elements/eventcam/npydec.hpp"
-#include "elements/eventcam/npyenc.hpp"
-#include "elements/eventcam/typefinders.hpp"
+#ifdef HAVE_AEDAT
+#define AEDAT_ELEMENTS(X) X(aedatdemux) X(aedatmux)
+#else
+#define AEDAT_ELEMENTS(X)
+#endif
+
+#ifdef HAVE_HDF5
+#define HDF5_ELEMENTS(X) X(eventhdf5dec) X(eventhdf5sink) X(eventhdf5src)
+#else
+#define HDF5_ELEMENTS(X)
+#endif
+
+#define ELEMENTS(X)                                                                       \
+  AEDAT_ELEMENTS(X)                                                                       \
+  HDF5_ELEMENTS(X)                                                                        \
+  X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc) \
+      X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats) X(evtdec) X(evtenc)    \
+          X(eventnpydec) X(eventnpyenc)
+#define TYPE_FINDERS(X) \
+  X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(propheseedat) X(propheseeraw)
+
+#define DECLARE_ELEMENT(name) GST_ELEMENT_REGISTER_DECLARE(name)
+#define DECLARE_TYPE_FINDER(name) GST_TYPE_FIND_REGISTER_DECLARE(name)
+G_BEGIN_DECLS
+ELEMENTS(DECLARE_ELEMENT)
+TYPE_FINDERS(DECLARE_TYPE_FINDER)
+G_END_DECLS
 
 static gboolean plugin_init(GstPlugin* plugin) {
   gboolean registered = FALSE;
-  registered |= GST_ELEMENT_REGISTER(aedatdemux, plugin);
-  registered |= GST_ELEMENT_REGISTER(aedatmux, plugin);
-  registered |= GST_ELEMENT_REGISTER(csvdec, plugin);
-  registered |= GST_ELEMENT_REGISTER(csvenc, plugin);
-  registered |= GST_ELEMENT_REGISTER(datdec, plugin);
-  registered |= GST_ELEMENT_REGISTER(datenc, plugin);
-  registered |= GST_ELEMENT_REGISTER(esdec, plugin);
-  registered |= GST_ELEMENT_REGISTER(esenc, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventcompare, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventhdf5dec, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventhdf5sink, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventhdf5src, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventoverlay, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventrender, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventstats, plugin);
-  registered |= GST_ELEMENT_REGISTER(evtdec, plugin);
-  registered |= GST_ELEMENT_REGISTER(evtenc, plugin);
-  registered |= GST_ELEMENT_REGISTER(npydec, plugin);
-  registered |= GST_ELEMENT_REGISTER(npyenc, plugin);
-  registered |= GST_TYPE_FIND_REGISTER(aedat, plugin);
-  registered |= GST_TYPE_FIND_REGISTER(eventcsv, plugin);
-  registered |= GST_TYPE_FIND_REGISTER(eventstream, plugin);
-  registered |= GST_TYPE_FIND_REGISTER(hdf5, plugin);
-  registered |= GST_TYPE_FIND_REGISTER(npy, plugin);
-  registered |= GST_TYPE_FIND_REGISTER(propheseedat, plugin);
-  registered |= GST_TYPE_FIND_REGISTER(propheseeraw, plugin);
+#define REGISTER_ELEMENT(name) registered |= GST_ELEMENT_REGISTER(name, plugin);
+#define REGISTER_TYPE_FINDER(name) registered |= GST_TYPE_FIND_REGISTER(name, plugin);
+  ELEMENTS(REGISTER_ELEMENT)
+  TYPE_FINDERS(REGISTER_TYPE_FINDER)
   return registered;
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "elements/eventcam/typefinders.hpp"
+#include <gst/gst.h>
 
 #include <algorithm>
 
-#include "src/codec/recognition.hpp"
+#include "src/formats/recognition.hpp"
 
 using eventcamera::FileKind;
 

@@ -17,11 +17,9 @@
  * ! x264enc ! mp4mux ! filesink location=events.mp4
  * ]|
  */
-#include "elements/eventsim/eventsimdense.hpp"
-
 #include <atomic>
 
-#include "gst/simulate/eventsimulator.hpp"
+#include "gst/base/eventsimulator.hpp"
 #include "src/simulate/dense.hpp"
 
 using eventcamera::DenseSimulator;

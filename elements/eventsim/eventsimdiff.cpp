@@ -17,9 +17,7 @@
  * gst-launch-1.0 v4l2src ! eventsim-diff ! videoconvert ! autovideosink
  * ]|
  */
-#include "elements/eventsim/eventsimdiff.hpp"
-
-#include "gst/simulate/eventsimulator.hpp"
+#include "gst/base/eventsimulator.hpp"
 #include "src/simulate/diff.hpp"
 
 namespace {

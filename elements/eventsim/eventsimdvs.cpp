@@ -29,16 +29,14 @@
  * threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=ball.raw
  * ]|
  */
-#include "elements/eventsim/eventsimdvs.hpp"
-
 #include <array>
 #include <bitset>
 #include <mutex>
 #include <variant>
 
-#include "gst/simulate/eventsimulator.hpp"
-#include "src/pixel/presets.hpp"
-#include "src/simulate/dvs.hpp"
+#include "gst/base/eventsimulator.hpp"
+#include "src/dvs/dvs.hpp"
+#include "src/dvs/presets.hpp"
 
 using eventcamera::DvsPreset;
 using eventcamera::DvsSettings;

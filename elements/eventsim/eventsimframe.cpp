@@ -16,9 +16,7 @@
  * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-frame ! videoconvert ! autovideosink
  * ]|
  */
-#include "elements/eventsim/eventsimframe.hpp"
-
-#include "gst/simulate/eventsimulator.hpp"
+#include "gst/base/eventsimulator.hpp"
 #include "src/simulate/frame.hpp"
 
 namespace {

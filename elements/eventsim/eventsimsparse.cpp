@@ -19,9 +19,7 @@
  * application/x-event-camera ! filesink location=ball.xytp
  * ]|
  */
-#include "elements/eventsim/eventsimsparse.hpp"
-
-#include "gst/simulate/eventsimulator.hpp"
+#include "gst/base/eventsimulator.hpp"
 #include "src/simulate/sparse.hpp"
 
 namespace {

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <gst/gst.h>
 
-#include "elements/eventsim/eventsimdense.hpp"
-#include "elements/eventsim/eventsimdiff.hpp"
-#include "elements/eventsim/eventsimdvs.hpp"
-#include "elements/eventsim/eventsimframe.hpp"
-#include "elements/eventsim/eventsimsparse.hpp"
+#define ELEMENTS(X) \
+  X(eventsim_frame) X(eventsim_dense) X(eventsim_sparse) X(eventsim_diff) X(eventsim_dvs)
+
+#define DECLARE(name) GST_ELEMENT_REGISTER_DECLARE(name)
+G_BEGIN_DECLS
+ELEMENTS(DECLARE)
+G_END_DECLS
 
 static gboolean plugin_init(GstPlugin* plugin) {
   gboolean registered = FALSE;
-  registered |= GST_ELEMENT_REGISTER(eventsim_frame, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventsim_dense, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventsim_sparse, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventsim_diff, plugin);
-  registered |= GST_ELEMENT_REGISTER(eventsim_dvs, plugin);
+#define REGISTER(name) registered |= GST_ELEMENT_REGISTER(name, plugin);
+  ELEMENTS(REGISTER)
   return registered;
 }
 

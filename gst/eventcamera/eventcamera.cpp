@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "src/event/event.hpp"
+#include "src/core/event.hpp"
 
 static_assert(sizeof(GstEventCameraEvent) == sizeof(eventcamera::Event) &&
                   offsetof(GstEventCameraEvent, x) == offsetof(eventcamera::Event, x) &&

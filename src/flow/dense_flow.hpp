@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "src/parallel/thread_pool.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
 

@@ -3,8 +3,8 @@
 
 #include <memory>
 
+#include "src/core/box.hpp"
 #include "src/flow/dense_flow.hpp"
-#include "src/picture/box.hpp"
 
 namespace eventcamera {
 

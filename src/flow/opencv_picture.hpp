@@ -3,7 +3,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
 
 namespace eventcamera {
 

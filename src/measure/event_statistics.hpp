@@ -4,10 +4,10 @@
 #include <array>
 #include <cstdint>
 
-#include "src/event/stamped_event.hpp"
-#include "src/event/step_times.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/stamped_event.hpp"
+#include "src/core/step_times.hpp"
 #include "src/measure/gap_histogram.hpp"
-#include "src/picture/plane.hpp"
 
 namespace eventcamera {
 

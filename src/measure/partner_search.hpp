@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <deque>
 
-#include "src/event/stamped_event.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/stamped_event.hpp"
 #include "src/measure/side.hpp"
-#include "src/picture/plane.hpp"
 
 namespace eventcamera {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "src/event/stamped_event.hpp"
+#include "src/core/stamped_event.hpp"
 #include "src/measure/side.hpp"
 
 namespace eventcamera {

@@ -7,14 +7,14 @@
 #include <span>
 #include <vector>
 
-#include "src/event/event.hpp"
-#include "src/event/stamped_event.hpp"
-#include "src/event/step_times.hpp"
+#include "src/core/arrivals.hpp"
+#include "src/core/event.hpp"
+#include "src/core/stamped_event.hpp"
+#include "src/core/step_times.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/measure/partner_search.hpp"
 #include "src/measure/rate_curve.hpp"
 #include "src/measure/side.hpp"
-#include "src/render/arrivals.hpp"
 
 namespace eventcamera {
 

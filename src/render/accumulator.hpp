@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "src/event/event_buckets.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/event_buckets.hpp"
+#include "src/core/plane.hpp"
 #include "src/render/pixel_kinds.hpp"
 
 namespace eventcamera {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
 #include "src/render/exponential.hpp"
 
 namespace eventcamera {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
 #include "src/render/recent_events.hpp"
 
 namespace eventcamera {

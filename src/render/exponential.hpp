@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "src/event/stamped_event.hpp"
+#include "src/core/stamped_event.hpp"
 
 namespace eventcamera {
 

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <span>
 
-#include "src/event/event.hpp"
-#include "src/picture/plane.hpp"
-#include "src/render/arrivals.hpp"
+#include "src/core/arrivals.hpp"
+#include "src/core/event.hpp"
+#include "src/core/plane.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
 #include "src/render/pixel_layout.hpp"

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "src/event/stamped_event.hpp"
+#include "src/core/stamped_event.hpp"
 
 namespace eventcamera {
 

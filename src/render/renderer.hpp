@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "src/event/event.hpp"
-#include "src/render/arrivals.hpp"
+#include "src/core/arrivals.hpp"
+#include "src/core/event.hpp"
 #include "src/render/decaying_sums.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include "src/event/stamped_event.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/stamped_event.hpp"
 
 namespace eventcamera {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "src/core/grey8.hpp"
 #include "src/flow/flow_of_changes.hpp"
-#include "src/picture/grey8.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/path.hpp"
 

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/event/event_buckets.hpp"
-#include "src/parallel/thread_pool.hpp"
-#include "src/picture/box.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/box.hpp"
+#include "src/core/event_buckets.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/simulate/bands.hpp"
 #include "src/simulate/simulator.hpp"
 

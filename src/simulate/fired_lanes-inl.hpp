@@ -12,7 +12,7 @@
 
 #include <cstdint>
 
-#include "src/event/event.hpp"
+#include "src/core/event.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {

@@ -3,10 +3,10 @@
 
 #include <cstdint>
 
-#include "src/event/event_buckets.hpp"
-#include "src/event/step_times.hpp"
+#include "src/core/event_buckets.hpp"
+#include "src/core/step_times.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/flow/dense_flow.hpp"
-#include "src/parallel/thread_pool.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/simulator.hpp"
 #include "src/simulate/steepness.hpp"

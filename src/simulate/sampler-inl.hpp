@@ -11,8 +11,8 @@
 
 #include <cstdint>
 
+#include "src/core/plane.hpp"
 #include "src/flow/fixed_point.hpp"
-#include "src/picture/plane.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <optional>
 
-#include "src/event/event_buckets.hpp"
-#include "src/event/step_times.hpp"
-#include "src/parallel/thread_pool.hpp"
-#include "src/picture/luma.hpp"
+#include "src/core/event_buckets.hpp"
+#include "src/core/luma.hpp"
+#include "src/core/step_times.hpp"
+#include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
 

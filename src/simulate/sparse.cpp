@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "src/picture/grey8.hpp"
+#include "src/core/grey8.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/moving_point.hpp"
 

@@ -3,9 +3,9 @@
 
 #include <cstdint>
 
-#include "src/parallel/thread_pool.hpp"
-#include "src/picture/box.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/box.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
 

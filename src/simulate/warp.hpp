@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "src/core/plane.hpp"
 #include "src/flow/fixed_point.hpp"
-#include "src/picture/plane.hpp"
 #include "src/simulate/dense.hpp"
 
 namespace eventcamera {

@@ -8,10 +8,10 @@
 #include <cstdlib>
 #include <new>
 
+#include "src/dvs/dvs.hpp"
 #include "src/render/accumulator.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
-#include "src/simulate/dvs.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/path.hpp"
 #include "src/simulate/sparse.hpp"

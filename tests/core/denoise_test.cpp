@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Denoising equals its plain reference on every SIMD target of this processor, takes noise away and
 // leaves edges.
-#include "src/picture/denoise.hpp"
+#include "src/dvs/denoise.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "src/reference/denoise.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/reference/denoise.hpp"
 
 namespace {
 

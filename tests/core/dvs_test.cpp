@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // A physical pixel against physics, and against its equations in double precision.
-#include "src/simulate/dvs.hpp"
+#include "src/dvs/dvs.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,13 +10,13 @@
 #include <numbers>
 #include <random>
 
-#include "src/pixel/course.hpp"
-#include "src/pixel/decay.hpp"
-#include "src/pixel/mismatch.hpp"
-#include "src/pixel/presets.hpp"
-#include "src/reference/dvs.hpp"
+#include "src/dvs/course.hpp"
+#include "src/dvs/decay.hpp"
+#include "src/dvs/mismatch.hpp"
+#include "src/dvs/presets.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/reference/dvs.hpp"
 
 namespace eventcamera {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/event/event.hpp"
+#include "src/core/event.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 
-#include "src/event/event_buckets.hpp"
-#include "src/event/step_times.hpp"
+#include "src/core/event_buckets.hpp"
+#include "src/core/step_times.hpp"
 
 namespace {
 

@@ -10,9 +10,9 @@
 #include <cstring>
 #include <thread>
 
-#include "src/reference/farneback.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/reference/farneback.hpp"
 
 namespace {
 

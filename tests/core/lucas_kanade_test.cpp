@@ -10,9 +10,9 @@
 
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/opencv_picture.hpp"
-#include "src/reference/lucas_kanade.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/reference/lucas_kanade.hpp"
 
 namespace {
 

@@ -6,17 +6,17 @@
 
 #include <cstring>
 
+#include "src/core/grey8.hpp"
 #include "src/flow/flow_of_changes.hpp"
-#include "src/picture/grey8.hpp"
-#include "src/reference/dense.hpp"
-#include "src/reference/diff.hpp"
-#include "src/reference/sparse.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/reference/dense.hpp"
+#include "tests/reference/diff.hpp"
+#include "tests/reference/sparse.hpp"
 
 namespace {
 

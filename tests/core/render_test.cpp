@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "src/picture/luma.hpp"
+#include "src/core/luma.hpp"
 #include "src/render/accumulator.hpp"
 #include "tests/core/targets.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/parallel/thread_pool.hpp"
+#include "src/core/thread_pool.hpp"
 
 #include <gtest/gtest.h>
 

@@ -10,12 +10,12 @@
 #include <set>
 #include <tuple>
 
-#include "src/codec/aedat4/aedat4_decoder.hpp"
-#include "src/codec/aedat4/aedat4_encoder.hpp"
-#include "tests/codec/aedat_files.hpp"
-#include "tests/codec/recordings.hpp"
-#include "tests/codec/shared_data.hpp"
+#include "src/formats/aedat/aedat4_decoder.hpp"
+#include "src/formats/aedat/aedat4_encoder.hpp"
 #include "tests/elements/harness.hpp"
+#include "tests/formats/aedat_files.hpp"
+#include "tests/formats/recordings.hpp"
+#include "tests/formats/shared_data.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "src/codec/interval_slicer.hpp"
+#include "src/formats/interval_slicer.hpp"
 #include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
@@ -41,10 +41,10 @@ const Format formats[] = {
     {"evt21", "evtenc format=EVT21", "evtdec", "application/x-prophesee-raw"},
     {"evt3", "evtenc format=EVT3", "evtdec", "application/x-prophesee-raw"},
     {"evt4", "evtenc format=EVT4", "evtdec", "application/x-prophesee-raw"},
-    {"dat", "datenc", "datdec", "application/x-prophesee-dat"},
-    {"es", "esenc", "esdec", "application/x-es"},
-    {"csv", "csvenc dialect=metavision", "csvdec", "application/x-event-csv", "no\n"},
-    {"npy", "npyenc", "npydec", "application/x-npy", "", false},
+    {"dat", "eventdatenc", "eventdatdec", "application/x-prophesee-dat"},
+    {"es", "eventesenc", "eventesdec", "application/x-es"},
+    {"csv", "eventcsvenc dialect=metavision", "eventcsvdec", "application/x-event-csv", "no\n"},
+    {"npy", "eventnpyenc", "eventnpydec", "application/x-npy", "", false},
 };
 
 std::string element_of(const char* launch) {

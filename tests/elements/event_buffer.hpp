@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gst/eventcamera/eventcamera.h"
-#include "src/event/stamped_event.hpp"
+#include "src/core/stamped_event.hpp"
 
 /// A buffer of the events of [start, start + 10 ms).
 inline GstBuffer* buffer_of(std::span<const eventcamera::StampedEvent> events,

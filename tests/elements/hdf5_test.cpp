@@ -6,8 +6,8 @@
 #include <fstream>
 #include <random>
 
-#include "src/codec/hdf5/hdf5_reader.hpp"
-#include "src/codec/hdf5/hdf5_writer.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_writer.hpp"
 #include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 

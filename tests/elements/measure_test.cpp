@@ -6,7 +6,7 @@
 #include <sstream>
 #include <string>
 
-#include "src/event/event.hpp"
+#include "src/core/event.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {

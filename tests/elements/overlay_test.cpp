@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventoverlay: which events are drawn over which frame, and where.
-#include "src/event/event.hpp"
+#include "src/core/event.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {

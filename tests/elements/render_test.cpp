@@ -2,8 +2,8 @@
 // eventrender: which pictures there are, when they are, and what they show.
 #include <algorithm>
 
-#include "gst/video/drawn_formats.hpp"
-#include "src/event/event.hpp"
+#include "gst/base/drawn_formats.hpp"
+#include "src/core/event.hpp"
 #include "src/render/accumulator.hpp"
 #include "tests/elements/harness.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // AEDAT4, through the reader that tells AEDAT's versions apart, and its table of packets.
-#include "src/codec/aedat/aedat_reader.hpp"
-#include "src/codec/aedat4/aedat4_table.hpp"
+#include "src/formats/aedat/aedat4_table.hpp"
+#include "src/formats/aedat/aedat_reader.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace {

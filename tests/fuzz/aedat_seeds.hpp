@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "src/codec/aedat4/aedat4_encoder.hpp"
-#include "tests/codec/aedat_files.hpp"
+#include "src/formats/aedat/aedat4_encoder.hpp"
+#include "tests/formats/aedat_files.hpp"
 #include "tests/fuzz/seed.hpp"
 
 namespace fuzz {

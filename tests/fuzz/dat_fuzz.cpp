@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/codec/dat/dat.hpp"
+#include "src/formats/dat/dat.hpp"
 
 #include "tests/fuzz/fuzz_decoder.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/codec/hdf5/ecf.hpp"
+#include "src/formats/hdf5/ecf.hpp"
 
 #include "tests/fuzz/fuzz_decoder.hpp"
 

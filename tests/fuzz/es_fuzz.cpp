@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/codec/es/es.hpp"
+#include "src/formats/es/es.hpp"
 
 #include "tests/fuzz/fuzz_decoder.hpp"
 

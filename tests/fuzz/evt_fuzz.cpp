@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The words of EVT_FORMAT, one of EvtFormat.
-#include "src/codec/prophesee/raw.hpp"
+#include "src/formats/evt/raw.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "src/codec/seekable_decoder.hpp"
+#include "src/formats/seekable_decoder.hpp"
 
 /// What holds for every decoder and any bytes.
 namespace fuzz {

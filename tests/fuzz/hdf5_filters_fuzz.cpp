@@ -3,7 +3,7 @@
 // out, and the bytes of a number.
 #include <hdf5.h>
 
-#include "src/codec/hdf5/hdf5_filters.hpp"
+#include "src/formats/hdf5/hdf5_filters.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

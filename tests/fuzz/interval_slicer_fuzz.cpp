@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Events at any times, cut into intervals. Four bytes are an event, or a word to the slicer.
-#include "src/codec/interval_slicer.hpp"
+#include "src/formats/interval_slicer.hpp"
 
 #include <optional>
 
-#include "src/codec/little_endian.hpp"
+#include "src/formats/little_endian.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/codec/formats.hpp"
-#include "tests/codec/recordings.hpp"
+#include "tests/formats/formats.hpp"
+#include "tests/formats/recordings.hpp"
 #include "tests/fuzz/aedat_seeds.hpp"
 #include "tests/fuzz/table_seeds.hpp"
 

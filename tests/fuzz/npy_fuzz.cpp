@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <memory>
 
-#include "src/codec/npy/npy_decoder.hpp"
+#include "src/formats/numpy/npy_decoder.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

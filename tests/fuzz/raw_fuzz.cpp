@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/codec/prophesee/raw.hpp"
+#include "src/formats/evt/raw.hpp"
 
 #include "tests/fuzz/fuzz_decoder.hpp"
 

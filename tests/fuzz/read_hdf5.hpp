@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include "src/codec/hdf5/hdf5_reader.hpp"
-#include "src/codec/memory_bytes.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/memory_bytes.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace fuzz {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // What the typefinders tell of any bytes.
-#include "src/codec/recognition.hpp"
+#include "src/formats/recognition.hpp"
 
-#include "src/codec/csv/csv_decoder.hpp"
+#include "src/formats/text/csv_decoder.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/codec/recordings.hpp"
+#include "tests/formats/recordings.hpp"
 
 namespace fuzz {
 

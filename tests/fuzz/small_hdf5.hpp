@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "src/codec/hdf5/ecf.hpp"
-#include "src/codec/hdf5/hdf5_handle.hpp"
+#include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/hdf5/hdf5_handle.hpp"
 
 namespace fuzz {
 

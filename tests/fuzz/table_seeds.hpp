@@ -6,10 +6,10 @@
 
 #include <string>
 
-#include "src/codec/csv/csv_encoder.hpp"
-#include "src/codec/hdf5/ecf.hpp"
-#include "src/codec/hdf5/hdf5_attribute.hpp"
-#include "src/codec/npy/npy_encoder.hpp"
+#include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/hdf5/hdf5_attribute.hpp"
+#include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/text/csv_encoder.hpp"
 #include "tests/fuzz/seed.hpp"
 #include "tests/fuzz/small_hdf5.hpp"
 

@@ -51,7 +51,7 @@ awk -v lead="${lead:-0}" -v pulse="${pulse:-0}" 'BEGIN { exit !(lead > 8800 && l
 for i in $(seq 0 15); do
   printf '%s %02d.png\n' "$(awk -v i="$i" 'BEGIN { print 0.04 * i + 0.002 }')" "$i"
 done >pictures.txt
-"$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! eventsim-dense positive-threshold=10 ! csvenc ! filesink location=recorded.csv
+"$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! eventsim-dense positive-threshold=10 ! eventcsvenc ! filesink location=recorded.csv
 calibrate pictures.txt recorded.csv --element eventsim-dense --lag find --to 0.3 --measure-from 0.3 --measure-to 0.5 --map map.png | tee found
 lag=$(sed -n 's/A frame shows the world \(-*[0-9.]*\) ms later.*/\1/p' found)
 awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 1) }' || fail "the pictures are ${lag:-0} ms late"

@@ -82,7 +82,7 @@ PYTHON
 gst-typefind-1.0 v2e.h5 | grep -q " - application/x-hdf5" || fail "v2e.h5 is not found by its type"
 convert v2e.h5 v2e.csv
 cmp ball.csv v2e.csv || fail "the events of v2e.h5 are others"
-timeout 60 "$GST_LAUNCH" -q filesrc location=v2e.h5 ! queue ! eventhdf5dec ! csvenc ! filesink location=pushed.csv
+timeout 60 "$GST_LAUNCH" -q filesrc location=v2e.h5 ! queue ! eventhdf5dec ! eventcsvenc ! filesink location=pushed.csv
 cmp ball.csv pushed.csv || fail "the events of v2e.h5 are others where it is pushed"
 
 # What a player and a tool make of them.

@@ -115,8 +115,8 @@ timeout 60 gst-play-1.0 -q --no-interactive --videosink=fakesink --start-positio
 # Files of events on their way.
 launch videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
 launch filesrc location=out.raw ! decodebin caps="application/x-event-camera,format=XYTP" ! aedatmux compression=zstd ! filesink location=out.aedat4
-launch filesrc location=out.raw ! evtdec ! esenc ! filesink location=out.es
-launch filesrc location=out.es ! esdec ! eventrender mode=decay accumulation-time=20000000 ! video/x-raw,framerate=60/1 ! videoconvert ! fakesink
+launch filesrc location=out.raw ! evtdec ! eventesenc ! filesink location=out.es
+launch filesrc location=out.es ! eventesdec ! eventrender mode=decay accumulation-time=20000000 ! video/x-raw,framerate=60/1 ! videoconvert ! fakesink
 launch filesrc location=out.raw ! decodebin ! eventhdf5sink layout=metavision location=out.h5 && fail "pictures were written as events"
 launch filesrc location=out.raw ! decodebin caps=application/x-event-camera ! eventhdf5sink layout=metavision location=out.h5
 launch eventhdf5src location=out.h5 ! evtenc ! filesink location=again.raw

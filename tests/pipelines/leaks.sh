@@ -23,7 +23,7 @@ done
 # Files of events, written and read, to their end and not.
 work=$(mktemp -d)
 trap 'rm -rf "$log" "$work"' EXIT
-for pair in evtenc:evtdec datenc:datdec esenc:esdec csvenc:csvdec npyenc:npydec; do
+for pair in evtenc:evtdec eventdatenc:eventdatdec eventesenc:eventesdec eventcsvenc:eventcsvdec eventnpyenc:eventnpydec; do
   file=$work/${pair%:*}
   check videotestsrc num-buffers=8 ! eventsim-frame ! "${pair%:*}" ! filesink location="$file"
   check filesrc location="$file" ! "${pair#*:}" ! fakesink

@@ -13,8 +13,8 @@
 #include <tuple>
 #include <vector>
 
-#include "src/codec/prophesee/raw.hpp"
-#include "tests/codec/aedat_files.hpp"
+#include "src/formats/evt/raw.hpp"
+#include "tests/formats/aedat_files.hpp"
 
 namespace {
 
@@ -95,11 +95,11 @@ class Files {
     }
     save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
     save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
-    for (const auto& [name, writer] : {std::pair{"a.dat", "datenc ! filesink"},
-                                       {"a.es", "esenc ! filesink"},
-                                       {"a.csv", "csvenc ! filesink"},
-                                       {"a.txt", "csvenc dialect=rpg ! filesink"},
-                                       {"a.npy", "npyenc ! filesink"},
+    for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
+                                       {"a.es", "eventesenc ! filesink"},
+                                       {"a.csv", "eventcsvenc ! filesink"},
+                                       {"a.txt", "eventcsvenc dialect=rpg ! filesink"},
+                                       {"a.npy", "eventnpyenc ! filesink"},
                                        {"a.aedat4", "aedatmux ! filesink"},
                                        {"dsec.h5", "eventhdf5sink"},
                                        {"metavision.hdf5", "eventhdf5sink layout=metavision"}})

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
 
 /// Recorded video, read with GStreamer.
 namespace video_frames {

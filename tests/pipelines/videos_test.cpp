@@ -18,13 +18,13 @@
 #include "src/flow/flow_of_changes.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/opencv_picture.hpp"
-#include "src/reference/dense.hpp"
-#include "src/reference/diff.hpp"
-#include "src/reference/sparse.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/sparse.hpp"
 #include "tests/pipelines/video_frames.hpp"
+#include "tests/reference/dense.hpp"
+#include "tests/reference/diff.hpp"
+#include "tests/reference/sparse.hpp"
 
 namespace {
 

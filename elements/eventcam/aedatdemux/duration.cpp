@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "elements/eventcam/aedatdemux/state.hpp"
-#include "gst/codec/pulling.hpp"
-#include "gst/owned.hpp"
-#include "src/codec/aedat/aedat_reader.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pulling.hpp"
+#include "src/formats/aedat/aedat_reader.hpp"
 
 namespace aedatdemux {
 

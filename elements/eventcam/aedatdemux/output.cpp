@@ -8,9 +8,9 @@
 
 #include "elements/eventcam/aedatdemux/pads.hpp"
 #include "elements/eventcam/aedatdemux/state.hpp"
-#include "gst/codec/copied_buffer.hpp"
-#include "gst/codec/file_streams.hpp"
-#include "gst/owned.hpp"
+#include "gst/base/copied_buffer.hpp"
+#include "gst/base/file_streams.hpp"
+#include "gst/base/owned.hpp"
 
 namespace aedatdemux {
 

@@ -10,8 +10,8 @@
 #include "elements/eventcam/aedatdemux/seeking.hpp"
 #include "elements/eventcam/aedatdemux/state.hpp"
 #include "elements/eventcam/aedatframe.hpp"
-#include "gst/codec/file_streams.hpp"
-#include "gst/owned.hpp"
+#include "gst/base/file_streams.hpp"
+#include "gst/base/owned.hpp"
 
 namespace aedatdemux {
 

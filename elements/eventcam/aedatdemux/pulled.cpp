@@ -6,8 +6,8 @@
 #include "elements/eventcam/aedatdemux/duration.hpp"
 #include "elements/eventcam/aedatdemux/input.hpp"
 #include "elements/eventcam/aedatdemux/output.hpp"
-#include "gst/codec/file_streams.hpp"
-#include "gst/codec/pulling.hpp"
+#include "gst/base/file_streams.hpp"
+#include "gst/base/pulling.hpp"
 
 namespace aedatdemux {
 

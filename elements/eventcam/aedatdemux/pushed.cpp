@@ -6,7 +6,7 @@
 #include "elements/eventcam/aedatdemux/input.hpp"
 #include "elements/eventcam/aedatdemux/output.hpp"
 #include "elements/eventcam/aedatdemux/state.hpp"
-#include "src/codec/aedat/aedat_reader.hpp"
+#include "src/formats/aedat/aedat_reader.hpp"
 
 namespace aedatdemux {
 

@@ -3,7 +3,7 @@
 
 #include <mutex>
 
-#include "gst/latency.hpp"
+#include "gst/base/latency.hpp"
 
 namespace aedatdemux {
 

@@ -5,9 +5,9 @@
 
 #include "elements/eventcam/aedatdemux/pulled.hpp"
 #include "elements/eventcam/aedatdemux/state.hpp"
-#include "gst/codec/file_streams.hpp"
-#include "gst/codec/seek_request.hpp"
-#include "src/codec/aedat4/aedat4_table.hpp"
+#include "gst/base/file_streams.hpp"
+#include "gst/base/seek_request.hpp"
+#include "src/formats/aedat/aedat4_table.hpp"
 
 namespace aedatdemux {
 

@@ -9,13 +9,13 @@
 #include <optional>
 #include <vector>
 
-#include "gst/codec/reading_faults.hpp"
-#include "gst/codec/reading_properties.hpp"
-#include "gst/owned.hpp"
-#include "src/codec/aedat/aedat_reader.hpp"
-#include "src/codec/aedat4/aedat4_table.hpp"
-#include "src/codec/interval_slicer.hpp"
-#include "src/codec/sensor_sizes.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/reading_faults.hpp"
+#include "gst/base/reading_properties.hpp"
+#include "src/formats/aedat/aedat4_table.hpp"
+#include "src/formats/aedat/aedat_reader.hpp"
+#include "src/formats/interval_slicer.hpp"
+#include "src/formats/sensor_sizes.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(aedat_demux_debug);
 #define GST_CAT_DEFAULT aedat_demux_debug

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "gst/codec/pulling.hpp"
-#include "src/codec/aedat4/aedat4_table.hpp"
+#include "gst/base/pulling.hpp"
+#include "src/formats/aedat/aedat4_table.hpp"
 
 namespace aedatdemux {
 

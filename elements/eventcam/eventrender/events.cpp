@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "elements/eventcam/eventrender/pictures.hpp"
-#include "gst/owned.hpp"
-#include "gst/video/mapped_events.hpp"
+#include "gst/base/mapped_events.hpp"
+#include "gst/base/owned.hpp"
 
 namespace eventrender {
 

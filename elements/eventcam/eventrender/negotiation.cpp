@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "elements/eventcam/eventrender/pictures.hpp"
-#include "gst/video/drawn_pool.hpp"
+#include "gst/base/drawn_pool.hpp"
 
 namespace eventrender {
 

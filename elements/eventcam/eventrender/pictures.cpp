@@ -5,9 +5,9 @@
 #include <new>
 #include <utility>
 
-#include "gst/owned.hpp"
-#include "gst/video/drawn_formats.hpp"
-#include "gst/video/video_frame.hpp"
+#include "gst/base/drawn_formats.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/video_frame.hpp"
 
 namespace eventrender {
 

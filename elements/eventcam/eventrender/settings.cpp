@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "gst/video/drawn_formats.hpp"
+#include "gst/base/drawn_formats.hpp"
 
 namespace eventrender {
 

@@ -3,9 +3,9 @@
 
 #include <gst/gst.h>
 
+#include "gst/base/event_interval.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "gst/video/event_interval.hpp"
-#include "src/event/event.hpp"
+#include "src/core/event.hpp"
 #include "src/render/renderer.hpp"
 
 namespace eventrender {

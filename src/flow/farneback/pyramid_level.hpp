@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "src/core/plane.hpp"
 #include "src/flow/farneback/resampling.hpp"
-#include "src/picture/plane.hpp"
 
 namespace eventcamera {
 

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "src/parallel/rows.hpp"
+#include "src/core/rows.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {

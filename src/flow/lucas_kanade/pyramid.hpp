@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/parallel/thread_pool.hpp"
-#include "src/picture/plane.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
 

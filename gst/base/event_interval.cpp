@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/base/event_interval.hpp"
+
+#include <algorithm>
+
+#include "gst/eventcamera/eventcamera.h"
+
+static GstClockTime time_of_last_event(GstBuffer* buffer) {
+  const gsize size = gst_buffer_get_size(buffer);
+  GstEventCameraEvent last = {};
+  if (size >= sizeof last) gst_buffer_extract(buffer, size - sizeof last, &last, sizeof last);
+  return last.t * GST_USECOND;
+}
+
+std::optional<EventInterval> interval_of(GstBuffer* buffer) {
+  const GstClockTime start = GST_BUFFER_PTS(buffer);
+  if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
+  const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID(buffer) ? GST_BUFFER_DURATION(buffer)
+                                                                     : time_of_last_event(buffer);
+  return EventInterval{start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)};
+}

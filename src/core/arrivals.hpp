@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <span>
+
+#include "src/core/stamped_event.hpp"
+
+namespace eventcamera {
+
+/// The time of an event in microseconds. Rounded down to the start of its interval (start, end] it
+/// would belong to the interval before.
+constexpr Microseconds time_of(const Event& event, Microseconds start) {
+  return start + (event.t == 0 ? 1 : event.t);
+}
+
+/// Makes sure of events that others rely on: they lie inside the picture and are sorted by time.
+class Arrivals {
+ public:
+  Arrivals(int width, int height) : width_(width), height_(height) {}
+
+  /// Hands events on that count their times from `start`. One that comes later than it should
+  /// counts as if it had come with the last one, or after what has passed; one outside the picture
+  /// is left out. Returns how many were left out.
+  template <class Take>
+  std::size_t take(std::span<const Event> events, Microseconds start, const Take& take) {
+    std::size_t left_out = 0;
+    for (const auto& event : events) {
+      if (event.x >= width_ || event.y() >= height_) {
+        ++left_out;
+        continue;
+      }
+      earliest_ = std::max(earliest_, time_of(event, start));
+      take(StampedEvent{earliest_, event.x, event.y_p});
+    }
+    return left_out;
+  }
+
+  /// A picture was drawn up to this time. Returns it, or that of the last event if that is later.
+  Microseconds pass(Microseconds end) {
+    const auto latest = std::max(earliest_, end);
+    earliest_ = std::max(earliest_, end + 1);
+    return latest;
+  }
+
+ private:
+  int width_;
+  int height_;
+  Microseconds earliest_ = std::numeric_limits<Microseconds>::min() / 4;
+};
+
+}  // namespace eventcamera

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "src/core/plane.hpp"
+#include "src/dvs/dvs_settings.hpp"
+#include "src/dvs/random.hpp"
+
+namespace eventcamera {
+
+/// What the pixels remember, a plane for each thing. Rows are as long as the longest vector needs.
+struct PixelArray {
+  PixelArray(int width, int height);
+
+  /// Makes each pixel's thresholds and leak what the settings say, a row at a time.
+  void draw_traits(int y, const DvsSettings& settings, const Random& random);
+
+  /// Sets a row of references to a signal that has long been there, and draws the first noise.
+  void settle(int y, const DvsSettings& settings, const Random& random);
+
+  std::uint64_t number_of(int x, int y) const {
+    return static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
+           static_cast<std::uint64_t>(x);
+  }
+
+  int width;
+  Plane<float> target;     ///< what the response makes of the light now
+  Plane<float> signal;     ///< what the photoreceptor has made of it so far
+  Plane<float> reference;  ///< what the signal is compared with
+  Plane<float> positive;   ///< thresholds; infinite where the pixel is dead
+  Plane<float> negative;
+  Plane<float> leak;           ///< the reference falls that much a microsecond
+  Plane<float> rest;           ///< microseconds until the pixel can fire again, or 0
+  Plane<std::uint32_t> quiet;  ///< the shot noise to be expected before it fires, 1/noise_unit
+};
+
+}  // namespace eventcamera

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/dvs/readout.hpp"
+
+#include <algorithm>
+
+#include "src/core/raster_order.hpp"
+
+namespace eventcamera {
+
+Readout::Readout(int width, int height)
+    : width_(width),
+      rows_(static_cast<std::size_t>(height)),
+      row_queue_(static_cast<std::size_t>(height)),
+      waits_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
+
+void Readout::reset() {
+  waiting_.clear();
+  free_ = none;
+  std::fill(rows_.begin(), rows_.end(), Row{});
+  queue_first_ = queue_count_ = 0;
+  std::fill(waits_.begin(), waits_.end(), std::uint8_t{0});
+  idle_from_ = 0;
+}
+
+void Readout::pass(const EventBuckets& in, double duration, double events_a_second,
+                   EventBuckets& out) {
+  const double an_event = 1e6 / events_a_second;
+  out.reset(1, 1);
+  auto& left = out.bucket(1, 0);
+  // Rows are served up to `time`, or for ever.
+  const auto serve_until = [&](double time) {
+    while (queue_count_ > 0 && idle_from_ < time) {
+      const int row = row_queue_[queue_first_];
+      queue_first_ = (queue_first_ + 1) % row_queue_.size();
+      --queue_count_;
+      const int count = rows_[static_cast<std::size_t>(row)].count;
+      serve(row, static_cast<std::uint32_t>(idle_from_), left);
+      idle_from_ += count * an_event;
+    }
+  };
+  for (const auto& bucket : in.buckets()) {
+    for (const auto& event : bucket) {
+      serve_until(event.t);
+      if (queue_count_ == 0) idle_from_ = std::max<double>(idle_from_, event.t);
+      admit(event);
+    }
+  }
+  serve_until(duration);
+  idle_from_ = std::max(0.0, idle_from_ - duration);
+  sort_within_times(left);
+}
+
+void Readout::admit(const Event& event) {
+  auto& waits =
+      waits_[static_cast<std::size_t>(event.y()) * static_cast<std::size_t>(width_) + event.x];
+  if (waits != 0) return;
+  waits = 1;
+  int place = free_;
+  if (place == none) {
+    place = static_cast<int>(waiting_.size());
+    waiting_.push_back({});
+  } else {
+    free_ = waiting_[static_cast<std::size_t>(place)].next;
+  }
+  waiting_[static_cast<std::size_t>(place)] = {event, none};
+  auto& row = rows_[static_cast<std::size_t>(event.y())];
+  if (row.count++ == 0) {
+    row.first = place;
+    row_queue_[(queue_first_ + queue_count_++) % row_queue_.size()] = event.y();
+  } else {
+    waiting_[static_cast<std::size_t>(row.last)].next = place;
+  }
+  row.last = place;
+}
+
+void Readout::serve(int y, std::uint32_t t, std::vector<Event>& out) {
+  auto& row = rows_[static_cast<std::size_t>(y)];
+  for (int place = row.first; place != none;) {
+    auto& waiting = waiting_[static_cast<std::size_t>(place)];
+    waiting.event.t = t;
+    out.push_back(waiting.event);
+    waits_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + waiting.event.x] = 0;
+    const int next = waiting.next;
+    waiting.next = free_;
+    free_ = place;
+    place = next;
+  }
+  row = {};
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/aedat/aedat3_decoder.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include "src/formats/header_line.hpp"
+#include "src/formats/little_endian.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::string_view magic = "#!AER-DAT3.1";
+constexpr std::string_view header_end = "#!END-HEADER";
+constexpr std::size_t packet_header_size = 28;
+constexpr std::size_t event_size = 8;
+constexpr std::int64_t largest_packet = std::int64_t{64} << 20;
+/// Its times end at 2^60 microseconds.
+constexpr std::int32_t largest_overflow = 1 << 29;
+constexpr int widest = 8192;
+/// So many events behind one that cannot be have to be sound for it to be the only one.
+constexpr std::uint64_t events_behind = 4;
+
+enum Type : int { special = 0, polarity = 1, last_type = 31 };
+
+/// An event's bits.
+constexpr std::uint32_t valid = 1;
+constexpr std::uint32_t on = 2;
+
+int x_of(std::uint32_t data) {
+  return static_cast<int>(data >> 17);
+}
+int y_of(std::uint32_t data) {
+  return static_cast<int>(data >> 2 & 0x7fff);
+}
+
+/// The header of a packet.
+struct PacketHeader {
+  int type;
+  int source;
+  std::int32_t event_size;
+  std::int32_t time_offset;
+  std::int32_t overflow;
+  std::int32_t capacity;
+  std::int32_t number;
+  std::int32_t valid_number;
+
+  explicit PacketHeader(const std::uint8_t* bytes)
+      : type(little_endian<std::int16_t>(bytes)),
+        source(little_endian<std::int16_t>(bytes + 2)),
+        event_size(little_endian<std::int32_t>(bytes + 4)),
+        time_offset(little_endian<std::int32_t>(bytes + 8)),
+        overflow(little_endian<std::int32_t>(bytes + 12)),
+        capacity(little_endian<std::int32_t>(bytes + 16)),
+        number(little_endian<std::int32_t>(bytes + 20)),
+        valid_number(little_endian<std::int32_t>(bytes + 24)) {}
+
+  bool of_events() const { return type == special || type == polarity; }
+};
+
+SensorSize size_of(std::string_view source) {
+  struct Camera {
+    std::string_view name;
+    SensorSize size;
+  };
+  constexpr Camera cameras[] = {
+      {"DVS128", {128, 128}},      {"DAVIS128", {128, 128}}, {"DAVIS208", {208, 192}},
+      {"DAVIS240", {240, 180}},    {"DAVIS346", {346, 260}}, {"DAVIS640", {640, 480}},
+      {"DAVISHet640", {640, 480}}, {"DAVISRGB", {640, 480}}, {"DVS132S", {132, 104}}};
+  for (const auto& camera : cameras)
+    if (source.find(camera.name) != std::string_view::npos) return camera.size;
+  return {};
+}
+
+}  // namespace
+
+void Aedat3Decoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
+  queue_.push(bytes);
+  if (header_read_ || read_header()) read_packets(out);
+  queue_.keep();
+}
+
+void Aedat3Decoder::finish(Decoded& out) {
+  finished_ = true;
+  if (!header_read_ && !read_header())
+    throw NotThisFormat(first_line_ ? "this is not AEDAT 3.1: it does not begin with #!AER-DAT3.1"
+                                    : "this AEDAT 3.1 file ends within its header");
+  read_packets(out);
+  const bool within = packet_.events != 0 || packet_.rest != 0;
+  if (!scanning_ && (within || queue_.size() > 0))
+    damage_.note(queue_.position(), "a packet that the end of the file cuts off");
+}
+
+bool Aedat3Decoder::read_header() {
+  while (true) {
+    if (first_line_ && line_.empty()) {
+      const auto start = queue_.peek(std::min(queue_.size(), magic.size()));
+      const auto count = std::min(start.size(), magic.size());
+      if (!std::equal(magic.begin(), magic.begin() + static_cast<std::ptrdiff_t>(count),
+                      start.begin()))
+        throw NotThisFormat("this is not AEDAT 3.1: it does not begin with #!AER-DAT3.1");
+      if (count < magic.size()) return false;
+    }
+    if (line_.empty()) {
+      const auto next = queue_.peek(1);
+      if (next.empty()) return false;
+      if (next.front() != '#')
+        throw NotThisFormat("the header of this AEDAT 3.1 file does not end with #!END-HEADER");
+    }
+    if (!take_header_line(queue_, line_)) return false;
+    first_line_ = false;
+    if (line_.starts_with(header_end)) break;
+    take_line();
+    line_.clear();
+  }
+  header_read_ = true;
+  return true;
+}
+
+/// Notes what a line of the header says.
+void Aedat3Decoder::take_line() {
+  if (line_.starts_with("#Format:") && line_.find("RAW") == std::string::npos)
+    throw NotThisFormat("this AEDAT 3.1 file is compressed, which cannot be read: " +
+                        line_.substr(1));
+  // A camera is one source; what filters make of its events are others of the same size.
+  if ((line_.starts_with("#Source") || line_.starts_with("#-Source")) && size_ == SensorSize{})
+    size_ = size_of(line_);
+}
+
+void Aedat3Decoder::read_packets(Decoded& out) {
+  while (true) {
+    if (packet_.events != 0) {
+      if (!read_events(out)) return;
+    } else if (packet_.rest != 0) {
+      const auto bytes = queue_.peek(1);
+      if (bytes.empty()) return;
+      const auto count = std::min<std::uint64_t>(packet_.rest, bytes.size());
+      packet_.rest -= count;
+      queue_.consume(static_cast<std::size_t>(count));
+    } else if ((scanning_ && !scan()) || !read_packet_header()) {
+      return;
+    }
+  }
+}
+
+bool Aedat3Decoder::read_packet_header() {
+  const auto bytes = queue_.peek(packet_header_size);
+  if (bytes.empty()) return false;
+  if (!begins_packet(bytes.data())) {
+    damage_.note(queue_.position(), "bytes that are no packet");
+    scanning_ = true;
+    return true;
+  }
+  const PacketHeader header(bytes.data());
+  const auto events = header.of_events() ? header.number : 0;
+  packet_ = {header.type, static_cast<std::uint64_t>(events),
+             static_cast<std::uint64_t>(std::int64_t{header.capacity} - events) *
+                 static_cast<std::uint64_t>(header.event_size),
+             Microseconds{header.overflow} << 31};
+  queue_.consume(packet_header_size);
+  return true;
+}
+
+/// Reads events of the packet as far as they have come. False where that takes more bytes.
+bool Aedat3Decoder::read_events(Decoded& out) {
+  const auto bytes = queue_.peek(event_size);
+  const auto count = std::min<std::uint64_t>(bytes.size() / event_size, packet_.events);
+  if (count == 0) return false;
+  std::size_t i = 0;
+  bool odd = false;
+  for (; i < count; ++i) {
+    const auto* const event = bytes.data() + i * event_size;
+    odd = is_odd(event);
+    if (odd) break;
+    append(event, out);
+  }
+  packet_.events -= i;
+  queue_.consume(i * event_size);
+  if (!odd) return true;
+
+  // One that cannot be: an event that is damaged, or the next packet where this one should go on,
+  // or bytes are missing and nothing here is an event.
+  const auto behind = std::min<std::uint64_t>(packet_.events - 1, events_behind);
+  const auto wanted = std::max(packet_header_size, (1 + behind) * event_size);
+  if (queue_.size() < wanted && !finished_) return false;
+  const auto next = queue_.peek(std::min(queue_.size(), wanted));
+  bool sound_behind = true;
+  for (std::size_t k = 1; k <= behind && (k + 1) * event_size <= next.size(); ++k)
+    sound_behind &= !is_odd(next.data() + k * event_size);
+  if (next.size() >= packet_header_size && begins_packet(next.data())) {
+    damage_.note(queue_.position(), "a packet that is shorter than it says");
+    packet_ = {};
+  } else if (!sound_behind) {
+    damage_.note(queue_.position(), "bytes that are no events");
+    packet_ = {};
+    scanning_ = true;
+  } else {
+    if (little_endian<std::int32_t>(next.data() + 4) < 0)
+      damage_.note(queue_.position(), "an event at an impossible time");
+    else
+      ++damage_.outside;
+    --packet_.events;
+    queue_.consume(event_size);
+  }
+  return true;
+}
+
+/// Goes on to where a packet of events seems to begin. False where that takes more bytes.
+bool Aedat3Decoder::scan() {
+  while (true) {
+    const auto bytes = queue_.peek(packet_header_size);
+    if (bytes.empty()) return false;
+    if (begins_packet(bytes.data())) {
+      const PacketHeader header(bytes.data());
+      if (header.of_events() && header.number > 0 && header.capacity == header.number) break;
+    }
+    queue_.consume(1);
+  }
+  scanning_ = false;
+  return true;
+}
+
+bool Aedat3Decoder::begins_packet(const std::uint8_t* bytes) const {
+  const PacketHeader header(bytes);
+  if (header.type < 0 || header.type > last_type || header.source < 0) return false;
+  if (header.event_size < static_cast<std::int32_t>(event_size) ||
+      (header.of_events() && header.event_size != static_cast<std::int32_t>(event_size)))
+    return false;
+  if (header.time_offset < 0 || header.time_offset > header.event_size - 4) return false;
+  if (header.of_events() && header.time_offset != 4) return false;
+  if (header.overflow < 0 || header.overflow >= largest_overflow) return false;
+  if (header.valid_number < 0 || header.number < header.valid_number ||
+      header.capacity < header.number)
+    return false;
+  return std::int64_t{header.capacity} * header.event_size <= largest_packet;
+}
+
+/// Whether an event is outside the sensor or at no time. Where the sensor is not known, what looks
+/// like a packet's header counts as odd, too: it has a row beyond any sensor.
+bool Aedat3Decoder::is_odd(const std::uint8_t* event) const {
+  const auto data = little_endian<std::uint32_t>(event);
+  if (little_endian<std::int32_t>(event + 4) < 0) return true;
+  if (packet_.type != polarity || (data & valid) == 0) return false;
+  const auto limit = size_ != SensorSize{} ? size_ : SensorSize{widest, widest};
+  return x_of(data) >= limit.width || y_of(data) >= limit.height;
+}
+
+void Aedat3Decoder::append(const std::uint8_t* event, Decoded& out) {
+  const auto data = little_endian<std::uint32_t>(event);
+  if ((data & valid) == 0) return;
+  const auto t = packet_.overflow | little_endian<std::int32_t>(event + 4);
+  if (packet_.type == polarity) {
+    if (t < newest_) ++damage_.unsorted;
+    newest_ = std::max(newest_, t);
+    out.events.push_back(StampedEvent::at(x_of(data), y_of(data), t,
+                                          (data & on) != 0 ? Polarity::on : Polarity::off));
+    return;
+  }
+  struct Input {
+    std::uint32_t rising;  ///< the type of its rising edge; the falling edge and the pulse follow
+    std::uint16_t id;
+  };
+  constexpr Input inputs[] = {{2, 0}, {6, 1}, {9, 2}};
+  const auto type = data >> 1 & 0x7f;
+  for (const auto& input : inputs)
+    if (type >= input.rising && type <= input.rising + 2)
+      out.triggers.push_back({t, input.id, type != input.rising + 1});
+}
+
+}  // namespace eventcamera

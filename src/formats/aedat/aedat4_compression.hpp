@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "src/formats/aedat/aedat4.hpp"
+
+struct LZ4F_dctx_s;
+struct ZSTD_DCtx_s;
+struct ZSTD_CCtx_s;
+
+namespace eventcamera {
+
+/// Undoes the compression of a packet. Memory follows what comes out, never what the bytes claim.
+class Aedat4Decompressor {
+ public:
+  Aedat4Decompressor();
+  ~Aedat4Decompressor();
+  Aedat4Decompressor(const Aedat4Decompressor&) = delete;
+  Aedat4Decompressor& operator=(const Aedat4Decompressor&) = delete;
+
+  struct Content {
+    std::span<const std::uint8_t> bytes;  ///< valid until the next call
+    std::size_t used;                     ///< how many bytes of the payload made them
+  };
+
+  /// The content of the frame at the front of `payload`; nothing where that is damaged, or larger
+  /// than `limit`. The compression is not `none`.
+  std::optional<Content> decompress(Aedat4Compression compression,
+                                    std::span<const std::uint8_t> payload,
+                                    std::size_t limit = aedat4_largest_packet);
+
+  /// A copy of `bytes` at an address that suits every number.
+  std::span<const std::uint8_t> aligned(std::span<const std::uint8_t> bytes);
+
+ private:
+  std::optional<Content> decompress_lz4(std::span<const std::uint8_t> payload, std::size_t limit);
+  std::optional<Content> decompress_zstd(std::span<const std::uint8_t> payload, std::size_t limit);
+  bool grow(std::size_t limit);
+
+  struct Deleter {
+    void operator()(LZ4F_dctx_s* context) const;
+    void operator()(ZSTD_DCtx_s* context) const;
+  };
+  std::unique_ptr<LZ4F_dctx_s, Deleter> lz4_;
+  std::unique_ptr<ZSTD_DCtx_s, Deleter> zstd_;
+  std::vector<std::uint8_t> content_;
+};
+
+/// Compresses packets.
+class Aedat4Compressor {
+ public:
+  explicit Aedat4Compressor(Aedat4Compression compression);
+  ~Aedat4Compressor();
+  Aedat4Compressor(const Aedat4Compressor&) = delete;
+  Aedat4Compressor& operator=(const Aedat4Compressor&) = delete;
+
+  /// Appends `content`, compressed, to `out`.
+  void compress(std::span<const std::uint8_t> content, std::vector<std::uint8_t>& out);
+
+ private:
+  struct Deleter {
+    void operator()(ZSTD_CCtx_s* context) const;
+  };
+  Aedat4Compression compression_;
+  std::unique_ptr<ZSTD_CCtx_s, Deleter> zstd_;
+};
+
+/// Whether `bytes` begin like a frame of `compression`, which is not `none`.
+bool begins_compressed(Aedat4Compression compression, std::span<const std::uint8_t> bytes);
+
+}  // namespace eventcamera

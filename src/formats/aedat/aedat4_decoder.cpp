@@ -1,0 +1,495 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/aedat/aedat4_decoder.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "src/formats/aedat/aedat4.fbs.h"
+#include "src/formats/aedat/aedat4_info_node.hpp"
+#include "src/formats/little_endian.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::size_t size_prefix = sizeof(flatbuffers::uoffset_t);
+constexpr std::size_t identifier_at = 2 * size_prefix;
+constexpr std::size_t identifier_size = 4;
+/// What of a payload tells that it is one.
+constexpr std::size_t payload_head = identifier_at + identifier_size;
+constexpr std::size_t packet_head = aedat4_packet_header + payload_head;
+
+constexpr std::size_t largest_header = std::size_t{16} << 20;
+constexpr int most_unlisted_streams = 256;
+constexpr int widest = 32768;
+/// Elements handed over at once: they stay in the cache of the second level.
+constexpr std::size_t block = 4096;
+/// Looking into a packet whose size is damaged for the one after it costs work a second time. A
+/// file made for that may not have more of it than this.
+constexpr std::size_t most_credit = std::size_t{256} << 20;
+/// What a packet that does not decompress counts for, besides its bytes.
+constexpr std::size_t decompressing = std::size_t{4} << 20;
+
+constexpr std::size_t event_size = sizeof(aedat4::Event);
+static_assert(event_size == sizeof(StampedEvent));
+
+/// The bytes or structs of a verified vector, which may lie at any address.
+struct Plain {
+  const std::uint8_t* data = nullptr;
+  std::size_t count = 0;
+};
+
+Plain plain(const void* vector) {
+  if (vector == nullptr) return {};
+  const auto* const bytes = static_cast<const std::uint8_t*>(vector);
+  return {bytes + size_prefix, flatbuffers::ReadScalar<flatbuffers::uoffset_t>(bytes)};
+}
+
+constexpr const char* broken_packet = "a packet whose FlatBuffer is damaged";
+
+/// Packets of bytes and structs are read where they lie in the file, at any address; those of
+/// tables are aligned first.
+enum class Address { any, aligned };
+
+template <class Table>
+const Table* verified(std::span<const std::uint8_t> content, const char* identifier,
+                      Address address) {
+  // The Verifier reads an identifier before it knows that there is room for one.
+  if (content.size() < payload_head) return nullptr;
+  flatbuffers::Verifier::Options options;
+  options.max_tables = static_cast<flatbuffers::uoffset_t>(content.size());
+  options.check_alignment = address == Address::aligned;
+  flatbuffers::Verifier verifier(content.data(), content.size(), options);
+  if (!verifier.VerifySizePrefixedBuffer<Table>(identifier)) return nullptr;
+  const auto* const root = content.data() + size_prefix;
+  return reinterpret_cast<const Table*>(root +
+                                        flatbuffers::ReadScalar<flatbuffers::uoffset_t>(root));
+}
+
+template <class Packet>
+std::optional<Plain> elements_of(std::span<const std::uint8_t> content, const char* identifier,
+                                 Address address) {
+  const auto* const packet = verified<Packet>(content, identifier, address);
+  if (packet == nullptr) return std::nullopt;
+  return plain(packet->elements());
+}
+
+bool is_time(Microseconds t) {
+  return t > -aedat4_last_time && t < aedat4_last_time;
+}
+
+/// The event that lies at `bytes`, its column and row unchecked.
+StampedEvent event_at(const std::uint8_t* bytes) {
+  // t:64, x:16, y:16, on:8, padding:24
+  const auto word = little_endian<std::uint64_t>(bytes + 8);
+  const auto on = static_cast<std::uint16_t>(((word >> 32) & 0xff) != 0 ? 0x8000 : 0);
+  return {little_endian<Microseconds>(bytes), static_cast<std::uint16_t>(word),
+          static_cast<std::uint16_t>(((word >> 16) & 0x7fff) | on)};
+}
+
+int row_at(const std::uint8_t* bytes) {
+  return little_endian<std::uint16_t>(bytes + 10);
+}
+
+/// No event of a sensor of this size reaches so far.
+SensorSize limit_of(SensorSize size) {
+  return {size.width != 0 ? size.width : widest, size.height != 0 ? size.height : widest};
+}
+
+Trigger trigger_of(const aedat4::Trigger& trigger) {
+  struct Edge {
+    std::uint16_t id;
+    bool rising;
+  };
+  constexpr Edge edges[] = {{4, true},  {0, true}, {0, false}, {0, true}, {1, true},
+                            {1, false}, {2, true}, {2, false}, {3, true}, {3, false}};
+  const auto source = static_cast<std::size_t>(static_cast<std::uint8_t>(trigger.source()));
+  const auto edge = source < std::size(edges) ? edges[source] : Edge{5, true};
+  return {trigger.t(), edge.id, edge.rising};
+}
+
+}  // namespace
+
+Aedat4Decoder::Aedat4Decoder() : events_(block), credit_(most_credit) {
+  triggers_.reserve(block);
+}
+
+void Aedat4Decoder::push(std::span<const std::uint8_t> piece) {
+  if (packet_ != 0) throw std::logic_error("Aedat4Decoder::push() before next() returned nothing");
+  queue_.push(piece);
+}
+
+std::optional<Aedat4Item> Aedat4Decoder::next() {
+  while (true) {
+    if (elements_.count > 0)
+      return elements_.kind == Aedat4Kind::events ? next_events() : next_triggers();
+    queue_.consume(std::exchange(packet_, 0));
+    const bool ready = header_read() || read_header();
+    if (!ready || (scanning_ && !scan()) || !read_packet()) break;
+    if (picture_) return *std::exchange(picture_, std::nullopt);
+  }
+  queue_.keep();
+  return std::nullopt;
+}
+
+void Aedat4Decoder::resume(std::uint64_t position) {
+  queue_.restart(position);
+  elements_ = {};
+  packet_ = 0;
+  picture_.reset();
+  finished_ = false;
+  scanning_ = false;
+  std::fill(newest_.begin(), newest_.end(), std::numeric_limits<Microseconds>::min());
+}
+
+bool Aedat4Decoder::read_header() {
+  const auto start = queue_.peek(std::min(queue_.size(), aedat4_magic.size()));
+  if (!std::equal(
+          start.begin(),
+          start.begin() + static_cast<std::ptrdiff_t>(std::min(start.size(), aedat4_magic.size())),
+          aedat4_magic.begin()))
+    throw NotThisFormat("this is not AEDAT4: it does not begin with " +
+                        std::string(aedat4_magic.substr(0, aedat4_magic.size() - 2)));
+  const auto size_at = aedat4_magic.size();
+  const auto before = size_at + size_prefix;
+  auto bytes = queue_.peek(before);
+  const auto size = bytes.empty() ? 0 : little_endian<std::uint32_t>(bytes.data() + size_at);
+  if (size > largest_header)
+    throw NotThisFormat("this AEDAT4 file claims a header of " + std::to_string(size) + " bytes");
+  if (!bytes.empty()) bytes = queue_.peek(before + size);
+  if (bytes.empty()) {
+    if (finished_) throw NotThisFormat("this AEDAT4 file ends within its header");
+    return false;
+  }
+  const auto content = decompressor_.aligned(bytes.subspan(size_at, size_prefix + size));
+  const auto* const header = verified<aedat4::Header>(content, "IOHE", Address::aligned);
+  if (header == nullptr) throw NotThisFormat("the header of this AEDAT4 file is damaged");
+  if (header->compression() < 0 ||
+      header->compression() > static_cast<int>(Aedat4Compression::zstd_high))
+    throw NotThisFormat("this AEDAT4 file is compressed in a way that we do not know, number " +
+                        std::to_string(header->compression()));
+  compression_ = static_cast<Aedat4Compression>(header->compression());
+  if (header->info_node() != nullptr) {
+    auto info = read_info_node(header->info_node()->string_view());
+    if (!info.whole) damage_.note(size_at, "the header's XML is damaged");
+    streams_ = std::move(info.streams);
+  }
+  listed_ = !streams_.empty();
+  newest_.assign(streams_.size(), std::numeric_limits<Microseconds>::min());
+  packets_at_ = before + size;
+  if (header->data_table_position() >= static_cast<std::int64_t>(packets_at_)) {
+    table_at_ = static_cast<std::uint64_t>(header->data_table_position());
+    const auto* const field = reinterpret_cast<const flatbuffers::Table*>(header)->GetAddressOf(
+        aedat4::Header::VT_DATA_TABLE_POSITION);
+    table_field_at_ = size_at + static_cast<std::uint64_t>(field - content.data());
+  }
+  queue_.consume(before + size);
+  return true;
+}
+
+Aedat4Decoder::Place Aedat4Decoder::place_at(std::size_t offset) {
+  const auto count = std::min(queue_.size(), offset + packet_head);
+  const auto bytes = queue_.peek(count).subspan(offset, count - offset);
+  if (bytes.size() < packet_head) {
+    if (!finished_) return Place::more;
+    if (bytes.empty()) return Place::end;
+  } else {
+    if (begins_packet(bytes)) return Place::packet;
+    const auto* const identifier = bytes.data() + identifier_at;
+    if (std::equal(identifier, identifier + identifier_size, "FTAB")) return Place::table;
+    if (compression_ != Aedat4Compression::none && begins_compressed(compression_, bytes))
+      return Place::table;
+  }
+  return table_at_ == queue_.position() + offset ? Place::table : Place::noise;
+}
+
+bool Aedat4Decoder::begins_packet(std::span<const std::uint8_t> bytes) const {
+  const auto id = little_endian<std::int32_t>(bytes.data());
+  const auto size = little_endian<std::uint32_t>(bytes.data() + 4);
+  if (size < payload_head || size > aedat4_largest_packet) return false;
+  if (listed_ ? !stream_of(id) : id < 0 || id >= most_unlisted_streams) return false;
+  const auto payload = bytes.subspan(aedat4_packet_header);
+  if (compression_ != Aedat4Compression::none) return begins_compressed(compression_, payload);
+  if (little_endian<std::uint32_t>(payload.data()) > size - size_prefix) return false;
+  const auto identifier = payload.subspan(identifier_at, identifier_size);
+  return std::all_of(identifier.begin(), identifier.end(), [](std::uint8_t c) {
+    return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  });
+}
+
+bool Aedat4Decoder::scan() {
+  while (true) {
+    const auto place = place_at(0);
+    if (place == Place::more || place == Place::end) return false;
+    if (place == Place::packet) break;
+    queue_.consume(1);
+  }
+  scanning_ = false;
+  return true;
+}
+
+bool Aedat4Decoder::read_packet() {
+  const auto place = place_at(0);
+  if (place == Place::more || place == Place::end) return false;
+  if (place != Place::packet) {
+    // The table ends the packets, but what it may hide is looked for all the same.
+    if (place == Place::noise)
+      damage_.note(queue_.position(), "bytes that are no packet");
+    else if (!table_found_at_)
+      table_found_at_ = queue_.position();
+    queue_.consume(1);
+    scanning_ = true;
+    return true;
+  }
+  const auto head = queue_.peek(packet_head);
+  const auto id = little_endian<std::int32_t>(head.data());
+  const std::size_t size = little_endian<std::uint32_t>(head.data() + 4);
+  const auto prefix = little_endian<std::uint32_t>(head.data() + aedat4_packet_header);
+  const auto packet = aedat4_packet_header + size;
+  auto bytes = queue_.peek(packet);
+  if (bytes.empty()) {
+    if (!finished_) return false;
+    damage_.note(queue_.position(), "a packet that the end of the file cuts off");
+    queue_.consume(aedat4_packet_header);
+    scanning_ = true;
+    return true;
+  }
+
+  std::span<const std::uint8_t> content;
+  std::size_t used = 0;
+  if (compression_ != Aedat4Compression::none) {
+    const auto decompressed =
+        decompressor_.decompress(compression_, bytes.subspan(aedat4_packet_header, size));
+    if (decompressed) {
+      content = decompressed->bytes;
+      used = decompressed->used;
+    }
+  } else {
+    used = size_prefix + prefix;
+  }
+  // A size that is damaged swallows packets or ends in the midst of one; what follows tells. Where
+  // nothing is compressed missing bytes show in no other way.
+  bool sound_after = true;
+  if (used != size || compression_ == Aedat4Compression::none) {
+    const auto after = place_at(packet);
+    if (after == Place::more) return false;
+    sound_after = after != Place::noise;
+    bytes = queue_.peek(packet);
+  }
+  if (compression_ == Aedat4Compression::none)
+    content = bytes.subspan(aedat4_packet_header, used);
+  else if (used != 0 && content.size() >= payload_head)
+    content = content.first(std::min(
+        content.size(), size_prefix + std::size_t{little_endian<std::uint32_t>(content.data())}));
+
+  const char* damage = nullptr;
+  if (used == 0)
+    damage = "a packet that does not decompress";
+  else if (compression_ == Aedat4Compression::none && !sound_after &&
+           !has_sound_events(content, id))
+    damage = "a packet that lacks bytes";
+  else
+    damage = read_content(content, id);
+  if (damage == nullptr) {
+    packet_ = packet;
+    if (!sound_after && used != size) {
+      packet_ = aedat4_packet_header + used;
+      damage_.note(queue_.position(), "a packet of the wrong size");
+      scanning_ = true;
+    }
+    credit_ = std::min(most_credit, credit_ + packet);
+    return true;
+  }
+  if (used == size && compression_ != Aedat4Compression::none) {
+    const auto after = place_at(packet);
+    if (after == Place::more) return false;
+    sound_after = after != Place::noise;
+  }
+  damage_.note(queue_.position(), damage);
+  // A frame that decompresses hides no packets.
+  const auto sound = compression_ == Aedat4Compression::none ? 0 : used;
+  skip_damaged(packet, sound, size + (used == 0 ? decompressing : content.size()), sound_after);
+  return true;
+}
+
+/// Goes on behind a damaged packet of `packet` bytes where something sound follows it, else with
+/// looking through it for the packets that it has swallowed.
+void Aedat4Decoder::skip_damaged(std::size_t packet, std::size_t sound, std::size_t work,
+                                 bool sound_after) {
+  if (sound_after) {
+    queue_.consume(packet);
+    return;
+  }
+  scanning_ = true;
+  const bool affordable = work <= credit_;
+  if (affordable) credit_ -= work;
+  queue_.consume(affordable ? aedat4_packet_header + sound : packet);
+}
+
+/// Takes up a packet's content. Returns what is wrong with it.
+const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, int id) {
+  if (content.size() < payload_head) return broken_packet;
+  const auto kind =
+      aedat4_kind({reinterpret_cast<const char*>(content.data()) + identifier_at, identifier_size});
+  const auto stream = stream_of(id);
+  if (stream && streams_[*stream].kind != kind) return "a packet of another kind than its stream";
+  if (kind == Aedat4Kind::other) {
+    ++skipped_.packets;
+    return nullptr;
+  }
+  const bool of_tables = kind == Aedat4Kind::triggers || kind == Aedat4Kind::imu;
+  if (of_tables && compression_ == Aedat4Compression::none)
+    content = decompressor_.aligned(content);
+
+  std::optional<Plain> elements = Plain{};
+  if (kind == Aedat4Kind::frames) {
+    if (const char* const damage = read_frame(content)) return damage;
+  } else if (kind == Aedat4Kind::events) {
+    elements = elements_of<aedat4::EventPacket>(content, "EVTS", Address::any);
+  } else if (kind == Aedat4Kind::triggers) {
+    elements = elements_of<aedat4::TriggerPacket>(content, "TRIG", Address::aligned);
+  } else {
+    elements = elements_of<aedat4::ImuPacket>(content, "IMUS", Address::aligned);
+  }
+  if (!elements) return broken_packet;
+  elements_ = {kind, elements->data, elements->count, stream ? *stream : add_stream(id, kind)};
+  if (picture_) picture_->stream = elements_.stream;
+  if (kind == Aedat4Kind::imu) skipped_.imu_samples += std::exchange(elements_.count, 0);
+  return nullptr;
+}
+
+const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
+  const auto* const packet = verified<aedat4::Frame>(content, "FRME", Address::any);
+  if (packet == nullptr) return broken_packet;
+  const auto format = static_cast<Aedat4PixelFormat>(packet->format());
+  const auto pixel = bytes_per_pixel(format);
+  if (pixel == 0) {
+    ++skipped_.frames;
+    return nullptr;
+  }
+  const auto pixels = plain(packet->pixels());
+  if (packet->width() <= 0 || packet->height() <= 0 ||
+      pixels.count != std::size_t{1} * packet->width() * packet->height() * pixel)
+    return "a frame that has not the pixels that it should";
+  for (const auto t : {packet->t(), packet->begin_t(), packet->end_t(), packet->exposure_begin_t(),
+                       packet->exposure_end_t(), packet->exposure()})
+    if (!is_time(t)) return "a frame at an impossible time";
+  Aedat4Frame frame{packet->t(),
+                    packet->begin_t(),
+                    packet->end_t(),
+                    packet->exposure_begin_t(),
+                    packet->exposure_end_t(),
+                    format,
+                    packet->width(),
+                    packet->height(),
+                    packet->offset_x(),
+                    packet->offset_y(),
+                    pixels.data,
+                    std::ptrdiff_t{1} * packet->width() * pixel};
+  // Newer files give the time and how long the exposure took, and nothing else.
+  if (frame.begin == 0 && frame.end == 0 && frame.exposure_begin == 0 && frame.exposure_end == 0) {
+    frame.begin = frame.exposure_begin = frame.t;
+    frame.end = frame.exposure_end = frame.t + packet->exposure();
+  }
+  picture_ = Aedat4Picture{0, frame};
+  return nullptr;
+}
+
+/// Whether the events of a packet are all as a camera gives them. Other packets pass.
+bool Aedat4Decoder::has_sound_events(std::span<const std::uint8_t> content, int id) const {
+  const auto elements = elements_of<aedat4::EventPacket>(content, "EVTS", Address::any);
+  const auto stream = stream_of(id);
+  if (!elements || !stream) return true;
+  const auto limit = limit_of(streams_[*stream].size);
+  auto last = std::numeric_limits<Microseconds>::min();
+  for (std::size_t i = 0; i < elements->count; ++i) {
+    const auto* const bytes = elements->data + i * event_size;
+    const auto event = event_at(bytes);
+    if (event.x >= limit.width || row_at(bytes) >= limit.height || event.t < last ||
+        !is_time(event.t) || little_endian<std::uint32_t>(bytes + 12) > 1)
+      return false;
+    last = event.t;
+  }
+  return true;
+}
+
+Aedat4Item Aedat4Decoder::next_events() {
+  const auto count = std::min(elements_.count, block);
+  const Aedat4Events item{elements_.stream, checked_events(count)};
+  elements_.data += count * event_size;
+  elements_.count -= count;
+  return item;
+}
+
+/// The next `count` events. In a block without fault nothing is looked at twice.
+std::span<const StampedEvent> Aedat4Decoder::checked_events(std::size_t count) {
+  const auto limit = limit_of(streams_[elements_.stream].size);
+  const auto width = limit.width;
+  const auto height = limit.height;
+  auto& newest = newest_[elements_.stream];
+  const auto* const from = elements_.data;
+  auto last = newest;
+  bool sound = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto* const bytes = from + i * event_size;
+    const auto event = event_at(bytes);
+    sound &= (event.x < width) & (row_at(bytes) < height) & (event.t >= last);
+    last = event.t;
+    events_[i] = event;
+  }
+  if (sound && is_time(events_[0].t) && is_time(last)) {
+    newest = last;
+    return {events_.data(), count};
+  }
+
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto* const bytes = from + i * event_size;
+    const auto event = event_at(bytes);
+    if (!is_time(event.t)) {
+      damage_.note(queue_.position(), "an event at an impossible time");
+    } else if (event.x >= width || row_at(bytes) >= height) {
+      ++damage_.outside;
+    } else {
+      if (event.t < newest) ++damage_.unsorted;
+      newest = std::max(newest, event.t);
+      events_[kept++] = event;
+    }
+  }
+  return {events_.data(), kept};
+}
+
+Aedat4Item Aedat4Decoder::next_triggers() {
+  const auto count = std::min(elements_.count, block);
+  triggers_.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto* const offset = elements_.data + i * sizeof(flatbuffers::uoffset_t);
+    const auto* const trigger = reinterpret_cast<const aedat4::Trigger*>(
+        offset + flatbuffers::ReadScalar<flatbuffers::uoffset_t>(offset));
+    if (is_time(trigger->t()))
+      triggers_.push_back(trigger_of(*trigger));
+    else
+      damage_.note(queue_.position(), "a trigger at an impossible time");
+  }
+  elements_.data += count * sizeof(flatbuffers::uoffset_t);
+  elements_.count -= count;
+  return Aedat4Triggers{elements_.stream, triggers_};
+}
+
+std::optional<std::size_t> Aedat4Decoder::stream_of(int id) const {
+  for (std::size_t i = 0; i < streams_.size(); ++i)
+    if (streams_[i].id == id) return i;
+  return std::nullopt;
+}
+
+/// Adds a stream that the header does not list.
+std::size_t Aedat4Decoder::add_stream(int id, Aedat4Kind kind) {
+  streams_.push_back({id, kind, {}, {}});
+  newest_.push_back(std::numeric_limits<Microseconds>::min());
+  return streams_.size() - 1;
+}
+
+}  // namespace eventcamera

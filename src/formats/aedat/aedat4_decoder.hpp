@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "src/formats/aedat/aedat4.hpp"
+#include "src/formats/aedat/aedat4_compression.hpp"
+#include "src/formats/byte_queue.hpp"
+#include "src/formats/decoder.hpp"
+
+namespace eventcamera {
+
+/// Events of one packet, or a part of it. `stream` is an index into the decoder's streams().
+struct Aedat4Events {
+  std::size_t stream;
+  std::span<const StampedEvent> events;
+};
+
+/// A packet's frame.
+struct Aedat4Picture {
+  std::size_t stream;
+  Aedat4Frame frame;
+};
+
+/// Triggers of one packet, or a part of it. Their id is what gave the edge: 0 the camera's input,
+/// 1 its generator, 2 a frame, 3 an exposure, 4 the zeroing of its clock.
+struct Aedat4Triggers {
+  std::size_t stream;
+  std::span<const Trigger> triggers;
+};
+
+using Aedat4Item = std::variant<Aedat4Events, Aedat4Picture, Aedat4Triggers>;
+
+/// Reads AEDAT4: streams of events, frames and triggers, in the file's order. Bytes come in pieces
+/// of any size, and how they are split changes nothing. A packet is the smallest unit that is
+/// whole or not.
+///
+///     decoder.push(piece);
+///     while (const auto item = decoder.next()) ...
+class Aedat4Decoder {
+ public:
+  Aedat4Decoder();
+  Aedat4Decoder(const Aedat4Decoder&) = delete;
+  Aedat4Decoder& operator=(const Aedat4Decoder&) = delete;
+
+  /// Adds bytes, which stay borrowed until next() returns nothing; only then more may be pushed.
+  void push(std::span<const std::uint8_t> piece);
+
+  /// Says that no more bytes come.
+  void finish() { finished_ = true; }
+
+  /// What comes next, valid until the next call; nothing where that takes more bytes. Throws
+  /// NotThisFormat.
+  std::optional<Aedat4Item> next();
+
+  /// What is pushed next lies at `position`, where a packet should begin. The header has to have
+  /// been read.
+  void resume(std::uint64_t position);
+
+  bool header_read() const { return packets_at_ != 0; }
+
+  /// Those of the header, and any that packets named besides.
+  const std::vector<Aedat4Stream>& streams() const { return streams_; }
+  Aedat4Compression compression() const { return compression_; }
+
+  /// Where the first packet begins, once the header is read.
+  std::uint64_t packets_at() const { return packets_at_; }
+
+  /// Where the table of packets begins, where the header says that there is one.
+  std::optional<std::uint64_t> table_at() const { return table_at_; }
+
+  /// Where the header says so.
+  std::uint64_t table_field_at() const { return table_field_at_; }
+
+  /// Where something like a table was come upon.
+  std::optional<std::uint64_t> table_found_at() const { return table_found_at_; }
+
+  const Damage& damage() const { return damage_; }
+
+  /// What is sound, but not handed over.
+  struct Skipped {
+    std::uint64_t imu_samples = 0;
+    std::uint64_t frames = 0;   ///< of a pixel format that we do not know
+    std::uint64_t packets = 0;  ///< of other kinds
+  };
+  const Skipped& skipped() const { return skipped_; }
+
+ private:
+  enum class Place { more, end, packet, table, noise };
+
+  /// A packet's elements that have not been handed over.
+  struct Elements {
+    Aedat4Kind kind = Aedat4Kind::other;
+    const std::uint8_t* data = nullptr;
+    std::size_t count = 0;
+    std::size_t stream = 0;
+  };
+
+  bool read_header();
+  bool scan();
+  bool read_packet();
+  Place place_at(std::size_t offset);
+  bool begins_packet(std::span<const std::uint8_t> bytes) const;
+  bool has_sound_events(std::span<const std::uint8_t> content, int id) const;
+  const char* read_content(std::span<const std::uint8_t> content, int id);
+  const char* read_frame(std::span<const std::uint8_t> content);
+  std::optional<std::size_t> stream_of(int id) const;
+  std::size_t add_stream(int id, Aedat4Kind kind);
+  void skip_damaged(std::size_t packet, std::size_t sound, std::size_t work, bool sound_after);
+  Aedat4Item next_events();
+  std::span<const StampedEvent> checked_events(std::size_t count);
+  Aedat4Item next_triggers();
+
+  ByteQueue queue_;
+  bool finished_ = false;
+  bool scanning_ = false;  ///< for the next place that looks like a packet
+  bool listed_ = false;    ///< the header lists the streams
+  std::uint64_t packets_at_ = 0;
+  std::optional<std::uint64_t> table_at_;
+  std::uint64_t table_field_at_ = 0;
+  std::optional<std::uint64_t> table_found_at_;
+  Aedat4Compression compression_ = Aedat4Compression::none;
+  std::vector<Aedat4Stream> streams_;
+  std::vector<Microseconds> newest_;  ///< the latest event of each stream
+  Aedat4Decompressor decompressor_;
+
+  std::size_t packet_ = 0;  ///< bytes of the packet that is being handed over
+  Elements elements_;
+  std::optional<Aedat4Picture> picture_;
+  std::vector<StampedEvent> events_;
+  std::vector<Trigger> triggers_;
+
+  std::size_t credit_;  ///< work that may still be spent on looking into damaged packets
+  Damage damage_;
+  Skipped skipped_;
+};
+
+}  // namespace eventcamera

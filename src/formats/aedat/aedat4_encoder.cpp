@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/aedat/aedat4_encoder.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <stdexcept>
+#include <utility>
+
+#include "src/formats/aedat/aedat4.fbs.h"
+#include "src/formats/aedat/aedat4_compression.hpp"
+#include "src/formats/aedat/aedat4_info_node.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::size_t most_events = 4096;
+constexpr int largest_side = 32767;
+
+template <class Number>
+void append(Number number, std::vector<std::uint8_t>& out) {
+  const auto at = out.size();
+  out.resize(at + sizeof number);
+  std::memcpy(out.data() + at, &number, sizeof number);
+}
+
+bool is_side(int pixels) {
+  return pixels > 0 && pixels <= largest_side;
+}
+
+}  // namespace
+
+Aedat4Encoder::Aedat4Encoder(Aedat4Settings settings)
+    : settings_(std::move(settings)),
+      compressor_(std::make_unique<Aedat4Compressor>(settings_.compression)),
+      builder_(std::make_unique<flatbuffers::FlatBufferBuilder>()) {
+  if (!is_side(settings_.size.width) || !is_side(settings_.size.height))
+    throw std::invalid_argument("AEDAT4 has sensors from 1x1 to 32767x32767 pixels");
+}
+
+Aedat4Encoder::~Aedat4Encoder() = default;
+
+void Aedat4Encoder::encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) {
+  write_header(out);
+  while (held_.size() + events.size() >= most_events) {
+    // A whole packet is written from where it lies.
+    const auto count = most_events - held_.size();
+    if (held_.empty()) {
+      write_events(events.first(count), out);
+    } else {
+      held_.insert(held_.end(), events.begin(),
+                   events.begin() + static_cast<std::ptrdiff_t>(count));
+      write_events(held_, out);
+      held_.clear();
+    }
+    events = events.subspan(count);
+  }
+  held_.insert(held_.end(), events.begin(), events.end());
+}
+
+void Aedat4Encoder::encode(const Aedat4Frame& frame, std::vector<std::uint8_t>& out) {
+  if (!settings_.frames) throw std::invalid_argument("this AEDAT4 file has no stream of frames");
+  const auto row = static_cast<std::size_t>(frame.width) *
+                   static_cast<std::size_t>(bytes_per_pixel(frame.format));
+  if (!is_side(frame.width) || !is_side(frame.height) ||
+      row * static_cast<std::size_t>(frame.height) > aedat4_largest_packet / 2)
+    throw std::invalid_argument("a frame of a size that does not go into AEDAT4");
+  flush(out);
+  builder_->Clear();
+  std::uint8_t* pixels = nullptr;
+  const auto vector = builder_->CreateUninitializedVector(
+      row * static_cast<std::size_t>(frame.height), sizeof *pixels, &pixels);
+  for (int y = 0; y < frame.height; ++y)
+    std::memcpy(pixels + static_cast<std::size_t>(y) * row, frame.pixels + y * frame.stride, row);
+  builder_->FinishSizePrefixed(
+      aedat4::CreateFrame(
+          *builder_, frame.t, frame.begin, frame.end, frame.exposure_begin, frame.exposure_end,
+          static_cast<std::int8_t>(frame.format), static_cast<std::int16_t>(frame.width),
+          static_cast<std::int16_t>(frame.height), static_cast<std::int16_t>(frame.x),
+          static_cast<std::int16_t>(frame.y), vector, frame.exposure_end - frame.exposure_begin),
+      "FRME");
+  write_packet(frame_stream, 1, frame.t, frame.t, out);
+}
+
+void Aedat4Encoder::flush(std::vector<std::uint8_t>& out) {
+  write_header(out);
+  if (held_.empty()) return;
+  write_events(held_, out);
+  held_.clear();
+}
+
+void Aedat4Encoder::finish(std::vector<std::uint8_t>& out) {
+  flush(out);
+  if (!settings_.table) return;
+  patch_.emplace();
+  patch_->position = table_field_at_;
+  std::memcpy(patch_->bytes.data(), &position_, sizeof position_);
+  const auto at = out.size();
+  compressor_->compress(aedat4_table_content(table_), out);
+  position_ += out.size() - at;
+}
+
+void Aedat4Encoder::write_header(std::vector<std::uint8_t>& out) {
+  if (position_ != 0) return;
+  std::vector<Aedat4Stream> streams{
+      {event_stream, Aedat4Kind::events, settings_.size, settings_.source}};
+  if (settings_.frames)
+    streams.push_back({frame_stream, Aedat4Kind::frames, settings_.size, settings_.source});
+  flatbuffers::FlatBufferBuilder builder;
+  // The table's position has to have a place, though it is not known yet.
+  builder.ForceDefaults(true);
+  const auto info = builder.CreateString(write_info_node(streams, settings_.compression));
+  builder.FinishSizePrefixed(
+      aedat4::CreateHeader(builder, static_cast<int>(settings_.compression), -1, info), "IOHE");
+  const std::span<const std::uint8_t> header(builder.GetBufferPointer(), builder.GetSize());
+  const auto* const fields = reinterpret_cast<const flatbuffers::Table*>(
+      flatbuffers::GetSizePrefixedRoot<aedat4::Header>(header.data()));
+  table_field_at_ =
+      aedat4_magic.size() +
+      static_cast<std::size_t>(fields->GetAddressOf(aedat4::Header::VT_DATA_TABLE_POSITION) -
+                               header.data());
+  out.insert(out.end(), aedat4_magic.begin(), aedat4_magic.end());
+  out.insert(out.end(), header.begin(), header.end());
+  position_ = aedat4_magic.size() + header.size();
+}
+
+void Aedat4Encoder::write_events(std::span<const StampedEvent> events,
+                                 std::vector<std::uint8_t>& out) {
+  builder_->Clear();
+  aedat4::Event* to = nullptr;
+  const auto vector =
+      builder_->CreateUninitializedVectorOfStructs<aedat4::Event>(events.size(), &to);
+  for (const auto& event : events)
+    new (to++)
+        aedat4::Event(event.t, static_cast<std::int16_t>(event.x),
+                      static_cast<std::int16_t>(event.y()), event.polarity() == Polarity::on);
+  builder_->FinishSizePrefixed(aedat4::CreateEventPacket(*builder_, vector), "EVTS");
+  write_packet(event_stream, static_cast<std::int64_t>(events.size()), events.front().t,
+               events.back().t, out);
+}
+
+/// Writes what the builder holds.
+void Aedat4Encoder::write_packet(int stream, std::int64_t elements, Microseconds start,
+                                 Microseconds end, std::vector<std::uint8_t>& out) {
+  const auto at = out.size();
+  append(std::int32_t{stream}, out);
+  append(std::int32_t{0}, out);
+  compressor_->compress({builder_->GetBufferPointer(), builder_->GetSize()}, out);
+  const auto size = static_cast<std::int32_t>(out.size() - at - aedat4_packet_header);
+  std::memcpy(out.data() + at + sizeof(std::int32_t), &size, sizeof size);
+  if (settings_.table) table_.push_back({position_, stream, size, elements, start, end});
+  position_ += out.size() - at;
+}
+
+}  // namespace eventcamera

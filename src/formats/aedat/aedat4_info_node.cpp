@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/aedat/aedat4_info_node.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+#include <utility>
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::size_t most_streams = 256;
+constexpr std::size_t deepest_node = 64;
+constexpr int largest_side = 32767;
+
+constexpr std::array<std::pair<std::string_view, char>, 5> entities{
+    {{"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}}};
+
+std::string unescaped(std::string_view text) {
+  std::string plain;
+  while (!text.empty()) {
+    const auto entity = std::find_if(entities.begin(), entities.end(), [&](const auto& candidate) {
+      return text.starts_with(candidate.first);
+    });
+    plain += entity != entities.end() ? entity->second : text.front();
+    text.remove_prefix(entity != entities.end() ? entity->first.size() : 1);
+  }
+  return plain;
+}
+
+std::string escaped(std::string_view text) {
+  std::string safe;
+  for (const char c : text) {
+    const auto* const entity =
+        std::find_if(entities.begin(), entities.end(),
+                     [&](const auto& candidate) { return candidate.second == c; });
+    if (entity != entities.end())
+      safe += entity->first;
+    else
+      safe += c;
+  }
+  return safe;
+}
+
+std::optional<int> number(std::string_view text) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < 0) return std::nullopt;
+  return value;
+}
+
+/// The value of attribute `name` in a tag's text.
+std::string_view attribute(std::string_view tag, std::string_view name) {
+  const auto is_name = [](char c) { return c != ' ' && c != '\t' && c != '\r' && c != '\n'; };
+  std::size_t before = 0;  // the end of the attribute before
+  for (auto equals = tag.find('='); equals != std::string_view::npos;
+       equals = tag.find('=', equals + 1)) {
+    if (equals + 1 >= tag.size() || (tag[equals + 1] != '"' && tag[equals + 1] != '\'')) return {};
+    const auto end = tag.find(tag[equals + 1], equals + 2);
+    if (end == std::string_view::npos) return {};
+    auto start = equals;
+    while (start > before && is_name(tag[start - 1])) --start;
+    if (tag.substr(start, equals - start) == name) return tag.substr(equals + 2, end - equals - 2);
+    equals = end;
+    before = end + 1;
+  }
+  return {};
+}
+
+/// Walks through the tags and notes what the nodes outInfo/N and outInfo/N/info say.
+class Reader {
+ public:
+  explicit Reader(std::string_view xml) : xml_(xml) {}
+
+  Aedat4InfoNode read() {
+    info_.whole = walk() && path_.empty();
+    for (auto& stream : info_.streams)
+      if (stream.size.width == 0 || stream.size.height == 0) stream.size = {};
+    return std::move(info_);
+  }
+
+ private:
+  bool walk() {
+    while (true) {
+      const auto open = xml_.find('<');
+      if (open == std::string_view::npos) return true;
+      xml_.remove_prefix(open);
+      const bool comment = xml_.starts_with("<!--");
+      const auto close = comment ? xml_.find("-->") : xml_.find('>');
+      if (close == std::string_view::npos) return false;
+      const auto tag = xml_.substr(1, close - 1);
+      xml_.remove_prefix(close + 1);
+      if (!comment && !take(tag)) return false;
+    }
+  }
+
+  bool take(std::string_view tag) {
+    if (tag.starts_with("node ")) {
+      if (path_.size() == deepest_node) return false;
+      path_.push_back(attribute(tag, "name"));
+      if (of_stream(1) && !add_stream()) return false;
+      if (tag.ends_with('/')) path_.pop_back();
+    } else if (tag == "/node") {
+      if (path_.empty()) return false;
+      path_.pop_back();
+    } else if (tag.starts_with("attr ") && !tag.ends_with('/')) {
+      const auto end = xml_.find('<');
+      if (end == std::string_view::npos) return false;
+      note(attribute(tag, "key"), xml_.substr(0, end));
+    }
+    return true;
+  }
+
+  /// Whether we are `below` levels below outInfo.
+  bool of_stream(std::size_t below) const {
+    return path_.size() > below && path_[path_.size() - 1 - below] == "outInfo" &&
+           (below == 1 || path_.back() == "info");
+  }
+
+  bool add_stream() {
+    const auto id = number(path_.back());
+    const auto& streams = info_.streams;
+    named_ = id.has_value();
+    if (!named_) return true;
+    if (streams.size() == most_streams ||
+        std::any_of(streams.begin(), streams.end(), [&](auto& s) { return s.id == *id; }))
+      return false;
+    info_.streams.emplace_back().id = *id;
+    return true;
+  }
+
+  void note(std::string_view key, std::string_view value) {
+    if (!named_ || info_.streams.empty()) return;
+    auto& stream = info_.streams.back();
+    if (of_stream(1)) {
+      if (key == "typeIdentifier") stream.kind = aedat4_kind(value);
+    } else if (of_stream(2)) {
+      const auto side = number(value).value_or(0);
+      if (key == "source") stream.source = unescaped(value);
+      if (key == "sizeX" && side <= largest_side) stream.size.width = side;
+      if (key == "sizeY" && side <= largest_side) stream.size.height = side;
+    }
+  }
+
+  std::string_view xml_;
+  std::vector<std::string_view> path_;  ///< names of the open nodes
+  bool named_ = false;                  ///< the last stream's node has a number
+  Aedat4InfoNode info_;
+};
+
+std::string node(const std::string& name, const std::string& path, const std::string& inside) {
+  return "<node name=\"" + name + "\" path=\"" + path + "\">" + inside + "</node>";
+}
+
+std::string text_attribute(const std::string& key, const std::string& value,
+                           const std::string& type = "string") {
+  return "<attr key=\"" + key + "\" type=\"" + type + "\">" + escaped(value) + "</attr>";
+}
+
+const char* name_of(Aedat4Compression compression) {
+  switch (compression) {
+    case Aedat4Compression::none:
+      return "NONE";
+    case Aedat4Compression::lz4:
+      return "LZ4";
+    case Aedat4Compression::lz4_high:
+      return "LZ4_HIGH";
+    case Aedat4Compression::zstd:
+      return "ZSTD";
+    case Aedat4Compression::zstd_high:
+      return "ZSTD_HIGH";
+  }
+  return "";
+}
+
+struct KindText {
+  Aedat4Kind kind;
+  const char* identifier;
+  const char* name;
+  const char* description;
+};
+
+constexpr std::array<KindText, 4> kinds{{
+    {Aedat4Kind::events, "EVTS", "events", "Array of events (polarity ON/OFF)."},
+    {Aedat4Kind::frames, "FRME", "frames", "Standard frame (8-bit image)."},
+    {Aedat4Kind::triggers, "TRIG", "triggers", "External triggers and special signals."},
+    {Aedat4Kind::imu, "IMUS", "imu", "Inertial Measurement Unit data samples."},
+}};
+
+}  // namespace
+
+Aedat4Kind aedat4_kind(std::string_view identifier) {
+  const auto* const text = std::find_if(
+      kinds.begin(), kinds.end(), [&](const auto& kind) { return identifier == kind.identifier; });
+  return text != kinds.end() ? text->kind : Aedat4Kind::other;
+}
+
+Aedat4InfoNode read_info_node(std::string_view xml) {
+  return Reader(xml).read();
+}
+
+std::string write_info_node(std::span<const Aedat4Stream> streams, Aedat4Compression compression) {
+  const std::string path = "/mainloop/Recorder/outInfo/";
+  std::string inside;
+  for (const auto& stream : streams) {
+    const auto* const text = std::find_if(
+        kinds.begin(), kinds.end(), [&](const auto& kind) { return kind.kind == stream.kind; });
+    if (text == kinds.end()) continue;
+    const auto id = std::to_string(stream.id);
+    const auto stream_path = path + id + "/";
+    inside += node(id, stream_path,
+                   text_attribute("compression", name_of(compression)) +
+                       text_attribute("originalModuleName", "gst-eventsim") +
+                       text_attribute("originalOutputName", text->name) +
+                       text_attribute("typeDescription", text->description) +
+                       text_attribute("typeIdentifier", text->identifier) +
+                       node("info", stream_path + "info/",
+                            text_attribute("sizeX", std::to_string(stream.size.width), "int") +
+                                text_attribute("sizeY", std::to_string(stream.size.height), "int") +
+                                text_attribute("source", stream.source)));
+  }
+  return "<dv version=\"2.0\">" + node("outInfo", path, inside) + "</dv>";
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "src/formats/aedat/aedat4.hpp"
+
+namespace eventcamera {
+
+/// What the XML of an AEDAT4 header says.
+struct Aedat4InfoNode {
+  std::vector<Aedat4Stream> streams;
+  bool whole = true;  ///< false: the XML is damaged, and the streams are what could be read of it
+};
+
+Aedat4InfoNode read_info_node(std::string_view xml);
+
+std::string write_info_node(std::span<const Aedat4Stream> streams, Aedat4Compression compression);
+
+/// The kind of a stream whose packets have this four-character identifier.
+Aedat4Kind aedat4_kind(std::string_view identifier);
+
+}  // namespace eventcamera

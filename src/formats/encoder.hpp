@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "src/core/stamped_event.hpp"
+
+namespace eventcamera {
+
+/// Writes one event format. Events come sorted by time and within the sensor, in pieces of any
+/// size: how they are split changes nothing in what a reader makes of the file.
+class Encoder {
+ public:
+  virtual ~Encoder() = default;
+  Encoder(const Encoder&) = delete;
+  Encoder& operator=(const Encoder&) = delete;
+
+  /// Appends the bytes of `events` to `out`, the header before the first.
+  virtual void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) = 0;
+
+  /// Appends what ends the file; the header, too, where nothing was encoded.
+  virtual void finish(std::vector<std::uint8_t>& out) = 0;
+
+ protected:
+  Encoder() = default;
+};
+
+}  // namespace eventcamera

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/es/es.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "src/formats/bounded_silence.hpp"
+#include "src/formats/unit_decoder.hpp"
+#include "src/formats/word_writer.hpp"
+
+namespace eventcamera {
+namespace {
+
+constexpr std::string_view magic = "Event Stream";
+constexpr std::uint8_t version = 2;
+constexpr std::size_t header_size = magic.size() + 3 + 1 + 4;
+
+/// y_p of an event has 15 bits of row.
+constexpr int most_rows = 32768;
+
+enum Type : std::uint8_t { generic = 0, dvs = 1, atis = 2, amd = 3, colour = 4 };
+
+/// An event is a byte, of the microseconds since the last one and `flag_bits` flags, and x and y of
+/// 16 bits each. Where all bits of the microseconds are set it is that byte alone.
+template <int flag_bits>
+class EsReader final : public UnitReader {
+ public:
+  explicit EsReader(SensorSize size) : bounds_(size, most_rows), height_(size.height) {}
+
+  const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
+                           Batch& batch) override {
+    constexpr std::uint32_t longest_step = 0xff >> flag_bits;
+    constexpr std::uint32_t flags = (1 << flag_bits) - 1;
+    // An ATIS event of which bit 0 is set is the start or the end of an exposure.
+    constexpr std::uint32_t exposure = flag_bits == 2 ? 1 : 0;
+    constexpr std::uint32_t on = flag_bits == 2 ? 2 : 1;
+    auto* event = batch.begin();
+    const auto* const full = batch.full();
+    auto t = t_;
+    std::uint64_t outside = 0;
+    while (from < to && event < full) {
+      const std::uint32_t byte = *from;
+      const auto step = byte >> flag_bits;
+      if (step == longest_step) {
+        // As many of the longest steps as the flags say; none is a sign that readers may ignore.
+        t += static_cast<std::uint64_t>(longest_step) * (byte & flags);
+        ++from;
+        continue;
+      }
+      if (to - from < 5) break;
+      t += step;
+      const auto x = load<std::uint16_t>(from + 1);
+      const auto y = height_ - 1 - load<std::uint16_t>(from + 3);
+      const auto row = static_cast<std::uint32_t>(y);
+      from += 5;
+      const auto inside = static_cast<int>(bounds_.contain(x, row));
+      const auto is_change = static_cast<int>((byte & exposure) == 0);
+      *event = {static_cast<Microseconds>(t), x,
+                static_cast<std::uint16_t>(row | ((byte & on) != 0 ? 0x8000 : 0))};
+      event += is_change & inside;
+      outside += static_cast<std::uint64_t>(is_change & ~inside);
+    }
+    t_ = t;
+    batch.end = event;
+    batch.outside(outside);
+    return from;
+  }
+
+  State state() const override { return {static_cast<Microseconds>(t_), 0}; }
+  void restore(const State& state) override { t_ = static_cast<std::uint64_t>(state.clock); }
+
+ private:
+  Bounds bounds_;
+  int height_;
+  std::uint64_t t_ = 0;
+};
+
+class EsDecoder final : public UnitDecoder {
+ private:
+  std::size_t read_header(std::span<const std::uint8_t> bytes, bool) override {
+    const auto known = std::min(bytes.size(), magic.size());
+    if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(known),
+                    magic.begin()))
+      throw NotThisFormat("no Event Stream: it does not begin with these words");
+    if (bytes.size() < header_size) return 0;
+    const auto* at = bytes.data() + magic.size();
+    if (at[0] != version)
+      throw NotThisFormat("Event Streams of version " + std::to_string(at[0]) + "." +
+                          std::to_string(at[1]) + " cannot be read");
+    const SensorSize size{load<std::uint16_t>(at + 4), load<std::uint16_t>(at + 6)};
+    switch (at[3]) {
+      case dvs:
+        begin_events<1>(size);
+        break;
+      case atis:
+        begin_events<2>(size);
+        break;
+      case generic:
+        throw NotThisFormat("an Event Stream of generic events, which are no pixels");
+      case colour:
+        throw NotThisFormat("an Event Stream of colour events, which have no polarity");
+      case amd:
+      default:
+        throw NotThisFormat("an Event Stream of events of the type " + std::to_string(at[3]) +
+                            ", which cannot be read");
+    }
+    return header_size;
+  }
+
+  template <int flag_bits>
+  void begin_events(SensorSize size) {
+    if (size.width == 0 || size.height == 0 || size.height > most_rows)
+      throw NotThisFormat("an Event Stream of an impossible sensor of " +
+                          std::to_string(size.width) + "x" + std::to_string(size.height));
+    begin(std::make_unique<EsReader<flag_bits>>(size), size);
+  }
+};
+
+class EsEncoder final : public Encoder {
+ public:
+  explicit EsEncoder(SensorSize size) : size_(size) {}
+
+  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override {
+    write_header(out);
+    const auto write = [&](std::span<const StampedEvent> few, WordWriter<std::uint8_t>& bytes) {
+      for (const auto& event : few) {
+        const auto step = reach(event.t, bytes);
+        const auto x = std::uint32_t{event.x};
+        const auto y = static_cast<std::uint32_t>(size_.height - 1 - event.y());
+        const auto on = static_cast<std::uint32_t>(event.y_p >> 15);
+        for (const auto byte : {step << 1 | on, x & 255, x >> 8, y & 255, y >> 8})
+          bytes.put(static_cast<std::uint8_t>(byte));
+      }
+    };
+    write_events<std::uint8_t>(events, bytes_at_once, out, write);
+  }
+
+  void finish(std::vector<std::uint8_t>& out) override { write_header(out); }
+
+ private:
+  static constexpr std::size_t bytes_at_once = 5 * events_at_once;
+  static constexpr std::uint32_t longest_step = 127;
+
+  /// Fills the silence before an event; what is left of it is returned.
+  std::uint32_t reach(Microseconds t, WordWriter<std::uint8_t>& bytes) {
+    // Where times are not sorted, time stands still: there are no steps back.
+    t = std::max(t, last_);
+    last_ = t;
+    silence_.reach(t);
+    auto step = silence_.written(t) - written_;
+    written_ += step;
+    if (step >= longest_step) [[unlikely]] {
+      bytes.reserve(step / longest_step + bytes_at_once);
+      for (; step >= longest_step; step -= longest_step) bytes.put(0xff);
+    }
+    return static_cast<std::uint32_t>(step);
+  }
+
+  void write_header(std::vector<std::uint8_t>& out) {
+    if (started_) return;
+    started_ = true;
+    out.insert(out.end(), magic.begin(), magic.end());
+    const auto width = static_cast<unsigned>(size_.width);
+    const auto height = static_cast<unsigned>(size_.height);
+    for (const auto byte :
+         {0U + version, 0U, 0U, 0U + dvs, width & 255, width >> 8, height & 255, height >> 8})
+      out.push_back(static_cast<std::uint8_t>(byte));
+  }
+
+  SensorSize size_;
+  bool started_ = false;
+  BoundedSilence silence_;
+  Microseconds last_ = 0;
+  std::uint64_t written_ = 0;  // the time of the last byte
+};
+
+}  // namespace
+
+std::unique_ptr<SeekableDecoder> make_event_stream_decoder() {
+  return std::make_unique<EsDecoder>();
+}
+
+std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size) {
+  if (size.width < 1 || size.height < 1 || size.width > 65535 || size.height > most_rows)
+    throw std::invalid_argument("an Event Stream is of 1x1 to 65535x32768 pixels");
+  return std::make_unique<EsEncoder>(size);
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/evt/evt3.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "src/formats/bounded_silence.hpp"
+#include "src/formats/evt/cd_word.hpp"
+#include "src/formats/evt/time_high.hpp"
+#include "src/formats/word_writer.hpp"
+
+namespace eventcamera {
+namespace {
+
+enum Type : std::uint32_t {
+  addr_y = 0x0,
+  em_addr_y = 0x1,
+  addr_x = 0x2,
+  vect_base_x = 0x3,
+  vect_12 = 0x4,
+  vect_8 = 0x5,
+  time_low = 0x6,
+  continued_4 = 0x7,
+  time_high = 0x8,
+  ext_trigger = 0xa,
+  others = 0xe,
+  continued_12 = 0xf,
+};
+
+constexpr std::uint32_t polarity_bit = 0x800;
+
+/// A row or column that no sensor has: there was none yet, or it is not one of events.
+constexpr std::uint32_t nowhere = 0x1fff;
+
+class Evt3Reader final : public UnitReader {
+ public:
+  explicit Evt3Reader(SensorSize size) : bounds_(size, 2048) {}
+
+  const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
+                           Batch& batch) override {
+    auto* const full = batch.full();
+    while (to - from >= 2 && batch.end < full) {
+      if (time_.known() && y_ != nowhere) from = read_common(from, to, batch);
+      if (to - from >= 2 && batch.end < full) from = read_any(from, to, batch);
+    }
+    return from;
+  }
+
+  State state() const override {
+    auto state = time_.state();
+    state.rest |= std::uint64_t{low_} << 1 | std::uint64_t{polarity_} << 13 |
+                  std::uint64_t{y_ ^ nowhere} << 32 | std::uint64_t{base_ ^ nowhere} << 48;
+    return state;
+  }
+
+  void restore(const State& state) override {
+    time_.restore(state.clock, (state.rest & 1) != 0);
+    low_ = static_cast<std::uint32_t>(state.rest >> 1) & 0xfff;
+    polarity_ = static_cast<std::uint32_t>(state.rest >> 13) & polarity_bit;
+    y_ = (static_cast<std::uint32_t>(state.rest >> 32) & 0xffff) ^ nowhere;
+    base_ = static_cast<std::uint32_t>(state.rest >> 48) ^ nowhere;
+  }
+
+ private:
+  static constexpr auto common_types = 1U << addr_y | 1U << addr_x | 1U << time_low | 1U << others |
+                                       1U << continued_4 | 1U << continued_12;
+
+  /// Reads rows, events, the low bits of times and what is passed over, as far as there is nothing
+  /// else.
+  const std::uint8_t* read_common(const std::uint8_t* from, const std::uint8_t* to, Batch& batch) {
+    auto* event = batch.end;
+    const auto bounds = bounds_;
+    const auto same_high = time_high << 12 | time_.count();
+    // The low bits and the row are kept as they are added, the type among them.
+    const auto high = time_.time() - (time_low << 12);
+    auto low = time_low << 12 | low_;
+    auto y = y_;
+    std::uint64_t seen = 0;
+    const auto* const end = from + 2 * std::min((to - from) / 2, batch.full() - event);
+    for (; from != end; from += 2) {
+      const std::uint32_t word = load<std::uint16_t>(from);
+      const auto type = word >> 12;
+      // A TIME_HIGH that says nothing new is frequent, too.
+      const auto is_common =
+          (common_types >> type & 1) | static_cast<std::uint32_t>(word == same_high);
+      if (is_common == 0) [[unlikely]]
+        break;
+      // These come in an order that no processor could guess, so no branch tells them apart.
+      const auto x = word & 0x7ff;
+      y = type == addr_y ? x : y;
+      low = type == time_low ? word : low;
+      *event = event_at(high + low, x, y, word & polarity_bit);
+      const auto is_event = static_cast<int>(type == addr_x);
+      event += is_event & static_cast<int>(bounds.contain(x, y));
+      seen += static_cast<std::uint64_t>(is_event);
+    }
+    y_ = y;
+    low_ = low & 0xfff;
+    batch.outside(seen - static_cast<std::uint64_t>(event - batch.end));
+    batch.end = event;
+    return from;
+  }
+
+  /// Reads any word, or the words of a vector.
+  const std::uint8_t* read_any(const std::uint8_t* at, const std::uint8_t* to, Batch& batch) {
+    const std::uint32_t word = load<std::uint16_t>(at);
+    const auto t = time_.time() + low_;
+    switch (const auto type = word >> 12) {
+      case addr_y:
+        y_ = word & 0x7ff;
+        break;
+      case em_addr_y:
+        y_ = nowhere;
+        break;
+      case addr_x:
+        expand_at(t, word & 0x7ff, word & polarity_bit, 1, batch);
+        break;
+      case vect_base_x: {
+        base_ = word & 0x7ff;
+        polarity_ = word & polarity_bit;
+        if (to - at < 8) break;
+        // What cameras and we write: all of it at once.
+        const auto masks = load<std::uint64_t>(at) >> 16;
+        if ((masks & 0xf000f000f000) != 0x500040004000) break;
+        const auto mask = (masks & 0xfff) | (masks >> 4 & 0xfff000) | (masks >> 8 & 0xff000000);
+        expand_at(t, base_, polarity_, static_cast<std::uint32_t>(mask), batch);
+        base_ += 32;
+        return at + 8;
+      }
+      case vect_12:
+      case vect_8: {
+        if (base_ == nowhere) {
+          batch.bad(at, 2, "a vector of events without a place");
+          break;
+        }
+        expand_at(t, base_, polarity_, word & (type == vect_12 ? 0xfff : 0xff), batch);
+        base_ = std::min(base_ + (type == vect_12 ? 12 : 8), nowhere - 1);
+        break;
+      }
+      case time_low:
+        low_ = word & 0xfff;
+        break;
+      case time_high: {
+        const auto count = word & 0xfff;
+        if (!time_.known() || count != time_.count()) low_ = 0;
+        time_.follow(count);
+        break;
+      }
+      case ext_trigger:
+        if (time_.known())
+          batch.triggers->push_back({static_cast<Microseconds>(t),
+                                     static_cast<std::uint16_t>(word >> 8 & 15), (word & 1) != 0});
+        break;
+      case others:
+      case continued_4:
+      case continued_12:
+        break;
+      default:
+        batch.bad(at, 2, "a word of a type that EVT3 does not have");
+    }
+    return at + 2;
+  }
+
+  /// Events in a row, unless there is none yet, or no time.
+  void expand_at(std::uint64_t t, std::uint32_t x, std::uint32_t polarity, std::uint32_t mask,
+                 Batch& batch) {
+    if (!time_.known() || y_ == nowhere) return;
+    const auto valid = bounds_.of_32(x, y_);
+    batch.end = expand(mask & valid, event_at(t, x, y_, polarity), batch.end);
+    batch.outside(static_cast<std::uint64_t>(std::popcount(mask & ~valid)));
+  }
+
+  static StampedEvent event_at(std::uint64_t t, std::uint32_t x, std::uint32_t y,
+                               std::uint32_t polarity) {
+    static_assert(polarity_bit << 4 == 0x8000);
+    return {static_cast<Microseconds>(t), static_cast<std::uint16_t>(x),
+            static_cast<std::uint16_t>(y | polarity << 4)};
+  }
+
+  Bounds bounds_;
+  TimeHigh<12, 12> time_;
+  std::uint32_t low_ = 0;
+  std::uint32_t y_ = nowhere;
+  std::uint32_t base_ = nowhere;
+  std::uint32_t polarity_ = 0;  // of vectors
+};
+
+class Evt3Encoder final : public Encoder {
+ public:
+  explicit Evt3Encoder(SensorSize size) : width_(static_cast<std::uint32_t>(size.width)) {}
+
+  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override {
+    const auto write = [&](std::span<const StampedEvent> few, WordWriter<std::uint16_t>& words) {
+      for (std::size_t i = 0; i < few.size();) {
+        const auto& event = few[i];
+        reach(event.t, words);
+        const auto polarity = static_cast<std::uint32_t>(event.y_p & 0x8000) >> 4;
+        if (const auto y = static_cast<std::uint32_t>(event.y()) & 0x7ff; y != y_) {
+          words.put(word(addr_y, y));
+          y_ = y;
+        }
+        if (const auto vector = vector_at(few, i); vector.events != 0) {
+          words.put(word(vect_base_x, vector.base | polarity));
+          words.put(word(vect_12, vector.mask & 0xfff));
+          words.put(word(vect_12, vector.mask >> 12 & 0xfff));
+          words.put(word(vect_8, vector.mask >> 24));
+          i += vector.events;
+        } else {
+          words.put(word(addr_x, (event.x & 0x7ff) | polarity));
+          ++i;
+        }
+      }
+    };
+    write_events<std::uint16_t>(events, words_at_once, out, write);
+  }
+
+  void finish(std::vector<std::uint8_t>&) override {}
+
+ private:
+  static constexpr std::size_t words_at_once = 4 * events_at_once;
+  static constexpr std::uint32_t none = ~std::uint32_t{0};
+  static constexpr std::uint64_t most_steps = (BoundedSilence::longest >> 12) + 2;
+
+  struct Vector {
+    std::size_t events = 0;  ///< 0: not worth its words
+    std::uint32_t base = 0;
+    std::uint32_t mask = 0;
+  };
+
+  static constexpr std::uint16_t word(std::uint32_t type, std::uint32_t payload) {
+    return static_cast<std::uint16_t>(type << 12 | payload);
+  }
+
+  void reach(Microseconds t, WordWriter<std::uint16_t>& words) {
+    auto time = silence_.written(t);
+    if (time >> 12 != high_) {
+      silence_.reach(t);
+      time = silence_.written(t);
+      // From zero on, each: readers follow the wraps by them.
+      const auto steps = (time >> 12) - high_;
+      if (steps > 1 && steps <= most_steps) {
+        words.reserve(steps + words_at_once);
+        while (++high_ != time >> 12) words.put(high_word(high_));
+      }
+      high_ = time >> 12;
+      words.put(high_word(high_));
+      low_ = none;
+    }
+    if (const auto low = static_cast<std::uint32_t>(time) & 0xfff; low != low_) {
+      words.put(word(time_low, low));
+      low_ = low;
+    }
+  }
+
+  static constexpr std::uint16_t high_word(std::uint64_t high) {
+    return word(time_high, static_cast<std::uint32_t>(high) & 0xfff);
+  }
+
+  /// The events from `first` on that go into one vector.
+  Vector vector_at(std::span<const StampedEvent> events, std::size_t first) const {
+    // Four words: as many as four events have.
+    constexpr std::size_t least = 5;
+    if (width_ < 32 || first + least > events.size()) return {};
+    const auto& event = events[first];
+    const auto base = std::min<std::uint32_t>(event.x, width_ - 32);
+    const auto fits = [&](const StampedEvent& next) {
+      return next.t == event.t && next.y_p == event.y_p && next.x - base < 32;
+    };
+    if (event.x - base >= 32 || !fits(events[first + least - 1])) return {};
+    Vector vector{1, base, std::uint32_t{1} << (event.x - base)};
+    for (auto i = first + 1; i < events.size() && fits(events[i]); ++i) {
+      if (events[i].x <= events[i - 1].x) break;
+      vector.mask |= std::uint32_t{1} << (events[i].x - base);
+      ++vector.events;
+    }
+    return vector.events >= least ? vector : Vector{};
+  }
+
+  std::uint32_t width_;
+  BoundedSilence silence_;
+  std::uint64_t high_ = ~std::uint64_t{0};  // one before the first
+  std::uint32_t low_ = none;
+  std::uint32_t y_ = none;
+};
+
+}  // namespace
+
+std::unique_ptr<UnitReader> make_evt3_reader(SensorSize size) {
+  return std::make_unique<Evt3Reader>(size);
+}
+
+std::unique_ptr<Encoder> make_evt3_encoder(SensorSize size) {
+  return std::make_unique<Evt3Encoder>(size);
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/hdf5/hdf5_dataset.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+
+#include "src/formats/decoder.hpp"
+#include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/hdf5/hdf5_filters.hpp"
+#include "src/formats/little_endian.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+/// Of a chunk, which the library unpacks as a whole.
+constexpr std::size_t most_chunk_bytes = std::size_t{64} << 20;
+constexpr std::size_t most_type_bytes = 4096;
+constexpr std::size_t most_columns = 4;
+constexpr std::uint64_t most_holes = 1024;
+constexpr std::size_t least_cache_bytes = std::size_t{1} << 20;
+
+[[noreturn]] void refuse(const std::string& path, const std::string& why) {
+  throw NotThisFormat("This HDF5 file's dataset " + path + " " + why);
+}
+
+}  // namespace
+
+bool Hdf5Dataset::exists(hid_t parent, const std::string& path, H5O_type_t type) {
+  for (std::size_t end = 0; end < path.size();) {
+    end = std::min(path.find('/', end + 1), path.size());
+    H5L_info_t link;
+    if (H5Lget_info(parent, path.substr(0, end).c_str(), &link, H5P_DEFAULT) < 0 ||
+        link.type != H5L_TYPE_HARD)
+      return false;
+  }
+  const Hdf5Handle object(H5Oopen(parent, path.c_str(), H5P_DEFAULT), H5Oclose);
+  const auto kind = H5Iget_type(object.get());
+  return kind == (type == H5O_TYPE_GROUP ? H5I_GROUP : H5I_DATASET);
+}
+
+Hdf5Dataset::Hdf5Dataset(hid_t parent, const std::string& path) : path_(path) {
+  if (!exists(parent, path, H5O_TYPE_DATASET)) refuse(path, "is missing");
+  dataset_ = {H5Dopen2(parent, path.c_str(), H5P_DEFAULT), H5Dclose};
+  type_ = {H5Dget_type(dataset_.get()), H5Tclose};
+  const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
+  creation_ = {H5Dget_create_plist(dataset_.get()), H5Pclose};
+  if (!dataset_ || !type_ || !space || !creation_) refuse(path, "cannot be opened");
+  type_bytes_ = H5Tget_size(type_.get());
+  if (type_bytes_ == 0 || type_bytes_ > most_type_bytes)
+    refuse(path, "has elements that are too large");
+  if (const auto number = number_of(type_.get())) numbers_.push_back(*number);
+
+  if (H5Sget_simple_extent_type(space.get()) == H5S_NULL) refuse(path, "holds nothing");
+  const int rank = H5Sget_simple_extent_ndims(space.get());
+  if (rank < 0 || rank > 2) refuse(path, "has too many dimensions");
+  extent_.resize(static_cast<std::size_t>(rank));
+  if (rank > 0 && H5Sget_simple_extent_dims(space.get(), extent_.data(), nullptr) != rank)
+    refuse(path, "has a damaged extent");
+  if (columns() == 0 || columns() > most_columns) refuse(path, "has too many columns, or none");
+  if (H5Pget_layout(creation_.get()) == H5D_CHUNKED) check_chunks();
+  check_storage(parent);
+}
+
+void Hdf5Dataset::check_chunks() {
+  chunk_.resize(extent_.size());
+  if (extent_.empty() || H5Pget_chunk(creation_.get(), rank(), chunk_.data()) != rank())
+    refuse(path_, "has damaged chunks");
+  chunk_bytes_ = type_bytes_;
+  for (const auto side : chunk_) {
+    if (side == 0 || side > most_chunk_bytes / chunk_bytes_)
+      refuse(path_, "has chunks that are too large");
+    chunk_bytes_ *= side;
+  }
+  const int count = H5Pget_nfilters(creation_.get());
+  for (int i = 0; i < count; ++i) {
+    unsigned flags = 0;
+    std::size_t values = 0;
+    filters_.push_back(H5Pget_filter2(creation_.get(), static_cast<unsigned>(i), &flags, &values,
+                                      nullptr, 0, nullptr, nullptr));
+  }
+  own_filters_ = std::ranges::all_of(filters_, is_own_hdf5_filter);
+}
+
+/// Finds out how many of the rows that the file claims are there.
+void Hdf5Dataset::check_storage(hid_t file) {
+  hsize_t file_bytes = 0;
+  if (H5Fget_filesize(file, &file_bytes) < 0) refuse(path_, "is in no file");
+  file_bytes_ = file_bytes;
+  const std::uint64_t claimed = claimed_rows();
+  const auto row_bytes = columns() * type_bytes_;
+  switch (H5Pget_layout(creation_.get())) {
+    case H5D_CHUNKED: {
+      hsize_t chunks = 0;
+      const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
+      if (claimed > 0 && H5Dget_num_chunks(dataset_.get(), space.get(), &chunks) < 0)
+        refuse(path_, "has a damaged index of its chunks");
+      // A file with holes is read to its end, but one that is mostly hole is not.
+      const auto most_chunks = 2 * std::min<std::uint64_t>(chunks, UINT32_MAX) + most_holes;
+      const auto most = std::min<std::uint64_t>(most_chunks, UINT64_MAX / chunk_[0]) * chunk_[0];
+      rows_ = std::min<std::uint64_t>(claimed, most);
+      return;
+    }
+    case H5D_CONTIGUOUS: {
+      if (H5Pget_external_count(creation_.get()) != 0) refuse(path_, "lies in another file");
+      const auto offset = H5Dget_offset(dataset_.get());
+      if (offset == HADDR_UNDEF || offset > file_bytes_) return;
+      rows_ = std::min<std::uint64_t>({claimed, (file_bytes_ - offset) / row_bytes,
+                                       H5Dget_storage_size(dataset_.get()) / row_bytes});
+      return;
+    }
+    case H5D_COMPACT:
+      rows_ = std::min<std::uint64_t>(claimed, H5Dget_storage_size(dataset_.get()) / row_bytes);
+      return;
+    default:
+      refuse(path_, "is stored in a way that is not read");
+  }
+}
+
+/// Loads a row of chunks.
+bool Hdf5Dataset::load(std::uint64_t block) {
+  if (loaded_block_ == block) return true;
+  loaded_block_.reset();
+  const std::uint64_t all_columns = columns();
+  const auto chunk_columns =
+      chunk_.size() < 2 ? 1 : std::min<std::uint64_t>(chunk_[1], all_columns);
+  const auto chunk_stride = chunk_.size() < 2 ? 1 : chunk_[1];
+  loaded_.resize(chunk_[0] * all_columns * type_bytes_);
+  std::vector<std::uint8_t> bytes;
+  for (std::uint64_t column = 0; column < all_columns; column += chunk_stride) {
+    const hsize_t offset[] = {block * chunk_[0], column};
+    // A chunk that does not shrink is stored a little larger.
+    const auto most = chunk_bytes_ + chunk_bytes_ / 64 + 1024;
+    std::uint32_t left_out = 0;
+    if (!read_stored(offset, most, bytes, left_out) ||
+        !undo_hdf5_filters(filters_, left_out, type_bytes_, chunk_bytes_, bytes))
+      return false;
+    if (all_columns == chunk_stride) {
+      loaded_.swap(bytes);
+      break;
+    }
+    const auto part = std::min(chunk_columns, all_columns - column) * type_bytes_;
+    for (std::uint64_t row = 0; row < chunk_[0]; ++row)
+      std::memcpy(loaded_.data() + (row * all_columns + column) * type_bytes_,
+                  bytes.data() + row * chunk_stride * type_bytes_, part);
+  }
+  loaded_block_ = block;
+  return true;
+}
+
+/// Reads rows as they are stored.
+bool Hdf5Dataset::read_elements(std::uint64_t first, std::uint64_t count,
+                                std::vector<std::uint8_t>& out) {
+  const auto row_bytes = columns() * type_bytes_;
+  out.resize(count * row_bytes);
+  if (chunk_.empty() || !own_filters_) {
+    const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
+    const hsize_t start[] = {first, 0};
+    const hsize_t size[] = {count, columns()};
+    if (!extent_.empty() &&
+        H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start, nullptr, size, nullptr) < 0)
+      return false;
+    const hsize_t elements = count * columns();
+    const Hdf5Handle memory(H5Screate_simple(1, &elements, nullptr), H5Sclose);
+    return H5Dread(dataset_.get(), type_.get(), memory.get(), space.get(), H5P_DEFAULT,
+                   out.data()) >= 0;
+  }
+  auto* to = out.data();
+  while (count > 0) {
+    const auto block = first / chunk_[0];
+    const auto skipped = first - block * chunk_[0];
+    const auto part = std::min<std::uint64_t>(count, chunk_[0] - skipped);
+    if (!load(block)) return false;
+    std::memcpy(to, loaded_.data() + skipped * row_bytes, part * row_bytes);
+    to += part * row_bytes;
+    first += part;
+    count -= part;
+  }
+  return true;
+}
+
+/// Reads a number of each element, and puts it where it belongs in each of the rows of `out`.
+template <class Unsigned>
+void Hdf5Dataset::widen(const std::uint8_t* element, const Number& number,
+                        std::span<std::int64_t> out) const {
+  constexpr auto unused = 64 - 8 * sizeof(Unsigned);
+  const auto step = numbers_.size();
+  for (std::size_t i = 0; i < out.size(); i += step, element += type_bytes_) {
+    std::uint64_t word = little_endian<Unsigned>(element);
+    word = number.big_endian ? __builtin_bswap64(word) : word << unused;
+    out[i] = number.is_signed ? static_cast<std::int64_t>(word) >> unused
+                              : static_cast<std::int64_t>(word >> unused);
+  }
+}
+
+bool Hdf5Dataset::read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out) {
+  std::vector<std::uint8_t> bytes;
+  if (!read_elements(first, count, bytes)) return false;
+  out.resize(count * columns() * numbers_.size());
+  for (std::size_t i = 0; i < numbers_.size(); ++i) {
+    const auto& number = numbers_[i];
+    const std::span to(out.data() + i, out.size() - i);
+    switch (number.bytes) {
+      case 1:
+        widen<std::uint8_t>(bytes.data() + number.offset, number, to);
+        break;
+      case 2:
+        widen<std::uint16_t>(bytes.data() + number.offset, number, to);
+        break;
+      case 4:
+        widen<std::uint32_t>(bytes.data() + number.offset, number, to);
+        break;
+      default:
+        widen<std::uint64_t>(bytes.data() + number.offset, number, to);
+    }
+  }
+  return true;
+}
+
+/// What kind of integer a type is; nothing where it is none that is read.
+std::optional<Hdf5Dataset::Number> Hdf5Dataset::number_of(hid_t type) {
+  const auto kind = H5Tget_class(type);
+  // h5py writes truth values as an enumeration of two bytes' values.
+  const Hdf5Handle integer(kind == H5T_ENUM ? H5Tget_super(type) : H5Tcopy(type), H5Tclose);
+  if (H5Tget_class(integer.get()) != H5T_INTEGER) return std::nullopt;
+  Number number;
+  number.bytes = H5Tget_size(integer.get());
+  number.is_signed = H5Tget_sign(integer.get()) != H5T_SGN_NONE;
+  number.big_endian = H5Tget_order(integer.get()) == H5T_ORDER_BE;
+  const bool whole =
+      number.bytes == 1 || number.bytes == 2 || number.bytes == 4 || number.bytes == 8;
+  if (!whole || H5Tget_precision(integer.get()) != 8 * number.bytes ||
+      H5Tget_size(type) != number.bytes)
+    return std::nullopt;
+  return number;
+}
+
+void Hdf5Dataset::choose(std::span<const char* const> members) {
+  if (H5Tget_class(type_.get()) != H5T_COMPOUND || columns() != 1)
+    refuse(path_, "does not hold rows");
+  for (const auto* const member : members) {
+    const int found = H5Tget_member_index(type_.get(), member);
+    const auto index = static_cast<unsigned>(found);
+    const Hdf5Handle type(found < 0 ? -1 : H5Tget_member_type(type_.get(), index), H5Tclose);
+    auto number = number_of(type.get());
+    if (number) number->offset = H5Tget_member_offset(type_.get(), index);
+    if (!number || number->offset > type_bytes_ || number->bytes > type_bytes_ - number->offset)
+      refuse(path_, std::string("has no integer ") + member);
+    numbers_.push_back(*number);
+  }
+}
+
+bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t most,
+                              std::vector<std::uint8_t>& out, std::uint32_t& left_out) {
+  if (filters_.empty()) {
+    // The library reads as many bytes as the file's index says, and will not tell beforehand how
+    // many those are: at most as many as there are. Memory that nothing is written to is not taken.
+    if (!room_) {
+      const auto most_bytes = std::min<std::uint64_t>(file_bytes_, UINT32_MAX);
+      room_.reset(static_cast<std::uint8_t*>(
+          std::calloc(std::max<std::size_t>(most_bytes, chunk_bytes_), 1)));
+      if (!room_) throw std::bad_alloc();
+    }
+    if (chunk_bytes_ > most ||
+        H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, room_.get()) < 0)
+      return false;
+    out.assign(room_.get(), room_.get() + chunk_bytes_);
+    return true;
+  }
+  hsize_t bytes = 0;
+  if (H5Dget_chunk_storage_size(dataset_.get(), offset, &bytes) < 0 || bytes == 0 || bytes > most)
+    return false;
+  out.resize(bytes);
+  return H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, out.data()) >= 0;
+}
+
+bool Hdf5Dataset::read_chunk(std::uint64_t row, std::size_t most, std::vector<std::uint8_t>& out) {
+  const hsize_t offset[] = {row, 0};
+  std::uint32_t left_out = 0;
+  return read_stored(offset, most, out, left_out) && left_out == 0;
+}
+
+std::uint64_t Hdf5Dataset::position(std::uint64_t row) const {
+  if (!chunk_.empty()) {
+    std::vector<hsize_t> offset(extent_.size());
+    offset[0] = row / chunk_[0] * chunk_[0];
+    haddr_t address = 0;
+    hsize_t bytes = 0;
+    unsigned left_out = 0;
+    const bool known =
+        H5Dget_chunk_info_by_coord(dataset_.get(), offset.data(), &left_out, &address, &bytes) >= 0;
+    return known && address != HADDR_UNDEF ? address : 0;
+  }
+  const auto offset = H5Dget_offset(dataset_.get());
+  return offset == HADDR_UNDEF ? 0 : offset;
+}
+
+void Hdf5Dataset::require_filters() {
+  struct Name {
+    int filter;
+    const char* name;
+  };
+  static constexpr Name names[] = {{307, "bzip2"},    {32000, "LZF"},        {32001, "Blosc"},
+                                   {32004, "LZ4"},    {32008, "bitshuffle"}, {32015, "Zstandard"},
+                                   {32026, "Blosc2"}, {ecf_filter, "ECF"}};
+  if (own_filters_) return;
+  for (const int filter : filters_) {
+    if (filter >= 0 && H5Zfilter_avail(filter) > 0) continue;
+    const auto* const known = std::ranges::find(names, filter, &Name::filter);
+    const auto name = known == std::end(names) ? std::to_string(filter) : known->name;
+    refuse(path_, "is compressed with the HDF5 filter " + name +
+                      ", whose plugin is not installed (or not in HDF5_PLUGIN_PATH)");
+  }
+  // The library unpacks a chunk as a whole; one that its cache cannot hold would be unpacked again
+  // for every part of it.
+  const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+  H5Pset_chunk_cache(access.get(), H5D_CHUNK_CACHE_NSLOTS_DEFAULT,
+                     std::max(least_cache_bytes, chunk_bytes_), 1.0);
+  const Hdf5Handle file(H5Iget_file_id(dataset_.get()), H5Fclose);
+  dataset_ = {H5Dopen2(file.get(), path_.c_str(), access.get()), H5Dclose};
+  if (!dataset_) refuse(path_, "cannot be opened");
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/formats/hdf5/hdf5_handle.hpp"
+
+namespace eventcamera {
+
+/// A dataset of rows of integers, in a file that is not trusted: it lies in the file itself, its
+/// chunks are of a bearable size, and there are no more rows than are stored.
+class Hdf5Dataset {
+ public:
+  /// Whether there is such a thing at all; links that lead out of the file do not count.
+  static bool exists(hid_t parent, const std::string& path, H5O_type_t type);
+
+  /// Throws NotThisFormat where it is not as it should be.
+  Hdf5Dataset(hid_t parent, const std::string& path);
+
+  int rank() const { return static_cast<int>(extent_.size()); }
+  std::uint64_t rows() const { return rows_; }
+  std::uint64_t claimed_rows() const { return extent_.empty() ? 1 : extent_[0]; }
+  std::uint64_t columns() const { return extent_.size() < 2 ? 1 : extent_[1]; }
+  bool is_integers() const { return !numbers_.empty(); }
+  bool is_unsigned_32() const {
+    return is_integers() && numbers_[0].bytes == 4 && !numbers_[0].is_signed;
+  }
+
+  /// Chooses the members of a compound that are read. Throws NotThisFormat where one is not there
+  /// or no integer.
+  void choose(std::span<const char* const> members);
+
+  /// Reads some rows: of each all columns, or the chosen members. False where the file is damaged
+  /// there.
+  bool read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out);
+
+  /// Rows in a chunk; 0 where the dataset is not chunked.
+  std::uint64_t chunk_rows() const { return chunk_.empty() ? 0 : chunk_[0]; }
+  /// The first row behind the chunk of a row.
+  std::uint64_t chunk_end(std::uint64_t row) const {
+    return chunk_.empty() ? rows_
+                          : std::min<std::uint64_t>(rows_, (row / chunk_[0] + 1) * chunk_[0]);
+  }
+  /// Whether this filter, and no other, is applied to chunks.
+  bool has_only_filter(int filter) const { return filters_.size() == 1 && filters_[0] == filter; }
+  /// The stored bytes of the chunk that begins with a row; nothing where it is not there, or larger
+  /// than `most`.
+  bool read_chunk(std::uint64_t row, std::size_t most, std::vector<std::uint8_t>& out);
+
+  /// Where a row's chunk, or the row, lies in the file; 0 where that is not known. Slow: the
+  /// library looks through all chunks.
+  std::uint64_t position(std::uint64_t row) const;
+
+  /// Throws NotThisFormat where a filter is missing that the dataset needs.
+  void require_filters();
+
+ private:
+  /// An integer in an element.
+  struct Number {
+    std::size_t offset = 0;
+    std::size_t bytes = 0;
+    bool is_signed = false;
+    bool big_endian = false;
+  };
+
+  static std::optional<Number> number_of(hid_t type);
+  template <class Unsigned>
+  void widen(const std::uint8_t* element, const Number& number, std::span<std::int64_t> out) const;
+  void check_chunks();
+  void check_storage(hid_t file);
+
+  bool read_stored(const hsize_t* offset, std::size_t most, std::vector<std::uint8_t>& out,
+                   std::uint32_t& left_out);
+  bool load(std::uint64_t block);
+  bool read_elements(std::uint64_t first, std::uint64_t count, std::vector<std::uint8_t>& out);
+
+  std::string path_;
+  Hdf5Handle dataset_, type_, creation_;
+  std::size_t type_bytes_ = 0;   ///< of an element
+  std::vector<Number> numbers_;  ///< what is read of an element
+  std::vector<hsize_t> extent_;
+  std::uint64_t rows_ = 0;
+  std::uint64_t file_bytes_ = 0;
+  std::vector<hsize_t> chunk_;  ///< its extent; empty where there are no chunks
+  std::size_t chunk_bytes_ = 0;
+
+  std::vector<int> filters_;
+  bool own_filters_ = false;  ///< we undo them, with bounds that the library does not have
+  struct Free {
+    void operator()(std::uint8_t* bytes) const { std::free(bytes); }
+  };
+  std::unique_ptr<std::uint8_t, Free> room_;  ///< for a chunk of a size that is not known
+  std::vector<std::uint8_t> loaded_;          ///< the rows of one row of chunks
+  std::optional<std::uint64_t> loaded_block_;
+};
+
+}  // namespace eventcamera

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/hdf5/hdf5_filters.hpp"
+
+#include <hdf5.h>
+#include <zlib.h>
+
+#include <algorithm>
+
+#include "src/formats/little_endian.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+/// Unpacks zlib's format. False where it is damaged or more than `most` bytes long.
+bool inflate_within(std::size_t most, std::vector<std::uint8_t>& bytes) {
+  std::vector<std::uint8_t> out(most);
+  auto size = static_cast<uLongf>(most);
+  if (uncompress(out.data(), &size, bytes.data(), bytes.size()) != Z_OK) return false;
+  out.resize(size);
+  bytes = std::move(out);
+  return true;
+}
+
+/// Puts the bytes of numbers together again that lie apart: first all first bytes, and so on.
+void unshuffle(std::size_t number_bytes, std::vector<std::uint8_t>& bytes) {
+  const auto count = bytes.size() / number_bytes;
+  if (count == 0) return;
+  std::vector<std::uint8_t> out(bytes.size());
+  for (std::size_t byte = 0; byte < number_bytes; ++byte) {
+    const auto* from = bytes.data() + byte * count;
+    auto* to = out.data() + byte;
+    for (std::size_t i = 0; i < count; ++i) to[i * number_bytes] = from[i];
+  }
+  std::copy(bytes.begin() + static_cast<std::ptrdiff_t>(count * number_bytes), bytes.end(),
+            out.begin() + static_cast<std::ptrdiff_t>(count * number_bytes));
+  bytes = std::move(out);
+}
+
+/// Fletcher's sum of the bytes, two at a time, the first of which is the more significant.
+std::uint32_t fletcher_sum(std::span<const std::uint8_t> bytes) {
+  std::uint64_t low = 0;
+  std::uint64_t high = 0;
+  const auto fold = [](std::uint64_t sum) { return (sum & 0xffff) + (sum >> 16); };
+  for (std::size_t i = 0; i < bytes.size(); i += 2) {
+    const unsigned second = i + 1 < bytes.size() ? bytes[i + 1] : 0;
+    low = fold(low + (static_cast<unsigned>(bytes[i]) << 8 | second));
+    high = fold(high + low);
+  }
+  return static_cast<std::uint32_t>(fold(high) << 16 | fold(low));
+}
+
+/// Takes the sum off the end. False where it is not that of the bytes before it.
+bool take_fletcher_sum(std::vector<std::uint8_t>& bytes) {
+  if (bytes.size() < sizeof(std::uint32_t)) return false;
+  bytes.resize(bytes.size() - sizeof(std::uint32_t));
+  const auto sum = little_endian<std::uint32_t>(bytes.data() + bytes.size());
+  return sum == fletcher_sum(bytes);
+}
+
+}  // namespace
+
+bool is_own_hdf5_filter(int filter) {
+  return filter == H5Z_FILTER_DEFLATE || filter == H5Z_FILTER_SHUFFLE ||
+         filter == H5Z_FILTER_FLETCHER32;
+}
+
+bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t left_out,
+                       std::size_t number_bytes, std::size_t chunk_bytes,
+                       std::vector<std::uint8_t>& bytes) {
+  for (auto i = filters.size(); i-- > 0;) {
+    if ((left_out >> i & 1) != 0) continue;
+    switch (filters[i]) {
+      case H5Z_FILTER_DEFLATE:
+        // Further filters may have added a sum each.
+        if (!inflate_within(chunk_bytes + 4 * filters.size(), bytes)) return false;
+        break;
+      case H5Z_FILTER_FLETCHER32:
+        if (!take_fletcher_sum(bytes)) return false;
+        break;
+      default:
+        unshuffle(number_bytes, bytes);
+    }
+  }
+  return bytes.size() == chunk_bytes;
+}
+
+}  // namespace eventcamera

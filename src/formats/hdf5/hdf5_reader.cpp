@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/hdf5/hdf5_reader.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "src/formats/hdf5/hdf5_input.hpp"
+#include "src/formats/hdf5/hdf5_table.hpp"
+
+namespace eventcamera {
+
+struct Hdf5Reader::File {
+  File() = default;
+  File(File&&) = default;
+  File& operator=(File&&) = delete;
+  ~File() {
+    const Hdf5Session session;
+    handle = {};
+  }
+
+  std::unique_ptr<ByteSource> bytes;  ///< none where the library reads by itself
+  Hdf5Handle handle;
+};
+
+namespace {
+
+Hdf5Handle open_path(const std::filesystem::path& path) {
+  const Hdf5Session session;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    throw std::runtime_error("There is no file " + path.string());
+  const auto is_hdf5 = H5Fis_hdf5(path.c_str());
+  if (is_hdf5 == 0) throw NotThisFormat(path.string() + " is not an HDF5 file");
+  Hdf5Handle file(is_hdf5 > 0 ? H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT) : -1, H5Fclose);
+  if (!file)
+    throw std::runtime_error(
+        path.string() + " cannot be opened: it may not be read, is damaged, or is being written");
+  return file;
+}
+
+/// A user's block of a power of two may lie before the file.
+bool is_signed(ByteSource& bytes) {
+  constexpr std::array<std::uint8_t, 8> signature = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
+  const auto size = bytes.size();
+  for (std::uint64_t at = 0; at + signature.size() <= size; at = at == 0 ? 512 : 2 * at) {
+    std::array<std::uint8_t, 8> found = {};
+    if (!bytes.read(at, found)) return false;
+    if (found == signature) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Hdf5Reader::Hdf5Reader(const std::filesystem::path& path)
+    : Hdf5Reader([&] {
+        File file;
+        file.handle = open_path(path);
+        return file;
+      }()) {}
+
+Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes)
+    : Hdf5Reader([&] {
+        if (!is_signed(*bytes)) throw NotThisFormat("This is not an HDF5 file");
+        File file;
+        file.bytes = std::move(bytes);
+        file.handle = open_hdf5(*file.bytes);
+        if (!file.handle)
+          throw NotThisFormat("This HDF5 file is damaged, cut short, or being written");
+        return file;
+      }()) {}
+
+Hdf5Reader::Hdf5Reader(File file) : file_(std::make_unique<File>(std::move(file))) {
+  const Hdf5Session session;
+  const auto id = file_->handle.get();
+  table_ = Hdf5Table::open(id);
+  layout_ = table_->layout();
+  size_ = table_->size();
+  if (layout_ == Hdf5Layout::metavision) triggers_ = Hdf5Triggers::open(id);
+  intake_.set_size(size_);
+  if (table_->rows() < table_->claimed_rows())
+    damage_.note(0, "there are fewer events than the file says");
+}
+
+Hdf5Reader::~Hdf5Reader() {
+  const Hdf5Session session;
+  triggers_.reset();
+  table_.reset();
+  file_.reset();
+}
+
+std::uint64_t Hdf5Reader::count() const {
+  return table_->rows();
+}
+
+std::optional<Hdf5Reader::TimeRange> Hdf5Reader::time_range() const {
+  const Hdf5Session session;
+  if (table_->rows() == 0) return std::nullopt;
+  const auto first = table_->time_at(0);
+  const auto last = table_->time_at(table_->rows() - 1);
+  if (!first || !last) return std::nullopt;
+  return TimeRange{*first, *last};
+}
+
+/// Reads on until there is an event to hand over, or the end is reached.
+void Hdf5Reader::fill() {
+  while (taken_ == events_.size() && row_ < table_->rows()) {
+    events_.clear();
+    taken_ = 0;
+    row_ = table_->read(row_, intake_, events_, damage_);
+    if (!not_before_) continue;
+    const auto found = std::ranges::find_if(
+        events_, [&](const StampedEvent& event) { return event.t >= *not_before_; });
+    taken_ = static_cast<std::size_t>(found - events_.begin());
+    if (found != events_.end()) not_before_.reset();
+  }
+}
+
+std::size_t Hdf5Reader::read(std::size_t count, std::vector<StampedEvent>& out) {
+  const Hdf5Session session;
+  std::size_t read = 0;
+  while (read < count) {
+    fill();
+    const auto part = std::min(count - read, events_.size() - taken_);
+    if (part == 0) break;
+    const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(taken_);
+    out.insert(out.end(), begin, begin + static_cast<std::ptrdiff_t>(part));
+    taken_ += part;
+    read += part;
+  }
+  return read;
+}
+
+std::size_t Hdf5Reader::read_triggers(std::size_t count, std::vector<Trigger>& out) {
+  const Hdf5Session session;
+  const auto before = out.size();
+  while (triggers_ && triggers_->read(count - (out.size() - before), out, damage_)) {
+  }
+  return out.size() - before;
+}
+
+void Hdf5Reader::seek(Microseconds t) {
+  const Hdf5Session session;
+  events_.clear();
+  taken_ = 0;
+  row_ = table_->row_before(t);
+  not_before_ = t;
+  intake_.restart();
+  if (triggers_) triggers_->seek(t);
+}
+
+}  // namespace eventcamera

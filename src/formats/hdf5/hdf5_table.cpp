@@ -1,0 +1,451 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/hdf5/hdf5_table.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+#include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/hdf5/hdf5_attribute.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::uint64_t block_rows = 16384;
+constexpr int largest_side = 65536;
+
+std::uint64_t block_end(std::uint64_t row, std::uint64_t rows) {
+  return std::min(rows, (row / block_rows + 1) * block_rows);
+}
+
+/// Two numbers such as 1280x720.
+SensorSize read_geometry(std::string_view text) {
+  SensorSize size;
+  const char* const end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, size.width);
+  if (width.ec != std::errc() || width.ptr == end || *width.ptr != 'x') return {};
+  const auto height = std::from_chars(width.ptr + 1, end, size.height);
+  if (height.ec != std::errc() || size.width <= 0 || size.height <= 0 ||
+      size.width > largest_side || size.height > largest_side)
+    return {};
+  return size;
+}
+
+/// Finding the position takes long, and only the first is told.
+void note(Damage& damage, const Hdf5Dataset& dataset, std::uint64_t row, const char* what) {
+  damage.note(damage.places == 0 ? dataset.position(row) : 0, what);
+}
+
+SensorSize size_of_attributes(hid_t object) {
+  const auto width = read_number_attribute(object, "width");
+  const auto height = read_number_attribute(object, "height");
+  if (!width || !height || *width <= 0 || *height <= 0 || *width > largest_side ||
+      *height > largest_side)
+    return {};
+  return {static_cast<int>(*width), static_cast<int>(*height)};
+}
+
+/// Layouts with a row of plain numbers for an event.
+class NumberTable : public Hdf5Table {
+ public:
+  SensorSize size() const override { return size_; }
+  std::uint64_t rows() const override { return rows_; }
+  std::uint64_t claimed_rows() const override { return claimed_rows_; }
+
+  std::uint64_t read(std::uint64_t row, EventIntake& intake, std::vector<StampedEvent>& out,
+                     Damage& damage) override {
+    if (row != next_row_) {
+      lap_ = lap_of(row);
+      last_ = 0;
+    }
+    auto end = block_end(row, rows_);
+    const auto* unread = read_numbers(row, end - row);
+    if (unread != nullptr) {
+      end = std::min(end, chunk_end(row));
+      unread = read_numbers(row, end - row);
+    }
+    next_row_ = end;
+    if (unread != nullptr) {
+      note(damage, *unread, row, "a part of a dataset cannot be read");
+      return end;
+    }
+    for (std::size_t i = 0; i < t_.size(); ++i) {
+      if (wraps_ && t_[i] < last_ - half_lap) lap_ += lap;
+      last_ = t_[i];
+      Microseconds t = 0;
+      if (__builtin_add_overflow(t_[i], offset_ + lap_, &t)) {
+        note(damage, t_dataset(), row, "a time is out of range");
+        continue;
+      }
+      intake.take(t, x_[i], y_[i], p_[i] > 0, out, damage);
+    }
+    return end;
+  }
+
+  std::uint64_t row_before(Microseconds t) override {
+    std::uint64_t first = 0;
+    for (auto count = rows_; count > 0;) {
+      const auto step = count / 2;
+      const auto time = time_at(first + step);
+      // What cannot be read is taken for late, as that goes over no event.
+      if (time && *time < t) {
+        first += step + 1;
+        count -= step + 1;
+      } else {
+        count = step;
+      }
+    }
+    return first;
+  }
+
+  std::optional<Microseconds> time_at(std::uint64_t row) override {
+    std::vector<std::int64_t> numbers;
+    Microseconds t = 0;
+    if (row >= rows_ || !t_dataset().read(row, 1, numbers) ||
+        __builtin_add_overflow(numbers[0], offset_ + lap_of(row), &t))
+      return std::nullopt;
+    return t;
+  }
+
+ protected:
+  static constexpr Microseconds lap = std::int64_t{1} << 32;
+  static constexpr Microseconds half_lap = lap / 2;
+
+  virtual Hdf5Dataset& t_dataset() = 0;
+
+  /// Reads t_, x_, y_ and p_. Returns the dataset that cannot be read.
+  virtual const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) = 0;
+
+  /// The first row that lies in another chunk than this one.
+  virtual std::uint64_t chunk_end(std::uint64_t row) const = 0;
+
+  /// What the laps of a clock of 32 bits have added up to before a row.
+  virtual Microseconds lap_of(std::uint64_t /*row*/) { return 0; }
+
+  SensorSize size_;
+  std::uint64_t rows_ = 0, claimed_rows_ = 0;
+  Microseconds offset_ = 0;
+  bool wraps_ = false;  ///< times are of 32 bits and start again after 71 minutes
+  std::vector<std::int64_t> t_, x_, y_, p_;
+
+ private:
+  std::uint64_t next_row_ = 0;
+  Microseconds lap_ = 0;
+  std::int64_t last_ = 0;
+};
+
+class DsecTable final : public NumberTable {
+ public:
+  explicit DsecTable(hid_t file)
+      : columns_{{Hdf5Dataset(file, "events/t"), Hdf5Dataset(file, "events/x"),
+                  Hdf5Dataset(file, "events/y"), Hdf5Dataset(file, "events/p")}} {
+    rows_ = columns_[0].rows();
+    for (auto& column : columns_) {
+      if (column.rank() != 1 || !column.is_integers())
+        throw NotThisFormat("This HDF5 file's /events are no columns of integers");
+      column.require_filters();
+      rows_ = std::min(rows_, column.rows());
+      claimed_rows_ = std::max(claimed_rows_, column.claimed_rows());
+    }
+    wraps_ = columns_[0].is_unsigned_32();
+    if (Hdf5Dataset::exists(file, "t_offset", H5O_TYPE_DATASET)) {
+      Hdf5Dataset offset(file, "t_offset");
+      std::vector<std::int64_t> number;
+      constexpr Microseconds most = INT64_MAX / 2;
+      if (!offset.is_integers() || offset.rows() != 1 || offset.columns() != 1 ||
+          !offset.read(0, 1, number) || number[0] > most || number[0] < -most)
+        throw NotThisFormat("This HDF5 file's /t_offset is no time");
+      offset_ = number[0];
+    }
+    if (Hdf5Dataset::exists(file, "ms_to_idx", H5O_TYPE_DATASET)) {
+      Hdf5Dataset index(file, "ms_to_idx");
+      if (index.rank() == 1 && index.is_integers()) {
+        index.require_filters();
+        index_ = std::move(index);
+      }
+    }
+    size_ = size_of_attributes(file);
+    if (size_ == SensorSize{}) {
+      const Hdf5Handle events(H5Gopen2(file, "events", H5P_DEFAULT), H5Gclose);
+      size_ = size_of_attributes(events.get());
+    }
+  }
+
+  Hdf5Layout layout() const override { return Hdf5Layout::dsec; }
+
+  std::uint64_t row_before(Microseconds t) override {
+    Microseconds since = 0;
+    if (index_ && !__builtin_sub_overflow(t, offset_, &since) && since >= 0) {
+      const auto row = indexed(static_cast<std::uint64_t>(since / 1000));
+      // The index may be wrong: then it is as if there was none.
+      if (row && *row <= rows_ && *row > 0) {
+        const auto before = time_at(*row - 1);
+        const auto at = time_at(*row);
+        if (before && *before < t && (!at || *at >= t - 1000)) return *row;
+      }
+    }
+    return NumberTable::row_before(t);
+  }
+
+ protected:
+  Hdf5Dataset& t_dataset() override { return columns_[0]; }
+
+  const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) override {
+    std::vector<std::int64_t>* const numbers[] = {&t_, &x_, &y_, &p_};
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+      if (!columns_[i].read(row, count, *numbers[i])) return &columns_[i];
+    return nullptr;
+  }
+
+  std::uint64_t chunk_end(std::uint64_t row) const override {
+    auto end = rows_;
+    for (const auto& column : columns_) end = std::min(end, column.chunk_end(row));
+    return end;
+  }
+
+  Microseconds lap_of(std::uint64_t row) override {
+    constexpr std::uint64_t lap_milliseconds = lap / 1000;
+    if (!wraps_ || !index_ || index_->rows() <= lap_milliseconds) return 0;
+    std::uint64_t milliseconds = 0;
+    for (auto count = index_->rows(); count > 0;) {
+      const auto step = count / 2;
+      const auto indexed_row = indexed(milliseconds + step);
+      if (indexed_row && *indexed_row <= row) {
+        milliseconds += step + 1;
+        count -= step + 1;
+      } else {
+        count = step;
+      }
+    }
+    std::vector<std::int64_t> t;
+    if (milliseconds == 0 || milliseconds > INT64_MAX / 1000 || !t_dataset().read(row, 1, t))
+      return 0;
+    const auto about = static_cast<Microseconds>((milliseconds - 1) * 1000);
+    const auto laps = (about - t[0] + half_lap) / lap;
+    return laps > 0 ? laps * lap : 0;
+  }
+
+ private:
+  std::optional<std::uint64_t> indexed(std::uint64_t milliseconds) {
+    std::vector<std::int64_t> row;
+    if (milliseconds >= index_->rows() || !index_->read(milliseconds, 1, row) || row[0] < 0)
+      return std::nullopt;
+    return static_cast<std::uint64_t>(row[0]);
+  }
+
+  std::array<Hdf5Dataset, 4> columns_;  ///< t, x, y, p
+  std::optional<Hdf5Dataset> index_;    ///< by millisecond, the first event at or after it
+};
+
+class V2eTable final : public NumberTable {
+ public:
+  explicit V2eTable(hid_t file) : events_(file, "events") {
+    if (events_.rank() != 2 || events_.columns() != columns || !events_.is_integers())
+      throw NotThisFormat("This HDF5 file's /events are no rows of four integers t, x, y and p");
+    events_.require_filters();
+    rows_ = events_.rows();
+    claimed_rows_ = events_.claimed_rows();
+    wraps_ = events_.is_unsigned_32();
+    if (Hdf5Dataset::exists(file, "frame", H5O_TYPE_DATASET)) {
+      const Hdf5Handle frame(H5Dopen2(file, "frame", H5P_DEFAULT), H5Dclose);
+      const Hdf5Handle space(H5Dget_space(frame.get()), H5Sclose);
+      hsize_t extent[3] = {};  // frames, rows, columns
+      if (H5Sget_simple_extent_ndims(space.get()) == 3 &&
+          H5Sget_simple_extent_dims(space.get(), extent, nullptr) == 3 &&
+          extent[1] <= largest_side && extent[2] <= largest_side && extent[1] > 0 && extent[2] > 0)
+        size_ = {static_cast<int>(extent[2]), static_cast<int>(extent[1])};
+    }
+  }
+
+  Hdf5Layout layout() const override { return Hdf5Layout::v2e; }
+
+ protected:
+  Hdf5Dataset& t_dataset() override { return events_; }
+
+  const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) override {
+    if (!events_.read(row, count, numbers_)) return &events_;
+    std::vector<std::int64_t>* const separate[] = {&t_, &x_, &y_, &p_};
+    for (std::size_t column = 0; column < columns; ++column) {
+      separate[column]->resize(count);
+      for (std::size_t i = 0; i < count; ++i)
+        (*separate[column])[i] = numbers_[i * columns + column];
+    }
+    return nullptr;
+  }
+
+  std::uint64_t chunk_end(std::uint64_t row) const override { return events_.chunk_end(row); }
+
+ private:
+  static constexpr std::size_t columns = 4;
+
+  Hdf5Dataset events_;
+  std::vector<std::int64_t> numbers_;
+};
+
+class MetavisionTable final : public Hdf5Table {
+ public:
+  explicit MetavisionTable(hid_t file) : events_(file, "CD/events") {
+    if (events_.rank() != 1) throw NotThisFormat("This HDF5 file's /CD/events are no rows");
+    constexpr const char* members[] = {"t", "x", "y", "p"};
+    events_.choose(members);
+    compressed_ = events_.has_only_filter(ecf_filter);
+    if (compressed_) {
+      step_ = events_.chunk_rows();
+      if (step_ == 0 || step_ > ecf_most_events)
+        throw NotThisFormat("This HDF5 file's /CD/events have chunks that are too large for ECF");
+    } else {
+      events_.require_filters();
+    }
+    if (const auto geometry = read_text_attribute(file, "geometry"))
+      size_ = read_geometry(*geometry);
+  }
+
+  Hdf5Layout layout() const override { return Hdf5Layout::metavision; }
+  SensorSize size() const override { return size_; }
+  std::uint64_t rows() const override { return events_.rows(); }
+  std::uint64_t claimed_rows() const override { return events_.claimed_rows(); }
+
+  std::uint64_t read(std::uint64_t row, EventIntake& intake, std::vector<StampedEvent>& out,
+                     Damage& damage) override {
+    if (!compressed_) return read_rows(row, intake, out, damage);
+    const auto chunk = row / step_;
+    const auto end = chunk_end(chunk);
+    if (!read_chunk(chunk)) {
+      note(damage, events_, row, "a chunk of events is damaged");
+      return end;
+    }
+    const auto begin = chunk * step_;
+    if (decoded_.size() < end - begin)
+      note(damage, events_, row, "a chunk has fewer events than it should");
+    for (auto i = row - begin; i < std::min<std::uint64_t>(decoded_.size(), end - begin); ++i) {
+      const auto& event = decoded_[i];
+      intake.take(event.t, event.x, event.y(), event.polarity() == Polarity::on, out, damage);
+    }
+    return end;
+  }
+
+  std::uint64_t row_before(Microseconds t) override {
+    // The last part that begins before t.
+    std::uint64_t first = 0;
+    for (auto count = (rows() + step_ - 1) / step_; count > 0;) {
+      const auto half = count / 2;
+      const auto time = first_time((first + half) * step_);
+      if (time && *time < t) {
+        first += half + 1;
+        count -= half + 1;
+      } else {
+        count = half;
+      }
+    }
+    return first == 0 ? 0 : (first - 1) * step_;
+  }
+
+  std::optional<Microseconds> time_at(std::uint64_t row) override {
+    if (row >= rows()) return std::nullopt;
+    if (!compressed_) return first_time(row);
+    const auto chunk = row / step_;
+    const auto at = row - chunk * step_;
+    if (!read_chunk(chunk) || at >= decoded_.size()) return std::nullopt;
+    return decoded_[at].t;
+  }
+
+ private:
+  std::uint64_t chunk_end(std::uint64_t chunk) const {
+    return std::min(rows(), (chunk + 1) * step_);
+  }
+
+  bool read_stored(std::uint64_t row) {
+    return events_.read_chunk(row, ecf_most_bytes(step_), stored_);
+  }
+
+  bool read_chunk(std::uint64_t chunk) {
+    decoded_.clear();
+    return read_stored(chunk * step_) && decode_ecf(stored_, decoded_);
+  }
+
+  std::optional<Microseconds> first_time(std::uint64_t row) {
+    if (compressed_) return read_stored(row) ? ecf_first_time(stored_) : std::nullopt;
+    if (!events_.read(row, 1, numbers_)) return std::nullopt;
+    return numbers_[0];
+  }
+
+  std::uint64_t read_rows(std::uint64_t row, EventIntake& intake, std::vector<StampedEvent>& out,
+                          Damage& damage) {
+    auto end = block_end(row, rows());
+    bool is_read = events_.read(row, end - row, numbers_);
+    if (!is_read) {
+      end = std::min(end, events_.chunk_end(row));
+      is_read = events_.read(row, end - row, numbers_);
+    }
+    if (!is_read) {
+      note(damage, events_, row, "a part of a dataset cannot be read");
+      return end;
+    }
+    for (std::size_t i = 0; i < numbers_.size(); i += 4)
+      intake.take(numbers_[i], numbers_[i + 1], numbers_[i + 2], numbers_[i + 3] > 0, out, damage);
+    return end;
+  }
+
+  Hdf5Dataset events_;
+  bool compressed_ = false;
+  std::uint64_t step_ = block_rows;  ///< rows that are read at once
+  SensorSize size_;
+  std::vector<std::uint8_t> stored_;
+  std::vector<StampedEvent> decoded_;
+  std::vector<std::int64_t> numbers_;
+};
+
+}  // namespace
+
+std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file) {
+  if (Hdf5Dataset::exists(file, "CD/events", H5O_TYPE_DATASET))
+    return std::make_unique<MetavisionTable>(file);
+  if (Hdf5Dataset::exists(file, "events/t", H5O_TYPE_DATASET))
+    return std::make_unique<DsecTable>(file);
+  if (Hdf5Dataset::exists(file, "events", H5O_TYPE_DATASET))
+    return std::make_unique<V2eTable>(file);
+  throw NotThisFormat(
+      "This HDF5 file has none of the layouts that are read: /events/t (DSEC), /events (v2e), "
+      "/CD/events (Metavision)");
+}
+
+Hdf5Triggers::Hdf5Triggers(hid_t file) : dataset_(file, "EXT_TRIGGER/events") {
+  if (dataset_.rank() != 1) throw NotThisFormat("This HDF5 file's /EXT_TRIGGER/events are no rows");
+  constexpr const char* members[] = {"t", "p", "id"};
+  dataset_.choose(members);
+  dataset_.require_filters();
+}
+
+std::unique_ptr<Hdf5Triggers> Hdf5Triggers::open(hid_t file) {
+  if (!Hdf5Dataset::exists(file, "EXT_TRIGGER/events", H5O_TYPE_DATASET)) return nullptr;
+  return std::unique_ptr<Hdf5Triggers>(new Hdf5Triggers(file));
+}
+
+bool Hdf5Triggers::read(std::size_t count, std::vector<Trigger>& out, Damage& damage) {
+  if (row_ >= dataset_.rows() || count == 0) return false;
+  const auto end = std::min<std::uint64_t>(block_end(row_, dataset_.rows()), row_ + count);
+  if (dataset_.read(row_, end - row_, numbers_)) {
+    for (std::size_t i = 0; i < numbers_.size(); i += 3)
+      out.push_back(
+          {numbers_[i], static_cast<std::uint16_t>(numbers_[i + 2]), numbers_[i + 1] > 0});
+  } else {
+    note(damage, dataset_, row_, "a part of a dataset cannot be read");
+  }
+  row_ = end;
+  return true;
+}
+
+void Hdf5Triggers::seek(Microseconds t) {
+  row_ = 0;
+  for (auto count = dataset_.rows(); count > 0;) {
+    const auto step = count / 2;
+    if (dataset_.read(row_ + step, 1, numbers_) && numbers_[0] < t) {
+      row_ += step + 1;
+      count -= step + 1;
+    } else {
+      count = step;
+    }
+  }
+}
+
+}  // namespace eventcamera

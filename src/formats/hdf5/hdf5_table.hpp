@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "src/formats/decoder.hpp"
+#include "src/formats/event_intake.hpp"
+#include "src/formats/hdf5/hdf5_dataset.hpp"
+#include "src/formats/hdf5/hdf5_layout.hpp"
+
+namespace eventcamera {
+
+/// The events of an HDF5 file as rows, whichever layout it has.
+class Hdf5Table {
+ public:
+  virtual ~Hdf5Table() = default;
+  Hdf5Table(const Hdf5Table&) = delete;
+  Hdf5Table& operator=(const Hdf5Table&) = delete;
+
+  /// Throws NotThisFormat where the file has no layout that is known, or is wrong in its own.
+  static std::unique_ptr<Hdf5Table> open(hid_t file);
+
+  virtual Hdf5Layout layout() const = 0;
+  virtual SensorSize size() const = 0;
+  virtual std::uint64_t rows() const = 0;
+  virtual std::uint64_t claimed_rows() const = 0;
+
+  /// Reads a bounded number of rows from `row` on, and returns the row behind them. What is
+  /// damaged is noted and left out.
+  virtual std::uint64_t read(std::uint64_t row, EventIntake& intake, std::vector<StampedEvent>& out,
+                             Damage& damage) = 0;
+
+  /// A row with no event of time `t` or later before it, and not many before that.
+  virtual std::uint64_t row_before(Microseconds t) = 0;
+
+  virtual std::optional<Microseconds> time_at(std::uint64_t row) = 0;
+
+ protected:
+  Hdf5Table() = default;
+};
+
+/// The triggers of Metavision's layout.
+class Hdf5Triggers {
+ public:
+  /// Nothing where the file has none.
+  static std::unique_ptr<Hdf5Triggers> open(hid_t file);
+
+  /// Appends a bounded number of triggers from the next row on. False at the end.
+  bool read(std::size_t count, std::vector<Trigger>& out, Damage& damage);
+  void seek(Microseconds t);
+
+ private:
+  explicit Hdf5Triggers(hid_t file);
+
+  Hdf5Dataset dataset_;
+  std::uint64_t row_ = 0;
+  std::vector<std::int64_t> numbers_;  ///< of each row t, p and id
+};
+
+}  // namespace eventcamera

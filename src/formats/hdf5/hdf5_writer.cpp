@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/hdf5/hdf5_writer.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "src/formats/hdf5/ecf.hpp"
+#include "src/formats/hdf5/hdf5_attribute.hpp"
+#include "src/formats/hdf5/hdf5_handle.hpp"
+#include "src/formats/hdf5/hdf5_output.hpp"
+
+namespace eventcamera {
+
+struct Hdf5Writer::File {
+  explicit File(const std::filesystem::path& path) : output(path) {}
+
+  Hdf5Output output;
+  Hdf5Handle handle;
+};
+
+namespace {
+
+using Compression = Hdf5Writer::Compression;
+
+/// Of a recording: both layouts have an index that grows with time, events or not.
+constexpr Microseconds longest_recording = 7LL * 24 * 3600 * 1'000'000;
+
+void check(bool done) {
+  if (!done) throw std::runtime_error("The HDF5 library cannot write the file");
+}
+
+/// Microseconds since the recording's first event.
+Microseconds since(Microseconds first, Microseconds t) {
+  Microseconds passed = 0;
+  if (__builtin_sub_overflow(t, first, &passed) || passed > longest_recording)
+    throw std::invalid_argument("An HDF5 file of events cannot be longer than a week");
+  return passed;
+}
+
+Hdf5Handle make_group(hid_t file, const char* name) {
+  Hdf5Handle group(H5Gcreate2(file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  check(static_cast<bool>(group));
+  return group;
+}
+
+/// A dataset of rows that is written from the front.
+class GrowingDataset {
+ public:
+  GrowingDataset(hid_t parent, const char* name, hid_t stored, hid_t memory, hsize_t chunk,
+                 Compression compression, int filter = 0)
+      : memory_(memory) {
+    constexpr hsize_t none = 0;
+    constexpr hsize_t no_limit = H5S_UNLIMITED;
+    constexpr unsigned quickest = 1;  // more makes events hardly smaller
+    const Hdf5Handle space(H5Screate_simple(1, &none, &no_limit), H5Sclose);
+    const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+    check(H5Pset_chunk(creation.get(), 1, &chunk) >= 0);
+    if (compression == Compression::gzip)
+      check(H5Pset_shuffle(creation.get()) >= 0 && H5Pset_deflate(creation.get(), quickest) >= 0);
+    if (filter != 0)
+      check(H5Pset_filter(creation.get(), filter, H5Z_FLAG_OPTIONAL, 0, nullptr) >= 0);
+    dataset_ = {
+        H5Dcreate2(parent, name, stored, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+        H5Dclose};
+    check(static_cast<bool>(dataset_));
+  }
+
+  void append(const void* rows, hsize_t count) {
+    if (count == 0) return;
+    const auto begin = rows_;
+    extend(count);
+    const auto space = select(begin, count);
+    const Hdf5Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    check(H5Dwrite(dataset_.get(), memory_, memory.get(), space.get(), H5P_DEFAULT, rows) >= 0);
+  }
+
+  /// Appends a chunk that the filter has been applied to.
+  void append_chunk(std::span<const std::uint8_t> chunk, hsize_t count) {
+    const auto begin = rows_;
+    extend(count);
+    check(H5Dwrite_chunk(dataset_.get(), H5P_DEFAULT, 0, &begin, chunk.size(), chunk.data()) >= 0);
+  }
+
+  void read(hsize_t first, hsize_t count, void* rows) const {
+    const auto space = select(first, count);
+    const Hdf5Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    check(H5Dread(dataset_.get(), memory_, memory.get(), space.get(), H5P_DEFAULT, rows) >= 0);
+  }
+
+  hid_t id() const { return dataset_.get(); }
+  hsize_t rows() const { return rows_; }
+
+ private:
+  void extend(hsize_t count) {
+    rows_ += count;
+    check(H5Dset_extent(dataset_.get(), &rows_) >= 0);
+  }
+
+  Hdf5Handle select(hsize_t first, hsize_t count) const {
+    Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
+    check(H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, &first, nullptr, &count, nullptr) >= 0);
+    return space;
+  }
+
+  Hdf5Handle dataset_;
+  hid_t memory_;
+  hsize_t rows_ = 0;
+};
+
+class DsecLayout final : public Hdf5Writer::Layout {
+ public:
+  DsecLayout(hid_t file, const Hdf5Writer::Settings& settings)
+      : file_(file),
+        compression_(settings.compression),
+        group_(make_group(file, "events")),
+        p_out_(group_.get(), "p", H5T_STD_U8LE, H5T_NATIVE_UINT8, chunk, compression_),
+        x_out_(group_.get(), "x", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression_),
+        y_out_(group_.get(), "y", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression_),
+        t_out_(group_.get(), "t", H5T_STD_U32LE, H5T_NATIVE_UINT64, chunk, compression_),
+        index_out_(file, "ms_to_idx", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, compression_) {
+    write_number(file, "width", settings.size.width);
+    write_number(file, "height", settings.size.height);
+  }
+
+  void append(std::span<const StampedEvent> events) override {
+    for (const auto& event : events) {
+      if (!first_) first_ = event.t;
+      const auto t = static_cast<std::uint64_t>(since(*first_, event.t));
+      if (t > std::numeric_limits<std::uint32_t>::max() && !wide_) widen();
+      for (; indexed_ * 1000 <= t; ++indexed_) {
+        index_.push_back(p_out_.rows() + t_.size());
+        if (index_.size() == chunk) flush_index();
+      }
+      p_.push_back(static_cast<std::uint8_t>(event.polarity()));
+      x_.push_back(event.x);
+      y_.push_back(static_cast<std::uint16_t>(event.y()));
+      t_.push_back(t);
+      if (t_.size() == chunk) flush();
+    }
+  }
+
+  void append(std::span<const Trigger> /*triggers*/) override {}
+
+  void close() override {
+    flush();
+    flush_index();
+    const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    const Hdf5Handle offset(H5Dcreate2(file_, "t_offset", H5T_STD_I64LE, space.get(), H5P_DEFAULT,
+                                       H5P_DEFAULT, H5P_DEFAULT),
+                            H5Dclose);
+    const Microseconds first = first_.value_or(0);
+    check(H5Dwrite(offset.get(), H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &first) >= 0);
+  }
+
+ private:
+  static constexpr hsize_t chunk = 65536;
+
+  static void write_number(hid_t object, const char* name, int number) {
+    const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    const Hdf5Handle attribute(
+        H5Acreate2(object, name, H5T_STD_I32LE, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+    check(H5Awrite(attribute.get(), H5T_NATIVE_INT, &number) >= 0);
+  }
+
+  /// DSEC's times are of 32 bits, 71 minutes. A longer recording gets 64, which readers take, too.
+  void widen() {
+    flush();
+    wide_ = true;
+    GrowingDataset wide(group_.get(), "t64", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, compression_);
+    std::vector<std::uint64_t> times(chunk);
+    while (wide.rows() < t_out_.rows()) {
+      const auto count = std::min(chunk, t_out_.rows() - wide.rows());
+      t_out_.read(wide.rows(), count, times.data());
+      wide.append(times.data(), count);
+    }
+    t_out_ = std::move(wide);
+    check(H5Ldelete(group_.get(), "t", H5P_DEFAULT) >= 0 &&
+          H5Lmove(group_.get(), "t64", group_.get(), "t", H5P_DEFAULT, H5P_DEFAULT) >= 0);
+  }
+
+  void flush() {
+    p_out_.append(p_.data(), p_.size());
+    x_out_.append(x_.data(), x_.size());
+    y_out_.append(y_.data(), y_.size());
+    t_out_.append(t_.data(), t_.size());
+    p_.clear();
+    x_.clear();
+    y_.clear();
+    t_.clear();
+  }
+
+  void flush_index() {
+    index_out_.append(index_.data(), index_.size());
+    index_.clear();
+  }
+
+  hid_t file_;
+  Compression compression_;
+  Hdf5Handle group_;
+  GrowingDataset p_out_, x_out_, y_out_, t_out_, index_out_;
+  std::vector<std::uint8_t> p_;
+  std::vector<std::uint16_t> x_, y_;
+  std::vector<std::uint64_t> t_;  ///< since the first event
+  std::vector<std::uint64_t> index_;
+  std::uint64_t indexed_ = 0;  ///< milliseconds that the index has
+  std::optional<Microseconds> first_;
+  bool wide_ = false;
+};
+
+/// For each 2 ms since the first event, the event to read from.
+class MetavisionIndex {
+ public:
+  explicit MetavisionIndex(hid_t group)
+      : type_(make_type()),
+        out_(group, "indexes", type_.get(), type_.get(), chunk, Compression::none) {}
+
+  void add(std::uint64_t id, Microseconds t) {
+    if (!first_) {
+      first_ = t;
+      check(write_text_attribute(
+          out_.id(), "offset",
+          std::to_string(static_cast<Microseconds>(0 - static_cast<std::uint64_t>(t)))));
+    }
+    const auto passed = since(*first_, t);
+    // The entry of a period is the first event of the last period before that has any.
+    for (const auto periods = passed / period; count_ <= periods; ++count_) {
+      put(last_);
+      if (count_ == periods) last_ = {id, passed};
+    }
+  }
+
+  void close() {
+    if (first_) put(last_);
+    flush();
+  }
+
+ private:
+  static constexpr hsize_t chunk = 16384;
+  static constexpr Microseconds period = 2000;
+
+  struct Entry {
+    std::uint64_t id;
+    std::int64_t t;
+  };
+
+  static Hdf5Handle make_type() {
+    Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(Entry)), H5Tclose);
+    H5Tinsert(type.get(), "id", offsetof(Entry, id), H5T_NATIVE_UINT64);
+    H5Tinsert(type.get(), "ts", offsetof(Entry, t), H5T_NATIVE_INT64);
+    return type;
+  }
+
+  void put(const Entry& entry) {
+    entries_.push_back(entry);
+    if (entries_.size() == chunk) flush();
+  }
+
+  void flush() {
+    out_.append(entries_.data(), entries_.size());
+    entries_.clear();
+  }
+
+  Hdf5Handle type_;
+  GrowingDataset out_;
+  std::vector<Entry> entries_;
+  std::optional<Microseconds> first_;
+  Microseconds count_ = 0;
+  Entry last_ = {0, -1};
+};
+
+class MetavisionLayout final : public Hdf5Writer::Layout {
+ public:
+  MetavisionLayout(hid_t file, const Hdf5Writer::Settings& settings)
+      : cd_(make_group(file, "CD")),
+        trigger_(make_group(file, "EXT_TRIGGER")),
+        event_type_(make_event_type()),
+        trigger_type_(make_trigger_type()),
+        events_out_(cd_.get(), "events", event_type_.get(), event_type_.get(), chunk,
+                    Compression::none, ecf_filter),
+        triggers_out_(trigger_.get(), "events", trigger_type_.get(), trigger_type_.get(), chunk,
+                      Compression::none),
+        event_index_(cd_.get()),
+        trigger_index_(trigger_.get()) {
+    const auto width = std::to_string(settings.size.width);
+    const auto height = std::to_string(settings.size.height);
+    const Hdf5Handle root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose);
+    check(write_text_attribute(root.get(), "version", "1.0") &&
+          write_text_attribute(root.get(), "geometry", width + "x" + height) &&
+          write_text_attribute(root.get(), "format", "EVT3;height=" + height + ";width=" + width));
+  }
+
+  void append(std::span<const StampedEvent> events) override {
+    for (const auto& event : events) {
+      event_index_.add(events_out_.rows() + events_.size(), event.t);
+      events_.push_back(event);
+      if (events_.size() == chunk) flush_events();
+    }
+  }
+
+  void append(std::span<const Trigger> triggers) override {
+    for (const auto& trigger : triggers) {
+      trigger_index_.add(triggers_out_.rows() + triggers_.size(), trigger.t);
+      TriggerRow row;
+      row.p = trigger.rising ? 1 : 0;
+      row.t = trigger.t;
+      row.id = static_cast<std::int16_t>(trigger.id);
+      triggers_.push_back(row);
+      if (triggers_.size() == chunk) flush_triggers();
+    }
+  }
+
+  void close() override {
+    flush_events();
+    flush_triggers();
+    event_index_.close();
+    trigger_index_.close();
+  }
+
+ private:
+  static constexpr hsize_t chunk = 16384;
+
+  /// As Metavision's events lie in memory.
+  struct EventRow {
+    std::uint16_t x, y;
+    std::int16_t p;
+    std::int64_t t;
+  };
+  struct TriggerRow {
+    std::int16_t p = 0;
+    std::int64_t t = 0;
+    std::int16_t id = 0;
+  };
+  static_assert(sizeof(EventRow) == 16 && sizeof(TriggerRow) == 24);
+
+  static Hdf5Handle make_event_type() {
+    Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(EventRow)), H5Tclose);
+    H5Tinsert(type.get(), "x", offsetof(EventRow, x), H5T_NATIVE_UINT16);
+    H5Tinsert(type.get(), "y", offsetof(EventRow, y), H5T_NATIVE_UINT16);
+    H5Tinsert(type.get(), "p", offsetof(EventRow, p), H5T_NATIVE_INT16);
+    H5Tinsert(type.get(), "t", offsetof(EventRow, t), H5T_NATIVE_INT64);
+    return type;
+  }
+
+  static Hdf5Handle make_trigger_type() {
+    Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(TriggerRow)), H5Tclose);
+    H5Tinsert(type.get(), "p", offsetof(TriggerRow, p), H5T_NATIVE_INT16);
+    H5Tinsert(type.get(), "t", offsetof(TriggerRow, t), H5T_NATIVE_INT64);
+    H5Tinsert(type.get(), "id", offsetof(TriggerRow, id), H5T_NATIVE_INT16);
+    return type;
+  }
+
+  void flush_events() {
+    if (events_.empty()) return;
+    encoded_.clear();
+    encode_ecf(events_, encoded_);
+    events_out_.append_chunk(encoded_, events_.size());
+    events_.clear();
+  }
+
+  void flush_triggers() {
+    triggers_out_.append(triggers_.data(), triggers_.size());
+    triggers_.clear();
+  }
+
+  Hdf5Handle cd_, trigger_;
+  Hdf5Handle event_type_, trigger_type_;
+  GrowingDataset events_out_, triggers_out_;
+  MetavisionIndex event_index_, trigger_index_;
+  std::vector<StampedEvent> events_;
+  std::vector<TriggerRow> triggers_;
+  std::vector<std::uint8_t> encoded_;
+};
+
+std::unique_ptr<Hdf5Writer::Layout> make_layout(hid_t file, const Hdf5Writer::Settings& settings) {
+  if (settings.layout == Hdf5Layout::dsec) return std::make_unique<DsecLayout>(file, settings);
+  return std::make_unique<MetavisionLayout>(file, settings);
+}
+
+void check(const Hdf5Writer::Settings& settings) {
+  const auto [width, height] = settings.size;
+  if (settings.layout == Hdf5Layout::v2e)
+    throw std::invalid_argument("HDF5 files of v2e's layout are only read");
+  const bool ecf = settings.layout == Hdf5Layout::metavision;
+  const int most = ecf ? ecf_most_pixels : 32768;
+  if (width <= 0 || height <= 0 || width > most || height > most)
+    throw std::invalid_argument("An HDF5 file of events needs the sensor's size, at most " +
+                                std::to_string(most) + " pixels in a row or column");
+}
+
+}  // namespace
+
+Hdf5Writer::Hdf5Writer(const std::filesystem::path& path, const Settings& settings)
+    : size_(settings.size) {
+  const Hdf5Session session;
+  check(settings);
+  file_ = std::make_unique<File>(path);
+  file_->handle = file_->output.create();
+  check(static_cast<bool>(file_->handle));
+  layout_ = make_layout(file_->handle.get(), settings);
+}
+
+Hdf5Writer::~Hdf5Writer() {
+  const Hdf5Session session;
+  try {
+    close();
+  } catch (const std::exception&) {
+    // Nobody is left to be told.
+  }
+  layout_.reset();
+  file_.reset();
+}
+
+void Hdf5Writer::append(std::span<const StampedEvent> events) {
+  const Hdf5Session session;
+  file_->output.check();
+  for (const auto& event : events) {
+    if (event.t < latest_) throw std::invalid_argument("Events are not sorted by time");
+    latest_ = event.t;
+    if (event.x >= size_.width || event.y() >= size_.height)
+      throw std::invalid_argument("An event is outside the sensor");
+  }
+  layout_->append(events);
+  file_->output.check();
+}
+
+void Hdf5Writer::append(std::span<const Trigger> triggers) {
+  const Hdf5Session session;
+  file_->output.check();
+  layout_->append(triggers);
+  file_->output.check();
+}
+
+void Hdf5Writer::close() {
+  if (!layout_) return;
+  const Hdf5Session session;
+  file_->output.check();
+  auto layout = std::move(layout_);
+  layout->close();
+  layout.reset();
+  file_->handle = {};
+  file_->output.check();
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/interval_slicer.hpp"
+
+#include <algorithm>
+
+namespace eventcamera {
+namespace {
+
+bool earlier(const StampedEvent& a, const StampedEvent& b) {
+  return a.t < b.t;
+}
+
+/// By time, then in raster order; OFF and ON alike.
+std::uint64_t key(const Event& event) {
+  return std::uint64_t{event.t} << 32 | static_cast<std::uint64_t>(event.y()) << 16 | event.x;
+}
+
+/// Puts events that are sorted by time into raster order within each time, and returns how many it
+/// removes because another has their pixel and time.
+std::uint64_t order_ties(std::vector<Event>& events) {
+  const auto before = [](const Event& a, const Event& b) { return key(a) < key(b); };
+  bool ordered = true;
+  for (std::size_t i = 1; i < events.size(); ++i)
+    ordered &= key(events[i - 1]) < key(events[i]);  // nearly always, and without a branch
+  if (ordered) return 0;
+  for (auto from = events.begin(); from != events.end();) {
+    const auto to =
+        std::find_if(from, events.end(), [&](const Event& e) { return e.t != from->t; });
+    if (!std::is_sorted(from, to, before)) std::stable_sort(from, to, before);
+    from = to;
+  }
+  const auto end = std::unique(events.begin(), events.end(),
+                               [](const Event& a, const Event& b) { return key(a) == key(b); });
+  const auto removed = static_cast<std::uint64_t>(events.end() - end);
+  events.erase(end, events.end());
+  return removed;
+}
+
+}  // namespace
+
+IntervalSlicer::IntervalSlicer(Microseconds length, Microseconds start)
+    : length_(length), first_(start), given_start_(true), start_(start) {}
+
+void IntervalSlicer::push(std::span<const StampedEvent> events) {
+  if (events.empty()) return;
+  // Nearly always all is as it should be, and nothing has to be looked at one by one.
+  if (ahead_.empty() && latest_ != never && events.front().t >= std::max(latest_, start_) &&
+      events.back().t <= latest_ + settled &&
+      std::is_sorted(events.begin(), events.end(), earlier)) {
+    kept_.insert(kept_.end(), events.begin(), events.end());
+    latest_ = events.back().t;
+    return;
+  }
+  for (const auto& event : events) place(event);
+}
+
+void IntervalSlicer::place(const StampedEvent& event) {
+  if (event.t > longest_time || event.t < -longest_time) {
+    ++dropped_.stray;
+    return;
+  }
+  if (!ahead_.empty()) {
+    if (event.t >= ahead_.front().t - settled) {
+      ahead_.push_back(event);
+      // The clock goes on from where it jumped to.
+      if (event.t - ahead_.front().t >= settled || ahead_.size() >= longest_ahead) believe_ahead();
+      return;
+    }
+    dropped_.stray += ahead_.size();
+    ahead_.clear();
+  }
+  if (first_ && event.t < *first_ && given_start_) return;
+  if (latest_ == never || event.t > latest_ + settled)
+    ahead_.push_back(event);
+  else
+    keep(event);
+}
+
+void IntervalSlicer::keep(const StampedEvent& event) {
+  if (event.t < start_) {
+    dropped_.late += static_cast<std::uint64_t>(!given_start_ || event.t >= *first_);
+    return;
+  }
+  sorted_ &= event.t >= latest_;
+  latest_ = std::max(latest_, event.t);
+  kept_.push_back(event);
+}
+
+void IntervalSlicer::believe_ahead() {
+  if (!first_) {
+    first_ = std::min_element(ahead_.begin(), ahead_.end(), earlier)->t;
+    start_ = *first_;
+  }
+  for (const auto& event : ahead_) keep(event);
+  ahead_.clear();
+}
+
+void IntervalSlicer::reach(Microseconds t) {
+  reached_ = std::max(reached_, std::clamp(t, -longest_time, longest_time));
+  if (!ahead_.empty() && ahead_.front().t < reached_ + settled) believe_ahead();
+}
+
+void IntervalSlicer::finish() {
+  if (!ahead_.empty()) believe_ahead();
+  finished_ = true;
+}
+
+void IntervalSlicer::sort() {
+  if (sorted_) return;
+  std::stable_sort(kept_.begin() + static_cast<std::ptrdiff_t>(head_), kept_.end(), earlier);
+  sorted_ = true;
+}
+
+std::optional<IntervalSlicer::Interval> IntervalSlicer::next() {
+  if (!first_) return std::nullopt;
+  const auto waiting = kept_.size() - head_;
+  auto due = reached_;
+  if (latest_ != never) due = std::max(due, latest_ - settled);
+  const auto end = grid_before(start_) + length_;
+  if (finished_) {
+    if (waiting == 0) return std::nullopt;
+    due = latest_ + 1;
+  } else if (end > due && waiting < most_events) {
+    return std::nullopt;
+  }
+  sort();
+  if (end > due) {
+    // The last interval ends with the last event; one that is too full, in the middle.
+    const auto middle = kept_[head_ + waiting / 2].t;
+    return hand_out(finished_ ? due : std::max(middle, start_ + 1));
+  }
+  const auto silent_until =
+      waiting == 0 ? grid_before(due) : grid_before(std::min(due, kept_[head_].t));
+  return hand_out(std::max(end, silent_until));
+}
+
+IntervalSlicer::Interval IntervalSlicer::hand_out(Microseconds end) {
+  const auto from = kept_.begin() + static_cast<std::ptrdiff_t>(head_);
+  const auto to =
+      std::partition_point(from, kept_.end(), [end](const auto& event) { return event.t < end; });
+  handed_out_.resize(static_cast<std::size_t>(to - from));
+  std::transform(from, to, handed_out_.begin(), [this](const StampedEvent& event) {
+    return Event{static_cast<std::uint32_t>(event.t - start_), event.x, event.y_p};
+  });
+  dropped_.repeated += order_ties(handed_out_);
+  head_ = static_cast<std::size_t>(to - kept_.begin());
+  // What was handed out makes room once it is the greater part, so that little is moved.
+  if (head_ > kept_.size() / 2) {
+    kept_.erase(kept_.begin(), to);
+    head_ = 0;
+  }
+  const Interval interval{start_, end - start_, handed_out_};
+  start_ = end;
+  return interval;
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include "src/core/event.hpp"
+
+namespace eventcamera {
+
+/// A number as it lies in a file, little-endian and at any address.
+template <class Number>
+Number little_endian(const std::uint8_t* bytes) {
+  Number number;
+  std::memcpy(&number, bytes, sizeof number);
+  return number;
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/numpy/npy_encoder.hpp"
+
+#include <cstring>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "src/formats/numpy/npy.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+// The count is blank-padded to the longest, so that any fits.
+constexpr std::string_view before_count =
+    "{'descr': [('x', '<u2'), ('y', '<u2'), ('t', '<i8'), ('p', '|u1')], "
+    "'fortran_order': False, 'shape': (";
+constexpr std::string_view after_count = ")}";
+constexpr std::size_t longest_count = 20;
+constexpr std::size_t preamble = npy_magic.size() + 4;
+constexpr std::size_t header_bytes = 192;  // NumPy aligns the data to 64
+static_assert(preamble + before_count.size() + longest_count + after_count.size() < header_bytes);
+
+/// A tuple of one, such as "50000,".
+std::string shape(std::uint64_t count) {
+  auto text = std::to_string(count) + ',';
+  text.resize(longest_count, ' ');
+  return text;
+}
+
+}  // namespace
+
+void NpyEncoder::begin(std::vector<std::uint8_t>& out) {
+  if (begun_) return;
+  begun_ = true;
+  std::string header(npy_magic);
+  header += {'\x01', '\x00', static_cast<char>(header_bytes - preamble), '\x00'};
+  header += before_count;
+  header += shape(npy_unknown_count);
+  header += after_count;
+  header.resize(header_bytes - 1, ' ');
+  header += '\n';
+  out.insert(out.end(), header.begin(), header.end());
+}
+
+void NpyEncoder::encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) {
+  begin(out);
+  count_ += events.size();
+  auto end = out.size();
+  out.resize(end + events.size() * event_bytes);
+  for (const auto& event : events) {
+    auto* const at = out.data() + end;
+    const auto y = static_cast<std::uint16_t>(event.y());
+    std::memcpy(at, &event.x, 2);
+    std::memcpy(at + 2, &y, 2);
+    std::memcpy(at + 4, &event.t, 8);
+    at[12] = static_cast<std::uint8_t>(event.polarity());
+    end += event_bytes;
+  }
+}
+
+void NpyEncoder::finish(std::vector<std::uint8_t>& out) {
+  begin(out);
+}
+
+NpyEncoder::Patch NpyEncoder::patch() const {
+  Patch patch{preamble + before_count.size(), {}};
+  const auto text = shape(count_);
+  std::memcpy(patch.bytes.data(), text.data(), patch.bytes.size());
+  return patch;
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+
+#include "src/formats/encoder.hpp"
+
+namespace eventcamera {
+
+/// Writes NumPy's format: a structured array of x, y (uint16), t (int64, microseconds) and p
+/// (uint8, 1 = ON). The header, which comes first, has to say how many events there are. Until
+/// patch() is written over it it claims more than any file holds: our decoder then reads to the
+/// end, and numpy.load() refuses rather than give less than there is.
+class NpyEncoder final : public Encoder {
+ public:
+  static constexpr std::size_t event_bytes = 13;
+
+  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override;
+  void finish(std::vector<std::uint8_t>& out) override;
+
+  /// Bytes that belong to another place than they were written at.
+  struct Patch {
+    std::uint64_t position;
+    std::array<std::uint8_t, 20> bytes;
+  };
+
+  /// What to write into the header once all events are encoded.
+  Patch patch() const;
+
+ private:
+  void begin(std::vector<std::uint8_t>& out);
+
+  bool begun_ = false;
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace eventcamera

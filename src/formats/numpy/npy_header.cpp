@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/numpy/npy_header.hpp"
+
+#include <optional>
+#include <string>
+
+#include "src/formats/decoder.hpp"
+#include "src/formats/event_column.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::uint32_t most_element_bytes = 65536;
+
+/// Reads a literal of Python's, of the kinds that NumPy writes into a header.
+class Literal {
+ public:
+  explicit Literal(std::string_view text) : rest_(text) {}
+
+  /// Goes over `mark` if it comes next.
+  bool take(char mark) {
+    skip_blanks();
+    if (!rest_.starts_with(mark)) return false;
+    rest_.remove_prefix(1);
+    return true;
+  }
+
+  void expect(char mark) {
+    if (!take(mark)) fail();
+  }
+
+  /// What stands between quotes. Escapes do not occur in what we look for.
+  std::string_view string() {
+    skip_blanks();
+    if (rest_.empty() || (rest_.front() != '\'' && rest_.front() != '"')) fail();
+    const auto end = rest_.find(rest_.front(), 1);
+    if (end == std::string_view::npos) fail();
+    const auto text = rest_.substr(1, end - 1);
+    rest_.remove_prefix(end + 1);
+    return text;
+  }
+
+  bool starts_with_string() {
+    skip_blanks();
+    return rest_.starts_with('\'') || rest_.starts_with('"');
+  }
+
+  bool boolean() {
+    skip_blanks();
+    for (const std::string_view word : {"True", "False"}) {
+      if (!rest_.starts_with(word)) continue;
+      rest_.remove_prefix(word.size());
+      return word == "True";
+    }
+    fail();
+  }
+
+  std::uint64_t integer() {
+    skip_blanks();
+    std::uint64_t value = 0;
+    std::size_t digits = 0;
+    for (; digits < rest_.size() && rest_[digits] >= '0' && rest_[digits] <= '9'; ++digits) {
+      if (digits == 19) fail();
+      value = value * 10 + static_cast<std::uint64_t>(rest_[digits] - '0');
+    }
+    if (digits == 0) fail();
+    rest_.remove_prefix(digits);
+    if (rest_.starts_with('L')) rest_.remove_prefix(1);  // Python 2 wrote it
+    return value;
+  }
+
+  void expect_end() {
+    skip_blanks();
+    if (!rest_.empty()) fail();
+  }
+
+  [[noreturn]] static void fail() {
+    throw NotThisFormat("This NumPy file's header is not of a structured array");
+  }
+
+ private:
+  void skip_blanks() {
+    while (!rest_.empty() && (rest_.front() == ' ' || rest_.front() == '\n' ||
+                              rest_.front() == '\t' || rest_.front() == '\r'))
+      rest_.remove_prefix(1);
+  }
+
+  std::string_view rest_;
+};
+
+/// A type such as <u2: byte order, kind and size in bytes.
+struct Type {
+  char order, kind;
+  std::uint32_t bytes;
+};
+
+Type read_type(std::string_view text) {
+  if (text.size() < 3) Literal::fail();
+  Literal size(text.substr(2));
+  const auto number = size.integer();
+  if (number > most_element_bytes) throw NotThisFormat("This NumPy file's elements are too large");
+  // A character of a string of U has four bytes.
+  return {text[0], text[1], static_cast<std::uint32_t>(number) * (text[1] == 'U' ? 4 : 1)};
+}
+
+std::optional<NpyField> number_of(const Type& type, std::uint32_t offset) {
+  if (type.order != '<' && type.order != '>' && type.order != '|' && type.order != '=')
+    return std::nullopt;
+  NpyField field;
+  field.big_endian = type.order == '>';
+  field.bytes = type.bytes;
+  field.offset = offset;
+  const bool whole = type.bytes == 1 || type.bytes == 2 || type.bytes == 4 || type.bytes == 8;
+  if (!whole) return std::nullopt;
+  switch (type.kind) {
+    case 'i':
+      field.kind = NpyField::Kind::signed_integer;
+      return field;
+    case 'u':
+      field.kind = NpyField::Kind::unsigned_integer;
+      return field;
+    case 'b':
+      if (type.bytes != 1) return std::nullopt;
+      field.kind = NpyField::Kind::boolean;
+      return field;
+    case 'f':
+      if (type.bytes == 1) return std::nullopt;
+      field.kind = NpyField::Kind::floating;
+      return field;
+    default:
+      return std::nullopt;
+  }
+}
+
+/// The fields: [('x', '<u2'), ('y', '<u2', (3,)), ('', '|V4'), (('title', 'p'), '|u1')].
+void read_fields(Literal& literal, NpyHeader& header) {
+  std::array<bool, 4> known{};
+  literal.expect('[');
+  while (!literal.take(']')) {
+    literal.expect('(');
+    std::string_view name;
+    if (literal.take('(')) {
+      literal.string();
+      literal.expect(',');
+      name = literal.string();
+      literal.expect(')');
+    } else {
+      name = literal.string();
+    }
+    literal.expect(',');
+    if (!literal.starts_with_string())
+      throw NotThisFormat("This NumPy file's fields have fields of their own, which is not read");
+    const auto type = read_type(literal.string());
+    std::uint64_t bytes = type.bytes;
+    bool one = true;
+    if (literal.take(',') && literal.take('(')) {
+      one = false;
+      while (!literal.take(')')) {
+        const auto extent = literal.integer();
+        if (extent > most_element_bytes || (bytes *= extent) > most_element_bytes)
+          throw NotThisFormat("This NumPy file's elements are too large");
+        if (!literal.take(',')) {
+          literal.expect(')');
+          break;
+        }
+      }
+      literal.take(',');
+    }
+    literal.expect(')');
+
+    if (const auto column = event_column_named(name)) {
+      const auto index = static_cast<std::size_t>(*column);
+      const auto number = one ? number_of(type, header.element_bytes) : std::nullopt;
+      if (!number || known[index])
+        throw NotThisFormat("This NumPy file's field '" + std::string(name) +
+                            "' is not a number of 8 to 64 bits");
+      header.fields[index] = *number;
+      known[index] = true;
+    }
+    if (header.element_bytes + bytes > most_element_bytes)
+      throw NotThisFormat("This NumPy file's elements are too large");
+    header.element_bytes += static_cast<std::uint32_t>(bytes);
+    if (!literal.take(',')) {
+      literal.expect(']');
+      break;
+    }
+  }
+  for (const bool is_known : known)
+    if (!is_known) throw NotThisFormat("This NumPy file's array has no fields t, x, y and p");
+}
+
+}  // namespace
+
+NpyHeader read_npy_header(std::string_view dictionary) {
+  NpyHeader header;
+  bool has_fields = false;
+  bool has_shape = false;
+  Literal literal(dictionary);
+  literal.expect('{');
+  while (!literal.take('}')) {
+    const auto key = literal.string();
+    literal.expect(':');
+    if (key == "descr" && !has_fields) {
+      if (literal.starts_with_string())
+        throw NotThisFormat(
+            "This NumPy file has an array of single numbers; a structured array of x, y, t and p "
+            "is read");
+      read_fields(literal, header);
+      has_fields = true;
+    } else if (key == "fortran_order") {
+      literal.boolean();  // in one dimension both orders are the same
+    } else if (key == "shape" && !has_shape) {
+      literal.expect('(');
+      if (literal.take(')')) throw NotThisFormat("This NumPy file has no array of one dimension");
+      header.count = literal.integer();
+      literal.take(',');
+      if (!literal.take(')')) throw NotThisFormat("This NumPy file has no array of one dimension");
+      has_shape = true;
+    } else {
+      Literal::fail();
+    }
+    if (!literal.take(',')) {
+      literal.expect('}');
+      break;
+    }
+  }
+  literal.expect_end();
+  if (!has_fields || !has_shape) Literal::fail();
+  return header;
+}
+
+}  // namespace eventcamera

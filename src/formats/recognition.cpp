@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/recognition.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include "src/formats/text/csv_decoder.hpp"
+#include "src/formats/text_header.hpp"
+
+namespace eventcamera {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+bool has_at(std::size_t at, std::string_view magic, Bytes bytes) {
+  return bytes.size() >= at && bytes.size() - at >= magic.size() &&
+         std::ranges::equal(bytes.subspan(at, magic.size()), magic, {},
+                            [](std::uint8_t byte) { return static_cast<char>(byte); });
+}
+
+constexpr std::string_view hdf5_magic("\x89HDF\r\n\x1a\n", 8);
+
+/// What the first bytes alone tell.
+std::optional<Recognised> by_magic(Bytes bytes) {
+  constexpr std::string_view aedat = "#!AER-DAT";
+  if (has_at(0, aedat, bytes) && has_at(aedat.size() + 1, ".", bytes)) {
+    const int version = bytes[aedat.size()] - '0';
+    if (version >= 1 && version <= 4) return Recognised{FileKind::aedat, version};
+  }
+  if (has_at(0, "Event Stream", bytes)) return Recognised{FileKind::event_stream};
+  if (has_at(0, "\x93NUMPY", bytes)) return Recognised{FileKind::npy};
+  if (has_at(0, hdf5_magic, bytes)) return Recognised{FileKind::hdf5};
+  return std::nullopt;
+}
+
+/// Both begin with lines "% key value". RAW tells its words there; behind DAT's come the type and
+/// the size of its events.
+std::optional<Recognised> by_text_header(Bytes bytes) {
+  if (!has_at(0, "% ", bytes)) return std::nullopt;
+  TextHeader header;
+  while (const auto line = header.take(bytes, false)) {
+    bytes = bytes.subspan(line);
+    if (!header.value("evt").empty() || header.value("format").starts_with("EVT"))
+      return Recognised{FileKind::prophesee_raw};
+  }
+  constexpr std::uint8_t types[] = {0x00, 0x0c, 0x0e};
+  if (header.ended() && bytes.size() >= 2 && std::ranges::count(types, bytes[0]) > 0 &&
+      bytes[1] == 8)
+    return Recognised{FileKind::prophesee_dat, 0, false};
+  return std::nullopt;
+}
+
+/// Whether the reader itself makes events of it, without a line that is none.
+bool is_csv(Bytes bytes) {
+  constexpr std::size_t looked_at = 4096;
+  constexpr std::size_t least_events = 3;
+  bytes = bytes.first(std::min(bytes.size(), looked_at));
+  const auto is_text = [](std::uint8_t byte) {
+    return byte >= ' ' || (byte >= '\t' && byte <= '\r');
+  };
+  if (!std::ranges::all_of(bytes, is_text)) return false;
+  while (!bytes.empty() && bytes.back() != '\n') bytes = bytes.first(bytes.size() - 1);
+  CsvDecoder decoder;
+  Decoded decoded;
+  decoder.decode(bytes, decoded);
+  decoder.finish(decoded);
+  return decoded.events.size() >= least_events && decoder.damage().places == 0;
+}
+
+/// Behind a user block, which may be anything, of a power of two.
+std::optional<Recognised> by_user_block(Bytes bytes) {
+  for (const std::size_t block : {512, 1024, 2048, 4096, 8192})
+    if (has_at(block, hdf5_magic, bytes)) return Recognised{FileKind::hdf5, 0, false};
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Recognised> recognise(Bytes start) {
+  start = start.first(std::min(start.size(), most_recognised_bytes));
+  try {
+    if (const auto found = by_magic(start)) return found;
+    if (const auto found = by_text_header(start)) return found;
+    if (is_csv(start)) return Recognised{FileKind::csv};
+  } catch (const NotThisFormat&) {
+    // It is not text of events; a user block still may be anything.
+  }
+  return by_user_block(start);
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "src/formats/decoder.hpp"
+
+namespace eventcamera {
+
+/// The smallest of the sensors that are sold that has a pixel (x, y); where none has, one that ends
+/// there. So is a file read that does not tell its sensor.
+constexpr SensorSize sensor_with(int x, int y) {
+  constexpr SensorSize sensors[] = {{128, 128}, {240, 180}, {304, 240}, {320, 320}, {346, 260},
+                                    {480, 360}, {640, 480}, {768, 512}, {1280, 720}};
+  for (const auto& sensor : sensors)
+    if (x < sensor.width && y < sensor.height) return sensor;
+  return {std::max(x + 1, sensors[8].width), std::max(y + 1, sensors[8].height)};
+}
+
+/// The part of a sensor that events come from, where a file does not tell its size.
+class UsedPixels {
+ public:
+  void include(std::span<const StampedEvent> events) {
+    for (const auto& event : events) {
+      largest_x_ = std::max<int>(largest_x_, event.x);
+      largest_y_ = std::max(largest_y_, event.y());
+    }
+  }
+
+  SensorSize sensor() const { return sensor_with(largest_x_, largest_y_); }
+
+ private:
+  int largest_x_ = 0;
+  int largest_y_ = 0;
+};
+
+/// Leaves out events that lie outside the sensor, and returns how many.
+inline std::size_t erase_outside(std::vector<StampedEvent>& events, SensorSize size) {
+  return std::erase_if(events, [&](const StampedEvent& event) {
+    return event.x >= size.width || event.y() >= size.height;
+  });
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,454 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/text/csv_decoder.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "src/formats/text/decimal.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::size_t head_lines = 256;
+constexpr std::size_t longest_head = 65536;
+constexpr std::size_t longest_line = 4096;
+
+/// What read_plain_line() may look at from a line's first character on.
+constexpr std::ptrdiff_t plain_line_reach = 128;
+
+constexpr bool is_blank(char letter) {
+  return letter == ' ' || letter == '\t' || letter == '\r';
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+bool is_word(std::string_view text, std::string_view word) {
+  return std::ranges::equal(text, word, {}, [](char letter) {
+    return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
+  });
+}
+
+bool is_comment(std::string_view line) {
+  return line.empty() || line.front() == '#' || line.front() == '%';
+}
+
+std::optional<int> read_extent(std::string_view text) {
+  const auto number = read_decimal(trimmed(text), 0);
+  if (!number || number->has_fraction || number->value <= 0 || number->value > 65535)
+    return std::nullopt;
+  return static_cast<int>(number->value);
+}
+
+std::optional<bool> read_polarity(std::string_view text) {
+  if (text == "1") return true;
+  if (text == "0") return false;
+  if (is_word(text, "true")) return true;
+  if (is_word(text, "false")) return false;
+  const auto number = read_decimal(text, 0);
+  if (!number || !number->whole || number->value < -1 || number->value > 1) return std::nullopt;
+  return number->value == 1;
+}
+
+int power_of(TimeUnit unit) {
+  switch (unit) {
+    case TimeUnit::seconds:
+      return 6;
+    case TimeUnit::microseconds:
+      return 0;
+    case TimeUnit::nanoseconds:
+      return -3;
+  }
+  return 0;
+}
+
+/// The digits that eight characters begin with, and their value.
+struct Digits {
+  unsigned count;
+  std::uint64_t value;
+};
+
+inline Digits read_digits(const char* at) {
+  std::uint64_t word;
+  std::memcpy(&word, at, sizeof word);
+  word ^= 0x3030303030303030;
+  // What is no digit is now more than 9, and sets its byte's highest bit. A carry out of a byte
+  // disturbs only those behind it, and the first one counts.
+  const auto others = ((word + 0x7676767676767676) | word) & 0x8080808080808080;
+  const auto count = static_cast<unsigned>(std::countr_zero(others)) / 8;
+  if (count == 0) return {0, 0};
+  word <<= 64 - 8 * count;  // the last digit goes to the last byte, and noughts before the first
+  // Neighbours are joined to numbers of two, four and eight digits.
+  word = word * 10 + (word >> 8);
+  word = ((word & 0x000000ff000000ff) * 0x000f424000000064 +
+          ((word >> 16) & 0x000000ff000000ff) * 0x0000271000000001) >>
+         32;
+  return {count, word};
+}
+
+constexpr std::uint64_t powers_of_ten[] = {1,       10,        100,        1'000,      10'000,
+                                           100'000, 1'000'000, 10'000'000, 100'000'000};
+
+/// Up to 16 digits; false where there are none, or more.
+inline bool read_plain_integer(const char*& at, std::uint64_t& value) {
+  const auto digits = read_digits(at);
+  at += digits.count;
+  value = digits.value;
+  if (digits.count < 8) return digits.count > 0;
+  const auto more = read_digits(at);
+  at += more.count;
+  value = value * powers_of_ten[more.count] + more.value;
+  return more.count < 8;
+}
+
+}  // namespace
+
+CsvDecoder::CsvDecoder(const CsvSettings& settings) : settings_(settings) {}
+
+void CsvDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
+  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (in_head_) {
+    const auto count = take_head(text);
+    if (head_lines_ < head_lines && head_.size() < longest_head) return;
+    text.remove_prefix(count);
+    read_head();
+    const auto head = std::move(head_);
+    read_text(std::string_view(head).substr(static_cast<std::size_t>(position_)), out);
+  }
+  read_text(text, out);
+}
+
+void CsvDecoder::finish(Decoded& out) {
+  if (in_head_) {
+    if (head_.empty()) throw NotThisFormat("the file is empty");
+    head_ += '\n';
+    read_head();
+    head_.pop_back();
+    position_ = std::min<std::uint64_t>(position_, head_.size());
+    const auto head = std::move(head_);
+    read_text(std::string_view(head).substr(static_cast<std::size_t>(position_)), out);
+  }
+  if (!rest_.empty()) read_line(rest_, out);
+  position_ += rest_.size();
+  rest_.clear();
+}
+
+/// Adds `text` to the head, up to the head's end, and returns how much that was.
+std::size_t CsvDecoder::take_head(std::string_view text) {
+  std::size_t count = 0;
+  while (count < text.size() && head_lines_ < head_lines && head_.size() < longest_head) {
+    const char letter = text[count++];
+    head_ += letter;
+    if (line_begins_ && letter != '#' && letter != '%' && letter != '\n') ++head_lines_;
+    line_begins_ = letter == '\n';
+  }
+  return count;
+}
+
+std::size_t CsvDecoder::split(std::string_view line, Fields& fields) {
+  std::size_t count = 0;
+  const bool by_marks = line.find_first_of(",;") != std::string_view::npos;
+  line = trimmed(line);
+  while (true) {
+    if (count == fields.size()) return 0;
+    const auto end = line.find_first_of(by_marks ? ",;" : " \t");
+    fields[count++] = trimmed(line.substr(0, end));
+    if (end == std::string_view::npos) return count;
+    line.remove_prefix(end + 1);
+    if (!by_marks) line = trimmed(line);
+  }
+}
+
+/// Finds out what the head's lines are, and where the events begin.
+void CsvDecoder::read_head() {
+  in_head_ = false;
+  std::vector<std::string_view> samples;
+  std::string_view text = head_;
+  constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  position_ = head_.size() - text.size();
+  const bool empty = text.find_first_not_of(" \t\r\n") == std::string_view::npos;
+  while (true) {
+    const auto end = text.find('\n');
+    if (end == std::string_view::npos) break;
+    const auto line = trimmed(text.substr(0, end));
+    text.remove_prefix(end + 1);
+    const bool header = samples.empty() && read_header_line(line);
+    if (header) position_ = head_.size() - text.size();
+    if (!header && !is_comment(line)) samples.push_back(line);
+  }
+  if (!empty && text.size() == head_.size())
+    throw NotThisFormat("This is not text of events: no line ends");
+
+  if (settings_.size != SensorSize{}) size_ = settings_.size;
+  intake_.set_size(size_);
+  if (settings_.order) columns_.assign(settings_.order->begin(), settings_.order->end());
+  find_columns(samples);
+  find_unit(samples);
+  plain_ = columns_.size() == 4;
+  if (!samples.empty()) {
+    const auto mark = samples.front().find_first_of(",; \t");
+    if (mark != std::string_view::npos) separator_ = samples.front()[mark];
+  }
+}
+
+/// Whether this line, before the first event, is none. Takes what it says.
+bool CsvDecoder::read_header_line(std::string_view line) {
+  constexpr std::string_view geometry = "%geometry:";
+  Fields fields;
+  if (line.starts_with(geometry)) {
+    if (split(line.substr(geometry.size()), fields) != 2) return true;
+    const auto width = read_extent(fields[0]);
+    const auto height = read_extent(fields[1]);
+    if (width && height) size_ = {*width, *height};
+    return true;
+  }
+  if (is_comment(line)) return true;
+  const auto count = split(line, fields);
+  if (count == 2) {
+    const auto width = read_extent(fields[0]);
+    const auto height = read_extent(fields[1]);
+    if (!width || !height || size_ != SensorSize{}) return false;
+    size_ = {*width, *height};
+    return true;
+  }
+  std::string_view first = fields[0];
+  if (first.starts_with('"')) first.remove_prefix(1);
+  const char letter = count == 0 || first.empty() ? '0' : static_cast<char>(first[0] | 0x20);
+  if (letter < 'a' || letter > 'z' || !columns_.empty()) return false;
+
+  SensorSize size;
+  for (auto field : std::span(fields).first(count)) {
+    if (field.size() >= 2 && field.front() == '"' && field.back() == '"')
+      field = field.substr(1, field.size() - 2);
+    auto column = event_column_named(field);
+    if (std::ranges::find(columns_, column) != columns_.end()) column.reset();
+    columns_.push_back(column);
+    if (const auto at = field.find('@'); at != std::string_view::npos) {
+      if (column == EventColumn::x) size.width = read_extent(field.substr(at + 1)).value_or(0);
+      if (column == EventColumn::y) size.height = read_extent(field.substr(at + 1)).value_or(0);
+    }
+  }
+  if (size.width > 0 && size.height > 0) size_ = size;
+  const auto known =
+      std::ranges::count_if(columns_, [](auto column) { return column.has_value(); });
+  if (known < 4 && !settings_.order)
+    throw NotThisFormat(
+        "This is not text of events: its first line names no columns t, x, y and p. Set the order");
+  return true;
+}
+
+std::optional<CsvDecoder::Row> CsvDecoder::read_row(
+    std::span<const std::string_view> fields, std::span<const std::optional<EventColumn>> columns,
+    int power) {
+  if (fields.size() != columns.size()) return std::nullopt;
+  Row row;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (!columns[i]) continue;
+    if (*columns[i] == EventColumn::p) {
+      const auto on = read_polarity(fields[i]);
+      if (!on) return std::nullopt;
+      row.on = *on;
+      continue;
+    }
+    const auto number = read_decimal(fields[i], *columns[i] == EventColumn::t ? power : 0);
+    if (!number) return std::nullopt;
+    if (*columns[i] == EventColumn::t) {
+      row.t = *number;
+      continue;
+    }
+    if (!number->whole) return std::nullopt;
+    (*columns[i] == EventColumn::x ? row.x : row.y) = number->value;
+  }
+  return row;
+}
+
+void CsvDecoder::find_columns(const std::vector<std::string_view>& samples) {
+  // Times of the samples that are events with these columns.
+  const auto times_of = [&](const Columns& columns, int power) {
+    std::vector<std::int64_t> times;
+    for (const auto sample : samples) {
+      Fields fields;
+      const auto count = split(sample, fields);
+      const auto row = read_row(std::span(fields).first(count), columns, power);
+      if (row && row->x >= 0 && row->x < 0x10000 && row->y >= 0 && row->y < 0x8000)
+        times.push_back(row->t.value);
+    }
+    return times;
+  };
+  if (!columns_.empty()) {
+    if (!samples.empty() && times_of(columns_, 0).empty())
+      throw NotThisFormat("This is not text of events: its lines do not have the columns expected");
+    return;
+  }
+
+  std::array<bool, 4> has_fraction{};
+  for (const auto sample : samples) {
+    Fields fields;
+    if (split(sample, fields) != has_fraction.size()) continue;
+    for (std::size_t i = 0; i < has_fraction.size(); ++i) {
+      const auto number = read_decimal(fields[i], 0);
+      if (number && number->has_fraction) has_fraction[i] = true;
+    }
+  }
+  const bool one_is_time = std::ranges::count(has_fraction, true) == 1;
+  for (const auto letters : {"txyp", "xypt", "xytp"}) {
+    const auto order = *column_order(letters);
+    const auto at = std::ranges::find(order, EventColumn::t) - order.begin();
+    const bool fraction = has_fraction[static_cast<std::size_t>(at)];
+    Columns columns(order.begin(), order.end());
+    if (samples.empty()) {
+      columns_ = columns;
+      return;
+    }
+    const auto times = times_of(columns, fraction ? 6 : 0);
+    if (times.size() * 2 < samples.size()) continue;
+    if (one_is_time ? !fraction : !std::ranges::is_sorted(times)) continue;
+    columns_ = columns;
+    return;
+  }
+  throw NotThisFormat(
+      "This is not text of events, or its columns cannot be told from its first lines: set the "
+      "order");
+}
+
+void CsvDecoder::find_unit(const std::vector<std::string_view>& samples) {
+  auto unit = TimeUnit::microseconds;
+  for (const auto sample : samples) {
+    Fields fields;
+    const auto count = split(sample, fields);
+    const auto row = read_row(std::span(fields).first(count), columns_, 0);
+    if (row && row->t.has_fraction) unit = TimeUnit::seconds;
+  }
+  power_ = power_of(settings_.unit.value_or(unit));
+}
+
+void CsvDecoder::read_text(std::string_view text, Decoded& out) {
+  if (skipping_ || !rest_.empty()) {
+    const auto end = text.find('\n');
+    const auto part = text.substr(0, end);
+    if (!skipping_ && rest_.size() + part.size() > longest_line) {
+      damage_.note(position_, "a line is too long");
+      position_ += rest_.size();
+      rest_.clear();
+      skipping_ = true;
+    }
+    if (skipping_) {
+      position_ += part.size();
+    } else {
+      rest_ += part;
+    }
+    if (end == std::string_view::npos) return;
+    text.remove_prefix(end + 1);
+    if (!skipping_) read_line(rest_, out);
+    position_ += rest_.size() + 1;
+    rest_.clear();
+    skipping_ = false;
+  }
+
+  const auto last = text.rfind('\n');
+  if (last != std::string_view::npos) {
+    const auto* const begin = text.data();
+    text.remove_prefix(static_cast<std::size_t>(read_lines(begin, begin + last + 1, out) - begin));
+  }
+  if (text.size() > longest_line) {
+    damage_.note(position_, "a line is too long");
+    position_ += text.size();
+    skipping_ = true;
+  } else {
+    rest_ = text;
+  }
+}
+
+/// Reads whole lines, and returns `end`.
+const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out) {
+  while (at < end) {
+    if (plain_) {
+      const char* const first = at;
+      while (end - at > plain_line_reach) {
+        Row row;
+        const char* const next = read_plain_line(at, row);
+        if (next == nullptr) break;
+        intake_.take(row.t.value, row.x, row.y, row.on, out.events, damage_);
+        at = next;
+      }
+      position_ += static_cast<std::uint64_t>(at - first);
+    }
+    const auto* const line_end =
+        static_cast<const char*>(std::memchr(at, '\n', static_cast<std::size_t>(end - at)));
+    const std::string_view line(at, static_cast<std::size_t>(line_end - at));
+    if (line.size() > longest_line) {
+      damage_.note(position_, "a line is too long");
+    } else {
+      read_line(line, out);
+    }
+    position_ += line.size() + 1;
+    at = line_end + 1;
+  }
+  return end;
+}
+
+/// Reads a line as almost all are: numbers with no sign but of the polarity, one separator, no
+/// blanks. Returns what follows it, or nothing where it is written in any other way.
+const char* CsvDecoder::read_plain_line(const char* at, Row& row) const {
+  std::array<std::uint64_t, 4> values;
+  for (const auto& column : columns_) {
+    auto& value = values[static_cast<std::size_t>(*column)];
+    if (*column == EventColumn::p) {
+      const bool minus = *at == '-';
+      at += minus ? 1 : 0;
+      const auto digit = static_cast<unsigned char>(*at++ - '0');
+      if (digit > 1) return nullptr;
+      value = minus ? 0 : digit;
+    } else {
+      if (!read_plain_integer(at, value)) return nullptr;
+      if (*column == EventColumn::t) {
+        if (power_ == 6) {
+          if (value > 1'000'000'000'000) return nullptr;
+          value *= 1'000'000;
+          if (*at == '.') {
+            ++at;
+            const auto digits = read_digits(at);
+            at += digits.count;
+            if (digits.count == 8) at += read_digits(at).count;
+            value += (digits.value * powers_of_ten[8 - digits.count] + 50) / 100;
+          }
+        } else if (power_ == -3) {
+          value = (value + 500) / 1000;
+        }
+      }
+    }
+    if (&column != &columns_.back() && *at++ != separator_) return nullptr;
+  }
+  if (*at == '\r') ++at;
+  if (*at++ != '\n') return nullptr;
+
+  const auto number = [&](EventColumn column) {
+    return static_cast<std::int64_t>(values[static_cast<std::size_t>(column)]);
+  };
+  row.t.value = number(EventColumn::t);
+  row.x = number(EventColumn::x);
+  row.y = number(EventColumn::y);
+  row.on = number(EventColumn::p) == 1;
+  return at;
+}
+
+void CsvDecoder::read_line(std::string_view line, Decoded& out) {
+  line = trimmed(line);
+  if (is_comment(line)) return;
+  Fields fields;
+  const auto count = split(line, fields);
+  const auto row = read_row(std::span(fields).first(count), columns_, power_);
+  if (!row) {
+    damage_.note(position_, "a line is no event");
+    return;
+  }
+  intake_.take(row->t.value, row->x, row->y, row->on, out.events, damage_);
+}
+
+}  // namespace eventcamera

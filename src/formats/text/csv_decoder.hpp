@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "src/formats/decoder.hpp"
+#include "src/formats/event_column.hpp"
+#include "src/formats/event_intake.hpp"
+#include "src/formats/text/csv_dialect.hpp"
+#include "src/formats/text/decimal.hpp"
+
+namespace eventcamera {
+
+/// What is known of a text file beforehand; the rest is found in its first lines.
+struct CsvSettings {
+  std::optional<ColumnOrder> order;
+  std::optional<TimeUnit> unit;
+  SensorSize size;  ///< 0x0: what the header says
+};
+
+/// Reads lines of text. Fields stand between commas, semicolons or blanks; lines that begin with #
+/// or % are comments, and empty ones nothing.
+///
+/// What the settings leave open is found in the header and the first 256 lines:
+/// - the columns, by a line of names; more columns than four are allowed there, and left out. Where
+///   there is none, the time is the column that alone has decimal points; else the first of txyp,
+///   xypt and xytp is taken in which p is a polarity, x and y are coordinates and t never falls;
+/// - the unit of time: seconds where a time has a decimal point or an exponent, else microseconds.
+///   Finer digits are rounded to the nearest microsecond;
+/// - the sensor's size, by %geometry:W,H, by names such as x@W and y@H, or by a first line W H.
+///
+/// Polarity is 0 or 1, -1 or 1, or false or true.
+///
+/// A header or a comment alone is a recording without events; a file of no bytes is none.
+class CsvDecoder final : public Decoder {
+ public:
+  explicit CsvDecoder(const CsvSettings& settings = {});
+
+  void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
+  void finish(Decoded& out) override;
+
+ private:
+  static constexpr std::size_t most_columns = 16;
+  using Fields = std::array<std::string_view, most_columns>;
+
+  struct Row {
+    Decimal t = {};
+    std::int64_t x = 0;
+    std::int64_t y = 0;
+    bool on = false;
+  };
+
+  using Columns = std::vector<std::optional<EventColumn>>;
+
+  static std::size_t split(std::string_view line, Fields& fields);
+  static std::optional<Row> read_row(std::span<const std::string_view> fields,
+                                     std::span<const std::optional<EventColumn>> columns,
+                                     int power);
+  std::size_t take_head(std::string_view text);
+  void read_head();
+  bool read_header_line(std::string_view line);
+  void find_columns(const std::vector<std::string_view>& samples);
+  void find_unit(const std::vector<std::string_view>& samples);
+
+  void read_text(std::string_view text, Decoded& out);
+  const char* read_lines(const char* at, const char* end, Decoded& out);
+  const char* read_plain_line(const char* at, Row& row) const;
+  void read_line(std::string_view line, Decoded& out);
+
+  CsvSettings settings_;
+  bool in_head_ = true;
+  std::string head_;            ///< the first lines, until it is known what they are
+  std::size_t head_lines_ = 0;  ///< of them, those that may be events
+  bool line_begins_ = true;     ///< the next character of the head is a line's first
+
+  Columns columns_;
+  char separator_ = ',';  ///< between the fields of the first line
+  bool plain_ = false;    ///< four columns, so that most lines need not be split
+  int power_ = 0;         ///< of ten, from the time's unit to microseconds
+  EventIntake intake_;
+
+  std::string rest_;  ///< the beginning of a line whose end has not come
+  bool skipping_ = false;
+  std::uint64_t position_ = 0;  ///< of what is read next
+};
+
+}  // namespace eventcamera

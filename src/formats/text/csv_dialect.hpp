@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "src/formats/event_column.hpp"
+
+namespace eventcamera {
+
+enum class TimeUnit : std::uint8_t { seconds, microseconds, nanoseconds };
+
+/// How a text file of events is written.
+struct CsvDialect {
+  /// What comes before the first event.
+  enum class Header : std::uint8_t {
+    none,
+    names,           ///< t,x,y,p
+    names_and_size,  ///< t,x@640,y@480,on
+    geometry,        ///< %geometry:640,480
+    size,            ///< 640 480
+    comment,         ///< # t x y p
+  };
+
+  ColumnOrder order = {EventColumn::t, EventColumn::x, EventColumn::y, EventColumn::p};
+  char separator = ',';
+  TimeUnit unit = TimeUnit::microseconds;
+  Header header = Header::names;
+  bool minus_one = false;        ///< OFF is -1, else 0
+  bool carriage_return = false;  ///< lines end with CR LF
+};
+
+struct NamedCsvDialect {
+  std::string_view name;
+  std::string_view description;
+  CsvDialect dialect;
+};
+
+/// The dialects that other tools write and read.
+std::span<const NamedCsvDialect> csv_dialects();
+
+}  // namespace eventcamera

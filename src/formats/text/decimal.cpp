@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/text/decimal.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace eventcamera {
+
+namespace {
+
+constexpr bool is_digit(char letter) {
+  return letter >= '0' && letter <= '9';
+}
+
+/// Reads digits into `number`, which stops to grow at a limit that no sound exponent reaches.
+int read_exponent(std::string_view digits) {
+  int number = 0;
+  for (const auto digit : digits) number = std::min(number * 10 + (digit - '0'), 100'000);
+  return number;
+}
+
+}  // namespace
+
+std::optional<Decimal> read_decimal(std::string_view text, int power) {
+  std::size_t at = 0;
+  const auto more = [&] { return at < text.size(); };
+  bool negative = false;
+  if (more() && (text[at] == '-' || text[at] == '+')) negative = text[at++] == '-';
+
+  // All digits count up to the 19th, which 64 bits can still hold.
+  constexpr auto room = std::numeric_limits<std::uint64_t>::max() / 10 - 1;
+  std::uint64_t digits = 0;
+  bool whole = true;
+  bool any = false;
+  bool in_fraction = false;
+  bool has_fraction = false;
+  for (; more(); ++at) {
+    if (text[at] == '.' && !in_fraction) {
+      in_fraction = has_fraction = true;
+      continue;
+    }
+    if (!is_digit(text[at])) break;
+    any = true;
+    if (digits <= room) {
+      digits = digits * 10 + static_cast<std::uint64_t>(text[at] - '0');
+      power -= in_fraction ? 1 : 0;
+    } else {
+      whole = whole && text[at] == '0';
+      power += in_fraction ? 0 : 1;
+    }
+  }
+  if (!any) return std::nullopt;
+  if (more() && (text[at] == 'e' || text[at] == 'E')) {
+    ++at;
+    has_fraction = true;
+    bool down = false;
+    if (more() && (text[at] == '-' || text[at] == '+')) down = text[at++] == '-';
+    const auto rest = text.substr(at);
+    if (rest.empty() || !std::ranges::all_of(rest, is_digit)) return std::nullopt;
+    power += down ? -read_exponent(rest) : read_exponent(rest);
+    at = text.size();
+  }
+  if (more()) return std::nullopt;
+
+  constexpr auto most = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  for (; power > 0 && digits != 0; --power) {
+    if (digits > most / 10) return std::nullopt;
+    digits *= 10;
+  }
+  // The last division rounds; those before it only cut, and half stays half or more.
+  for (; power < 0 && digits != 0; ++power) {
+    const auto last = digits % 10;
+    whole = whole && last == 0;
+    digits = digits / 10 + (power == -1 && last >= 5 ? 1 : 0);
+  }
+  if (digits > most) return std::nullopt;
+  const auto value = static_cast<std::int64_t>(digits);
+  return Decimal{negative ? -value : value, whole, has_fraction};
+}
+
+}  // namespace eventcamera

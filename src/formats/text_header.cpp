@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/text_header.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <string_view>
+
+#include "src/formats/decoder.hpp"
+
+namespace eventcamera {
+namespace {
+
+constexpr std::size_t longest_line = 4096;
+constexpr std::size_t longest_header = 65536;
+
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+}  // namespace
+
+std::size_t TextHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
+  if (ended_) return 0;
+  const auto looked_at = bytes.first(std::min(bytes.size(), longest_line));
+  // Binary data may begin as a line does, but hardly goes on as text.
+  const auto stop = std::find_if(looked_at.begin(), looked_at.end(), [](std::uint8_t byte) {
+    return byte < ' ' && byte != '\t' && byte != '\r';
+  });
+  const bool begins = (looked_at.empty() || looked_at[0] == '%') &&
+                      (looked_at.size() < 2 || looked_at[1] == ' ' || looked_at[1] == '\n');
+  const bool whole = stop != looked_at.end() && *stop == '\n';
+  if (!begins || (!whole && (ended || stop != looked_at.end() || bytes.size() >= longest_line))) {
+    ended_ = true;
+    return 0;
+  }
+  if (!whole) return 0;
+
+  const auto length = static_cast<std::size_t>(stop - looked_at.begin()) + 1;
+  length_ += length;
+  if (length_ > longest_header) throw NotThisFormat("the header does not end");
+  found_ = true;
+  const auto line = trimmed({reinterpret_cast<const char*>(looked_at.data()) + 1, length - 2});
+  const auto key = line.substr(0, line.find(' '));
+  if (key == "end") ended_ = true;
+  values_[std::string(key)] = trimmed(line.substr(key.size()));
+  return length;
+}
+
+std::string TextHeader::value(const std::string& key) const {
+  const auto found = values_.find(key);
+  return found == values_.end() ? std::string() : found->second;
+}
+
+int TextHeader::number(const std::string& text, int largest) {
+  int number = 0;
+  const auto end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data(), end, number);
+  return parsed.ec == std::errc() && parsed.ptr == end && number >= 1 && number <= largest ? number
+                                                                                           : 0;
+}
+
+}  // namespace eventcamera

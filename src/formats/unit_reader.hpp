@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "src/formats/decoder.hpp"
+
+namespace eventcamera {
+
+/// What a UnitReader fills: a few thousand events, so that they stay in the cache.
+class Batch {
+ public:
+  /// Of one unit, at the most.
+  static constexpr std::size_t events_per_unit = 32;
+
+  explicit Batch(Damage& damage) : damage_(damage) {}
+
+  StampedEvent* begin() { return events_.data(); }
+
+  /// Where no other unit is read.
+  StampedEvent* full() { return events_.data() + events_.size() - events_per_unit; }
+
+  /// Notes that the bytes at `at` are no unit. Such units in a row are one place.
+  void bad(const std::uint8_t* at, std::size_t bytes, const char* what) {
+    const auto position = start_position + static_cast<std::uint64_t>(at - start);
+    if (position != bad_end_) damage_.note(position, what);
+    bad_end_ = position + bytes;
+  }
+
+  void outside(std::uint64_t events) { damage_.outside += events; }
+
+  StampedEvent* end = nullptr;               ///< of the events
+  std::vector<Trigger>* triggers = nullptr;  ///< appended to
+  const std::uint8_t* start = nullptr;       ///< of the bytes
+  std::uint64_t start_position = 0;          ///< in the file
+
+ private:
+  std::array<StampedEvent, 4096> events_;
+  Damage& damage_;
+  std::uint64_t bad_end_ = ~std::uint64_t{0};
+};
+
+/// Reads a format's units: words, or some bytes that are an event.
+class UnitReader {
+ public:
+  struct State {
+    Microseconds clock = 0;
+    std::uint64_t rest = 0;
+  };
+
+  /// Of the longest unit, in bytes.
+  static constexpr std::size_t longest = 8;
+
+  virtual ~UnitReader() = default;
+  UnitReader(const UnitReader&) = delete;
+  UnitReader& operator=(const UnitReader&) = delete;
+
+  /// Reads units, until the batch is full or what is left is none; returns where that is.
+  virtual const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
+                                   Batch& batch) = 0;
+
+  /// All that the reader knows of what it has read. At the start of the data it is State{}.
+  virtual State state() const = 0;
+  virtual void restore(const State& state) = 0;
+
+ protected:
+  UnitReader() = default;
+};
+
+/// A little-endian number.
+template <class Word>
+Word load(const std::uint8_t* bytes) {
+  Word word;
+  std::memcpy(&word, bytes, sizeof word);
+  return word;
+}
+
+/// What is within the sensor.
+class Bounds {
+ public:
+  /// A sensor of unknown size is as large as it can be.
+  constexpr Bounds(SensorSize size, int largest)
+      : width_(static_cast<std::uint32_t>(size.width > 0 ? size.width : largest)),
+        height_(static_cast<std::uint32_t>(size.height > 0 ? size.height : largest)) {}
+
+  constexpr bool contain(std::uint32_t x, std::uint32_t y) const {
+    return static_cast<bool>(static_cast<int>(x < width_) & static_cast<int>(y < height_));
+  }
+
+  /// Of 32 pixels from (x, y) to the right, those within: bit i is (x + i, y).
+  constexpr std::uint32_t of_32(std::uint32_t x, std::uint32_t y) const {
+    if (x >= width_ || y >= height_) return 0;
+    const auto left = width_ - x;
+    return left >= 32 ? ~std::uint32_t{0} : (std::uint32_t{1} << left) - 1;
+  }
+
+ private:
+  std::uint32_t width_;
+  std::uint32_t height_;
+};
+
+}  // namespace eventcamera

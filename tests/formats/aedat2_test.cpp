@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// AEDAT 2.0: files made byte by byte are read, through wraps and silences and in any split; broken
+// ones lose what is broken.
+#include <gtest/gtest.h>
+
+#include "src/formats/aedat/aedat2_decoder.hpp"
+#include "tests/formats/aedat_files.hpp"
+#include "tests/formats/pieces.hpp"
+#include "tests/formats/random_events.hpp"
+#include "tests/formats/shared_data.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using aedat_files::Bytes;
+using pieces::decoded;
+
+constexpr SensorSize davis346{346, 260};
+constexpr SensorSize dvs128{128, 128};
+constexpr Microseconds hour = 3'600'000'000;
+
+TEST(Aedat2, Davis) {
+  const auto events = random_events::make(davis346, 30'000, 1, 0, {hour});
+  const auto bytes =
+      aedat_files::aedat2_davis(events, davis346, "eu.seebetter.ini.chips.davis.Davis346blue");
+  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}, std::size_t{0}}) {
+    Aedat2Decoder decoder;
+    EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
+    EXPECT_EQ(decoder.size(), davis346);
+    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+    EXPECT_EQ(decoder.damage().unsorted + decoder.damage().outside, 0U);
+  }
+}
+
+TEST(Aedat2, Dvs128) {
+  const auto events = random_events::make(dvs128, 30'000, 2, 5, {hour});
+  const auto bytes = aedat_files::aedat2_dvs128(events);
+  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}, std::size_t{0}}) {
+    Aedat2Decoder decoder;
+    EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
+    EXPECT_EQ(decoder.size(), dvs128);
+    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+  }
+}
+
+TEST(Aedat2, AddressesAsTheFormatHasThem) {
+  auto bytes = aedat_files::aedat2_header("Davis240C");
+  aedat_files::add_record(bytes, 7U << 22 | 3U << 12 | 1U << 11, 1000);
+  aedat_files::add_record(bytes, 0x80000000U | 5U << 22 | 123, 1001);    // a frame's sample
+  aedat_files::add_record(bytes, 0x80000000U | 3U << 10, 1002);          // the IMU's
+  aedat_files::add_record(bytes, 1U << 10, 1003);                        // a trigger
+  aedat_files::add_record(bytes, 1U << 10 | 2, 1004);                    // a falling one
+  aedat_files::add_record(bytes, 9U << 22 | 4U << 12 | 1U << 10, 1005);  // v2e's noise
+  Aedat2Decoder decoder;
+  const auto out = decoded(decoder, bytes);
+  EXPECT_EQ(decoder.size(), (SensorSize{240, 180}));
+  EXPECT_EQ(out.events, (std::vector{StampedEvent::at(236, 172, 1000, Polarity::on),
+                                     StampedEvent::at(235, 170, 1005, Polarity::off)}));
+  EXPECT_EQ(out.triggers, (std::vector<Trigger>{{1003, 0, true}, {1004, 0, false}}));
+
+  bytes = aedat_files::aedat2_header("DVS128");
+  aedat_files::add_record(bytes, 2U << 8 | 9U << 1, 50);
+  aedat_files::add_record(bytes, 2U << 8 | 9U << 1 | 1, 51);
+  aedat_files::add_record(bytes, 0x8000, 52);
+  Aedat2Decoder other;
+  const auto of_dvs = decoded(other, bytes);
+  EXPECT_EQ(of_dvs.events, (std::vector{StampedEvent::at(118, 125, 50, Polarity::on),
+                                        StampedEvent::at(118, 125, 51, Polarity::off)}));
+  EXPECT_EQ(of_dvs.triggers, (std::vector<Trigger>{{52, 0, true}}));
+}
+
+TEST(Aedat2, WrapsAreFollowedThroughSilence) {
+  std::vector<StampedEvent> events;
+  Microseconds t = 0;
+  for (int i = 0; i < 40; ++i) {
+    events.push_back(StampedEvent::at(i, i, t, Polarity::on));
+    events.push_back(StampedEvent::at(i, i, t + 3, Polarity::off));
+    t += 70LL * 60 * 1'000'000;  // a wrap takes 71.6 minutes
+  }
+  Aedat2Decoder decoder;
+  EXPECT_TRUE(decoded(decoder, aedat_files::aedat2_dvs128(events)).events == events);
+  EXPECT_EQ(decoder.damage().places, 0U);
+}
+
+TEST(Aedat2, DisorderIsCountedEvenAcrossAWrap) {
+  const auto wrap = Microseconds{1} << 32;
+  std::vector<StampedEvent> events;
+  for (const auto t : {wrap / 2 - 2, wrap / 2 + 1, wrap / 2 - 1, wrap / 2 + 2, wrap / 2 - 500})
+    events.push_back(StampedEvent::at(1, 1, t, Polarity::on));
+  Aedat2Decoder decoder;
+  EXPECT_TRUE(decoded(decoder, aedat_files::aedat2_dvs128(events)).events == events);
+  EXPECT_EQ(decoder.damage().unsorted, 2U);
+}
+
+TEST(Aedat2, ACameraThatIsNotNamedIsAssumed) {
+  const auto size_of = [](std::string_view line, SensorSize assumed) {
+    auto bytes = aedat_files::aedat2_header("");
+    aedat_files::add(bytes, std::string(line));
+    Aedat2Decoder decoder(assumed);
+    decoded(decoder, bytes);
+    return decoder.size();
+  };
+  EXPECT_EQ(size_of("", {}), dvs128);
+  EXPECT_EQ(size_of("# created by v2e\r\n", {}), davis346);
+  EXPECT_EQ(size_of("# created by v2e\r\n", {240, 180}), (SensorSize{240, 180}));
+}
+
+TEST(Aedat2, WhatIsNotAedat2IsRefused) {
+  for (const std::string_view text : {"", "#", "#!AER-DAT3.1\r\n", "#!AER-DAT4.0\r\n",
+                                      "% evt 3.0\n", "#!AER-DAT2.0\r\n# AEChip: Cochlea\r\n"}) {
+    const Bytes bytes(text.begin(), text.end());
+    Aedat2Decoder decoder;
+    EXPECT_THROW(decoded(decoder, bytes), NotThisFormat) << text;
+  }
+}
+
+TEST(Aedat2, MissingBytesCostNoMoreThanTheNextFewRecords) {
+  const auto events = random_events::make(dvs128, 2000, 4, 1'000'000'000, {1000});
+  const auto sound = aedat_files::aedat2_dvs128(events);
+  const auto data = sound.size() - 8 * events.size();
+  for (std::size_t missing = 1; missing < 8; ++missing) {
+    auto bytes = sound;
+    const auto at = static_cast<std::ptrdiff_t>(data + 8 * 1000 + 3);
+    bytes.erase(bytes.begin() + at, bytes.begin() + at + static_cast<std::ptrdiff_t>(missing));
+    for (const std::size_t piece : {1000, 1}) {
+      Aedat2Decoder decoder;
+      const auto found = decoded(decoder, bytes, piece).events;
+      EXPECT_GE(found.size(), 1990U);
+      EXPECT_TRUE(std::equal(events.end() - 990, events.end(), found.end() - 990)) << missing;
+      EXPECT_EQ(decoder.damage().places, 1U);
+      EXPECT_NEAR(static_cast<double>(decoder.damage().first_at), static_cast<double>(at), 16);
+    }
+  }
+}
+
+TEST(Aedat2, ATimeFarFromItsNeighboursMovesNoOther) {
+  const auto events = random_events::make(davis346, 100, 4, 1'000'000'000, {1000});
+  auto bytes = aedat_files::aedat2_davis(events, davis346, "Davis346");
+  bytes[bytes.size() - 8 * 50 + 4] ^= 0x40;
+  bytes[bytes.size() - 8 * 30] |= 0x7f;  // a row that is not there
+  Aedat2Decoder decoder;
+  auto expected = events;
+  expected.erase(expected.begin() + 70);
+  expected.erase(expected.begin() + 50);
+  EXPECT_TRUE(decoded(decoder, bytes, 1).events == expected);
+  EXPECT_EQ(decoder.damage().places, 1U);
+  EXPECT_EQ(decoder.damage().outside, 1U);
+}
+
+TEST(Aedat2, RandomDamageEndsAndIsTheSameForAnySplit) {
+  std::mt19937 random(5);
+  const auto events = random_events::make(davis346, 1000, 6, 0, {hour});
+  const auto sound = aedat_files::aedat2_davis(events, davis346, "Davis346");
+  for (int round = 0; round < 300; ++round) {
+    auto bytes = sound;
+    for (unsigned i = 0; i < 1 + random() % 20; ++i)
+      bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
+    bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(random() % bytes.size()));
+    Decoded whole;
+    Decoded split;
+    Aedat2Decoder a;
+    Aedat2Decoder b;
+    bool refused = false;
+    try {
+      whole = decoded(a, bytes);
+    } catch (const NotThisFormat&) {
+      refused = true;
+    }
+    try {
+      split = decoded(b, bytes, 0);
+      ASSERT_FALSE(refused);
+    } catch (const NotThisFormat&) {
+      ASSERT_TRUE(refused);
+    }
+    if (refused) continue;
+    ASSERT_TRUE(whole.events == split.events);
+    ASSERT_EQ(a.damage().places, b.damage().places);
+    ASSERT_EQ(a.damage().first_at, b.damage().first_at);
+  }
+}
+
+TEST(Aedat2, ARecordingWithALongHeader) {
+  const auto bytes = shared_data::events_file("aedat2-dvs128-header.aedat");
+  if (bytes.empty()) GTEST_SKIP() << "no aedat2-dvs128-header.aedat in $SHARED_DATA";
+  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}}) {
+    Aedat2Decoder decoder;
+    decoded(decoder, bytes, piece);
+    EXPECT_EQ(decoder.data_at(), 4241U);
+    EXPECT_EQ(decoder.size(), dvs128);
+    // What is there is "$$$...\r\n", no address of a DVS128; the last 6 bytes are no record.
+    EXPECT_EQ(decoder.damage().places, 1U);
+    EXPECT_EQ(decoder.damage().first_at, 4241U);
+    EXPECT_EQ((bytes.size() - decoder.data_at()) % 8, 6U);
+  }
+}
+
+}  // namespace

@@ -1,0 +1,683 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// AEDAT4: what is written is read back equal, by us, by a strict validator and by Python's
+// libraries; a recording of a camera gives the known counts; any split gives the same; broken files
+// lose what is broken and no more.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <numeric>
+
+#include "src/formats/aedat/aedat4_decoder.hpp"
+#include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/aedat/aedat4_table.hpp"
+#include "tests/formats/aedat4_validator.hpp"
+#include "tests/formats/aedat_files.hpp"
+#include "tests/formats/pieces.hpp"
+#include "tests/formats/random_events.hpp"
+#include "tests/formats/shared_data.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using aedat_files::Bytes;
+
+constexpr Microseconds hour = 3'600'000'000;
+constexpr std::array compressions{Aedat4Compression::none, Aedat4Compression::lz4,
+                                  Aedat4Compression::lz4_high, Aedat4Compression::zstd,
+                                  Aedat4Compression::zstd_high};
+
+struct Picture {
+  Aedat4Frame frame;
+  Bytes pixels;
+};
+
+/// All that a decoder hands over.
+struct Contents {
+  std::vector<std::vector<StampedEvent>> events;  ///< of each stream
+  std::vector<Picture> frames;
+  std::vector<Trigger> triggers;
+  std::size_t items = 0;
+};
+
+void take(Aedat4Decoder& decoder, Contents& out) {
+  while (const auto item = decoder.next()) {
+    ++out.items;
+    out.events.resize(decoder.streams().size());
+    if (const auto* events = std::get_if<Aedat4Events>(&*item)) {
+      auto& all = out.events[events->stream];
+      all.insert(all.end(), events->events.begin(), events->events.end());
+    } else if (const auto* picture = std::get_if<Aedat4Picture>(&*item)) {
+      const auto& frame = picture->frame;
+      out.frames.push_back({frame, {frame.pixels, frame.pixels + frame.stride * frame.height}});
+    } else {
+      const auto triggers = std::get<Aedat4Triggers>(*item).triggers;
+      out.triggers.insert(out.triggers.end(), triggers.begin(), triggers.end());
+    }
+  }
+}
+
+Contents decoded(Aedat4Decoder& decoder, std::span<const std::uint8_t> bytes,
+                 std::size_t piece = std::size_t{1} << 20) {
+  Contents contents;
+  for (const auto part : pieces::of(bytes, piece)) {
+    // What was pushed is gone once it has been read.
+    auto copy = std::make_unique<std::uint8_t[]>(part.size());
+    std::copy(part.begin(), part.end(), copy.get());
+    decoder.push({copy.get(), part.size()});
+    take(decoder, contents);
+  }
+  decoder.finish();
+  take(decoder, contents);
+  contents.events.resize(decoder.streams().size());
+  return contents;
+}
+
+/// Ends the file, and does with it what whoever can seek does.
+void finish(Aedat4Encoder& encoder, Bytes& bytes) {
+  encoder.finish(bytes);
+  if (const auto patch = encoder.patch())
+    std::copy(patch->bytes.begin(), patch->bytes.end(),
+              bytes.begin() + static_cast<std::ptrdiff_t>(patch->position));
+}
+
+Bytes encoded(const Aedat4Settings& settings, std::span<const StampedEvent> events,
+              std::size_t piece = 1000) {
+  Aedat4Encoder encoder(settings);
+  Bytes bytes;
+  while (!events.empty()) {
+    const auto count = std::min(piece, events.size());
+    encoder.encode(events.first(count), bytes);
+    events = events.subspan(count);
+  }
+  finish(encoder, bytes);
+  return bytes;
+}
+
+/// A file by hand of one stream, 346x260, with these packets.
+Bytes file_of(std::initializer_list<std::span<const StampedEvent>> packets) {
+  auto bytes = aedat_files::aedat4_header(aedat_files::xml_of_one_stream);
+  for (const auto& packet : packets)
+    aedat_files::add_packet(bytes, 0, aedat_files::events_content(packet));
+  return bytes;
+}
+
+std::vector<StampedEvent> some_events(std::size_t count, unsigned seed = 3,
+                                      Microseconds start = 1'600'000'000'000'000) {
+  return random_events::make({346, 260}, count, seed, start, {hour});
+}
+
+TEST(Aedat4, ReadsBackWhatItWrites) {
+  unsigned seed = 1;
+  for (const auto compression : compressions)
+    for (const SensorSize size :
+         {SensorSize{1, 1}, {1, 2048}, {346, 260}, {1280, 720}, {2048, 2048}, {32767, 32767}})
+      for (const bool table : {false, true}) {
+        SCOPED_TRACE(testing::Message() << static_cast<int>(compression) << " " << size.width << "x"
+                                        << size.height << " table " << table);
+        const auto events = random_events::make(size, 10'000, ++seed, -5, {200 * hour});
+        const auto bytes = encoded({size, "made", compression, false, table}, events);
+        Aedat4Decoder decoder;
+        const auto contents = decoded(decoder, bytes);
+        ASSERT_EQ(decoder.streams().size(), 1U);
+        EXPECT_EQ(decoder.streams()[0].size, size);
+        EXPECT_EQ(decoder.streams()[0].source, "made");
+        EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+        EXPECT_EQ(decoder.damage().unsorted + decoder.damage().outside, 0U);
+        EXPECT_EQ(decoder.table_at().has_value(), table);
+        ASSERT_TRUE(contents.events[0] == events);
+
+        const auto valid = aedat4_validator::read(bytes);
+        ASSERT_TRUE(valid.events == events);
+        EXPECT_EQ(valid.largest_packet, 4096U);
+        EXPECT_EQ(valid.packets.size(), 3U);
+        if (table) {
+          EXPECT_EQ(valid.table, valid.packets);
+        }
+      }
+}
+
+TEST(Aedat4, SplittingTheInputOfTheEncoderChangesNothing) {
+  const auto events = some_events(20'000);
+  const Aedat4Settings settings{{346, 260}, "", Aedat4Compression::zstd, false, true};
+  const auto whole = encoded(settings, events, events.size());
+  for (const std::size_t piece : {1, 17, 4096, 9000})
+    EXPECT_TRUE(encoded(settings, events, piece) == whole) << piece;
+}
+
+TEST(Aedat4, AnySplitOfTheBytesGivesTheSame) {
+  for (const auto compression : compressions) {
+    const auto bytes = encoded({{346, 260}, "", compression, false, true}, some_events(9000));
+    Aedat4Decoder decoder;
+    const auto whole = decoded(decoder, bytes);
+    for (const std::size_t piece : {0, 1, 7, 1000}) {
+      Aedat4Decoder other;
+      const auto contents = decoded(other, bytes, piece);
+      EXPECT_TRUE(contents.events == whole.events) << piece;
+      EXPECT_EQ(contents.items, whole.items);
+      EXPECT_EQ(other.damage().places, 0U);
+    }
+  }
+}
+
+TEST(Aedat4, FramesOfEveryFormatAmongEvents) {
+  const auto events = some_events(100);
+  for (const auto format : {Aedat4PixelFormat::grey8, Aedat4PixelFormat::grey16,
+                            Aedat4PixelFormat::bgr, Aedat4PixelFormat::bgra}) {
+    Bytes pixels(64 * 50);
+    std::iota(pixels.begin(), pixels.end(), std::uint8_t{0});
+    const auto t = events[49].t;
+    const Aedat4Frame frame{t, t - 9, t + 9, t - 5, t + 5, format, 13, 50, 3, 4, pixels.data(), 64};
+    Aedat4Encoder encoder(
+        {{346, 260}, "a \"<camera>\" & more", Aedat4Compression::lz4, true, true});
+    Bytes bytes;
+    encoder.encode(std::span(events).first(50), bytes);
+    encoder.encode(frame, bytes);
+    encoder.encode(std::span(events).subspan(50), bytes);
+    finish(encoder, bytes);
+
+    const auto valid = aedat4_validator::read(bytes);
+    EXPECT_EQ(valid.table, valid.packets);
+    EXPECT_EQ(valid.packets.size(), 3U);
+    ASSERT_EQ(valid.frames.size(), 1U);
+    EXPECT_EQ(valid.frames[0].format, static_cast<int>(format));
+
+    Aedat4Decoder decoder;
+    const auto contents = decoded(decoder, bytes);
+    ASSERT_EQ(decoder.streams().size(), 2U);
+    EXPECT_EQ(decoder.streams()[1].kind, Aedat4Kind::frames);
+    EXPECT_EQ(decoder.streams()[1].source, "a \"<camera>\" & more");
+    EXPECT_TRUE(contents.events[0] == events);
+    ASSERT_EQ(contents.frames.size(), 1U);
+    const auto& read = contents.frames[0].frame;
+    EXPECT_EQ(read.t, t);
+    EXPECT_EQ(read.begin, t - 9);
+    EXPECT_EQ(read.end, t + 9);
+    EXPECT_EQ(read.exposure_begin, t - 5);
+    EXPECT_EQ(read.exposure_end, t + 5);
+    EXPECT_EQ(read.format, format);
+    EXPECT_EQ(read.x, 3);
+    EXPECT_EQ(read.y, 4);
+    ASSERT_EQ(read.width, 13);
+    ASSERT_EQ(read.height, 50);
+    const auto row = static_cast<std::size_t>(13 * bytes_per_pixel(format));
+    for (std::size_t y = 0; y < 50; ++y)
+      EXPECT_EQ(
+          std::memcmp(contents.frames[0].pixels.data() + y * row, pixels.data() + y * 64, row), 0);
+    EXPECT_EQ(valid.frames[0].pixels, contents.frames[0].pixels);
+  }
+}
+
+TEST(Aedat4, FramesThatCannotBeWrittenAreRefused) {
+  Bytes bytes;
+  Aedat4Encoder without({{346, 260}, ""});
+  std::uint8_t pixel = 0;
+  Aedat4Frame frame{0, 0, 0, 0, 0, Aedat4PixelFormat::grey8, 1, 1, 0, 0, &pixel, 1};
+  EXPECT_THROW(without.encode(frame, bytes), std::invalid_argument);
+  Aedat4Encoder with({{346, 260}, "", Aedat4Compression::none, true});
+  frame.width = 40'000;
+  EXPECT_THROW(with.encode(frame, bytes), std::invalid_argument);
+  EXPECT_THROW(Aedat4Encoder({{0, 260}, ""}), std::invalid_argument);
+  EXPECT_THROW(Aedat4Encoder({{346, 32768}, ""}), std::invalid_argument);
+}
+
+TEST(Aedat4, AFileWithoutEventsHasAHeader) {
+  const auto bytes = encoded({{346, 260}, "", Aedat4Compression::lz4, false, true}, {});
+  EXPECT_TRUE(aedat4_validator::read(bytes).events.empty());
+  Aedat4Decoder decoder;
+  EXPECT_EQ(decoded(decoder, bytes).items, 0U);
+  EXPECT_TRUE(decoder.header_read());
+  EXPECT_EQ(decoder.damage().places, 0U);
+}
+
+TEST(Aedat4, EveryTriggerSource) {
+  auto bytes = aedat_files::aedat4_header("");
+  std::vector<aedat_files::TriggerSource> sources;
+  for (int source = 0; source < 10; ++source) sources.push_back({1000 + source, source});
+  aedat_files::add_packet(bytes, 3, aedat_files::triggers_content(sources));
+  Aedat4Decoder decoder;
+  const auto contents = decoded(decoder, bytes);
+  const std::vector<Trigger> expected{
+      {1000, 4, true},  {1001, 0, true}, {1002, 0, false}, {1003, 0, true}, {1004, 1, true},
+      {1005, 1, false}, {1006, 2, true}, {1007, 2, false}, {1008, 3, true}, {1009, 3, false}};
+  EXPECT_EQ(contents.triggers, expected);
+  EXPECT_EQ(decoder.streams()[0].kind, Aedat4Kind::triggers);
+  EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+}
+
+TEST(Aedat4, StreamsThatTheHeaderDoesNotListAreFound) {
+  const auto events = some_events(100);
+  auto bytes = aedat_files::aedat4_header("");
+  aedat_files::add_packet(bytes, 7, aedat_files::events_content(events));
+  Aedat4Decoder decoder;
+  EXPECT_TRUE(decoded(decoder, bytes).events[0] == events);
+  EXPECT_EQ(decoder.streams()[0].id, 7);
+  EXPECT_EQ(decoder.streams()[0].size, SensorSize{});
+}
+
+TEST(Aedat4, ReadsThePlainFile) {
+  const auto events = some_events(5000);
+  Aedat4Decoder decoder;
+  EXPECT_TRUE(decoded(decoder, file_of({events})).events[0] == events);
+  EXPECT_EQ(decoder.streams()[0].size, (SensorSize{346, 260}));
+  EXPECT_EQ(decoder.damage().places, 0U);
+}
+
+TEST(Aedat4, EventsOutsideAndUnsortedOnesAreCounted) {
+  const std::vector<StampedEvent> events{
+      StampedEvent::at(345, 259, 100, Polarity::on), StampedEvent::at(346, 0, 101, Polarity::on),
+      StampedEvent::at(0, 260, 102, Polarity::off),  StampedEvent::at(5, 5, 90, Polarity::on),
+      StampedEvent::at(5, 6, 95, Polarity::on),      StampedEvent::at(32767, 1, 99, Polarity::on),
+      StampedEvent::at(5, 6, 100, Polarity::on)};
+  Aedat4Decoder decoder;
+  const auto contents = decoded(decoder, file_of({events}));
+  const std::vector<StampedEvent> kept{events[0], events[3], events[4], events[6]};
+  EXPECT_TRUE(contents.events[0] == kept);
+  EXPECT_EQ(decoder.damage().outside, 3U);
+  EXPECT_EQ(decoder.damage().unsorted, 2U);
+  EXPECT_EQ(decoder.damage().places, 0U);
+}
+
+TEST(Aedat4, ImpossibleTimesAreDropped) {
+  const auto far = std::numeric_limits<Microseconds>::max();
+  const std::vector<StampedEvent> events{
+      StampedEvent::at(1, 1, -far - 1, Polarity::on), StampedEvent::at(1, 2, 5, Polarity::on),
+      StampedEvent::at(1, 3, far, Polarity::on), StampedEvent::at(1, 4, 6, Polarity::on)};
+  Aedat4Decoder decoder;
+  const auto contents = decoded(decoder, file_of({events}));
+  EXPECT_TRUE(contents.events[0] == (std::vector{events[1], events[3]}));
+  EXPECT_EQ(decoder.damage().places, 2U);
+}
+
+TEST(Aedat4, WhatIsNotAedat4IsRefused) {
+  const auto refused = [](std::string_view text, const char* word) {
+    Bytes bytes(text.begin(), text.end());
+    try {
+      Aedat4Decoder decoder;
+      decoded(decoder, bytes);
+      ADD_FAILURE() << text;
+    } catch (const NotThisFormat& error) {
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+    }
+  };
+  refused("", "ends within its header");
+  refused("% evt 3.0\n", "not AEDAT4");
+  refused("#!AER-DAT2.0\r\n", "not AEDAT4");
+  refused("#!AER-DAT4.0\r\n", "ends within its header");
+  refused(std::string_view("#!AER-DAT4.0\r\n\x40\0\0\0 and no more", 31), "ends within its header");
+  refused("#!AER-DAT4.0\r\n\xff\xff\xff\x7f", "claims a header of 2147483647 bytes");
+  refused(std::string_view("#!AER-DAT4.0\r\n\x10\0\0\0 and no FlatBuffer", 36), "damaged");
+  for (const char size : {0, 1, 4, 7, 8})
+    refused(std::string("#!AER-DAT4.0\r\n") + size +
+                std::string(3 + static_cast<std::size_t>(size), '\0'),
+            "damaged");
+  const auto unknown = aedat_files::aedat4_header("", 9);
+  refused({reinterpret_cast<const char*>(unknown.data()), unknown.size()}, "number 9");
+}
+
+TEST(Aedat4, ADamagedXmlIsReportedAndTheStreamsFoundByTheirPackets) {
+  const auto events = some_events(10);
+  for (const std::string xml :
+       {"<dv><node name=", "</node></node>", "no XML", "<a", "<node name='outInfo'>"}) {
+    auto bytes = aedat_files::aedat4_header(xml);
+    aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
+    Aedat4Decoder decoder;
+    EXPECT_TRUE(decoded(decoder, bytes).events[0] == events) << xml;
+  }
+}
+
+TEST(Aedat4, AttributesWithoutEndTakeTimeInProportion) {
+  std::string xml = "<dv><node ";
+  for (int i = 0; i < 2'000'000; ++i) xml += "x=''";
+  xml += "/></dv>";
+  Aedat4Decoder decoder;
+  const auto bytes = aedat_files::aedat4_header(xml);
+  decoded(decoder, bytes);
+  EXPECT_EQ(decoder.damage().places, 0U);
+}
+
+TEST(Aedat4, ASizeOfWhichOneSideIsMissingIsNone) {
+  std::string xml(aedat_files::xml_of_one_stream);
+  xml.replace(xml.find("sizeY"), 5, "sizeZ");
+  auto bytes = aedat_files::aedat4_header(xml);
+  const std::vector events{StampedEvent::at(400, 300, 1000, Polarity::on)};
+  aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
+  Aedat4Decoder decoder;
+  EXPECT_TRUE(decoded(decoder, bytes).events[0] == events);
+  EXPECT_EQ(decoder.streams()[0].size, SensorSize{});
+}
+
+TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoDamage) {
+  for (const auto compression : compressions) {
+    Aedat4Encoder encoder({{346, 260}, "", compression, false, true});
+    Bytes bytes;
+    const auto events = some_events(9000);
+    encoder.encode(events, bytes);
+    encoder.finish(bytes);  // and the header is left as it is
+    Aedat4Decoder decoder;
+    EXPECT_TRUE(decoded(decoder, bytes, 100).events[0] == events);
+    EXPECT_FALSE(decoder.table_at());
+    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+  }
+}
+
+/// Where each packet's header lies, and the end.
+std::vector<std::size_t> packets_of(std::span<const std::uint8_t> bytes) {
+  std::vector<std::size_t> at;
+  for (const auto& packet : aedat4_validator::read(bytes).packets)
+    at.push_back(static_cast<std::size_t>(packet.offset) - 8);
+  return at;
+}
+
+std::vector<StampedEvent> without(const std::vector<StampedEvent>& events, std::size_t from,
+                                  std::size_t to) {
+  auto rest = events;
+  rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(from),
+             rest.begin() + static_cast<std::ptrdiff_t>(std::min(to, rest.size())));
+  return rest;
+}
+
+TEST(Aedat4, ABrokenPacketIsLostAndNoOther) {
+  const auto events = some_events(20'000);
+  for (const auto compression : compressions)
+    for (const bool table : {false, true}) {
+      const auto sound = encoded({{346, 260}, "", compression, false, table}, events);
+      const auto at = packets_of(sound);
+      const auto broken = [&](const char* what, std::size_t lost, auto breaking) {
+        SCOPED_TRACE(testing::Message() << what << ", compression " << static_cast<int>(compression)
+                                        << ", table " << table);
+        auto bytes = sound;
+        breaking(bytes);
+        Contents whole;
+        for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1000}}) {
+          Aedat4Decoder decoder;
+          const auto contents = decoded(decoder, bytes, piece);
+          EXPECT_TRUE(contents.events[0] == without(events, 4096 * lost, 4096 * (lost + 1)));
+          EXPECT_EQ(decoder.damage().places, 1U) << decoder.damage().first;
+          EXPECT_EQ(decoder.damage().first_at, at[lost]);
+        }
+      };
+      const auto set = [](Bytes& bytes, std::size_t place, std::uint32_t number) {
+        std::memcpy(bytes.data() + place, &number, sizeof number);
+      };
+      const auto size = [&](std::size_t i) {
+        std::uint32_t number = 0;
+        std::memcpy(&number, sound.data() + at[i] + 4, sizeof number);
+        return number;
+      };
+      broken("size larger", 1, [&](Bytes& b) {
+        set(b, at[1] + 4, 60'000'000);
+        if (compression == Aedat4Compression::none) set(b, at[1] + 8, 0xffffffff);
+      });
+      broken("size negative", 1, [&](Bytes& b) { set(b, at[1] + 4, 0x80000001); });
+      broken("stream", 2, [&](Bytes& b) { set(b, at[2], 77); });
+      broken("no magic", 2, [&](Bytes& b) { set(b, at[2] + 8, 0xffffffff); });
+      broken("payload rubbed out", 1, [&](Bytes& b) {
+        std::fill_n(b.begin() + static_cast<std::ptrdiff_t>(at[1] + 16), size(1) - 16, 0xff);
+      });
+      broken("bytes missing", 2, [&](Bytes& b) {
+        b.erase(b.begin() + static_cast<std::ptrdiff_t>(at[2] + 30),
+                b.begin() + static_cast<std::ptrdiff_t>(at[2] + 1030));
+      });
+      if (!table) broken("cut off", 4, [&](Bytes& b) { b.resize(b.size() - 100); });
+    }
+}
+
+TEST(Aedat4, BytesBetweenPacketsAreSkipped) {
+  const auto events = some_events(9000);
+  for (const auto compression : compressions) {
+    auto bytes = encoded({{346, 260}, "", compression, false, false}, events);
+    const auto at = packets_of(bytes);
+    const Bytes noise(333, 0xa5);
+    bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(at[1]), noise.begin(), noise.end());
+    Aedat4Decoder decoder;
+    EXPECT_TRUE(decoded(decoder, bytes, 50).events[0] == events);
+    EXPECT_EQ(decoder.damage().places, 1U);
+    EXPECT_EQ(decoder.damage().first_at, at[1]);
+  }
+}
+
+TEST(Aedat4, BombsAreCappedAndSkipped) {
+  const auto events = some_events(1000);
+  for (const auto compression : {Aedat4Compression::lz4, Aedat4Compression::zstd}) {
+    auto bytes = encoded({{346, 260}, "", compression, false, false}, events);
+    const std::vector<std::uint8_t> zeros(aedat4_largest_packet + 1);
+    Bytes bomb(compression == Aedat4Compression::lz4
+                   ? LZ4F_compressFrameBound(zeros.size(), nullptr)
+                   : ZSTD_compressBound(zeros.size()));
+    bomb.resize(
+        compression == Aedat4Compression::lz4
+            ? LZ4F_compressFrame(bomb.data(), bomb.size(), zeros.data(), zeros.size(), nullptr)
+            : ZSTD_compress(bomb.data(), bomb.size(), zeros.data(), zeros.size(), 3));
+    aedat_files::add_packet(bytes, 0, bomb);
+    const auto tail = packets_of(encoded({{346, 260}, "", compression, false, false}, events))[0];
+    const Bytes again(bytes.begin() + static_cast<std::ptrdiff_t>(tail),
+                      bytes.end() - static_cast<std::ptrdiff_t>(bomb.size() + 8));
+    aedat_files::add(bytes, again);
+    Aedat4Decoder decoder;
+    const auto contents = decoded(decoder, bytes);
+    EXPECT_EQ(contents.events[0].size(), 2000U);
+    EXPECT_EQ(decoder.damage().places, 1U);
+  }
+}
+
+/// Each of its packets claims to hold all that follow. Looking into each of them in full would take
+/// hours.
+TEST(Aedat4, PacketsWithinPacketsTakeNoTimeToSpeakOf) {
+  for (const auto compression : {Aedat4Compression::none, Aedat4Compression::lz4}) {
+    auto bytes = encoded({{346, 260}, "", compression, false, false}, {});
+    const auto begin = bytes.size();
+    while (bytes.size() < begin + (std::size_t{8} << 20)) {
+      aedat_files::add_little(bytes, 0, 4);
+      aedat_files::add_little(bytes, 1 << 20, 4);
+      if (compression == Aedat4Compression::none) {
+        aedat_files::add_little(bytes, (1 << 20) - 4, 4);
+        aedat_files::add_little(bytes, 4, 4);
+        aedat_files::add(bytes, "EVTS");
+      } else {
+        // A frame whose block is stored as it is, and as large as it may be.
+        for (const int byte : {0x04, 0x22, 0x4d, 0x18, 0x40, 0x40, 0xc0})
+          bytes.push_back(static_cast<std::uint8_t>(byte));
+        aedat_files::add_little(bytes, std::int64_t{0x80010000}, 4);
+      }
+    }
+    Aedat4Decoder decoder;
+    EXPECT_EQ(decoded(decoder, bytes).items, 0U);
+    EXPECT_GE(decoder.damage().places, 1U);
+  }
+}
+
+/// Any byte may be wrong: the decoder ends, and hands over the same whatever the split.
+TEST(Aedat4, RandomDamageEndsAndIsTheSameForAnySplit) {
+  std::mt19937 random(5);
+  const auto events = some_events(5000);
+  for (int round = 0; round < 300; ++round) {
+    auto bytes = encoded(
+        {{346, 260}, "", compressions[random() % compressions.size()], false, random() % 2 == 0},
+        std::span(events).first(random() % events.size()));
+    const auto body = packets_of(bytes).empty() ? bytes.size() - 1 : packets_of(bytes)[0];
+    for (unsigned i = 0; i < 1 + random() % 5; ++i)
+      bytes[body + random() % (bytes.size() - body)] = static_cast<std::uint8_t>(random());
+    if (random() % 4 == 0) bytes.resize(body + random() % (bytes.size() - body));
+    Aedat4Decoder whole;
+    const auto expected = decoded(whole, bytes);
+    Aedat4Decoder split;
+    const auto contents = decoded(split, bytes, 0);
+    ASSERT_TRUE(contents.events == expected.events);
+    ASSERT_EQ(split.damage().places, whole.damage().places);
+    ASSERT_EQ(split.damage().first_at, whole.damage().first_at);
+  }
+}
+
+TEST(Aedat4, SeeksByTheTable) {
+  const auto events = some_events(60'000);
+  for (const auto compression : compressions) {
+    const auto bytes = encoded({{346, 260}, "", compression, false, true}, events);
+    Aedat4Decoder decoder;
+    decoded(decoder, bytes);
+    ASSERT_TRUE(decoder.table_at());
+    const auto table =
+        read_aedat4_table(std::span(bytes).subspan(static_cast<std::size_t>(*decoder.table_at())),
+                          decoder.compression(), decoder.packets_at());
+    ASSERT_TRUE(table);
+    ASSERT_EQ(table->size(), 15U);
+    for (const std::size_t wanted : {0, 4095, 4096, 30'000, 59'999}) {
+      const auto t = events[wanted].t;
+      const auto position = aedat4_position_of(*table, t);
+      ASSERT_TRUE(position);
+      decoder.resume(*position);
+      const auto rest =
+          decoded(decoder, std::span(bytes).subspan(static_cast<std::size_t>(*position)), 777);
+      const auto& found = rest.events[0];
+      const auto first =
+          std::find_if(found.begin(), found.end(), [&](const auto& event) { return event.t >= t; });
+      ASSERT_LE(first - found.begin(), 4096);
+      const auto expected = std::find_if(events.begin(), events.end(),
+                                         [&](const auto& event) { return event.t >= t; });
+      EXPECT_TRUE(std::equal(first, found.end(), expected, events.end()));
+      EXPECT_EQ(decoder.damage().places, 0U);
+      EXPECT_EQ(decoder.damage().unsorted, 0U);
+    }
+    EXPECT_FALSE(aedat4_position_of(*table, events.back().t + 1));
+  }
+}
+
+/// A table of so many entries, all of which are the same bytes.
+Bytes shared_table(int entries) {
+  Bytes bytes;
+  const auto add = [&](std::initializer_list<int> numbers, int size) {
+    for (const int number : numbers) aedat_files::add_little(bytes, number, size);
+  };
+  const int entry = 32 + 4 * entries + 12;  // 4 behind a multiple of 8, as they are even
+  add({entry + 20 - 4, 16}, 4);
+  aedat_files::add(bytes, "FTAB");
+  add({6, 8, 4, 0}, 2);
+  add({8, 4, entries}, 4);
+  for (int i = 0; i < entries; ++i) add({entry - 32 - 4 * i}, 4);
+  add({8, 20, 4, 12, 0, 0}, 2);
+  add({12, 100, 0, 0, 50}, 4);
+  return bytes;
+}
+
+TEST(Aedat4, EntriesOfATableDoNotShareTheirBytes) {
+  EXPECT_EQ(read_aedat4_table(shared_table(2), Aedat4Compression::none, 18).value().size(), 2U);
+  EXPECT_FALSE(read_aedat4_table(shared_table(10'000), Aedat4Compression::none, 18));
+}
+
+TEST(Aedat4, TablesWithThePositionsOfHeadersAreUnderstood) {
+  // As it is, the first packet is at 1008 and its payload at 1016.
+  std::vector<Aedat4TableEntry> entries{{1008, 0, 50, 10, 5, 9}, {1066, 1, 20, 1, 7, 7}};
+  EXPECT_EQ(*read_aedat4_table(aedat4_table_content(entries), Aedat4Compression::lz4, 1008),
+            entries);
+  auto of_headers = entries;
+  for (auto& entry : of_headers) entry.position -= 8;
+  EXPECT_EQ(*read_aedat4_table(aedat4_table_content(of_headers), Aedat4Compression::zstd, 1008),
+            entries);
+  EXPECT_FALSE(read_aedat4_table(Bytes(100, 3), Aedat4Compression::none, 18));
+  const auto content = aedat4_table_content(entries);
+  for (std::uint8_t size = 0; size < content.size(); ++size) {
+    Bytes part(content.begin(), content.begin() + size);
+    EXPECT_FALSE(read_aedat4_table(part, Aedat4Compression::lz4, 18));
+    if (size < 4) continue;
+    part[0] = static_cast<std::uint8_t>(size - 4);
+    if (size < 12) {
+      EXPECT_FALSE(read_aedat4_table(part, Aedat4Compression::none, 18));
+    }
+  }
+}
+
+TEST(Aedat4, ARecordingOfADavis346) {
+  const auto bytes = shared_data::events_file("davis346-frames-events-imu.aedat4");
+  if (bytes.empty()) GTEST_SKIP() << "no davis346-frames-events-imu.aedat4 in $SHARED_DATA";
+  for (const std::size_t piece : {1 << 21, 4096, 0}) {
+    Aedat4Decoder decoder;
+    const auto contents = decoded(decoder, bytes, piece);
+    ASSERT_EQ(decoder.streams().size(), 4U);
+    EXPECT_EQ(decoder.streams()[0].size, (SensorSize{346, 260}));
+    EXPECT_EQ(decoder.streams()[0].source, "DAVIS346_00000104");
+    const auto& events = contents.events[0];
+    EXPECT_EQ(events.size(), 117'667U);
+    EXPECT_EQ(std::count_if(events.begin(), events.end(),
+                            [](const auto& event) { return event.polarity() == Polarity::on; }),
+              72'363);
+    ASSERT_EQ(contents.frames.size(), 3U);
+    for (const auto& [frame, pixels] : contents.frames) {
+      EXPECT_EQ(frame.width, 346);
+      EXPECT_EQ(frame.height, 260);
+      EXPECT_EQ(frame.format, Aedat4PixelFormat::grey8);
+    }
+    EXPECT_EQ(contents.frames[1].frame.t - contents.frames[0].frame.t, 40'000);
+    EXPECT_EQ(contents.frames[2].frame.t - contents.frames[1].frame.t, 40'000);
+    EXPECT_EQ(contents.triggers.size(), 15U);
+    EXPECT_EQ(decoder.skipped().imu_samples, 130U);
+    EXPECT_EQ(decoder.skipped().packets, 0U);
+    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+    EXPECT_EQ(decoder.damage().unsorted + decoder.damage().outside, 0U);
+
+    const auto table = read_aedat4_table(
+        std::span(bytes).subspan(static_cast<std::size_t>(decoder.table_at().value())),
+        decoder.compression(), decoder.packets_at());
+    ASSERT_TRUE(table);
+    EXPECT_EQ(table->size(), 40U);
+    EXPECT_EQ(table->front().position, decoder.packets_at());
+    std::int64_t events_of_table = 0;
+    for (const auto& entry : *table)
+      if (entry.stream == 0) events_of_table += entry.elements;
+    EXPECT_EQ(events_of_table, 117'667);
+  }
+}
+
+TEST(Aedat4, PythonsLibrariesReadWhatWeWrite) {
+  const auto events = some_events(9000, 3, 1000);
+  std::int64_t sum_t = 0;
+  std::int64_t sum_x = 0;
+  std::int64_t sum_y = 0;
+  std::int64_t on = 0;
+  for (const auto& event : events) {
+    sum_t += event.t;
+    sum_x += event.x;
+    sum_y += event.y();
+    on += event.polarity() == Polarity::on ? 1 : 0;
+  }
+  auto folder = (std::filesystem::temp_directory_path() / "aedat4-test-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  std::string command = "/usr/bin/python3 " + std::string(AEDAT4_CHECK);
+  std::string expected;
+  for (const auto compression : compressions)
+    for (const bool table : {false, true}) {
+      Aedat4Encoder encoder({{346, 260}, "a <b> & c", compression, true, table});
+      Bytes bytes;
+      encoder.encode(events, bytes);
+      const Bytes pixels(346 * 260, 3);
+      encoder.encode({events.back().t, 0, 0, 0, 0, Aedat4PixelFormat::grey8, 346, 260, 0, 0,
+                      pixels.data(), 346},
+                     bytes);
+      finish(encoder, bytes);
+      const auto path = folder + "/" + std::to_string(static_cast<int>(compression)) +
+                        (table ? "t" : "") + ".aedat4";
+      std::ofstream(path, std::ios::binary)
+          .write(reinterpret_cast<const char*>(bytes.data()),
+                 static_cast<std::streamsize>(bytes.size()));
+      command += " " + path;
+      for (const auto number : {std::int64_t{9000}, on, sum_t, sum_x, sum_y, std::int64_t{1},
+                                std::int64_t{3 * 346 * 260}})
+        expected += std::to_string(number) + " ";
+      expected += table ? "4\n" : "0\n";
+    }
+  command += " 2>&1";
+  FILE* const pipe = popen(command.c_str(), "r");
+  ASSERT_NE(pipe, nullptr);
+  std::string printed;
+  std::array<char, 4096> part{};
+  while (std::fgets(part.data(), part.size(), pipe) != nullptr) printed += part.data();
+  const int status = pclose(pipe);
+  std::filesystem::remove_all(folder);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << printed;
+  EXPECT_EQ(printed, expected);
+}
+
+}  // namespace

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <numeric>
+
+#include "src/formats/text/csv_decoder.hpp"
+#include "src/formats/text/csv_encoder.hpp"
+#include "src/formats/text/decimal.hpp"
+#include "tests/formats/table_events.hpp"
+
+namespace {
+
+using namespace table_events;
+
+struct Read {
+  std::vector<StampedEvent> events;
+  Damage damage;
+  SensorSize size;
+};
+
+Read read(std::string_view text, const CsvSettings& settings = {}) {
+  CsvDecoder decoder(settings);
+  const auto bytes = bytes_of(text);
+  auto events = decoded(decoder, bytes, bytes.size() + 1);
+  return {std::move(events), decoder.damage(), decoder.size()};
+}
+
+StampedEvent on(int x, int y, Microseconds t) {
+  return StampedEvent::at(x, y, t, Polarity::on);
+}
+
+StampedEvent off(int x, int y, Microseconds t) {
+  return StampedEvent::at(x, y, t, Polarity::off);
+}
+
+using Events = std::vector<StampedEvent>;
+
+TEST(Decimal, IsExact) {
+  struct Case {
+    const char* text;
+    int power;
+    std::int64_t value;
+    bool whole;
+  };
+  for (const auto& [text, power, value, whole] : {
+           Case{"0", 6, 0, true},
+           {"-12", 0, -12, true},
+           {"+12.50", 1, 125, true},
+           {".5", 6, 500'000, true},
+           {"5.", 0, 5, true},
+           {"0.003820001", 6, 3820, false},
+           {"0.0038195", 6, 3820, false},
+           {"0.00381949999999999999999999", 6, 3819, false},
+           {"1.000000000000000000e+00", 0, 1, true},
+           {"1.5E-6", 6, 2, false},
+           {"1468939993.067416019", 6, 1468939993067416, false},
+           {"9223372036854775807", 0, INT64_MAX, true},
+           {"-9223372036854775807", 0, -INT64_MAX, true},
+           {"9223372036854.775807", 6, INT64_MAX, true},
+           {"123456", -3, 123, false},
+           {"123500", -3, 124, false},
+           {"0e999999999999", 6, 0, true},
+           {"1e-999999999999", 6, 0, false},
+           {"100000000000000000000000000000e-29", 0, 1, true},
+       }) {
+    const auto decimal = read_decimal(text, power);
+    ASSERT_TRUE(decimal) << text;
+    EXPECT_EQ(decimal->value, value) << text;
+    EXPECT_EQ(decimal->whole, whole) << text;
+  }
+  for (const auto* const text :
+       {"", "-", ".", "e5", "1e", "1e+", "1.2.3", "1,2", "nan", "inf", " 1", "1 ", "0x10",
+        "9223372036854775808", "1e19", "1e999999999999"})
+    EXPECT_FALSE(read_decimal(text, 0)) << text;
+}
+
+TEST(Csv, ColumnsByNames) {
+  const Events expected = {on(3, 4, 10), off(5, 6, 12)};
+  EXPECT_EQ(read("t,x,y,p\n10,3,4,1\n12,5,6,0\n").events, expected);
+  EXPECT_EQ(read("x;y;polarity;timestamp\n3;4;1;10\n5;6;-1;12\n").events, expected);
+  EXPECT_EQ(read("\"X\", \"Y\", \"Pol\", \"Time\"\r\n3, 4, True, 10\r\n5, 6, False, 12").events,
+            expected);
+  EXPECT_EQ(read("id t   x y p note\n1 10 3  4 1 a\n2 12 5 6 0 b\n").events, expected);
+  EXPECT_EQ(read("\xef\xbb\xbft,x,y,p\n10,3,4,1\n12,5,6,0\n").events, expected);
+  const auto sized = read("t,x@640,y@480,on\r\n10,3,4,1\r\n12,5,6,0\r\n");
+  EXPECT_EQ(sized.events, expected);
+  EXPECT_EQ(sized.size, (SensorSize{640, 480}));
+}
+
+TEST(Csv, ColumnsByTheFirstLines) {
+  const Events expected = {on(3, 4, 10), off(5, 6, 12)};
+  for (const auto* const text :
+       {"10,3,4,1\n12,5,6,0\n", "3,4,1,10\n5,6,0,12\n", "3,4,1,10\n5,6,-1,12\n",
+        "0.000010 3 4 1\n0.000012 5 6 0\n", "3\t4\t1e-5\t1\n5\t6\t1.2e-5\t-1\n",
+        "# t x y p\n\n10 3 4 true\n# more\n12 5 6 FALSE", "%geometry:640,480\n3,4,1,10\n5,6,0,12\n",
+        "240 180\n0.00001 3 4 1\n0.000012 5 6 0\n",
+        "1.0e-05 3.00e+00 4.00e+00 1.00e+00\n1.2e-05 5.00e+00 6.00e+00 0.00e+00\n"}) {
+    const auto found = read(text);
+    EXPECT_EQ(found.events, expected) << text;
+    EXPECT_EQ(found.damage.places, 0U) << text;
+  }
+  EXPECT_EQ(read("%geometry:640,480\n3,4,1,10\n").size, (SensorSize{640, 480}));
+  EXPECT_EQ(read("240 180\n0.00001 3 4 1\n").size, (SensorSize{240, 180}));
+  // Out of order, but with one column of seconds.
+  EXPECT_EQ(read("3 4 0.00001 1\n5 6 0.000002 0\n").events, (Events{on(3, 4, 10), off(5, 6, 2)}));
+}
+
+TEST(Csv, OrderAndUnitAsSet) {
+  CsvSettings settings;
+  settings.order = column_order("pyxt");
+  EXPECT_EQ(read("1,4,3,10\n0,6,5,2\n", settings).events, (Events{on(3, 4, 10), off(5, 6, 2)}));
+  EXPECT_EQ(read("a,b,c,d\n1,4,3,10\n", settings).events, (Events{on(3, 4, 10)}));
+  settings.order = column_order("txyp");
+  settings.unit = TimeUnit::nanoseconds;
+  EXPECT_EQ(read("10499 3 4 1\n10500 5 6 0\n", settings).events,
+            (Events{on(3, 4, 10), off(5, 6, 11)}));
+  settings.unit = TimeUnit::seconds;
+  EXPECT_EQ(read("10 3 4 1\n", settings).events, (Events{on(3, 4, 10'000'000)}));
+  EXPECT_FALSE(column_order("txy"));
+  EXPECT_FALSE(column_order("txyy"));
+  EXPECT_FALSE(column_order("txyq"));
+}
+
+TEST(Csv, SecondsAreExact) {
+  // Also in long files, where lines are read the quick way.
+  std::string text;
+  Events expected;
+  for (int i = 0; i < 1000; ++i) {
+    char line[64];
+    std::snprintf(line, sizeof line, "1468939993.%06d%03d %d 2 1\n", i * 991 % 1'000'000, i % 500,
+                  i % 100);
+    text += line;
+    expected.push_back(on(i % 100, 2, 1'468'939'993'000'000 + i * 991 % 1'000'000));
+  }
+  EXPECT_EQ(read(text).events, expected);
+  const std::string fill(200, '#');
+  EXPECT_EQ(read("0.0 1 1 1\n0.12345678949999 1 1 1\n0.1234565 1 1 1\n1 1 1 1\n2.5 1 1 0\n" + fill)
+                .events,
+            (Events{on(1, 1, 0), on(1, 1, 123457), on(1, 1, 123457), on(1, 1, 1'000'000),
+                    off(1, 1, 2'500'000)}));
+}
+
+TEST(Csv, DamageIsSkippedAndCounted) {
+  const std::string text =
+      "t,x,y,p\n1,1,1,1\n2,2,2\n3,3,3,1,1\nfour,4,4,1\n5,5,5,2\n6,70000,6,1\n7,7,40000,1\n"
+      "8,-1,8,1\n3,9,9,0\n99999999999999999999,1,1,1\n10,10,10,1\n";
+  const auto found = read(text);
+  EXPECT_EQ(found.events, (Events{on(1, 1, 1), off(9, 9, 3), on(10, 10, 10)}));
+  EXPECT_EQ(found.damage.places, 5U);
+  EXPECT_EQ(found.damage.first_at, 16U);
+  EXPECT_EQ(found.damage.outside, 3U);
+  EXPECT_EQ(found.damage.unsorted, 0U);
+  expect_same_however_cut([] { return std::make_unique<CsvDecoder>(); }, bytes_of(text));
+
+  const auto unsorted = read("t,x,y,p\n5,1,1,1\n3,1,1,1\n4,1,1,1\n5,1,1,1\n");
+  EXPECT_EQ(unsorted.events.size(), 4U);
+  EXPECT_EQ(unsorted.damage.unsorted, 2U);
+
+  CsvSettings settings;
+  settings.size = {10, 8};
+  const auto outside = read("t,x,y,p\n1,9,7,1\n1,10,7,1\n1,9,8,1\n", settings);
+  EXPECT_EQ(outside.events.size(), 1U);
+  EXPECT_EQ(outside.damage.outside, 2U);
+}
+
+TEST(Csv, ALongLineIsSkippedWithoutBeingKept) {
+  std::string text = "t,x,y,p\n1,1,1,1\n";
+  for (int i = 0; i < 300; ++i) text += "2,1,1,1\n";
+  const auto at = text.size();
+  text += "3,1,1,";
+  text.append(1'000'000, '1');
+  text += "\n4,1,1,1\n";
+  text += "5,1,1,1" + std::string(4089, ' ') + "\n";  // as long as can be
+  text += "6,1,1,1" + std::string(4090, ' ') + "\n";
+  text += "7,1,1,1\n";
+  const auto found = read(text);
+  EXPECT_EQ(found.events.size(), 304U);
+  EXPECT_EQ(found.damage.places, 2U);
+  EXPECT_EQ(found.damage.first_at, at);
+  expect_same_however_cut([] { return std::make_unique<CsvDecoder>(); }, bytes_of(text));
+}
+
+TEST(Csv, WhatIsNoTextOfEventsIsRefused) {
+  std::string noise;
+  std::mt19937 random(3);
+  for (int i = 0; i < 200'000; ++i) noise += static_cast<char>(random());
+  for (const std::string& text :
+       {std::string("hello\n"), std::string("{\"a\": 1}\n"), std::string("1 2 3\n4 5 6\n7 8 9\n"),
+        std::string("% evt 3.0\n% end\n\x01\x02\x03\n"), std::string(100'000, '1'),
+        std::string(100'000, '\0'), noise, std::string("5,6,7,8\n9,10,11,12\n"),
+        std::string("5,6,7,1\n3,6,6,1\n")}) {
+    EXPECT_THROW(read(text), NotThisFormat) << text.substr(0, 40);
+  }
+}
+
+TEST(Csv, AHeaderAloneIsARecordingWithoutEventsAndAnEmptyFileIsNone) {
+  for (const std::string text :
+       {"t,x,y,p\n", "t,x,y,p", "# t,x,y,p\n", "%geometry:640,480\n", "\n"}) {
+    const auto found = read(text);
+    EXPECT_TRUE(found.events.empty()) << text;
+    EXPECT_EQ(found.damage.places, 0U) << text;
+  }
+  try {
+    read("");
+    ADD_FAILURE() << "an empty file was read";
+  } catch (const NotThisFormat& error) {
+    EXPECT_STREQ(error.what(), "the file is empty");
+  }
+}
+
+TEST(Csv, EveryDialectComesBack) {
+  for (const auto& [name, description, dialect] : csv_dialects()) {
+    SCOPED_TRACE(name);
+    for (const auto size : sizes()) {
+      const auto events = random_events(20'000, size, static_cast<unsigned>(size.width), 1000);
+      CsvEncoder encoder(dialect, size);
+      const auto bytes = encoded(encoder, events);
+      CsvSettings settings;
+      if (dialect.unit == TimeUnit::nanoseconds) settings.unit = dialect.unit;
+      // Of a sensor of a few pixels a time cannot be told from a coordinate.
+      if (size.width < 100) settings.order = dialect.order;
+      CsvDecoder decoder(settings);
+      EXPECT_TRUE(decoded(decoder, bytes) == events) << size.width;
+      EXPECT_EQ(decoder.damage().places, 0U);
+      EXPECT_EQ(decoder.damage().unsorted, 0U);
+      EXPECT_EQ(decoder.damage().outside, 0U);
+      using Header = CsvDialect::Header;
+      const auto header = dialect.header;
+      const bool sized =
+          header == Header::names_and_size || header == Header::geometry || header == Header::size;
+      EXPECT_EQ(decoder.size(), sized ? size : SensorSize{});
+    }
+    const auto events = random_events(1500, {640, 480}, 5, 12345);
+    CsvEncoder encoder(dialect, {640, 480});
+    CsvSettings settings;
+    settings.unit = dialect.unit;
+    expect_same_however_cut([&] { return std::make_unique<CsvDecoder>(settings); },
+                            encoded(encoder, events, 7));
+  }
+}
+
+TEST(Csv, NoEventsComeBack) {
+  for (const auto& [name, description, dialect] : csv_dialects()) {
+    CsvEncoder encoder(dialect, {640, 480});
+    CsvDecoder decoder;
+    const auto bytes = encoded(encoder, {});
+    EXPECT_EQ(bytes.empty(), dialect.header == CsvDialect::Header::none) << name;
+    if (bytes.empty()) continue;
+    EXPECT_TRUE(decoded(decoder, bytes).empty()) << name;
+  }
+}
+
+TEST(Csv, TimesBelowZeroComeBack) {
+  const Events events = {on(1, 1, -3'000'001), on(1, 1, -1), on(1, 1, 0), on(1, 1, 1)};
+  for (const auto& [name, description, dialect] : csv_dialects()) {
+    CsvEncoder encoder(dialect, {640, 480});
+    CsvSettings settings;
+    settings.unit = dialect.unit;
+    settings.order = dialect.order;
+    CsvDecoder decoder(settings);
+    EXPECT_EQ(decoded(decoder, encoded(encoder, events)), events) << name;
+  }
+}
+
+TEST(Csv, RealEventsOfTheEventCameraDataset) {
+  const char* shared = std::getenv("SHARED_DATA");
+  const auto path =
+      std::string(shared != nullptr ? shared : "") + "/slider-depth/events-t-x-y-p.txt.gz";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "there is no " << path;
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(("gzip -dc '" + path + "'").c_str(), "r"),
+                                                   pclose);
+  ASSERT_NE(pipe, nullptr);
+  Bytes bytes(2'000'000);
+  bytes.resize(std::fread(bytes.data(), 1, bytes.size(), pipe.get()));
+  CsvSettings settings;
+  settings.size = {240, 180};
+  CsvDecoder decoder(settings);
+  const auto events = decoded(decoder, bytes);
+  ASSERT_EQ(events.size(), 50'000U);
+  EXPECT_EQ(decoder.damage().places + decoder.damage().unsorted + decoder.damage().outside, 0U);
+  EXPECT_EQ(events.front(), off(96, 133, 3811));
+  EXPECT_EQ(events[1], off(127, 171, 3820));
+  EXPECT_EQ(events.back(), on(70, 103, 174'156));
+  // Between the frames of images.txt.
+  constexpr std::array<Microseconds, 5> frames = {0, 38766, 77531, 116296, 155062};
+  constexpr std::array<std::ptrdiff_t, 4> counts = {7778, 11318, 13497, 12327};
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    EXPECT_EQ(std::ranges::count_if(events,
+                                    [&](const StampedEvent& event) {
+                                      return event.t > frames[i] && event.t <= frames[i + 1];
+                                    }),
+              counts[i]);
+}
+
+}  // namespace

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Event Streams made by hand.
+#include "src/formats/es/es.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/formats/recordings.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using recordings::decode;
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes file(std::uint8_t type, const Bytes& body, std::uint8_t version = 2) {
+  // Of 320x240 pixels.
+  Bytes bytes{'E', 'v', 'e',     'n', 't', ' ',  'S',  't',  'r',  'e',
+              'a', 'm', version, 0,   0,   type, 0x40, 0x01, 0xf0, 0};
+  for (const auto byte : body) bytes.push_back(byte);
+  return bytes;
+}
+
+TEST(EventStream, ReadsDvsEventsWithRowsFromTheBottom) {
+  const auto decoder = make_event_stream_decoder();
+  const auto decoded = decode(*decoder, file(1, {5 << 1 | 1, 0x3f, 0x01, 0,   0,  //
+                                                 0xff,       0xff, 0xfe,          //
+                                                 126 << 1,   0,    0,    239, 0,  //
+                                                 0,          0x40, 0x01, 0,   0,  //
+                                                 0,          0,    0,    240, 0}));
+  EXPECT_EQ(decoded.events, (std::vector{StampedEvent::at(319, 239, 5, Polarity::on),
+                                         StampedEvent::at(0, 0, 5 + 254 + 126, Polarity::off)}));
+  EXPECT_EQ(decoder->size(), (SensorSize{320, 240}));
+  EXPECT_EQ(decoder->damage().outside, 2U);
+  EXPECT_EQ(decoder->damage().places, 0U);
+}
+
+TEST(EventStream, ReadsTheChangesAmongAtisEvents) {
+  const auto decoder = make_event_stream_decoder();
+  const auto decoded =
+      decode(*decoder, file(2, {5 << 2 | 2,  1,    0,    239, 0,     // ON
+                                1 << 2 | 1,  1,    0,    239, 0,     // an exposure starts
+                                0xfc,        0xfd, 0xff,             // 0, 63 and 189 us
+                                62 << 2 | 3, 1,    0,    239, 0,     // and ends
+                                0,           2,    0,    238, 0}));  // OFF
+  EXPECT_EQ(decoded.events,
+            (std::vector{StampedEvent::at(1, 0, 5, Polarity::on),
+                         StampedEvent::at(2, 1, 5 + 1 + 63 + 189 + 62, Polarity::off)}));
+  EXPECT_EQ(decoder->damage().outside, 0U);
+}
+
+TEST(EventStream, IsAnErrorThatSaysWhy) {
+  const auto error = [](const Bytes& bytes) {
+    try {
+      decode(*make_event_stream_decoder(), bytes);
+    } catch (const NotThisFormat& exception) {
+      return std::string(exception.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(error({}), "");
+  EXPECT_NE(error({'E', 'v', 'e'}), "");
+  EXPECT_NE(error({'E', 'v', 'i'}), "");
+  EXPECT_NE(error(file(1, {}, 1)).find("1.0"), std::string::npos);
+  EXPECT_NE(error(file(0, {})).find("generic"), std::string::npos);
+  EXPECT_NE(error(file(4, {})).find("colour"), std::string::npos);
+  EXPECT_NE(error(file(9, {})).find('9'), std::string::npos);
+  auto no_rows = file(1, {});
+  no_rows[18] = no_rows[19] = 0;
+  EXPECT_NE(error(no_rows).find("320x0"), std::string::npos);
+}
+
+TEST(EventStream, IsWrittenByteByByte) {
+  const auto encoder = make_event_stream_encoder({320, 240});
+  const std::vector events{StampedEvent::at(319, 239, 5, Polarity::on),
+                           StampedEvent::at(0, 0, 5 + 126, Polarity::off),
+                           StampedEvent::at(0, 0, 5 + 126 + 127, Polarity::off)};
+  EXPECT_EQ(recordings::encode(*encoder, events),
+            file(1, {5 << 1 | 1, 0x3f, 0x01, 0, 0, 126 << 1, 0, 0, 239, 0, 0xff, 0, 0, 0, 239, 0}));
+  EXPECT_THROW(make_event_stream_encoder({65536, 1}), std::invalid_argument);
+}
+
+TEST(EventStream, IsSilentForHours) {
+  const auto hours = Microseconds{3} * 3'600'000'000;
+  const std::vector events{StampedEvent::at(1, 2, 1, Polarity::on),
+                           StampedEvent::at(3, 4, hours, Polarity::off)};
+  const auto encoder = make_event_stream_encoder({320, 240});
+  const auto decoder = make_event_stream_decoder();
+  EXPECT_EQ(decode(*decoder, recordings::encode(*encoder, events)).events, events);
+}
+
+TEST(EventStream, LeavesNothingOutOfALongRecordingWithoutPauses) {
+  std::vector<StampedEvent> events;
+  const auto step = Microseconds{11} * 3'600'000'000;
+  events.push_back(StampedEvent::at(1, 2, 0, Polarity::on));
+  // Steps that need no byte of their own must count, too, before a pause.
+  for (int i = 0; i < 1000; ++i)
+    events.push_back(StampedEvent::at(1, 2, events.back().t + 100, Polarity::on));
+  events.push_back(StampedEvent::at(1, 2, step, Polarity::on));
+  const auto encoder = make_event_stream_encoder({320, 240});
+  const auto decoder = make_event_stream_decoder();
+  EXPECT_EQ(decode(*decoder, recordings::encode(*encoder, events)).events, events);
+}
+
+}  // namespace

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include <hdf5.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <thread>
+
+#include "src/formats/hdf5/hdf5_filters.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_writer.hpp"
+#include "src/formats/memory_bytes.hpp"
+#include "tests/formats/table_events.hpp"
+
+namespace {
+
+using namespace table_events;
+
+using Events = std::vector<StampedEvent>;
+using Compression = Hdf5Writer::Compression;
+using Settings = Hdf5Writer::Settings;
+
+class Hdf5 : public testing::Test {
+ protected:
+  Hdf5()
+      : folder_(std::filesystem::temp_directory_path() /
+                ("hdf5_test." + std::to_string(getpid()) + "." +
+                 testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    std::filesystem::create_directories(folder_);
+  }
+  ~Hdf5() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path path(const std::string& name = "events.h5") const { return folder_ / name; }
+
+  std::filesystem::path write(std::span<const StampedEvent> events, const Settings& settings,
+                              std::size_t at_once = 5000) const {
+    Hdf5Writer writer(path(), settings);
+    while (!events.empty()) {
+      const auto part = events.first(std::min(at_once, events.size()));
+      writer.append(part);
+      events = events.subspan(part.size());
+    }
+    writer.close();
+    return path();
+  }
+
+  static Bytes contents(const std::filesystem::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return bytes_of(std::string(std::istreambuf_iterator<char>(stream), {}));
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+std::unique_ptr<ByteSource> in_memory(Bytes file) {
+  return std::make_unique<MemoryBytes>(std::move(file));
+}
+
+std::vector<Settings> all_settings(SensorSize size) {
+  return {{Hdf5Layout::dsec, Compression::none, size},
+          {Hdf5Layout::dsec, Compression::gzip, size},
+          {Hdf5Layout::metavision, Compression::none, size}};
+}
+
+Events read_all(Hdf5Reader& reader, std::size_t at_once = 10'000) {
+  Events events;
+  while (reader.read(at_once, events) > 0) {
+  }
+  return events;
+}
+
+TEST_F(Hdf5, ComesBack) {
+  for (const auto size : sizes()) {
+    for (const auto& settings : all_settings(size)) {
+      const auto events =
+          random_events(100'000, size, static_cast<unsigned>(size.height), 1'000'000);
+      for (const std::size_t at_once : {777, 1'000'000}) {
+        Hdf5Reader reader(write(events, settings, at_once));
+        EXPECT_EQ(reader.layout(), settings.layout);
+        EXPECT_EQ(reader.size(), size);
+        EXPECT_EQ(reader.count(), events.size());
+        ASSERT_TRUE(reader.time_range());
+        EXPECT_EQ(reader.time_range()->first, events.front().t);
+        EXPECT_EQ(reader.time_range()->last, events.back().t);
+        EXPECT_TRUE(read_all(reader, at_once) == events);
+        EXPECT_EQ(reader.damage().places + reader.damage().unsorted + reader.damage().outside, 0U);
+      }
+      const auto other = random_events(100, size, 1);
+      Hdf5Reader reader(in_memory(contents(path())));
+      Hdf5Reader other_reader(in_memory(contents(write(other, settings))));
+      EXPECT_TRUE(read_all(reader) == events);
+      EXPECT_TRUE(read_all(other_reader) == other);
+    }
+  }
+}
+
+TEST_F(Hdf5, NoEventsComeBack) {
+  for (const auto& settings : all_settings({640, 480})) {
+    Hdf5Reader reader(write({}, settings));
+    EXPECT_EQ(reader.count(), 0U);
+    EXPECT_FALSE(reader.time_range());
+    EXPECT_TRUE(read_all(reader).empty());
+    reader.seek(5);
+    EXPECT_TRUE(read_all(reader).empty());
+    EXPECT_EQ(reader.damage().places, 0U);
+  }
+}
+
+TEST_F(Hdf5, SeeksToTheFirstEventNotBefore) {
+  const auto events = random_events(200'000, {640, 480}, 11, 777'777);
+  for (const auto& settings : all_settings({640, 480})) {
+    Hdf5Reader reader(write(events, settings));
+    std::mt19937 random(4);
+    std::vector<Microseconds> times = {
+        INT64_MIN, 0, events.front().t, events.back().t, events.back().t + 1, INT64_MAX};
+    for (int i = 0; i < 60; ++i) {
+      const auto t = events[random() % events.size()].t;
+      times.insert(times.end(), {t, t - 1, t + 1});
+    }
+    for (const auto t : times) {
+      reader.seek(t);
+      const auto expected = std::ranges::lower_bound(events, t, {}, &StampedEvent::t);
+      Events found;
+      reader.read(500, found);
+      const auto count = std::min<std::ptrdiff_t>(500, events.end() - expected);
+      EXPECT_TRUE(found == Events(expected, expected + count)) << t;
+    }
+    reader.seek(0);
+    EXPECT_TRUE(read_all(reader) == events);
+    EXPECT_EQ(reader.damage().unsorted, 0U);
+  }
+}
+
+TEST_F(Hdf5, TriggersComeBack) {
+  std::vector<Trigger> triggers;
+  for (int i = 0; i < 40'000; ++i)
+    triggers.push_back({i * 100, static_cast<std::uint16_t>(i % 3), i % 2 == 0});
+  {
+    Hdf5Writer writer(path(), {Hdf5Layout::metavision, Compression::none, {640, 480}});
+    writer.append(std::span<const Trigger>(triggers).first(100));
+    writer.append(std::span<const Trigger>(triggers).subspan(100));
+  }
+  Hdf5Reader reader(path());
+  std::vector<Trigger> found;
+  while (reader.read_triggers(777, found) > 0) {
+  }
+  EXPECT_TRUE(found == triggers);
+  reader.seek(1'000'050);
+  found.clear();
+  EXPECT_EQ(reader.read_triggers(1, found), 1U);
+  EXPECT_EQ(found.front().t, 1'000'100);
+}
+
+TEST_F(Hdf5, WhatALayoutCannotHoldIsRefused) {
+  const Settings dsec = {Hdf5Layout::dsec, Compression::none, {640, 480}};
+  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Layout::v2e, Compression::none, {640, 480}}),
+               std::invalid_argument);
+  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Layout::dsec, Compression::none, {}}),
+               std::invalid_argument);
+  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Layout::metavision, Compression::none, {2049, 480}}),
+               std::invalid_argument);
+  EXPECT_THROW(Hdf5Writer("/nowhere/at/all.h5", dsec), std::runtime_error);
+  for (const auto& settings : all_settings({640, 480})) {
+    Hdf5Writer writer(path(), settings);
+    writer.append(Events{StampedEvent::at(1, 1, 100, Polarity::on)});
+    EXPECT_THROW(writer.append(Events{StampedEvent::at(1, 1, 99, Polarity::on)}),
+                 std::invalid_argument);
+    EXPECT_THROW(writer.append(Events{StampedEvent::at(640, 1, 100, Polarity::on)}),
+                 std::invalid_argument);
+    EXPECT_THROW(writer.append(Events{StampedEvent::at(1, 480, 100, Polarity::on)}),
+                 std::invalid_argument);
+    EXPECT_THROW(writer.append(Events{StampedEvent::at(1, 1, INT64_MAX, Polarity::on)}),
+                 std::invalid_argument);
+  }
+}
+
+/// As a full disk does, a limit lets writes fail from some byte on.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t most) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit = {most, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_ = {};
+  void (*handler_)(int) = nullptr;
+};
+
+TEST_F(Hdf5, AFullDiskIsToldAndSurvived) {
+  const auto events = random_events(150'000, {640, 480}, 5);
+  for (const auto& settings : all_settings({640, 480})) {
+    for (const rlim_t most : {0, 1000, 5000, 100'000, 300'000}) {
+      const FileSizeLimit limit(most);
+      try {
+        write(events, settings);
+        ADD_FAILURE() << "nobody was told";
+      } catch (const std::runtime_error& error) {
+        EXPECT_NE(std::string(error.what()).find("cannot be written: File too large"),
+                  std::string::npos)
+            << error.what();
+      }
+    }
+    // The library is as it was.
+    Hdf5Reader reader(write(events, settings));
+    EXPECT_TRUE(read_all(reader) == events);
+  }
+  EXPECT_EQ(H5Fget_obj_count(static_cast<hid_t>(H5F_OBJ_ALL), H5F_OBJ_FILE), 0);
+}
+
+TEST_F(Hdf5, WhatIsNoFileOfEventsIsRefused) {
+  EXPECT_THROW(Hdf5Reader reader(path("missing.h5")), std::runtime_error);
+  std::ofstream(path("text.h5")) << "t,x,y,p\n";
+  EXPECT_THROW(Hdf5Reader reader(path("text.h5")), NotThisFormat);
+  EXPECT_THROW(Hdf5Reader reader(in_memory(bytes_of("\x89HDF\r\n\x1a\n"))), NotThisFormat);
+  EXPECT_THROW(Hdf5Reader reader(in_memory({})), NotThisFormat);
+}
+
+TEST_F(Hdf5, DamagedChunksAreLeftOutAndCounted) {
+  const auto events = random_events(60'000, {640, 480}, 2, 5);
+  const auto file =
+      contents(write(events, {Hdf5Layout::metavision, Compression::none, {640, 480}}));
+  // The head of the third chunk: how many events, and from when on.
+  std::uint32_t count = 16384 << 2;
+  Bytes head(12);
+  std::memcpy(head.data() + 4, &events[16384 * 2].t, 8);
+  auto at = file.end();
+  for (std::uint32_t packing = 0; packing < 3 && at == file.end(); ++packing) {
+    const std::uint32_t word = count | packing;
+    std::memcpy(head.data(), &word, 4);
+    at = std::ranges::search(file, head).begin();
+  }
+  ASSERT_NE(at, file.end());
+  auto damaged = file;
+  damaged[static_cast<std::size_t>(at - file.begin()) + 3] = 0xff;
+  Hdf5Reader reader(in_memory(damaged));
+  auto expected = events;
+  expected.erase(expected.begin() + 16384 * 2, expected.begin() + 16384 * 3);
+  EXPECT_TRUE(read_all(reader) == expected);
+  EXPECT_EQ(reader.damage().places, 1U);
+  EXPECT_EQ(reader.damage().first_at, static_cast<std::uint64_t>(at - file.begin()));
+}
+
+TEST_F(Hdf5, AChunkOfLessThanANumberIsDamaged) {
+  constexpr int shuffle[] = {H5Z_FILTER_SHUFFLE};
+  for (const std::size_t size : {0, 1, 3}) {
+    Bytes bytes(size, 7);
+    EXPECT_FALSE(undo_hdf5_filters(shuffle, 0, 4, 16, bytes));
+    EXPECT_EQ(bytes, Bytes(size, 7));
+  }
+}
+
+TEST_F(Hdf5, ASizeThatNoSensorHasIsNone) {
+  auto bytes = contents(
+      write(random_events(10, {4, 4}, 1), {Hdf5Layout::metavision, Compression::none, {640, 480}}));
+  constexpr std::string_view size = "640x480";
+  constexpr std::string_view none = "65537x9";
+  const auto found = std::ranges::search(bytes, size);
+  ASSERT_FALSE(found.empty());
+  std::ranges::copy(none, found.begin());
+  Hdf5Reader reader(in_memory(bytes));
+  EXPECT_EQ(reader.size(), SensorSize{});
+}
+
+TEST_F(Hdf5, FilesAreReadAndWrittenByThreads) {
+  std::vector<std::thread> threads;
+  std::array<bool, 4> equal{};
+  for (std::size_t i = 0; i < equal.size(); ++i) {
+    threads.emplace_back([&, i] {
+      const auto settings = all_settings({640, 480})[i % 3];
+      const auto events = random_events(100'000, {640, 480}, static_cast<unsigned>(i));
+      const auto file = path(std::to_string(i));
+      {
+        Hdf5Writer writer(file, settings);
+        for (std::size_t j = 0; j < events.size(); j += 1000)
+          writer.append(std::span(events).subspan(j, 1000));
+      }
+      Hdf5Reader reader(file);
+      equal[i] = read_all(reader, 1000) == events;
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  for (const bool same : equal) EXPECT_TRUE(same);
+}
+
+}  // namespace

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "src/formats/numpy/npy_decoder.hpp"
+#include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/numpy/npy_header.hpp"
+#include "tests/formats/table_events.hpp"
+
+namespace {
+
+using namespace table_events;
+
+using Events = std::vector<StampedEvent>;
+
+Bytes patched(NpyEncoder& encoder, Bytes bytes) {
+  const auto patch = encoder.patch();
+  std::memcpy(bytes.data() + patch.position, patch.bytes.data(), patch.bytes.size());
+  return bytes;
+}
+
+Bytes with_header(const std::string& dictionary, int version = 1) {
+  std::string text = std::string("\x93NUMPY") + static_cast<char>(version) + '\0';
+  text += static_cast<char>(dictionary.size() & 0xff);
+  text += static_cast<char>(dictionary.size() >> 8);
+  if (version > 1) text += std::string(2, '\0');
+  return bytes_of(text + dictionary);
+}
+
+template <class Number>
+void append(Bytes& bytes, Number number, bool big_endian = false) {
+  std::uint8_t raw[sizeof number];
+  std::memcpy(raw, &number, sizeof number);
+  if (big_endian) std::reverse(std::begin(raw), std::end(raw));
+  bytes.insert(bytes.end(), std::begin(raw), std::end(raw));
+}
+
+TEST(Npy, ComesBack) {
+  for (const auto size : sizes()) {
+    const auto events = random_events(50'000, size, static_cast<unsigned>(size.width), -1000);
+    NpyEncoder encoder;
+    const auto unpatched = encoded(encoder, events);
+    for (const auto& bytes : {unpatched, patched(encoder, unpatched)}) {
+      NpyDecoder decoder(size);
+      EXPECT_TRUE(decoded(decoder, bytes) == events);
+      EXPECT_EQ(decoder.damage().places + decoder.damage().unsorted + decoder.damage().outside, 0U);
+    }
+  }
+  const auto events = random_events(3000, {640, 480}, 7);
+  NpyEncoder encoder;
+  const auto bytes = encoded(encoder, events, 17);
+  EXPECT_EQ((bytes.size() - events.size() * NpyEncoder::event_bytes) % 64, 0U);
+  expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, patched(encoder, bytes));
+}
+
+TEST(Npy, NoEventsComeBack) {
+  NpyEncoder encoder;
+  const auto bytes = patched(encoder, encoded(encoder, {}));
+  NpyDecoder decoder;
+  EXPECT_TRUE(decoded(decoder, bytes).empty());
+  EXPECT_EQ(decoder.damage().places, 0U);
+}
+
+TEST(Npy, FieldsOfAnyKindInAnyOrder) {
+  auto bytes = with_header(
+      "{'descr': [('p', '|i1'), ('', '|V3'), ('label', '<U2'), ('time', '>f8'), ('box', '<f4', (2, "
+      "2)), "
+      "(('column', 'x'), '<f2'), ('y', '>u4')], 'fortran_order': False, 'shape': (3,), }\n",
+      3);
+  const auto element = [&](std::int8_t p, double t, std::uint16_t half, std::uint32_t y) {
+    append(bytes, p);
+    bytes.insert(bytes.end(), 3 + 8, 0xee);
+    append(bytes, t, true);
+    bytes.insert(bytes.end(), 16, 0xee);
+    append(bytes, half);
+    append(bytes, y, true);
+  };
+  element(1, 0.003820, 0x4900, 7);  // 10
+  element(-1, 1468939993.0674, 0x0000, 8);
+  element(1, std::nan(""), 0x4900, 7);
+  NpyDecoder decoder;
+  EXPECT_EQ(decoded(decoder, bytes),
+            (Events{StampedEvent::at(10, 7, 3820, Polarity::on),
+                    StampedEvent::at(0, 8, 1'468'939'993'067'400, Polarity::off)}));
+  EXPECT_EQ(decoder.damage().places, 1U);
+  EXPECT_EQ(decoder.damage().first_at, bytes.size() - 42);
+  expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, bytes);
+}
+
+TEST(Npy, SmallElements) {
+  auto bytes = with_header(
+      "{'descr': [('t', '<u2'), ('x', '|u1'), ('y', '|u1'), ('p', '|b1')], 'fortran_order': True, "
+      "'shape': (2,)}");
+  for (const std::uint8_t byte : {1, 2, 3, 4, 1, 5, 6, 7, 8, 0}) bytes.push_back(byte);
+  NpyDecoder decoder;
+  EXPECT_EQ(decoded(decoder, bytes), (Events{StampedEvent::at(3, 4, 0x201, Polarity::on),
+                                             StampedEvent::at(7, 8, 0x605, Polarity::off)}));
+}
+
+TEST(Npy, WhatIsWrongIsSkippedAndCounted) {
+  auto bytes = with_header(
+      "{'descr': [('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4')], 'fortran_order': False, "
+      "'shape': (6,), }");
+  const auto begin = bytes.size();
+  const auto element = [&](std::uint64_t t, std::int32_t x, std::int32_t y) {
+    append(bytes, t);
+    append(bytes, x);
+    append(bytes, y);
+    append<std::int32_t>(bytes, 1);
+  };
+  element(5, 1, 1);
+  element(1ULL << 63, 1, 1);
+  element(6, -1, 1);
+  element(7, 70000, 1);
+  element(4, 1, 0x8000);
+  element(4, 1, 0x7fff);
+  {
+    NpyDecoder decoder;
+    EXPECT_EQ(decoded(decoder, bytes).size(), 2U);
+    EXPECT_EQ(decoder.damage().places, 1U);
+    EXPECT_EQ(decoder.damage().first_at, begin + 20);
+    EXPECT_EQ(decoder.damage().outside, 3U);
+    EXPECT_EQ(decoder.damage().unsorted, 1U);
+  }
+  auto longer = bytes;
+  longer.insert(longer.end(), 1000, 0);
+  const Bytes shorter(bytes.begin(), bytes.end() - 20);
+  const Bytes cut(bytes.begin(), bytes.end() - 1);
+  for (const auto& damaged : {longer, shorter, cut}) {
+    NpyDecoder decoder;
+    decoded(decoder, damaged);
+    EXPECT_EQ(decoder.damage().places, 2U);
+    expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, damaged);
+  }
+}
+
+TEST(Npy, WhatIsNoneIsRefused) {
+  const std::string fields = "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4')]";
+  const auto refused = [](const Bytes& bytes) {
+    NpyDecoder decoder;
+    EXPECT_THROW(decoded(decoder, bytes), NotThisFormat) << std::string(bytes.begin(), bytes.end());
+  };
+  refused({});
+  refused(bytes_of("hello, this is a text"));
+  refused(bytes_of("\x93NUMPY"));
+  refused(bytes_of(std::string("\x93NUMPY\x04\0\x10\0", 10)));
+  refused(bytes_of(std::string("\x93NUMPY\x02\0\xff\xff\xff\xff", 12) + "{'descr'"));
+  refused(with_header("{'descr': '<f8', 'fortran_order': False, 'shape': (5, 4), }"));
+  for (const std::string descr :
+       {"[]", "[('t', '<u8')]", "[('t', '<u8'), ('x', '<i4'), ('y', '<i4')]",
+        "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4'), ('p', '<i4')]",
+        "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<c8')]",
+        "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i3')]",
+        "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4', (2,))]",
+        "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', [('q', '<i4')])]",
+        "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4'), ('', '|V99999999999')]",
+        "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4'), ('b', '|V60000', (65535, "
+        "65535))]",
+        "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4')", "[[", "[("})
+    refused(with_header("{'descr': " + descr + ", 'fortran_order': False, 'shape': (5,), }"));
+  for (const std::string shape :
+       {"()", "(5, 4)", "(-1,)", "(5", "5", "(99999999999999999999,)", "(x,)"})
+    refused(
+        with_header("{'descr': " + fields + ", 'fortran_order': False, 'shape': " + shape + ", }"));
+  refused(with_header("{'descr': " + fields + ", 'fortran_order': False}"));
+  refused(with_header("{'descr': " + fields + ", 'shape': (1,)} more"));
+  refused(with_header("{'descr': " + fields + ", 'shape': (1,), 'other': 3}"));
+}
+
+}  // namespace

@@ -1,0 +1,417 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Prophesee's RAW files and their words: what is written, word by word, and what is read of words
+// made by hand.
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "src/formats/evt/raw.hpp"
+#include "tests/formats/evt_validator.hpp"
+#include "tests/formats/recordings.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using recordings::below;
+using recordings::decode;
+using recordings::encode;
+using recordings::Random;
+using recordings::random_events;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr SensorSize vga{640, 480};
+constexpr auto off = Polarity::off;
+constexpr auto on = Polarity::on;
+
+template <class Word>
+Bytes bytes_of(std::initializer_list<Word> words) {
+  Bytes bytes(words.size() * sizeof(Word));
+  std::memcpy(bytes.data(), words.begin(), bytes.size());
+  return bytes;
+}
+
+Bytes evt3(std::initializer_list<std::uint16_t> words) {
+  return bytes_of(words);
+}
+
+Bytes words32(std::initializer_list<std::uint32_t> words) {
+  return bytes_of(words);
+}
+
+struct Read {
+  Decoded decoded;
+  Damage damage;
+};
+
+Read read(EvtFormat format, const Bytes& bytes, SensorSize size = vga) {
+  const auto decoder = make_evt_decoder(format, size);
+  auto decoded = decode(*decoder, bytes);
+  return {decoded, decoder->damage()};
+}
+
+std::vector<StampedEvent> events(std::initializer_list<StampedEvent> list) {
+  return list;
+}
+
+// What is written.
+
+TEST(Written, Evt3IsWhatEveryReaderReadsAlike) {
+  Random random(1);
+  for (int i = 0; i < 200; ++i) {
+    const SensorSize size{1 + below(random, 2048), 1 + below(random, 2048)};
+    const auto recording = random_events(random, size, 3000, i % 20 == 0 ? 60'000'000 : 100'000);
+    const auto encoder = make_evt_encoder(EvtFormat::evt3, size);
+    ASSERT_EQ(evt_validator::evt3(encode(*encoder, recording), size), "");
+  }
+}
+
+TEST(Written, Evt2AndEvt21AndEvt4AreSoundWordByWord) {
+  Random random(2);
+  for (int i = 0; i < 100; ++i) {
+    const SensorSize size{1 + below(random, 2048), 1 + below(random, 2048)};
+    const auto recording =
+        random_events(random, size, 3000, i % 4 == 0 ? Microseconds{40'000'000'000} : 100'000);
+    const auto bytes = [&](EvtFormat format) {
+      return encode(*make_evt_encoder(format, size), recording);
+    };
+    ASSERT_EQ(evt_validator::evt2(bytes(EvtFormat::evt2), size), "");
+    ASSERT_EQ(evt_validator::evt21(bytes(EvtFormat::evt21), size, false), "");
+    ASSERT_EQ(evt_validator::evt21(bytes(EvtFormat::evt21_legacy), size, true), "");
+    ASSERT_EQ(evt_validator::evt4(bytes(EvtFormat::evt4), size), "");
+  }
+}
+
+TEST(Written, TheValidatorFindsWhatItIsFor) {
+  const auto wrong = [](std::initializer_list<std::uint16_t> words) {
+    return !evt_validator::evt3(evt3(words), vga).empty();
+  };
+  EXPECT_FALSE(wrong({0x8000, 0x6001, 0x0002, 0x2003, 0x8001, 0x6000, 0x2003}));
+  EXPECT_TRUE(wrong({0x6001, 0x8000, 0x0002, 0x2003}));                  // TIME_LOW first
+  EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x2003, 0x8001, 0x2003}));  // no TIME_LOW
+  EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x2003, 0x8002}));          // a step left out
+  EXPECT_TRUE(wrong({0x8000, 0x8000}));
+  EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x3000, 0x4001, 0x5001}));  // no triplet
+  EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x3000 + 609, 0x4001, 0x4001, 0x5001}));
+  EXPECT_FALSE(wrong({0x8000, 0x6001, 0x0002, 0x3000 + 608, 0x4001, 0x4001, 0x5001}));
+  EXPECT_TRUE(wrong({0x8000, 0x6001, 480, 0x2003}));
+}
+
+TEST(Written, Evt3GroupsWhatPays) {
+  std::vector<StampedEvent> row;
+  for (int x = 100; x < 104; ++x) row.push_back(StampedEvent::at(x, 7, 9, on));
+  const auto written = [&] { return encode(*make_evt_encoder(EvtFormat::evt3, vga), row); };
+  EXPECT_EQ(written(), evt3({0x8000, 0x6009, 0x0007, 0x2864, 0x2865, 0x2866, 0x2867}));
+  row.push_back(StampedEvent::at(131, 7, 9, on));
+  EXPECT_EQ(written(), evt3({0x8000, 0x6009, 0x0007, 0x3864, 0x400f, 0x4000, 0x5080}));
+  row.push_back(StampedEvent::at(132, 7, 9, on));
+  EXPECT_EQ(written(), evt3({0x8000, 0x6009, 0x0007, 0x3864, 0x400f, 0x4000, 0x5080, 0x2884}));
+}
+
+TEST(Written, Evt3KeepsTimeAliveThroughSilence) {
+  const auto recording =
+      events({StampedEvent::at(1, 2, 5, on), StampedEvent::at(1, 2, 20'000'000, on)});
+  const auto bytes = encode(*make_evt_encoder(EvtFormat::evt3, vga), recording);
+  // A step for every 4096 us, and 2 more words at the second event.
+  EXPECT_EQ(bytes.size() / 2, 4U + 20'000'000 / 4096 + 2U);
+}
+
+TEST(Written, HeadersAreThese) {
+  const auto text = [](EvtFormat format) {
+    const auto bytes = encode(*make_prophesee_raw_encoder(format, {1280, 720}), {});
+    return std::string(bytes.begin(), bytes.end());
+  };
+  const auto expected = [](const std::string& evt, const std::string& format) {
+    return "% camera_integrator_name Prophesee\n% evt " + evt + "\n% format " + format +
+           ";height=720;width=1280\n% geometry 1280x720\n% plugin_integrator_name "
+           "Prophesee\n% end\n";
+  };
+  EXPECT_EQ(text(EvtFormat::evt2), expected("2.0", "EVT2"));
+  EXPECT_EQ(text(EvtFormat::evt21), expected("2.1", "EVT21;endianness=little"));
+  EXPECT_EQ(text(EvtFormat::evt21_legacy), expected("2.1", "EVT21;endianness=legacy"));
+  EXPECT_EQ(text(EvtFormat::evt3), expected("3.0", "EVT3"));
+  EXPECT_EQ(text(EvtFormat::evt4), expected("4.0", "EVT4"));
+}
+
+TEST(Written, IsForSensorsThatTheWordsCanAddress) {
+  EXPECT_THROW(make_prophesee_raw_encoder(EvtFormat::evt3, {2049, 1}), std::invalid_argument);
+  EXPECT_THROW(make_evt_encoder(EvtFormat::evt2, {1, 0}), std::invalid_argument);
+}
+
+// Headers.
+
+std::unique_ptr<Decoder> decoder_after(const std::string& header, Decoded& decoded) {
+  auto decoder = make_prophesee_raw_decoder();
+  Bytes bytes(header.begin(), header.end());
+  decoder->decode(bytes, decoded);
+  decoder->finish(decoded);
+  return decoder;
+}
+
+/// An event of EVT2 at (3, 2), 1 us, behind a header.
+std::string with_evt2(const std::string& header) {
+  const auto bytes = words32({0x80000000, 0x10000000 | 1 << 22 | 3 << 11 | 2});
+  return header + std::string(bytes.begin(), bytes.end());
+}
+
+void expect_evt2(const std::string& header, SensorSize size) {
+  Decoded decoded;
+  const auto decoder = decoder_after(with_evt2(header), decoded);
+  EXPECT_EQ(decoded.events, events({StampedEvent::at(3, 2, 1, on)})) << header;
+  EXPECT_EQ(decoder->size(), size);
+  EXPECT_EQ(decoder->damage().places, 0U);
+}
+
+TEST(RawHeader, IsReadAsWritersWriteIt) {
+  expect_evt2("% format EVT2;height=480;width=640\n% end\n", vga);
+  expect_evt2("% format EVT2\n% geometry 640x480\n% generator x\n% end\n", vga);
+  expect_evt2("% evt 2.0\n% geometry 640x480\n% end\n", vga);
+  expect_evt2("% date 2019-01-01 10:11:12\n% evt 2.0\n", {});  // older: without an end
+  expect_evt2("% evt 2.0\r\n%  geometry   640x480 \r\n% t0 123\n% end\r\n", vga);
+  expect_evt2("% evt 3.0\n% format EVT2;width=640;height=480\n% geometry 1x1\n% end\n", vga);
+  expect_evt2("% evt 2.0\n% geometry 99999999999x480\n% end\n", {});
+  expect_evt2("% evt 2.0\n%\n% geometry -5x480\n% end\n", {});
+}
+
+TEST(RawHeader, TakesDataThatBeginAsALineDoesForData) {
+  // 0x2025 are the low 16 bits of an event in EVT2, before which the header did not end.
+  const auto bytes = words32({0x00002025, 0x80000000, 0x10000000 | 3 << 11});
+  Decoded decoded;
+  decoder_after("% evt 2.0\n" + std::string(bytes.begin(), bytes.end()), decoded);
+  EXPECT_EQ(decoded.events, events({StampedEvent::at(3, 0, 0, on)}));
+}
+
+TEST(RawHeader, TellsTheOrderOfEvt21) {
+  const auto expect_order = [](const std::string& header, bool legacy) {
+    const auto little = words32({0, 0x80000000, 1, 0x10000000});
+    const auto other = words32({0x80000000, 0, 0x10000000, 1});
+    const auto& bytes = legacy ? other : little;
+    Decoded decoded;
+    decoder_after(header + std::string(bytes.begin(), bytes.end()), decoded);
+    EXPECT_EQ(decoded.events, events({StampedEvent::at(0, 0, 0, on)})) << header;
+  };
+  expect_order("% format EVT21;height=480;width=640\n% end\n", false);
+  expect_order("% format EVT21;endianness=little;height=480;width=640\n% end\n", false);
+  expect_order("% format EVT21;endianness=legacy;height=480;width=640\n% end\n", true);
+  expect_order("% format EVT21;height=480;width=640;endianness=legacy\n% end\n", true);
+  expect_order("% endianness legacy\n% format EVT21;height=480;width=640\n% end\n", true);
+  expect_order("% evt 2.1\n% system_ID 49\n% end\n", true);
+}
+
+TEST(RawHeader, IsAnErrorThatSaysWhy) {
+  const auto error = [](const std::string& file) {
+    Decoded decoded;
+    try {
+      decoder_after(file, decoded);
+    } catch (const NotThisFormat& exception) {
+      return std::string(exception.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(error(""), "");
+  EXPECT_NE(error("%"), "");
+  EXPECT_NE(error("GIF89a"), "");
+  EXPECT_NE(error("%PDF-1.4\n"), "");
+  EXPECT_NE(error(std::string(1000, '\0')), "");
+  EXPECT_NE(error("% date 1\n% end\n").find("format"), std::string::npos);
+  EXPECT_NE(error("% format HISTO3D;height=1;width=1\n% end\n").find("HISTO3D"), std::string::npos);
+  EXPECT_NE(error("% format EVT21;endianness=big\n% end\n").find("big"), std::string::npos);
+  EXPECT_NE(error("% evt 9.9\n% end\n"), "");
+  std::string endless;
+  while (endless.size() < 1'000'000) endless += "% a b\n";
+  EXPECT_NE(error(endless), "");
+  EXPECT_NE(error("% " + std::string(1'000'000, 'x')), "");
+}
+
+// EVT2.
+
+TEST(Evt2, ReadsEventsAndTriggersAndPassesOverTheRest) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt2,
+           words32({0x10000000 | 1 << 11,  // before any time
+                    0x80000002,            // 128 us
+                    0x00000000 | 5 << 22 | 639 << 11 | 479, 0xe0000000, 0xf0000001,
+                    0xd0000000,                         // others, continued, IMU
+                    0xa0000000 | 6 << 22 | 1 << 8 | 1,  // a trigger of input 1 rises
+                    0xa0000000 | 7 << 22 | 1 << 8,      // and falls
+                    0x10000000 | 63U << 22}));
+  EXPECT_EQ(decoded.events,
+            events({StampedEvent::at(639, 479, 133, off), StampedEvent::at(0, 0, 191, on)}));
+  EXPECT_EQ(decoded.triggers, (std::vector<Trigger>{{134, 1, true}, {135, 1, false}}));
+  EXPECT_EQ(damage.places, 0U);
+}
+
+TEST(Evt2, FollowsTheWrapOf34Bits) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt2, words32({0x8fffffff, 0x10000000 | 63U << 22, 0x80000000, 0x10000000,
+                                     0x8fffffff, 0x80000000, 0x10000000}));
+  const auto lap = Microseconds{1} << 34;
+  EXPECT_EQ(decoded.events,
+            events({StampedEvent::at(0, 0, lap - 1, on), StampedEvent::at(0, 0, lap, on),
+                    StampedEvent::at(0, 0, 2 * lap, on)}));
+  EXPECT_EQ(damage.unsorted, 0U);
+}
+
+TEST(Evt2, CountsDisorderAndWhatIsOutside) {
+  const auto [decoded, damage] = read(
+      EvtFormat::evt2, words32({0x80000064, 0x10000000, 0x80000063, 0x10000000 | 1 << 11,
+                                0x80000065, 0x10000000, 0x10000000 | 640 << 11, 0x10000000 | 480}));
+  EXPECT_EQ(decoded.events,
+            events({StampedEvent::at(0, 0, 6400, on), StampedEvent::at(1, 0, 6336, on),
+                    StampedEvent::at(0, 0, 6464, on)}));
+  EXPECT_EQ(damage.unsorted, 1U);
+  EXPECT_EQ(damage.outside, 2U);
+  EXPECT_EQ(damage.places, 0U);
+}
+
+TEST(Evt2, CountsBrokenWordsByPlaces) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt2, words32({0x80000000, 0x10000000, 0x20000000, 0x30000000, 0x10000000,
+                                     0x90000000, 0x10000000}));
+  EXPECT_EQ(decoded.events.size(), 3U);
+  EXPECT_EQ(damage.places, 2U);
+  EXPECT_EQ(damage.first_at, 8U);
+  EXPECT_NE(damage.first, "");
+}
+
+TEST(Evt2, KnowsNoBoundsWhereItKnowsNoSize) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt2, words32({0x80000000, 0x10000000 | 0x3fffff}), {});
+  EXPECT_EQ(decoded.events, events({StampedEvent::at(2047, 2047, 0, on)}));
+}
+
+// EVT2.1.
+
+TEST(Evt21, ReadsVectorsInBothOrders) {
+  const std::uint32_t upper[] = {0x80000001, 0x10000000 | 2 << 22 | 32 << 11 | 9,
+                                 0xa0000000 | 3 << 22 | 1, 0xe0000000,
+                                 0x00000000 | 4 << 22 | 620 << 11 | 9};
+  const std::uint32_t lower[] = {0, 0x80000005, 0, 0, 0x80080000 | 1};
+  Bytes little;
+  Bytes legacy;
+  for (int i = 0; i < 5; ++i) {
+    const auto add = [](Bytes& bytes, std::uint32_t first, std::uint32_t second) {
+      const auto word = words32({first, second});
+      bytes.insert(bytes.end(), word.begin(), word.end());
+    };
+    add(little, lower[i], upper[i]);
+    add(legacy, upper[i], lower[i]);
+  }
+  for (const auto& [format, bytes] :
+       {std::pair(EvtFormat::evt21, little), std::pair(EvtFormat::evt21_legacy, legacy)}) {
+    const auto [decoded, damage] = read(format, bytes);
+    EXPECT_EQ(decoded.events,
+              events({StampedEvent::at(32, 9, 66, on), StampedEvent::at(34, 9, 66, on),
+                      StampedEvent::at(63, 9, 66, on), StampedEvent::at(620, 9, 68, off),
+                      StampedEvent::at(639, 9, 68, off)}));
+    EXPECT_EQ(decoded.triggers, (std::vector<Trigger>{{67, 0, true}}));
+    EXPECT_EQ(damage.outside, 1U);  // x = 651
+    EXPECT_EQ(damage.places, 0U);
+  }
+}
+
+// EVT3.
+
+TEST(Evt3, ReadsEventsVectorsAndTriggers) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt3, evt3({0x2001,                          // before any time and row
+                                  0x8001, 0x6002, 0x0005, 0x2803,  // ON at (3, 5), 4098 us
+                                  0x3010, 0x4003, 0x4800, 0x5081,  // OFF from x = 16 on
+                                  0x8001,                          // the same again
+                                  0x2004,                          //
+                                  0xa301,                          // a trigger of input 3 rises
+                                  0xe015, 0xf000, 0xf000, 0x7016,  // others
+                                  0x8002, 0x2005}));               // time is 8192 us anew
+  EXPECT_EQ(decoded.events,
+            events({StampedEvent::at(3, 5, 4098, on), StampedEvent::at(16, 5, 4098, off),
+                    StampedEvent::at(17, 5, 4098, off), StampedEvent::at(39, 5, 4098, off),
+                    StampedEvent::at(40, 5, 4098, off), StampedEvent::at(47, 5, 4098, off),
+                    StampedEvent::at(4, 5, 4098, off), StampedEvent::at(5, 5, 8192, off)}));
+  EXPECT_EQ(decoded.triggers, (std::vector<Trigger>{{4098, 3, true}}));
+  EXPECT_EQ(damage.places, 0U);
+}
+
+TEST(Evt3, ReadsVectorsThatAreNoTriplets) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x3800, 0x5001, 0x5001, 0x4001}));
+  EXPECT_EQ(decoded.events, events({StampedEvent::at(0, 0, 0, on), StampedEvent::at(8, 0, 0, on),
+                                    StampedEvent::at(16, 0, 0, on)}));
+}
+
+TEST(Evt3, PassesOverWhatIsNoChange) {
+  // After EM_ADDR_Y, events are not changes of contrast until the next row.
+  const auto [decoded, damage] =
+      read(EvtFormat::evt3,
+           evt3({0x8000, 0x6000, 0x0000, 0x1001, 0x2001, 0x3001, 0x4fff, 0x0002, 0x2003}));
+  EXPECT_EQ(decoded.events, events({StampedEvent::at(3, 2, 0, off)}));
+  EXPECT_EQ(damage.places + damage.outside, 0U);
+}
+
+TEST(Evt3, FollowsTheWrapOf24BitsAndAFlippedBit) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt3,
+           evt3({0x8ffe, 0x6000, 0x0000, 0x2000, 0x8fff, 0x6000, 0x2000, 0x8000, 0x6000, 0x2000,
+                 0x8064, 0x6000, 0x2000, 0x8864, 0x6000, 0x2000, 0x8065, 0x6000, 0x2000}));
+  constexpr Microseconds lap = 1 << 24;
+  EXPECT_EQ(
+      decoded.events,
+      events({StampedEvent::at(0, 0, lap - 8192, off), StampedEvent::at(0, 0, lap - 4096, off),
+              StampedEvent::at(0, 0, lap, off), StampedEvent::at(0, 0, lap + 0x64000, off),
+              StampedEvent::at(0, 0, lap + 0x864000, off),
+              StampedEvent::at(0, 0, lap + 0x65000, off)}));
+  EXPECT_EQ(damage.unsorted, 1U);
+}
+
+TEST(Evt3, DropsWhatIsOutside) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x2000 + 640, 0x3000 + 638, 0x4fff,
+                                  0x4fff, 480, 0x2000, 0x3000, 0x5003}));
+  EXPECT_EQ(decoded.events,
+            events({StampedEvent::at(638, 0, 0, off), StampedEvent::at(639, 0, 0, off)}));
+  EXPECT_EQ(damage.outside, 1U + 22U + 1U + 2U);
+}
+
+TEST(Evt3, NotesWhatIsNoWord) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x4001, 0x9000, 0xb000, 0x2000, 0xc000}));
+  EXPECT_EQ(decoded.events.size(), 1U);
+  EXPECT_EQ(damage.places, 2U);
+  EXPECT_EQ(damage.first_at, 6U);
+}
+
+TEST(Evt3, DoesNotRunOutOfTheSensorByVectors) {
+  Bytes bytes = evt3({0x8000, 0x6000, 0x0000, 0x3000});
+  for (int i = 0; i < 200'000; ++i) {
+    bytes.push_back(0xff);
+    bytes.push_back(0x4f);
+  }
+  const auto [decoded, damage] = read(EvtFormat::evt3, bytes);
+  EXPECT_EQ(decoded.events.size(), 640U);
+  EXPECT_EQ(damage.outside, 200'000U * 12 - 640);
+}
+
+// EVT4.
+
+TEST(Evt4, ReadsEventsVectorsAndTriggers) {
+  const auto [decoded, damage] =
+      read(EvtFormat::evt4,
+           words32({0xb0000000, 0xc0000000, 0xe0000009,  // before any time; a mask of one
+                    0xe0000001, 0xa0000000 | 1 << 22 | 3 << 11 | 4,  //
+                    0xd0000000 | 2 << 22 | 32 << 11 | 5, 0x80000001, 0xffffffff,
+                    0x90000000 | 3 << 22 | 2 << 8 | 1, 0x60000000, 0x70000000,
+                    0xc0000000 | 4 << 22 | 608 << 11 | 5, 0xe0000000}));
+  EXPECT_EQ(decoded.events,
+            events({StampedEvent::at(3, 4, 65, off), StampedEvent::at(32, 5, 66, on),
+                    StampedEvent::at(63, 5, 66, on), StampedEvent::at(637, 5, 68, off),
+                    StampedEvent::at(638, 5, 68, off), StampedEvent::at(639, 5, 68, off)}));
+  EXPECT_EQ(decoded.triggers, (std::vector<Trigger>{{67, 2, true}}));
+  EXPECT_EQ(damage.places + damage.outside + damage.unsorted, 0U);
+}
+
+TEST(Evt4, NotesAVectorThatTheFileCuts) {
+  const auto [decoded, damage] = read(EvtFormat::evt4, words32({0xe0000000, 0xc0000000}));
+  EXPECT_TRUE(decoded.events.empty());
+  EXPECT_EQ(damage.places, 1U);
+  EXPECT_EQ(damage.first_at, 4U);
+}
+
+}  // namespace

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Files that cameras recorded, against counts and sums that another reader made.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "src/formats/evt/raw.hpp"
+#include "tests/formats/evt_validator.hpp"
+#include "tests/formats/recordings.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+std::string path(const std::string& name) {
+  const char* shared = std::getenv("SHARED_DATA");
+  return std::string(shared != nullptr ? shared : "") + "/events/" + name;
+}
+
+std::vector<std::uint8_t> bytes_of(const std::string& name) {
+  std::ifstream file(path(name), std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct Sums {
+  Microseconds t = 0;
+  long x = 0, y = 0, on = 0, off = 0;
+};
+
+Sums sums_of(const Decoded& decoded) {
+  Sums sums;
+  for (const auto& event : decoded.events) {
+    sums.t += event.t;
+    sums.x += event.x;
+    sums.y += event.y();
+    ++(event.polarity() == Polarity::on ? sums.on : sums.off);
+  }
+  return sums;
+}
+
+TEST(Recorded, Evt3Of1280x720) {
+  const std::string name = "evt3-1280x720-triggers.raw";
+  if (!std::filesystem::exists(path(name))) GTEST_SKIP() << "no " << path(name);
+  const auto decoder = make_prophesee_raw_decoder();
+  const auto decoded = recordings::decode(*decoder, bytes_of(name));
+  const auto sums = sums_of(decoded);
+  EXPECT_EQ(decoder->size(), (SensorSize{1280, 720}));
+  EXPECT_EQ(decoded.events.size(), 82'469U);
+  EXPECT_EQ(decoded.triggers.size(), 2U);
+  EXPECT_EQ(sums.t, 1'222'326'831'810);
+  EXPECT_EQ(sums.x, 42'078'718);
+  EXPECT_EQ(sums.y, 31'656'267);
+  EXPECT_EQ(sums.on, 41'439);
+  EXPECT_EQ(decoder->damage().places, 0U);
+  EXPECT_EQ(decoder->damage().outside, 0U);
+}
+
+TEST(Recorded, Evt3Of640x480) {
+  const std::string name = "evt3-640x480-triggers.raw";
+  if (!std::filesystem::exists(path(name))) GTEST_SKIP() << "no " << path(name);
+  const auto decoder = make_prophesee_raw_decoder();
+  const auto decoded = recordings::decode(*decoder, bytes_of(name));
+  auto sums = sums_of(decoded);
+  for (const auto& trigger : decoded.triggers) sums.t += trigger.t;
+  EXPECT_EQ(decoder->size(), (SensorSize{640, 480}));
+  EXPECT_EQ(sums.off, 218'291);
+  EXPECT_EQ(sums.on, 125'183);
+  EXPECT_EQ(sums.t, 2'885'601'049'874);
+  EXPECT_EQ(decoder->damage().places, 0U);
+  EXPECT_EQ(decoder->damage().outside, 0U);
+}
+
+TEST(Recorded, WrittenAgainInEveryFormatIsTheSame) {
+  for (const std::string name : {"evt3-1280x720-triggers.raw", "evt3-640x480-triggers.raw"}) {
+    if (!std::filesystem::exists(path(name))) GTEST_SKIP() << "no " << path(name);
+    const auto decoder = make_prophesee_raw_decoder();
+    auto events = recordings::decode(*decoder, bytes_of(name)).events;
+    // A camera's own order is not quite that of time.
+    std::stable_sort(events.begin(), events.end(),
+                     [](const auto& a, const auto& b) { return a.t < b.t; });
+    for (const auto format : {EvtFormat::evt2, EvtFormat::evt21, EvtFormat::evt21_legacy,
+                              EvtFormat::evt3, EvtFormat::evt4}) {
+      const auto encoder = make_evt_encoder(format, decoder->size());
+      const auto bytes = recordings::encode(*encoder, events);
+      if (format == EvtFormat::evt3) {
+        EXPECT_EQ(evt_validator::evt3(bytes, decoder->size()), "");
+      }
+      EXPECT_EQ(recordings::decode(*make_evt_decoder(format, decoder->size()), bytes).events,
+                events);
+    }
+  }
+}
+
+}  // namespace

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Every format that is both read and written: what comes back is what was written.
+#include <gtest/gtest.h>
+
+#include "tests/formats/formats.hpp"
+#include "tests/formats/recordings.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using formats::Format;
+using recordings::below;
+using recordings::decode;
+using recordings::encode;
+using recordings::Random;
+using recordings::random_events;
+
+class EveryFormat : public testing::TestWithParam<Format> {
+ protected:
+  SensorSize random_size(Random& random) const {
+    const int largest = std::min(2048, GetParam().largest_side);
+    const auto side = [&] { return below(random, 4) == 0 ? largest : 1 + below(random, largest); };
+    return {side(), side()};
+  }
+
+  std::vector<std::uint8_t> encoded(SensorSize size, std::span<const StampedEvent> events) const {
+    return encode(*GetParam().make_encoder(size), events);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats::all()),
+                         [](const auto& test) { return test.param.name; });
+
+void expect_sound(const Damage& damage) {
+  EXPECT_EQ(damage.places, 0U) << damage.first << " at " << damage.first_at;
+  EXPECT_EQ(damage.unsorted, 0U);
+  EXPECT_EQ(damage.outside, 0U);
+}
+
+TEST_P(EveryFormat, ReturnsWhatWasWritten) {
+  Random random(1);
+  for (int i = 0; i < 60; ++i) {
+    const auto size = i == 0 ? SensorSize{1, 1} : random_size(random);
+    const auto pause = i % 4 == 0 ? GetParam().longest_pause : 100'000;
+    const auto events = random_events(random, size, i % 4 == 0 ? 60 : 4000, pause);
+    const auto decoder = GetParam().make_decoder(size);
+    const auto decoded = decode(*decoder, encoded(size, events));
+    ASSERT_EQ(decoded.events, events) << "recording " << i;
+    ASSERT_TRUE(decoded.triggers.empty());
+    EXPECT_EQ(decoder->size(), size);
+    expect_sound(decoder->damage());
+  }
+}
+
+TEST_P(EveryFormat, TakesTheSensorsLastPixel) {
+  const int side = GetParam().largest_side;
+  const SensorSize size{side, side};
+  const std::vector events{StampedEvent::at(0, 0, 0, Polarity::on),
+                           StampedEvent::at(side - 1, 0, 0, Polarity::off),
+                           StampedEvent::at(0, side - 1, 1, Polarity::off),
+                           StampedEvent::at(side - 1, side - 1, 1, Polarity::on)};
+  const auto decoder = GetParam().make_decoder(size);
+  EXPECT_EQ(decode(*decoder, encoded(size, events)).events, events);
+}
+
+TEST_P(EveryFormat, ReadsTheSameHoweverTheBytesAreSplit) {
+  Random random(2);
+  const SensorSize size{640, 480};
+  const auto events = random_events(random, size, 2000, 1'000'000);
+  const auto bytes = encoded(size, events);
+  const auto one = GetParam().make_decoder(size);
+  EXPECT_EQ(decode(*one, bytes, [] { return 1; }).events, events);
+  for (int i = 0; i < 50; ++i) {
+    const auto decoder = GetParam().make_decoder(size);
+    const auto longest = 1 + below(random, 300);
+    EXPECT_EQ(decode(*decoder, bytes, [&] { return 1 + below(random, longest); }).events, events);
+    expect_sound(decoder->damage());
+  }
+}
+
+TEST_P(EveryFormat, ReadsTheSameSplitAtAnyByte) {
+  Random random(3);
+  const SensorSize size{64, 64};
+  const auto events = random_events(random, size, 60, 1000);
+  const auto bytes = encoded(size, events);
+  for (std::size_t at = 1; at < bytes.size(); ++at) {
+    const auto decoder = GetParam().make_decoder(size);
+    Decoded decoded;
+    decoder->decode(std::span(bytes).first(at), decoded);
+    decoder->decode({}, decoded);
+    decoder->decode(std::span(bytes).subspan(at), decoded);
+    decoder->finish(decoded);
+    ASSERT_EQ(decoded.events, events) << "split at " << at;
+  }
+}
+
+TEST_P(EveryFormat, WritesWhatReadsTheSameHoweverTheEventsAreSplit) {
+  Random random(4);
+  for (int i = 0; i < 20; ++i) {
+    const auto size = random_size(random);
+    const auto events = random_events(random, size, 3000, 1'000'000);
+    const auto encoder = GetParam().make_encoder(size);
+    std::vector<std::uint8_t> bytes;
+    for (std::span<const StampedEvent> rest = events; !rest.empty();) {
+      const auto piece = rest.first(
+          std::min<std::size_t>(rest.size(), static_cast<std::size_t>(below(random, 100))));
+      encoder->encode(piece, bytes);
+      rest = rest.subspan(piece.size());
+    }
+    encoder->finish(bytes);
+    const auto decoder = GetParam().make_decoder(size);
+    ASSERT_EQ(decode(*decoder, bytes).events, events);
+    expect_sound(decoder->damage());
+  }
+}
+
+TEST_P(EveryFormat, FollowsWrapsOfTheTime) {
+  // Past 24, 32 and 34 bits; as far as the format can be silent at once, and somewhat beyond the
+  // largest wrap.
+  std::vector<StampedEvent> events;
+  const SensorSize size{320, 240};
+  const auto step = std::min(GetParam().longest_pause, 30 * formats::minutes);
+  const int steps = GetParam().name == "es" ? 4 : 21;
+  for (int i = 0; i < steps; ++i)
+    events.push_back(StampedEvent::at(i, i, step * i + i % 3, Polarity::on));
+  for (const int bits : {24, 32, 34})
+    for (int i = -2; i <= 2; ++i)
+      if (GetParam().name != "es")
+        events.push_back(
+            StampedEvent::at(bits, 10 + i, (Microseconds{1} << bits) + i, Polarity::off));
+  std::sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.t < b.t; });
+  const auto decoder = GetParam().make_decoder(size);
+  EXPECT_EQ(decode(*decoder, encoded(size, events)).events, events);
+  expect_sound(decoder->damage());
+}
+
+TEST_P(EveryFormat, LeavesOutAnAbsurdSilence) {
+  if (GetParam().name == "dat") return;  // which does not fill silence
+  const SensorSize size{320, 240};
+  const Microseconds now = 1'790'000'000'000'000;
+  const std::vector events{StampedEvent::at(1, 2, now, Polarity::on),
+                           StampedEvent::at(3, 4, now + 50'000, Polarity::off),
+                           StampedEvent::at(5, 6, 2 * now, Polarity::off),
+                           StampedEvent::at(7, 8, 2 * now + 3, Polarity::off)};
+  const auto bytes = encoded(size, events);
+  EXPECT_LT(bytes.size(), 2000U);
+  const auto decoded = decode(*GetParam().make_decoder(size), bytes);
+  ASSERT_EQ(decoded.events.size(), 4U);
+  const Microseconds times[] = {0, 50'000, 50'000, 50'003};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(decoded.events[i].x, events[i].x);
+    EXPECT_EQ(decoded.events[i].t, times[i]);
+  }
+}
+
+TEST_P(EveryFormat, WritesDisorderWithoutHarm) {
+  Random random(5);
+  const SensorSize size{100, 100};
+  std::vector<StampedEvent> events;
+  for (int i = 0; i < 1000; ++i)
+    events.push_back({static_cast<Microseconds>(random()), static_cast<std::uint16_t>(random()),
+                      static_cast<std::uint16_t>(random())});
+  EXPECT_LT(encoded(size, events).size(), std::size_t{1} << 31);
+}
+
+TEST_P(EveryFormat, WritesAnEmptyRecording) {
+  const SensorSize size{320, 240};
+  const auto bytes = encoded(size, {});
+  const auto decoder = GetParam().make_decoder(size);
+  EXPECT_TRUE(decode(*decoder, bytes).events.empty());
+  EXPECT_EQ(decoder->size(), size);
+  expect_sound(decoder->damage());
+}
+
+TEST_P(EveryFormat, GoesOnFromEveryLandmarkAsIfItHadReadAll) {
+  Random random(6);
+  const SensorSize size{640, 480};
+  const auto events = random_events(random, size, 200'000, 200'000);
+  const auto bytes = encoded(size, events);
+  const auto decoder = GetParam().make_decoder(size);
+  ASSERT_EQ(decode(*decoder, bytes).events.size(), events.size());
+  ASSERT_GT(decoder->landmark_before(events.back().t)->position, 100'000U);
+  for (int i = 0; i < 40; ++i) {
+    const auto wanted = i == 0 ? 0 : events[static_cast<std::size_t>(below(random, 200'000))].t;
+    const auto landmark = decoder->landmark_before(wanted);
+    ASSERT_TRUE(landmark);
+    decoder->restart(*landmark);
+    const auto decoded = decode(*decoder, std::span(bytes).subspan(landmark->position));
+    ASSERT_LE(decoded.events.size(), events.size());
+    const auto skipped = events.size() - decoded.events.size();
+    ASSERT_TRUE(std::equal(decoded.events.begin(), decoded.events.end(),
+                           events.begin() + static_cast<std::ptrdiff_t>(skipped)));
+    // Nothing that was asked for is missing.
+    if (skipped != 0) {
+      ASSERT_LT(events[skipped - 1].t, wanted);
+    }
+  }
+  expect_sound(decoder->damage());
+}
+
+/// Whatever is done to a file, no event appears out of nothing, and the split changes nothing.
+TEST_P(EveryFormat, SurvivesDamage) {
+  Random random(7);
+  const SensorSize size{640, 480};
+  const auto events = random_events(random, size, 2000, 1'000'000);
+  const auto sound = encoded(size, events);
+  for (int i = 0; i < 300; ++i) {
+    auto bytes = sound;
+    for (int j = 1 + below(random, 20); j > 0; --j) {
+      const auto at = static_cast<std::size_t>(below(random, static_cast<int>(bytes.size())));
+      const auto place = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+      switch (below(random, 4)) {
+        case 0:
+          *place ^= static_cast<std::uint8_t>(1 << below(random, 8));
+          break;
+        case 1:
+          bytes.erase(place,
+                      place + std::min<std::ptrdiff_t>(1 + below(random, 9), bytes.end() - place));
+          break;
+        case 2:
+          bytes.insert(place, static_cast<std::uint8_t>(random()));
+          break;
+        default:
+          bytes.resize(std::max<std::size_t>(at, bytes.size() / 2));
+      }
+      if (bytes.empty()) bytes.push_back(0);
+    }
+    const auto outcome = [&](auto next_piece) {
+      const auto decoder = GetParam().make_decoder(size);
+      std::string error;
+      Decoded decoded;
+      try {
+        decoded = decode(*decoder, bytes, next_piece);
+      } catch (const NotThisFormat& exception) {
+        error = exception.what();
+      }
+      for (const auto& event : decoded.events) {
+        const int width = decoder->size().width;
+        const int height = decoder->size().height;
+        EXPECT_TRUE(width == 0 || (event.x < width && event.y() < height));
+      }
+      const auto& damage = decoder->damage();
+      return std::tuple(error, decoded.events, damage.places, damage.first_at, damage.first,
+                        damage.unsorted, damage.outside);
+    };
+    const auto whole = outcome([&] { return bytes.size(); });
+    ASSERT_EQ(outcome([&] { return 1 + below(random, 50); }), whole);
+  }
+}
+
+TEST_P(EveryFormat, TellsACutFile) {
+  Random random(8);
+  const SensorSize size{640, 480};
+  // DAT and Event Stream files end with an event, and the words of the others are longer than 1.
+  const auto events = random_events(random, size, 100, 1000);
+  auto bytes = encoded(size, events);
+  bytes.pop_back();
+  const auto decoder = GetParam().make_decoder(size);
+  const auto decoded = decode(*decoder, bytes);
+  EXPECT_EQ(decoder->damage().places, 1U);
+  EXPECT_LT(decoder->damage().first_at, bytes.size());
+  EXPECT_GE(decoder->damage().first_at + 8, bytes.size());
+  EXPECT_TRUE(std::equal(decoded.events.begin(), decoded.events.end(), events.begin()));
+}
+
+}  // namespace

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Events to write and to read, and the ways to cut bytes into pieces.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "src/formats/decoder.hpp"
+#include "src/formats/encoder.hpp"
+
+namespace table_events {
+
+using namespace eventcamera;
+
+using Bytes = std::vector<std::uint8_t>;
+
+inline Bytes bytes_of(std::string_view text) {
+  return {text.begin(), text.end()};
+}
+
+/// Events in bursts of one time, neighbours, rows, noise, and silence of hours.
+inline std::vector<StampedEvent> random_events(std::size_t count, SensorSize size, unsigned seed,
+                                               Microseconds first = 0) {
+  std::mt19937 random(seed);
+  const auto below = [&](int end) {
+    return static_cast<int>(random() % static_cast<unsigned>(end));
+  };
+  std::vector<StampedEvent> events;
+  Microseconds t = first;
+  while (events.size() < count) {
+    const int kind = below(100);
+    const int run =
+        std::min<int>(1 + below(kind < 5 ? 3000 : 20), static_cast<int>(count - events.size()));
+    const int x = below(size.width);
+    const int y = below(size.height);
+    const int mean_gap = below(3) == 0 ? 0 : 1 + below(200);
+    for (int i = 0; i < run; ++i) {
+      const bool row = kind % 3 == 0;
+      const bool noise = kind % 3 == 1;
+      events.push_back(
+          StampedEvent::at(noise ? below(size.width) : (x + i * (1 + kind % 2)) % size.width,
+                           row ? y : (noise ? below(size.height) : (y + i) % size.height), t,
+                           below(kind % 4 == 0 ? 100 : 2) == 1 ? Polarity::on : Polarity::off));
+      if (mean_gap > 0) t += below(mean_gap);
+    }
+    if (below(2000) == 0) t += 3'600'000'000LL * (1 + below(5));
+    if (below(50) == 0) t += below(100'000'000);
+  }
+  return events;
+}
+
+inline const std::vector<SensorSize>& sizes() {
+  static const std::vector<SensorSize> sizes = {{1, 1},     {2, 3},      {128, 128},  {240, 180},
+                                                {640, 480}, {1280, 720}, {2048, 2048}};
+  return sizes;
+}
+
+inline Bytes encoded(Encoder& encoder, std::span<const StampedEvent> events,
+                     std::size_t at_once = 1000) {
+  Bytes bytes;
+  while (!events.empty()) {
+    const auto part = events.first(std::min(at_once, events.size()));
+    encoder.encode(part, bytes);
+    events = events.subspan(part.size());
+  }
+  encoder.finish(bytes);
+  return bytes;
+}
+
+/// Feeds `bytes` in pieces of `size`, or of any size where it is 0.
+inline std::vector<StampedEvent> decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
+                                         std::size_t size = 0, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  Decoded out;
+  while (!bytes.empty()) {
+    const auto wanted = size > 0 ? size : 1 + random() % (random() % 3 == 0 ? 100'000 : 300);
+    const auto piece = bytes.first(std::min<std::size_t>(wanted, bytes.size()));
+    decoder.decode(piece, out);
+    bytes = bytes.subspan(piece.size());
+  }
+  decoder.finish(out);
+  return out.events;
+}
+
+/// Whatever the pieces, a decoder says the same of these bytes.
+template <class Make>
+void expect_same_however_cut(const Make& make, std::span<const std::uint8_t> bytes) {
+  auto whole = make();
+  const auto events = decoded(*whole, bytes, bytes.size() + 1);
+  for (const std::size_t size : {1, 2, 7, 64, 4097, 0}) {
+    auto decoder = make();
+    EXPECT_TRUE(decoded(*decoder, bytes, size) == events) << "pieces of " << size;
+    EXPECT_EQ(decoder->damage().places, whole->damage().places) << "pieces of " << size;
+    EXPECT_EQ(decoder->damage().first_at, whole->damage().first_at) << "pieces of " << size;
+    EXPECT_EQ(decoder->damage().first, whole->damage().first) << "pieces of " << size;
+    EXPECT_EQ(decoder->damage().unsorted, whole->damage().unsorted) << "pieces of " << size;
+    EXPECT_EQ(decoder->damage().outside, whole->damage().outside) << "pieces of " << size;
+  }
+}
+
+}  // namespace table_events

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Lets scripts write and read tables of events: table_files write|read KIND FILE RAW. RAW is
+// StampedEvents as they lie in memory. Prints what was wrong with the file that is read.
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+
+#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_writer.hpp"
+#include "src/formats/numpy/npy_decoder.hpp"
+#include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/text/csv_decoder.hpp"
+#include "src/formats/text/csv_encoder.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+constexpr SensorSize size = {1280, 720};
+
+std::vector<std::uint8_t> load(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(stream), {});
+  return {text.begin(), text.end()};
+}
+
+void save(const std::string& path, const void* bytes, std::size_t count) {
+  std::ofstream(path, std::ios::binary)
+      .write(static_cast<const char*>(bytes), static_cast<std::streamsize>(count));
+}
+
+void write_file(const std::string& kind, const std::string& file, const std::string& raw) {
+  const auto bytes = load(raw);
+  std::vector<StampedEvent> events(bytes.size() / sizeof(StampedEvent));
+  if (!events.empty())
+    std::memcpy(static_cast<void*>(events.data()), bytes.data(),
+                events.size() * sizeof(StampedEvent));
+  std::vector<std::uint8_t> out;
+  if (kind == "npy") {
+    NpyEncoder encoder;
+    encoder.encode(events, out);
+    encoder.finish(out);
+    const auto patch = encoder.patch();
+    std::memcpy(out.data() + patch.position, patch.bytes.data(), patch.bytes.size());
+    save(file, out.data(), out.size());
+    return;
+  }
+  for (const auto& [name, description, dialect] : csv_dialects()) {
+    if (kind != name) continue;
+    CsvEncoder encoder(dialect, size);
+    encoder.encode(events, out);
+    encoder.finish(out);
+    save(file, out.data(), out.size());
+    return;
+  }
+  Hdf5Writer::Settings settings;
+  settings.size = size;
+  settings.layout = kind == "metavision-hdf5" ? Hdf5Layout::metavision : Hdf5Layout::dsec;
+  settings.compression =
+      kind == "dsec-gzip" ? Hdf5Writer::Compression::gzip : Hdf5Writer::Compression::none;
+  Hdf5Writer writer(file, settings);
+  writer.append(events);
+  writer.close();
+}
+
+void read_file(const std::string& kind, const std::string& file, const std::string& raw) {
+  Decoded out;
+  Damage damage;
+  if (kind == "hdf5") {
+    Hdf5Reader reader(file);
+    while (reader.read(10'000, out.events) > 0) {
+    }
+    damage = reader.damage();
+  } else {
+    const std::unique_ptr<Decoder> decoder =
+        kind == "npy" ? std::unique_ptr<Decoder>(std::make_unique<NpyDecoder>())
+                      : std::make_unique<CsvDecoder>();
+    decoder->decode(load(file), out);
+    decoder->finish(out);
+    damage = decoder->damage();
+  }
+  save(raw, out.events.data(), out.events.size() * sizeof(StampedEvent));
+  std::printf("%d %d %d %s\n", static_cast<int>(damage.places), static_cast<int>(damage.unsorted),
+              static_cast<int>(damage.outside), damage.first.c_str());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 5) return 2;
+  try {
+    (std::string(argv[1]) == "write" ? write_file : read_file)(argv[2], argv[3], argv[4]);
+  } catch (const std::exception& error) {
+    std::printf("%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

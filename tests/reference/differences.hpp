@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <vector>
+
+#include "src/core/box.hpp"
+#include "src/core/event.hpp"
+#include "src/core/plane.hpp"
+#include "src/core/step_times.hpp"
+#include "src/simulate/simulator.hpp"
+
+/// The equations of the simulators written down as they are read, one picture after another, in
+/// plain loops and in double precision (which holds all of their numbers exactly). Tests and
+/// benchmarks hold the simulators to them.
+namespace eventcamera::reference {
+
+/// I(0), I(1/m) ... I(1).
+template <class Pixel>
+using Sequence = std::vector<Plane<Pixel>>;
+
+/// e_j(x) = ON where I(j) - I(j-1) > C+, OFF where I(j-1) - I(j) > C-, at the time of I(j).
+template <class Pixel>
+std::vector<Event> differences(const Sequence<Pixel>& sequence, const StepTimes& steps,
+                               const Thresholds& thresholds) {
+  std::vector<Event> events;
+  for (int j = 1; j < static_cast<int>(sequence.size()); ++j) {
+    const auto& before = sequence[static_cast<std::size_t>(j - 1)];
+    const auto& now = sequence[static_cast<std::size_t>(j)];
+    for (int y = 0; y < now.height(); ++y) {
+      for (int x = 0; x < now.width(); ++x) {
+        if (now.at(x, y) - before.at(x, y) > thresholds.positive)
+          events.push_back(Event::at(x, y, steps.microseconds(j), Polarity::on));
+        if (before.at(x, y) - now.at(x, y) > thresholds.negative)
+          events.push_back(Event::at(x, y, steps.microseconds(j), Polarity::off));
+      }
+    }
+  }
+  return events;
+}
+
+/// The smallest box that holds the pixels with |now - last| over the threshold.
+template <class Pixel>
+Box changed_box(const Plane<Pixel>& last, const Plane<Pixel>& now, int threshold) {
+  Box box;
+  for (int y = 0; y < now.height(); ++y) {
+    for (int x = 0; x < now.width(); ++x) {
+      if (std::abs(now.at(x, y) - last.at(x, y)) <= threshold) continue;
+      if (box.empty()) box = {x, y, x + 1, y + 1};
+      box = {std::min(box.left, x), box.top, std::max(box.right, x + 1), y + 1};
+    }
+  }
+  return box;
+}
+
+}  // namespace eventcamera::reference

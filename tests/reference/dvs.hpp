@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "src/core/event.hpp"
+#include "src/core/plane.hpp"
+#include "src/dvs/dvs_settings.hpp"
+
+/// The equations of the event camera's pixel as they are read, in double precision and one after
+/// another in time.
+namespace eventcamera::reference {
+
+struct EsimEvent {
+  double t;  ///< microseconds
+  int x;
+  int y;
+  Polarity polarity;
+};
+
+/// ESIM's rule (Rebecq et al., CoRL 2018): L = ln(eps + I/255) goes on a straight line from a at t0
+/// to b at t1. Towards b, each level r = ref + C, ref + 2C ... that lies between them is crossed at
+/// t0 + (r - a)(t1 - t0)/(b - a), and the last one that is becomes ref. Of one threshold, levels
+/// lie at first L + n C, which is how they are counted: so that the way back to it is no
+/// rounding's.
+class Esim {
+ public:
+  Esim(int width, int height, double log_eps, double threshold)
+      : log_eps_(log_eps),
+        threshold_(threshold),
+        first_(width, height),
+        last_(width, height),
+        levels_(width, height) {}
+
+  std::vector<EsimEvent> push(const Plane<std::uint8_t>& frame, double time) {
+    std::vector<EsimEvent> events;
+    for (int y = 0; y < frame.height(); ++y) {
+      for (int x = 0; x < frame.width(); ++x) {
+        const double b = std::log(log_eps_ + frame.at(x, y) / 255.0);
+        if (is_first_) first_.at(x, y) = last_.at(x, y) = b;
+        const double a = last_.at(x, y);
+        const int step = b > a ? 1 : -1;
+        const auto level = [&](int n) { return first_.at(x, y) + n * threshold_; };
+        for (int n = levels_.at(x, y) + step; b > a ? level(n) <= b : b < a && level(n) >= b;
+             n += step) {
+          const double t = last_time_ + (level(n) - a) * (time - last_time_) / (b - a);
+          events.push_back({t, x, y, b > a ? Polarity::on : Polarity::off});
+          levels_.at(x, y) = n;
+        }
+        last_.at(x, y) = b;
+      }
+    }
+    is_first_ = false;
+    last_time_ = time;
+    return events;
+  }
+
+ private:
+  double log_eps_;
+  double threshold_;
+  bool is_first_ = true;
+  double last_time_ = 0;
+  Plane<double> first_;
+  Plane<double> last_;
+  Plane<int> levels_;
+};
+
+/// One pixel that is neither noisy nor mismatched, looked at every microsecond.
+///   light      I = luma, or ((luma + 0.055)/1.055)^2.4
+///   response   log: ln(eps + I); lin-log: x ln(20)/20 or ln(x), x = 255 I; linear: ln(255) I
+///   input      L(t), from frame to frame on a straight line
+///   low pass   dV/dt = 2 pi f (I + d)/(1 + d) (L(t) - V), I of the later frame in 8 bits
+///   leak       dR/dt = -rate C+
+///   events     ON where V - R >= C+, OFF where R - V >= C-
+///   afterwards R = R +- C (level), or R = V as the refractory period ends (signal)
+class DvsPixel {
+ public:
+  DvsPixel(const DvsSettings& settings, double luma, double leaked)
+      : settings_(settings), input_(response(light(luma))), signal_(input_) {
+    reference_ = signal_ - leaked;
+  }
+
+  /// The events of the microseconds to the next frame.
+  std::vector<EsimEvent> push(double luma, int microseconds) {
+    std::vector<EsimEvent> events;
+    const double last = input_;
+    const double next = response(light(luma));
+    const double dark = settings_.dark_light;
+    const double shade = std::min(std::floor(luma * 65535 / 256), 255.0) / 255;
+    const double bandwidth =
+        2 * std::numbers::pi * settings_.cutoff_hz / 1e6 * (light(shade) + dark) / (1 + dark);
+    // The line, sampled this often, is the curve itself as far as events to the microsecond go.
+    for (int i = 1; i <= microseconds; ++i, ++now_) {
+      input_ = last + (next - last) * i / microseconds;
+      signal_ =
+          settings_.cutoff_hz > 0 ? input_ + (signal_ - input_) * std::exp(-bandwidth) : input_;
+      reference_ -= settings_.leak_rate_hz / 1e6 * settings_.positive_threshold;
+      const bool is_resting = now_ + 1 < ready_;
+      if (settings_.refractory_reset == RefractoryReset::signal && is_resting) {
+        reference_ = signal_;
+        continue;
+      }
+      const bool is_on = signal_ - reference_ >= settings_.positive_threshold;
+      if (!is_on && reference_ - signal_ < settings_.negative_threshold) continue;
+      reference_ += is_on ? settings_.positive_threshold : -settings_.negative_threshold;
+      if (is_resting) continue;
+      events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off});
+      ready_ = now_ + 1 + settings_.refractory_period;
+      if (settings_.refractory_reset == RefractoryReset::signal) reference_ = signal_;
+    }
+    input_ = next;
+    return events;
+  }
+
+ private:
+  double light(double luma) const {
+    if (!settings_.linear_light) return luma;
+    return luma <= 0.04045 ? luma / 12.92 : std::pow((luma + 0.055) / 1.055, 2.4);
+  }
+
+  double response(double light) const {
+    if (settings_.response == Response::log) return std::log(settings_.log_eps + light);
+    if (settings_.response == Response::linear) return std::log(255) * light;
+    const double x = 255 * light;
+    return x <= 20 ? x * std::log(20) / 20 : std::log(x);
+  }
+
+  DvsSettings settings_;
+  double input_;
+  double signal_;
+  double reference_ = 0;
+  double now_ = 0;
+  double ready_ = 0;
+};
+
+}  // namespace eventcamera::reference
