@@ -22,7 +22,7 @@ constexpr std::size_t count = 2'000'000;
 /// Bytes handed over at once, as a file source does.
 constexpr std::size_t piece = std::size_t{1} << 20;
 
-const std::vector<StampedEvent>& events() {
+const std::vector<AbsoluteEvent>& events() {
   static const auto made = random_events::make(size, count, 1, 0, {1000});
   return made;
 }
@@ -50,9 +50,9 @@ void for_each_piece(std::span<const std::uint8_t> bytes, Take take) {
 
 void copy(benchmark::State& state) {
   const auto& from = events();
-  std::vector<StampedEvent> to(count);
+  std::vector<AbsoluteEvent> to(count);
   for (auto _ : state) {
-    std::memcpy(static_cast<void*>(to.data()), from.data(), count * sizeof(StampedEvent));
+    std::memcpy(static_cast<void*>(to.data()), from.data(), count * sizeof(AbsoluteEvent));
     benchmark::DoNotOptimize(to.data());
     benchmark::ClobberMemory();
   }
@@ -90,7 +90,7 @@ void encode_aedat4(benchmark::State& state, Aedat4Compression compression) {
   std::vector<std::uint8_t> bytes;
   for (auto _ : state) {
     Aedat4Encoder encoder({size, "bench", compression});
-    for (std::span<const StampedEvent> rest = events(); !rest.empty();) {
+    for (std::span<const AbsoluteEvent> rest = events(); !rest.empty();) {
       const auto part = rest.first(std::min<std::size_t>(65'536, rest.size()));
       bytes.clear();
       encoder.encode(part, bytes);

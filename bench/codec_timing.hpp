@@ -8,7 +8,7 @@
 #include <ctime>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace bench {
 
@@ -20,8 +20,8 @@ inline double seconds_now() {
 }
 
 /// Seconds of a memcpy of these events, the best of some.
-inline double memcpy_seconds(const std::vector<eventcamera::StampedEvent>& events) {
-  std::vector<eventcamera::StampedEvent> copy(events.size());
+inline double memcpy_seconds(const std::vector<eventcamera::AbsoluteEvent>& events) {
+  std::vector<eventcamera::AbsoluteEvent> copy(events.size());
   double best = 1;
   for (int i = 0; i < 20; ++i) {
     const double start = seconds_now();
@@ -36,7 +36,7 @@ inline double memcpy_seconds(const std::vector<eventcamera::StampedEvent>& event
 /// Times `body`, which handles all of these events: million events a second, and the time as a
 /// ratio to that of a memcpy of them.
 template <class Body>
-void measure(benchmark::State& state, const std::vector<eventcamera::StampedEvent>& events,
+void measure(benchmark::State& state, const std::vector<eventcamera::AbsoluteEvent>& events,
              const Body& body) {
   body();
   double seconds = 0;

@@ -17,7 +17,7 @@ constexpr std::size_t count = 1 << 20;
 
 struct Recording {
   std::string name;
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
 };
 
 /// Single pixels all over the sensor, 10 million a second: what formats that save rows and times
@@ -27,9 +27,9 @@ Recording noise() {
   Recording recording{"noise", {}};
   for (std::size_t i = 0; i < count; ++i)
     recording.events.push_back(
-        StampedEvent::at(recordings::below(random, size.width),
-                         recordings::below(random, size.height), static_cast<Microseconds>(i / 10),
-                         recordings::below(random, 2) == 0 ? Polarity::off : Polarity::on));
+        AbsoluteEvent::at(recordings::below(random, size.width),
+                          recordings::below(random, size.height), static_cast<Microseconds>(i / 10),
+                          recordings::below(random, 2) == 0 ? Polarity::off : Polarity::on));
   return recording;
 }
 
@@ -42,7 +42,7 @@ Recording edges() {
       for (int x = recordings::below(random, 100); x < size.width;) {
         const auto polarity = recordings::below(random, 2) == 0 ? Polarity::off : Polarity::on;
         const int end = std::min(size.width, x + 1 + recordings::below(random, 16));
-        for (; x < end; ++x) recording.events.push_back(StampedEvent::at(x, y, t, polarity));
+        for (; x < end; ++x) recording.events.push_back(AbsoluteEvent::at(x, y, t, polarity));
         x += recordings::below(random, 200);
       }
     }

@@ -23,7 +23,7 @@ namespace {
 
 using namespace eventcamera;
 
-using Events = std::vector<StampedEvent>;
+using Events = std::vector<AbsoluteEvent>;
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr SensorSize size{1280, 720};
@@ -42,8 +42,8 @@ Events make_events() {
     int x = below(size.width);
     for (int run = below(2) == 0 ? 1 : below(30); run > 0 && x < size.width;
          --run, x += 1 + below(2))
-      events.push_back(StampedEvent::at(x, y, static_cast<Microseconds>(events.size() / 10),
-                                        below(2) == 0 ? Polarity::off : Polarity::on));
+      events.push_back(AbsoluteEvent::at(x, y, static_cast<Microseconds>(events.size() / 10),
+                                         below(2) == 0 ? Polarity::off : Polarity::on));
   }
   events.resize(count);
   return events;

@@ -61,8 +61,8 @@ class DiffSimulator final : public Simulator {
   };
 
   /// What fires in one interpolated difference frame.
-  struct Landings {
-    explicit Landings(const LumaFormat& format)
+  struct FiredPixels {
+    explicit FiredPixels(const LumaFormat& format)
         : strongest(format.width, format.height), taken((format.width + 63) / 64, format.height) {}
 
     void add(int x, int y, int difference) {
@@ -132,14 +132,14 @@ class DiffSimulator final : public Simulator {
   }
 
   void fire_between(const StepTimes& steps, EventBuckets& events) {
-    while (static_cast<int>(landings_.size()) < threads().threads())
-      landings_.emplace_back(format());
+    while (static_cast<int>(fired_pixels_.size()) < threads().threads())
+      fired_pixels_.emplace_back(format());
     threads().for_each(steps.count() - 1, [&](int i, int thread) {
       const int j = i + 1;
-      auto& landings = landings_[static_cast<std::size_t>(thread)];
+      auto& fired_pixels = fired_pixels_[static_cast<std::size_t>(thread)];
       for (const auto& [point, difference] : moving_)
-        landings.add(point.x_at(j), point.y_at(j), difference);
-      landings.fire(steps.microseconds(j), events.bucket(j, 0));
+        fired_pixels.add(point.x_at(j), point.y_at(j), difference);
+      fired_pixels.fire(steps.microseconds(j), events.bucket(j, 0));
     });
   }
 
@@ -148,7 +148,7 @@ class DiffSimulator final : public Simulator {
   Part on_;
   Part off_;
   std::vector<MovingDifference> moving_;
-  std::vector<Landings> landings_;  // one a thread
+  std::vector<FiredPixels> fired_pixels_;  // one a thread
 };
 
 }  // namespace plain

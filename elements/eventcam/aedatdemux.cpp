@@ -129,7 +129,7 @@ static void gst_aedat_demux_class_init(GstAedatDemuxClass* klass) {
   g_object_class_install_property(
       object_class, prop_stats,
       g_param_spec_boxed(
-          "stats", "Statistics", "What was read, and what was damaged or left out, since the start",
+          "stats", "Statistics", "What was read, and what was corrupt or left out, since the start",
           GST_TYPE_STRUCTURE, static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);

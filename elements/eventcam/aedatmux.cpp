@@ -54,7 +54,7 @@ enum Property : guint { prop_compression = 1 };
 constexpr auto default_compression = Aedat4Compression::lz4;
 
 /// Events wait for no more than this to become a packet.
-constexpr Microseconds longest_wait = 100'000;
+constexpr Microseconds max_wait = 100'000;
 
 struct UnrefPad {
   void operator()(GstAggregatorPad* pad) const { gst_object_unref(pad); }
@@ -357,7 +357,7 @@ static GstFlowReturn write_next(GstAedatMux* self) {
     write_events(self, buffer.get(), t, out);
   else if (!silent)
     write_frame(self, buffer.get(), t, out);
-  if (t - state.flushed >= longest_wait) {
+  if (t - state.flushed >= max_wait) {
     state.flushed = t;
     state.encoder->flush(out);
   }

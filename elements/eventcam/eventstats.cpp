@@ -244,7 +244,7 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
     return;
   }
   const std::size_t left_out = measurement.arrivals.take(
-      mapped.events(), start / 1000, [&](const eventcamera::StampedEvent& event) {
+      mapped.events(), start / 1000, [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
         measurement.whole.statistics.add(event);
         measurement.recent.statistics.add(event);

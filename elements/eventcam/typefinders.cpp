@@ -9,7 +9,7 @@ using eventcamera::FileKind;
 
 /// The first bytes, as many as there are up to as many as are looked at.
 static std::span<const guint8> first_bytes(GstTypeFind* find) {
-  constexpr guint64 most = eventcamera::most_recognised_bytes;
+  constexpr guint64 most = eventcamera::max_recognised_bytes;
   const guint64 length = gst_type_find_get_length(find);
   // The length is not always known, and asking for more than there is gives nothing.
   for (auto count = static_cast<guint>(length > 0 ? std::min(length, most) : most); count > 0;

@@ -8,9 +8,9 @@
 namespace {
 
 /// Buffers that return when this much lies idle are freed, unless they are all there is.
-constexpr gsize most_idle = gsize{64} << 20;
+constexpr gsize max_idle = gsize{64} << 20;
 
-constexpr gsize least_room = 4096;
+constexpr gsize min_room = 4096;
 
 struct EventPool {
   GstBufferPool parent;
@@ -46,7 +46,7 @@ void release_buffer(GstBufferPool* pool, GstBuffer* buffer) {
   auto& idle = event_pool(pool)->idle;
   const gsize room = room_of(buffer);
   // A buffer whose memory is not as it was is freed, and so is this one.
-  if (idle > 0 && idle + room > most_idle) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_TAG_MEMORY);
+  if (idle > 0 && idle + room > max_idle) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_TAG_MEMORY);
   if (!GST_BUFFER_FLAG_IS_SET(buffer, GST_BUFFER_FLAG_TAG_MEMORY) &&
       gst_buffer_is_all_memory_writable(buffer))
     idle += room;
@@ -78,7 +78,7 @@ GstBufferPool* event_pool_new() {
 bool event_pool_make_room(GstBuffer* buffer, gsize size) {
   gsize& needed = event_pool(buffer->pool)->needed;
   needed = std::max(size, needed - needed / 64);
-  const gsize wanted = std::bit_ceil(std::max(needed, least_room));
+  const gsize wanted = std::bit_ceil(std::max(needed, min_room));
   const gsize room = room_of(buffer);
   if (room < size || room / 4 > wanted) {
     gst_buffer_remove_all_memory(buffer);

@@ -251,11 +251,11 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-void gst_event_encoder_class_add_pads(GstEventEncoderClass* klass, int largest_width,
-                                      int largest_height, const char* src_caps) {
+void gst_event_encoder_class_add_pads(GstEventEncoderClass* klass, int max_width, int max_height,
+                                      const char* src_caps) {
   const OwnedCaps in(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING,
-                                         "XYTP", "width", GST_TYPE_INT_RANGE, 1, largest_width,
-                                         "height", GST_TYPE_INT_RANGE, 1, largest_height, nullptr));
+                                         "XYTP", "width", GST_TYPE_INT_RANGE, 1, max_width,
+                                         "height", GST_TYPE_INT_RANGE, 1, max_height, nullptr));
   const OwnedCaps out(gst_caps_from_string(src_caps));
   auto* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_pad_template(

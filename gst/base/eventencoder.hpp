@@ -54,5 +54,5 @@ struct GstEventEncoderClass {
 
 /// For class_init: the pads. The sink takes sensors of up to this size, the source gives these
 /// caps.
-void gst_event_encoder_class_add_pads(GstEventEncoderClass* klass, int largest_width,
-                                      int largest_height, const char* src_caps);
+void gst_event_encoder_class_add_pads(GstEventEncoderClass* klass, int max_width, int max_height,
+                                      const char* src_caps);

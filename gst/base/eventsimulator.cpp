@@ -44,7 +44,7 @@ constexpr guint max_interpolated_frames = 255;
 constexpr guint default_interpolated_frames = 10;
 
 /// The latency is that of the framerate, or the longest interval seen, up to this.
-constexpr GstClockTime longest_latency = GST_SECOND;
+constexpr GstClockTime max_latency = GST_SECOND;
 
 /// What the application sets, copied once per buffer.
 struct Settings {
@@ -191,7 +191,7 @@ static void set_latency(GstEventSimulator* self, GstClockTime latency) {
 
 /// Frames come as they come, whatever the caps say.
 static void learn_latency(GstEventSimulator* self, GstClockTime interval) {
-  const GstClockTime seen = MIN(interval, longest_latency);
+  const GstClockTime seen = MIN(interval, max_latency);
   if (seen > latency_of(self)) set_latency(self, seen);
 }
 
@@ -235,7 +235,7 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   if (last && time <= *last) {
     warn_of_times(self, "a frame is not later than the one before");
     forget_frames(self);
-  } else if (last && time - *last > eventcamera::longest_interval) {
+  } else if (last && time - *last > eventcamera::max_interval) {
     warn_of_times(self, "two frames lie more than 71 minutes apart");
     forget_frames(self);
   }
@@ -609,7 +609,7 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
                       "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS
                       ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
                       "framerate = (fraction) [ 0, max ]"));
-  static_assert(eventcamera::longest_side == 16384);
+  static_assert(eventcamera::max_side == 16384);
   gst_element_class_add_static_pad_template(GST_ELEMENT_CLASS(klass), &sink_template);
   gst_element_class_add_static_pad_template(GST_ELEMENT_CLASS(klass), &src_template);
 

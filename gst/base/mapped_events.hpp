@@ -4,8 +4,8 @@
 #include <span>
 
 #include "gst/eventcamera/eventcamera.h"
+#include "src/core/absolute_event.hpp"
 #include "src/core/event.hpp"
-#include "src/core/stamped_event.hpp"
 
 /// The events of a buffer, mapped while this lives.
 class MappedEvents {

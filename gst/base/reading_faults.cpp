@@ -6,17 +6,17 @@
 
 #include "src/formats/decoder.hpp"
 
-void ReadingFaults::warn_of_damage(guint64 at, const char* what) {
-  if (std::exchange(warned_of_damage_, true)) return;
+void ReadingFaults::warn_of_corruption(guint64 at, const char* what) {
+  if (std::exchange(warned_of_corruption_, true)) return;
   gst_element_message_full(element_, GST_MESSAGE_WARNING, GST_STREAM_ERROR, code_,
-                           g_strdup_printf("The data are damaged at byte %" G_GUINT64_FORMAT
+                           g_strdup_printf("The data are corrupt at byte %" G_GUINT64_FORMAT
                                            ": %s. What is whole is read all the same.",
                                            at, what),
                            nullptr, __FILE__, GST_FUNCTION, __LINE__);
 }
 
 GstFlowReturn ReadingFaults::fail(const std::exception& error) {
-  if (dynamic_cast<const eventcamera::NotThisFormat*>(&error) != nullptr)
+  if (dynamic_cast<const eventcamera::UnsupportedFormat*>(&error) != nullptr)
     GST_ELEMENT_ERROR(element_, STREAM, WRONG_TYPE, ("This cannot be read: %s.", error.what()),
                       (nullptr));
   else if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)

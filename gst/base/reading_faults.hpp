@@ -21,16 +21,17 @@ class ReadingFaults {
     }
   }
 
-  /// Damage is reported where it first shows; how much there is in the end is in the statistics.
-  void warn_of_damage(guint64 at, const char* what);
+  /// Corruption is reported where it first shows; how much there is in the end is in the
+  /// statistics.
+  void warn_of_corruption(guint64 at, const char* what);
 
   /// Another file comes.
-  void begin_anew() { warned_of_damage_ = false; }
+  void begin_anew() { warned_of_corruption_ = false; }
 
  private:
   GstFlowReturn fail(const std::exception& error);
 
   GstElement* element_;
   GstStreamError code_;
-  bool warned_of_damage_ = false;
+  bool warned_of_corruption_ = false;
 };

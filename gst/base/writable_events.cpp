@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/writable_events.hpp"
 
+using eventcamera::AbsoluteEvent;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
-using eventcamera::StampedEvent;
 
 void WritableEvents::begin_file(SensorSize sensor) {
   sensor_ = sensor;
@@ -11,12 +11,12 @@ void WritableEvents::begin_file(SensorSize sensor) {
   earlier_ = outside_ = {};
 }
 
-std::span<const StampedEvent> WritableEvents::pick(std::span<const GstEventCameraEvent> events,
-                                                   Microseconds start) {
+std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const GstEventCameraEvent> events,
+                                                    Microseconds start) {
   picked_.clear();
   std::size_t before_last_left_out = 0;
   for (const auto& event : events) {
-    const StampedEvent stamped{start + event.t, event.x, event.y_p};
+    const AbsoluteEvent stamped{start + event.t, event.x, event.y_p};
     const bool outside = event.x >= sensor_.width || stamped.y() >= sensor_.height;
     if (outside || stamped.t < latest_) {
       ++(outside ? outside_ : earlier_).count;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gst/eventcamera/eventcamera.h"
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 #include "src/formats/decoder.hpp"
 
 /// Picks the events that a file can hold, sorted by time and within the sensor, counts the others,
@@ -24,8 +24,8 @@ class WritableEvents {
 
   /// Those of `events`, whose times count from `start`, that can be written. They are gone with the
   /// next call.
-  std::span<const eventcamera::StampedEvent> pick(std::span<const GstEventCameraEvent> events,
-                                                  eventcamera::Microseconds start);
+  std::span<const eventcamera::AbsoluteEvent> pick(std::span<const GstEventCameraEvent> events,
+                                                   eventcamera::Microseconds start);
 
   void end_file();
 
@@ -44,7 +44,7 @@ class WritableEvents {
   GstStreamError code_;
   eventcamera::SensorSize sensor_;
   eventcamera::Microseconds latest_ = 0;  ///< of what is written
-  std::vector<eventcamera::StampedEvent> picked_;
+  std::vector<eventcamera::AbsoluteEvent> picked_;
   LeftOut earlier_;
   LeftOut outside_;
 };

@@ -6,7 +6,7 @@
 #include <limits>
 #include <span>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 
@@ -33,7 +33,7 @@ class Arrivals {
         continue;
       }
       earliest_ = std::max(earliest_, time_of(event, start));
-      take(StampedEvent{earliest_, event.x, event.y_p});
+      take(AbsoluteEvent{earliest_, event.x, event.y_p});
     }
     return left_out;
   }

@@ -9,7 +9,7 @@ namespace eventcamera {
 using Nanoseconds = std::int64_t;
 
 /// The longest interval whose microseconds fit into an event's 32 bits (71 minutes).
-inline constexpr Nanoseconds longest_interval = Nanoseconds{0xffffffff} * 1000;
+inline constexpr Nanoseconds max_interval = Nanoseconds{0xffffffff} * 1000;
 
 /// The moments of the steps into which an interval (t0, t1] is cut: step j of `count` happens at
 /// t0 + (t1 - t0) * j / count, and the last one at t1.
@@ -18,7 +18,7 @@ inline constexpr Nanoseconds longest_interval = Nanoseconds{0xffffffff} * 1000;
 /// are made than the interval has whole microseconds.
 class StepTimes {
  public:
-  /// `duration` in (0, longest_interval]; `wanted` steps, at least 1.
+  /// `duration` in (0, max_interval]; `wanted` steps, at least 1.
   StepTimes(Nanoseconds duration, int wanted)
       : duration_(duration),
         count_(static_cast<int>(

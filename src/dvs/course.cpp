@@ -10,7 +10,7 @@ namespace {
 constexpr double precision = 0.001;
 
 /// Halving alone would find any time in an interval to that precision with fewer.
-constexpr int most_iterations = 64;
+constexpr int max_iterations = 64;
 
 }  // namespace
 
@@ -42,7 +42,7 @@ double Crossings::time_of(double level, CoursePoint a, CoursePoint b) const {
   if (!(t >= 0 && t <= duration)) t = secant;
   double early = 0;
   double late = duration;
-  for (int i = 0; i < most_iterations; ++i) {
+  for (int i = 0; i < max_iterations; ++i) {
     const double lag_left = lag * decay(bandwidth * t);
     const double beyond = slope * t - (lag - lag_left) - rise;
     const bool is_late = (beyond > 0) == rises;

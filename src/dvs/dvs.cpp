@@ -15,10 +15,10 @@
 #include "src/dvs/light_response.hpp"
 #include "src/dvs/passages.hpp"
 #include "src/dvs/pixel_array.hpp"
-#include "src/dvs/pixel_time.hpp"
+#include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/readout.hpp"
-#include "src/dvs/row_screen.hpp"
-#include "src/flow/flow_of_changes.hpp"
+#include "src/dvs/row_filter.hpp"
+#include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/bands.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/interpolated_row.hpp"
@@ -199,8 +199,7 @@ class PixelSimulator final : public DvsSimulator {
       farthest_[static_cast<std::size_t>(band)] = farthest;
     });
     const float farthest = *std::max_element(farthest_.begin(), farthest_.end());
-    return static_cast<int>(
-        std::ceil(std::sqrt(std::min<double>(farthest, longest_side * longest_side))));
+    return static_cast<int>(std::ceil(std::sqrt(std::min<double>(farthest, max_side * max_side))));
   }
 
   template <class Luma>
@@ -290,7 +289,7 @@ class PixelSimulator final : public DvsSimulator {
   std::optional<Readout> readout_;
   std::vector<Scratch> scratch_;  ///< thread by thread
 
-  std::optional<FlowOfChanges> finder_;
+  std::optional<RegionOfInterestFlow> finder_;
   Grey8 last_grey_;
   Grey8 grey_;
   std::vector<float> farthest_;  ///< that something moves, squared, band by band

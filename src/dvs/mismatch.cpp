@@ -14,23 +14,23 @@ using Purpose = Random::Purpose;
 constexpr double microseconds_a_second = 1e6;
 
 /// A threshold of 0 would fire for ever.
-constexpr double least_threshold = 1e-3;
+constexpr double min_threshold = 1e-3;
 
 /// Nor does mismatch take more than this from one.
-constexpr double least_share = 0.1;
+constexpr double min_share = 0.1;
 
 /// Hot pixels leak so many ON events a second, evenly spread over the decades.
 constexpr double coolest_hz = 10;
 constexpr double hottest_hz = 1000;
 
 double bounded(double threshold, double mean) {
-  return std::max({threshold, least_share * mean, least_threshold});
+  return std::max({threshold, min_share * mean, min_threshold});
 }
 
 }  // namespace
 
 double Mismatch::fixed_threshold(std::uint64_t pixel, double mean, Purpose purpose) const {
-  if (settings_.threshold_sigma <= 0) return std::max(mean, least_threshold);
+  if (settings_.threshold_sigma <= 0) return std::max(mean, min_threshold);
   return bounded(mean + settings_.threshold_sigma * random_.normal(pixel, purpose), mean);
 }
 

@@ -7,10 +7,10 @@
 namespace eventcamera {
 namespace {
 
-constexpr int longest_vector = 16;
+constexpr int max_vector = 16;
 
 int padded(int width) {
-  return (width + longest_vector - 1) / longest_vector * longest_vector;
+  return (width + max_vector - 1) / max_vector * max_vector;
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
 
 /// OpenCV's DIS needs a few patches on each side; smaller pictures are continued beyond their
 /// border to this many pixels.
-constexpr int smallest_side = 64;
+constexpr int min_side = 64;
 
 /// Dense inverse search (Kroeger et al., ECCV 2016). Spatial propagation is OpenCV's addition and
 /// stays off: the paper's code has none.
@@ -37,9 +37,8 @@ class DisFlow final : public DenseFlow {
 
   void push(const PlaneView<std::uint8_t>& picture, ThreadPool& /*threads*/) override {
     cv::swap(last_, next_);
-    cv::copyMakeBorder(opencv_picture(picture), next_, 0,
-                       std::max(0, smallest_side - picture.height), 0,
-                       std::max(0, smallest_side - picture.width), cv::BORDER_REPLICATE);
+    cv::copyMakeBorder(opencv_picture(picture), next_, 0, std::max(0, min_side - picture.height), 0,
+                       std::max(0, min_side - picture.width), cv::BORDER_REPLICATE);
     width_ = picture.width;
     height_ = picture.height;
   }
@@ -71,8 +70,7 @@ int coarsest_scale(int width, int height, int patch) {
 DisFlow::Quality low_quality(int width, int height) {
   constexpr int patch = 4;
   constexpr int scales = 3;
-  const int coarsest =
-      coarsest_scale(std::max(width, smallest_side), std::max(height, smallest_side), patch);
+  const int coarsest = coarsest_scale(std::max(width, min_side), std::max(height, min_side), patch);
   return {patch, 3, 8, std::max(0, coarsest - scales + 1)};
 }
 

@@ -8,7 +8,7 @@
 namespace eventcamera {
 
 /// Widest and tallest picture whose positions, and every flow within it, fit into a Motion.
-inline constexpr int longest_side = 16384;
+inline constexpr int max_side = 16384;
 
 /// How far something moves in one step, in 1/65536 of a pixel. A flow becomes a Motion once; what
 /// follows is integer arithmetic, the same on every processor.
@@ -18,7 +18,7 @@ using Motion = std::int32_t;
 /// number stands still; one longer than any picture is cut.
 inline Motion motion_per_step(float flow, int steps) {
   if (!(flow == flow)) return 0;
-  constexpr float longest = longest_side;
+  constexpr float longest = max_side;
   return static_cast<Motion>(
       std::lrint(std::clamp(flow, -longest, longest) * (65536.0F / static_cast<float>(steps))));
 }

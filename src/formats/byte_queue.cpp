@@ -8,7 +8,7 @@ namespace eventcamera {
 namespace {
 
 /// Consumed bytes that may lie in front of the kept ones before these are moved.
-constexpr std::size_t most_consumed = 4096;
+constexpr std::size_t max_consumed = 4096;
 
 }  // namespace
 
@@ -56,7 +56,7 @@ void ByteQueue::restart(std::uint64_t position) {
 }
 
 void ByteQueue::append_to_kept(std::size_t count) {
-  if (head_ >= most_consumed && head_ >= kept_.size() / 2) {
+  if (head_ >= max_consumed && head_ >= kept_.size() / 2) {
     kept_.erase(kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(head_));
     head_ = 0;
   }

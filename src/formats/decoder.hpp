@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 
@@ -22,19 +22,19 @@ struct SensorSize {
 
 /// What a decoder hands over; it only appends.
 struct Decoded {
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   std::vector<Trigger> triggers;
 };
 
 /// The bytes are not of this format at all, or of a version or codec that cannot be read; what()
 /// says so in words for a user.
-class NotThisFormat : public std::runtime_error {
+class UnsupportedFormat : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
 /// What was wrong with the bytes so far. A decoder skips it and goes on at the next sound place.
-struct Damage {
+struct Corruption {
   std::uint64_t places = 0;    ///< how many
   std::uint64_t first_at = 0;  ///< byte position of the first, from the file's start
   std::string first;           ///< what it is, in words for a user
@@ -59,23 +59,23 @@ class Decoder {
   Decoder(const Decoder&) = delete;
   Decoder& operator=(const Decoder&) = delete;
 
-  /// Appends what `bytes` completes. Throws NotThisFormat.
+  /// Appends what `bytes` completes. Throws UnsupportedFormat.
   virtual void decode(std::span<const std::uint8_t> bytes, Decoded& out) = 0;
 
-  /// Says that there are no more bytes: what is whole is appended, a rest is damage. Throws
-  /// NotThisFormat where there was not even a header.
+  /// Says that there are no more bytes: what is whole is appended, a rest is corruption. Throws
+  /// UnsupportedFormat where there was not even a header.
   virtual void finish(Decoded& out) = 0;
 
   /// The sensor's size, once its header is read or it is known from elsewhere; 0x0 before.
   SensorSize size() const { return size_; }
 
-  const Damage& damage() const { return damage_; }
+  const Corruption& corruption() const { return corruption_; }
 
  protected:
   Decoder() = default;
 
   SensorSize size_;
-  Damage damage_;
+  Corruption corruption_;
 };
 
 }  // namespace eventcamera

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 
@@ -18,7 +18,7 @@ class Encoder {
   Encoder& operator=(const Encoder&) = delete;
 
   /// Appends the bytes of `events` to `out`, the header before the first.
-  virtual void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) = 0;
+  virtual void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) = 0;
 
   /// Appends what ends the file; the header, too, where nothing was encoded.
   virtual void finish(std::vector<std::uint8_t>& out) = 0;

@@ -27,7 +27,7 @@ class EventFile {
   virtual std::optional<TimeRange> time_range() const = 0;
 
   /// Appends up to `count` events, fewer only at the end, and returns how many.
-  virtual std::size_t read(std::size_t count, std::vector<StampedEvent>& out) = 0;
+  virtual std::size_t read(std::size_t count, std::vector<AbsoluteEvent>& out) = 0;
 
   /// The same of a camera's triggers.
   virtual std::size_t read_triggers(std::size_t count, std::vector<Trigger>& out) = 0;
@@ -35,7 +35,7 @@ class EventFile {
   /// Events and triggers before `t` are gone over, or come back.
   virtual void seek(Microseconds t) = 0;
 
-  virtual const Damage& damage() const = 0;
+  virtual const Corruption& corruption() const = 0;
 
  protected:
   EventFile() = default;

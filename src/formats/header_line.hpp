@@ -9,7 +9,7 @@
 namespace eventcamera {
 
 /// Longer lines of a text header are read, but only their beginning is kept.
-constexpr std::size_t longest_header_line = 4096;
+constexpr std::size_t max_header_line = 4096;
 
 /// Consumes bytes up to the end of a line and appends them to `line`, without CR and LF. False
 /// while the end has not come.
@@ -20,7 +20,7 @@ inline bool take_header_line(ByteQueue& queue, std::string& line) {
     const auto end = std::find(bytes.begin(), bytes.end(), '\n');
     const auto count = static_cast<std::size_t>(end - bytes.begin());
     line.append(reinterpret_cast<const char*>(bytes.data()),
-                std::min(count, longest_header_line - std::min(line.size(), longest_header_line)));
+                std::min(count, max_header_line - std::min(line.size(), max_header_line)));
     const bool ended = end != bytes.end();
     queue.consume(count + (ended ? 1 : 0));
     if (!ended) continue;

@@ -53,7 +53,7 @@ std::optional<Recognised> by_text_header(Bytes bytes) {
 /// Whether the reader itself makes events of it, without a line that is none.
 bool is_csv(Bytes bytes) {
   constexpr std::size_t looked_at = 4096;
-  constexpr std::size_t least_events = 3;
+  constexpr std::size_t min_events = 3;
   bytes = bytes.first(std::min(bytes.size(), looked_at));
   const auto is_text = [](std::uint8_t byte) {
     return byte >= ' ' || (byte >= '\t' && byte <= '\r');
@@ -64,7 +64,7 @@ bool is_csv(Bytes bytes) {
   Decoded decoded;
   decoder.decode(bytes, decoded);
   decoder.finish(decoded);
-  return decoded.events.size() >= least_events && decoder.damage().places == 0;
+  return decoded.events.size() >= min_events && decoder.corruption().places == 0;
 }
 
 /// Behind a user block, which may be anything, of a power of two.
@@ -77,12 +77,12 @@ std::optional<Recognised> by_user_block(Bytes bytes) {
 }  // namespace
 
 std::optional<Recognised> recognise(Bytes start) {
-  start = start.first(std::min(start.size(), most_recognised_bytes));
+  start = start.first(std::min(start.size(), max_recognised_bytes));
   try {
     if (const auto found = by_magic(start)) return found;
     if (const auto found = by_text_header(start)) return found;
     if (is_csv(start)) return Recognised{FileKind::csv};
-  } catch (const NotThisFormat&) {
+  } catch (const UnsupportedFormat&) {
     // It is not text of events; a user block still may be anything.
   }
   return by_user_block(start);

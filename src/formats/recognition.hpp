@@ -29,7 +29,7 @@ struct Recognised {
 };
 
 /// More bytes of a file's beginning than these are not looked at.
-constexpr std::size_t most_recognised_bytes = 16384;
+constexpr std::size_t max_recognised_bytes = 16384;
 
 /// What a file that begins with these bytes is; nothing where it is none that we read, or where
 /// that takes more bytes. More bytes do not make another kind of it, unless it was text: what is

@@ -23,23 +23,23 @@ constexpr SensorSize sensor_with(int x, int y) {
 /// The part of a sensor that events come from, where a file does not tell its size.
 class UsedPixels {
  public:
-  void include(std::span<const StampedEvent> events) {
+  void include(std::span<const AbsoluteEvent> events) {
     for (const auto& event : events) {
-      largest_x_ = std::max<int>(largest_x_, event.x);
-      largest_y_ = std::max(largest_y_, event.y());
+      max_x_ = std::max<int>(max_x_, event.x);
+      max_y_ = std::max(max_y_, event.y());
     }
   }
 
-  SensorSize sensor() const { return sensor_with(largest_x_, largest_y_); }
+  SensorSize sensor() const { return sensor_with(max_x_, max_y_); }
 
  private:
-  int largest_x_ = 0;
-  int largest_y_ = 0;
+  int max_x_ = 0;
+  int max_y_ = 0;
 };
 
 /// Leaves out events that lie outside the sensor, and returns how many.
-inline std::size_t erase_outside(std::vector<StampedEvent>& events, SensorSize size) {
-  return std::erase_if(events, [&](const StampedEvent& event) {
+inline std::size_t erase_outside(std::vector<AbsoluteEvent>& events, SensorSize size) {
+  return std::erase_if(events, [&](const AbsoluteEvent& event) {
     return event.x >= size.width || event.y() >= size.height;
   });
 }

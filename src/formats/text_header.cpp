@@ -10,8 +10,8 @@
 namespace eventcamera {
 namespace {
 
-constexpr std::size_t longest_line = 4096;
-constexpr std::size_t longest_header = 65536;
+constexpr std::size_t max_line = 4096;
+constexpr std::size_t max_header = 65536;
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r");
@@ -23,7 +23,7 @@ std::string_view trimmed(std::string_view text) {
 
 std::size_t TextHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
   if (ended_) return 0;
-  const auto looked_at = bytes.first(std::min(bytes.size(), longest_line));
+  const auto looked_at = bytes.first(std::min(bytes.size(), max_line));
   // Binary data may begin as a line does, but hardly goes on as text.
   const auto stop = std::find_if(looked_at.begin(), looked_at.end(), [](std::uint8_t byte) {
     return byte < ' ' && byte != '\t' && byte != '\r';
@@ -31,7 +31,7 @@ std::size_t TextHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
   const bool begins = (looked_at.empty() || looked_at[0] == '%') &&
                       (looked_at.size() < 2 || looked_at[1] == ' ' || looked_at[1] == '\n');
   const bool whole = stop != looked_at.end() && *stop == '\n';
-  if (!begins || (!whole && (ended || stop != looked_at.end() || bytes.size() >= longest_line))) {
+  if (!begins || (!whole && (ended || stop != looked_at.end() || bytes.size() >= max_line))) {
     ended_ = true;
     return 0;
   }
@@ -39,7 +39,7 @@ std::size_t TextHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
 
   const auto length = static_cast<std::size_t>(stop - looked_at.begin()) + 1;
   length_ += length;
-  if (length_ > longest_header) throw NotThisFormat("the header does not end");
+  if (length_ > max_header) throw UnsupportedFormat("the header does not end");
   found_ = true;
   const auto line = trimmed({reinterpret_cast<const char*>(looked_at.data()) + 1, length - 2});
   const auto key = line.substr(0, line.find(' '));

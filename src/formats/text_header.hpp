@@ -14,8 +14,8 @@ namespace eventcamera {
 class TextHeader {
  public:
   /// Takes a line from the front of `bytes` and returns its length; 0 where it is not yet whole or
-  /// the header has ended. `ended`: no more bytes will come. Throws NotThisFormat where there is
-  /// too much.
+  /// the header has ended. `ended`: no more bytes will come. Throws UnsupportedFormat where there
+  /// is too much.
   std::size_t take(std::span<const std::uint8_t> bytes, bool ended);
 
   bool ended() const { return ended_; }

@@ -56,37 +56,37 @@ void UnitDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
 void UnitDecoder::finish(Decoded& out) {
   if (!reader_) {
     read_headers(true);
-    if (!reader_) throw NotThisFormat("the file ends before its header does");
+    if (!reader_) throw UnsupportedFormat("the file ends before its header does");
     const auto read = read_units(rest_, out);
     rest_.erase(rest_.begin(), rest_.begin() + static_cast<std::ptrdiff_t>(read));
   }
   if (rest_.empty()) return;
-  damage_.note(position_, "the file ends within an event");
+  corruption_.note(position_, "the file ends within an event");
   rest_.clear();
 }
 
-void UnitDecoder::restart(const Landmark& landmark) {
+void UnitDecoder::restart(const SeekPoint& seek_point) {
   rest_.clear();
-  position_ = landmark.position;
-  latest_ = landmark.t;
-  reader_->restore({landmark.clock, landmark.state});
+  position_ = seek_point.position;
+  latest_ = seek_point.t;
+  reader_->restore({seek_point.clock, seek_point.state});
 }
 
 std::size_t UnitDecoder::read_units(std::span<const std::uint8_t> bytes, Decoded& out) {
-  // Landmarks are noted between batches, and silence must not make them rare.
-  constexpr std::ptrdiff_t longest_batch = 1 << 15;
+  // SeekPoints are noted between batches, and silence must not make them rare.
+  constexpr std::ptrdiff_t max_batch = 1 << 15;
   const auto* from = bytes.data();
   const auto* const to = from + bytes.size();
   batch_.triggers = &out.triggers;
   for (;;) {
-    if (landmarks_.due(position_)) {
+    if (seek_points_.due(position_)) {
       const auto state = reader_->state();
-      landmarks_.note({latest_, position_, state.clock, state.rest});
+      seek_points_.note({latest_, position_, state.clock, state.rest});
     }
     batch_.start = from;
     batch_.start_position = position_;
     batch_.end = batch_.begin();
-    const auto* reached = reader_->read(from, from + std::min(to - from, longest_batch), batch_);
+    const auto* reached = reader_->read(from, from + std::min(to - from, max_batch), batch_);
     deliver(out);
     if (reached == from) return bytes.size() - static_cast<std::size_t>(to - from);
     position_ += static_cast<std::uint64_t>(reached - from);
@@ -104,7 +104,7 @@ void UnitDecoder::deliver(Decoded& out) {
     latest_ = events.back().t;
   } else {
     for (const auto& event : events) {
-      damage_.unsorted += static_cast<std::uint64_t>(event.t < latest_);
+      corruption_.unsorted += static_cast<std::uint64_t>(event.t < latest_);
       latest_ = std::max(latest_, event.t);
     }
   }

@@ -19,14 +19,14 @@ class UnitDecoder : public SeekableDecoder {
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) final;
   void finish(Decoded& out) final;
-  void restart(const Landmark& landmark) final;
+  void restart(const SeekPoint& seek_point) final;
 
  protected:
   UnitDecoder() = default;
 
   /// Takes some of the header from the front of `bytes`, and returns how much; 0 where that takes
   /// more bytes. Where the header ends, calls begin(). `ended`: no more will come. Throws
-  /// NotThisFormat.
+  /// UnsupportedFormat.
   virtual std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended);
 
   void begin(std::unique_ptr<UnitReader> reader, SensorSize size);
@@ -40,7 +40,7 @@ class UnitDecoder : public SeekableDecoder {
   std::vector<std::uint8_t> rest_;      // of what was given, where it is not yet whole
   std::uint64_t position_ = 0;          // of what is read next
   Microseconds latest_ = std::numeric_limits<Microseconds>::min();
-  Batch batch_{damage_};
+  Batch batch_{corruption_};
 };
 
 }  // namespace eventcamera

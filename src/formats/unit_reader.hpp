@@ -16,30 +16,30 @@ class Batch {
   /// Of one unit, at the most.
   static constexpr std::size_t events_per_unit = 32;
 
-  explicit Batch(Damage& damage) : damage_(damage) {}
+  explicit Batch(Corruption& corruption) : corruption_(corruption) {}
 
-  StampedEvent* begin() { return events_.data(); }
+  AbsoluteEvent* begin() { return events_.data(); }
 
   /// Where no other unit is read.
-  StampedEvent* full() { return events_.data() + events_.size() - events_per_unit; }
+  AbsoluteEvent* full() { return events_.data() + events_.size() - events_per_unit; }
 
   /// Notes that the bytes at `at` are no unit. Such units in a row are one place.
   void bad(const std::uint8_t* at, std::size_t bytes, const char* what) {
     const auto position = start_position + static_cast<std::uint64_t>(at - start);
-    if (position != bad_end_) damage_.note(position, what);
+    if (position != bad_end_) corruption_.note(position, what);
     bad_end_ = position + bytes;
   }
 
-  void outside(std::uint64_t events) { damage_.outside += events; }
+  void outside(std::uint64_t events) { corruption_.outside += events; }
 
-  StampedEvent* end = nullptr;               ///< of the events
+  AbsoluteEvent* end = nullptr;              ///< of the events
   std::vector<Trigger>* triggers = nullptr;  ///< appended to
   const std::uint8_t* start = nullptr;       ///< of the bytes
   std::uint64_t start_position = 0;          ///< in the file
 
  private:
-  std::array<StampedEvent, 4096> events_;
-  Damage& damage_;
+  std::array<AbsoluteEvent, 4096> events_;
+  Corruption& corruption_;
   std::uint64_t bad_end_ = ~std::uint64_t{0};
 };
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 
@@ -41,7 +41,7 @@ constexpr std::size_t events_at_once = 2048;
 
 /// Encodes events by `write(few, words)`, which finds room for `words_at_once`.
 template <class Word, class Write>
-void write_events(std::span<const StampedEvent> events, std::size_t words_at_once,
+void write_events(std::span<const AbsoluteEvent> events, std::size_t words_at_once,
                   std::vector<std::uint8_t>& out, const Write& write) {
   WordWriter<Word> words(out);
   while (!events.empty()) {

@@ -4,8 +4,8 @@
 #include <array>
 #include <cstdint>
 
+#include "src/core/absolute_event.hpp"
 #include "src/core/plane.hpp"
-#include "src/core/stamped_event.hpp"
 #include "src/core/step_times.hpp"
 #include "src/measure/gap_histogram.hpp"
 
@@ -34,7 +34,7 @@ class EventStatistics {
   EventStatistics(int width, int height);
 
   /// An event inside the picture, not before the last one.
-  void add(const StampedEvent& event) {
+  void add(const AbsoluteEvent& event) {
     auto& last = last_.at(event.x, event.y());
     if (last != never) gaps_.add(event.t - last);
     last = event.t;

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 

@@ -47,7 +47,7 @@ void PartnerSearch::meet(Lane& lane, Pixel& pixel, Microseconds time) {
 
 void PartnerSearch::wait(Lane& lane, Pixel& pixel, const Waiting& waiting) {
   while (!lane.waiting.empty() && (waiting.time - lane.waiting.front().time > farthest ||
-                                   lane.waiting.size() == most_waiting)) {
+                                   lane.waiting.size() == max_waiting)) {
     lane.waiting.pop_front();
     ++lane.first;
   }
@@ -55,7 +55,7 @@ void PartnerSearch::wait(Lane& lane, Pixel& pixel, const Waiting& waiting) {
   pixel.waiting = lane.first + lane.waiting.size() - 1;
 }
 
-void PartnerSearch::add(Side side, const StampedEvent& event) {
+void PartnerSearch::add(Side side, const AbsoluteEvent& event) {
   const auto polarity = static_cast<std::size_t>(event.polarity());
   auto& others = lanes_[other(side)];
   auto& around = others.pixels[polarity];

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <deque>
 
+#include "src/core/absolute_event.hpp"
 #include "src/core/plane.hpp"
-#include "src/core/stamped_event.hpp"
 #include "src/measure/side.hpp"
 
 namespace eventcamera {
@@ -31,14 +31,14 @@ class PartnerSearch {
   PartnerSearch(int width, int height);
 
   /// An event inside the picture, not before the last one of either side.
-  void add(Side side, const StampedEvent& event);
+  void add(Side side, const AbsoluteEvent& event);
 
   /// Of the events so far, by what has come so far.
   const PartnerCounts& partnered(Side side) const { return lanes_[side].partnered; }
 
  private:
   using Ticket = std::uint64_t;  ///< of those that wait, in the order of time; 0 = nobody
-  static constexpr std::size_t most_waiting = std::size_t{1} << 23;
+  static constexpr std::size_t max_waiting = std::size_t{1} << 23;
 
   struct Pixel {
     Microseconds last;  ///< event

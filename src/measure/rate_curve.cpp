@@ -7,7 +7,7 @@ namespace eventcamera {
 
 void RateCurve::extend_to(Microseconds end) {
   if (end <= covered_) return;
-  while (bin_of(end) >= most_bins) join_bins();
+  while (bin_of(end) >= max_bins) join_bins();
   bins_.resize(std::max(bins_.size(), bin_of(end) + 1));
   covered_ = start_ + length_ * static_cast<Microseconds>(bins_.size());
 }

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 #include "src/measure/side.hpp"
 
 namespace eventcamera {
@@ -16,7 +16,7 @@ namespace eventcamera {
 class RateCurve {
  public:
   using Bin = OfSides<std::uint64_t>;
-  static constexpr std::size_t most_bins = 1024;
+  static constexpr std::size_t max_bins = 1024;
 
   explicit RateCurve(Microseconds start = 0) : start_(start), covered_(start) {}
 

@@ -37,7 +37,7 @@ std::size_t StreamComparison::add(Side side, std::span<const Event> events, Nano
     arriving.end = start;
   }
   const std::size_t left_out = arriving.arrivals.take(
-      events, start / 1000, [&](const StampedEvent& event) { arriving.waiting.push_back(event); });
+      events, start / 1000, [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); });
   arriving.end = std::max(arriving.end, end);
   if (this->start()) take_until(this->end() / 1000);
   return left_out;
@@ -46,12 +46,12 @@ std::size_t StreamComparison::add(Side side, std::span<const Event> events, Nano
 void StreamComparison::take_until(Microseconds end) {
   const Microseconds begin = *start() / 1000;
   if (!std::exchange(begun_, true)) rates_ = RateCurve(begin);
-  OfSides<std::span<const StampedEvent>> due;
+  OfSides<std::span<const AbsoluteEvent>> due;
   for (const auto side : both_sides) {
     const auto waiting =
-        std::span<const StampedEvent>(arriving_[side].waiting).subspan(arriving_[side].taken);
+        std::span<const AbsoluteEvent>(arriving_[side].waiting).subspan(arriving_[side].taken);
     due[side] = waiting.first(static_cast<std::size_t>(
-        std::ranges::upper_bound(waiting, end, {}, &StampedEvent::t) - waiting.begin()));
+        std::ranges::upper_bound(waiting, end, {}, &AbsoluteEvent::t) - waiting.begin()));
   }
   for (const auto side : both_sides) arriving_[side].taken += due[side].size();
   auto& reference = due[Side::reference];

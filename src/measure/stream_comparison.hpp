@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "src/core/absolute_event.hpp"
 #include "src/core/arrivals.hpp"
 #include "src/core/event.hpp"
-#include "src/core/stamped_event.hpp"
 #include "src/core/step_times.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/measure/partner_search.hpp"
@@ -48,8 +48,8 @@ class StreamComparison {
  private:
   struct Arriving {
     Arrivals arrivals;
-    std::vector<StampedEvent> waiting{};  ///< for the other side
-    std::size_t taken = 0;                ///< of those, the first ones
+    std::vector<AbsoluteEvent> waiting{};  ///< for the other side
+    std::size_t taken = 0;                 ///< of those, the first ones
     std::optional<Nanoseconds> start{};
     Nanoseconds end = 0;
   };

@@ -16,7 +16,7 @@ class DecayingSums {
       : exponential_(time_constant), most_(most), sums_(width, height) {}
 
   /// An event inside the picture, not before the last one.
-  void add(const StampedEvent& event) {
+  void add(const AbsoluteEvent& event) {
     auto& sum = sums_.at(event.x, event.y());
     const float step = event.polarity() == Polarity::on ? 1.0F : -1.0F;
     sum.value =

@@ -17,14 +17,14 @@ EventWindow::EventWindow(int width, int height, const WindowLimits& limits)
                   static_cast<std::size_t>(areas_along(height, limits.area_side)));
 }
 
-std::size_t& EventWindow::area_of(const StampedEvent& event) {
+std::size_t& EventWindow::area_of(const AbsoluteEvent& event) {
   const int column = event.x / limits_.area_side;
   const int row = event.y() / limits_.area_side;
   return areas_[static_cast<std::size_t>(row) * static_cast<std::size_t>(areas_across_) +
                 static_cast<std::size_t>(column)];
 }
 
-void EventWindow::add(const StampedEvent& event) {
+void EventWindow::add(const AbsoluteEvent& event) {
   if (events_.full()) drop_oldest();
   events_.push(event);
   auto& counts = counts_.at(event.x, event.y());

@@ -33,7 +33,7 @@ class EventWindow {
 
   /// Takes an event, which must lie inside the picture and not before the last one, and lets the
   /// oldest go that the limits no longer allow.
-  void add(const StampedEvent& event);
+  void add(const AbsoluteEvent& event);
 
   /// Lets events go that are not later than this.
   void begin_after(Microseconds time);
@@ -42,7 +42,7 @@ class EventWindow {
 
  private:
   void drop_oldest();
-  std::size_t& area_of(const StampedEvent& event);
+  std::size_t& area_of(const AbsoluteEvent& event);
 
   WindowLimits limits_;
   RecentEvents events_;

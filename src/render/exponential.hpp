@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 

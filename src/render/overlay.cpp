@@ -29,7 +29,7 @@ Overlay::Overlay(Size sensor, Size picture)
       kinds_(picture.width, picture.height) {}
 
 std::size_t Overlay::add(std::span<const Event> events, Microseconds start) {
-  return arrivals_.take(events, start, [this](const StampedEvent& event) { window_.add(event); });
+  return arrivals_.take(events, start, [this](const AbsoluteEvent& event) { window_.add(event); });
 }
 
 void Overlay::mark(int x, int y, std::uint8_t kind) {

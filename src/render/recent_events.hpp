@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 
@@ -16,10 +16,10 @@ class RecentEvents {
   bool empty() const { return size_ == 0; }
   bool full() const { return size_ == most; }
   std::size_t size() const { return size_; }
-  const StampedEvent& front() const { return ring_[first_]; }
+  const AbsoluteEvent& front() const { return ring_[first_]; }
 
   /// Not where full(). Throws std::bad_alloc.
-  void push(const StampedEvent& event) {
+  void push(const AbsoluteEvent& event) {
     if (size_ == ring_.size()) grow();
     ring_[(first_ + size_) & (ring_.size() - 1)] = event;
     ++size_;
@@ -33,13 +33,13 @@ class RecentEvents {
  private:
   /// To a power of two, so that a place in the ring is a matter of bits.
   void grow() {
-    std::vector<StampedEvent> larger(ring_.empty() ? 1024 : 2 * ring_.size());
+    std::vector<AbsoluteEvent> larger(ring_.empty() ? 1024 : 2 * ring_.size());
     for (std::size_t i = 0; i < size_; ++i) larger[i] = ring_[(first_ + i) & (ring_.size() - 1)];
     ring_.swap(larger);
     first_ = 0;
   }
 
-  std::vector<StampedEvent> ring_;
+  std::vector<AbsoluteEvent> ring_;
   std::size_t first_ = 0;
   std::size_t size_ = 0;
 };

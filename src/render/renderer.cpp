@@ -72,7 +72,7 @@ std::size_t Renderer::add(std::span<const Event> events, Microseconds start) {
   return std::visit(
       [&](auto& memory) {
         return arrivals_.take(events, start,
-                              [&memory](const StampedEvent& event) { memory.add(event); });
+                              [&memory](const AbsoluteEvent& event) { memory.add(event); });
       },
       memory_);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include "src/core/absolute_event.hpp"
 #include "src/core/plane.hpp"
-#include "src/core/stamped_event.hpp"
 
 namespace eventcamera {
 
@@ -14,7 +14,7 @@ class TimeSurface {
       : longest_(longest), last_(width, height) {}
 
   /// An event inside the picture, not before the last one.
-  void add(const StampedEvent& event) {
+  void add(const AbsoluteEvent& event) {
     last_.at(event.x, event.y()) = {event.t, event.polarity() == Polarity::on ? 1.0F : -1.0F};
   }
 

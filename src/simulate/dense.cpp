@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "src/core/grey8.hpp"
-#include "src/flow/flow_of_changes.hpp"
+#include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/path.hpp"
 
@@ -55,7 +55,7 @@ class InterpolatingSimulator final : public DenseSimulator {
   Plane<Pixel> last_;
   Plane<Pixel> now_;
   PathWalker walker_;
-  std::optional<FlowOfChanges> finder_;
+  std::optional<RegionOfInterestFlow> finder_;
   Grey8 last_grey_;
   Grey8 grey_;
 };

@@ -28,7 +28,7 @@ class DenseSimulator : public Simulator {
   Interpolation interpolation_ = Interpolation::forward;
 };
 
-/// Neither side of `format` may exceed longest_side.
+/// Neither side of `format` may exceed max_side.
 std::unique_ptr<DenseSimulator> make_dense_simulator(const LumaFormat& format);
 
 }  // namespace eventcamera

@@ -64,9 +64,9 @@ struct Part {
 };
 
 /// What fires in one interpolated difference frame.
-class Landings {
+class FiredPixels {
  public:
-  Landings(int width, int height)
+  FiredPixels(int width, int height)
       : strongest_(width, height),
         words_((width + 63) / 64),
         taken_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)) {}
@@ -164,13 +164,13 @@ class DiffSimulator final : public Simulator {
   }
 
   void fire_between(const StepTimes& steps, EventBuckets& events) {
-    while (static_cast<int>(landings_.size()) < threads().threads())
-      landings_.emplace_back(format().width, format().height);
+    while (static_cast<int>(fired_pixels_.size()) < threads().threads())
+      fired_pixels_.emplace_back(format().width, format().height);
     threads().for_each(steps.count() - 1, [&](int i, int thread) {
       const int j = i + 1;
-      auto& landings = landings_[static_cast<std::size_t>(thread)];
-      for (const auto& moving : moving_) landings.add(moving.point.at(j), moving.difference);
-      landings.fire(steps.microseconds(j), events.bucket(j, 0));
+      auto& fired_pixels = fired_pixels_[static_cast<std::size_t>(thread)];
+      for (const auto& moving : moving_) fired_pixels.add(moving.point.at(j), moving.difference);
+      fired_pixels.fire(steps.microseconds(j), events.bucket(j, 0));
     });
   }
 
@@ -179,7 +179,7 @@ class DiffSimulator final : public Simulator {
   Part on_;
   Part off_;
   std::vector<MovingDifference> moving_;
-  std::vector<Landings> landings_;  // one a thread
+  std::vector<FiredPixels> fired_pixels_;  // one a thread
 };
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace eventcamera {
 /// polarity within a pixel: what has stopped does not fire.
 ///
 /// The first interval has one difference frame only, so its events are all of D(1).
-/// Neither side of `format` may exceed longest_side.
+/// Neither side of `format` may exceed max_side.
 std::unique_ptr<Simulator> make_diff_simulator(const LumaFormat& format);
 
 }  // namespace eventcamera

@@ -21,7 +21,7 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// In words of 64 pixels.
-constexpr int longest_vector = (hn::MaxLanes(hn::ScalableTag<std::uint8_t>()) + 63) / 64;
+constexpr int max_vector = (hn::MaxLanes(hn::ScalableTag<std::uint8_t>()) + 63) / 64;
 
 /// A threshold in all lanes; one that no difference exceeds is cut to what a pixel can be.
 template <class Pixel>
@@ -84,8 +84,8 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint
     const auto fall = hn::SaturatedSub(hn::SaturatedSub(a, b), negative);
     const auto fired = hn::Ne(hn::Or(rise, fall), zero);
     if (hn::AllFalse(pixels, fired)) continue;
-    std::uint64_t fired_bits[longest_vector] = {};
-    std::uint64_t on_bits[longest_vector] = {};
+    std::uint64_t fired_bits[max_vector] = {};
+    std::uint64_t on_bits[max_vector] = {};
     hn::StoreMaskBits(pixels, fired, reinterpret_cast<std::uint8_t*>(fired_bits));
     hn::StoreMaskBits(pixels, hn::Ne(rise, zero), reinterpret_cast<std::uint8_t*>(on_bits));
     for (int i = 0; i * 64 < lanes; ++i) events.add(fired_bits[i], on_bits[i], x + 64 * i);

@@ -58,7 +58,7 @@ void interpolate_8(const Warp<std::uint8_t>& warp, const PlaneView<Flow>& flow, 
     if (count == lanes) {
       hn::StoreU(shade, shades, out + x);
     } else {
-      HWY_ALIGN std::uint16_t rest[most_sampled_lanes];
+      HWY_ALIGN std::uint16_t rest[max_sampled_lanes];
       hn::Store(shade, shades, rest);
       std::copy_n(rest, count, out + x);
     }

@@ -22,7 +22,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Pixels that are skipped together or not at all. No vector is wider.
 constexpr int tile_width = 16;
-static_assert(tile_width == most_sampled_lanes);
+static_assert(tile_width == max_sampled_lanes);
 constexpr int tile_height = 4;
 static_assert(rows_per_band % tile_height == 0);
 
@@ -31,7 +31,7 @@ constexpr int steps_at_once = 16;
 
 /// For each tile of a row of tiles the step at which to begin, where nothing can fire before the
 /// last one: at the last but one, or at the last where that shows the last frame itself. Else 1.
-using FirstSteps = std::array<int, longest_side / tile_width>;
+using FirstSteps = std::array<int, max_side / tile_width>;
 
 /// Sets each pixel of some rows beside the one below it, the lowest beside itself.
 void pair_rows(const PlaneView<std::uint8_t>& picture, int first, int last,
@@ -175,7 +175,8 @@ FlowRange flow_range(const PlaneView<Flow>& flow, const Box& tile) {
 }
 
 /// The first step of a forward path at which a tile must be looked at.
-int first_step(const Path<std::uint8_t>& path, const Steepness& steepness, const Box& tile) {
+int first_step(const Path<std::uint8_t>& path, const GradientBound& gradient_bound,
+               const Box& tile) {
   const int steps = path.steps.count();
   const auto range = flow_range(path.flow, tile);
   const auto motion = [steps](float flow) { return std::int64_t{motion_per_step(flow, steps)}; };
@@ -196,13 +197,13 @@ int first_step(const Path<std::uint8_t>& path, const Steepness& steepness, const
   const Box reached{tile.left - reach(range.most[0]), tile.top - reach(range.most[1]),
                     tile.right + reach(-range.least[0]), tile.bottom + reach(-range.least[1])};
   if (reached.width() > tile_width + 2 * far || reached.height() > tile_height + 2 * far) return 1;
-  const auto bound = steepness.within(reached);
+  const auto bound = gradient_bound.within(reached);
   const std::int64_t threshold = std::min(path.thresholds.positive, path.thresholds.negative);
   return dx * bound.x + dy * bound.y <= threshold << 16 ? std::max(1, steps - 1) : 1;
 }
 
 void fire_band_forward(const Path<std::uint8_t>& path, const PlaneView<std::uint16_t>& last_pairs,
-                       const Steepness& steepness, int band, EventBuckets& events) {
+                       const GradientBound& gradient_bound, int band, EventBuckets& events) {
   const PairSampler last(last_pairs);
   const BandRows rows(band, path.flow.height);
   const int width = path.flow.width;
@@ -211,7 +212,7 @@ void fire_band_forward(const Path<std::uint8_t>& path, const PlaneView<std::uint
     const int bottom = std::min(top + tile_height, rows.last);
     for (int left = 0; left < width; left += tile_width)
       first_steps[static_cast<std::size_t>(left / tile_width)] =
-          first_step(path, steepness, {left, top, std::min(left + tile_width, width), bottom});
+          first_step(path, gradient_bound, {left, top, std::min(left + tile_width, width), bottom});
     for (int y = top; y < bottom; ++y)
       fire_row<Interpolation::forward>(path, last, y, band, first_steps, events);
   }
@@ -270,7 +271,7 @@ void PathWalker::fire(const Path<std::uint8_t>& path, ThreadPool& threads, Event
   const int bands = band_count(path.flow.height);
   events.reset(path.steps.count(), bands);
   if (path.interpolation == Interpolation::forward) {
-    steepness_.measure(path.warp.last, threads);
+    gradient_bound_.measure(path.warp.last, threads);
     if (last_pairs_.width() != path.flow.width || last_pairs_.height() != path.flow.height)
       last_pairs_ = Plane<std::uint16_t>(path.flow.width, path.flow.height);
     threads.for_each(bands, [&](int band, int) {
@@ -278,7 +279,8 @@ void PathWalker::fire(const Path<std::uint8_t>& path, ThreadPool& threads, Event
       HWY_DYNAMIC_DISPATCH(pair_rows)(path.warp.last, rows.first, rows.last, last_pairs_);
     });
     threads.for_each(bands, [&](int band, int) {
-      HWY_DYNAMIC_DISPATCH(fire_band_forward)(path, last_pairs_.view(), steepness_, band, events);
+      HWY_DYNAMIC_DISPATCH(fire_band_forward)
+      (path, last_pairs_.view(), gradient_bound_, band, events);
     });
   } else {
     threads.for_each(bands, [&](int band, int) {

@@ -8,8 +8,8 @@
 #include "src/core/thread_pool.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/dense.hpp"
+#include "src/simulate/gradient_bound.hpp"
 #include "src/simulate/simulator.hpp"
-#include "src/simulate/steepness.hpp"
 #include "src/simulate/warp.hpp"
 
 namespace eventcamera {
@@ -39,7 +39,7 @@ class PathWalker {
   void fire(const Path<std::uint16_t>& path, ThreadPool& threads, EventBuckets& events);
 
  private:
-  Steepness steepness_;
+  GradientBound gradient_bound_;
   Plane<std::uint16_t> last_pairs_;  ///< the last frame, each pixel beside the one below it
 };
 

@@ -20,10 +20,10 @@ namespace eventcamera::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// No vector of places is wider.
-inline constexpr int most_sampled_lanes = 16;
+inline constexpr int max_sampled_lanes = 16;
 
-using Words = hn::CappedTag<std::int32_t, most_sampled_lanes>;
-using Floats = hn::CappedTag<float, most_sampled_lanes>;
+using Words = hn::CappedTag<std::int32_t, max_sampled_lanes>;
+using Floats = hn::CappedTag<float, max_sampled_lanes>;
 using Bytes = hn::Rebind<std::uint8_t, Words>;
 using Vector = hn::Vec<Words>;
 
@@ -118,7 +118,7 @@ class PairSampler {
 
 /// motion_per_step(), for many flows at once.
 inline Vector motions(hn::Vec<Floats> flow, float scale) {
-  const auto longest = hn::Set(Floats(), static_cast<float>(longest_side));
+  const auto longest = hn::Set(Floats(), static_cast<float>(max_side));
   const auto number = hn::IfThenElseZero(hn::Eq(flow, flow), flow);
   const auto cut = hn::Min(hn::Max(number, hn::Neg(longest)), longest);
   return hn::NearestInt(hn::Mul(cut, hn::Set(Floats(), scale)));

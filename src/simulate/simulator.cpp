@@ -13,7 +13,7 @@ const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
   if (is_first) {
     start(frame);
   } else {
-    assert(time > *last_time_ && time - *last_time_ <= longest_interval);
+    assert(time > *last_time_ && time - *last_time_ <= max_interval);
     simulate(frame, StepTimes(time - *last_time_, settings.interpolated_frames + 1), settings,
              events_);
   }
@@ -26,7 +26,7 @@ const EventBuckets* Simulator::hold_until(Nanoseconds time, const Settings& sett
   if (!last_time_) return nullptr;
   const Nanoseconds duration = time - *last_time_;
   last_time_ = time;
-  if (duration <= 0 || duration > longest_interval) return nullptr;
+  if (duration <= 0 || duration > max_interval) return nullptr;
   threads_.set_threads(settings.threads);
   return hold(StepTimes(duration, 1), settings, events_) ? &events_ : nullptr;
 }

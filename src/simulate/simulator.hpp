@@ -43,7 +43,7 @@ class Simulator {
   Simulator& operator=(const Simulator&) = delete;
 
   /// Takes the next frame, in the format the simulator was made for. `time` must lie after that
-  /// of the last frame, by longest_interval at most.
+  /// of the last frame, by max_interval at most.
   /// Returns the sorted events of (time of the last frame, time], good until the next call; or
   /// nullptr for the first frame, to which the next is compared.
   /// Throws std::bad_alloc, or what OpenCV throws; the simulator is then good for nothing but being

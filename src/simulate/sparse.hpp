@@ -13,7 +13,7 @@ namespace eventcamera {
 /// stands at p + a f, rounded (where several meet, that of the last in raster order); a place that
 /// a tracked pixel has left shows I(i), what it uncovered; the rest is I(i-1). I(1) = I(i). Then
 /// each difference of neighbours is thresholded, at the time of its later frame.
-/// Neither side of `format` may exceed longest_side.
+/// Neither side of `format` may exceed max_side.
 std::unique_ptr<Simulator> make_sparse_simulator(const LumaFormat& format);
 
 }  // namespace eventcamera

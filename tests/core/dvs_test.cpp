@@ -490,7 +490,7 @@ TEST(Dvs, IsBoundedWhateverComes) {
     settings.cutoff_hz = cutoff_hz;
     Playback playback({20, 10, 8}, settings);
     Nanoseconds time = 0;
-    const Nanoseconds gaps[] = {1, 999, 1001, 40'000'000, longest_interval};
+    const Nanoseconds gaps[] = {1, 999, 1001, 40'000'000, max_interval};
     playback.push(flat(20, 10, 0), 8, time);
     for (int i = 0; i < 10; ++i)
       playback.push(flat(20, 10, i % 2 == 0 ? 255 : 0), 8, time += gaps[i % 5]);

@@ -77,7 +77,7 @@ TEST(StepTimes, HaveAMicrosecondEach) {
 }
 
 TEST(StepTimes, ReachOverTheLongestInterval) {
-  const StepTimes steps(longest_interval, 256);
+  const StepTimes steps(max_interval, 256);
   EXPECT_EQ(steps.microseconds(256), 0xffffffffU);
   EXPECT_EQ(steps.microseconds(128), 0x7fffffffU);
 }

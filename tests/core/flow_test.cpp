@@ -9,9 +9,9 @@
 
 #include "src/flow/dense_flow.hpp"
 #include "src/flow/fixed_point.hpp"
-#include "src/flow/flow_of_changes.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/opencv_threads.hpp"
+#include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
 #include "tests/core/scene.hpp"
 
@@ -101,7 +101,7 @@ struct MovingPatch {
 
 TEST_P(EveryFlow, OfChangesIsNotSoughtWhereNothingChanged) {
   const MovingPatch patch;
-  FlowOfChanges finder(GetParam(), 640, 480);
+  RegionOfInterestFlow finder(GetParam(), 640, 480);
   const auto check = [&](const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to, int sign) {
     const auto flow =
         finder.find(from.view(), to.view(), changed_box(from.view(), to.view(), 2), threads);
@@ -133,7 +133,7 @@ TEST_P(EveryFlow, OfChangesIsNotSoughtWhereNothingChanged) {
 TEST_P(EveryFlow, OfChangesIsThatOfTheWholeWhereAllChanges) {
   const auto a = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
   const auto b = scene::texture<std::uint8_t>(320, 240, 8, 2.3, 1.9);
-  FlowOfChanges finder(GetParam(), 320, 240);
+  RegionOfInterestFlow finder(GetParam(), 320, 240);
   const Box all{0, 0, 320, 240};
   const Plane<std::uint8_t>* sequence[] = {&a, &b, &b, &a, &b};
   for (int i = 1; i < 5; ++i) {
@@ -178,8 +178,8 @@ TEST(FixedPoint, SharesAFlowOutOverTheSteps) {
   EXPECT_EQ(motion_per_step(8, 4), 2 << 16);
   EXPECT_EQ(motion_per_step(-1, 2), -(1 << 15));
   EXPECT_EQ(motion_per_step(std::nanf(""), 3), 0);
-  EXPECT_EQ(motion_per_step(INFINITY, 1), longest_side << 16);
-  EXPECT_EQ(motion_per_step(-1e30F, 1), -longest_side * (1 << 16));
+  EXPECT_EQ(motion_per_step(INFINITY, 1), max_side << 16);
+  EXPECT_EQ(motion_per_step(-1e30F, 1), -max_side * (1 << 16));
 }
 
 TEST(FixedPoint, RoundsToTheNearestPixel) {

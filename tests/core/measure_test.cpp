@@ -23,7 +23,7 @@ struct Extent {
   int height;
 };
 
-using Stream = std::vector<StampedEvent>;
+using Stream = std::vector<AbsoluteEvent>;
 
 /// Sorted events by chance in (start, end]; some of the times are the same.
 Stream stream_by_chance(Extent extent, std::size_t count, Microseconds start, Microseconds end,
@@ -34,11 +34,11 @@ Stream stream_by_chance(Extent extent, std::size_t count, Microseconds start, Mi
   };
   Stream stream;
   for (std::size_t i = 0; i < count; ++i)
-    stream.push_back(StampedEvent::at(static_cast<int>(between(0, extent.width - 1)),
-                                      static_cast<int>(between(0, extent.height - 1)),
-                                      between(start + 1, end),
-                                      between(0, 2) == 0 ? Polarity::off : Polarity::on));
-  std::ranges::sort(stream, {}, &StampedEvent::t);
+    stream.push_back(AbsoluteEvent::at(static_cast<int>(between(0, extent.width - 1)),
+                                       static_cast<int>(between(0, extent.height - 1)),
+                                       between(start + 1, end),
+                                       between(0, 2) == 0 ? Polarity::off : Polarity::on));
+  std::ranges::sort(stream, {}, &AbsoluteEvent::t);
   return stream;
 }
 
@@ -74,7 +74,7 @@ PartnerCounts partnered_plainly(const Stream& of, const Stream& among) {
   PartnerCounts counts{};
   for (const auto& event : of) {
     for (std::size_t i = 0; i < counts.size(); ++i) {
-      counts[i] += std::ranges::any_of(among, [&](const StampedEvent& partner) {
+      counts[i] += std::ranges::any_of(among, [&](const AbsoluteEvent& partner) {
         return partner.polarity() == event.polarity() && std::abs(partner.x - event.x) <= 1 &&
                std::abs(partner.y() - event.y()) <= 1 &&
                std::abs(partner.t - event.t) <= partner_distances[i];
@@ -111,7 +111,7 @@ void expect_figures(const StreamFigures& figures, Extent extent, const Stream& s
   EXPECT_NEAR(figures.rate, static_cast<double>(stream.size()) / seconds, 1e-6);
   EXPECT_NEAR(figures.mean, mean_plainly(map) / seconds, 1e-9);
   EXPECT_NEAR(figures.deviation, std::sqrt(covariance_plainly(map, map)) / seconds, 1e-6);
-  const auto on = std::ranges::count(stream, Polarity::on, &StampedEvent::polarity);
+  const auto on = std::ranges::count(stream, Polarity::on, &AbsoluteEvent::polarity);
   EXPECT_NEAR(figures.on_share,
               stream.empty() ? 0 : static_cast<double>(on) / static_cast<double>(stream.size()),
               1e-12);
@@ -153,9 +153,9 @@ TEST(GapHistogram, IsExactBelow64AndToAThirtySecondBeyond) {
 
 TEST(EventStatistics, RestartsAndRemembersLastTimes) {
   EventStatistics statistics(3, 2);
-  statistics.add(StampedEvent::at(2, 1, 100, Polarity::on));
+  statistics.add(AbsoluteEvent::at(2, 1, 100, Polarity::on));
   statistics.restart();
-  statistics.add(StampedEvent::at(2, 1, 130, Polarity::off));
+  statistics.add(AbsoluteEvent::at(2, 1, 130, Polarity::off));
   auto figures = statistics.figures(1'000'000'000);
   EXPECT_EQ(figures.events, 1U);
   EXPECT_EQ(figures.on_share, 0);
@@ -163,13 +163,13 @@ TEST(EventStatistics, RestartsAndRemembersLastTimes) {
   EXPECT_EQ(statistics.map().at(2, 1), 1U);
   statistics.restart();
   statistics.forget_times();
-  statistics.add(StampedEvent::at(2, 1, 90, Polarity::off));
+  statistics.add(AbsoluteEvent::at(2, 1, 90, Polarity::off));
   EXPECT_EQ(statistics.figures(1'000'000'000).gaps[2], 0);
 }
 
 TEST(EventStatistics, HasNoRateWithoutTime) {
   EventStatistics statistics(1, 1);
-  statistics.add(StampedEvent::at(0, 0, 1, Polarity::on));
+  statistics.add(AbsoluteEvent::at(0, 0, 1, Polarity::on));
   const auto figures = statistics.figures(0);
   EXPECT_EQ(figures.events, 1U);
   EXPECT_EQ(figures.rate, 0);
@@ -195,16 +195,16 @@ TEST(RateCurve, JoinsBinsWhenThereAreTooMany) {
   ASSERT_EQ(curve.bins().size(), 2U);
   EXPECT_EQ(curve.bins()[0][Side::reference], 2U);
   EXPECT_EQ(curve.bins()[1][Side::candidate], 1U);
-  curve.extend_to(500 + 1000 * static_cast<Microseconds>(RateCurve::most_bins));
-  EXPECT_EQ(curve.bins().size(), RateCurve::most_bins);
+  curve.extend_to(500 + 1000 * static_cast<Microseconds>(RateCurve::max_bins));
+  EXPECT_EQ(curve.bins().size(), RateCurve::max_bins);
   EXPECT_EQ(curve.bin_length(), 1000);
-  curve.add(Side::candidate, 501 + 1000 * static_cast<Microseconds>(RateCurve::most_bins));
+  curve.add(Side::candidate, 501 + 1000 * static_cast<Microseconds>(RateCurve::max_bins));
   EXPECT_EQ(curve.bin_length(), 2000);
-  EXPECT_EQ(curve.bins().size(), RateCurve::most_bins / 2 + 1);
+  EXPECT_EQ(curve.bins().size(), RateCurve::max_bins / 2 + 1);
   EXPECT_EQ(curve.bins()[0][Side::reference], 2U);
   EXPECT_EQ(curve.bins()[0][Side::candidate], 1U);
   curve.extend_to(Microseconds{1} << 55);
-  EXPECT_LE(curve.bins().size(), RateCurve::most_bins);
+  EXPECT_LE(curve.bins().size(), RateCurve::max_bins);
   std::uint64_t sum = 0;
   for (const auto& bin : curve.bins()) sum += bin[Side::reference] + bin[Side::candidate];
   EXPECT_EQ(sum, 4U);
@@ -240,7 +240,7 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
   const auto start = std::max(scene.reference_start, scene.candidate_start);
   const auto both = [&](const Stream& stream) {
     Stream covered;
-    std::ranges::copy_if(stream, std::back_inserter(covered), [&](const StampedEvent& event) {
+    std::ranges::copy_if(stream, std::back_inserter(covered), [&](const AbsoluteEvent& event) {
       return event.t > start && event.t <= reference_end;
     });
     return covered;
@@ -274,7 +274,7 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
   EXPECT_EQ(curve.bins().size(), static_cast<std::size_t>((reference_end - start + 999) / 1000));
   for (std::size_t i = 0; i < curve.bins().size(); ++i) {
     const auto in_bin = [&](const Stream& stream) {
-      return std::ranges::count_if(stream, [&](const StampedEvent& event) {
+      return std::ranges::count_if(stream, [&](const AbsoluteEvent& event) {
         return (event.t - start - 1) / 1000 == static_cast<Microseconds>(i);
       });
     };

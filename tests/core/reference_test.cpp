@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "src/core/grey8.hpp"
-#include "src/flow/flow_of_changes.hpp"
+#include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
@@ -120,7 +120,7 @@ class Equality : public testing::TestWithParam<Case> {
   void hold_dense(const Plane<Pixel>& last, const Plane<Pixel>& now, const StepTimes& steps,
                   const Thresholds& thresholds) {
     for (const auto method : {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback}) {
-      FlowOfChanges finder(method, format.width, format.height);
+      RegionOfInterestFlow finder(method, format.width, format.height);
       const auto from = grey8(last, format.bits);
       const auto to = grey8(now, format.bits);
       ThreadPool one;

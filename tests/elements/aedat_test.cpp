@@ -20,6 +20,7 @@
 namespace {
 
 using namespace harness;
+using eventcamera::AbsoluteEvent;
 using eventcamera::Aedat4Compression;
 using eventcamera::Aedat4Decoder;
 using eventcamera::Aedat4Encoder;
@@ -31,9 +32,8 @@ using eventcamera::Aedat4Settings;
 using eventcamera::Microseconds;
 using eventcamera::Polarity;
 using eventcamera::SensorSize;
-using eventcamera::StampedEvent;
 using Bytes = std::vector<std::uint8_t>;
-using Events = std::vector<StampedEvent>;
+using Events = std::vector<AbsoluteEvent>;
 
 constexpr SensorSize sensor{346, 260};
 /// Of a recording with the times of day.
@@ -42,7 +42,7 @@ constexpr const char* davis = "davis346-frames-events-imu.aedat4";
 
 /// As XYTP has them: ties in raster order, and each pixel once a time.
 Events ordered(Events events) {
-  const auto key = [](const StampedEvent& e) { return std::tuple(e.t, e.y(), e.x); };
+  const auto key = [](const AbsoluteEvent& e) { return std::tuple(e.t, e.y(), e.x); };
   std::stable_sort(events.begin(), events.end(),
                    [&](const auto& a, const auto& b) { return key(a) < key(b); });
   events.erase(std::unique(events.begin(), events.end(),
@@ -68,8 +68,8 @@ Events steady_events(Microseconds end, Microseconds step, Microseconds start = 0
   Events events;
   for (Microseconds t = 0; t < end; t += step) {
     const auto i = static_cast<int>(t / step);
-    events.push_back(StampedEvent::at(i % sensor.width, i / 7 % sensor.height, start + t,
-                                      i % 3 == 0 ? Polarity::on : Polarity::off));
+    events.push_back(AbsoluteEvent::at(i % sensor.width, i / 7 % sensor.height, start + t,
+                                       i % 3 == 0 ? Polarity::on : Polarity::off));
   }
   return events;
 }
@@ -95,7 +95,7 @@ Bytes aedat4(const Events& events, Aedat4Compression compression = Aedat4Compres
 Bytes aedat4_with_frames(const Events& events, Aedat4PixelFormat format, int frames) {
   Aedat4Encoder encoder({sensor, "", Aedat4Compression::zstd, true, true});
   Bytes bytes;
-  std::span<const StampedEvent> rest(events);
+  std::span<const AbsoluteEvent> rest(events);
   for (int i = 0; i < frames; ++i) {
     const auto t = events.front().t - 3'000 + i * 40'000;
     std::size_t count = 0;
@@ -455,7 +455,7 @@ TEST(AedatDemux, ReadsTheRecordingOfADavis) {
     EXPECT_LT(pictures[0].pts, start + 40 * GST_MSECOND);
     EXPECT_EQ(player.stat("imu-samples"), 130U);
     EXPECT_EQ(player.stat("triggers"), 15U);
-    EXPECT_EQ(player.stat("damaged-places"), 0U);
+    EXPECT_EQ(player.stat("corrupt-places"), 0U);
   }
 }
 
@@ -549,14 +549,14 @@ TEST(AedatDemux, SeeksWhilePlayingAgainAndAgain) {
   EXPECT_EQ(player.track("video_0").pictures.size(), 50U);
 }
 
-/// Of the first damage, as the decoder finds it without any element.
-std::uint64_t place_of_damage(const Bytes& bytes) {
+/// Of the first corruption, as the decoder finds it without any element.
+std::uint64_t place_of_corruption(const Bytes& bytes) {
   Aedat4Decoder decoder;
   decoder.push(bytes);
   decoder.finish();
   while (decoder.next()) continue;
-  EXPECT_GT(decoder.damage().places, 0U);
-  return decoder.damage().first_at;
+  EXPECT_GT(decoder.corruption().places, 0U);
+  return decoder.corruption().first_at;
 }
 
 TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
@@ -581,20 +581,20 @@ TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
       bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at),
                   bytes.begin() + static_cast<std::ptrdiff_t>(at) + 33);
     const File file(bytes);
-    // Pulled, its table is missed, too; what is told of is the damage that comes first.
-    const auto first_damage = place_of_damage(bytes);
+    // Pulled, its table is missed, too; what is told of is the corruption that comes first.
+    const auto first_corruption = place_of_corruption(bytes);
     for (const char* between : {"", "identity"}) {
       Player player(file.path(), between);
       ASSERT_TRUE(player.play()) << player.error;
       ASSERT_FALSE(player.warnings.empty());
-      EXPECT_TRUE(player.warnings.front().starts_with("The data are damaged at byte " +
-                                                      std::to_string(first_damage) + ": "))
+      EXPECT_TRUE(player.warnings.front().starts_with("The data are corrupt at byte " +
+                                                      std::to_string(first_corruption) + ": "))
           << player.warnings.front();
       EXPECT_EQ(
           std::count_if(player.warnings.begin(), player.warnings.end(),
                         [](const auto& text) { return text.find("at byte") != std::string::npos; }),
           1);
-      EXPECT_GE(player.stat("damaged-places"), 1U);
+      EXPECT_GE(player.stat("corrupt-places"), 1U);
       const auto track = player.track("events_0");
       EXPECT_GT(track.events.size(), events.size() / 3);
       for (const auto& event : track.events) EXPECT_TRUE(expected.contains(event.t));
@@ -636,11 +636,11 @@ TEST(AedatDemux, SaysWhereTheTableIsWrong) {
     Player player(file.path());
     ASSERT_TRUE(player.play()) << player.error;
     ASSERT_EQ(player.warnings.size(), 1U);
-    EXPECT_TRUE(player.warnings.front().starts_with("The data are damaged at byte " +
+    EXPECT_TRUE(player.warnings.front().starts_with("The data are corrupt at byte " +
                                                     std::to_string(fault.at) + ": " + fault.what))
         << player.warnings.front();
     EXPECT_TRUE(player.track("events_0").events == events);
-    EXPECT_EQ(player.stat("damaged-places"), 1U);
+    EXPECT_EQ(player.stat("corrupt-places"), 1U);
   }
 }
 
@@ -754,7 +754,7 @@ Content content_of(const Bytes& bytes) {
       content.pictures.emplace_back(f.t, Bytes(f.pixels, f.pixels + f.height * f.stride));
     }
   }
-  EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+  EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
   content.table = decoder.table_at().has_value();
   content.streams = decoder.streams();
   content.compression = decoder.compression();
@@ -889,9 +889,9 @@ TEST(AedatMux, WritesTheTimesOfTheStream) {
   const auto content =
       content_of(muxed({events_buffer(5 * GST_SECOND + 999, {{0, 1, 2}, {7, 3, 0x8004}}),
                         events_buffer(5 * GST_SECOND + 10 * GST_MSECOND, {{9'999, 345, 259}})}));
-  const Events expected{StampedEvent::at(1, 2, 5'000'000, Polarity::off),
-                        StampedEvent::at(3, 4, 5'000'007, Polarity::on),
-                        StampedEvent::at(345, 259, 5'019'999, Polarity::off)};
+  const Events expected{AbsoluteEvent::at(1, 2, 5'000'000, Polarity::off),
+                        AbsoluteEvent::at(3, 4, 5'000'007, Polarity::on),
+                        AbsoluteEvent::at(345, 259, 5'019'999, Polarity::off)};
   EXPECT_TRUE(content.events == expected);
   EXPECT_FALSE(content.table) << "nothing could seek to where the header tells of it";
 }
@@ -905,8 +905,8 @@ TEST(AedatMux, LeavesOutWhatDoesNotFit) {
                         timeless, events_buffer(0, {{0, 1, 1}}), gst_buffer_new_memdup("123", 3),
                         events_buffer(2 * GST_SECOND, {{0, 1, 1}})},
                        &warnings));
-  EXPECT_TRUE((content.events == Events{StampedEvent::at(6, 7, 1'000'005, Polarity::off),
-                                        StampedEvent::at(1, 1, 2'000'000, Polarity::off)}));
+  EXPECT_TRUE((content.events == Events{AbsoluteEvent::at(6, 7, 1'000'005, Polarity::off),
+                                        AbsoluteEvent::at(1, 1, 2'000'000, Polarity::off)}));
   ASSERT_EQ(warnings.size(), 3U);
   EXPECT_TRUE(warnings[0].starts_with("Input was left out: a buffer has no time"));
   EXPECT_TRUE(warnings[1].starts_with("Events left out: 2. They are earlier than"));
@@ -931,8 +931,8 @@ TEST(AedatMux, WritesAnewAfterAFlush) {
             GST_FLOW_OK);
   EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_eos()));
   const auto content = content_of(rest_of_file(h.get()));
-  EXPECT_TRUE((content.events == Events{StampedEvent::at(3, 4, 600'000, Polarity::off),
-                                        StampedEvent::at(5, 6, 600'007, Polarity::off)}));
+  EXPECT_TRUE((content.events == Events{AbsoluteEvent::at(3, 4, 600'000, Polarity::off),
+                                        AbsoluteEvent::at(5, 6, 600'007, Polarity::off)}));
 }
 
 TEST(AedatMux, HasOnePadOfAKind) {

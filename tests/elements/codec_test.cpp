@@ -7,16 +7,16 @@
 #include <fstream>
 #include <sstream>
 
-#include "src/formats/interval_slicer.hpp"
+#include "src/formats/chunker.hpp"
 #include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
 
 using namespace harness;
+using eventcamera::AbsoluteEvent;
 using eventcamera::Microseconds;
 using eventcamera::Polarity;
-using eventcamera::StampedEvent;
 
 constexpr int width = 320;
 constexpr int height = 240;
@@ -53,12 +53,12 @@ std::string element_of(const char* launch) {
 
 /// Sorted, and no two of one pixel and time: a dot that runs through the rows for a second, from
 /// 2 s on, and again after a silence of three.
-std::vector<StampedEvent> some_events() {
-  std::vector<StampedEvent> events;
+std::vector<AbsoluteEvent> some_events() {
+  std::vector<AbsoluteEvent> events;
   for (int i = 0; i < 20'000; ++i) {
     const Microseconds t = 2'000'000 + 50 * i + (i >= 10'000 ? 3'000'000 : 0);
     events.push_back(
-        StampedEvent::at(i % width, i / width, t, i % 3 == 0 ? Polarity::off : Polarity::on));
+        AbsoluteEvent::at(i % width, i / width, t, i % 3 == 0 ? Polarity::off : Polarity::on));
   }
   return events;
 }
@@ -70,7 +70,7 @@ std::string pull_bytes(Harness& h) {
 }
 
 /// The file of these events, written by the element.
-std::string file_of(const Format& format, std::span<const StampedEvent> events) {
+std::string file_of(const Format& format, std::span<const AbsoluteEvent> events) {
   Harness h(format.writer);
   gst_harness_set_sink_caps_str(h.get(), format.caps);
   gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
@@ -90,7 +90,7 @@ GstBuffer* bytes(std::string_view text) {
   return gst_buffer_new_memdup(text.data(), text.size());
 }
 
-void append_events(GstBuffer* buffer, std::vector<StampedEvent>& out) {
+void append_events(GstBuffer* buffer, std::vector<AbsoluteEvent>& out) {
   GstEventCameraMap map;
   ASSERT_TRUE(gst_event_camera_map(&map, buffer));
   for (std::size_t i = 0; i < map.n_events; ++i)
@@ -99,8 +99,8 @@ void append_events(GstBuffer* buffer, std::vector<StampedEvent>& out) {
   gst_event_camera_unmap(&map);
 }
 
-std::vector<StampedEvent> pull_events(Harness& h) {
-  std::vector<StampedEvent> events;
+std::vector<AbsoluteEvent> pull_events(Harness& h) {
+  std::vector<AbsoluteEvent> events;
   while (const auto buffer = h.pull()) append_events(buffer.get(), events);
   return events;
 }
@@ -203,7 +203,7 @@ class Player {
     return static_cast<GstClockTime>(position);
   }
 
-  std::vector<StampedEvent> events;  ///< since play()
+  std::vector<AbsoluteEvent> events;  ///< since play()
 
  private:
   Owned<GstElement> pipeline_;
@@ -294,7 +294,7 @@ TEST_P(EveryFormat, IsEmptyWhereThereAreNoEvents) {
   EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
 }
 
-TEST_P(EveryFormat, SaysWhenItIsNotThisFormat) {
+TEST_P(EveryFormat, SaysWhenItIsUnsupportedFormat) {
   for (const auto& file : {std::string("a,b\n"), std::string("no events at all, but words\n"),
                            std::string(100'000, '\0')}) {
     auto h = Harness::with_late_pad(format().reader);
@@ -325,7 +325,7 @@ TEST_P(EveryFormat, IsNoFileWithoutAByte) {
   }
 }
 
-TEST_P(EveryFormat, WarnsOnceOfDamageAndTellsWhere) {
+TEST_P(EveryFormat, WarnsOnceOfCorruptionAndTellsWhere) {
   const auto events = some_events();
   auto file = file_of(format(), events);
   if (format().end.empty())
@@ -338,7 +338,7 @@ TEST_P(EveryFormat, WarnsOnceOfDamageAndTellsWhere) {
   const auto message = h.message(GST_MESSAGE_WARNING);
   ASSERT_TRUE(message);
   const auto text = text_of(message.get());
-  const auto found = text.find("damaged at byte ");
+  const auto found = text.find("corrupt at byte ");
   ASSERT_NE(found, std::string::npos) << text;
   const auto position = std::stoul(text.substr(found + 16));
   EXPECT_LT(position, file.size());
@@ -352,7 +352,7 @@ TEST_P(EveryFormat, WarnsOnceOfDamageAndTellsWhere) {
   GstStructure* stats = nullptr;
   g_object_get(h.element(), "stats", &stats, nullptr);
   guint64 places = 0;
-  EXPECT_TRUE(gst_structure_get_uint64(stats, "damaged-places", &places));
+  EXPECT_TRUE(gst_structure_get_uint64(stats, "corrupt-places", &places));
   EXPECT_EQ(places, 1U);
   gst_structure_free(stats);
 }
@@ -395,7 +395,7 @@ TEST_P(EveryFormat, IsPulledAndSoughtIn) {
     ASSERT_TRUE(player.seek(static_cast<GstClockTime>(from) * GST_USECOND));
     EXPECT_EQ(player.position(), static_cast<GstClockTime>(from) * GST_USECOND);
     ASSERT_TRUE(player.ends_well());
-    std::vector<StampedEvent> expected;
+    std::vector<AbsoluteEvent> expected;
     std::ranges::copy_if(events, std::back_inserter(expected),
                          [](const auto& event) { return event.t >= 2'000'000 + from; });
     EXPECT_EQ(player.events, expected);
@@ -476,7 +476,7 @@ std::unique_ptr<Harness> writer_of(const Format& format) {
   return h;
 }
 
-std::vector<StampedEvent> events_in(const Format& format, const std::string& file) {
+std::vector<AbsoluteEvent> events_in(const Format& format, const std::string& file) {
   auto reader = Harness::with_late_pad(format.reader);
   begin_file(reader, format);
   push_file(reader, file, 1000);
@@ -491,9 +491,10 @@ void push_segment(Harness& h) {
 
 TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
   const auto h = writer_of(format());
-  const std::vector events = {
-      StampedEvent::at(5, 5, 1000, Polarity::on), StampedEvent::at(width, 5, 1001, Polarity::on),
-      StampedEvent::at(5, height, 1002, Polarity::on), StampedEvent::at(6, 6, 1003, Polarity::off)};
+  const std::vector events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
+                              AbsoluteEvent::at(width, 5, 1001, Polarity::on),
+                              AbsoluteEvent::at(5, height, 1002, Polarity::on),
+                              AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
   EXPECT_EQ(h->push(buffer_of(events, 0)), GST_FLOW_OK);
   gst_harness_push_event(h->get(), gst_event_new_gap(10 * GST_MSECOND, 10 * GST_MSECOND));
   EXPECT_TRUE(h->pull_event(GST_EVENT_GAP));
@@ -512,8 +513,8 @@ TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
 TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
   const auto h = writer_of(format());
   const auto push = [&](const std::vector<Microseconds>& times) {
-    std::vector<StampedEvent> events;
-    for (const auto t : times) events.push_back(StampedEvent::at(5, 5, t, Polarity::on));
+    std::vector<AbsoluteEvent> events;
+    for (const auto t : times) events.push_back(AbsoluteEvent::at(5, 5, t, Polarity::on));
     EXPECT_EQ(h->push(buffer_of(events, 0)), GST_FLOW_OK);
   };
   push({3000});
@@ -540,8 +541,8 @@ TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
 
 TEST_P(EveryFormat, TellsOfEventsLeftOutWhereItIsStopped) {
   const auto h = writer_of(format());
-  const auto late = StampedEvent::at(5, 5, 1000, Polarity::on);
-  const auto early = StampedEvent::at(5, 5, 10, Polarity::on);
+  const auto late = AbsoluteEvent::at(5, 5, 1000, Polarity::on);
+  const auto early = AbsoluteEvent::at(5, 5, 10, Polarity::on);
   EXPECT_EQ(h->push(buffer_of(std::span(&late, 1), 0)), GST_FLOW_OK);
   EXPECT_EQ(h->push(buffer_of(std::span(&early, 1), 0)), GST_FLOW_OK);
   EXPECT_FALSE(h->message(GST_MESSAGE_WARNING));
@@ -553,8 +554,8 @@ TEST_P(EveryFormat, TellsOfEventsLeftOutWhereItIsStopped) {
 
 TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
   const auto h = writer_of(format());
-  const auto late = StampedEvent::at(5, 5, 1'000'000, Polarity::on);
-  const auto early = StampedEvent::at(6, 6, 1000, Polarity::off);
+  const auto late = AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on);
+  const auto early = AbsoluteEvent::at(6, 6, 1000, Polarity::off);
   for (const bool ended : {false, true}) {
     EXPECT_EQ(h->push(buffer_of(std::span(&late, 1), 1'000'000)), GST_FLOW_OK);
     if (ended) gst_harness_push_event(h->get(), gst_event_new_eos());
@@ -592,7 +593,7 @@ TEST_P(EveryFormat, IsOfOneSize) {
   Harness h(format().writer);
   gst_harness_set_sink_caps_str(h.get(), format().caps);
   gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
-  const auto event = StampedEvent::at(5, 5, 1000, Polarity::on);
+  const auto event = AbsoluteEvent::at(5, 5, 1000, Polarity::on);
   EXPECT_EQ(h.push(buffer_of(std::span(&event, 1), 0)), GST_FLOW_OK);
   gst_harness_set_src_caps_str(
       h.get(), "application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
@@ -633,12 +634,12 @@ TEST_P(EveryWord, KeepsTheTimesOfItsBuffers) {
   gst_harness_set_src_caps_str(writer.get(), events_caps.c_str());
   auto reader = Harness::with_late_pad("evtdec");
   gst_harness_set_src_caps_str(reader.get(), words_caps(GetParam()).c_str());
-  std::vector<StampedEvent> expected;
-  std::vector<StampedEvent> read;
+  std::vector<AbsoluteEvent> expected;
+  std::vector<AbsoluteEvent> read;
   for (int i = 0; i < 20; ++i) {
     const auto start = static_cast<Microseconds>(late / GST_USECOND) + 10'000 * i;
-    const std::vector events = {StampedEvent::at(i, 7, start + 17, Polarity::on),
-                                StampedEvent::at(i, 9, start + 9'999, Polarity::off)};
+    const std::vector events = {AbsoluteEvent::at(i, 7, start + 17, Polarity::on),
+                                AbsoluteEvent::at(i, 9, start + 9'999, Polarity::off)};
     expected.insert(expected.end(), events.begin(), events.end());
     writer.push(buffer_of(events, start));
     const auto words = writer.pull();
@@ -663,7 +664,7 @@ TEST_P(EveryWord, FollowsGapsAndFlushes) {
   gst_harness_set_src_caps_str(reader.get(), words_caps(GetParam()).c_str());
   gst_harness_push_event(reader.get(), gst_event_new_gap(0, 10 * GST_MSECOND));
   EXPECT_TRUE(reader.pull_event(GST_EVENT_GAP));
-  const auto event = StampedEvent::at(3, 4, 12'000, Polarity::on);
+  const auto event = AbsoluteEvent::at(3, 4, 12'000, Polarity::on);
   writer.push(buffer_of(std::span(&event, 1), 10'000));
   reader.push(writer.pull().release());
   gst_harness_push_event(reader.get(), gst_event_new_gap(20 * GST_MSECOND, 30 * GST_MSECOND));
@@ -675,13 +676,13 @@ TEST_P(EveryWord, FollowsGapsAndFlushes) {
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   gst_harness_push_event(reader.get(), gst_event_new_segment(&segment));
-  const auto later = StampedEvent::at(3, 4, 70'000, Polarity::on);
+  const auto later = AbsoluteEvent::at(3, 4, 70'000, Polarity::on);
   writer.push(buffer_of(std::span(&later, 1), 70'000));
   GstBuffer* words = writer.pull().release();
   GST_BUFFER_PTS(words) = 5 * GST_MSECOND;
   reader.push(words);
   gst_harness_push_event(reader.get(), gst_event_new_eos());
-  const auto moved = StampedEvent::at(3, 4, 5'000, Polarity::on);
+  const auto moved = AbsoluteEvent::at(3, 4, 5'000, Polarity::on);
   EXPECT_EQ(pull_events(reader), std::vector{moved});
 }
 

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "gst/eventcamera/eventcamera.h"
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 /// A buffer of the events of [start, start + 10 ms).
-inline GstBuffer* buffer_of(std::span<const eventcamera::StampedEvent> events,
+inline GstBuffer* buffer_of(std::span<const eventcamera::AbsoluteEvent> events,
                             eventcamera::Microseconds start) {
   std::vector<GstEventCameraEvent> stream;
   for (const auto& event : events)

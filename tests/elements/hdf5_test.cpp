@@ -14,13 +14,13 @@
 namespace {
 
 using namespace harness;
+using eventcamera::AbsoluteEvent;
 using eventcamera::Hdf5Layout;
 using eventcamera::Hdf5Reader;
 using eventcamera::Hdf5Writer;
 using eventcamera::Microseconds;
 using eventcamera::Polarity;
-using eventcamera::StampedEvent;
-using Events = std::vector<StampedEvent>;
+using Events = std::vector<AbsoluteEvent>;
 
 constexpr int width = 320;
 constexpr int height = 240;
@@ -32,8 +32,8 @@ Events some_events() {
   Events events;
   for (int i = 0; i < 50'000; ++i) {
     const Microseconds t = 2'000'000 + 20 * i + (i >= 25'000 ? 3'000'000 : 0);
-    events.push_back(StampedEvent::at(i % width, i / width % height, t,
-                                      i % 3 == 0 ? Polarity::off : Polarity::on));
+    events.push_back(AbsoluteEvent::at(i % width, i / width % height, t,
+                                       i % 3 == 0 ? Polarity::off : Polarity::on));
   }
   return events;
 }
@@ -85,7 +85,7 @@ Events read(const std::string& path) {
   Hdf5Reader reader(path);
   Events events;
   while (reader.read(10'000, events) > 0) continue;
-  EXPECT_EQ(reader.damage().places, 0U) << reader.damage().first;
+  EXPECT_EQ(reader.corruption().places, 0U) << reader.corruption().first;
   EXPECT_EQ(reader.size(), (eventcamera::SensorSize{width, height}));
   return events;
 }
@@ -261,12 +261,12 @@ TEST_P(Hdf5, SurvivesBrokenFiles) {
   const auto path = written(events);
   std::ifstream stream(path, std::ios::binary);
   const std::string whole(std::istreambuf_iterator<char>(stream), {});
-  // The library itself is not proof against damage in its own structures, so only data is.
-  auto damaged = whole;
-  const auto middle = damaged.size() / 2;
+  // The library itself is not proof against corruption in its own structures, so only data is.
+  auto corrupt = whole;
+  const auto middle = corrupt.size() / 2;
   for (std::size_t i = 0; i < 64; ++i)
-    damaged[middle + i] = static_cast<char>(~damaged[middle + i]);
-  for (const auto& bytes : {whole.substr(0, whole.size() - 5000), damaged}) {
+    corrupt[middle + i] = static_cast<char>(~corrupt[middle + i]);
+  for (const auto& bytes : {whole.substr(0, whole.size() - 5000), corrupt}) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
     for (const char* way : {"", "queue ! "}) {
       Player player("filesrc location=" + path + " ! " + way + "eventhdf5dec");
@@ -337,8 +337,8 @@ class Sink {
 
 TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
   const auto path = folder_ / "out.h5";
-  const Events events = {StampedEvent::at(5, 6, 1'000'007, Polarity::on),
-                         StampedEvent::at(7, 8, 1'000'009, Polarity::off)};
+  const Events events = {AbsoluteEvent::at(5, 6, 1'000'007, Polarity::on),
+                         AbsoluteEvent::at(7, 8, 1'000'009, Polarity::off)};
   Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
   sink.caps(events_caps);
   EXPECT_EQ(sink.push(events, 1'000'000), GST_FLOW_OK);
@@ -350,9 +350,10 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
   const auto path = folder_ / "out.h5";
   Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
   sink.caps(events_caps);
-  const Events events = {
-      StampedEvent::at(5, 5, 1000, Polarity::on), StampedEvent::at(width, 5, 1001, Polarity::on),
-      StampedEvent::at(5, height, 1002, Polarity::on), StampedEvent::at(6, 6, 1003, Polarity::off)};
+  const Events events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
+                         AbsoluteEvent::at(width, 5, 1001, Polarity::on),
+                         AbsoluteEvent::at(5, height, 1002, Polarity::on),
+                         AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
   EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
   EXPECT_TRUE(
       sink.message(GST_MESSAGE_WARNING).starts_with("Events left out: 2. They lie outside"));
@@ -371,8 +372,8 @@ TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
   const auto path = folder_ / "out.h5";
   Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
   sink.caps(events_caps);
-  const auto late = StampedEvent::at(5, 5, 1'000'000, Polarity::on);
-  const auto early = StampedEvent::at(6, 6, 1003, Polarity::off);
+  const auto late = AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on);
+  const auto early = AbsoluteEvent::at(6, 6, 1003, Polarity::off);
   for (const bool ended : {false, true}) {
     EXPECT_EQ(sink.push({late}, 1'000'000), GST_FLOW_OK);
     if (ended) sink.end();
@@ -394,7 +395,7 @@ TEST_P(Hdf5, IsOfOneSize) {
             " location=" + (folder_ / "out.h5"));
   sink.caps("application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1");
   sink.caps(events_caps);  // nothing is written yet
-  EXPECT_EQ(sink.push({StampedEvent::at(200, 5, 0, Polarity::on)}, 0), GST_FLOW_OK);
+  EXPECT_EQ(sink.push({AbsoluteEvent::at(200, 5, 0, Polarity::on)}, 0), GST_FLOW_OK);
   sink.caps("application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
   EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
   gst_harness_push_event(

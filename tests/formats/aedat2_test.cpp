@@ -27,8 +27,8 @@ TEST(Aedat2, Davis) {
     Aedat2Decoder decoder;
     EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
     EXPECT_EQ(decoder.size(), davis346);
-    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
-    EXPECT_EQ(decoder.damage().unsorted + decoder.damage().outside, 0U);
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+    EXPECT_EQ(decoder.corruption().unsorted + decoder.corruption().outside, 0U);
   }
 }
 
@@ -39,7 +39,7 @@ TEST(Aedat2, Dvs128) {
     Aedat2Decoder decoder;
     EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
     EXPECT_EQ(decoder.size(), dvs128);
-    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
   }
 }
 
@@ -54,8 +54,8 @@ TEST(Aedat2, AddressesAsTheFormatHasThem) {
   Aedat2Decoder decoder;
   const auto out = decoded(decoder, bytes);
   EXPECT_EQ(decoder.size(), (SensorSize{240, 180}));
-  EXPECT_EQ(out.events, (std::vector{StampedEvent::at(236, 172, 1000, Polarity::on),
-                                     StampedEvent::at(235, 170, 1005, Polarity::off)}));
+  EXPECT_EQ(out.events, (std::vector{AbsoluteEvent::at(236, 172, 1000, Polarity::on),
+                                     AbsoluteEvent::at(235, 170, 1005, Polarity::off)}));
   EXPECT_EQ(out.triggers, (std::vector<Trigger>{{1003, 0, true}, {1004, 0, false}}));
 
   bytes = aedat_files::aedat2_header("DVS128");
@@ -64,32 +64,32 @@ TEST(Aedat2, AddressesAsTheFormatHasThem) {
   aedat_files::add_record(bytes, 0x8000, 52);
   Aedat2Decoder other;
   const auto of_dvs = decoded(other, bytes);
-  EXPECT_EQ(of_dvs.events, (std::vector{StampedEvent::at(118, 125, 50, Polarity::on),
-                                        StampedEvent::at(118, 125, 51, Polarity::off)}));
+  EXPECT_EQ(of_dvs.events, (std::vector{AbsoluteEvent::at(118, 125, 50, Polarity::on),
+                                        AbsoluteEvent::at(118, 125, 51, Polarity::off)}));
   EXPECT_EQ(of_dvs.triggers, (std::vector<Trigger>{{52, 0, true}}));
 }
 
 TEST(Aedat2, WrapsAreFollowedThroughSilence) {
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   Microseconds t = 0;
   for (int i = 0; i < 40; ++i) {
-    events.push_back(StampedEvent::at(i, i, t, Polarity::on));
-    events.push_back(StampedEvent::at(i, i, t + 3, Polarity::off));
+    events.push_back(AbsoluteEvent::at(i, i, t, Polarity::on));
+    events.push_back(AbsoluteEvent::at(i, i, t + 3, Polarity::off));
     t += 70LL * 60 * 1'000'000;  // a wrap takes 71.6 minutes
   }
   Aedat2Decoder decoder;
   EXPECT_TRUE(decoded(decoder, aedat_files::aedat2_dvs128(events)).events == events);
-  EXPECT_EQ(decoder.damage().places, 0U);
+  EXPECT_EQ(decoder.corruption().places, 0U);
 }
 
 TEST(Aedat2, DisorderIsCountedEvenAcrossAWrap) {
   const auto wrap = Microseconds{1} << 32;
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   for (const auto t : {wrap / 2 - 2, wrap / 2 + 1, wrap / 2 - 1, wrap / 2 + 2, wrap / 2 - 500})
-    events.push_back(StampedEvent::at(1, 1, t, Polarity::on));
+    events.push_back(AbsoluteEvent::at(1, 1, t, Polarity::on));
   Aedat2Decoder decoder;
   EXPECT_TRUE(decoded(decoder, aedat_files::aedat2_dvs128(events)).events == events);
-  EXPECT_EQ(decoder.damage().unsorted, 2U);
+  EXPECT_EQ(decoder.corruption().unsorted, 2U);
 }
 
 TEST(Aedat2, ACameraThatIsNotNamedIsAssumed) {
@@ -110,7 +110,7 @@ TEST(Aedat2, WhatIsNotAedat2IsRefused) {
                                       "% evt 3.0\n", "#!AER-DAT2.0\r\n# AEChip: Cochlea\r\n"}) {
     const Bytes bytes(text.begin(), text.end());
     Aedat2Decoder decoder;
-    EXPECT_THROW(decoded(decoder, bytes), NotThisFormat) << text;
+    EXPECT_THROW(decoded(decoder, bytes), UnsupportedFormat) << text;
   }
 }
 
@@ -127,8 +127,8 @@ TEST(Aedat2, MissingBytesCostNoMoreThanTheNextFewRecords) {
       const auto found = decoded(decoder, bytes, piece).events;
       EXPECT_GE(found.size(), 1990U);
       EXPECT_TRUE(std::equal(events.end() - 990, events.end(), found.end() - 990)) << missing;
-      EXPECT_EQ(decoder.damage().places, 1U);
-      EXPECT_NEAR(static_cast<double>(decoder.damage().first_at), static_cast<double>(at), 16);
+      EXPECT_EQ(decoder.corruption().places, 1U);
+      EXPECT_NEAR(static_cast<double>(decoder.corruption().first_at), static_cast<double>(at), 16);
     }
   }
 }
@@ -143,11 +143,11 @@ TEST(Aedat2, ATimeFarFromItsNeighboursMovesNoOther) {
   expected.erase(expected.begin() + 70);
   expected.erase(expected.begin() + 50);
   EXPECT_TRUE(decoded(decoder, bytes, 1).events == expected);
-  EXPECT_EQ(decoder.damage().places, 1U);
-  EXPECT_EQ(decoder.damage().outside, 1U);
+  EXPECT_EQ(decoder.corruption().places, 1U);
+  EXPECT_EQ(decoder.corruption().outside, 1U);
 }
 
-TEST(Aedat2, RandomDamageEndsAndIsTheSameForAnySplit) {
+TEST(Aedat2, RandomCorruptionEndsAndIsTheSameForAnySplit) {
   std::mt19937 random(5);
   const auto events = random_events::make(davis346, 1000, 6, 0, {hour});
   const auto sound = aedat_files::aedat2_davis(events, davis346, "Davis346");
@@ -163,19 +163,19 @@ TEST(Aedat2, RandomDamageEndsAndIsTheSameForAnySplit) {
     bool refused = false;
     try {
       whole = decoded(a, bytes);
-    } catch (const NotThisFormat&) {
+    } catch (const UnsupportedFormat&) {
       refused = true;
     }
     try {
       split = decoded(b, bytes, 0);
       ASSERT_FALSE(refused);
-    } catch (const NotThisFormat&) {
+    } catch (const UnsupportedFormat&) {
       ASSERT_TRUE(refused);
     }
     if (refused) continue;
     ASSERT_TRUE(whole.events == split.events);
-    ASSERT_EQ(a.damage().places, b.damage().places);
-    ASSERT_EQ(a.damage().first_at, b.damage().first_at);
+    ASSERT_EQ(a.corruption().places, b.corruption().places);
+    ASSERT_EQ(a.corruption().first_at, b.corruption().first_at);
   }
 }
 
@@ -188,8 +188,8 @@ TEST(Aedat2, ARecordingWithALongHeader) {
     EXPECT_EQ(decoder.data_at(), 4241U);
     EXPECT_EQ(decoder.size(), dvs128);
     // What is there is "$$$...\r\n", no address of a DVS128; the last 6 bytes are no record.
-    EXPECT_EQ(decoder.damage().places, 1U);
-    EXPECT_EQ(decoder.damage().first_at, 4241U);
+    EXPECT_EQ(decoder.corruption().places, 1U);
+    EXPECT_EQ(decoder.corruption().first_at, 4241U);
     EXPECT_EQ((bytes.size() - decoder.data_at()) % 8, 6U);
   }
 }

@@ -24,8 +24,8 @@ TEST(Aedat3, PolarityEventsOfAllTimes) {
     Aedat3Decoder decoder;
     EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
     EXPECT_EQ(decoder.size(), davis346);
-    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
-    EXPECT_EQ(decoder.damage().unsorted + decoder.damage().outside, 0U);
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+    EXPECT_EQ(decoder.corruption().unsorted + decoder.corruption().outside, 0U);
   }
 }
 
@@ -53,13 +53,13 @@ TEST(Aedat3, OtherPacketsAreLeftOutAndEdgesAreTriggers) {
   Aedat3Decoder decoder;
   const auto out = decoded(decoder, bytes, 1);
   const auto base = Microseconds{1} << 31;
-  EXPECT_EQ(out.events, (std::vector{StampedEvent::at(5, 6, base + 201, Polarity::on)}));
+  EXPECT_EQ(out.events, (std::vector{AbsoluteEvent::at(5, 6, base + 201, Polarity::on)}));
   EXPECT_EQ(out.triggers, (std::vector<Trigger>{{base + 102, 0, true},
                                                 {base + 103, 0, false},
                                                 {base + 104, 0, true},
                                                 {base + 107, 1, false},
                                                 {base + 109, 2, true}}));
-  EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+  EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
 }
 
 TEST(Aedat3, WhatIsNotAedat3IsRefused) {
@@ -68,7 +68,7 @@ TEST(Aedat3, WhatIsNotAedat3IsRefused) {
         "#!AER-DAT3.1\r\n#Format: Serial-TS\r\n#!END-HEADER\r\n"}) {
     const Bytes bytes(text.begin(), text.end());
     Aedat3Decoder decoder;
-    EXPECT_THROW(decoded(decoder, bytes), NotThisFormat) << text;
+    EXPECT_THROW(decoded(decoder, bytes), UnsupportedFormat) << text;
   }
 }
 
@@ -88,7 +88,7 @@ TEST(Aedat3, ABrokenPacketCostsNoOther) {
       const auto before = static_cast<std::ptrdiff_t>(first_lost);
       EXPECT_TRUE(std::equal(events.begin(), events.begin() + before, found.begin()));
       EXPECT_TRUE(std::equal(events.end() - 3000, events.end(), found.end() - 3000));
-      EXPECT_EQ(decoder.damage().places, 1U) << decoder.damage().first;
+      EXPECT_EQ(decoder.corruption().places, 1U) << decoder.corruption().first;
     }
   };
   broken("header", 1000, 1000, [&](Bytes& b) { b[header + packet + 5] = 3; });
@@ -108,19 +108,19 @@ TEST(Aedat3, ABrokenPacketCostsNoOther) {
   bytes.erase(bytes.end() - 12, bytes.end());
   Aedat3Decoder decoder;
   EXPECT_EQ(decoded(decoder, bytes, 0).events.size(), 4998U);
-  EXPECT_EQ(decoder.damage().places, 1U);
+  EXPECT_EQ(decoder.corruption().places, 1U);
 }
 
 TEST(Aedat3, AnEventOutsideIsDropped) {
-  std::vector<StampedEvent> events(20, StampedEvent::at(1, 2, 3, Polarity::on));
-  events[10] = StampedEvent::at(346, 2, 3, Polarity::on);
+  std::vector<AbsoluteEvent> events(20, AbsoluteEvent::at(1, 2, 3, Polarity::on));
+  events[10] = AbsoluteEvent::at(346, 2, 3, Polarity::on);
   Aedat3Decoder decoder;
   EXPECT_EQ(decoded(decoder, aedat_files::aedat3(events, "DAVIS346", 100)).events.size(), 19U);
-  EXPECT_EQ(decoder.damage().outside, 1U);
-  EXPECT_EQ(decoder.damage().places, 0U);
+  EXPECT_EQ(decoder.corruption().outside, 1U);
+  EXPECT_EQ(decoder.corruption().places, 0U);
 }
 
-TEST(Aedat3, RandomDamageEndsAndIsTheSameForAnySplit) {
+TEST(Aedat3, RandomCorruptionEndsAndIsTheSameForAnySplit) {
   std::mt19937 random(5);
   const auto events = random_events::make(davis346, 1000, 6, 0, {hour});
   const auto sound = aedat_files::aedat3(events, "DAVIS346", 50);
@@ -134,8 +134,8 @@ TEST(Aedat3, RandomDamageEndsAndIsTheSameForAnySplit) {
     Aedat3Decoder split;
     const auto expected = decoded(whole, bytes);
     ASSERT_TRUE(expected.events == decoded(split, bytes, 0).events);
-    ASSERT_EQ(whole.damage().places, split.damage().places);
-    ASSERT_EQ(whole.damage().first_at, split.damage().first_at);
+    ASSERT_EQ(whole.corruption().places, split.corruption().places);
+    ASSERT_EQ(whole.corruption().first_at, split.corruption().first_at);
   }
 }
 

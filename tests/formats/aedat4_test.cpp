@@ -38,7 +38,7 @@ struct Picture {
 
 /// All that a decoder hands over.
 struct Contents {
-  std::vector<std::vector<StampedEvent>> events;  ///< of each stream
+  std::vector<std::vector<AbsoluteEvent>> events;  ///< of each stream
   std::vector<Picture> frames;
   std::vector<Trigger> triggers;
   std::size_t items = 0;
@@ -85,7 +85,7 @@ void finish(Aedat4Encoder& encoder, Bytes& bytes) {
               bytes.begin() + static_cast<std::ptrdiff_t>(patch->position));
 }
 
-Bytes encoded(const Aedat4Settings& settings, std::span<const StampedEvent> events,
+Bytes encoded(const Aedat4Settings& settings, std::span<const AbsoluteEvent> events,
               std::size_t piece = 1000) {
   Aedat4Encoder encoder(settings);
   Bytes bytes;
@@ -99,15 +99,15 @@ Bytes encoded(const Aedat4Settings& settings, std::span<const StampedEvent> even
 }
 
 /// A file by hand of one stream, 346x260, with these packets.
-Bytes file_of(std::initializer_list<std::span<const StampedEvent>> packets) {
+Bytes file_of(std::initializer_list<std::span<const AbsoluteEvent>> packets) {
   auto bytes = aedat_files::aedat4_header(aedat_files::xml_of_one_stream);
   for (const auto& packet : packets)
     aedat_files::add_packet(bytes, 0, aedat_files::events_content(packet));
   return bytes;
 }
 
-std::vector<StampedEvent> some_events(std::size_t count, unsigned seed = 3,
-                                      Microseconds start = 1'600'000'000'000'000) {
+std::vector<AbsoluteEvent> some_events(std::size_t count, unsigned seed = 3,
+                                       Microseconds start = 1'600'000'000'000'000) {
   return random_events::make({346, 260}, count, seed, start, {hour});
 }
 
@@ -126,14 +126,14 @@ TEST(Aedat4, ReadsBackWhatItWrites) {
         ASSERT_EQ(decoder.streams().size(), 1U);
         EXPECT_EQ(decoder.streams()[0].size, size);
         EXPECT_EQ(decoder.streams()[0].source, "made");
-        EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
-        EXPECT_EQ(decoder.damage().unsorted + decoder.damage().outside, 0U);
+        EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+        EXPECT_EQ(decoder.corruption().unsorted + decoder.corruption().outside, 0U);
         EXPECT_EQ(decoder.table_at().has_value(), table);
         ASSERT_TRUE(contents.events[0] == events);
 
         const auto valid = aedat4_validator::read(bytes);
         ASSERT_TRUE(valid.events == events);
-        EXPECT_EQ(valid.largest_packet, 4096U);
+        EXPECT_EQ(valid.max_packet, 4096U);
         EXPECT_EQ(valid.packets.size(), 3U);
         if (table) {
           EXPECT_EQ(valid.table, valid.packets);
@@ -159,7 +159,7 @@ TEST(Aedat4, AnySplitOfTheBytesGivesTheSame) {
       const auto contents = decoded(other, bytes, piece);
       EXPECT_TRUE(contents.events == whole.events) << piece;
       EXPECT_EQ(contents.items, whole.items);
-      EXPECT_EQ(other.damage().places, 0U);
+      EXPECT_EQ(other.corruption().places, 0U);
     }
   }
 }
@@ -231,7 +231,7 @@ TEST(Aedat4, AFileWithoutEventsHasAHeader) {
   Aedat4Decoder decoder;
   EXPECT_EQ(decoded(decoder, bytes).items, 0U);
   EXPECT_TRUE(decoder.header_read());
-  EXPECT_EQ(decoder.damage().places, 0U);
+  EXPECT_EQ(decoder.corruption().places, 0U);
 }
 
 TEST(Aedat4, EveryTriggerSource) {
@@ -246,7 +246,7 @@ TEST(Aedat4, EveryTriggerSource) {
       {1005, 1, false}, {1006, 2, true}, {1007, 2, false}, {1008, 3, true}, {1009, 3, false}};
   EXPECT_EQ(contents.triggers, expected);
   EXPECT_EQ(decoder.streams()[0].kind, Aedat4Kind::triggers);
-  EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+  EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
 }
 
 TEST(Aedat4, StreamsThatTheHeaderDoesNotListAreFound) {
@@ -264,33 +264,33 @@ TEST(Aedat4, ReadsThePlainFile) {
   Aedat4Decoder decoder;
   EXPECT_TRUE(decoded(decoder, file_of({events})).events[0] == events);
   EXPECT_EQ(decoder.streams()[0].size, (SensorSize{346, 260}));
-  EXPECT_EQ(decoder.damage().places, 0U);
+  EXPECT_EQ(decoder.corruption().places, 0U);
 }
 
 TEST(Aedat4, EventsOutsideAndUnsortedOnesAreCounted) {
-  const std::vector<StampedEvent> events{
-      StampedEvent::at(345, 259, 100, Polarity::on), StampedEvent::at(346, 0, 101, Polarity::on),
-      StampedEvent::at(0, 260, 102, Polarity::off),  StampedEvent::at(5, 5, 90, Polarity::on),
-      StampedEvent::at(5, 6, 95, Polarity::on),      StampedEvent::at(32767, 1, 99, Polarity::on),
-      StampedEvent::at(5, 6, 100, Polarity::on)};
+  const std::vector<AbsoluteEvent> events{
+      AbsoluteEvent::at(345, 259, 100, Polarity::on), AbsoluteEvent::at(346, 0, 101, Polarity::on),
+      AbsoluteEvent::at(0, 260, 102, Polarity::off),  AbsoluteEvent::at(5, 5, 90, Polarity::on),
+      AbsoluteEvent::at(5, 6, 95, Polarity::on),      AbsoluteEvent::at(32767, 1, 99, Polarity::on),
+      AbsoluteEvent::at(5, 6, 100, Polarity::on)};
   Aedat4Decoder decoder;
   const auto contents = decoded(decoder, file_of({events}));
-  const std::vector<StampedEvent> kept{events[0], events[3], events[4], events[6]};
+  const std::vector<AbsoluteEvent> kept{events[0], events[3], events[4], events[6]};
   EXPECT_TRUE(contents.events[0] == kept);
-  EXPECT_EQ(decoder.damage().outside, 3U);
-  EXPECT_EQ(decoder.damage().unsorted, 2U);
-  EXPECT_EQ(decoder.damage().places, 0U);
+  EXPECT_EQ(decoder.corruption().outside, 3U);
+  EXPECT_EQ(decoder.corruption().unsorted, 2U);
+  EXPECT_EQ(decoder.corruption().places, 0U);
 }
 
 TEST(Aedat4, ImpossibleTimesAreDropped) {
   const auto far = std::numeric_limits<Microseconds>::max();
-  const std::vector<StampedEvent> events{
-      StampedEvent::at(1, 1, -far - 1, Polarity::on), StampedEvent::at(1, 2, 5, Polarity::on),
-      StampedEvent::at(1, 3, far, Polarity::on), StampedEvent::at(1, 4, 6, Polarity::on)};
+  const std::vector<AbsoluteEvent> events{
+      AbsoluteEvent::at(1, 1, -far - 1, Polarity::on), AbsoluteEvent::at(1, 2, 5, Polarity::on),
+      AbsoluteEvent::at(1, 3, far, Polarity::on), AbsoluteEvent::at(1, 4, 6, Polarity::on)};
   Aedat4Decoder decoder;
   const auto contents = decoded(decoder, file_of({events}));
   EXPECT_TRUE(contents.events[0] == (std::vector{events[1], events[3]}));
-  EXPECT_EQ(decoder.damage().places, 2U);
+  EXPECT_EQ(decoder.corruption().places, 2U);
 }
 
 TEST(Aedat4, WhatIsNotAedat4IsRefused) {
@@ -300,7 +300,7 @@ TEST(Aedat4, WhatIsNotAedat4IsRefused) {
       Aedat4Decoder decoder;
       decoded(decoder, bytes);
       ADD_FAILURE() << text;
-    } catch (const NotThisFormat& error) {
+    } catch (const UnsupportedFormat& error) {
       EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
     }
   };
@@ -310,16 +310,16 @@ TEST(Aedat4, WhatIsNotAedat4IsRefused) {
   refused("#!AER-DAT4.0\r\n", "ends within its header");
   refused(std::string_view("#!AER-DAT4.0\r\n\x40\0\0\0 and no more", 31), "ends within its header");
   refused("#!AER-DAT4.0\r\n\xff\xff\xff\x7f", "claims a header of 2147483647 bytes");
-  refused(std::string_view("#!AER-DAT4.0\r\n\x10\0\0\0 and no FlatBuffer", 36), "damaged");
+  refused(std::string_view("#!AER-DAT4.0\r\n\x10\0\0\0 and no FlatBuffer", 36), "corrupt");
   for (const char size : {0, 1, 4, 7, 8})
     refused(std::string("#!AER-DAT4.0\r\n") + size +
                 std::string(3 + static_cast<std::size_t>(size), '\0'),
-            "damaged");
+            "corrupt");
   const auto unknown = aedat_files::aedat4_header("", 9);
   refused({reinterpret_cast<const char*>(unknown.data()), unknown.size()}, "number 9");
 }
 
-TEST(Aedat4, ADamagedXmlIsReportedAndTheStreamsFoundByTheirPackets) {
+TEST(Aedat4, ACorruptXmlIsReportedAndTheStreamsFoundByTheirPackets) {
   const auto events = some_events(10);
   for (const std::string xml :
        {"<dv><node name=", "</node></node>", "no XML", "<a", "<node name='outInfo'>"}) {
@@ -337,21 +337,21 @@ TEST(Aedat4, AttributesWithoutEndTakeTimeInProportion) {
   Aedat4Decoder decoder;
   const auto bytes = aedat_files::aedat4_header(xml);
   decoded(decoder, bytes);
-  EXPECT_EQ(decoder.damage().places, 0U);
+  EXPECT_EQ(decoder.corruption().places, 0U);
 }
 
 TEST(Aedat4, ASizeOfWhichOneSideIsMissingIsNone) {
   std::string xml(aedat_files::xml_of_one_stream);
   xml.replace(xml.find("sizeY"), 5, "sizeZ");
   auto bytes = aedat_files::aedat4_header(xml);
-  const std::vector events{StampedEvent::at(400, 300, 1000, Polarity::on)};
+  const std::vector events{AbsoluteEvent::at(400, 300, 1000, Polarity::on)};
   aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
   Aedat4Decoder decoder;
   EXPECT_TRUE(decoded(decoder, bytes).events[0] == events);
   EXPECT_EQ(decoder.streams()[0].size, SensorSize{});
 }
 
-TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoDamage) {
+TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoCorruption) {
   for (const auto compression : compressions) {
     Aedat4Encoder encoder({{346, 260}, "", compression, false, true});
     Bytes bytes;
@@ -361,7 +361,7 @@ TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoDamage) {
     Aedat4Decoder decoder;
     EXPECT_TRUE(decoded(decoder, bytes, 100).events[0] == events);
     EXPECT_FALSE(decoder.table_at());
-    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
   }
 }
 
@@ -373,8 +373,8 @@ std::vector<std::size_t> packets_of(std::span<const std::uint8_t> bytes) {
   return at;
 }
 
-std::vector<StampedEvent> without(const std::vector<StampedEvent>& events, std::size_t from,
-                                  std::size_t to) {
+std::vector<AbsoluteEvent> without(const std::vector<AbsoluteEvent>& events, std::size_t from,
+                                   std::size_t to) {
   auto rest = events;
   rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(from),
              rest.begin() + static_cast<std::ptrdiff_t>(std::min(to, rest.size())));
@@ -397,8 +397,8 @@ TEST(Aedat4, ABrokenPacketIsLostAndNoOther) {
           Aedat4Decoder decoder;
           const auto contents = decoded(decoder, bytes, piece);
           EXPECT_TRUE(contents.events[0] == without(events, 4096 * lost, 4096 * (lost + 1)));
-          EXPECT_EQ(decoder.damage().places, 1U) << decoder.damage().first;
-          EXPECT_EQ(decoder.damage().first_at, at[lost]);
+          EXPECT_EQ(decoder.corruption().places, 1U) << decoder.corruption().first;
+          EXPECT_EQ(decoder.corruption().first_at, at[lost]);
         }
       };
       const auto set = [](Bytes& bytes, std::size_t place, std::uint32_t number) {
@@ -436,8 +436,8 @@ TEST(Aedat4, BytesBetweenPacketsAreSkipped) {
     bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(at[1]), noise.begin(), noise.end());
     Aedat4Decoder decoder;
     EXPECT_TRUE(decoded(decoder, bytes, 50).events[0] == events);
-    EXPECT_EQ(decoder.damage().places, 1U);
-    EXPECT_EQ(decoder.damage().first_at, at[1]);
+    EXPECT_EQ(decoder.corruption().places, 1U);
+    EXPECT_EQ(decoder.corruption().first_at, at[1]);
   }
 }
 
@@ -461,7 +461,7 @@ TEST(Aedat4, BombsAreCappedAndSkipped) {
     Aedat4Decoder decoder;
     const auto contents = decoded(decoder, bytes);
     EXPECT_EQ(contents.events[0].size(), 2000U);
-    EXPECT_EQ(decoder.damage().places, 1U);
+    EXPECT_EQ(decoder.corruption().places, 1U);
   }
 }
 
@@ -487,12 +487,12 @@ TEST(Aedat4, PacketsWithinPacketsTakeNoTimeToSpeakOf) {
     }
     Aedat4Decoder decoder;
     EXPECT_EQ(decoded(decoder, bytes).items, 0U);
-    EXPECT_GE(decoder.damage().places, 1U);
+    EXPECT_GE(decoder.corruption().places, 1U);
   }
 }
 
 /// Any byte may be wrong: the decoder ends, and hands over the same whatever the split.
-TEST(Aedat4, RandomDamageEndsAndIsTheSameForAnySplit) {
+TEST(Aedat4, RandomCorruptionEndsAndIsTheSameForAnySplit) {
   std::mt19937 random(5);
   const auto events = some_events(5000);
   for (int round = 0; round < 300; ++round) {
@@ -508,8 +508,8 @@ TEST(Aedat4, RandomDamageEndsAndIsTheSameForAnySplit) {
     Aedat4Decoder split;
     const auto contents = decoded(split, bytes, 0);
     ASSERT_TRUE(contents.events == expected.events);
-    ASSERT_EQ(split.damage().places, whole.damage().places);
-    ASSERT_EQ(split.damage().first_at, whole.damage().first_at);
+    ASSERT_EQ(split.corruption().places, whole.corruption().places);
+    ASSERT_EQ(split.corruption().first_at, whole.corruption().first_at);
   }
 }
 
@@ -539,8 +539,8 @@ TEST(Aedat4, SeeksByTheTable) {
       const auto expected = std::find_if(events.begin(), events.end(),
                                          [&](const auto& event) { return event.t >= t; });
       EXPECT_TRUE(std::equal(first, found.end(), expected, events.end()));
-      EXPECT_EQ(decoder.damage().places, 0U);
-      EXPECT_EQ(decoder.damage().unsorted, 0U);
+      EXPECT_EQ(decoder.corruption().places, 0U);
+      EXPECT_EQ(decoder.corruption().unsorted, 0U);
     }
     EXPECT_FALSE(aedat4_position_of(*table, events.back().t + 1));
   }
@@ -615,8 +615,8 @@ TEST(Aedat4, ARecordingOfADavis346) {
     EXPECT_EQ(contents.triggers.size(), 15U);
     EXPECT_EQ(decoder.skipped().imu_samples, 130U);
     EXPECT_EQ(decoder.skipped().packets, 0U);
-    EXPECT_EQ(decoder.damage().places, 0U) << decoder.damage().first;
-    EXPECT_EQ(decoder.damage().unsorted + decoder.damage().outside, 0U);
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+    EXPECT_EQ(decoder.corruption().unsorted + decoder.corruption().outside, 0U);
 
     const auto table = read_aedat4_table(
         std::span(bytes).subspan(static_cast<std::size_t>(decoder.table_at().value())),

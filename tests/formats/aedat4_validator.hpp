@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera::aedat4_validator {
 
@@ -132,11 +132,11 @@ struct Entry {
 
 struct File {
   std::string xml;
-  std::vector<StampedEvent> events;  ///< of stream 0
-  std::vector<Frame> frames;         ///< of stream 1
-  std::vector<Entry> packets;        ///< as they are
-  std::vector<Entry> table;          ///< as the file says
-  std::size_t largest_packet = 0;    ///< events
+  std::vector<AbsoluteEvent> events;  ///< of stream 0
+  std::vector<Frame> frames;          ///< of stream 1
+  std::vector<Entry> packets;         ///< as they are
+  std::vector<Entry> table;           ///< as the file says
+  std::size_t max_packet = 0;         ///< events
 };
 
 inline void read_packet(View content, std::int32_t stream, Entry& entry, File& out) {
@@ -149,13 +149,13 @@ inline void read_packet(View content, std::int32_t stream, Entry& entry, File& o
       const auto y = number<std::int16_t>(content, at + 10);
       const auto on = number<std::uint32_t>(content, at + 12);
       require(x >= 0 && y >= 0 && on <= 1, "an event");
-      out.events.push_back(StampedEvent::at(x, y, number<std::int64_t>(content, at),
-                                            on == 1 ? Polarity::on : Polarity::off));
+      out.events.push_back(AbsoluteEvent::at(x, y, number<std::int64_t>(content, at),
+                                             on == 1 ? Polarity::on : Polarity::off));
     }
     entry.elements = static_cast<std::int64_t>(elements.count);
     entry.start = number<std::int64_t>(content, elements.at);
     entry.end = out.events.back().t;
-    out.largest_packet = std::max(out.largest_packet, elements.count);
+    out.max_packet = std::max(out.max_packet, elements.count);
   } else {
     require(stream == 1, "a stream that the header does not list");
     const auto table = Table::root(content, "FRME");

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera::aedat_files {
@@ -42,13 +42,13 @@ inline Bytes aedat2_header(std::string_view chip) {
   return bytes;
 }
 
-inline std::uint32_t davis_address(const StampedEvent& event, SensorSize size) {
+inline std::uint32_t davis_address(const AbsoluteEvent& event, SensorSize size) {
   return static_cast<std::uint32_t>((size.height - 1 - event.y()) << 22 |
                                     (size.width - 1 - event.x) << 12 |
                                     (event.polarity() == Polarity::on ? 1 : 0) << 11);
 }
 
-inline std::uint32_t dvs128_address(const StampedEvent& event) {
+inline std::uint32_t dvs128_address(const AbsoluteEvent& event) {
   return static_cast<std::uint32_t>((127 - event.y()) << 8 | (127 - event.x) << 1 |
                                     (event.polarity() == Polarity::on ? 0 : 1));
 }
@@ -58,7 +58,7 @@ inline void add_record(Bytes& bytes, std::uint32_t address, Microseconds t) {
   add_big(bytes, static_cast<std::uint32_t>(t));
 }
 
-inline Bytes aedat2_davis(std::span<const StampedEvent> events, SensorSize size,
+inline Bytes aedat2_davis(std::span<const AbsoluteEvent> events, SensorSize size,
                           std::string_view chip) {
   auto bytes = aedat2_header(chip);
   add(bytes, "#End Of ASCII Header\r\n");
@@ -66,7 +66,7 @@ inline Bytes aedat2_davis(std::span<const StampedEvent> events, SensorSize size,
   return bytes;
 }
 
-inline Bytes aedat2_dvs128(std::span<const StampedEvent> events) {
+inline Bytes aedat2_dvs128(std::span<const AbsoluteEvent> events) {
   auto bytes = aedat2_header("ch.unizh.ini.jaer.chip.retina.DVS128");
   add(bytes, "#End Of ASCII Header\r\n");
   for (const auto& event : events) add_record(bytes, dvs128_address(event), event.t);
@@ -93,7 +93,7 @@ inline void add_aedat3_packet_header(Bytes& bytes, int type, int event_size, std
 }
 
 /// A packet ends where the times wrap, or with `most` events.
-inline Bytes aedat3(std::span<const StampedEvent> events, std::string_view source,
+inline Bytes aedat3(std::span<const AbsoluteEvent> events, std::string_view source,
                     std::size_t most) {
   auto bytes = aedat3_header(source);
   while (!events.empty()) {
@@ -167,7 +167,7 @@ inline Bytes vector_packet(std::string_view identifier, const Bytes& elements, s
   return bytes;
 }
 
-inline Bytes events_content(std::span<const StampedEvent> events) {
+inline Bytes events_content(std::span<const AbsoluteEvent> events) {
   Bytes elements;
   for (const auto& event : events) {
     add_little(elements, event.t, 8);

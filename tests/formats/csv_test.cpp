@@ -15,8 +15,8 @@ namespace {
 using namespace table_events;
 
 struct Read {
-  std::vector<StampedEvent> events;
-  Damage damage;
+  std::vector<AbsoluteEvent> events;
+  Corruption corruption;
   SensorSize size;
 };
 
@@ -24,18 +24,18 @@ Read read(std::string_view text, const CsvSettings& settings = {}) {
   CsvDecoder decoder(settings);
   const auto bytes = bytes_of(text);
   auto events = decoded(decoder, bytes, bytes.size() + 1);
-  return {std::move(events), decoder.damage(), decoder.size()};
+  return {std::move(events), decoder.corruption(), decoder.size()};
 }
 
-StampedEvent on(int x, int y, Microseconds t) {
-  return StampedEvent::at(x, y, t, Polarity::on);
+AbsoluteEvent on(int x, int y, Microseconds t) {
+  return AbsoluteEvent::at(x, y, t, Polarity::on);
 }
 
-StampedEvent off(int x, int y, Microseconds t) {
-  return StampedEvent::at(x, y, t, Polarity::off);
+AbsoluteEvent off(int x, int y, Microseconds t) {
+  return AbsoluteEvent::at(x, y, t, Polarity::off);
 }
 
-using Events = std::vector<StampedEvent>;
+using Events = std::vector<AbsoluteEvent>;
 
 TEST(Decimal, IsExact) {
   struct Case {
@@ -99,7 +99,7 @@ TEST(Csv, ColumnsByTheFirstLines) {
         "1.0e-05 3.00e+00 4.00e+00 1.00e+00\n1.2e-05 5.00e+00 6.00e+00 0.00e+00\n"}) {
     const auto found = read(text);
     EXPECT_EQ(found.events, expected) << text;
-    EXPECT_EQ(found.damage.places, 0U) << text;
+    EXPECT_EQ(found.corruption.places, 0U) << text;
   }
   EXPECT_EQ(read("%geometry:640,480\n3,4,1,10\n").size, (SensorSize{640, 480}));
   EXPECT_EQ(read("240 180\n0.00001 3 4 1\n").size, (SensorSize{240, 180}));
@@ -142,27 +142,27 @@ TEST(Csv, SecondsAreExact) {
                     off(1, 1, 2'500'000)}));
 }
 
-TEST(Csv, DamageIsSkippedAndCounted) {
+TEST(Csv, CorruptionIsSkippedAndCounted) {
   const std::string text =
       "t,x,y,p\n1,1,1,1\n2,2,2\n3,3,3,1,1\nfour,4,4,1\n5,5,5,2\n6,70000,6,1\n7,7,40000,1\n"
       "8,-1,8,1\n3,9,9,0\n99999999999999999999,1,1,1\n10,10,10,1\n";
   const auto found = read(text);
   EXPECT_EQ(found.events, (Events{on(1, 1, 1), off(9, 9, 3), on(10, 10, 10)}));
-  EXPECT_EQ(found.damage.places, 5U);
-  EXPECT_EQ(found.damage.first_at, 16U);
-  EXPECT_EQ(found.damage.outside, 3U);
-  EXPECT_EQ(found.damage.unsorted, 0U);
+  EXPECT_EQ(found.corruption.places, 5U);
+  EXPECT_EQ(found.corruption.first_at, 16U);
+  EXPECT_EQ(found.corruption.outside, 3U);
+  EXPECT_EQ(found.corruption.unsorted, 0U);
   expect_same_however_cut([] { return std::make_unique<CsvDecoder>(); }, bytes_of(text));
 
   const auto unsorted = read("t,x,y,p\n5,1,1,1\n3,1,1,1\n4,1,1,1\n5,1,1,1\n");
   EXPECT_EQ(unsorted.events.size(), 4U);
-  EXPECT_EQ(unsorted.damage.unsorted, 2U);
+  EXPECT_EQ(unsorted.corruption.unsorted, 2U);
 
   CsvSettings settings;
   settings.size = {10, 8};
   const auto outside = read("t,x,y,p\n1,9,7,1\n1,10,7,1\n1,9,8,1\n", settings);
   EXPECT_EQ(outside.events.size(), 1U);
-  EXPECT_EQ(outside.damage.outside, 2U);
+  EXPECT_EQ(outside.corruption.outside, 2U);
 }
 
 TEST(Csv, ALongLineIsSkippedWithoutBeingKept) {
@@ -177,8 +177,8 @@ TEST(Csv, ALongLineIsSkippedWithoutBeingKept) {
   text += "7,1,1,1\n";
   const auto found = read(text);
   EXPECT_EQ(found.events.size(), 304U);
-  EXPECT_EQ(found.damage.places, 2U);
-  EXPECT_EQ(found.damage.first_at, at);
+  EXPECT_EQ(found.corruption.places, 2U);
+  EXPECT_EQ(found.corruption.first_at, at);
   expect_same_however_cut([] { return std::make_unique<CsvDecoder>(); }, bytes_of(text));
 }
 
@@ -191,7 +191,7 @@ TEST(Csv, WhatIsNoTextOfEventsIsRefused) {
         std::string("% evt 3.0\n% end\n\x01\x02\x03\n"), std::string(100'000, '1'),
         std::string(100'000, '\0'), noise, std::string("5,6,7,8\n9,10,11,12\n"),
         std::string("5,6,7,1\n3,6,6,1\n")}) {
-    EXPECT_THROW(read(text), NotThisFormat) << text.substr(0, 40);
+    EXPECT_THROW(read(text), UnsupportedFormat) << text.substr(0, 40);
   }
 }
 
@@ -200,12 +200,12 @@ TEST(Csv, AHeaderAloneIsARecordingWithoutEventsAndAnEmptyFileIsNone) {
        {"t,x,y,p\n", "t,x,y,p", "# t,x,y,p\n", "%geometry:640,480\n", "\n"}) {
     const auto found = read(text);
     EXPECT_TRUE(found.events.empty()) << text;
-    EXPECT_EQ(found.damage.places, 0U) << text;
+    EXPECT_EQ(found.corruption.places, 0U) << text;
   }
   try {
     read("");
     ADD_FAILURE() << "an empty file was read";
-  } catch (const NotThisFormat& error) {
+  } catch (const UnsupportedFormat& error) {
     EXPECT_STREQ(error.what(), "the file is empty");
   }
 }
@@ -223,9 +223,9 @@ TEST(Csv, EveryDialectComesBack) {
       if (size.width < 100) settings.order = dialect.order;
       CsvDecoder decoder(settings);
       EXPECT_TRUE(decoded(decoder, bytes) == events) << size.width;
-      EXPECT_EQ(decoder.damage().places, 0U);
-      EXPECT_EQ(decoder.damage().unsorted, 0U);
-      EXPECT_EQ(decoder.damage().outside, 0U);
+      EXPECT_EQ(decoder.corruption().places, 0U);
+      EXPECT_EQ(decoder.corruption().unsorted, 0U);
+      EXPECT_EQ(decoder.corruption().outside, 0U);
       using Header = CsvDialect::Header;
       const auto header = dialect.header;
       const bool sized =
@@ -279,7 +279,9 @@ TEST(Csv, RealEventsOfTheEventCameraDataset) {
   CsvDecoder decoder(settings);
   const auto events = decoded(decoder, bytes);
   ASSERT_EQ(events.size(), 50'000U);
-  EXPECT_EQ(decoder.damage().places + decoder.damage().unsorted + decoder.damage().outside, 0U);
+  EXPECT_EQ(
+      decoder.corruption().places + decoder.corruption().unsorted + decoder.corruption().outside,
+      0U);
   EXPECT_EQ(events.front(), off(96, 133, 3811));
   EXPECT_EQ(events[1], off(127, 171, 3820));
   EXPECT_EQ(events.back(), on(70, 103, 174'156));
@@ -288,7 +290,7 @@ TEST(Csv, RealEventsOfTheEventCameraDataset) {
   constexpr std::array<std::ptrdiff_t, 4> counts = {7778, 11318, 13497, 12327};
   for (std::size_t i = 0; i < counts.size(); ++i)
     EXPECT_EQ(std::ranges::count_if(events,
-                                    [&](const StampedEvent& event) {
+                                    [&](const AbsoluteEvent& event) {
                                       return event.t > frames[i] && event.t <= frames[i + 1];
                                     }),
               counts[i]);

@@ -36,11 +36,11 @@ TEST(Dat, ReadsVersion2) {
              file("% Data file containing CD events.\n% Version 2\n% Date 2017-3-1 9:30:00\n"
                   "% Height 720\n% Width 1280\n",
                   0x0c, {{5, 1279 | 719U << 14 | 1U << 28}, {6, 0}, {6, 1280}, {6, 720U << 14}}));
-  EXPECT_EQ(decoded.events, (std::vector{StampedEvent::at(1279, 719, 5, Polarity::on),
-                                         StampedEvent::at(0, 0, 6, Polarity::off)}));
+  EXPECT_EQ(decoded.events, (std::vector{AbsoluteEvent::at(1279, 719, 5, Polarity::on),
+                                         AbsoluteEvent::at(0, 0, 6, Polarity::off)}));
   EXPECT_EQ(decoder->size(), (SensorSize{1280, 720}));
-  EXPECT_EQ(decoder->damage().outside, 2U);
-  EXPECT_EQ(decoder->damage().places, 0U);
+  EXPECT_EQ(decoder->corruption().outside, 2U);
+  EXPECT_EQ(decoder->corruption().places, 0U);
 }
 
 TEST(Dat, ReadsVersion1) {
@@ -48,8 +48,8 @@ TEST(Dat, ReadsVersion1) {
     const auto decoder = make_dat_decoder();
     const auto decoded =
         decode(*decoder, file(header, 0x00, {{5, 303 | 239U << 9 | 1U << 17}, {6, 7U << 18}}));
-    EXPECT_EQ(decoded.events, (std::vector{StampedEvent::at(303, 239, 5, Polarity::on),
-                                           StampedEvent::at(0, 0, 6, Polarity::off)}));
+    EXPECT_EQ(decoded.events, (std::vector{AbsoluteEvent::at(303, 239, 5, Polarity::on),
+                                           AbsoluteEvent::at(0, 0, 6, Polarity::off)}));
     EXPECT_EQ(decoder->size(), (SensorSize{304, 240}));
   }
 }
@@ -71,14 +71,14 @@ TEST(Dat, FollowsWrapsAndCountsDisorder) {
   const auto lap = Microseconds{1} << 32;
   EXPECT_EQ(times, (std::vector<Microseconds>{0xfffffff0, lap + 3, lap + 2, lap + 0xf0000000,
                                               2 * lap + 1}));
-  EXPECT_EQ(decoder->damage().unsorted, 1U);
+  EXPECT_EQ(decoder->corruption().unsorted, 1U);
 }
 
 TEST(Dat, IsAnErrorThatSaysWhy) {
   const auto error = [](const std::vector<std::uint8_t>& bytes) {
     try {
       decode(*make_dat_decoder(), bytes);
-    } catch (const NotThisFormat& exception) {
+    } catch (const UnsupportedFormat& exception) {
       return std::string(exception.what());
     }
     return std::string();
@@ -93,7 +93,7 @@ TEST(Dat, IsAnErrorThatSaysWhy) {
 
 TEST(Dat, IsWrittenAsTheToolsOfTheVendorDo) {
   const auto encoder = make_dat_encoder({1280, 720});
-  const std::vector events{StampedEvent::at(1279, 719, 0x1'0000'0005, Polarity::on)};
+  const std::vector events{AbsoluteEvent::at(1279, 719, 0x1'0000'0005, Polarity::on)};
   EXPECT_EQ(recordings::encode(*encoder, events),
             file("% Data file containing CD events.\n% Version 2\n% Height 720\n% Width 1280\n"
                  "% end\n",

@@ -9,7 +9,7 @@ namespace {
 
 using namespace table_events;
 
-using Events = std::vector<StampedEvent>;
+using Events = std::vector<AbsoluteEvent>;
 
 Bytes encoded_chunk(const Events& events) {
   Bytes chunk;
@@ -19,7 +19,7 @@ Bytes encoded_chunk(const Events& events) {
 }
 
 void expect_comes_back(const Events& events) {
-  Events out = {StampedEvent::at(1, 2, 3, Polarity::on)};
+  Events out = {AbsoluteEvent::at(1, 2, 3, Polarity::on)};
   const auto before = out.front();
   ASSERT_TRUE(decode_ecf(encoded_chunk(events), out));
   EXPECT_EQ(out.front(), before);
@@ -29,9 +29,9 @@ void expect_comes_back(const Events& events) {
 
 TEST(Ecf, ChunkByteByByte) {
   // Two events of one row, then one 1000 us later in another: runs of y, masks of x, runs of p.
-  const Events events = {StampedEvent::at(5, 9, 100, Polarity::on),
-                         StampedEvent::at(7, 9, 100, Polarity::on),
-                         StampedEvent::at(3, 9, 1100, Polarity::off)};
+  const Events events = {AbsoluteEvent::at(5, 9, 100, Polarity::on),
+                         AbsoluteEvent::at(7, 9, 100, Polarity::on),
+                         AbsoluteEvent::at(3, 9, 1100, Polarity::off)};
   const Bytes expected = {
       3 << 2,
       0,
@@ -65,10 +65,10 @@ TEST(Ecf, ChunkByteByByte) {
 
 TEST(Ecf, PackedChunksByteByByte) {
   // Rows that differ: v = y << 12 | x << 1 | p of four events in three words.
-  Events events = {StampedEvent::at(0x123, 0x456, 0, Polarity::on),
-                   StampedEvent::at(0x321, 0x654, 0, Polarity::off),
-                   StampedEvent::at(0x7ff, 0x7fe, 0, Polarity::on),
-                   StampedEvent::at(0, 1, 0, Polarity::off)};
+  Events events = {AbsoluteEvent::at(0x123, 0x456, 0, Polarity::on),
+                   AbsoluteEvent::at(0x321, 0x654, 0, Polarity::off),
+                   AbsoluteEvent::at(0x7ff, 0x7fe, 0, Polarity::on),
+                   AbsoluteEvent::at(0, 1, 0, Polarity::off)};
   auto chunk = encoded_chunk(events);
   ASSERT_EQ(chunk.size(), 12U + 1 + 12);
   EXPECT_EQ(chunk[0], 4 << 2 | 2);
@@ -103,13 +103,13 @@ TEST(Ecf, ComesBack) {
   expect_comes_back(random_events(ecf_most_events, {2048, 2048}, 1, -5'000'000'000));
   // Runs at and around the lengths that are written in another way.
   for (const std::size_t count : {14, 15, 16, 30, 31, 32, 126, 127, 128, 65534, 65535})
-    expect_comes_back(Events(count, StampedEvent::at(2047, 2047, 1LL << 62, Polarity::on)));
+    expect_comes_back(Events(count, AbsoluteEvent::at(2047, 2047, 1LL << 62, Polarity::on)));
 }
 
 TEST(Ecf, OtherWritersGoOnBehindTheLastEvent) {
-  auto chunk = encoded_chunk({StampedEvent::at(5, 9, 100, Polarity::on),
-                              StampedEvent::at(7, 9, 100, Polarity::on),
-                              StampedEvent::at(3, 9, 1100, Polarity::off)});
+  auto chunk = encoded_chunk({AbsoluteEvent::at(5, 9, 100, Polarity::on),
+                              AbsoluteEvent::at(7, 9, 100, Polarity::on),
+                              AbsoluteEvent::at(3, 9, 1100, Polarity::off)});
   chunk[21] |= 31;  // the last mask
   Events out;
   ASSERT_TRUE(decode_ecf(chunk, out));
@@ -117,7 +117,7 @@ TEST(Ecf, OtherWritersGoOnBehindTheLastEvent) {
   EXPECT_EQ(out[2].x, 3);
 }
 
-TEST(Ecf, DamagedChunksAreRefused) {
+TEST(Ecf, CorruptChunksAreRefused) {
   const auto events = random_events(500, {640, 480}, 3);
   const auto chunk = encoded_chunk(events);
   Events out;
@@ -127,11 +127,11 @@ TEST(Ecf, DamagedChunksAreRefused) {
   }
   std::mt19937 random(5);
   for (int i = 0; i < 20'000; ++i) {
-    auto damaged = chunk;
+    auto corrupt = chunk;
     for (int j = 0; j < 3; ++j)
-      damaged[random() % damaged.size()] = static_cast<std::uint8_t>(random());
+      corrupt[random() % corrupt.size()] = static_cast<std::uint8_t>(random());
     out.clear();
-    decode_ecf(damaged, out);
+    decode_ecf(corrupt, out);
     EXPECT_LE(out.size(), ecf_most_events);
   }
   // More events than a chunk can have, a run of more than there are, a time of more than 64 bits.

@@ -27,11 +27,11 @@ TEST(EventStream, ReadsDvsEventsWithRowsFromTheBottom) {
                                                  126 << 1,   0,    0,    239, 0,  //
                                                  0,          0x40, 0x01, 0,   0,  //
                                                  0,          0,    0,    240, 0}));
-  EXPECT_EQ(decoded.events, (std::vector{StampedEvent::at(319, 239, 5, Polarity::on),
-                                         StampedEvent::at(0, 0, 5 + 254 + 126, Polarity::off)}));
+  EXPECT_EQ(decoded.events, (std::vector{AbsoluteEvent::at(319, 239, 5, Polarity::on),
+                                         AbsoluteEvent::at(0, 0, 5 + 254 + 126, Polarity::off)}));
   EXPECT_EQ(decoder->size(), (SensorSize{320, 240}));
-  EXPECT_EQ(decoder->damage().outside, 2U);
-  EXPECT_EQ(decoder->damage().places, 0U);
+  EXPECT_EQ(decoder->corruption().outside, 2U);
+  EXPECT_EQ(decoder->corruption().places, 0U);
 }
 
 TEST(EventStream, ReadsTheChangesAmongAtisEvents) {
@@ -43,16 +43,16 @@ TEST(EventStream, ReadsTheChangesAmongAtisEvents) {
                                 62 << 2 | 3, 1,    0,    239, 0,     // and ends
                                 0,           2,    0,    238, 0}));  // OFF
   EXPECT_EQ(decoded.events,
-            (std::vector{StampedEvent::at(1, 0, 5, Polarity::on),
-                         StampedEvent::at(2, 1, 5 + 1 + 63 + 189 + 62, Polarity::off)}));
-  EXPECT_EQ(decoder->damage().outside, 0U);
+            (std::vector{AbsoluteEvent::at(1, 0, 5, Polarity::on),
+                         AbsoluteEvent::at(2, 1, 5 + 1 + 63 + 189 + 62, Polarity::off)}));
+  EXPECT_EQ(decoder->corruption().outside, 0U);
 }
 
 TEST(EventStream, IsAnErrorThatSaysWhy) {
   const auto error = [](const Bytes& bytes) {
     try {
       decode(*make_event_stream_decoder(), bytes);
-    } catch (const NotThisFormat& exception) {
+    } catch (const UnsupportedFormat& exception) {
       return std::string(exception.what());
     }
     return std::string();
@@ -71,9 +71,9 @@ TEST(EventStream, IsAnErrorThatSaysWhy) {
 
 TEST(EventStream, IsWrittenByteByByte) {
   const auto encoder = make_event_stream_encoder({320, 240});
-  const std::vector events{StampedEvent::at(319, 239, 5, Polarity::on),
-                           StampedEvent::at(0, 0, 5 + 126, Polarity::off),
-                           StampedEvent::at(0, 0, 5 + 126 + 127, Polarity::off)};
+  const std::vector events{AbsoluteEvent::at(319, 239, 5, Polarity::on),
+                           AbsoluteEvent::at(0, 0, 5 + 126, Polarity::off),
+                           AbsoluteEvent::at(0, 0, 5 + 126 + 127, Polarity::off)};
   EXPECT_EQ(recordings::encode(*encoder, events),
             file(1, {5 << 1 | 1, 0x3f, 0x01, 0, 0, 126 << 1, 0, 0, 239, 0, 0xff, 0, 0, 0, 239, 0}));
   EXPECT_THROW(make_event_stream_encoder({65536, 1}), std::invalid_argument);
@@ -81,21 +81,21 @@ TEST(EventStream, IsWrittenByteByByte) {
 
 TEST(EventStream, IsSilentForHours) {
   const auto hours = Microseconds{3} * 3'600'000'000;
-  const std::vector events{StampedEvent::at(1, 2, 1, Polarity::on),
-                           StampedEvent::at(3, 4, hours, Polarity::off)};
+  const std::vector events{AbsoluteEvent::at(1, 2, 1, Polarity::on),
+                           AbsoluteEvent::at(3, 4, hours, Polarity::off)};
   const auto encoder = make_event_stream_encoder({320, 240});
   const auto decoder = make_event_stream_decoder();
   EXPECT_EQ(decode(*decoder, recordings::encode(*encoder, events)).events, events);
 }
 
 TEST(EventStream, LeavesNothingOutOfALongRecordingWithoutPauses) {
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   const auto step = Microseconds{11} * 3'600'000'000;
-  events.push_back(StampedEvent::at(1, 2, 0, Polarity::on));
+  events.push_back(AbsoluteEvent::at(1, 2, 0, Polarity::on));
   // Steps that need no byte of their own must count, too, before a pause.
   for (int i = 0; i < 1000; ++i)
-    events.push_back(StampedEvent::at(1, 2, events.back().t + 100, Polarity::on));
-  events.push_back(StampedEvent::at(1, 2, step, Polarity::on));
+    events.push_back(AbsoluteEvent::at(1, 2, events.back().t + 100, Polarity::on));
+  events.push_back(AbsoluteEvent::at(1, 2, step, Polarity::on));
   const auto encoder = make_event_stream_encoder({320, 240});
   const auto decoder = make_event_stream_decoder();
   EXPECT_EQ(decode(*decoder, recordings::encode(*encoder, events)).events, events);

@@ -17,8 +17,8 @@ using namespace eventcamera;
 /// A format that is both read and written.
 struct Format {
   std::string name;
-  int largest_side;
-  Microseconds longest_pause;  ///< that it can hold, or that tests have the time for
+  int max_side;
+  Microseconds max_pause;  ///< that it can hold, or that tests have the time for
   std::function<std::unique_ptr<SeekableDecoder>(SensorSize)> make_decoder;
   std::function<std::unique_ptr<Encoder>(SensorSize)> make_encoder;
 };

@@ -22,7 +22,7 @@ namespace {
 
 using namespace table_events;
 
-using Events = std::vector<StampedEvent>;
+using Events = std::vector<AbsoluteEvent>;
 using Compression = Hdf5Writer::Compression;
 using Settings = Hdf5Writer::Settings;
 
@@ -38,7 +38,7 @@ class Hdf5 : public testing::Test {
 
   std::filesystem::path path(const std::string& name = "events.h5") const { return folder_ / name; }
 
-  std::filesystem::path write(std::span<const StampedEvent> events, const Settings& settings,
+  std::filesystem::path write(std::span<const AbsoluteEvent> events, const Settings& settings,
                               std::size_t at_once = 5000) const {
     Hdf5Writer writer(path(), settings);
     while (!events.empty()) {
@@ -90,7 +90,9 @@ TEST_F(Hdf5, ComesBack) {
         EXPECT_EQ(reader.time_range()->first, events.front().t);
         EXPECT_EQ(reader.time_range()->last, events.back().t);
         EXPECT_TRUE(read_all(reader, at_once) == events);
-        EXPECT_EQ(reader.damage().places + reader.damage().unsorted + reader.damage().outside, 0U);
+        EXPECT_EQ(
+            reader.corruption().places + reader.corruption().unsorted + reader.corruption().outside,
+            0U);
       }
       const auto other = random_events(100, size, 1);
       Hdf5Reader reader(in_memory(contents(path())));
@@ -109,7 +111,7 @@ TEST_F(Hdf5, NoEventsComeBack) {
     EXPECT_TRUE(read_all(reader).empty());
     reader.seek(5);
     EXPECT_TRUE(read_all(reader).empty());
-    EXPECT_EQ(reader.damage().places, 0U);
+    EXPECT_EQ(reader.corruption().places, 0U);
   }
 }
 
@@ -126,7 +128,7 @@ TEST_F(Hdf5, SeeksToTheFirstEventNotBefore) {
     }
     for (const auto t : times) {
       reader.seek(t);
-      const auto expected = std::ranges::lower_bound(events, t, {}, &StampedEvent::t);
+      const auto expected = std::ranges::lower_bound(events, t, {}, &AbsoluteEvent::t);
       Events found;
       reader.read(500, found);
       const auto count = std::min<std::ptrdiff_t>(500, events.end() - expected);
@@ -134,7 +136,7 @@ TEST_F(Hdf5, SeeksToTheFirstEventNotBefore) {
     }
     reader.seek(0);
     EXPECT_TRUE(read_all(reader) == events);
-    EXPECT_EQ(reader.damage().unsorted, 0U);
+    EXPECT_EQ(reader.corruption().unsorted, 0U);
   }
 }
 
@@ -169,14 +171,14 @@ TEST_F(Hdf5, WhatALayoutCannotHoldIsRefused) {
   EXPECT_THROW(Hdf5Writer("/nowhere/at/all.h5", dsec), std::runtime_error);
   for (const auto& settings : all_settings({640, 480})) {
     Hdf5Writer writer(path(), settings);
-    writer.append(Events{StampedEvent::at(1, 1, 100, Polarity::on)});
-    EXPECT_THROW(writer.append(Events{StampedEvent::at(1, 1, 99, Polarity::on)}),
+    writer.append(Events{AbsoluteEvent::at(1, 1, 100, Polarity::on)});
+    EXPECT_THROW(writer.append(Events{AbsoluteEvent::at(1, 1, 99, Polarity::on)}),
                  std::invalid_argument);
-    EXPECT_THROW(writer.append(Events{StampedEvent::at(640, 1, 100, Polarity::on)}),
+    EXPECT_THROW(writer.append(Events{AbsoluteEvent::at(640, 1, 100, Polarity::on)}),
                  std::invalid_argument);
-    EXPECT_THROW(writer.append(Events{StampedEvent::at(1, 480, 100, Polarity::on)}),
+    EXPECT_THROW(writer.append(Events{AbsoluteEvent::at(1, 480, 100, Polarity::on)}),
                  std::invalid_argument);
-    EXPECT_THROW(writer.append(Events{StampedEvent::at(1, 1, INT64_MAX, Polarity::on)}),
+    EXPECT_THROW(writer.append(Events{AbsoluteEvent::at(1, 1, INT64_MAX, Polarity::on)}),
                  std::invalid_argument);
   }
 }
@@ -226,12 +228,12 @@ TEST_F(Hdf5, AFullDiskIsToldAndSurvived) {
 TEST_F(Hdf5, WhatIsNoFileOfEventsIsRefused) {
   EXPECT_THROW(Hdf5Reader reader(path("missing.h5")), std::runtime_error);
   std::ofstream(path("text.h5")) << "t,x,y,p\n";
-  EXPECT_THROW(Hdf5Reader reader(path("text.h5")), NotThisFormat);
-  EXPECT_THROW(Hdf5Reader reader(in_memory(bytes_of("\x89HDF\r\n\x1a\n"))), NotThisFormat);
-  EXPECT_THROW(Hdf5Reader reader(in_memory({})), NotThisFormat);
+  EXPECT_THROW(Hdf5Reader reader(path("text.h5")), UnsupportedFormat);
+  EXPECT_THROW(Hdf5Reader reader(in_memory(bytes_of("\x89HDF\r\n\x1a\n"))), UnsupportedFormat);
+  EXPECT_THROW(Hdf5Reader reader(in_memory({})), UnsupportedFormat);
 }
 
-TEST_F(Hdf5, DamagedChunksAreLeftOutAndCounted) {
+TEST_F(Hdf5, CorruptChunksAreLeftOutAndCounted) {
   const auto events = random_events(60'000, {640, 480}, 2, 5);
   const auto file =
       contents(write(events, {Hdf5Layout::metavision, Compression::none, {640, 480}}));
@@ -246,17 +248,17 @@ TEST_F(Hdf5, DamagedChunksAreLeftOutAndCounted) {
     at = std::ranges::search(file, head).begin();
   }
   ASSERT_NE(at, file.end());
-  auto damaged = file;
-  damaged[static_cast<std::size_t>(at - file.begin()) + 3] = 0xff;
-  Hdf5Reader reader(in_memory(damaged));
+  auto corrupt = file;
+  corrupt[static_cast<std::size_t>(at - file.begin()) + 3] = 0xff;
+  Hdf5Reader reader(in_memory(corrupt));
   auto expected = events;
   expected.erase(expected.begin() + 16384 * 2, expected.begin() + 16384 * 3);
   EXPECT_TRUE(read_all(reader) == expected);
-  EXPECT_EQ(reader.damage().places, 1U);
-  EXPECT_EQ(reader.damage().first_at, static_cast<std::uint64_t>(at - file.begin()));
+  EXPECT_EQ(reader.corruption().places, 1U);
+  EXPECT_EQ(reader.corruption().first_at, static_cast<std::uint64_t>(at - file.begin()));
 }
 
-TEST_F(Hdf5, AChunkOfLessThanANumberIsDamaged) {
+TEST_F(Hdf5, AChunkOfLessThanANumberIsCorrupt) {
   constexpr int shuffle[] = {H5Z_FILTER_SHUFFLE};
   for (const std::size_t size : {0, 1, 3}) {
     Bytes bytes(size, 7);

@@ -12,7 +12,7 @@ namespace {
 
 using namespace table_events;
 
-using Events = std::vector<StampedEvent>;
+using Events = std::vector<AbsoluteEvent>;
 
 Bytes patched(NpyEncoder& encoder, Bytes bytes) {
   const auto patch = encoder.patch();
@@ -44,7 +44,9 @@ TEST(Npy, ComesBack) {
     for (const auto& bytes : {unpatched, patched(encoder, unpatched)}) {
       NpyDecoder decoder(size);
       EXPECT_TRUE(decoded(decoder, bytes) == events);
-      EXPECT_EQ(decoder.damage().places + decoder.damage().unsorted + decoder.damage().outside, 0U);
+      EXPECT_EQ(decoder.corruption().places + decoder.corruption().unsorted +
+                    decoder.corruption().outside,
+                0U);
     }
   }
   const auto events = random_events(3000, {640, 480}, 7);
@@ -59,7 +61,7 @@ TEST(Npy, NoEventsComeBack) {
   const auto bytes = patched(encoder, encoded(encoder, {}));
   NpyDecoder decoder;
   EXPECT_TRUE(decoded(decoder, bytes).empty());
-  EXPECT_EQ(decoder.damage().places, 0U);
+  EXPECT_EQ(decoder.corruption().places, 0U);
 }
 
 TEST(Npy, FieldsOfAnyKindInAnyOrder) {
@@ -81,10 +83,10 @@ TEST(Npy, FieldsOfAnyKindInAnyOrder) {
   element(1, std::nan(""), 0x4900, 7);
   NpyDecoder decoder;
   EXPECT_EQ(decoded(decoder, bytes),
-            (Events{StampedEvent::at(10, 7, 3820, Polarity::on),
-                    StampedEvent::at(0, 8, 1'468'939'993'067'400, Polarity::off)}));
-  EXPECT_EQ(decoder.damage().places, 1U);
-  EXPECT_EQ(decoder.damage().first_at, bytes.size() - 42);
+            (Events{AbsoluteEvent::at(10, 7, 3820, Polarity::on),
+                    AbsoluteEvent::at(0, 8, 1'468'939'993'067'400, Polarity::off)}));
+  EXPECT_EQ(decoder.corruption().places, 1U);
+  EXPECT_EQ(decoder.corruption().first_at, bytes.size() - 42);
   expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, bytes);
 }
 
@@ -94,8 +96,8 @@ TEST(Npy, SmallElements) {
       "'shape': (2,)}");
   for (const std::uint8_t byte : {1, 2, 3, 4, 1, 5, 6, 7, 8, 0}) bytes.push_back(byte);
   NpyDecoder decoder;
-  EXPECT_EQ(decoded(decoder, bytes), (Events{StampedEvent::at(3, 4, 0x201, Polarity::on),
-                                             StampedEvent::at(7, 8, 0x605, Polarity::off)}));
+  EXPECT_EQ(decoded(decoder, bytes), (Events{AbsoluteEvent::at(3, 4, 0x201, Polarity::on),
+                                             AbsoluteEvent::at(7, 8, 0x605, Polarity::off)}));
 }
 
 TEST(Npy, WhatIsWrongIsSkippedAndCounted) {
@@ -118,20 +120,20 @@ TEST(Npy, WhatIsWrongIsSkippedAndCounted) {
   {
     NpyDecoder decoder;
     EXPECT_EQ(decoded(decoder, bytes).size(), 2U);
-    EXPECT_EQ(decoder.damage().places, 1U);
-    EXPECT_EQ(decoder.damage().first_at, begin + 20);
-    EXPECT_EQ(decoder.damage().outside, 3U);
-    EXPECT_EQ(decoder.damage().unsorted, 1U);
+    EXPECT_EQ(decoder.corruption().places, 1U);
+    EXPECT_EQ(decoder.corruption().first_at, begin + 20);
+    EXPECT_EQ(decoder.corruption().outside, 3U);
+    EXPECT_EQ(decoder.corruption().unsorted, 1U);
   }
   auto longer = bytes;
   longer.insert(longer.end(), 1000, 0);
   const Bytes shorter(bytes.begin(), bytes.end() - 20);
   const Bytes cut(bytes.begin(), bytes.end() - 1);
-  for (const auto& damaged : {longer, shorter, cut}) {
+  for (const auto& corrupt : {longer, shorter, cut}) {
     NpyDecoder decoder;
-    decoded(decoder, damaged);
-    EXPECT_EQ(decoder.damage().places, 2U);
-    expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, damaged);
+    decoded(decoder, corrupt);
+    EXPECT_EQ(decoder.corruption().places, 2U);
+    expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, corrupt);
   }
 }
 
@@ -139,7 +141,8 @@ TEST(Npy, WhatIsNoneIsRefused) {
   const std::string fields = "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4')]";
   const auto refused = [](const Bytes& bytes) {
     NpyDecoder decoder;
-    EXPECT_THROW(decoded(decoder, bytes), NotThisFormat) << std::string(bytes.begin(), bytes.end());
+    EXPECT_THROW(decoded(decoder, bytes), UnsupportedFormat)
+        << std::string(bytes.begin(), bytes.end());
   };
   refused({});
   refused(bytes_of("hello, this is a text"));

@@ -112,8 +112,8 @@ class TableTest(unittest.TestCase):
             np.testing.assert_array_equal(found[name], events[name], name)
 
     def assert_read(self, kind, events):
-        found, damage = self.read(kind)
-        self.assertEqual(damage, '0 0 0')
+        found, corruption = self.read(kind)
+        self.assertEqual(corruption, '0 0 0')
         self.assert_equal(found, events)
 
     def refused(self):
@@ -305,7 +305,7 @@ class OtherReaders(TableTest):
             self.assert_read('hdf5', events)
 
 
-class Damaged(TableTest):
+class Corrupt(TableTest):
     """Files that claim what is not so: an error or a count, at once."""
 
     def with_columns(self, **changed):
@@ -341,11 +341,11 @@ class Damaged(TableTest):
         def huge(file, name):
             file.create_dataset(name, shape=(1 << 60,), dtype='u2', chunks=(1000,), maxshape=(None,))[:10] = 1
         self.with_columns(**{name: huge for name in 'txyp'})
-        found, damage = self.read('hdf5')
+        found, corruption = self.read('hdf5')
         self.assertEqual(len(found['t']), 1000)
-        self.assertGreater(int(damage.split()[0]), 0)
+        self.assertGreater(int(corruption.split()[0]), 0)
         self.with_columns(t=huge)
-        found, damage = self.read('hdf5')
+        found, corruption = self.read('hdf5')
         self.assertEqual(len(found['t']), 10)
 
     def test_holes(self):
@@ -357,8 +357,8 @@ class Damaged(TableTest):
                     for first in range(0, 30_000, 1000):
                         if name != hole or first != 5000:
                             dataset[first:first + 1000] = values[first:first + 1000]
-            found, damage = self.read('hdf5')
-            self.assertEqual(damage.split()[0], '1')
+            found, corruption = self.read('hdf5')
+            self.assertEqual(corruption.split()[0], '1')
             np.testing.assert_array_equal(found['t'], np.r_[0:5000, 6000:30_000])
 
     def test_chunks_stored_with_other_sizes(self):
@@ -377,11 +377,11 @@ class Damaged(TableTest):
             data = file['events/x'].id
             _, chunk = data.read_direct_chunk((4000,))
             data.write_direct_chunk((4000,), chunk[:100] + b'\0' + chunk[101:])
-        found, damage = self.read('hdf5')
-        self.assertEqual((len(found['t']), damage.split()[0]), (29_000, '1'))
+        found, corruption = self.read('hdf5')
+        self.assertEqual((len(found['t']), corruption.split()[0]), (29_000, '1'))
 
     def test_bombs(self):
-        """A chunk that would unpack to more than it should is damage, and takes no memory."""
+        """A chunk that would unpack to more than it should is corruption, and takes no memory."""
         rows = 1 << 20
         packed = zlib.compressobj(9)
         bomb = b''.join([packed.compress(bytes(1 << 20)) for _ in range(1000)] + [packed.flush()])
@@ -391,9 +391,9 @@ class Damaged(TableTest):
                                               compression='gzip')
                 dataset[:] = 1
             file['events/t'].id.write_direct_chunk((0,), bomb)
-        found, damage = self.read('hdf5')
+        found, corruption = self.read('hdf5')
         self.assertEqual(len(found['t']), rows)
-        self.assertGreater(int(damage.split()[0]), 0)
+        self.assertGreater(int(corruption.split()[0]), 0)
         self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, 800_000)
 
 

@@ -40,16 +40,16 @@ Bytes words32(std::initializer_list<std::uint32_t> words) {
 
 struct Read {
   Decoded decoded;
-  Damage damage;
+  Corruption corruption;
 };
 
 Read read(EvtFormat format, const Bytes& bytes, SensorSize size = vga) {
   const auto decoder = make_evt_decoder(format, size);
   auto decoded = decode(*decoder, bytes);
-  return {decoded, decoder->damage()};
+  return {decoded, decoder->corruption()};
 }
 
-std::vector<StampedEvent> events(std::initializer_list<StampedEvent> list) {
+std::vector<AbsoluteEvent> events(std::initializer_list<AbsoluteEvent> list) {
   return list;
 }
 
@@ -97,19 +97,19 @@ TEST(Written, TheValidatorFindsWhatItIsFor) {
 }
 
 TEST(Written, Evt3GroupsWhatPays) {
-  std::vector<StampedEvent> row;
-  for (int x = 100; x < 104; ++x) row.push_back(StampedEvent::at(x, 7, 9, on));
+  std::vector<AbsoluteEvent> row;
+  for (int x = 100; x < 104; ++x) row.push_back(AbsoluteEvent::at(x, 7, 9, on));
   const auto written = [&] { return encode(*make_evt_encoder(EvtFormat::evt3, vga), row); };
   EXPECT_EQ(written(), evt3({0x8000, 0x6009, 0x0007, 0x2864, 0x2865, 0x2866, 0x2867}));
-  row.push_back(StampedEvent::at(131, 7, 9, on));
+  row.push_back(AbsoluteEvent::at(131, 7, 9, on));
   EXPECT_EQ(written(), evt3({0x8000, 0x6009, 0x0007, 0x3864, 0x400f, 0x4000, 0x5080}));
-  row.push_back(StampedEvent::at(132, 7, 9, on));
+  row.push_back(AbsoluteEvent::at(132, 7, 9, on));
   EXPECT_EQ(written(), evt3({0x8000, 0x6009, 0x0007, 0x3864, 0x400f, 0x4000, 0x5080, 0x2884}));
 }
 
 TEST(Written, Evt3KeepsTimeAliveThroughSilence) {
   const auto recording =
-      events({StampedEvent::at(1, 2, 5, on), StampedEvent::at(1, 2, 20'000'000, on)});
+      events({AbsoluteEvent::at(1, 2, 5, on), AbsoluteEvent::at(1, 2, 20'000'000, on)});
   const auto bytes = encode(*make_evt_encoder(EvtFormat::evt3, vga), recording);
   // A step for every 4096 us, and 2 more words at the second event.
   EXPECT_EQ(bytes.size() / 2, 4U + 20'000'000 / 4096 + 2U);
@@ -156,9 +156,9 @@ std::string with_evt2(const std::string& header) {
 void expect_evt2(const std::string& header, SensorSize size) {
   Decoded decoded;
   const auto decoder = decoder_after(with_evt2(header), decoded);
-  EXPECT_EQ(decoded.events, events({StampedEvent::at(3, 2, 1, on)})) << header;
+  EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(3, 2, 1, on)})) << header;
   EXPECT_EQ(decoder->size(), size);
-  EXPECT_EQ(decoder->damage().places, 0U);
+  EXPECT_EQ(decoder->corruption().places, 0U);
 }
 
 TEST(RawHeader, IsReadAsWritersWriteIt) {
@@ -177,7 +177,7 @@ TEST(RawHeader, TakesDataThatBeginAsALineDoesForData) {
   const auto bytes = words32({0x00002025, 0x80000000, 0x10000000 | 3 << 11});
   Decoded decoded;
   decoder_after("% evt 2.0\n" + std::string(bytes.begin(), bytes.end()), decoded);
-  EXPECT_EQ(decoded.events, events({StampedEvent::at(3, 0, 0, on)}));
+  EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(3, 0, 0, on)}));
 }
 
 TEST(RawHeader, TellsTheOrderOfEvt21) {
@@ -187,7 +187,7 @@ TEST(RawHeader, TellsTheOrderOfEvt21) {
     const auto& bytes = legacy ? other : little;
     Decoded decoded;
     decoder_after(header + std::string(bytes.begin(), bytes.end()), decoded);
-    EXPECT_EQ(decoded.events, events({StampedEvent::at(0, 0, 0, on)})) << header;
+    EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(0, 0, 0, on)})) << header;
   };
   expect_order("% format EVT21;height=480;width=640\n% end\n", false);
   expect_order("% format EVT21;endianness=little;height=480;width=640\n% end\n", false);
@@ -202,7 +202,7 @@ TEST(RawHeader, IsAnErrorThatSaysWhy) {
     Decoded decoded;
     try {
       decoder_after(file, decoded);
-    } catch (const NotThisFormat& exception) {
+    } catch (const UnsupportedFormat& exception) {
       return std::string(exception.what());
     }
     return std::string();
@@ -225,7 +225,7 @@ TEST(RawHeader, IsAnErrorThatSaysWhy) {
 // EVT2.
 
 TEST(Evt2, ReadsEventsAndTriggersAndPassesOverTheRest) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt2,
            words32({0x10000000 | 1 << 11,  // before any time
                     0x80000002,            // 128 us
@@ -235,48 +235,48 @@ TEST(Evt2, ReadsEventsAndTriggersAndPassesOverTheRest) {
                     0xa0000000 | 7 << 22 | 1 << 8,      // and falls
                     0x10000000 | 63U << 22}));
   EXPECT_EQ(decoded.events,
-            events({StampedEvent::at(639, 479, 133, off), StampedEvent::at(0, 0, 191, on)}));
+            events({AbsoluteEvent::at(639, 479, 133, off), AbsoluteEvent::at(0, 0, 191, on)}));
   EXPECT_EQ(decoded.triggers, (std::vector<Trigger>{{134, 1, true}, {135, 1, false}}));
-  EXPECT_EQ(damage.places, 0U);
+  EXPECT_EQ(corruption.places, 0U);
 }
 
 TEST(Evt2, FollowsTheWrapOf34Bits) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt2, words32({0x8fffffff, 0x10000000 | 63U << 22, 0x80000000, 0x10000000,
                                      0x8fffffff, 0x80000000, 0x10000000}));
   const auto lap = Microseconds{1} << 34;
   EXPECT_EQ(decoded.events,
-            events({StampedEvent::at(0, 0, lap - 1, on), StampedEvent::at(0, 0, lap, on),
-                    StampedEvent::at(0, 0, 2 * lap, on)}));
-  EXPECT_EQ(damage.unsorted, 0U);
+            events({AbsoluteEvent::at(0, 0, lap - 1, on), AbsoluteEvent::at(0, 0, lap, on),
+                    AbsoluteEvent::at(0, 0, 2 * lap, on)}));
+  EXPECT_EQ(corruption.unsorted, 0U);
 }
 
 TEST(Evt2, CountsDisorderAndWhatIsOutside) {
-  const auto [decoded, damage] = read(
+  const auto [decoded, corruption] = read(
       EvtFormat::evt2, words32({0x80000064, 0x10000000, 0x80000063, 0x10000000 | 1 << 11,
                                 0x80000065, 0x10000000, 0x10000000 | 640 << 11, 0x10000000 | 480}));
   EXPECT_EQ(decoded.events,
-            events({StampedEvent::at(0, 0, 6400, on), StampedEvent::at(1, 0, 6336, on),
-                    StampedEvent::at(0, 0, 6464, on)}));
-  EXPECT_EQ(damage.unsorted, 1U);
-  EXPECT_EQ(damage.outside, 2U);
-  EXPECT_EQ(damage.places, 0U);
+            events({AbsoluteEvent::at(0, 0, 6400, on), AbsoluteEvent::at(1, 0, 6336, on),
+                    AbsoluteEvent::at(0, 0, 6464, on)}));
+  EXPECT_EQ(corruption.unsorted, 1U);
+  EXPECT_EQ(corruption.outside, 2U);
+  EXPECT_EQ(corruption.places, 0U);
 }
 
 TEST(Evt2, CountsBrokenWordsByPlaces) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt2, words32({0x80000000, 0x10000000, 0x20000000, 0x30000000, 0x10000000,
                                      0x90000000, 0x10000000}));
   EXPECT_EQ(decoded.events.size(), 3U);
-  EXPECT_EQ(damage.places, 2U);
-  EXPECT_EQ(damage.first_at, 8U);
-  EXPECT_NE(damage.first, "");
+  EXPECT_EQ(corruption.places, 2U);
+  EXPECT_EQ(corruption.first_at, 8U);
+  EXPECT_NE(corruption.first, "");
 }
 
 TEST(Evt2, KnowsNoBoundsWhereItKnowsNoSize) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt2, words32({0x80000000, 0x10000000 | 0x3fffff}), {});
-  EXPECT_EQ(decoded.events, events({StampedEvent::at(2047, 2047, 0, on)}));
+  EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(2047, 2047, 0, on)}));
 }
 
 // EVT2.1.
@@ -298,21 +298,21 @@ TEST(Evt21, ReadsVectorsInBothOrders) {
   }
   for (const auto& [format, bytes] :
        {std::pair(EvtFormat::evt21, little), std::pair(EvtFormat::evt21_legacy, legacy)}) {
-    const auto [decoded, damage] = read(format, bytes);
+    const auto [decoded, corruption] = read(format, bytes);
     EXPECT_EQ(decoded.events,
-              events({StampedEvent::at(32, 9, 66, on), StampedEvent::at(34, 9, 66, on),
-                      StampedEvent::at(63, 9, 66, on), StampedEvent::at(620, 9, 68, off),
-                      StampedEvent::at(639, 9, 68, off)}));
+              events({AbsoluteEvent::at(32, 9, 66, on), AbsoluteEvent::at(34, 9, 66, on),
+                      AbsoluteEvent::at(63, 9, 66, on), AbsoluteEvent::at(620, 9, 68, off),
+                      AbsoluteEvent::at(639, 9, 68, off)}));
     EXPECT_EQ(decoded.triggers, (std::vector<Trigger>{{67, 0, true}}));
-    EXPECT_EQ(damage.outside, 1U);  // x = 651
-    EXPECT_EQ(damage.places, 0U);
+    EXPECT_EQ(corruption.outside, 1U);  // x = 651
+    EXPECT_EQ(corruption.places, 0U);
   }
 }
 
 // EVT3.
 
 TEST(Evt3, ReadsEventsVectorsAndTriggers) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt3, evt3({0x2001,                          // before any time and row
                                   0x8001, 0x6002, 0x0005, 0x2803,  // ON at (3, 5), 4098 us
                                   0x3010, 0x4003, 0x4800, 0x5081,  // OFF from x = 16 on
@@ -322,60 +322,60 @@ TEST(Evt3, ReadsEventsVectorsAndTriggers) {
                                   0xe015, 0xf000, 0xf000, 0x7016,  // others
                                   0x8002, 0x2005}));               // time is 8192 us anew
   EXPECT_EQ(decoded.events,
-            events({StampedEvent::at(3, 5, 4098, on), StampedEvent::at(16, 5, 4098, off),
-                    StampedEvent::at(17, 5, 4098, off), StampedEvent::at(39, 5, 4098, off),
-                    StampedEvent::at(40, 5, 4098, off), StampedEvent::at(47, 5, 4098, off),
-                    StampedEvent::at(4, 5, 4098, off), StampedEvent::at(5, 5, 8192, off)}));
+            events({AbsoluteEvent::at(3, 5, 4098, on), AbsoluteEvent::at(16, 5, 4098, off),
+                    AbsoluteEvent::at(17, 5, 4098, off), AbsoluteEvent::at(39, 5, 4098, off),
+                    AbsoluteEvent::at(40, 5, 4098, off), AbsoluteEvent::at(47, 5, 4098, off),
+                    AbsoluteEvent::at(4, 5, 4098, off), AbsoluteEvent::at(5, 5, 8192, off)}));
   EXPECT_EQ(decoded.triggers, (std::vector<Trigger>{{4098, 3, true}}));
-  EXPECT_EQ(damage.places, 0U);
+  EXPECT_EQ(corruption.places, 0U);
 }
 
 TEST(Evt3, ReadsVectorsThatAreNoTriplets) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x3800, 0x5001, 0x5001, 0x4001}));
-  EXPECT_EQ(decoded.events, events({StampedEvent::at(0, 0, 0, on), StampedEvent::at(8, 0, 0, on),
-                                    StampedEvent::at(16, 0, 0, on)}));
+  EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(0, 0, 0, on), AbsoluteEvent::at(8, 0, 0, on),
+                                    AbsoluteEvent::at(16, 0, 0, on)}));
 }
 
 TEST(Evt3, PassesOverWhatIsNoChange) {
   // After EM_ADDR_Y, events are not changes of contrast until the next row.
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt3,
            evt3({0x8000, 0x6000, 0x0000, 0x1001, 0x2001, 0x3001, 0x4fff, 0x0002, 0x2003}));
-  EXPECT_EQ(decoded.events, events({StampedEvent::at(3, 2, 0, off)}));
-  EXPECT_EQ(damage.places + damage.outside, 0U);
+  EXPECT_EQ(decoded.events, events({AbsoluteEvent::at(3, 2, 0, off)}));
+  EXPECT_EQ(corruption.places + corruption.outside, 0U);
 }
 
 TEST(Evt3, FollowsTheWrapOf24BitsAndAFlippedBit) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt3,
            evt3({0x8ffe, 0x6000, 0x0000, 0x2000, 0x8fff, 0x6000, 0x2000, 0x8000, 0x6000, 0x2000,
                  0x8064, 0x6000, 0x2000, 0x8864, 0x6000, 0x2000, 0x8065, 0x6000, 0x2000}));
   constexpr Microseconds lap = 1 << 24;
   EXPECT_EQ(
       decoded.events,
-      events({StampedEvent::at(0, 0, lap - 8192, off), StampedEvent::at(0, 0, lap - 4096, off),
-              StampedEvent::at(0, 0, lap, off), StampedEvent::at(0, 0, lap + 0x64000, off),
-              StampedEvent::at(0, 0, lap + 0x864000, off),
-              StampedEvent::at(0, 0, lap + 0x65000, off)}));
-  EXPECT_EQ(damage.unsorted, 1U);
+      events({AbsoluteEvent::at(0, 0, lap - 8192, off), AbsoluteEvent::at(0, 0, lap - 4096, off),
+              AbsoluteEvent::at(0, 0, lap, off), AbsoluteEvent::at(0, 0, lap + 0x64000, off),
+              AbsoluteEvent::at(0, 0, lap + 0x864000, off),
+              AbsoluteEvent::at(0, 0, lap + 0x65000, off)}));
+  EXPECT_EQ(corruption.unsorted, 1U);
 }
 
 TEST(Evt3, DropsWhatIsOutside) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x2000 + 640, 0x3000 + 638, 0x4fff,
                                   0x4fff, 480, 0x2000, 0x3000, 0x5003}));
   EXPECT_EQ(decoded.events,
-            events({StampedEvent::at(638, 0, 0, off), StampedEvent::at(639, 0, 0, off)}));
-  EXPECT_EQ(damage.outside, 1U + 22U + 1U + 2U);
+            events({AbsoluteEvent::at(638, 0, 0, off), AbsoluteEvent::at(639, 0, 0, off)}));
+  EXPECT_EQ(corruption.outside, 1U + 22U + 1U + 2U);
 }
 
 TEST(Evt3, NotesWhatIsNoWord) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt3, evt3({0x8000, 0x6000, 0x0000, 0x4001, 0x9000, 0xb000, 0x2000, 0xc000}));
   EXPECT_EQ(decoded.events.size(), 1U);
-  EXPECT_EQ(damage.places, 2U);
-  EXPECT_EQ(damage.first_at, 6U);
+  EXPECT_EQ(corruption.places, 2U);
+  EXPECT_EQ(corruption.first_at, 6U);
 }
 
 TEST(Evt3, DoesNotRunOutOfTheSensorByVectors) {
@@ -384,15 +384,15 @@ TEST(Evt3, DoesNotRunOutOfTheSensorByVectors) {
     bytes.push_back(0xff);
     bytes.push_back(0x4f);
   }
-  const auto [decoded, damage] = read(EvtFormat::evt3, bytes);
+  const auto [decoded, corruption] = read(EvtFormat::evt3, bytes);
   EXPECT_EQ(decoded.events.size(), 640U);
-  EXPECT_EQ(damage.outside, 200'000U * 12 - 640);
+  EXPECT_EQ(corruption.outside, 200'000U * 12 - 640);
 }
 
 // EVT4.
 
 TEST(Evt4, ReadsEventsVectorsAndTriggers) {
-  const auto [decoded, damage] =
+  const auto [decoded, corruption] =
       read(EvtFormat::evt4,
            words32({0xb0000000, 0xc0000000, 0xe0000009,  // before any time; a mask of one
                     0xe0000001, 0xa0000000 | 1 << 22 | 3 << 11 | 4,  //
@@ -400,18 +400,18 @@ TEST(Evt4, ReadsEventsVectorsAndTriggers) {
                     0x90000000 | 3 << 22 | 2 << 8 | 1, 0x60000000, 0x70000000,
                     0xc0000000 | 4 << 22 | 608 << 11 | 5, 0xe0000000}));
   EXPECT_EQ(decoded.events,
-            events({StampedEvent::at(3, 4, 65, off), StampedEvent::at(32, 5, 66, on),
-                    StampedEvent::at(63, 5, 66, on), StampedEvent::at(637, 5, 68, off),
-                    StampedEvent::at(638, 5, 68, off), StampedEvent::at(639, 5, 68, off)}));
+            events({AbsoluteEvent::at(3, 4, 65, off), AbsoluteEvent::at(32, 5, 66, on),
+                    AbsoluteEvent::at(63, 5, 66, on), AbsoluteEvent::at(637, 5, 68, off),
+                    AbsoluteEvent::at(638, 5, 68, off), AbsoluteEvent::at(639, 5, 68, off)}));
   EXPECT_EQ(decoded.triggers, (std::vector<Trigger>{{67, 2, true}}));
-  EXPECT_EQ(damage.places + damage.outside + damage.unsorted, 0U);
+  EXPECT_EQ(corruption.places + corruption.outside + corruption.unsorted, 0U);
 }
 
 TEST(Evt4, NotesAVectorThatTheFileCuts) {
-  const auto [decoded, damage] = read(EvtFormat::evt4, words32({0xe0000000, 0xc0000000}));
+  const auto [decoded, corruption] = read(EvtFormat::evt4, words32({0xe0000000, 0xc0000000}));
   EXPECT_TRUE(decoded.events.empty());
-  EXPECT_EQ(damage.places, 1U);
-  EXPECT_EQ(damage.first_at, 4U);
+  EXPECT_EQ(corruption.places, 1U);
+  EXPECT_EQ(corruption.first_at, 4U);
 }
 
 }  // namespace

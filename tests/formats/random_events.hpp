@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera::random_events {
@@ -16,13 +16,13 @@ struct Silence {
 };
 
 /// `count` sorted events from `start` on.
-inline std::vector<StampedEvent> make(SensorSize size, std::size_t count, unsigned seed,
-                                      Microseconds start, Silence silence) {
+inline std::vector<AbsoluteEvent> make(SensorSize size, std::size_t count, unsigned seed,
+                                       Microseconds start, Silence silence) {
   std::mt19937 random(seed);
   const auto below = [&](std::int64_t limit) {
     return std::uniform_int_distribution<std::int64_t>(0, limit - 1)(random);
   };
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   auto t = start;
   while (events.size() < count) {
     switch (below(200)) {
@@ -37,9 +37,9 @@ inline std::vector<StampedEvent> make(SensorSize size, std::size_t count, unsign
       default:
         t += below(4) == 0 ? below(20) : 0;
     }
-    events.push_back(StampedEvent::at(static_cast<int>(below(size.width)),
-                                      static_cast<int>(below(size.height)), t,
-                                      below(2) == 1 ? Polarity::on : Polarity::off));
+    events.push_back(AbsoluteEvent::at(static_cast<int>(below(size.width)),
+                                       static_cast<int>(below(size.height)), t,
+                                       below(2) == 1 ? Polarity::on : Polarity::off));
   }
   return events;
 }

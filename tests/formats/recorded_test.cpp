@@ -54,8 +54,8 @@ TEST(Recorded, Evt3Of1280x720) {
   EXPECT_EQ(sums.x, 42'078'718);
   EXPECT_EQ(sums.y, 31'656'267);
   EXPECT_EQ(sums.on, 41'439);
-  EXPECT_EQ(decoder->damage().places, 0U);
-  EXPECT_EQ(decoder->damage().outside, 0U);
+  EXPECT_EQ(decoder->corruption().places, 0U);
+  EXPECT_EQ(decoder->corruption().outside, 0U);
 }
 
 TEST(Recorded, Evt3Of640x480) {
@@ -69,8 +69,8 @@ TEST(Recorded, Evt3Of640x480) {
   EXPECT_EQ(sums.off, 218'291);
   EXPECT_EQ(sums.on, 125'183);
   EXPECT_EQ(sums.t, 2'885'601'049'874);
-  EXPECT_EQ(decoder->damage().places, 0U);
-  EXPECT_EQ(decoder->damage().outside, 0U);
+  EXPECT_EQ(decoder->corruption().places, 0U);
+  EXPECT_EQ(decoder->corruption().outside, 0U);
 }
 
 TEST(Recorded, WrittenAgainInEveryFormatIsTheSame) {

@@ -18,12 +18,12 @@ using recordings::random_events;
 class EveryFormat : public testing::TestWithParam<Format> {
  protected:
   SensorSize random_size(Random& random) const {
-    const int largest = std::min(2048, GetParam().largest_side);
+    const int largest = std::min(2048, GetParam().max_side);
     const auto side = [&] { return below(random, 4) == 0 ? largest : 1 + below(random, largest); };
     return {side(), side()};
   }
 
-  std::vector<std::uint8_t> encoded(SensorSize size, std::span<const StampedEvent> events) const {
+  std::vector<std::uint8_t> encoded(SensorSize size, std::span<const AbsoluteEvent> events) const {
     return encode(*GetParam().make_encoder(size), events);
   }
 };
@@ -31,34 +31,34 @@ class EveryFormat : public testing::TestWithParam<Format> {
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats::all()),
                          [](const auto& test) { return test.param.name; });
 
-void expect_sound(const Damage& damage) {
-  EXPECT_EQ(damage.places, 0U) << damage.first << " at " << damage.first_at;
-  EXPECT_EQ(damage.unsorted, 0U);
-  EXPECT_EQ(damage.outside, 0U);
+void expect_sound(const Corruption& corruption) {
+  EXPECT_EQ(corruption.places, 0U) << corruption.first << " at " << corruption.first_at;
+  EXPECT_EQ(corruption.unsorted, 0U);
+  EXPECT_EQ(corruption.outside, 0U);
 }
 
 TEST_P(EveryFormat, ReturnsWhatWasWritten) {
   Random random(1);
   for (int i = 0; i < 60; ++i) {
     const auto size = i == 0 ? SensorSize{1, 1} : random_size(random);
-    const auto pause = i % 4 == 0 ? GetParam().longest_pause : 100'000;
+    const auto pause = i % 4 == 0 ? GetParam().max_pause : 100'000;
     const auto events = random_events(random, size, i % 4 == 0 ? 60 : 4000, pause);
     const auto decoder = GetParam().make_decoder(size);
     const auto decoded = decode(*decoder, encoded(size, events));
     ASSERT_EQ(decoded.events, events) << "recording " << i;
     ASSERT_TRUE(decoded.triggers.empty());
     EXPECT_EQ(decoder->size(), size);
-    expect_sound(decoder->damage());
+    expect_sound(decoder->corruption());
   }
 }
 
 TEST_P(EveryFormat, TakesTheSensorsLastPixel) {
-  const int side = GetParam().largest_side;
+  const int side = GetParam().max_side;
   const SensorSize size{side, side};
-  const std::vector events{StampedEvent::at(0, 0, 0, Polarity::on),
-                           StampedEvent::at(side - 1, 0, 0, Polarity::off),
-                           StampedEvent::at(0, side - 1, 1, Polarity::off),
-                           StampedEvent::at(side - 1, side - 1, 1, Polarity::on)};
+  const std::vector events{AbsoluteEvent::at(0, 0, 0, Polarity::on),
+                           AbsoluteEvent::at(side - 1, 0, 0, Polarity::off),
+                           AbsoluteEvent::at(0, side - 1, 1, Polarity::off),
+                           AbsoluteEvent::at(side - 1, side - 1, 1, Polarity::on)};
   const auto decoder = GetParam().make_decoder(size);
   EXPECT_EQ(decode(*decoder, encoded(size, events)).events, events);
 }
@@ -74,7 +74,7 @@ TEST_P(EveryFormat, ReadsTheSameHoweverTheBytesAreSplit) {
     const auto decoder = GetParam().make_decoder(size);
     const auto longest = 1 + below(random, 300);
     EXPECT_EQ(decode(*decoder, bytes, [&] { return 1 + below(random, longest); }).events, events);
-    expect_sound(decoder->damage());
+    expect_sound(decoder->corruption());
   }
 }
 
@@ -101,7 +101,7 @@ TEST_P(EveryFormat, WritesWhatReadsTheSameHoweverTheEventsAreSplit) {
     const auto events = random_events(random, size, 3000, 1'000'000);
     const auto encoder = GetParam().make_encoder(size);
     std::vector<std::uint8_t> bytes;
-    for (std::span<const StampedEvent> rest = events; !rest.empty();) {
+    for (std::span<const AbsoluteEvent> rest = events; !rest.empty();) {
       const auto piece = rest.first(
           std::min<std::size_t>(rest.size(), static_cast<std::size_t>(below(random, 100))));
       encoder->encode(piece, bytes);
@@ -110,38 +110,38 @@ TEST_P(EveryFormat, WritesWhatReadsTheSameHoweverTheEventsAreSplit) {
     encoder->finish(bytes);
     const auto decoder = GetParam().make_decoder(size);
     ASSERT_EQ(decode(*decoder, bytes).events, events);
-    expect_sound(decoder->damage());
+    expect_sound(decoder->corruption());
   }
 }
 
 TEST_P(EveryFormat, FollowsWrapsOfTheTime) {
   // Past 24, 32 and 34 bits; as far as the format can be silent at once, and somewhat beyond the
   // largest wrap.
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   const SensorSize size{320, 240};
-  const auto step = std::min(GetParam().longest_pause, 30 * formats::minutes);
+  const auto step = std::min(GetParam().max_pause, 30 * formats::minutes);
   const int steps = GetParam().name == "es" ? 4 : 21;
   for (int i = 0; i < steps; ++i)
-    events.push_back(StampedEvent::at(i, i, step * i + i % 3, Polarity::on));
+    events.push_back(AbsoluteEvent::at(i, i, step * i + i % 3, Polarity::on));
   for (const int bits : {24, 32, 34})
     for (int i = -2; i <= 2; ++i)
       if (GetParam().name != "es")
         events.push_back(
-            StampedEvent::at(bits, 10 + i, (Microseconds{1} << bits) + i, Polarity::off));
+            AbsoluteEvent::at(bits, 10 + i, (Microseconds{1} << bits) + i, Polarity::off));
   std::sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.t < b.t; });
   const auto decoder = GetParam().make_decoder(size);
   EXPECT_EQ(decode(*decoder, encoded(size, events)).events, events);
-  expect_sound(decoder->damage());
+  expect_sound(decoder->corruption());
 }
 
 TEST_P(EveryFormat, LeavesOutAnAbsurdSilence) {
   if (GetParam().name == "dat") return;  // which does not fill silence
   const SensorSize size{320, 240};
   const Microseconds now = 1'790'000'000'000'000;
-  const std::vector events{StampedEvent::at(1, 2, now, Polarity::on),
-                           StampedEvent::at(3, 4, now + 50'000, Polarity::off),
-                           StampedEvent::at(5, 6, 2 * now, Polarity::off),
-                           StampedEvent::at(7, 8, 2 * now + 3, Polarity::off)};
+  const std::vector events{AbsoluteEvent::at(1, 2, now, Polarity::on),
+                           AbsoluteEvent::at(3, 4, now + 50'000, Polarity::off),
+                           AbsoluteEvent::at(5, 6, 2 * now, Polarity::off),
+                           AbsoluteEvent::at(7, 8, 2 * now + 3, Polarity::off)};
   const auto bytes = encoded(size, events);
   EXPECT_LT(bytes.size(), 2000U);
   const auto decoded = decode(*GetParam().make_decoder(size), bytes);
@@ -156,7 +156,7 @@ TEST_P(EveryFormat, LeavesOutAnAbsurdSilence) {
 TEST_P(EveryFormat, WritesDisorderWithoutHarm) {
   Random random(5);
   const SensorSize size{100, 100};
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   for (int i = 0; i < 1000; ++i)
     events.push_back({static_cast<Microseconds>(random()), static_cast<std::uint16_t>(random()),
                       static_cast<std::uint16_t>(random())});
@@ -169,23 +169,23 @@ TEST_P(EveryFormat, WritesAnEmptyRecording) {
   const auto decoder = GetParam().make_decoder(size);
   EXPECT_TRUE(decode(*decoder, bytes).events.empty());
   EXPECT_EQ(decoder->size(), size);
-  expect_sound(decoder->damage());
+  expect_sound(decoder->corruption());
 }
 
-TEST_P(EveryFormat, GoesOnFromEveryLandmarkAsIfItHadReadAll) {
+TEST_P(EveryFormat, GoesOnFromEverySeekPointAsIfItHadReadAll) {
   Random random(6);
   const SensorSize size{640, 480};
   const auto events = random_events(random, size, 200'000, 200'000);
   const auto bytes = encoded(size, events);
   const auto decoder = GetParam().make_decoder(size);
   ASSERT_EQ(decode(*decoder, bytes).events.size(), events.size());
-  ASSERT_GT(decoder->landmark_before(events.back().t)->position, 100'000U);
+  ASSERT_GT(decoder->seek_point_before(events.back().t)->position, 100'000U);
   for (int i = 0; i < 40; ++i) {
     const auto wanted = i == 0 ? 0 : events[static_cast<std::size_t>(below(random, 200'000))].t;
-    const auto landmark = decoder->landmark_before(wanted);
-    ASSERT_TRUE(landmark);
-    decoder->restart(*landmark);
-    const auto decoded = decode(*decoder, std::span(bytes).subspan(landmark->position));
+    const auto seek_point = decoder->seek_point_before(wanted);
+    ASSERT_TRUE(seek_point);
+    decoder->restart(*seek_point);
+    const auto decoded = decode(*decoder, std::span(bytes).subspan(seek_point->position));
     ASSERT_LE(decoded.events.size(), events.size());
     const auto skipped = events.size() - decoded.events.size();
     ASSERT_TRUE(std::equal(decoded.events.begin(), decoded.events.end(),
@@ -195,11 +195,11 @@ TEST_P(EveryFormat, GoesOnFromEveryLandmarkAsIfItHadReadAll) {
       ASSERT_LT(events[skipped - 1].t, wanted);
     }
   }
-  expect_sound(decoder->damage());
+  expect_sound(decoder->corruption());
 }
 
 /// Whatever is done to a file, no event appears out of nothing, and the split changes nothing.
-TEST_P(EveryFormat, SurvivesDamage) {
+TEST_P(EveryFormat, SurvivesCorruption) {
   Random random(7);
   const SensorSize size{640, 480};
   const auto events = random_events(random, size, 2000, 1'000'000);
@@ -231,7 +231,7 @@ TEST_P(EveryFormat, SurvivesDamage) {
       Decoded decoded;
       try {
         decoded = decode(*decoder, bytes, next_piece);
-      } catch (const NotThisFormat& exception) {
+      } catch (const UnsupportedFormat& exception) {
         error = exception.what();
       }
       for (const auto& event : decoded.events) {
@@ -239,9 +239,9 @@ TEST_P(EveryFormat, SurvivesDamage) {
         const int height = decoder->size().height;
         EXPECT_TRUE(width == 0 || (event.x < width && event.y() < height));
       }
-      const auto& damage = decoder->damage();
-      return std::tuple(error, decoded.events, damage.places, damage.first_at, damage.first,
-                        damage.unsorted, damage.outside);
+      const auto& corruption = decoder->corruption();
+      return std::tuple(error, decoded.events, corruption.places, corruption.first_at,
+                        corruption.first, corruption.unsorted, corruption.outside);
     };
     const auto whole = outcome([&] { return bytes.size(); });
     ASSERT_EQ(outcome([&] { return 1 + below(random, 50); }), whole);
@@ -257,9 +257,9 @@ TEST_P(EveryFormat, TellsACutFile) {
   bytes.pop_back();
   const auto decoder = GetParam().make_decoder(size);
   const auto decoded = decode(*decoder, bytes);
-  EXPECT_EQ(decoder->damage().places, 1U);
-  EXPECT_LT(decoder->damage().first_at, bytes.size());
-  EXPECT_GE(decoder->damage().first_at + 8, bytes.size());
+  EXPECT_EQ(decoder->corruption().places, 1U);
+  EXPECT_LT(decoder->corruption().first_at, bytes.size());
+  EXPECT_GE(decoder->corruption().first_at + 8, bytes.size());
   EXPECT_TRUE(std::equal(decoded.events.begin(), decoded.events.end(), events.begin()));
 }
 

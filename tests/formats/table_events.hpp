@@ -24,13 +24,13 @@ inline Bytes bytes_of(std::string_view text) {
 }
 
 /// Events in bursts of one time, neighbours, rows, noise, and silence of hours.
-inline std::vector<StampedEvent> random_events(std::size_t count, SensorSize size, unsigned seed,
-                                               Microseconds first = 0) {
+inline std::vector<AbsoluteEvent> random_events(std::size_t count, SensorSize size, unsigned seed,
+                                                Microseconds first = 0) {
   std::mt19937 random(seed);
   const auto below = [&](int end) {
     return static_cast<int>(random() % static_cast<unsigned>(end));
   };
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   Microseconds t = first;
   while (events.size() < count) {
     const int kind = below(100);
@@ -43,9 +43,9 @@ inline std::vector<StampedEvent> random_events(std::size_t count, SensorSize siz
       const bool row = kind % 3 == 0;
       const bool noise = kind % 3 == 1;
       events.push_back(
-          StampedEvent::at(noise ? below(size.width) : (x + i * (1 + kind % 2)) % size.width,
-                           row ? y : (noise ? below(size.height) : (y + i) % size.height), t,
-                           below(kind % 4 == 0 ? 100 : 2) == 1 ? Polarity::on : Polarity::off));
+          AbsoluteEvent::at(noise ? below(size.width) : (x + i * (1 + kind % 2)) % size.width,
+                            row ? y : (noise ? below(size.height) : (y + i) % size.height), t,
+                            below(kind % 4 == 0 ? 100 : 2) == 1 ? Polarity::on : Polarity::off));
       if (mean_gap > 0) t += below(mean_gap);
     }
     if (below(2000) == 0) t += 3'600'000'000LL * (1 + below(5));
@@ -60,7 +60,7 @@ inline const std::vector<SensorSize>& sizes() {
   return sizes;
 }
 
-inline Bytes encoded(Encoder& encoder, std::span<const StampedEvent> events,
+inline Bytes encoded(Encoder& encoder, std::span<const AbsoluteEvent> events,
                      std::size_t at_once = 1000) {
   Bytes bytes;
   while (!events.empty()) {
@@ -73,8 +73,8 @@ inline Bytes encoded(Encoder& encoder, std::span<const StampedEvent> events,
 }
 
 /// Feeds `bytes` in pieces of `size`, or of any size where it is 0.
-inline std::vector<StampedEvent> decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
-                                         std::size_t size = 0, unsigned seed = 1) {
+inline std::vector<AbsoluteEvent> decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
+                                          std::size_t size = 0, unsigned seed = 1) {
   std::mt19937 random(seed);
   Decoded out;
   while (!bytes.empty()) {
@@ -95,11 +95,11 @@ void expect_same_however_cut(const Make& make, std::span<const std::uint8_t> byt
   for (const std::size_t size : {1, 2, 7, 64, 4097, 0}) {
     auto decoder = make();
     EXPECT_TRUE(decoded(*decoder, bytes, size) == events) << "pieces of " << size;
-    EXPECT_EQ(decoder->damage().places, whole->damage().places) << "pieces of " << size;
-    EXPECT_EQ(decoder->damage().first_at, whole->damage().first_at) << "pieces of " << size;
-    EXPECT_EQ(decoder->damage().first, whole->damage().first) << "pieces of " << size;
-    EXPECT_EQ(decoder->damage().unsorted, whole->damage().unsorted) << "pieces of " << size;
-    EXPECT_EQ(decoder->damage().outside, whole->damage().outside) << "pieces of " << size;
+    EXPECT_EQ(decoder->corruption().places, whole->corruption().places) << "pieces of " << size;
+    EXPECT_EQ(decoder->corruption().first_at, whole->corruption().first_at) << "pieces of " << size;
+    EXPECT_EQ(decoder->corruption().first, whole->corruption().first) << "pieces of " << size;
+    EXPECT_EQ(decoder->corruption().unsorted, whole->corruption().unsorted) << "pieces of " << size;
+    EXPECT_EQ(decoder->corruption().outside, whole->corruption().outside) << "pieces of " << size;
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Lets scripts write and read tables of events: table_files write|read KIND FILE RAW. RAW is
-// StampedEvents as they lie in memory. Prints what was wrong with the file that is read.
+// AbsoluteEvents as they lie in memory. Prints what was wrong with the file that is read.
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -34,10 +34,10 @@ void save(const std::string& path, const void* bytes, std::size_t count) {
 
 void write_file(const std::string& kind, const std::string& file, const std::string& raw) {
   const auto bytes = load(raw);
-  std::vector<StampedEvent> events(bytes.size() / sizeof(StampedEvent));
+  std::vector<AbsoluteEvent> events(bytes.size() / sizeof(AbsoluteEvent));
   if (!events.empty())
     std::memcpy(static_cast<void*>(events.data()), bytes.data(),
-                events.size() * sizeof(StampedEvent));
+                events.size() * sizeof(AbsoluteEvent));
   std::vector<std::uint8_t> out;
   if (kind == "npy") {
     NpyEncoder encoder;
@@ -68,23 +68,24 @@ void write_file(const std::string& kind, const std::string& file, const std::str
 
 void read_file(const std::string& kind, const std::string& file, const std::string& raw) {
   Decoded out;
-  Damage damage;
+  Corruption corruption;
   if (kind == "hdf5") {
     Hdf5Reader reader(file);
     while (reader.read(10'000, out.events) > 0) {
     }
-    damage = reader.damage();
+    corruption = reader.corruption();
   } else {
     const std::unique_ptr<Decoder> decoder =
         kind == "npy" ? std::unique_ptr<Decoder>(std::make_unique<NpyDecoder>())
                       : std::make_unique<CsvDecoder>();
     decoder->decode(load(file), out);
     decoder->finish(out);
-    damage = decoder->damage();
+    corruption = decoder->corruption();
   }
-  save(raw, out.events.data(), out.events.size() * sizeof(StampedEvent));
-  std::printf("%d %d %d %s\n", static_cast<int>(damage.places), static_cast<int>(damage.unsorted),
-              static_cast<int>(damage.outside), damage.first.c_str());
+  save(raw, out.events.data(), out.events.size() * sizeof(AbsoluteEvent));
+  std::printf("%d %d %d %s\n", static_cast<int>(corruption.places),
+              static_cast<int>(corruption.unsorted), static_cast<int>(corruption.outside),
+              corruption.first.c_str());
 }
 
 }  // namespace

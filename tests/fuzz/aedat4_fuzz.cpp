@@ -30,11 +30,11 @@ class Sum {
       add(std::uint64_t{trigger.id} << 1 | (trigger.rising ? 1U : 0U));
     }
   }
-  void add(const Damage& damage) {
-    add(damage.places);
-    add(damage.first_at);
-    add(damage.unsorted);
-    add(damage.outside);
+  void add(const Corruption& corruption) {
+    add(corruption.places);
+    add(corruption.first_at);
+    add(corruption.unsorted);
+    add(corruption.outside);
   }
 
   friend bool operator==(const Sum&, const Sum&) = default;
@@ -103,12 +103,12 @@ Sums sums_of(std::span<const std::uint8_t> bytes, Pieces pieces) {
     });
     reader.finish();
     take(reader, sums);
-  } catch (const NotThisFormat&) {
+  } catch (const UnsupportedFormat&) {
     sums.rest.add(std::uint64_t{1});
     return sums;
   }
-  require(reader.damage().unsorted == sums.unsorted, "disorder is counted");
-  sums.rest.add(reader.damage());
+  require(reader.corruption().unsorted == sums.unsorted, "disorder is counted");
+  sums.rest.add(reader.corruption());
   sums.rest.add(reader.streams().size());
   if (reader.version() == 4) {
     sums.rest.add(reader.aedat4()->skipped().imu_samples);

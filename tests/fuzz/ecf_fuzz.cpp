@@ -5,9 +5,9 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace eventcamera;
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   const bool sound = decode_ecf({data, size}, events);
   fuzz::require(events.size() <= ecf_most_events, "memory is bounded");
-  fuzz::require(sound || events.empty(), "a damaged chunk has no events");
+  fuzz::require(sound || events.empty(), "a corrupt chunk has no events");
   return 0;
 }

@@ -60,7 +60,7 @@ void require_same_however_cut(std::span<const std::uint8_t> bytes, const Outcome
 }
 
 /// How many events are earlier than one before them.
-inline std::uint64_t unsorted(std::span<const StampedEvent> events) {
+inline std::uint64_t unsorted(std::span<const AbsoluteEvent> events) {
   std::uint64_t count = 0;
   auto latest = std::numeric_limits<Microseconds>::min();
   for (const auto& event : events) {
@@ -70,20 +70,20 @@ inline std::uint64_t unsorted(std::span<const StampedEvent> events) {
   return count;
 }
 
-inline void require_within(SensorSize size, std::span<const StampedEvent> events) {
+inline void require_within(SensorSize size, std::span<const AbsoluteEvent> events) {
   for (const auto& event : events)
     require(size.width == 0 || (event.x < size.width && event.y() < size.height),
             "events are within the sensor");
 }
 
-/// From the landmark before all events, the same events are read once more.
+/// From the seek point before all events, the same events are read once more.
 inline void require_restarts(SeekableDecoder& decoder, std::span<const std::uint8_t> bytes,
                              const Decoded& before) {
-  const auto landmark = decoder.landmark_before(std::numeric_limits<Microseconds>::min());
-  if (!landmark) return;
-  decoder.restart(*landmark);
+  const auto seek_point = decoder.seek_point_before(std::numeric_limits<Microseconds>::min());
+  if (!seek_point) return;
+  decoder.restart(*seek_point);
   Decoded again;
-  decoder.decode(bytes.subspan(static_cast<std::size_t>(landmark->position)), again);
+  decoder.decode(bytes.subspan(static_cast<std::size_t>(seek_point->position)), again);
   decoder.finish(again);
   require(again.events == before.events && again.triggers == before.triggers,
           "what is read anew is the same");
@@ -99,21 +99,21 @@ auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces piece
   try {
     in_pieces(bytes, pieces, [&](auto piece) { decoder->decode(piece, decoded); });
     decoder->finish(decoded);
-  } catch (const NotThisFormat& exception) {
+  } catch (const UnsupportedFormat& exception) {
     error = exception.what();
     require(!error.empty(), "an error says why");
   }
-  const auto damage = decoder->damage();
-  require((damage.places == 0) == damage.first.empty(), "damage says what it is");
-  require(damage.first_at <= bytes.size(), "damage is within the file");
-  require(damage.unsorted == unsorted(decoded.events), "disorder is counted");
+  const auto corruption = decoder->corruption();
+  require((corruption.places == 0) == corruption.first.empty(), "corruption says what it is");
+  require(corruption.first_at <= bytes.size(), "corruption is within the file");
+  require(corruption.unsorted == unsorted(decoded.events), "disorder is counted");
   require(decoded.events.size() + decoded.triggers.size() <= bytes.size() * events_per_byte,
           "memory is bounded");
   require_within(decoder->size(), decoded.events);
   if constexpr (std::derived_from<std::remove_cvref_t<decltype(*decoder)>, SeekableDecoder>)
     if (error.empty() && pieces.longest == 0) require_restarts(*decoder, bytes, decoded);
-  return std::tuple(decoded.events, decoded.triggers, error, decoder->size(), damage.places,
-                    damage.first_at, damage.first, damage.unsorted, damage.outside);
+  return std::tuple(decoded.events, decoded.triggers, error, decoder->size(), corruption.places,
+                    corruption.first_at, corruption.first, corruption.unsorted, corruption.outside);
 }
 
 template <class Make>

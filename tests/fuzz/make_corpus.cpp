@@ -30,8 +30,8 @@ std::vector<Seed> seeds_of(const formats::Format& format) {
   return seeds;
 }
 
-/// For interval_slicer_fuzz: events at an even pace, and between them a word to hand some out.
-std::vector<Seed> interval_slicer_seeds() {
+/// For chunker_fuzz: events at an even pace, and between them a word to hand some out.
+std::vector<Seed> chunker_seeds() {
   std::vector<Seed> seeds;
   for (const std::uint8_t shift : {0, 4, 10}) {
     Seed seed{"pace-" + std::to_string(shift), {}};
@@ -76,7 +76,7 @@ int main(int argc, char** argv) {
   write(corpus / "ecf", ecf_seeds());
   write(corpus / "hdf5_chunk", hdf5_chunk_seeds());
   write(corpus / "hdf5_filters", hdf5_filters_seeds());
-  write(corpus / "interval_slicer", interval_slicer_seeds());
+  write(corpus / "chunker", chunker_seeds());
 
   // A typefinder may be asked about any of them.
   std::vector<Seed> all;

@@ -14,7 +14,7 @@ inline void read_hdf5(std::span<const std::uint8_t> bytes) {
         std::make_unique<MemoryBytes>(std::vector<std::uint8_t>(bytes.begin(), bytes.end())));
     // A few bytes of gzip can be many events.
     constexpr std::size_t most = 100'000;
-    std::vector<StampedEvent> events;
+    std::vector<AbsoluteEvent> events;
     std::vector<Trigger> triggers;
     while (events.size() < most && reader.read(10'000, events) > 0) {
     }

@@ -18,10 +18,10 @@ struct Seed {
 };
 
 /// No more than `count`, so that a file is small.
-inline std::vector<StampedEvent> few_events(unsigned seed, SensorSize size, std::size_t count) {
-  constexpr Microseconds longest_pause = 3'600'000'000;
+inline std::vector<AbsoluteEvent> few_events(unsigned seed, SensorSize size, std::size_t count) {
+  constexpr Microseconds max_pause = 3'600'000'000;
   recordings::Random random(seed);
-  auto events = recordings::random_events(random, size, count, longest_pause);
+  auto events = recordings::random_events(random, size, count, max_pause);
   events.resize(count);
   return events;
 }

@@ -140,7 +140,7 @@ refused "No such file" nowhere.raw out.dat
 refused "the same file" ball.raw ./ball.raw
 head -c 100001 ball.raw >short.raw
 convert short.raw short.dat 2>warnings
-grep -q "damaged at byte " warnings || fail "no warning of a file that is cut short"
+grep -q "corrupt at byte " warnings || fail "no warning of a file that is cut short"
 
 # Interrupted, it ends the file in order.
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw

@@ -18,11 +18,11 @@
 
 namespace {
 
+using eventcamera::AbsoluteEvent;
 using eventcamera::EvtFormat;
 using eventcamera::Microseconds;
 using eventcamera::Polarity;
 using eventcamera::SensorSize;
-using eventcamera::StampedEvent;
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr SensorSize sensor{346, 260};
@@ -31,13 +31,13 @@ constexpr Microseconds length = 5'000'000;
 constexpr Microseconds beginning = 30'000'000;
 
 /// A dot that runs through the rows.
-std::vector<StampedEvent> some_events() {
-  std::vector<StampedEvent> events;
+std::vector<AbsoluteEvent> some_events() {
+  std::vector<AbsoluteEvent> events;
   constexpr Microseconds step = 100;
   for (Microseconds t = 0; t < length; t += step) {
     const auto i = static_cast<int>(t / step);
-    events.push_back(StampedEvent::at(i % sensor.width, i / 7 % sensor.height, beginning + t,
-                                      i % 3 == 0 ? Polarity::on : Polarity::off));
+    events.push_back(AbsoluteEvent::at(i % sensor.width, i / 7 % sensor.height, beginning + t,
+                                       i % 3 == 0 ? Polarity::on : Polarity::off));
   }
   return events;
 }

@@ -15,9 +15,9 @@
 
 #include "gst/eventcamera/eventcamera.h"
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/flow_of_changes.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/opencv_picture.hpp"
+#include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/sparse.hpp"
@@ -126,7 +126,7 @@ Plane<std::uint8_t> part(const Plane<std::uint8_t>& last, const Plane<std::uint8
 
 /// The slope about each pixel (15x15, root of the mean square, grey levels a pixel) in the
 /// direction in which it is least.
-cv::Mat least_slopes(const Plane<std::uint8_t>& picture) {
+cv::Mat min_slopes(const Plane<std::uint8_t>& picture) {
   cv::Mat x;
   cv::Mat y;
   cv::Scharr(opencv_picture(picture.view()), x, CV_32F, 1, 0, 1 / 32.0);
@@ -176,7 +176,7 @@ struct TrackErrors {
     tracker.push(to.view(), threads);
     const auto ours = tracker.track(points, threads);
     const auto theirs = opencv_tracks(from, to, points);
-    const auto texture = least_slopes(from);
+    const auto texture = min_slopes(from);
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (texture.at<float>(points[i].y, points[i].x) < 3) continue;
       ++tracks;
@@ -389,7 +389,7 @@ TEST(Events, AreThoseOfTheFlowOfTheWhole) {
     for (std::size_t i = 20; i < frames.size(); i += 40) {
       const auto& last = frames[i - 1];
       const auto& now = frames[i];
-      FlowOfChanges finder(method, 640, 360);
+      RegionOfInterestFlow finder(method, 640, 360);
       const auto changed = reference::changed_box(last, now, 3);
       const auto part = finder.find(last.view(), now.view(), changed, threads);
       const auto whole_finder = make_dense_flow(method, 640, 360);

@@ -31,8 +31,7 @@ static GstClockTime duration_by_table(const State& state) {
     const auto stream =
         std::find_if(streams.begin(), streams.end(),
                      [&](const eventcamera::Aedat4Stream& s) { return s.id == entry.stream; });
-    if (stream != streams.end() && is_shown(stream->kind) &&
-        entry.end < IntervalSlicer::longest_time)
+    if (stream != streams.end() && is_shown(stream->kind) && entry.end < Chunker::max_time)
       end = std::max(end, entry.end + 1);
   }
   return static_cast<GstClockTime>(end - state.zero) * GST_USECOND;
@@ -46,35 +45,35 @@ class LatestTime {
   explicit LatestTime(Microseconds interval) : interval_(interval) {}
 
   void take(const Aedat4Events& item) {
-    while (slicers_.size() <= item.stream) slicers_.emplace_back(interval_);
-    IntervalSlicer& slicer = slicers_[item.stream];
-    slicer.push(item.events);
-    note(slicer);
+    while (chunkers_.size() <= item.stream) chunkers_.emplace_back(interval_);
+    Chunker& chunker = chunkers_[item.stream];
+    chunker.push(item.events);
+    note(chunker);
   }
 
   void take(const Aedat4Picture& item) {
-    if (item.frame.t <= IntervalSlicer::longest_time) latest_ = std::max(latest_, item.frame.t);
+    if (item.frame.t <= Chunker::max_time) latest_ = std::max(latest_, item.frame.t);
   }
 
   void take(const Aedat4Triggers& /*item*/) {}
 
   Microseconds finish() {
-    for (auto& slicer : slicers_) {
-      slicer.finish();
-      note(slicer);
+    for (auto& chunker : chunkers_) {
+      chunker.finish();
+      note(chunker);
     }
     return latest_;
   }
 
  private:
-  void note(IntervalSlicer& slicer) {
-    while (slicer.next()) continue;
-    if (slicer.first()) latest_ = std::max(latest_, slicer.latest());
+  void note(Chunker& chunker) {
+    while (chunker.next()) continue;
+    if (chunker.first()) latest_ = std::max(latest_, chunker.latest());
   }
 
   Microseconds interval_;
   Microseconds latest_ = std::numeric_limits<Microseconds>::min();
-  std::vector<IntervalSlicer> slicers_;  ///< a stream each
+  std::vector<Chunker> chunkers_;  ///< a stream each
 };
 
 }  // namespace

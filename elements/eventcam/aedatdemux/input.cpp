@@ -40,7 +40,7 @@ static GstFlowReturn take(GstAedatDemux* self, const Aedat4Picture& item) {
   State& state = self->priv->state;
   Frame frame;
   frame.t = item.frame.t;
-  if (frame.t < -IntervalSlicer::longest_time || frame.t > IntervalSlicer::longest_time ||
+  if (frame.t < -Chunker::max_time || frame.t > Chunker::max_time ||
       !aedat_frame_info(item.frame, &frame.info)) {
     ++state.counts.untimely;
     return GST_FLOW_OK;
@@ -78,7 +78,7 @@ static void learn_streams(GstAedatDemux* self) {
     state.streams.push_back(Stream{.kind = kind,
                                    .number = static_cast<guint>(number),
                                    .size = known[i].size,
-                                   .slicer = IntervalSlicer(interval_length(self)),
+                                   .chunker = Chunker(interval_length(self)),
                                    .first = {},
                                    .video = {}});
   }
@@ -90,14 +90,14 @@ static void learn_streams(GstAedatDemux* self) {
 /// Hands out what the reader makes of what it has. May throw.
 static GstFlowReturn read_items(GstAedatDemux* self) {
   State& state = self->priv->state;
-  const auto places = state.reader.damage().places;
+  const auto places = state.reader.corruption().places;
   GstFlowReturn result = GST_FLOW_OK;
   while (result == GST_FLOW_OK) {
     const auto item = state.reader.next();
     learn_streams(self);
     seek_table(self);
     if (!item) break;
-    if (state.reader.damage().places != places)
+    if (state.reader.corruption().places != places)
       for (auto& stream : state.streams) stream.discontinuous = true;
     result = std::visit([self](const auto& content) { return take(self, content); }, *item);
     if (result != GST_FLOW_OK) break;
@@ -130,14 +130,14 @@ GstFlowReturn take_end(GstAedatDemux* self) {
   GstFlowReturn result = read_items(self);
   for (auto& stream : state.streams) {
     if (!state.holding || stream.kind != Aedat4Kind::events) continue;
-    stream.slicer.finish();
-    stream.first = stream.slicer.first();
+    stream.chunker.finish();
+    stream.first = stream.chunker.first();
   }
   if (result == GST_FLOW_OK && state.holding) result = release(self);
   for (auto& stream : state.streams) {
     if (result != GST_FLOW_OK) break;
     if (stream.pad == nullptr || stream.kind != Aedat4Kind::events) continue;
-    stream.slicer.finish();
+    stream.chunker.finish();
     result = push_intervals(self, stream);
   }
   report(self);

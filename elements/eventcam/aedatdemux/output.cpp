@@ -15,7 +15,7 @@
 namespace aedatdemux {
 
 /// A stream that is further behind the others is silent.
-constexpr GstClockTime longest_lag = 500 * GST_MSECOND;
+constexpr GstClockTime max_lag = 500 * GST_MSECOND;
 
 static GstFlowReturn combined(GstAedatDemux* self, const Stream& stream, GstFlowReturn result) {
   return gst_flow_combiner_update_pad_flow(self->priv->combiner, stream.pad, result);
@@ -51,7 +51,7 @@ static GstFlowReturn push_buffer(GstAedatDemux* self, Stream& stream, OwnedBuffe
 }
 
 static GstFlowReturn push_interval(GstAedatDemux* self, Stream& stream,
-                                   const IntervalSlicer::Interval& interval) {
+                                   const Chunker::Interval& interval) {
   State& state = self->priv->state;
   const auto start = static_cast<GstClockTime>(interval.start - state.zero) * GST_USECOND;
   const auto end = start + static_cast<GstClockTime>(interval.duration) * GST_USECOND;
@@ -66,7 +66,7 @@ static GstFlowReturn push_interval(GstAedatDemux* self, Stream& stream,
 GstFlowReturn push_intervals(GstAedatDemux* self, Stream& stream) {
   GstFlowReturn result = GST_FLOW_OK;
   while (result == GST_FLOW_OK) {
-    const auto interval = stream.slicer.next();
+    const auto interval = stream.chunker.next();
     if (!interval) break;
     result = push_interval(self, stream, *interval);
   }
@@ -75,15 +75,15 @@ GstFlowReturn push_intervals(GstAedatDemux* self, Stream& stream) {
 
 GstFlowReturn catch_up(GstAedatDemux* self) {
   State& state = self->priv->state;
-  if (state.newest < longest_lag) return GST_FLOW_OK;
-  const GstClockTime silent_until = state.newest - longest_lag;
+  if (state.newest < max_lag) return GST_FLOW_OK;
+  const GstClockTime silent_until = state.newest - max_lag;
   GstFlowReturn result = GST_FLOW_OK;
   for (auto& stream : state.streams) {
     if (stream.pad == nullptr || stream.position >= silent_until) continue;
     if (stream.kind == Aedat4Kind::events) {
-      stream.slicer.reach(state.zero + static_cast<Microseconds>(silent_until / GST_USECOND));
+      stream.chunker.reach(state.zero + static_cast<Microseconds>(silent_until / GST_USECOND));
       result = push_intervals(self, stream);
-    } else if (silent_until - stream.position >= longest_lag) {
+    } else if (silent_until - stream.position >= max_lag) {
       const GstClockTime start = stream.position;
       if (advance(self, stream, start, silent_until))
         result = push_gap(self, stream, start, silent_until);
@@ -96,7 +96,7 @@ GstFlowReturn catch_up(GstAedatDemux* self) {
 }
 
 GstFlowReturn put_out(GstAedatDemux* self, std::size_t index,
-                      std::span<const StampedEvent> events) {
+                      std::span<const AbsoluteEvent> events) {
   State& state = self->priv->state;
   Stream& stream = state.streams[index];
   if (stream.size_assumed) {
@@ -104,7 +104,7 @@ GstFlowReturn put_out(GstAedatDemux* self, std::size_t index,
     state.counts.outside += eventcamera::erase_outside(state.within, stream.size);
     events = state.within;
   }
-  stream.slicer.push(events);
+  stream.chunker.push(events);
   return push_intervals(self, stream);
 }
 

@@ -16,7 +16,8 @@ GstFlowReturn push_intervals(GstAedatDemux* self, Stream& stream);
 GstFlowReturn catch_up(GstAedatDemux* self);
 
 /// Hands out events, as far as their intervals are whole.
-GstFlowReturn put_out(GstAedatDemux* self, std::size_t index, std::span<const StampedEvent> events);
+GstFlowReturn put_out(GstAedatDemux* self, std::size_t index,
+                      std::span<const AbsoluteEvent> events);
 
 /// Hands out a frame.
 GstFlowReturn put_out(GstAedatDemux* self, std::size_t index, Frame frame);

@@ -82,7 +82,7 @@ void make_pad(GstAedatDemux* self, std::size_t index) {
       GST_INFO_OBJECT(self, "the size is not told; %dx%d is assumed", stream.size.width,
                       stream.size.height);
     }
-    stream.slicer = IntervalSlicer(interval_length(self), output_start(self));
+    stream.chunker = Chunker(interval_length(self), output_start(self));
   }
   gchar* const name = g_strdup_printf(of_events ? "events_%u" : "video_%u", stream.number);
   stream.pad =

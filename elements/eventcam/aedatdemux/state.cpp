@@ -37,8 +37,8 @@ void begin_anew(GstAedatDemux* self) {
   self->priv->flow = GST_FLOW_OK;
   for (auto& stream : state.streams) {
     if (stream.kind == Aedat4Kind::events)
-      stream.slicer = state.holding ? IntervalSlicer(interval_length(self))
-                                    : IntervalSlicer(interval_length(self), output_start(self));
+      stream.chunker = state.holding ? Chunker(interval_length(self))
+                                     : Chunker(interval_length(self), output_start(self));
     stream.segment_due = true;
     stream.discontinuous = true;
   }

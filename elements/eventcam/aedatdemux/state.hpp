@@ -14,7 +14,7 @@
 #include "gst/base/reading_properties.hpp"
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_reader.hpp"
-#include "src/formats/interval_slicer.hpp"
+#include "src/formats/chunker.hpp"
 #include "src/formats/sensor_sizes.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(aedat_demux_debug);
@@ -22,13 +22,13 @@ GST_DEBUG_CATEGORY_EXTERN(aedat_demux_debug);
 
 namespace aedatdemux {
 
+using eventcamera::AbsoluteEvent;
 using eventcamera::Aedat4Kind;
 using eventcamera::Aedat4TableEntry;
 using eventcamera::AedatReader;
-using eventcamera::IntervalSlicer;
+using eventcamera::Chunker;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
-using eventcamera::StampedEvent;
 using eventcamera::UsedPixels;
 
 /// Whether a stream has a pad.
@@ -43,7 +43,7 @@ struct Stream {
   SensorSize size;
   bool size_assumed = false;
   GstPad* pad = nullptr;  ///< the element's; none while it is not shown
-  IntervalSlicer slicer;
+  Chunker chunker;
   std::optional<Microseconds> first;  ///< its earliest time, as far as it was held back
   UsedPixels used{};                  ///< by the events that were held back
   std::optional<GstVideoInfo> video;  ///< that of the caps
@@ -61,7 +61,7 @@ struct Frame {
 /// What is held back until the zero of time is known.
 struct Held {
   std::size_t stream;
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   Frame frame;  ///< without a buffer where it is events
 };
 
@@ -70,7 +70,7 @@ struct Counts {
   guint64 frames = 0;
   guint64 triggers = 0;
   guint64 imu_samples = 0;
-  guint64 damaged_places = 0;
+  guint64 corrupt_places = 0;
   guint64 outside = 0;   ///< events beyond the sensor
   guint64 untimely = 0;  ///< events and frames whose time cannot be
   guint64 repeated = 0;  ///< events of another's pixel and time
@@ -90,8 +90,8 @@ struct State {
   Microseconds zero = 0;            ///< once nothing is held back
   bool duration_estimated = false;  ///< and not yet known
   GstClockTime newest = 0;          ///< the greatest position of a stream
-  std::vector<StampedEvent> within;
-  Counts counts;  ///< but for what reader and slicers count
+  std::vector<AbsoluteEvent> within;
+  Counts counts;  ///< but for what reader and chunkers count
 };
 
 }  // namespace aedatdemux

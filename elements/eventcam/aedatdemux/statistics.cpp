@@ -11,7 +11,7 @@ GstStructure* make_stats(GstAedatDemux* self) {
   return gst_structure_new(
       "application/x-aedat-demux-stats", "events", G_TYPE_UINT64, counts.events, "frames",
       G_TYPE_UINT64, counts.frames, "triggers", G_TYPE_UINT64, counts.triggers, "imu-samples",
-      G_TYPE_UINT64, counts.imu_samples, "damaged-places", G_TYPE_UINT64, counts.damaged_places,
+      G_TYPE_UINT64, counts.imu_samples, "corrupt-places", G_TYPE_UINT64, counts.corrupt_places,
       "outside", G_TYPE_UINT64, counts.outside, "untimely", G_TYPE_UINT64, counts.untimely,
       "repeated", G_TYPE_UINT64, counts.repeated, nullptr);
 }
@@ -19,14 +19,14 @@ GstStructure* make_stats(GstAedatDemux* self) {
 static void count(GstAedatDemux* self) {
   const State& state = self->priv->state;
   Counts counts = state.counts;
-  const auto& damage = state.reader.damage();
-  counts.damaged_places += damage.places;
-  counts.outside += damage.outside;
+  const auto& corruption = state.reader.corruption();
+  counts.corrupt_places += corruption.places;
+  counts.outside += corruption.outside;
   if (const auto* const aedat4 = state.reader.aedat4())
     counts.imu_samples = aedat4->skipped().imu_samples;
   for (const auto& stream : state.streams) {
     if (state.holding) break;
-    const auto& dropped = stream.slicer.dropped();
+    const auto& dropped = stream.chunker.dropped();
     counts.untimely += dropped.late + dropped.stray;
     counts.repeated += dropped.repeated;
   }
@@ -36,8 +36,9 @@ static void count(GstAedatDemux* self) {
 
 void report(GstAedatDemux* self) {
   count(self);
-  const auto& damage = self->priv->state.reader.damage();
-  if (damage.places > 0) self->priv->faults.warn_of_damage(damage.first_at, damage.first.c_str());
+  const auto& corruption = self->priv->state.reader.corruption();
+  if (corruption.places > 0)
+    self->priv->faults.warn_of_corruption(corruption.first_at, corruption.first.c_str());
 }
 
 void tell_counts(GstAedatDemux* self) {

@@ -12,13 +12,13 @@
 namespace aedatdemux {
 
 /// Larger tables, of many days, are not read.
-constexpr guint64 largest_table = guint64{1} << 26;
+constexpr guint64 max_table = guint64{1} << 26;
 
 /// The bytes of the file from `position` to its end; none where that cannot be.
 static std::vector<guint8> pull_rest(GstAedatDemux* self, guint64 position) {
   std::vector<guint8> bytes;
   const guint64 size = upstream_bytes(self->priv->sink);
-  if (size <= position || size - position > largest_table) return bytes;
+  if (size <= position || size - position > max_table) return bytes;
   bytes.resize(size - position);
   for (std::size_t at = 0; at < bytes.size();) {
     GstBuffer* piece = nullptr;
@@ -50,26 +50,26 @@ void seek_table(GstAedatDemux* self) {
     state.table = std::move(*table);
     return;
   }
-  ++state.counts.damaged_places;
+  ++state.counts.corrupt_places;
   state.table_missing = true;
 }
 
 void warn_of_missing_table(GstAedatDemux* self) {
   const State& state = self->priv->state;
   // Bytes that are missing before a table have moved it, too.
-  if (!state.table_missing || state.reader.damage().places > 0) return;
+  if (!state.table_missing || state.reader.corruption().places > 0) return;
   auto& faults = self->priv->faults;
   const auto* const aedat4 = state.reader.aedat4();
   const auto at = aedat4->table_at().value_or(0);
   const auto found_at = aedat4->table_found_at();
   const auto end = upstream_bytes(self->priv->sink);
   if (found_at && *found_at != at)
-    faults.warn_of_damage(aedat4->table_field_at(),
-                          "the header names a place without a table of packets");
+    faults.warn_of_corruption(aedat4->table_field_at(),
+                              "the header names a place without a table of packets");
   else if (end <= at)
-    faults.warn_of_damage(end, "the file ends before its table of packets");
+    faults.warn_of_corruption(end, "the file ends before its table of packets");
   else
-    faults.warn_of_damage(at, "here should be a table of its packets");
+    faults.warn_of_corruption(at, "here should be a table of its packets");
 }
 
 }  // namespace aedatdemux

@@ -15,8 +15,8 @@
 namespace aedatdemux {
 
 /// So much is held back at most, in bytes and in microseconds.
-constexpr std::size_t most_held = std::size_t{1} << 24;
-constexpr Microseconds longest_hold = 1'000'000;
+constexpr std::size_t max_held = std::size_t{1} << 24;
+constexpr Microseconds max_hold = 1'000'000;
 
 GstFlowReturn release(GstAedatDemux* self) {
   auto* priv = self->priv;
@@ -74,7 +74,7 @@ static bool is_awaited(const State& state, std::size_t index) {
 
 bool is_zero_known(const State& state) {
   if (state.held.empty()) return false;
-  if (state.held_bytes >= most_held) return true;
+  if (state.held_bytes >= max_held) return true;
   bool awaited = false;
   auto first = std::numeric_limits<Microseconds>::max();
   auto last = std::numeric_limits<Microseconds>::min();
@@ -84,18 +84,18 @@ bool is_zero_known(const State& state) {
     if (!stream.first) continue;
     first = std::min(first, *stream.first);
     last =
-        std::max(last, stream.kind == Aedat4Kind::events ? stream.slicer.latest() : *stream.first);
+        std::max(last, stream.kind == Aedat4Kind::events ? stream.chunker.latest() : *stream.first);
   }
-  return !awaited || (last > first && last - first >= longest_hold);
+  return !awaited || (last > first && last - first >= max_hold);
 }
 
-void hold(State& state, std::size_t index, std::span<const StampedEvent> events) {
+void hold(State& state, std::size_t index, std::span<const AbsoluteEvent> events) {
   Stream& stream = state.streams[index];
   stream.used.include(events);
   // It tells which times are to be believed.
-  stream.slicer.push(events);
-  while (stream.slicer.next()) continue;
-  stream.first = stream.slicer.first();
+  stream.chunker.push(events);
+  while (stream.chunker.next()) continue;
+  stream.first = stream.chunker.first();
   state.held.push_back({index, {events.begin(), events.end()}, {}});
   state.held_bytes += sizeof(Held) + events.size_bytes();
 }

@@ -9,7 +9,7 @@
 namespace aedatdemux {
 
 /// Holds events back.
-void hold(State& state, std::size_t index, std::span<const StampedEvent> events);
+void hold(State& state, std::size_t index, std::span<const AbsoluteEvent> events);
 
 /// Holds a frame back.
 void hold(State& state, std::size_t index, Frame frame);

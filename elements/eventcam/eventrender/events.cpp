@@ -15,7 +15,7 @@ namespace eventrender {
 using eventcamera::Microseconds;
 
 /// Pictures are made through a silence, but not through one that no interval could have.
-constexpr GstClockTime longest_silence = GstClockTime{G_MAXUINT32} * GST_USECOND;
+constexpr GstClockTime max_silence = GstClockTime{G_MAXUINT32} * GST_USECOND;
 
 /// A live source that has sent nothing for so long is taken to be silent.
 constexpr GstClockTime patience = 200 * GST_MSECOND;
@@ -59,7 +59,7 @@ static bool approach(GstEventRender* self, GstBuffer* buffer, const EventInterva
   if (!priv.taken) {
     const bool returns =
         GST_BUFFER_IS_DISCONT(buffer) && interval.start + event_resolution < priv.known;
-    const bool leaps = priv.times && interval.start > priv.times->events().end + longest_silence;
+    const bool leaps = priv.times && interval.start > priv.times->events().end + max_silence;
     if (returns || leaps) priv.begin_anew();
     priv.taken = 0;
   }

@@ -71,7 +71,7 @@ GstFlowReturn scan(GstEventDecoder* self) {
   State& state = *priv->state;
   const auto drop = [&] {
     slice(self, nullptr);
-    while (state.slicer.next()) continue;
+    while (state.chunker.next()) continue;
     return GST_FLOW_OK;
   };
   GstFlowReturn result = GST_FLOW_OK;
@@ -89,12 +89,12 @@ GstFlowReturn scan(GstEventDecoder* self) {
     if (whole) {
       finish_decoder(self);
       drop();
-      state.slicer.finish();
+      state.chunker.finish();
     }
     Restart beginning;
     {
       const std::lock_guard lock(priv->mutex);
-      priv->first = state.slicer.first();
+      priv->first = state.chunker.first();
       beginning.segment = priv->segment;
       beginning.seqnum = priv->seqnum;
     }
@@ -103,7 +103,7 @@ GstFlowReturn scan(GstEventDecoder* self) {
     const guint64 size = whole ? 0 : upstream_bytes(priv->sink);
     if (size > 0) duration = gst_util_uint64_scale(duration, size, state.pulled);
     set_duration(self, duration);
-    beginning.landmark = landmark_before(self, beginning.segment.position);
+    beginning.seek_point = seek_point_before(self, beginning.segment.position);
     restart_at(self, beginning);
     state.scanned = true;
     return GST_FLOW_OK;

@@ -18,10 +18,10 @@ void set_duration(GstEventDecoder* self, GstClockTime duration) {
 }
 
 GstClockTime duration_so_far(GstEventDecoder* self) {
-  const IntervalSlicer& slicer = self->priv->state->slicer;
+  const Chunker& chunker = self->priv->state->chunker;
   const std::lock_guard lock(self->priv->mutex);
-  if (!self->priv->first || slicer.latest() < *self->priv->first) return self->priv->duration;
-  return static_cast<GstClockTime>(slicer.latest() + 1 - *self->priv->first) * GST_USECOND;
+  if (!self->priv->first || chunker.latest() < *self->priv->first) return self->priv->duration;
+  return static_cast<GstClockTime>(chunker.latest() + 1 - *self->priv->first) * GST_USECOND;
 }
 
 /// Bytes that are pushed tell only by and by how long it all is.

@@ -19,7 +19,7 @@ GstFlowReturn take_end(GstEventDecoder* self) {
   }
   finish_decoder(self);
   slice(self, nullptr);
-  state.slicer.finish();
+  state.chunker.finish();
   GstFlowReturn result = hand_out(self);
   // A file without events is an event stream, too.
   if (result == GST_FLOW_OK) result = begin_output(self);

@@ -23,11 +23,11 @@ constexpr std::size_t read_events = 1 << 14;
 /// Read ahead where the file does not tell the sensor's size.
 constexpr std::size_t scanned_events = std::size_t{1} << 22;
 /// Of a file that is pushed, in bytes.
-constexpr std::size_t most_collected = std::size_t{1} << 28;
+constexpr std::size_t max_collected = std::size_t{1} << 28;
 
 void collect(GstEventDecoder* self, std::span<const guint8> bytes) {
   auto& collected = self->priv->state->collected;
-  if (bytes.size() > most_collected - collected.size())
+  if (bytes.size() > max_collected - collected.size())
     throw std::runtime_error("a file this large has to be pulled, as from filesrc");
   self->priv->state->consumed = true;
   collected.insert(collected.end(), bytes.begin(), bytes.end());
@@ -65,14 +65,14 @@ static GstFlowReturn read_ahead(GstEventDecoder* self) {
   GstFlowReturn result = GST_FLOW_OK;
   std::size_t count = 0;
   const auto is_known = [&] {
-    return state.slicer.first() && (state.told_size().width > 0 || count >= scanned_events);
+    return state.chunker.first() && (state.told_size().width > 0 || count >= scanned_events);
   };
   while (result == GST_FLOW_OK && !is_known()) {
     result = read_file(self);
     count += state.decoded.events.size();
     slice(self, nullptr);
-    if (result == GST_FLOW_EOS) state.slicer.finish();
-    while (state.slicer.next()) continue;
+    if (result == GST_FLOW_EOS) state.chunker.finish();
+    while (state.chunker.next()) continue;
   }
   return result;
 }
@@ -83,8 +83,8 @@ GstFlowReturn read_collected(GstEventDecoder* self) {
       std::make_unique<eventcamera::MemoryBytes>(std::move(state.collected)));
   read_ahead(self);
   state.file->seek(std::numeric_limits<Microseconds>::min());
-  state.slicer = IntervalSlicer(interval_length(self));
-  state.before = state.damage();
+  state.chunker = Chunker(interval_length(self));
+  state.before = state.corruption();
   GstFlowReturn result = GST_FLOW_OK;
   while (result == GST_FLOW_OK) {
     result = read_file(self);
@@ -100,7 +100,7 @@ GstFlowReturn scan_file(GstEventDecoder* self) {
   State& state = *priv->state;
   // It may have been begun before, and interrupted by a flush.
   state.decoded = {};
-  state.slicer = IntervalSlicer(interval_length(self));
+  state.chunker = Chunker(interval_length(self));
   GstFlowReturn result = while_readable(self, [&] {
     state.file = GST_EVENT_DECODER_GET_CLASS(self)->open(
         std::make_unique<PadBytes>(priv->sink, state.unread));
@@ -118,11 +118,10 @@ GstFlowReturn scan_file(GstEventDecoder* self) {
   std::optional<Microseconds> length;
   {
     const std::lock_guard lock(priv->mutex);
-    priv->first = state.slicer.first();
+    priv->first = state.chunker.first();
     beginning.segment = priv->segment;
     beginning.seqnum = priv->seqnum;
-    if (range && priv->first && range->last >= *priv->first &&
-        range->last < IntervalSlicer::longest_time)
+    if (range && priv->first && range->last >= *priv->first && range->last < Chunker::max_time)
       length = range->last + 1 - *priv->first;
   }
   if (length || !range)

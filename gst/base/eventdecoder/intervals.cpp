@@ -40,10 +40,9 @@ void slice(GstEventDecoder* self, GstBuffer* buffer) {
   if (self->priv->timed && !state.shift && buffer != nullptr && GST_BUFFER_PTS_IS_VALID(buffer) &&
       !state.decoded.events.empty())
     set_shift(state,
-              std::clamp(state.decoded.events.front().t, -IntervalSlicer::longest_time,
-                         IntervalSlicer::longest_time),
+              std::clamp(state.decoded.events.front().t, -Chunker::max_time, Chunker::max_time),
               buffer);
-  state.slicer.push(state.decoded.events);
+  state.chunker.push(state.decoded.events);
   state.decoded.events.clear();
   if (!state.decoded.triggers.empty()) {
     const std::lock_guard lock(self->priv->mutex);
@@ -55,7 +54,7 @@ void slice(GstEventDecoder* self, GstBuffer* buffer) {
 GstFlowReturn hand_out(GstEventDecoder* self) {
   GstFlowReturn result = GST_FLOW_OK;
   while (result == GST_FLOW_OK) {
-    const auto interval = self->priv->state->slicer.next();
+    const auto interval = self->priv->state->chunker.next();
     if (!interval) break;
     result = push_interval(self, *interval);
   }
@@ -65,7 +64,7 @@ GstFlowReturn hand_out(GstEventDecoder* self) {
 
 void forget_times(GstEventDecoder* self) {
   State& state = *self->priv->state;
-  state.slicer = IntervalSlicer(interval_length(self));
+  state.chunker = Chunker(interval_length(self));
   state.shift.reset();
   state.decoded = {};
   state.consumed = false;

@@ -96,12 +96,12 @@ GstFlowReturn begin_output(GstEventDecoder* self) {
   return GST_FLOW_OK;
 }
 
-GstFlowReturn push_interval(GstEventDecoder* self, const IntervalSlicer::Interval& interval) {
+GstFlowReturn push_interval(GstEventDecoder* self, const Chunker::Interval& interval) {
   auto* priv = self->priv;
   if (!priv->caps_sent || priv->segment_due || !priv->held.empty()) {
     {
       const std::lock_guard lock(priv->mutex);
-      if (!priv->first) priv->first = priv->state->slicer.first();
+      if (!priv->first) priv->first = priv->state->chunker.first();
     }
     const GstFlowReturn result = begin_output(self);
     if (result != GST_FLOW_OK) return result;

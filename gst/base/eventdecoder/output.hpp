@@ -2,7 +2,7 @@
 #pragma once
 
 #include "gst/base/eventdecoder.hpp"
-#include "src/formats/interval_slicer.hpp"
+#include "src/formats/chunker.hpp"
 
 /// What goes downstream.
 namespace eventdecoder {
@@ -11,7 +11,6 @@ namespace eventdecoder {
 GstFlowReturn begin_output(GstEventDecoder* self);
 
 /// Pushes an interval's events, or tells of its silence.
-GstFlowReturn push_interval(GstEventDecoder* self,
-                            const eventcamera::IntervalSlicer::Interval& interval);
+GstFlowReturn push_interval(GstEventDecoder* self, const eventcamera::Chunker::Interval& interval);
 
 }  // namespace eventdecoder

@@ -32,7 +32,7 @@ static GstFlowReturn drain(GstEventDecoder* self) {
 static GstFlowReturn take_time(GstEventDecoder* self, GstClockTime time) {
   State& state = *self->priv->state;
   if (!state.shift || time > G_MAXINT64) return GST_FLOW_OK;
-  state.slicer.reach(static_cast<Microseconds>(time / GST_USECOND) - *state.shift);
+  state.chunker.reach(static_cast<Microseconds>(time / GST_USECOND) - *state.shift);
   return hand_out(self);
 }
 
@@ -134,7 +134,7 @@ static gboolean take_segment(GstEventDecoder* self, GstEvent* event) {
   }
   gst_event_unref(event);
   return priv->faults.guard([&] {
-    if (restart && restart->landmark.value_or(Landmark{}).position == start) {
+    if (restart && restart->seek_point.value_or(SeekPoint{}).position == start) {
       if (!priv->state) begin(self);
       restart_at(self, *restart);
     } else {
@@ -157,7 +157,7 @@ static gboolean take_gap(GstEventDecoder* self, GstEvent* event) {
   gst_event_parse_gap(event, &pts, &duration);
   const GstFlowReturn result = priv->faults.guard([&] {
     if (!is_timed(self) || !priv->state || !GST_CLOCK_TIME_IS_VALID(duration)) return GST_FLOW_OK;
-    if (priv->state->slicer.first()) return take_time(self, pts + duration);
+    if (priv->state->chunker.first()) return take_time(self, pts + duration);
     const GstFlowReturn begun = begin_output(self);
     if (begun == GST_FLOW_OK) gst_pad_push_event(priv->src, gst_event_ref(event));
     return begun;

@@ -39,7 +39,7 @@ static gboolean seek_pulling(GstEventDecoder* self, const Restart& restart, bool
   bool ok = true;
   if (priv->state && priv->state->scanned) {
     Restart found = restart;
-    found.landmark = landmark_before(self, restart.segment.position);
+    found.seek_point = seek_point_before(self, restart.segment.position);
     ok = priv->faults.guard([&] {
       restart_at(self, found);
       return GST_FLOW_OK;
@@ -58,14 +58,14 @@ static gboolean seek_pulling(GstEventDecoder* self, const Restart& restart, bool
 static gboolean seek_pushed(GstEventDecoder* self, const Restart& restart, gdouble rate) {
   auto* priv = self->priv;
   Restart found = restart;
-  found.landmark = landmark_before(self, restart.segment.position);
+  found.seek_point = seek_point_before(self, restart.segment.position);
   {
     const std::lock_guard lock(priv->mutex);
     priv->restart = found;
   }
   GstEvent* event = gst_event_new_seek(
       rate, GST_FORMAT_BYTES, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET,
-      static_cast<gint64>(found.landmark.value_or(Landmark{}).position), GST_SEEK_TYPE_NONE, -1);
+      static_cast<gint64>(found.seek_point.value_or(SeekPoint{}).position), GST_SEEK_TYPE_NONE, -1);
   gst_event_set_seqnum(event, restart.seqnum);
   if (gst_pad_push_event(priv->sink, event)) return TRUE;
   const std::lock_guard lock(priv->mutex);

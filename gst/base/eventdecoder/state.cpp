@@ -39,7 +39,7 @@ void begin(GstEventDecoder* self) {
   priv->state.emplace(State{.decoder = std::move(decoder),
                             .file = nullptr,
                             .collected = {},
-                            .slicer = IntervalSlicer(interval_length(self)),
+                            .chunker = Chunker(interval_length(self)),
                             .decoded = {},
                             .assumed = {},
                             .before = {},
@@ -80,24 +80,24 @@ void restart_at(GstEventDecoder* self, const Restart& restart) {
   auto* priv = self->priv;
   State& state = *priv->state;
   auto* seekable = dynamic_cast<SeekableDecoder*>(state.decoder.get());
-  auto fresh = restart.landmark && seekable != nullptr ? nullptr : make_decoder(self);
+  auto fresh = restart.seek_point && seekable != nullptr ? nullptr : make_decoder(self);
   const auto length = interval_length(self);
   const auto to = static_cast<Microseconds>(restart.segment.position / GST_USECOND);
   const std::lock_guard decoding(priv->decoding);
   if (state.file) {
-    state.before = state.damage();
+    state.before = state.corruption();
     state.file->seek(priv->first.value_or(0) + to);
   } else if (fresh) {
     state.decoder = std::move(fresh);
     state.before = {};
     state.pulled = 0;
   } else {
-    state.before = state.decoder->damage();
-    seekable->restart(*restart.landmark);
-    state.pulled = restart.landmark->position;
+    state.before = state.decoder->corruption();
+    seekable->restart(*restart.seek_point);
+    state.pulled = restart.seek_point->position;
   }
   const std::lock_guard lock(priv->mutex);
-  state.slicer = priv->first ? IntervalSlicer(length, *priv->first + to) : IntervalSlicer(length);
+  state.chunker = priv->first ? Chunker(length, *priv->first + to) : Chunker(length);
   state.outside = 0;
   priv->counts = {};
   priv->segment = restart.segment;
@@ -106,15 +106,15 @@ void restart_at(GstEventDecoder* self, const Restart& restart) {
   priv->discontinuous = true;
 }
 
-std::optional<Landmark> landmark_before(GstEventDecoder* self, GstClockTime time) {
+std::optional<SeekPoint> seek_point_before(GstEventDecoder* self, GstClockTime time) {
   auto* priv = self->priv;
   const std::lock_guard decoding(priv->decoding);
   if (!priv->state) return std::nullopt;
   const auto* seekable = dynamic_cast<const SeekableDecoder*>(priv->state->decoder.get());
   if (seekable == nullptr) return std::nullopt;
   const std::lock_guard lock(priv->mutex);
-  return seekable->landmark_before(priv->first.value_or(0) +
-                                   static_cast<Microseconds>(time / GST_USECOND));
+  return seekable->seek_point_before(priv->first.value_or(0) +
+                                     static_cast<Microseconds>(time / GST_USECOND));
 }
 
 }  // namespace eventdecoder

@@ -12,7 +12,7 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/reading_faults.hpp"
 #include "gst/base/reading_properties.hpp"
-#include "src/formats/interval_slicer.hpp"
+#include "src/formats/chunker.hpp"
 #include "src/formats/seekable_decoder.hpp"
 #include "src/formats/sensor_sizes.hpp"
 
@@ -21,28 +21,28 @@ GST_DEBUG_CATEGORY_EXTERN(event_decoder_debug);
 
 namespace eventdecoder {
 
-using eventcamera::Damage;
+using eventcamera::Chunker;
+using eventcamera::Corruption;
 using eventcamera::Decoded;
 using eventcamera::Decoder;
 using eventcamera::EventFile;
-using eventcamera::IntervalSlicer;
-using eventcamera::Landmark;
 using eventcamera::Microseconds;
+using eventcamera::SeekPoint;
 using eventcamera::SensorSize;
 using eventcamera::UsedPixels;
 
 struct Counts {
   guint64 events = 0;
   guint64 triggers = 0;
-  guint64 damaged_places = 0;
+  guint64 corrupt_places = 0;
   guint64 outside = 0;
-  IntervalSlicer::Dropped dropped;
+  Chunker::Dropped dropped;
 };
 
 /// Where to go on after a seek.
 struct Restart {
-  GstSegment segment = {};           ///< to play, the first event being at 0
-  std::optional<Landmark> landmark;  ///< none: the file's beginning
+  GstSegment segment = {};              ///< to play, the first event being at 0
+  std::optional<SeekPoint> seek_point;  ///< none: the file's beginning
   guint32 seqnum = GST_SEQNUM_INVALID;
 };
 
@@ -52,7 +52,7 @@ struct State {
   GstFlowReturn unread = GST_FLOW_OK;  ///< why bytes of the file could not be pulled
   std::unique_ptr<EventFile> file;     ///< once it is open
   std::vector<guint8> collected;       ///< to be opened, if it is pushed
-  IntervalSlicer slicer;
+  Chunker chunker;
   Decoded decoded;
   guint64 pulled = 0;                   ///< position of the next byte
   bool at_end = false;                  ///< there is none
@@ -62,17 +62,17 @@ struct State {
   UsedPixels used{};                    ///< while the decoder does not know the size
   std::optional<SensorSize> assumed;    ///< where the decoder does not tell
   guint64 outside = 0;                  ///< of it
-  Damage before;                        ///< the decoder's, when it was restarted
+  Corruption before;                    ///< the decoder's, when it was restarted
   std::optional<Microseconds> shift;    ///< from the decoder's time to upstream's, if it has one
 
   SensorSize told_size() const {
     if (file) return file->size();
     return decoder ? decoder->size() : SensorSize{};
   }
-  const Damage& damage() const {
-    static const Damage none;
-    if (file) return file->damage();
-    return decoder ? decoder->damage() : none;
+  const Corruption& corruption() const {
+    static const Corruption none;
+    if (file) return file->corruption();
+    return decoder ? decoder->corruption() : none;
   }
 };
 
@@ -95,7 +95,7 @@ struct GstEventDecoderPrivate {
   guint64 pushed_bytes = 0;  ///< since the file's beginning
   eventdecoder::Counts counts;
 
-  // Guards the decoder against a seek that looks for a landmark. Taken before `mutex`.
+  // Guards the decoder against a seek that looks for a seek point. Taken before `mutex`.
   std::mutex decoding;
 
   // The streaming thread's, or nobody's while there is none.
@@ -131,11 +131,11 @@ void drop_held(GstEventDecoder* self);
 /// Forgets the stream.
 void reset(GstEventDecoder* self);
 
-/// Goes on at a landmark, or the beginning, for the events of a segment; what was counted by then
+/// Goes on at a seek point, or the beginning, for the events of a segment; what was counted by then
 /// is forgotten. May throw.
 void restart_at(GstEventDecoder* self, const Restart& restart);
 
-/// Where to go on for a time of the segment; nothing where no landmark is.
-std::optional<Landmark> landmark_before(GstEventDecoder* self, GstClockTime time);
+/// Where to go on for a time of the segment; nothing where no seek point is.
+std::optional<SeekPoint> seek_point_before(GstEventDecoder* self, GstClockTime time);
 
 }  // namespace eventdecoder

@@ -12,7 +12,7 @@ GstStructure* make_stats(GstEventDecoder* self) {
   const Counts& counts = self->priv->counts;
   return gst_structure_new("application/x-event-decoder-stats", "events", G_TYPE_UINT64,
                            counts.events, "triggers", G_TYPE_UINT64, counts.triggers,
-                           "damaged-places", G_TYPE_UINT64, counts.damaged_places, "outside",
+                           "corrupt-places", G_TYPE_UINT64, counts.corrupt_places, "outside",
                            G_TYPE_UINT64, counts.outside, "late", G_TYPE_UINT64,
                            counts.dropped.late, "stray", G_TYPE_UINT64, counts.dropped.stray,
                            "repeated", G_TYPE_UINT64, counts.dropped.repeated, nullptr);
@@ -20,18 +20,19 @@ GstStructure* make_stats(GstEventDecoder* self) {
 
 static void count(GstEventDecoder* self) {
   const State& state = *self->priv->state;
-  const Damage& damage = state.damage();
+  const Corruption& corruption = state.corruption();
   const std::lock_guard lock(self->priv->mutex);
   Counts& counts = self->priv->counts;
-  counts.damaged_places = damage.places - state.before.places;
-  counts.outside = damage.outside - state.before.outside + state.outside;
-  counts.dropped = state.slicer.dropped();
+  counts.corrupt_places = corruption.places - state.before.places;
+  counts.outside = corruption.outside - state.before.outside + state.outside;
+  counts.dropped = state.chunker.dropped();
 }
 
 void report(GstEventDecoder* self) {
   count(self);
-  const Damage& damage = self->priv->state->damage();
-  if (damage.places > 0) self->priv->faults.warn_of_damage(damage.first_at, damage.first.c_str());
+  const Corruption& corruption = self->priv->state->corruption();
+  if (corruption.places > 0)
+    self->priv->faults.warn_of_corruption(corruption.first_at, corruption.first.c_str());
 }
 
 void warn_of_dropped(GstEventDecoder* self) {
@@ -41,9 +42,9 @@ void warn_of_dropped(GstEventDecoder* self) {
     counts = self->priv->counts;
   }
   GST_INFO_OBJECT(self,
-                  "%" G_GUINT64_FORMAT " damaged places, %" G_GUINT64_FORMAT
+                  "%" G_GUINT64_FORMAT " corrupt places, %" G_GUINT64_FORMAT
                   " triggers, %" G_GUINT64_FORMAT " events repeated",
-                  counts.damaged_places, counts.triggers, counts.dropped.repeated);
+                  counts.corrupt_places, counts.triggers, counts.dropped.repeated);
   const guint64 times = counts.dropped.late + counts.dropped.stray;
   if (times + counts.outside == 0) return;
   GST_ELEMENT_WARNING(self, STREAM, DECODE,

@@ -9,7 +9,7 @@ namespace eventdecoder {
 /// What was read and left out, for an application.
 GstStructure* make_stats(GstEventDecoder* self);
 
-/// Brings the statistics up to date, and warns of damage that is new.
+/// Brings the statistics up to date, and warns of corruption that is new.
 void report(GstEventDecoder* self);
 
 /// Tells, at the end, what was left out.

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int halvings = 3;
 constexpr int iterations = 3;
-constexpr int shortest_side = 32;  ///< of a shrunk picture
+constexpr int min_side = 32;  ///< of a shrunk picture
 
 /// A band of polynomials needs some more rows of the picture on both sides, which are worked out
 /// twice: bands are not thin.
@@ -44,7 +44,7 @@ void FarnebackFlow::start(int width, int height) {
   height_ = height;
   levels_.clear();
   for (int level = 0; level <= halvings; ++level) {
-    if (level > 0 && std::min(width, height) < shortest_side << level) break;
+    if (level > 0 && std::min(width, height) < min_side << level) break;
     levels_.emplace_back(width, height, level);
     if (level == 0) continue;
     Level& finer = levels_[levels_.size() - 2];

@@ -72,14 +72,14 @@ namespace {
 HWY_EXPORT(add_rows);
 HWY_EXPORT(blur_row);
 
-constexpr int longest_kernel = 19;
+constexpr int max_kernel = 19;
 
 std::vector<float> kernel_of(int level) {
   if (level == 0) return {0.25F, 0.5F, 0.25F};
   const double sigma = ((1 << level) - 1) * 0.5;
   const int reach = static_cast<int>(std::lrint(sigma * 5)) / 2;
   std::vector<float> kernel(2 * static_cast<std::size_t>(reach) + 1);
-  assert(kernel.size() <= longest_kernel);
+  assert(kernel.size() <= max_kernel);
   const auto weight = [&](int k) { return std::exp(-k * k / (2 * sigma * sigma)); };
   double sum = 0;
   for (int k = -reach; k <= reach; ++k) sum += weight(k);
@@ -114,8 +114,8 @@ void PyramidLevel::row(const PlaneView<std::uint8_t>& picture, int y, Scratch& s
   const auto room = static_cast<std::size_t>(width) + Resampling::spare;
 
   // Blurred rows are mixed before they are summed: one kernel, longer by a row.
-  std::array<const std::uint8_t*, longest_kernel + 1> rows;
-  std::array<float, longest_kernel + 1> weights{};
+  std::array<const std::uint8_t*, max_kernel + 1> rows;
+  std::array<float, max_kernel + 1> weights{};
   const float lower = rows_.weight()[y];
   for (int t = 0; t < count; ++t) {
     weights[t] += (1 - lower) * kernel_[t];

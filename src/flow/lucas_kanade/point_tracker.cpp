@@ -21,7 +21,7 @@ class Place {
   int group() const { return tile() << level_ | (position_ & mask(level_)); }
 
  private:
-  static constexpr int top_level = Pyramid::most_levels - 1;
+  static constexpr int top_level = Pyramid::max_levels - 1;
   static constexpr int bits_of_tile = 4;
   static_assert(1 << bits_of_tile == Tile::side && 1 << top_level == Tile::fractions);
 
@@ -88,7 +88,7 @@ void PointTracker::follow(std::span<const Point> points, int left, int top, Bloc
 void PointTracker::search(std::span<const Point> points, std::size_t level, int left, int top,
                           Block& block) {
   const auto group = [&](const Point& point) {
-    constexpr int groups_across = 1 << (Pyramid::most_levels - 1);
+    constexpr int groups_across = 1 << (Pyramid::max_levels - 1);
     return static_cast<std::size_t>(Place(point.y - top, level).group() * groups_across +
                                     Place(point.x - left, level).group());
   };

@@ -35,8 +35,8 @@ class PointTracker {
  private:
   /// Pixels that are followed together: on the uppermost level the points of each fraction of a
   /// pixel are a tile, on the others several.
-  static constexpr int block_side = Tile::side << (Pyramid::most_levels - 1);
-  static constexpr int tiles_a_block = 1 << 2 * (Pyramid::most_levels - 1);
+  static constexpr int block_side = Tile::side << (Pyramid::max_levels - 1);
+  static constexpr int tiles_a_block = 1 << 2 * (Pyramid::max_levels - 1);
 
   /// The points of a block, in the order of the tiles that they are in on a level.
   struct Block {

@@ -24,7 +24,7 @@ template <class Lanes>
 using BytesFor = hn::Rebind<std::uint8_t, Lanes>;
 
 /// The longest blurred row: a picture's, two pixels more each side, and a vector's rest.
-constexpr int longest_row = 16384 + 64;
+constexpr int max_row = 16384 + 64;
 
 // NOLINTBEGIN(clang-analyzer-core.uninitialized.Assign): the second loop reads what the first
 // wrote, and what a vector reads beyond it goes nowhere.
@@ -33,7 +33,7 @@ void halve_row(const PlaneWithMargin<std::uint8_t>& picture, int y, std::uint8_t
   const Words words;
   const BytesFor<Words> bytes;
   const int lanes = static_cast<int>(hn::Lanes(words));
-  HWY_ALIGN std::uint16_t blurred[longest_row];
+  HWY_ALIGN std::uint16_t blurred[max_row];
   const auto load = [&](int row, int x) {
     return hn::PromoteTo(words, hn::LoadU(bytes, picture.row(row) + x));
   };
@@ -144,8 +144,7 @@ void Pyramid::shape(int width, int height) {
       levels_[0].picture.height() == height)
     return;
   levels_.clear();
-  while (levels_.empty() ||
-         (std::min(width, height) > shortest_side && levels_.size() < most_levels)) {
+  while (levels_.empty() || (std::min(width, height) > min_side && levels_.size() < max_levels)) {
     levels_.push_back({PlaneWithMargin<std::uint8_t>(width, height),
                        PlaneWithMargin<std::int16_t>(width, height),
                        PlaneWithMargin<std::int16_t>(width, height)});

@@ -40,7 +40,7 @@ class PlaneWithMargin {
 };
 
 /// A picture and its halves, blurred with (1 4 6 4 1) / 16 each way and every second pixel taken,
-/// as long as both sides are longer than `shortest_side`; at most `most_levels`.
+/// as long as both sides are longer than `min_side`; at most `max_levels`.
 class Pyramid {
  public:
   /// The picture, reflected about its border pixels beyond them, and its slopes by Scharr's
@@ -51,8 +51,8 @@ class Pyramid {
     PlaneWithMargin<std::int16_t> slope_y;
   };
 
-  static constexpr int most_levels = 4;
-  static constexpr int shortest_side = 15;
+  static constexpr int max_levels = 4;
+  static constexpr int min_side = 15;
 
   /// Makes the levels, of a picture of any size; keeps the memory of one of the same size.
   void build(const PlaneView<std::uint8_t>& picture, ThreadPool& threads);

@@ -34,13 +34,13 @@ constexpr int window = 15;
 constexpr int half_window = window / 2;
 /// A row of the window takes up 16 values, the last of them without weight.
 constexpr int row_values = 16;
-constexpr int most_moves = 10;
-constexpr float shortest_move = 0.03F;
+constexpr int max_moves = 10;
+constexpr float min_move = 0.03F;
 /// Two moves that cancel each other to this much stand for one half way.
 constexpr float turning_back = 0.01F;
 /// The least eigenvalue of the slopes' mean products that can be followed.
-constexpr float least_texture = 1e-4F;
-/// Products of slopes (32 a grey level) in the units of least_texture.
+constexpr float min_texture = 1e-4F;
+/// Products of slopes (32 a grey level) in the units of min_texture.
 constexpr float slope_product = 1.0F / (1 << 20);
 /// Products of a slope and a value (4 a grey level), in the same units.
 constexpr float mismatch_product = slope_product * 8;
@@ -92,7 +92,7 @@ class Patch {
   const std::int16_t* slope_y() const { return slope_y_; }
 
  private:
-  static constexpr int most_values = (Tile::side + window) * stride;
+  static constexpr int max_values = (Tile::side + window) * stride;
 
   template <class Load>
   static void interpolate(const Tile& tile, int rows, const Load& load, std::int16_t* out) {
@@ -117,9 +117,9 @@ class Patch {
     }
   }
 
-  HWY_ALIGN std::int16_t grey_[most_values];
-  HWY_ALIGN std::int16_t slope_x_[most_values];
-  HWY_ALIGN std::int16_t slope_y_[most_values];
+  HWY_ALIGN std::int16_t grey_[max_values];
+  HWY_ALIGN std::int16_t slope_x_[max_values];
+  HWY_ALIGN std::int16_t slope_y_[max_values];
   int first_row_;
 };
 
@@ -254,7 +254,7 @@ class Points {
                                  hn::Set(floats, static_cast<float>(2 * window * window)));
       const auto determinant = hn::Sub(hn::Mul(xx, yy), cross);
       const auto followed =
-          hn::And(hn::Ge(least, hn::Set(floats, least_texture)),
+          hn::And(hn::Ge(least, hn::Set(floats, min_texture)),
                   hn::Ge(determinant, hn::Set(floats, std::numeric_limits<float>::epsilon())));
       const auto present =
           hn::FirstN(floats, static_cast<std::size_t>(std::min(lanes, count_ - i)));
@@ -275,7 +275,7 @@ class Points {
       const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
       locate(i, active, hn::Load(floats, flow_x_ + i), hn::Load(floats, flow_y_ + i));
     }
-    for (int round = 0; round < most_moves; ++round) {
+    for (int round = 0; round < max_moves; ++round) {
       for (int k = 0; k < moved_count_; ++k) mismatch(moved_[k]);
       moved_count_ = 0;
       bool any = false;
@@ -461,7 +461,7 @@ class Points {
     auto to_x = hn::Add(flow_x, move_x);
     auto to_y = hn::Add(flow_y, move_y);
     auto stops = hn::Le(hn::Add(hn::Mul(move_x, move_x), hn::Mul(move_y, move_y)),
-                        hn::Set(floats, shortest_move * shortest_move));
+                        hn::Set(floats, min_move * min_move));
     if (has_before) {
       const auto limit = hn::Set(floats, turning_back);
       const auto turns = hn::AndNot(

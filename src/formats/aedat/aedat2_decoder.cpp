@@ -28,7 +28,7 @@ constexpr std::uint32_t dvs128_off = 1;
 
 /// Times are 32 bits wide. Backwards by less is disorder, by more is a wrap.
 constexpr std::int64_t wrap = std::int64_t{1} << 32;
-constexpr std::int64_t most_disorder = 1'000'000;
+constexpr std::int64_t max_disorder = 1'000'000;
 /// A step of time that is larger is compared with the next record's before it is believed.
 constexpr std::int64_t large_step = 60'000'000;
 
@@ -62,7 +62,7 @@ SensorSize size_of(const std::string& chip) {
                             {"davis640", {640, 480}}, {"davisrgbw640", {640, 480}}};
   for (const auto& known : chips)
     if (chip.find(known.name) != std::string::npos) return known.size;
-  throw NotThisFormat("this AEDAT 2.0 file is of a " + chip + ", which cannot be read");
+  throw UnsupportedFormat("this AEDAT 2.0 file is of a " + chip + ", which cannot be read");
 }
 
 }  // namespace
@@ -77,13 +77,13 @@ void Aedat2Decoder::finish(Decoded& out) {
   finished_ = true;
   if (!header_read_ && !read_header()) {
     if (first_line_)
-      throw NotThisFormat("this is not AEDAT 2.0: it does not begin with #!AER-DAT2.0");
-    if (in_line_) damage_.note(queue_.position(), "the file ends within its header");
+      throw UnsupportedFormat("this is not AEDAT 2.0: it does not begin with #!AER-DAT2.0");
+    if (in_line_) corruption_.note(queue_.position(), "the file ends within its header");
     end_header();
   }
   read_records(out);
   if (queue_.size() > 0 && !scanning_)
-    damage_.note(queue_.position(), "a record that the end of the file cuts off");
+    corruption_.note(queue_.position(), "a record that the end of the file cuts off");
 }
 
 bool Aedat2Decoder::read_header() {
@@ -93,7 +93,7 @@ bool Aedat2Decoder::read_header() {
       const auto count = std::min(start.size(), magic.size());
       if (!std::equal(magic.begin(), magic.begin() + static_cast<std::ptrdiff_t>(count),
                       start.begin()))
-        throw NotThisFormat("this is not AEDAT 2.0: it does not begin with #!AER-DAT2.0");
+        throw UnsupportedFormat("this is not AEDAT 2.0: it does not begin with #!AER-DAT2.0");
       if (count < magic.size()) return false;
     }
     if (!in_line_) {
@@ -161,15 +161,15 @@ bool Aedat2Decoder::read_odd_record(Decoded& out) {
     sound_behind &= within_sensor(record_at(bytes.data() + i * record_size).address);
   const bool within = within_sensor(record.address);
   if (!sound_behind) {
-    damage_.note(queue_.position(), "bytes that are no records");
+    corruption_.note(queue_.position(), "bytes that are no records");
     queue_.consume(1);
     scanning_ = true;
     return true;
   }
   if (!within)
-    ++damage_.outside;
+    ++corruption_.outside;
   else if (behind > 0 && !far(record_at(bytes.data() + record_size).t))
-    damage_.note(queue_.position(), "a time far from those around it");
+    corruption_.note(queue_.position(), "a time far from those around it");
   else
     append(record, out);
   queue_.consume(record_size);
@@ -215,8 +215,8 @@ bool Aedat2Decoder::far(std::int32_t t) const {
 Microseconds Aedat2Decoder::unwrapped(std::int32_t t) const {
   if (!last_) return t;
   const auto step = std::int64_t{t} - *last_;
-  if (step < -most_disorder) return wraps_ + wrap + t;
-  if (step > wrap - most_disorder) return wraps_ - wrap + t;  // late, from before the wrap
+  if (step < -max_disorder) return wraps_ + wrap + t;
+  if (step > wrap - max_disorder) return wraps_ - wrap + t;  // late, from before the wrap
   return wraps_ + t;
 }
 
@@ -242,10 +242,10 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
   const auto x = static_cast<int>(davis_ ? address >> 12 & 0x3ff : address >> 1 & 0x7f);
   const auto y = static_cast<int>(davis_ ? address >> 22 & 0x1ff : address >> 8 & 0x7f);
   const bool on = davis_ ? (address & davis_on) != 0 : (address & dvs128_off) == 0;
-  if (t < newest_) ++damage_.unsorted;
+  if (t < newest_) ++corruption_.unsorted;
   newest_ = std::max(newest_, t);
-  out.events.push_back(StampedEvent::at(size_.width - 1 - x, size_.height - 1 - y, t,
-                                        on ? Polarity::on : Polarity::off));
+  out.events.push_back(AbsoluteEvent::at(size_.width - 1 - x, size_.height - 1 - y, t,
+                                         on ? Polarity::on : Polarity::off));
 }
 
 Aedat2Decoder::Record Aedat2Decoder::record_at(const std::uint8_t* bytes) {

@@ -15,9 +15,9 @@ constexpr std::string_view magic = "#!AER-DAT3.1";
 constexpr std::string_view header_end = "#!END-HEADER";
 constexpr std::size_t packet_header_size = 28;
 constexpr std::size_t event_size = 8;
-constexpr std::int64_t largest_packet = std::int64_t{64} << 20;
+constexpr std::int64_t max_packet = std::int64_t{64} << 20;
 /// Its times end at 2^60 microseconds.
-constexpr std::int32_t largest_overflow = 1 << 29;
+constexpr std::int32_t max_overflow = 1 << 29;
 constexpr int widest = 8192;
 /// So many events behind one that cannot be have to be sound for it to be the only one.
 constexpr std::uint64_t events_behind = 4;
@@ -84,12 +84,13 @@ void Aedat3Decoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
 void Aedat3Decoder::finish(Decoded& out) {
   finished_ = true;
   if (!header_read_ && !read_header())
-    throw NotThisFormat(first_line_ ? "this is not AEDAT 3.1: it does not begin with #!AER-DAT3.1"
-                                    : "this AEDAT 3.1 file ends within its header");
+    throw UnsupportedFormat(first_line_
+                                ? "this is not AEDAT 3.1: it does not begin with #!AER-DAT3.1"
+                                : "this AEDAT 3.1 file ends within its header");
   read_packets(out);
   const bool within = packet_.events != 0 || packet_.rest != 0;
   if (!scanning_ && (within || queue_.size() > 0))
-    damage_.note(queue_.position(), "a packet that the end of the file cuts off");
+    corruption_.note(queue_.position(), "a packet that the end of the file cuts off");
 }
 
 bool Aedat3Decoder::read_header() {
@@ -99,14 +100,14 @@ bool Aedat3Decoder::read_header() {
       const auto count = std::min(start.size(), magic.size());
       if (!std::equal(magic.begin(), magic.begin() + static_cast<std::ptrdiff_t>(count),
                       start.begin()))
-        throw NotThisFormat("this is not AEDAT 3.1: it does not begin with #!AER-DAT3.1");
+        throw UnsupportedFormat("this is not AEDAT 3.1: it does not begin with #!AER-DAT3.1");
       if (count < magic.size()) return false;
     }
     if (line_.empty()) {
       const auto next = queue_.peek(1);
       if (next.empty()) return false;
       if (next.front() != '#')
-        throw NotThisFormat("the header of this AEDAT 3.1 file does not end with #!END-HEADER");
+        throw UnsupportedFormat("the header of this AEDAT 3.1 file does not end with #!END-HEADER");
     }
     if (!take_header_line(queue_, line_)) return false;
     first_line_ = false;
@@ -121,8 +122,8 @@ bool Aedat3Decoder::read_header() {
 /// Notes what a line of the header says.
 void Aedat3Decoder::take_line() {
   if (line_.starts_with("#Format:") && line_.find("RAW") == std::string::npos)
-    throw NotThisFormat("this AEDAT 3.1 file is compressed, which cannot be read: " +
-                        line_.substr(1));
+    throw UnsupportedFormat("this AEDAT 3.1 file is compressed, which cannot be read: " +
+                            line_.substr(1));
   // A camera is one source; what filters make of its events are others of the same size.
   if ((line_.starts_with("#Source") || line_.starts_with("#-Source")) && size_ == SensorSize{})
     size_ = size_of(line_);
@@ -148,7 +149,7 @@ bool Aedat3Decoder::read_packet_header() {
   const auto bytes = queue_.peek(packet_header_size);
   if (bytes.empty()) return false;
   if (!begins_packet(bytes.data())) {
-    damage_.note(queue_.position(), "bytes that are no packet");
+    corruption_.note(queue_.position(), "bytes that are no packet");
     scanning_ = true;
     return true;
   }
@@ -179,7 +180,7 @@ bool Aedat3Decoder::read_events(Decoded& out) {
   queue_.consume(i * event_size);
   if (!odd) return true;
 
-  // One that cannot be: an event that is damaged, or the next packet where this one should go on,
+  // One that cannot be: an event that is corrupt, or the next packet where this one should go on,
   // or bytes are missing and nothing here is an event.
   const auto behind = std::min<std::uint64_t>(packet_.events - 1, events_behind);
   const auto wanted = std::max(packet_header_size, (1 + behind) * event_size);
@@ -189,17 +190,17 @@ bool Aedat3Decoder::read_events(Decoded& out) {
   for (std::size_t k = 1; k <= behind && (k + 1) * event_size <= next.size(); ++k)
     sound_behind &= !is_odd(next.data() + k * event_size);
   if (next.size() >= packet_header_size && begins_packet(next.data())) {
-    damage_.note(queue_.position(), "a packet that is shorter than it says");
+    corruption_.note(queue_.position(), "a packet that is shorter than it says");
     packet_ = {};
   } else if (!sound_behind) {
-    damage_.note(queue_.position(), "bytes that are no events");
+    corruption_.note(queue_.position(), "bytes that are no events");
     packet_ = {};
     scanning_ = true;
   } else {
     if (little_endian<std::int32_t>(next.data() + 4) < 0)
-      damage_.note(queue_.position(), "an event at an impossible time");
+      corruption_.note(queue_.position(), "an event at an impossible time");
     else
-      ++damage_.outside;
+      ++corruption_.outside;
     --packet_.events;
     queue_.consume(event_size);
   }
@@ -229,11 +230,11 @@ bool Aedat3Decoder::begins_packet(const std::uint8_t* bytes) const {
     return false;
   if (header.time_offset < 0 || header.time_offset > header.event_size - 4) return false;
   if (header.of_events() && header.time_offset != 4) return false;
-  if (header.overflow < 0 || header.overflow >= largest_overflow) return false;
+  if (header.overflow < 0 || header.overflow >= max_overflow) return false;
   if (header.valid_number < 0 || header.number < header.valid_number ||
       header.capacity < header.number)
     return false;
-  return std::int64_t{header.capacity} * header.event_size <= largest_packet;
+  return std::int64_t{header.capacity} * header.event_size <= max_packet;
 }
 
 /// Whether an event is outside the sensor or at no time. Where the sensor is not known, what looks
@@ -251,10 +252,10 @@ void Aedat3Decoder::append(const std::uint8_t* event, Decoded& out) {
   if ((data & valid) == 0) return;
   const auto t = packet_.overflow | little_endian<std::int32_t>(event + 4);
   if (packet_.type == polarity) {
-    if (t < newest_) ++damage_.unsorted;
+    if (t < newest_) ++corruption_.unsorted;
     newest_ = std::max(newest_, t);
-    out.events.push_back(StampedEvent::at(x_of(data), y_of(data), t,
-                                          (data & on) != 0 ? Polarity::on : Polarity::off));
+    out.events.push_back(AbsoluteEvent::at(x_of(data), y_of(data), t,
+                                           (data & on) != 0 ? Polarity::on : Polarity::off));
     return;
   }
   struct Input {

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera {
@@ -74,7 +74,7 @@ constexpr std::size_t aedat4_packet_header = 8;
 /// of 4096x2304 pixels fits.
 constexpr std::size_t aedat4_largest_packet = std::size_t{64} << 20;
 
-/// Times further from zero than this are damage: 36,000 years.
+/// Times further from zero than this are corruption: 36,000 years.
 constexpr Microseconds aedat4_last_time = Microseconds{1} << 60;
 
 }  // namespace eventcamera

@@ -28,7 +28,7 @@ class Aedat4Decompressor {
     std::size_t used;                     ///< how many bytes of the payload made them
   };
 
-  /// The content of the frame at the front of `payload`; nothing where that is damaged, or larger
+  /// The content of the frame at the front of `payload`; nothing where that is corrupt, or larger
   /// than `limit`. The compression is not `none`.
   std::optional<Content> decompress(Aedat4Compression compression,
                                     std::span<const std::uint8_t> payload,

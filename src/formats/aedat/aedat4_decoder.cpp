@@ -22,19 +22,19 @@ constexpr std::size_t identifier_size = 4;
 constexpr std::size_t payload_head = identifier_at + identifier_size;
 constexpr std::size_t packet_head = aedat4_packet_header + payload_head;
 
-constexpr std::size_t largest_header = std::size_t{16} << 20;
-constexpr int most_unlisted_streams = 256;
+constexpr std::size_t max_header = std::size_t{16} << 20;
+constexpr int max_unlisted_streams = 256;
 constexpr int widest = 32768;
 /// Elements handed over at once: they stay in the cache of the second level.
 constexpr std::size_t block = 4096;
-/// Looking into a packet whose size is damaged for the one after it costs work a second time. A
+/// Looking into a packet whose size is corrupt for the one after it costs work a second time. A
 /// file made for that may not have more of it than this.
-constexpr std::size_t most_credit = std::size_t{256} << 20;
+constexpr std::size_t max_credit = std::size_t{256} << 20;
 /// What a packet that does not decompress counts for, besides its bytes.
 constexpr std::size_t decompressing = std::size_t{4} << 20;
 
 constexpr std::size_t event_size = sizeof(aedat4::Event);
-static_assert(event_size == sizeof(StampedEvent));
+static_assert(event_size == sizeof(AbsoluteEvent));
 
 /// The bytes or structs of a verified vector, which may lie at any address.
 struct Plain {
@@ -48,7 +48,7 @@ Plain plain(const void* vector) {
   return {bytes + size_prefix, flatbuffers::ReadScalar<flatbuffers::uoffset_t>(bytes)};
 }
 
-constexpr const char* broken_packet = "a packet whose FlatBuffer is damaged";
+constexpr const char* broken_packet = "a packet whose FlatBuffer is corrupt";
 
 /// Packets of bytes and structs are read where they lie in the file, at any address; those of
 /// tables are aligned first.
@@ -82,7 +82,7 @@ bool is_time(Microseconds t) {
 }
 
 /// The event that lies at `bytes`, its column and row unchecked.
-StampedEvent event_at(const std::uint8_t* bytes) {
+AbsoluteEvent event_at(const std::uint8_t* bytes) {
   // t:64, x:16, y:16, on:8, padding:24
   const auto word = little_endian<std::uint64_t>(bytes + 8);
   const auto on = static_cast<std::uint16_t>(((word >> 32) & 0xff) != 0 ? 0x8000 : 0);
@@ -113,7 +113,7 @@ Trigger trigger_of(const aedat4::Trigger& trigger) {
 
 }  // namespace
 
-Aedat4Decoder::Aedat4Decoder() : events_(block), credit_(most_credit) {
+Aedat4Decoder::Aedat4Decoder() : events_(block), credit_(max_credit) {
   triggers_.reserve(block);
 }
 
@@ -151,30 +151,31 @@ bool Aedat4Decoder::read_header() {
           start.begin(),
           start.begin() + static_cast<std::ptrdiff_t>(std::min(start.size(), aedat4_magic.size())),
           aedat4_magic.begin()))
-    throw NotThisFormat("this is not AEDAT4: it does not begin with " +
-                        std::string(aedat4_magic.substr(0, aedat4_magic.size() - 2)));
+    throw UnsupportedFormat("this is not AEDAT4: it does not begin with " +
+                            std::string(aedat4_magic.substr(0, aedat4_magic.size() - 2)));
   const auto size_at = aedat4_magic.size();
   const auto before = size_at + size_prefix;
   auto bytes = queue_.peek(before);
   const auto size = bytes.empty() ? 0 : little_endian<std::uint32_t>(bytes.data() + size_at);
-  if (size > largest_header)
-    throw NotThisFormat("this AEDAT4 file claims a header of " + std::to_string(size) + " bytes");
+  if (size > max_header)
+    throw UnsupportedFormat("this AEDAT4 file claims a header of " + std::to_string(size) +
+                            " bytes");
   if (!bytes.empty()) bytes = queue_.peek(before + size);
   if (bytes.empty()) {
-    if (finished_) throw NotThisFormat("this AEDAT4 file ends within its header");
+    if (finished_) throw UnsupportedFormat("this AEDAT4 file ends within its header");
     return false;
   }
   const auto content = decompressor_.aligned(bytes.subspan(size_at, size_prefix + size));
   const auto* const header = verified<aedat4::Header>(content, "IOHE", Address::aligned);
-  if (header == nullptr) throw NotThisFormat("the header of this AEDAT4 file is damaged");
+  if (header == nullptr) throw UnsupportedFormat("the header of this AEDAT4 file is corrupt");
   if (header->compression() < 0 ||
       header->compression() > static_cast<int>(Aedat4Compression::zstd_high))
-    throw NotThisFormat("this AEDAT4 file is compressed in a way that we do not know, number " +
-                        std::to_string(header->compression()));
+    throw UnsupportedFormat("this AEDAT4 file is compressed in a way that we do not know, number " +
+                            std::to_string(header->compression()));
   compression_ = static_cast<Aedat4Compression>(header->compression());
   if (header->info_node() != nullptr) {
     auto info = read_info_node(header->info_node()->string_view());
-    if (!info.whole) damage_.note(size_at, "the header's XML is damaged");
+    if (!info.whole) corruption_.note(size_at, "the header's XML is corrupt");
     streams_ = std::move(info.streams);
   }
   listed_ = !streams_.empty();
@@ -210,7 +211,7 @@ bool Aedat4Decoder::begins_packet(std::span<const std::uint8_t> bytes) const {
   const auto id = little_endian<std::int32_t>(bytes.data());
   const auto size = little_endian<std::uint32_t>(bytes.data() + 4);
   if (size < payload_head || size > aedat4_largest_packet) return false;
-  if (listed_ ? !stream_of(id) : id < 0 || id >= most_unlisted_streams) return false;
+  if (listed_ ? !stream_of(id) : id < 0 || id >= max_unlisted_streams) return false;
   const auto payload = bytes.subspan(aedat4_packet_header);
   if (compression_ != Aedat4Compression::none) return begins_compressed(compression_, payload);
   if (little_endian<std::uint32_t>(payload.data()) > size - size_prefix) return false;
@@ -237,7 +238,7 @@ bool Aedat4Decoder::read_packet() {
   if (place != Place::packet) {
     // The table ends the packets, but what it may hide is looked for all the same.
     if (place == Place::noise)
-      damage_.note(queue_.position(), "bytes that are no packet");
+      corruption_.note(queue_.position(), "bytes that are no packet");
     else if (!table_found_at_)
       table_found_at_ = queue_.position();
     queue_.consume(1);
@@ -252,7 +253,7 @@ bool Aedat4Decoder::read_packet() {
   auto bytes = queue_.peek(packet);
   if (bytes.empty()) {
     if (!finished_) return false;
-    damage_.note(queue_.position(), "a packet that the end of the file cuts off");
+    corruption_.note(queue_.position(), "a packet that the end of the file cuts off");
     queue_.consume(aedat4_packet_header);
     scanning_ = true;
     return true;
@@ -270,7 +271,7 @@ bool Aedat4Decoder::read_packet() {
   } else {
     used = size_prefix + prefix;
   }
-  // A size that is damaged swallows packets or ends in the midst of one; what follows tells. Where
+  // A size that is corrupt swallows packets or ends in the midst of one; what follows tells. Where
   // nothing is compressed missing bytes show in no other way.
   bool sound_after = true;
   if (used != size || compression_ == Aedat4Compression::none) {
@@ -285,22 +286,22 @@ bool Aedat4Decoder::read_packet() {
     content = content.first(std::min(
         content.size(), size_prefix + std::size_t{little_endian<std::uint32_t>(content.data())}));
 
-  const char* damage = nullptr;
+  const char* corruption = nullptr;
   if (used == 0)
-    damage = "a packet that does not decompress";
+    corruption = "a packet that does not decompress";
   else if (compression_ == Aedat4Compression::none && !sound_after &&
            !has_sound_events(content, id))
-    damage = "a packet that lacks bytes";
+    corruption = "a packet that lacks bytes";
   else
-    damage = read_content(content, id);
-  if (damage == nullptr) {
+    corruption = read_content(content, id);
+  if (corruption == nullptr) {
     packet_ = packet;
     if (!sound_after && used != size) {
       packet_ = aedat4_packet_header + used;
-      damage_.note(queue_.position(), "a packet of the wrong size");
+      corruption_.note(queue_.position(), "a packet of the wrong size");
       scanning_ = true;
     }
-    credit_ = std::min(most_credit, credit_ + packet);
+    credit_ = std::min(max_credit, credit_ + packet);
     return true;
   }
   if (used == size && compression_ != Aedat4Compression::none) {
@@ -308,16 +309,16 @@ bool Aedat4Decoder::read_packet() {
     if (after == Place::more) return false;
     sound_after = after != Place::noise;
   }
-  damage_.note(queue_.position(), damage);
+  corruption_.note(queue_.position(), corruption);
   // A frame that decompresses hides no packets.
   const auto sound = compression_ == Aedat4Compression::none ? 0 : used;
-  skip_damaged(packet, sound, size + (used == 0 ? decompressing : content.size()), sound_after);
+  skip_corrupt(packet, sound, size + (used == 0 ? decompressing : content.size()), sound_after);
   return true;
 }
 
-/// Goes on behind a damaged packet of `packet` bytes where something sound follows it, else with
+/// Goes on behind a corrupt packet of `packet` bytes where something sound follows it, else with
 /// looking through it for the packets that it has swallowed.
-void Aedat4Decoder::skip_damaged(std::size_t packet, std::size_t sound, std::size_t work,
+void Aedat4Decoder::skip_corrupt(std::size_t packet, std::size_t sound, std::size_t work,
                                  bool sound_after) {
   if (sound_after) {
     queue_.consume(packet);
@@ -346,7 +347,7 @@ const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, i
 
   std::optional<Plain> elements = Plain{};
   if (kind == Aedat4Kind::frames) {
-    if (const char* const damage = read_frame(content)) return damage;
+    if (const char* const corruption = read_frame(content)) return corruption;
   } else if (kind == Aedat4Kind::events) {
     elements = elements_of<aedat4::EventPacket>(content, "EVTS", Address::any);
   } else if (kind == Aedat4Kind::triggers) {
@@ -425,7 +426,7 @@ Aedat4Item Aedat4Decoder::next_events() {
 }
 
 /// The next `count` events. In a block without fault nothing is looked at twice.
-std::span<const StampedEvent> Aedat4Decoder::checked_events(std::size_t count) {
+std::span<const AbsoluteEvent> Aedat4Decoder::checked_events(std::size_t count) {
   const auto limit = limit_of(streams_[elements_.stream].size);
   const auto width = limit.width;
   const auto height = limit.height;
@@ -450,11 +451,11 @@ std::span<const StampedEvent> Aedat4Decoder::checked_events(std::size_t count) {
     const auto* const bytes = from + i * event_size;
     const auto event = event_at(bytes);
     if (!is_time(event.t)) {
-      damage_.note(queue_.position(), "an event at an impossible time");
+      corruption_.note(queue_.position(), "an event at an impossible time");
     } else if (event.x >= width || row_at(bytes) >= height) {
-      ++damage_.outside;
+      ++corruption_.outside;
     } else {
-      if (event.t < newest) ++damage_.unsorted;
+      if (event.t < newest) ++corruption_.unsorted;
       newest = std::max(newest, event.t);
       events_[kept++] = event;
     }
@@ -472,7 +473,7 @@ Aedat4Item Aedat4Decoder::next_triggers() {
     if (is_time(trigger->t()))
       triggers_.push_back(trigger_of(*trigger));
     else
-      damage_.note(queue_.position(), "a trigger at an impossible time");
+      corruption_.note(queue_.position(), "a trigger at an impossible time");
   }
   elements_.data += count * sizeof(flatbuffers::uoffset_t);
   elements_.count -= count;

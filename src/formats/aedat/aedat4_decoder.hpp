@@ -18,7 +18,7 @@ namespace eventcamera {
 /// Events of one packet, or a part of it. `stream` is an index into the decoder's streams().
 struct Aedat4Events {
   std::size_t stream;
-  std::span<const StampedEvent> events;
+  std::span<const AbsoluteEvent> events;
 };
 
 /// A packet's frame.
@@ -55,7 +55,7 @@ class Aedat4Decoder {
   void finish() { finished_ = true; }
 
   /// What comes next, valid until the next call; nothing where that takes more bytes. Throws
-  /// NotThisFormat.
+  /// UnsupportedFormat.
   std::optional<Aedat4Item> next();
 
   /// What is pushed next lies at `position`, where a packet should begin. The header has to have
@@ -80,7 +80,7 @@ class Aedat4Decoder {
   /// Where something like a table was come upon.
   std::optional<std::uint64_t> table_found_at() const { return table_found_at_; }
 
-  const Damage& damage() const { return damage_; }
+  const Corruption& corruption() const { return corruption_; }
 
   /// What is sound, but not handed over.
   struct Skipped {
@@ -111,9 +111,9 @@ class Aedat4Decoder {
   const char* read_frame(std::span<const std::uint8_t> content);
   std::optional<std::size_t> stream_of(int id) const;
   std::size_t add_stream(int id, Aedat4Kind kind);
-  void skip_damaged(std::size_t packet, std::size_t sound, std::size_t work, bool sound_after);
+  void skip_corrupt(std::size_t packet, std::size_t sound, std::size_t work, bool sound_after);
   Aedat4Item next_events();
-  std::span<const StampedEvent> checked_events(std::size_t count);
+  std::span<const AbsoluteEvent> checked_events(std::size_t count);
   Aedat4Item next_triggers();
 
   ByteQueue queue_;
@@ -132,11 +132,11 @@ class Aedat4Decoder {
   std::size_t packet_ = 0;  ///< bytes of the packet that is being handed over
   Elements elements_;
   std::optional<Aedat4Picture> picture_;
-  std::vector<StampedEvent> events_;
+  std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
 
-  std::size_t credit_;  ///< work that may still be spent on looking into damaged packets
-  Damage damage_;
+  std::size_t credit_;  ///< work that may still be spent on looking into corrupt packets
+  Corruption corruption_;
   Skipped skipped_;
 };
 

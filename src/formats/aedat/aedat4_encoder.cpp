@@ -15,8 +15,8 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::size_t most_events = 4096;
-constexpr int largest_side = 32767;
+constexpr std::size_t max_events = 4096;
+constexpr int max_side = 32767;
 
 template <class Number>
 void append(Number number, std::vector<std::uint8_t>& out) {
@@ -26,7 +26,7 @@ void append(Number number, std::vector<std::uint8_t>& out) {
 }
 
 bool is_side(int pixels) {
-  return pixels > 0 && pixels <= largest_side;
+  return pixels > 0 && pixels <= max_side;
 }
 
 }  // namespace
@@ -41,11 +41,11 @@ Aedat4Encoder::Aedat4Encoder(Aedat4Settings settings)
 
 Aedat4Encoder::~Aedat4Encoder() = default;
 
-void Aedat4Encoder::encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) {
+void Aedat4Encoder::encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
   write_header(out);
-  while (held_.size() + events.size() >= most_events) {
+  while (held_.size() + events.size() >= max_events) {
     // A whole packet is written from where it lies.
-    const auto count = most_events - held_.size();
+    const auto count = max_events - held_.size();
     if (held_.empty()) {
       write_events(events.first(count), out);
     } else {
@@ -125,7 +125,7 @@ void Aedat4Encoder::write_header(std::vector<std::uint8_t>& out) {
   position_ = aedat4_magic.size() + header.size();
 }
 
-void Aedat4Encoder::write_events(std::span<const StampedEvent> events,
+void Aedat4Encoder::write_events(std::span<const AbsoluteEvent> events,
                                  std::vector<std::uint8_t>& out) {
   builder_->Clear();
   aedat4::Event* to = nullptr;

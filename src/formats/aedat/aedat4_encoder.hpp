@@ -42,7 +42,7 @@ class Aedat4Encoder final : public Encoder {
   ~Aedat4Encoder() override;
 
   /// Events are held back until there are enough of them for a packet.
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override;
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
 
   /// Appends the events that are held back, and then the frame. Throws std::invalid_argument for
   /// one that AEDAT4 cannot hold.
@@ -65,14 +65,14 @@ class Aedat4Encoder final : public Encoder {
 
  private:
   void write_header(std::vector<std::uint8_t>& out);
-  void write_events(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out);
+  void write_events(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out);
   void write_packet(int stream, std::int64_t elements, Microseconds start, Microseconds end,
                     std::vector<std::uint8_t>& out);
 
   Aedat4Settings settings_;
   std::unique_ptr<Aedat4Compressor> compressor_;
   std::unique_ptr<flatbuffers::FlatBufferBuilder> builder_;
-  std::vector<StampedEvent> held_;
+  std::vector<AbsoluteEvent> held_;
   std::uint64_t position_ = 0;        ///< in the file, of what comes next
   std::uint64_t table_field_at_ = 0;  ///< in the file, of the table's position
   std::vector<Aedat4TableEntry> table_;

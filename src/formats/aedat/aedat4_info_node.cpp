@@ -11,9 +11,9 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::size_t most_streams = 256;
+constexpr std::size_t max_streams = 256;
 constexpr std::size_t deepest_node = 64;
-constexpr int largest_side = 32767;
+constexpr int max_side = 32767;
 
 constexpr std::array<std::pair<std::string_view, char>, 5> entities{
     {{"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}}};
@@ -124,7 +124,7 @@ class Reader {
     const auto& streams = info_.streams;
     named_ = id.has_value();
     if (!named_) return true;
-    if (streams.size() == most_streams ||
+    if (streams.size() == max_streams ||
         std::any_of(streams.begin(), streams.end(), [&](auto& s) { return s.id == *id; }))
       return false;
     info_.streams.emplace_back().id = *id;
@@ -139,8 +139,8 @@ class Reader {
     } else if (of_stream(2)) {
       const auto side = number(value).value_or(0);
       if (key == "source") stream.source = unescaped(value);
-      if (key == "sizeX" && side <= largest_side) stream.size.width = side;
-      if (key == "sizeY" && side <= largest_side) stream.size.height = side;
+      if (key == "sizeX" && side <= max_side) stream.size.width = side;
+      if (key == "sizeY" && side <= max_side) stream.size.height = side;
     }
   }
 

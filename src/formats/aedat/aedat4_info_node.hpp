@@ -13,7 +13,7 @@ namespace eventcamera {
 /// What the XML of an AEDAT4 header says.
 struct Aedat4InfoNode {
   std::vector<Aedat4Stream> streams;
-  bool whole = true;  ///< false: the XML is damaged, and the streams are what could be read of it
+  bool whole = true;  ///< false: the XML is corrupt, and the streams are what could be read of it
 };
 
 Aedat4InfoNode read_info_node(std::string_view xml);

@@ -11,12 +11,12 @@ namespace eventcamera {
 namespace {
 
 /// A recording of a day fits.
-constexpr std::size_t largest_table = std::size_t{512} << 20;
-constexpr std::size_t smallest_table = 12;
+constexpr std::size_t max_table = std::size_t{512} << 20;
+constexpr std::size_t min_table = 12;
 /// Even of evenly spaced packets a table shrinks to no less than a fifth; what grows more is none.
-constexpr std::size_t most_growth = 16;
+constexpr std::size_t max_growth = 16;
 /// What an entry takes, so that those which share their bytes do not fill the memory.
-constexpr std::size_t smallest_entry = 24;
+constexpr std::size_t min_entry = 24;
 constexpr const char* identifier = "FTAB";
 
 }  // namespace
@@ -24,19 +24,19 @@ constexpr const char* identifier = "FTAB";
 std::optional<std::vector<Aedat4TableEntry>> read_aedat4_table(std::span<const std::uint8_t> bytes,
                                                                Aedat4Compression compression,
                                                                std::uint64_t packets_at) {
-  if (bytes.size() > largest_table) return std::nullopt;
+  if (bytes.size() > max_table) return std::nullopt;
   Aedat4Decompressor decompressor;
   auto content = bytes;
   if (compression != Aedat4Compression::none && begins_compressed(compression, bytes)) {
-    const auto decompressed = decompressor.decompress(
-        compression, bytes, std::min(largest_table, most_growth * bytes.size()));
+    const auto decompressed =
+        decompressor.decompress(compression, bytes, std::min(max_table, max_growth * bytes.size()));
     if (!decompressed) return std::nullopt;
     content = decompressed->bytes;
   } else {
     content = decompressor.aligned(bytes);
   }
   // The Verifier reads an identifier before it knows that there is room for one.
-  if (content.size() < smallest_table) return std::nullopt;
+  if (content.size() < min_table) return std::nullopt;
   flatbuffers::Verifier::Options options;
   options.max_tables = static_cast<flatbuffers::uoffset_t>(content.size());
   flatbuffers::Verifier verifier(content.data(), content.size(), options);
@@ -46,7 +46,7 @@ std::optional<std::vector<Aedat4TableEntry>> read_aedat4_table(std::span<const s
   const auto* const entries =
       flatbuffers::GetSizePrefixedRoot<aedat4::FileTable>(content.data())->table();
   if (entries == nullptr) return table;
-  if (entries->size() > content.size() / smallest_entry) return std::nullopt;
+  if (entries->size() > content.size() / min_entry) return std::nullopt;
   const auto first = static_cast<std::int64_t>(packets_at);
   const bool of_headers = std::any_of(entries->begin(), entries->end(), [&](const auto* entry) {
     return entry->byte_offset() == first;

@@ -14,7 +14,7 @@ namespace eventcamera {
 namespace {
 
 constexpr std::string_view any_version = "#!AER-DAT";
-constexpr std::size_t longest_magic = any_version.size() + 3;
+constexpr std::size_t max_magic = any_version.size() + 3;
 /// Decoded at once: few enough for the cache, however large the pieces are.
 constexpr std::size_t decoded_bytes = std::size_t{1} << 16;
 
@@ -39,12 +39,12 @@ std::optional<Aedat4Item> AedatReader::next() {
 /// Makes the decoder that the file's first line asks for. False where that takes more bytes.
 bool AedatReader::find_version() {
   const std::string_view text(reinterpret_cast<const char*>(start_.data()),
-                              std::min(start_.size(), longest_magic));
+                              std::min(start_.size(), max_magic));
   const auto known = std::min(text.size(), any_version.size());
   if (text.substr(0, known) != any_version.substr(0, known) ||
-      (finished_ && text.size() < longest_magic))
-    throw NotThisFormat("this is not AEDAT: it does not begin with #!AER-DAT and a version");
-  if (text.size() < longest_magic) return false;
+      (finished_ && text.size() < max_magic))
+    throw UnsupportedFormat("this is not AEDAT: it does not begin with #!AER-DAT and a version");
+  if (text.size() < max_magic) return false;
   const auto version = text.substr(any_version.size());
   if (version == "4.0") {
     version_ = 4;
@@ -57,8 +57,8 @@ bool AedatReader::find_version() {
     version_ = 2;
     older_ = std::make_unique<Aedat2Decoder>();
   } else {
-    throw NotThisFormat("this is AEDAT " + std::string(version) +
-                        ", of which only 4.0, 3.1 and 2.0 can be read");
+    throw UnsupportedFormat("this is AEDAT " + std::string(version) +
+                            ", of which only 4.0, 3.1 and 2.0 can be read");
   }
   if (older_) {
     rest_ = start_;
@@ -102,9 +102,9 @@ const std::vector<Aedat4Stream>& AedatReader::streams() const {
   return aedat4_ ? aedat4_->streams() : older_streams_;
 }
 
-const Damage& AedatReader::damage() const {
-  static const Damage none;
-  return aedat4_ ? aedat4_->damage() : older_ ? older_->damage() : none;
+const Corruption& AedatReader::corruption() const {
+  static const Corruption none;
+  return aedat4_ ? aedat4_->corruption() : older_ ? older_->corruption() : none;
 }
 
 }  // namespace eventcamera

@@ -26,7 +26,7 @@ class AedatReader {
   void finish() { finished_ = true; }
 
   /// What comes next, valid until the next call; nothing where that takes more bytes. Throws
-  /// NotThisFormat.
+  /// UnsupportedFormat.
   std::optional<Aedat4Item> next();
 
   /// What is pushed next lies at `position`, where a packet of AEDAT 4 should begin. Its header has
@@ -41,7 +41,7 @@ class AedatReader {
 
   /// Those that are known so far.
   const std::vector<Aedat4Stream>& streams() const;
-  const Damage& damage() const;
+  const Corruption& corruption() const;
 
   /// What reads AEDAT 4; nothing where the file is none, or not known to be one.
   const Aedat4Decoder* aedat4() const { return aedat4_.get(); }

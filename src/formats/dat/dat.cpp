@@ -13,7 +13,7 @@ namespace eventcamera {
 namespace {
 
 /// Columns and rows are numbers of 14 bits.
-constexpr int largest_side = 16384;
+constexpr int max_side = 16384;
 
 enum Type : std::uint8_t { event_2d = 0x00, event_cd = 0x0c, event_trigger = 0x0e };
 
@@ -51,7 +51,7 @@ class DatReader : public UnitReader {
 template <int version>
 class DatEventReader final : public DatReader {
  public:
-  explicit DatEventReader(SensorSize size) : bounds_(size, largest_side) {}
+  explicit DatEventReader(SensorSize size) : bounds_(size, max_side) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
@@ -104,7 +104,7 @@ class DatDecoder final : public UnitDecoder {
       const auto taken = header_.take(bytes, ended);
       if (!header_.ended() || taken != 0) return taken;
     }
-    if (!header_.found()) throw NotThisFormat("no DAT file: it does not begin with a header");
+    if (!header_.found()) throw UnsupportedFormat("no DAT file: it does not begin with a header");
     if (bytes.size() < 2) return 0;
     begin_records(bytes[0], bytes[1]);
     return 2;
@@ -112,21 +112,21 @@ class DatDecoder final : public UnitDecoder {
 
   void begin_records(std::uint8_t type, std::uint8_t bytes) {
     if (!header_.value("evt").empty() || header_.value("format").starts_with("EVT"))
-      throw NotThisFormat("no DAT file: it is RAW, which evtdec reads");
+      throw UnsupportedFormat("no DAT file: it is RAW, which evtdec reads");
     if (bytes != record_size)
-      throw NotThisFormat("DAT files with events of " + std::to_string(bytes) +
-                          " bytes cannot be read");
+      throw UnsupportedFormat("DAT files with events of " + std::to_string(bytes) +
+                              " bytes cannot be read");
     // What does not tell its version is older than versions.
     const auto version = header_.value("Version");
     if (version != "2" && version != "1" && !version.empty())
-      throw NotThisFormat("DAT files of version '" + version + "' cannot be read");
-    SensorSize size{TextHeader::number(header_.value("Width"), largest_side),
-                    TextHeader::number(header_.value("Height"), largest_side)};
+      throw UnsupportedFormat("DAT files of version '" + version + "' cannot be read");
+    SensorSize size{TextHeader::number(header_.value("Width"), max_side),
+                    TextHeader::number(header_.value("Height"), max_side)};
     if (size.width == 0 || size.height == 0) size = version == "2" ? SensorSize{} : first_camera;
     if (type == event_trigger)
       begin(std::make_unique<DatTriggerReader>(), size);
     else if (type != event_2d && type != event_cd)
-      throw NotThisFormat("DAT files of the type " + std::to_string(type) + " cannot be read");
+      throw UnsupportedFormat("DAT files of the type " + std::to_string(type) + " cannot be read");
     else if (version == "2")
       begin(std::make_unique<DatEventReader<2>>(size), size);
     else
@@ -148,7 +148,7 @@ class DatEncoder final : public Encoder {
     header_ += {static_cast<char>(event_cd), static_cast<char>(record_size)};
   }
 
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override {
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     write_header(out);
     WordWriter<std::uint64_t> words(out);
     while (!events.empty()) {
@@ -182,7 +182,7 @@ std::unique_ptr<SeekableDecoder> make_dat_decoder() {
 }
 
 std::unique_ptr<Encoder> make_dat_encoder(SensorSize size) {
-  if (size.width < 1 || size.height < 1 || size.width > largest_side || size.height > largest_side)
+  if (size.width < 1 || size.height < 1 || size.width > max_side || size.height > max_side)
     throw std::invalid_argument("DAT files are for sensors of 1x1 to 16384x16384 pixels");
   return std::make_unique<DatEncoder>(size);
 }

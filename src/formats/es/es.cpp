@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "src/formats/bounded_silence.hpp"
+#include "src/formats/gap_limiter.hpp"
 #include "src/formats/unit_decoder.hpp"
 #include "src/formats/word_writer.hpp"
 
@@ -18,7 +18,7 @@ constexpr std::uint8_t version = 2;
 constexpr std::size_t header_size = magic.size() + 3 + 1 + 4;
 
 /// y_p of an event has 15 bits of row.
-constexpr int most_rows = 32768;
+constexpr int max_rows = 32768;
 
 enum Type : std::uint8_t { generic = 0, dvs = 1, atis = 2, amd = 3, colour = 4 };
 
@@ -27,11 +27,11 @@ enum Type : std::uint8_t { generic = 0, dvs = 1, atis = 2, amd = 3, colour = 4 }
 template <int flag_bits>
 class EsReader final : public UnitReader {
  public:
-  explicit EsReader(SensorSize size) : bounds_(size, most_rows), height_(size.height) {}
+  explicit EsReader(SensorSize size) : bounds_(size, max_rows), height_(size.height) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
-    constexpr std::uint32_t longest_step = 0xff >> flag_bits;
+    constexpr std::uint32_t max_step = 0xff >> flag_bits;
     constexpr std::uint32_t flags = (1 << flag_bits) - 1;
     // An ATIS event of which bit 0 is set is the start or the end of an exposure.
     constexpr std::uint32_t exposure = flag_bits == 2 ? 1 : 0;
@@ -43,9 +43,9 @@ class EsReader final : public UnitReader {
     while (from < to && event < full) {
       const std::uint32_t byte = *from;
       const auto step = byte >> flag_bits;
-      if (step == longest_step) {
+      if (step == max_step) {
         // As many of the longest steps as the flags say; none is a sign that readers may ignore.
-        t += static_cast<std::uint64_t>(longest_step) * (byte & flags);
+        t += static_cast<std::uint64_t>(max_step) * (byte & flags);
         ++from;
         continue;
       }
@@ -83,12 +83,12 @@ class EsDecoder final : public UnitDecoder {
     const auto known = std::min(bytes.size(), magic.size());
     if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(known),
                     magic.begin()))
-      throw NotThisFormat("no Event Stream: it does not begin with these words");
+      throw UnsupportedFormat("no Event Stream: it does not begin with these words");
     if (bytes.size() < header_size) return 0;
     const auto* at = bytes.data() + magic.size();
     if (at[0] != version)
-      throw NotThisFormat("Event Streams of version " + std::to_string(at[0]) + "." +
-                          std::to_string(at[1]) + " cannot be read");
+      throw UnsupportedFormat("Event Streams of version " + std::to_string(at[0]) + "." +
+                              std::to_string(at[1]) + " cannot be read");
     const SensorSize size{load<std::uint16_t>(at + 4), load<std::uint16_t>(at + 6)};
     switch (at[3]) {
       case dvs:
@@ -98,22 +98,22 @@ class EsDecoder final : public UnitDecoder {
         begin_events<2>(size);
         break;
       case generic:
-        throw NotThisFormat("an Event Stream of generic events, which are no pixels");
+        throw UnsupportedFormat("an Event Stream of generic events, which are no pixels");
       case colour:
-        throw NotThisFormat("an Event Stream of colour events, which have no polarity");
+        throw UnsupportedFormat("an Event Stream of colour events, which have no polarity");
       case amd:
       default:
-        throw NotThisFormat("an Event Stream of events of the type " + std::to_string(at[3]) +
-                            ", which cannot be read");
+        throw UnsupportedFormat("an Event Stream of events of the type " + std::to_string(at[3]) +
+                                ", which cannot be read");
     }
     return header_size;
   }
 
   template <int flag_bits>
   void begin_events(SensorSize size) {
-    if (size.width == 0 || size.height == 0 || size.height > most_rows)
-      throw NotThisFormat("an Event Stream of an impossible sensor of " +
-                          std::to_string(size.width) + "x" + std::to_string(size.height));
+    if (size.width == 0 || size.height == 0 || size.height > max_rows)
+      throw UnsupportedFormat("an Event Stream of an impossible sensor of " +
+                              std::to_string(size.width) + "x" + std::to_string(size.height));
     begin(std::make_unique<EsReader<flag_bits>>(size), size);
   }
 };
@@ -122,9 +122,9 @@ class EsEncoder final : public Encoder {
  public:
   explicit EsEncoder(SensorSize size) : size_(size) {}
 
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override {
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     write_header(out);
-    const auto write = [&](std::span<const StampedEvent> few, WordWriter<std::uint8_t>& bytes) {
+    const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint8_t>& bytes) {
       for (const auto& event : few) {
         const auto step = reach(event.t, bytes);
         const auto x = std::uint32_t{event.x};
@@ -141,7 +141,7 @@ class EsEncoder final : public Encoder {
 
  private:
   static constexpr std::size_t bytes_at_once = 5 * events_at_once;
-  static constexpr std::uint32_t longest_step = 127;
+  static constexpr std::uint32_t max_step = 127;
 
   /// Fills the silence before an event; what is left of it is returned.
   std::uint32_t reach(Microseconds t, WordWriter<std::uint8_t>& bytes) {
@@ -151,9 +151,9 @@ class EsEncoder final : public Encoder {
     silence_.reach(t);
     auto step = silence_.written(t) - written_;
     written_ += step;
-    if (step >= longest_step) [[unlikely]] {
-      bytes.reserve(step / longest_step + bytes_at_once);
-      for (; step >= longest_step; step -= longest_step) bytes.put(0xff);
+    if (step >= max_step) [[unlikely]] {
+      bytes.reserve(step / max_step + bytes_at_once);
+      for (; step >= max_step; step -= max_step) bytes.put(0xff);
     }
     return static_cast<std::uint32_t>(step);
   }
@@ -171,7 +171,7 @@ class EsEncoder final : public Encoder {
 
   SensorSize size_;
   bool started_ = false;
-  BoundedSilence silence_;
+  GapLimiter silence_;
   Microseconds last_ = 0;
   std::uint64_t written_ = 0;  // the time of the last byte
 };
@@ -183,7 +183,7 @@ std::unique_ptr<SeekableDecoder> make_event_stream_decoder() {
 }
 
 std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size) {
-  if (size.width < 1 || size.height < 1 || size.width > 65535 || size.height > most_rows)
+  if (size.width < 1 || size.height < 1 || size.width > 65535 || size.height > max_rows)
     throw std::invalid_argument("an Event Stream is of 1x1 to 65535x32768 pixels");
   return std::make_unique<EsEncoder>(size);
 }

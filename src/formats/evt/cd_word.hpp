@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 
@@ -31,7 +31,7 @@ struct CdWord {
   constexpr std::uint32_t y() const { return bits & 0x7ff; }
 
   /// `on` is 0 or 1; `time` is that of the last TIME_HIGH.
-  constexpr StampedEvent event(std::uint64_t time, std::uint32_t on) const {
+  constexpr AbsoluteEvent event(std::uint64_t time, std::uint32_t on) const {
     return {static_cast<Microseconds>(time + time_low()), static_cast<std::uint16_t>(x()),
             static_cast<std::uint16_t>(y() | on << 15)};
   }
@@ -45,7 +45,8 @@ struct CdWord {
 
 /// Writes an event for each set bit of `mask`: bit i is i pixels to the right of `first`. Returns
 /// the end of the events.
-inline StampedEvent* expand(std::uint32_t mask, const StampedEvent& first, StampedEvent* events) {
+inline AbsoluteEvent* expand(std::uint32_t mask, const AbsoluteEvent& first,
+                             AbsoluteEvent* events) {
   for (; mask != 0; mask &= mask - 1)
     *events++ = {first.t, static_cast<std::uint16_t>(first.x + std::countr_zero(mask)), first.y_p};
   return events;
@@ -60,7 +61,7 @@ struct MaskedEvents {
 
 /// The first of some events, as far as one mask holds them. A sensor's words begin at multiples of
 /// 32, and hold what comes in the order of columns.
-inline MaskedEvents first_masked(std::span<const StampedEvent> events) {
+inline MaskedEvents first_masked(std::span<const AbsoluteEvent> events) {
   const auto& first = events.front();
   MaskedEvents masked{.base = first.x & ~31U};
   auto& count = masked.count;

@@ -85,8 +85,8 @@ class Evt2Reader final : public CdReader {
 
 class Evt2Encoder final : public Encoder {
  public:
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override {
-    const auto write = [&](std::span<const StampedEvent> few, WordWriter<std::uint32_t>& words) {
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
+    const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint32_t>& words) {
       for (const auto& event : few) {
         if (time_.is_new(event.t)) {
           time_.reach(event.t, words, words_at_once,

@@ -72,8 +72,8 @@ class Evt21Reader final : public CdReader {
 template <Evt21Order order>
 class Evt21Encoder final : public Encoder {
  public:
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override {
-    const auto write = [&](std::span<const StampedEvent> few, WordWriter<std::uint64_t>& words) {
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
+    const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint64_t>& words) {
       while (!few.empty()) {
         const auto& first = few.front();
         if (time_.is_new(first.t)) {

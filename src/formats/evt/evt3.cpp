@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <bit>
 
-#include "src/formats/bounded_silence.hpp"
 #include "src/formats/evt/cd_word.hpp"
 #include "src/formats/evt/time_high.hpp"
+#include "src/formats/gap_limiter.hpp"
 #include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
@@ -170,8 +170,8 @@ class Evt3Reader final : public UnitReader {
     batch.outside(static_cast<std::uint64_t>(std::popcount(mask & ~valid)));
   }
 
-  static StampedEvent event_at(std::uint64_t t, std::uint32_t x, std::uint32_t y,
-                               std::uint32_t polarity) {
+  static AbsoluteEvent event_at(std::uint64_t t, std::uint32_t x, std::uint32_t y,
+                                std::uint32_t polarity) {
     static_assert(polarity_bit << 4 == 0x8000);
     return {static_cast<Microseconds>(t), static_cast<std::uint16_t>(x),
             static_cast<std::uint16_t>(y | polarity << 4)};
@@ -189,8 +189,8 @@ class Evt3Encoder final : public Encoder {
  public:
   explicit Evt3Encoder(SensorSize size) : width_(static_cast<std::uint32_t>(size.width)) {}
 
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override {
-    const auto write = [&](std::span<const StampedEvent> few, WordWriter<std::uint16_t>& words) {
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
+    const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint16_t>& words) {
       for (std::size_t i = 0; i < few.size();) {
         const auto& event = few[i];
         reach(event.t, words);
@@ -219,7 +219,7 @@ class Evt3Encoder final : public Encoder {
  private:
   static constexpr std::size_t words_at_once = 4 * events_at_once;
   static constexpr std::uint32_t none = ~std::uint32_t{0};
-  static constexpr std::uint64_t most_steps = (BoundedSilence::longest >> 12) + 2;
+  static constexpr std::uint64_t max_steps = (GapLimiter::longest >> 12) + 2;
 
   struct Vector {
     std::size_t events = 0;  ///< 0: not worth its words
@@ -238,7 +238,7 @@ class Evt3Encoder final : public Encoder {
       time = silence_.written(t);
       // From zero on, each: readers follow the wraps by them.
       const auto steps = (time >> 12) - high_;
-      if (steps > 1 && steps <= most_steps) {
+      if (steps > 1 && steps <= max_steps) {
         words.reserve(steps + words_at_once);
         while (++high_ != time >> 12) words.put(high_word(high_));
       }
@@ -257,13 +257,13 @@ class Evt3Encoder final : public Encoder {
   }
 
   /// The events from `first` on that go into one vector.
-  Vector vector_at(std::span<const StampedEvent> events, std::size_t first) const {
+  Vector vector_at(std::span<const AbsoluteEvent> events, std::size_t first) const {
     // Four words: as many as four events have.
     constexpr std::size_t least = 5;
     if (width_ < 32 || first + least > events.size()) return {};
     const auto& event = events[first];
     const auto base = std::min<std::uint32_t>(event.x, width_ - 32);
-    const auto fits = [&](const StampedEvent& next) {
+    const auto fits = [&](const AbsoluteEvent& next) {
       return next.t == event.t && next.y_p == event.y_p && next.x - base < 32;
     };
     if (event.x - base >= 32 || !fits(events[first + least - 1])) return {};
@@ -277,7 +277,7 @@ class Evt3Encoder final : public Encoder {
   }
 
   std::uint32_t width_;
-  BoundedSilence silence_;
+  GapLimiter silence_;
   std::uint64_t high_ = ~std::uint64_t{0};  // one before the first
   std::uint32_t low_ = none;
   std::uint32_t y_ = none;

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "src/formats/bounded_silence.hpp"
+#include "src/formats/gap_limiter.hpp"
 #include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
@@ -22,7 +22,7 @@ class HighTimeWriter {
     silence_.reach(t);
     const auto count = written(t) >> 6;
     const auto laps = (count >> bits) - (count_ == none ? 0 : count_ >> bits);
-    if (laps != 0 && laps <= most_laps) {
+    if (laps != 0 && laps <= max_laps) {
       // Readers know a wrap by the fall from nearly the largest count to nearly zero (OpenEB allows
       // 10 ms), so each is written out.
       words.reserve(2 * laps + 1 + room);
@@ -37,10 +37,10 @@ class HighTimeWriter {
 
  private:
   static constexpr int bits = 28;
-  static constexpr std::uint64_t most_laps = (BoundedSilence::longest >> (bits + 6)) + 1;
+  static constexpr std::uint64_t max_laps = (GapLimiter::longest >> (bits + 6)) + 1;
   static constexpr std::uint64_t none = ~std::uint64_t{0};
 
-  BoundedSilence silence_;
+  GapLimiter silence_;
   std::uint64_t count_ = none;
 };
 

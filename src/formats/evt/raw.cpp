@@ -16,7 +16,7 @@ namespace eventcamera {
 namespace {
 
 /// Columns and rows are numbers of 11 bits.
-constexpr int largest_side = 2048;
+constexpr int max_side = 2048;
 
 std::unique_ptr<UnitReader> make_reader(EvtFormat format, SensorSize size) {
   switch (format) {
@@ -72,22 +72,23 @@ EvtFormat format_of(const TextHeader& header) {
     if (order.empty()) order = header.value("system_ID").empty() ? "little" : "legacy";
     if (order == "little") return EvtFormat::evt21;
     if (order == "legacy") return EvtFormat::evt21_legacy;
-    throw NotThisFormat("EVT21 words in the byte order '" + order + "' cannot be read");
+    throw UnsupportedFormat("EVT21 words in the byte order '" + order + "' cannot be read");
   }
-  if (name.empty()) throw NotThisFormat("the RAW header does not tell the format of the events");
-  throw NotThisFormat("RAW files of the format '" + name + "' cannot be read");
+  if (name.empty())
+    throw UnsupportedFormat("the RAW header does not tell the format of the events");
+  throw UnsupportedFormat("RAW files of the format '" + name + "' cannot be read");
 }
 
 SensorSize size_of(const TextHeader& header) {
   const FormatValue format(header.value("format"));
-  SensorSize size{TextHeader::number(format.option("width"), largest_side),
-                  TextHeader::number(format.option("height"), largest_side)};
+  SensorSize size{TextHeader::number(format.option("width"), max_side),
+                  TextHeader::number(format.option("height"), max_side)};
   if (size.width == 0 || size.height == 0) {
     const auto geometry = header.value("geometry");
     const auto cross = geometry.find('x');
     if (cross != std::string::npos)
-      size = {TextHeader::number(geometry.substr(0, cross), largest_side),
-              TextHeader::number(geometry.substr(cross + 1), largest_side)};
+      size = {TextHeader::number(geometry.substr(0, cross), max_side),
+              TextHeader::number(geometry.substr(cross + 1), max_side)};
   }
   // Files of the first cameras tell none; one that cannot be is none.
   if (size.width == 0 || size.height == 0) return {};
@@ -100,7 +101,7 @@ class RawDecoder final : public UnitDecoder {
     const auto taken = header_.take(bytes, ended);
     if (header_.ended()) {
       if (!header_.found())
-        throw NotThisFormat("no RAW file of Prophesee: it does not begin with a header");
+        throw UnsupportedFormat("no RAW file of Prophesee: it does not begin with a header");
       const auto size = size_of(header_);
       begin(make_reader(format_of(header_), size), size);
     }
@@ -150,7 +151,7 @@ class RawEncoder final : public Encoder {
   RawEncoder(EvtFormat format, SensorSize size)
       : header_(header_text(format, size)), words_(make_evt_encoder(format, size)) {}
 
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override {
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     write_header(out);
     words_->encode(events, out);
   }
@@ -185,7 +186,7 @@ std::unique_ptr<SeekableDecoder> make_evt_decoder(EvtFormat format, SensorSize s
 }
 
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size) {
-  if (size.width < 1 || size.height < 1 || size.width > largest_side || size.height > largest_side)
+  if (size.width < 1 || size.height < 1 || size.width > max_side || size.height > max_side)
     throw std::invalid_argument("EVT words are for sensors of 1x1 to 2048x2048 pixels");
   switch (format) {
     case EvtFormat::evt2:

@@ -56,17 +56,17 @@ class Reader {
 
 /// How many events from `first` on have the same value as it.
 template <class Value>
-std::size_t run(std::span<const StampedEvent> events, std::size_t first, const Value& value) {
+std::size_t run(std::span<const AbsoluteEvent> events, std::size_t first, const Value& value) {
   auto end = first + 1;
   while (end < events.size() && value(events[end]) == value(events[first])) ++end;
   return end - first;
 }
 
-int polarity_bit(const StampedEvent& event) {
+int polarity_bit(const AbsoluteEvent& event) {
   return event.y_p >> 15;
 }
 
-void put_times(std::span<const StampedEvent> events, Writer& writer) {
+void put_times(std::span<const AbsoluteEvent> events, Writer& writer) {
   auto last = static_cast<std::uint64_t>(events.front().t);
   for (std::size_t i = 0; i < events.size();) {
     auto gap = static_cast<std::uint64_t>(events[i].t) - last;
@@ -74,7 +74,7 @@ void put_times(std::span<const StampedEvent> events, Writer& writer) {
     if (gap >= 15) {
       for (; gap > 0; gap >>= 4) writer.put(static_cast<std::uint8_t>(0xf0 | (gap & 15)));
     }
-    const auto count = run(events, i, [](const StampedEvent& event) { return event.t; });
+    const auto count = run(events, i, [](const AbsoluteEvent& event) { return event.t; });
     if (count < 15) {
       writer.put(static_cast<std::uint8_t>(gap << 4 | count));
     } else {
@@ -85,7 +85,7 @@ void put_times(std::span<const StampedEvent> events, Writer& writer) {
   }
 }
 
-bool take_times(Reader& reader, std::span<StampedEvent> events) {
+bool take_times(Reader& reader, std::span<AbsoluteEvent> events) {
   auto t = reader.take<std::uint64_t>();
   for (std::size_t i = 0; i < events.size();) {
     auto byte = reader.take<std::uint8_t>();
@@ -105,9 +105,9 @@ bool take_times(Reader& reader, std::span<StampedEvent> events) {
   return true;
 }
 
-void put_rows(std::span<const StampedEvent> events, Writer& writer) {
+void put_rows(std::span<const AbsoluteEvent> events, Writer& writer) {
   for (std::size_t i = 0; i < events.size();) {
-    const auto count = run(events, i, [](const StampedEvent& event) { return event.y(); });
+    const auto count = run(events, i, [](const AbsoluteEvent& event) { return event.y(); });
     const auto y = static_cast<unsigned>(events[i].y());
     writer.put(static_cast<std::uint16_t>(y << 5 | std::min<std::size_t>(count, 31)));
     if (count >= 31) writer.put(static_cast<std::uint16_t>(count));
@@ -115,7 +115,7 @@ void put_rows(std::span<const StampedEvent> events, Writer& writer) {
   }
 }
 
-bool take_rows(Reader& reader, std::span<StampedEvent> events) {
+bool take_rows(Reader& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size();) {
     const auto word = reader.take<std::uint16_t>();
     std::size_t count = word & 31;
@@ -127,7 +127,7 @@ bool take_rows(Reader& reader, std::span<StampedEvent> events) {
   return true;
 }
 
-void put_columns(std::span<const StampedEvent> events, Writer& writer) {
+void put_columns(std::span<const AbsoluteEvent> events, Writer& writer) {
   for (std::size_t i = 0; i < events.size();) {
     const unsigned x = events[i++].x;
     unsigned mask = 0;
@@ -140,7 +140,7 @@ void put_columns(std::span<const StampedEvent> events, Writer& writer) {
   }
 }
 
-bool take_columns(Reader& reader, std::span<StampedEvent> events) {
+bool take_columns(Reader& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size();) {
     const auto word = reader.take<std::uint16_t>();
     if (reader.ended()) return false;
@@ -153,7 +153,7 @@ bool take_columns(Reader& reader, std::span<StampedEvent> events) {
   return true;
 }
 
-void put_polarities(std::span<const StampedEvent> events, Writer& writer) {
+void put_polarities(std::span<const AbsoluteEvent> events, Writer& writer) {
   for (std::size_t i = 0; i < events.size();) {
     const auto count = run(events, i, polarity_bit);
     const auto bit = static_cast<unsigned>(polarity_bit(events[i]));
@@ -163,7 +163,7 @@ void put_polarities(std::span<const StampedEvent> events, Writer& writer) {
   }
 }
 
-bool take_polarities(Reader& reader, std::span<StampedEvent> events) {
+bool take_polarities(Reader& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size();) {
     const auto byte = reader.take<std::uint8_t>();
     std::size_t count = byte & 127;
@@ -178,7 +178,7 @@ bool take_polarities(Reader& reader, std::span<StampedEvent> events) {
 
 /// Four events' numbers, with noughts behind the last event.
 template <class Number>
-std::array<std::uint32_t, 4> group(std::span<const StampedEvent> events, std::size_t first,
+std::array<std::uint32_t, 4> group(std::span<const AbsoluteEvent> events, std::size_t first,
                                    const Number& number) {
   std::array<std::uint32_t, 4> numbers{};
   for (std::size_t j = 0; j < 4 && first + j < events.size(); ++j)
@@ -186,9 +186,9 @@ std::array<std::uint32_t, 4> group(std::span<const StampedEvent> events, std::si
   return numbers;
 }
 
-void put_all_packed(std::span<const StampedEvent> events, Writer& writer) {
+void put_all_packed(std::span<const AbsoluteEvent> events, Writer& writer) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
-    const auto v = group(events, i, [](const StampedEvent& event) {
+    const auto v = group(events, i, [](const AbsoluteEvent& event) {
       return event.y() << 12 | event.x << 1 | polarity_bit(event);
     });
     writer.put(v[0] << 8 | (v[1] & 0xff));
@@ -197,7 +197,7 @@ void put_all_packed(std::span<const StampedEvent> events, Writer& writer) {
   }
 }
 
-bool take_all_packed(Reader& reader, std::span<StampedEvent> events) {
+bool take_all_packed(Reader& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
     const auto w0 = reader.take<std::uint32_t>();
     const auto w1 = reader.take<std::uint32_t>();
@@ -213,17 +213,17 @@ bool take_all_packed(Reader& reader, std::span<StampedEvent> events) {
   return true;
 }
 
-void put_xp_packed(std::span<const StampedEvent> events, Writer& writer) {
+void put_xp_packed(std::span<const AbsoluteEvent> events, Writer& writer) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
     const auto v = group(
-        events, i, [](const StampedEvent& event) { return event.x << 1 | polarity_bit(event); });
+        events, i, [](const AbsoluteEvent& event) { return event.x << 1 | polarity_bit(event); });
     writer.put(static_cast<std::uint16_t>(v[0] << 4 | (v[1] & 0xf)));
     writer.put(static_cast<std::uint16_t>(v[1] >> 4 << 8 | (v[2] & 0xff)));
     writer.put(static_cast<std::uint16_t>(v[2] >> 8 << 12 | v[3]));
   }
 }
 
-bool take_xp_packed(Reader& reader, std::span<StampedEvent> events) {
+bool take_xp_packed(Reader& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
     const unsigned h0 = reader.take<std::uint16_t>();
     const unsigned h1 = reader.take<std::uint16_t>();
@@ -240,7 +240,7 @@ bool take_xp_packed(Reader& reader, std::span<StampedEvent> events) {
 }
 
 /// How to pack, from what the first quarter looks like: runs pay only where there are some.
-std::uint32_t packing(std::span<const StampedEvent> events) {
+std::uint32_t packing(std::span<const AbsoluteEvent> events) {
   const auto sample = events.first(events.size() < 16 ? events.size() : events.size() / 4);
   std::size_t same_row = 0;
   std::size_t near = 0;
@@ -260,7 +260,7 @@ std::uint32_t packing(std::span<const StampedEvent> events) {
 
 }  // namespace
 
-void encode_ecf(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) {
+void encode_ecf(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
   assert(events.size() <= ecf_most_events);
   Writer writer(out);
   if (events.empty()) {
@@ -285,7 +285,7 @@ void encode_ecf(std::span<const StampedEvent> events, std::vector<std::uint8_t>&
   }
 }
 
-bool decode_ecf(std::span<const std::uint8_t> chunk, std::vector<StampedEvent>& out) {
+bool decode_ecf(std::span<const std::uint8_t> chunk, std::vector<AbsoluteEvent>& out) {
   if (chunk.size() < header_bytes) return false;
   Reader reader(chunk);
   const auto head = reader.take<std::uint32_t>();

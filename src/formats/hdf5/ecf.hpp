@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 
@@ -26,10 +26,10 @@ constexpr std::size_t ecf_most_bytes(std::size_t events) {
 }
 
 /// Appends a chunk to `out`: at most ecf_most_events events, sorted, within ecf_most_pixels.
-void encode_ecf(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out);
+void encode_ecf(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out);
 
-/// Appends the events of a chunk to `out`. False, and nothing is appended, where it is damaged.
-bool decode_ecf(std::span<const std::uint8_t> chunk, std::vector<StampedEvent>& out);
+/// Appends the events of a chunk to `out`. False, and nothing is appended, where it is corrupt.
+bool decode_ecf(std::span<const std::uint8_t> chunk, std::vector<AbsoluteEvent>& out);
 
 /// The time of a chunk's first event; nothing where the chunk is too short.
 std::optional<Microseconds> ecf_first_time(std::span<const std::uint8_t> chunk);

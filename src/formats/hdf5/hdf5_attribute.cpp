@@ -5,7 +5,7 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::size_t longest_text = 4096;
+constexpr std::size_t max_text = 4096;
 
 struct Attribute {
   Attribute(hid_t object, const char* name) {
@@ -34,7 +34,7 @@ std::optional<std::string> read_text_attribute(hid_t object, const char* name) {
     return copy;
   }
   const auto bytes = H5Tget_size(found.type.get());
-  if (bytes == 0 || bytes > longest_text) return std::nullopt;
+  if (bytes == 0 || bytes > max_text) return std::nullopt;
   std::string text(bytes, '\0');
   if (H5Aread(found.attribute.get(), found.type.get(), text.data()) < 0) return std::nullopt;
   text.resize(text.find_last_not_of(std::string_view("\0 ", 2)) + 1);

@@ -16,14 +16,14 @@ namespace eventcamera {
 namespace {
 
 /// Of a chunk, which the library unpacks as a whole.
-constexpr std::size_t most_chunk_bytes = std::size_t{64} << 20;
-constexpr std::size_t most_type_bytes = 4096;
-constexpr std::size_t most_columns = 4;
-constexpr std::uint64_t most_holes = 1024;
-constexpr std::size_t least_cache_bytes = std::size_t{1} << 20;
+constexpr std::size_t max_chunk_bytes = std::size_t{64} << 20;
+constexpr std::size_t max_type_bytes = 4096;
+constexpr std::size_t max_columns = 4;
+constexpr std::uint64_t max_holes = 1024;
+constexpr std::size_t min_cache_bytes = std::size_t{1} << 20;
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
-  throw NotThisFormat("This HDF5 file's dataset " + path + " " + why);
+  throw UnsupportedFormat("This HDF5 file's dataset " + path + " " + why);
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ Hdf5Dataset::Hdf5Dataset(hid_t parent, const std::string& path) : path_(path) {
   creation_ = {H5Dget_create_plist(dataset_.get()), H5Pclose};
   if (!dataset_ || !type_ || !space || !creation_) refuse(path, "cannot be opened");
   type_bytes_ = H5Tget_size(type_.get());
-  if (type_bytes_ == 0 || type_bytes_ > most_type_bytes)
+  if (type_bytes_ == 0 || type_bytes_ > max_type_bytes)
     refuse(path, "has elements that are too large");
   if (const auto number = number_of(type_.get())) numbers_.push_back(*number);
 
@@ -58,8 +58,8 @@ Hdf5Dataset::Hdf5Dataset(hid_t parent, const std::string& path) : path_(path) {
   if (rank < 0 || rank > 2) refuse(path, "has too many dimensions");
   extent_.resize(static_cast<std::size_t>(rank));
   if (rank > 0 && H5Sget_simple_extent_dims(space.get(), extent_.data(), nullptr) != rank)
-    refuse(path, "has a damaged extent");
-  if (columns() == 0 || columns() > most_columns) refuse(path, "has too many columns, or none");
+    refuse(path, "has a corrupt extent");
+  if (columns() == 0 || columns() > max_columns) refuse(path, "has too many columns, or none");
   if (H5Pget_layout(creation_.get()) == H5D_CHUNKED) check_chunks();
   check_storage(parent);
 }
@@ -67,10 +67,10 @@ Hdf5Dataset::Hdf5Dataset(hid_t parent, const std::string& path) : path_(path) {
 void Hdf5Dataset::check_chunks() {
   chunk_.resize(extent_.size());
   if (extent_.empty() || H5Pget_chunk(creation_.get(), rank(), chunk_.data()) != rank())
-    refuse(path_, "has damaged chunks");
+    refuse(path_, "has corrupt chunks");
   chunk_bytes_ = type_bytes_;
   for (const auto side : chunk_) {
-    if (side == 0 || side > most_chunk_bytes / chunk_bytes_)
+    if (side == 0 || side > max_chunk_bytes / chunk_bytes_)
       refuse(path_, "has chunks that are too large");
     chunk_bytes_ *= side;
   }
@@ -96,10 +96,10 @@ void Hdf5Dataset::check_storage(hid_t file) {
       hsize_t chunks = 0;
       const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
       if (claimed > 0 && H5Dget_num_chunks(dataset_.get(), space.get(), &chunks) < 0)
-        refuse(path_, "has a damaged index of its chunks");
+        refuse(path_, "has a corrupt index of its chunks");
       // A file with holes is read to its end, but one that is mostly hole is not.
-      const auto most_chunks = 2 * std::min<std::uint64_t>(chunks, UINT32_MAX) + most_holes;
-      const auto most = std::min<std::uint64_t>(most_chunks, UINT64_MAX / chunk_[0]) * chunk_[0];
+      const auto max_chunks = 2 * std::min<std::uint64_t>(chunks, UINT32_MAX) + max_holes;
+      const auto most = std::min<std::uint64_t>(max_chunks, UINT64_MAX / chunk_[0]) * chunk_[0];
       rows_ = std::min<std::uint64_t>(claimed, most);
       return;
     }
@@ -258,9 +258,9 @@ bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t most,
     // The library reads as many bytes as the file's index says, and will not tell beforehand how
     // many those are: at most as many as there are. Memory that nothing is written to is not taken.
     if (!room_) {
-      const auto most_bytes = std::min<std::uint64_t>(file_bytes_, UINT32_MAX);
+      const auto max_bytes = std::min<std::uint64_t>(file_bytes_, UINT32_MAX);
       room_.reset(static_cast<std::uint8_t*>(
-          std::calloc(std::max<std::size_t>(most_bytes, chunk_bytes_), 1)));
+          std::calloc(std::max<std::size_t>(max_bytes, chunk_bytes_), 1)));
       if (!room_) throw std::bad_alloc();
     }
     if (chunk_bytes_ > most ||
@@ -317,7 +317,7 @@ void Hdf5Dataset::require_filters() {
   // for every part of it.
   const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   H5Pset_chunk_cache(access.get(), H5D_CHUNK_CACHE_NSLOTS_DEFAULT,
-                     std::max(least_cache_bytes, chunk_bytes_), 1.0);
+                     std::max(min_cache_bytes, chunk_bytes_), 1.0);
   const Hdf5Handle file(H5Iget_file_id(dataset_.get()), H5Fclose);
   dataset_ = {H5Dopen2(file.get(), path_.c_str(), access.get()), H5Dclose};
   if (!dataset_) refuse(path_, "cannot be opened");

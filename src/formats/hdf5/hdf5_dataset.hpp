@@ -20,7 +20,7 @@ class Hdf5Dataset {
   /// Whether there is such a thing at all; links that lead out of the file do not count.
   static bool exists(hid_t parent, const std::string& path, H5O_type_t type);
 
-  /// Throws NotThisFormat where it is not as it should be.
+  /// Throws UnsupportedFormat where it is not as it should be.
   Hdf5Dataset(hid_t parent, const std::string& path);
 
   int rank() const { return static_cast<int>(extent_.size()); }
@@ -32,11 +32,11 @@ class Hdf5Dataset {
     return is_integers() && numbers_[0].bytes == 4 && !numbers_[0].is_signed;
   }
 
-  /// Chooses the members of a compound that are read. Throws NotThisFormat where one is not there
-  /// or no integer.
+  /// Chooses the members of a compound that are read. Throws UnsupportedFormat where one is not
+  /// there or no integer.
   void choose(std::span<const char* const> members);
 
-  /// Reads some rows: of each all columns, or the chosen members. False where the file is damaged
+  /// Reads some rows: of each all columns, or the chosen members. False where the file is corrupt
   /// there.
   bool read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out);
 
@@ -57,7 +57,7 @@ class Hdf5Dataset {
   /// library looks through all chunks.
   std::uint64_t position(std::uint64_t row) const;
 
-  /// Throws NotThisFormat where a filter is missing that the dataset needs.
+  /// Throws UnsupportedFormat where a filter is missing that the dataset needs.
   void require_filters();
 
  private:

@@ -12,7 +12,7 @@ namespace eventcamera {
 
 namespace {
 
-/// Unpacks zlib's format. False where it is damaged or more than `most` bytes long.
+/// Unpacks zlib's format. False where it is corrupt or more than `most` bytes long.
 bool inflate_within(std::size_t most, std::vector<std::uint8_t>& bytes) {
   std::vector<std::uint8_t> out(most);
   auto size = static_cast<uLongf>(most);

@@ -30,11 +30,11 @@ Hdf5Handle open_path(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, error))
     throw std::runtime_error("There is no file " + path.string());
   const auto is_hdf5 = H5Fis_hdf5(path.c_str());
-  if (is_hdf5 == 0) throw NotThisFormat(path.string() + " is not an HDF5 file");
+  if (is_hdf5 == 0) throw UnsupportedFormat(path.string() + " is not an HDF5 file");
   Hdf5Handle file(is_hdf5 > 0 ? H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT) : -1, H5Fclose);
   if (!file)
     throw std::runtime_error(
-        path.string() + " cannot be opened: it may not be read, is damaged, or is being written");
+        path.string() + " cannot be opened: it may not be read, is corrupt, or is being written");
   return file;
 }
 
@@ -61,12 +61,12 @@ Hdf5Reader::Hdf5Reader(const std::filesystem::path& path)
 
 Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes)
     : Hdf5Reader([&] {
-        if (!is_signed(*bytes)) throw NotThisFormat("This is not an HDF5 file");
+        if (!is_signed(*bytes)) throw UnsupportedFormat("This is not an HDF5 file");
         File file;
         file.bytes = std::move(bytes);
         file.handle = open_hdf5(*file.bytes);
         if (!file.handle)
-          throw NotThisFormat("This HDF5 file is damaged, cut short, or being written");
+          throw UnsupportedFormat("This HDF5 file is corrupt, cut short, or being written");
         return file;
       }()) {}
 
@@ -77,9 +77,9 @@ Hdf5Reader::Hdf5Reader(File file) : file_(std::make_unique<File>(std::move(file)
   layout_ = table_->layout();
   size_ = table_->size();
   if (layout_ == Hdf5Layout::metavision) triggers_ = Hdf5Triggers::open(id);
-  intake_.set_size(size_);
+  validator_.set_size(size_);
   if (table_->rows() < table_->claimed_rows())
-    damage_.note(0, "there are fewer events than the file says");
+    corruption_.note(0, "there are fewer events than the file says");
 }
 
 Hdf5Reader::~Hdf5Reader() {
@@ -107,16 +107,16 @@ void Hdf5Reader::fill() {
   while (taken_ == events_.size() && row_ < table_->rows()) {
     events_.clear();
     taken_ = 0;
-    row_ = table_->read(row_, intake_, events_, damage_);
+    row_ = table_->read(row_, validator_, events_, corruption_);
     if (!not_before_) continue;
     const auto found = std::ranges::find_if(
-        events_, [&](const StampedEvent& event) { return event.t >= *not_before_; });
+        events_, [&](const AbsoluteEvent& event) { return event.t >= *not_before_; });
     taken_ = static_cast<std::size_t>(found - events_.begin());
     if (found != events_.end()) not_before_.reset();
   }
 }
 
-std::size_t Hdf5Reader::read(std::size_t count, std::vector<StampedEvent>& out) {
+std::size_t Hdf5Reader::read(std::size_t count, std::vector<AbsoluteEvent>& out) {
   const Hdf5Session session;
   std::size_t read = 0;
   while (read < count) {
@@ -134,7 +134,7 @@ std::size_t Hdf5Reader::read(std::size_t count, std::vector<StampedEvent>& out) 
 std::size_t Hdf5Reader::read_triggers(std::size_t count, std::vector<Trigger>& out) {
   const Hdf5Session session;
   const auto before = out.size();
-  while (triggers_ && triggers_->read(count - (out.size() - before), out, damage_)) {
+  while (triggers_ && triggers_->read(count - (out.size() - before), out, corruption_)) {
   }
   return out.size() - before;
 }
@@ -145,7 +145,7 @@ void Hdf5Reader::seek(Microseconds t) {
   taken_ = 0;
   row_ = table_->row_before(t);
   not_before_ = t;
-  intake_.restart();
+  validator_.restart();
   if (triggers_) triggers_->seek(t);
 }
 

@@ -7,7 +7,7 @@
 
 #include "src/formats/byte_source.hpp"
 #include "src/formats/event_file.hpp"
-#include "src/formats/event_intake.hpp"
+#include "src/formats/event_validator.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
 
 namespace eventcamera {
@@ -15,10 +15,10 @@ namespace eventcamera {
 class Hdf5Table;
 class Hdf5Triggers;
 
-/// Reads an HDF5 file of events, whichever layout it has. Rows that are damaged are left out.
+/// Reads an HDF5 file of events, whichever layout it has. Rows that are corrupt are left out.
 class Hdf5Reader final : public EventFile {
  public:
-  /// Throws NotThisFormat, or std::runtime_error where the file cannot be opened.
+  /// Throws UnsupportedFormat, or std::runtime_error where the file cannot be opened.
   explicit Hdf5Reader(const std::filesystem::path& path);
   explicit Hdf5Reader(std::unique_ptr<ByteSource> bytes);
   ~Hdf5Reader() override;
@@ -31,11 +31,11 @@ class Hdf5Reader final : public EventFile {
   std::uint64_t count() const;
 
   std::optional<TimeRange> time_range() const override;
-  std::size_t read(std::size_t count, std::vector<StampedEvent>& out) override;
+  std::size_t read(std::size_t count, std::vector<AbsoluteEvent>& out) override;
   /// Only Metavision's layout has triggers.
   std::size_t read_triggers(std::size_t count, std::vector<Trigger>& out) override;
   void seek(Microseconds t) override;
-  const Damage& damage() const override { return damage_; }
+  const Corruption& corruption() const override { return corruption_; }
 
  private:
   struct File;
@@ -48,11 +48,11 @@ class Hdf5Reader final : public EventFile {
   SensorSize size_;
   std::unique_ptr<Hdf5Table> table_;
   std::unique_ptr<Hdf5Triggers> triggers_;
-  EventIntake intake_;
-  Damage damage_;
+  EventValidator validator_;
+  Corruption corruption_;
 
-  std::uint64_t row_ = 0;             ///< to be read next
-  std::vector<StampedEvent> events_;  ///< read, the first taken_ of them handed over
+  std::uint64_t row_ = 0;              ///< to be read next
+  std::vector<AbsoluteEvent> events_;  ///< read, the first taken_ of them handed over
   std::size_t taken_ = 0;
   std::optional<Microseconds> not_before_;  ///< until an event is there
 };

@@ -12,7 +12,7 @@ namespace eventcamera {
 namespace {
 
 constexpr std::uint64_t block_rows = 16384;
-constexpr int largest_side = 65536;
+constexpr int max_side = 65536;
 
 std::uint64_t block_end(std::uint64_t row, std::uint64_t rows) {
   return std::min(rows, (row / block_rows + 1) * block_rows);
@@ -25,22 +25,21 @@ SensorSize read_geometry(std::string_view text) {
   const auto width = std::from_chars(text.data(), end, size.width);
   if (width.ec != std::errc() || width.ptr == end || *width.ptr != 'x') return {};
   const auto height = std::from_chars(width.ptr + 1, end, size.height);
-  if (height.ec != std::errc() || size.width <= 0 || size.height <= 0 ||
-      size.width > largest_side || size.height > largest_side)
+  if (height.ec != std::errc() || size.width <= 0 || size.height <= 0 || size.width > max_side ||
+      size.height > max_side)
     return {};
   return size;
 }
 
 /// Finding the position takes long, and only the first is told.
-void note(Damage& damage, const Hdf5Dataset& dataset, std::uint64_t row, const char* what) {
-  damage.note(damage.places == 0 ? dataset.position(row) : 0, what);
+void note(Corruption& corruption, const Hdf5Dataset& dataset, std::uint64_t row, const char* what) {
+  corruption.note(corruption.places == 0 ? dataset.position(row) : 0, what);
 }
 
 SensorSize size_of_attributes(hid_t object) {
   const auto width = read_number_attribute(object, "width");
   const auto height = read_number_attribute(object, "height");
-  if (!width || !height || *width <= 0 || *height <= 0 || *width > largest_side ||
-      *height > largest_side)
+  if (!width || !height || *width <= 0 || *height <= 0 || *width > max_side || *height > max_side)
     return {};
   return {static_cast<int>(*width), static_cast<int>(*height)};
 }
@@ -52,8 +51,8 @@ class NumberTable : public Hdf5Table {
   std::uint64_t rows() const override { return rows_; }
   std::uint64_t claimed_rows() const override { return claimed_rows_; }
 
-  std::uint64_t read(std::uint64_t row, EventIntake& intake, std::vector<StampedEvent>& out,
-                     Damage& damage) override {
+  std::uint64_t read(std::uint64_t row, EventValidator& validator, std::vector<AbsoluteEvent>& out,
+                     Corruption& corruption) override {
     if (row != next_row_) {
       lap_ = lap_of(row);
       last_ = 0;
@@ -66,7 +65,7 @@ class NumberTable : public Hdf5Table {
     }
     next_row_ = end;
     if (unread != nullptr) {
-      note(damage, *unread, row, "a part of a dataset cannot be read");
+      note(corruption, *unread, row, "a part of a dataset cannot be read");
       return end;
     }
     for (std::size_t i = 0; i < t_.size(); ++i) {
@@ -74,10 +73,10 @@ class NumberTable : public Hdf5Table {
       last_ = t_[i];
       Microseconds t = 0;
       if (__builtin_add_overflow(t_[i], offset_ + lap_, &t)) {
-        note(damage, t_dataset(), row, "a time is out of range");
+        note(corruption, t_dataset(), row, "a time is out of range");
         continue;
       }
-      intake.take(t, x_[i], y_[i], p_[i] > 0, out, damage);
+      validator.take(t, x_[i], y_[i], p_[i] > 0, out, corruption);
     }
     return end;
   }
@@ -142,7 +141,7 @@ class DsecTable final : public NumberTable {
     rows_ = columns_[0].rows();
     for (auto& column : columns_) {
       if (column.rank() != 1 || !column.is_integers())
-        throw NotThisFormat("This HDF5 file's /events are no columns of integers");
+        throw UnsupportedFormat("This HDF5 file's /events are no columns of integers");
       column.require_filters();
       rows_ = std::min(rows_, column.rows());
       claimed_rows_ = std::max(claimed_rows_, column.claimed_rows());
@@ -154,7 +153,7 @@ class DsecTable final : public NumberTable {
       constexpr Microseconds most = INT64_MAX / 2;
       if (!offset.is_integers() || offset.rows() != 1 || offset.columns() != 1 ||
           !offset.read(0, 1, number) || number[0] > most || number[0] < -most)
-        throw NotThisFormat("This HDF5 file's /t_offset is no time");
+        throw UnsupportedFormat("This HDF5 file's /t_offset is no time");
       offset_ = number[0];
     }
     if (Hdf5Dataset::exists(file, "ms_to_idx", H5O_TYPE_DATASET)) {
@@ -241,7 +240,8 @@ class V2eTable final : public NumberTable {
  public:
   explicit V2eTable(hid_t file) : events_(file, "events") {
     if (events_.rank() != 2 || events_.columns() != columns || !events_.is_integers())
-      throw NotThisFormat("This HDF5 file's /events are no rows of four integers t, x, y and p");
+      throw UnsupportedFormat(
+          "This HDF5 file's /events are no rows of four integers t, x, y and p");
     events_.require_filters();
     rows_ = events_.rows();
     claimed_rows_ = events_.claimed_rows();
@@ -251,8 +251,8 @@ class V2eTable final : public NumberTable {
       const Hdf5Handle space(H5Dget_space(frame.get()), H5Sclose);
       hsize_t extent[3] = {};  // frames, rows, columns
       if (H5Sget_simple_extent_ndims(space.get()) == 3 &&
-          H5Sget_simple_extent_dims(space.get(), extent, nullptr) == 3 &&
-          extent[1] <= largest_side && extent[2] <= largest_side && extent[1] > 0 && extent[2] > 0)
+          H5Sget_simple_extent_dims(space.get(), extent, nullptr) == 3 && extent[1] <= max_side &&
+          extent[2] <= max_side && extent[1] > 0 && extent[2] > 0)
         size_ = {static_cast<int>(extent[2]), static_cast<int>(extent[1])};
     }
   }
@@ -285,14 +285,15 @@ class V2eTable final : public NumberTable {
 class MetavisionTable final : public Hdf5Table {
  public:
   explicit MetavisionTable(hid_t file) : events_(file, "CD/events") {
-    if (events_.rank() != 1) throw NotThisFormat("This HDF5 file's /CD/events are no rows");
+    if (events_.rank() != 1) throw UnsupportedFormat("This HDF5 file's /CD/events are no rows");
     constexpr const char* members[] = {"t", "x", "y", "p"};
     events_.choose(members);
     compressed_ = events_.has_only_filter(ecf_filter);
     if (compressed_) {
       step_ = events_.chunk_rows();
       if (step_ == 0 || step_ > ecf_most_events)
-        throw NotThisFormat("This HDF5 file's /CD/events have chunks that are too large for ECF");
+        throw UnsupportedFormat(
+            "This HDF5 file's /CD/events have chunks that are too large for ECF");
     } else {
       events_.require_filters();
     }
@@ -305,21 +306,22 @@ class MetavisionTable final : public Hdf5Table {
   std::uint64_t rows() const override { return events_.rows(); }
   std::uint64_t claimed_rows() const override { return events_.claimed_rows(); }
 
-  std::uint64_t read(std::uint64_t row, EventIntake& intake, std::vector<StampedEvent>& out,
-                     Damage& damage) override {
-    if (!compressed_) return read_rows(row, intake, out, damage);
+  std::uint64_t read(std::uint64_t row, EventValidator& validator, std::vector<AbsoluteEvent>& out,
+                     Corruption& corruption) override {
+    if (!compressed_) return read_rows(row, validator, out, corruption);
     const auto chunk = row / step_;
     const auto end = chunk_end(chunk);
     if (!read_chunk(chunk)) {
-      note(damage, events_, row, "a chunk of events is damaged");
+      note(corruption, events_, row, "a chunk of events is corrupt");
       return end;
     }
     const auto begin = chunk * step_;
     if (decoded_.size() < end - begin)
-      note(damage, events_, row, "a chunk has fewer events than it should");
+      note(corruption, events_, row, "a chunk has fewer events than it should");
     for (auto i = row - begin; i < std::min<std::uint64_t>(decoded_.size(), end - begin); ++i) {
       const auto& event = decoded_[i];
-      intake.take(event.t, event.x, event.y(), event.polarity() == Polarity::on, out, damage);
+      validator.take(event.t, event.x, event.y(), event.polarity() == Polarity::on, out,
+                     corruption);
     }
     return end;
   }
@@ -369,8 +371,8 @@ class MetavisionTable final : public Hdf5Table {
     return numbers_[0];
   }
 
-  std::uint64_t read_rows(std::uint64_t row, EventIntake& intake, std::vector<StampedEvent>& out,
-                          Damage& damage) {
+  std::uint64_t read_rows(std::uint64_t row, EventValidator& validator,
+                          std::vector<AbsoluteEvent>& out, Corruption& corruption) {
     auto end = block_end(row, rows());
     bool is_read = events_.read(row, end - row, numbers_);
     if (!is_read) {
@@ -378,11 +380,12 @@ class MetavisionTable final : public Hdf5Table {
       is_read = events_.read(row, end - row, numbers_);
     }
     if (!is_read) {
-      note(damage, events_, row, "a part of a dataset cannot be read");
+      note(corruption, events_, row, "a part of a dataset cannot be read");
       return end;
     }
     for (std::size_t i = 0; i < numbers_.size(); i += 4)
-      intake.take(numbers_[i], numbers_[i + 1], numbers_[i + 2], numbers_[i + 3] > 0, out, damage);
+      validator.take(numbers_[i], numbers_[i + 1], numbers_[i + 2], numbers_[i + 3] > 0, out,
+                     corruption);
     return end;
   }
 
@@ -391,7 +394,7 @@ class MetavisionTable final : public Hdf5Table {
   std::uint64_t step_ = block_rows;  ///< rows that are read at once
   SensorSize size_;
   std::vector<std::uint8_t> stored_;
-  std::vector<StampedEvent> decoded_;
+  std::vector<AbsoluteEvent> decoded_;
   std::vector<std::int64_t> numbers_;
 };
 
@@ -404,13 +407,14 @@ std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file) {
     return std::make_unique<DsecTable>(file);
   if (Hdf5Dataset::exists(file, "events", H5O_TYPE_DATASET))
     return std::make_unique<V2eTable>(file);
-  throw NotThisFormat(
+  throw UnsupportedFormat(
       "This HDF5 file has none of the layouts that are read: /events/t (DSEC), /events (v2e), "
       "/CD/events (Metavision)");
 }
 
 Hdf5Triggers::Hdf5Triggers(hid_t file) : dataset_(file, "EXT_TRIGGER/events") {
-  if (dataset_.rank() != 1) throw NotThisFormat("This HDF5 file's /EXT_TRIGGER/events are no rows");
+  if (dataset_.rank() != 1)
+    throw UnsupportedFormat("This HDF5 file's /EXT_TRIGGER/events are no rows");
   constexpr const char* members[] = {"t", "p", "id"};
   dataset_.choose(members);
   dataset_.require_filters();
@@ -421,7 +425,7 @@ std::unique_ptr<Hdf5Triggers> Hdf5Triggers::open(hid_t file) {
   return std::unique_ptr<Hdf5Triggers>(new Hdf5Triggers(file));
 }
 
-bool Hdf5Triggers::read(std::size_t count, std::vector<Trigger>& out, Damage& damage) {
+bool Hdf5Triggers::read(std::size_t count, std::vector<Trigger>& out, Corruption& corruption) {
   if (row_ >= dataset_.rows() || count == 0) return false;
   const auto end = std::min<std::uint64_t>(block_end(row_, dataset_.rows()), row_ + count);
   if (dataset_.read(row_, end - row_, numbers_)) {
@@ -429,7 +433,7 @@ bool Hdf5Triggers::read(std::size_t count, std::vector<Trigger>& out, Damage& da
       out.push_back(
           {numbers_[i], static_cast<std::uint16_t>(numbers_[i + 2]), numbers_[i + 1] > 0});
   } else {
-    note(damage, dataset_, row_, "a part of a dataset cannot be read");
+    note(corruption, dataset_, row_, "a part of a dataset cannot be read");
   }
   row_ = end;
   return true;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_intake.hpp"
+#include "src/formats/event_validator.hpp"
 #include "src/formats/hdf5/hdf5_dataset.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
 
@@ -19,7 +19,7 @@ class Hdf5Table {
   Hdf5Table(const Hdf5Table&) = delete;
   Hdf5Table& operator=(const Hdf5Table&) = delete;
 
-  /// Throws NotThisFormat where the file has no layout that is known, or is wrong in its own.
+  /// Throws UnsupportedFormat where the file has no layout that is known, or is wrong in its own.
   static std::unique_ptr<Hdf5Table> open(hid_t file);
 
   virtual Hdf5Layout layout() const = 0;
@@ -28,9 +28,9 @@ class Hdf5Table {
   virtual std::uint64_t claimed_rows() const = 0;
 
   /// Reads a bounded number of rows from `row` on, and returns the row behind them. What is
-  /// damaged is noted and left out.
-  virtual std::uint64_t read(std::uint64_t row, EventIntake& intake, std::vector<StampedEvent>& out,
-                             Damage& damage) = 0;
+  /// corrupt is noted and left out.
+  virtual std::uint64_t read(std::uint64_t row, EventValidator& validator,
+                             std::vector<AbsoluteEvent>& out, Corruption& corruption) = 0;
 
   /// A row with no event of time `t` or later before it, and not many before that.
   virtual std::uint64_t row_before(Microseconds t) = 0;
@@ -48,7 +48,7 @@ class Hdf5Triggers {
   static std::unique_ptr<Hdf5Triggers> open(hid_t file);
 
   /// Appends a bounded number of triggers from the next row on. False at the end.
-  bool read(std::size_t count, std::vector<Trigger>& out, Damage& damage);
+  bool read(std::size_t count, std::vector<Trigger>& out, Corruption& corruption);
   void seek(Microseconds t);
 
  private:

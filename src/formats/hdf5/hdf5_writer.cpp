@@ -28,7 +28,7 @@ namespace {
 using Compression = Hdf5Writer::Compression;
 
 /// Of a recording: both layouts have an index that grows with time, events or not.
-constexpr Microseconds longest_recording = 7LL * 24 * 3600 * 1'000'000;
+constexpr Microseconds max_recording = 7LL * 24 * 3600 * 1'000'000;
 
 void check(bool done) {
   if (!done) throw std::runtime_error("The HDF5 library cannot write the file");
@@ -37,7 +37,7 @@ void check(bool done) {
 /// Microseconds since the recording's first event.
 Microseconds since(Microseconds first, Microseconds t) {
   Microseconds passed = 0;
-  if (__builtin_sub_overflow(t, first, &passed) || passed > longest_recording)
+  if (__builtin_sub_overflow(t, first, &passed) || passed > max_recording)
     throw std::invalid_argument("An HDF5 file of events cannot be longer than a week");
   return passed;
 }
@@ -127,7 +127,7 @@ class DsecLayout final : public Hdf5Writer::Layout {
     write_number(file, "height", settings.size.height);
   }
 
-  void append(std::span<const StampedEvent> events) override {
+  void append(std::span<const AbsoluteEvent> events) override {
     for (const auto& event : events) {
       if (!first_) first_ = event.t;
       const auto t = static_cast<std::uint64_t>(since(*first_, event.t));
@@ -294,7 +294,7 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
           write_text_attribute(root.get(), "format", "EVT3;height=" + height + ";width=" + width));
   }
 
-  void append(std::span<const StampedEvent> events) override {
+  void append(std::span<const AbsoluteEvent> events) override {
     for (const auto& event : events) {
       event_index_.add(events_out_.rows() + events_.size(), event.t);
       events_.push_back(event);
@@ -371,7 +371,7 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
   Hdf5Handle event_type_, trigger_type_;
   GrowingDataset events_out_, triggers_out_;
   MetavisionIndex event_index_, trigger_index_;
-  std::vector<StampedEvent> events_;
+  std::vector<AbsoluteEvent> events_;
   std::vector<TriggerRow> triggers_;
   std::vector<std::uint8_t> encoded_;
 };
@@ -415,7 +415,7 @@ Hdf5Writer::~Hdf5Writer() {
   file_.reset();
 }
 
-void Hdf5Writer::append(std::span<const StampedEvent> events) {
+void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   const Hdf5Session session;
   file_->output.check();
   for (const auto& event : events) {

@@ -29,7 +29,7 @@ class Hdf5Writer {
     virtual ~Layout() = default;
     Layout(const Layout&) = delete;
     Layout& operator=(const Layout&) = delete;
-    virtual void append(std::span<const StampedEvent> events) = 0;
+    virtual void append(std::span<const AbsoluteEvent> events) = 0;
     virtual void append(std::span<const Trigger> triggers) = 0;
     virtual void close() = 0;
 
@@ -45,7 +45,7 @@ class Hdf5Writer {
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
 
   /// Events come sorted by time and within the sensor.
-  void append(std::span<const StampedEvent> events);
+  void append(std::span<const AbsoluteEvent> events);
 
   /// Triggers are kept by Metavision's layout alone; DSEC has no place for them.
   void append(std::span<const Trigger> triggers);

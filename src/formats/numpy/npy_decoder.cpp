@@ -16,7 +16,7 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::size_t longest_header = 65536;
+constexpr std::size_t max_header = 65536;
 
 double half_of(std::uint16_t bits) {
   const int exponent = bits >> 10 & 31;
@@ -94,18 +94,18 @@ bool NpyDecoder::take_header(std::span<const std::uint8_t>& bytes) {
   const bool long_enough = take();
   const auto known = std::min(rest_.size(), npy_magic.size());
   if (std::memcmp(rest_.data(), npy_magic.data(), known) != 0)
-    throw NotThisFormat("This is not a NumPy file");
+    throw UnsupportedFormat("This is not a NumPy file");
   if (!long_enough) return false;
   const int version = rest_[npy_magic.size()];
   if (version < 1 || version > 3)
-    throw NotThisFormat("This NumPy file is of a version that is not known");
+    throw UnsupportedFormat("This NumPy file is of a version that is not known");
   needed += version == 1 ? 2 : 4;
   if (!take()) return false;
   const std::size_t length = version == 1
                                  ? little_endian<std::uint16_t>(rest_.data() + version_end)
                                  : little_endian<std::uint32_t>(rest_.data() + version_end);
   const auto header_begin = needed;
-  if (length > longest_header) throw NotThisFormat("This NumPy file's header is too long");
+  if (length > max_header) throw UnsupportedFormat("This NumPy file's header is too long");
   needed += length;
   if (!take()) return false;
 
@@ -141,17 +141,17 @@ void NpyDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   if (left_ > 0) {
     rest_.assign(bytes.begin(), bytes.end());
   } else if (!bytes.empty() && !after_end_) {
-    damage_.note(position_, "bytes after the last event");
+    corruption_.note(position_, "bytes after the last event");
     after_end_ = true;
   }
 }
 
 void NpyDecoder::finish(Decoded& /*out*/) {
-  if (!header_read_) throw NotThisFormat("This NumPy file ends within its header");
+  if (!header_read_) throw UnsupportedFormat("This NumPy file ends within its header");
   if (!rest_.empty()) {
-    damage_.note(position_, "the last event is not whole");
+    corruption_.note(position_, "the last event is not whole");
   } else if (left_ > 0 && header_.count != npy_unknown_count) {
-    damage_.note(position_, "there are fewer events than the header says");
+    corruption_.note(position_, "there are fewer events than the header says");
   }
 }
 
@@ -169,8 +169,8 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
   if (plain_) {
     const Window t(t_field, size), x(x_field, size), y(y_field, size), p(p_field, size);
     for (; bytes < end; bytes += size, position_ += size)
-      intake_.take(t.read(bytes), x.read(bytes), y.read(bytes), p.read(bytes) > 0, out.events,
-                   damage_);
+      validator_.take(t.read(bytes), x.read(bytes), y.read(bytes), p.read(bytes) > 0, out.events,
+                      corruption_);
     return;
   }
   const double microseconds = t_field.kind == NpyField::Kind::floating ? 1e6 : 1;
@@ -180,9 +180,9 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
     const auto y = number_of(y_field, bytes, 1);
     const auto p = number_of(p_field, bytes, 1);
     if (t && x && y && p) {
-      intake_.take(*t, *x, *y, *p > 0, out.events, damage_);
+      validator_.take(*t, *x, *y, *p > 0, out.events, corruption_);
     } else {
-      damage_.note(position_, "a number is out of range");
+      corruption_.note(position_, "a number is out of range");
     }
   }
 }

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_intake.hpp"
+#include "src/formats/event_validator.hpp"
 #include "src/formats/numpy/npy_header.hpp"
 
 namespace eventcamera {
@@ -17,7 +17,7 @@ class NpyDecoder final : public Decoder {
   /// The file does not tell the sensor's size; where it is 0x0 no event is outside.
   explicit NpyDecoder(SensorSize size = {}) {
     size_ = size;
-    intake_.set_size(size);
+    validator_.set_size(size);
   }
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
@@ -34,7 +34,7 @@ class NpyDecoder final : public Decoder {
   std::uint64_t position_ = 0;      ///< of what is read next
   std::uint64_t left_ = 0;          ///< elements that the header claims and that have not come
   bool after_end_ = false;
-  EventIntake intake_;
+  EventValidator validator_;
 };
 
 }  // namespace eventcamera

@@ -17,15 +17,15 @@ constexpr std::string_view before_count =
     "{'descr': [('x', '<u2'), ('y', '<u2'), ('t', '<i8'), ('p', '|u1')], "
     "'fortran_order': False, 'shape': (";
 constexpr std::string_view after_count = ")}";
-constexpr std::size_t longest_count = 20;
+constexpr std::size_t max_count = 20;
 constexpr std::size_t preamble = npy_magic.size() + 4;
 constexpr std::size_t header_bytes = 192;  // NumPy aligns the data to 64
-static_assert(preamble + before_count.size() + longest_count + after_count.size() < header_bytes);
+static_assert(preamble + before_count.size() + max_count + after_count.size() < header_bytes);
 
 /// A tuple of one, such as "50000,".
 std::string shape(std::uint64_t count) {
   auto text = std::to_string(count) + ',';
-  text.resize(longest_count, ' ');
+  text.resize(max_count, ' ');
   return text;
 }
 
@@ -44,7 +44,7 @@ void NpyEncoder::begin(std::vector<std::uint8_t>& out) {
   out.insert(out.end(), header.begin(), header.end());
 }
 
-void NpyEncoder::encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) {
+void NpyEncoder::encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
   begin(out);
   count_ += events.size();
   auto end = out.size();

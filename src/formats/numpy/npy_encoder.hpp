@@ -15,7 +15,7 @@ class NpyEncoder final : public Encoder {
  public:
   static constexpr std::size_t event_bytes = 13;
 
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override;
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
   void finish(std::vector<std::uint8_t>& out) override;
 
   /// Bytes that belong to another place than they were written at.

@@ -11,7 +11,7 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::uint32_t most_element_bytes = 65536;
+constexpr std::uint32_t max_element_bytes = 65536;
 
 /// Reads a literal of Python's, of the kinds that NumPy writes into a header.
 class Literal {
@@ -76,7 +76,7 @@ class Literal {
   }
 
   [[noreturn]] static void fail() {
-    throw NotThisFormat("This NumPy file's header is not of a structured array");
+    throw UnsupportedFormat("This NumPy file's header is not of a structured array");
   }
 
  private:
@@ -99,7 +99,8 @@ Type read_type(std::string_view text) {
   if (text.size() < 3) Literal::fail();
   Literal size(text.substr(2));
   const auto number = size.integer();
-  if (number > most_element_bytes) throw NotThisFormat("This NumPy file's elements are too large");
+  if (number > max_element_bytes)
+    throw UnsupportedFormat("This NumPy file's elements are too large");
   // A character of a string of U has four bytes.
   return {text[0], text[1], static_cast<std::uint32_t>(number) * (text[1] == 'U' ? 4 : 1)};
 }
@@ -150,7 +151,8 @@ void read_fields(Literal& literal, NpyHeader& header) {
     }
     literal.expect(',');
     if (!literal.starts_with_string())
-      throw NotThisFormat("This NumPy file's fields have fields of their own, which is not read");
+      throw UnsupportedFormat(
+          "This NumPy file's fields have fields of their own, which is not read");
     const auto type = read_type(literal.string());
     std::uint64_t bytes = type.bytes;
     bool one = true;
@@ -158,8 +160,8 @@ void read_fields(Literal& literal, NpyHeader& header) {
       one = false;
       while (!literal.take(')')) {
         const auto extent = literal.integer();
-        if (extent > most_element_bytes || (bytes *= extent) > most_element_bytes)
-          throw NotThisFormat("This NumPy file's elements are too large");
+        if (extent > max_element_bytes || (bytes *= extent) > max_element_bytes)
+          throw UnsupportedFormat("This NumPy file's elements are too large");
         if (!literal.take(',')) {
           literal.expect(')');
           break;
@@ -173,13 +175,13 @@ void read_fields(Literal& literal, NpyHeader& header) {
       const auto index = static_cast<std::size_t>(*column);
       const auto number = one ? number_of(type, header.element_bytes) : std::nullopt;
       if (!number || known[index])
-        throw NotThisFormat("This NumPy file's field '" + std::string(name) +
-                            "' is not a number of 8 to 64 bits");
+        throw UnsupportedFormat("This NumPy file's field '" + std::string(name) +
+                                "' is not a number of 8 to 64 bits");
       header.fields[index] = *number;
       known[index] = true;
     }
-    if (header.element_bytes + bytes > most_element_bytes)
-      throw NotThisFormat("This NumPy file's elements are too large");
+    if (header.element_bytes + bytes > max_element_bytes)
+      throw UnsupportedFormat("This NumPy file's elements are too large");
     header.element_bytes += static_cast<std::uint32_t>(bytes);
     if (!literal.take(',')) {
       literal.expect(']');
@@ -187,7 +189,7 @@ void read_fields(Literal& literal, NpyHeader& header) {
     }
   }
   for (const bool is_known : known)
-    if (!is_known) throw NotThisFormat("This NumPy file's array has no fields t, x, y and p");
+    if (!is_known) throw UnsupportedFormat("This NumPy file's array has no fields t, x, y and p");
 }
 
 }  // namespace
@@ -203,7 +205,7 @@ NpyHeader read_npy_header(std::string_view dictionary) {
     literal.expect(':');
     if (key == "descr" && !has_fields) {
       if (literal.starts_with_string())
-        throw NotThisFormat(
+        throw UnsupportedFormat(
             "This NumPy file has an array of single numbers; a structured array of x, y, t and p "
             "is read");
       read_fields(literal, header);
@@ -212,10 +214,12 @@ NpyHeader read_npy_header(std::string_view dictionary) {
       literal.boolean();  // in one dimension both orders are the same
     } else if (key == "shape" && !has_shape) {
       literal.expect('(');
-      if (literal.take(')')) throw NotThisFormat("This NumPy file has no array of one dimension");
+      if (literal.take(')'))
+        throw UnsupportedFormat("This NumPy file has no array of one dimension");
       header.count = literal.integer();
       literal.take(',');
-      if (!literal.take(')')) throw NotThisFormat("This NumPy file has no array of one dimension");
+      if (!literal.take(')'))
+        throw UnsupportedFormat("This NumPy file has no array of one dimension");
       has_shape = true;
     } else {
       Literal::fail();

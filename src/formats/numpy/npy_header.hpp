@@ -24,7 +24,7 @@ struct NpyHeader {
   std::uint64_t count = 0;
 };
 
-/// Reads the header's dictionary. Throws NotThisFormat where it is not of a structured array of
+/// Reads the header's dictionary. Throws UnsupportedFormat where it is not of a structured array of
 /// one dimension that has fields t, x, y and p.
 NpyHeader read_npy_header(std::string_view dictionary);
 

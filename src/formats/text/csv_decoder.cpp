@@ -12,8 +12,8 @@ namespace eventcamera {
 namespace {
 
 constexpr std::size_t head_lines = 256;
-constexpr std::size_t longest_head = 65536;
-constexpr std::size_t longest_line = 4096;
+constexpr std::size_t max_head = 65536;
+constexpr std::size_t max_line = 4096;
 
 /// What read_plain_line() may look at from a line's first character on.
 constexpr std::ptrdiff_t plain_line_reach = 128;
@@ -114,7 +114,7 @@ void CsvDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (in_head_) {
     const auto count = take_head(text);
-    if (head_lines_ < head_lines && head_.size() < longest_head) return;
+    if (head_lines_ < head_lines && head_.size() < max_head) return;
     text.remove_prefix(count);
     read_head();
     const auto head = std::move(head_);
@@ -125,7 +125,7 @@ void CsvDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
 
 void CsvDecoder::finish(Decoded& out) {
   if (in_head_) {
-    if (head_.empty()) throw NotThisFormat("the file is empty");
+    if (head_.empty()) throw UnsupportedFormat("the file is empty");
     head_ += '\n';
     read_head();
     head_.pop_back();
@@ -141,7 +141,7 @@ void CsvDecoder::finish(Decoded& out) {
 /// Adds `text` to the head, up to the head's end, and returns how much that was.
 std::size_t CsvDecoder::take_head(std::string_view text) {
   std::size_t count = 0;
-  while (count < text.size() && head_lines_ < head_lines && head_.size() < longest_head) {
+  while (count < text.size() && head_lines_ < head_lines && head_.size() < max_head) {
     const char letter = text[count++];
     head_ += letter;
     if (line_begins_ && letter != '#' && letter != '%' && letter != '\n') ++head_lines_;
@@ -183,10 +183,10 @@ void CsvDecoder::read_head() {
     if (!header && !is_comment(line)) samples.push_back(line);
   }
   if (!empty && text.size() == head_.size())
-    throw NotThisFormat("This is not text of events: no line ends");
+    throw UnsupportedFormat("This is not text of events: no line ends");
 
   if (settings_.size != SensorSize{}) size_ = settings_.size;
-  intake_.set_size(size_);
+  validator_.set_size(size_);
   if (settings_.order) columns_.assign(settings_.order->begin(), settings_.order->end());
   find_columns(samples);
   find_unit(samples);
@@ -238,7 +238,7 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   const auto known =
       std::ranges::count_if(columns_, [](auto column) { return column.has_value(); });
   if (known < 4 && !settings_.order)
-    throw NotThisFormat(
+    throw UnsupportedFormat(
         "This is not text of events: its first line names no columns t, x, y and p. Set the order");
   return true;
 }
@@ -283,7 +283,8 @@ void CsvDecoder::find_columns(const std::vector<std::string_view>& samples) {
   };
   if (!columns_.empty()) {
     if (!samples.empty() && times_of(columns_, 0).empty())
-      throw NotThisFormat("This is not text of events: its lines do not have the columns expected");
+      throw UnsupportedFormat(
+          "This is not text of events: its lines do not have the columns expected");
     return;
   }
 
@@ -312,7 +313,7 @@ void CsvDecoder::find_columns(const std::vector<std::string_view>& samples) {
     columns_ = columns;
     return;
   }
-  throw NotThisFormat(
+  throw UnsupportedFormat(
       "This is not text of events, or its columns cannot be told from its first lines: set the "
       "order");
 }
@@ -332,8 +333,8 @@ void CsvDecoder::read_text(std::string_view text, Decoded& out) {
   if (skipping_ || !rest_.empty()) {
     const auto end = text.find('\n');
     const auto part = text.substr(0, end);
-    if (!skipping_ && rest_.size() + part.size() > longest_line) {
-      damage_.note(position_, "a line is too long");
+    if (!skipping_ && rest_.size() + part.size() > max_line) {
+      corruption_.note(position_, "a line is too long");
       position_ += rest_.size();
       rest_.clear();
       skipping_ = true;
@@ -356,8 +357,8 @@ void CsvDecoder::read_text(std::string_view text, Decoded& out) {
     const auto* const begin = text.data();
     text.remove_prefix(static_cast<std::size_t>(read_lines(begin, begin + last + 1, out) - begin));
   }
-  if (text.size() > longest_line) {
-    damage_.note(position_, "a line is too long");
+  if (text.size() > max_line) {
+    corruption_.note(position_, "a line is too long");
     position_ += text.size();
     skipping_ = true;
   } else {
@@ -374,7 +375,7 @@ const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out
         Row row;
         const char* const next = read_plain_line(at, row);
         if (next == nullptr) break;
-        intake_.take(row.t.value, row.x, row.y, row.on, out.events, damage_);
+        validator_.take(row.t.value, row.x, row.y, row.on, out.events, corruption_);
         at = next;
       }
       position_ += static_cast<std::uint64_t>(at - first);
@@ -382,8 +383,8 @@ const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out
     const auto* const line_end =
         static_cast<const char*>(std::memchr(at, '\n', static_cast<std::size_t>(end - at)));
     const std::string_view line(at, static_cast<std::size_t>(line_end - at));
-    if (line.size() > longest_line) {
-      damage_.note(position_, "a line is too long");
+    if (line.size() > max_line) {
+      corruption_.note(position_, "a line is too long");
     } else {
       read_line(line, out);
     }
@@ -445,10 +446,10 @@ void CsvDecoder::read_line(std::string_view line, Decoded& out) {
   const auto count = split(line, fields);
   const auto row = read_row(std::span(fields).first(count), columns_, power_);
   if (!row) {
-    damage_.note(position_, "a line is no event");
+    corruption_.note(position_, "a line is no event");
     return;
   }
-  intake_.take(row->t.value, row->x, row->y, row->on, out.events, damage_);
+  validator_.take(row->t.value, row->x, row->y, row->on, out.events, corruption_);
 }
 
 }  // namespace eventcamera

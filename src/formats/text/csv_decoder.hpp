@@ -9,7 +9,7 @@
 
 #include "src/formats/decoder.hpp"
 #include "src/formats/event_column.hpp"
-#include "src/formats/event_intake.hpp"
+#include "src/formats/event_validator.hpp"
 #include "src/formats/text/csv_dialect.hpp"
 #include "src/formats/text/decimal.hpp"
 
@@ -44,8 +44,8 @@ class CsvDecoder final : public Decoder {
   void finish(Decoded& out) override;
 
  private:
-  static constexpr std::size_t most_columns = 16;
-  using Fields = std::array<std::string_view, most_columns>;
+  static constexpr std::size_t max_columns = 16;
+  using Fields = std::array<std::string_view, max_columns>;
 
   struct Row {
     Decimal t = {};
@@ -81,7 +81,7 @@ class CsvDecoder final : public Decoder {
   char separator_ = ',';  ///< between the fields of the first line
   bool plain_ = false;    ///< four columns, so that most lines need not be split
   int power_ = 0;         ///< of ten, from the time's unit to microseconds
-  EventIntake intake_;
+  EventValidator validator_;
 
   std::string rest_;  ///< the beginning of a line whose end has not come
   bool skipping_ = false;

@@ -9,12 +9,12 @@ namespace eventcamera {
 namespace {
 
 /// More than the longest line: a time of 19 digits, a sign and three noughts, and the rest.
-constexpr std::size_t longest_line = 64;
+constexpr std::size_t max_line = 64;
 constexpr std::size_t events_at_once = 1024;
 
 template <class Number>
 char* write_number(char* at, Number number) {
-  return std::to_chars(at, at + longest_line, number).ptr;
+  return std::to_chars(at, at + max_line, number).ptr;
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ char* CsvEncoder::write(char* at, Microseconds t) const {
   return at + 6;
 }
 
-char* CsvEncoder::write(char* at, const StampedEvent& event) const {
+char* CsvEncoder::write(char* at, const AbsoluteEvent& event) const {
   for (const auto column : dialect_.order) {
     switch (column) {
       case EventColumn::t:
@@ -116,9 +116,9 @@ char* CsvEncoder::write(char* at, const StampedEvent& event) const {
   return at;
 }
 
-void CsvEncoder::encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) {
+void CsvEncoder::encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
   begin(out);
-  char text[events_at_once * longest_line];
+  char text[events_at_once * max_line];
   while (!events.empty()) {
     const auto count = std::min(events.size(), events_at_once);
     char* at = text;

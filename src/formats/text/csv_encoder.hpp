@@ -14,14 +14,14 @@ class CsvEncoder final : public Encoder {
  public:
   CsvEncoder(const CsvDialect& dialect, SensorSize size) : dialect_(dialect), size_(size) {}
 
-  void encode(std::span<const StampedEvent> events, std::vector<std::uint8_t>& out) override;
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
   void finish(std::vector<std::uint8_t>& out) override;
 
  private:
   std::string header() const;
   void begin(std::vector<std::uint8_t>& out);
   char* write(char* at, Microseconds t) const;
-  char* write(char* at, const StampedEvent& event) const;
+  char* write(char* at, const AbsoluteEvent& event) const;
 
   CsvDialect dialect_;
   SensorSize size_;

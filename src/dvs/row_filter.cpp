@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/dvs/row_screen.hpp"
+#include "src/dvs/row_filter.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/dvs/row_screen.cpp"
+#define HWY_TARGET_INCLUDE "src/dvs/row_filter.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants to come after that.
 #include <hwy/highway.h>
@@ -19,9 +19,9 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// No vector is wider: rows of a PixelArray are multiples of it.
-constexpr int most_lanes = 16;
+constexpr int max_lanes = 16;
 
-using Floats = hn::CappedTag<float, most_lanes>;
+using Floats = hn::CappedTag<float, max_lanes>;
 using Words = hn::Rebind<std::int32_t, Floats>;
 using Counts = hn::Rebind<std::uint32_t, Floats>;
 using Vector = hn::Vec<Floats>;
@@ -56,7 +56,7 @@ void pass(const Screen& screen, const Pixel* luma, int y, PixelArray& pixels,
   for (int x = 0; x < width; x += lanes) {
     const int count = std::min(lanes, width - x);
     const Pixel* here = luma + x;
-    Pixel tail[most_lanes] = {};
+    Pixel tail[max_lanes] = {};
     if (count < lanes) {  // behind the row lies what is not ours
       std::copy_n(here, count, tail);
       here = tail;
@@ -120,14 +120,14 @@ void pass(const Screen& screen, const Pixel* luma, int y, PixelArray& pixels,
     hn::BlendedStore(next_reference, rest_of_them, floats, references + x);
     if (screen.has_noise)
       hn::BlendedStore(quiet, hn::RebindMask(counts, rest_of_them), counts, quiets + x);
-    HWY_ALIGN float last_targets[most_lanes];
-    HWY_ALIGN float last_signals[most_lanes];
-    HWY_ALIGN std::int32_t shades_here[most_lanes];
+    HWY_ALIGN float last_targets[max_lanes];
+    HWY_ALIGN float last_signals[max_lanes];
+    HWY_ALIGN std::int32_t shades_here[max_lanes];
     hn::Store(last_target, floats, last_targets);
     hn::Store(last_signal, floats, last_signals);
     hn::Store(shade, words, shades_here);
     const auto add = [&](const auto& mask, std::vector<Candidate>& to) {
-      std::uint64_t bits[(most_lanes + 63) / 64] = {};
+      std::uint64_t bits[(max_lanes + 63) / 64] = {};
       hn::StoreMaskBits(floats, mask, reinterpret_cast<std::uint8_t*>(bits));
       for (; bits[0] != 0; bits[0] &= bits[0] - 1) {
         const int i = std::countr_zero(bits[0]);

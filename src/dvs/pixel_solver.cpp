@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/dvs/pixel_time.hpp"
+#include "src/dvs/pixel_solver.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 constexpr double never = std::numeric_limits<double>::infinity();
 
 /// Events cannot be told apart by less, microseconds.
-constexpr double shortest_rest = 1;
+constexpr double min_rest = 1;
 
 /// More numbers than a pixel draws in a segment.
 constexpr std::uint64_t draws_a_segment = 1 << 16;
@@ -60,7 +60,7 @@ class Pixel {
     const Crossings crossings(above_leak_, end_);
     CoursePoint now{0, above_leak_.offset + above_leak_.lag};
     int happened = 0;
-    for (; happened < most_events; ++happened) {
+    for (; happened < max_events; ++happened) {
       if (held_) {
         if (released_ > end_.t) break;
         now = at(released_);
@@ -79,7 +79,7 @@ class Pixel {
         break;
       }
     }
-    if (happened == most_events) reference_ = end_.value;
+    if (happened == max_events) reference_ = end_.value;
     skip_noise();
     keep();
   }
@@ -90,16 +90,16 @@ class Pixel {
     const double step = rises ? positive_ : -negative_;
     const double last = end_.value + (rises ? rounding : -rounding);
     int happened = 0;
-    for (; happened < most_events; ++happened) {
+    for (; happened < max_events; ++happened) {
       const double level = reference_ + step;
       if (rises ? level > last : level < last) break;
       reference_ = level;
       const double t = std::clamp((level - above_leak_.offset) / above_leak_.slope, 0.0, end_.t);
       if (t < ready_) continue;
       events_.add(segment_.begin + t, x_, y_, rises ? Polarity::on : Polarity::off);
-      ready_ = t + std::max(settings_.refractory_period, shortest_rest);
+      ready_ = t + std::max(settings_.refractory_period, min_rest);
     }
-    if (happened == most_events) reference_ = end_.value;
+    if (happened == max_events) reference_ = end_.value;
     keep();
   }
 
@@ -110,16 +110,16 @@ class Pixel {
     const Crossings crossings(above_leak_, end_);
     CoursePoint now{0, above_leak_.offset + above_leak_.lag};
     int happened = 0;
-    for (; happened < most_events; ++happened) {
+    for (; happened < max_events; ++happened) {
       const auto crossing = crossings.first(reference_ - negative_, reference_ + positive_, now);
       if (!crossing) break;
       now = crossing->point;
       reference_ += crossing->polarity == Polarity::on ? positive_ : -negative_;
       if (now.t < ready_) continue;
       events_.add(segment_.begin + now.t, x_, y_, crossing->polarity);
-      ready_ = now.t + std::max(settings_.refractory_period, shortest_rest);
+      ready_ = now.t + std::max(settings_.refractory_period, min_rest);
     }
-    if (happened == most_events) reference_ = end_.value;
+    if (happened == max_events) reference_ = end_.value;
     keep();
   }
 
@@ -186,7 +186,7 @@ class Pixel {
     }
     if (!std::isinf(positive_)) events_.add(segment_.begin + t, x_, y_, polarity);
     released_ = t + settings_.refractory_period;
-    ready_ = std::max(released_, t + shortest_rest);
+    ready_ = std::max(released_, t + min_rest);
     held_ = settings_.refractory_reset == RefractoryReset::signal;
     if (settings_.threshold_jitter > 0 && !std::isinf(positive_)) {
       const Mismatch mismatch(settings_, random_);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Events at any times, cut into intervals. Four bytes are an event, or a word to the slicer.
-#include "src/formats/interval_slicer.hpp"
+// Events at any times, cut into intervals. Four bytes are an event, or a word to the chunker.
+#include "src/formats/chunker.hpp"
 
 #include <optional>
 
@@ -12,9 +12,9 @@ namespace {
 using namespace fuzz;
 
 /// Takes what is ready, and returns how many events that were.
-std::uint64_t take(IntervalSlicer& slicer, std::optional<Microseconds>& end) {
+std::uint64_t take(Chunker& chunker, std::optional<Microseconds>& end) {
   std::uint64_t count = 0;
-  while (const auto interval = slicer.next()) {
+  while (const auto interval = chunker.next()) {
     require(!end || interval->start == *end, "an interval begins where the last one ended");
     require(interval->duration > 0, "an interval is not empty");
     end = interval->start + interval->duration;
@@ -32,9 +32,9 @@ std::uint64_t take(IntervalSlicer& slicer, std::optional<Microseconds>& end) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  IntervalSlicer slicer(1 + size % 2000);
+  Chunker chunker(1 + size % 2000);
   std::optional<Microseconds> end;
-  std::vector<StampedEvent> events;
+  std::vector<AbsoluteEvent> events;
   std::uint64_t pushed = 0;
   std::uint64_t taken = 0;
   std::uint64_t t = 0;
@@ -43,26 +43,26 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto step = static_cast<std::uint64_t>(little_endian<std::int16_t>(data + 1)) << shift;
     switch (data[3] % 8) {
       case 0:
-        slicer.push(events);
+        chunker.push(events);
         pushed += events.size();
         events.clear();
         break;
       case 1:
-        taken += take(slicer, end);
+        taken += take(chunker, end);
         break;
       case 2:
-        slicer.reach(static_cast<Microseconds>(t + step));
+        chunker.reach(static_cast<Microseconds>(t + step));
         break;
       default:
         t += step;
         events.push_back({static_cast<Microseconds>(t), data[0], data[3]});
     }
   }
-  slicer.push(events);
+  chunker.push(events);
   pushed += events.size();
-  slicer.finish();
-  taken += take(slicer, end);
-  const auto& dropped = slicer.dropped();
+  chunker.finish();
+  taken += take(chunker, end);
+  const auto& dropped = chunker.dropped();
   require(taken + dropped.late + dropped.stray + dropped.repeated == pushed, "no event is lost");
   return 0;
 }

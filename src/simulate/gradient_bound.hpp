@@ -11,7 +11,7 @@ namespace eventcamera {
 
 /// How much neighbouring pixels of a picture differ at most, cell by cell: 4x4 pixels for looking
 /// near, 16x16 for looking far.
-class Steepness {
+class GradientBound {
  public:
   /// `picture` must be a Plane: SIMD code reads behind its end.
   void measure(const PlaneView<std::uint8_t>& picture, ThreadPool& threads);

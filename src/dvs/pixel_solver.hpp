@@ -8,14 +8,14 @@
 #include "src/dvs/event_collector.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/random.hpp"
-#include "src/dvs/row_screen.hpp"
+#include "src/dvs/row_filter.hpp"
 
 namespace eventcamera {
 
 /// A pixel makes at most so many events in one segment, those that its refractory period swallows
 /// included; then it is taken to be where its signal is. White after black is 35 events at common
 /// thresholds.
-inline constexpr int most_events = 512;
+inline constexpr int max_events = 512;
 
 /// A stretch of time in which the light goes on a straight line in each pixel.
 struct Segment {

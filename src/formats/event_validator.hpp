@@ -12,22 +12,22 @@ namespace eventcamera {
 
 /// Takes the numbers that are read from a table: an event outside the sensor is dropped, one
 /// earlier than another before it is delivered, and both are counted.
-class EventIntake {
+class EventValidator {
  public:
-  /// 0x0 where the size is not known: all that StampedEvent can hold is inside.
+  /// 0x0 where the size is not known: all that AbsoluteEvent can hold is inside.
   void set_size(SensorSize size) {
-    x_end_ = size.width > 0 ? static_cast<std::uint64_t>(std::min(size.width, most_x)) : most_x;
-    y_end_ = size.height > 0 ? static_cast<std::uint64_t>(std::min(size.height, most_y)) : most_y;
+    x_end_ = size.width > 0 ? static_cast<std::uint64_t>(std::min(size.width, max_x)) : max_x;
+    y_end_ = size.height > 0 ? static_cast<std::uint64_t>(std::min(size.height, max_y)) : max_y;
   }
 
-  void take(Microseconds t, std::int64_t x, std::int64_t y, bool on, std::vector<StampedEvent>& out,
-            Damage& damage) {
+  void take(Microseconds t, std::int64_t x, std::int64_t y, bool on,
+            std::vector<AbsoluteEvent>& out, Corruption& corruption) {
     if (static_cast<std::uint64_t>(x) >= x_end_ || static_cast<std::uint64_t>(y) >= y_end_) {
-      ++damage.outside;
+      ++corruption.outside;
       return;
     }
     if (t < latest_) {
-      ++damage.unsorted;
+      ++corruption.unsorted;
     } else {
       latest_ = t;
     }
@@ -39,10 +39,10 @@ class EventIntake {
   void restart() { latest_ = std::numeric_limits<Microseconds>::min(); }
 
  private:
-  static constexpr int most_x = 0x10000;
-  static constexpr int most_y = 0x8000;
+  static constexpr int max_x = 0x10000;
+  static constexpr int max_y = 0x8000;
 
-  std::uint64_t x_end_ = most_x, y_end_ = most_y;
+  std::uint64_t x_end_ = max_x, y_end_ = max_y;
   Microseconds latest_ = std::numeric_limits<Microseconds>::min();
 };
 

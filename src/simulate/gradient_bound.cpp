@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/simulate/steepness.hpp"
+#include "src/simulate/gradient_bound.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/simulate/steepness.cpp"
+#define HWY_TARGET_INCLUDE "src/simulate/gradient_bound.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants to come after that.
 #include <hwy/highway.h>
@@ -82,14 +82,14 @@ void gather_row(const Plane<std::uint8_t>& small, int row, Plane<std::uint8_t>& 
 
 }  // namespace
 
-void Steepness::Cells::shape(int cell_side, int columns, int rows) {
+void GradientBound::Cells::shape(int cell_side, int columns, int rows) {
   side = cell_side;
   if (x.width() == columns && x.height() == rows) return;
   x = Plane<std::uint8_t>(columns, rows);
   y = Plane<std::uint8_t>(columns, rows);
 }
 
-void Steepness::measure(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) {
+void GradientBound::measure(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) {
   const int columns = (picture.width + 15) / 16;
   const int rows = (picture.height + 15) / 16;
   far_.shape(16, columns, rows);
@@ -102,27 +102,27 @@ void Steepness::measure(const PlaneView<std::uint8_t>& picture, ThreadPool& thre
   });
 }
 
-Steepness::Bound Steepness::within(const Box& box) const {
+GradientBound::Bound GradientBound::within(const Box& box) const {
   constexpr int near = 40;
   return box.width() <= near && box.height() <= near ? near_.within(box) : far_.within(box);
 }
 
-Steepness::Bound Steepness::Cells::within(const Box& box) const {
+GradientBound::Bound GradientBound::Cells::within(const Box& box) const {
   const int left = std::clamp(box.left / side, 0, x.width() - 1);
   const int right = std::clamp((box.right - 1) / side, 0, x.width() - 1);
   const int top = std::clamp(box.top / side, 0, x.height() - 1);
   const int bottom = std::clamp((box.bottom - 1) / side, 0, x.height() - 1);
-  std::uint8_t largest_x = 0;
-  std::uint8_t largest_y = 0;
+  std::uint8_t max_x = 0;
+  std::uint8_t max_y = 0;
   for (int row = top; row <= bottom; ++row) {
     const auto* x_row = x.row(row);
     const auto* y_row = y.row(row);
     for (int column = left; column <= right; ++column) {
-      largest_x = std::max(largest_x, x_row[column]);
-      largest_y = std::max(largest_y, y_row[column]);
+      max_x = std::max(max_x, x_row[column]);
+      max_y = std::max(max_y, y_row[column]);
     }
   }
-  return {largest_x, largest_y};
+  return {max_x, max_y};
 }
 
 }  // namespace eventcamera

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/interval_slicer.hpp"
+#include "src/formats/chunker.hpp"
 
 #include <algorithm>
 
 namespace eventcamera {
 namespace {
 
-bool earlier(const StampedEvent& a, const StampedEvent& b) {
+bool earlier(const AbsoluteEvent& a, const AbsoluteEvent& b) {
   return a.t < b.t;
 }
 
@@ -38,10 +38,10 @@ std::uint64_t order_ties(std::vector<Event>& events) {
 
 }  // namespace
 
-IntervalSlicer::IntervalSlicer(Microseconds length, Microseconds start)
+Chunker::Chunker(Microseconds length, Microseconds start)
     : length_(length), first_(start), given_start_(true), start_(start) {}
 
-void IntervalSlicer::push(std::span<const StampedEvent> events) {
+void Chunker::push(std::span<const AbsoluteEvent> events) {
   if (events.empty()) return;
   // Nearly always all is as it should be, and nothing has to be looked at one by one.
   if (ahead_.empty() && latest_ != never && events.front().t >= std::max(latest_, start_) &&
@@ -54,8 +54,8 @@ void IntervalSlicer::push(std::span<const StampedEvent> events) {
   for (const auto& event : events) place(event);
 }
 
-void IntervalSlicer::place(const StampedEvent& event) {
-  if (event.t > longest_time || event.t < -longest_time) {
+void Chunker::place(const AbsoluteEvent& event) {
+  if (event.t > max_time || event.t < -max_time) {
     ++dropped_.stray;
     return;
   }
@@ -63,7 +63,7 @@ void IntervalSlicer::place(const StampedEvent& event) {
     if (event.t >= ahead_.front().t - settled) {
       ahead_.push_back(event);
       // The clock goes on from where it jumped to.
-      if (event.t - ahead_.front().t >= settled || ahead_.size() >= longest_ahead) believe_ahead();
+      if (event.t - ahead_.front().t >= settled || ahead_.size() >= max_ahead) believe_ahead();
       return;
     }
     dropped_.stray += ahead_.size();
@@ -76,7 +76,7 @@ void IntervalSlicer::place(const StampedEvent& event) {
     keep(event);
 }
 
-void IntervalSlicer::keep(const StampedEvent& event) {
+void Chunker::keep(const AbsoluteEvent& event) {
   if (event.t < start_) {
     dropped_.late += static_cast<std::uint64_t>(!given_start_ || event.t >= *first_);
     return;
@@ -86,7 +86,7 @@ void IntervalSlicer::keep(const StampedEvent& event) {
   kept_.push_back(event);
 }
 
-void IntervalSlicer::believe_ahead() {
+void Chunker::believe_ahead() {
   if (!first_) {
     first_ = std::min_element(ahead_.begin(), ahead_.end(), earlier)->t;
     start_ = *first_;
@@ -95,23 +95,23 @@ void IntervalSlicer::believe_ahead() {
   ahead_.clear();
 }
 
-void IntervalSlicer::reach(Microseconds t) {
-  reached_ = std::max(reached_, std::clamp(t, -longest_time, longest_time));
+void Chunker::reach(Microseconds t) {
+  reached_ = std::max(reached_, std::clamp(t, -max_time, max_time));
   if (!ahead_.empty() && ahead_.front().t < reached_ + settled) believe_ahead();
 }
 
-void IntervalSlicer::finish() {
+void Chunker::finish() {
   if (!ahead_.empty()) believe_ahead();
   finished_ = true;
 }
 
-void IntervalSlicer::sort() {
+void Chunker::sort() {
   if (sorted_) return;
   std::stable_sort(kept_.begin() + static_cast<std::ptrdiff_t>(head_), kept_.end(), earlier);
   sorted_ = true;
 }
 
-std::optional<IntervalSlicer::Interval> IntervalSlicer::next() {
+std::optional<Chunker::Interval> Chunker::next() {
   if (!first_) return std::nullopt;
   const auto waiting = kept_.size() - head_;
   auto due = reached_;
@@ -120,7 +120,7 @@ std::optional<IntervalSlicer::Interval> IntervalSlicer::next() {
   if (finished_) {
     if (waiting == 0) return std::nullopt;
     due = latest_ + 1;
-  } else if (end > due && waiting < most_events) {
+  } else if (end > due && waiting < max_events) {
     return std::nullopt;
   }
   sort();
@@ -134,12 +134,12 @@ std::optional<IntervalSlicer::Interval> IntervalSlicer::next() {
   return hand_out(std::max(end, silent_until));
 }
 
-IntervalSlicer::Interval IntervalSlicer::hand_out(Microseconds end) {
+Chunker::Interval Chunker::hand_out(Microseconds end) {
   const auto from = kept_.begin() + static_cast<std::ptrdiff_t>(head_);
   const auto to =
       std::partition_point(from, kept_.end(), [end](const auto& event) { return event.t < end; });
   handed_out_.resize(static_cast<std::size_t>(to - from));
-  std::transform(from, to, handed_out_.begin(), [this](const StampedEvent& event) {
+  std::transform(from, to, handed_out_.begin(), [this](const AbsoluteEvent& event) {
     return Event{static_cast<std::uint32_t>(event.t - start_), event.x, event.y_p};
   });
   dropped_.repeated += order_ties(handed_out_);

@@ -10,10 +10,10 @@ namespace eventcamera {
 
 /// Dense flow between the pictures of a sequence, sought only around what has changed: elsewhere
 /// it is 0. A still camera sees little change, and then most of the work falls away.
-class FlowOfChanges {
+class RegionOfInterestFlow {
  public:
   /// Of pictures of this size.
-  FlowOfChanges(FlowMethod method, int width, int height);
+  RegionOfInterestFlow(FlowMethod method, int width, int height);
 
   FlowMethod method() const { return method_; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/flow_of_changes.hpp"
+#include "src/flow/region_of_interest_flow.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -33,12 +33,12 @@ PlaneView<std::uint8_t> cut_out(const PlaneView<std::uint8_t>& picture, const Bo
 
 }  // namespace
 
-FlowOfChanges::FlowOfChanges(FlowMethod method, int width, int height)
+RegionOfInterestFlow::RegionOfInterestFlow(FlowMethod method, int width, int height)
     : method_(method), width_(width), height_(height), flow_(width, height) {}
 
-PlaneView<Flow> FlowOfChanges::find(const PlaneView<std::uint8_t>& from,
-                                    const PlaneView<std::uint8_t>& to, const Box& changed,
-                                    ThreadPool& threads) {
+PlaneView<Flow> RegionOfInterestFlow::find(const PlaneView<std::uint8_t>& from,
+                                           const PlaneView<std::uint8_t>& to, const Box& changed,
+                                           ThreadPool& threads) {
   if (changed.empty()) {
     whole_knows_last_ = false;
     clear();
@@ -57,9 +57,9 @@ PlaneView<Flow> FlowOfChanges::find(const PlaneView<std::uint8_t>& from,
   return flow_.view();
 }
 
-PlaneView<Flow> FlowOfChanges::find_in_whole(const PlaneView<std::uint8_t>& from,
-                                             const PlaneView<std::uint8_t>& to,
-                                             ThreadPool& threads) {
+PlaneView<Flow> RegionOfInterestFlow::find_in_whole(const PlaneView<std::uint8_t>& from,
+                                                    const PlaneView<std::uint8_t>& to,
+                                                    ThreadPool& threads) {
   if (!whole_) whole_ = make_dense_flow(method_, width_, height_);
   if (!whole_knows_last_) whole_->push(from, threads);
   whole_->push(to, threads);
@@ -67,9 +67,9 @@ PlaneView<Flow> FlowOfChanges::find_in_whole(const PlaneView<std::uint8_t>& from
   return whole_->flow(threads);
 }
 
-void FlowOfChanges::find_in_part(const PlaneView<std::uint8_t>& from,
-                                 const PlaneView<std::uint8_t>& to, const Box& part,
-                                 ThreadPool& threads) {
+void RegionOfInterestFlow::find_in_part(const PlaneView<std::uint8_t>& from,
+                                        const PlaneView<std::uint8_t>& to, const Box& part,
+                                        ThreadPool& threads) {
   if (!part_ || part_width_ != part.width() || part_height_ != part.height()) {
     part_ = make_dense_flow(method_, part.width(), part.height());
     part_width_ = part.width();
@@ -82,7 +82,7 @@ void FlowOfChanges::find_in_part(const PlaneView<std::uint8_t>& from,
   filled_ = part;
 }
 
-void FlowOfChanges::clear() {
+void RegionOfInterestFlow::clear() {
   for (int y = filled_.top; y < filled_.bottom; ++y)
     std::fill_n(flow_.row(y) + filled_.left, filled_.width(), Flow{});
   filled_ = {};

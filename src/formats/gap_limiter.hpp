@@ -3,13 +3,13 @@
 
 #include <cstdint>
 
-#include "src/core/stamped_event.hpp"
+#include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
 
 /// Times for formats that write silence out: a pause of more than half a day, also before the first
 /// event, is left out. So a stray time, or one since 1970, does not fill the disk.
-class BoundedSilence {
+class GapLimiter {
  public:
   static constexpr Microseconds longest = Microseconds{12} * 3600 * 1'000'000;
 

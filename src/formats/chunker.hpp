@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "src/core/absolute_event.hpp"
 #include "src/core/event.hpp"
-#include "src/core/stamped_event.hpp"
 
 namespace eventcamera {
 
@@ -20,14 +20,14 @@ namespace eventcamera {
 /// Events may come out of order by up to `settled`; later ones are dropped. So are those of a clock
 /// that jumps ahead and soon comes back, as a bit that flips makes it, and the second of two events
 /// of the same pixel and time.
-class IntervalSlicer {
+class Chunker {
  public:
   /// Sensors' own disorder, and the time for which a clock that errs does so, are shorter.
   static constexpr Microseconds settled = 10'000;
   /// Times beyond, in either direction, are errors: 142 years.
-  static constexpr Microseconds longest_time = Microseconds{1} << 52;
+  static constexpr Microseconds max_time = Microseconds{1} << 52;
   /// Memory is bounded: an interval that has more is cut in two.
-  static constexpr std::size_t most_events = std::size_t{1} << 22;
+  static constexpr std::size_t max_events = std::size_t{1} << 22;
 
   struct Interval {
     Microseconds start;
@@ -42,12 +42,12 @@ class IntervalSlicer {
   };
 
   /// The first interval begins with the first event.
-  explicit IntervalSlicer(Microseconds length) : length_(length) {}
+  explicit Chunker(Microseconds length) : length_(length) {}
 
   /// The first interval begins at `start`, and what is before is left out.
-  IntervalSlicer(Microseconds length, Microseconds start);
+  Chunker(Microseconds length, Microseconds start);
 
-  void push(std::span<const StampedEvent> events);
+  void push(std::span<const AbsoluteEvent> events);
 
   /// Says that nothing earlier than `t` will come any more.
   void reach(Microseconds t);
@@ -68,10 +68,10 @@ class IntervalSlicer {
 
  private:
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
-  static constexpr std::size_t longest_ahead = std::size_t{1} << 16;
+  static constexpr std::size_t max_ahead = std::size_t{1} << 16;
 
-  void place(const StampedEvent& event);
-  void keep(const StampedEvent& event);
+  void place(const AbsoluteEvent& event);
+  void keep(const AbsoluteEvent& event);
   void believe_ahead();
   void sort();
   Interval hand_out(Microseconds end);
@@ -85,10 +85,10 @@ class IntervalSlicer {
   Microseconds reached_ = never;  ///< nothing earlier will come
   bool finished_ = false;
 
-  std::vector<StampedEvent> kept_;  ///< its first head_ are handed out
+  std::vector<AbsoluteEvent> kept_;  ///< its first head_ are handed out
   std::size_t head_ = 0;
   bool sorted_ = true;
-  std::vector<StampedEvent> ahead_;  ///< far ahead of latest_: not yet believed
+  std::vector<AbsoluteEvent> ahead_;  ///< far ahead of latest_: not yet believed
   std::vector<Event> handed_out_;
   Dropped dropped_;
 };
