@@ -10,7 +10,7 @@
 #include "bench/plain/dvs.hpp"
 #include "bench/plain/frame.hpp"
 #include "bench/plain/sparse.hpp"
-#include "src/dvs/dvs.hpp"
+#include "src/dvs/dvs_simulator.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"

@@ -11,7 +11,7 @@
 #include "bench/plain/denoise.hpp"
 #include "bench/plain/opencv.hpp"
 #include "bench/plain/pixels.hpp"
-#include "src/dvs/presets.hpp"
+#include "src/dvs/dvs_settings.hpp"
 #include "src/simulate/warp.hpp"
 
 namespace plain {

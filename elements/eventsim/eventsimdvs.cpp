@@ -35,8 +35,8 @@
 #include <variant>
 
 #include "gst/base/eventsimulator.hpp"
-#include "src/dvs/dvs.hpp"
-#include "src/dvs/presets.hpp"
+#include "src/dvs/dvs_settings.hpp"
+#include "src/dvs/dvs_simulator.hpp"
 
 using eventcamera::DvsPreset;
 using eventcamera::DvsSettings;

@@ -1,116 +1,76 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/dvs/presets.hpp"
+#include <algorithm>
+
+#include "src/dvs/dvs_settings.hpp"
 
 namespace eventcamera {
 namespace {
 
-// Rebecq et al., ESIM, CoRL 2018, with the thresholds of rpg_vid2e and the offset of esim_py.
-constexpr DvsSettings esim{
-    .response = Response::log,
-    .log_eps = 1e-3,
-    .positive_threshold = 0.2,
-    .negative_threshold = 0.2,
+struct Row {
+  DvsPreset preset;
+  Response response;
+  double log_eps, dark_light;
+  double cutoff_hz;
+  double positive_threshold, negative_threshold, threshold_sigma, threshold_jitter;
+  double leak_rate_hz, leak_spread, shot_noise_rate_hz, hot_pixels;
+  double refractory_period;
+  RefractoryReset refractory_reset;
+  double latency, latency_jitter;
+  double max_event_rate;
 };
 
-// Hu, Liu, Delbruck, v2e, CVPRW 2021: set_dvs_params("clean").
-constexpr DvsSettings v2e_clean{
-    .response = Response::lin_log,
-    .positive_threshold = 0.2,
-    .negative_threshold = 0.2,
-    .threshold_sigma = 0.02,
-};
+using enum Response;
+using enum RefractoryReset;
+constexpr double dark = 20.0 / 255;  // v2e's
 
-// The same, "noisy": dim light.
-constexpr DvsSettings v2e_noisy{
-    .response = Response::lin_log,
-    .cutoff_hz = 30,
-    .positive_threshold = 0.2,
-    .negative_threshold = 0.2,
-    .threshold_sigma = 0.05,
-    .leak_rate_hz = 0.1,
-    .leak_spread = 0.1,
-    .shot_noise_rate_hz = 5,
+// esim: Rebecq et al., ESIM, CoRL 2018; thresholds of rpg_vid2e, offset of esim_py.
+// v2e: Hu, Liu, Delbruck, CVPRW 2021; set_dvs_params("clean") and, for dim light, ("noisy").
+// icns: Joubert et al., Event camera simulator improvements via characterized parameters, Front.
+//   Neurosci. 2021, with the parameters of its example. White is 10 klux; the response ln(lux + 1)
+//   is ln(1e-4 + I) plus a constant. The time constant is 40 us at 1 klux and proportional to
+//   1 / (lux + 1), so 4 us at white. Noise of 0.1 Hz ON and 0.01 Hz OFF is a single rate here.
+// davis346: v2e's own defaults, which its authors chose for their DAVIS346 in good light. The leak
+//   of 0.1 Hz is what DVS-Voltmeter was fitted with on recordings of that camera. The readout does
+//   12 million events per second according to the data sheet.
+// gen4: the ranges from which OpenEB's own simulator samples: thresholds 0.15 and 0.1, refractory
+//   period 10 to 1000 us, leak and shot noise up to 1 Hz, cutoff up to 900 Hz. These are their
+//   middles, on a suitable scale. Finateu et al., ISSCC 2020: 1.066 Gev/s of readout, latency below
+//   220 us at 5 lux and about 100 us in office light.
+// The shares of hot pixels are guesses.
+// clang-format off
+constexpr Row table[] = {
+    //                     response  eps   dark     cutoff ON    OFF   sigma  jitter leak  spread shot   hot  period  reset  latency jitter max rate
+    {DvsPreset::ideal,     lin_log,  1e-3, dark,      0,    0.2,  0.2,  0,     0,    0,    0,     0,     0,       0,  level,    0,   0,   0},
+    {DvsPreset::esim,      log,      1e-3, dark,      0,    0.2,  0.2,  0,     0,    0,    0,     0,     0,       0,  level,    0,   0,   0},
+    {DvsPreset::v2e_clean, lin_log,  1e-3, dark,      0,    0.2,  0.2,  0.02,  0,    0,    0,     0,     0,       0,  level,    0,   0,   0},
+    {DvsPreset::v2e_noisy, lin_log,  1e-3, dark,     30,    0.2,  0.2,  0.05,  0,    0.1,  0.1,   5,     0,       0,  level,    0,   0,   0},
+    {DvsPreset::icns,      log,      1e-4, 1e-4, 39'789,    0.4,  0.4,  0.01,  0.01, 0,    0,     0.11,  0,     100,  signal, 100,  10,   0},
+    {DvsPreset::davis346,  lin_log,  1e-3, dark,    300,    0.2,  0.2,  0.03,  0,    0.1,  0.1,   0.001, 1e-4,  500,  level,    0,   0,  12e6},
+    {DvsPreset::gen4,      lin_log,  1e-3, dark,    450,    0.15, 0.1,  0.005, 0,    0.1,  0.1,   0.1,   1e-5,  100,  signal, 100,  20,   1.066e9},
 };
-
-// Joubert et al., Event camera simulator improvements via characterized parameters, Front.
-// Neurosci. 2021, with the parameters of its example: white is 10 klux, the response ln(lux + 1),
-// that is ln(1e-4 + I) and a constant; the time constant 40 us at 1 klux, falling as lux + 1, so
-// that white's is 4 us; noise of 0.1 Hz ON and 0.01 Hz OFF, which is one rate here.
-constexpr DvsSettings icns{
-    .response = Response::log,
-    .log_eps = 1e-4,
-    .cutoff_hz = 39'789,
-    .dark_light = 1e-4,
-    .positive_threshold = 0.4,
-    .negative_threshold = 0.4,
-    .threshold_sigma = 0.01,
-    .threshold_jitter = 0.01,
-    .shot_noise_rate_hz = 0.11,
-    .refractory_period = 100,
-    .refractory_reset = RefractoryReset::signal,
-    .latency = 100,
-    .latency_jitter = 10,
-};
-
-// v2e's own defaults, which its authors chose as those of their DAVIS346 in good light: mismatch,
-// bandwidth, noise, refractory period. The leak of 0.1 Hz is what DVS-Voltmeter was fitted with on
-// recordings of that camera. 12 million events a second is what its data sheet gives for the
-// readout. Response by the same authors. The share of hot pixels, here and below, is a guess.
-constexpr DvsSettings davis346{
-    .response = Response::lin_log,
-    .cutoff_hz = 300,
-    .positive_threshold = 0.2,
-    .negative_threshold = 0.2,
-    .threshold_sigma = 0.03,
-    .leak_rate_hz = 0.1,
-    .leak_spread = 0.1,
-    .shot_noise_rate_hz = 0.001,
-    .hot_pixels = 1e-4,
-    .refractory_period = 500,
-    .max_event_rate = 12e6,
-};
-
-// Thresholds, refractory period and noise as OpenEB's own simulator samples them for its cameras
-// (thresholds 0.15 and 0.1, refractory period 10 to 1000 us, leak and shot noise up to 1 Hz,
-// cutoff up to 900 Hz: their middles, on scales that fit). Finateu et al., ISSCC 2020: 1.066 Geps
-// of readout, latency below 220 us with 5 lux and some 100 us in office light.
-constexpr DvsSettings gen4{
-    .response = Response::lin_log,
-    .cutoff_hz = 450,
-    .positive_threshold = 0.15,
-    .negative_threshold = 0.1,
-    .threshold_sigma = 0.005,
-    .leak_rate_hz = 0.1,
-    .leak_spread = 0.1,
-    .shot_noise_rate_hz = 0.1,
-    .hot_pixels = 1e-5,
-    .refractory_period = 100,
-    .refractory_reset = RefractoryReset::signal,
-    .latency = 100,
-    .latency_jitter = 20,
-    .max_event_rate = 1.066e9,
-};
+// clang-format on
 
 }  // namespace
 
 DvsSettings settings_of(DvsPreset preset) {
-  switch (preset) {
-    case DvsPreset::esim:
-      return esim;
-    case DvsPreset::v2e_clean:
-      return v2e_clean;
-    case DvsPreset::v2e_noisy:
-      return v2e_noisy;
-    case DvsPreset::icns:
-      return icns;
-    case DvsPreset::davis346:
-      return davis346;
-    case DvsPreset::gen4:
-      return gen4;
-    case DvsPreset::ideal:
-      break;
-  }
-  return {};
+  const Row& row = *std::ranges::find(table, preset, &Row::preset);
+  return {.response = row.response,
+          .log_eps = row.log_eps,
+          .cutoff_hz = row.cutoff_hz,
+          .dark_light = row.dark_light,
+          .positive_threshold = row.positive_threshold,
+          .negative_threshold = row.negative_threshold,
+          .threshold_sigma = row.threshold_sigma,
+          .threshold_jitter = row.threshold_jitter,
+          .leak_rate_hz = row.leak_rate_hz,
+          .leak_spread = row.leak_spread,
+          .shot_noise_rate_hz = row.shot_noise_rate_hz,
+          .hot_pixels = row.hot_pixels,
+          .refractory_period = row.refractory_period,
+          .refractory_reset = row.refractory_reset,
+          .latency = row.latency,
+          .latency_jitter = row.latency_jitter,
+          .max_event_rate = row.max_event_rate};
 }
 
 }  // namespace eventcamera

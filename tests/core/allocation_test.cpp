@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "src/dvs/dvs.hpp"
+#include "src/dvs/dvs_simulator.hpp"
 #include "src/render/accumulator.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"

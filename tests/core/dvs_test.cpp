@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // A physical pixel against physics, and against its equations in double precision.
-#include "src/dvs/dvs.hpp"
+#include "src/dvs/dvs_simulator.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 
 #include "src/dvs/course.hpp"
 #include "src/dvs/decay.hpp"
+#include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/mismatch.hpp"
-#include "src/dvs/presets.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/dvs.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/dvs/dvs.hpp"
+#include "src/dvs/dvs_simulator.hpp"
 
 #include <algorithm>
 #include <cmath>
