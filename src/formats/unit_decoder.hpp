@@ -6,13 +6,13 @@
 #include <memory>
 #include <vector>
 
-#include "src/formats/seekable_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/unit_reader.hpp"
 
 namespace eventcamera {
 
 /// A decoder of a format that is a header and then units of a few bytes each.
-class UnitDecoder : public SeekableDecoder {
+class UnitDecoder : public Decoder {
  public:
   /// Without a header.
   UnitDecoder(std::unique_ptr<UnitReader> reader, SensorSize size);

@@ -19,7 +19,7 @@ struct Format {
   std::string name;
   int max_side;
   Microseconds max_pause;  ///< that it can hold, or that tests have the time for
-  std::function<std::unique_ptr<SeekableDecoder>(SensorSize)> make_decoder;
+  std::function<std::unique_ptr<Decoder>(SensorSize)> make_decoder;
   std::function<std::unique_ptr<Encoder>(SensorSize)> make_encoder;
 };
 

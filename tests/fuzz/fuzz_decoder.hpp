@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <concepts>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -12,7 +11,7 @@
 #include <tuple>
 #include <vector>
 
-#include "src/formats/seekable_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 /// What holds for every decoder and any bytes.
 namespace fuzz {
@@ -77,7 +76,7 @@ inline void require_within(SensorSize size, std::span<const AbsoluteEvent> event
 }
 
 /// From the seek point before all events, the same events are read once more.
-inline void require_restarts(SeekableDecoder& decoder, std::span<const std::uint8_t> bytes,
+inline void require_restarts(Decoder& decoder, std::span<const std::uint8_t> bytes,
                              const Decoded& before) {
   const auto seek_point = decoder.seek_point_before(std::numeric_limits<Microseconds>::min());
   if (!seek_point) return;
@@ -110,8 +109,7 @@ auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces piece
   require(decoded.events.size() + decoded.triggers.size() <= bytes.size() * events_per_byte,
           "memory is bounded");
   require_within(decoder->size(), decoded.events);
-  if constexpr (std::derived_from<std::remove_cvref_t<decltype(*decoder)>, SeekableDecoder>)
-    if (error.empty() && pieces.longest == 0) require_restarts(*decoder, bytes, decoded);
+  if (error.empty() && pieces.longest == 0) require_restarts(*decoder, bytes, decoded);
   return std::tuple(decoded.events, decoded.triggers, error, decoder->size(), corruption.places,
                     corruption.first_at, corruption.first, corruption.unsorted, corruption.outside);
 }

@@ -6,11 +6,11 @@
 #include <optional>
 #include <utility>
 
-#include "src/formats/seekable_decoder.hpp"
+#include "src/formats/decoder.hpp"
 
 namespace eventdecoder {
 
-using eventcamera::SeekableDecoder;
+using eventcamera::Decoder;
 
 Microseconds interval_length(GstEventDecoder* self) {
   const std::lock_guard lock(self->priv->mutex);
@@ -79,7 +79,7 @@ void reset(GstEventDecoder* self) {
 void restart_at(GstEventDecoder* self, const Restart& restart) {
   auto* priv = self->priv;
   State& state = *priv->state;
-  auto* seekable = dynamic_cast<SeekableDecoder*>(state.decoder.get());
+  auto* seekable = dynamic_cast<Decoder*>(state.decoder.get());
   auto fresh = restart.seek_point && seekable != nullptr ? nullptr : make_decoder(self);
   const auto length = interval_length(self);
   const auto to = static_cast<Microseconds>(restart.segment.position / GST_USECOND);
@@ -110,7 +110,7 @@ std::optional<SeekPoint> seek_point_before(GstEventDecoder* self, GstClockTime t
   auto* priv = self->priv;
   const std::lock_guard decoding(priv->decoding);
   if (!priv->state) return std::nullopt;
-  const auto* seekable = dynamic_cast<const SeekableDecoder*>(priv->state->decoder.get());
+  const auto* seekable = dynamic_cast<const Decoder*>(priv->state->decoder.get());
   if (seekable == nullptr) return std::nullopt;
   const std::lock_guard lock(priv->mutex);
   return seekable->seek_point_before(priv->first.value_or(0) +

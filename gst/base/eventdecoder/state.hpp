@@ -13,7 +13,7 @@
 #include "gst/base/reading_faults.hpp"
 #include "gst/base/reading_properties.hpp"
 #include "src/formats/chunker.hpp"
-#include "src/formats/seekable_decoder.hpp"
+#include "src/formats/decoder.hpp"
 #include "src/formats/sensor_sizes.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN(event_decoder_debug);

@@ -177,7 +177,7 @@ class DatEncoder final : public Encoder {
 
 }  // namespace
 
-std::unique_ptr<SeekableDecoder> make_dat_decoder() {
+std::unique_ptr<Decoder> make_dat_decoder() {
   return std::make_unique<DatDecoder>();
 }
 

@@ -178,7 +178,7 @@ class EsEncoder final : public Encoder {
 
 }  // namespace
 
-std::unique_ptr<SeekableDecoder> make_event_stream_decoder() {
+std::unique_ptr<Decoder> make_event_stream_decoder() {
   return std::make_unique<EsDecoder>();
 }
 

@@ -173,7 +173,7 @@ class RawEncoder final : public Encoder {
 
 }  // namespace
 
-std::unique_ptr<SeekableDecoder> make_prophesee_raw_decoder() {
+std::unique_ptr<Decoder> make_prophesee_raw_decoder() {
   return std::make_unique<RawDecoder>();
 }
 
@@ -181,7 +181,7 @@ std::unique_ptr<Encoder> make_prophesee_raw_encoder(EvtFormat format, SensorSize
   return std::make_unique<RawEncoder>(format, size);
 }
 
-std::unique_ptr<SeekableDecoder> make_evt_decoder(EvtFormat format, SensorSize size) {
+std::unique_ptr<Decoder> make_evt_decoder(EvtFormat format, SensorSize size) {
   return std::make_unique<UnitDecoder>(make_reader(format, size), size);
 }
 
