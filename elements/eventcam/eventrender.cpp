@@ -36,7 +36,7 @@
 #include "elements/eventcam/eventrender/pictures.hpp"
 #include "elements/eventcam/eventrender/properties.hpp"
 #include "elements/eventcam/eventrender/state.hpp"
-#include "gst/base/drawn_formats.hpp"
+#include "gst/base/drawn_video.hpp"
 
 using eventrender::event_render;
 

@@ -39,8 +39,7 @@
 
 #include "elements/eventcam/broken_events.hpp"
 #include "elements/eventcam/report.hpp"
-#include "gst/base/event_interval.hpp"
-#include "gst/base/mapped_events.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/arrivals.hpp"
 #include "src/measure/event_statistics.hpp"

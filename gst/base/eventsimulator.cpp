@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "gst/base/drawn_formats.hpp"
+#include "gst/base/drawn_video.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/output_buffers.hpp"
 #include "gst/base/output_caps.hpp"

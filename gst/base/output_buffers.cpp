@@ -3,8 +3,7 @@
 
 #include <new>
 
-#include "gst/base/drawn_formats.hpp"
-#include "gst/base/drawn_pool.hpp"
+#include "gst/base/drawn_video.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/base/output_caps.hpp"
 #include "gst/base/video_frame.hpp"

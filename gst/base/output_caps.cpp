@@ -3,7 +3,7 @@
 
 #include <initializer_list>
 
-#include "gst/base/drawn_formats.hpp"
+#include "gst/base/drawn_video.hpp"
 #include "gst/base/picture_formats.hpp"
 #include "gst/eventcamera/eventcamera.h"
 

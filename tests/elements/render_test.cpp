@@ -2,7 +2,7 @@
 // eventrender: which pictures there are, when they are, and what they show.
 #include <algorithm>
 
-#include "gst/base/drawn_formats.hpp"
+#include "gst/base/drawn_video.hpp"
 #include "src/core/event.hpp"
 #include "src/render/accumulator.hpp"
 #include "tests/elements/harness.hpp"

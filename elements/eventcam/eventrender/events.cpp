@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "elements/eventcam/eventrender/pictures.hpp"
-#include "gst/base/mapped_events.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
 
 namespace eventrender {

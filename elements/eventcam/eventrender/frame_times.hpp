@@ -3,7 +3,7 @@
 
 #include <gst/video/video.h>
 
-#include "gst/base/event_interval.hpp"
+#include "gst/base/event_buffer.hpp"
 
 namespace eventrender {
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "elements/eventcam/eventrender/pictures.hpp"
-#include "gst/base/drawn_pool.hpp"
+#include "gst/base/drawn_video.hpp"
 
 namespace eventrender {
 

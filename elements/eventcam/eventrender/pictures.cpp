@@ -5,7 +5,7 @@
 #include <new>
 #include <utility>
 
-#include "gst/base/drawn_formats.hpp"
+#include "gst/base/drawn_video.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/video_frame.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "gst/base/drawn_formats.hpp"
+#include "gst/base/drawn_video.hpp"
 
 namespace eventrender {
 

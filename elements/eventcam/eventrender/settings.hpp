@@ -3,7 +3,7 @@
 
 #include <gst/gst.h>
 
-#include "gst/base/event_interval.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event.hpp"
 #include "src/render/renderer.hpp"

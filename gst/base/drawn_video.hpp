@@ -15,3 +15,7 @@ eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info);
 
 /// What the core calls an application's palette.
 eventcamera::PaletteName palette_name_of(GstEventCameraPalette palette);
+
+/// Decides, in an answered allocation query, that pictures come from downstream's pool, or one of
+/// ours. False where these caps are not video.
+bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps);

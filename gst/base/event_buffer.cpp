@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "gst/base/event_interval.hpp"
+#include "gst/base/event_buffer.hpp"
 
 #include <algorithm>
-
-#include "gst/eventcamera/eventcamera.h"
 
 static GstClockTime time_of_last_event(GstBuffer* buffer) {
   const gsize size = gst_buffer_get_size(buffer);
