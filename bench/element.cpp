@@ -7,6 +7,7 @@
 #include <benchmark/benchmark.h>
 #include <gst/app/gstappsrc.h>
 #include <gst/gst.h>
+#include <gst/video/video.h>
 
 #include <algorithm>
 #include <atomic>
@@ -29,13 +30,13 @@ namespace {
 
 using namespace eventcamera;
 
-using Frames = std::vector<Plane<std::uint8_t>>;
+using Frames = std::vector<Image<std::uint8_t>>;
 
 struct Scene {
   std::string name;
   Frames frames;  ///< seen forwards and backwards for ever
 
-  const Plane<std::uint8_t>& frame(std::int64_t i) const {
+  const Image<std::uint8_t>& frame(std::int64_t i) const {
     const auto last = static_cast<std::int64_t>(frames.size()) - 1;
     const auto at = i % (2 * last);
     return frames[static_cast<std::size_t>(at <= last ? at : 2 * last - at)];
@@ -123,10 +124,15 @@ class Pipeline {
  private:
   void push() {
     const auto& frame = scene_.frame(pushed_);
+    gsize offsets[GST_VIDEO_MAX_PLANES] = {};
+    gint strides[GST_VIDEO_MAX_PLANES] = {static_cast<gint>(frame.stride())};
     const auto size = static_cast<gsize>(frame.stride()) * static_cast<gsize>(frame.height());
     GstBuffer* buffer = gst_buffer_new_wrapped_full(GST_MEMORY_FLAG_READONLY,
                                                     const_cast<std::uint8_t*>(frame.row(0)), size,
                                                     0, size, nullptr, nullptr);
+    gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8,
+                                   static_cast<guint>(frame.width()),
+                                   static_cast<guint>(frame.height()), 1, offsets, strides);
     GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(pushed_++ * scene::frame_time);
     gst_app_src_push_buffer(source_, buffer);
   }

@@ -25,8 +25,8 @@ class Plain : public testing::TestWithParam<int> {
   }
 
   /// Where points of a picture went in the next, as the references take it.
-  static std::vector<Track> tracks_of(const Plane<std::uint8_t>& from,
-                                      const Plane<std::uint8_t>& to,
+  static std::vector<Track> tracks_of(const Image<std::uint8_t>& from,
+                                      const Image<std::uint8_t>& to,
                                       const std::vector<Point>& points) {
     plain::OpenCvTracker tracker;
     tracker.push(from.view(), 1);
@@ -46,8 +46,8 @@ class Plain : public testing::TestWithParam<int> {
 
   // The patch leaves to the right and below, the ground stands still.
   const bench::Clip frames = bench::moving_patch(330, 200, 0.9, 3);
-  const Plane<std::uint8_t>& last = frames[1];
-  const Plane<std::uint8_t>& now = frames[2];
+  const Image<std::uint8_t>& last = frames[1];
+  const Image<std::uint8_t>& now = frames[2];
   const LumaFormat format{330, 200, 8};
   const StepTimes steps{scene::frame_time, 11};
 };

@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/step_times.hpp"
 
 /// What the methods are timed on.
 namespace bench {
 
-using Picture = eventcamera::Plane<std::uint8_t>;
+using Picture = eventcamera::Image<std::uint8_t>;
 /// Consecutive frames.
 using Clip = std::vector<Picture>;
 

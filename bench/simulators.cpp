@@ -12,7 +12,7 @@ struct Pair {
   const Picture* now;
   std::vector<Flow> flow;
 
-  PlaneView<Flow> flow_view() const {
+  ImageView<Flow> flow_view() const {
     return {flow.data(), now->width() * static_cast<std::ptrdiff_t>(sizeof(Flow)), now->width(),
             now->height()};
   }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
 
 namespace plain {
@@ -12,8 +12,8 @@ namespace plain {
 using namespace eventcamera;
 
 /// reference::denoised() in whole numbers, row by row on all threads.
-inline void denoise(const PlaneView<std::uint8_t>& frame, int limit, ThreadPool& threads,
-                    Plane<std::uint8_t>& out) {
+inline void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
+                    Image<std::uint8_t>& out) {
   constexpr int weights[] = {1, 2, 1};
   threads.for_each(frame.height, [&](int y, int) {
     for (int x = 0; x < frame.width; ++x) {

@@ -13,9 +13,9 @@ class DenseInterpolation {
   DenseInterpolation(int width, int height)
       : dx_(width, height),
         dy_(width, height),
-        between_{Plane<std::uint8_t>(width, height), Plane<std::uint8_t>(width, height)} {}
+        between_{Image<std::uint8_t>(width, height), Image<std::uint8_t>(width, height)} {}
 
-  void fire(const Picture& last, const Picture& now, const PlaneView<Flow>& flow,
+  void fire(const Picture& last, const Picture& now, const ImageView<Flow>& flow,
             const StepTimes& steps, const Thresholds& thresholds, ThreadPool& threads,
             EventBuckets& events) {
     const int m = steps.count();
@@ -41,9 +41,9 @@ class DenseInterpolation {
   }
 
  private:
-  Plane<Motion> dx_;
-  Plane<Motion> dy_;
-  Plane<std::uint8_t> between_[2];
+  Image<Motion> dx_;
+  Image<Motion> dy_;
+  Image<std::uint8_t> between_[2];
 };
 
 /// Dense interpolation, the flow counted in. The frames' rows lie without gaps.
@@ -66,7 +66,7 @@ class DenseSimulator final : public Simulator {
     copy(now, last_, threads());
   }
 
-  Plane<std::uint8_t> last_;
+  Image<std::uint8_t> last_;
   OpenCvFlow flow_;
   DenseInterpolation interpolation_;
 };

@@ -30,7 +30,7 @@ class DiffSimulator final : public Simulator {
 
     Kept last;
     Kept now;
-    Plane<std::uint8_t> picture;  ///< now as a picture, 0 where nothing is kept
+    Image<std::uint8_t> picture;  ///< now as a picture, 0 where nothing is kept
     OpenCvTracker tracker;
 
     void begin_next() {
@@ -85,8 +85,8 @@ class DiffSimulator final : public Simulator {
       }
     }
 
-    Plane<int> strongest;
-    Plane<std::uint64_t> taken;  ///< a bit a pixel: something has landed
+    Image<int> strongest;
+    Image<std::uint64_t> taken;  ///< a bit a pixel: something has landed
   };
 
   void start(const LumaView& frame) override {
@@ -143,7 +143,7 @@ class DiffSimulator final : public Simulator {
     });
   }
 
-  Plane<std::uint8_t> last_;
+  Image<std::uint8_t> last_;
   bool has_difference_ = false;
   Part on_;
   Part off_;

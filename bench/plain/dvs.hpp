@@ -130,12 +130,12 @@ class DvsPixels {
   }
 
   DvsSettings settings_;
-  Plane<float> filtered_;
-  Plane<float> reference_;
-  Plane<float> positive_;
-  Plane<float> negative_;
-  Plane<int> rises_;
-  Plane<int> falls_;
+  Image<float> filtered_;
+  Image<float> reference_;
+  Image<float> positive_;
+  Image<float> negative_;
+  Image<int> rises_;
+  Image<int> falls_;
   std::vector<int> most_;  ///< band by band
   std::vector<std::mt19937> random_;
 };
@@ -156,7 +156,7 @@ class DvsSimulator final : public Simulator {
   }
 
  private:
-  PlaneView<std::uint8_t> seen(const LumaView& frame) {
+  ImageView<std::uint8_t> seen(const LumaView& frame) {
     if (settings_.denoise == 0) return frame.as<std::uint8_t>();
     denoise(frame.as<std::uint8_t>(), static_cast<int>(settings_.denoise), threads(), denoised_);
     return denoised_.view();
@@ -171,7 +171,7 @@ class DvsSimulator final : public Simulator {
                 EventBuckets& events) override {
     const auto now = seen(frame);
     const double duration = static_cast<double>(interval.duration()) * 1e-9;
-    PlaneView<Flow> flow;
+    ImageView<Flow> flow;
     int steps = 1;
     if (flow_) {
       flow = flow_->find(last_.view(), now, threads().threads());
@@ -200,9 +200,9 @@ class DvsSimulator final : public Simulator {
 
   DvsSettings settings_;
   DvsPixels pixels_;
-  Plane<std::uint8_t> last_;
-  Plane<std::uint8_t> between_;
-  Plane<std::uint8_t> denoised_;
+  Image<std::uint8_t> last_;
+  Image<std::uint8_t> between_;
+  Image<std::uint8_t> denoised_;
   std::optional<OpenCvFlow> flow_;
 };
 

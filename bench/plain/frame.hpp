@@ -23,7 +23,7 @@ class FrameSimulator final : public Simulator {
     copy(now, last_, threads());
   }
 
-  Plane<std::uint8_t> last_;
+  Image<std::uint8_t> last_;
 };
 
 }  // namespace plain

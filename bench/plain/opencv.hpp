@@ -15,7 +15,7 @@ namespace plain {
 
 using namespace eventcamera;
 
-inline cv::Mat opencv_picture(const PlaneView<std::uint8_t>& picture) {
+inline cv::Mat opencv_picture(const ImageView<std::uint8_t>& picture) {
   return {picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
           static_cast<std::size_t>(picture.stride)};
 }
@@ -39,7 +39,7 @@ class OpenCvFlow {
   }
 
   /// Good until the next call.
-  PlaneView<Flow> find(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
+  ImageView<Flow> find(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                        int threads) {
     set_opencv_threads(threads);
     if (method_ == FlowMethod::farneback) {
@@ -74,7 +74,7 @@ struct Tracks {
 /// Pyramidal Lucas-Kanade from the last picture to the next.
 class OpenCvTracker {
  public:
-  void push(const PlaneView<std::uint8_t>& picture, int threads) {
+  void push(const ImageView<std::uint8_t>& picture, int threads) {
     set_opencv_threads(threads);
     std::swap(last_, next_);
     cv::buildOpticalFlowPyramid(opencv_picture(picture), next_, window, coarsest_level, true,

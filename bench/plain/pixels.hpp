@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "src/core/event_buckets.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
 #include "src/simulate/bands.hpp"
 #include "src/simulate/simulator.hpp"
@@ -15,7 +15,7 @@
 namespace plain {
 
 using namespace eventcamera;
-using Picture = PlaneView<std::uint8_t>;
+using Picture = ImageView<std::uint8_t>;
 
 /// The events of a difference, band by band.
 inline void fire(const Picture& before, const Picture& now, int step, std::uint32_t t,
@@ -38,7 +38,7 @@ inline void fire(const Picture& before, const Picture& now, int step, std::uint3
 }
 
 /// Copies a picture of the same size, band by band.
-inline void copy(const Picture& from, Plane<std::uint8_t>& to, ThreadPool& threads) {
+inline void copy(const Picture& from, Image<std::uint8_t>& to, ThreadPool& threads) {
   threads.for_each(band_count(from.height), [&](int band, int) {
     const BandRows rows(band, from.height);
     for (int y = rows.first; y < rows.last; ++y)

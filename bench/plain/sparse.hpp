@@ -15,8 +15,8 @@ class SparseSimulator final : public Simulator {
   explicit SparseSimulator(const LumaFormat& format)
       : Simulator(format),
         last_(format.width, format.height),
-        between_{Plane<std::uint8_t>(format.width, format.height),
-                 Plane<std::uint8_t>(format.width, format.height)},
+        between_{Image<std::uint8_t>(format.width, format.height),
+                 Image<std::uint8_t>(format.width, format.height)},
         changed_in_band_(static_cast<std::size_t>(band_count(format.height))) {}
 
  private:
@@ -65,7 +65,7 @@ class SparseSimulator final : public Simulator {
   }
 
   /// The interpolated frame of step j.
-  void interpolate(const Picture& now, int j, Plane<std::uint8_t>& between) {
+  void interpolate(const Picture& now, int j, Image<std::uint8_t>& between) {
     copy(last_.view(), between, threads());
     for (const auto& point : points_)
       if (point.x_at(j) != point.x || point.y_at(j) != point.y)
@@ -74,8 +74,8 @@ class SparseSimulator final : public Simulator {
       between.at(point.x_at(j), point.y_at(j)) = last_.at(point.x, point.y);
   }
 
-  Plane<std::uint8_t> last_;
-  Plane<std::uint8_t> between_[2];
+  Image<std::uint8_t> last_;
+  Image<std::uint8_t> between_[2];
   OpenCvTracker tracker_;
   std::vector<std::vector<cv::Point2f>> changed_in_band_;
   std::vector<cv::Point2f> changed_;

@@ -26,7 +26,7 @@ using eventcamera::Accumulator;
 using eventcamera::EventBuckets;
 using eventcamera::LumaView;
 using eventcamera::Nanoseconds;
-using eventcamera::Plane;
+using eventcamera::Image;
 using eventcamera::Simulator;
 
 namespace {
@@ -57,7 +57,7 @@ struct State {
   GstVideoInfo video;              ///< what comes in
   std::optional<Drawing> drawing;  ///< what goes out, unless events do
   std::unique_ptr<Simulator> simulator;
-  Plane<guint8> gathered;      ///< luma that was packed
+  Image<guint8> gathered;      ///< luma that was packed
   bool discontinuous = false;  ///< the next buffer does not follow on the last one
 };
 
@@ -301,7 +301,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     if (event_simulator_draws(out))
       state->drawing = Drawing{drawn, Accumulator(luma.width, luma.height)};
     state->gathered =
-        has_packed_luma(video) ? Plane<guint8>(luma.width, luma.height) : Plane<guint8>();
+        has_packed_luma(video) ? Image<guint8>(luma.width, luma.height) : Image<guint8>();
   } catch (const std::exception& error) {
     state.reset();
     GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,

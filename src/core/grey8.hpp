@@ -10,11 +10,11 @@ namespace eventcamera {
 class Grey8 {
  public:
   /// Good as long as `frame` and until the next call.
-  PlaneView<std::uint8_t> of(const LumaView& frame) {
+  ImageView<std::uint8_t> of(const LumaView& frame) {
     if (frame.format.bits == 8) return frame.as<std::uint8_t>();
     const auto picture = frame.as<std::uint16_t>();
     if (upper_.width() != picture.width || upper_.height() != picture.height)
-      upper_ = Plane<std::uint8_t>(picture.width, picture.height);
+      upper_ = Image<std::uint8_t>(picture.width, picture.height);
     const int shift = frame.format.bits - 8;
     for (int y = 0; y < picture.height; ++y)
       for (int x = 0; x < picture.width; ++x)
@@ -23,7 +23,7 @@ class Grey8 {
   }
 
  private:
-  Plane<std::uint8_t> upper_;
+  Image<std::uint8_t> upper_;
 };
 
 }  // namespace eventcamera

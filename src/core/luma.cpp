@@ -3,7 +3,7 @@
 
 namespace eventcamera {
 
-void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Plane<std::uint8_t>& out) {
+void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Image<std::uint8_t>& out) {
   for (int y = 0; y < out.height(); ++y) {
     const std::uint8_t* in = data + y * stride;
     std::uint8_t* row = out.row(y);

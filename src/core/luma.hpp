@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 
 namespace eventcamera {
 
@@ -25,13 +25,13 @@ struct LumaView {
 
   /// Pixel is std::uint8_t where format.bits is 8, std::uint16_t otherwise.
   template <class Pixel>
-  PlaneView<Pixel> as() const {
+  ImageView<Pixel> as() const {
     return {static_cast<const Pixel*>(data), stride, format.width, format.height};
   }
 };
 
 /// Gathers the luma of a packed 4:2:2 picture (YUY2, UYVY, ...), whose luma is every second byte
 /// from `data` on: the one layout whose luma is no plane.
-void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Plane<std::uint8_t>& out);
+void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Image<std::uint8_t>& out);
 
 }  // namespace eventcamera

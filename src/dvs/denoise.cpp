@@ -84,7 +84,7 @@ HWY_EXPORT(denoise_row_16);
 
 /// Calls denoise_row(above, here, below, y) for each row.
 template <class Pixel, class DenoiseRow>
-void for_each_row_between(const PlaneView<Pixel>& frame, ThreadPool& threads,
+void for_each_row_between(const ImageView<Pixel>& frame, ThreadPool& threads,
                           const DenoiseRow& denoise_row) {
   for_each_row(threads, frame.height, [&](int y) {
     denoise_row(frame.row(std::max(y - 1, 0)), frame.row(y),
@@ -94,16 +94,16 @@ void for_each_row_between(const PlaneView<Pixel>& frame, ThreadPool& threads,
 
 }  // namespace
 
-void denoise(const PlaneView<std::uint8_t>& frame, int limit, ThreadPool& threads,
-             Plane<std::uint8_t>& out) {
+void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
+             Image<std::uint8_t>& out) {
   for_each_row_between(
       frame, threads, [&](const auto* above, const auto* here, const auto* below, int y) {
         HWY_DYNAMIC_DISPATCH(denoise_row_8)(above, here, below, frame.width, limit, out.row(y));
       });
 }
 
-void denoise(const PlaneView<std::uint16_t>& frame, int limit, ThreadPool& threads,
-             Plane<std::uint16_t>& out) {
+void denoise(const ImageView<std::uint16_t>& frame, int limit, ThreadPool& threads,
+             Image<std::uint16_t>& out) {
   for_each_row_between(
       frame, threads, [&](const auto* above, const auto* here, const auto* below, int y) {
         HWY_DYNAMIC_DISPATCH(denoise_row_16)(above, here, below, frame.width, limit, out.row(y));

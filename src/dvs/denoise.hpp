@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
@@ -12,9 +12,9 @@ namespace eventcamera {
 /// pixel the mean difference of its 3x3 neighbourhood is added (weights 1 2 1 by 1 2 1 of 16),
 /// each difference being cut to `limit`, in luma values. Beyond the border lies what lies on it.
 /// `out` has the size of `frame`. `reference::denoised()` is the equation.
-void denoise(const PlaneView<std::uint8_t>& frame, int limit, ThreadPool& threads,
-             Plane<std::uint8_t>& out);
-void denoise(const PlaneView<std::uint16_t>& frame, int limit, ThreadPool& threads,
-             Plane<std::uint16_t>& out);
+void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
+             Image<std::uint8_t>& out);
+void denoise(const ImageView<std::uint16_t>& frame, int limit, ThreadPool& threads,
+             Image<std::uint16_t>& out);
 
 }  // namespace eventcamera

@@ -87,7 +87,7 @@ class PixelSimulator final : public DvsSimulator {
     return true;
   }
 
-  void keep(const LumaView& frame, Plane<Pixel>& kept) {
+  void keep(const LumaView& frame, Image<Pixel>& kept) {
     const int white = (1 << format().bits) - 1;
     const int limit = static_cast<int>(std::lround(settings_.denoise / 255 * white));
     if (limit > 0)
@@ -175,9 +175,9 @@ class PixelSimulator final : public DvsSimulator {
     }
   }
 
-  PlaneView<Flow> find_flow() {
+  ImageView<Flow> find_flow() {
     if (!finder_) finder_.emplace(FlowMethod::dis_lq, format().width, format().height);
-    const auto luma = [this](const Plane<Pixel>& frame) {
+    const auto luma = [this](const Image<Pixel>& frame) {
       return LumaView{format(), frame.view().data, frame.stride()};
     };
     const Box changed = changed_box(last_.view(), now_.view(), 0);
@@ -185,7 +185,7 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   /// With which nothing moves by more than a pixel.
-  int steps_of(const PlaneView<Flow>& flow) {
+  int steps_of(const ImageView<Flow>& flow) {
     const int bands = band_count(format().height);
     farthest_.assign(static_cast<std::size_t>(bands), 0);
     threads().for_each(bands, [&](int band, int) {
@@ -273,8 +273,8 @@ class PixelSimulator final : public DvsSimulator {
     });
   }
 
-  Plane<Pixel> last_;
-  Plane<Pixel> now_;
+  Image<Pixel> last_;
+  Image<Pixel> now_;
   PixelArray pixels_;
   DvsSettings current_;  ///< what the pixels are made for
   Random random_{0};

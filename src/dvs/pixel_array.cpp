@@ -5,26 +5,17 @@
 #include "src/dvs/shot_noise.hpp"
 
 namespace eventcamera {
-namespace {
-
-constexpr int max_vector = 16;
-
-int padded(int width) {
-  return (width + max_vector - 1) / max_vector * max_vector;
-}
-
-}  // namespace
 
 PixelArray::PixelArray(int w, int height)
     : width(w),
-      target(padded(w), height),
-      signal(padded(w), height),
-      reference(padded(w), height),
-      positive(padded(w), height),
-      negative(padded(w), height),
-      leak(padded(w), height),
-      rest(padded(w), height),
-      quiet(padded(w), height) {}
+      target(w, height),
+      signal(w, height),
+      reference(w, height),
+      positive(w, height),
+      negative(w, height),
+      leak(w, height),
+      rest(w, height),
+      quiet(w, height) {}
 
 void PixelArray::draw_traits(int y, const DvsSettings& settings, const Random& random) {
   const Mismatch mismatch(settings, random);

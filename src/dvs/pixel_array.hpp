@@ -3,13 +3,13 @@
 
 #include <cstdint>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/random.hpp"
 
 namespace eventcamera {
 
-/// What the pixels remember, a plane for each thing. Rows are as long as the longest vector needs.
+/// What the pixels remember, an image for each thing.
 struct PixelArray {
   PixelArray(int width, int height);
 
@@ -25,14 +25,14 @@ struct PixelArray {
   }
 
   int width;
-  Plane<float> target;     ///< what the response makes of the light now
-  Plane<float> signal;     ///< what the photoreceptor has made of it so far
-  Plane<float> reference;  ///< what the signal is compared with
-  Plane<float> positive;   ///< thresholds; infinite where the pixel is dead
-  Plane<float> negative;
-  Plane<float> leak;           ///< the reference falls that much a microsecond
-  Plane<float> rest;           ///< microseconds until the pixel can fire again, or 0
-  Plane<std::uint32_t> quiet;  ///< the shot noise to be expected before it fires, 1/noise_unit
+  Image<float> target;     ///< what the response makes of the light now
+  Image<float> signal;     ///< what the photoreceptor has made of it so far
+  Image<float> reference;  ///< what the signal is compared with
+  Image<float> positive;   ///< thresholds; infinite where the pixel is dead
+  Image<float> negative;
+  Image<float> leak;           ///< the reference falls that much a microsecond
+  Image<float> rest;           ///< microseconds until the pixel can fire again, or 0
+  Image<std::uint32_t> quiet;  ///< the shot noise to be expected before it fires, 1/noise_unit
 };
 
 }  // namespace eventcamera

@@ -18,7 +18,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// No vector is wider: rows of a PixelArray are multiples of it.
+/// No vector is wider.
 constexpr int max_lanes = 16;
 
 using Floats = hn::CappedTag<float, max_lanes>;

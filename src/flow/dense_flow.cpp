@@ -35,7 +35,7 @@ class DisFlow final : public DenseFlow {
     dis_->setUseSpatialPropagation(false);
   }
 
-  void push(const PlaneView<std::uint8_t>& picture, ThreadPool& /*threads*/) override {
+  void push(const ImageView<std::uint8_t>& picture, ThreadPool& /*threads*/) override {
     cv::swap(last_, next_);
     cv::copyMakeBorder(opencv_picture(picture), next_, 0, std::max(0, min_side - picture.height), 0,
                        std::max(0, min_side - picture.width), cv::BORDER_REPLICATE);
@@ -43,7 +43,7 @@ class DisFlow final : public DenseFlow {
     height_ = picture.height;
   }
 
-  PlaneView<Flow> flow(ThreadPool& threads) override {
+  ImageView<Flow> flow(ThreadPool& threads) override {
     const OpenCvThreads limit(threads.threads());
     flow_.release();  // else the last flow would be where the search begins
     dis_->calc(last_, next_, flow_);

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
@@ -29,14 +29,14 @@ class DenseFlow {
 
   /// Makes the next picture the later one, and what was so the earlier one. It need not outlive the
   /// call.
-  virtual void push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) = 0;
+  virtual void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) = 0;
 
   /// The flow from the earlier picture to the later one, after two push() of one size. It is good
   /// until the next call, and the same for any number of threads.
-  virtual PlaneView<Flow> flow(ThreadPool& threads) = 0;
+  virtual ImageView<Flow> flow(ThreadPool& threads) = 0;
 
   /// The flow between two pictures, whatever came before.
-  PlaneView<Flow> find(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
+  ImageView<Flow> find(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                        ThreadPool& threads) {
     push(from, threads);
     push(to, threads);

@@ -3,13 +3,13 @@
 
 #include <opencv2/core.hpp>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 
 namespace eventcamera {
 
 /// A picture as OpenCV sees it, where it lies. OpenCV only reads what it takes as input, though
 /// its type cannot say so.
-inline cv::Mat opencv_picture(const PlaneView<std::uint8_t>& picture) {
+inline cv::Mat opencv_picture(const ImageView<std::uint8_t>& picture) {
   return {picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
           static_cast<std::size_t>(picture.stride)};
 }

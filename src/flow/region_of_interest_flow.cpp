@@ -27,7 +27,7 @@ struct Range {
   }
 };
 
-PlaneView<std::uint8_t> cut_out(const PlaneView<std::uint8_t>& picture, const Box& part) {
+ImageView<std::uint8_t> cut_out(const ImageView<std::uint8_t>& picture, const Box& part) {
   return {picture.row(part.top) + part.left, picture.stride, part.width(), part.height()};
 }
 
@@ -36,8 +36,8 @@ PlaneView<std::uint8_t> cut_out(const PlaneView<std::uint8_t>& picture, const Bo
 RegionOfInterestFlow::RegionOfInterestFlow(FlowMethod method, int width, int height)
     : method_(method), width_(width), height_(height), flow_(width, height) {}
 
-PlaneView<Flow> RegionOfInterestFlow::find(const PlaneView<std::uint8_t>& from,
-                                           const PlaneView<std::uint8_t>& to, const Box& changed,
+ImageView<Flow> RegionOfInterestFlow::find(const ImageView<std::uint8_t>& from,
+                                           const ImageView<std::uint8_t>& to, const Box& changed,
                                            ThreadPool& threads) {
   if (changed.empty()) {
     whole_knows_last_ = false;
@@ -57,8 +57,8 @@ PlaneView<Flow> RegionOfInterestFlow::find(const PlaneView<std::uint8_t>& from,
   return flow_.view();
 }
 
-PlaneView<Flow> RegionOfInterestFlow::find_in_whole(const PlaneView<std::uint8_t>& from,
-                                                    const PlaneView<std::uint8_t>& to,
+ImageView<Flow> RegionOfInterestFlow::find_in_whole(const ImageView<std::uint8_t>& from,
+                                                    const ImageView<std::uint8_t>& to,
                                                     ThreadPool& threads) {
   if (!whole_) whole_ = make_dense_flow(method_, width_, height_);
   if (!whole_knows_last_) whole_->push(from, threads);
@@ -67,8 +67,8 @@ PlaneView<Flow> RegionOfInterestFlow::find_in_whole(const PlaneView<std::uint8_t
   return whole_->flow(threads);
 }
 
-void RegionOfInterestFlow::find_in_part(const PlaneView<std::uint8_t>& from,
-                                        const PlaneView<std::uint8_t>& to, const Box& part,
+void RegionOfInterestFlow::find_in_part(const ImageView<std::uint8_t>& from,
+                                        const ImageView<std::uint8_t>& to, const Box& part,
                                         ThreadPool& threads) {
   if (!part_ || part_width_ != part.width() || part_height_ != part.height()) {
     part_ = make_dense_flow(method_, part.width(), part.height());

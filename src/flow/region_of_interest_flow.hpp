@@ -20,13 +20,13 @@ class RegionOfInterestFlow {
   /// The flow from a picture, which must be the `to` of the call before if there was one, to the
   /// next, where `changed` holds all that has changed between them. Good until the next call, and
   /// the same for any number of threads.
-  PlaneView<Flow> find(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
+  ImageView<Flow> find(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                        const Box& changed, ThreadPool& threads);
 
  private:
-  PlaneView<Flow> find_in_whole(const PlaneView<std::uint8_t>& from,
-                                const PlaneView<std::uint8_t>& to, ThreadPool& threads);
-  void find_in_part(const PlaneView<std::uint8_t>& from, const PlaneView<std::uint8_t>& to,
+  ImageView<Flow> find_in_whole(const ImageView<std::uint8_t>& from,
+                                const ImageView<std::uint8_t>& to, ThreadPool& threads);
+  void find_in_part(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                     const Box& part, ThreadPool& threads);
   void clear();
 
@@ -38,7 +38,7 @@ class RegionOfInterestFlow {
   std::unique_ptr<DenseFlow> part_;
   int part_width_ = 0;
   int part_height_ = 0;
-  Plane<Flow> flow_;  ///< 0 outside of filled_
+  Image<Flow> flow_;  ///< 0 outside of filled_
   Box filled_;
 };
 

@@ -9,7 +9,7 @@ namespace eventcamera {
 namespace {
 
 template <class Pixel>
-void fill(Plane<Pixel>& plane, Pixel value) {
+void fill(Image<Pixel>& plane, Pixel value) {
   for (int y = 0; y < plane.height(); ++y) std::fill_n(plane.row(y), plane.width(), value);
 }
 

@@ -5,14 +5,14 @@
 #include <cstdint>
 
 #include "src/core/absolute_event.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/step_times.hpp"
 #include "src/measure/gap_histogram.hpp"
 
 namespace eventcamera {
 
 /// How many events each pixel has.
-using EventMap = Plane<std::uint32_t>;
+using EventMap = Image<std::uint32_t>;
 
 /// The shares of gaps whose quantiles are told.
 inline constexpr std::array gap_shares = {0.05, 0.25, 0.5, 0.75, 0.95};
@@ -57,7 +57,7 @@ class EventStatistics {
   static constexpr Microseconds never = INT64_MIN;
 
   EventMap map_;
-  Plane<Microseconds> last_;
+  Image<Microseconds> last_;
   GapHistogram gaps_;
   std::uint64_t on_ = 0;
   std::uint64_t off_ = 0;

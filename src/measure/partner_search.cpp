@@ -22,7 +22,7 @@ Microseconds distance_between(Microseconds earlier, Microseconds later) {
 PartnerSearch::PartnerSearch(int width, int height) {
   for (const auto side : both_sides) {
     for (auto& pixels : lanes_[side].pixels) {
-      pixels = Plane<Pixel>(width + 2, height + 2);
+      pixels = Image<Pixel>(width + 2, height + 2);
       for (int y = 0; y < height + 2; ++y)
         std::fill_n(pixels.row(y), width + 2, Pixel{.last = never, .waiting = 0});
     }

@@ -7,7 +7,7 @@
 #include <deque>
 
 #include "src/core/absolute_event.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/measure/side.hpp"
 
 namespace eventcamera {
@@ -50,7 +50,7 @@ class PartnerSearch {
     Ticket before;         ///< who waits at the same pixel
   };
   struct Lane {
-    std::array<Plane<Pixel>, 2> pixels;  ///< by polarity, with a margin of one
+    std::array<Image<Pixel>, 2> pixels;  ///< by polarity, with a margin of one
     std::deque<Waiting> waiting;
     Ticket first = 1;  ///< in `waiting`
     PartnerCounts partnered{};

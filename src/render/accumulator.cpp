@@ -80,24 +80,24 @@ class RowPainter {
 };
 
 template <int bytes>
-void draw_rows(Plane<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+void draw_rows(Image<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
                std::ptrdiff_t stride) {
   const RowPainter<bytes> painter(kinds);
   for (int y = 0; y < fired.height(); ++y)
     painter.draw(fired.row(y), fired.width(), out + y * stride);
 }
 
-void draw_pixels_of_1(Plane<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+void draw_pixels_of_1(Image<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
                       std::ptrdiff_t stride) {
   draw_rows<1>(fired, kinds, out, stride);
 }
 
-void draw_pixels_of_3(Plane<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+void draw_pixels_of_3(Image<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
                       std::ptrdiff_t stride) {
   draw_rows<3>(fired, kinds, out, stride);
 }
 
-void draw_pixels_of_4(Plane<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+void draw_pixels_of_4(Image<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
                       std::ptrdiff_t stride) {
   draw_rows<4>(fired, kinds, out, stride);
 }
@@ -119,9 +119,9 @@ HWY_EXPORT(draw_pixels_of_4);
 void Accumulator::add(std::span<const Event> events) {
   // In locals: a byte that is written might else be any of these.
   std::uint8_t* const fired = fired_.row(0);
-  const auto width = static_cast<std::size_t>(fired_.width());
+  const auto stride = static_cast<std::size_t>(fired_.stride());
   for (const auto event : events)
-    fired[static_cast<std::size_t>(event.y()) * width + event.x] |=
+    fired[static_cast<std::size_t>(event.y()) * stride + event.x] |=
         static_cast<std::uint8_t>(1 + static_cast<int>(event.polarity()));
 }
 

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "src/core/event_buckets.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/render/pixel_kinds.hpp"
 
 namespace eventcamera {
@@ -28,7 +28,7 @@ class Accumulator {
  private:
   void add_band(const EventBuckets& events, std::size_t band);
 
-  Plane<std::uint8_t> fired_;  // bit 0: OFF, bit 1: ON
+  Image<std::uint8_t> fired_;  // bit 0: OFF, bit 1: ON
 };
 
 }  // namespace eventcamera

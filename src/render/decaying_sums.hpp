@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/render/exponential.hpp"
 
 namespace eventcamera {
@@ -41,7 +41,7 @@ class DecayingSums {
 
   Exponential exponential_;
   float most_;
-  Plane<Sum> sums_;
+  Image<Sum> sums_;
 };
 
 }  // namespace eventcamera

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/render/recent_events.hpp"
 
 namespace eventcamera {
@@ -46,7 +46,7 @@ class EventWindow {
 
   WindowLimits limits_;
   RecentEvents events_;
-  Plane<Counts> counts_;
+  Image<Counts> counts_;
   int areas_across_;
   std::vector<std::size_t> areas_;  ///< events in each, where they are limited
 };

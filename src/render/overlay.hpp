@@ -7,7 +7,7 @@
 
 #include "src/core/arrivals.hpp"
 #include "src/core/event.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
 #include "src/render/pixel_layout.hpp"
@@ -42,7 +42,7 @@ class Overlay {
   Size picture_;
   Arrivals arrivals_;
   EventWindow window_;
-  Plane<std::uint8_t> kinds_;  ///< of the picture's pixels; all 0 between pictures
+  Image<std::uint8_t> kinds_;  ///< of the picture's pixels; all 0 between pictures
 };
 
 }  // namespace eventcamera

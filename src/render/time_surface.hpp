@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/core/absolute_event.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 
 namespace eventcamera {
 
@@ -37,7 +37,7 @@ class TimeSurface {
   };
 
   Microseconds longest_;
-  Plane<Last> last_;
+  Image<Last> last_;
 };
 
 }  // namespace eventcamera

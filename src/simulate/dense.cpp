@@ -41,10 +41,10 @@ class InterpolatingSimulator final : public DenseSimulator {
   }
 
   /// What has not changed by more than a threshold does not fire, so it need not move.
-  PlaneView<Flow> find_flow(const Thresholds& thresholds) {
+  ImageView<Flow> find_flow(const Thresholds& thresholds) {
     if (!finder_ || finder_->method() != flow_)
       finder_.emplace(flow_, format().width, format().height);
-    const auto luma = [this](const Plane<Pixel>& frame) {
+    const auto luma = [this](const Image<Pixel>& frame) {
       return LumaView{format(), frame.view().data, frame.stride()};
     };
     const Box changed =
@@ -52,8 +52,8 @@ class InterpolatingSimulator final : public DenseSimulator {
     return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), changed, threads());
   }
 
-  Plane<Pixel> last_;
-  Plane<Pixel> now_;
+  Image<Pixel> last_;
+  Image<Pixel> now_;
   PathWalker walker_;
   std::optional<RegionOfInterestFlow> finder_;
   Grey8 last_grey_;

@@ -36,7 +36,7 @@ struct Part {
 
   Kept last;
   Kept now;
-  Plane<std::uint8_t> picture;  ///< now as a picture in 8 bits, 0 where nothing is kept
+  Image<std::uint8_t> picture;  ///< now as a picture in 8 bits, 0 where nothing is kept
   PointTracker tracker;
 
   void begin_next() {
@@ -98,7 +98,7 @@ class FiredPixels {
            static_cast<std::size_t>(place.x / 64);
   }
 
-  Plane<int> strongest_;
+  Image<int> strongest_;
   int words_;                         ///< of 64 pixels, in a row
   std::vector<std::uint64_t> taken_;  ///< a bit a pixel: something has landed
 };
@@ -139,7 +139,7 @@ class DiffSimulator final : public Simulator {
   }
 
   /// D(i) = I(i) - I(i-1), kept where it fires, each polarity apart.
-  void keep_difference(const PlaneView<Pixel>& now, int last_step, EventBuckets& events) {
+  void keep_difference(const ImageView<Pixel>& now, int last_step, EventBuckets& events) {
     on_.begin_next();
     off_.begin_next();
     const int shift = format().bits - 8;
@@ -174,7 +174,7 @@ class DiffSimulator final : public Simulator {
     });
   }
 
-  Plane<Pixel> last_;
+  Image<Pixel> last_;
   bool has_difference_ = false;
   Part on_;
   Part off_;

@@ -7,7 +7,7 @@
 
 #include "src/core/box.hpp"
 #include "src/core/event_buckets.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
 #include "src/simulate/bands.hpp"
 #include "src/simulate/simulator.hpp"
@@ -34,7 +34,7 @@ ChangedColumns changed_columns(const std::uint16_t* before, const std::uint16_t*
 
 /// The smallest box that holds those of a picture.
 template <class Pixel>
-Box changed_box(const PlaneView<Pixel>& before, const PlaneView<Pixel>& now, int threshold) {
+Box changed_box(const ImageView<Pixel>& before, const ImageView<Pixel>& now, int threshold) {
   Box box;
   for (int y = 0; y < now.height; ++y) {
     const auto columns = changed_columns(before.row(y), now.row(y), now.width, threshold);
@@ -47,7 +47,7 @@ Box changed_box(const PlaneView<Pixel>& before, const PlaneView<Pixel>& now, int
 
 /// fire_differences() for whole pictures, into the buckets of one step, which has their bands.
 template <class Pixel>
-void fire_differences(const PlaneView<Pixel>& before, const PlaneView<Pixel>& now, int step,
+void fire_differences(const ImageView<Pixel>& before, const ImageView<Pixel>& now, int step,
                       std::uint32_t t, const Thresholds& thresholds, ThreadPool& threads,
                       EventBuckets& events) {
   threads.for_each(band_count(now.height), [&](int band, int) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/simulate/frame.hpp"
 
-#include <cstring>
-
 #include "src/simulate/bands.hpp"
 #include "src/simulate/difference.hpp"
 
@@ -30,12 +28,12 @@ class FrameSimulator final : public Simulator {
       for (int y = rows.first; y < rows.last; ++y) {
         fire_differences(last_.row(y), now.row(y), now.width, y, t, thresholds,
                          events.bucket(1, band));
-        std::memcpy(last_.row(y), now.row(y), static_cast<std::size_t>(last_.stride()));
+        last_.assign_row(y, now.row(y));
       }
     });
   }
 
-  Plane<Pixel> last_;
+  Image<Pixel> last_;
 };
 
 }  // namespace

@@ -39,9 +39,9 @@ class LargestDifference {
   HWY_ALIGN std::uint8_t columns_[columns_at_once] = {};
 };
 
-/// A row of 4x4 cells, from row `top` of the picture on. Behind the right border stands the next
-/// row, and behind the last one 0: what is measured there is too large at worst.
-void measure_row(const PlaneView<std::uint8_t>& picture, int top, std::uint8_t* x_out,
+/// A row of 4x4 cells, from row `top` of the picture on. What lies past the right border is measured
+/// too: the bound is too large at worst.
+void measure_row(const ImageView<std::uint8_t>& picture, int top, std::uint8_t* x_out,
                  std::uint8_t* y_out) {
   const int bottom = std::min(top + 4, picture.height);
   for (int left = 0; left < picture.width; left += columns_at_once) {
@@ -71,7 +71,7 @@ namespace {
 HWY_EXPORT(measure_row);
 
 /// The largest of 4x4 small cells makes a large one.
-void gather_row(const Plane<std::uint8_t>& small, int row, Plane<std::uint8_t>& large) {
+void gather_row(const Image<std::uint8_t>& small, int row, Image<std::uint8_t>& large) {
   for (int column = 0; column < large.width(); ++column) {
     std::uint8_t largest = 0;
     for (int y = 4 * row; y < 4 * row + 4; ++y)
@@ -85,11 +85,11 @@ void gather_row(const Plane<std::uint8_t>& small, int row, Plane<std::uint8_t>& 
 void GradientBound::Cells::shape(int cell_side, int columns, int rows) {
   side = cell_side;
   if (x.width() == columns && x.height() == rows) return;
-  x = Plane<std::uint8_t>(columns, rows);
-  y = Plane<std::uint8_t>(columns, rows);
+  x = Image<std::uint8_t>(columns, rows);
+  y = Image<std::uint8_t>(columns, rows);
 }
 
-void GradientBound::measure(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) {
+void GradientBound::measure(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   const int columns = (picture.width + 15) / 16;
   const int rows = (picture.height + 15) / 16;
   far_.shape(16, columns, rows);

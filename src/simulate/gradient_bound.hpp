@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "src/core/box.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
@@ -13,8 +13,8 @@ namespace eventcamera {
 /// near, 16x16 for looking far.
 class GradientBound {
  public:
-  /// `picture` must be a Plane: SIMD code reads behind its end.
-  void measure(const PlaneView<std::uint8_t>& picture, ThreadPool& threads);
+  /// `picture` must be the view of an Image: SIMD code reads behind its end.
+  void measure(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
   struct Bound {
     int x;  ///< of a pixel and the one to its right, grey levels
@@ -28,8 +28,8 @@ class GradientBound {
   /// Square cells of one size.
   struct Cells {
     int side = 0;
-    Plane<std::uint8_t> x;
-    Plane<std::uint8_t> y;
+    Image<std::uint8_t> x;
+    Image<std::uint8_t> y;
 
     void shape(int cell_side, int columns, int rows);
     Bound within(const Box& box) const;

@@ -16,7 +16,7 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-void interpolate_8(const Warp<std::uint8_t>& warp, const PlaneView<Flow>& flow, int y, int j,
+void interpolate_8(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
                    std::uint16_t* out) {
   const Words words;
   const hn::Rebind<std::uint16_t, Words> shades;
@@ -74,12 +74,12 @@ namespace eventcamera {
 
 HWY_EXPORT(interpolate_8);
 
-void interpolate_row(const Warp<std::uint8_t>& warp, const PlaneView<Flow>& flow, int y, int j,
+void interpolate_row(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
                      std::uint16_t* out) {
   HWY_DYNAMIC_DISPATCH(interpolate_8)(warp, flow, y, j, out);
 }
 
-void interpolate_row(const Warp<std::uint16_t>& warp, const PlaneView<Flow>& flow, int y, int j,
+void interpolate_row(const Warp<std::uint16_t>& warp, const ImageView<Flow>& flow, int y, int j,
                      std::uint16_t* out) {
   for (int x = 0; x < flow.width; ++x) {
     const Flow& here = flow.row(y)[x];

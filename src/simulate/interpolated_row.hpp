@@ -11,9 +11,9 @@ namespace eventcamera {
 /// A row of the blended frame of step j = 1 ... steps - 1 between two frames. Of frames in 8 bits
 /// it has 16, so that the dark has more shades than grey levels; of others their own depth. The
 /// frames in 8 bits must be Planes: SIMD code reads behind their ends.
-void interpolate_row(const Warp<std::uint8_t>& warp, const PlaneView<Flow>& flow, int y, int j,
+void interpolate_row(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
                      std::uint16_t* out);
-void interpolate_row(const Warp<std::uint16_t>& warp, const PlaneView<Flow>& flow, int y, int j,
+void interpolate_row(const Warp<std::uint16_t>& warp, const ImageView<Flow>& flow, int y, int j,
                      std::uint16_t* out);
 
 /// A row of a frame, as interpolate_row() would give it.

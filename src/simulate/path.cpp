@@ -34,8 +34,8 @@ constexpr int steps_at_once = 16;
 using FirstSteps = std::array<int, max_side / tile_width>;
 
 /// Sets each pixel of some rows beside the one below it, the lowest beside itself.
-void pair_rows(const PlaneView<std::uint8_t>& picture, int first, int last,
-               Plane<std::uint16_t>& pairs) {
+void pair_rows(const ImageView<std::uint8_t>& picture, int first, int last,
+               Image<std::uint16_t>& pairs) {
   const hn::CappedTag<std::uint16_t, 32> words;
   const hn::Rebind<std::uint8_t, decltype(words)> bytes;
   const int lanes = static_cast<int>(hn::Lanes(words));
@@ -43,13 +43,11 @@ void pair_rows(const PlaneView<std::uint8_t>& picture, int first, int last,
     const std::uint8_t* here = picture.row(y);
     const std::uint8_t* below = picture.row(std::min(y + 1, picture.height - 1));
     std::uint16_t* out = pairs.row(y);
-    int x = 0;
-    for (; x + lanes <= picture.width; x += lanes) {
+    for (int x = 0; x < picture.width; x += lanes) {
       const auto low = hn::PromoteTo(words, hn::LoadU(bytes, here + x));
       const auto high = hn::PromoteTo(words, hn::LoadU(bytes, below + x));
       hn::StoreU(hn::Or(low, hn::ShiftLeft<8>(high)), words, out + x);
     }
-    for (; x < picture.width; ++x) out[x] = static_cast<std::uint16_t>(here[x] | below[x] << 8);
   }
 }
 
@@ -144,7 +142,7 @@ struct FlowRange {
   float most[2];
 };
 
-FlowRange flow_range(const PlaneView<Flow>& flow, const Box& tile) {
+FlowRange flow_range(const ImageView<Flow>& flow, const Box& tile) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const int count = 2 * tile.width();
@@ -202,7 +200,7 @@ int first_step(const Path<std::uint8_t>& path, const GradientBound& gradient_bou
   return dx * bound.x + dy * bound.y <= threshold << 16 ? std::max(1, steps - 1) : 1;
 }
 
-void fire_band_forward(const Path<std::uint8_t>& path, const PlaneView<std::uint16_t>& last_pairs,
+void fire_band_forward(const Path<std::uint8_t>& path, const ImageView<std::uint16_t>& last_pairs,
                        const GradientBound& gradient_bound, int band, EventBuckets& events) {
   const PairSampler last(last_pairs);
   const BandRows rows(band, path.flow.height);
@@ -273,7 +271,7 @@ void PathWalker::fire(const Path<std::uint8_t>& path, ThreadPool& threads, Event
   if (path.interpolation == Interpolation::forward) {
     gradient_bound_.measure(path.warp.last, threads);
     if (last_pairs_.width() != path.flow.width || last_pairs_.height() != path.flow.height)
-      last_pairs_ = Plane<std::uint16_t>(path.flow.width, path.flow.height);
+      last_pairs_ = Image<std::uint16_t>(path.flow.width, path.flow.height);
     threads.for_each(bands, [&](int band, int) {
       const BandRows rows(band, path.flow.height);
       HWY_DYNAMIC_DISPATCH(pair_rows)(path.warp.last, rows.first, rows.last, last_pairs_);

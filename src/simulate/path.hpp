@@ -18,7 +18,7 @@ namespace eventcamera {
 template <class Pixel>
 struct Path {
   Warp<Pixel> warp;
-  PlaneView<Flow> flow;
+  ImageView<Flow> flow;
   Interpolation interpolation;
   StepTimes steps;
   Thresholds thresholds;
@@ -40,7 +40,7 @@ class PathWalker {
 
  private:
   GradientBound gradient_bound_;
-  Plane<std::uint16_t> last_pairs_;  ///< the last frame, each pixel beside the one below it
+  Image<std::uint16_t> last_pairs_;  ///< the last frame, each pixel beside the one below it
 };
 
 }  // namespace eventcamera

@@ -11,7 +11,7 @@
 
 #include <cstdint>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/flow/fixed_point.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -50,7 +50,7 @@ struct SamplePlaces {
 /// sample() of warp.hpp, for many places at once.
 class Sampler {
  public:
-  explicit Sampler(const PlaneView<std::uint8_t>& picture)
+  explicit Sampler(const ImageView<std::uint8_t>& picture)
       : pixels_(reinterpret_cast<const std::int32_t*>(picture.data)),
         stride_(hn::Set(Words(), static_cast<std::int32_t>(picture.stride))),
         right_end_(hn::Set(Words(), (picture.width - 1) * 64)),
@@ -88,7 +88,7 @@ class Sampler {
 class PairSampler {
  public:
   /// The pixel in the lower byte, the one below it in the upper.
-  explicit PairSampler(const PlaneView<std::uint16_t>& pairs)
+  explicit PairSampler(const ImageView<std::uint16_t>& pairs)
       : pairs_(reinterpret_cast<const std::int32_t*>(pairs.data)),
         stride_(hn::Set(Words(), static_cast<std::int32_t>(pairs.stride))),
         right_end_(hn::Set(Words(), (pairs.width - 1) * 64)),

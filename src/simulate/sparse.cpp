@@ -2,7 +2,6 @@
 #include "src/simulate/sparse.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <span>
 #include <utility>
 #include <vector>
@@ -24,8 +23,8 @@ struct MovingPixel {
 /// What lies between two frames.
 template <class Pixel>
 struct Interval {
-  PlaneView<Pixel> last;
-  PlaneView<Pixel> now;
+  ImageView<Pixel> last;
+  ImageView<Pixel> now;
   std::span<const MovingPixel<Pixel>> pixels;  ///< in raster order of where they start
   const std::vector<char>& touched;            ///< rows that a pixel leaves or crosses
 };
@@ -60,8 +59,7 @@ class Painter {
   void paint(const Interval<Pixel>& interval, int j) {
     for (int y = 0; y < between_.height(); ++y)
       if (interval.touched[static_cast<std::size_t>(y)] != 0)
-        std::memcpy(between_.row(y), interval.last.row(y),
-                    static_cast<std::size_t>(between_.stride()));
+        between_.assign_row(y, interval.last.row(y));
     places_.resize(interval.pixels.size());
     auto* place = places_.data();
     for (const auto& pixel : interval.pixels) {
@@ -74,8 +72,8 @@ class Painter {
     for (const auto& pixel : interval.pixels) **place++ = pixel.brightness;
   }
 
-  Plane<Pixel> between_;
-  Plane<Pixel> before_;
+  Image<Pixel> between_;
+  Image<Pixel> before_;
   std::vector<Pixel*> places_;  ///< of the pixels, in between_
 };
 
@@ -116,7 +114,7 @@ class SparseSimulator final : public Simulator {
   }
 
   /// The pixels whose change exceeds `threshold`, in raster order.
-  void find_changed(const PlaneView<Pixel>& now, int threshold) {
+  void find_changed(const ImageView<Pixel>& now, int threshold) {
     changes_.reset(1, band_count(now.height));
     fire_differences(last_.view(), now, 1, 0, {threshold, threshold}, threads(), changes_);
     changed_.clear();
@@ -139,7 +137,7 @@ class SparseSimulator final : public Simulator {
     }
   }
 
-  Plane<Pixel> last_;
+  Image<Pixel> last_;
   PointTracker tracker_;
   Grey8 grey_;
   EventBuckets changes_;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/flow/fixed_point.hpp"
 #include "src/simulate/dense.hpp"
 
@@ -14,7 +14,7 @@ namespace eventcamera {
 /// The bilinear sample of a picture at (x, y), which are in 1/65536 of a pixel and rounded to 1/64;
 /// the border goes on for ever. In 1/4096 of a grey level, exactly.
 template <class Pixel>
-std::int32_t sample(const PlaneView<Pixel>& picture, std::int32_t x, std::int32_t y) {
+std::int32_t sample(const ImageView<Pixel>& picture, std::int32_t x, std::int32_t y) {
   const int qx = std::clamp((x + 512) >> 10, 0, (picture.width - 1) * 64);
   const int qy = std::clamp((y + 512) >> 10, 0, (picture.height - 1) * 64);
   const int x0 = qx >> 6;
@@ -36,8 +36,8 @@ inline int blend_weight(int j, int steps) {
 /// The pixel (x, y) of the interpolated frames between two frames.
 template <class Pixel>
 struct Warp {
-  PlaneView<Pixel> last;
-  PlaneView<Pixel> now;
+  ImageView<Pixel> last;
+  ImageView<Pixel> now;
   int steps;
 
   /// Step j = 1 ... steps - 1 of a pixel that moves by (dx, dy) a step; rounded to a grey level.

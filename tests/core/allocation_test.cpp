@@ -88,8 +88,8 @@ int allocations_in_steady_state(const Frame& take_frame) {
 }
 
 template <class Pixel>
-std::vector<Plane<Pixel>> frames_of_a_drift(int bits) {
-  std::vector<Plane<Pixel>> frames;
+std::vector<Image<Pixel>> frames_of_a_drift(int bits) {
+  std::vector<Image<Pixel>> frames;
   for (int i = 0; i < frames_a_round; ++i)
     frames.push_back(scene::texture<Pixel>(width, height, bits, 1.7 * i, 0.6 * i));
   return frames;
@@ -162,7 +162,7 @@ TEST(Allocations, AreNotMadeByPhysicalPixels) {
 template <class Pixel>
 int allocations_of_paths(int bits, Interpolation interpolation) {
   const auto frames = frames_of_a_drift<Pixel>(bits);
-  std::vector<Plane<Flow>> flows;
+  std::vector<Image<Flow>> flows;
   for (int i = 0; i < frames_a_round; ++i) {
     flows.emplace_back(width, height);
     for (int y = 0; y < height; ++y)

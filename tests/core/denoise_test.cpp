@@ -28,14 +28,14 @@ void hold_to_the_reference(int width, int height, int bits, int limit) {
   std::vector<Pixel> memory(static_cast<std::size_t>(stride) * (height - 1) + width);
   for (int y = 0; y < height; ++y)
     std::copy_n(packed.row(y), width, memory.data() + static_cast<std::ptrdiff_t>(stride) * y);
-  const PlaneView<Pixel> frame{memory.data(), static_cast<std::ptrdiff_t>(stride * sizeof(Pixel)),
+  const ImageView<Pixel> frame{memory.data(), static_cast<std::ptrdiff_t>(stride * sizeof(Pixel)),
                                width, height};
   const auto expected = reference::denoised(frame, limit);
   targets::for_each([&](const char* target) {
     for (const int most : {1, 2}) {
       ThreadPool threads;
       threads.set_threads(most);
-      Plane<Pixel> out(width, height);
+      Image<Pixel> out(width, height);
       denoise(frame, limit, threads, out);
       for (int y = 0; y < height; ++y)
         ASSERT_EQ(std::memcmp(out.row(y), expected.row(y), width * sizeof(Pixel)), 0)
@@ -59,7 +59,7 @@ TEST(Denoise, EqualsTheReferenceOnEveryTarget) {
 TEST(Denoise, TakesNoiseAwayAndLeavesEdges) {
   constexpr int width = 200;
   constexpr int height = 100;
-  Plane<std::uint8_t> frame(width, height);
+  Image<std::uint8_t> frame(width, height);
   std::minstd_rand random(3);
   std::normal_distribution<> normal(0, 2);
   const auto level = [](int x) { return x < width / 2 ? 60 : 160; };
@@ -67,7 +67,7 @@ TEST(Denoise, TakesNoiseAwayAndLeavesEdges) {
     for (int x = 0; x < width; ++x)
       frame.at(x, y) = static_cast<std::uint8_t>(std::lround(level(x) + normal(random)));
   ThreadPool threads;
-  Plane<std::uint8_t> out(width, height);
+  Image<std::uint8_t> out(width, height);
   denoise(frame.view(), 6, threads, out);
   double before = 0;
   double after = 0;

@@ -51,7 +51,7 @@ class Playback {
   }
 
   template <class Pixel>
-  void push(const Plane<Pixel>& frame, int bits, Nanoseconds time) {
+  void push(const Image<Pixel>& frame, int bits, Nanoseconds time) {
     const auto last = simulator_->last_time();
     const auto* made = simulator_->push(scene::luma(frame.view(), bits), time, common_);
     if (made == nullptr) return;
@@ -155,12 +155,12 @@ Pixels by_pixel(const std::vector<Timed>& events) {
   return pixels;
 }
 
-Plane<std::uint8_t> flat(int width, int height, int grey) {
+Image<std::uint8_t> flat(int width, int height, int grey) {
   return scene::flat<std::uint8_t>(width, height, grey);
 }
 
 /// Shows the same picture for so many seconds.
-void stand(Playback& playback, const Plane<std::uint8_t>& picture, int frames,
+void stand(Playback& playback, const Image<std::uint8_t>& picture, int frames,
            Nanoseconds frame_time) {
   for (int i = 0; i <= frames; ++i) playback.push(picture, 8, i * frame_time);
 }
@@ -333,7 +333,7 @@ TEST(Dvs, AnswersASineOfLightWithAsManyOnAsOff) {
                                               .positive_threshold = 0.11,
                                               .negative_threshold = 0.11});
     for (int i = 0; i <= 400; ++i) {
-      Plane<std::uint16_t> frame(8, 8);
+      Image<std::uint16_t> frame(8, 8);
       for (int y = 0; y < 8; ++y)
         for (int x = 0; x < 8; ++x)
           frame.at(x, y) = static_cast<std::uint16_t>(
@@ -396,7 +396,7 @@ std::vector<std::vector<Event>> film(int width, int height, int bits, const DvsS
     const auto frame = scene::texture<Pixel>(width, height, bits, 2.6 * i, -1.3 * i);
     for (int y = 0; y < height; ++y)
       std::memcpy(memory.data() + y * stride, frame.row(y),
-                  static_cast<std::size_t>(frame.stride()));
+                  static_cast<std::size_t>(width) * sizeof(Pixel));
     Settings common;
     common.threads = threads;
     if (const auto* made = simulator->push({{width, height, bits}, memory.data(), stride},

@@ -28,29 +28,30 @@ void PrintTo(const Case& c, std::ostream* out) {
   *out << c.width << "x" << c.height << (c.noise ? " noise" : " texture");
 }
 
-using Picture = Plane<std::uint8_t>;
+using Picture = Image<std::uint8_t>;
 
 Picture picture_of(const Case& c, int i) {
   if (c.noise) return scene::noise<std::uint8_t>(c.width, c.height, 8, 1 + i);
   return scene::texture<std::uint8_t>(c.width, c.height, 8, 2.3 * i, -1.4 * i);
 }
 
-Plane<Flow> copy(const PlaneView<Flow>& flow) {
-  Plane<Flow> result(flow.width, flow.height);
+Image<Flow> copy(const ImageView<Flow>& flow) {
+  Image<Flow> result(flow.width, flow.height);
   result.assign(flow);
   return result;
 }
 
-Plane<Flow> flow_of(const Picture& from, const Picture& to, ThreadPool& threads) {
+Image<Flow> flow_of(const Picture& from, const Picture& to, ThreadPool& threads) {
   FarnebackFlow flow;
   return copy(flow.find(from.view(), to.view(), threads));
 }
 
-bool equal(const Plane<Flow>& a, const Plane<Flow>& b) {
-  return a.width() == b.width() && a.height() == b.height() &&
-         std::memcmp(a.row(0), b.row(0),
-                     static_cast<std::size_t>(a.stride()) * static_cast<std::size_t>(a.height())) ==
-             0;
+bool equal(const Image<Flow>& a, const Image<Flow>& b) {
+  if (a.width() != b.width() || a.height() != b.height()) return false;
+  const auto row_size = static_cast<std::size_t>(a.width()) * sizeof(Flow);
+  for (int y = 0; y < a.height(); ++y)
+    if (std::memcmp(a.row(y), b.row(y), row_size) != 0) return false;
+  return true;
 }
 
 class Farneback : public testing::TestWithParam<Case> {

@@ -88,21 +88,21 @@ TEST_P(EveryFlow, KnowsThePicturesThatWerePushedBefore) {
 /// A square of texture that moves by (3, 1) over a still, textured ground.
 struct MovingPatch {
   MovingPatch() : from(picture(0, 0)), to(picture(3, 1)) {}
-  static Plane<std::uint8_t> picture(int dx, int dy) {
+  static Image<std::uint8_t> picture(int dx, int dy) {
     auto result = scene::texture<std::uint8_t>(640, 480, 8, 0, 0);
     const auto patch = scene::texture<std::uint8_t>(60, 60, 8, 900, 900);
     for (int y = 0; y < 60; ++y)
       for (int x = 0; x < 60; ++x) result.at(200 + dx + x, 150 + dy + y) = patch.at(x, y);
     return result;
   }
-  const Plane<std::uint8_t> from;
-  const Plane<std::uint8_t> to;
+  const Image<std::uint8_t> from;
+  const Image<std::uint8_t> to;
 };
 
 TEST_P(EveryFlow, OfChangesIsNotSoughtWhereNothingChanged) {
   const MovingPatch patch;
   RegionOfInterestFlow finder(GetParam(), 640, 480);
-  const auto check = [&](const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to, int sign) {
+  const auto check = [&](const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int sign) {
     const auto flow =
         finder.find(from.view(), to.view(), changed_box(from.view(), to.view(), 2), threads);
     double x = 0;
@@ -135,7 +135,7 @@ TEST_P(EveryFlow, OfChangesIsThatOfTheWholeWhereAllChanges) {
   const auto b = scene::texture<std::uint8_t>(320, 240, 8, 2.3, 1.9);
   RegionOfInterestFlow finder(GetParam(), 320, 240);
   const Box all{0, 0, 320, 240};
-  const Plane<std::uint8_t>* sequence[] = {&a, &b, &b, &a, &b};
+  const Image<std::uint8_t>* sequence[] = {&a, &b, &b, &a, &b};
   for (int i = 1; i < 5; ++i) {
     const auto& from = *sequence[i - 1];
     const auto& to = *sequence[i];

@@ -46,7 +46,7 @@ void PrintTo(const Case& c, std::ostream* out) {
 template <class Pixel>
 class Padded {
  public:
-  explicit Padded(const Plane<Pixel>& picture)
+  explicit Padded(const Image<Pixel>& picture)
       : stride_((picture.width() + 13) * static_cast<std::ptrdiff_t>(sizeof(Pixel))),
         bytes_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(picture.height()),
                0xab),
@@ -54,7 +54,7 @@ class Padded {
         height_(picture.height()) {
     for (int y = 0; y < height_; ++y)
       std::memcpy(bytes_.data() + y * stride_, picture.row(y),
-                  static_cast<std::size_t>(picture.stride()));
+                  static_cast<std::size_t>(width_) * sizeof(Pixel));
   }
   LumaView luma(int bits) const { return {{width_, height_, bits}, bytes_.data(), stride_}; }
 
@@ -66,15 +66,15 @@ class Padded {
 };
 
 template <class Pixel>
-Plane<std::uint8_t> grey8(const Plane<Pixel>& picture, int bits) {
+Image<std::uint8_t> grey8(const Image<Pixel>& picture, int bits) {
   Grey8 grey;
-  Plane<std::uint8_t> copy(picture.width(), picture.height());
+  Image<std::uint8_t> copy(picture.width(), picture.height());
   copy.assign(grey.of(scene::luma(picture.view(), bits)));
   return copy;
 }
 
 template <class Pixel>
-Plane<Pixel> picture_of(const Case& c, int i) {
+Image<Pixel> picture_of(const Case& c, int i) {
   if (c.picture == Picture::noise) return scene::noise<Pixel>(c.width, c.height, c.bits, 7 + i);
   if (c.picture == Picture::texture)
     return scene::texture<Pixel>(c.width, c.height, c.bits, 2.6 * i, -1.3 * i);
@@ -95,7 +95,7 @@ class Equality : public testing::TestWithParam<Case> {
     settings.threads = c.threads;
     format = {c.width, c.height, c.bits};
     const StepTimes steps(scene::frame_time, c.interpolated_frames + 1);
-    std::vector<Plane<Pixel>> frames;
+    std::vector<Image<Pixel>> frames;
     for (int i = 0; i < 3; ++i) frames.push_back(picture_of<Pixel>(c, i));
     std::vector<Padded<Pixel>> padded(frames.begin(), frames.end());
     for (const auto& frame : padded) views.push_back(frame.luma(c.bits));
@@ -117,7 +117,7 @@ class Equality : public testing::TestWithParam<Case> {
 
  private:
   template <class Pixel>
-  void hold_dense(const Plane<Pixel>& last, const Plane<Pixel>& now, const StepTimes& steps,
+  void hold_dense(const Image<Pixel>& last, const Image<Pixel>& now, const StepTimes& steps,
                   const Thresholds& thresholds) {
     for (const auto method : {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback}) {
       RegionOfInterestFlow finder(method, format.width, format.height);
@@ -139,7 +139,7 @@ class Equality : public testing::TestWithParam<Case> {
   }
 
   template <class Pixel>
-  void hold_sparse(const Plane<Pixel>& last, const Plane<Pixel>& now, const StepTimes& steps,
+  void hold_sparse(const Image<Pixel>& last, const Image<Pixel>& now, const StepTimes& steps,
                    const Thresholds& thresholds) {
     SCOPED_TRACE("sparse");
     const auto points =
@@ -153,7 +153,7 @@ class Equality : public testing::TestWithParam<Case> {
   }
 
   template <class Pixel>
-  void hold_diff(const std::vector<Plane<Pixel>>& frames, const StepTimes& steps,
+  void hold_diff(const std::vector<Image<Pixel>>& frames, const StepTimes& steps,
                  const Thresholds& thresholds) {
     SCOPED_TRACE("diff");
     const auto before = reference::difference_frame(frames[0], frames[1], thresholds);

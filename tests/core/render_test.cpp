@@ -177,7 +177,7 @@ TEST(Palette, TellsFourKindsOfPixelApartInGreyToo) {
 
 TEST(Luma, IsGatheredFromPackedPictures) {
   const std::uint8_t packed[] = {1, 90, 2, 91, 3, 92, 0, 0, 4, 93, 5, 94, 6, 95, 0, 0};
-  Plane<std::uint8_t> luma(3, 2);
+  Image<std::uint8_t> luma(3, 2);
   unpack_luma(packed, 8, luma);
   for (int i = 0; i < 6; ++i) EXPECT_EQ(luma.at(i % 3, i / 3), i + 1);
 }

@@ -16,16 +16,16 @@ namespace scene {
 using eventcamera::Event;
 using eventcamera::LumaView;
 using eventcamera::Nanoseconds;
-using eventcamera::Plane;
-using eventcamera::PlaneView;
+using eventcamera::Image;
+using eventcamera::ImageView;
 using eventcamera::Settings;
 using eventcamera::Simulator;
 
 inline constexpr Nanoseconds frame_time = 40'000'000;
 
 template <class Pixel>
-Plane<Pixel> flat(int width, int height, int grey) {
-  Plane<Pixel> picture(width, height);
+Image<Pixel> flat(int width, int height, int grey) {
+  Image<Pixel> picture(width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) picture.at(x, y) = static_cast<Pixel>(grey);
   return picture;
@@ -33,9 +33,9 @@ Plane<Pixel> flat(int width, int height, int grey) {
 
 /// Every pixel by chance, in all `bits`.
 template <class Pixel>
-Plane<Pixel> noise(int width, int height, int bits, unsigned seed) {
+Image<Pixel> noise(int width, int height, int bits, unsigned seed) {
   std::minstd_rand random(seed);
-  Plane<Pixel> picture(width, height);
+  Image<Pixel> picture(width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       picture.at(x, y) = static_cast<Pixel>(random() >> 8 & ((1U << bits) - 1));
@@ -45,9 +45,9 @@ Plane<Pixel> noise(int width, int height, int bits, unsigned seed) {
 /// A cut-out of an endless smooth texture in full contrast: what a camera sees that looks at
 /// (left, top).
 template <class Pixel>
-Plane<Pixel> texture(int width, int height, int bits, double left, double top) {
+Image<Pixel> texture(int width, int height, int bits, double left, double top) {
   const double white = (1 << bits) - 1;
-  Plane<Pixel> picture(width, height);
+  Image<Pixel> picture(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const double u = x + left;
@@ -61,7 +61,7 @@ Plane<Pixel> texture(int width, int height, int bits, double left, double top) {
 }
 
 /// A square with its upper left corner at (left, top) before a flat ground.
-inline Plane<std::uint8_t> square(int width, int height, int left, int top, int side,
+inline Image<std::uint8_t> square(int width, int height, int left, int top, int side,
                                   std::uint8_t grey, std::uint8_t ground) {
   auto picture = flat<std::uint8_t>(width, height, ground);
   for (int y = std::max(0, top); y < std::min(height, top + side); ++y)
@@ -70,11 +70,11 @@ inline Plane<std::uint8_t> square(int width, int height, int left, int top, int 
 }
 
 template <class Pixel>
-LumaView luma(const PlaneView<Pixel>& picture, int bits) {
+LumaView luma(const ImageView<Pixel>& picture, int bits) {
   return {{picture.width, picture.height, bits}, picture.data, picture.stride};
 }
 
-inline LumaView luma(const Plane<std::uint8_t>& picture) {
+inline LumaView luma(const Image<std::uint8_t>& picture) {
   return luma(picture.view(), 8);
 }
 

@@ -57,7 +57,7 @@ class EveryMethod : public testing::TestWithParam<Method> {
 
   double half_a_level_more = 0;
 
-  std::vector<Event> events_of(const std::vector<Plane<std::uint8_t>>& frames) {
+  std::vector<Event> events_of(const std::vector<Image<std::uint8_t>>& frames) {
     std::vector<LumaView> views;
     for (const auto& frame : frames) views.push_back(scene::luma(frame));
     const auto simulator = GetParam().make(views.front().format);
@@ -157,8 +157,8 @@ TEST_P(EveryMethod, DoesNotDependOnThreadsOrOnTheFramesBeforeAReset) {
 }
 
 TEST_P(EveryMethod, GivesTheSameIn16Bits) {
-  const auto widened = [](const Plane<std::uint8_t>& narrow) {
-    Plane<std::uint16_t> wide(narrow.width(), narrow.height());
+  const auto widened = [](const Image<std::uint8_t>& narrow) {
+    Image<std::uint16_t> wide(narrow.width(), narrow.height());
     for (int y = 0; y < wide.height(); ++y)
       for (int x = 0; x < wide.width(); ++x)
         wide.at(x, y) = static_cast<std::uint16_t>(narrow.at(x, y) * 257);
@@ -166,7 +166,7 @@ TEST_P(EveryMethod, GivesTheSameIn16Bits) {
   };
   const auto at = [](int left) { return scene::square(90, 60, left, 20, 16, 200, 60); };
   const auto narrow = {at(20), at(24), at(28)};
-  std::vector<Plane<std::uint16_t>> wide;
+  std::vector<Image<std::uint16_t>> wide;
   std::vector<LumaView> views;
   for (const auto& frame : narrow) wide.push_back(widened(frame));
   for (const auto& frame : wide) views.push_back(scene::luma(frame.view(), 16));
@@ -210,8 +210,8 @@ TEST_P(EveryMethod, HoldsTheLastFrame) {
 }
 
 TEST(FrameSimulator, NeedsAChangeOfMoreThanTheThreshold) {
-  Plane<std::uint8_t> last(5, 1);
-  Plane<std::uint8_t> now(5, 1);
+  Image<std::uint8_t> last(5, 1);
+  Image<std::uint8_t> now(5, 1);
   for (int x = 0; x < 5; ++x) last.at(x, 0) = 100;
   now.at(0, 0) = 120;
   now.at(1, 0) = 121;

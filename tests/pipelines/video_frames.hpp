@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 
 /// Recorded video, read with GStreamer.
 namespace video_frames {
@@ -66,15 +66,15 @@ void for_each_frame(const std::string& path, int count, int width, int height, c
       count, [&](GstSample* sample) {
         GstMapInfo map;
         gst_buffer_map(gst_sample_get_buffer(sample), &map, GST_MAP_READ);
-        visit(eventcamera::PlaneView<std::uint8_t>{map.data, width, width, height});
+        visit(eventcamera::ImageView<std::uint8_t>{map.data, width, width, height});
         gst_buffer_unmap(gst_sample_get_buffer(sample), &map);
       });
 }
 
 /// All of them.
-inline std::vector<eventcamera::Plane<std::uint8_t>> frames_of(const std::string& path, int count,
+inline std::vector<eventcamera::Image<std::uint8_t>> frames_of(const std::string& path, int count,
                                                                int width, int height) {
-  std::vector<eventcamera::Plane<std::uint8_t>> frames;
+  std::vector<eventcamera::Image<std::uint8_t>> frames;
   for_each_frame(path, count, width, height, [&](const auto& frame) {
     frames.emplace_back(width, height);
     frames.back().assign(frame);

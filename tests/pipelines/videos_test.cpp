@@ -45,8 +45,8 @@ const std::string driving = "driving-1280x720-25fps.mp4";
 const std::string cars = "cars-768x432-12fps.mp4";
 
 /// The grey pictures of the hand-held sequence in Debian's package visp-images-data.
-std::vector<Plane<std::uint8_t>> castel_frames(int count) {
-  std::vector<Plane<std::uint8_t>> frames;
+std::vector<Image<std::uint8_t>> castel_frames(int count) {
+  std::vector<Image<std::uint8_t>> frames;
   for (int i = 0; i < count; ++i) {
     char name[32];
     std::snprintf(name, sizeof name, "/image_%04d.pgm", i);
@@ -65,14 +65,14 @@ std::vector<Plane<std::uint8_t>> castel_frames(int count) {
   return frames;
 }
 
-double square_error(const Plane<std::uint8_t>& a, const Plane<std::uint8_t>& b) {
+double square_error(const Image<std::uint8_t>& a, const Image<std::uint8_t>& b) {
   double sum = 0;
   for (int y = 0; y < a.height(); ++y)
     for (int x = 0; x < a.width(); ++x) sum += std::pow(a.at(x, y) - b.at(x, y), 2);
   return sum / (a.width() * a.height());
 }
 
-double psnr(const Plane<std::uint8_t>& a, const Plane<std::uint8_t>& b) {
+double psnr(const Image<std::uint8_t>& a, const Image<std::uint8_t>& b) {
   return 10 * std::log10(255.0 * 255.0 / square_error(a, b));
 }
 
@@ -80,8 +80,8 @@ constexpr FlowMethod flows[] = {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMeth
 constexpr Interpolation interpolations[] = {Interpolation::forward, Interpolation::blend};
 
 /// The warp of I(i-1) with all of its flow.
-Plane<std::uint8_t> warped(const Plane<std::uint8_t>& last, const PlaneView<Flow>& flow) {
-  Plane<std::uint8_t> result(last.width(), last.height());
+Image<std::uint8_t> warped(const Image<std::uint8_t>& last, const ImageView<Flow>& flow) {
+  Image<std::uint8_t> result(last.width(), last.height());
   for (int y = 0; y < last.height(); ++y)
     for (int x = 0; x < last.width(); ++x)
       result.at(x, y) = static_cast<std::uint8_t>(
@@ -114,9 +114,9 @@ TEST(Dense, WarpsTheRightWayRound) {
 }
 
 /// The 8-bit difference frame of one polarity (1 or -1).
-Plane<std::uint8_t> part(const Plane<std::uint8_t>& last, const Plane<std::uint8_t>& now, int sign,
+Image<std::uint8_t> part(const Image<std::uint8_t>& last, const Image<std::uint8_t>& now, int sign,
                          int threshold) {
-  Plane<std::uint8_t> result(now.width(), now.height());
+  Image<std::uint8_t> result(now.width(), now.height());
   for (int y = 0; y < now.height(); ++y)
     for (int x = 0; x < now.width(); ++x)
       if (const int rise = sign * (now.at(x, y) - last.at(x, y)); rise > threshold)
@@ -126,7 +126,7 @@ Plane<std::uint8_t> part(const Plane<std::uint8_t>& last, const Plane<std::uint8
 
 /// The slope about each pixel (15x15, root of the mean square, grey levels a pixel) in the
 /// direction in which it is least.
-cv::Mat min_slopes(const Plane<std::uint8_t>& picture) {
+cv::Mat min_slopes(const Image<std::uint8_t>& picture) {
   cv::Mat x;
   cv::Mat y;
   cv::Scharr(opencv_picture(picture.view()), x, CV_32F, 1, 0, 1 / 32.0);
@@ -146,7 +146,7 @@ cv::Mat min_slopes(const Plane<std::uint8_t>& picture) {
   return slopes;
 }
 
-std::vector<Track> opencv_tracks(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to,
+std::vector<Track> opencv_tracks(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
                                  const std::vector<Point>& points) {
   std::vector<cv::Point2f> starts;
   for (const auto& point : points)
@@ -168,7 +168,7 @@ struct TrackErrors {
   int tracks = 0;
   int found_by_one = 0;
 
-  void add(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to,
+  void add(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
            const std::vector<Point>& points) {
     PointTracker tracker;
     ThreadPool threads;
@@ -213,9 +213,10 @@ TEST(Tracks, AreThoseOfOpenCv) {
 }
 
 /// OpenCV's function of the same method, with the same parameters.
-Plane<Flow> opencv_farneback(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to) {
-  Plane<Flow> flow(from.width(), from.height());
-  cv::Mat mat(from.height(), from.width(), CV_32FC2, flow.row(0));
+Image<Flow> opencv_farneback(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to) {
+  Image<Flow> flow(from.width(), from.height());
+  cv::Mat mat(from.height(), from.width(), CV_32FC2, flow.row(0),
+              static_cast<std::size_t>(flow.stride()));
   cv::calcOpticalFlowFarneback(opencv_picture(from.view()), opencv_picture(to.view()), mat, 0.5, 3,
                                15, 3, 5, 1.2, 0);
   return flow;
@@ -223,8 +224,8 @@ Plane<Flow> opencv_farneback(const Plane<std::uint8_t>& from, const Plane<std::u
 
 /// The mean distance between two flows where the picture has texture: a gradient of 4 grey levels
 /// a pixel.
-double distance(const Plane<std::uint8_t>& picture, const PlaneView<Flow>& a,
-                const PlaneView<Flow>& b) {
+double distance(const Image<std::uint8_t>& picture, const ImageView<Flow>& a,
+                const ImageView<Flow>& b) {
   double sum = 0;
   int count = 0;
   for (int y = 1; y < picture.height() - 1; ++y) {
@@ -304,7 +305,7 @@ constexpr Nanoseconds interval = 40'000'000;
 
 /// The events that a simulator makes of the last of a few frames.
 std::vector<Event> events_of(Simulator& simulator,
-                             const std::vector<const Plane<std::uint8_t>*>& frames,
+                             const std::vector<const Image<std::uint8_t>*>& frames,
                              double threshold, int interpolated_frames) {
   Settings settings;
   settings.positive_threshold = settings.negative_threshold = threshold;
@@ -396,7 +397,7 @@ TEST(Events, AreThoseOfTheFlowOfTheWhole) {
       const auto whole = whole_finder->find(last.view(), now.view(), threads);
       part_error += square_error(warped(last, part), now);
       whole_error += square_error(warped(last, whole), now);
-      const auto events = [&](const PlaneView<Flow>& flow) {
+      const auto events = [&](const ImageView<Flow>& flow) {
         return reference::dense(last, now, flow, Interpolation::forward, steps, {3, 3});
       };
       const auto a = events(part);
@@ -426,9 +427,9 @@ struct Agreement {
   double right_events = 0;  ///< of these, those whose polarity is that of the difference
 };
 
-void add_agreement(const Plane<std::uint8_t>& last, const Plane<std::uint8_t>& now,
+void add_agreement(const Image<std::uint8_t>& last, const Image<std::uint8_t>& now,
                    const std::vector<Event>& events, Agreement& agreement) {
-  Plane<int> sum(now.width(), now.height());
+  Image<int> sum(now.width(), now.height());
   for (const auto& e : events) {
     const int polarity = e.polarity() == Polarity::on ? 1 : -1;
     const int difference = now.at(e.x, e.y()) - last.at(e.x, e.y());
@@ -449,7 +450,7 @@ void add_agreement(const Plane<std::uint8_t>& last, const Plane<std::uint8_t>& n
 
 /// How often the polarities of a pixel's events add up to the sign of its change, at the default
 /// settings.
-Agreement agreement_of(const std::vector<Plane<std::uint8_t>>& frames, FlowMethod method,
+Agreement agreement_of(const std::vector<Image<std::uint8_t>>& frames, FlowMethod method,
                        Interpolation interpolation) {
   const int width = frames.front().width();
   const int height = frames.front().height();
@@ -476,7 +477,7 @@ struct AgreementBounds {
   double events;
 };
 
-void expect_agreement(const char* name, const std::vector<Plane<std::uint8_t>>& frames,
+void expect_agreement(const char* name, const std::vector<Image<std::uint8_t>>& frames,
                       const AgreementBounds& bounds) {
   for (const auto method : flows) {
     for (const auto interpolation : interpolations) {

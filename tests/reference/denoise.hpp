@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 
 namespace eventcamera::reference {
 
@@ -12,8 +12,8 @@ namespace eventcamera::reference {
 ///   w(i) w(j) clamp(I(x + i, y + j) - I(x, y), -limit, limit)), w = 1/4, 1/2, 1/4;
 /// halves are rounded up, and beyond the border lies what lies on it.
 template <class Pixel>
-Plane<Pixel> denoised(const PlaneView<Pixel>& frame, int limit) {
-  Plane<Pixel> out(frame.width, frame.height);
+Image<Pixel> denoised(const ImageView<Pixel>& frame, int limit) {
+  Image<Pixel> out(frame.width, frame.height);
   const auto weight = [](int i) { return i == 0 ? 0.5 : 0.25; };
   for (int y = 0; y < frame.height; ++y) {
     for (int x = 0; x < frame.width; ++x) {

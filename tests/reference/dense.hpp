@@ -12,7 +12,7 @@ namespace eventcamera::reference {
 
 /// I(x, y), bilinear at the nearest 1/64 of a pixel, border replicated.
 template <class Pixel>
-double bilinear(const Plane<Pixel>& picture, double x, double y) {
+double bilinear(const Image<Pixel>& picture, double x, double y) {
   const double qx = std::clamp(std::floor(x * 64 + 0.5) / 64, 0.0, picture.width() - 1.0);
   const double qy = std::clamp(std::floor(y * 64 + 0.5) / 64, 0.0, picture.height() - 1.0);
   const int x0 = static_cast<int>(qx);
@@ -29,11 +29,11 @@ double bilinear(const Plane<Pixel>& picture, double x, double y) {
 ///   forward: last(x - a F(x))
 ///   blend:   (1 - a) last(x - a F(x)) + a now(x + (1 - a) F(x)), the weight a to 1/256
 template <class Pixel>
-Plane<Pixel> interpolate(const Plane<Pixel>& last, const Plane<Pixel>& now,
-                         const PlaneView<Flow>& flow, int j, int m, Interpolation interpolation) {
+Image<Pixel> interpolate(const Image<Pixel>& last, const Image<Pixel>& now,
+                         const ImageView<Flow>& flow, int j, int m, Interpolation interpolation) {
   if (j == m) return now;
   const double a = std::floor(256.0 * j / m + 0.5) / 256;
-  Plane<Pixel> between(last.width(), last.height());
+  Image<Pixel> between(last.width(), last.height());
   for (int y = 0; y < last.height(); ++y) {
     for (int x = 0; x < last.width(); ++x) {
       const double dx = motion_per_step(flow.row(y)[x].x, m) / 65536.0;
@@ -48,8 +48,8 @@ Plane<Pixel> interpolate(const Plane<Pixel>& last, const Plane<Pixel>& now,
 }
 
 template <class Pixel>
-std::vector<Event> dense(const Plane<Pixel>& last, const Plane<Pixel>& now,
-                         const PlaneView<Flow>& flow, Interpolation interpolation,
+std::vector<Event> dense(const Image<Pixel>& last, const Image<Pixel>& now,
+                         const ImageView<Flow>& flow, Interpolation interpolation,
                          const StepTimes& steps, const Thresholds& thresholds) {
   Sequence<Pixel> sequence;
   for (int j = 0; j <= steps.count(); ++j)

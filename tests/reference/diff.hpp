@@ -12,9 +12,9 @@ namespace eventcamera::reference {
 
 /// D = now - last where it exceeds a threshold, 0 elsewhere.
 template <class Pixel>
-Plane<int> difference_frame(const Plane<Pixel>& last, const Plane<Pixel>& now,
+Image<int> difference_frame(const Image<Pixel>& last, const Image<Pixel>& now,
                             const Thresholds& thresholds) {
-  Plane<int> kept(now.width(), now.height());
+  Image<int> kept(now.width(), now.height());
   for (int y = 0; y < now.height(); ++y) {
     for (int x = 0; x < now.width(); ++x) {
       const int difference = now.at(x, y) - last.at(x, y);
@@ -26,8 +26,8 @@ Plane<int> difference_frame(const Plane<Pixel>& last, const Plane<Pixel>& now,
 }
 
 /// One polarity (sign 1 or -1) of a difference frame in 8 bits, at least 1 where it is kept.
-inline Plane<std::uint8_t> part_of(const Plane<int>& difference, int sign, int bits) {
-  Plane<std::uint8_t> part(difference.width(), difference.height());
+inline Image<std::uint8_t> part_of(const Image<int>& difference, int sign, int bits) {
+  Image<std::uint8_t> part(difference.width(), difference.height());
   for (int y = 0; y < part.height(); ++y)
     for (int x = 0; x < part.width(); ++x)
       if (const int kept = sign * difference.at(x, y); kept > 0)
@@ -36,7 +36,7 @@ inline Plane<std::uint8_t> part_of(const Plane<int>& difference, int sign, int b
 }
 
 /// The pixels of a part, in raster order.
-inline std::vector<Point> points_of(const Plane<std::uint8_t>& part) {
+inline std::vector<Point> points_of(const Image<std::uint8_t>& part) {
   std::vector<Point> points;
   for (int y = 0; y < part.height(); ++y)
     for (int x = 0; x < part.width(); ++x)
@@ -51,7 +51,7 @@ struct Tracked {
 };
 
 /// The events from D(i-1) = before to D(i) = now.
-inline std::vector<Event> diff(const Plane<int>& before, const Plane<int>& now, const Tracked& on,
+inline std::vector<Event> diff(const Image<int>& before, const Image<int>& now, const Tracked& on,
                                const Tracked& off, const StepTimes& steps) {
   const int m = steps.count();
   const auto arrives = [&](const Point& end, int sign) {
@@ -61,7 +61,7 @@ inline std::vector<Event> diff(const Plane<int>& before, const Plane<int>& now, 
     return false;
   };
   std::vector<Event> events;
-  const auto fire = [&](const Plane<int>& frame, int j) {
+  const auto fire = [&](const Image<int>& frame, int j) {
     for (int y = 0; y < frame.height(); ++y)
       for (int x = 0; x < frame.width(); ++x)
         if (const int d = frame.at(x, y); d != 0)
@@ -69,7 +69,7 @@ inline std::vector<Event> diff(const Plane<int>& before, const Plane<int>& now, 
               Event::at(x, y, steps.microseconds(j), d > 0 ? Polarity::on : Polarity::off));
   };
   for (int j = 1; j < m; ++j) {
-    Plane<int> frame(now.width(), now.height());
+    Image<int> frame(now.width(), now.height());
     const auto land = [&](const Tracked& tracked, int sign) {
       for (std::size_t i = 0; i < tracked.points.size(); ++i) {
         const Point& p = tracked.points[i];

@@ -7,7 +7,7 @@
 
 #include "src/core/box.hpp"
 #include "src/core/event.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/core/step_times.hpp"
 #include "src/simulate/simulator.hpp"
 
@@ -18,7 +18,7 @@ namespace eventcamera::reference {
 
 /// I(0), I(1/m) ... I(1).
 template <class Pixel>
-using Sequence = std::vector<Plane<Pixel>>;
+using Sequence = std::vector<Image<Pixel>>;
 
 /// e_j(x) = ON where I(j) - I(j-1) > C+, OFF where I(j-1) - I(j) > C-, at the time of I(j).
 template <class Pixel>
@@ -42,7 +42,7 @@ std::vector<Event> differences(const Sequence<Pixel>& sequence, const StepTimes&
 
 /// The smallest box that holds the pixels with |now - last| over the threshold.
 template <class Pixel>
-Box changed_box(const Plane<Pixel>& last, const Plane<Pixel>& now, int threshold) {
+Box changed_box(const Image<Pixel>& last, const Image<Pixel>& now, int threshold) {
   Box box;
   for (int y = 0; y < now.height(); ++y) {
     for (int x = 0; x < now.width(); ++x) {

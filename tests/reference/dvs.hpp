@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "src/core/event.hpp"
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/dvs/dvs_settings.hpp"
 
 /// The equations of the event camera's pixel as they are read, in double precision and one after
@@ -35,7 +35,7 @@ class Esim {
         last_(width, height),
         levels_(width, height) {}
 
-  std::vector<EsimEvent> push(const Plane<std::uint8_t>& frame, double time) {
+  std::vector<EsimEvent> push(const Image<std::uint8_t>& frame, double time) {
     std::vector<EsimEvent> events;
     for (int y = 0; y < frame.height(); ++y) {
       for (int x = 0; x < frame.width(); ++x) {
@@ -63,9 +63,9 @@ class Esim {
   double threshold_;
   bool is_first_ = true;
   double last_time_ = 0;
-  Plane<double> first_;
-  Plane<double> last_;
-  Plane<int> levels_;
+  Image<double> first_;
+  Image<double> last_;
+  Image<int> levels_;
 };
 
 /// One pixel that is neither noisy nor mismatched, looked at every microsecond.

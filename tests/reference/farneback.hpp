@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/flow/dense_flow.hpp"
 
 /// Farneback, "Two-frame motion estimation based on polynomial expansion" (SCIA 2003), with the
@@ -50,8 +50,8 @@ struct Between {
 };
 
 template <class T>
-Plane<T> resized(const Plane<T>& plane, int width, int height) {
-  Plane<T> result(width, height);
+Image<T> resized(const Image<T>& plane, int width, int height) {
+  Image<T> result(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const Between column(x, plane.width(), width);
@@ -66,7 +66,7 @@ Plane<T> resized(const Plane<T>& plane, int width, int height) {
 }
 
 /// A picture blurred and shrunk to 1 / 2^level. Beyond its border it is mirrored.
-inline Plane<double> pyramid_level(const Plane<std::uint8_t>& picture, int level) {
+inline Image<double> pyramid_level(const Image<std::uint8_t>& picture, int level) {
   const double sigma = level == 0 ? std::sqrt(0.5 / std::log(2)) : ((1 << level) - 1) / 2.0;
   const int reach = level == 0 ? 1 : static_cast<int>(std::lrint(5 * sigma)) / 2;
   const auto weights = gaussian(sigma, reach);
@@ -75,7 +75,7 @@ inline Plane<double> pyramid_level(const Plane<std::uint8_t>& picture, int level
     const int period = 2 * (length - 1);
     return std::min(std::abs(i) % period, period - std::abs(i) % period);
   };
-  Plane<double> blurred(picture.width(), picture.height());
+  Image<double> blurred(picture.width(), picture.height());
   for (int y = 0; y < picture.height(); ++y)
     for (int x = 0; x < picture.width(); ++x)
       for (int v = -reach; v <= reach; ++v)
@@ -98,7 +98,7 @@ struct Polynomial {
 
 /// The least-squares fit around (x, y), the border continued: x, y, x y, x^2 - m2 and y^2 - m2 are
 /// orthogonal to each other and to constants, under the weight, whose moments are m2 and m4.
-inline Polynomial fit(const Plane<double>& picture, int x, int y) {
+inline Polynomial fit(const Image<double>& picture, int x, int y) {
   constexpr int reach = 5;
   const auto weights = gaussian(1.2, reach);
   double m2 = 0;
@@ -123,8 +123,8 @@ inline Polynomial fit(const Plane<double>& picture, int x, int y) {
   return p;
 }
 
-inline Plane<Polynomial> expansion(const Plane<double>& picture) {
-  Plane<Polynomial> result(picture.width(), picture.height());
+inline Image<Polynomial> expansion(const Image<double>& picture) {
+  Image<Polynomial> result(picture.width(), picture.height());
   for (int y = 0; y < picture.height(); ++y)
     for (int x = 0; x < picture.width(); ++x) result.at(x, y) = fit(picture, x, y);
   return result;
@@ -164,7 +164,7 @@ struct Equations {
 /// A is the mean of both polynomials' A, and b what d must be for the earlier one's b, less the
 /// later one's, where the flow found so far leads. Where that is out of the picture, there is only
 /// the earlier one.
-inline Equations equations(const Plane<Polynomial>& from, const Plane<Polynomial>& to,
+inline Equations equations(const Image<Polynomial>& from, const Image<Polynomial>& to,
                            const Flow& flow, int x, int y) {
   const Polynomial& p = from.at(x, y);
   double a_yy = p.a_yy;
@@ -202,13 +202,13 @@ inline Equations equations(const Plane<Polynomial>& from, const Plane<Polynomial
 }
 
 /// One iteration: the equations of 15x15 pixels, the border continued, solved for each.
-inline Plane<Flow> better_flow(const Plane<Polynomial>& from, const Plane<Polynomial>& to,
-                               const Plane<Flow>& flow) {
-  Plane<Equations> of_pixel(flow.width(), flow.height());
+inline Image<Flow> better_flow(const Image<Polynomial>& from, const Image<Polynomial>& to,
+                               const Image<Flow>& flow) {
+  Image<Equations> of_pixel(flow.width(), flow.height());
   for (int y = 0; y < flow.height(); ++y)
     for (int x = 0; x < flow.width(); ++x)
       of_pixel.at(x, y) = equations(from, to, flow.at(x, y), x, y);
-  Plane<Flow> result(flow.width(), flow.height());
+  Image<Flow> result(flow.width(), flow.height());
   for (int y = 0; y < flow.height(); ++y) {
     for (int x = 0; x < flow.width(); ++x) {
       Equations sum;
@@ -222,15 +222,15 @@ inline Plane<Flow> better_flow(const Plane<Polynomial>& from, const Plane<Polyno
   return result;
 }
 
-inline Plane<Flow> farneback(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to) {
+inline Image<Flow> farneback(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to) {
   int coarsest = 0;
   while (coarsest < 3 && std::min(from.width(), from.height()) >= 32 << (coarsest + 1)) ++coarsest;
-  Plane<Flow> flow;
+  Image<Flow> flow;
   for (int level = coarsest; level >= 0; --level) {
     const auto last = pyramid_level(from, level);
     const auto next = pyramid_level(to, level);
     if (level == coarsest) {
-      flow = Plane<Flow>(last.width(), last.height());
+      flow = Image<Flow>(last.width(), last.height());
     } else {
       flow = resized(flow, last.width(), last.height());
       for (int y = 0; y < flow.height(); ++y)

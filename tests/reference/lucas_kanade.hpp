@@ -14,7 +14,7 @@ namespace eventcamera::reference {
 
 /// A picture that goes on beyond its border, mirrored at its border pixels.
 struct Mirrored {
-  const Plane<std::uint8_t>& picture;
+  const Image<std::uint8_t>& picture;
 
   int operator()(int x, int y) const {
     return picture.at(mirror(x, picture.width()), mirror(y, picture.height()));
@@ -28,10 +28,10 @@ struct Mirrored {
 };
 
 /// The next level of a pyramid.
-inline Plane<std::uint8_t> halved(const Plane<std::uint8_t>& picture) {
+inline Image<std::uint8_t> halved(const Image<std::uint8_t>& picture) {
   constexpr int weight[] = {1, 4, 6, 4, 1};
   const Mirrored at{picture};
-  Plane<std::uint8_t> half((picture.width() + 1) / 2, (picture.height() + 1) / 2);
+  Image<std::uint8_t> half((picture.width() + 1) / 2, (picture.height() + 1) / 2);
   for (int y = 0; y < half.height(); ++y) {
     for (int x = 0; x < half.width(); ++x) {
       int sum = 0;
@@ -44,7 +44,7 @@ inline Plane<std::uint8_t> halved(const Plane<std::uint8_t>& picture) {
 }
 
 /// Scharr's operator, across or down; 0 outside the picture.
-inline int slope(const Plane<std::uint8_t>& picture, int x, int y, bool across) {
+inline int slope(const Image<std::uint8_t>& picture, int x, int y, bool across) {
   if (x < 0 || x >= picture.width() || y < 0 || y >= picture.height()) return 0;
   constexpr int weight[] = {3, 10, 3};
   const Mirrored at{picture};
@@ -56,7 +56,7 @@ inline int slope(const Plane<std::uint8_t>& picture, int x, int y, bool across) 
 }
 
 /// Lucas-Kanade on one level, pixel by pixel.
-inline void search(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to, const Tile& tile,
+inline void search(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, const Tile& tile,
                    Search& search) {
   const int left = tile.left + search.x - 7;
   const int top = tile.top + search.y - 7;
@@ -138,9 +138,9 @@ inline void search(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& t
 }
 
 /// A point's track: its flow on one level, twice as long, is where its search on the next begins.
-inline Track track(const Plane<std::uint8_t>& from, const Plane<std::uint8_t>& to,
+inline Track track(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
                    const Point& point) {
-  std::vector<std::pair<Plane<std::uint8_t>, Plane<std::uint8_t>>> levels{{from, to}};
+  std::vector<std::pair<Image<std::uint8_t>, Image<std::uint8_t>>> levels{{from, to}};
   while (levels.size() < 4) {
     const auto& [a, b] = levels.back();
     if (std::min(a.width(), a.height()) <= 30) break;  // half of it is no longer than a window

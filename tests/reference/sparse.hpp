@@ -11,7 +11,7 @@ namespace eventcamera::reference {
 
 /// The pixels with |now - last| over the threshold.
 template <class Pixel>
-std::vector<Point> changed(const Plane<Pixel>& last, const Plane<Pixel>& now, int threshold) {
+std::vector<Point> changed(const Image<Pixel>& last, const Image<Pixel>& now, int threshold) {
   std::vector<Point> points;
   for (int y = 0; y < now.height(); ++y)
     for (int x = 0; x < now.width(); ++x)
@@ -21,7 +21,7 @@ std::vector<Point> changed(const Plane<Pixel>& last, const Plane<Pixel>& now, in
 
 /// `tracks` are those of changed() at the smaller threshold.
 template <class Pixel>
-std::vector<Event> sparse(const Plane<Pixel>& last, const Plane<Pixel>& now,
+std::vector<Event> sparse(const Image<Pixel>& last, const Image<Pixel>& now,
                           std::span<const Point> points, std::span<const Track> tracks,
                           const StepTimes& steps, const Thresholds& thresholds) {
   const int m = steps.count();

@@ -37,7 +37,7 @@ FarnebackFlow::Level::Level(int width, int height, int level)
       last(pyramid.width(), pyramid.height()),
       next(pyramid.width(), pyramid.height()),
       update(pyramid.width(), pyramid.height()),
-      flow(pyramid.width() + Resampling::spare, pyramid.height()) {}
+      flow(pyramid.width(), pyramid.height()) {}
 
 void FarnebackFlow::start(int width, int height) {
   width_ = width;
@@ -53,7 +53,7 @@ void FarnebackFlow::start(int width, int height) {
   }
 }
 
-void FarnebackFlow::push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) {
+void FarnebackFlow::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   if (picture.width != width_ || picture.height != height_) start(picture.width, picture.height);
   scratch_.resize(static_cast<std::size_t>(threads.threads()));
   int bands = 0;
@@ -70,7 +70,7 @@ void FarnebackFlow::push(const PlaneView<std::uint8_t>& picture, ThreadPool& thr
   });
 }
 
-void FarnebackFlow::expand(const PlaneView<std::uint8_t>& picture, Level& level, int band,
+void FarnebackFlow::expand(const ImageView<std::uint8_t>& picture, Level& level, int band,
                            Scratch& scratch) {
   constexpr int reach = PolynomialExpansion::reach;
   const int first = band * rows_per_expansion;
@@ -91,7 +91,7 @@ void FarnebackFlow::expand(const PlaneView<std::uint8_t>& picture, Level& level,
   }
 }
 
-PlaneView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
+ImageView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
   assert(!levels_.empty());
   scratch_.resize(static_cast<std::size_t>(threads.threads()));
   const Level* coarser = nullptr;
@@ -105,15 +105,14 @@ PlaneView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
     });
     coarser = &level;
   }
-  const auto& finest = levels_.front().flow;
-  return {finest.row(0), finest.stride(), width_, height_};
+  return levels_.front().flow.view();
 }
 
 /// Rows [first, last) of a level's flow.
 void FarnebackFlow::find_rows(const Level* coarser, Level& level, int first, int last,
                               Scratch& scratch) {
   const int height = level.flow.height();
-  const auto stride = static_cast<std::size_t>(level.flow.width());
+  const auto stride = static_cast<std::size_t>(level.flow.stride()) / sizeof(Flow);
   const auto first_of = [&](int iteration) {
     return std::max(0, first - FlowUpdate::reach * (iterations - iteration));
   };
@@ -139,7 +138,7 @@ void FarnebackFlow::start_rows(const Level* coarser, const Level& level, int las
     std::fill_n(out.row(out.first), (last - out.first) * out.stride, Flow{0, 0});
     return;
   }
-  const auto room = static_cast<std::size_t>(coarser->flow.width()) * 2;
+  const auto room = 2 * static_cast<std::size_t>(coarser->flow.width() + Resampling::spare);
   float* between = room_in(scratch.coarser_row, room);
   for (int y = out.first; y < last; ++y) {
     const int upper = level.rows.first()[y];

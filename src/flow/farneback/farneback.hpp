@@ -15,8 +15,8 @@ namespace eventcamera {
 /// Farneback's flow (SCIA 2003), from coarse to fine. Between two equal pictures it is 0.
 class FarnebackFlow final : public DenseFlow {
  public:
-  void push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) override;
-  PlaneView<Flow> flow(ThreadPool& threads) override;
+  void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) override;
+  ImageView<Flow> flow(ThreadPool& threads) override;
 
  private:
   struct Level {
@@ -26,7 +26,7 @@ class FarnebackFlow final : public DenseFlow {
     PolynomialExpansion last;
     PolynomialExpansion next;
     FlowUpdate update;
-    Plane<Flow> flow;    ///< with Resampling::spare pixels behind its rows
+    Image<Flow> flow;
     Resampling columns;  ///< from the coarser level
     Resampling rows;
   };
@@ -42,7 +42,7 @@ class FarnebackFlow final : public DenseFlow {
   };
 
   void start(int width, int height);
-  static void expand(const PlaneView<std::uint8_t>& picture, Level& level, int band,
+  static void expand(const ImageView<std::uint8_t>& picture, Level& level, int band,
                      Scratch& scratch);
   static void start_rows(const Level* coarser, const Level& level, int last, Scratch& scratch,
                          const FlowRows& out);

@@ -106,7 +106,7 @@ PyramidLevel::PyramidLevel(int width, int height, int level)
       columns_(width, shrunk(width, level)),
       rows_(height, shrunk(height, level)) {}
 
-void PyramidLevel::row(const PlaneView<std::uint8_t>& picture, int y, Scratch& scratch,
+void PyramidLevel::row(const ImageView<std::uint8_t>& picture, int y, Scratch& scratch,
                        float* out) const {
   const int count = static_cast<int>(kernel_.size());
   const int reach = count / 2;

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/core/plane.hpp"
+#include "src/core/image.hpp"
 #include "src/flow/farneback/resampling.hpp"
 
 namespace eventcamera {
@@ -26,7 +26,7 @@ class PyramidLevel {
   int width() const { return columns_.size(); }
   int height() const { return rows_.size(); }
   /// Row y goes to `out`, which has Resampling::spare places more than there are pixels.
-  void row(const PlaneView<std::uint8_t>& picture, int y, Scratch& scratch, float* out) const;
+  void row(const ImageView<std::uint8_t>& picture, int y, Scratch& scratch, float* out) const;
 
  private:
   bool full_size_;

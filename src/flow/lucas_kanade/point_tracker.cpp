@@ -33,7 +33,7 @@ class Place {
 
 }  // namespace
 
-void PointTracker::push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) {
+void PointTracker::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   std::swap(last_, next_);
   next_.build(picture, threads);
   has_slopes_ = false;

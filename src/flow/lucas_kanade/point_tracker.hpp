@@ -26,7 +26,7 @@ struct Track {
 class PointTracker {
  public:
   /// Makes the next picture the one tracked to, and what was the next the one tracked from.
-  void push(const PlaneView<std::uint8_t>& picture, ThreadPool& threads);
+  void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
   /// Follows points of the last picture, in raster order and each once, into the next, after two
   /// push(). A track for each point, good until the next call, the same for any number of threads.

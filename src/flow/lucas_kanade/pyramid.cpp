@@ -8,7 +8,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "src/core/rows.hpp"
 
@@ -29,7 +28,7 @@ constexpr int max_row = 16384 + 64;
 // NOLINTBEGIN(clang-analyzer-core.uninitialized.Assign): the second loop reads what the first
 // wrote, and what a vector reads beyond it goes nowhere.
 /// A row of the next level, from the rows about row 2y of this one. Writes up to a vector more.
-void halve_row(const PlaneWithMargin<std::uint8_t>& picture, int y, std::uint8_t* out, int width) {
+void halve_row(const Image<std::uint8_t>& picture, int y, std::uint8_t* out, int width) {
   const Words words;
   const BytesFor<Words> bytes;
   const int lanes = static_cast<int>(hn::Lanes(words));
@@ -69,7 +68,7 @@ void halve_row(const PlaneWithMargin<std::uint8_t>& picture, int y, std::uint8_t
 // NOLINTEND(clang-analyzer-core.uninitialized.Assign)
 
 /// A row of both slopes; up to a vector of 0 more.
-void slope_row(const PlaneWithMargin<std::uint8_t>& picture, int y, std::int16_t* out_x,
+void slope_row(const Image<std::uint8_t>& picture, int y, std::int16_t* out_x,
                std::int16_t* out_y) {
   const Slopes slopes;
   const BytesFor<Slopes> bytes;
@@ -116,22 +115,21 @@ int reflected(int p, int size) {
   return std::min(q, period - q);
 }
 
-void reflect_sides(PlaneWithMargin<std::uint8_t>& picture, int y) {
+void reflect_sides(Image<std::uint8_t>& picture, int y) {
   std::uint8_t* row = picture.row(y);
   const int width = picture.width();
-  for (int i = 1; i <= picture.margin; ++i) row[-i] = row[reflected(-i, width)];
-  for (int i = 0; i < picture.right_margin; ++i) row[width + i] = row[reflected(width + i, width)];
+  for (int i = 1; i <= Pyramid::margin; ++i) row[-i] = row[reflected(-i, width)];
+  for (int i = 0; i < Pyramid::margin; ++i) row[width + i] = row[reflected(width + i, width)];
 }
 
-void reflect_ends(PlaneWithMargin<std::uint8_t>& picture) {
+void reflect_ends(Image<std::uint8_t>& picture) {
   const int height = picture.height();
-  const auto bytes =
-      static_cast<std::size_t>(picture.width()) + picture.margin + picture.right_margin;
+  constexpr int margin = Pyramid::margin;
   const auto copy_row = [&](int to) {
-    std::memcpy(picture.row(to) - picture.margin,
-                picture.row(reflected(to, height)) - picture.margin, bytes);
+    std::copy_n(picture.row(reflected(to, height)) - margin, picture.width() + 2 * margin,
+                picture.row(to) - margin);
   };
-  for (int i = 1; i <= picture.margin; ++i) {
+  for (int i = 1; i <= margin; ++i) {
     copy_row(-i);
     copy_row(height - 1 + i);
   }
@@ -145,19 +143,19 @@ void Pyramid::shape(int width, int height) {
     return;
   levels_.clear();
   while (levels_.empty() || (std::min(width, height) > min_side && levels_.size() < max_levels)) {
-    levels_.push_back({PlaneWithMargin<std::uint8_t>(width, height),
-                       PlaneWithMargin<std::int16_t>(width, height),
-                       PlaneWithMargin<std::int16_t>(width, height)});
+    levels_.push_back({Image<std::uint8_t>(width, height, margin),
+                       Image<std::int16_t>(width, height, margin),
+                       Image<std::int16_t>(width, height, margin)});
     width = (width + 1) / 2;
     height = (height + 1) / 2;
   }
 }
 
-void Pyramid::build(const PlaneView<std::uint8_t>& picture, ThreadPool& threads) {
+void Pyramid::build(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   shape(picture.width, picture.height);
   auto& base = levels_[0].picture;
   for_each_row(threads, picture.height, [&](int y) {
-    std::memcpy(base.row(y), picture.row(y), static_cast<std::size_t>(picture.width));
+    base.assign_row(y, picture.row(y));
     reflect_sides(base, y);
   });
   reflect_ends(base);

@@ -76,7 +76,7 @@ class Patch {
       const auto* at = level.picture.row(y + row) + x + column;
       return hn::ShiftLeft<2>(hn::PromoteTo(values, hn::LoadU(Bytes(), at)));
     };
-    const auto load_from = [&](const PlaneWithMargin<std::int16_t>& slope) {
+    const auto load_from = [&](const Image<std::int16_t>& slope) {
       return
           [&](int row, int column) { return hn::LoadU(values, slope.row(y + row) + x + column); };
     };
@@ -356,7 +356,7 @@ class Points {
   void mismatch(int i) {
     const Values values;
     const int lanes = static_cast<int>(hn::Lanes(values));
-    const auto stride = to_.row(1) - to_.row(0);
+    const auto stride = to_.stride();
     BothSum upper_left;
     BothSum upper_right;
     BothSum lower_left;
@@ -408,7 +408,7 @@ class Points {
         hn::And(hn::Ge(y, least), hn::Lt(y, hn::Set(floats, static_cast<float>(to_.height())))));
     active = hn::And(active, inside);
     const Ints ints;
-    const auto stride = hn::Set(ints, static_cast<std::int32_t>(to_.row(1) - to_.row(0)));
+    const auto stride = hn::Set(ints, static_cast<std::int32_t>(to_.stride()));
     hn::Store(hn::Add(hn::Mul(hn::ConvertTo(ints, y), stride), hn::ConvertTo(ints, x)), ints,
               at_ + i);
     const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
@@ -481,7 +481,7 @@ class Points {
     locate(i, hn::AndNot(stops, active), to_x, to_y);
   }
 
-  const PlaneWithMargin<std::uint8_t>& to_;
+  const Image<std::uint8_t>& to_;
   const Patch& patch_;
   int count_;
   float right_;

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+namespace eventcamera {
+
+/// A picture of one channel that somebody else owns, read in place. Any stride; nothing beyond a
+/// row's last pixel may be read.
+template <class Pixel>
+struct ImageView {
+  const Pixel* data = nullptr;
+  std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
+  int width = 0;
+  int height = 0;
+
+  const Pixel* row(int y) const {
+    return reinterpret_cast<const Pixel*>(reinterpret_cast<const std::byte*>(data) + y * stride);
+  }
+};
+
+/// A picture of one channel that owns its pixels, with an optional margin around them.
+///
+/// Rows begin on a cache line. Past the last pixel of a row (and its margin) lie at least 64 bytes
+/// and 16 pixels that may be read and written: a kernel may load and store whole vectors to the end
+/// of any row. They are 0 until then.
+template <class Pixel>
+class Image {
+ public:
+  Image() = default;
+  /// All pixels 0. Rows -margin ... height + margin - 1 and columns -margin ... width + margin - 1
+  /// exist.
+  Image(int width, int height, int margin = 0)
+      : width_(width), height_(height), margin_(margin), stride_(padded_stride()) {
+    lines_.resize(static_cast<std::size_t>(height + 2 * margin) * (stride_ / line_size));
+  }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  int margin() const { return margin_; }
+  /// Bytes from one row to the next.
+  std::ptrdiff_t stride() const { return stride_; }
+  Pixel* row(int y) { return reinterpret_cast<Pixel*>(bytes() + offset(y)); }
+  const Pixel* row(int y) const { return reinterpret_cast<const Pixel*>(bytes() + offset(y)); }
+  Pixel& at(int x, int y) { return row(y)[x]; }
+  const Pixel& at(int x, int y) const { return row(y)[x]; }
+  ImageView<Pixel> view() const { return {row(0), stride_, width_, height_}; }
+
+  /// Copies a picture of the same size.
+  void assign(const ImageView<Pixel>& other) {
+    for (int y = 0; y < height_; ++y) assign_row(y, other.row(y));
+  }
+  void assign_row(int y, const Pixel* from) {
+    std::memcpy(row(y), from, static_cast<std::size_t>(width_) * sizeof(Pixel));
+  }
+
+ private:
+  static constexpr std::ptrdiff_t line_size = 64;
+  struct alignas(line_size) Line {
+    std::byte bytes[line_size];
+  };
+
+  static std::ptrdiff_t whole_lines(std::ptrdiff_t bytes) {
+    return (bytes + line_size - 1) / line_size * line_size;
+  }
+  std::ptrdiff_t left_margin() const {
+    return whole_lines(margin_ * static_cast<std::ptrdiff_t>(sizeof(Pixel)));
+  }
+  std::ptrdiff_t padded_stride() const {
+    constexpr auto pixel = static_cast<std::ptrdiff_t>(sizeof(Pixel));
+    constexpr std::ptrdiff_t page = 2048;
+    const auto padding = std::max(line_size, 16 * pixel);
+    const auto stride = left_margin() + whole_lines((width_ + margin_) * pixel + padding);
+    return stride % page == 0 ? stride + line_size : stride;  // rows must not share a cache set
+  }
+  std::ptrdiff_t offset(int y) const { return (y + margin_) * stride_ + left_margin(); }
+  std::byte* bytes() { return reinterpret_cast<std::byte*>(lines_.data()); }
+  const std::byte* bytes() const { return reinterpret_cast<const std::byte*>(lines_.data()); }
+
+  int width_ = 0;
+  int height_ = 0;
+  int margin_ = 0;
+  std::ptrdiff_t stride_ = 0;
+  std::vector<Line> lines_;
+};
+
+}  // namespace eventcamera
