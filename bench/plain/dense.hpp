@@ -46,7 +46,7 @@ class DenseInterpolation {
   Image<std::uint8_t> between_[2];
 };
 
-/// Dense interpolation, the flow counted in. The frames' rows lie without gaps.
+/// Dense interpolation, the flow counted in.
 class DenseSimulator final : public Simulator {
  public:
   DenseSimulator(const LumaFormat& format, FlowMethod method)

@@ -141,7 +141,7 @@ class DvsPixels {
 };
 
 /// Events from frame to frame, or, with motion, from one interpolated picture to the next: as many
-/// as the fastest thing moves pixels. The frames' rows lie without gaps.
+/// as the fastest thing moves pixels.
 class DvsSimulator final : public Simulator {
  public:
   DvsSimulator(const LumaFormat& format, const DvsSettings& settings)

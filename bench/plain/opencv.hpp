@@ -24,7 +24,7 @@ inline void set_opencv_threads(int threads) {
   if (cv::getNumThreads() != threads) cv::setNumThreads(threads);
 }
 
-/// Dense flow between pictures of at least 64x64 pixels without gaps between their rows.
+/// Dense flow between pictures of at least 64x64 pixels.
 class OpenCvFlow {
  public:
   OpenCvFlow(FlowMethod method, int width, int height) : method_(method) {
@@ -47,7 +47,10 @@ class OpenCvFlow {
                                    5, 1.2, 0);
     } else {
       flow_.release();  // else the last flow would be where the search begins
-      dis_->calc(opencv_picture(from), opencv_picture(to), flow_);
+      // OpenCV's DIS wants rows without gaps.
+      opencv_picture(from).copyTo(from_);
+      opencv_picture(to).copyTo(to_);
+      dis_->calc(from_, to_, flow_);
     }
     return {flow_.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow_.step[0]), from.width, from.height};
   }
@@ -62,6 +65,8 @@ class OpenCvFlow {
 
   FlowMethod method_;
   cv::Ptr<cv::DISOpticalFlow> dis_ = cv::DISOpticalFlow::create();
+  cv::Mat from_;
+  cv::Mat to_;
   cv::Mat flow_;
 };
 
