@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Configures and builds the plugins and programs with each feature disabled. Without the simulators
+# nothing may need OpenCV.
+set -eu
+cd "$(dirname "$0")/.."
+builds=$(mktemp -d)
+trap 'rm -rf "$builds"' EXIT
+
+fail() {
+  echo "FAILED: $*" >&2
+  exit 1
+}
+
+without() { # FEATURE...
+  echo "Without $*"
+  build=$builds/without-${*// /-}
+  ./compile "$build" -Dtests=false -Dintrospection=disabled -Dbuildtype=plain -Dwerror=true \
+    "${@/%/=disabled}"
+}
+
+plugins() {
+  (cd "$build/elements" && find . -name '*.so' | sort | tr '\n' ' ')
+}
+
+without -Deventsim
+if grep -q opencv "$build/compile_commands.json" "$build/build.ninja"; then
+  fail "OpenCV is in the commands of a build without simulators"
+fi
+[ "$(plugins)" = "./eventcam/libgsteventcam.so " ] || fail "built $(plugins)"
+
+without -Deventsim -Daedat
+without -Deventsim -Dhdf5
+without -Deventcam
+[ "$(plugins)" = "./eventsim/libgsteventsim.so " ] || fail "built $(plugins)"
