@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Calibrates every simulator on the first frame intervals of a recording that has frames and real
-events of the same pixels, and compares it with the real events of the others. Prints the tables.
+events of the same pixels, and compares it with the real events of the other intervals. Prints the
+tables.
 
   realism.py [DOCS]
 
-With a folder, the tables also replace what its realism.md has between its markers, and
-realism-figures.png and realism.png show them, the one as bars, the other the events themselves."""
+Given a folder, writes the tables between the markers of its realism.md, and draws them:
+realism-figures.png has bars, realism.png the events themselves."""
 import gzip
 import json
 import os
@@ -15,6 +16,7 @@ import shutil
 import sys
 import tempfile
 from dataclasses import dataclass
+from importlib.machinery import SourceFileLoader
 
 import matplotlib
 import numpy as np
@@ -22,14 +24,16 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
-from calibrate import (  # noqa: E402
+# A program, so its name is not a module's.
+PIPELINES = os.path.join(os.path.dirname(__file__), "..", "pipelines")
+SourceFileLoader("event_calibrate", os.path.join(PIPELINES, "event-calibrate")).load_module()
+from event_calibrate import (  # noqa: E402
     ON, Gst, Progress, Span, calibrate, compare, delayed, find_lag, read_recording, read_video,
     refine_lag, simulate, until)
 
-# What each row is called, and the element that makes it.
+# The name of each row, and its element.
 ROWS = {
-    "difference frame": "eventsim-frame",
+    "frame": "eventsim-frame",
     "dense, `dis-lq`, `forward`": "eventsim-dense flow=dis-lq interpolation=forward",
     "dense, `dis-lq`, `blend`": "eventsim-dense flow=dis-lq interpolation=blend",
     "dense, `dis-hq`, `forward`": "eventsim-dense flow=dis-hq interpolation=forward",
@@ -42,10 +46,10 @@ ROWS = {
         "eventsim-dvs preset=esim response=log log-eps=0.001 denoise=0 exposure-pulse=0",
     "`eventsim-dvs preset=v2e-noisy`":
         "eventsim-dvs preset=v2e-noisy response=lin-log denoise=0 exposure-pulse=0",
-    "`eventsim-dvs`, linear grey": "eventsim-dvs upsampling=motion response=linear",
-    "`eventsim-dvs`, straight lines": "eventsim-dvs upsampling=linear",
-    "`eventsim-dvs`, noise and all": "eventsim-dvs upsampling=motion denoise=0",
-    "`eventsim-dvs`, without pulses": "eventsim-dvs upsampling=motion exposure-pulse=0",
+    "`eventsim-dvs`, `response=linear`": "eventsim-dvs upsampling=motion response=linear",
+    "`eventsim-dvs`, `upsampling=linear`": "eventsim-dvs upsampling=linear",
+    "`eventsim-dvs`, `denoise=0`": "eventsim-dvs upsampling=motion denoise=0",
+    "`eventsim-dvs`, `exposure-pulse=0`": "eventsim-dvs upsampling=motion exposure-pulse=0",
     "`eventsim-dvs`": "eventsim-dvs upsampling=motion",
 }
 CALIBRATED = "`eventsim-dvs`"
@@ -59,8 +63,8 @@ class Scene:
     folder: str
     video: str
     recording: str
-    calibrated: int  # frame intervals, the first ones
-    measured: int  # those after them
+    calibrated: int  # frame intervals to calibrate on
+    measured: int  # frame intervals after them to measure
 
 
 SCENES = {
@@ -82,17 +86,17 @@ def unpacked(path, folder):
 
 def read(scene, data):
     folder = os.path.join(data, scene.folder)
-    # By their times, since how many are needed is known but not when they are.
+    # Selected by number below: their times are not known yet.
     video = read_video(os.path.join(folder, scene.video), 0, 10)
     video.frames = video.frames[:scene.calibrated + scene.measured + 1]
-    with tempfile.TemporaryDirectory() as room:
-        recorded = read_recording(unpacked(os.path.join(folder, scene.recording), room), video)
+    with tempfile.TemporaryDirectory() as scratch:
+        recorded = read_recording(unpacked(os.path.join(folder, scene.recording), scratch), video)
     return video, recorded
 
 
 def measure(scene, data, progress):
-    """The rows of a scene. The first interval is the past of the pixels, where there is another one
-    to count."""
+    """The rows of a scene. With several intervals to calibrate on, the first only gives the pixels a
+    history."""
     video, recorded = read(scene, data)
     past = scene.calibrated - 1
 
@@ -105,11 +109,11 @@ def measure(scene, data, progress):
     lag = 0.0
     if past > 0:
         lag = find_lag(until(video, video.frames[scene.calibrated].time // 1000), recorded)
-        # As the simulator sees it that is nearest to a camera.
+        # With the most realistic simulator.
         early = delayed(video, lag)
         training, _ = spans(early)
         early = until(early, training.end)
-        # Pulses have times of their own.
+        # Pulses depend on the frame times.
         element = calibrate(early, recorded, training, ROWS[CALIBRATED] + " exposure-pulse=0",
                             progress)
         lag += refine_lag(early, recorded, training, element, progress)
@@ -125,7 +129,7 @@ def measure(scene, data, progress):
         training, test = spans(punctual)
         element = calibrate(until(punctual, training.end), recorded, training, ROWS[CALIBRATED],
                             progress)
-        rows["the same without lag"] = measured(punctual, recorded, test, element)
+        rows["`eventsim-dvs`, lag ignored"] = measured(punctual, recorded, test, element)
     progress.end()
     return {"title": scene.title, "lag": lag, "calibrated": scene.calibrated,
             "measured": scene.measured, "rows": rows}
@@ -145,7 +149,7 @@ def bold_where(best, text):
 
 
 def table(result):
-    """A row a simulator; what is nearest to the real camera is bold."""
+    """A row per simulator; the values closest to the real camera are bold."""
     rows = result["rows"]
     real = next(iter(rows.values()))["reference"]
     shares = [(side, within) for side in ("reference", "candidate")
@@ -161,7 +165,7 @@ def table(result):
                   for share in shares}
     lines = [
         "| | C+ / C− | mean | std. dev. | map correlation"
-        " | real events with a partner within 1, 5, 10 ms | simulated events with one |",
+        " | real events matched within 1, 5, 10 ms | simulated events matched |",
         "|---|---|---|---|---|---|---|",
         f"| real events | | {real['mean']:.3f} | {real['deviation']:.3f} | | | |",
     ]
@@ -182,24 +186,24 @@ def table(result):
             cells.append(", ".join(values))
         lines.append("| " + " | ".join(cells) + " |")
     calibrated = rows[CALIBRATED]["element"]
-    lag = f"{1000 * result['lag']:.1f} ms" if result["lag"] != 0 else "not sought"
+    lag = f"{1000 * result['lag']:.1f} ms" if result["lag"] != 0 else "not estimated"
     lines += ["", f"Frame intervals: {result['calibrated']} to calibrate, the next"
-              f" {result['measured']} to measure. Lag of the frames: {lag}. What was found:"
+              f" {result['measured']} to measure. Lag of the frames: {lag}. Calibrated element:"
               f" `{calibrated}`.", ""]
     return "\n".join([f"### {result['title'][0].upper()}{result['title'][1:]}", ""] + lines)
 
 
 def plot(path, rows):
-    """How near each simulator is to the camera, as bars."""
+    """Bar charts of how close each simulator is to the camera."""
     real = next(iter(rows.values()))["reference"]
     names = [name.replace("`", "") for name in rows][::-1]
     panels = {
-        "standard deviation, beside the camera's": (
+        "standard deviation, relative to the camera": (
             [row["candidate"]["deviation"] / real["deviation"] for row in rows.values()], 1),
-        "correlation of the maps": ([row["map-correlation"] for row in rows.values()], None),
-        "real events with a partner within 5 ms": (
+        "map correlation": ([row["map-correlation"] for row in rows.values()], None),
+        "real events matched within 5 ms": (
             [row["reference-partners"]["within-5ms"] for row in rows.values()], None),
-        "simulated events with one": (
+        "simulated events matched": (
             [row["candidate-partners"]["within-5ms"] for row in rows.values()], None),
     }
     figure, axes = plt.subplots(1, len(panels), figsize=(15, 4.6), sharey=True, dpi=90)
@@ -214,7 +218,7 @@ def plot(path, rows):
 
 
 def draw(path, scene, data, elements):
-    """Where events are in the last interval, side by side: ON blue, OFF dark, both dark blue."""
+    """Draws the events of the last interval, side by side: ON blue, OFF dark, both dark blue."""
     colours = np.array([[255, 255, 255], [28, 34, 48], [64, 128, 208], [46, 81, 128]], np.uint8)
     video, recorded = read(scene, data)
     span = Span(video.frames[-2].time // 1000, video.frames[-1].time // 1000)
@@ -248,7 +252,7 @@ def replace_tables(path, text):
     begin, end = "<!-- tables of bench/realism -->\n", "<!-- end of the tables -->\n"
     between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
     if not between.search(page):
-        sys.exit(f"{path} has no place for the tables")
+        sys.exit(f"{path} has no markers for the tables")
     with open(path, "w", encoding="utf-8") as file:
         file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", page))
 
@@ -260,12 +264,12 @@ def main():
     results = {}
     for key, scene in SCENES.items():
         if not os.path.exists(os.path.join(data, scene.folder, scene.recording)):
-            print(f"{scene.title}: there is no {os.path.join(data, scene.folder)}, left out",
+            print(f"{scene.title}: skipped, no {os.path.join(data, scene.folder)}",
                   file=sys.stderr)
             continue
         results[key] = measure(scene, data, progress)
     if not results:
-        print("Without recordings there is nothing to measure.", file=sys.stderr)
+        print("No recordings, nothing to measure.", file=sys.stderr)
         return
     if os.path.isdir("bench-output"):
         with open(os.path.join("bench-output", "realism.json"), "w", encoding="utf-8") as file:

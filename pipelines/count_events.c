@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later
  *
- * How an application reads events: runs a pipeline and counts the events that come to its appsink.
+ * Example of reading events in C: runs a pipeline and counts the events that reach its appsink.
  *
  *   count_events "videotestsrc pattern=ball num-buffers=90 ! eventsim-diff ! appsink name=events"
  *
- * To build it outside of this project:
+ * To build it outside this project:
  *   cc count_events.c $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
  */
 #include <gst/app/gstappsink.h>
@@ -26,14 +26,14 @@ static void print(const char* what, const Count* count, gdouble seconds) {
 static void count_buffer(Count* count, GstBuffer* buffer) {
   GstEventCameraMap map;
   if (!gst_event_camera_map(&map, buffer)) return;
-  /* map.events is an array; the time of an event in microseconds is map.start + t. */
+  /* map.events is an array; the time of an event, in microseconds, is map.start + t. */
   for (gsize i = 0; i < map.n_events; ++i)
     count->on += gst_event_camera_event_is_on(&map.events[i]) ? 1 : 0;
   count->events += map.n_events;
   gst_event_camera_unmap(&map);
 }
 
-/* Prints the error that ended the pipeline, if one did. */
+/* Whether an error ended the pipeline; prints it. */
 static gboolean failed(GstBus* bus) {
   GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
   GError* error = NULL;
@@ -45,7 +45,7 @@ static gboolean failed(GstBus* bus) {
   return TRUE;
 }
 
-/* Counts until the stream ends, printing a line for each second of it. */
+/* Counts to the end of the stream; prints a line for each second of it. */
 static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
   Count all = {0, 0};
   Count second = {0, 0};
@@ -64,7 +64,7 @@ static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
     if (start == GST_CLOCK_TIME_NONE) {
       GstEventCameraInfo info;
       if (gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample)))
-        g_print("Events of a sensor of %d x %d pixels\n", info.width, info.height);
+        g_print("Events of a %dx%d sensor\n", info.width, info.height);
       start = printed = GST_BUFFER_PTS(buffer);
     }
     count_buffer(&second, buffer);
@@ -80,18 +80,18 @@ static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
   }
   all.events += second.events;
   all.on += second.on;
-  print("In all", &all, start == GST_CLOCK_TIME_NONE ? 0 : (gdouble)(end - start) / GST_SECOND);
+  print("Total", &all, start == GST_CLOCK_TIME_NONE ? 0 : (gdouble)(end - start) / GST_SECOND);
   return !failed(bus);
 }
 
 static GstElement* pipeline;
 
-/* Ctrl-C ends the stream, so that files are finished. */
+/* Ctrl-C ends the stream, so that sinks finish their files. */
 static gpointer wait_for_interrupt(gpointer signals) {
   int caught;
   if (sigwait(signals, &caught) != 0) return NULL;
   gst_element_send_event(pipeline, gst_event_new_eos());
-  pthread_sigmask(SIG_UNBLOCK, signals, NULL); /* a second one ends the program */
+  pthread_sigmask(SIG_UNBLOCK, signals, NULL); /* a second Ctrl-C ends the program */
   pause();
   return NULL;
 }
@@ -124,7 +124,7 @@ int main(int argc, char** argv) {
     gst_object_unref(pipeline);
     return 2;
   }
-  gst_object_ref(pipeline); /* the thread's, until the program ends */
+  gst_object_ref(pipeline); /* for the thread, until the program ends */
   g_thread_unref(g_thread_new("interrupt", wait_for_interrupt, &signals));
   gst_element_set_state(pipeline, GST_STATE_PLAYING);
   bus = gst_element_get_bus(pipeline);

@@ -1,9 +1,12 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""How Python reads events: runs a pipeline and makes a NumPy array of the events that come to its
-appsink, one row (t, x, y, p) an event, t in microseconds.
+"""Example of reading events in Python: runs a pipeline and collects the events that reach its
+appsink in a NumPy array, one row (t, x, y, p) per event, t in microseconds.
 
     events_to_numpy.py "videotestsrc num-buffers=90 ! eventsim-diff ! appsink name=events" out.npy
+
+Needs the system's Python with PyGObject and NumPy (Debian: python3-gi python3-numpy
+gir1.2-gstreamer-1.0 gir1.2-gst-plugins-base-1.0).
 """
 import sys
 
@@ -20,7 +23,7 @@ EVENT = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")])
 
 
 def events_of(buffer):
-    """The events of a buffer, with times that count from the start of the stream."""
+    """The events of a buffer, with times since the start of the stream."""
     packed = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), XYTP)
     events = np.empty(len(packed), EVENT)
     events["t"] = buffer.pts // 1000 + packed["t"].astype("<i8")
@@ -45,7 +48,7 @@ def main(launch, path=None):
             continue
         if not parts:
             _, info = GstEventCamera.Info.from_caps(sample.get_caps())
-            print(f"Events of a sensor of {info.width} x {info.height} pixels")
+            print(f"Events of a {info.width}x{info.height} sensor")
         parts.append(events_of(sample.get_buffer()))
     pipeline.set_state(Gst.State.NULL)
 

@@ -645,7 +645,7 @@ TEST(Aedat4, PythonsLibrariesReadWhatWeWrite) {
   }
   auto folder = (std::filesystem::temp_directory_path() / "aedat4-test-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
-  std::string command = "/usr/bin/python3 " + std::string(AEDAT4_CHECK);
+  std::string command = "/usr/bin/python3 '" + std::string(AEDAT4_CHECK) + "'";
   std::string expected;
   for (const auto compression : compressions)
     for (const bool table : {false, true}) {
@@ -662,7 +662,7 @@ TEST(Aedat4, PythonsLibrariesReadWhatWeWrite) {
       std::ofstream(path, std::ios::binary)
           .write(reinterpret_cast<const char*>(bytes.data()),
                  static_cast<std::streamsize>(bytes.size()));
-      command += " " + path;
+      command += " '" + path + "'";
       for (const auto number : {std::int64_t{9000}, on, sum_t, sum_x, sum_y, std::int64_t{1},
                                 std::int64_t{3 * 346 * 260}})
         expected += std::to_string(number) + " ";

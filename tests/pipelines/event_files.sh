@@ -12,8 +12,8 @@ fail() {
 }
 
 convert() {
-  echo "event_convert $*"
-  timeout 60 "$BUILD/pipelines/event_convert" "$@"
+  echo "event-convert $*"
+  timeout 60 "$BUILD/pipelines/event-convert" "$@"
 }
 
 declare -A types=([raw]=application/x-prophesee-raw [dat]=application/x-prophesee-dat
@@ -39,6 +39,14 @@ for in in "${!types[@]}"; do
     cmp ball.csv pair.lines.csv || fail "ball.$in as $out has other events"
   done
 done
+
+# Options of the formats.
+convert --format=EVT2 ball.raw evt2.raw
+grep -aq "format EVT2" evt2.raw || fail "the words are not EVT2"
+convert --compression=none ball.raw plain.aedat4
+[ "$(stat -c %s plain.aedat4)" -gt "$(stat -c %s ball.aedat4)" ] || fail "plain.aedat4 is compressed"
+convert --dialect=rpg ball.raw rpg.csv
+cmp ball.txt rpg.csv || fail "the dialect is not that of .txt"
 
 # What eventhdf5sink wrote, to a reader that is none of ours.
 /usr/bin/python3 - ball.h5 ball.hdf5 ball.csv <<'PYTHON'
@@ -118,16 +126,20 @@ for file in picture.png video.mp4 sound.wav words.txt numbers.txt comments.m "$S
 done
 
 # Errors that say what is wrong.
-refused() { # WORDS IN OUT
-  if convert "$2" "$3" 2>errors; then fail "$2 was converted to $3"; fi
+refused() { # WORDS ARGUMENT...
+  local words=$1
+  shift
+  if convert "$@" 2>errors; then fail "$* was converted"; fi
   cat errors
-  grep -q "$1" errors || fail "no word of it"
+  grep -q -e "$words" errors || fail "the error does not say \"$words\""
 }
 refused "cannot be read" words.txt words.raw
 cp words.txt words.raw
 refused "cannot be read" words.raw out.dat
-refused "not known by its ending" ball.raw ball.mp3
-refused "are only read" ball.raw ball.aedat
+refused "unknown extension" ball.raw ball.mp3
+refused "choose one of EVT2 EVT21 EVT3 EVT4" ball.raw other.raw --format=EVT5
+refused "does not apply to .dat" ball.raw ball.dat --dialect=rpg
+refused "can only be read" ball.raw ball.aedat
 refused "No such file" ball.raw nowhere/at/all.h5
 cp words.txt words.h5
 refused "not an HDF5 file" words.h5 out.dat
@@ -145,8 +157,8 @@ grep -q "corrupt at byte " warnings || fail "no warning of a file that is cut sh
 # Interrupted, it ends the file in order.
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw
 for ending in raw npy aedat4 h5 hdf5; do
-  echo "event_convert long.raw interrupted.$ending"
-  "$BUILD/pipelines/event_convert" long.raw "interrupted.$ending" 2>interruption &
+  echo "event-convert long.raw interrupted.$ending"
+  "$BUILD/pipelines/event-convert" long.raw "interrupted.$ending" 2>interruption &
   converting=$!
   while kill -0 $converting && [ "$(stat -c %s "interrupted.$ending.part" 2>/dev/null || echo 0)" -lt 10000 ]; do sleep 0.01; done
   kill -INT $converting || true

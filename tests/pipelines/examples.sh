@@ -7,7 +7,7 @@ trap 'rm -rf "$work"' EXIT
 line="videotestsrc pattern=ball num-buffers=40 ! eventsim-diff ! appsink name=events sync=false"
 
 "$BUILD/pipelines/count_events" "$line" | tee "$work/c"
-counted=$(sed -n 's/^In all *\([0-9]*\) events.*/\1/p' "$work/c")
+counted=$(sed -n 's/^Total *\([0-9]*\) events.*/\1/p' "$work/c")
 [ "$counted" -gt 10000 ]
 
 if "$BUILD/pipelines/count_events" "filesrc location=/nowhere ! decodebin ! eventsim-diff ! appsink name=events"; then
@@ -19,9 +19,9 @@ if [ ! -f "$GI_TYPELIB_PATH/GstEventCamera-1.0.typelib" ]; then
   echo "built without introspection: no Python"
   exit 77
 fi
-"$PYTHON" "$SOURCE/pipelines/events_to_numpy.py" "$line" "$work/events.npy" | tee "$work/python"
+"$SOURCE/pipelines/events_to_numpy.py" "$line" "$work/events.npy" | tee "$work/python"
 grep -q "^$counted events" "$work/python"
-"$PYTHON" - "$work/events.npy" <<'PYTHON'
+/usr/bin/python3 - "$work/events.npy" <<'PYTHON'
 import sys
 import numpy as np
 events = np.load(sys.argv[1])

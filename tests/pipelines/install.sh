@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# What is installed is complete: the plugin, the library, its header, pkg-config file and GIR. The
-# C example is built against it as an application would be.
+# The installation is complete: plugins, programs, library, header, pkg-config file and GIR. Builds
+# the C example against it, as an application would.
 set -eu
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
@@ -13,12 +13,16 @@ plugins=$library/gstreamer-1.0
 # Debian's GStreamer looks for plugins here, unless it is told to look elsewhere.
 [ "${plugins#"$root"}" = "$(pkg-config --variable=pluginsdir gstreamer-1.0)" ]
 
-# As if the root were /.
-sed -i "s#^prefix=.*#prefix=$root/usr#" "$library/pkgconfig/gsteventcamera-1.0.pc"
+# As if the root were /. pkg-config escapes blanks, on its way in and out.
+sed -i "s#^prefix=.*#prefix=${root// /\\\\ }/usr#" "$library/pkgconfig/gsteventcamera-1.0.pc"
 export PKG_CONFIG_PATH=$library/pkgconfig
-# shellcheck disable=SC2046
-cc -Wall -Werror -o "$root/count_events" "$SOURCE/pipelines/count_events.c" \
-  $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
+declare -a flags
+eval "flags=($(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0))"
+cc -Wall -Werror -o "$root/count_events" "$SOURCE/pipelines/count_events.c" "${flags[@]}"
 
 export LD_LIBRARY_PATH=$library GST_PLUGIN_PATH=$plugins GST_REGISTRY=$root/registry.bin
+for program in event-convert event-calibrate; do
+  "$root/usr/bin/$program" --help >"$root/help"
+  grep -qi "^usage" "$root/help"
+done
 "$root/count_events" "videotestsrc num-buffers=5 pattern=ball ! eventsim-frame ! appsink name=events"

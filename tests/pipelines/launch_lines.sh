@@ -119,7 +119,7 @@ launch filesrc location=out.raw ! evtdec ! eventesenc ! filesink location=out.es
 launch filesrc location=out.es ! eventesdec ! eventrender mode=decay accumulation-time=20000000 ! video/x-raw,framerate=60/1 ! videoconvert ! fakesink
 launch filesrc location=out.raw ! decodebin ! eventhdf5sink layout=metavision location=out.h5 && fail "pictures were written as events"
 launch filesrc location=out.raw ! decodebin caps=application/x-event-camera ! eventhdf5sink layout=metavision location=out.h5
-launch eventhdf5src location=out.h5 ! evtenc ! filesink location=again.raw
+launch filesrc location=out.h5 ! eventhdf5dec ! evtenc ! filesink location=again.raw
 # Two files with times of their own, side by side.
 launch filesrc location=out.aedat4 ! decodebin ! videoconvert ! mixer.  filesrc location=out.h5 ! decodebin ! videoconvert ! mixer.  compositor name=mixer sink_1::xpos=320 ! fakesink
 davis=$SHARED_DATA/events/davis346-frames-events-imu.aedat4
@@ -134,7 +134,7 @@ for _ in $(seq 300); do
 done
 pkill -INT -P $launched
 wait $launched || true
-launch eventhdf5src location=interrupted.h5 ! filesink location=interrupted.xytp
+launch filesrc location=interrupted.h5 ! eventhdf5dec ! filesink location=interrupted.xytp
 [ "$(stat -c %s interrupted.xytp)" -gt 300000 ] || fail "what was written before the interruption is lost"
 
 # Refused, with a reason.

@@ -34,11 +34,11 @@ done
 for layout in dsec metavision; do
   file=$work/$layout.h5
   check videotestsrc num-buffers=8 ! eventsim-frame ! eventhdf5sink layout=$layout location="$file"
-  check eventhdf5src location="$file" ! fakesink
+  check filesrc location="$file" ! eventhdf5dec ! fakesink
   check filesrc location="$file" ! queue ! eventhdf5dec ! fakesink num-buffers=1
   check filesrc location="$file" ! decodebin caps=application/x-event-camera ! fakesink
   check filesrc location="$file" ! decodebin3 ! fakesink
-  check eventhdf5src location="$file" ! identity error-after=2 ! eventhdf5sink location="$file.out"
+  check filesrc location="$file" ! eventhdf5dec ! identity error-after=2 ! eventhdf5sink location="$file.out"
 done
 check filesrc location="$0" ! eventhdf5dec ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventhdf5sink location=/nowhere/at/all.h5

@@ -542,7 +542,7 @@ TEST_P(EveryElement, MakesSoundEventsOfRealVideo) {
   double fast = 0;
   int buffers = 0;
   for_each_sample(
-      "filesrc location=" + path + " ! decodebin ! " + GetParam().element +
+      "filesrc location=\"" + path + "\" ! decodebin ! " + GetParam().element +
           " ! application/x-event-camera ! appsink name=sink sync=false max-buffers=4",
       GetParam().intervals, [&](GstSample* sample) {
         GstEventCameraInfo info;

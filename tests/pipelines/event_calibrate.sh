@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# calibrate finds again what a recording was simulated with.
+# event-calibrate recovers the settings that a recording was simulated with.
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -12,8 +12,8 @@ fail() {
 }
 
 calibrate() {
-  echo "calibrate $*"
-  timeout 60 "$PYTHON" "$SOURCE/pipelines/calibrate.py" "$@" 2>progress || {
+  echo "event-calibrate $*"
+  timeout 60 "$BUILD/pipelines/event-calibrate" "$@" 2>progress || {
     cat progress
     return 1
   }
@@ -53,7 +53,7 @@ for i in $(seq 0 15); do
 done >pictures.txt
 "$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! eventsim-dense positive-threshold=10 ! eventcsvenc ! filesink location=recorded.csv
 calibrate pictures.txt recorded.csv --element eventsim-dense --lag find --to 0.3 --measure-from 0.3 --measure-to 0.5 --map map.png | tee found
-lag=$(sed -n 's/A frame shows the world \(-*[0-9.]*\) ms later.*/\1/p' found)
+lag=$(sed -n 's/Frames show the scene \(-*[0-9.]*\) ms later.*/\1/p' found)
 awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 1) }' || fail "the pictures are ${lag:-0} ms late"
 [ -s map.png ] || fail "no picture was written"
 
@@ -61,11 +61,11 @@ awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 1) }' || fail "the pict
 refused() { # WORDS ARGUMENT...
   local words=$1
   shift
-  if timeout 60 "$PYTHON" "$SOURCE/pipelines/calibrate.py" "$@" 2>errors; then fail "calibrate $* went well"; fi
+  if timeout 60 "$BUILD/pipelines/event-calibrate" "$@" 2>errors; then fail "event-calibrate $* succeeded"; fi
   cat errors
   grep -q "$words" errors || fail "no word of it"
 }
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
 refused "nowhere.mkv" nowhere.mkv recorded.raw
-refused "no time in common" scene.mkv recorded.raw --element eventsim-frame --from 5
+refused "do not overlap in time" scene.mkv recorded.raw --element eventsim-frame --from 5
 echo "all thresholds were found"
