@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Prints the table of runs of the codecs' benchmarks: a row a format; million events a second on one
-core, and how many times as long that takes as a memcpy of the decoded events.
+"""Prints the table of the codec benchmarks, a row per format: million events per second on one core,
+and the time relative to a memcpy of the decoded events.
 
   codec_table.py PAGE.md RUN.json...
 
-The table replaces what the page has between its markers."""
+Also writes the table between the markers of the page."""
 import json
 import re
 import sys
 
-# The name of a benchmark, without what it does: the name in the table.
+# Benchmark names without their verbs, and the names in the table.
 FORMATS = {
     "edges/evt2": "EVT2",
     "edges/evt21": "EVT2.1",
@@ -24,22 +24,22 @@ FORMATS = {
     "noise/es": "Event Stream",
     "aedat2": "AEDAT 2",
     "aedat3": "AEDAT 3.1",
-    "aedat4/none": "AEDAT 4, not compressed",
+    "aedat4/none": "AEDAT 4, uncompressed",
     "aedat4/lz4": "AEDAT 4, LZ4",
     "aedat4/zstd": "AEDAT 4, Zstandard",
     "npy": "NumPy",
     "csv-names": "CSV, whole microseconds",
-    "csv-rpg": "TXT, seconds with a fraction",
-    "dsec": "HDF5 of DSEC, not compressed",
+    "csv-rpg": "TXT, fractional seconds",
+    "dsec": "HDF5 of DSEC, uncompressed",
     "dsec-gzip": "HDF5 of DSEC, gzip",
     "metavision": "HDF5 of Metavision",
-    "ecf": "ECF alone",
+    "ecf": "ECF without HDF5",
 }
 VERBS = {"decode": "read", "encode": "write"}
 
 
 def results_of(run):
-    """(million events a second, memcpys) by (format, read or write)."""
+    """(million events per second, memcpys) by (format, read or write)."""
     results = {}
     benchmarks = [each for each in run["benchmarks"] if not each.get("error_occurred")]
     memcpy = [each for each in benchmarks if each["name"] == "memcpy"]
@@ -88,7 +88,7 @@ def main():
     begin, end = "<!-- table of bench/run -->\n", "<!-- end of the table -->\n"
     between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
     if not between.search(before):
-        sys.exit(f"{page} has no place for the table")
+        sys.exit(f"{page} has no markers for the table")
     with open(page, "w", encoding="utf-8") as file:
         file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", before))
 

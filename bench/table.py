@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Prints the tables of a run of the benchmarks: a row a method, a column a scene; how many times
-as fast as the plain formulation, and milliseconds a frame.
+"""Prints the tables of a benchmark run, a row per method and a column per scene: speed relative to
+the plain formulation, and milliseconds per frame.
 
   table.py BENCHMARKS.json [PAGE.md]
 
-With a page, the tables also replace what it has between its markers."""
+Given a page, also writes the tables between its markers."""
 import json
 import re
 import statistics
@@ -19,15 +19,15 @@ SCENES = {
 METHODS = {
     "frame": "frame",
     "dense-after-flow": "dense, after the flow",
-    "dense-dis-lq": "dense, `dis-lq`, whole",
-    "dense-dis-hq": "dense, `dis-hq`, whole",
-    "dense-farneback": "dense, `farneback`, whole",
-    "sparse": "sparse, whole",
-    "diff": "diff, whole",
+    "dense-dis-lq": "dense, `dis-lq`, with flow",
+    "dense-dis-hq": "dense, `dis-hq`, with flow",
+    "dense-farneback": "dense, `farneback`, with flow",
+    "sparse": "sparse, with tracking",
+    "diff": "diff, with tracking",
     "dvs-ideal": "dvs, `ideal`",
     "dvs-denoised": "dvs, `ideal`, `denoise=8`",
     "dvs-v2e-noisy": "dvs, `v2e-noisy`",
-    "dvs-motion": "dvs, `ideal`, `upsampling=motion`, whole",
+    "dvs-motion": "dvs, `ideal`, `upsampling=motion`, with flow",
 }
 COPIES = {
     "events-to-buffer": "events → buffer",
@@ -37,7 +37,7 @@ COPIES = {
 
 
 def times_of(run):
-    """Milliseconds by (scene, method, formulation, threads); the median where one ran repeatedly."""
+    """Milliseconds by (scene, method, formulation, threads); the median of repeated runs."""
     times = {}
     for benchmark in run["benchmarks"]:
         parts = benchmark["name"].split("/")
@@ -93,7 +93,7 @@ def main():
     ]
     machine = (
         f"Run on {context['date'][:10]} on {context['num_cpus']} processors"
-        f" of {context['mhz_per_cpu']} MHz; load average as it began {context['load_avg'][0]:.1f}.\n"
+        f" of {context['mhz_per_cpu']} MHz; load average at the start {context['load_avg'][0]:.1f}.\n"
     )
     text = "\n".join([machine] + [each for each in tables if each])
     print(text)
@@ -103,7 +103,7 @@ def main():
         begin, end = "<!-- tables of bench/run -->\n", "<!-- end of the tables -->\n"
         between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
         if not between.search(page):
-            sys.exit(f"{sys.argv[2]} has no place for the tables")
+            sys.exit(f"{sys.argv[2]} has no markers for the tables")
         with open(sys.argv[2], "w", encoding="utf-8") as file:
             file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", page))
 
