@@ -30,24 +30,13 @@
  * eventsim-dense ! compare.candidate
  * ]|
  */
-#include <gst/base/gstaggregator.h>
-
 #include <algorithm>
 #include <array>
-#include <exception>
-#include <memory>
-#include <mutex>
-#include <new>
 #include <optional>
-#include <span>
-#include <utility>
 
-#include "elements/eventcam/aggregator_pads.hpp"
-#include "elements/eventcam/aggregator_seeking.hpp"
-#include "elements/eventcam/broken_events.hpp"
 #include "elements/eventcam/report.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/eventaggregator.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/measure/map_picture.hpp"
 #include "src/measure/stream_comparison.hpp"
@@ -56,18 +45,11 @@ GST_DEBUG_CATEGORY_STATIC(event_compare_debug);
 #define GST_CAT_DEFAULT event_compare_debug
 
 using eventcamera::both_sides;
-using eventcamera::Nanoseconds;
 using eventcamera::OfSides;
 using eventcamera::Side;
 using eventcamera::StreamComparison;
 
 namespace {
-
-enum Property {
-  prop_0,
-  prop_location,
-  prop_map,
-};
 
 /// A sensor's size.
 struct Sensor {
@@ -77,103 +59,53 @@ struct Sensor {
   friend bool operator==(const Sensor&, const Sensor&) = default;
 };
 
-struct Private {
-  std::mutex mutex;  // guards what follows; nothing is called under it
-  ReportPlaces places;
-
-  // Set at init.
-  OfSides<GstAggregatorPad*> pads;
-
-  // The source pad's thread's, or nobody's while there is none.
-  OfSides<std::optional<Sensor>> sensors;
-  OwnedCaps candidate_caps;
-  std::optional<StreamComparison> comparison;  // once both sensors are known
-  bool concluded = true;  // there are no events in it that figures do not tell of
-  BrokenEvents broken{"not compared"};
-};
-
-struct GstEventCompare {
-  GstAggregator parent;
-  Private* priv;
-};
-
-struct GstEventCompareClass {
-  GstAggregatorClass parent_class;
-};
-
-GstEventCompare* event_compare(gpointer object) {
-  return static_cast<GstEventCompare*>(object);
-}
-
 const char* name_of(Side side) {
   return side == Side::reference ? "reference" : "candidate";
 }
 
-}  // namespace
+class EventCompare final : public EventAggregator {
+ public:
+  explicit EventCompare(GstAggregator* element)
+      : EventAggregator(element, {.verb = "compare", .main_pad = "candidate"}) {}
 
-G_DEFINE_TYPE_WITH_CODE(GstEventCompare, gst_event_compare, GST_TYPE_AGGREGATOR,
-                        GST_DEBUG_CATEGORY_INIT(event_compare_debug, "eventcompare", 0,
-                                                "how alike two streams of events are"))
-#define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_event_compare_parent_class)
-GST_ELEMENT_REGISTER_DEFINE(eventcompare, "eventcompare", GST_RANK_NONE,
-                            gst_event_compare_get_type())
+  bool start() override { return can_report(element(), settings.copy()); }
+  void stop() override;
+  void flush() override { comparison_.reset(); }
+  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  GstFlowReturn aggregate(bool timed_out) override;
 
-/* properties */
+  GuardedSettings<ReportFiles> settings;
 
-static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  auto& priv = *event_compare(object)->priv;
-  const gchar* text = g_value_get_string(value);
-  const std::string path = text != nullptr ? text : "";
-  const std::lock_guard lock(priv.mutex);
-  switch (id) {
-    case prop_location:
-      priv.places.location = path;
-      break;
-    case prop_map:
-      priv.places.map = path;
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-      break;
-  }
-}
+ private:
+  bool is_over(Side side) const;
+  bool begin();
+  void compare(Side side, GstBuffer* buffer);
+  GstFlowReturn take_next();
+  void conclude();
 
-static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  auto& priv = *event_compare(object)->priv;
-  const std::lock_guard lock(priv.mutex);
-  switch (id) {
-    case prop_location:
-      g_value_set_string(value, priv.places.location.c_str());
-      break;
-    case prop_map:
-      g_value_set_string(value, priv.places.map.c_str());
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-      break;
-  }
-}
+  const OfSides<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
 
-static ReportPlaces places_of(GstEventCompare* self) {
-  const std::lock_guard lock(self->priv->mutex);
-  return self->priv->places;
-}
+  // The source pad's thread's, or nobody's while there is none.
+  OfSides<std::optional<Sensor>> sensors_;
+  std::optional<StreamComparison> comparison_;  // once both sensors are known
+  bool concluded_ = true;  // there are no events in it that figures do not tell of
+};
 
 /* figures */
 
 /// Moves a structure into a field of another.
-static void put_structure(GstStructure* structure, const char* field, GstStructure* value) {
+void put_structure(GstStructure* structure, const char* field, GstStructure* value) {
   gst_structure_set(structure, field, GST_TYPE_STRUCTURE, value, nullptr);
   gst_structure_free(value);
 }
 
-static GstStructure* partners_of(const std::array<double, 3>& shares) {
+GstStructure* partners_of(const std::array<double, 3>& shares) {
   return gst_structure_new("partners", "within-1ms", G_TYPE_DOUBLE, shares[0], "within-5ms",
                            G_TYPE_DOUBLE, shares[1], "within-10ms", G_TYPE_DOUBLE, shares[2],
                            nullptr);
 }
 
-static GstStructure* curve_of(const eventcamera::RateCurve& rates) {
+GstStructure* curve_of(const eventcamera::RateCurve& rates) {
   GstStructure* curve =
       gst_structure_new("rate-curve", "bin", G_TYPE_UINT64,
                         static_cast<guint64>(rates.bin_length()) * GST_USECOND, nullptr);
@@ -191,7 +123,7 @@ static GstStructure* curve_of(const eventcamera::RateCurve& rates) {
   return curve;
 }
 
-static GstStructure* structure_of(const StreamComparison& comparison) {
+GstStructure* structure_of(const StreamComparison& comparison) {
   const auto figures = comparison.figures();
   GstStructure* structure =
       gst_structure_new("eventcompare", "start", G_TYPE_INT64, gint64{figures.start}, "end",
@@ -210,271 +142,143 @@ static GstStructure* structure_of(const StreamComparison& comparison) {
   return structure;
 }
 
-/// Tells and writes what has come out. What never began to be compared is a comparison without
-/// events.
-static void conclude(GstEventCompare* self) {
-  self->priv->concluded = true;
+/// Posts and writes the figures; those of no events where the comparison has not begun.
+void EventCompare::conclude() {
+  concluded_ = true;
   const StreamComparison nothing(1, 1);
-  const auto& comparison = self->priv->comparison ? *self->priv->comparison : nothing;
-  report(self, places_of(self), structure_of(comparison), [&] {
+  const auto& comparison = comparison_ ? *comparison_ : nothing;
+  report(element(), settings.copy(), structure_of(comparison), [&] {
     return eventcamera::draw_maps(comparison.map(Side::reference), comparison.map(Side::candidate));
   });
 }
 
 /* events */
 
-static Nanoseconds stream_time(GstAggregatorPad* pad, GstClockTime time) {
-  guint64 result = time;
-  GST_OBJECT_LOCK(pad);
-  const gint sign = gst_segment_to_stream_time_full(&pad->segment, GST_FORMAT_TIME, time, &result);
-  GST_OBJECT_UNLOCK(pad);
-  const auto magnitude = static_cast<Nanoseconds>(std::min<guint64>(result, G_MAXINT64));
-  return sign < 0 ? -magnitude : magnitude;
-}
-
 /// Takes a buffer into the comparison. May throw.
-static void compare(GstEventCompare* self, Side side, GstBuffer* buffer) {
-  auto& priv = *self->priv;
+void EventCompare::compare(Side side, GstBuffer* buffer) {
   const auto interval = interval_of(buffer);
   const MappedEvents mapped(buffer);
   if (!interval || !mapped) {
-    priv.broken.warn(self,
-                     interval ? "a buffer is no whole number of events" : "a buffer has no PTS");
+    warn(interval ? EventFault::partial_event : EventFault::no_pts, buffer);
     return;
   }
-  if (!mapped.events().empty()) priv.concluded = false;
-  const auto left_out =
-      priv.comparison->add(side, mapped.events(), stream_time(priv.pads[side], interval->start),
-                           stream_time(priv.pads[side], interval->end));
-  if (left_out > 0) priv.broken.warn(self, "some lie beyond the sensor");
+  if (!mapped.events().empty()) concluded_ = false;
+  const GstSegment segment = segment_of(pads_[side]);
+  const auto skipped =
+      comparison_->add(side, mapped.events(), stream_time(segment, interval->start),
+                       stream_time(segment, interval->end));
+  if (skipped > 0) warn(EventFault::beyond_sensor, buffer);
 }
 
-static bool over(GstAggregatorPad* pad) {
-  return gst_aggregator_pad_is_eos(pad) && !gst_aggregator_pad_has_buffer(pad);
+bool EventCompare::is_over(Side side) const {
+  return gst_aggregator_pad_is_eos(pads_[side]) && !gst_aggregator_pad_has_buffer(pads_[side]);
 }
 
-/// Whether there is anything to compare, now that caps have come. May throw.
-static bool begin(GstEventCompare* self) {
-  auto& priv = *self->priv;
-  const auto& reference = priv.sensors[Side::reference];
-  const auto& candidate = priv.sensors[Side::candidate];
+/// Returns whether there is anything to compare, now that caps have come. May throw.
+bool EventCompare::begin() {
+  const auto& reference = sensors_[Side::reference];
+  const auto& candidate = sensors_[Side::candidate];
   if (!reference || !candidate || *reference != *candidate) return false;
-  if (!priv.comparison) {
-    priv.comparison.emplace(reference->width, reference->height);
-    priv.concluded = true;
+  if (!comparison_) {
+    comparison_.emplace(reference->width, reference->height);
+    concluded_ = true;
   }
   return true;
 }
 
-/// Takes what comes next of either side. May throw.
-static GstFlowReturn take_next(GstEventCompare* self) {
-  auto& priv = *self->priv;
-  auto* reference_pad = priv.pads[Side::reference];
-  auto* candidate_pad = priv.pads[Side::candidate];
-  const bool comparing = begin(self);
-  const auto behind = comparing ? priv.comparison->behind() : Side::candidate;
-  if (behind == Side::reference && !over(reference_pad)) {
-    GstBuffer* buffer = gst_aggregator_pad_pop_buffer(reference_pad);
-    if (buffer == nullptr) return GST_AGGREGATOR_FLOW_NEED_DATA;
-    const OwnedBuffer owned(buffer);
-    compare(self, Side::reference, buffer);
+/// Takes the next buffer of either stream. May throw.
+GstFlowReturn EventCompare::take_next() {
+  const bool comparing = begin();
+  const auto behind = comparing ? comparison_->behind() : Side::candidate;
+  if (behind == Side::reference && !is_over(Side::reference)) {
+    const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[Side::reference]));
+    if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    compare(Side::reference, buffer.get());
     return GST_FLOW_OK;
   }
-  GstBuffer* buffer = gst_aggregator_pad_peek_buffer(candidate_pad);
-  if (buffer == nullptr) return GST_AGGREGATOR_FLOW_NEED_DATA;
   {
-    const OwnedBuffer owned(buffer);
-    if (comparing && behind == Side::candidate) compare(self, Side::candidate, buffer);
+    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(main_pad()));
+    if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    if (comparing && behind == Side::candidate) compare(Side::candidate, buffer.get());
   }
-  return gst_aggregator_finish_buffer(GST_AGGREGATOR(self),
-                                      gst_aggregator_pad_pop_buffer(candidate_pad));
+  return gst_aggregator_finish_buffer(element(), gst_aggregator_pad_pop_buffer(main_pad()));
 }
 
-static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean) {
-  auto* self = event_compare(aggregator);
-  auto& priv = *self->priv;
-  if (over(priv.pads[Side::candidate])) {
-    conclude(self);
+GstFlowReturn EventCompare::aggregate(bool) {
+  if (is_over(Side::candidate)) {
+    conclude();
     return GST_FLOW_EOS;
   }
-  const auto& reference = priv.sensors[Side::reference];
-  const auto& candidate = priv.sensors[Side::candidate];
+  const auto& reference = sensors_[Side::reference];
+  const auto& candidate = sensors_[Side::candidate];
   if (reference && candidate && *reference != *candidate) {
-    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
-                      ("Only streams of sensors of one size can be compared; the reference has "
-                       "%d x %d pixels, the candidate %d x %d.",
+    GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                      ("Cannot compare sensors of two sizes: the reference has %d x %d pixels, the "
+                       "candidate %d x %d; scale one of them.",
                        reference->width, reference->height, candidate->width, candidate->height),
-                      (nullptr));
+                      ("width or height differ in the caps of the two sink pads"));
     return GST_FLOW_NOT_NEGOTIATED;
   }
-  try {
-    return take_next(self);
-  } catch (const std::bad_alloc&) {
-    priv.comparison.reset();
-    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
-                      ("There is not enough memory to compare these events."), (nullptr));
-    return GST_FLOW_ERROR;
-  }
+  return take_next();
 }
 
-/* negotiation */
+/* negotiation, states */
 
-static GstFlowReturn update_src_caps(GstAggregator* aggregator, GstCaps*, GstCaps** result) {
-  const auto& priv = *event_compare(aggregator)->priv;
-  if (!priv.candidate_caps) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  *result = gst_caps_ref(priv.candidate_caps.get());
-  return GST_FLOW_OK;
-}
-
-static bool take_caps(GstEventCompare* self, Side side, GstCaps* caps) {
-  auto& priv = *self->priv;
+bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  const Sensor sensor{info.width, info.height};
-  if (priv.sensors[side] != sensor) priv.comparison.reset();
-  priv.sensors[side] = sensor;
-  if (side == Side::candidate) {
-    priv.candidate_caps.reset(gst_caps_ref(caps));
-    gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(self));
-  }
+  auto& sensor = sensors_[pad == main_pad() ? Side::candidate : Side::reference];
+  const Sensor next{info.width, info.height};
+  if (sensor != next) comparison_.reset();
+  sensor = next;
   return true;
 }
 
-/// The candidate goes on as it comes, so downstream must take what upstream makes.
-static gboolean sink_query(GstAggregator* aggregator, GstAggregatorPad* pad, GstQuery* query) {
-  if (GST_QUERY_TYPE(query) != GST_QUERY_CAPS ||
-      pad != event_compare(aggregator)->priv->pads[Side::candidate])
-    return PARENT_AGGREGATOR_CLASS->sink_query(aggregator, pad, query);
-  answer_caps_of_passed(aggregator, pad, query);
-  return TRUE;
+void EventCompare::stop() {
+  if (comparison_ && !concluded_) conclude();
+  comparison_.reset();
+  sensors_ = {};
 }
 
-/* events, states */
+}  // namespace
 
-static bool take_segment(GstEventCompare* self, Side side, GstEvent* event) {
-  const GstSegment* segment = nullptr;
-  gst_event_parse_segment(event, &segment);
-  if (!plays_forwards(self, *segment, "compared")) return false;
-  if (side == Side::candidate) gst_aggregator_update_segment(GST_AGGREGATOR(self), segment);
-  return true;
-}
+G_DECLARE_FINAL_TYPE(GstEventCompare, gst_event_compare, GST, EVENT_COMPARE, GstEventAggregator)
 
-static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
-  auto* self = event_compare(aggregator);
-  const auto side = pad == self->priv->pads[Side::reference] ? Side::reference : Side::candidate;
-  if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
-    GstCaps* caps = nullptr;
-    gst_event_parse_caps(event, &caps);
-    const bool taken = take_caps(self, side, caps);
-    gst_event_unref(event);
-    return taken ? TRUE : FALSE;
-  }
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !take_segment(self, side, event)) {
-    gst_event_unref(event);
-    return FALSE;
-  }
-  return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
-}
+struct _GstEventCompare {
+  GstEventAggregator parent;
+};
 
-static gboolean src_event(GstAggregator* aggregator, GstEvent* event) {
-  auto* self = event_compare(aggregator);
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
-    for (GstAggregatorPad* pad :
-         {self->priv->pads[Side::reference], self->priv->pads[Side::candidate]}) {
-      if (would_seek(pad, event)) continue;
-      GST_WARNING_OBJECT(self, "refused %" GST_PTR_FORMAT, event);
-      gst_event_unref(event);
-      return FALSE;
-    }
-  }
-  return PARENT_AGGREGATOR_CLASS->src_event(aggregator, event);
-}
-
-static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
-  if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING)
-    return answer_seeking(event_compare(aggregator)->priv->pads[Side::candidate], query);
-  return PARENT_AGGREGATOR_CLASS->src_query(aggregator, query);
-}
-
-static GstFlowReturn flush(GstAggregator* aggregator) {
-  event_compare(aggregator)->priv->comparison.reset();
-  return GST_FLOW_OK;
-}
-
-static gboolean start(GstAggregator* aggregator) {
-  auto* self = event_compare(aggregator);
-  return can_report(self, places_of(self)) ? TRUE : FALSE;
-}
-
-static gboolean stop(GstAggregator* aggregator) {
-  auto* self = event_compare(aggregator);
-  auto& priv = *self->priv;
-  if (priv.comparison && !priv.concluded) conclude(self);
-  priv.comparison.reset();
-  priv.candidate_caps.reset();
-  priv.sensors = {};
-  priv.broken.begin_anew();
-  return TRUE;
-}
+G_DEFINE_TYPE_WITH_CODE(GstEventCompare, gst_event_compare, GST_TYPE_EVENT_AGGREGATOR,
+                        GST_DEBUG_CATEGORY_INIT(event_compare_debug, "eventcompare", 0,
+                                                "how alike two streams of events are"))
+GST_ELEMENT_REGISTER_DEFINE(eventcompare, "eventcompare", GST_RANK_NONE,
+                            gst_event_compare_get_type())
 
 /* type */
 
-static void finalize(GObject* object) {
-  delete event_compare(object)->priv;
-  G_OBJECT_CLASS(gst_event_compare_parent_class)->finalize(object);
+static GuardedSettings<ReportFiles>& settings_of(GObject* object) {
+  return inside_of<EventCompare>(object).settings;
 }
 
 static void gst_event_compare_init(GstEventCompare* self) {
-  self->priv = new Private;
-  for (const auto side : both_sides) self->priv->pads[side] = add_sink_pad(self, name_of(side));
+  gst_event_aggregator_make<EventCompare>(GST_EVENT_AGGREGATOR(self));
 }
 
 static void gst_event_compare_class_init(GstEventCompareClass* klass) {
-  GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = set_property;
-  object_class->get_property = get_property;
-  object_class->finalize = finalize;
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  add_report_properties(properties,
+                        "PNG file of the events per pixel, of both streams and of their "
+                        "difference, written at EOS or on stop");
 
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                  GST_PARAM_MUTABLE_READY);
-  g_object_class_install_property(
-      object_class, prop_location,
-      g_param_spec_string(
-          "location", "Location",
-          "Where the figures are written as JSON, at EOS or where it is stopped before", "",
-          flags));
-  g_object_class_install_property(
-      object_class, prop_map,
-      g_param_spec_string("map", "Map",
-                          "Where a picture of the events of each pixel, of both and of their "
-                          "difference, is written as PNG, at EOS or where it is stopped before",
-                          "", flags));
-
-#define COMPARED_CAPS         \
-  GST_EVENT_CAMERA_MEDIA_TYPE \
-  ", format = (string) XYTP, width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ]"
   static GstStaticPadTemplate reference_template = GST_STATIC_PAD_TEMPLATE(
-      "reference", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(COMPARED_CAPS));
+      "reference", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
   static GstStaticPadTemplate candidate_template = GST_STATIC_PAD_TEMPLATE(
-      "candidate", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(COMPARED_CAPS));
+      "candidate", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
   static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(COMPARED_CAPS));
-  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
-  for (auto* pad_template : {&reference_template, &candidate_template, &src_template})
-    gst_element_class_add_static_pad_template_with_gtype(element_class, pad_template,
-                                                         GST_TYPE_AGGREGATOR_PAD);
-  gst_element_class_set_static_metadata(element_class, "Event comparison", "Filter/Analyzer",
-                                        "Measures how alike two streams of events are",
-                                        "gst-eventsim");
-
-  GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
-  aggregator_class->aggregate = aggregate;
-  aggregator_class->update_src_caps = update_src_caps;
-  aggregator_class->sink_event = sink_event;
-  aggregator_class->src_event = src_event;
-  aggregator_class->src_query = src_query;
-  aggregator_class->sink_query = sink_query;
-  aggregator_class->flush = flush;
-  aggregator_class->start = start;
-  aggregator_class->stop = stop;
+      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
+  gst_event_aggregator_class_add_templates(
+      GST_EVENT_AGGREGATOR_CLASS(klass), {&reference_template, &candidate_template, &src_template});
+  gst_element_class_set_static_metadata(
+      GST_ELEMENT_CLASS(klass), "Event comparison", "Filter/Analyzer",
+      "Measures how alike two streams of events are", "gst-eventsim");
 }

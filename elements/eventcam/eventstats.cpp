@@ -37,7 +37,6 @@
 #include <span>
 #include <utility>
 
-#include "elements/eventcam/broken_events.hpp"
 #include "elements/eventcam/report.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -54,17 +53,9 @@ using eventcamera::Nanoseconds;
 
 namespace {
 
-enum Property {
-  prop_0,
-  prop_interval,
-  prop_location,
-  prop_map,
-};
-
 /// What the application sets.
-struct Settings {
+struct Settings : ReportFiles {
   GstClockTime interval = GST_SECOND;
-  ReportPlaces places{};
 };
 
 /// What is measured of some stretch of the stream.
@@ -99,28 +90,21 @@ struct Measurement {
 };
 
 struct Private {
-  std::mutex mutex;  // guards the settings; nothing is called under it
-  Settings settings;
+  GuardedSettings<Settings> settings;
 
   // The streaming thread's, or nobody's while there is none.
   std::optional<Measurement> measurement;
-  BrokenEvents broken{"not counted"};
+  EventFaults faults{"count"};
 };
 
-struct GstEventStats {
+}  // namespace
+
+G_DECLARE_FINAL_TYPE(GstEventStats, gst_event_stats, GST, EVENT_STATS, GstBaseTransform)
+
+struct _GstEventStats {
   GstBaseTransform parent;
   Private* priv;
 };
-
-struct GstEventStatsClass {
-  GstBaseTransformClass parent_class;
-};
-
-GstEventStats* event_stats(gpointer object) {
-  return static_cast<GstEventStats*>(object);
-}
-
-}  // namespace
 
 G_DEFINE_TYPE_WITH_CODE(GstEventStats, gst_event_stats, GST_TYPE_BASE_TRANSFORM,
                         GST_DEBUG_CATEGORY_INIT(event_stats_debug, "eventstats", 0,
@@ -128,53 +112,8 @@ G_DEFINE_TYPE_WITH_CODE(GstEventStats, gst_event_stats, GST_TYPE_BASE_TRANSFORM,
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
 GST_ELEMENT_REGISTER_DEFINE(eventstats, "eventstats", GST_RANK_NONE, gst_event_stats_get_type())
 
-/* properties */
-
-static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  auto& priv = *event_stats(object)->priv;
-  const auto text = [value] {
-    const gchar* path = g_value_get_string(value);
-    return std::string(path != nullptr ? path : "");
-  };
-  const std::lock_guard lock(priv.mutex);
-  switch (id) {
-    case prop_interval:
-      priv.settings.interval = g_value_get_uint64(value);
-      break;
-    case prop_location:
-      priv.settings.places.location = text();
-      break;
-    case prop_map:
-      priv.settings.places.map = text();
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-      break;
-  }
-}
-
-static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  auto& priv = *event_stats(object)->priv;
-  const std::lock_guard lock(priv.mutex);
-  switch (id) {
-    case prop_interval:
-      g_value_set_uint64(value, priv.settings.interval);
-      break;
-    case prop_location:
-      g_value_set_string(value, priv.settings.places.location.c_str());
-      break;
-    case prop_map:
-      g_value_set_string(value, priv.settings.places.map.c_str());
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-      break;
-  }
-}
-
-static Settings settings_of(GstEventStats* self) {
-  const std::lock_guard lock(self->priv->mutex);
-  return self->priv->settings;
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_EVENT_STATS(object)->priv->settings;
 }
 
 /* figures */
@@ -194,23 +133,15 @@ static void post(GstEventStats* self, GstStructure* structure) {
 }
 
 /// Of everything so far; what is no stream has no pixel, and no event.
-static void conclude(GstEventStats* self, const ReportPlaces& places) {
+static void conclude(GstEventStats* self, const ReportFiles& files) {
   Measurement nothing(1, 1);
   auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
   measurement.concluded = true;
-  report(self, places, figures_of(measurement.whole, measurement.end.value_or(0), true),
+  report(self, files, figures_of(measurement.whole, measurement.end.value_or(0), true),
          [&] { return eventcamera::draw_map(measurement.whole.statistics.map()); });
 }
 
 /* events */
-
-static Nanoseconds stream_time(GstEventStats* self, GstClockTime time) {
-  guint64 result = time;
-  const gint sign = gst_segment_to_stream_time_full(&GST_BASE_TRANSFORM(self)->segment,
-                                                    GST_FORMAT_TIME, time, &result);
-  const auto magnitude = static_cast<Nanoseconds>(std::min<guint64>(result, G_MAXINT64));
-  return sign < 0 ? -magnitude : magnitude;
-}
 
 /// What lies between intervals counts as time without events; where time goes back, it begins anew.
 static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) {
@@ -229,7 +160,7 @@ static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) 
 }
 
 static void post_if_due(GstEventStats* self, Measurement& measurement) {
-  const auto interval = static_cast<Nanoseconds>(settings_of(self).interval);
+  const auto interval = static_cast<Nanoseconds>(self->priv->settings.copy().interval);
   if (interval == 0 || measurement.recent.covered < interval) return;
   post(self, figures_of(measurement.recent, *measurement.end, false));
   measurement.recent.restart();
@@ -239,7 +170,7 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
                   Nanoseconds start) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
-    self->priv->broken.warn(self, "a buffer is no whole number of events");
+    self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
   const std::size_t left_out = measurement.arrivals.take(
@@ -248,20 +179,20 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
         measurement.whole.statistics.add(event);
         measurement.recent.statistics.add(event);
       });
-  if (left_out > 0) self->priv->broken.warn(self, "some lie beyond the sensor");
+  if (left_out > 0) self->priv->faults.warn(self, EventFault::beyond_sensor, buffer);
 }
 
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
-  auto* self = event_stats(transform);
+  auto* self = GST_EVENT_STATS(transform);
   auto& measurement = self->priv->measurement;
   const auto interval = interval_of(buffer);
   if (!interval) {
-    self->priv->broken.warn(self, "a buffer has no PTS");
+    self->priv->faults.warn(self, EventFault::no_pts, buffer);
     return GST_FLOW_OK;
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
-  const Nanoseconds start = stream_time(self, interval->start);
-  cover(*measurement, start, stream_time(self, interval->end));
+  const Nanoseconds start = stream_time(transform->segment, interval->start);
+  cover(*measurement, start, stream_time(transform->segment, interval->end));
   count(self, *measurement, buffer, start);
   post_if_due(self, *measurement);
   return GST_FLOW_OK;
@@ -274,18 +205,19 @@ static void take_gap(GstEventStats* self, GstEvent* event) {
   gst_event_parse_gap(event, &start, &duration);
   if (!measurement || !GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64) return;
   const GstClockTime end = start + std::min(duration, GstClockTime{G_MAXINT64} - start);
-  cover(*measurement, stream_time(self, start), stream_time(self, end));
+  const auto& segment = GST_BASE_TRANSFORM(self)->segment;
+  cover(*measurement, stream_time(segment, start), stream_time(segment, end));
   post_if_due(self, *measurement);
 }
 
 static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
-  auto* self = event_stats(transform);
+  auto* self = GST_EVENT_STATS(transform);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:
       take_gap(self, event);
       break;
     case GST_EVENT_EOS:
-      conclude(self, settings_of(self).places);
+      conclude(self, self->priv->settings.copy());
       break;
     case GST_EVENT_FLUSH_STOP:
       if (auto& measurement = self->priv->measurement)
@@ -300,7 +232,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 /* negotiation, states */
 
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
-  auto* self = event_stats(transform);
+  auto* self = GST_EVENT_STATS(transform);
   auto& measurement = self->priv->measurement;
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
@@ -310,34 +242,35 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
   if (measurement) conclude(self, {});
   try {
     measurement.emplace(info.width, info.height);
-  } catch (const std::bad_alloc&) {
+  } catch (const std::bad_alloc& error) {
     GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
-                      ("There is not enough memory to count the events of %d x %d pixels.",
+                      ("Not enough memory to count the events of %d x %d pixels; free memory, or "
+                       "lower the resolution.",
                        info.width, info.height),
-                      (nullptr));
+                      ("%s", error.what()));
     return FALSE;
   }
   return TRUE;
 }
 
 static gboolean start(GstBaseTransform* transform) {
-  auto* self = event_stats(transform);
-  return can_report(self, settings_of(self).places) ? TRUE : FALSE;
+  auto* self = GST_EVENT_STATS(transform);
+  return can_report(self, self->priv->settings.copy()) ? TRUE : FALSE;
 }
 
 static gboolean stop(GstBaseTransform* transform) {
-  auto* self = event_stats(transform);
+  auto* self = GST_EVENT_STATS(transform);
   auto& priv = *self->priv;
-  if (priv.measurement && !priv.measurement->concluded) conclude(self, settings_of(self).places);
+  if (priv.measurement && !priv.measurement->concluded) conclude(self, self->priv->settings.copy());
   priv.measurement.reset();
-  priv.broken.begin_anew();
+  priv.faults.reset();
   return TRUE;
 }
 
 /* type */
 
 static void finalize(GObject* object) {
-  delete event_stats(object)->priv;
+  delete GST_EVENT_STATS(object)->priv;
   G_OBJECT_CLASS(gst_event_stats_parent_class)->finalize(object);
 }
 
@@ -349,40 +282,22 @@ static void gst_event_stats_init(GstEventStats* self) {
 
 static void gst_event_stats_class_init(GstEventStatsClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = set_property;
-  object_class->get_property = get_property;
   object_class->finalize = finalize;
 
-  constexpr auto ready_flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                        GST_PARAM_MUTABLE_READY);
-  constexpr auto playing_flags = static_cast<GParamFlags>(
-      G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
-  const Settings defaults;
-  g_object_class_install_property(
-      object_class, prop_interval,
-      g_param_spec_uint64("interval", "Interval",
-                          "After how much of the stream figures are posted (ns; 0 = at EOS only)",
-                          0, std::numeric_limits<gint64>::max(), defaults.interval, playing_flags));
-  g_object_class_install_property(
-      object_class, prop_location,
-      g_param_spec_string(
-          "location", "Location",
-          "Where the figures are written as JSON, at EOS or where it is stopped before", "",
-          ready_flags));
-  g_object_class_install_property(
-      object_class, prop_map,
-      g_param_spec_string("map", "Map",
-                          "Where a picture of the events of each pixel is written as PNG, at EOS "
-                          "or where it is stopped before",
-                          "", ready_flags));
+  Properties<settings_of> properties(object_class);
+  properties.add(&Settings::interval,
+                 g_param_spec_uint64(
+                     "interval", "Interval",
+                     "Time between messages with figures, in stream time (ns; 0 = at EOS only)", 0,
+                     std::numeric_limits<gint64>::max(), Settings().interval,
+                     static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                              GST_PARAM_MUTABLE_PLAYING)));
+  add_report_properties(properties, "PNG file of the events per pixel, written at EOS or on stop");
 
-#define MEASURED_CAPS         \
-  GST_EVENT_CAMERA_MEDIA_TYPE \
-  ", format = (string) XYTP, width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ]"
   static GstStaticPadTemplate sink_template =
-      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(MEASURED_CAPS));
+      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
   static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(MEASURED_CAPS));
+      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_static_pad_template(element_class, &sink_template);
   gst_element_class_add_static_pad_template(element_class, &src_template);

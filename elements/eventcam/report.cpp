@@ -3,6 +3,7 @@
 
 #include <json-glib/json-glib.h>
 
+#include <algorithm>
 #include <array>
 #include <exception>
 #include <memory>
@@ -59,7 +60,7 @@ JsonNode* node_of(const GstStructure* structure) {
   return node;
 }
 
-/// Why a file could not be written; nothing where it could, or is not to be.
+/// Why a file cannot be written; nothing where it can, or is not to be.
 std::optional<std::string> obstacle_to(const std::string& path) {
   if (path.empty()) return std::nullopt;
   const Owned<gchar> folder(g_path_get_dirname(path.c_str()));
@@ -98,25 +99,35 @@ void put_figures(GstStructure* structure, const StreamFigures& figures) {
                       static_cast<guint64>(figures.gaps[i]) * GST_USECOND, nullptr);
 }
 
-bool can_report(gpointer element, const ReportPlaces& places) {
-  for (const auto& path : {places.location, places.map}) {
+eventcamera::Nanoseconds stream_time(const GstSegment& segment, GstClockTime time) {
+  guint64 result = time;
+  const gint sign = gst_segment_to_stream_time_full(&segment, GST_FORMAT_TIME, time, &result);
+  const auto magnitude =
+      static_cast<eventcamera::Nanoseconds>(std::min<guint64>(result, G_MAXINT64));
+  return sign < 0 ? -magnitude : magnitude;
+}
+
+bool can_report(gpointer element, const ReportFiles& files) {
+  for (const auto& path : {files.location, files.map}) {
     const auto obstacle = obstacle_to(path);
     if (!obstacle) continue;
     GST_ELEMENT_ERROR(element, RESOURCE, OPEN_WRITE,
-                      ("\"%s\" cannot be written. %s", path.c_str(), obstacle->c_str()), (nullptr));
+                      ("Cannot write \"%s\": %s", path.c_str(), obstacle->c_str()),
+                      ("g_file_test() on \"%s\"", path.c_str()));
     return false;
   }
   return true;
 }
 
-void report(gpointer element, const ReportPlaces& places, GstStructure* figures,
+void report(gpointer element, const ReportFiles& files, GstStructure* figures,
             const std::function<eventcamera::RgbPicture()>& draw) {
   try {
-    if (!places.location.empty()) write_json(figures, places.location);
-    if (!places.map.empty()) draw().write_png(places.map);
-  } catch (const std::exception& failure) {
+    if (!files.location.empty()) write_json(figures, files.location);
+    if (!files.map.empty()) draw().write_png(files.map);
+  } catch (const std::exception& error) {
     GST_ELEMENT_ERROR(element, RESOURCE, WRITE,
-                      ("The figures cannot be written: %s", failure.what()), (nullptr));
+                      ("Cannot write the figures; check the folder and the free space."),
+                      ("%s", error.what()));
   }
   gst_element_post_message(GST_ELEMENT(element),
                            gst_message_new_element(GST_OBJECT(element), figures));

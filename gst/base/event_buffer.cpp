@@ -17,3 +17,16 @@ std::optional<EventInterval> interval_of(GstBuffer* buffer) {
                                                                      : time_of_last_event(buffer);
   return EventInterval{start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)};
 }
+
+void EventFaults::warn(gpointer element, EventFault fault, GstBuffer* buffer) {
+  static constexpr std::array reasons = {"a buffer has no PTS",
+                                         "a buffer's size is not a multiple of 8 bytes",
+                                         "some lie beyond the sensor"};
+  const auto index = static_cast<std::size_t>(fault);
+  gchar* cause = gst_info_strdup_printf("%" GST_PTR_FORMAT, buffer);
+  warnings_[index](element,
+                   {GST_STREAM_ERROR_FORMAT, std::string("Cannot ") + verb_ + " all events: " +
+                                                 reasons[index] + "; skipping these."},
+                   cause);
+  g_free(cause);
+}

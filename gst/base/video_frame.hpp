@@ -6,6 +6,13 @@
 #include <cstddef>
 #include <cstdint>
 
+/// How long a frame lasts; 0 where the framerate varies.
+inline GstClockTime frame_duration(const GstVideoInfo& video) {
+  if (GST_VIDEO_INFO_FPS_N(&video) <= 0) return 0;
+  return gst_util_uint64_scale_int(GST_SECOND, GST_VIDEO_INFO_FPS_D(&video),
+                                   GST_VIDEO_INFO_FPS_N(&video));
+}
+
 /// The first plane of a buffer mapped as video, while it lives; its stride is that of the buffer's
 /// GstVideoMeta, if it has one.
 class VideoFrame {

@@ -16,6 +16,14 @@ constexpr Microseconds time_of(const Event& event, Microseconds start) {
   return start + (event.t == 0 ? 1 : event.t);
 }
 
+/// Those of sorted events, which count their times from `start`, that are not later than `end`.
+inline std::span<const Event> events_until(std::span<const Event> events, Microseconds start,
+                                           Microseconds end) {
+  const auto first_after =
+      std::ranges::find_if(events, [&](const Event& event) { return time_of(event, start) > end; });
+  return events.first(static_cast<std::size_t>(first_after - events.begin()));
+}
+
 /// Makes sure of events that others rely on: they lie inside the picture and are sorted by time.
 class Arrivals {
  public:

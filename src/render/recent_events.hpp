@@ -11,10 +11,10 @@ namespace eventcamera {
 /// A queue of events in a ring that grows as it must, up to so many.
 class RecentEvents {
  public:
-  static constexpr std::size_t most = std::size_t{1} << 23;
+  static constexpr std::size_t max_size = std::size_t{1} << 23;
 
   bool empty() const { return size_ == 0; }
-  bool full() const { return size_ == most; }
+  bool full() const { return size_ == max_size; }
   std::size_t size() const { return size_; }
   const AbsoluteEvent& front() const { return ring_[first_]; }
 

@@ -283,7 +283,7 @@ TEST(Renderer, KeepsWhatItShowsWhenRepainted) {
 
 /// A window that takes for ever at a rate that knows no bounds.
 TEST(Renderer, KeepsSoManyEventsAndNoMore) {
-  constexpr std::size_t more = RecentEvents::most + 10;
+  constexpr std::size_t more = RecentEvents::max_size + 10;
   Renderer renderer(width, height, {.mode = RenderMode::count, .full_scale = 100});
   const std::vector<Event> early(20, Event::at(1, 1, 1, Polarity::on));
   const std::vector<Event> rest(more - 20, Event::at(2, 2, 2, Polarity::off));

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <glib-object.h>
+
+#include <functional>
+#include <mutex>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+/// What the application sets, at any time; the element works with a copy.
+template <class Settings>
+class GuardedSettings {
+ public:
+  using Type = Settings;
+
+  Settings copy() const {
+    const std::lock_guard lock(mutex_);
+    return settings_;
+  }
+  template <class Access>
+  void access(const Access& access) {
+    const std::lock_guard lock(mutex_);
+    access(settings_);
+  }
+
+ private:
+  mutable std::mutex mutex_;  // nothing is called under it
+  Settings settings_;
+};
+
+/// Copies a property's value into a field.
+template <class Field>
+void read_value(const GValue* value, Field& field) {
+  if constexpr (std::is_same_v<Field, std::string>) {
+    const gchar* text = g_value_get_string(value);
+    field = text != nullptr ? text : "";
+  } else {
+    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) {
+      case G_TYPE_BOOLEAN:
+        field = static_cast<Field>(g_value_get_boolean(value));
+        break;
+      case G_TYPE_ENUM:
+        field = static_cast<Field>(g_value_get_enum(value));
+        break;
+      case G_TYPE_UINT:
+        field = static_cast<Field>(g_value_get_uint(value));
+        break;
+      case G_TYPE_UINT64:
+        field = static_cast<Field>(g_value_get_uint64(value));
+        break;
+      case G_TYPE_DOUBLE:
+        field = static_cast<Field>(g_value_get_double(value));
+        break;
+      default:
+        g_assert_not_reached();
+    }
+  }
+}
+
+/// Copies a field into a property's value.
+template <class Field>
+void write_value(const Field& field, GValue* value) {
+  if constexpr (std::is_same_v<Field, std::string>) {
+    g_value_set_string(value, field.c_str());
+  } else {
+    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) {
+      case G_TYPE_BOOLEAN:
+        g_value_set_boolean(value, static_cast<gboolean>(field));
+        break;
+      case G_TYPE_ENUM:
+        g_value_set_enum(value, static_cast<gint>(field));
+        break;
+      case G_TYPE_UINT:
+        g_value_set_uint(value, static_cast<guint>(field));
+        break;
+      case G_TYPE_UINT64:
+        g_value_set_uint64(value, static_cast<guint64>(field));
+        break;
+      case G_TYPE_DOUBLE:
+        g_value_set_double(value, static_cast<gdouble>(field));
+        break;
+      default:
+        g_assert_not_reached();
+    }
+  }
+}
+
+/// For class_init: properties that are fields of a class's settings. `settings_of` gives the
+/// GuardedSettings of an object.
+template <auto settings_of>
+class Properties {
+ public:
+  using Settings =
+      typename std::remove_reference_t<decltype(settings_of(static_cast<GObject*>(nullptr)))>::Type;
+
+  explicit Properties(GObjectClass* klass) : klass_(klass) {
+    klass->set_property = set_property;
+    klass->get_property = get_property;
+  }
+
+  /// Adds the property that is this field: a pointer to a member of Settings, or a function that
+  /// returns a reference into it. Fields are numbers, enums, truths or strings.
+  template <class Field>
+  void add(Field field, GParamSpec* spec) {
+    fields().push_back(
+        {.read = [field](Settings& settings,
+                         const GValue* value) { read_value(value, std::invoke(field, settings)); },
+         .write = [field](Settings& settings,
+                          GValue* value) { write_value(std::invoke(field, settings), value); }});
+    g_object_class_install_property(klass_, static_cast<guint>(fields().size()), spec);
+  }
+
+ private:
+  struct Accessors {
+    std::function<void(Settings&, const GValue*)> read;
+    std::function<void(Settings&, GValue*)> write;
+  };
+
+  /// By property number, from 1 on.
+  static std::vector<Accessors>& fields() {
+    static std::vector<Accessors> fields;
+    return fields;
+  }
+  static void set_property(GObject* object, guint id, const GValue* value, GParamSpec*) {
+    settings_of(object).access([&](Settings& settings) { fields()[id - 1].read(settings, value); });
+  }
+  static void get_property(GObject* object, guint id, GValue* value, GParamSpec*) {
+    settings_of(object).access(
+        [&](Settings& settings) { fields()[id - 1].write(settings, value); });
+  }
+
+  GObjectClass* klass_;
+};
