@@ -158,7 +158,7 @@ class Player {
   explicit Player(const std::string& path, const std::string& between = "",
                   const std::string& properties = "") {
     gst_init(nullptr, nullptr);
-    const auto launch = "filesrc name=source location=" + path + " ! " +
+    const auto launch = "filesrc name=source location=" + in_quotes(path) + " ! " +
                         (between.empty() ? "" : between + " ! ") + "aedatdemux name=d " +
                         properties;
     pipeline_.reset(gst_parse_launch(launch.c_str(), nullptr));
@@ -787,10 +787,10 @@ TEST(AedatMux, WritesWhatTheDemuxerReads) {
     SCOPED_TRACE(compressions[i]);
     const File in(aedat4_with_frames(events, formats[i], 30));
     const File out{Bytes{}};
-    ASSERT_TRUE(run("filesrc location=" + in.path() +
+    ASSERT_TRUE(run("filesrc location=" + in_quotes(in.path()) +
                     " ! aedatdemux name=d  d.events_0 ! queue ! m.events  d.video_0 ! queue ! "
                     "m.video  aedatmux name=m compression=" +
-                    compressions[i] + " ! filesink location=" + out.path()));
+                    compressions[i] + " ! filesink location=" + in_quotes(out.path())));
     const auto before = content_of(in.bytes());
     const auto after = content_of(out.bytes());
     EXPECT_TRUE(after.table);
@@ -817,10 +817,10 @@ TEST(AedatMux, KeepsTheTimesOfAFile) {
   const File in(aedat4_with_frames(events, Aedat4PixelFormat::grey8, 5));
   const File out{Bytes{}};
   ASSERT_TRUE(
-      run("filesrc location=" + in.path() +
+      run("filesrc location=" + in_quotes(in.path()) +
           " ! aedatdemux name=d  d.events_0 ! queue ! m.events  d.video_0 ! queue ! m.video  "
           "aedatmux name=m ! filesink location=" +
-          out.path()));
+          in_quotes(out.path())));
   const auto before = content_of(in.bytes());
   const auto after = content_of(out.bytes());
   EXPECT_TRUE(after.events == before.events);
@@ -832,10 +832,10 @@ TEST(AedatMux, NeedsNoSeeking) {
   const File in(aedat4(events));
   const File out{Bytes{}};
   // What comes through the tee's branch goes on as a stream does.
-  ASSERT_TRUE(run("filesrc location=" + in.path() +
+  ASSERT_TRUE(run("filesrc location=" + in_quotes(in.path()) +
                   " ! aedatdemux ! aedatmux ! aedatdemux ! aedatmux compression=none ! filesink "
                   "location=" +
-                  out.path()));
+                  in_quotes(out.path())));
   const auto content = content_of(out.bytes());
   EXPECT_TRUE(content.events == events);
   EXPECT_EQ(content.streams.front().source, "a camera");

@@ -143,7 +143,7 @@ class Player {
  public:
   Player(const std::string& path, const std::string& middle) {
     gst_init(nullptr, nullptr);
-    const auto launch = "filesrc location=" + path + " ! " + middle +
+    const auto launch = "filesrc location=" + in_quotes(path) + " ! " + middle +
                         " ! fakesink name=sink sync=false signal-handoffs=true";
     pipeline_.reset(gst_parse_launch(launch.c_str(), nullptr));
     bus_.reset(gst_element_get_bus(pipeline_.get()));
@@ -577,7 +577,7 @@ TEST_P(EveryFormat, HoldsWhatComesAfterASeekAlone) {
   const TemporaryFile in(file_of(format(), events));
   const TemporaryFile out("");
   Player player(in.path(), std::string(format().reader) + " ! tee name=t  t. ! queue ! " +
-                               format().writer + " ! filesink location=" + out.path() +
+                               format().writer + " ! filesink location=" + in_quotes(out.path()) +
                                "  t. ! queue");
   ASSERT_TRUE(player.pause());
   ASSERT_TRUE(player.seek(3 * GST_SECOND));

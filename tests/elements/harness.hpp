@@ -13,6 +13,11 @@
 
 #include "gst/eventcamera/eventcamera.h"
 
+/// For launch lines: a path may have blanks.
+inline std::string in_quotes(const std::string& path) {
+  return '"' + path + '"';
+}
+
 /// A simulator element between a source and a sink that the test plays.
 namespace harness {
 

@@ -183,10 +183,10 @@ TEST_P(Hdf5, IsReadPulledPushedAndFromItsSource) {
   const auto events = some_events();
   const auto path = written(events);
   for (const auto& launch :
-       {"filesrc location=" + path + " ! eventhdf5dec",
-        "filesrc location=" + path + " ! queue ! eventhdf5dec",
-        "filesrc blocksize=777 location=" + path + " ! identity ! eventhdf5dec",
-        "eventhdf5src location=" + path}) {
+       {"filesrc location=" + in_quotes(path) + " ! eventhdf5dec",
+        "filesrc location=" + in_quotes(path) + " ! queue ! eventhdf5dec",
+        "filesrc blocksize=777 location=" + in_quotes(path) + " ! identity ! eventhdf5dec",
+        "eventhdf5src location=" + in_quotes(path)}) {
     SCOPED_TRACE(launch);
     Player player(launch);
     for (int times = 0; times < 2; ++times) {
@@ -201,21 +201,21 @@ TEST_P(Hdf5, IsReadPulledPushedAndFromItsSource) {
 
 TEST_P(Hdf5, IsFoundByDecodebin) {
   const auto events = some_events();
-  Player player("filesrc location=" + written(events) +
+  Player player("filesrc location=" + in_quotes(written(events)) +
                 " ! decodebin caps=application/x-event-camera");
   ASSERT_TRUE(player.ends_well());
   EXPECT_TRUE(player.events == events);
 }
 
 TEST_P(Hdf5, CutsByBufferTime) {
-  Player player("eventhdf5src buffer-time=100000000 location=" + written(some_events()));
+  Player player("eventhdf5src buffer-time=100000000 location=" + in_quotes(written(some_events())));
   ASSERT_TRUE(player.ends_well());
   EXPECT_EQ(player.buffers, 10);
 }
 
 TEST_P(Hdf5, IsSoughtIn) {
   const auto events = some_events();
-  Player player("eventhdf5src location=" + written(events));
+  Player player("eventhdf5src location=" + in_quotes(written(events)));
   ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
   EXPECT_EQ(player.duration(), (events.back().t - events.front().t + 1) * 1000);
   for (const Microseconds start : {3'700'000, 100'000, 0, 499'999, 2'000'000, 3'999'000}) {
@@ -233,7 +233,7 @@ TEST_P(Hdf5, IsSoughtIn) {
 }
 
 TEST_P(Hdf5, IsSoughtInWhilePlaying) {
-  Player player("eventhdf5src location=" + written(some_events()));
+  Player player("eventhdf5src location=" + in_quotes(written(some_events())));
   ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
   gst_element_set_state(player.get(), GST_STATE_PLAYING);
   std::mt19937 random(3);
@@ -250,7 +250,7 @@ TEST_P(Hdf5, IsSoughtInWhilePlaying) {
 TEST_P(Hdf5, IsEmptyWhereThereAreNoEvents) {
   const auto path = written({});
   for (const char* way : {"", "queue ! "}) {
-    Player player("filesrc location=" + path + " ! " + way + "eventhdf5dec");
+    Player player("filesrc location=" + in_quotes(path) + " ! " + way + "eventhdf5dec");
     EXPECT_TRUE(player.ends_well());
     EXPECT_TRUE(player.events.empty());
   }
@@ -269,7 +269,7 @@ TEST_P(Hdf5, SurvivesBrokenFiles) {
   for (const auto& bytes : {whole.substr(0, whole.size() - 5000), corrupt}) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
     for (const char* way : {"", "queue ! "}) {
-      Player player("filesrc location=" + path + " ! " + way + "eventhdf5dec");
+      Player player("filesrc location=" + in_quotes(path) + " ! " + way + "eventhdf5dec");
       const auto message = player.play();
       ASSERT_TRUE(message);
       if (GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_ERROR)
@@ -283,9 +283,9 @@ TEST_P(Hdf5, SurvivesBrokenFiles) {
 TEST_P(Hdf5, IsWritten) {
   const auto events = some_events();
   const auto path = folder_ / "out.h5";
-  Player player("eventhdf5src location=" + written(events) +
+  Player player("eventhdf5src location=" + in_quotes(written(events)) +
                 " ! tee name=t  t. ! queue ! eventhdf5sink layout=" + GetParam() +
-                " location=" + path + "  t. ! queue");
+                " location=" + in_quotes(path) + "  t. ! queue");
   ASSERT_TRUE(player.ends_well());
   // It is whole at the end of the stream, not only after the stop.
   EXPECT_TRUE(read(path) == events);
@@ -339,7 +339,7 @@ TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
   const auto path = folder_ / "out.h5";
   const Events events = {AbsoluteEvent::at(5, 6, 1'000'007, Polarity::on),
                          AbsoluteEvent::at(7, 8, 1'000'009, Polarity::off)};
-  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
+  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + in_quotes(path));
   sink.caps(events_caps);
   EXPECT_EQ(sink.push(events, 1'000'000), GST_FLOW_OK);
   sink.stop();
@@ -348,7 +348,7 @@ TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
 
 TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
   const auto path = folder_ / "out.h5";
-  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
+  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + in_quotes(path));
   sink.caps(events_caps);
   const Events events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
                          AbsoluteEvent::at(width, 5, 1001, Polarity::on),
@@ -370,7 +370,7 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
 
 TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
   const auto path = folder_ / "out.h5";
-  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + path);
+  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + in_quotes(path));
   sink.caps(events_caps);
   const auto late = AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on);
   const auto early = AbsoluteEvent::at(6, 6, 1003, Polarity::off);
@@ -392,7 +392,7 @@ TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
 
 TEST_P(Hdf5, IsOfOneSize) {
   Sink sink("eventhdf5sink layout=" + std::string(GetParam()) +
-            " location=" + (folder_ / "out.h5"));
+            " location=" + in_quotes(folder_ / "out.h5"));
   sink.caps("application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1");
   sink.caps(events_caps);  // nothing is written yet
   EXPECT_EQ(sink.push({AbsoluteEvent::at(200, 5, 0, Polarity::on)}, 0), GST_FLOW_OK);
@@ -418,12 +418,12 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
               std::string::npos);
   }
   {
-    Sink sink("eventhdf5sink layout=metavision location=" + (folder / "out.h5"));
+    Sink sink("eventhdf5sink layout=metavision location=" + in_quotes(folder / "out.h5"));
     sink.caps("application/x-event-camera, format=XYTP, width=4000, height=48, framerate=0/1");
     EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("at most 2048 pixels"), std::string::npos);
   }
   {
-    Sink sink("eventhdf5sink location=" + (folder / "out.h5"));
+    Sink sink("eventhdf5sink location=" + in_quotes(folder / "out.h5"));
     sink.caps(events_caps);
     GstBuffer* buffer = gst_buffer_new_memdup("seven b", 7);
     GST_BUFFER_PTS(buffer) = 0;
@@ -437,13 +437,14 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
 
 TEST(Hdf5Src, SaysWhatCannotBeRead) {
   const Folder folder;
-  EXPECT_NE(Player("eventhdf5src location=" + (folder / "none.h5")).error(), "");
+  EXPECT_NE(Player("eventhdf5src location=" + in_quotes(folder / "none.h5")).error(), "");
   std::ofstream(folder / "text.h5") << "t,x,y,p\n";
   for (const char* way : {"", "queue ! "})
-    EXPECT_NE(Player("filesrc location=" + (folder / "text.h5") + " ! " + way + "eventhdf5dec")
-                  .error()
-                  .find("not an HDF5 file"),
-              std::string::npos);
+    EXPECT_NE(
+        Player("filesrc location=" + in_quotes(folder / "text.h5") + " ! " + way + "eventhdf5dec")
+            .error()
+            .find("not an HDF5 file"),
+        std::string::npos);
 }
 
 TEST(Hdf5Elements, GoThroughAllStates) {

@@ -81,8 +81,8 @@ class MeasureTest : public testing::Test {
 class StatsTest : public MeasureTest {};
 
 TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
-  Harness h("eventstats interval=" + std::to_string(50 * ms) + " location=" + path("f.json") +
-            " map=" + path("map.png"));
+  Harness h("eventstats interval=" + std::to_string(50 * ms) +
+            " location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   h.caps(small_sensor);
   const std::vector first = {Event::at(1, 0, 0, Polarity::on), Event::at(1, 0, 30, Polarity::off),
                              Event::at(2, 3, 40, Polarity::on)};
@@ -118,7 +118,8 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
 }
 
 TEST_F(StatsTest, WritesWhatHasComeWhereItIsStopped) {
-  Harness h("eventstats location=" + path("f.json") + " map=" + path("map.png"));
+  Harness h("eventstats location=" + in_quotes(path("f.json")) +
+            " map=" + in_quotes(path("map.png")));
   h.caps(small_sensor);
   h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
   gst_element_set_state(h.element(), GST_STATE_READY);
@@ -131,7 +132,7 @@ TEST_F(StatsTest, WritesWhatHasComeWhereItIsStopped) {
 
 TEST_F(StatsTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
   for (const bool with_events : {false, true}) {
-    Harness h("eventstats location=" + path("f.json"));
+    Harness h("eventstats location=" + in_quotes(path("f.json")));
     h.caps(small_sensor);
     if (with_events) {
       h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
@@ -156,7 +157,8 @@ TEST_F(StatsTest, CountsASilenceBetweenBuffersAsTime) {
 
 TEST_F(StatsTest, EndsWithoutAnyEvent) {
   for (const bool with_caps : {true, false}) {
-    Harness h("eventstats location=" + path("f.json") + " map=" + path("map.png"));
+    Harness h("eventstats location=" + in_quotes(path("f.json")) +
+              " map=" + in_quotes(path("map.png")));
     if (with_caps) h.caps(small_sensor);
     gst_harness_push_event(h.get(), gst_event_new_eos());
     const auto message = h.message(GST_MESSAGE_ELEMENT);
@@ -238,17 +240,18 @@ std::string refusal_of(const std::string& launch) {
 TEST_F(StatsTest, SaysBeforehandThatAFolderIsMissing) {
   for (const std::string element : {"eventstats", "eventcompare"}) {
     for (const std::string property : {"location", "map"}) {
-      const auto text = refusal_of(element + " " + property + "=" + path("nowhere/file"));
+      const auto text =
+          refusal_of(element + " " + property + "=" + in_quotes(path("nowhere/file")));
       EXPECT_NE(text.find("There is no folder"), std::string::npos) << text;
       EXPECT_NE(text.find("nowhere"), std::string::npos) << text;
     }
-    const auto text = refusal_of(element + " location=" + folder.string());
+    const auto text = refusal_of(element + " location=" + in_quotes(folder.string()));
     EXPECT_NE(text.find("is a folder"), std::string::npos) << text;
   }
 }
 
 TEST_F(StatsTest, SaysThatAFolderHasGoneMissing) {
-  Harness h("eventstats location=" + path("f.json"));
+  Harness h("eventstats location=" + in_quotes(path("f.json")));
   h.caps(small_sensor);
   std::filesystem::remove_all(folder);
   gst_harness_push_event(h.get(), gst_event_new_eos());
@@ -304,7 +307,7 @@ class CompareTest : public MeasureTest {
 };
 
 TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
-  make("location=" + path("f.json") + " map=" + path("map.png"));
+  make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   begin();
   // The candidate begins 10 ms later; what of the reference lies before that does not count.
   gst_harness_push(reference.get(), buffer_of(0,
@@ -390,7 +393,7 @@ TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
 }
 
 TEST_F(CompareTest, EndsWithoutAnyEvent) {
-  make("location=" + path("f.json"));
+  make("location=" + in_quotes(path("f.json")));
   begin();
   end(reference);
   end(candidate);
@@ -402,7 +405,7 @@ TEST_F(CompareTest, EndsWithoutAnyEvent) {
 }
 
 TEST_F(CompareTest, WritesWhatHasComeWhereItIsStopped) {
-  make("location=" + path("f.json") + " map=" + path("map.png"));
+  make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   begin();
   for (const GstClockTime t : {0 * ms, 10 * ms})
     for (auto* h : {reference.get(), candidate.get()})
@@ -417,14 +420,14 @@ TEST_F(CompareTest, WritesWhatHasComeWhereItIsStopped) {
 }
 
 TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasCome) {
-  make("location=" + path("f.json"));
+  make("location=" + in_quotes(path("f.json")));
   begin();
   gst_element_set_state(element_.get(), GST_STATE_READY);
   EXPECT_FALSE(std::filesystem::exists(path("f.json")));
 }
 
 TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
-  make("location=" + path("f.json"));
+  make("location=" + in_quotes(path("f.json")));
   begin();
   for (auto* h : {reference.get(), candidate.get()})
     gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());

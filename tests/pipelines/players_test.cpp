@@ -103,8 +103,8 @@ class Files {
                                        {"a.aedat4", "aedatmux ! filesink"},
                                        {"dsec.h5", "eventhdf5sink"},
                                        {"metavision.hdf5", "eventhdf5sink layout=metavision"}})
-      EXPECT_TRUE(run("filesrc location=" + path("evt3.raw") + " ! evtdec ! " + writer +
-                      " location=" + path(name)));
+      EXPECT_TRUE(run("filesrc location=\"" + path("evt3.raw") + "\" ! evtdec ! " + writer +
+                      " location=\"" + path(name) + "\""));
   }
 
   void save(const std::string& name, const Bytes& bytes) const {
@@ -247,7 +247,7 @@ TEST_P(EveryDecodebin, DrawsTheWholeFile) {
   const auto& [bin, file] = GetParam();
   gst_init(nullptr, nullptr);
   GError* error = nullptr;
-  const auto launch = "filesrc location=" + Files::get().path(file) + " ! " + bin +
+  const auto launch = "filesrc location=\"" + Files::get().path(file) + "\" ! " + bin +
                       " ! video/x-raw ! fakesink name=sink signal-handoffs=true";
   GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
   ASSERT_EQ(error, nullptr) << error->message;
