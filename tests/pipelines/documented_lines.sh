@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Runs the command lines of README.md and docs/*.md, with test pictures instead of cameras and
+# without windows.
+set -eu
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+export PATH=$BUILD/pipelines:$PATH
+mkdir pipelines
+cp "$SOURCE/pipelines/events_to_numpy.py" pipelines/
+
+fail() {
+  echo "FAILED: $*"
+  exit 1
+}
+
+# The files that the lines read.
+ball="videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=I420,framerate=25/1"
+eval "$GST_LAUNCH -q $ball ! x264enc ! mp4mux ! filesink location=drive.mp4"
+eval "$GST_LAUNCH -q filesrc location=drive.mp4 ! decodebin ! eventsim-dvs ! evtenc ! filesink location=drive.raw"
+eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-dvs ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=davis.aedat4"
+for name in recording real simulated; do cp drive.raw $name.raw; done
+
+count=0
+while IFS= read -r line; do
+  line=${line//v4l2src/$ball}
+  line=${line//rtspsrc location=rtsp:\/\/camera\/stream ! decodebin/$ball}
+  line=${line//num-buffers=300/num-buffers=40}
+  line=${line//pattern=ball foreground/pattern=ball num-buffers=40 foreground}
+  line=${line//autovideosink/fakesink}
+  case $line in
+    gst-play*) line="$line --no-interactive --videosink=fakesink" ;;
+    event-calibrate*) # one and a half seconds are enough
+      line=${line/--to 2 --measure-from 2 --measure-to 10/--to 0.3 --measure-from 0.3 --measure-to 1}
+      line="${line/eventsim-dvs/\"eventsim-dvs response=log log-eps=0.02 denoise=0\"}"
+      ;;
+  esac
+  echo "$line"
+  eval "timeout 120 $line" >output 2>&1 </dev/null || fail "$(cat output)"
+  count=$((count + 1))
+done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|event-|\.\/pipelines\/events_)/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
+[ $count -ge 18 ] || fail "found only $count lines"
+for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy; do
+  [ -s $file ] || fail "$file is missing or empty"
+done
