@@ -159,19 +159,19 @@ def table(result):
         return abs(np.log(max(row["candidate"][field], 1e-9) / real[field]))
 
     nearest = {field: min(off(row, field) for row in rows.values())
-               for field in ("mean", "deviation")}
+               for field in ("mean", "std-dev")}
     best_map = max(row["map-correlation"] for row in rows.values())
-    best_share = {share: max(row[f"{share[0]}-partners"][share[1]] for row in rows.values())
+    best_share = {share: max(row[f"{share[0]}-matches"][share[1]] for row in rows.values())
                   for share in shares}
     lines = [
         "| | C+ / C− | mean | std. dev. | map correlation"
         " | real events matched within 1, 5, 10 ms | simulated events matched |",
         "|---|---|---|---|---|---|---|",
-        f"| real events | | {real['mean']:.3f} | {real['deviation']:.3f} | | | |",
+        f"| real events | | {real['mean']:.3f} | {real['std-dev']:.3f} | | | |",
     ]
     for name, row in rows.items():
         cells = [name, thresholds_of(row["element"])]
-        for field in ("mean", "deviation"):
+        for field in ("mean", "std-dev"):
             value = row["candidate"][field]
             cells.append(bold_where(
                 off(row, field) == nearest[field],
@@ -181,7 +181,7 @@ def table(result):
         for side in ("reference", "candidate"):
             values = []
             for within in ("within-1ms", "within-5ms", "within-10ms"):
-                value = row[f"{side}-partners"][within]
+                value = row[f"{side}-matches"][within]
                 values.append(bold_where(value == best_share[side, within], f"{value:.2f}"))
             cells.append(", ".join(values))
         lines.append("| " + " | ".join(cells) + " |")
@@ -199,12 +199,12 @@ def plot(path, rows):
     names = [name.replace("`", "") for name in rows][::-1]
     panels = {
         "standard deviation, relative to the camera": (
-            [row["candidate"]["deviation"] / real["deviation"] for row in rows.values()], 1),
+            [row["candidate"]["std-dev"] / real["std-dev"] for row in rows.values()], 1),
         "map correlation": ([row["map-correlation"] for row in rows.values()], None),
         "real events matched within 5 ms": (
-            [row["reference-partners"]["within-5ms"] for row in rows.values()], None),
+            [row["reference-matches"]["within-5ms"] for row in rows.values()], None),
         "simulated events matched": (
-            [row["candidate-partners"]["within-5ms"] for row in rows.values()], None),
+            [row["candidate-matches"]["within-5ms"] for row in rows.values()], None),
     }
     figure, axes = plt.subplots(1, len(panels), figsize=(15, 4.6), sharey=True, dpi=90)
     for axis, (title, (values, goal)) in zip(axes, panels.items()):

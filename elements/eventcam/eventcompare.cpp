@@ -5,23 +5,22 @@
  * @short_description: measures how alike two streams of events are
  *
  * Compares the stream on the pad `candidate`, which it passes through, with the one on the pad
- * `reference`, over the time that both cover: from where the later one begins to where the first
- * one ends. The two are held together by their stream times, and must be of sensors of one size.
- * At EOS of the candidate, or where it is stopped before, it posts an element message
- * `eventcompare`:
+ * `reference`, over the time that both cover. The two are synchronized by their stream times, and
+ * must be of sensors of the same size. At EOS of the candidate, or on stop, it posts an element
+ * message `eventcompare`:
  *
  * - `start`, `end` (#gint64): the time that both cover, in stream time (ns);
- * - `reference`, `candidate` (#GstStructure): the figures of either, as #GstEventStats has them;
- * - `map-correlation` (#gdouble): Pearson's, of the events of each pixel;
- * - `reference-partners`, `candidate-partners` (#GstStructure): the shares of the events of either
- *   stream that have a partner in the other, of the same polarity, at the same pixel or next to it
+ * - `reference`, `candidate` (#GstStructure): the figures of each, as #GstEventStats has them;
+ * - `map-correlation` (#gdouble): Pearson's, of the events per pixel;
+ * - `reference-matches`, `candidate-matches` (#GstStructure): the shares of the events of either
+ *   stream that have a match in the other, of the same polarity, at the same pixel or next to it
  *   (#gdouble, `within-1ms`, `within-5ms`, `within-10ms`);
- * - `rate-curve` (#GstStructure): how many events there are in bins of `bin` ns (#guint64), as
- *   arrays `reference` and `candidate`.
+ * - `rate-curve` (#GstStructure): event counts in bins of `bin` ns (#guint64), as two arrays,
+ *   `reference` and `candidate`.
  *
  * The same is written to #GstEventCompare:location as JSON, and to #GstEventCompare:map a picture
- * of the events of each pixel: of the reference, of the candidate and, in blue where the candidate
- * has more and in red where it has fewer, their difference.
+ * of the events per pixel: of the reference, of the candidate and of their difference, blue where
+ * the candidate has more and red where it has fewer.
  *
  * ## Example launch line
  * |[
@@ -38,16 +37,16 @@
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/eventaggregator.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "src/measure/map_picture.hpp"
 #include "src/measure/stream_comparison.hpp"
+#include "src/render/map_picture.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_compare_debug);
 #define GST_CAT_DEFAULT event_compare_debug
 
-using eventcamera::both_sides;
-using eventcamera::OfSides;
-using eventcamera::Side;
+using eventcamera::both_roles;
+using eventcamera::PerRole;
 using eventcamera::StreamComparison;
+using eventcamera::StreamRole;
 
 namespace {
 
@@ -59,8 +58,8 @@ struct Sensor {
   friend bool operator==(const Sensor&, const Sensor&) = default;
 };
 
-const char* name_of(Side side) {
-  return side == Side::reference ? "reference" : "candidate";
+const char* name_of(StreamRole role) {
+  return role == StreamRole::reference ? "reference" : "candidate";
 }
 
 class EventCompare final : public EventAggregator {
@@ -77,18 +76,18 @@ class EventCompare final : public EventAggregator {
   GuardedSettings<ReportFiles> settings;
 
  private:
-  bool is_over(Side side) const;
+  bool is_over(StreamRole role) const;
   bool begin();
-  void compare(Side side, GstBuffer* buffer);
+  void compare(StreamRole role, GstBuffer* buffer);
   GstFlowReturn take_next();
   void conclude();
 
-  const OfSides<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
+  const PerRole<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
 
   // The source pad's thread's, or nobody's while there is none.
-  OfSides<std::optional<Sensor>> sensors_;
+  PerRole<std::optional<Sensor>> sensors_;
   std::optional<StreamComparison> comparison_;  // once both sensors are known
-  bool concluded_ = true;  // there are no events in it that figures do not tell of
+  bool concluded_ = true;                       // no events have come since the last report
 };
 
 /* figures */
@@ -99,8 +98,8 @@ void put_structure(GstStructure* structure, const char* field, GstStructure* val
   gst_structure_free(value);
 }
 
-GstStructure* partners_of(const std::array<double, 3>& shares) {
-  return gst_structure_new("partners", "within-1ms", G_TYPE_DOUBLE, shares[0], "within-5ms",
+GstStructure* matches_of(const std::array<double, 3>& shares) {
+  return gst_structure_new("matches", "within-1ms", G_TYPE_DOUBLE, shares[0], "within-5ms",
                            G_TYPE_DOUBLE, shares[1], "within-10ms", G_TYPE_DOUBLE, shares[2],
                            nullptr);
 }
@@ -109,16 +108,16 @@ GstStructure* curve_of(const eventcamera::RateCurve& rates) {
   GstStructure* curve =
       gst_structure_new("rate-curve", "bin", G_TYPE_UINT64,
                         static_cast<guint64>(rates.bin_length()) * GST_USECOND, nullptr);
-  for (const auto side : both_sides) {
+  for (const auto role : both_roles) {
     GValue counts = G_VALUE_INIT;
     g_value_init(&counts, GST_TYPE_ARRAY);
     for (const auto& bin : rates.bins()) {
       GValue count = G_VALUE_INIT;
       g_value_init(&count, G_TYPE_UINT64);
-      g_value_set_uint64(&count, bin[side]);
+      g_value_set_uint64(&count, bin[role]);
       gst_value_array_append_and_take_value(&counts, &count);
     }
-    gst_structure_take_value(curve, name_of(side), &counts);
+    gst_structure_take_value(curve, name_of(role), &counts);
   }
   return curve;
 }
@@ -128,16 +127,16 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   GstStructure* structure =
       gst_structure_new("eventcompare", "start", G_TYPE_INT64, gint64{figures.start}, "end",
                         G_TYPE_INT64, gint64{figures.end}, nullptr);
-  for (const auto side : both_sides) {
-    GstStructure* stream = gst_structure_new_empty(name_of(side));
-    put_figures(stream, figures.streams[side]);
-    put_structure(structure, name_of(side), stream);
+  for (const auto role : both_roles) {
+    GstStructure* stream = gst_structure_new_empty(name_of(role));
+    put_figures(stream, figures.streams[role]);
+    put_structure(structure, name_of(role), stream);
   }
   gst_structure_set(structure, "map-correlation", G_TYPE_DOUBLE, figures.map_correlation, nullptr);
-  put_structure(structure, "reference-partners",
-                partners_of(figures.partner_shares[Side::reference]));
-  put_structure(structure, "candidate-partners",
-                partners_of(figures.partner_shares[Side::candidate]));
+  put_structure(structure, "reference-matches",
+                matches_of(figures.match_shares[StreamRole::reference]));
+  put_structure(structure, "candidate-matches",
+                matches_of(figures.match_shares[StreamRole::candidate]));
   put_structure(structure, "rate-curve", curve_of(comparison.rates()));
   return structure;
 }
@@ -148,14 +147,15 @@ void EventCompare::conclude() {
   const StreamComparison nothing(1, 1);
   const auto& comparison = comparison_ ? *comparison_ : nothing;
   report(element(), settings.copy(), structure_of(comparison), [&] {
-    return eventcamera::draw_maps(comparison.map(Side::reference), comparison.map(Side::candidate));
+    return eventcamera::draw_maps(comparison.map(StreamRole::reference),
+                                  comparison.map(StreamRole::candidate));
   });
 }
 
 /* events */
 
 /// Takes a buffer into the comparison. May throw.
-void EventCompare::compare(Side side, GstBuffer* buffer) {
+void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   const auto interval = interval_of(buffer);
   const MappedEvents mapped(buffer);
   if (!interval || !mapped) {
@@ -163,21 +163,21 @@ void EventCompare::compare(Side side, GstBuffer* buffer) {
     return;
   }
   if (!mapped.events().empty()) concluded_ = false;
-  const GstSegment segment = segment_of(pads_[side]);
+  const GstSegment segment = segment_of(pads_[role]);
   const auto skipped =
-      comparison_->add(side, mapped.events(), stream_time(segment, interval->start),
+      comparison_->add(role, mapped.events(), stream_time(segment, interval->start),
                        stream_time(segment, interval->end));
   if (skipped > 0) warn(EventFault::beyond_sensor, buffer);
 }
 
-bool EventCompare::is_over(Side side) const {
-  return gst_aggregator_pad_is_eos(pads_[side]) && !gst_aggregator_pad_has_buffer(pads_[side]);
+bool EventCompare::is_over(StreamRole role) const {
+  return gst_aggregator_pad_is_eos(pads_[role]) && !gst_aggregator_pad_has_buffer(pads_[role]);
 }
 
 /// Returns whether there is anything to compare, now that caps have come. May throw.
 bool EventCompare::begin() {
-  const auto& reference = sensors_[Side::reference];
-  const auto& candidate = sensors_[Side::candidate];
+  const auto& reference = sensors_[StreamRole::reference];
+  const auto& candidate = sensors_[StreamRole::candidate];
   if (!reference || !candidate || *reference != *candidate) return false;
   if (!comparison_) {
     comparison_.emplace(reference->width, reference->height);
@@ -189,28 +189,28 @@ bool EventCompare::begin() {
 /// Takes the next buffer of either stream. May throw.
 GstFlowReturn EventCompare::take_next() {
   const bool comparing = begin();
-  const auto behind = comparing ? comparison_->behind() : Side::candidate;
-  if (behind == Side::reference && !is_over(Side::reference)) {
-    const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[Side::reference]));
+  const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
+  if (behind == StreamRole::reference && !is_over(StreamRole::reference)) {
+    const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[StreamRole::reference]));
     if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
-    compare(Side::reference, buffer.get());
+    compare(StreamRole::reference, buffer.get());
     return GST_FLOW_OK;
   }
   {
     const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(main_pad()));
     if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
-    if (comparing && behind == Side::candidate) compare(Side::candidate, buffer.get());
+    if (comparing && behind == StreamRole::candidate) compare(StreamRole::candidate, buffer.get());
   }
   return gst_aggregator_finish_buffer(element(), gst_aggregator_pad_pop_buffer(main_pad()));
 }
 
 GstFlowReturn EventCompare::aggregate(bool) {
-  if (is_over(Side::candidate)) {
+  if (is_over(StreamRole::candidate)) {
     conclude();
     return GST_FLOW_EOS;
   }
-  const auto& reference = sensors_[Side::reference];
-  const auto& candidate = sensors_[Side::candidate];
+  const auto& reference = sensors_[StreamRole::reference];
+  const auto& candidate = sensors_[StreamRole::candidate];
   if (reference && candidate && *reference != *candidate) {
     GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
                       ("Cannot compare sensors of two sizes: the reference has %d x %d pixels, the "
@@ -227,7 +227,7 @@ GstFlowReturn EventCompare::aggregate(bool) {
 bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  auto& sensor = sensors_[pad == main_pad() ? Side::candidate : Side::reference];
+  auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
   const Sensor next{info.width, info.height};
   if (sensor != next) comparison_.reset();
   sensor = next;

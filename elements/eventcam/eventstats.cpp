@@ -4,21 +4,20 @@
  * @title: eventstats
  * @short_description: measures a stream of events
  *
- * Passes events through and posts an element message `eventstats` whenever #GstEventStats:interval
- * has passed, and at EOS, or where it is stopped before, of everything. An interval ends with the
- * buffer in which it is over.
+ * Passes events through and posts an element message `eventstats` every #GstEventStats:interval of
+ * stream time, with the figures since the last one, and at EOS or on stop, with those of the whole
+ * stream. An interval ends with a buffer.
  *
- * - `whole` (#gboolean): whether this is of everything;
- * - `start`, `end` (#gint64): what it is of, in stream time (ns);
- * - `events` (#guint64), `rate` (#gdouble, events a second);
- * - `on-share` (#gdouble): of ON events among them;
- * - `mean`, `deviation` (#gdouble): over all pixels, of events per pixel and second;
- * - `gap-5`, `gap-25`, `gap-50`, `gap-75`, `gap-95` (#guint64, ns): the quantiles of the time from
+ * - `cumulative` (#gboolean): whether the figures are of the whole stream;
+ * - `start`, `end` (#gint64): the time that they cover, in stream time (ns);
+ * - `events` (#guint64), `rate` (#gdouble, events per second);
+ * - `on-share` (#gdouble): the share of ON events;
+ * - `mean`, `std-dev` (#gdouble): over all pixels, of events per pixel and second;
+ * - `interval-p5`, `-p25`, `-p50`, `-p75`, `-p95` (#guint64, ns): the percentiles of the time from
  *   a pixel's event to its next, to 3 %.
  *
- * At EOS the same is written to #GstEventStats:location as JSON, and to #GstEventStats:map a
- * picture of the events of each pixel. A pipeline that is stopped before, as with Ctrl-C, gives
- * both of what has come until then.
+ * At EOS or on stop (Ctrl-C), the figures of the whole stream are written to
+ * #GstEventStats:location as JSON, and a picture of the events per pixel to #GstEventStats:map.
  *
  * ## Example launch line
  * |[
@@ -42,7 +41,7 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/arrivals.hpp"
 #include "src/measure/event_statistics.hpp"
-#include "src/measure/map_picture.hpp"
+#include "src/render/map_picture.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 #define GST_CAT_DEFAULT event_stats_debug
@@ -58,8 +57,8 @@ struct Settings : ReportFiles {
   GstClockTime interval = GST_SECOND;
 };
 
-/// What is measured of some stretch of the stream.
-struct Stretch {
+/// What is measured over a part of the stream.
+struct Part {
   EventStatistics statistics;
   std::optional<Nanoseconds> start{};  ///< in stream time
   Nanoseconds covered = 0;
@@ -77,16 +76,16 @@ struct Measurement {
       : width(sensor_width),
         height(sensor_height),
         arrivals(width, height),
-        whole{.statistics = EventStatistics(width, height)},
+        cumulative{.statistics = EventStatistics(width, height)},
         recent{.statistics = EventStatistics(width, height)} {}
 
   int width;
   int height;
   Arrivals arrivals;
-  Stretch whole;
-  Stretch recent;                    ///< since the last message
+  Part cumulative;
+  Part recent;                       ///< since the last message
   std::optional<Nanoseconds> end{};  ///< in stream time
-  bool concluded = true;             ///< there are no events that the figures do not tell of
+  bool concluded = true;             ///< no events have come since the last report
 };
 
 struct Private {
@@ -118,12 +117,12 @@ static GuardedSettings<Settings>& settings_of(GObject* object) {
 
 /* figures */
 
-static GstStructure* figures_of(const Stretch& stretch, Nanoseconds end, bool whole) {
-  const Nanoseconds start = stretch.start.value_or(end);
-  GstStructure* structure =
-      gst_structure_new("eventstats", "whole", G_TYPE_BOOLEAN, whole ? TRUE : FALSE, "start",
-                        G_TYPE_INT64, gint64{start}, "end", G_TYPE_INT64, gint64{end}, nullptr);
-  put_figures(structure, stretch.statistics.figures(stretch.covered));
+static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulative) {
+  const Nanoseconds start = part.start.value_or(end);
+  GstStructure* structure = gst_structure_new(
+      "eventstats", "cumulative", G_TYPE_BOOLEAN, cumulative ? TRUE : FALSE, "start", G_TYPE_INT64,
+      gint64{start}, "end", G_TYPE_INT64, gint64{end}, nullptr);
+  put_figures(structure, part.statistics.figures(part.covered));
   return structure;
 }
 
@@ -132,29 +131,30 @@ static void post(GstEventStats* self, GstStructure* structure) {
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_element(GST_OBJECT(self), structure));
 }
 
-/// Of everything so far; what is no stream has no pixel, and no event.
+/// Reports the figures of the whole stream; those of no events where no caps have come.
 static void conclude(GstEventStats* self, const ReportFiles& files) {
   Measurement nothing(1, 1);
   auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
   measurement.concluded = true;
-  report(self, files, figures_of(measurement.whole, measurement.end.value_or(0), true),
-         [&] { return eventcamera::draw_map(measurement.whole.statistics.map()); });
+  report(self, files, figures_of(measurement.cumulative, measurement.end.value_or(0), true),
+         [&] { return eventcamera::draw_map(measurement.cumulative.statistics.map()); });
 }
 
 /* events */
 
-/// What lies between intervals counts as time without events; where time goes back, it begins anew.
+/// Adds an interval. Time between intervals counts as time without events; where time goes back, no
+/// inter-event interval spans the jump.
 static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) {
   if (measurement.end && start + static_cast<Nanoseconds>(event_resolution) < *measurement.end) {
     measurement.arrivals = Arrivals(measurement.width, measurement.height);
-    for (auto* stretch : {&measurement.whole, &measurement.recent})
-      stretch->statistics.forget_times();
+    for (auto* part : {&measurement.cumulative, &measurement.recent})
+      part->statistics.forget_times();
     measurement.end.reset();
   }
   const Nanoseconds from = measurement.end.value_or(start);
-  for (auto* stretch : {&measurement.whole, &measurement.recent}) {
-    if (!stretch->start) stretch->start = from;
-    stretch->covered += std::max(end - from, Nanoseconds{0});
+  for (auto* part : {&measurement.cumulative, &measurement.recent}) {
+    if (!part->start) part->start = from;
+    part->covered += std::max(end - from, Nanoseconds{0});
   }
   measurement.end = std::max(end, from);
 }
@@ -173,13 +173,13 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
     self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
-  const std::size_t left_out = measurement.arrivals.take(
+  const std::size_t skipped = measurement.arrivals.take(
       mapped.events(), start / 1000, [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
-        measurement.whole.statistics.add(event);
+        measurement.cumulative.statistics.add(event);
         measurement.recent.statistics.add(event);
       });
-  if (left_out > 0) self->priv->faults.warn(self, EventFault::beyond_sensor, buffer);
+  if (skipped > 0) self->priv->faults.warn(self, EventFault::beyond_sensor, buffer);
 }
 
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
@@ -238,7 +238,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
   if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
   if (measurement && measurement->width == info.width && measurement->height == info.height)
     return TRUE;
-  // Pixels of another sensor are not to be compared: what follows is measured on its own.
+  // Each sensor is measured on its own.
   if (measurement) conclude(self, {});
   try {
     measurement.emplace(info.width, info.height);

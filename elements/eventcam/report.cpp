@@ -10,7 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
-using eventcamera::gap_shares;
+using eventcamera::interval_shares;
 using eventcamera::StreamFigures;
 
 namespace {
@@ -24,8 +24,9 @@ struct Unref {
 template <class Type>
 using Owned = std::unique_ptr<Type, Unref>;
 
-constexpr std::array gap_names = {"gap-5", "gap-25", "gap-50", "gap-75", "gap-95"};
-static_assert(gap_names.size() == gap_shares.size());
+constexpr std::array interval_names = {"interval-p5", "interval-p25", "interval-p50",
+                                       "interval-p75", "interval-p95"};
+static_assert(interval_names.size() == interval_shares.size());
 
 JsonNode* node_of(const GstStructure* structure);
 
@@ -92,11 +93,11 @@ void write_json(const GstStructure* structure, const std::string& path) {
 void put_figures(GstStructure* structure, const StreamFigures& figures) {
   gst_structure_set(structure, "events", G_TYPE_UINT64, guint64{figures.events}, "rate",
                     G_TYPE_DOUBLE, figures.rate, "on-share", G_TYPE_DOUBLE, figures.on_share,
-                    "mean", G_TYPE_DOUBLE, figures.mean, "deviation", G_TYPE_DOUBLE,
-                    figures.deviation, nullptr);
-  for (std::size_t i = 0; i < gap_names.size(); ++i)
-    gst_structure_set(structure, gap_names[i], G_TYPE_UINT64,
-                      static_cast<guint64>(figures.gaps[i]) * GST_USECOND, nullptr);
+                    "mean", G_TYPE_DOUBLE, figures.mean, "std-dev", G_TYPE_DOUBLE, figures.std_dev,
+                    nullptr);
+  for (std::size_t i = 0; i < interval_names.size(); ++i)
+    gst_structure_set(structure, interval_names[i], G_TYPE_UINT64,
+                      static_cast<guint64>(figures.intervals[i]) * GST_USECOND, nullptr);
 }
 
 eventcamera::Nanoseconds stream_time(const GstSegment& segment, GstClockTime time) {

@@ -9,8 +9,8 @@ namespace eventcamera {
 namespace {
 
 template <class Pixel>
-void fill(Image<Pixel>& plane, Pixel value) {
-  for (int y = 0; y < plane.height(); ++y) std::fill_n(plane.row(y), plane.width(), value);
+void fill(Image<Pixel>& image, Pixel value) {
+  for (int y = 0; y < image.height(); ++y) std::fill_n(image.row(y), image.width(), value);
 }
 
 double pixels_of(const EventMap& map) {
@@ -26,6 +26,16 @@ double mean_of(const EventMap& map) {
 
 }  // namespace
 
+Microseconds IntervalHistogram::quantile(double share) const {
+  if (count_ == 0) return 0;
+  const auto rank = std::clamp<std::uint64_t>(
+      static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_))), 1, count_);
+  std::uint64_t below = 0;
+  std::size_t bin = 0;
+  while ((below += bins_[bin]) < rank) ++bin;
+  return middle_of(bin);
+}
+
 EventStatistics::EventStatistics(int width, int height)
     : map_(width, height), last_(width, height) {
   forget_times();
@@ -33,7 +43,7 @@ EventStatistics::EventStatistics(int width, int height)
 
 void EventStatistics::restart() {
   fill(map_, std::uint32_t{0});
-  gaps_.clear();
+  intervals_.clear();
   on_ = 0;
   off_ = 0;
 }
@@ -47,8 +57,8 @@ StreamFigures EventStatistics::figures(Nanoseconds duration) const {
   figures.events = on_ + off_;
   if (figures.events > 0)
     figures.on_share = static_cast<double>(on_) / static_cast<double>(figures.events);
-  for (std::size_t i = 0; i < gap_shares.size(); ++i)
-    figures.gaps[i] = gaps_.quantile(gap_shares[i]);
+  for (std::size_t i = 0; i < interval_shares.size(); ++i)
+    figures.intervals[i] = intervals_.quantile(interval_shares[i]);
   if (duration <= 0) return figures;
 
   const double seconds = static_cast<double>(duration) * 1e-9;
@@ -58,7 +68,7 @@ StreamFigures EventStatistics::figures(Nanoseconds duration) const {
     for (int x = 0; x < map_.width(); ++x) squares += std::pow(map_.at(x, y) - mean, 2);
   figures.rate = static_cast<double>(figures.events) / seconds;
   figures.mean = mean / seconds;
-  figures.deviation = std::sqrt(squares / pixels_of(map_)) / seconds;
+  figures.std_dev = std::sqrt(squares / pixels_of(map_)) / seconds;
   return figures;
 }
 

@@ -2,53 +2,95 @@
 #pragma once
 
 #include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include "src/core/absolute_event.hpp"
 #include "src/core/image.hpp"
 #include "src/core/step_times.hpp"
-#include "src/measure/gap_histogram.hpp"
 
 namespace eventcamera {
 
 /// How many events each pixel has.
 using EventMap = Image<std::uint32_t>;
 
-/// The shares of gaps whose quantiles are told.
-inline constexpr std::array gap_shares = {0.05, 0.25, 0.5, 0.75, 0.95};
+/// The quantiles of inter-event intervals that are measured.
+inline constexpr std::array interval_shares = {0.05, 0.25, 0.5, 0.75, 0.95};
 
 /// A stream in a few numbers.
 struct StreamFigures {
   std::uint64_t events = 0;
-  double rate = 0;       ///< events a second
-  double on_share = 0;   ///< of ON among the events
-  double mean = 0;       ///< over all pixels, of events per pixel and second
-  double deviation = 0;  ///< the standard deviation of the same
-  std::array<Microseconds, gap_shares.size()> gaps{};  ///< from a pixel's event to its next
+  double rate = 0;      ///< events a second
+  double on_share = 0;  ///< of ON among the events
+  double mean = 0;      ///< over all pixels, of events per pixel and second
+  double std_dev = 0;   ///< their standard deviation
+  /// From a pixel's event to its next: the quantiles of interval_shares.
+  std::array<Microseconds, interval_shares.size()> intervals{};
 };
 
-/// Counts a stream. What it keeps grows with the sensor, not with the stream.
+/// Lengths of intervals, in bins that grow with them: exact up to 63 microseconds, and to 1/32 of
+/// the interval beyond.
+class IntervalHistogram {
+ public:
+  /// Counts an interval of 0 or more.
+  void add(Microseconds interval) {
+    ++bins_[bin_of(static_cast<std::uint64_t>(interval))];
+    ++count_;
+  }
+
+  std::uint64_t count() const { return count_; }
+
+  /// Returns the length that this share, in [0, 1], of the intervals do not exceed, as the middle
+  /// of its bin; 0 without intervals.
+  Microseconds quantile(double share) const;
+
+  void clear() { *this = {}; }
+
+ private:
+  static constexpr unsigned step_bits = 5;  ///< of the bins of an octave
+  static constexpr std::uint64_t steps = 1U << step_bits;
+  static constexpr std::uint64_t exact = 2 * steps;  ///< intervals below have a bin each
+
+  static constexpr std::size_t bin_of(std::uint64_t interval) {
+    if (interval < exact) return interval;
+    const auto shift = static_cast<unsigned>(std::bit_width(interval)) - step_bits - 1;
+    return steps * shift + (interval >> shift);
+  }
+  static constexpr Microseconds middle_of(std::size_t bin) {
+    if (bin < exact) return static_cast<Microseconds>(bin);
+    const auto shift = static_cast<unsigned>(bin / steps) - 1;
+    const std::uint64_t first = (bin - steps * shift) << shift;
+    return static_cast<Microseconds>(first + (std::uint64_t{1} << shift) / 2);
+  }
+  static constexpr std::size_t bin_count = steps * (63 - step_bits - 1) + exact;  ///< up to 63 bits
+
+  std::array<std::uint64_t, bin_count> bins_{};
+  std::uint64_t count_ = 0;
+};
+
+/// Counts a stream. Its memory depends on the sensor, not on the length of the stream.
 class EventStatistics {
  public:
   /// Throws std::bad_alloc.
   EventStatistics(int width, int height);
 
-  /// An event inside the picture, not before the last one.
+  /// Takes an event inside the picture, not before the last one.
   void add(const AbsoluteEvent& event) {
     auto& last = last_.at(event.x, event.y());
-    if (last != never) gaps_.add(event.t - last);
+    if (last != never) intervals_.add(event.t - last);
     last = event.t;
     ++map_.at(event.x, event.y());
     ++(event.polarity() == Polarity::on ? on_ : off_);
   }
 
-  /// Counts from 0 again. Pixels remember their last events, so that no gap is lost.
+  /// Counts from 0 again. Pixels remember their last events, so that no interval is lost.
   void restart();
 
-  /// Time begins anew: no gap lies between what was and what comes.
+  /// Forgets the last events, so that no interval spans a jump in time.
   void forget_times();
 
-  /// Where all this took `duration`.
+  /// The figures of all since the last restart, which took `duration`.
   StreamFigures figures(Nanoseconds duration) const;
 
   const EventMap& map() const { return map_; }
@@ -58,7 +100,7 @@ class EventStatistics {
 
   EventMap map_;
   Image<Microseconds> last_;
-  GapHistogram gaps_;
+  IntervalHistogram intervals_;
   std::uint64_t on_ = 0;
   std::uint64_t off_ = 0;
 };

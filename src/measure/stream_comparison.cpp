@@ -2,82 +2,167 @@
 #include "src/measure/stream_comparison.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace eventcamera {
+namespace {
+
+constexpr Microseconds max_distance = match_distances.back();
+constexpr Microseconds no_match = std::numeric_limits<Microseconds>::max();
+constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
+
+/// Infinite without an earlier event: a difference from `never` would overflow.
+Microseconds distance_between(Microseconds earlier, Microseconds later) {
+  if (earlier == never) return no_match;
+  return later - earlier;
+}
+
+}  // namespace
+
+void RateCurve::extend_to(Microseconds end) {
+  if (end <= covered_) return;
+  while (bin_of(end) >= max_bins) join_bins();
+  bins_.resize(std::max(bins_.size(), bin_of(end) + 1));
+  covered_ = start_ + length_ * static_cast<Microseconds>(bins_.size());
+}
+
+void RateCurve::join_bins() {
+  const std::size_t joined = (bins_.size() + 1) / 2;
+  bins_.resize(2 * joined);
+  for (std::size_t i = 0; i < joined; ++i)
+    for (const auto role : both_roles) bins_[i][role] = bins_[2 * i][role] + bins_[2 * i + 1][role];
+  bins_.resize(joined);
+  length_ *= 2;
+}
+
+EventMatcher::EventMatcher(int width, int height) {
+  for (const auto role : both_roles) {
+    for (auto& pixels : streams_[role].pixels) {
+      pixels = Image<Pixel>(width + 2, height + 2);
+      for (int y = 0; y < height + 2; ++y)
+        std::fill_n(pixels.row(y), width + 2, Pixel{.last = never, .waiting = 0});
+    }
+  }
+}
+
+void EventMatcher::count(Stream& stream, Microseconds distance, Microseconds known_distance) {
+  for (std::size_t i = 0; i < match_distances.size(); ++i)
+    if (distance <= match_distances[i] && known_distance > match_distances[i]) ++stream.matched[i];
+}
+
+void EventMatcher::match_waiting(Stream& stream, Pixel& pixel, Microseconds time) {
+  for (Number number = pixel.waiting; number >= stream.first;) {
+    const auto& waiting = stream.waiting[number - stream.first];
+    const auto distance = time - waiting.time;
+    if (distance < waiting.nearest) count(stream, distance, waiting.nearest);
+    number = waiting.before;
+  }
+  pixel.waiting = 0;
+}
+
+void EventMatcher::wait(Stream& stream, Pixel& pixel, const Waiting& waiting) {
+  while (!stream.waiting.empty() && (waiting.time - stream.waiting.front().time > max_distance ||
+                                     stream.waiting.size() == max_waiting)) {
+    stream.waiting.pop_front();
+    ++stream.first;
+  }
+  stream.waiting.push_back(waiting);
+  pixel.waiting = stream.first + stream.waiting.size() - 1;
+}
+
+void EventMatcher::add(StreamRole role, const AbsoluteEvent& event) {
+  const auto polarity = static_cast<std::size_t>(event.polarity());
+  auto& others = streams_[other(role)];
+  auto& around = others.pixels[polarity];
+  auto last = never;
+  for (int y = event.y(); y < event.y() + 3; ++y) {
+    for (auto* pixel = &around.at(event.x, y); pixel != &around.at(event.x, y) + 3; ++pixel) {
+      last = std::max(last, pixel->last);
+      if (pixel->waiting != 0) match_waiting(others, *pixel, event.t);
+    }
+  }
+  auto& own = streams_[role];
+  auto& pixel = own.pixels[polarity].at(event.x + 1, event.y() + 1);
+  const auto nearest = distance_between(last, event.t);
+  count(own, nearest, no_match);
+  if (nearest > match_distances.front())
+    wait(own, pixel, {.time = event.t, .nearest = nearest, .before = pixel.waiting});
+  pixel.last = event.t;
+}
 
 StreamComparison::StreamComparison(int width, int height)
     : arriving_({.arrivals = Arrivals(width, height)}, {.arrivals = Arrivals(width, height)}),
       statistics_(EventStatistics(width, height), EventStatistics(width, height)),
-      partners_(width, height) {}
+      matcher_(width, height) {}
 
-Side StreamComparison::behind() const {
-  const auto& reference = arriving_[Side::reference];
-  const auto& candidate = arriving_[Side::candidate];
-  if (!reference.start) return Side::reference;
-  if (!candidate.start) return Side::candidate;
-  return candidate.end < reference.end ? Side::candidate : Side::reference;
+StreamRole StreamComparison::behind() const {
+  const auto& reference = arriving_[StreamRole::reference];
+  const auto& candidate = arriving_[StreamRole::candidate];
+  if (!reference.start) return StreamRole::reference;
+  if (!candidate.start) return StreamRole::candidate;
+  return candidate.end < reference.end ? StreamRole::candidate : StreamRole::reference;
 }
 
 std::optional<Nanoseconds> StreamComparison::start() const {
-  const auto& a = arriving_[Side::reference].start;
-  const auto& b = arriving_[Side::candidate].start;
+  const auto& a = arriving_[StreamRole::reference].start;
+  const auto& b = arriving_[StreamRole::candidate].start;
   return a && b ? std::optional(std::max(*a, *b)) : std::nullopt;
 }
 
 Nanoseconds StreamComparison::end() const {
-  return std::min(arriving_[Side::reference].end, arriving_[Side::candidate].end);
+  return std::min(arriving_[StreamRole::reference].end, arriving_[StreamRole::candidate].end);
 }
 
-std::size_t StreamComparison::add(Side side, std::span<const Event> events, Nanoseconds start,
+std::size_t StreamComparison::add(StreamRole role, std::span<const Event> events, Nanoseconds start,
                                   Nanoseconds end) {
-  auto& arriving = arriving_[side];
+  auto& arriving = arriving_[role];
   if (!arriving.start) {
     arriving.start = start;
     arriving.end = start;
   }
-  const std::size_t left_out = arriving.arrivals.take(
+  const std::size_t skipped = arriving.arrivals.take(
       events, start / 1000, [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); });
   arriving.end = std::max(arriving.end, end);
   if (this->start()) take_until(this->end() / 1000);
-  return left_out;
+  return skipped;
 }
 
 void StreamComparison::take_until(Microseconds end) {
   const Microseconds begin = *start() / 1000;
   if (!std::exchange(begun_, true)) rates_ = RateCurve(begin);
-  OfSides<std::span<const AbsoluteEvent>> due;
-  for (const auto side : both_sides) {
+  PerRole<std::span<const AbsoluteEvent>> due;
+  for (const auto role : both_roles) {
     const auto waiting =
-        std::span<const AbsoluteEvent>(arriving_[side].waiting).subspan(arriving_[side].taken);
-    due[side] = waiting.first(static_cast<std::size_t>(
+        std::span<const AbsoluteEvent>(arriving_[role].waiting).subspan(arriving_[role].taken);
+    due[role] = waiting.first(static_cast<std::size_t>(
         std::ranges::upper_bound(waiting, end, {}, &AbsoluteEvent::t) - waiting.begin()));
   }
-  for (const auto side : both_sides) arriving_[side].taken += due[side].size();
-  auto& reference = due[Side::reference];
-  auto& candidate = due[Side::candidate];
+  for (const auto role : both_roles) arriving_[role].taken += due[role].size();
+  auto& reference = due[StreamRole::reference];
+  auto& candidate = due[StreamRole::candidate];
   while (!reference.empty() || !candidate.empty()) {
-    const auto side =
+    const auto role =
         candidate.empty() || (!reference.empty() && reference.front().t <= candidate.front().t)
-            ? Side::reference
-            : Side::candidate;
-    const auto& event = due[side].front();
-    due[side] = due[side].subspan(1);
+            ? StreamRole::reference
+            : StreamRole::candidate;
+    const auto& event = due[role].front();
+    due[role] = due[role].subspan(1);
     if (event.t <= begin) continue;
-    statistics_[side].add(event);
-    partners_.add(side, event);
-    rates_.add(side, event.t);
+    statistics_[role].add(event);
+    matcher_.add(role, event);
+    rates_.add(role, event.t);
   }
-  for (const auto side : both_sides) {
+  for (const auto role : both_roles) {
     // Not each time: a long buffer may be taken in many short pieces.
-    auto& waiting = arriving_[side].waiting;
-    auto& taken = arriving_[side].taken;
+    auto& waiting = arriving_[role].waiting;
+    auto& taken = arriving_[role].taken;
     if (2 * taken < waiting.size()) continue;
     waiting.erase(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(taken));
     taken = 0;
   }
   rates_.extend_to(end);
-  for (const auto side : both_sides) arriving_[side].arrivals.pass(end);
+  for (const auto role : both_roles) arriving_[role].arrivals.pass(end);
 }
 
 ComparisonFigures StreamComparison::figures() const {
@@ -85,15 +170,15 @@ ComparisonFigures StreamComparison::figures() const {
   if (!start() || end() <= *start()) return figures;
   figures.start = *start();
   figures.end = end();
-  for (const auto side : both_sides) {
-    auto& stream = figures.streams[side];
-    stream = statistics_[side].figures(figures.end - figures.start);
-    const auto& partnered = partners_.partnered(side);
-    for (std::size_t i = 0; stream.events > 0 && i < partnered.size(); ++i)
-      figures.partner_shares[side][i] =
-          static_cast<double>(partnered[i]) / static_cast<double>(stream.events);
+  for (const auto role : both_roles) {
+    auto& stream = figures.streams[role];
+    stream = statistics_[role].figures(figures.end - figures.start);
+    const auto& matched = matcher_.matched(role);
+    for (std::size_t i = 0; stream.events > 0 && i < matched.size(); ++i)
+      figures.match_shares[role][i] =
+          static_cast<double>(matched[i]) / static_cast<double>(stream.events);
   }
-  figures.map_correlation = correlation(map(Side::reference), map(Side::candidate));
+  figures.map_correlation = correlation(map(StreamRole::reference), map(StreamRole::candidate));
   return figures;
 }
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "src/measure/event_statistics.hpp"
-#include "src/measure/map_picture.hpp"
 #include "src/measure/stream_comparison.hpp"
+#include "src/render/map_picture.hpp"
 
 namespace {
 
@@ -45,8 +45,8 @@ Stream stream_by_chance(Extent extent, std::size_t count, Microseconds start, Mi
 /// Hands a stream on in buffers of lengths by chance, whose borders lie on microseconds.
 class Feed {
  public:
-  Feed(Side side, const Stream& stream, Microseconds start, Microseconds end, unsigned seed)
-      : side_(side), stream_(stream), at_(start), end_(end), random_(seed) {}
+  Feed(StreamRole role, const Stream& stream, Microseconds start, Microseconds end, unsigned seed)
+      : role_(role), stream_(stream), at_(start), end_(end), random_(seed) {}
 
   bool done() const { return at_ >= end_; }
 
@@ -57,12 +57,12 @@ class Feed {
     for (; taken_ < stream_.size() && stream_[taken_].t <= until; ++taken_)
       events.push_back({static_cast<std::uint32_t>(stream_[taken_].t - at_), stream_[taken_].x,
                         stream_[taken_].y_p});
-    EXPECT_EQ(comparison.add(side_, events, at_ * 1000, until * 1000), 0U);
+    EXPECT_EQ(comparison.add(role_, events, at_ * 1000, until * 1000), 0U);
     at_ = until;
   }
 
  private:
-  Side side_;
+  StreamRole role_;
   const Stream& stream_;
   std::size_t taken_ = 0;
   Microseconds at_;
@@ -70,14 +70,14 @@ class Feed {
   std::mt19937 random_;
 };
 
-PartnerCounts partnered_plainly(const Stream& of, const Stream& among) {
-  PartnerCounts counts{};
+MatchCounts matched_plainly(const Stream& of, const Stream& among) {
+  MatchCounts counts{};
   for (const auto& event : of) {
     for (std::size_t i = 0; i < counts.size(); ++i) {
-      counts[i] += std::ranges::any_of(among, [&](const AbsoluteEvent& partner) {
-        return partner.polarity() == event.polarity() && std::abs(partner.x - event.x) <= 1 &&
-               std::abs(partner.y() - event.y()) <= 1 &&
-               std::abs(partner.t - event.t) <= partner_distances[i];
+      counts[i] += std::ranges::any_of(among, [&](const AbsoluteEvent& match) {
+        return match.polarity() == event.polarity() && std::abs(match.x - event.x) <= 1 &&
+               std::abs(match.y() - event.y()) <= 1 &&
+               std::abs(match.t - event.t) <= match_distances[i];
       });
     }
   }
@@ -110,45 +110,45 @@ void expect_figures(const StreamFigures& figures, Extent extent, const Stream& s
   EXPECT_EQ(figures.events, stream.size());
   EXPECT_NEAR(figures.rate, static_cast<double>(stream.size()) / seconds, 1e-6);
   EXPECT_NEAR(figures.mean, mean_plainly(map) / seconds, 1e-9);
-  EXPECT_NEAR(figures.deviation, std::sqrt(covariance_plainly(map, map)) / seconds, 1e-6);
+  EXPECT_NEAR(figures.std_dev, std::sqrt(covariance_plainly(map, map)) / seconds, 1e-6);
   const auto on = std::ranges::count(stream, Polarity::on, &AbsoluteEvent::polarity);
   EXPECT_NEAR(figures.on_share,
               stream.empty() ? 0 : static_cast<double>(on) / static_cast<double>(stream.size()),
               1e-12);
 
   std::map<std::pair<int, int>, Microseconds> last;
-  std::vector<Microseconds> gaps;
+  std::vector<Microseconds> intervals;
   for (const auto& event : stream) {
     const auto [place, first] = last.try_emplace({event.x, event.y()}, event.t);
-    if (!first) gaps.push_back(event.t - std::exchange(place->second, event.t));
+    if (!first) intervals.push_back(event.t - std::exchange(place->second, event.t));
   }
-  std::ranges::sort(gaps);
-  for (std::size_t i = 0; i < gap_shares.size(); ++i) {
-    const auto rank =
-        static_cast<std::size_t>(std::ceil(gap_shares[i] * static_cast<double>(gaps.size())));
-    const auto expected = gaps.empty() ? 0 : gaps[std::max<std::size_t>(rank, 1) - 1];
-    EXPECT_NEAR(static_cast<double>(figures.gaps[i]), static_cast<double>(expected),
+  std::ranges::sort(intervals);
+  for (std::size_t i = 0; i < interval_shares.size(); ++i) {
+    const auto rank = static_cast<std::size_t>(
+        std::ceil(interval_shares[i] * static_cast<double>(intervals.size())));
+    const auto expected = intervals.empty() ? 0 : intervals[std::max<std::size_t>(rank, 1) - 1];
+    EXPECT_NEAR(static_cast<double>(figures.intervals[i]), static_cast<double>(expected),
                 static_cast<double>(expected) / 32);
   }
 }
 
-TEST(GapHistogram, IsExactBelow64AndToAThirtySecondBeyond) {
-  GapHistogram gaps;
-  EXPECT_EQ(gaps.quantile(0.5), 0);
-  for (Microseconds gap = 0; gap < 64; ++gap) {
-    gaps.clear();
-    gaps.add(gap);
-    EXPECT_EQ(gaps.quantile(0.5), gap);
+TEST(IntervalHistogram, IsExactBelow64AndToAThirtySecondBeyond) {
+  IntervalHistogram intervals;
+  EXPECT_EQ(intervals.quantile(0.5), 0);
+  for (Microseconds interval = 0; interval < 64; ++interval) {
+    intervals.clear();
+    intervals.add(interval);
+    EXPECT_EQ(intervals.quantile(0.5), interval);
   }
-  for (Microseconds gap = 64; gap < INT64_MAX / 3; gap += gap / 7) {
-    gaps.clear();
-    gaps.add(gap);
-    EXPECT_NEAR(static_cast<double>(gaps.quantile(1)), static_cast<double>(gap),
-                static_cast<double>(gap) / 32);
+  for (Microseconds interval = 64; interval < INT64_MAX / 3; interval += interval / 7) {
+    intervals.clear();
+    intervals.add(interval);
+    EXPECT_NEAR(static_cast<double>(intervals.quantile(1)), static_cast<double>(interval),
+                static_cast<double>(interval) / 32);
   }
-  gaps.add(INT64_MAX);
-  EXPECT_EQ(gaps.count(), 2U);
-  EXPECT_GT(gaps.quantile(1), INT64_MAX / 33 * 32);
+  intervals.add(INT64_MAX);
+  EXPECT_EQ(intervals.count(), 2U);
+  EXPECT_GT(intervals.quantile(1), INT64_MAX / 33 * 32);
 }
 
 TEST(EventStatistics, RestartsAndRemembersLastTimes) {
@@ -159,12 +159,12 @@ TEST(EventStatistics, RestartsAndRemembersLastTimes) {
   auto figures = statistics.figures(1'000'000'000);
   EXPECT_EQ(figures.events, 1U);
   EXPECT_EQ(figures.on_share, 0);
-  EXPECT_EQ(figures.gaps[2], 30);
+  EXPECT_EQ(figures.intervals[2], 30);
   EXPECT_EQ(statistics.map().at(2, 1), 1U);
   statistics.restart();
   statistics.forget_times();
   statistics.add(AbsoluteEvent::at(2, 1, 90, Polarity::off));
-  EXPECT_EQ(statistics.figures(1'000'000'000).gaps[2], 0);
+  EXPECT_EQ(statistics.figures(1'000'000'000).intervals[2], 0);
 }
 
 TEST(EventStatistics, HasNoRateWithoutTime) {
@@ -173,7 +173,7 @@ TEST(EventStatistics, HasNoRateWithoutTime) {
   const auto figures = statistics.figures(0);
   EXPECT_EQ(figures.events, 1U);
   EXPECT_EQ(figures.rate, 0);
-  EXPECT_EQ(figures.deviation, 0);
+  EXPECT_EQ(figures.std_dev, 0);
 }
 
 TEST(Correlation, IsZeroWhereAMapIsTheSameEverywhere) {
@@ -189,24 +189,25 @@ TEST(Correlation, IsZeroWhereAMapIsTheSameEverywhere) {
 
 TEST(RateCurve, JoinsBinsWhenThereAreTooMany) {
   RateCurve curve(500);
-  curve.add(Side::reference, 501);
-  curve.add(Side::reference, 1500);
-  curve.add(Side::candidate, 1501);
+  curve.add(StreamRole::reference, 501);
+  curve.add(StreamRole::reference, 1500);
+  curve.add(StreamRole::candidate, 1501);
   ASSERT_EQ(curve.bins().size(), 2U);
-  EXPECT_EQ(curve.bins()[0][Side::reference], 2U);
-  EXPECT_EQ(curve.bins()[1][Side::candidate], 1U);
+  EXPECT_EQ(curve.bins()[0][StreamRole::reference], 2U);
+  EXPECT_EQ(curve.bins()[1][StreamRole::candidate], 1U);
   curve.extend_to(500 + 1000 * static_cast<Microseconds>(RateCurve::max_bins));
   EXPECT_EQ(curve.bins().size(), RateCurve::max_bins);
   EXPECT_EQ(curve.bin_length(), 1000);
-  curve.add(Side::candidate, 501 + 1000 * static_cast<Microseconds>(RateCurve::max_bins));
+  curve.add(StreamRole::candidate, 501 + 1000 * static_cast<Microseconds>(RateCurve::max_bins));
   EXPECT_EQ(curve.bin_length(), 2000);
   EXPECT_EQ(curve.bins().size(), RateCurve::max_bins / 2 + 1);
-  EXPECT_EQ(curve.bins()[0][Side::reference], 2U);
-  EXPECT_EQ(curve.bins()[0][Side::candidate], 1U);
+  EXPECT_EQ(curve.bins()[0][StreamRole::reference], 2U);
+  EXPECT_EQ(curve.bins()[0][StreamRole::candidate], 1U);
   curve.extend_to(Microseconds{1} << 55);
   EXPECT_LE(curve.bins().size(), RateCurve::max_bins);
   std::uint64_t sum = 0;
-  for (const auto& bin : curve.bins()) sum += bin[Side::reference] + bin[Side::candidate];
+  for (const auto& bin : curve.bins())
+    sum += bin[StreamRole::reference] + bin[StreamRole::candidate];
   EXPECT_EQ(sum, 4U);
 }
 
@@ -229,10 +230,10 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
   const auto candidate = stream_by_chance(scene.extent, scene.candidate, scene.candidate_start,
                                           candidate_end, seed + 100);
   StreamComparison comparison(scene.extent.width, scene.extent.height);
-  Feed feed_reference(Side::reference, reference, scene.reference_start, reference_end, seed);
-  Feed feed_candidate(Side::candidate, candidate, scene.candidate_start, candidate_end, seed);
+  Feed feed_reference(StreamRole::reference, reference, scene.reference_start, reference_end, seed);
+  Feed feed_candidate(StreamRole::candidate, candidate, scene.candidate_start, candidate_end, seed);
   while (true) {
-    auto& feed = comparison.behind() == Side::reference ? feed_reference : feed_candidate;
+    auto& feed = comparison.behind() == StreamRole::reference ? feed_reference : feed_candidate;
     if (feed.done()) break;
     feed.next(comparison);
   }
@@ -251,8 +252,8 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
   EXPECT_EQ(figures.start, start * 1000);
   EXPECT_EQ(figures.end, reference_end * 1000);
   const double seconds = static_cast<double>(reference_end - start) / 1e6;
-  expect_figures(figures.streams[Side::reference], scene.extent, covered_reference, seconds);
-  expect_figures(figures.streams[Side::candidate], scene.extent, covered_candidate, seconds);
+  expect_figures(figures.streams[StreamRole::reference], scene.extent, covered_reference, seconds);
+  expect_figures(figures.streams[StreamRole::candidate], scene.extent, covered_candidate, seconds);
 
   const auto a = map_plainly(scene.extent, covered_reference);
   const auto b = map_plainly(scene.extent, covered_candidate);
@@ -260,15 +261,15 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
   EXPECT_NEAR(figures.map_correlation,
               variances > 0 ? covariance_plainly(a, b) / std::sqrt(variances) : 0, 1e-9);
 
-  const auto expect_partners = [&](Side side, const Stream& of, const Stream& among) {
-    const auto counts = partnered_plainly(of, among);
+  const auto expect_matches = [&](StreamRole role, const Stream& of, const Stream& among) {
+    const auto counts = matched_plainly(of, among);
     for (std::size_t i = 0; i < counts.size(); ++i)
-      EXPECT_NEAR(figures.partner_shares[side][i],
+      EXPECT_NEAR(figures.match_shares[role][i],
                   of.empty() ? 0 : static_cast<double>(counts[i]) / static_cast<double>(of.size()),
                   1e-12);
   };
-  expect_partners(Side::reference, covered_reference, covered_candidate);
-  expect_partners(Side::candidate, covered_candidate, covered_reference);
+  expect_matches(StreamRole::reference, covered_reference, covered_candidate);
+  expect_matches(StreamRole::candidate, covered_candidate, covered_reference);
 
   const auto& curve = comparison.rates();
   EXPECT_EQ(curve.bins().size(), static_cast<std::size_t>((reference_end - start + 999) / 1000));
@@ -278,9 +279,9 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
         return (event.t - start - 1) / 1000 == static_cast<Microseconds>(i);
       });
     };
-    EXPECT_EQ(curve.bins()[i][Side::reference],
+    EXPECT_EQ(curve.bins()[i][StreamRole::reference],
               static_cast<std::uint64_t>(in_bin(covered_reference)));
-    EXPECT_EQ(curve.bins()[i][Side::candidate],
+    EXPECT_EQ(curve.bins()[i][StreamRole::candidate],
               static_cast<std::uint64_t>(in_bin(covered_candidate)));
   }
 }
@@ -298,16 +299,16 @@ INSTANTIATE_TEST_SUITE_P(Streams, ComparisonTest,
 
 TEST(Comparison, HasNothingToSayOfStreamsThatDoNotMeet) {
   StreamComparison comparison(4, 4);
-  EXPECT_EQ(comparison.behind(), Side::reference);
+  EXPECT_EQ(comparison.behind(), StreamRole::reference);
   EXPECT_EQ(comparison.figures().end, 0);
   const std::vector events = {Event::at(1, 1, 5, Polarity::on)};
-  comparison.add(Side::reference, events, 0, 1'000'000);
-  EXPECT_EQ(comparison.behind(), Side::candidate);
-  comparison.add(Side::candidate, events, 5'000'000, 6'000'000);
-  EXPECT_EQ(comparison.behind(), Side::reference);
+  comparison.add(StreamRole::reference, events, 0, 1'000'000);
+  EXPECT_EQ(comparison.behind(), StreamRole::candidate);
+  comparison.add(StreamRole::candidate, events, 5'000'000, 6'000'000);
+  EXPECT_EQ(comparison.behind(), StreamRole::reference);
   const auto figures = comparison.figures();
-  EXPECT_EQ(figures.streams[Side::reference].events, 0U);
-  EXPECT_EQ(figures.streams[Side::candidate].events, 0U);
+  EXPECT_EQ(figures.streams[StreamRole::reference].events, 0U);
+  EXPECT_EQ(figures.streams[StreamRole::candidate].events, 0U);
 }
 
 TEST(Comparison, SurvivesEventsBeyondThePictureAndOutOfOrder) {
@@ -315,14 +316,15 @@ TEST(Comparison, SurvivesEventsBeyondThePictureAndOutOfOrder) {
   const std::vector events = {Event::at(4, 0, 5, Polarity::on), Event::at(0, 4, 5, Polarity::on),
                               Event::at(3, 3, 900, Polarity::on), Event::at(0, 0, 2, Polarity::on),
                               Event::at(0, 0, 4'000'000'000, Polarity::on)};
-  for (const auto side : both_sides) {
-    EXPECT_EQ(comparison.add(side, events, 1'000'000, 2'000'000), 2U);
-    EXPECT_EQ(comparison.add(side, events, 0, 1'000'000), 2U);
-    EXPECT_EQ(comparison.add(side, events, -5'000'000, 9'000'000), 2U);
+  for (const auto role : both_roles) {
+    EXPECT_EQ(comparison.add(role, events, 1'000'000, 2'000'000), 2U);
+    EXPECT_EQ(comparison.add(role, events, 0, 1'000'000), 2U);
+    EXPECT_EQ(comparison.add(role, events, -5'000'000, 9'000'000), 2U);
   }
   const auto figures = comparison.figures();
-  EXPECT_EQ(figures.streams[Side::reference].events, figures.streams[Side::candidate].events);
-  EXPECT_EQ(figures.partner_shares[Side::candidate][0], 1);
+  EXPECT_EQ(figures.streams[StreamRole::reference].events,
+            figures.streams[StreamRole::candidate].events);
+  EXPECT_EQ(figures.match_shares[StreamRole::candidate][0], 1);
 }
 
 TEST(MapPicture, ShowsMoreEventsBrighterAndSaysWhatCannotBeWritten) {

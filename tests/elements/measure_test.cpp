@@ -100,20 +100,20 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_NEAR(number_in(recent, "rate"), 50, 1e-9);
   EXPECT_NEAR(number_in(recent, "on-share"), 2.0 / 3, 1e-9);
   EXPECT_NEAR(number_in(recent, "mean"), 3 / 32.0 / 0.06, 1e-9);
-  EXPECT_EQ(count_in(recent, "gap-50"), 29 * GST_USECOND);
+  EXPECT_EQ(count_in(recent, "interval-p50"), 29 * GST_USECOND);
 
   h.push(buffer_of(1060 * ms, {Event::at(2, 3, 40, Polarity::on)}, 40 * ms).release());
   gst_harness_push_event(h.get(), gst_event_new_eos());
   message = h.message(GST_MESSAGE_ELEMENT);
-  const auto* whole = structure_of(message);
-  ASSERT_TRUE(whole);
-  EXPECT_EQ(count_in(whole), 4U);
-  EXPECT_EQ(time_in(whole, "end"), gint64{1100 * ms});
-  EXPECT_NEAR(number_in(whole, "rate"), 40, 1e-9);
+  const auto* cumulative = structure_of(message);
+  ASSERT_TRUE(cumulative);
+  EXPECT_EQ(count_in(cumulative), 4U);
+  EXPECT_EQ(time_in(cumulative, "end"), gint64{1100 * ms});
+  EXPECT_NEAR(number_in(cumulative, "rate"), 40, 1e-9);
   // A pixel with 2, another with 2, and 30 with none, in a tenth of a second.
-  EXPECT_NEAR(number_in(whole, "deviation"), std::sqrt(8 / 32.0 - 1 / 64.0) * 10, 1e-9);
+  EXPECT_NEAR(number_in(cumulative, "std-dev"), std::sqrt(8 / 32.0 - 1 / 64.0) * 10, 1e-9);
   EXPECT_NE(text_in(path("f.json")).find("\"events\" : 4"), std::string::npos);
-  EXPECT_NE(text_in(path("f.json")).find("\"whole\" : true"), std::string::npos);
+  EXPECT_NE(text_in(path("f.json")).find("\"cumulative\" : true"), std::string::npos);
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
 }
 
@@ -219,7 +219,7 @@ TEST_F(StatsTest, GoesOnWhereTimeGoesBackAndWherePtsAreMissing) {
   const auto message = h.message(GST_MESSAGE_ELEMENT);
   ASSERT_TRUE(message);
   EXPECT_EQ(count_in(structure_of(message)), 2U);
-  EXPECT_EQ(count_in(structure_of(message), "gap-50"), 0U);
+  EXPECT_EQ(count_in(structure_of(message), "interval-p50"), 0U);
   EXPECT_NEAR(number_in(structure_of(message), "rate"), 100, 1e-9);
 }
 
@@ -335,11 +335,11 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   EXPECT_EQ(time_in(figures, "end"), gint64{40 * ms});
   EXPECT_EQ(count_in(within(figures, "reference")), 3U);
   EXPECT_EQ(count_in(within(figures, "candidate")), 2U);
-  const auto* of_reference = within(figures, "reference-partners");
+  const auto* of_reference = within(figures, "reference-matches");
   EXPECT_NEAR(number_in(of_reference, "within-1ms"), 0, 1e-9);
   EXPECT_NEAR(number_in(of_reference, "within-5ms"), 2 / 3.0, 1e-9);
   EXPECT_NEAR(number_in(of_reference, "within-10ms"), 2 / 3.0, 1e-9);
-  EXPECT_NEAR(number_in(within(figures, "candidate-partners"), "within-5ms"), 1, 1e-9);
+  EXPECT_NEAR(number_in(within(figures, "candidate-matches"), "within-5ms"), 1, 1e-9);
   const GValue* curve = gst_structure_get_value(within(figures, "rate-curve"), "reference");
   ASSERT_TRUE(curve);
   EXPECT_EQ(gst_value_array_get_size(curve), 30U);
@@ -350,7 +350,7 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   EXPECT_EQ(GST_BUFFER_PTS(passed[0].get()), 10 * ms);
   EXPECT_TRUE(GST_BUFFER_FLAG_IS_SET(passed[1].get(), GST_BUFFER_FLAG_GAP));
   const auto json = text_in(path("f.json"));
-  for (const char* field : {"map-correlation", "candidate-partners", "rate-curve", "deviation"})
+  for (const char* field : {"map-correlation", "candidate-matches", "rate-curve", "std-dev"})
     EXPECT_NE(json.find(field), std::string::npos) << field;
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
 }
@@ -371,7 +371,7 @@ TEST_F(CompareTest, FindsAStreamLikeItself) {
   EXPECT_EQ(count_in(within(figures, "reference")), 20U);
   EXPECT_EQ(count_in(within(figures, "candidate")), 20U);
   EXPECT_DOUBLE_EQ(number_in(figures, "map-correlation"), 1);
-  EXPECT_EQ(number_in(within(figures, "reference-partners"), "within-1ms"), 1);
+  EXPECT_EQ(number_in(within(figures, "reference-matches"), "within-1ms"), 1);
   EXPECT_EQ(passed.size(), 10U);
 }
 

@@ -67,7 +67,7 @@ launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! 
 # Measured on their way, and beside another simulator's.
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventstats location=stats.json map=map.png ! eventrender ! fakesink
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! eventsim-dense ! compare.reference  t. ! queue ! eventsim-diff ! compare.candidate  eventcompare name=compare location=compare.json map=maps.png ! evtenc ! filesink location=candidate.raw
-grep -q '"deviation" : [0-9]' stats.json || fail "no figures were written"
+grep -q '"std-dev" : [0-9]' stats.json || fail "no figures were written"
 grep -q '"map-correlation" : [0-9-]' compare.json || fail "no comparison was written"
 [ -s map.png ] && [ -s maps.png ] && [ -s candidate.raw ] || fail "a picture or the candidate is missing"
 launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null interval=0 ! fakesink

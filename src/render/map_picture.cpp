@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/measure/map_picture.hpp"
+#include "src/render/map_picture.hpp"
 
 #include <png.h>
 
@@ -15,8 +15,8 @@
 namespace eventcamera {
 namespace {
 
-/// The events that are shown in full colour.
-float full_scale(const EventMap& map) {
+/// The event count that is shown in full colour.
+float full_scale(const Image<std::uint32_t>& map) {
   std::vector<std::uint32_t> counts;
   for (int y = 0; y < map.height(); ++y)
     std::copy_if(map.row(y), map.row(y) + map.width(), std::back_inserter(counts),
@@ -27,9 +27,9 @@ float full_scale(const EventMap& map) {
   return static_cast<float>(*top);
 }
 
-/// Draws from column `left` on; value(x, y) is from -1 to 1.
+/// Draws from column `left` on; value(x, y) is in [-1, 1].
 template <class Value>
-void draw(RgbPicture& picture, int left, const EventMap& map, PaletteName palette,
+void draw(RgbPicture& picture, int left, const Image<std::uint32_t>& map, PaletteName palette,
           const Value& value) {
   const auto& colours = shades(palette);
   for (int y = 0; y < map.height(); ++y) {
@@ -52,7 +52,7 @@ RgbPicture blank(int width, int height) {
                                               static_cast<std::size_t>(height))};
 }
 
-void draw_counts(RgbPicture& picture, int left, const EventMap& map, float scale) {
+void draw_counts(RgbPicture& picture, int left, const Image<std::uint32_t>& map, float scale) {
   draw(picture, left, map, PaletteName::magma,
        [&](int x, int y) { return static_cast<float>(map.at(x, y)) / scale; });
 }
@@ -77,13 +77,13 @@ void RgbPicture::write_png(const std::string& path) const {
     throw std::system_error(errno, std::generic_category(), path);
 }
 
-RgbPicture draw_map(const EventMap& map) {
+RgbPicture draw_map(const Image<std::uint32_t>& map) {
   auto picture = blank(map.width(), map.height());
   draw_counts(picture, 0, map, full_scale(map));
   return picture;
 }
 
-RgbPicture draw_maps(const EventMap& reference, const EventMap& candidate) {
+RgbPicture draw_maps(const Image<std::uint32_t>& reference, const Image<std::uint32_t>& candidate) {
   auto picture = blank(3 * reference.width(), reference.height());
   const float scale = std::max(full_scale(reference), full_scale(candidate));
   draw_counts(picture, 0, reference, scale);
