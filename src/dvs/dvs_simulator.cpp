@@ -10,14 +10,7 @@
 #include "src/core/grey8.hpp"
 #include "src/core/rows.hpp"
 #include "src/dvs/denoise.hpp"
-#include "src/dvs/event_collector.hpp"
-#include "src/dvs/exposure_pulse.hpp"
-#include "src/dvs/light_response.hpp"
-#include "src/dvs/passages.hpp"
-#include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
-#include "src/dvs/readout.hpp"
-#include "src/dvs/row_filter.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/bands.hpp"
 #include "src/simulate/difference.hpp"
@@ -26,7 +19,7 @@
 namespace eventcamera {
 namespace {
 
-/// Whether the pixels are as different from each other under both.
+/// Whether the pixels have the same properties under both.
 bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
   return a.positive_threshold == b.positive_threshold &&
          a.negative_threshold == b.negative_threshold && a.threshold_sigma == b.threshold_sigma &&
@@ -38,13 +31,13 @@ bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
   return a.linear_light == b.linear_light && a.response == b.response && a.log_eps == b.log_eps;
 }
 
-/// Events a second that no readout is too slow for.
+/// Events per second, more than any array makes.
 constexpr double unlimited = 1e18;
 
-/// What a thread needs while it is at work.
+/// The working memory of a thread.
 struct alignas(64) Scratch {
   Candidates candidates;
-  std::vector<std::uint16_t> luma;
+  std::vector<std::uint16_t> luma;  ///< a row, with padding for vectors
 };
 
 template <class Pixel>
@@ -60,8 +53,8 @@ class PixelSimulator final : public DvsSimulator {
   void start(const LumaView& frame) override {
     keep(frame, last_);
     finder_.reset();
-    segments_ = 0;
-    order_.reset();
+    sub_interval_count_ = 0;
+    sorter_.reset();
     if (readout_) readout_->reset();
     adopt(settings_);
     settle();
@@ -72,9 +65,9 @@ class PixelSimulator final : public DvsSimulator {
     keep(frame, now_);
     const double duration = begin(interval);
     if (current_.upsampling == Upsampling::motion)
-      pass_along_motion(duration);
+      advance_along_motion(duration);
     else
-      pass_straight(duration, true);
+      advance_straight(duration, true);
     finish(duration, events);
     std::swap(last_, now_);
   }
@@ -82,7 +75,7 @@ class PixelSimulator final : public DvsSimulator {
   bool hold(const StepTimes& interval, const Settings&, EventBuckets& events) override {
     now_.assign(last_.view());
     const double duration = begin(interval);
-    pass_straight(duration, false);
+    advance_straight(duration, false);
     finish(duration, events);
     return true;
   }
@@ -100,79 +93,72 @@ class PixelSimulator final : public DvsSimulator {
   double begin(const StepTimes& interval) {
     if (settings_ != current_) change_to(settings_);
     const double duration = static_cast<double>(interval.duration()) / 1000;
-    order_.begin(duration, band_count(format().height));
+    sorter_.begin(duration, band_count(format().height));
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
     return duration;
   }
 
   void finish(double duration, EventBuckets& events) {
-    segments_ += passages_.size();
+    sub_interval_count_ += sub_intervals_.size();
     const bool is_limited = current_.max_event_rate > 0;
     if (!is_limited && !readout_) {
-      order_.finish(events, threads());
+      sorter_.finish(events, threads());
       return;
     }
     if (!readout_) readout_.emplace(format().width, format().height);
-    order_.finish(ordered_, threads());
-    readout_->pass(ordered_, duration, is_limited ? current_.max_event_rate : unlimited, events);
-    if (!is_limited) readout_.reset();  // now that nothing waits in it
+    sorter_.finish(sorted_, threads());
+    readout_->pass(sorted_, duration, is_limited ? current_.max_event_rate : unlimited, events);
+    if (!is_limited) readout_.reset();  // no event waits in it any more
   }
 
-  void pass_straight(double duration, bool is_exposed) {
-    finder_.reset();  // what it knows is not the last frame any more
+  /// The light changes on a straight line in each pixel.
+  void advance_straight(double duration, bool is_exposed) {
+    finder_.reset();  // its last frame is no longer the last one
     plan(duration, 1, is_exposed);
-    for_each_band([&](const BandRows& rows, Scratch& scratch, EventCollector& collector) {
-      scratch.luma.resize(static_cast<std::size_t>(format().width));
+    const bool is_widened = luma_bits(current_) != format().bits;
+    for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
       for (int y = rows.first; y < rows.last; ++y) {
-        const bool is_ready = luma_bits(current_) == format().bits;
-        if (!is_ready) widen_row(now_.row(y), format().width, scratch.luma.data());
-        for (std::size_t i = 0; i < passages_.size(); ++i) {
-          if (is_ready)
-            pass_row_of_luma(now_.row(y), y, i, scratch, collector);
-          else
-            pass_row_of_luma(scratch.luma.data(), y, i, scratch, collector);
+        const void* luma = now_.row(y);
+        if (is_widened) {
+          widen_row(now_.row(y), format().width, scratch.luma.data());
+          luma = scratch.luma.data();
         }
+        for (const auto& sub_interval : sub_intervals_)
+          advance_row(luma, y, sub_interval, scratch, events);
       }
     });
   }
 
-  void pass_along_motion(double duration) {
+  void advance_along_motion(double duration) {
     const auto flow = find_flow();
     const int steps = std::clamp(steps_of(flow), 1, current_.max_steps);
     plan(duration, steps, true);
     const Warp<Pixel> warp{last_.view(), now_.view(), steps};
-    for_each_band([&](const BandRows& rows, Scratch& scratch, EventCollector& collector) {
-      scratch.luma.resize(static_cast<std::size_t>(format().width));
-      for (std::size_t i = 0; i < passages_.size(); ++i) {
-        const int step = passages_[i].step;
+    for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
+      for (const auto& sub_interval : sub_intervals_) {
         for (int y = rows.first; y < rows.last; ++y) {
-          if (step < steps)
-            interpolate_row(warp, flow, y, step, scratch.luma.data());
+          if (sub_interval.step < steps)
+            interpolate_row(warp, flow, y, sub_interval.step, scratch.luma.data());
           else
             widen_row(now_.row(y), format().width, scratch.luma.data());
-          pass_row_of_luma(scratch.luma.data(), y, i, scratch, collector);
+          advance_row(scratch.luma.data(), y, sub_interval, scratch, events);
         }
       }
     });
   }
 
-  /// What is the same for all pixels in the interval to come.
+  /// Prepares what all pixels share in the next interval.
   void plan(double duration, int steps, bool is_exposed) {
-    cut_into_passages(duration, steps, pulse_.next(current_, duration, is_exposed), passages_);
+    divide_interval(duration, steps, pulse_.next(current_, duration, is_exposed),
+                    sub_interval_count_, sub_intervals_);
     tables_.clear();
-    table_of_.clear();
-    for (const auto& passage : passages_) {
-      const auto same = std::find_if(passages_.begin(), passages_.end(), [&](const auto& other) {
-        return other.duration == passage.duration;
-      });
-      const auto before = static_cast<std::size_t>(same - passages_.begin());
-      if (before < table_of_.size()) {
-        table_of_.push_back(table_of_[before]);
-      } else {
-        table_of_.push_back(tables_.size());
-        tables_.emplace_back(current_, passage.duration);
-      }
-    }
+    for (const auto& sub_interval : sub_intervals_)
+      if (tables_for(sub_interval) == tables_.end())
+        tables_.emplace_back(current_, sub_interval.duration);
+  }
+
+  auto tables_for(const SubInterval& sub_interval) const {
+    return std::ranges::find(tables_, sub_interval.duration, &ShadeTables::duration);
   }
 
   ImageView<Flow> find_flow() {
@@ -184,55 +170,48 @@ class PixelSimulator final : public DvsSimulator {
     return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), changed, threads());
   }
 
-  /// With which nothing moves by more than a pixel.
+  /// Returns the number of steps in which nothing moves by more than a pixel each.
   int steps_of(const ImageView<Flow>& flow) {
     const int bands = band_count(format().height);
-    farthest_.assign(static_cast<std::size_t>(bands), 0);
+    max_squares_.assign(static_cast<std::size_t>(bands), 0);
     threads().for_each(bands, [&](int band, int) {
       const BandRows rows(band, format().height);
-      float farthest = 0;
+      float max_square = 0;
       for (int y = rows.first; y < rows.last; ++y) {
         const Flow* row = flow.row(y);
         for (int x = 0; x < flow.width; ++x)
-          farthest = std::max(farthest, row[x].x * row[x].x + row[x].y * row[x].y);
+          max_square = std::max(max_square, row[x].x * row[x].x + row[x].y * row[x].y);
       }
-      farthest_[static_cast<std::size_t>(band)] = farthest;
+      max_squares_[static_cast<std::size_t>(band)] = max_square;
     });
-    const float farthest = *std::max_element(farthest_.begin(), farthest_.end());
-    return static_cast<int>(std::ceil(std::sqrt(std::min<double>(farthest, max_side * max_side))));
+    const float max_square = *std::max_element(max_squares_.begin(), max_squares_.end());
+    return static_cast<int>(
+        std::ceil(std::sqrt(std::min<double>(max_square, max_side * max_side))));
   }
 
-  template <class Luma>
-  void pass_row_of_luma(const Luma* luma, int y, std::size_t which, Scratch& scratch,
-                        EventCollector& collector) {
-    const Passage& passage = passages_[which];
-    const ShadeTables& tables = tables_[table_of_[which]];
-    const Segment segment{passage.begin, passage.duration, segments_ + which, passage.rise};
-    const Screen screen{*response_,
-                        tables,
-                        luma_bits(current_),
-                        static_cast<float>(passage.duration),
-                        static_cast<float>(passage.share),
-                        static_cast<float>(passage.rise),
-                        current_.cutoff_hz > 0,
-                        current_.shot_noise_rate_hz > 0};
+  void advance_row(const void* luma, int y, const SubInterval& sub_interval, Scratch& scratch,
+                   const BandEvents& events) {
+    const ShadeTables& tables = *tables_for(sub_interval);
     auto& candidates = scratch.candidates;
     candidates.clear();
-    pass_row(screen, luma, y, pixels_, candidates);
-    PixelTime(current_, random_, segment).pass(pixels_, y, candidates, tables, collector);
+    const PixelRow pixels = pixels_.row(y);
+    filter_row({sub_interval, tables, responses_, luma_bits(current_), current_.cutoff_hz > 0,
+                current_.shot_noise_rate_hz > 0},
+               luma, pixels, format().width, candidates);
+    PixelSolver(current_, random_, sub_interval).solve(pixels, candidates, tables, events);
   }
 
-  /// Of the luma that the pixels are shown.
+  /// Bits of the luma that the pixels see.
   int luma_bits(const DvsSettings& settings) const {
     const bool is_widened = settings.upsampling == Upsampling::motion && sizeof(Pixel) == 1;
     return is_widened ? 16 : format().bits;
   }
 
   void adopt(const DvsSettings& settings) {
-    const bool is_first = !response_;
+    const bool is_first = responses_.empty();
     if (is_first || !have_same_response(settings, current_) ||
         settings.upsampling != current_.upsampling)
-      response_.emplace(settings, luma_bits(settings));
+      responses_ = responses(settings, luma_bits(settings));
     random_ = Random(settings.seed);
     if (is_first || !have_same_traits(settings, current_) || current_.threshold_jitter > 0)
       for_each_row(threads(), format().height,
@@ -240,7 +219,7 @@ class PixelSimulator final : public DvsSimulator {
     current_ = settings;
   }
 
-  /// In the midst of a video: the pixels keep what they remember, unless it was in other units.
+  /// Changes settings during a video: pixels keep their state, unless its units changed.
   void change_to(const DvsSettings& settings) {
     const bool is_comparable = have_same_response(settings, current_);
     const bool had_bandwidth = current_.cutoff_hz > 0;
@@ -249,50 +228,54 @@ class PixelSimulator final : public DvsSimulator {
       settle();
     else if (!had_bandwidth)
       for_each_row(threads(), format().height, [&](int y) {
-        for (int x = 0; x < format().width; ++x) pixels_.signal.at(x, y) = pixels_.target.at(x, y);
+        const PixelRow pixels = pixels_.row(y);
+        std::copy_n(pixels.target, format().width, pixels.signal);
       });
   }
 
-  /// The last frame has always been there.
+  /// Sets the pixels as if the last frame had stood for long.
   void settle() {
     pulse_.reset();
     const int widening = luma_bits(current_) == format().bits ? 1 : 257;
+    const int white = static_cast<int>(responses_.size()) - 1;
     for_each_row(threads(), format().height, [&](int y) {
+      float* target = pixels_.row(y).target;
       for (int x = 0; x < format().width; ++x)
-        pixels_.target.at(x, y) =
-            response_->values()[std::min(last_.at(x, y) * widening, response_->white())];
+        target[x] =
+            responses_[static_cast<std::size_t>(std::min(last_.at(x, y) * widening, white))];
       pixels_.settle(y, current_, random_);
     });
   }
 
+  /// Calls body(rows, scratch, events) for each band of rows, on all threads.
   template <class Body>
   void for_each_band(const Body& body) {
     threads().for_each(band_count(format().height), [&](int band, int thread) {
-      EventCollector collector(order_, band);
-      body(BandRows(band, format().height), scratch_[static_cast<std::size_t>(thread)], collector);
+      auto& scratch = scratch_[static_cast<std::size_t>(thread)];
+      scratch.luma.resize(static_cast<std::size_t>(format().width) + max_lanes);
+      body(BandRows(band, format().height), scratch, BandEvents{sorter_, band});
     });
   }
 
   Image<Pixel> last_;
   Image<Pixel> now_;
   PixelArray pixels_;
-  DvsSettings current_;  ///< what the pixels are made for
+  DvsSettings current_;  ///< of the pixels
   Random random_{0};
-  std::optional<LightResponse> response_;
+  std::vector<float> responses_;  ///< to each luma value
   ExposurePulse pulse_;
-  std::vector<Passage> passages_;      ///< of the interval, in the order of time
-  std::vector<ShadeTables> tables_;    ///< for each duration of a passage
-  std::vector<std::size_t> table_of_;  ///< of each passage
-  std::uint64_t segments_ = 0;         ///< that have passed
-  EventOrder order_;
-  EventBuckets ordered_;
+  std::vector<SubInterval> sub_intervals_;  ///< of the interval, in order of time
+  std::vector<ShadeTables> tables_;         ///< for each duration of a sub-interval
+  std::uint64_t sub_interval_count_ = 0;    ///< before this interval
+  EventSorter sorter_;
+  EventBuckets sorted_;
   std::optional<Readout> readout_;
-  std::vector<Scratch> scratch_;  ///< thread by thread
+  std::vector<Scratch> scratch_;  ///< by thread
 
   std::optional<RegionOfInterestFlow> finder_;
   Grey8 last_grey_;
   Grey8 grey_;
-  std::vector<float> farthest_;  ///< that something moves, squared, band by band
+  std::vector<float> max_squares_;  ///< of the flow's length, by band
 };
 
 }  // namespace

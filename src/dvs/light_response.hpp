@@ -6,55 +6,79 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 #include "src/dvs/dvs_settings.hpp"
 
 namespace eventcamera {
 
-/// The light of a luma value, which is a share of white: itself, or what the transfer function of
-/// sRGB (IEC 61966-2-1) made it from.
-double light_of(double luma, bool linear_light);
-
-/// What the photoreceptor makes of light, 0 ... 1.
-double response_of(double light, Response response, double log_eps);
-
-/// How fast a photoreceptor is, and how quiet, beside one that sees white: in (0, 1] (v2e).
-inline double brightness_of(double light, double dark_light) {
-  return (light + dark_light) / (1 + dark_light);
+/// The light of a luma value, both shares of white: the same, or what the transfer function of sRGB
+/// (IEC 61966-2-1) made the luma from.
+inline double light_of(double luma, bool linear_light) {
+  if (!linear_light) return luma;
+  return luma <= 0.04045 ? luma / 12.92 : std::pow((luma + 0.055) / 1.055, 2.4);
 }
 
-/// The response to each luma value of a bit depth.
-class LightResponse {
- public:
-  /// For luma of 8 to 16 bits.
-  LightResponse(const DvsSettings& settings, int bits);
+/// What the photoreceptor makes of light, 0 ... 1.
+inline double response_of(double light, Response response, double log_eps) {
+  constexpr double linear_up_to = 20;  // 8-bit grey levels, v2e's
+  if (response == Response::log) return std::log(log_eps + light);
+  if (response == Response::linear) return std::log(255.0) * light;
+  const double x = 255 * light;
+  return x <= linear_up_to ? x * std::log(linear_up_to) / linear_up_to : std::log(x);
+}
 
-  const float* values() const { return values_.data(); }
-  int white() const { return static_cast<int>(values_.size()) - 1; }
+/// The response to each luma value of a bit depth, 8 to 16.
+inline std::vector<float> responses(const DvsSettings& settings, int bits) {
+  std::vector<float> values(std::size_t{1} << bits);
+  const auto white = static_cast<double>(values.size() - 1);
+  for (std::size_t luma = 0; luma < values.size(); ++luma) {
+    const double light = light_of(static_cast<double>(luma) / white, settings.linear_light);
+    values[luma] = static_cast<float>(response_of(light, settings.response, settings.log_eps));
+  }
+  return values;
+}
 
- private:
-  std::vector<float> values_;
-};
+/// Shot noise is counted in fixed-point numbers, in units of 1/noise_unit events.
+inline constexpr double noise_unit = 1 << 27;
 
-/// Luma is told apart in this many shades where what hangs on it need not be exact: the speed of a
-/// photoreceptor and its noise.
+/// The bandwidth of a photoreceptor and its noise depend on the light (v2e). They need not be
+/// exact, so luma is reduced to this many shades.
 inline constexpr int shades = 256;
 
-/// What happens within a while to a pixel of each shade.
+/// What happens to a pixel of each shade in a sub-interval.
 struct ShadeTables {
-  std::array<float, shades> decays;         ///< k: bandwidth times the while
-  std::array<float, shades> kept;           ///< exp(-k), the share of a lag that is left
-  std::array<float, shades> mean_kept;      ///< (1 - exp(-k)) / k, its mean over the while
-  std::array<std::uint32_t, shades> noise;  ///< expected shot noise, in 1/noise_unit
+  std::array<float, shades> exponent;           ///< k = bandwidth times duration
+  std::array<float, shades> decay_factor;       ///< exp(-k), of a lag behind the light
+  std::array<float, shades> mean_decay_factor;  ///< (1 - exp(-k)) / k, over the duration
+  std::array<std::uint32_t, shades> noise;      ///< expected shot noise, 1/noise_unit
 
-  std::array<double, shades> bandwidth;  ///< 1/us; k exactly
+  std::array<double, shades> bandwidth;  ///< 1/us
   std::array<double, shades> expected_noise;
 
-  ShadeTables(const DvsSettings& settings, double microseconds);
-};
+  double duration;  ///< microseconds
 
-/// Of the fixed-point numbers that shot noise is counted in.
-inline constexpr double noise_unit = 1 << 27;
+  ShadeTables(const DvsSettings& settings, double microseconds) : duration(microseconds) {
+    constexpr double min_cutoff_hz = 1e-3;  // slower is all the same: minutes
+    constexpr double noise_at_white = 0.25;
+    const double max_bandwidth =
+        2 * std::numbers::pi * std::max(settings.cutoff_hz, min_cutoff_hz) / 1e6;
+    const double max_noise_rate = settings.shot_noise_rate_hz / 1e6;
+    for (std::size_t i = 0; i < shades; ++i) {
+      const double light = light_of(static_cast<double>(i) / 255, settings.linear_light);
+      // How fast a photoreceptor is, and how quiet, compared with one that sees white: in (0, 1].
+      const double brightness = (light + settings.dark_light) / (1 + settings.dark_light);
+      bandwidth[i] = max_bandwidth * brightness;
+      const double k = bandwidth[i] * duration;
+      exponent[i] = static_cast<float>(k);
+      decay_factor[i] = static_cast<float>(std::exp(-k));
+      mean_decay_factor[i] = static_cast<float>(k > 0 ? -std::expm1(-k) / k : 1);
+      expected_noise[i] =
+          max_noise_rate * (1 - (1 - noise_at_white) * brightness) * duration * noise_unit;
+      noise[i] = static_cast<std::uint32_t>(std::min(expected_noise[i], 4294967295.0));
+    }
+  }
+};
 
 }  // namespace eventcamera

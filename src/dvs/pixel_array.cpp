@@ -1,43 +1,123 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/dvs/pixel_array.hpp"
 
-#include "src/dvs/mismatch.hpp"
-#include "src/dvs/shot_noise.hpp"
+#include <algorithm>
+#include <limits>
 
 namespace eventcamera {
+namespace {
 
-PixelArray::PixelArray(int w, int height)
-    : width(w),
-      target(w, height),
-      signal(w, height),
-      reference(w, height),
-      positive(w, height),
-      negative(w, height),
-      leak(w, height),
-      rest(w, height),
-      quiet(w, height) {}
+using Purpose = Random::Purpose;
+
+/// A threshold of 0 would fire for ever.
+constexpr double min_threshold = 1e-3;
+
+/// Mismatch leaves this share of a threshold at least.
+constexpr double min_share = 0.1;
+
+/// The leak rates of hot pixels, log-uniform.
+constexpr double min_hot_hz = 10;
+constexpr double max_hot_hz = 1000;
+
+double bounded(double threshold, double mean) {
+  return std::max({threshold, min_share * mean, min_threshold});
+}
+
+}  // namespace
+
+double Mismatch::fixed_threshold(std::uint64_t pixel, Polarity polarity) const {
+  const bool is_on = polarity == Polarity::on;
+  const double mean = is_on ? settings_.positive_threshold : settings_.negative_threshold;
+  if (settings_.threshold_sigma <= 0) return std::max(mean, min_threshold);
+  const auto purpose = is_on ? Purpose::positive_threshold : Purpose::negative_threshold;
+  return bounded(mean + settings_.threshold_sigma * random_.normal(pixel, purpose), mean);
+}
+
+double Mismatch::next_threshold(std::uint64_t pixel, Polarity polarity,
+                                std::uint64_t counter) const {
+  const double mean = fixed_threshold(pixel, polarity);
+  return bounded(mean + settings_.threshold_jitter * random_.normal(pixel, Purpose::event, counter),
+                 mean);
+}
+
+PixelTraits Mismatch::of(std::uint64_t pixel) const {
+  constexpr double never = std::numeric_limits<double>::infinity();
+  const double defect = settings_.dead_pixels + settings_.hot_pixels > 0
+                            ? random_.uniform(pixel, Purpose::defect)
+                            : 1;
+  if (defect < settings_.dead_pixels) return {never, never, 0};
+
+  const double positive = fixed_threshold(pixel, Polarity::on);
+  const double negative = fixed_threshold(pixel, Polarity::off);
+  double leak_rate_hz = settings_.leak_rate_hz;
+  if (settings_.leak_spread > 0 && leak_rate_hz > 0) {
+    // The mean over all pixels is the set rate.
+    const double spread = settings_.leak_spread * std::numbers::ln10;
+    leak_rate_hz *= std::exp(spread * random_.normal(pixel, Purpose::leak) - spread * spread / 2);
+  }
+  if (defect < settings_.dead_pixels + settings_.hot_pixels)
+    leak_rate_hz +=
+        min_hot_hz * std::pow(max_hot_hz / min_hot_hz, random_.uniform(pixel, Purpose::heat));
+  return {positive, negative, leak_rate_hz * positive / 1e6};
+}
+
+double Mismatch::leaked(std::uint64_t pixel, const PixelTraits& traits, double noise_rate) const {
+  if (traits.leak <= 0) return 0;
+  const double max_age = traits.positive_threshold / traits.leak;
+  const double u = random_.uniform(pixel, Purpose::leak_phase);
+  // The age of a reference that is reset by noise, and by the leak's own event in any case.
+  const double age = noise_rate > 0
+                         ? -std::log1p(u * std::expm1(-noise_rate * max_age)) / noise_rate
+                         : u * max_age;
+  return traits.leak * age;
+}
+
+PixelArray::PixelArray(int width, int height)
+    : target_(width, height),
+      signal_(width, height),
+      reference_(width, height),
+      positive_(width, height),
+      negative_(width, height),
+      leak_(width, height),
+      refractory_left_(width, height),
+      noise_budget_(width, height) {}
+
+PixelRow PixelArray::row(int y) {
+  return {y,
+          static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width()),
+          target_.row(y),
+          signal_.row(y),
+          reference_.row(y),
+          positive_.row(y),
+          negative_.row(y),
+          leak_.row(y),
+          refractory_left_.row(y),
+          noise_budget_.row(y)};
+}
 
 void PixelArray::draw_traits(int y, const DvsSettings& settings, const Random& random) {
   const Mismatch mismatch(settings, random);
-  for (int x = 0; x < width; ++x) {
-    const auto traits = mismatch.of(number_of(x, y));
-    positive.at(x, y) = static_cast<float>(traits.positive_threshold);
-    negative.at(x, y) = static_cast<float>(traits.negative_threshold);
-    leak.at(x, y) = static_cast<float>(traits.leak);
+  const PixelRow pixels = row(y);
+  for (int x = 0; x < width(); ++x) {
+    const auto traits = mismatch.of(pixels.first_number + static_cast<std::uint64_t>(x));
+    pixels.positive[x] = static_cast<float>(traits.positive_threshold);
+    pixels.negative[x] = static_cast<float>(traits.negative_threshold);
+    pixels.leak[x] = static_cast<float>(traits.leak);
   }
 }
 
 void PixelArray::settle(int y, const DvsSettings& settings, const Random& random) {
   const Mismatch mismatch(settings, random);
   const double noise_rate = settings.shot_noise_rate_hz / 1e6;
-  for (int x = 0; x < width; ++x) {
-    const auto pixel = number_of(x, y);
-    const PixelTraits traits{positive.at(x, y), negative.at(x, y), leak.at(x, y)};
-    signal.at(x, y) = target.at(x, y);
-    reference.at(x, y) =
-        static_cast<float>(target.at(x, y) - mismatch.leaked(pixel, traits, noise_rate));
-    rest.at(x, y) = 0;
-    quiet.at(x, y) = quiet_before_noise(random, pixel, Random::Purpose::first_noise, 0);
+  const PixelRow pixels = row(y);
+  for (int x = 0; x < width(); ++x) {
+    const auto number = pixels.first_number + static_cast<std::uint64_t>(x);
+    const PixelTraits traits{pixels.positive[x], pixels.negative[x], pixels.leak[x]};
+    pixels.signal[x] = pixels.target[x];
+    pixels.reference[x] =
+        static_cast<float>(pixels.target[x] - mismatch.leaked(number, traits, noise_rate));
+    pixels.refractory_left[x] = 0;
+    pixels.noise_budget[x] = draw_noise_budget(random, number, Purpose::first_noise, 0);
   }
 }
 

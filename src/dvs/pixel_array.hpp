@@ -1,38 +1,146 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <numbers>
 
+#include "src/core/event.hpp"
 #include "src/core/image.hpp"
-#include "src/dvs/dvs_settings.hpp"
-#include "src/dvs/random.hpp"
+#include "src/dvs/light_response.hpp"
 
 namespace eventcamera {
 
-/// What the pixels remember, an image for each thing.
-struct PixelArray {
-  PixelArray(int width, int height);
+/// Random numbers without state: each is a hash of what it is for, so it does not depend on the
+/// order in which pixels are processed. The hash is the finalizer of SplitMix64, applied once for
+/// each of seed, pixel, purpose and counter.
+class Random {
+ public:
+  /// What a number is for; numbers for different purposes are independent.
+  enum class Purpose : std::uint64_t {
+    positive_threshold = 1,
+    negative_threshold,
+    leak,
+    leak_phase,
+    defect,
+    heat,
+    first_noise,
+    event,  ///< what happens to a pixel as time passes
+  };
 
-  /// Makes each pixel's thresholds and leak what the settings say, a row at a time.
-  void draw_traits(int y, const DvsSettings& settings, const Random& random);
+  explicit Random(std::uint64_t seed) : key_(mixed(seed + 0x9e3779b97f4a7c15)) {}
 
-  /// Sets a row of references to a signal that has long been there, and draws the first noise.
-  void settle(int y, const DvsSettings& settings, const Random& random);
-
-  std::uint64_t number_of(int x, int y) const {
-    return static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
-           static_cast<std::uint64_t>(x);
+  std::uint64_t bits(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
+    return mixed(mixed(mixed(key_ + pixel) + static_cast<std::uint64_t>(purpose)) + counter);
   }
 
-  int width;
-  Image<float> target;     ///< what the response makes of the light now
-  Image<float> signal;     ///< what the photoreceptor has made of it so far
-  Image<float> reference;  ///< what the signal is compared with
-  Image<float> positive;   ///< thresholds; infinite where the pixel is dead
-  Image<float> negative;
-  Image<float> leak;           ///< the reference falls that much a microsecond
-  Image<float> rest;           ///< microseconds until the pixel can fire again, or 0
-  Image<std::uint32_t> quiet;  ///< the shot noise to be expected before it fires, 1/noise_unit
+  /// In (0, 1).
+  double uniform(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
+    return to_uniform(bits(pixel, purpose, counter));
+  }
+
+  /// With mean and standard deviation 1.
+  double exponential(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
+    return -std::log(uniform(pixel, purpose, counter));
+  }
+
+  /// With mean 0 and standard deviation 1 (Box and Muller).
+  double normal(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
+    const std::uint64_t first = bits(pixel, purpose, counter);
+    return std::sqrt(-2 * std::log(to_uniform(first))) *
+           std::cos(2 * std::numbers::pi * to_uniform(mixed(first + 1)));
+  }
+
+ private:
+  static double to_uniform(std::uint64_t bits) {
+    return (static_cast<double>(bits >> 11) + 0.5) * 0x1p-53;
+  }
+
+  static std::uint64_t mixed(std::uint64_t z) {
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+    return z ^ (z >> 31);
+  }
+
+  std::uint64_t key_;
+};
+
+/// Draws how much shot noise is to be expected before a pixel's next noise event, 1/noise_unit.
+/// Shot noise is a Poisson process whose rate depends on the light: its next event comes when the
+/// integral of the rate has used up this budget, drawn from the exponential distribution of mean 1.
+inline std::uint32_t draw_noise_budget(const Random& random, std::uint64_t pixel,
+                                       Random::Purpose purpose, std::uint64_t counter) {
+  const double drawn = random.exponential(pixel, purpose, counter) * noise_unit;
+  return static_cast<std::uint32_t>(std::clamp(drawn, 1.0, 4294967294.0));
+}
+
+/// The properties of one pixel.
+struct PixelTraits {
+  double positive_threshold;  ///< infinite if the pixel is dead
+  double negative_threshold;
+  double leak;  ///< how much its reference falls per microsecond
+};
+
+/// The differences between pixels, determined by the seed.
+class Mismatch {
+ public:
+  Mismatch(const DvsSettings& settings, const Random& random)
+      : settings_(settings), random_(random) {}
+
+  PixelTraits of(std::uint64_t pixel) const;
+
+  /// The threshold after another event, `counter`, where thresholds change from event to event.
+  double next_threshold(std::uint64_t pixel, Polarity polarity, std::uint64_t counter) const;
+
+  /// How far the reference has fallen when the first frame comes, if noise of this rate (1/us)
+  /// resets it: the camera has been on for long.
+  double leaked(std::uint64_t pixel, const PixelTraits& traits, double noise_rate) const;
+
+ private:
+  double fixed_threshold(std::uint64_t pixel, Polarity polarity) const;
+
+  const DvsSettings& settings_;
+  const Random& random_;
+};
+
+/// A row of pixels: what each of them is, and its state.
+struct PixelRow {
+  int y;
+  std::uint64_t first_number;  ///< of the pixel x = 0
+
+  float* target;     ///< the response to the light now
+  float* signal;     ///< what the photoreceptor has made of it so far
+  float* reference;  ///< what the signal is compared with
+  float* positive;   ///< thresholds; infinite if the pixel is dead
+  float* negative;
+  float* leak;                  ///< how much the reference falls per microsecond
+  float* refractory_left;       ///< microseconds until the pixel can fire again, or 0
+  std::uint32_t* noise_budget;  ///< expected shot noise before its next event, 1/noise_unit
+};
+
+class PixelArray {
+ public:
+  PixelArray(int width, int height);
+
+  int width() const { return target_.width(); }
+  PixelRow row(int y);
+
+  /// Draws the thresholds and the leak of a row of pixels.
+  void draw_traits(int y, const DvsSettings& settings, const Random& random);
+
+  /// Resets a row as if its target had been constant for long, and draws its first noise budgets.
+  void settle(int y, const DvsSettings& settings, const Random& random);
+
+ private:
+  Image<float> target_;
+  Image<float> signal_;
+  Image<float> reference_;
+  Image<float> positive_;
+  Image<float> negative_;
+  Image<float> leak_;
+  Image<float> refractory_left_;
+  Image<std::uint32_t> noise_budget_;
 };
 
 }  // namespace eventcamera

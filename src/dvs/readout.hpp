@@ -8,25 +8,75 @@
 
 namespace eventcamera {
 
-/// What lies between the pixels and the outside: an arbiter that takes the events of one row at a
-/// time, the row first that waits longest, each event at its share of a second. A row's events
-/// leave together and get the time at which they do. A pixel that waits makes no other event, so
-/// what comes too fast for the readout is lost there, and never more waits than there are pixels.
+/// Sorts the events of an interval, which the bands of rows make in any order: by time, and within
+/// a microsecond in raster order.
+class EventSorter {
+ public:
+  /// Begins an interval of `duration` microseconds with the events that the last one deferred.
+  void begin(double duration, int bands);
+  /// Drops the deferred events.
+  void reset() { deferred_.clear(); }
+
+  /// Adds an event `t` microseconds after the start of the interval; past its end, the event is
+  /// deferred to the next interval. Each band may have a thread of its own.
+  void add(int band, double t, int x, int y, Polarity polarity) {
+    if (t > duration_) {
+      deferred_[static_cast<std::size_t>(band)].push_back({t, Event::at(x, y, 0, polarity)});
+      return;
+    }
+    const auto microseconds = static_cast<std::uint32_t>(t);
+    collected_.bucket(static_cast<int>(microseconds >> shift_) + 1, band)
+        .push_back(Event::at(x, y, microseconds, polarity));
+  }
+
+  /// Fills `events`, a bucket for each time slice.
+  void finish(EventBuckets& events, ThreadPool& threads);
+
+ private:
+  struct DeferredEvent {
+    double t;
+    Event event;
+  };
+  struct alignas(64) Deferred : std::vector<DeferredEvent> {};
+  struct alignas(64) Counts : std::vector<std::uint32_t> {};
+
+  void sort_slice(int slice, std::vector<std::uint32_t>& counts, std::vector<Event>& out);
+
+  double duration_ = 0;
+  int shift_ = 0;  ///< a time slice has 2^shift_ microseconds
+  int slices_ = 1;
+  EventBuckets collected_;          ///< by slice and band
+  std::vector<Deferred> deferred_;  ///< by band
+  std::vector<Counts> counts_;      ///< by thread
+};
+
+/// What collects the events of one band of rows.
+struct BandEvents {
+  EventSorter& sorter;
+  int band;
+
+  void add(double t, int x, int y, Polarity polarity) const { sorter.add(band, t, x, y, polarity); }
+};
+
+/// The arbiter between the pixels and the outside: takes the events of one row at a time, the
+/// longest waiting row first, each event at its share of a second. The events of a row leave
+/// together and get the time at which they do. A pixel that waits makes no other event, so events
+/// that come too fast for the readout are lost there, and no more wait than there are pixels.
 class Readout {
  public:
   Readout(int width, int height);
 
-  /// Forgets what waits.
+  /// Drops the events that wait.
   void reset();
 
-  /// Takes the events of an interval of so many microseconds, and fills `out` with those that leave
-  /// within it, sorted; the others leave in the next.
-  void pass(const EventBuckets& in, double duration, double events_a_second, EventBuckets& out);
+  /// Takes the events of an interval of `duration` microseconds, and fills `out`, sorted, with
+  /// those that leave within it; the others leave in the next one.
+  void pass(const EventBuckets& in, double duration, double events_per_second, EventBuckets& out);
 
  private:
   static constexpr int none = -1;
 
-  struct Waiting {
+  struct WaitingEvent {
     Event event;
     int next;  ///< in its row
   };
@@ -39,14 +89,18 @@ class Readout {
   void admit(const Event& event);
   void serve(int row, std::uint32_t t, std::vector<Event>& out);
 
+  std::uint8_t& waits(const Event& event) {
+    return waits_[static_cast<std::size_t>(event.y()) * static_cast<std::size_t>(width_) + event.x];
+  }
+
   int width_;
-  std::vector<Waiting> waiting_;  ///< lists, one for each row and one of free places
+  std::vector<WaitingEvent> waiting_;  ///< linked lists: one for each row, one of free places
   int free_ = none;
   std::vector<Row> rows_;
-  std::vector<int> row_queue_;  ///< a ring of the rows in which something waits
+  std::vector<int> row_queue_;  ///< a ring of the rows in which events wait
   std::size_t queue_first_ = 0;
   std::size_t queue_count_ = 0;
-  std::vector<std::uint8_t> waits_;  ///< pixel by pixel
+  std::vector<std::uint8_t> waits_;  ///< by pixel
   double idle_from_ = 0;             ///< microseconds after the start of the interval
 };
 

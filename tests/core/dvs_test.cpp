@@ -10,10 +10,9 @@
 #include <numbers>
 #include <random>
 
-#include "src/dvs/course.hpp"
-#include "src/dvs/decay.hpp"
 #include "src/dvs/dvs_settings.hpp"
-#include "src/dvs/mismatch.hpp"
+#include "src/dvs/pixel_array.hpp"
+#include "src/dvs/trajectory.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/dvs.hpp"
@@ -82,17 +81,17 @@ TEST(Decay, IsTheExponentialFunction) {
   EXPECT_LT(decay(1e300), 1e-300);
 }
 
-/// The first moment, by very small steps, at which a course is beyond a level on either side.
-double plainly_crossed(const Course& course, double lower, double upper, double end) {
+/// The first moment, by very small steps, at which a trajectory is beyond a level on either side.
+double plainly_crossed(const Trajectory& trajectory, double lower, double upper, double end) {
   constexpr int steps = 200'000;
   for (int i = 0; i <= steps; ++i) {
-    const double value = course.at(end * i / steps);
+    const double value = trajectory.at(end * i / steps);
     if (value >= upper || value <= lower) return end * i / steps;
   }
   return -1;
 }
 
-TEST(Crossings, AreFoundOnEveryCourseOfALowPass) {
+TEST(Crossings, AreFoundOnEveryTrajectoryOfALowPass) {
   std::minstd_rand random(5);
   const auto uniform = [&](double from, double to) {
     return std::uniform_real_distribution<>(from, to)(random);
@@ -101,17 +100,18 @@ TEST(Crossings, AreFoundOnEveryCourseOfALowPass) {
   int found = 0;
   for (int i = 0; i < 600; ++i) {
     const double bandwidth = std::pow(10, uniform(-7, -2));
-    auto course = Course::low_pass(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), end, bandwidth);
-    course.slope += uniform(0, 1) < 0.5 ? 0 : uniform(0, 2e-5);
-    const double reference = course.at(0) + uniform(-0.19, 0.19);
-    const Crossings crossings(course, {end, course.at(end)});
-    const auto first = crossings.first(reference - 0.2, reference + 0.2, {0, course.at(0)});
-    const double plain = plainly_crossed(course, reference - 0.2, reference + 0.2, end);
+    auto trajectory =
+        Trajectory::low_pass(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), end, bandwidth);
+    trajectory.slope += uniform(0, 1) < 0.5 ? 0 : uniform(0, 2e-5);
+    const double reference = trajectory.at(0) + uniform(-0.19, 0.19);
+    const Crossings crossings(trajectory, {end, trajectory.at(end)});
+    const auto first = crossings.first(reference - 0.2, reference + 0.2, {0, trajectory.at(0)});
+    const double plain = plainly_crossed(trajectory, reference - 0.2, reference + 0.2, end);
     ASSERT_EQ(first.has_value(), plain >= 0) << i;
     if (!first) continue;
     ++found;
     ASSERT_NEAR(first->point.t, plain, 0.3) << i << " " << bandwidth;
-    ASSERT_NEAR(course.at(first->point.t), first->point.value, 1e-6) << i;
+    ASSERT_NEAR(trajectory.at(first->point.t), first->point.value, 1e-6) << i;
   }
   EXPECT_GT(found, 200);
 }

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <optional>
+
+#include "src/core/event.hpp"
+
+namespace eventcamera {
+
+/// exp(-x) of x >= 0 with a relative error of 1e-12: the same on every machine, without a branch,
+/// and inline.
+inline double decay(double x) {
+  constexpr double log2_e = 1.4426950408889634;
+  constexpr double ln_2 = 0.6931471805599453;
+  constexpr double to_integers = 0x1.8p52;  // doubles of this size are integers
+  x = std::min(x, 700.0);                   // the result is close to 0 beyond
+  const double shifted = x * log2_e + to_integers;
+  const double r = (shifted - to_integers) * ln_2 - x;  // |r| <= ln_2 / 2
+  const double r2 = r * r;
+  const double r4 = r2 * r2;
+  const double low = (1 + r) + r2 * (1.0 / 2 + r * (1.0 / 6));
+  const double middle = (1.0 / 24 + r * (1.0 / 120)) + r2 * (1.0 / 720 + r * (1.0 / 5040));
+  const double high = (1.0 / 40320 + r * (1.0 / 362880)) + r2 * (1.0 / 3628800);
+  const double mantissa = low + r4 * (middle + r4 * high);
+  // The lowest bits of `shifted` are the power of 1/2.
+  const auto exponent = (std::uint64_t{1023} << 52) - (std::bit_cast<std::uint64_t>(shifted) << 52);
+  return mantissa * std::bit_cast<double>(exponent);
+}
+
+/// A signal of a pixel over the time t of a sub-interval, from 0 to its end, microseconds:
+/// offset + slope t + lag exp(-bandwidth t).
+struct Trajectory {
+  double offset = 0;
+  double slope = 0;
+  double lag = 0;        ///< 0 for a straight line
+  double bandwidth = 0;  ///< 1/us
+
+  double at(double t) const {
+    const double straight = offset + slope * t;
+    return lag == 0 ? straight : straight + lag * decay(bandwidth * t);
+  }
+
+  /// A straight line from one value to another.
+  static Trajectory line(double from, double to, double duration) {
+    return {.offset = from, .slope = (to - from) / duration};
+  }
+
+  /// The exact output of a one-pole low-pass filter that is at `signal` when its input starts on a
+  /// straight line.
+  static Trajectory low_pass(double signal, double from, double to, double duration,
+                             double bandwidth) {
+    const double slope = (to - from) / duration;
+    const double final_lag = slope / bandwidth;
+    return {from - final_lag, slope, signal - (from - final_lag), bandwidth};
+  }
+};
+
+/// A point of a trajectory.
+struct TrajectoryPoint {
+  double t;
+  double value;
+};
+
+/// Where a trajectory reaches a level.
+struct Crossing {
+  TrajectoryPoint point;
+  Polarity polarity;
+};
+
+/// A level that is missed by less counts as reached: floats are rounded this much, over several
+/// events, on the way up from a grey level and back to it.
+inline constexpr float rounding = 2e-6F;
+
+/// Finds the exact times at which a trajectory crosses levels.
+class Crossings {
+ public:
+  /// Up to the point `end`.
+  Crossings(const Trajectory& trajectory, TrajectoryPoint end)
+      : sign_(trajectory.lag < 0 ? -1 : 1),
+        trajectory_{sign_ * trajectory.offset, sign_ * trajectory.slope, sign_ * trajectory.lag,
+                    trajectory.bandwidth},
+        end_{end.t, sign_ * end.value},
+        last_slope_(slope_at(end_)) {}
+
+  /// Returns the first point from `from` on at which the trajectory is at or above `upper` (ON), or
+  /// at or below `lower` (OFF), if there is one.
+  std::optional<Crossing> first(double lower, double upper, TrajectoryPoint from) const;
+
+ private:
+  double lag_at(TrajectoryPoint point) const {
+    return point.value - trajectory_.offset - trajectory_.slope * point.t;
+  }
+  double slope_at(TrajectoryPoint point) const {
+    return trajectory_.slope - trajectory_.bandwidth * lag_at(point);
+  }
+  TrajectoryPoint turn_after(TrajectoryPoint from) const;
+  double time_of(double level, TrajectoryPoint a, TrajectoryPoint b) const;
+
+  /// The trajectory times `sign_`: its slope never decreases. So it may turn once, from falling to
+  /// rising, and of two levels around it only the lower one can be crossed and crossed back.
+  double sign_;
+  Trajectory trajectory_;
+  TrajectoryPoint end_;
+  double last_slope_;
+};
+
+inline std::optional<Crossing> Crossings::first(double lower, double upper,
+                                                TrajectoryPoint from) const {
+  if (from.value >= upper) return Crossing{from, Polarity::on};
+  if (from.value <= lower) return Crossing{from, Polarity::off};
+  const TrajectoryPoint start{from.t, sign_ * from.value};
+  const double near = sign_ > 0 ? lower : -upper;
+  const double far = sign_ > 0 ? upper : -lower;
+  const auto crossing = [&](double level, TrajectoryPoint a, TrajectoryPoint b) {
+    return Crossing{{time_of(level, a, b), sign_ * level},
+                    (level == far) == (sign_ > 0) ? Polarity::on : Polarity::off};
+  };
+  const double first_slope = slope_at(start);
+  const bool ends_near = end_.value <= near;
+  if (!ends_near && first_slope < 0 && last_slope_ > 0) {
+    // It stays above the point where the tangents at both ends meet, which needs no logarithm.
+    const double rise = end_.value - start.value;
+    const double to_meeting =
+        (rise - last_slope_ * (end_.t - start.t)) / (first_slope - last_slope_);
+    if (start.value + first_slope * to_meeting <= near + rounding) {
+      const auto turn = turn_after(start);
+      if (turn.value <= near + rounding) return crossing(near, start, turn);
+    }
+  } else if (end_.value <= near + rounding) {
+    return crossing(near, start, end_);
+  }
+  if (end_.value >= far - rounding) return crossing(far, start, end_);
+  return std::nullopt;
+}
+
+}  // namespace eventcamera
