@@ -7,8 +7,9 @@ and the time relative to a memcpy of the decoded events.
 
 Also writes the table between the markers of the page."""
 import json
-import re
 import sys
+
+from page import replace_tables, run_on
 
 # Benchmark names without their verbs, and the names in the table.
 FORMATS = {
@@ -69,11 +70,8 @@ def main():
         with open(path, encoding="utf-8") as file:
             run = json.load(file)
         results |= results_of(run)
-    context = run["context"]
     lines = [
-        f"Run on {context['date'][:10]} on a processor of {context['mhz_per_cpu']} MHz; load average"
-        f" {context['load_avg'][0]:.1f}.",
-        "",
+        run_on(run["context"]),
         "| format | read | write |",
         "|---|---|---|",
     ]
@@ -83,14 +81,7 @@ def main():
             lines.append(f"| {label} | {cells[0]} | {cells[1]} |")
     text = "\n".join(lines) + "\n"
     print(text)
-    with open(page, encoding="utf-8") as file:
-        before = file.read()
-    begin, end = "<!-- table of bench/run -->\n", "<!-- end of the table -->\n"
-    between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
-    if not between.search(before):
-        sys.exit(f"{page} has no markers for the table")
-    with open(page, "w", encoding="utf-8") as file:
-        file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", before))
+    replace_tables(page, "bench/run", text)
 
 
 main()

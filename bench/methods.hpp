@@ -22,7 +22,7 @@ using namespace eventcamera;
 
 using MakeSimulator = std::function<std::unique_ptr<Simulator>(const LumaFormat&)>;
 
-/// A method, written plainly and ours.
+/// A method in both formulations, plain and ours.
 struct Method {
   std::string name;
   double threshold;
@@ -30,30 +30,24 @@ struct Method {
   MakeSimulator ours;
 };
 
-template <class PlainSimulator>
-MakeSimulator make_plain() {
-  return [](const LumaFormat& format) { return std::make_unique<PlainSimulator>(format); };
+template <class PlainSimulator, class... Arguments>
+MakeSimulator make_plain(const Arguments&... arguments) {
+  return [=](const LumaFormat& format) {
+    return std::make_unique<PlainSimulator>(format, arguments...);
+  };
 }
 
 inline Method dense_method(const std::string& name, FlowMethod flow) {
-  return {name, 3,
-          [flow](const LumaFormat& format) {
-            return std::make_unique<plain::DenseSimulator>(format, flow);
-          },
-          [flow](const LumaFormat& format) {
+  return {name, 3, make_plain<plain::DenseSimulator>(flow), [flow](const LumaFormat& format) {
             auto simulator = make_dense_simulator(format);
             simulator->set_flow(flow);
             return simulator;
           }};
 }
 
-/// Of the physical pixel; its thresholds are those of the settings.
+/// The thresholds are those of the settings.
 inline Method dvs_method(const std::string& name, const DvsSettings& settings) {
-  return {name, 0,
-          [settings](const LumaFormat& format) {
-            return std::make_unique<plain::DvsSimulator>(format, settings);
-          },
-          [settings](const LumaFormat& format) {
+  return {name, 0, make_plain<plain::DvsSimulator>(settings), [settings](const auto& format) {
             auto simulator = make_dvs_simulator(format);
             simulator->set(settings);
             return simulator;

@@ -30,6 +30,7 @@ SourceFileLoader("event_calibrate", os.path.join(PIPELINES, "event-calibrate")).
 from event_calibrate import (  # noqa: E402
     ON, Gst, Progress, Span, calibrate, compare, delayed, find_lag, read_recording, read_video,
     refine_lag, simulate, until)
+from page import replace_tables  # noqa: E402
 
 # The name of each row, and its element.
 ROWS = {
@@ -246,17 +247,6 @@ def draw(path, scene, data, elements):
     figure.savefig(path)
 
 
-def replace_tables(path, text):
-    with open(path, encoding="utf-8") as file:
-        page = file.read()
-    begin, end = "<!-- tables of bench/realism -->\n", "<!-- end of the tables -->\n"
-    between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
-    if not between.search(page):
-        sys.exit(f"{path} has no markers for the tables")
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", page))
-
-
 def main():
     data = os.environ.get("SHARED_DATA", os.path.join("..", "shared", "data"))
     Gst.init(None)
@@ -277,7 +267,7 @@ def main():
     text = "\n".join(table(result) for result in results.values())
     print(text)
     if len(sys.argv) > 1 and len(results) == len(SCENES):
-        replace_tables(os.path.join(sys.argv[1], "realism.md"), text)
+        replace_tables(os.path.join(sys.argv[1], "realism.md"), "bench/realism", text)
         plot(os.path.join(sys.argv[1], "realism-figures.png"), results["slider"]["rows"])
         # The licence of the other recording allows measuring only.
         draw(os.path.join(sys.argv[1], "realism.png"), SCENES["davis"], data,

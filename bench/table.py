@@ -7,9 +7,10 @@ the plain formulation, and milliseconds per frame.
 
 Given a page, also writes the tables between its markers."""
 import json
-import re
 import statistics
 import sys
+
+from page import replace_tables, run_on
 
 SCENES = {
     "driving-640x480": "driving, 640x480, n = 20",
@@ -65,47 +66,36 @@ def table(times, rows, threads, header, cell):
     return "\n".join(head + ["|---" * (len(scenes) + 1) + "|"] + lines) + "\n"
 
 
-def beside_plain(times, scene, method, threads):
-    ours = times.get((scene, method, "ours", threads))
-    plain = times.get((scene, method, "plain", threads))
-    if ours is None or plain is None:
-        return ""
-    return f"**{plain / ours:.1f}×** {milliseconds(ours)} ms (plain {milliseconds(plain)})"
+def beside(other, text):
+    """What a cell says about our time and that of the other formulation."""
+
+    def cell(times, scene, method, threads):
+        ours = times.get((scene, method, "ours", threads))
+        theirs = times.get((scene, method, other, threads))
+        return "" if ours is None or theirs is None else text(ours, theirs)
+
+    return cell
 
 
-def beside_memcpy(times, scene, method, threads):
-    ours = times.get((scene, method, "ours", threads))
-    memcpy = times.get((scene, method, "memcpy", threads))
-    if ours is None or memcpy is None:
-        return ""
-    return f"**{ours / memcpy:.1f}** memcpy, {milliseconds(ours)} ms"
+beside_plain = beside("plain", lambda ours, plain: (
+    f"**{plain / ours:.1f}×** {milliseconds(ours)} ms (plain {milliseconds(plain)})"))
+beside_memcpy = beside("memcpy", lambda ours, memcpy: (
+    f"**{ours / memcpy:.1f}** memcpy, {milliseconds(ours)} ms"))
 
 
 def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         run = json.load(file)
     times = times_of(run)
-    context = run["context"]
     tables = [
         table(times, METHODS, "2", "two threads", beside_plain),
         table(times, METHODS, "1", "one thread", beside_plain),
         table(times, COPIES, "1", "one thread", beside_memcpy),
     ]
-    machine = (
-        f"Run on {context['date'][:10]} on {context['num_cpus']} processors"
-        f" of {context['mhz_per_cpu']} MHz; load average at the start {context['load_avg'][0]:.1f}.\n"
-    )
-    text = "\n".join([machine] + [each for each in tables if each])
+    text = "\n".join([run_on(run["context"])] + [each for each in tables if each])
     print(text)
     if len(sys.argv) > 2:
-        with open(sys.argv[2], encoding="utf-8") as file:
-            page = file.read()
-        begin, end = "<!-- tables of bench/run -->\n", "<!-- end of the tables -->\n"
-        between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
-        if not between.search(page):
-            sys.exit(f"{sys.argv[2]} has no markers for the tables")
-        with open(sys.argv[2], "w", encoding="utf-8") as file:
-            file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", page))
+        replace_tables(sys.argv[2], "bench/run", text)
 
 
 main()

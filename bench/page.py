@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the scripts here share: the pages of docs/ whose tables they renew."""
+import re
+import sys
+
+
+def replace_tables(path, source, text):
+    """Replaces what a page has between "tables of SOURCE" and "end of the tables"."""
+    with open(path, encoding="utf-8") as file:
+        page = file.read()
+    begin, end = f"<!-- tables of {source} -->\n", "<!-- end of the tables -->\n"
+    between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
+    if not between.search(page):
+        sys.exit(f"{path}: no marker '{begin.strip()}'; add it where the tables belong")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(between.sub(lambda _: f"{begin}\n{text}\n{end}", page))
+
+
+def run_on(context):
+    """When and on what a run of Google Benchmark was made."""
+    return (f"Run on {context['date'][:10]} on {context['num_cpus']} processors"
+            f" of {context['mhz_per_cpu']} MHz; load average at the start"
+            f" {context['load_avg'][0]:.1f}.\n")
