@@ -5,16 +5,15 @@
  * @short_description: writes AEDAT 4, events and frames in one file
  *
  * Writes one event stream, video beside it, or both, in the order of their times. The times in the
- * file are those of the event stream, floor(PTS / 1000) + t microseconds; video is put in sync with
+ * file are those of the event stream, floor(PTS / 1000) + t microseconds; video is synchronised to
  * it.
  *
- * A flush of all pads, as of a seek, begins the file anew, as it does with filesink. Events that
- * are earlier than what is written, or lie outside the sensor, are left out; a warning says how
- * many.
+ * A flushing seek truncates the file and starts over. Events that are earlier than what is written,
+ * or lie outside the sensor, are left out; a warning says how many.
  *
- * What is written needs no seeking, and can go through a network. Where downstream can seek, as
- * filesink can, the file ends with a table of its packets, and its header is made to point there,
- * so that readers can seek and know the duration.
+ * The file is written from start to end, and can go through a network. Where downstream can seek,
+ * as filesink can, the file also ends with a table of its packets, which its header points to, so
+ * that readers can seek and know the duration.
  *
  * ## Example launch line
  * |[
@@ -24,17 +23,20 @@
  */
 #include <gst/base/gstaggregator.h>
 
-#include <exception>
 #include <memory>
 #include <mutex>
-#include <new>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "elements/eventcam/aedatframe.hpp"
+#include "gst/base/enum_type.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/video_frame.hpp"
 #include "gst/base/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/formats/aedat/aedat4_encoder.hpp"
@@ -63,7 +65,7 @@ using Pad = std::unique_ptr<GstAggregatorPad, UnrefPad>;
 
 using Bytes = std::vector<guint8>;
 
-/// What is known of the file, and what writes it.
+/// The file that is written, from caps to stop.
 struct State {
   SensorSize size;  ///< of the event stream
   std::optional<GstVideoInfo> video;
@@ -71,7 +73,7 @@ struct State {
   std::unique_ptr<Aedat4Encoder> encoder;  ///< none before the header
   gint64 shift = 0;                        ///< nanoseconds from the running time to the file's
   Microseconds flushed = 0;                ///< when events were last made a packet
-  bool warned = false;
+  WarnOnce warn;
 };
 
 }  // namespace
@@ -87,27 +89,17 @@ struct GstAedatMuxPrivate {
   WritableEvents writable;
 };
 
-namespace {
+G_DECLARE_FINAL_TYPE(GstAedatMux, gst_aedat_mux, GST, AEDAT_MUX, GstAggregator)
 
-struct GstAedatMux {
+struct _GstAedatMux {
   GstAggregator parent;
   GstAedatMuxPrivate* priv;
 };
-
-struct GstAedatMuxClass {
-  GstAggregatorClass parent_class;
-};
-
-}  // namespace
 
 G_DEFINE_TYPE_WITH_CODE(GstAedatMux, gst_aedat_mux, GST_TYPE_AGGREGATOR,
                         GST_DEBUG_CATEGORY_INIT(aedat_mux_debug, "aedatmux", 0, "AEDAT 4 muxer"))
 GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mux_get_type())
 #define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_aedat_mux_parent_class)
-
-static GstAedatMux* mux_of(gpointer object) {
-  return reinterpret_cast<GstAedatMux*>(object);
-}
 
 static constexpr const char* events_name = "events";
 static constexpr const char* video_name = "video";
@@ -124,24 +116,20 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
 
 /* properties */
 
-#define GST_TYPE_AEDAT_COMPRESSION (gst_aedat_compression_get_type())
-static GType gst_aedat_compression_get_type() {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {static_cast<int>(Aedat4Compression::none), "No compression", "none"},
-        {static_cast<int>(Aedat4Compression::lz4), "LZ4, the fastest", "lz4"},
-        {static_cast<int>(Aedat4Compression::lz4_high), "LZ4, slower and smaller", "lz4-high"},
-        {static_cast<int>(Aedat4Compression::zstd), "Zstandard", "zstd"},
-        {static_cast<int>(Aedat4Compression::zstd_high), "Zstandard, the smallest", "zstd-high"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstAedatCompression", values);
-  }();
-  return type;
+static GType compression_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Aedat4Compression::none), "No compression", "none"},
+      {static_cast<int>(Aedat4Compression::lz4), "LZ4, the fastest", "lz4"},
+      {static_cast<int>(Aedat4Compression::lz4_high), "LZ4, slower and smaller", "lz4-high"},
+      {static_cast<int>(Aedat4Compression::zstd), "Zstandard", "zstd"},
+      {static_cast<int>(Aedat4Compression::zstd_high), "Zstandard, the smallest", "zstd-high"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstAedatCompression", values);
 }
 
 static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  auto* priv = mux_of(object)->priv;
+  auto* priv = GST_AEDAT_MUX(object)->priv;
   if (id == prop_compression) {
     const std::lock_guard lock(priv->mutex);
     priv->compression = static_cast<Aedat4Compression>(g_value_get_enum(value));
@@ -151,7 +139,7 @@ static void set_property(GObject* object, guint id, const GValue* value, GParamS
 }
 
 static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  auto* priv = mux_of(object)->priv;
+  auto* priv = GST_AEDAT_MUX(object)->priv;
   if (id == prop_compression) {
     const std::lock_guard lock(priv->mutex);
     g_value_set_enum(value, static_cast<int>(priv->compression));
@@ -194,11 +182,10 @@ static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   return earliest;
 }
 
-/// Bad input comes in droves: the first is reported to the application, all to the log.
-static void warn(GstAedatMux* self, const char* what) {
-  GST_WARNING_OBJECT(self, "%s", what);
-  if (std::exchange(self->priv->state.warned, true)) return;
-  GST_ELEMENT_WARNING(self, STREAM, MUX, ("Input was left out: %s.", what), (nullptr));
+/// Warns of input that is left out.
+static void warn(GstAedatMux* self, const char* what, const std::string& cause) {
+  self->priv->state.warn(self, {GST_STREAM_ERROR_MUX, std::string("Left out ") + what + "."},
+                         cause);
 }
 
 /* output */
@@ -232,15 +219,6 @@ static void send_caps(GstAedatMux* self, const Bytes& header) {
   gst_aggregator_set_src_caps(GST_AGGREGATOR(self), caps.get());
 }
 
-static bool is_seekable(GstAedatMux* self) {
-  GstQuery* query = gst_query_new_seeking(GST_FORMAT_BYTES);
-  gboolean seekable = FALSE;
-  if (gst_pad_peer_query(GST_AGGREGATOR_SRC_PAD(self), query))
-    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
-  gst_query_unref(query);
-  return seekable != FALSE;
-}
-
 /// Lets the next buffer go to `position` of the file.
 static void send_segment(GstAedatMux* self, guint64 position) {
   GstSegment segment;
@@ -270,7 +248,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
     settings.size = {GST_VIDEO_INFO_WIDTH(&*state.video), GST_VIDEO_INFO_HEIGHT(&*state.video)};
   settings.source = state.source;
   settings.frames = static_cast<bool>(pad_named(self, video_name));
-  settings.table = is_seekable(self);
+  settings.table = can_seek_bytes(GST_AGGREGATOR_SRC_PAD(self));
   {
     const std::lock_guard lock(self->priv->mutex);
     settings.compression = self->priv->compression;
@@ -285,17 +263,17 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   return push_bytes(self, std::move(header), true);
 }
 
-/// Writes what ends the file, and tells the header of it. May throw.
+/// Writes the end of the file, and its place into the header. May throw.
 static GstFlowReturn end_file(GstAedatMux* self) {
   State& state = self->priv->state;
   self->priv->writable.end_file();
   Bytes bytes;
   state.encoder->finish(bytes);
   const GstFlowReturn result = push_bytes(self, std::move(bytes));
-  const auto patch = state.encoder->patch();
+  auto patch = state.encoder->patch();
   if (result != GST_FLOW_OK || !patch) return result;
   send_segment(self, patch->position);
-  return push_bytes(self, Bytes(patch->bytes.begin(), patch->bytes.end()));
+  return push_bytes(self, std::move(patch->bytes));
 }
 
 /// The file's time of a running time, in microseconds.
@@ -306,35 +284,31 @@ static Microseconds file_time(const State& state, GstClockTime running) {
 /// Adds the events of a buffer that begins at `start`. May throw.
 static void write_events(GstAedatMux* self, GstBuffer* buffer, Microseconds start, Bytes& out) {
   State& state = self->priv->state;
-  GstEventCameraMap map;
-  if (!gst_event_camera_map(&map, buffer)) {
-    warn(self, "a buffer is no whole number of events");
+  const MappedEvents mapped(buffer);
+  if (!mapped) {
+    warn(self, "a buffer with a partial event",
+         std::to_string(gst_buffer_get_size(buffer)) + " bytes");
     return;
   }
-  const auto writable = self->priv->writable.pick({map.events, map.n_events}, start);
-  gst_event_camera_unmap(&map);
-  state.encoder->encode(writable, out);
+  state.encoder->encode(self->priv->writable.pick(mapped.events(), start), out);
 }
 
-/// Adds a picture. May throw.
+/// Adds a frame. May throw.
 static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, Bytes& out) {
   State& state = self->priv->state;
-  GstVideoFrame video;
-  if (!state.video || !gst_video_frame_map(&video, &*state.video, buffer, GST_MAP_READ)) {
-    warn(self, "a frame is not of the negotiated format");
-    return;
-  }
-  auto frame = aedat_frame_of(&video);
+  const auto reject = [&](const char* cause) {
+    warn(self, "a frame that does not fit into the file", cause);
+  };
+  if (!state.video) return reject("no caps");
+  const VideoFrame video(*state.video, buffer, GST_MAP_READ);
+  if (!video) return reject("cannot map it as video of the negotiated format");
+  auto frame = aedat_frame_of(video.get());
   frame.t = frame.begin = frame.end = frame.exposure_begin = frame.exposure_end = t;
   try {
     state.encoder->encode(frame, out);
   } catch (const std::invalid_argument& error) {
-    warn(self, error.what());
-  } catch (...) {
-    gst_video_frame_unmap(&video);
-    throw;
+    reject(error.what());
   }
-  gst_video_frame_unmap(&video);
 }
 
 /// Writes the earliest buffer. May throw.
@@ -347,7 +321,8 @@ static GstFlowReturn write_next(GstAedatMux* self) {
   if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
   const GstClockTime running = running_time(pad.get(), buffer.get());
   if (!GST_CLOCK_TIME_IS_VALID(running)) {
-    warn(self, "a buffer has no time, or lies outside its segment");
+    warn(self, "a buffer without a timestamp, or outside its segment",
+         "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
     return GST_FLOW_OK;
   }
   Bytes out;
@@ -376,14 +351,16 @@ static bool is_known(GstAedatMux* self) {
   return is_at_end(self, events_name) && state.video;
 }
 
-static GstFlowReturn aggregate_guarded(GstAedatMux* self) {
+/// Writes the header, the earliest buffer, or what ends the file. May throw.
+static GstFlowReturn write_some(GstAedatMux* self) {
   auto& encoder = self->priv->state.encoder;
   const bool ended = is_at_end(self, events_name) && is_at_end(self, video_name);
   if (!encoder) {
     if (!is_known(self)) {
       if (!ended) return GST_AGGREGATOR_FLOW_NEED_DATA;
-      GST_ELEMENT_ERROR(self, STREAM, MUX, ("There is nothing to write."),
-                        ("No pad has had caps before the end."));
+      GST_ELEMENT_ERROR(self, STREAM, MUX,
+                        ("No stream to write. Link events or video to the muxer."),
+                        ("no pad had caps before the end of the stream"));
       return GST_FLOW_ERROR;
     }
     const GstFlowReturn result = begin_file(self);
@@ -395,21 +372,18 @@ static GstFlowReturn aggregate_guarded(GstAedatMux* self) {
 }
 
 static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) {
-  auto* self = mux_of(aggregator);
-  try {
-    return aggregate_guarded(self);
-  } catch (const std::bad_alloc&) {
-    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT, ("There is not enough memory to write."),
-                      (nullptr));
-  } catch (const std::exception& error) {
-    GST_ELEMENT_ERROR(self, STREAM, MUX, ("The file cannot be written."), ("%s", error.what()));
-  }
-  return GST_FLOW_ERROR;
+  auto* self = GST_AEDAT_MUX(aggregator);
+  return guarded(
+      self,
+      [](const auto& error) {
+        return WritableEvents::failure(error, {GST_STREAM_ERROR_MUX, "Cannot write the file."});
+      },
+      [&] { return write_some(self); });
 }
 
 /// Live, no pad is waited for longer than until the time of the earliest buffer.
 static GstClockTime get_next_time(GstAggregator* aggregator) {
-  auto* self = mux_of(aggregator);
+  auto* self = GST_AEDAT_MUX(aggregator);
   GstClockTime time = GST_CLOCK_TIME_NONE;
   return earliest_pad(self, &time) ? time : GST_CLOCK_TIME_NONE;
 }
@@ -427,18 +401,13 @@ static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* c
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   const SensorSize size{info.width, info.height};
-  if (state.encoder && size != state.size) {
-    GST_ELEMENT_ERROR(self, STREAM, MUX,
-                      ("A file has events of one sensor only, and its size has changed."),
-                      (nullptr));
-    return false;
-  }
+  if (state.encoder && !self->priv->writable.accepts(size)) return false;
   state.size = size;
   return true;
 }
 
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
-  auto* self = mux_of(aggregator);
+  auto* self = GST_AEDAT_MUX(aggregator);
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);
@@ -475,7 +444,7 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
 
 static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplate* templ,
                                         const gchar*, const GstCaps*) {
-  auto* self = mux_of(aggregator);
+  auto* self = GST_AEDAT_MUX(aggregator);
   const gchar* const name = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
   if (pad_named(self, name)) {
     GST_WARNING_OBJECT(self, "there is a pad %s already", name);
@@ -491,30 +460,30 @@ static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplat
 }
 
 static gboolean start(GstAggregator* aggregator) {
-  send_segment(mux_of(aggregator), 0);
+  send_segment(GST_AEDAT_MUX(aggregator), 0);
   return TRUE;
 }
 
 static gboolean stop(GstAggregator* aggregator) {
-  auto* priv = mux_of(aggregator)->priv;
+  auto* priv = GST_AEDAT_MUX(aggregator)->priv;
   if (priv->state.encoder) priv->writable.end_file();
   priv->state = State();
   return TRUE;
 }
 
-/// Downstream has let go of the file: filesink has emptied it, and a demuxer expects a header.
+/// After a flush: filesink has truncated the file, and a demuxer expects a header.
 static GstFlowReturn flush(GstAggregator* aggregator) {
-  State& state = mux_of(aggregator)->priv->state;
+  State& state = GST_AEDAT_MUX(aggregator)->priv->state;
   state.encoder.reset();
   state.flushed = 0;
-  state.warned = false;
+  state.warn.reset();
   return GST_FLOW_OK;
 }
 
 /* type */
 
 static void finalize(GObject* object) {
-  delete mux_of(object)->priv;
+  delete GST_AEDAT_MUX(object)->priv;
   G_OBJECT_CLASS(gst_aedat_mux_parent_class)->finalize(object);
 }
 
@@ -529,11 +498,10 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   object_class->finalize = finalize;
   g_object_class_install_property(
       object_class, prop_compression,
-      g_param_spec_enum("compression", "Compression", "How the file is compressed",
-                        GST_TYPE_AEDAT_COMPRESSION, static_cast<int>(default_compression),
+      g_param_spec_enum("compression", "Compression", "Compression of the file", compression_type(),
+                        static_cast<int>(default_compression),
                         static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                  GST_PARAM_MUTABLE_READY)));
-  gst_type_mark_as_plugin_api(GST_TYPE_AEDAT_COMPRESSION, static_cast<GstPluginAPIFlags>(0));
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_static_pad_template_with_gtype(element_class, &events_template,

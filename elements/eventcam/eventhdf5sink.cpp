@@ -4,12 +4,12 @@
  * @title: eventhdf5sink
  * @short_description: writes HDF5 files of events
  *
- * Writes events as an HDF5 file, whose arrays h5py and its like read at once, in the layout of DSEC
- * or of Metavision. The times written are those of the PTS.
+ * Writes events as an HDF5 file in the layout of DSEC or of Metavision, whose arrays h5py reads as
+ * they are. The times written are those of the PTS.
  *
- * The file is whole at the end of the stream, and where the pipeline is stopped before. A flush, as
- * of a seek, begins it anew, as it does with filesink. Events that are earlier than what is
- * written, or lie outside the sensor, are left out; a warning says how many.
+ * The file is complete at the end of the stream, or when the pipeline is stopped before. A flushing
+ * seek truncates the file and starts over. Events that are earlier than what is written, or lie
+ * outside the sensor, are left out; a warning says how many.
  *
  * ## Example launch line
  * |[
@@ -19,16 +19,13 @@
  */
 #include <gst/base/gstbasesink.h>
 
-#include <algorithm>
-#include <exception>
 #include <memory>
 #include <mutex>
-#include <new>
-#include <span>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "gst/base/enum_type.hpp"
+#include "gst/base/errors.hpp"
 #include "gst/base/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/formats/hdf5/hdf5_writer.hpp"
@@ -38,7 +35,6 @@ GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
 
 using eventcamera::Hdf5Layout;
 using eventcamera::Hdf5Writer;
-using eventcamera::Microseconds;
 
 namespace {
 
@@ -46,9 +42,6 @@ enum Property : guint { prop_location = 1, prop_layout, prop_compression };
 
 constexpr auto default_layout = Hdf5Layout::dsec;
 constexpr auto default_compression = Hdf5Writer::Compression::gzip;
-
-/// Written at once, so that events stay in the cache.
-constexpr std::size_t written_events = 1 << 14;
 
 /// The file, from caps to stop.
 struct State {
@@ -73,28 +66,18 @@ struct GstEventHdf5SinkPrivate {
   WritableEvents writable;
 };
 
-namespace {
+G_DECLARE_FINAL_TYPE(GstEventHdf5Sink, gst_event_hdf5_sink, GST, EVENT_HDF5_SINK, GstBaseSink)
 
-struct GstEventHdf5Sink {
+struct _GstEventHdf5Sink {
   GstBaseSink parent;
   GstEventHdf5SinkPrivate* priv;
 };
-
-struct GstEventHdf5SinkClass {
-  GstBaseSinkClass parent_class;
-};
-
-}  // namespace
 
 G_DEFINE_TYPE_WITH_CODE(GstEventHdf5Sink, gst_event_hdf5_sink, GST_TYPE_BASE_SINK,
                         GST_DEBUG_CATEGORY_INIT(event_hdf5_sink_debug, "eventhdf5sink", 0,
                                                 "writer of HDF5 files of events"))
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5sink, "eventhdf5sink", GST_RANK_NONE,
                             gst_event_hdf5_sink_get_type())
-
-static GstEventHdf5Sink* sink_of(gpointer object) {
-  return reinterpret_cast<GstEventHdf5Sink*>(object);
-}
 
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
@@ -104,36 +87,28 @@ static GstStaticPadTemplate sink_template =
 
 /* properties */
 
-#define GST_TYPE_EVENT_HDF5_LAYOUT (gst_event_hdf5_layout_get_type())
-static GType gst_event_hdf5_layout_get_type() {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {static_cast<int>(Hdf5Layout::dsec), "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset",
-         "dsec"},
-        {static_cast<int>(Hdf5Layout::metavision),
-         "Metavision: /CD/events, compressed with ECF; at most 2048x2048 pixels", "metavision"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstEventHdf5Layout", values);
-  }();
-  return type;
+static GType layout_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Hdf5Layout::dsec), "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset",
+       "dsec"},
+      {static_cast<int>(Hdf5Layout::metavision),
+       "Metavision: /CD/events, compressed with ECF; at most 2048x2048 pixels", "metavision"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventHdf5Layout", values);
 }
 
-#define GST_TYPE_EVENT_HDF5_COMPRESSION (gst_event_hdf5_compression_get_type())
-static GType gst_event_hdf5_compression_get_type() {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {static_cast<int>(Hdf5Writer::Compression::none), "No compression", "none"},
-        {static_cast<int>(Hdf5Writer::Compression::gzip), "gzip, which every reader has", "gzip"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstEventHdf5Compression", values);
-  }();
-  return type;
+static GType compression_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Hdf5Writer::Compression::none), "No compression", "none"},
+      {static_cast<int>(Hdf5Writer::Compression::gzip), "gzip, which every reader has", "gzip"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventHdf5Compression", values);
 }
 
 static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  auto* priv = sink_of(object)->priv;
+  auto* priv = GST_EVENT_HDF5_SINK(object)->priv;
   const std::lock_guard lock(priv->mutex);
   switch (id) {
     case prop_location: {
@@ -153,7 +128,7 @@ static void set_property(GObject* object, guint id, const GValue* value, GParamS
 }
 
 static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  auto* priv = sink_of(object)->priv;
+  auto* priv = GST_EVENT_HDF5_SINK(object)->priv;
   const std::lock_guard lock(priv->mutex);
   switch (id) {
     case prop_location:
@@ -172,37 +147,33 @@ static void get_property(GObject* object, guint id, GValue* value, GParamSpec* s
 
 /* the file */
 
-/// Runs what may throw; an exception is an error of the element.
+/// Runs what may throw. What is thrown is reported, and ends the file: nothing of it can be saved
+/// by writing on.
 template <class Work>
-static bool guarded(GstEventHdf5Sink* self, const Work& work) {
-  try {
-    work();
-    return true;
-  } catch (const std::bad_alloc&) {
-    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
-                      ("There is not enough memory to write the events."), (nullptr));
-  } catch (const std::invalid_argument& error) {
-    GST_ELEMENT_ERROR(self, STREAM, FORMAT, ("This cannot be written: %s.", error.what()),
-                      (nullptr));
-  } catch (const std::exception& error) {
-    GST_ELEMENT_ERROR(self, RESOURCE, WRITE, ("%s.", error.what()), (nullptr));
-  }
-  // Nothing of it can be saved by writing on.
-  self->priv->state.writer.reset();
-  self->priv->state.ended = true;
-  return false;
+static bool reported(GstEventHdf5Sink* self, const Work& work) {
+  return guarded(
+      self,
+      [&](const std::exception& error) {
+        auto* priv = self->priv;
+        priv->state.writer.reset();
+        priv->state.ended = true;
+        const std::lock_guard lock(priv->mutex);
+        return WritableEvents::failure(
+            error, {GST_RESOURCE_ERROR_WRITE, "Cannot write " + priv->location + "."});
+      },
+      work);
 }
 
-/// Writes what is not yet written, and ends the file.
+/// Writes what is held back, and closes the file.
 static bool end_file(GstEventHdf5Sink* self) {
   State& state = self->priv->state;
   state.ended = true;
   const auto writer = std::exchange(state.writer, nullptr);
   if (writer) self->priv->writable.end_file();
-  return !writer || guarded(self, [&] { writer->close(); });
+  return !writer || reported(self, [&] { writer->close(); });
 }
 
-/// Begins a file of events of this sensor, in the place of what is there.
+/// Begins a file of events of this sensor, and overwrites what is there.
 static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
   auto* priv = self->priv;
   priv->state = State();  // to the library two open files of one name are one
@@ -217,27 +188,28 @@ static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
     settings.layout = priv->layout;
     settings.compression = priv->compression;
   }
-  return guarded(self,
-                 [&] { priv->state.writer = std::make_unique<Hdf5Writer>(location, settings); });
+  return reported(self,
+                  [&] { priv->state.writer = std::make_unique<Hdf5Writer>(location, settings); });
 }
 
 static gboolean start(GstBaseSink* sink) {
-  auto* self = sink_of(sink);
+  auto* self = GST_EVENT_HDF5_SINK(sink);
   const std::lock_guard lock(self->priv->mutex);
   if (!self->priv->location.empty()) return TRUE;
-  GST_ELEMENT_ERROR(self, RESOURCE, NOT_FOUND, ("There is no location to write to."), (nullptr));
+  GST_ELEMENT_ERROR(self, RESOURCE, NOT_FOUND, ("No file to write to. Set the property location."),
+                    ("location is empty"));
   return FALSE;
 }
 
 static gboolean stop(GstBaseSink* sink) {
-  auto* self = sink_of(sink);
+  auto* self = GST_EVENT_HDF5_SINK(sink);
   const bool ended = end_file(self);
   self->priv->state = State();
   return ended;
 }
 
 static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
-  auto* self = sink_of(sink);
+  auto* self = GST_EVENT_HDF5_SINK(sink);
   const State& state = self->priv->state;
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {
@@ -247,51 +219,29 @@ static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
   if (state.ended) return TRUE;
   if (state.writer && info.width == state.info.width && info.height == state.info.height)
     return TRUE;
-  if (state.begun) {
-    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
-                      ("The size of the sensor changes from %dx%d to %dx%d, but a file has one.",
-                       state.info.width, state.info.height, info.width, info.height),
-                      (nullptr));
-    return FALSE;
-  }
+  if (state.begun && !self->priv->writable.accepts({info.width, info.height})) return FALSE;
   return begin_file(self, info);
 }
 
 /* data */
 
-/// May throw.
-static void write(GstEventHdf5Sink* self, const GstEventCameraMap& map) {
-  State& state = self->priv->state;
-  const auto start = static_cast<Microseconds>(map.start);
-  for (std::span left(map.events, map.n_events); !left.empty();) {
-    const auto few = left.first(std::min(left.size(), written_events));
-    left = left.subspan(few.size());
-    const auto writable = self->priv->writable.pick(few, start);
-    state.begun |= !writable.empty();
-    state.writer->append(writable);
-  }
-}
-
 static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
-  auto* self = sink_of(sink);
-  if (self->priv->state.ended) return GST_FLOW_EOS;
-  if (!self->priv->state.writer) return GST_FLOW_NOT_NEGOTIATED;
-  GstEventCameraMap map;
-  if (GST_BUFFER_PTS(buffer) > G_MAXINT64 || !gst_event_camera_map(&map, buffer)) {
-    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
-                      ("A buffer is no event buffer: it has no PTS, or no whole number of events."),
-                      (nullptr));
-    return GST_FLOW_ERROR;
-  }
-  const bool written = guarded(self, [&] { write(self, map); });
-  gst_event_camera_unmap(&map);
+  auto* self = GST_EVENT_HDF5_SINK(sink);
+  State& state = self->priv->state;
+  if (state.ended) return GST_FLOW_EOS;
+  if (!state.writer) return GST_FLOW_NOT_NEGOTIATED;
+  const bool written = reported(self, [&] {
+    return self->priv->writable.take(buffer, [&](const auto& events) {
+      state.begun |= !events.empty();
+      state.writer->append(events);
+    });
+  });
   return written ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/// The file is whole before the application hears of the end, and begins anew where all that came
-/// is let go.
+/// The file is complete before the application hears of the end, and starts over after a flush.
 static gboolean event(GstBaseSink* sink, GstEvent* event) {
-  auto* self = sink_of(sink);
+  auto* self = GST_EVENT_HDF5_SINK(sink);
   const State& state = self->priv->state;
   bool done = true;
   if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
@@ -307,7 +257,7 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
 /* type */
 
 static void finalize(GObject* object) {
-  delete sink_of(object)->priv;
+  delete GST_EVENT_HDF5_SINK(object)->priv;
   G_OBJECT_CLASS(gst_event_hdf5_sink_parent_class)->finalize(object);
 }
 
@@ -325,20 +275,17 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
                                               GST_PARAM_MUTABLE_READY);
   g_object_class_install_property(
       object_class, prop_location,
-      g_param_spec_string("location", "Location", "The file to write; what is there is overwritten",
+      g_param_spec_string("location", "Location", "File to write; an existing file is overwritten",
                           nullptr, flags));
   g_object_class_install_property(
       object_class, prop_layout,
-      g_param_spec_enum("layout", "Layout", "How events lie in the file",
-                        GST_TYPE_EVENT_HDF5_LAYOUT, static_cast<int>(default_layout), flags));
+      g_param_spec_enum("layout", "Layout", "Layout of the events in the file", layout_type(),
+                        static_cast<int>(default_layout), flags));
   g_object_class_install_property(
       object_class, prop_compression,
       g_param_spec_enum("compression", "Compression",
-                        "Of DSEC's layout; that of Metavision is always compressed with ECF",
-                        GST_TYPE_EVENT_HDF5_COMPRESSION, static_cast<int>(default_compression),
-                        flags));
-  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_HDF5_LAYOUT, static_cast<GstPluginAPIFlags>(0));
-  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_HDF5_COMPRESSION, static_cast<GstPluginAPIFlags>(0));
+                        "Compression of the DSEC layout; Metavision's is always ECF",
+                        compression_type(), static_cast<int>(default_compression), flags));
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_static_pad_template(element_class, &sink_template);

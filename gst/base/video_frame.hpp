@@ -30,6 +30,7 @@ class VideoFrame {
   /// where this is false.
   explicit operator bool() const { return fits_; }
 
+  const GstVideoFrame* get() const { return &frame_; }
   std::byte* data() const {
     return static_cast<std::byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0));
   }

@@ -1,9 +1,26 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/writable_events.hpp"
 
+#include <new>
+#include <stdexcept>
+
 using eventcamera::AbsoluteEvent;
+using eventcamera::Event;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
+
+static std::string text_of(SensorSize size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+bool can_seek_bytes(GstPad* src) {
+  GstQuery* query = gst_query_new_seeking(GST_FORMAT_BYTES);
+  gboolean seekable = FALSE;
+  if (gst_pad_peer_query(src, query))
+    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
+  gst_query_unref(query);
+  return seekable != FALSE;
+}
 
 void WritableEvents::begin_file(SensorSize sensor) {
   sensor_ = sensor;
@@ -11,52 +28,82 @@ void WritableEvents::begin_file(SensorSize sensor) {
   earlier_ = outside_ = {};
 }
 
-std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const GstEventCameraEvent> events,
+bool WritableEvents::accepts(SensorSize sensor) const {
+  if (sensor == sensor_) return true;
+  post_message(
+      element_, GST_MESSAGE_ERROR,
+      {GST_STREAM_ERROR_FORMAT, "The sensor size changes from " + text_of(sensor_) + " to " +
+                                    text_of(sensor) + " within a file. Start a new file for it."},
+      "new caps after events were written");
+  return false;
+}
+
+void WritableEvents::report_buffer(GstBuffer* buffer) const {
+  post_message(element_, GST_MESSAGE_ERROR,
+               {GST_STREAM_ERROR_FORMAT,
+                "Cannot write a buffer that has no PTS or a partial event. Check the elements "
+                "upstream."},
+               GST_BUFFER_PTS(buffer) > G_MAXINT64
+                   ? "no PTS"
+                   : "cannot map " + std::to_string(gst_buffer_get_size(buffer)) +
+                         " bytes as events of 8 bytes");
+}
+
+std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> events,
                                                     Microseconds start) {
   picked_.clear();
   std::size_t before_last_left_out = 0;
   for (const auto& event : events) {
-    const AbsoluteEvent stamped{start + event.t, event.x, event.y_p};
-    const bool outside = event.x >= sensor_.width || stamped.y() >= sensor_.height;
-    if (outside || stamped.t < latest_) {
+    const AbsoluteEvent absolute{start + event.t, event.x, event.y_p};
+    const bool outside = event.x >= sensor_.width || absolute.y() >= sensor_.height;
+    if (outside || absolute.t < latest_) {
       ++(outside ? outside_ : earlier_).count;
       before_last_left_out = picked_.size();
       continue;
     }
-    latest_ = stamped.t;
-    picked_.push_back(stamped);
+    latest_ = absolute.t;
+    picked_.push_back(absolute);
   }
   if (picked_.size() > before_last_left_out) {
-    if (earlier_.told == 0) tell_of_earlier();
-    if (outside_.told == 0) tell_of_outside();
+    if (earlier_.reported == 0) warn_of_earlier();
+    if (outside_.reported == 0) warn_of_outside();
   }
   return picked_;
 }
 
 void WritableEvents::end_file() {
-  tell_of_earlier();
-  tell_of_outside();
+  warn_of_earlier();
+  warn_of_outside();
 }
 
-void WritableEvents::tell_of_earlier() {
-  if (earlier_.count == earlier_.told) return;
-  tell(earlier_,
-       "They are earlier than others that are written, and the times of a file only rise: write "
-       "what begins anew to a file of its own.");
+void WritableEvents::warn_of_earlier() {
+  warn(earlier_,
+       "earlier than others already written. Timestamps must not decrease; start a new file where "
+       "time starts over.",
+       "latest time written: " + std::to_string(latest_) + " us");
 }
 
-void WritableEvents::tell_of_outside() {
-  if (outside_.count == outside_.told) return;
-  tell(outside_, "They lie outside the sensor, which the caps say has " +
-                     std::to_string(sensor_.width) + "x" + std::to_string(sensor_.height) +
-                     " pixels: give them its true size.");
+void WritableEvents::warn_of_outside() {
+  warn(outside_,
+       "outside the sensor. Correct the size in the caps, " + text_of(sensor_) + " pixels.",
+       "x or y is past the width or height in the caps");
 }
 
-void WritableEvents::tell(LeftOut& left_out, const std::string& why) {
-  gst_element_message_full(
-      element_, GST_MESSAGE_WARNING, GST_STREAM_ERROR, code_,
-      g_strdup_printf("Events left out%s: %" G_GUINT64_FORMAT ". %s",
-                      left_out.told == 0 ? "" : " in all", left_out.count, why.c_str()),
-      nullptr, __FILE__, GST_FUNCTION, __LINE__);
-  left_out.told = left_out.count;
+void WritableEvents::warn(LeftOut& left_out, const std::string& what, const std::string& cause) {
+  if (left_out.count == left_out.reported) return;
+  post_message(element_, GST_MESSAGE_WARNING,
+               {code_, "Left out " + std::to_string(left_out.count) + " event" +
+                           (left_out.count == 1 ? "" : "s") +
+                           (left_out.reported == 0 ? " " : " in total ") + what},
+               cause);
+  left_out.reported = left_out.count;
+}
+
+Report WritableEvents::failure(const std::exception& error, const Report& otherwise) {
+  if (is_a<std::bad_alloc>(error))
+    return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to write the events."};
+  if (is_a<std::invalid_argument>(error))
+    return {GST_STREAM_ERROR_FORMAT,
+            std::string("This file format cannot hold the stream: ") + error.what() + "."};
+  return otherwise;
 }

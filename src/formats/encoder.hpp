@@ -2,12 +2,19 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "src/core/absolute_event.hpp"
 
 namespace eventcamera {
+
+/// Bytes that overwrite what was written at a position of the file.
+struct FilePatch {
+  std::uint64_t position;
+  std::vector<std::uint8_t> bytes;
+};
 
 /// Writes one event format. Events come sorted by time and within the sensor, in pieces of any
 /// size: how they are split changes nothing in what a reader makes of the file.
@@ -22,6 +29,10 @@ class Encoder {
 
   /// Appends what ends the file; the header, too, where nothing was encoded.
   virtual void finish(std::vector<std::uint8_t>& out) = 0;
+
+  /// What to write into the header after finish(), where the file can be seeked in. Our readers do
+  /// without it.
+  virtual std::optional<FilePatch> patch() const { return std::nullopt; }
 
  protected:
   Encoder() = default;

@@ -908,9 +908,9 @@ TEST(AedatMux, LeavesOutWhatDoesNotFit) {
   EXPECT_TRUE((content.events == Events{AbsoluteEvent::at(6, 7, 1'000'005, Polarity::off),
                                         AbsoluteEvent::at(1, 1, 2'000'000, Polarity::off)}));
   ASSERT_EQ(warnings.size(), 3U);
-  EXPECT_TRUE(warnings[0].starts_with("Input was left out: a buffer has no time"));
-  EXPECT_TRUE(warnings[1].starts_with("Events left out: 2. They are earlier than"));
-  EXPECT_TRUE(warnings[2].starts_with("Events left out: 2. They lie outside"));
+  EXPECT_TRUE(warnings[0].starts_with("Left out a buffer without a timestamp"));
+  EXPECT_TRUE(warnings[1].starts_with("Left out 2 events earlier than"));
+  EXPECT_TRUE(warnings[2].starts_with("Left out 2 events outside"));
 }
 
 TEST(AedatMux, WritesAnewAfterAFlush) {

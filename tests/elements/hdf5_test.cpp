@@ -355,14 +355,12 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
                          AbsoluteEvent::at(5, height, 1002, Polarity::on),
                          AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
   EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
-  EXPECT_TRUE(
-      sink.message(GST_MESSAGE_WARNING).starts_with("Events left out: 2. They lie outside"));
+  EXPECT_TRUE(sink.message(GST_MESSAGE_WARNING).starts_with("Left out 2 events outside"));
   // Time goes back.
   EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);
   EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
   sink.end();
-  EXPECT_TRUE(
-      sink.message(GST_MESSAGE_WARNING).starts_with("Events left out: 1. They are earlier"));
+  EXPECT_TRUE(sink.message(GST_MESSAGE_WARNING).starts_with("Left out 1 event earlier"));
   EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
   EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
   EXPECT_TRUE(read(path) == (Events{events[0], events[3]}));
@@ -404,8 +402,7 @@ TEST_P(Hdf5, IsOfOneSize) {
           Owned<GstCaps>(gst_caps_from_string("application/x-event-camera, format=XYTP, width=64, "
                                               "height=48, framerate=30/1"))
               .get()));
-  EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("The size of the sensor changes"),
-            std::string::npos);
+  EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("The sensor size changes"), std::string::npos);
 }
 
 TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
@@ -414,7 +411,7 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
   {
     Sink sink("eventhdf5sink location=/no/such/folder/out.h5");
     sink.caps(events_caps);
-    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("/no/such/folder/out.h5 cannot be written"),
+    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("Cannot write /no/such/folder/out.h5"),
               std::string::npos);
   }
   {
@@ -428,7 +425,7 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
     GstBuffer* buffer = gst_buffer_new_memdup("seven b", 7);
     GST_BUFFER_PTS(buffer) = 0;
     EXPECT_EQ(gst_harness_push(sink.get(), buffer), GST_FLOW_ERROR);
-    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("no event buffer"), std::string::npos);
+    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("partial event"), std::string::npos);
   }
   const Owned<GstElement> nowhere(gst_element_factory_make("eventhdf5sink", nullptr));
   EXPECT_EQ(gst_element_set_state(nowhere.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);

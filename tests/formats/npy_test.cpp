@@ -15,7 +15,7 @@ using namespace table_events;
 using Events = std::vector<AbsoluteEvent>;
 
 Bytes patched(NpyEncoder& encoder, Bytes bytes) {
-  const auto patch = encoder.patch();
+  const auto patch = encoder.patch().value();
   std::memcpy(bytes.data() + patch.position, patch.bytes.data(), patch.bytes.size());
   return bytes;
 }

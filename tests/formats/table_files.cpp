@@ -43,7 +43,7 @@ void write_file(const std::string& kind, const std::string& file, const std::str
     NpyEncoder encoder;
     encoder.encode(events, out);
     encoder.finish(out);
-    const auto patch = encoder.patch();
+    const auto patch = encoder.patch().value();
     std::memcpy(out.data() + patch.position, patch.bytes.data(), patch.bytes.size());
     save(file, out.data(), out.size());
     return;

@@ -93,8 +93,7 @@ void Aedat4Encoder::flush(std::vector<std::uint8_t>& out) {
 void Aedat4Encoder::finish(std::vector<std::uint8_t>& out) {
   flush(out);
   if (!settings_.table) return;
-  patch_.emplace();
-  patch_->position = table_field_at_;
+  patch_.emplace(FilePatch{table_field_at_, std::vector<std::uint8_t>(sizeof position_)});
   std::memcpy(patch_->bytes.data(), &position_, sizeof position_);
   const auto at = out.size();
   compressor_->compress(aedat4_table_content(table_), out);

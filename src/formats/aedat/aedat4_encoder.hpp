@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -53,15 +52,8 @@ class Aedat4Encoder final : public Encoder {
 
   void finish(std::vector<std::uint8_t>& out) override;
 
-  /// Bytes that belong to another place than they were written at.
-  struct Patch {
-    std::uint64_t position;
-    std::array<std::uint8_t, 8> bytes;
-  };
-
-  /// What to write into the header once finish() has appended the table: until then it says that
-  /// there is none. Nothing where no table is wanted.
-  std::optional<Patch> patch() const { return patch_; }
+  /// The table's position: until it is written, the header says that there is no table.
+  std::optional<FilePatch> patch() const override { return patch_; }
 
  private:
   void write_header(std::vector<std::uint8_t>& out);
@@ -76,7 +68,7 @@ class Aedat4Encoder final : public Encoder {
   std::uint64_t position_ = 0;        ///< in the file, of what comes next
   std::uint64_t table_field_at_ = 0;  ///< in the file, of the table's position
   std::vector<Aedat4TableEntry> table_;
-  std::optional<Patch> patch_;
+  std::optional<FilePatch> patch_;
 };
 
 }  // namespace eventcamera

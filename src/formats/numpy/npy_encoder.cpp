@@ -64,11 +64,9 @@ void NpyEncoder::finish(std::vector<std::uint8_t>& out) {
   begin(out);
 }
 
-NpyEncoder::Patch NpyEncoder::patch() const {
-  Patch patch{preamble + before_count.size(), {}};
+std::optional<FilePatch> NpyEncoder::patch() const {
   const auto text = shape(count_);
-  std::memcpy(patch.bytes.data(), text.data(), patch.bytes.size());
-  return patch;
+  return FilePatch{preamble + before_count.size(), {text.begin(), text.end()}};
 }
 
 }  // namespace eventcamera

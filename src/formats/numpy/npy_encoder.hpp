@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <array>
-
 #include "src/formats/encoder.hpp"
 
 namespace eventcamera {
@@ -18,14 +16,7 @@ class NpyEncoder final : public Encoder {
   void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
   void finish(std::vector<std::uint8_t>& out) override;
 
-  /// Bytes that belong to another place than they were written at.
-  struct Patch {
-    std::uint64_t position;
-    std::array<std::uint8_t, 20> bytes;
-  };
-
-  /// What to write into the header once all events are encoded.
-  Patch patch() const;
+  std::optional<FilePatch> patch() const override;
 
  private:
   void begin(std::vector<std::uint8_t>& out);
