@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Closes a test run: says on one line how many tests passed, failed and were skipped."""
+"""Prints the totals of a test run: passed, failed and skipped."""
 import collections
 import json
 import sys

@@ -3,6 +3,10 @@
 # The installation is complete: plugins, programs, library, header, pkg-config file and GIR. Builds
 # the C example against it, as an application would.
 set -eu
+if [ ! -w "$BUILD" ]; then
+  echo "$BUILD is read-only: meson cannot install from it"
+  exit 77
+fi
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
 meson install -C "$BUILD" --no-rebuild --destdir "$root" --quiet
