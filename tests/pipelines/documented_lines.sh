@@ -3,17 +3,10 @@
 # Runs the command lines of README.md and docs/*.md, with test pictures instead of cameras and
 # without windows.
 set -eu
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
+source "$SOURCE/tests/pipelines/scratch_folder.sh"
 export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
 cp "$SOURCE/pipelines/events_to_numpy.py" pipelines/
-
-fail() {
-  echo "FAILED: $*"
-  exit 1
-}
 
 # The files that the lines read.
 ball="videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=I420,framerate=25/1"

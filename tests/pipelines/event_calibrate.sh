@@ -2,14 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # event-calibrate recovers the settings that a recording was simulated with.
 set -euo pipefail
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-
-fail() {
-  echo "FAILED: $*"
-  exit 1
-}
+source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
 calibrate() {
   echo "event-calibrate $*"

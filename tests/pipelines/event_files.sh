@@ -2,14 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Files of events, as users handle them: converted, looked at, and played.
 set -eu
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-
-fail() {
-  echo "FAILED: $*"
-  exit 1
-}
+source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
 convert() {
   echo "event-convert $*"

@@ -2,18 +2,25 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Lines that a user would type, with gst-launch-1.0 itself.
 set -eu
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
+source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
 launch() {
   echo "gst-launch-1.0 $*"
   timeout 60 "$GST_LAUNCH" -q "$@"
 }
 
-fail() {
-  echo "FAILED: $*"
-  exit 1
+interrupt() { # FILE SIZE ARGUMENT...: Ctrl-C when the file has this size
+  local file=$1 size=$2
+  shift 2
+  echo "gst-launch-1.0 $*, interrupted"
+  timeout 60 "$GST_LAUNCH" -q "$@" &
+  local launched=$!
+  for _ in $(seq 300); do
+    [ "$(stat -c %s "$file" 2>/dev/null || echo 0)" -gt "$size" ] && break
+    sleep 0.1
+  done
+  pkill -INT -P $launched
+  wait $launched || true
 }
 
 # Events of every simulator into a file.
@@ -72,16 +79,8 @@ grep -q '"map-correlation" : [0-9-]' compare.json || fail "no comparison was wri
 [ -s map.png ] && [ -s maps.png ] && [ -s candidate.raw ] || fail "a picture or the candidate is missing"
 launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null interval=0 ! fakesink
 
-# Interrupted with -e, it ends in order.
-echo "gst-launch-1.0 -e, interrupted"
-timeout 60 "$GST_LAUNCH" -q -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4 &
-launched=$!
-for _ in $(seq 300); do
-  [ "$(stat -c %s interrupted.mp4 2>/dev/null || echo 0)" -gt 10000 ] && break
-  sleep 0.1
-done
-pkill -INT -P $launched
-wait $launched || true
+# Interrupted with -e, the file is complete.
+interrupt interrupted.mp4 10000 -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4
 launch filesrc location=interrupted.mp4 ! decodebin ! fakesink
 
 # Events and the frames that they are made of in one file, and from there back into pipelines.
@@ -125,15 +124,7 @@ launch filesrc location=out.aedat4 ! decodebin ! videoconvert ! mixer.  filesrc 
 davis=$SHARED_DATA/events/davis346-frames-events-imu.aedat4
 [ ! -f "$davis" ] || launch filesrc location="$davis" ! aedatdemux name=d  d.events_0 ! queue ! eventrender ! videoconvert ! fakesink  d.video_0 ! queue ! eventsim-dense ! videoconvert ! fakesink
 
-echo "eventhdf5sink, interrupted"
-timeout 60 "$GST_LAUNCH" -q videotestsrc is-live=true pattern=snow ! eventsim-frame ! eventhdf5sink compression=none location=interrupted.h5 &
-launched=$!
-for _ in $(seq 300); do
-  [ "$(stat -c %s interrupted.h5 2>/dev/null || echo 0)" -gt 300000 ] && break
-  sleep 0.1
-done
-pkill -INT -P $launched
-wait $launched || true
+interrupt interrupted.h5 300000 videotestsrc is-live=true pattern=snow ! eventsim-frame ! eventhdf5sink compression=none location=interrupted.h5
 launch filesrc location=interrupted.h5 ! eventhdf5dec ! filesink location=interrupted.xytp
 [ "$(stat -c %s interrupted.xytp)" -gt 300000 ] || fail "what was written before the interruption is lost"
 
