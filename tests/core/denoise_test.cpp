@@ -14,7 +14,7 @@
 
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
-#include "tests/reference/denoise.hpp"
+#include "tests/reference/dvs.hpp"
 
 namespace {
 

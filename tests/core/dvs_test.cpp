@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// A physical pixel against physics, and against its equations in double precision.
+// The physical pixel is compared with physics, and with its equations in double precision.
 #include "src/dvs/dvs_simulator.hpp"
 
 #include <gtest/gtest.h>
@@ -32,15 +32,35 @@ namespace {
 
 using namespace eventcamera;
 
-/// An event with the time since the first frame.
-struct Timed {
-  double t;  ///< microseconds
-  int x;
-  int y;
-  Polarity polarity;
-};
+using reference::TimedEvent;  // `t` is the time since the first frame
 
-/// Plays frames to a simulator and gathers its events.
+using Pixels = std::map<std::pair<int, int>, std::vector<TimedEvent>>;
+
+Pixels by_pixel(const std::vector<TimedEvent>& events) {
+  Pixels pixels;
+  for (const auto& event : events) pixels[{event.x, event.y}].push_back(event);
+  return pixels;
+}
+
+/// Expects as many events but for a share of `tolerance` (one is always tolerated), and at least a
+/// share of `equal_share` whose polarity is the expected one and whose time is up to `precision`
+/// microseconds off.
+void expect_near(const std::vector<TimedEvent>& found, const std::vector<TimedEvent>& expected,
+                 double tolerance, double equal_share, double precision) {
+  const auto count = static_cast<double>(expected.size());
+  EXPECT_NEAR(static_cast<double>(found.size()), count, std::max(1.0, tolerance * count));
+  auto found_pixels = by_pixel(found);
+  double equal = 0;
+  for (const auto& [place, events] : by_pixel(expected)) {
+    const auto& ours = found_pixels[place];
+    for (std::size_t i = 0; i < std::min(events.size(), ours.size()); ++i)
+      equal +=
+          ours[i].polarity == events[i].polarity && std::abs(ours[i].t - events[i].t) <= precision;
+  }
+  EXPECT_GT(equal, equal_share * count);
+}
+
+/// Pushes frames to a simulator and collects its events.
 class Playback {
  public:
   Playback(const LumaFormat& format, const DvsSettings& settings, int threads = 2)
@@ -66,7 +86,7 @@ class Playback {
   void set(const DvsSettings& settings) { simulator_->set(settings); }
   DvsSimulator& simulator() { return *simulator_; }
 
-  std::vector<Timed> events;
+  std::vector<TimedEvent> events;
 
  private:
   std::unique_ptr<DvsSimulator> simulator_;
@@ -81,7 +101,7 @@ TEST(Decay, IsTheExponentialFunction) {
   EXPECT_LT(decay(1e300), 1e-300);
 }
 
-/// The first moment, by very small steps, at which a trajectory is beyond a level on either side.
+/// The first of many small steps at which a trajectory is beyond a level on either side, or -1.
 double plainly_crossed(const Trajectory& trajectory, double lower, double upper, double end) {
   constexpr int steps = 200'000;
   for (int i = 0; i <= steps; ++i) {
@@ -121,45 +141,24 @@ TEST(Dvs, EqualsTheRuleOfEsim) {
   constexpr int height = 37;
   Playback playback({width, height, 8}, settings_of(DvsPreset::esim));
   reference::Esim esim(width, height, 1e-3, 0.2);
-  std::map<std::pair<int, int>, std::vector<reference::EsimEvent>> expected;
-  std::size_t expected_count = 0;
+  std::vector<TimedEvent> expected;
   for (int i = 0; i < 12; ++i) {
     const auto frame = scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.4 * i);
     playback.push(frame, 8, i * scene::frame_time);
-    for (const auto& event : esim.push(frame, i * 40'000.0)) {
-      expected[{event.x, event.y}].push_back(event);
-      ++expected_count;
-    }
+    const auto events = esim.push(frame, i * 40'000.0);
+    expected.insert(expected.end(), events.begin(), events.end());
   }
-  EXPECT_GT(expected_count, 20'000U);
-  EXPECT_NEAR(static_cast<double>(playback.events.size()), static_cast<double>(expected_count),
-              0.001 * static_cast<double>(expected_count));
-  std::map<std::pair<int, int>, std::vector<Timed>> found;
-  for (const auto& event : playback.events) found[{event.x, event.y}].push_back(event);
-  std::size_t equal = 0;
-  for (const auto& [place, events] : expected) {
-    const auto& ours = found[place];
-    for (std::size_t i = 0; i < std::min(events.size(), ours.size()); ++i)
-      equal += ours[i].polarity == events[i].polarity && std::abs(ours[i].t - events[i].t) <= 1.5;
-  }
-  EXPECT_GT(static_cast<double>(equal), 0.999 * static_cast<double>(expected_count));
+  EXPECT_GT(expected.size(), 20'000U);
+  expect_near(playback.events, expected, 0.001, 0.999, 1.5);
 }
 
 constexpr double second = 1e6;
-
-using Pixels = std::map<std::pair<int, int>, std::vector<Timed>>;
-
-Pixels by_pixel(const std::vector<Timed>& events) {
-  Pixels pixels;
-  for (const auto& event : events) pixels[{event.x, event.y}].push_back(event);
-  return pixels;
-}
 
 Image<std::uint8_t> flat(int width, int height, int grey) {
   return scene::flat<std::uint8_t>(width, height, grey);
 }
 
-/// Shows the same picture for so many seconds.
+/// Shows the same picture for `frames` frames.
 void stand(Playback& playback, const Image<std::uint8_t>& picture, int frames,
            Nanoseconds frame_time) {
   for (int i = 0; i <= frames; ++i) playback.push(picture, 8, i * frame_time);
@@ -188,8 +187,7 @@ TEST_P(Reference, IsEqualled) {
   const Random random(settings.seed);
   const Mismatch mismatch(settings, random);
   std::vector<reference::DvsPixel> pixels;
-  Pixels expected;
-  std::size_t count = 0;
+  std::vector<TimedEvent> expected;
   for (int i = 0; i < 6; ++i) {
     const auto frame = scene::texture<std::uint16_t>(width, height, 16, 2.3 * i, 1.1 * i);
     playback.push(frame, 16, i * scene::frame_time);
@@ -201,24 +199,13 @@ TEST_P(Reference, IsEqualled) {
           pixels.emplace_back(settings, luma, mismatch.leaked(pixel, mismatch.of(pixel), 0));
           continue;
         }
-        for (auto event : pixels[pixel].push(luma, 40'000)) {
-          expected[{x, y}].push_back({event.t, x, y, event.polarity});
-          ++count;
-        }
+        for (const auto& event : pixels[pixel].push(luma, 40'000))
+          expected.push_back({event.t, x, y, event.polarity});
       }
     }
   }
-  ASSERT_GT(count, 130U);
-  EXPECT_NEAR(static_cast<double>(playback.events.size()), static_cast<double>(count),
-              std::max(1.0, 0.001 * static_cast<double>(count)));
-  auto found = by_pixel(playback.events);
-  std::size_t equal = 0;
-  for (const auto& [place, events] : expected) {
-    const auto& ours = found[place];
-    for (std::size_t i = 0; i < std::min(events.size(), ours.size()); ++i)
-      equal += ours[i].polarity == events[i].polarity && std::abs(ours[i].t - events[i].t) <= 5;
-  }
-  EXPECT_GT(static_cast<double>(equal), 0.97 * static_cast<double>(count));
+  ASSERT_GT(expected.size(), 130U);
+  expect_near(playback.events, expected, 0.001, 0.97, 5);
 }
 
 TEST(Dvs, LeaksAtItsRate) {
@@ -228,7 +215,7 @@ TEST(Dvs, LeaksAtItsRate) {
   const double expected = 96 * 80 * 5 * 10.0;
   EXPECT_NEAR(static_cast<double>(playback.events.size()), expected, 0.02 * expected);
   for (const auto& event : playback.events) ASSERT_EQ(event.polarity, Polarity::on);
-  // A pixel's own are evenly spaced.
+  // The events of a pixel are evenly spaced.
   for (const auto& [place, events] : by_pixel(playback.events))
     for (std::size_t i = 2; i < events.size(); ++i)
       ASSERT_NEAR(events[i].t - events[i - 1].t, events[1].t - events[0].t, 30);
@@ -245,7 +232,7 @@ TEST(Dvs, MakesShotNoiseThatIsPoisson) {
     double on = 0;
     for (const auto& event : playback.events) on += event.polarity == Polarity::on;
     EXPECT_NEAR(on / static_cast<double>(playback.events.size()), 0.5, 0.01);
-    // Of the gaps that begin in the first half none is cut off; they are exponential.
+    // Gaps that begin in the first half are not cut off; they are exponential.
     double gaps = 0;
     double sum = 0;
     double squares = 0;
@@ -344,7 +331,7 @@ TEST(Dvs, AnswersASineOfLightWithAsManyOnAsOff) {
       int on = 0;
       for (const auto& event : events) on += event.polarity == Polarity::on ? 1 : -1;
       ASSERT_GT(events.size(), 200U);
-      // It may end a swing away from where it began, and the first settles.
+      // It may end a swing away from where it began, and the first one settles.
       ASSERT_LE(std::abs(on), cutoff_hz > 0 ? 4 : 1);
     }
   }
@@ -383,7 +370,7 @@ DvsSettings everything() {
           .seed = 11};
 }
 
-/// All events of a short film. Its pictures lie in memory with `padding` bytes behind each row.
+/// All events of a short film, whose rows have `padding` bytes past their end.
 template <class Pixel>
 std::vector<std::vector<Event>> film(int width, int height, int bits, const DvsSettings& settings,
                                      int threads, int padding = 0) {
@@ -505,14 +492,14 @@ TEST(Dvs, DoesNotSeeTheNoiseOfFramesThatAreDenoised) {
     std::minstd_rand random(9);
     std::normal_distribution<> normal(0, 2);
     for (int i = 0; i < 10; ++i) {
-      // A square moves before a still ground.
+      // A square moves over a still background.
       auto frame = scene::square(80, 60, 10 + 3 * i, 20, 20, 90, 30);
       for (int y = 0; y < frame.height(); ++y)
         for (int x = 0; x < frame.width(); ++x)
           frame.at(x, y) = static_cast<std::uint8_t>(std::lround(frame.at(x, y) + normal(random)));
       playback.push(frame, 8, i * 40'000'000LL);
     }
-    const auto on_the_way = [](const Timed& event) {
+    const auto on_the_way = [](const TimedEvent& event) {
       return event.y >= 19 && event.y < 41 && event.x >= 9 && event.x < 60;
     };
     const auto seen = std::count_if(playback.events.begin(), playback.events.end(), on_the_way);
@@ -541,8 +528,8 @@ TEST(Dvs, HasItsSharesOfHotAndDeadPixels) {
 }
 
 TEST(Dvs, FiresAllOverAsExposuresBegin) {
-  // What a still scene sees of the first pulse, up and down by 0.45: ON as it passes 0.2 and 0.4,
-  // OFF as it passes 0.1 again.
+  // The first pulse in a still scene, up and down by 0.45: ON when it passes 0.2 and 0.4, OFF when
+  // it passes 0.1 again.
   const auto first_pulse_is_at = [&](double begin, double lead) {
     Playback playback({9, 3, 8},
                       {.negative_threshold = 0.3, .exposure_pulse = 0.45, .exposure_lead = lead});
@@ -589,10 +576,10 @@ TEST(Dvs, SeesTheSameLightWhereAPulseCutsIt) {
     for (const auto& event : cut) cut_sum += event.t;
     EXPECT_NEAR(cut_sum / static_cast<double>(cut.size()), sum / static_cast<double>(whole.size()),
                 20);
-    // A pulse makes ON of what was about to be.
+    // A pulse fires ON in pixels that were about to.
     const auto pulsed = events_with(0.1);
-    const auto on_within = [](const std::vector<Timed>& events) {
-      return std::count_if(events.begin(), events.end(), [](const Timed& event) {
+    const auto on_within = [](const std::vector<TimedEvent>& events) {
+      return std::count_if(events.begin(), events.end(), [](const TimedEvent& event) {
         const double t = std::fmod(event.t, 40'000) - (40'000 - 21'234);
         return event.polarity == Polarity::on && t >= 0 && t <= 100;
       });
@@ -617,7 +604,7 @@ TEST(Dvs, SendsEventsAsLateAsItsLatency) {
   ASSERT_EQ(prompt.size(), 6U * 5U * 3U);
   ASSERT_EQ(late.size(), prompt.size());
   for (std::size_t i = 0; i < prompt.size(); ++i) EXPECT_NEAR(late[i].t, prompt[i].t + 25, 1);
-  // Behind the end of the interval, none is lost; but a pixel does one thing at a time.
+  // Past the end of the interval, none is lost; but a pixel makes one event at a time.
   const auto later = play(45'000);
   EXPECT_EQ(later.size(), 6U * 5U);
   EXPECT_GT(later.front().t, 45'000);
@@ -643,10 +630,10 @@ TEST(Dvs, ReadsOutNoMoreThanItCan) {
   const auto slow = play(20'000);
   EXPECT_LT(slow.size(), all.size());
   EXPECT_GT(slow.size(), 3000U);
-  // In no stretch of time more than the rate, and the rows under way.
+  // At no time more than the rate, plus the rows under way.
   for (std::size_t i = 500; i < slow.size(); ++i)
     ASSERT_GE(slow[i].t - slow[i - 500].t, (500 - 2 * width) / 20'000.0 * second - 1);
-  // What leaves together is of one row.
+  // Events that leave together are of one row.
   for (std::size_t i = 1; i < slow.size(); ++i)
     ASSERT_TRUE(slow[i].t != slow[i - 1].t || slow[i].y == slow[i - 1].y);
 }
@@ -659,8 +646,8 @@ TEST(Dvs, FollowsMotion) {
     playback.push(at(48), 8, 40'000'000);
     return playback.events;
   };
-  // The right edge passes column 64 + k as k/8 of the interval is over.
-  const auto deviation = [](const std::vector<Timed>& events) {
+  // The right edge passes column 64 + k at k/8 of the interval.
+  const auto deviation = [](const std::vector<TimedEvent>& events) {
     double sum = 0;
     double count = 0;
     for (const auto& event : events) {
@@ -672,7 +659,7 @@ TEST(Dvs, FollowsMotion) {
     return sum / count;
   };
   EXPECT_LT(deviation(play(Upsampling::motion)), 0.7 * deviation(play(Upsampling::linear)));
-  // Where nothing moves, it changes nothing but how the light goes on its way.
+  // Where nothing moves, nothing fires.
   Playback still({40, 30, 8}, DvsSettings{.upsampling = Upsampling::motion});
   stand(still, scene::texture<std::uint8_t>(40, 30, 8, 1, 2), 3, 40'000'000);
   EXPECT_TRUE(still.events.empty());
@@ -690,7 +677,7 @@ TEST(Dvs, TakesSettingsFromFrameToFrame) {
   EXPECT_EQ(push(150), 30U * 20U * 2U);
   playback.set({.positive_threshold = 1});
   EXPECT_EQ(push(200), 0U);
-  playback.set({.response = Response::log});  // other units: begins anew
+  playback.set({.response = Response::log});  // other units: starts over
   EXPECT_EQ(push(200), 0U);
   playback.set({.response = Response::log, .cutoff_hz = 1});
   EXPECT_EQ(push(220), 0U);

@@ -10,7 +10,7 @@
 
 namespace eventcamera::reference {
 
-/// I(x, y), bilinear at the nearest 1/64 of a pixel, border replicated.
+/// I(x, y): bilinear, positions rounded to 1/64 of a pixel, border replicated.
 template <class Pixel>
 double bilinear(const Image<Pixel>& picture, double x, double y) {
   const double qx = std::clamp(std::floor(x * 64 + 0.5) / 64, 0.0, picture.width() - 1.0);

@@ -6,32 +6,31 @@
 #include <span>
 
 #include "tests/reference/differences.hpp"
-#include "tests/reference/tracks.hpp"
 
 namespace eventcamera::reference {
 
-/// D = now - last where it exceeds a threshold, 0 elsewhere.
+/// D = now - last where that exceeds a threshold, 0 elsewhere.
 template <class Pixel>
 Image<int> difference_frame(const Image<Pixel>& last, const Image<Pixel>& now,
                             const Thresholds& thresholds) {
-  Image<int> kept(now.width(), now.height());
+  Image<int> result(now.width(), now.height());
   for (int y = 0; y < now.height(); ++y) {
     for (int x = 0; x < now.width(); ++x) {
       const int difference = now.at(x, y) - last.at(x, y);
       if (difference > thresholds.positive || -difference > thresholds.negative)
-        kept.at(x, y) = difference;
+        result.at(x, y) = difference;
     }
   }
-  return kept;
+  return result;
 }
 
-/// One polarity (sign 1 or -1) of a difference frame in 8 bits, at least 1 where it is kept.
+/// One polarity (sign 1 or -1) of D in 8 bits, at least 1 where D is not 0.
 inline Image<std::uint8_t> part_of(const Image<int>& difference, int sign, int bits) {
   Image<std::uint8_t> part(difference.width(), difference.height());
   for (int y = 0; y < part.height(); ++y)
     for (int x = 0; x < part.width(); ++x)
-      if (const int kept = sign * difference.at(x, y); kept > 0)
-        part.at(x, y) = static_cast<std::uint8_t>(std::max(1, kept >> (bits - 8)));
+      if (const int d = sign * difference.at(x, y); d > 0)
+        part.at(x, y) = static_cast<std::uint8_t>(std::max(1, d >> (bits - 8)));
   return part;
 }
 
@@ -44,13 +43,14 @@ inline std::vector<Point> points_of(const Image<std::uint8_t>& part) {
   return points;
 }
 
-/// The kept pixels of one polarity of D(i-1), and where they went.
+/// The pixels of one polarity of D(i-1) that are not 0, and their tracks.
 struct Tracked {
   std::vector<Point> points;
   std::vector<Track> tracks;
 };
 
-/// The events from D(i-1) = before to D(i) = now.
+/// The events from D(i-1) = before to D(i) = now. A tracked pixel fires at each step if it ends
+/// next to a pixel of its polarity in `now`; where several meet, the largest difference fires.
 inline std::vector<Event> diff(const Image<int>& before, const Image<int>& now, const Tracked& on,
                                const Tracked& off, const StepTimes& steps) {
   const int m = steps.count();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <vector>
 
@@ -9,11 +10,13 @@
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/core/step_times.hpp"
+#include "src/flow/fixed_point.hpp"
+#include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// The equations of the simulators written down as they are read, one picture after another, in
-/// plain loops and in double precision (which holds all of their numbers exactly). Tests and
-/// benchmarks hold the simulators to them.
+/// The equations of the simulators, written down literally: one picture after another, in plain
+/// loops and double precision, which holds all their numbers exactly. The tests compare the
+/// simulators with them, event for event.
 namespace eventcamera::reference {
 
 /// I(0), I(1/m) ... I(1).
@@ -40,7 +43,7 @@ std::vector<Event> differences(const Sequence<Pixel>& sequence, const StepTimes&
   return events;
 }
 
-/// The smallest box that holds the pixels with |now - last| over the threshold.
+/// The bounding box of the pixels where |now - last| exceeds the threshold.
 template <class Pixel>
 Box changed_box(const Image<Pixel>& last, const Image<Pixel>& now, int threshold) {
   Box box;
@@ -52,6 +55,18 @@ Box changed_box(const Image<Pixel>& last, const Image<Pixel>& now, int threshold
     }
   }
   return box;
+}
+
+/// p + j/m f, rounded.
+inline Point moved_point(const Point& p, const Flow& f, int j, int m) {
+  const auto along = [j, m](int start, float flow) {
+    return static_cast<int>(std::floor(start + j * (motion_per_step(flow, m) / 65536.0) + 0.5));
+  };
+  return {along(p.x, f.x), along(p.y, f.y)};
+}
+
+inline bool inside(const Point& p, int width, int height) {
+  return p.x >= 0 && p.x < width && p.y >= 0 && p.y < height;
 }
 
 }  // namespace eventcamera::reference

@@ -10,22 +10,44 @@
 #include "src/core/image.hpp"
 #include "src/dvs/dvs_settings.hpp"
 
-/// The equations of the event camera's pixel as they are read, in double precision and one after
-/// another in time.
+/// The equations of the event camera's pixel, written down literally, in double precision and in
+/// order of time.
 namespace eventcamera::reference {
 
-struct EsimEvent {
+/// out(x, y) = round(I(x, y) + sum over i, j in {-1, 0, 1} of
+///   w(i) w(j) clamp(I(x + i, y + j) - I(x, y), -limit, limit)), w = 1/4, 1/2, 1/4;
+/// halves are rounded up, the border is replicated.
+template <class Pixel>
+Image<Pixel> denoised(const ImageView<Pixel>& frame, int limit) {
+  Image<Pixel> out(frame.width, frame.height);
+  const auto weight = [](int i) { return i == 0 ? 0.5 : 0.25; };
+  for (int y = 0; y < frame.height; ++y) {
+    for (int x = 0; x < frame.width; ++x) {
+      const int centre = frame.row(y)[x];
+      double value = centre;
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) {
+          const int neighbour = frame.row(
+              std::clamp(y + j, 0, frame.height - 1))[std::clamp(x + i, 0, frame.width - 1)];
+          value += weight(i) * weight(j) * std::clamp(neighbour - centre, -limit, limit);
+        }
+      out.at(x, y) = static_cast<Pixel>(std::floor(value + 0.5));
+    }
+  }
+  return out;
+}
+
+struct TimedEvent {
   double t;  ///< microseconds
   int x;
   int y;
   Polarity polarity;
 };
 
-/// ESIM's rule (Rebecq et al., CoRL 2018): L = ln(eps + I/255) goes on a straight line from a at t0
-/// to b at t1. Towards b, each level r = ref + C, ref + 2C ... that lies between them is crossed at
-/// t0 + (r - a)(t1 - t0)/(b - a), and the last one that is becomes ref. Of one threshold, levels
-/// lie at first L + n C, which is how they are counted: so that the way back to it is no
-/// rounding's.
+/// ESIM's rule (Rebecq et al., CoRL 2018): L = ln(eps + I/255) changes on a straight line from a at
+/// t0 to b at t1. Each level r = ref + C, ref + 2C ... between them, in the direction of b, is
+/// crossed at t0 + (r - a)(t1 - t0)/(b - a), and the last of them becomes ref. With a single
+/// threshold all levels are (first L) + n C; n is counted, so that rounding does not add up.
 class Esim {
  public:
   Esim(int width, int height, double log_eps, double threshold)
@@ -35,8 +57,8 @@ class Esim {
         last_(width, height),
         levels_(width, height) {}
 
-  std::vector<EsimEvent> push(const Image<std::uint8_t>& frame, double time) {
-    std::vector<EsimEvent> events;
+  std::vector<TimedEvent> push(const Image<std::uint8_t>& frame, double time) {
+    std::vector<TimedEvent> events;
     for (int y = 0; y < frame.height(); ++y) {
       for (int x = 0; x < frame.width(); ++x) {
         const double b = std::log(log_eps_ + frame.at(x, y) / 255.0);
@@ -68,14 +90,14 @@ class Esim {
   Image<int> levels_;
 };
 
-/// One pixel that is neither noisy nor mismatched, looked at every microsecond.
+/// One pixel without noise and mismatch, evaluated every microsecond.
 ///   light      I = luma, or ((luma + 0.055)/1.055)^2.4
 ///   response   log: ln(eps + I); lin-log: x ln(20)/20 or ln(x), x = 255 I; linear: ln(255) I
-///   input      L(t), from frame to frame on a straight line
+///   input      L(t), a straight line from frame to frame
 ///   low pass   dV/dt = 2 pi f (I + d)/(1 + d) (L(t) - V), I of the later frame in 8 bits
 ///   leak       dR/dt = -rate C+
 ///   events     ON where V - R >= C+, OFF where R - V >= C-
-///   afterwards R = R +- C (level), or R = V as the refractory period ends (signal)
+///   afterwards R = R +- C (level), or R = V when the refractory period ends (signal)
 class DvsPixel {
  public:
   DvsPixel(const DvsSettings& settings, double luma, double leaked)
@@ -83,30 +105,30 @@ class DvsPixel {
     reference_ = signal_ - leaked;
   }
 
-  /// The events of the microseconds to the next frame.
-  std::vector<EsimEvent> push(double luma, int microseconds) {
-    std::vector<EsimEvent> events;
+  /// The events until the next frame, `microseconds` later.
+  std::vector<TimedEvent> push(double luma, int microseconds) {
+    std::vector<TimedEvent> events;
     const double last = input_;
     const double next = response(light(luma));
     const double dark = settings_.dark_light;
     const double shade = std::min(std::floor(luma * 65535 / 256), 255.0) / 255;
     const double bandwidth =
         2 * std::numbers::pi * settings_.cutoff_hz / 1e6 * (light(shade) + dark) / (1 + dark);
-    // The line, sampled this often, is the curve itself as far as events to the microsecond go.
+    // Sampled every microsecond, the line is exact to the resolution of events.
     for (int i = 1; i <= microseconds; ++i, ++now_) {
       input_ = last + (next - last) * i / microseconds;
       signal_ =
           settings_.cutoff_hz > 0 ? input_ + (signal_ - input_) * std::exp(-bandwidth) : input_;
       reference_ -= settings_.leak_rate_hz / 1e6 * settings_.positive_threshold;
-      const bool is_resting = now_ + 1 < ready_;
-      if (settings_.refractory_reset == RefractoryReset::signal && is_resting) {
+      const bool is_refractory = now_ + 1 < ready_;
+      if (settings_.refractory_reset == RefractoryReset::signal && is_refractory) {
         reference_ = signal_;
         continue;
       }
       const bool is_on = signal_ - reference_ >= settings_.positive_threshold;
       if (!is_on && reference_ - signal_ < settings_.negative_threshold) continue;
       reference_ += is_on ? settings_.positive_threshold : -settings_.negative_threshold;
-      if (is_resting) continue;
+      if (is_refractory) continue;
       events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off});
       ready_ = now_ + 1 + settings_.refractory_period;
       if (settings_.refractory_reset == RefractoryReset::signal) reference_ = signal_;

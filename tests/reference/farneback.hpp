@@ -11,10 +11,10 @@
 #include "src/flow/dense_flow.hpp"
 
 /// Farneback, "Two-frame motion estimation based on polynomial expansion" (SCIA 2003), with the
-/// pyramid, the window and the weights at the border that are OpenCV's.
+/// pyramid, window and border weights of OpenCV.
 namespace eventcamera::reference {
 
-/// The weights at -reach ... reach of a Gaussian cut off there, whose sum is 1.
+/// A Gaussian at -reach ... reach, normalised to a sum of 1.
 inline std::vector<double> gaussian(double sigma, int reach) {
   std::vector<double> weights(2 * static_cast<std::size_t>(reach) + 1);
   for (int k = -reach; k <= reach; ++k) weights[reach + k] = std::exp(-k * k / (2 * sigma * sigma));
@@ -30,13 +30,13 @@ inline Flow operator+(const Flow& a, const Flow& b) {
   return {a.x + b.x, a.y + b.y};
 }
 
-/// A place on a line of pixels between two of them.
+/// A position between two pixels of a line.
 struct Between {
   int first;
   int second;
   double weight;  ///< of the second
 
-  /// Where pixel i of a line of `to` pixels lies on one of `from`.
+  /// Of pixel i of a line of `to` pixels, on a line of `from`.
   Between(int i, int from, int to) {
     const double place = std::clamp((i + 0.5) * from / to - 0.5, 0.0, from - 1.0);
     first = static_cast<int>(place);
@@ -65,7 +65,7 @@ Image<T> resized(const Image<T>& plane, int width, int height) {
   return result;
 }
 
-/// A picture blurred and shrunk to 1 / 2^level. Beyond its border it is mirrored.
+/// A picture blurred and shrunk to 1 / 2^level; the border is mirrored.
 inline Image<double> pyramid_level(const Image<std::uint8_t>& picture, int level) {
   const double sigma = level == 0 ? std::sqrt(0.5 / std::log(2)) : ((1 << level) - 1) / 2.0;
   const int reach = level == 0 ? 1 : static_cast<int>(std::lrint(5 * sigma)) / 2;
@@ -96,8 +96,8 @@ struct Polynomial {
   double a_xy;
 };
 
-/// The least-squares fit around (x, y), the border continued: x, y, x y, x^2 - m2 and y^2 - m2 are
-/// orthogonal to each other and to constants, under the weight, whose moments are m2 and m4.
+/// The least-squares fit around (x, y), border replicated: under the weight, whose moments are m2
+/// and m4, the functions x, y, x y, x^2 - m2 and y^2 - m2 are orthogonal to each other and to 1.
 inline Polynomial fit(const Image<double>& picture, int x, int y) {
   constexpr int reach = 5;
   const auto weights = gaussian(1.2, reach);
@@ -130,14 +130,14 @@ inline Image<Polynomial> expansion(const Image<double>& picture) {
   return result;
 }
 
-/// Of a polynomial at (x, y), in a picture of this size.
+/// The weight of the polynomial at (x, y) in a picture of this size.
 inline double border_weight(int x, int y, int width, int height) {
   constexpr double weights[] = {0.14, 0.14, 0.4472, 0.4472, 0.4472};
   const auto along = [&](int i) { return i < 5 ? weights[i] : 1; };
   return along(x) * along(width - 1 - x) * along(y) * along(height - 1 - y);
 }
 
-/// A^T A d = A^T b for the flow d of one pixel, or many of them summed up.
+/// A^T A d = A^T b for the flow d of one pixel, or the sum of many.
 struct Equations {
   double g_yy = 0;
   double g_xy = 0;
@@ -153,7 +153,7 @@ struct Equations {
     h_x += o.h_x;
     return *this;
   }
-  /// Of their mean, a little regularised.
+  /// The solution of the mean of `count`, slightly regularised.
   Flow solution(int count) const {
     const double determinant = g_yy * g_xx - g_xy * g_xy + 1e-3 * count * count;
     return {static_cast<float>((g_yy * h_x - g_xy * h_y) / determinant),
@@ -161,9 +161,8 @@ struct Equations {
   }
 };
 
-/// A is the mean of both polynomials' A, and b what d must be for the earlier one's b, less the
-/// later one's, where the flow found so far leads. Where that is out of the picture, there is only
-/// the earlier one.
+/// A is the mean of the A of both polynomials, b their difference in b plus A times the flow so
+/// far; the later polynomial is taken where that flow leads, and left out outside the picture.
 inline Equations equations(const Image<Polynomial>& from, const Image<Polynomial>& to,
                            const Flow& flow, int x, int y) {
   const Polynomial& p = from.at(x, y);
@@ -201,7 +200,7 @@ inline Equations equations(const Image<Polynomial>& from, const Image<Polynomial
           w2 * (a_xy * b_y + a_xx * b_x)};
 }
 
-/// One iteration: the equations of 15x15 pixels, the border continued, solved for each.
+/// One iteration: for each pixel, the equations of 15x15 pixels, border replicated, are solved.
 inline Image<Flow> better_flow(const Image<Polynomial>& from, const Image<Polynomial>& to,
                                const Image<Flow>& flow) {
   Image<Equations> of_pixel(flow.width(), flow.height());

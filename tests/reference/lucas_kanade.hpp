@@ -12,7 +12,7 @@
 
 namespace eventcamera::reference {
 
-/// A picture that goes on beyond its border, mirrored at its border pixels.
+/// A picture mirrored at its border pixels.
 struct Mirrored {
   const Image<std::uint8_t>& picture;
 
@@ -43,7 +43,7 @@ inline Image<std::uint8_t> halved(const Image<std::uint8_t>& picture) {
   return half;
 }
 
-/// Scharr's operator, across or down; 0 outside the picture.
+/// Scharr's gradient, horizontal or vertical; 0 outside the picture.
 inline int slope(const Image<std::uint8_t>& picture, int x, int y, bool across) {
   if (x < 0 || x >= picture.width() || y < 0 || y >= picture.height()) return 0;
   constexpr int weight[] = {3, 10, 3};
@@ -62,7 +62,7 @@ inline void search(const Image<std::uint8_t>& from, const Image<std::uint8_t>& t
   const int top = tile.top + search.y - 7;
   const float right = static_cast<float>(tile.right) / 8;
   const float down = static_cast<float>(tile.down) / 8;
-  /// Bilinear, rounded after each way as the hardware does it.
+  // Bilinear, rounded after each direction as SIMD code does.
   const auto here = [&](int x, int y, auto&& at) {
     const auto between = [](int a, int b, int eighths) {
       return a + (((b - a) * eighths + 4) >> 3);
@@ -137,13 +137,13 @@ inline void search(const Image<std::uint8_t>& from, const Image<std::uint8_t>& t
   search.found = inside();
 }
 
-/// A point's track: its flow on one level, twice as long, is where its search on the next begins.
+/// The track of a point: twice its flow on one level is where the search on the next begins.
 inline Track track(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
                    const Point& point) {
   std::vector<std::pair<Image<std::uint8_t>, Image<std::uint8_t>>> levels{{from, to}};
   while (levels.size() < 4) {
     const auto& [a, b] = levels.back();
-    if (std::min(a.width(), a.height()) <= 30) break;  // half of it is no longer than a window
+    if (std::min(a.width(), a.height()) <= 30) break;  // its half would not exceed a window
     levels.emplace_back(halved(a), halved(b));
   }
   Search result{0, 0, {0, 0}, false};

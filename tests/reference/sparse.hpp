@@ -5,11 +5,10 @@
 #include <span>
 
 #include "tests/reference/differences.hpp"
-#include "tests/reference/tracks.hpp"
 
 namespace eventcamera::reference {
 
-/// The pixels with |now - last| over the threshold.
+/// The pixels where |now - last| exceeds the threshold, in raster order.
 template <class Pixel>
 std::vector<Point> changed(const Image<Pixel>& last, const Image<Pixel>& now, int threshold) {
   std::vector<Point> points;
@@ -19,7 +18,8 @@ std::vector<Point> changed(const Image<Pixel>& last, const Image<Pixel>& now, in
   return points;
 }
 
-/// `tracks` are those of changed() at the smaller threshold.
+/// `points` are changed() at the smaller threshold, `tracks` their tracks. At each step a tracked
+/// pixel shows what is behind it, from `now`, and covers the pixel that it has moved to.
 template <class Pixel>
 std::vector<Event> sparse(const Image<Pixel>& last, const Image<Pixel>& now,
                           std::span<const Point> points, std::span<const Track> tracks,
