@@ -24,15 +24,15 @@ void denoise_row(const Pixel* above, const Pixel* here, const Pixel* below, int 
   const hn::ScalableTag<Wide> wide;
   const hn::Rebind<Pixel, decltype(wide)> pixels;
   const int lanes = static_cast<int>(hn::Lanes(wide));
-  const auto most = hn::Set(wide, static_cast<Wide>(limit));
-  const auto least = hn::Set(wide, static_cast<Wide>(-limit));
+  const auto max = hn::Set(wide, static_cast<Wide>(limit));
+  const auto min = hn::Set(wide, static_cast<Wide>(-limit));
   const auto vectors = [&](int x) {
     const auto load = [&](const Pixel* row, int at) {
       return hn::PromoteTo(wide, hn::LoadU(pixels, row + at));
     };
     const auto centre = load(here, x);
     const auto difference = [&](const Pixel* row, int at) {
-      return hn::Min(hn::Max(hn::Sub(load(row, at), centre), least), most);
+      return hn::Min(hn::Max(hn::Sub(load(row, at), centre), min), max);
     };
     const auto corners = hn::Add(hn::Add(difference(above, x - 1), difference(above, x + 1)),
                                  hn::Add(difference(below, x - 1), difference(below, x + 1)));
@@ -61,14 +61,23 @@ void denoise_row(const Pixel* above, const Pixel* here, const Pixel* below, int 
   for (; x < width; ++x) one(x);
 }
 
-void denoise_row_8(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below,
-                   int width, int limit, std::uint8_t* out) {
-  denoise_row(above, here, below, width, limit, out);
+template <class Pixel>
+void denoise_rows(const ImageView<Pixel>& frame, int limit, ThreadPool& threads,
+                  Image<Pixel>& out) {
+  for_each_row(threads, frame.height, [&](int y) {
+    denoise_row(frame.row(std::max(y - 1, 0)), frame.row(y),
+                frame.row(std::min(y + 1, frame.height - 1)), frame.width, limit, out.row(y));
+  });
 }
 
-void denoise_row_16(const std::uint16_t* above, const std::uint16_t* here,
-                    const std::uint16_t* below, int width, int limit, std::uint16_t* out) {
-  denoise_row(above, here, below, width, limit, out);
+void denoise_8(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
+               Image<std::uint8_t>& out) {
+  denoise_rows(frame, limit, threads, out);
+}
+
+void denoise_16(const ImageView<std::uint16_t>& frame, int limit, ThreadPool& threads,
+                Image<std::uint16_t>& out) {
+  denoise_rows(frame, limit, threads, out);
 }
 
 }  // namespace
@@ -77,37 +86,18 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace eventcamera {
-namespace {
 
-HWY_EXPORT(denoise_row_8);
-HWY_EXPORT(denoise_row_16);
-
-/// Calls denoise_row(above, here, below, y) for each row.
-template <class Pixel, class DenoiseRow>
-void for_each_row_between(const ImageView<Pixel>& frame, ThreadPool& threads,
-                          const DenoiseRow& denoise_row) {
-  for_each_row(threads, frame.height, [&](int y) {
-    denoise_row(frame.row(std::max(y - 1, 0)), frame.row(y),
-                frame.row(std::min(y + 1, frame.height - 1)), y);
-  });
-}
-
-}  // namespace
+HWY_EXPORT(denoise_8);
+HWY_EXPORT(denoise_16);
 
 void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
              Image<std::uint8_t>& out) {
-  for_each_row_between(
-      frame, threads, [&](const auto* above, const auto* here, const auto* below, int y) {
-        HWY_DYNAMIC_DISPATCH(denoise_row_8)(above, here, below, frame.width, limit, out.row(y));
-      });
+  HWY_DYNAMIC_DISPATCH(denoise_8)(frame, limit, threads, out);
 }
 
 void denoise(const ImageView<std::uint16_t>& frame, int limit, ThreadPool& threads,
              Image<std::uint16_t>& out) {
-  for_each_row_between(
-      frame, threads, [&](const auto* above, const auto* here, const auto* below, int y) {
-        HWY_DYNAMIC_DISPATCH(denoise_row_16)(above, here, below, frame.width, limit, out.row(y));
-      });
+  HWY_DYNAMIC_DISPATCH(denoise_16)(frame, limit, threads, out);
 }
 
 }  // namespace eventcamera

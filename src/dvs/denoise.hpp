@@ -8,10 +8,10 @@
 
 namespace eventcamera {
 
-/// Smooths away the noise of a frame, which no event camera sees, and leaves its edges: to each
-/// pixel the mean difference of its 3x3 neighbourhood is added (weights 1 2 1 by 1 2 1 of 16),
-/// each difference being cut to `limit`, in luma values. Beyond the border lies what lies on it.
-/// `out` has the size of `frame`. `reference::denoised()` is the equation.
+/// Removes the noise of a frame, which no event camera sees, and leaves its edges: adds to each
+/// pixel the weighted mean difference of its 3x3 neighbourhood (weights 1 2 1 by 1 2 1 of 16), each
+/// difference clamped to `limit` luma values. The border is replicated. `out` has the size of
+/// `frame`. `reference::denoised()` is the equation.
 void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
              Image<std::uint8_t>& out);
 void denoise(const ImageView<std::uint16_t>& frame, int limit, ThreadPool& threads,
