@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Events a second that the AEDAT codecs read and write on one core, beside memcpy of the same
-// decoded events, in one process and one run.
+// Events per second that the AEDAT codecs read and write on one core, compared with a memcpy of the
+// decoded events in the same run.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using namespace eventcamera;
 
 constexpr SensorSize size{346, 260};
 constexpr std::size_t count = 2'000'000;
-/// Bytes handed over at once, as a file source does.
+/// Bytes that a decoder gets at once, as from a file source.
 constexpr std::size_t piece = std::size_t{1} << 20;
 
 const std::vector<AbsoluteEvent>& events() {

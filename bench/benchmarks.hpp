@@ -5,14 +5,14 @@
 
 namespace bench {
 
-/// Every method on a scene, written plainly and ours: SCENE/METHOD/FORMULATION/threads:N.
+/// Every method on a scene, plain and ours: SCENE/METHOD/FORMULATION/threads:N.
 void register_simulators(const Scene& scene);
 
-/// Events into a buffer, and a buffer into a picture, beside a memcpy of what comes out:
+/// Events to a buffer, and a buffer to a picture, compared with a memcpy of the output:
 /// SCENE/STEP/FORMULATION/threads:1.
 void register_events(const Scene& scene);
 
-/// How the methods' cost grows: growth/AXIS/METHOD/FORMULATION/VALUE.
+/// The scaling of the methods: growth/AXIS/METHOD/FORMULATION/VALUE.
 void register_growth(bool few_frames);
 
 }  // namespace bench

@@ -12,14 +12,14 @@
 
 namespace bench {
 
-/// Of this thread: what else the machine does is not counted.
+/// The processor time of this thread, which does not depend on the load of the machine.
 inline double seconds_now() {
   timespec now;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Seconds of a memcpy of these events, the best of some.
+/// The seconds of a memcpy of these events, the minimum of several.
 inline double memcpy_seconds(const std::vector<eventcamera::AbsoluteEvent>& events) {
   std::vector<eventcamera::AbsoluteEvent> copy(events.size());
   double best = 1;
@@ -33,8 +33,8 @@ inline double memcpy_seconds(const std::vector<eventcamera::AbsoluteEvent>& even
   return best;
 }
 
-/// Times `body`, which handles all of these events: million events a second, and the time as a
-/// ratio to that of a memcpy of them.
+/// Times `body`, which processes all of these events: million events per second, and the time as a
+/// multiple of that of a memcpy of them.
 template <class Body>
 void measure(benchmark::State& state, const std::vector<eventcamera::AbsoluteEvent>& events,
              const Body& body) {

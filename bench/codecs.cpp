@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// How fast event formats are read and written, on one core: million events a second, and the time
-// as a ratio to that of a memcpy of the decoded events, in the same run. Names are
-// RECORDING/FORMAT/read or write.
+// Reads and writes event formats on one core: million events per second, and the time as a multiple
+// of that of a memcpy of the decoded events in the same run. Names are RECORDING/FORMAT/read or
+// write.
 #include <benchmark/benchmark.h>
 
 #include "bench/codec_timing.hpp"
@@ -20,8 +20,8 @@ struct Recording {
   std::vector<AbsoluteEvent> events;
 };
 
-/// Single pixels all over the sensor, 10 million a second: what formats that save rows and times
-/// like least.
+/// Single pixels all over the sensor, 10 million per second: the worst case of formats that store
+/// rows and times once.
 Recording noise() {
   recordings::Random random(1);
   Recording recording{"noise", {}};
@@ -33,7 +33,7 @@ Recording noise() {
   return recording;
 }
 
-/// What a simulator makes of moving edges: every 4 ms, row by row, runs of some pixels.
+/// Moving edges as a simulator sees them: every 4 ms, row by row, runs of several pixels.
 Recording edges() {
   recordings::Random random(2);
   Recording recording{"edges", {}};
@@ -53,7 +53,7 @@ Recording edges() {
 
 void register_all(const Recording& recording) {
   for (const auto& format : formats::all()) {
-    // The header does not matter.
+    // The header does not affect the speed.
     if (format.name.rfind("raw_", 0) == 0) continue;
     const auto bytes = recordings::encode(*format.make_encoder(size), recording.events);
     const auto add = [&](const char* what, auto&& body) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What GStreamer adds to a frame: a whole pipeline beside the core alone, events written and drawn
-// beside a memcpy of the same bytes. Both of a pair take turns in one run; the counters are the
-// medians of the turns, in microseconds for each frame, and the medians of the turns' ratios: on
-// the clock, and of processor time.
+// What GStreamer adds to a frame: a whole pipeline compared with the core alone, events written and
+// drawn compared with a memcpy of the same bytes. Both of a pair take turns in one run; the
+// counters are medians over the turns: microseconds per frame, and ratios of wall-clock and
+// processor time.
 //   meson devenv -C build-bench bench/element_bench
 #include <benchmark/benchmark.h>
 #include <gst/app/gstappsrc.h>
@@ -21,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/scenes.hpp"
 #include "src/render/accumulator.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/frame.hpp"
@@ -30,50 +31,29 @@ namespace {
 
 using namespace eventcamera;
 
-using Frames = std::vector<Image<std::uint8_t>>;
-
 struct Scene {
   std::string name;
-  Frames frames;  ///< seen forwards and backwards for ever
-
-  const Image<std::uint8_t>& frame(std::int64_t i) const {
-    const auto last = static_cast<std::int64_t>(frames.size()) - 1;
-    const auto at = i % (2 * last);
-    return frames[static_cast<std::size_t>(at <= last ? at : 2 * last - at)];
-  }
+  bench::Clip clip;
 };
 
 /// A texture that drifts.
 Scene drift() {
   Scene scene{"drift-640x480", {}};
   for (int i = 0; i < 12; ++i)
-    scene.frames.push_back(scene::texture<std::uint8_t>(640, 480, 8, 1.7 * i, 0.6 * i));
-  return scene;
-}
-
-/// A ball of 40 pixels that flies over a still, textured picture.
-Scene ball() {
-  Scene scene{"ball-1280x720", {}};
-  for (int i = 0; i < 12; ++i) {
-    auto picture = scene::texture<std::uint8_t>(1280, 720, 8, 0, 0);
-    for (int y = -20; y < 20; ++y)
-      for (int x = -20; x < 20; ++x)
-        if (x * x + y * y < 400) picture.at(200 + 30 * i + x, 300 + 8 * i + y) = 240;
-    scene.frames.push_back(std::move(picture));
-  }
+    scene.clip.push_back(scene::texture<std::uint8_t>(640, 480, 8, 1.7 * i, 0.6 * i));
   return scene;
 }
 
 struct Method {
-  std::string element;  ///< its properties set by name, as in a launch line
+  std::string element;  ///< with properties, as in a launch line
   std::unique_ptr<Simulator> (*make)(const LumaFormat& format);
   double threshold;
-  int frames_a_turn;
+  int frames_per_turn;
 };
 
 constexpr int interpolated_frames = 10;
 
-/// `appsrc ! the element ! fakesink`, fed from memory.
+/// `appsrc ! ELEMENT ! fakesink`, fed from memory.
 class Pipeline {
  public:
   Pipeline(const Scene& scene, const Method& method, const std::string& out, int threads)
@@ -90,7 +70,7 @@ class Pipeline {
       std::exit(1);
     }
     source_ = GST_APP_SRC(gst_bin_get_by_name(GST_BIN(pipeline_), "source"));
-    const auto& first = scene.frames.front();
+    const auto& first = scene.clip.front();
     GstCaps* caps = gst_caps_new_simple(
         "video/x-raw", "format", G_TYPE_STRING, "GRAY8", "width", G_TYPE_INT, first.width(),
         "height", G_TYPE_INT, first.height(), "framerate", GST_TYPE_FRACTION, 25, 1, nullptr);
@@ -113,7 +93,7 @@ class Pipeline {
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  /// Sends so many frames through and returns when the pipeline wants more.
+  /// Pushes `frames` frames and returns when the pipeline wants more.
   void run(int frames) {
     wants_more_ = false;
     left_ = frames - 1;
@@ -123,7 +103,7 @@ class Pipeline {
 
  private:
   void push() {
-    const auto& frame = scene_.frame(pushed_);
+    const auto& frame = bench::back_and_forth(scene_.clip, pushed_);
     gsize offsets[GST_VIDEO_MAX_PLANES] = {};
     gint strides[GST_VIDEO_MAX_PLANES] = {static_cast<gint>(frame.stride())};
     const auto size = static_cast<gsize>(frame.stride()) * static_cast<gsize>(frame.height());
@@ -136,7 +116,7 @@ class Pipeline {
     GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(pushed_++ * scene::frame_time);
     gst_app_src_push_buffer(source_, buffer);
   }
-  /// Called when all frames have gone their way.
+  /// Called when the pipeline has processed all frames.
   void push_another() {
     if (left_ > 0) {
       --left_;
@@ -155,8 +135,8 @@ class Pipeline {
   std::atomic<bool> wants_more_ = false;
 };
 
-/// What a piece of work took, in microseconds: on the clock, and of all threads together, which
-/// stays what it is where others use the machine.
+/// What a piece of work takes, microseconds: wall-clock time, and the processor time of all
+/// threads, which does not depend on other users of the machine.
 struct Cost {
   double time;
   double processor;
@@ -177,7 +157,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Runs both by turns; each call does `frames` frames.
+/// Runs both in turns; each call processes `frames` frames.
 void by_turns(benchmark::State& state, const char* base_name, int frames,
               const std::function<void()>& ours, const std::function<void()>& base) {
   std::vector<double> ours_times;
@@ -208,17 +188,18 @@ void register_pipeline(const Scene& scene, const Method& method, const std::stri
       name.c_str(),
       [&, out, threads](benchmark::State& state) {
         Pipeline pipeline(scene, method, out, threads);
-        const LumaFormat format{scene.frames[0].width(), scene.frames[0].height(), 8};
+        const LumaFormat format{scene.clip[0].width(), scene.clip[0].height(), 8};
         const auto simulator = method.make(format);
         const Settings settings{method.threshold, method.threshold, interpolated_frames, threads};
         std::int64_t pushed = 0;
         std::size_t events = 0;
         by_turns(
-            state, "core", method.frames_a_turn, [&] { pipeline.run(method.frames_a_turn); },
+            state, "core", method.frames_per_turn, [&] { pipeline.run(method.frames_per_turn); },
             [&] {
-              for (int i = 0; i < method.frames_a_turn; ++i, ++pushed) {
-                const auto* made = simulator->push(scene::luma(scene.frame(pushed)),
-                                                   pushed * scene::frame_time, settings);
+              for (int i = 0; i < method.frames_per_turn; ++i, ++pushed) {
+                const auto* made =
+                    simulator->push(scene::luma(bench::back_and_forth(scene.clip, pushed)),
+                                    pushed * scene::frame_time, settings);
                 if (made != nullptr) events += made->size();
               }
             });
@@ -228,8 +209,8 @@ void register_pipeline(const Scene& scene, const Method& method, const std::stri
       ->UseRealTime();
 }
 
-/// So many events of an interval, over the picture and the steps by chance.
-EventBuckets events_by_chance(int count, int width, int height) {
+/// `count` random events of an interval, all over the picture and the steps.
+EventBuckets random_events(int count, int width, int height) {
   std::minstd_rand random;
   constexpr int steps = interpolated_frames + 1;
   constexpr int rows_a_bucket = 16;
@@ -254,7 +235,7 @@ constexpr int picture_width = 1280;
 constexpr int picture_height = 720;
 
 void copy_events(benchmark::State& state, int count) {
-  const auto events = events_by_chance(count, picture_width, picture_height);
+  const auto events = random_events(count, picture_width, picture_height);
   std::vector<Event> in(events.size());
   std::vector<Event> out(events.size());
   events.copy_to(in.data());
@@ -264,7 +245,7 @@ void copy_events(benchmark::State& state, int count) {
 }
 
 void draw_events(benchmark::State& state, int count, const PixelLayout& layout) {
-  const auto events = events_by_chance(count, picture_width, picture_height);
+  const auto events = random_events(count, picture_width, picture_height);
   const std::ptrdiff_t stride = std::ptrdiff_t{picture_width} * layout.bytes;
   const auto size = static_cast<std::size_t>(stride) * picture_height;
   std::vector<std::byte> in(size);
@@ -304,7 +285,7 @@ int main(int argc, char** argv) {
   gst_init(&argc, &argv);
   std::vector<Scene> scenes;
   scenes.push_back(drift());
-  scenes.push_back(ball());
+  scenes.push_back({"ball-1280x720", bench::ball(12)});
   const std::vector<Method> methods = {
       {"eventsim-frame", make_frame_simulator, 20, 50},
       {"eventsim-dense",

@@ -9,7 +9,7 @@
 namespace bench {
 namespace {
 
-/// The events of an interval, as a simulator leaves them and as a buffer has them.
+/// The events of an interval, as a simulator returns them and as a buffer holds them.
 struct Interval {
   EventBuckets buckets;
   std::vector<Event> buffer;
@@ -17,7 +17,7 @@ struct Interval {
 
 using Intervals = std::vector<Interval>;
 
-/// Those of dense interpolation, which makes the most of them; the first of each clip.
+/// The first interval of each clip, by dense interpolation, which makes the most events.
 Intervals intervals_of(const Scene& scene) {
   const double threshold = dis_hq_method.threshold;
   const Settings settings{threshold, threshold, scene.interpolated_frames, 0};
@@ -52,9 +52,9 @@ void time_intervals(benchmark::State& state, const Intervals& intervals, const V
 }
 
 std::vector<Event> buffer_for(const Intervals& intervals) {
-  std::size_t most = 1;
-  for (const auto& interval : intervals) most = std::max(most, interval.buffer.size());
-  return std::vector<Event>(most);
+  std::size_t max_size = 1;
+  for (const auto& interval : intervals) max_size = std::max(max_size, interval.buffer.size());
+  return std::vector<Event>(max_size);
 }
 
 void time_copying_events(benchmark::State& state, const Intervals& intervals) {
@@ -96,7 +96,7 @@ void time_drawing(benchmark::State& state, const Intervals& intervals, const Pic
 }  // namespace
 
 void register_events(const Scene& scene) {
-  const auto intervals = std::make_shared<Intervals>();  // made when first used
+  const auto intervals = std::make_shared<Intervals>();  // made on first use
   const auto add = [&](const std::string& name, const auto& body) {
     benchmark::RegisterBenchmark((scene.name + "/" + name + "/threads:1").c_str(),
                                  [&scene, intervals, body](benchmark::State& state) {

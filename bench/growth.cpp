@@ -5,11 +5,11 @@
 namespace bench {
 namespace {
 
-/// A textured patch moves before a still texture.
+/// A textured patch moves over a still texture.
 struct Setup {
   int width = 640;
   int height = 480;
-  double share = 0.1;  ///< of the picture's area, the patch
+  double share = 0.1;  ///< of the picture that the patch covers
   int interpolated_frames = 10;
   double threshold_factor = 1;  ///< times the method's threshold
 };
@@ -26,7 +26,7 @@ double changed_share(const Picture& a, const Picture& b) {
 }
 
 void add(const std::string& axis, const std::string& value, const Setup& setup) {
-  const auto clips = std::make_shared<std::vector<Clip>>();  // drawn when first used
+  const auto clips = std::make_shared<std::vector<Clip>>();  // drawn on first use
   for (const auto& method : {frame_method, dis_lq_method, sparse_method, diff_method}) {
     const auto add_formulation = [&](const char* formulation, const MakeSimulator& make) {
       std::string name = "growth";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// The plain formulations make the same events as what they are compared with: the frame simulator
-// and the dense path themselves, and, of the same flow, the references that all simulators equal.
+// The plain formulations make the same events as ours: as the frame simulator and the dense path,
+// and, given the same flow, as the equations that all simulators are compared with.
 #include <gtest/gtest.h>
 
 #include "bench/methods.hpp"
@@ -24,7 +24,7 @@ class Plain : public testing::TestWithParam<int> {
     return scene::last_interval(simulator, {grey_levels, grey_levels, 10, GetParam()}, views);
   }
 
-  /// Where points of a picture went in the next, as the references take it.
+  /// The tracks of points from one picture to the next, as the equations take them.
   static std::vector<Track> tracks_of(const Image<std::uint8_t>& from,
                                       const Image<std::uint8_t>& to,
                                       const std::vector<Point>& points) {
@@ -44,7 +44,7 @@ class Plain : public testing::TestWithParam<int> {
     return tracks;
   }
 
-  // The patch leaves to the right and below, the ground stands still.
+  // The patch leaves at the right and the bottom, the background is still.
   const bench::Clip frames = bench::moving_patch(330, 200, 0.9, 3);
   const Image<std::uint8_t>& last = frames[1];
   const Image<std::uint8_t>& now = frames[2];

@@ -11,21 +11,20 @@
 
 namespace bench {
 
-/// A simulator that is shown a clip forwards and backwards for ever.
+/// A simulator that gets a clip forwards and backwards for ever.
 class Playback {
  public:
   Playback(const Clip& clip, std::unique_ptr<Simulator> simulator, const Settings& settings)
       : clip_(clip), simulator_(std::move(simulator)), settings_(settings) {
-    // The first interval is special, and memory grows in those after it.
+    // The first interval is special, and memory grows in the next ones.
     while (pushed_ < period()) push();
   }
 
-  /// How many frames there and back are.
+  /// The number of frames forwards and backwards.
   int period() const { return 2 * (static_cast<int>(clip_.size()) - 1); }
 
   const EventBuckets* push() {
-    const int at = pushed_ % period();
-    const auto& frame = clip_[static_cast<std::size_t>(std::min(at, period() - at))];
+    const auto& frame = back_and_forth(clip_, pushed_);
     return simulator_->push({{frame.width(), frame.height(), 8}, frame.row(0), frame.stride()},
                             pushed_++ * frame_time, settings_);
   }
@@ -37,7 +36,7 @@ class Playback {
   int pushed_ = std::max(0, period() - 3);
 };
 
-/// Times a simulator frame after frame, every frame of every clip as often as any other.
+/// Times a simulator frame by frame, all frames of all clips equally often.
 inline void time_simulator(benchmark::State& state, const std::vector<Clip>& clips,
                            const MakeSimulator& make, const Settings& settings) {
   std::vector<std::unique_ptr<Playback>> playbacks;

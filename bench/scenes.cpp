@@ -45,8 +45,9 @@ Scene read(const Video& video, const std::string& path) {
   return scene;
 }
 
-/// A ball of 40 pixels that flies over a still, textured picture.
-Scene ball(int count) {
+}  // namespace
+
+Clip ball(int count) {
   constexpr int radius = 20;
   const auto ground = scene::texture<std::uint8_t>(1280, 720, 8, 0, 0);
   Clip clip;
@@ -56,13 +57,11 @@ Scene ball(int count) {
       for (int x = -radius; x < radius; ++x)
         if (x * x + y * y < radius * radius) picture.at(200 + 30 * i + x, 300 + 8 * i + y) = 240;
   }
-  return {"ball-1280x720", {std::move(clip)}, 10};
+  return clip;
 }
 
-}  // namespace
-
 std::vector<Scene> scenes(bool few_frames) {
-  // From the cars' video, three times when cars drive through.
+  // The spans of the cars' video are when cars drive through.
   const Video videos[] = {
       {"driving-640x480", "driving-1280x720-25fps.mp4", {{0, 4}, {17, 4}, {34, 4}}, 640, 480, 20},
       {"cars-1280x720", "cars-768x432-12fps.mp4", {{66, 4}, {205, 4}, {325, 4}}, 1280, 720, 10},
@@ -78,7 +77,7 @@ std::vector<Scene> scenes(bool few_frames) {
     if (few_frames) video.spans = {{video.spans.front().first, 3}};
     scenes.push_back(read(video, path));
   }
-  scenes.push_back(ball(few_frames ? 3 : 7));
+  scenes.push_back({"ball-1280x720", {ball(few_frames ? 3 : 7)}, 10});
   return scenes;
 }
 
@@ -90,7 +89,7 @@ Clip moving_patch(int width, int height, double share, int count) {
   for (int i = 0; i < count; ++i) {
     const int left = std::min((width - patch_width) / 2 + 4 * i, width - patch_width);
     const int top = std::min((height - patch_height) / 2 + 2 * i, height - patch_height);
-    // Where the patch cannot move, the camera that looks at it does.
+    // A patch without room to move shows a texture that moves.
     const auto patch = scene::texture<std::uint8_t>(
         patch_width, patch_height, 8, 1000 + (left == width - patch_width ? -4.0 * i : 0.0),
         500 + (top == height - patch_height ? -2.0 * i : 0.0));

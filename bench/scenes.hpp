@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "src/core/image.hpp"
 #include "src/core/step_times.hpp"
 
-/// What the methods are timed on.
+/// The videos on which the methods are timed.
 namespace bench {
 
 using Picture = eventcamera::Image<std::uint8_t>;
@@ -22,11 +23,21 @@ struct Scene {
   int interpolated_frames;
 };
 
-/// Two recorded videos, where $SHARED_DATA has them, and a ball that flies. With `few_frames` the
-/// clips are as short as can be.
+/// Two recorded videos, if $SHARED_DATA has them, and the ball. With `few_frames` the clips are as
+/// short as possible.
 std::vector<Scene> scenes(bool few_frames);
 
-/// A textured patch that moves before a still texture; `share` is that of the picture's area.
+/// A ball of 40 pixels that flies over a still, textured picture of 1280x720.
+Clip ball(int count);
+
+/// A textured patch that covers `share` of the picture and moves over a still texture.
 Clip moving_patch(int width, int height, double share, int count);
+
+/// Frame i of a clip that is played forwards and backwards for ever.
+inline const Picture& back_and_forth(const Clip& clip, std::int64_t i) {
+  const auto period = 2 * (static_cast<std::int64_t>(clip.size()) - 1);
+  const auto at = i % period;
+  return clip[static_cast<std::size_t>(std::min(at, period - at))];
+}
 
 }  // namespace bench

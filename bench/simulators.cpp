@@ -36,7 +36,7 @@ Pairs pairs_of(const Scene& scene) {
   return pairs;
 }
 
-/// Times what comes after the flow: fire(pair, threads, events).
+/// Times the steps after the flow: fire(pair, threads, events).
 template <class Fire>
 void time_pairs(benchmark::State& state, const Pairs& pairs, int threads, const Fire& fire) {
   ThreadPool pool;
@@ -79,7 +79,7 @@ void time_our_after_flow(benchmark::State& state, const Pairs& pairs, const Step
 }  // namespace
 
 void register_simulators(const Scene& scene) {
-  const auto pairs = std::make_shared<Pairs>();  // found when first used
+  const auto pairs = std::make_shared<Pairs>();  // made on first use
   for (const int threads : {2, 1}) {
     const auto add = [&](const std::string& name, const auto& body) {
       benchmark::RegisterBenchmark(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// How fast tables of events are read and written, on one core: million events a second, and the
-// time as a ratio to that of a memcpy of the decoded events, in the same run. Names are
-// FORMAT/read or write.
+// Reads and writes tables of events on one core: million events per second, and the time as a
+// multiple of that of a memcpy of the decoded events in the same run. Names are FORMAT/read or
+// write.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -28,9 +28,9 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr SensorSize size{1280, 720};
 constexpr std::size_t count = 1 << 20;
-constexpr std::size_t piece = 1 << 20;  // of a file, in bytes
+constexpr std::size_t piece = 1 << 20;  // bytes that a decoder gets at once
 
-/// Ten events a microsecond: some of them along rows, some anywhere.
+/// Ten events per microsecond: some in runs along rows, some anywhere.
 Events make_events() {
   std::mt19937 random(1);
   const auto below = [&](int end) {

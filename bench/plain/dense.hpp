@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include "bench/plain/frame.hpp"
 #include "bench/plain/opencv.hpp"
-#include "bench/plain/pixels.hpp"
 #include "src/simulate/warp.hpp"
 
 namespace plain {

@@ -2,23 +2,22 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cstdlib>
 #include <utility>
 
-#include "bench/plain/moving_points.hpp"
-#include "bench/plain/pixels.hpp"
+#include "bench/plain/frame.hpp"
+#include "bench/plain/opencv.hpp"
 
 namespace plain {
 
-/// Difference frame interpolation: the difference frame on its way into the next.
+/// Diff: the pixels of one difference frame move into the next.
 class DiffSimulator final : public Simulator {
  public:
   explicit DiffSimulator(const LumaFormat& format)
       : Simulator(format), last_(format.width, format.height), on_(format), off_(format) {}
 
  private:
-  /// A difference frame, one polarity: the pixels that exceeded the threshold, in raster order.
+  /// One polarity of a difference frame: the pixels over the threshold, in raster order.
   struct Kept {
     std::vector<cv::Point2f> places;
     std::vector<int> differences;  ///< I(i) - I(i-1) at each of them
@@ -60,35 +59,6 @@ class DiffSimulator final : public Simulator {
     int difference;
   };
 
-  /// What fires in one interpolated difference frame.
-  struct FiredPixels {
-    explicit FiredPixels(const LumaFormat& format)
-        : strongest(format.width, format.height), taken((format.width + 63) / 64, format.height) {}
-
-    void add(int x, int y, int difference) {
-      int& here = strongest.at(x, y);
-      if (std::abs(difference) > std::abs(here) || difference == -here)
-        here = difference == -here ? std::abs(difference) : difference;
-      taken.at(x / 64, y) |= std::uint64_t{1} << (x % 64);
-    }
-
-    /// Fires in raster order, and is empty again.
-    void fire(std::uint32_t t, std::vector<Event>& out) {
-      for (int y = 0; y < taken.height(); ++y) {
-        for (int word = 0; word < taken.width(); ++word) {
-          for (auto bits = std::exchange(taken.at(word, y), 0); bits != 0; bits &= bits - 1) {
-            const int x = 64 * word + std::countr_zero(bits);
-            const int difference = std::exchange(strongest.at(x, y), 0);
-            out.push_back(Event::at(x, y, t, difference > 0 ? Polarity::on : Polarity::off));
-          }
-        }
-      }
-    }
-
-    Image<int> strongest;
-    Image<std::uint64_t> taken;  ///< a bit a pixel: something has landed
-  };
-
   void start(const LumaView& frame) override {
     last_.assign(frame.as<std::uint8_t>());
     has_difference_ = false;
@@ -121,7 +91,7 @@ class DiffSimulator final : public Simulator {
     copy(now, last_, threads());
   }
 
-  /// Sets the kept pixels of the last difference frame moving towards this one.
+  /// Makes the kept pixels of the last difference frame move towards this one.
   void follow(Part& part, int steps) {
     const auto& kept = part.last;
     for_each_moving(kept.places, part.tracker.track(kept.places, threads().threads()), steps,
@@ -131,15 +101,28 @@ class DiffSimulator final : public Simulator {
                     });
   }
 
+  /// At each pixel of an interpolated difference frame, the largest of the differences that meet
+  /// there fires.
   void fire_between(const StepTimes& steps, EventBuckets& events) {
-    while (static_cast<int>(fired_pixels_.size()) < threads().threads())
-      fired_pixels_.emplace_back(format());
+    const auto size = static_cast<std::size_t>(threads().threads());
+    if (frames_.size() != size) frames_.assign(size, {format().width, format().height});
     threads().for_each(steps.count() - 1, [&](int i, int thread) {
       const int j = i + 1;
-      auto& fired_pixels = fired_pixels_[static_cast<std::size_t>(thread)];
-      for (const auto& [point, difference] : moving_)
-        fired_pixels.add(point.x_at(j), point.y_at(j), difference);
-      fired_pixels.fire(steps.microseconds(j), events.bucket(j, 0));
+      auto& frame = frames_[static_cast<std::size_t>(thread)];
+      for (const auto& [point, difference] : moving_) {
+        int& here = frame.at(point.x_at(j), point.y_at(j));
+        if (std::abs(difference) > std::abs(here) || difference == -here)
+          here = difference == -here ? std::abs(difference) : difference;
+      }
+      auto& out = events.bucket(j, 0);
+      for (int y = 0; y < frame.height(); ++y) {
+        for (int x = 0; x < frame.width(); ++x) {
+          const int difference = std::exchange(frame.at(x, y), 0);
+          if (difference == 0) continue;
+          out.push_back(Event::at(x, y, steps.microseconds(j),
+                                  difference > 0 ? Polarity::on : Polarity::off));
+        }
+      }
     });
   }
 
@@ -148,7 +131,7 @@ class DiffSimulator final : public Simulator {
   Part on_;
   Part off_;
   std::vector<MovingDifference> moving_;
-  std::vector<FiredPixels> fired_pixels_;  // one a thread
+  std::vector<Image<int>> frames_;  ///< by thread; 0 where nothing fires
 };
 
 }  // namespace plain

@@ -8,16 +8,34 @@
 #include <random>
 #include <vector>
 
-#include "bench/plain/denoise.hpp"
+#include "bench/plain/frame.hpp"
 #include "bench/plain/opencv.hpp"
-#include "bench/plain/pixels.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/simulate/warp.hpp"
 
 namespace plain {
 
-/// The physical pixel as v2e computes it: from frame to frame, with the Euler step of the low pass,
-/// events spread evenly over the interval, noise at its end; thresholds, leak, shot noise.
+/// reference::denoised() in integers.
+inline void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool& threads,
+                    Image<std::uint8_t>& out) {
+  constexpr int weights[] = {1, 2, 1};
+  threads.for_each(frame.height, [&](int y, int) {
+    for (int x = 0; x < frame.width; ++x) {
+      const int centre = frame.row(y)[x];
+      int sum = 8;
+      for (int j = -1; j <= 1; ++j) {
+        const auto* row = frame.row(std::clamp(y + j, 0, frame.height - 1));
+        for (int i = -1; i <= 1; ++i)
+          sum += weights[i + 1] * weights[j + 1] *
+                 std::clamp(row[std::clamp(x + i, 0, frame.width - 1)] - centre, -limit, limit);
+      }
+      out.at(x, y) = static_cast<std::uint8_t>(centre + (sum >> 4));
+    }
+  });
+}
+
+/// The physical pixel as v2e computes it, from frame to frame: an Euler step of the low-pass
+/// filter, events spread evenly over the interval, noise at its end; thresholds, leak, shot noise.
 class DvsPixels {
  public:
   DvsPixels(int width, int height, const DvsSettings& settings)
@@ -54,15 +72,15 @@ class DvsPixels {
   void pass(const Picture& frame, double begin, double end, int step, ThreadPool& threads,
             EventBuckets& events) {
     const auto duration = static_cast<float>(end - begin);
-    most_.assign(random_.size(), 0);
+    max_counts_.assign(random_.size(), 0);
     threads.for_each(band_count(frame.height),
                      [&](int band, int) { count(frame, duration, band); });
-    const int most = std::max(1, *std::max_element(most_.begin(), most_.end()));
+    const int max_count = std::max(1, *std::max_element(max_counts_.begin(), max_counts_.end()));
     threads.for_each(band_count(frame.height), [&](int band, int) {
       auto& out = events.bucket(step, band);
       const BandRows rows(band, frame.height);
-      for (int i = 1; i <= most; ++i) {
-        const auto t = static_cast<std::uint32_t>((begin + (end - begin) * i / most) * 1e6);
+      for (int i = 1; i <= max_count; ++i) {
+        const auto t = static_cast<std::uint32_t>((begin + (end - begin) * i / max_count) * 1e6);
         for (int y = rows.first; y < rows.last; ++y) {
           for (int x = 0; x < frame.width; ++x) {
             if (rises_.at(x, y) >= i) out.push_back(Event::at(x, y, t, Polarity::on));
@@ -82,13 +100,13 @@ class DvsPixels {
 
   static float brightness(float grey) { return (grey + 20) / 275; }
 
-  /// How often each pixel fires.
+  /// Counts the events of each pixel.
   void count(const Picture& frame, float duration, int band) {
     const BandRows rows(band, frame.height);
     const auto bandwidth =
         static_cast<float>(2 * std::numbers::pi * settings_.cutoff_hz) * duration;
     const auto leak = static_cast<float>(settings_.leak_rate_hz) * duration;
-    int most = 0;
+    int max_count = 0;
     for (int y = rows.first; y < rows.last; ++y) {
       for (int x = 0; x < frame.width; ++x) {
         const float grey = frame.row(y)[x];
@@ -105,10 +123,10 @@ class DvsPixels {
                      static_cast<float>(fall) * negative_.at(x, y);
         rises_.at(x, y) = rise;
         falls_.at(x, y) = fall;
-        most = std::max({most, rise, fall});
+        max_count = std::max({max_count, rise, fall});
       }
     }
-    most_[static_cast<std::size_t>(band)] = most;
+    max_counts_[static_cast<std::size_t>(band)] = max_count;
   }
 
   void add_noise(const Picture& frame, float duration, double end, int band,
@@ -136,12 +154,12 @@ class DvsPixels {
   Image<float> negative_;
   Image<int> rises_;
   Image<int> falls_;
-  std::vector<int> most_;  ///< band by band
+  std::vector<int> max_counts_;  ///< by band
   std::vector<std::mt19937> random_;
 };
 
-/// Events from frame to frame, or, with motion, from one interpolated picture to the next: as many
-/// as the fastest thing moves pixels.
+/// Events from frame to frame or, with motion, from one interpolated picture to the next, as many
+/// as the longest flow has pixels.
 class DvsSimulator final : public Simulator {
  public:
   DvsSimulator(const LumaFormat& format, const DvsSettings& settings)

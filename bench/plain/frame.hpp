@@ -1,11 +1,52 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include "bench/plain/pixels.hpp"
+#include <cstring>
 
+#include "src/core/event_buckets.hpp"
+#include "src/core/image.hpp"
+#include "src/core/thread_pool.hpp"
+#include "src/simulate/bands.hpp"
+#include "src/simulate/simulator.hpp"
+
+/// The plain formulation, what our speed is compared with: each method as anyone would write it,
+/// OpenCV's optical flow, one picture after another and simple loops over its pixels, on all
+/// threads. 8-bit pictures.
 namespace plain {
 
-/// The difference frame.
+using namespace eventcamera;
+using Picture = ImageView<std::uint8_t>;
+
+/// Fires where the difference of two pictures exceeds the thresholds.
+inline void fire(const Picture& before, const Picture& now, int step, std::uint32_t t,
+                 const Thresholds& thresholds, ThreadPool& threads, EventBuckets& events) {
+  threads.for_each(band_count(now.height), [&](int band, int) {
+    auto& out = events.bucket(step, band);
+    const BandRows rows(band, now.height);
+    for (int y = rows.first; y < rows.last; ++y) {
+      const auto* before_row = before.row(y);
+      const auto* now_row = now.row(y);
+      for (int x = 0; x < now.width; ++x) {
+        const int difference = now_row[x] - before_row[x];
+        if (difference > thresholds.positive)
+          out.push_back(Event::at(x, y, t, Polarity::on));
+        else if (-difference > thresholds.negative)
+          out.push_back(Event::at(x, y, t, Polarity::off));
+      }
+    }
+  });
+}
+
+/// Copies a picture of the same size.
+inline void copy(const Picture& from, Image<std::uint8_t>& to, ThreadPool& threads) {
+  threads.for_each(band_count(from.height), [&](int band, int) {
+    const BandRows rows(band, from.height);
+    for (int y = rows.first; y < rows.last; ++y)
+      std::memcpy(to.row(y), from.row(y), static_cast<std::size_t>(from.width));
+  });
+}
+
+/// Frame: the difference of two frames.
 class FrameSimulator final : public Simulator {
  public:
   explicit FrameSimulator(const LumaFormat& format)

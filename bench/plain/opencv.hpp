@@ -8,9 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "src/core/luma.hpp"
 #include "src/flow/dense_flow.hpp"
+#include "src/flow/fixed_point.hpp"
 
-/// OpenCV's optical flow, with the parameters of the simulators.
+/// OpenCV's optical flow with the parameters of the simulators.
 namespace plain {
 
 using namespace eventcamera;
@@ -38,7 +40,7 @@ class OpenCvFlow {
     dis_->setUseSpatialPropagation(false);
   }
 
-  /// Good until the next call.
+  /// Valid until the next call.
   ImageView<Flow> find(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                        int threads) {
     set_opencv_threads(threads);
@@ -46,7 +48,7 @@ class OpenCvFlow {
       cv::calcOpticalFlowFarneback(opencv_picture(from), opencv_picture(to), flow_, 0.5, 3, 15, 3,
                                    5, 1.2, 0);
     } else {
-      flow_.release();  // else the last flow would be where the search begins
+      flow_.release();  // or the search would begin at the last flow
       // OpenCV's DIS wants rows without gaps.
       opencv_picture(from).copyTo(from_);
       opencv_picture(to).copyTo(to_);
@@ -70,7 +72,7 @@ class OpenCvFlow {
   cv::Mat flow_;
 };
 
-/// Where points went.
+/// The ends of tracks.
 struct Tracks {
   std::vector<cv::Point2f> ends;
   std::vector<unsigned char> found;
@@ -86,7 +88,7 @@ class OpenCvTracker {
                                 cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
   }
 
-  /// Good until the next call.
+  /// Valid until the next call.
   const Tracks& track(const std::vector<cv::Point2f>& points, int threads) {
     set_opencv_threads(threads);
     tracks_.ends.clear();
@@ -105,5 +107,32 @@ class OpenCvTracker {
   std::vector<cv::Mat> next_;
   Tracks tracks_;
 };
+
+/// A tracked pixel that moves through the steps of an interval.
+struct MovingPoint {
+  int x;
+  int y;
+  Motion dx;
+  Motion dy;
+  std::size_t index;  ///< of the track
+
+  int x_at(int j) const { return moved(x, dx, j); }
+  int y_at(int j) const { return moved(y, dy, j); }
+};
+
+/// Calls visit(MovingPoint) for each point whose track is found and ends in the picture.
+template <class Visit>
+void for_each_moving(const std::vector<cv::Point2f>& points, const Tracks& tracks, int steps,
+                     const LumaFormat& format, const Visit& visit) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const cv::Point2f flow = tracks.ends[i] - points[i];
+    if (tracks.found[i] == 0 || !std::isfinite(flow.x) || !std::isfinite(flow.y)) continue;
+    const MovingPoint point{static_cast<int>(points[i].x), static_cast<int>(points[i].y),
+                            motion_per_step(flow.x, steps), motion_per_step(flow.y, steps), i};
+    const int x = point.x_at(steps);
+    const int y = point.y_at(steps);
+    if (x >= 0 && x < format.width && y >= 0 && y < format.height) visit(point);
+  }
+}
 
 }  // namespace plain

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "bench/plain/moving_points.hpp"
-#include "bench/plain/pixels.hpp"
+#include "bench/plain/frame.hpp"
+#include "bench/plain/opencv.hpp"
 
 namespace plain {
 
