@@ -13,9 +13,10 @@ fail() {
 }
 
 without() { # FEATURE...
-  echo "Without $*"
-  build=$builds/without-${*// /-}
+  echo "Without ${*#-D}"
+  build=$builds/without$(printf -- '-%s' "${@#-D}")
   ./compile "$build" -Dtests=false -Dintrospection=disabled -Dbuildtype=plain -Dwerror=true \
+    --prefix="$builds/installed" \
     "${@/%/=disabled}"
 }
 
@@ -31,5 +32,5 @@ fi
 
 without -Deventsim -Daedat
 without -Deventsim -Dhdf5
-without -Deventcam
+without -Deventcam # finds OpenCV, although it is not in the prefix
 [ "$(plugins)" = "./eventsim/libgsteventsim.so " ] || fail "built $(plugins)"
