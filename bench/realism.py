@@ -17,6 +17,7 @@ import sys
 import tempfile
 from dataclasses import dataclass
 from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 
 import matplotlib
 import numpy as np
@@ -24,9 +25,11 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-# A program, so its name is not a module's.
-PIPELINES = os.path.join(os.path.dirname(__file__), "..", "pipelines")
-SourceFileLoader("event_calibrate", os.path.join(PIPELINES, "event-calibrate")).load_module()
+# A program, which import would not find.
+CALIBRATE = os.path.join(os.path.dirname(__file__), "..", "pipelines", "event-calibrate")
+loader = SourceFileLoader("event_calibrate", CALIBRATE)
+sys.modules[loader.name] = module_from_spec(spec_from_loader(loader.name, loader))
+loader.exec_module(sys.modules[loader.name])
 from event_calibrate import (  # noqa: E402
     ON, Gst, Progress, Span, calibrate, compare, delayed, find_lag, read_recording, read_video,
     refine_lag, simulate, until)

@@ -19,27 +19,27 @@ recovers() { # POSITIVE NEGATIVE TOLERANCE ELEMENT...
   shift 3
   "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! "$@" positive-threshold="$positive" negative-threshold="$negative" ! evtenc ! filesink location=recorded.raw
   calibrate scene.mkv recorded.raw --element "$*" --to 0.3 | tee found
-  grep -q "trial" progress || fail "no progress was told"
+  grep -q "trial" progress || fail "no progress was printed"
   read -r found_positive found_negative < <(sed -n 's/.* positive-threshold=\([0-9.]*\) negative-threshold=\([0-9.]*\)$/\1 \2/p' found)
   awk -v p="$found_positive" -v n="$found_negative" -v wp="$positive" -v wn="$negative" -v by="$tolerance" \
     'BEGIN { exit !(p / wp < 1 + by && wp / p < 1 + by && n / wn < 1 + by && wn / n < 1 + by) }' ||
     fail "$*: $found_positive and $found_negative instead of $positive and $negative"
   awk '/map correlation/ { exit !($3 > 0.97) }' found || fail "$*: the maps differ"
 }
-# Of 8 bits, thresholds between two grey levels are the same.
+# On 8-bit video all thresholds between two grey levels are equivalent.
 recovers 12.5 8.5 0.1 eventsim-frame
 recovers 6.5 4.5 0.2 eventsim-dense
 recovers 8.5 12.5 0.12 eventsim-diff
 recovers 0.2 0.3 0.05 eventsim-dvs response=log log-eps=0.02
 
-# Exposures that pulse are found by the bursts that they make.
+# Exposure pulses are found by their bursts of events.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000 ! evtenc ! filesink location=recorded.raw
 calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02" --to 0.3 | tee found
 read -r lead pulse < <(sed -n 's/.* exposure-lead=\([0-9]*\) exposure-pulse=\([0-9.]*\) .*/\1 \2/p' found)
 awk -v lead="${lead:-0}" -v pulse="${pulse:-0}" 'BEGIN { exit !(lead > 8800 && lead < 9200 && pulse > 0.02 && pulse < 0.045) }' ||
   fail "a pulse of ${pulse:-0}, ${lead:-0} us before the frames"
 
-# A video as a list of pictures, later by a known time.
+# A video as a list of pictures, with a known lag.
 "$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! pngenc ! multifilesink location=%02d.png
 for i in $(seq 0 15); do
   printf '%s %02d.png\n' "$(awk -v i="$i" 'BEGIN { print 0.04 * i + 0.002 }')" "$i"
@@ -50,15 +50,15 @@ lag=$(sed -n 's/Frames show the scene \(-*[0-9.]*\) ms later.*/\1/p' found)
 awk -v lag="${lag:-0}" 'BEGIN { exit !(lag > -5 && lag < 1) }' || fail "the pictures are ${lag:-0} ms late"
 [ -s map.png ] || fail "no picture was written"
 
-# What cannot be done is said.
+# Errors say what is wrong.
 refused() { # WORDS ARGUMENT...
   local words=$1
   shift
   if timeout 60 "$BUILD/pipelines/event-calibrate" "$@" 2>errors; then fail "event-calibrate $* succeeded"; fi
   cat errors
-  grep -q "$words" errors || fail "no word of it"
+  grep -q "$words" errors || fail "the error does not say \"$words\""
 }
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
 refused "nowhere.mkv" nowhere.mkv recorded.raw
 refused "do not overlap in time" scene.mkv recorded.raw --element eventsim-frame --from 5
-echo "all thresholds were found"
+echo "all thresholds were recovered"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Files of events, as users handle them: converted, looked at, and played.
+# Event files as users handle them: converted, inspected, and played.
 set -eu
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
@@ -15,16 +15,16 @@ declare -A types=([raw]=application/x-prophesee-raw [dat]=application/x-prophese
 
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=ball.raw
 
-# Into each format, and from there into lines that tell no size: the same events.
+# To each format and from there to text without a sensor size: the same events.
 convert ball.raw ball.csv
 for ending in "${!types[@]}"; do
   [ -f "ball.$ending" ] || convert ball.raw "ball.$ending"
-  gst-typefind-1.0 "ball.$ending" | grep -q " - ${types[$ending]}" || fail "$ending is not found by its type"
+  gst-typefind-1.0 "ball.$ending" | grep -q " - ${types[$ending]}" || fail "$ending is not recognised"
   convert "ball.$ending" "back of $ending.csv"
-  cmp ball.csv "back of $ending.csv" || fail "the events of ball.$ending are others"
+  cmp ball.csv "back of $ending.csv" || fail "ball.$ending has other events"
 done
 
-# From each into each.
+# From each format to each.
 for in in "${!types[@]}"; do
   for out in "${!types[@]}"; do
     convert "ball.$in" "pair.$out"
@@ -41,7 +41,7 @@ convert --compression=none ball.raw plain.aedat4
 convert --dialect=rpg ball.raw rpg.csv
 cmp ball.txt rpg.csv || fail "the dialect is not that of .txt"
 
-# What eventhdf5sink wrote, to a reader that is none of ours.
+# h5py reads what eventhdf5sink wrote.
 /usr/bin/python3 - ball.h5 ball.hdf5 ball.csv <<'PYTHON'
 import csv
 import sys
@@ -67,7 +67,7 @@ with h5py.File(sys.argv[2]) as metavision:
     assert int(indexes.attrs["offset"]) == -lines[0, 0]
 PYTHON
 
-# v2e's HDF5, which is only read, and a user's block before the file.
+# v2e's HDF5, which is only read, after a user block.
 /usr/bin/python3 - ball.csv v2e.h5 <<'PYTHON'
 import csv
 import sys
@@ -80,13 +80,13 @@ with open(sys.argv[1], encoding="utf-8") as file:
 with h5py.File(sys.argv[2], "w", userblock_size=1024) as v2e:
     v2e.create_dataset("events", data=lines.astype(np.uint32), compression="gzip")
 PYTHON
-gst-typefind-1.0 v2e.h5 | grep -q " - application/x-hdf5" || fail "v2e.h5 is not found by its type"
+gst-typefind-1.0 v2e.h5 | grep -q " - application/x-hdf5" || fail "v2e.h5 is not recognised"
 convert v2e.h5 v2e.csv
-cmp ball.csv v2e.csv || fail "the events of v2e.h5 are others"
+cmp ball.csv v2e.csv || fail "v2e.h5 has other events"
 timeout 60 "$GST_LAUNCH" -q filesrc location=v2e.h5 ! queue ! eventhdf5dec ! eventcsvenc ! filesink location=pushed.csv
-cmp ball.csv pushed.csv || fail "the events of v2e.h5 are others where it is pushed"
+cmp ball.csv pushed.csv || fail "v2e.h5 has other events in push mode"
 
-# What a player and a tool make of them.
+# Players and discoverer.
 for ending in "${!types[@]}"; do
   echo "ball.$ending is played"
   timeout 60 "$GST_LAUNCH" -q filesrc location="ball.$ending" ! decodebin caps=application/x-event-camera ! fakesink sync=true
@@ -101,7 +101,7 @@ for ending in "${!types[@]}"; do
   done
 done
 
-# What is none of them stays what it is.
+# Other files are not recognised as events.
 "$GST_LAUNCH" -q videotestsrc num-buffers=1 ! pngenc ! filesink location=picture.png
 "$GST_LAUNCH" -q videotestsrc num-buffers=5 ! x264enc ! mp4mux ! filesink location=video.mp4
 "$GST_LAUNCH" -q audiotestsrc num-buffers=5 ! wavenc ! filesink location=sound.wav
@@ -110,15 +110,15 @@ seq 1 3000 >numbers.txt
 printf '%% a comment of another tool\n%.0s' $(seq 40) >comments.m
 for file in picture.png video.mp4 sound.wav words.txt numbers.txt comments.m "$SOURCE/README.md" "$SHARED_DATA"/video/*.mp4; do
   [ -f "$file" ] || continue
-  # The name stands in the output, too: only what follows it is the type.
+  # The output has the name first, then the type.
   type=$(gst-typefind-1.0 "$file")
   type=${type#"$file"}
   if grep -E "prophesee|x-es$|event|npy|hdf5|aedat" <<<"$type"; then
-    fail "$file is taken for events"
+    fail "$file is recognised as events"
   fi
 done
 
-# Errors that say what is wrong.
+# Errors say what is wrong.
 refused() { # WORDS ARGUMENT...
   local words=$1
   shift
@@ -145,9 +145,9 @@ refused "No such file" nowhere.raw out.dat
 refused "the same file" ball.raw ./ball.raw
 head -c 100001 ball.raw >short.raw
 convert short.raw short.dat 2>warnings
-grep -q "corrupt at byte " warnings || fail "no warning of a file that is cut short"
+grep -q "corrupt at byte " warnings || fail "no warning about a truncated file"
 
-# Interrupted, it ends the file in order.
+# Interrupted, it completes the file.
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw
 for ending in raw npy aedat4 h5 hdf5; do
   echo "event-convert long.raw interrupted.$ending"
@@ -155,9 +155,9 @@ for ending in raw npy aedat4 h5 hdf5; do
   converting=$!
   while kill -0 $converting && [ "$(stat -c %s "interrupted.$ending.part" 2>/dev/null || echo 0)" -lt 10000 ]; do sleep 0.01; done
   kill -INT $converting || true
-  if wait $converting; then echo "it was done by then"; else grep -q interrupted interruption; fi
+  if wait $converting; then echo "it was already done"; else grep -q interrupted interruption; fi
   convert "interrupted.$ending" part.dat 2>warnings | tee count
-  grep -q "^[1-9][0-9]* events" count || fail "nothing is in interrupted.$ending"
+  grep -q "^[1-9][0-9]* events" count || fail "no events in interrupted.$ending"
   if grep -q warning: warnings; then fail "interrupted.$ending: $(cat warnings)"; fi
 done
 
@@ -169,7 +169,7 @@ if [ ! -d "$recordings" ]; then
 fi
 counted() { # EVENTS FILE
   convert "$2" counted.csv | tee count
-  grep -q "^$1 events" count || fail "$2 has $1 events"
+  grep -q "^$1 events" count || fail "$2 does not have $1 events"
   [ "$(grep -vc t "counted.csv")" = "$1" ] || fail "$1 lines were not written"
 }
 counted 82469 "$recordings/evt3-1280x720-triggers.raw"

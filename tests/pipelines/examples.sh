@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The examples of pipelines/, as applications run them; both count the same events.
+# Runs the examples of pipelines/; both count the same events.
 set -eu
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -11,12 +11,12 @@ counted=$(sed -n 's/^Total *\([0-9]*\) events.*/\1/p' "$work/c")
 [ "$counted" -gt 10000 ]
 
 if "$BUILD/pipelines/count_events" "filesrc location=/nowhere ! decodebin ! eventsim-diff ! appsink name=events"; then
-  echo "FAILED: a file that is not there was read"
+  echo "FAILED: a missing file was read"
   exit 1
 fi
 
 if [ ! -f "$GI_TYPELIB_PATH/GstEventCamera-1.0.typelib" ]; then
-  echo "built without introspection: no Python"
+  echo "built without introspection: Python example skipped"
   exit 77
 fi
 "$SOURCE/pipelines/events_to_numpy.py" "$line" "$work/events.npy" | tee "$work/python"

@@ -14,10 +14,10 @@ meson install -C "$BUILD" --no-rebuild --destdir "$root" --quiet
 
 library=$(dirname "$(find "$root" -name libgsteventcamera-1.0.so)")
 plugins=$library/gstreamer-1.0
-# Debian's GStreamer looks for plugins here, unless it is told to look elsewhere.
+# Debian's GStreamer searches for plugins here.
 [ "${plugins#"$root"}" = "$(pkg-config --variable=pluginsdir gstreamer-1.0)" ]
 
-# As if the root were /. pkg-config escapes blanks, on its way in and out.
+# As if the root were /. pkg-config expects and prints escaped blanks.
 sed -i "s#^prefix=.*#prefix=${root// /\\\\ }/usr#" "$library/pkgconfig/gsteventcamera-1.0.pc"
 export PKG_CONFIG_PATH=$library/pkgconfig
 declare -a flags

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Lines that a user would type, with gst-launch-1.0 itself.
+# Lines that a user would type, run by gst-launch-1.0.
 set -eu
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
@@ -30,7 +30,7 @@ for element in frame dense sparse diff dvs; do
   [ "$size" -gt 8000 ] && [ $((size % 8)) -eq 0 ] || fail "$element: $size bytes"
 done
 
-# A physical pixel, in each of its presets, and along motion.
+# The physical pixel with each preset, and with motion.
 for preset in ideal esim v2e-clean v2e-noisy icns davis346 gen4; do
   launch videotestsrc pattern=ball num-buffers=10 ! eventsim-dvs preset=$preset threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=$preset.raw
   [ -s $preset.raw ] || fail "$preset: no events"
@@ -42,7 +42,7 @@ launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! videoconvert !
 launch filesrc location=events.mp4 ! decodebin ! eventsim-dense flow=dis-hq ! videoconvert ! fakesink
 [ -s events.mp4 ] || fail "no video was written"
 
-# No converter in front: what cameras and decoders give.
+# Formats of cameras and decoders, without a converter.
 for format in YUY2 UYVY NV12 I420 GRAY8 P010_10LE; do
   launch videotestsrc num-buffers=5 ! video/x-raw,format=$format ! eventsim-frame positive-threshold=15 ! fakesink
 done
@@ -56,10 +56,10 @@ launch videotestsrc num-buffers=10 ! identity drop-allocation=true ! eventsim-de
 launch videotestsrc num-buffers=10 ! videorate ! video/x-raw,framerate=50/1 ! eventsim-diff ! fakesink
 launch videotestsrc num-buffers=1 ! eventsim-sparse ! fakesink
 
-# Mixed back into a picture.
+# Mixed with the video.
 launch videotestsrc pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! mixer.  t. ! queue ! eventsim-diff ! videoconvert ! mixer.  compositor name=mixer sink_1::alpha=0.5 ! fakesink
 
-# Drawn in every mode, at other framerates than the events', from live sources too.
+# Drawn in every mode, at other framerates than the events', also from live sources.
 for mode in accumulate decay time-surface count; do
   launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! application/x-event-camera ! eventrender mode=$mode ! video/x-raw,framerate=60/1 ! videoconvert ! fakesink
 done
@@ -71,7 +71,7 @@ launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventrender ! 
 launch videotestsrc pattern=ball num-buffers=30 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink  t. ! queue ! eventsim-diff ! overlay.events
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink sync=true  t. ! queue ! eventsim-diff ! overlay.events
 
-# Measured on their way, and beside another simulator's.
+# Measured, and compared with another simulator.
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventstats location=stats.json map=map.png ! eventrender ! fakesink
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! eventsim-dense ! compare.reference  t. ! queue ! eventsim-diff ! compare.candidate  eventcompare name=compare location=compare.json map=maps.png ! evtenc ! filesink location=candidate.raw
 grep -q '"std-dev" : [0-9]' stats.json || fail "no figures were written"
@@ -83,7 +83,7 @@ launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null i
 interrupt interrupted.mp4 10000 -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4
 launch filesrc location=interrupted.mp4 ! decodebin ! fakesink
 
-# Events and the frames that they are made of in one file, and from there back into pipelines.
+# Events and their frames in one file, and read back.
 launch videotestsrc pattern=ball num-buffers=50 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux compression=zstd ! filesink location=ball.aedat4
 launch filesrc location=ball.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! filesink location=ball.xytp  d.video_0 ! queue ! filesink location=ball.grey
 [ "$(stat -c %s ball.xytp)" -gt 8000 ] || fail "no events came back"
@@ -111,7 +111,7 @@ discover ball.aedat4 "video/x-raw, format=(string)GRAY8, width=(int)320, height=
 echo "gst-play-1.0 ball.aedat4"
 timeout 60 gst-play-1.0 -q --no-interactive --videosink=fakesink --start-position=1 ball.aedat4 >played 2>&1 || fail "gst-play-1.0: $(cat played)"
 
-# Files of events on their way.
+# Conversions of event files.
 launch videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
 launch filesrc location=out.raw ! decodebin caps="application/x-event-camera,format=XYTP" ! aedatmux compression=zstd ! filesink location=out.aedat4
 launch filesrc location=out.raw ! evtdec ! eventesenc ! filesink location=out.es
@@ -119,20 +119,20 @@ launch filesrc location=out.es ! eventesdec ! eventrender mode=decay accumulatio
 launch filesrc location=out.raw ! decodebin ! eventhdf5sink layout=metavision location=out.h5 && fail "pictures were written as events"
 launch filesrc location=out.raw ! decodebin caps=application/x-event-camera ! eventhdf5sink layout=metavision location=out.h5
 launch filesrc location=out.h5 ! eventhdf5dec ! evtenc ! filesink location=again.raw
-# Two files with times of their own, side by side.
+# Two files with different time origins, side by side.
 launch filesrc location=out.aedat4 ! decodebin ! videoconvert ! mixer.  filesrc location=out.h5 ! decodebin ! videoconvert ! mixer.  compositor name=mixer sink_1::xpos=320 ! fakesink
 davis=$SHARED_DATA/events/davis346-frames-events-imu.aedat4
 [ ! -f "$davis" ] || launch filesrc location="$davis" ! aedatdemux name=d  d.events_0 ! queue ! eventrender ! videoconvert ! fakesink  d.video_0 ! queue ! eventsim-dense ! videoconvert ! fakesink
 
 interrupt interrupted.h5 300000 videotestsrc is-live=true pattern=snow ! eventsim-frame ! eventhdf5sink compression=none location=interrupted.h5
 launch filesrc location=interrupted.h5 ! eventhdf5dec ! filesink location=interrupted.xytp
-[ "$(stat -c %s interrupted.xytp)" -gt 300000 ] || fail "what was written before the interruption is lost"
+[ "$(stat -c %s interrupted.xytp)" -gt 300000 ] || fail "events from before the interruption are lost"
 
 # Refused, with a reason.
-timeout 5 "$GST_LAUNCH" -q filesrc location=ball-frame.xytp ! aedatdemux ! fakesink 2>refusal && fail "a file that is no AEDAT was read"
+timeout 5 "$GST_LAUNCH" -q filesrc location=ball-frame.xytp ! aedatdemux ! fakesink 2>refusal && fail "a file that is not AEDAT was read"
 grep -q "this is not AEDAT" refusal || fail "the refusal does not name the format"
 if "$GST_LAUNCH" -q videotestsrc num-buffers=2 ! video/x-raw,format=RGB ! eventsim-frame ! fakesink 2>refusal; then
-  fail "RGB was taken"
+  fail "RGB was accepted"
 fi
 grep -q "format=(string)RGB" refusal || fail "the refusal does not name the format"
 echo "all lines ran"

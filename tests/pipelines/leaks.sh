@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Nothing of GStreamer's is left behind when a pipeline is gone.
+# Pipelines leak no GStreamer objects.
 set -eu
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
@@ -10,17 +10,17 @@ check() {
   echo "gst-launch-1.0 $*"
   timeout 60 "$GST_LAUNCH" -q "$@" || true
   if grep "object-alive, " "$log" | grep -v "new format string"; then
-    echo "FAILED: these were leaked"
+    echo "FAILED: leaked objects"
     exit 1
   fi
-  grep -q "GST_TRACER" "$log" # the tracer was there
+  grep -q "GST_TRACER" "$log" # the tracer was active
 }
 
 for element in frame dense sparse diff; do
   check videotestsrc num-buffers=8 ! eventsim-$element ! fakesink
   check videotestsrc num-buffers=8 ! eventsim-$element ! videoconvert ! fakesink
 done
-# Files of events, written and read, to their end and not.
+# Event files, written and read, completely and partly.
 work=$(mktemp -d)
 trap 'rm -rf "$log" "$work"' EXIT
 for pair in evtenc:evtdec eventdatenc:eventdatdec eventesenc:eventesdec eventcsvenc:eventcsvdec eventnpyenc:eventnpydec; do
@@ -57,7 +57,7 @@ for mode in accumulate decay time-surface count; do
   check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender mode=$mode ! videoconvert ! fakesink
 done
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.events
-# Errors half-way.
+# Errors in mid-stream.
 check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! fakesink
 check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! aedatmux ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender ! identity error-after=2 ! fakesink
