@@ -5,7 +5,6 @@
 
 #include "gst/eventcamera/eventcamera.h"
 #include "src/render/palette.hpp"
-#include "src/render/pixel_layout.hpp"
 
 /// The formats events can be drawn in, the most usual first.
 #define DRAWN_VIDEO_FORMATS "{ BGRx, RGBx, xRGB, xBGR, BGRA, RGBA, ARGB, ABGR, RGB, BGR, GRAY8 }"

@@ -24,26 +24,26 @@ inline std::span<const Event> events_until(std::span<const Event> events, Micros
   return events.first(static_cast<std::size_t>(first_after - events.begin()));
 }
 
-/// Makes sure of events that others rely on: they lie inside the picture and are sorted by time.
+/// Ensures what others rely on: events lie inside the picture and are sorted by time.
 class Arrivals {
  public:
   Arrivals(int width, int height) : width_(width), height_(height) {}
 
-  /// Hands events on that count their times from `start`. One that comes later than it should
-  /// counts as if it had come with the last one, or after what has passed; one outside the picture
-  /// is left out. Returns how many were left out.
+  /// Passes on events that count their times from `start`. A late event is moved to the time of the
+  /// last one, or to after pass(); one outside the picture is skipped. Returns how many were
+  /// skipped.
   template <class Take>
   std::size_t take(std::span<const Event> events, Microseconds start, const Take& take) {
-    std::size_t left_out = 0;
+    std::size_t skipped = 0;
     for (const auto& event : events) {
       if (event.x >= width_ || event.y() >= height_) {
-        ++left_out;
+        ++skipped;
         continue;
       }
       earliest_ = std::max(earliest_, time_of(event, start));
       take(AbsoluteEvent{earliest_, event.x, event.y_p});
     }
-    return left_out;
+    return skipped;
   }
 
   /// A picture was drawn up to this time. Returns it, or that of the last event if that is later.

@@ -39,9 +39,9 @@ void RateCurve::join_bins() {
 EventMatcher::EventMatcher(int width, int height) {
   for (const auto role : both_roles) {
     for (auto& pixels : streams_[role].pixels) {
-      pixels = Image<Pixel>(width + 2, height + 2);
-      for (int y = 0; y < height + 2; ++y)
-        std::fill_n(pixels.row(y), width + 2, Pixel{.last = never, .waiting = 0});
+      pixels = Image<Pixel>(width, height, 1);
+      for (int y = -1; y <= height; ++y)
+        std::fill_n(&pixels.at(-1, y), width + 2, Pixel{.last = never, .waiting = 0});
     }
   }
 }
@@ -76,14 +76,15 @@ void EventMatcher::add(StreamRole role, const AbsoluteEvent& event) {
   auto& others = streams_[other(role)];
   auto& around = others.pixels[polarity];
   auto last = never;
-  for (int y = event.y(); y < event.y() + 3; ++y) {
-    for (auto* pixel = &around.at(event.x, y); pixel != &around.at(event.x, y) + 3; ++pixel) {
-      last = std::max(last, pixel->last);
-      if (pixel->waiting != 0) match_waiting(others, *pixel, event.t);
+  for (int y = event.y() - 1; y <= event.y() + 1; ++y) {
+    for (int x = event.x - 1; x <= event.x + 1; ++x) {
+      auto& pixel = around.at(x, y);
+      last = std::max(last, pixel.last);
+      if (pixel.waiting != 0) match_waiting(others, pixel, event.t);
     }
   }
   auto& own = streams_[role];
-  auto& pixel = own.pixels[polarity].at(event.x + 1, event.y() + 1);
+  auto& pixel = own.pixels[polarity].at(event.x, event.y());
   const auto nearest = distance_between(last, event.t);
   count(own, nearest, no_match);
   if (nearest > match_distances.front())

@@ -7,7 +7,23 @@
 // Highway wants to come after that.
 #include <hwy/highway.h>
 
-#include "src/render/pixel_kinds.hpp"
+#ifndef EVENTCAMERA_KIND_TABLES
+#define EVENTCAMERA_KIND_TABLES
+namespace eventcamera {
+
+/// Byte by byte of a pixel, what it is for each kind; a table that SIMD code shuffles.
+struct KindTables {
+  KindTables(const Palette& palette, const PixelLayout& layout) {
+    const auto pixels = pixels_by_kind(palette, layout);
+    for (std::size_t kind = 0; kind < pixels.size(); ++kind)
+      for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i][kind] = pixels[kind][i];
+  }
+
+  alignas(16) std::array<std::array<std::uint8_t, 16>, 4> bytes{};
+};
+
+}  // namespace eventcamera
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -22,7 +38,7 @@ using Vector = hn::Vec<Bytes>;
 template <int bytes>
 class RowPainter {
  public:
-  explicit RowPainter(const PixelKinds& kinds) : kinds_(kinds) {
+  explicit RowPainter(const KindTables& kinds) : kinds_(kinds) {
     store(hn::Zero(Bytes()), silent_);
   }
 
@@ -75,31 +91,26 @@ class RowPainter {
     }
   }
 
-  const PixelKinds& kinds_;
+  const KindTables& kinds_;
   HWY_ALIGN std::uint8_t silent_[bytes * hn::MaxLanes(Bytes())];  ///< a vector of them
 };
 
 template <int bytes>
-void draw_rows(Image<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
+void draw_rows(Image<std::uint8_t>& fired, const KindTables& kinds, std::uint8_t* out,
                std::ptrdiff_t stride) {
   const RowPainter<bytes> painter(kinds);
   for (int y = 0; y < fired.height(); ++y)
     painter.draw(fired.row(y), fired.width(), out + y * stride);
 }
 
-void draw_pixels_of_1(Image<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
-                      std::ptrdiff_t stride) {
-  draw_rows<1>(fired, kinds, out, stride);
-}
-
-void draw_pixels_of_3(Image<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
-                      std::ptrdiff_t stride) {
-  draw_rows<3>(fired, kinds, out, stride);
-}
-
-void draw_pixels_of_4(Image<std::uint8_t>& fired, const PixelKinds& kinds, std::uint8_t* out,
-                      std::ptrdiff_t stride) {
-  draw_rows<4>(fired, kinds, out, stride);
+void draw_pixels(Image<std::uint8_t>& fired, const KindTables& kinds, int bytes, std::uint8_t* out,
+                 std::ptrdiff_t stride) {
+  if (bytes == 1)
+    draw_rows<1>(fired, kinds, out, stride);
+  else if (bytes == 3)
+    draw_rows<3>(fired, kinds, out, stride);
+  else
+    draw_rows<4>(fired, kinds, out, stride);
 }
 
 }  // namespace
@@ -110,9 +121,7 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 namespace {
 
-HWY_EXPORT(draw_pixels_of_1);
-HWY_EXPORT(draw_pixels_of_3);
-HWY_EXPORT(draw_pixels_of_4);
+HWY_EXPORT(draw_pixels);
 
 }  // namespace
 
@@ -144,14 +153,8 @@ void Accumulator::add_band(const EventBuckets& events, std::size_t band) {
 
 void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
                        std::ptrdiff_t stride) {
-  const PixelKinds kinds(palette, layout);
-  auto* bytes = reinterpret_cast<std::uint8_t*>(out);
-  if (layout.bytes == 1)
-    HWY_DYNAMIC_DISPATCH(draw_pixels_of_1)(fired_, kinds, bytes, stride);
-  else if (layout.bytes == 3)
-    HWY_DYNAMIC_DISPATCH(draw_pixels_of_3)(fired_, kinds, bytes, stride);
-  else
-    HWY_DYNAMIC_DISPATCH(draw_pixels_of_4)(fired_, kinds, bytes, stride);
+  HWY_DYNAMIC_DISPATCH(draw_pixels)
+  (fired_, KindTables(palette, layout), layout.bytes, reinterpret_cast<std::uint8_t*>(out), stride);
 }
 
 }  // namespace eventcamera

@@ -7,21 +7,21 @@
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/image.hpp"
-#include "src/render/pixel_kinds.hpp"
+#include "src/render/palette.hpp"
 
 namespace eventcamera {
 
-/// Collects events in a picture that shows, for each pixel, which polarities fired.
+/// Accumulates events into a picture of which polarities fired at each pixel.
 class Accumulator {
  public:
   Accumulator(int width, int height) : fired_(width, height) {}
 
-  /// Events outside the picture must not occur.
+  /// Takes events, all of them inside the picture.
   void add(std::span<const Event> events);
   void add(const EventBuckets& events);
   void add(const EventBuckets& events, ThreadPool& threads);
 
-  /// Draws what was collected and begins anew. `stride` in bytes.
+  /// Draws what was accumulated and starts over. `stride` in bytes.
   void draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
 

@@ -5,12 +5,48 @@
 #include <cstdint>
 #include <vector>
 
+#include "src/core/absolute_event.hpp"
 #include "src/core/image.hpp"
-#include "src/render/recent_events.hpp"
 
 namespace eventcamera {
 
-/// What a window holds at most, besides its length in time; 0 = no such limit.
+/// A queue of events in a ring buffer that grows up to `max_size`.
+class RecentEvents {
+ public:
+  static constexpr std::size_t max_size = std::size_t{1} << 23;
+
+  bool empty() const { return size_ == 0; }
+  bool full() const { return size_ == max_size; }
+  std::size_t size() const { return size_; }
+  const AbsoluteEvent& front() const { return ring_[first_]; }
+
+  /// Must not be full(). Throws std::bad_alloc.
+  void push(const AbsoluteEvent& event) {
+    if (size_ == ring_.size()) grow();
+    ring_[(first_ + size_) & (ring_.size() - 1)] = event;
+    ++size_;
+  }
+
+  void pop() {
+    first_ = (first_ + 1) & (ring_.size() - 1);
+    --size_;
+  }
+
+ private:
+  /// To a power of two, so that an index wraps by a mask.
+  void grow() {
+    std::vector<AbsoluteEvent> larger(ring_.empty() ? 1024 : 2 * ring_.size());
+    for (std::size_t i = 0; i < size_; ++i) larger[i] = ring_[(first_ + i) & (ring_.size() - 1)];
+    ring_.swap(larger);
+    first_ = 0;
+  }
+
+  std::vector<AbsoluteEvent> ring_;
+  std::size_t first_ = 0;
+  std::size_t size_ = 0;
+};
+
+/// Limits of a window besides its length in time; 0 = no limit.
 struct WindowLimits {
   std::size_t events = 0;       ///< in all
   std::size_t area_events = 0;  ///< in any one area
@@ -19,9 +55,8 @@ struct WindowLimits {
   friend bool operator==(const WindowLimits&, const WindowLimits&) = default;
 };
 
-/// The latest events, and how many of them each pixel has. Windows that follow each other may
-/// overlap: an event is counted when it comes and again when it leaves, however many pictures there
-/// are in between.
+/// The latest events, and how many of them each pixel has. Consecutive windows may overlap: an
+/// event costs work when it comes and when it leaves, not with each picture in between.
 class EventWindow {
  public:
   struct Counts {
@@ -31,11 +66,11 @@ class EventWindow {
 
   EventWindow(int width, int height, const WindowLimits& limits);
 
-  /// Takes an event, which must lie inside the picture and not before the last one, and lets the
-  /// oldest go that the limits no longer allow.
+  /// Takes an event inside the picture, not before the last one, and drops the oldest ones that the
+  /// limits no longer allow.
   void add(const AbsoluteEvent& event);
 
-  /// Lets events go that are not later than this.
+  /// Drops the events up to this time.
   void begin_after(Microseconds time);
 
   const Counts* row(int y) const { return counts_.row(y); }
@@ -51,7 +86,7 @@ class EventWindow {
   std::vector<std::size_t> areas_;  ///< events in each, where they are limited
 };
 
-/// Which polarities a pixel has, as PixelKinds numbers them: bit 0 OFF, bit 1 ON.
+/// Which polarities a pixel has: bit 0 OFF, bit 1 ON.
 constexpr std::uint8_t kind_of(const EventWindow::Counts& counts) {
   return static_cast<std::uint8_t>((counts.off > 0 ? 1 : 0) + (counts.on > 0 ? 2 : 0));
 }

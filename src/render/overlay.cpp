@@ -49,8 +49,7 @@ void Overlay::draw(Microseconds start, Microseconds end, const Palette& palette,
       if (const auto kind = kind_of(row[x]); kind != 0) mark(x, y, kind);
   }
 
-  const std::array colours = {pixel(palette.none, layout), pixel(palette.off, layout),
-                              pixel(palette.on, layout), pixel(palette.both, layout)};
+  const auto pixels = pixels_by_kind(palette, layout);
   const int weight = static_cast<int>(std::lround(256 * opacity));
   const auto bytes = static_cast<std::size_t>(layout.bytes);
   for (int y = 0; y < picture_.height; ++y) {
@@ -58,7 +57,7 @@ void Overlay::draw(Microseconds start, Microseconds end, const Palette& palette,
     auto* kinds = kinds_.row(y);
     for (int x = 0; x < picture_.width; ++x, out += bytes) {
       if (kinds[x] == 0) continue;
-      const auto& colour = colours[std::exchange(kinds[x], 0)];
+      const auto& colour = pixels[std::exchange(kinds[x], 0)];
       for (std::size_t i = 0; i < bytes; ++i)
         out[i] = static_cast<std::uint8_t>(out[i] + (colour[i] - out[i]) * weight / 256);
     }

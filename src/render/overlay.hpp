@@ -10,7 +10,6 @@
 #include "src/core/image.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
-#include "src/render/pixel_layout.hpp"
 
 namespace eventcamera {
 
@@ -21,14 +20,14 @@ struct Size {
   friend bool operator==(const Size&, const Size&) = default;
 };
 
-/// Draws the events of a window over pictures, whose size may be another than the sensor's. Events
-/// and pictures come in the order of time.
+/// Draws the events of a window over pictures, scaled to their size. Events and pictures come in
+/// the order of time.
 class Overlay {
  public:
   /// Throws std::bad_alloc, as does add().
   Overlay(Size sensor, Size picture);
 
-  /// As Renderer's.
+  /// As Renderer::add().
   std::size_t add(std::span<const Event> events, Microseconds start);
 
   /// Draws the events of (start, end] over a picture; `opacity` from 0 to 1. `stride` in bytes.

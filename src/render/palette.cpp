@@ -116,48 +116,17 @@ Shades shades_of(const Scale& scale) {
 
 }  // namespace
 
+// In the order of PaletteName.
 const Palette& palette(PaletteName name) {
-  static const Palette of_viridis = palette_of(viridis);
-  static const Palette of_magma = palette_of(magma);
-  switch (name) {
-    case PaletteName::light:
-      return light;
-    case PaletteName::dark:
-      return dark;
-    case PaletteName::grey:
-      return grey;
-    case PaletteName::red_blue:
-      return red_blue;
-    case PaletteName::viridis:
-      return of_viridis;
-    case PaletteName::magma:
-      return of_magma;
-  }
-  return dark;
+  static const std::array palettes = {
+      light, dark, grey, red_blue, palette_of(viridis), palette_of(magma)};
+  return palettes[static_cast<std::size_t>(name)];
 }
 
 const Shades& shades(PaletteName name) {
-  static const Shades of_light = shades_of(light);
-  static const Shades of_dark = shades_of(dark);
-  static const Shades of_grey = shades_of(grey);
-  static const Shades of_red_blue = shades_of(red_blue);
-  static const Shades of_viridis = shades_of(viridis);
-  static const Shades of_magma = shades_of(magma);
-  switch (name) {
-    case PaletteName::light:
-      return of_light;
-    case PaletteName::dark:
-      return of_dark;
-    case PaletteName::grey:
-      return of_grey;
-    case PaletteName::red_blue:
-      return of_red_blue;
-    case PaletteName::viridis:
-      return of_viridis;
-    case PaletteName::magma:
-      return of_magma;
-  }
-  return of_dark;
+  static const std::array all_shades = {shades_of(light),    shades_of(dark),    shades_of(grey),
+                                        shades_of(red_blue), shades_of(viridis), shades_of(magma)};
+  return all_shades[static_cast<std::size_t>(name)];
 }
 
 }  // namespace eventcamera

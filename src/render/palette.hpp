@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace eventcamera {
@@ -13,8 +14,8 @@ struct Colour {
   std::uint8_t blue;
 };
 
-/// The colours of accumulated events. In each palette the four differ in brightness too, so that
-/// they are told apart in a grey picture.
+/// The colours of accumulated events. The four of a palette differ in brightness too, for grey
+/// pictures.
 struct Palette {
   Colour none;  ///< no event
   Colour off;   ///< OFF only
@@ -29,14 +30,47 @@ const Palette& palette(PaletteName name);
 /// The colours of values from -1 to 1, by shade().
 using Shades = std::array<Colour, 256>;
 
-/// The shade of a value, which is saturated.
+/// The shade of a value, clamped to [-1, 1].
 constexpr std::uint8_t shade(float value) {
   const float scaled = 127 * std::clamp(value, -1.0F, 1.0F);
   return static_cast<std::uint8_t>(128.5F + scaled);
 }
 
-/// From the colour of no event to that of OFF below 0 and to that of ON above, in even steps to the
-/// eye. The palettes that are one scale show the magnitude alone.
+/// From the colour of no event to that of OFF below 0 and to that of ON above, in perceptually even
+/// steps. Viridis and magma show the magnitude alone.
 const Shades& shades(PaletteName name);
+
+/// Where a picture's pixels go: one byte of grey, or bytes of red, green, blue and, in some
+/// layouts, one that is filled with 255.
+struct PixelLayout {
+  int bytes = 1;                     ///< of a pixel: 1 = grey, else 3 or 4
+  int red = 0, green = 1, blue = 2;  ///< their places in it; unused for grey
+};
+
+/// The bytes of a pixel; as many as the layout has.
+using PixelBytes = std::array<std::uint8_t, 4>;
+
+/// Brightness as BT.601 weighs it.
+constexpr std::uint8_t luma(const Colour& colour) {
+  return static_cast<std::uint8_t>(
+      (299 * colour.red + 587 * colour.green + 114 * colour.blue + 500) / 1000);
+}
+
+/// A pixel of this colour.
+constexpr PixelBytes pixel(const Colour& colour, const PixelLayout& layout) {
+  if (layout.bytes == 1) return {luma(colour)};
+  PixelBytes bytes{255, 255, 255, 255};
+  bytes[static_cast<std::size_t>(layout.red)] = colour.red;
+  bytes[static_cast<std::size_t>(layout.green)] = colour.green;
+  bytes[static_cast<std::size_t>(layout.blue)] = colour.blue;
+  return bytes;
+}
+
+/// The pixels of each kind of pixel, by the bits of the polarities that fired: 1 OFF, 2 ON.
+constexpr std::array<PixelBytes, 4> pixels_by_kind(const Palette& palette,
+                                                   const PixelLayout& layout) {
+  return {pixel(palette.none, layout), pixel(palette.off, layout), pixel(palette.on, layout),
+          pixel(palette.both, layout)};
+}
 
 }  // namespace eventcamera

@@ -9,7 +9,7 @@ namespace eventcamera {
 namespace {
 
 /// The pixel of each shade or kind.
-using Pixels = std::array<std::array<std::uint8_t, 4>, 256>;
+using Pixels = std::array<PixelBytes, 256>;
 
 template <std::size_t bytes>
 void draw_row(std::span<const std::uint8_t> row, const Pixels& pixels, std::byte* out) {
@@ -21,15 +21,11 @@ void draw_row(std::span<const std::uint8_t> row, const Pixels& pixels, std::byte
 
 Pixels pixels_of(const RenderSettings& settings, const PixelLayout& layout) {
   Pixels pixels{};
-  if (settings.mode == RenderMode::accumulate) {
-    const auto& colours = palette(settings.palette);
-    std::size_t kind = 0;
-    for (const auto& colour : {colours.none, colours.off, colours.on, colours.both})
-      pixels[kind++] = pixel(colour, layout);
-  } else {
+  if (settings.mode == RenderMode::accumulate)
+    std::ranges::copy(pixels_by_kind(palette(settings.palette), layout), pixels.begin());
+  else
     std::ranges::transform(shades(settings.palette), pixels.begin(),
                            [&layout](const Colour& colour) { return pixel(colour, layout); });
-  }
   return pixels;
 }
 

@@ -12,7 +12,6 @@
 #include "src/render/decaying_sums.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
-#include "src/render/pixel_layout.hpp"
 #include "src/render/time_surface.hpp"
 
 namespace eventcamera {
@@ -20,11 +19,11 @@ namespace eventcamera {
 enum class RenderMode {
   accumulate,    ///< which polarities fired within a window
   decay,         ///< the sum of ON minus OFF, fading exponentially
-  time_surface,  ///< how young the last event is, by its polarity
+  time_surface,  ///< how recent the last event is, by its polarity
   count,         ///< ON minus OFF within a window
 };
 
-/// Where a change means that the picture begins anew, the palette aside.
+/// A change of any but the palette starts a new picture.
 struct RenderSettings {
   RenderMode mode = RenderMode::accumulate;
   PaletteName palette = PaletteName::dark;
@@ -35,7 +34,7 @@ struct RenderSettings {
   friend bool operator==(const RenderSettings&, const RenderSettings&) = default;
 };
 
-/// Draws what events up to a moment look like. Events and pictures come in the order of time.
+/// Draws the events up to a moment as a picture. Events and pictures come in the order of time.
 class Renderer {
  public:
   /// Up to 65535 x 32768 pixels. Throws std::bad_alloc, as do configure() and add().
@@ -46,10 +45,9 @@ class Renderer {
   /// Forgets all events, and time.
   void reset();
 
-  /// Takes sorted events that count their times from `start`. One that comes later than it should
-  /// counts as if it had come with the last one, or after the last picture; one outside the picture
-  /// is left out.
-  /// Returns how many were left out.
+  /// Takes sorted events that count their times from `start`. A late event is moved to the time of
+  /// the last one, or to after the last picture; one outside the picture is skipped. Returns how
+  /// many were skipped.
   std::size_t add(std::span<const Event> events, Microseconds start);
 
   /// Draws the picture at `end`. The window of accumulate and count is (start, end]. `stride` in
