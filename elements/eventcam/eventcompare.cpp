@@ -242,27 +242,8 @@ void EventCompare::stop() {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventCompare, gst_event_compare, GST, EVENT_COMPARE, GstEventAggregator)
-
-struct _GstEventCompare {
-  GstEventAggregator parent;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventCompare, gst_event_compare, GST_TYPE_EVENT_AGGREGATOR,
-                        GST_DEBUG_CATEGORY_INIT(event_compare_debug, "eventcompare", 0,
-                                                "how alike two streams of events are"))
-GST_ELEMENT_REGISTER_DEFINE(eventcompare, "eventcompare", GST_RANK_NONE,
-                            gst_event_compare_get_type())
-
-/* type */
-
-static GuardedSettings<ReportFiles>& settings_of(GObject* object) {
-  return inside_of<EventCompare>(object).settings;
-}
-
-static void gst_event_compare_init(GstEventCompare* self) {
-  gst_event_aggregator_make<EventCompare>(GST_EVENT_AGGREGATOR(self));
-}
+DEFINE_EVENT_AGGREGATOR(GstEventCompare, gst_event_compare, EVENT_COMPARE, EventCompare,
+                        eventcompare, GST_RANK_NONE, "how alike two streams of events are")
 
 static void gst_event_compare_class_init(GstEventCompareClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));

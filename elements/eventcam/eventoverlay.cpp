@@ -239,27 +239,8 @@ void EventOverlay::stop() {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventOverlay, gst_event_overlay, GST, EVENT_OVERLAY, GstEventAggregator)
-
-struct _GstEventOverlay {
-  GstEventAggregator parent;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventOverlay, gst_event_overlay, GST_TYPE_EVENT_AGGREGATOR,
-                        GST_DEBUG_CATEGORY_INIT(event_overlay_debug, "eventoverlay", 0,
-                                                "events drawn over video"))
-GST_ELEMENT_REGISTER_DEFINE(eventoverlay, "eventoverlay", GST_RANK_NONE,
-                            gst_event_overlay_get_type())
-
-/* type */
-
-static GuardedSettings<Settings>& settings_of(GObject* object) {
-  return inside_of<EventOverlay>(object).settings;
-}
-
-static void gst_event_overlay_init(GstEventOverlay* self) {
-  gst_event_aggregator_make<EventOverlay>(GST_EVENT_AGGREGATOR(self));
-}
+DEFINE_EVENT_AGGREGATOR(GstEventOverlay, gst_event_overlay, EVENT_OVERLAY, EventOverlay,
+                        eventoverlay, GST_RANK_NONE, "events drawn over video")
 
 static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
   constexpr auto flags = static_cast<GParamFlags>(

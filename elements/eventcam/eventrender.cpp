@@ -453,19 +453,8 @@ void EventRender::stop() {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventRender, gst_event_render, GST, EVENT_RENDER, GstEventAggregator)
-
-struct _GstEventRender {
-  GstEventAggregator parent;
-};
-
-G_DEFINE_TYPE_WITH_CODE(GstEventRender, gst_event_render, GST_TYPE_EVENT_AGGREGATOR,
-                        GST_DEBUG_CATEGORY_INIT(event_render_debug, "eventrender", 0,
-                                                "events drawn as video"))
-GST_ELEMENT_REGISTER_DEFINE(eventrender, "eventrender", GST_RANK_PRIMARY,
-                            gst_event_render_get_type())
-
-/* type */
+DEFINE_EVENT_AGGREGATOR(GstEventRender, gst_event_render, EVENT_RENDER, EventRender, eventrender,
+                        GST_RANK_PRIMARY, "events drawn as video")
 
 static GType gst_event_render_mode_get_type() {
   static const GType type = [] {
@@ -482,10 +471,6 @@ static GType gst_event_render_mode_get_type() {
     return g_enum_register_static("GstEventRenderMode", values);
   }();
   return type;
-}
-
-static GuardedSettings<Settings>& settings_of(GObject* object) {
-  return inside_of<EventRender>(object).settings;
 }
 
 static void install_properties(GObjectClass* object_class) {
@@ -554,10 +539,6 @@ static gboolean decide_allocation(GstAggregator*, GstQuery* query) {
   GstCaps* caps = nullptr;
   gst_query_parse_allocation(query, &caps, nullptr);
   return decide_on_drawn_pool(query, caps);
-}
-
-static void gst_event_render_init(GstEventRender* self) {
-  gst_event_aggregator_make<EventRender>(GST_EVENT_AGGREGATOR(self));
 }
 
 static void gst_event_render_class_init(GstEventRenderClass* klass) {

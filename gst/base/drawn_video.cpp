@@ -17,21 +17,13 @@ eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info) {
 }
 
 PaletteName palette_name_of(GstEventCameraPalette palette) {
-  switch (palette) {
-    case GST_EVENT_CAMERA_PALETTE_LIGHT:
-      return PaletteName::light;
-    case GST_EVENT_CAMERA_PALETTE_DARK:
-      return PaletteName::dark;
-    case GST_EVENT_CAMERA_PALETTE_GREY:
-      return PaletteName::grey;
-    case GST_EVENT_CAMERA_PALETTE_RED_BLUE:
-      return PaletteName::red_blue;
-    case GST_EVENT_CAMERA_PALETTE_VIRIDIS:
-      return PaletteName::viridis;
-    case GST_EVENT_CAMERA_PALETTE_MAGMA:
-      return PaletteName::magma;
-  }
-  return PaletteName::dark;
+  static_assert(static_cast<int>(PaletteName::light) == GST_EVENT_CAMERA_PALETTE_LIGHT);
+  static_assert(static_cast<int>(PaletteName::dark) == GST_EVENT_CAMERA_PALETTE_DARK);
+  static_assert(static_cast<int>(PaletteName::grey) == GST_EVENT_CAMERA_PALETTE_GREY);
+  static_assert(static_cast<int>(PaletteName::red_blue) == GST_EVENT_CAMERA_PALETTE_RED_BLUE);
+  static_assert(static_cast<int>(PaletteName::viridis) == GST_EVENT_CAMERA_PALETTE_VIRIDIS);
+  static_assert(static_cast<int>(PaletteName::magma) == GST_EVENT_CAMERA_PALETTE_MAGMA);
+  return static_cast<PaletteName>(palette);
 }
 
 bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps) {

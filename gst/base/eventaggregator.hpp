@@ -107,3 +107,20 @@ Inside& inside_of(gpointer element) {
 /// For class_init: the pad templates, as GstAggregator wants them.
 void gst_event_aggregator_class_add_templates(GstEventAggregatorClass* klass,
                                               std::initializer_list<GstStaticPadTemplate*> list);
+
+/// Defines the type of an element with an EventAggregator of class `Inside`, which has `settings`,
+/// and registers the element. Its class_init is to follow.
+#define DEFINE_EVENT_AGGREGATOR(Type, type, OBJECT, Inside, element, rank, description)       \
+  G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventAggregator)                           \
+  struct _##Type {                                                                            \
+    GstEventAggregator parent;                                                                \
+  };                                                                                          \
+  G_DEFINE_TYPE_WITH_CODE(Type, type, GST_TYPE_EVENT_AGGREGATOR,                              \
+                          GST_DEBUG_CATEGORY_INIT(GST_CAT_DEFAULT, #element, 0, description)) \
+  GST_ELEMENT_REGISTER_DEFINE(element, #element, rank, type##_get_type())                     \
+  static void type##_init(Type* self) {                                                       \
+    gst_event_aggregator_make<Inside>(GST_EVENT_AGGREGATOR(self));                            \
+  }                                                                                           \
+  static auto& settings_of(GObject* object) {                                                 \
+    return inside_of<Inside>(object).settings;                                                \
+  }

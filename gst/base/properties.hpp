@@ -30,61 +30,39 @@ class GuardedSettings {
   Settings settings_;
 };
 
+// The types that properties have: numbers, enums and truths.
+#define FOR_EACH_PROPERTY_TYPE(X) \
+  X(BOOLEAN, boolean) X(ENUM, enum) X(UINT, uint) X(UINT64, uint64) X(DOUBLE, double)
+
 /// Copies a property's value into a field.
 template <class Field>
 void read_value(const GValue* value, Field& field) {
+#define READ(TYPE, type)                                   \
+  case G_TYPE_##TYPE:                                      \
+    field = static_cast<Field>(g_value_get_##type(value)); \
+    break;
   if constexpr (std::is_same_v<Field, std::string>) {
     const gchar* text = g_value_get_string(value);
     field = text != nullptr ? text : "";
   } else {
-    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) {
-      case G_TYPE_BOOLEAN:
-        field = static_cast<Field>(g_value_get_boolean(value));
-        break;
-      case G_TYPE_ENUM:
-        field = static_cast<Field>(g_value_get_enum(value));
-        break;
-      case G_TYPE_UINT:
-        field = static_cast<Field>(g_value_get_uint(value));
-        break;
-      case G_TYPE_UINT64:
-        field = static_cast<Field>(g_value_get_uint64(value));
-        break;
-      case G_TYPE_DOUBLE:
-        field = static_cast<Field>(g_value_get_double(value));
-        break;
-      default:
-        g_assert_not_reached();
-    }
+    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) { FOR_EACH_PROPERTY_TYPE(READ) }
   }
+#undef READ
 }
 
 /// Copies a field into a property's value.
 template <class Field>
 void write_value(const Field& field, GValue* value) {
+#define WRITE(TYPE, type)                                                               \
+  case G_TYPE_##TYPE:                                                                   \
+    g_value_set_##type(value, static_cast<decltype(g_value_get_##type(value))>(field)); \
+    break;
   if constexpr (std::is_same_v<Field, std::string>) {
     g_value_set_string(value, field.c_str());
   } else {
-    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) {
-      case G_TYPE_BOOLEAN:
-        g_value_set_boolean(value, static_cast<gboolean>(field));
-        break;
-      case G_TYPE_ENUM:
-        g_value_set_enum(value, static_cast<gint>(field));
-        break;
-      case G_TYPE_UINT:
-        g_value_set_uint(value, static_cast<guint>(field));
-        break;
-      case G_TYPE_UINT64:
-        g_value_set_uint64(value, static_cast<guint64>(field));
-        break;
-      case G_TYPE_DOUBLE:
-        g_value_set_double(value, static_cast<gdouble>(field));
-        break;
-      default:
-        g_assert_not_reached();
-    }
+    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) { FOR_EACH_PROPERTY_TYPE(WRITE) }
   }
+#undef WRITE
 }
 
 /// For class_init: properties that are fields of a class's settings. `settings_of` gives the

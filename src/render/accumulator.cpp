@@ -119,11 +119,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace eventcamera {
-namespace {
 
 HWY_EXPORT(draw_pixels);
-
-}  // namespace
 
 void Accumulator::add(std::span<const Event> events) {
   // In locals: a byte that is written might else be any of these.

@@ -251,9 +251,7 @@ TEST_P(EveryFormat, BeginsAtTheFirstEventAndTellsSilence) {
 
   const auto gap = h.pull_event(GST_EVENT_GAP);
   ASSERT_TRUE(gap);
-  GstClockTime start = 0;
-  GstClockTime duration = 0;
-  gst_event_parse_gap(gap.get(), &start, &duration);
+  const auto [start, duration] = gap_of(gap.get());
   EXPECT_EQ(start, 2500 * GST_MSECOND);
   EXPECT_GT(duration, 2900 * GST_MSECOND);
   int gaps = 1;

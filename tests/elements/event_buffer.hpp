@@ -8,6 +8,18 @@
 
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
+
+/// A buffer of events that count their times from its PTS.
+inline GstBuffer* buffer_of(GstClockTime pts, const std::vector<eventcamera::Event>& events,
+                            GstClockTime duration) {
+  GstBuffer* buffer = events.empty()
+                          ? gst_buffer_new()
+                          : gst_buffer_new_memdup(events.data(), events.size() * sizeof events[0]);
+  GST_BUFFER_PTS(buffer) = pts;
+  GST_BUFFER_DURATION(buffer) = duration;
+  return buffer;
+}
 
 /// A buffer of the events of [start, start + 10 ms).
 inline GstBuffer* buffer_of(std::span<const eventcamera::AbsoluteEvent> events,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Tells ThreadSanitizer what GLib's locks guard, and what its queues hand on: they are futexes, of
-// which it sees nothing. Linked into a test these stand before GLib's own, which they call.
+// Tells ThreadSanitizer what GLib's locks guard and what its queues pass on, since it cannot see
+// futexes. Linked into a test, these functions replace GLib's own, which they call.
 #include <dlfcn.h>
 #include <glib-object.h>
 #include <sanitizer/tsan_interface.h>
@@ -20,24 +20,25 @@ Function* behind(Function*, const char* name) {
 #pragma GCC visibility push(default)
 extern "C" {
 
-void g_mutex_lock(GMutex* mutex) {
-  BEHIND(g_mutex_lock);
-  real(mutex);
-  __tsan_acquire(mutex);
-}
-
-gboolean g_mutex_trylock(GMutex* mutex) {
-  BEHIND(g_mutex_trylock);
-  const gboolean locked = real(mutex);
-  if (locked) __tsan_acquire(mutex);
-  return locked;
-}
-
-void g_mutex_unlock(GMutex* mutex) {
-  BEHIND(g_mutex_unlock);
-  __tsan_release(mutex);
-  real(mutex);
-}
+#define GUARD_LOCK(name, Type)           \
+  void name##_lock(Type* mutex) {        \
+    BEHIND(name##_lock);                 \
+    real(mutex);                         \
+    __tsan_acquire(mutex);               \
+  }                                      \
+  gboolean name##_trylock(Type* mutex) { \
+    BEHIND(name##_trylock);              \
+    const gboolean locked = real(mutex); \
+    if (locked) __tsan_acquire(mutex);   \
+    return locked;                       \
+  }                                      \
+  void name##_unlock(Type* mutex) {      \
+    BEHIND(name##_unlock);               \
+    __tsan_release(mutex);               \
+    real(mutex);                         \
+  }
+GUARD_LOCK(g_mutex, GMutex)
+GUARD_LOCK(g_rec_mutex, GRecMutex)
 
 void g_cond_wait(GCond* condition, GMutex* mutex) {
   BEHIND(g_cond_wait);
@@ -54,44 +55,21 @@ gboolean g_cond_wait_until(GCond* condition, GMutex* mutex, gint64 end_time) {
   return woken;
 }
 
-void g_rec_mutex_lock(GRecMutex* mutex) {
-  BEHIND(g_rec_mutex_lock);
-  real(mutex);
-  __tsan_acquire(mutex);
-}
-
-gboolean g_rec_mutex_trylock(GRecMutex* mutex) {
-  BEHIND(g_rec_mutex_trylock);
-  const gboolean locked = real(mutex);
-  if (locked) __tsan_acquire(mutex);
-  return locked;
-}
-
-void g_rec_mutex_unlock(GRecMutex* mutex) {
-  BEHIND(g_rec_mutex_unlock);
-  __tsan_release(mutex);
-  real(mutex);
-}
-
 void g_async_queue_push(GAsyncQueue* queue, gpointer data) {
   BEHIND(g_async_queue_push);
   __tsan_release(queue);
   real(queue, data);
 }
 
-gpointer g_async_queue_pop(GAsyncQueue* queue) {
-  BEHIND(g_async_queue_pop);
-  gpointer data = real(queue);
-  __tsan_acquire(queue);
-  return data;
-}
-
-gpointer g_async_queue_try_pop(GAsyncQueue* queue) {
-  BEHIND(g_async_queue_try_pop);
-  gpointer data = real(queue);
-  __tsan_acquire(queue);
-  return data;
-}
+#define GUARD_POP(name)               \
+  gpointer name(GAsyncQueue* queue) { \
+    BEHIND(name);                     \
+    gpointer data = real(queue);      \
+    __tsan_acquire(queue);            \
+    return data;                      \
+  }
+GUARD_POP(g_async_queue_pop)
+GUARD_POP(g_async_queue_try_pop)
 
 gpointer g_async_queue_timeout_pop(GAsyncQueue* queue, guint64 timeout) {
   BEHIND(g_async_queue_timeout_pop);

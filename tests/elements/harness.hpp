@@ -7,6 +7,7 @@
 
 #include <cstring>
 #include <functional>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -192,6 +193,65 @@ inline std::string text_of(GstMessage* message) {
   std::string text = error->message;
   g_error_free(error);
   return text;
+}
+
+/// Plays an element of two sink pads, of which the first goes on to the source pad.
+struct TwoInputs {
+  TwoInputs(const std::string& launch, const char* first_pad, const char* second_pad) {
+    gst_init(nullptr, nullptr);
+    element.reset(GST_ELEMENT(gst_object_ref_sink(
+        gst_parse_launch_full(launch.c_str(), nullptr, GST_PARSE_FLAG_NONE, nullptr))));
+    bus.reset(gst_bus_new());
+    gst_element_set_bus(element.get(), bus.get());
+    first.reset(gst_harness_new_with_element(element.get(), first_pad, "src"));
+    second.reset(gst_harness_new_with_element(element.get(), second_pad, nullptr));
+    for (auto* h : {first.get(), second.get()}) gst_harness_set_live(h, FALSE);
+  }
+  ~TwoInputs() { gst_element_set_bus(element.get(), nullptr); }
+
+  Owned<GstMessage> message(GstMessageType type) {
+    return Owned<GstMessage>(gst_bus_pop_filtered(bus.get(), type));
+  }
+
+  Owned<GstElement> element;
+  Owned<GstBus> bus;
+  Owned<GstHarness> first;
+  Owned<GstHarness> second;
+};
+
+inline void flush(std::initializer_list<GstHarness*> inputs) {
+  for (auto* h : inputs) gst_harness_push_event(h, gst_event_new_flush_start());
+  for (auto* h : inputs) gst_harness_push_event(h, gst_event_new_flush_stop(TRUE));
+}
+
+/// Pushes the segment from 0 on.
+inline void push_segment(GstHarness* h) {
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_harness_push_event(h, gst_event_new_segment(&segment));
+}
+
+/// Seeks backwards, which is refused without an error, and then pushes a segment that runs so.
+inline void play_backwards(Harness& h) {
+  EXPECT_FALSE(gst_element_seek(h.element(), -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, GST_SECOND));
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.rate = -1;
+  segment.stop = GST_SECOND;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+}
+
+struct Gap {
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+};
+
+inline Gap gap_of(GstEvent* event) {
+  Gap gap;
+  gst_event_parse_gap(event, &gap.start, &gap.duration);
+  return gap;
 }
 
 }  // namespace harness

@@ -3,10 +3,12 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 
 #include "src/core/event.hpp"
+#include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -17,14 +19,6 @@ using eventcamera::Polarity;
 
 constexpr GstClockTime ms = GST_MSECOND;
 const std::string small_sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
-
-Buffer buffer_of(GstClockTime pts, const std::vector<Event>& list, GstClockTime duration) {
-  Buffer buffer(list.empty() ? gst_buffer_new()
-                             : gst_buffer_new_memdup(list.data(), list.size() * sizeof(Event)));
-  GST_BUFFER_PTS(buffer.get()) = pts;
-  GST_BUFFER_DURATION(buffer.get()) = duration;
-  return buffer;
-}
 
 std::string text_in(const std::filesystem::path& path) {
   std::stringstream text;
@@ -86,7 +80,7 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   h.caps(small_sensor);
   const std::vector first = {Event::at(1, 0, 0, Polarity::on), Event::at(1, 0, 30, Polarity::off),
                              Event::at(2, 3, 40, Polarity::on)};
-  h.push(buffer_of(1000 * ms, first, 40 * ms).release());
+  h.push(buffer_of(1000 * ms, first, 40 * ms));
   EXPECT_EQ(bytes_of(h.pull().get()).size(), 24U);
   EXPECT_FALSE(h.message(GST_MESSAGE_ELEMENT));
   gst_harness_push_event(h.get(), gst_event_new_gap(1040 * ms, 20 * ms));
@@ -102,7 +96,7 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_NEAR(number_in(recent, "mean"), 3 / 32.0 / 0.06, 1e-9);
   EXPECT_EQ(count_in(recent, "interval-p50"), 29 * GST_USECOND);
 
-  h.push(buffer_of(1060 * ms, {Event::at(2, 3, 40, Polarity::on)}, 40 * ms).release());
+  h.push(buffer_of(1060 * ms, {Event::at(2, 3, 40, Polarity::on)}, 40 * ms));
   gst_harness_push_event(h.get(), gst_event_new_eos());
   message = h.message(GST_MESSAGE_ELEMENT);
   const auto* cumulative = structure_of(message);
@@ -121,7 +115,7 @@ TEST_F(StatsTest, WritesWhatHasComeWhereItIsStopped) {
   Harness h("eventstats location=" + in_quotes(path("f.json")) +
             " map=" + in_quotes(path("map.png")));
   h.caps(small_sensor);
-  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
   gst_element_set_state(h.element(), GST_STATE_READY);
   EXPECT_NE(text_in(path("f.json")).find("\"events\" : 1"), std::string::npos);
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
@@ -135,7 +129,7 @@ TEST_F(StatsTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
     Harness h("eventstats location=" + in_quotes(path("f.json")));
     h.caps(small_sensor);
     if (with_events) {
-      h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+      h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
       gst_harness_push_event(h.get(), gst_event_new_eos());
       EXPECT_TRUE(std::filesystem::remove(path("f.json")));
     }
@@ -147,8 +141,8 @@ TEST_F(StatsTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
 TEST_F(StatsTest, CountsASilenceBetweenBuffersAsTime) {
   Harness h("eventstats");
   h.caps(small_sensor);
-  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
-  h.push(buffer_of(90 * ms, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+  h.push(buffer_of(90 * ms, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
   gst_harness_push_event(h.get(), gst_event_new_eos());
   const auto message = h.message(GST_MESSAGE_ELEMENT);
   ASSERT_TRUE(message);
@@ -173,13 +167,10 @@ TEST_F(StatsTest, EndsWithoutAnyEvent) {
 TEST_F(StatsTest, ForgetsWhatLiesBeforeAFlush) {
   Harness h("eventstats");
   h.caps(small_sensor);
-  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
-  gst_harness_push_event(h.get(), gst_event_new_flush_start());
-  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
-  h.push(buffer_of(0, {Event::at(2, 0, 5, Polarity::off)}, 10 * ms).release());
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+  flush({h.get()});
+  push_segment(h.get());
+  h.push(buffer_of(0, {Event::at(2, 0, 5, Polarity::off)}, 10 * ms));
   gst_harness_push_event(h.get(), gst_event_new_eos());
   const auto message = h.message(GST_MESSAGE_ELEMENT);
   ASSERT_TRUE(message);
@@ -190,7 +181,7 @@ TEST_F(StatsTest, ForgetsWhatLiesBeforeAFlush) {
 TEST_F(StatsTest, MeasuresEachSensorOnItsOwn) {
   Harness h("eventstats");
   h.caps(small_sensor);
-  h.push(buffer_of(0, {Event::at(7, 3, 5, Polarity::on)}, 10 * ms).release());
+  h.push(buffer_of(0, {Event::at(7, 3, 5, Polarity::on)}, 10 * ms));
   h.caps("application/x-event-camera, format=XYTP, width=4, height=2");
   auto message = h.message(GST_MESSAGE_ELEMENT);
   ASSERT_TRUE(message);
@@ -198,8 +189,7 @@ TEST_F(StatsTest, MeasuresEachSensorOnItsOwn) {
   h.push(buffer_of(10 * ms,
                    {Event::at(3, 1, 5, Polarity::on), Event::at(3, 1, 6, Polarity::on),
                     Event::at(7, 3, 7, Polarity::on)},
-                   10 * ms)
-             .release());
+                   10 * ms));
   EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
   gst_harness_push_event(h.get(), gst_event_new_eos());
   message = h.message(GST_MESSAGE_ELEMENT);
@@ -211,9 +201,9 @@ TEST_F(StatsTest, MeasuresEachSensorOnItsOwn) {
 TEST_F(StatsTest, GoesOnWhereTimeGoesBackAndWherePtsAreMissing) {
   Harness h("eventstats");
   h.caps(small_sensor);
-  h.push(buffer_of(500 * ms, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
-  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
-  h.push(buffer_of(GST_CLOCK_TIME_NONE, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms).release());
+  h.push(buffer_of(500 * ms, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+  h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+  h.push(buffer_of(GST_CLOCK_TIME_NONE, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
   EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
   gst_harness_push_event(h.get(), gst_event_new_eos());
   const auto message = h.message(GST_MESSAGE_ELEMENT);
@@ -263,46 +253,37 @@ TEST_F(StatsTest, SaysThatAFolderHasGoneMissing) {
 class CompareTest : public MeasureTest {
  protected:
   void make(const std::string& properties = "") {
-    gst_init(nullptr, nullptr);
-    element_.reset(GST_ELEMENT(gst_object_ref_sink(gst_parse_launch_full(
-        ("eventcompare " + properties).c_str(), nullptr, GST_PARSE_FLAG_NONE, nullptr))));
-    bus_.reset(gst_bus_new());
-    gst_element_set_bus(element_.get(), bus_.get());
-    candidate.reset(gst_harness_new_with_element(element_.get(), "candidate", "src"));
-    reference.reset(gst_harness_new_with_element(element_.get(), "reference", nullptr));
-    for (auto* h : {candidate.get(), reference.get()}) gst_harness_set_live(h, FALSE);
-  }
-  ~CompareTest() override {
-    if (element_) gst_element_set_bus(element_.get(), nullptr);
+    compare.emplace("eventcompare " + properties, "candidate", "reference");
+    candidate = compare->first.get();
+    reference = compare->second.get();
   }
 
   void begin(const std::string& of_reference = small_sensor,
              const std::string& of_candidate = small_sensor) {
-    gst_harness_set_src_caps_str(reference.get(), of_reference.c_str());
-    gst_harness_set_src_caps_str(candidate.get(), of_candidate.c_str());
+    gst_harness_set_src_caps_str(reference, of_reference.c_str());
+    gst_harness_set_src_caps_str(candidate, of_candidate.c_str());
   }
 
-  void end(const Owned<GstHarness>& h) { gst_harness_push_event(h.get(), gst_event_new_eos()); }
+  void end(GstHarness* h) { gst_harness_push_event(h, gst_event_new_eos()); }
 
   /// The buffers that go on until EOS, and then the figures.
   const GstStructure* conclude() {
     GstBuffer* last = nullptr;
-    while (gst_harness_buffers_in_queue(candidate.get()) > 0)
-      passed.emplace_back(gst_harness_pull(candidate.get()));
-    EXPECT_TRUE(gst_harness_pull_until_eos(candidate.get(), &last));
+    while (gst_harness_buffers_in_queue(candidate) > 0)
+      passed.emplace_back(gst_harness_pull(candidate));
+    EXPECT_TRUE(gst_harness_pull_until_eos(candidate, &last));
     while (last != nullptr) {
       passed.emplace_back(last);
-      EXPECT_TRUE(gst_harness_pull_until_eos(candidate.get(), &last));
+      EXPECT_TRUE(gst_harness_pull_until_eos(candidate, &last));
     }
-    message_.reset(gst_bus_pop_filtered(bus_.get(), GST_MESSAGE_ELEMENT));
+    message_ = compare->message(GST_MESSAGE_ELEMENT);
     return structure_of(message_);
   }
 
-  Owned<GstElement> element_;
-  Owned<GstBus> bus_;
+  std::optional<TwoInputs> compare;
   Owned<GstMessage> message_;
-  Owned<GstHarness> reference;
-  Owned<GstHarness> candidate;
+  GstHarness* reference = nullptr;
+  GstHarness* candidate = nullptr;
   std::vector<Buffer> passed;
 };
 
@@ -310,22 +291,18 @@ TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   begin();
   // The candidate begins 10 ms later; what of the reference lies before that does not count.
-  gst_harness_push(reference.get(), buffer_of(0,
-                                              {Event::at(1, 1, 5'000, Polarity::on),
-                                               Event::at(1, 1, 15'000, Polarity::on),
-                                               Event::at(6, 1, 18'000, Polarity::off)},
-                                              20 * ms)
-                                        .release());
-  gst_harness_push(candidate.get(), buffer_of(10 * ms,
-                                              {Event::at(2, 2, 1'000, Polarity::on),
-                                               Event::at(6, 1, 8'500, Polarity::on)},
-                                              10 * ms)
-                                        .release());
-  gst_harness_push(reference.get(),
-                   buffer_of(20 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms).release());
-  gst_harness_push_event(candidate.get(), gst_event_new_gap(20 * ms, 20 * ms));
-  gst_harness_push(reference.get(),
-                   buffer_of(40 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms).release());
+  gst_harness_push(reference, buffer_of(0,
+                                        {Event::at(1, 1, 5'000, Polarity::on),
+                                         Event::at(1, 1, 15'000, Polarity::on),
+                                         Event::at(6, 1, 18'000, Polarity::off)},
+                                        20 * ms));
+  gst_harness_push(candidate, buffer_of(10 * ms,
+                                        {Event::at(2, 2, 1'000, Polarity::on),
+                                         Event::at(6, 1, 8'500, Polarity::on)},
+                                        10 * ms));
+  gst_harness_push(reference, buffer_of(20 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms));
+  gst_harness_push_event(candidate, gst_event_new_gap(20 * ms, 20 * ms));
+  gst_harness_push(reference, buffer_of(40 * ms, {Event::at(5, 1, 1'000, Polarity::on)}, 20 * ms));
   end(candidate);
   end(reference);
   const auto* figures = conclude();
@@ -361,8 +338,7 @@ TEST_F(CompareTest, FindsAStreamLikeItself) {
   for (GstClockTime t = 0; t < 100 * ms; t += 10 * ms) {
     const std::vector events = {Event::at(static_cast<int>(t / ms / 13), 2, 700, Polarity::on),
                                 Event::at(1, 1, 7'000, Polarity::off)};
-    for (auto* h : {reference.get(), candidate.get()})
-      gst_harness_push(h, buffer_of(t, events, 10 * ms).release());
+    for (auto* h : {reference, candidate}) gst_harness_push(h, buffer_of(t, events, 10 * ms));
   }
   end(reference);
   end(candidate);
@@ -378,12 +354,10 @@ TEST_F(CompareTest, FindsAStreamLikeItself) {
 TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
   make();
   begin();
-  gst_harness_push(reference.get(),
-                   buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+  gst_harness_push(reference, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
   end(reference);
   for (const GstClockTime t : {0 * ms, 10 * ms, 20 * ms})
-    gst_harness_push(candidate.get(),
-                     buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+    gst_harness_push(candidate, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
   end(candidate);
   const auto* figures = conclude();
   ASSERT_TRUE(figures);
@@ -408,13 +382,13 @@ TEST_F(CompareTest, WritesWhatHasComeWhereItIsStopped) {
   make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   begin();
   for (const GstClockTime t : {0 * ms, 10 * ms})
-    for (auto* h : {reference.get(), candidate.get()})
-      gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
-  EXPECT_TRUE(Buffer(gst_harness_pull(candidate.get())));
-  gst_element_set_state(element_.get(), GST_STATE_READY);
+    for (auto* h : {reference, candidate})
+      gst_harness_push(h, buffer_of(t, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  EXPECT_TRUE(Buffer(gst_harness_pull(candidate)));
+  gst_element_set_state(compare->element.get(), GST_STATE_READY);
   EXPECT_FALSE(text_in(path("f.json")).empty());
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
-  const Owned<GstMessage> message(gst_bus_pop_filtered(bus_.get(), GST_MESSAGE_ELEMENT));
+  const auto message = compare->message(GST_MESSAGE_ELEMENT);
   ASSERT_TRUE(message);
   EXPECT_EQ(time_in(structure_of(message), "start"), 0);
 }
@@ -422,30 +396,30 @@ TEST_F(CompareTest, WritesWhatHasComeWhereItIsStopped) {
 TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasCome) {
   make("location=" + in_quotes(path("f.json")));
   begin();
-  gst_element_set_state(element_.get(), GST_STATE_READY);
+  gst_element_set_state(compare->element.get(), GST_STATE_READY);
   EXPECT_FALSE(std::filesystem::exists(path("f.json")));
 }
 
 TEST_F(CompareTest, WritesNothingAtAStopWhereNothingHasComeSinceItDid) {
   make("location=" + in_quotes(path("f.json")));
   begin();
-  for (auto* h : {reference.get(), candidate.get()})
-    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+  for (auto* h : {reference, candidate})
+    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
   end(reference);
   end(candidate);
   EXPECT_TRUE(conclude());
   EXPECT_TRUE(std::filesystem::remove(path("f.json")));
-  gst_element_set_state(element_.get(), GST_STATE_READY);
+  gst_element_set_state(compare->element.get(), GST_STATE_READY);
   EXPECT_FALSE(std::filesystem::exists(path("f.json")));
 }
 
 TEST_F(CompareTest, RefusesSensorsOfTwoSizes) {
   make();
   begin(small_sensor, "application/x-event-camera, format=XYTP, width=9, height=4");
-  for (auto* h : {reference.get(), candidate.get()})
-    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
+  for (auto* h : {reference, candidate})
+    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
   const Owned<GstMessage> message(
-      gst_bus_timed_pop_filtered(bus_.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
+      gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
   ASSERT_TRUE(message);
   EXPECT_NE(text_of(message.get()).find("8 x 4 pixels, the candidate 9 x 4"), std::string::npos);
 }
@@ -453,17 +427,12 @@ TEST_F(CompareTest, RefusesSensorsOfTwoSizes) {
 TEST_F(CompareTest, BeginsAnewAfterAFlush) {
   make();
   begin();
-  for (auto* h : {reference.get(), candidate.get()})
-    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms).release());
-  for (auto* h : {reference.get(), candidate.get()})
-    gst_harness_push_event(h, gst_event_new_flush_start());
-  for (auto* h : {reference.get(), candidate.get()})
-    gst_harness_push_event(h, gst_event_new_flush_stop(TRUE));
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  for (auto* h : {reference.get(), candidate.get()}) {
-    gst_harness_push_event(h, gst_event_new_segment(&segment));
-    gst_harness_push(h, buffer_of(0, {Event::at(2, 1, 5, Polarity::on)}, 10 * ms).release());
+  for (auto* h : {reference, candidate})
+    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  flush({reference, candidate});
+  for (auto* h : {reference, candidate}) {
+    push_segment(h);
+    gst_harness_push(h, buffer_of(0, {Event::at(2, 1, 5, Polarity::on)}, 10 * ms));
   }
   end(reference);
   end(candidate);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventoverlay: which events are drawn over which frame, and where.
 #include "src/core/event.hpp"
+#include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -13,18 +14,8 @@ constexpr GstClockTime ms = GST_MSECOND;
 
 class OverlayTest : public testing::Test {
  protected:
-  explicit OverlayTest(const std::string& launch = "eventoverlay palette=grey") {
-    gst_init(nullptr, nullptr);
-    element_.reset(GST_ELEMENT(gst_object_ref_sink(
-        gst_parse_launch_full(launch.c_str(), nullptr, GST_PARSE_FLAG_NONE, nullptr))));
-    bus_.reset(gst_bus_new());
-    gst_element_set_bus(element_.get(), bus_.get());
-    video.reset(gst_harness_new_with_element(element_.get(), "sink", "src"));
-    events.reset(gst_harness_new_with_element(element_.get(), "events", nullptr));
-    gst_harness_set_live(video.get(), FALSE);
-    gst_harness_set_live(events.get(), FALSE);
-  }
-  ~OverlayTest() override { gst_element_set_bus(element_.get(), nullptr); }
+  explicit OverlayTest(const std::string& launch = "eventoverlay palette=grey")
+      : overlay(launch, "sink", "events") {}
 
   void begin(const std::string& sensor_size, const std::string& format = "GRAY8") {
     gst_harness_set_src_caps_str(
@@ -44,10 +35,7 @@ class OverlayTest : public testing::Test {
 
   void push_events(GstClockTime pts, const std::vector<Event>& list,
                    GstClockTime duration = 40 * ms) {
-    GstBuffer* buffer = gst_buffer_new_memdup(list.data(), list.size() * sizeof(Event));
-    GST_BUFFER_PTS(buffer) = pts;
-    GST_BUFFER_DURATION(buffer) = duration;
-    gst_harness_push(events.get(), buffer);
+    gst_harness_push(events.get(), buffer_of(pts, list, duration));
   }
 
   /// The next frame's places that are not grey 100, and what they are.
@@ -63,10 +51,9 @@ class OverlayTest : public testing::Test {
     return places;
   }
 
-  Owned<GstElement> element_;
-  Owned<GstBus> bus_;
-  Owned<GstHarness> video;
-  Owned<GstHarness> events;
+  TwoInputs overlay;
+  Owned<GstHarness>& video = overlay.first;
+  Owned<GstHarness>& events = overlay.second;
   GstClockTime last_pts = 0;
 };
 
@@ -130,7 +117,7 @@ TEST_F(OverlayTest, LeavesEventsBeyondTheSensorOut) {
   push_frame(0);
   push_events(0, {Event::at(8, 0, 5, Polarity::on), Event::at(0, 4, 6, Polarity::on)});
   EXPECT_EQ(drawn(), Places{});
-  EXPECT_TRUE(Owned<GstMessage>(gst_bus_pop_filtered(bus_.get(), GST_MESSAGE_WARNING)));
+  EXPECT_TRUE(overlay.message(GST_MESSAGE_WARNING));
 }
 
 class OverlayHalf : public OverlayTest {
@@ -154,14 +141,8 @@ TEST_F(OverlayHalf, MixesAndRemembers) {
 TEST_F(OverlayTest, BeginsAnewAfterAFlush) {
   begin("width=8, height=4");
   push_events(0, {Event::at(1, 0, 5, Polarity::on)}, 20 * ms);
-  for (auto* h : {video.get(), events.get()})
-    gst_harness_push_event(h, gst_event_new_flush_start());
-  for (auto* h : {video.get(), events.get()})
-    gst_harness_push_event(h, gst_event_new_flush_stop(TRUE));
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  for (auto* h : {video.get(), events.get()})
-    gst_harness_push_event(h, gst_event_new_segment(&segment));
+  flush({video.get(), events.get()});
+  for (auto* h : {video.get(), events.get()}) push_segment(h);
   push_frame(0);
   push_events(0, {Event::at(2, 0, 5, Polarity::on)});
   EXPECT_EQ(drawn(), (Places{{2, 255}}));

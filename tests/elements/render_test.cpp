@@ -5,6 +5,7 @@
 #include "gst/base/drawn_video.hpp"
 #include "src/core/event.hpp"
 #include "src/render/accumulator.hpp"
+#include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -21,13 +22,6 @@ const std::string events_caps =
 
 std::string grey_at(const std::string& framerate) {
   return "video/x-raw, format=GRAY8, framerate=" + framerate;
-}
-
-GstBuffer* buffer_of(GstClockTime pts, GstClockTime duration, const std::vector<Event>& events) {
-  GstBuffer* buffer = gst_buffer_new_memdup(events.data(), events.size() * sizeof(Event));
-  GST_BUFFER_PTS(buffer) = pts;
-  GST_BUFFER_DURATION(buffer) = duration;
-  return buffer;
 }
 
 /// ON in a column, half-way through an interval of 40 ms.
@@ -70,7 +64,7 @@ class Render : public testing::Test {
 
   GstFlowReturn push(GstClockTime pts, const std::vector<Event>& events,
                      GstClockTime duration = 40 * ms) {
-    return h.push(buffer_of(pts, duration, events));
+    return h.push(buffer_of(pts, events, duration));
   }
 
   /// Ends the stream, and gives all pictures that came out.
@@ -228,8 +222,7 @@ TEST_F(Render, TakesBuffersWithoutDuration) {
 TEST_F(Render, BeginsAnewAfterAFlush) {
   begin(grey_at("10/1"));
   push(0, column(1));
-  gst_harness_push_event(h.get(), gst_event_new_flush_start());
-  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
+  flush({h.get()});
   segment(5 * GST_SECOND);
   push(5 * GST_SECOND, column(2), 100 * ms);
   expect(finish(), {{5 * GST_SECOND, 100 * ms, accumulated(column(2))}});
@@ -260,14 +253,7 @@ TEST_F(Render, ShowsNothingFromOutsideTheSegment) {
 
 TEST_F(Render, RefusesToRunBackwards) {
   begin(grey_at("25/1"));
-  EXPECT_FALSE(gst_element_seek(h.element(), -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
-                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, GST_SECOND));
-  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
-  GstSegment s;
-  gst_segment_init(&s, GST_FORMAT_TIME);
-  s.rate = -1;
-  s.stop = GST_SECOND;
-  gst_harness_push_event(h.get(), gst_event_new_segment(&s));
+  play_backwards(h);
   finish();
   EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
 }
@@ -497,28 +483,12 @@ TEST_F(RenderLive, IsOnePictureLate) {
   EXPECT_EQ(gst_harness_query_latency(h.get()), 50 * ms);
 }
 
-class EveryRenderer : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(, EveryRenderer, testing::Values("eventrender", "eventoverlay"));
-
-TEST_P(EveryRenderer, GoesThroughAllStates) {
-  gst_init(nullptr, nullptr);
-  Owned<GstElement> element(gst_element_factory_make(GetParam(), nullptr));
-  ASSERT_TRUE(element);
-  for (int times = 0; times < 3; ++times) {
-    for (const auto state : {GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_PLAYING, GST_STATE_PAUSED,
-                             GST_STATE_READY, GST_STATE_NULL})
-      EXPECT_NE(gst_element_set_state(element.get(), state), GST_STATE_CHANGE_FAILURE);
-  }
-  gst_element_set_state(element.get(), GST_STATE_PLAYING);
-  gst_element_set_state(element.get(), GST_STATE_NULL);
-}
-
 TEST_F(Render, IsFreedWhileInUse) {
   for (int buffers = 0; buffers < 4; ++buffers) {
     Harness other("eventrender");
     gst_harness_set_sink_caps_str(other.get(), grey_at("25/1").c_str());
     gst_harness_set_src_caps_str(other.get(), events_caps.c_str());
-    for (int i = 0; i < buffers; ++i) other.push(buffer_of(i * 40 * ms, 40 * ms, column(i)));
+    for (int i = 0; i < buffers; ++i) other.push(buffer_of(i * 40 * ms, column(i), 40 * ms));
   }
 }
 

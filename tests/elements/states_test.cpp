@@ -9,7 +9,11 @@ using namespace harness;
 class EveryElement : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
 
-TEST_P(EveryElement, GoesThroughAllStates) {
+class AllStates : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Simulators, AllStates, testing::ValuesIn(elements));
+INSTANTIATE_TEST_SUITE_P(Renderers, AllStates, testing::Values("eventrender", "eventoverlay"));
+
+TEST_P(AllStates, AreEntered) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make(GetParam(), nullptr));
   ASSERT_TRUE(element);

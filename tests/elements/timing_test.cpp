@@ -56,9 +56,7 @@ TEST_P(EveryElement, SendsAGapForAnIntervalWithoutEvents) {
   EXPECT_FALSE(h.pull());
   const auto gap = h.pull_event(GST_EVENT_GAP);
   ASSERT_TRUE(gap);
-  GstClockTime start = 0;
-  GstClockTime duration = 0;
-  gst_event_parse_gap(gap.get(), &start, &duration);
+  const auto [start, duration] = gap_of(gap.get());
   EXPECT_EQ(start, 0U);
   EXPECT_EQ(duration, 40 * GST_MSECOND);
 }
@@ -96,8 +94,7 @@ TEST_P(EveryElement, BeginsAnewAfterADiscontinuity) {
 TEST_P(EveryElement, BeginsAnewAfterAFlush) {
   h.caps(video);
   flash(0);
-  gst_harness_push_event(h.get(), gst_event_new_flush_start());
-  gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE));
+  flush({h.get()});
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
@@ -187,9 +184,7 @@ TEST_P(EveryElement, HoldsTheLastFrameThroughAGapOfTheVideo) {
   gst_harness_push_event(h.get(), gst_event_new_gap(50 * GST_MSECOND, 100 * GST_MSECOND));
   const auto gap = h.pull_event(GST_EVENT_GAP);
   ASSERT_TRUE(gap);
-  GstClockTime start = 0;
-  GstClockTime duration = 0;
-  gst_event_parse_gap(gap.get(), &start, &duration);
+  const auto [start, duration] = gap_of(gap.get());
   EXPECT_EQ(start, 10 * GST_MSECOND);
   // The gap ends at 150 ms; a frame's length before that, the next interval begins.
   EXPECT_EQ(start + duration, 110 * GST_MSECOND);
@@ -200,22 +195,14 @@ TEST_P(EveryElement, HoldsTheLastFrameThroughAGapOfTheVideo) {
 TEST_P(EveryElement, RefusesToRunBackwards) {
   h.caps(video);
   flash(0);
-  EXPECT_FALSE(gst_element_seek(h.element(), -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
-                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, GST_SECOND));
-  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.rate = -1;
-  segment.stop = GST_SECOND;
-  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  play_backwards(h);
   const auto error = h.message(GST_MESSAGE_ERROR);
   ASSERT_TRUE(error);
   EXPECT_NE(text_of(error.get()).find("backwards"), std::string::npos);
   EXPECT_EQ(flash(40 * GST_MSECOND), GST_FLOW_ERROR);
   EXPECT_EQ(flash(80 * GST_MSECOND), GST_FLOW_ERROR);
   EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));  // one is enough
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  push_segment(h.get());
   EXPECT_EQ(flash(120 * GST_MSECOND), GST_FLOW_OK);
 }
 
