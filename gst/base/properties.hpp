@@ -45,7 +45,11 @@ void read_value(const GValue* value, Field& field) {
     const gchar* text = g_value_get_string(value);
     field = text != nullptr ? text : "";
   } else {
-    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) { FOR_EACH_PROPERTY_TYPE(READ) }
+    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) {
+      FOR_EACH_PROPERTY_TYPE(READ)
+      default:
+        g_assert_not_reached();
+    }
   }
 #undef READ
 }
@@ -60,7 +64,11 @@ void write_value(const Field& field, GValue* value) {
   if constexpr (std::is_same_v<Field, std::string>) {
     g_value_set_string(value, field.c_str());
   } else {
-    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) { FOR_EACH_PROPERTY_TYPE(WRITE) }
+    switch (G_TYPE_FUNDAMENTAL(G_VALUE_TYPE(value))) {
+      FOR_EACH_PROPERTY_TYPE(WRITE)
+      default:
+        g_assert_not_reached();
+    }
   }
 #undef WRITE
 }
