@@ -24,7 +24,6 @@
 #include <gst/base/gstaggregator.h>
 
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -32,10 +31,11 @@
 #include <vector>
 
 #include "elements/eventcam/aedatframe.hpp"
-#include "gst/base/enum_type.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/base/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -51,9 +51,9 @@ using eventcamera::SensorSize;
 
 namespace {
 
-enum Property : guint { prop_compression = 1 };
-
-constexpr auto default_compression = Aedat4Compression::lz4;
+struct Settings {
+  Aedat4Compression compression = Aedat4Compression::lz4;
+};
 
 /// Events wait for no more than this to become a packet.
 constexpr Microseconds max_wait = 100'000;
@@ -81,8 +81,7 @@ struct State {
 struct GstAedatMuxPrivate {
   explicit GstAedatMuxPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_MUX) {}
 
-  std::mutex mutex;  // guards the property; nothing is called under it
-  Aedat4Compression compression = default_compression;
+  GuardedSettings<Settings> settings;
 
   // The streaming thread's, or nobody's while there is none.
   State state;
@@ -126,26 +125,6 @@ static GType compression_type() {
       {0, nullptr, nullptr},
   };
   return enum_type("GstAedatCompression", values);
-}
-
-static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  auto* priv = GST_AEDAT_MUX(object)->priv;
-  if (id == prop_compression) {
-    const std::lock_guard lock(priv->mutex);
-    priv->compression = static_cast<Aedat4Compression>(g_value_get_enum(value));
-  } else {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-  }
-}
-
-static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  auto* priv = GST_AEDAT_MUX(object)->priv;
-  if (id == prop_compression) {
-    const std::lock_guard lock(priv->mutex);
-    g_value_set_enum(value, static_cast<int>(priv->compression));
-  } else {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-  }
 }
 
 /* input */
@@ -249,10 +228,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   settings.source = state.source;
   settings.frames = static_cast<bool>(pad_named(self, video_name));
   settings.table = can_seek_bytes(GST_AGGREGATOR_SRC_PAD(self));
-  {
-    const std::lock_guard lock(self->priv->mutex);
-    settings.compression = self->priv->compression;
-  }
+  settings.compression = self->priv->settings.copy().compression;
   self->priv->writable.begin_file(state.size);
   state.shift = shift_of(self);
   state.encoder = std::make_unique<Aedat4Encoder>(settings);
@@ -482,6 +458,10 @@ static GstFlowReturn flush(GstAggregator* aggregator) {
 
 /* type */
 
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_AEDAT_MUX(object)->priv->settings;
+}
+
 static void finalize(GObject* object) {
   delete GST_AEDAT_MUX(object)->priv;
   G_OBJECT_CLASS(gst_aedat_mux_parent_class)->finalize(object);
@@ -493,15 +473,13 @@ static void gst_aedat_mux_init(GstAedatMux* self) {
 
 static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = set_property;
-  object_class->get_property = get_property;
   object_class->finalize = finalize;
-  g_object_class_install_property(
-      object_class, prop_compression,
-      g_param_spec_enum("compression", "Compression", "Compression of the file", compression_type(),
-                        static_cast<int>(default_compression),
-                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                 GST_PARAM_MUTABLE_READY)));
+  Properties<settings_of>(object_class)
+      .add(&Settings::compression,
+           g_param_spec_enum("compression", "Compression", "Compression of the file",
+                             compression_type(), static_cast<int>(Settings().compression),
+                             static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                      GST_PARAM_MUTABLE_READY)));
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_static_pad_template_with_gtype(element_class, &events_template,

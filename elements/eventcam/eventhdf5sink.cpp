@@ -20,12 +20,12 @@
 #include <gst/base/gstbasesink.h>
 
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 
-#include "gst/base/enum_type.hpp"
 #include "gst/base/errors.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
 #include "gst/base/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/formats/hdf5/hdf5_writer.hpp"
@@ -38,10 +38,11 @@ using eventcamera::Hdf5Writer;
 
 namespace {
 
-enum Property : guint { prop_location = 1, prop_layout, prop_compression };
-
-constexpr auto default_layout = Hdf5Layout::dsec;
-constexpr auto default_compression = Hdf5Writer::Compression::gzip;
+struct Settings {
+  std::string location;
+  Hdf5Layout layout = Hdf5Layout::dsec;
+  Hdf5Writer::Compression compression = Hdf5Writer::Compression::gzip;
+};
 
 /// The file, from caps to stop.
 struct State {
@@ -56,10 +57,7 @@ struct State {
 struct GstEventHdf5SinkPrivate {
   explicit GstEventHdf5SinkPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
 
-  std::mutex mutex;  // guards the properties; nothing is called under it
-  std::string location;
-  Hdf5Layout layout = default_layout;
-  Hdf5Writer::Compression compression = default_compression;
+  GuardedSettings<Settings> settings;
 
   // The streaming thread's, or nobody's while there is none.
   State state;
@@ -107,44 +105,6 @@ static GType compression_type() {
   return enum_type("GstEventHdf5Compression", values);
 }
 
-static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  auto* priv = GST_EVENT_HDF5_SINK(object)->priv;
-  const std::lock_guard lock(priv->mutex);
-  switch (id) {
-    case prop_location: {
-      const gchar* const location = g_value_get_string(value);
-      priv->location = location == nullptr ? "" : location;
-      break;
-    }
-    case prop_layout:
-      priv->layout = static_cast<Hdf5Layout>(g_value_get_enum(value));
-      break;
-    case prop_compression:
-      priv->compression = static_cast<Hdf5Writer::Compression>(g_value_get_enum(value));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-  }
-}
-
-static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  auto* priv = GST_EVENT_HDF5_SINK(object)->priv;
-  const std::lock_guard lock(priv->mutex);
-  switch (id) {
-    case prop_location:
-      g_value_set_string(value, priv->location.empty() ? nullptr : priv->location.c_str());
-      break;
-    case prop_layout:
-      g_value_set_enum(value, static_cast<int>(priv->layout));
-      break;
-    case prop_compression:
-      g_value_set_enum(value, static_cast<int>(priv->compression));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-  }
-}
-
 /* the file */
 
 /// Runs what may throw. What is thrown is reported, and ends the file: nothing of it can be saved
@@ -157,9 +117,9 @@ static bool reported(GstEventHdf5Sink* self, const Work& work) {
         auto* priv = self->priv;
         priv->state.writer.reset();
         priv->state.ended = true;
-        const std::lock_guard lock(priv->mutex);
         return WritableEvents::failure(
-            error, {GST_RESOURCE_ERROR_WRITE, "Cannot write " + priv->location + "."});
+            error,
+            {GST_RESOURCE_ERROR_WRITE, "Cannot write " + priv->settings.copy().location + "."});
       },
       work);
 }
@@ -179,23 +139,15 @@ static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
   priv->state = State();  // to the library two open files of one name are one
   priv->state.info = info;
   priv->writable.begin_file({info.width, info.height});
-  std::string location;
-  Hdf5Writer::Settings settings;
-  settings.size = {info.width, info.height};
-  {
-    const std::lock_guard lock(priv->mutex);
-    location = priv->location;
-    settings.layout = priv->layout;
-    settings.compression = priv->compression;
-  }
+  const auto [location, layout, compression] = priv->settings.copy();
+  const Hdf5Writer::Settings settings{layout, compression, {info.width, info.height}};
   return reported(self,
                   [&] { priv->state.writer = std::make_unique<Hdf5Writer>(location, settings); });
 }
 
 static gboolean start(GstBaseSink* sink) {
   auto* self = GST_EVENT_HDF5_SINK(sink);
-  const std::lock_guard lock(self->priv->mutex);
-  if (!self->priv->location.empty()) return TRUE;
+  if (!self->priv->settings.copy().location.empty()) return TRUE;
   GST_ELEMENT_ERROR(self, RESOURCE, NOT_FOUND, ("No file to write to. Set the property location."),
                     ("location is empty"));
   return FALSE;
@@ -256,6 +208,10 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
 
 /* type */
 
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_EVENT_HDF5_SINK(object)->priv->settings;
+}
+
 static void finalize(GObject* object) {
   delete GST_EVENT_HDF5_SINK(object)->priv;
   G_OBJECT_CLASS(gst_event_hdf5_sink_parent_class)->finalize(object);
@@ -268,24 +224,22 @@ static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
 
 static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = set_property;
-  object_class->get_property = get_property;
   object_class->finalize = finalize;
-  const auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                              GST_PARAM_MUTABLE_READY);
-  g_object_class_install_property(
-      object_class, prop_location,
-      g_param_spec_string("location", "Location", "File to write; an existing file is overwritten",
-                          nullptr, flags));
-  g_object_class_install_property(
-      object_class, prop_layout,
-      g_param_spec_enum("layout", "Layout", "Layout of the events in the file", layout_type(),
-                        static_cast<int>(default_layout), flags));
-  g_object_class_install_property(
-      object_class, prop_compression,
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                  GST_PARAM_MUTABLE_READY);
+  const Settings defaults;
+  Properties<settings_of> properties(object_class);
+  properties.add(&Settings::location,
+                 g_param_spec_string("location", "Location",
+                                     "File to write; an existing file is overwritten", "", flags));
+  properties.add(&Settings::layout,
+                 g_param_spec_enum("layout", "Layout", "Layout of the events in the file",
+                                   layout_type(), static_cast<int>(defaults.layout), flags));
+  properties.add(
+      &Settings::compression,
       g_param_spec_enum("compression", "Compression",
                         "Compression of the DSEC layout; Metavision's is always ECF",
-                        compression_type(), static_cast<int>(default_compression), flags));
+                        compression_type(), static_cast<int>(defaults.compression), flags));
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_static_pad_template(element_class, &sink_template);

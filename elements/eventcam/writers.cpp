@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "elements/eventcam/evtformat.hpp"
-#include "gst/base/enum_type.hpp"
 #include "gst/base/eventwriter.hpp"
+#include "gst/base/types.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"

@@ -5,18 +5,18 @@
  * @short_description: events of a physical event-camera pixel
  *
  * Turns video into what an event camera would have seen, with the pixel itself simulated: the
- * response to light, the photoreceptor's bandwidth, a reference level that is remembered from frame
- * to frame, thresholds that differ from pixel to pixel, leak, shot noise, hot and dead pixels, the
- * refractory period, latency, and the limits of the readout. Each event has the time at which its
- * pixel's signal crossed its threshold, to the microsecond.
+ * response to light, photoreceptor bandwidth, a reference level that is kept from frame to frame,
+ * threshold mismatch, leak, shot noise, hot and dead pixels, the refractory period, latency, and
+ * the limits of the readout. Each event has the time at which its pixel's signal crossed its
+ * threshold, to the microsecond.
  *
- * A preset says what all of it is; a property that is set, before the preset or after it, says what
- * is different. Thresholds are in units of the response: with log and lin-log a threshold of 0.2 is
- * a change of light by 22 %; linear has as many units from black to white as lin-log, ln(255) =
- * 5.54, so that 0.2 are 9.2 grey levels of 8-bit video.
+ * A preset sets all of it; properties that are set, before the preset or after it, override it.
+ * Thresholds are in units of the response: with log and lin-log a threshold of 0.2 is a change of
+ * light by 22 %; linear has as many units from black to white as lin-log, ln(255) = 5.54, so that
+ * 0.2 is 9.2 grey levels of 8-bit video.
  *
- * What the sensor of a webcam makes of itself is not light: where a still scene fires, or the dark,
- * denoise keeps its noise away, and its edges where they are.
+ * Sensor noise of a webcam is not light: where a still or dark scene fires, denoise removes the
+ * noise and keeps the edges.
  *
  * The same video, settings and seed give the same events, whatever the number of threads.
  *
@@ -29,12 +29,13 @@
  * threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=ball.raw
  * ]|
  */
-#include <array>
 #include <bitset>
-#include <mutex>
+#include <utility>
 #include <variant>
 
 #include "gst/base/eventsimulator.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 
@@ -45,14 +46,57 @@ using eventcamera::RefractoryReset;
 using eventcamera::Response;
 using eventcamera::Upsampling;
 
+static GType response_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Response::log), "ln(log-eps + light)", "log"},
+      {static_cast<int>(Response::lin_log), "Linear up to grey level 20, ln(light) above (v2e)",
+       "lin-log"},
+      {static_cast<int>(Response::linear),
+       "ln(255) light: for video whose gamma has made it nearly logarithmic", "linear"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventSimDvsResponse", values);
+}
+
+static GType upsampling_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Upsampling::linear),
+       "In each pixel on a straight line, in units of the response", "linear"},
+      {static_cast<int>(Upsampling::motion),
+       "Along dense optical flow, in steps of at most one pixel", "motion"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventSimDvsUpsampling", values);
+}
+
+static GType refractory_reset_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(RefractoryReset::level),
+       "At the level that was crossed; crossings within the refractory period are lost", "level"},
+      {static_cast<int>(RefractoryReset::signal), "At the signal when the refractory period ends",
+       "signal"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventSimDvsRefractoryReset", values);
+}
+
+static GType preset_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(DvsPreset::ideal), "No noise, no delay; lin-log", "ideal"},
+      {static_cast<int>(DvsPreset::esim), "ESIM: the same with a logarithm", "esim"},
+      {static_cast<int>(DvsPreset::v2e_clean), "v2e, clean: mismatch only", "v2e-clean"},
+      {static_cast<int>(DvsPreset::v2e_noisy), "v2e, noisy: in dim light", "v2e-noisy"},
+      {static_cast<int>(DvsPreset::icns), "IEBCS, the simulator of the ICNS", "icns"},
+      {static_cast<int>(DvsPreset::davis346), "iniVation DAVIS346", "davis346"},
+      {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636", "gen4"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventSimDvsPreset", values);
+}
+
 namespace {
 
-constexpr guint prop_preset = GST_EVENT_SIMULATOR_FIRST_OWN_PROPERTY;
-constexpr guint prop_first_setting = prop_preset + 1;
-
-constexpr DvsPreset default_preset = DvsPreset::ideal;
-
-/// A property that is a setting, and where the settings have it.
+/// A property that is a member of DvsSettings.
 struct Setting {
   const char* name;
   const char* nick;
@@ -61,42 +105,44 @@ struct Setting {
                std::uint64_t DvsSettings::*, Response DvsSettings::*, Upsampling DvsSettings::*,
                RefractoryReset DvsSettings::*>
       member;
-  double least = 0;
-  double most = 0;
+  double min = 0;
+  double max = 0;
+  GType (*type)() = nullptr;  ///< of an enum
 };
 
 const Setting table[] = {
     {"denoise", "Denoise",
-     "Smooth the frames first, but no difference between neighbours beyond this many grey levels, "
-     "white being 255: a frame's noise is not light (0 = off)",
+     "Smooth frames first, sparing differences between neighbours above this, since sensor noise "
+     "is not light (grey levels, white is 255; 0 = off)",
      &DvsSettings::denoise, 0, 255},
     {"linear-light", "Linear light",
-     "Undo the transfer function of sRGB (IEC 61966-2-1) first, so that light is what the camera "
-     "saw; otherwise luma is taken to be light",
+     "Undo the transfer function of sRGB (IEC 61966-2-1) first, to get the light that the camera "
+     "saw; otherwise luma is taken as light",
      &DvsSettings::linear_light},
-    {"response", "Response", "What the photoreceptor makes of light", &DvsSettings::response},
+    {"response", "Response", "Response of the photoreceptor to light", &DvsSettings::response, 0, 0,
+     response_type},
     {"log-eps", "Offset of the logarithm",
-     "response=log is ln(log-eps + light), white being 1: what the darkest pixels see anyway",
+     "Light that response=log adds before the logarithm, which limits how dark pixels get (white "
+     "is 1)",
      &DvsSettings::log_eps, 1e-6, 1},
-    {"upsampling", "Upsampling", "How the light goes from one frame to the next",
-     &DvsSettings::upsampling},
-    {"max-steps", "Most steps",
-     "With upsampling=motion, the most steps between two frames; there are as many as the fastest "
-     "thing moves pixels",
+    {"upsampling", "Upsampling", "How the light changes between two frames",
+     &DvsSettings::upsampling, 0, 0, upsampling_type},
+    {"max-steps", "Maximum steps",
+     "Maximum number of steps between two frames with upsampling=motion; there are as many as the "
+     "pixels that the fastest point moves",
      &DvsSettings::max_steps, 1, 255},
     {"cutoff-hz", "Cutoff",
-     "Bandwidth of the photoreceptor at white, Hz; darker pixels are slower (0 = no limit)",
+     "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
      &DvsSettings::cutoff_hz, 0, 1e6},
     {"dark-light", "Dark light",
-     "Light that is always there, white being 1: bandwidth goes with "
-     "(light + dark-light) / (1 + dark-light), and shot noise falls with it to a quarter",
+     "Light that is always there (white is 1): the bandwidth is proportional to (light + "
+     "dark-light) / (1 + dark-light), and light reduces shot noise to as little as a quarter",
      &DvsSettings::dark_light, 1e-6, 1},
     {"positive-threshold", "Positive threshold",
-     "An ON event needs a rise of this much above the reference (units of the response)",
+     "Rise above the reference level that fires an ON event (units of the response)",
      &DvsSettings::positive_threshold, 1e-3, 10},
     {"negative-threshold", "Negative threshold",
-     "An OFF event needs a fall of this much below the reference (units of the response, a "
-     "magnitude)",
+     "Fall below the reference level that fires an OFF event (units of the response, a magnitude)",
      &DvsSettings::negative_threshold, 1e-3, 10},
     {"threshold-sigma", "Threshold mismatch",
      "Standard deviation of each threshold from pixel to pixel (units of the response)",
@@ -105,291 +151,145 @@ const Setting table[] = {
      "Standard deviation of each threshold from event to event (units of the response)",
      &DvsSettings::threshold_jitter, 0, 10},
     {"leak-rate-hz", "Leak rate",
-     "ON events a second of a pixel that sees nothing change, in the mean, Hz: its reference leaks",
+     "Mean rate of ON events of a pixel without change, from the leak of its reference level (Hz)",
      &DvsSettings::leak_rate_hz, 0, 1e4},
     {"leak-spread", "Leak spread",
-     "Standard deviation of the leak rate from pixel to pixel, decades", &DvsSettings::leak_spread,
+     "Standard deviation of the leak rate from pixel to pixel (decades)", &DvsSettings::leak_spread,
      0, 1},
     {"shot-noise-rate-hz", "Shot-noise rate",
-     "Events a second of a pixel that come by chance, ON and OFF together, in the dark, Hz",
+     "Rate of random events of a pixel in the dark, ON and OFF together (Hz)",
      &DvsSettings::shot_noise_rate_hz, 0, 1e4},
     {"hot-pixels", "Hot pixels",
-     "Share of the pixels that leak 10 to 1000 ON events a second, whatever they see",
+     "Fraction of pixels that leak 10 to 1000 ON events per second, whatever they see",
      &DvsSettings::hot_pixels, 0, 1},
-    {"dead-pixels", "Dead pixels", "Share of the pixels that never fire", &DvsSettings::dead_pixels,
+    {"dead-pixels", "Dead pixels", "Fraction of pixels that never fire", &DvsSettings::dead_pixels,
      0, 1},
     {"refractory-period", "Refractory period",
-     "A pixel that has fired does not fire again for so long, microseconds",
+     "Time after an event in which a pixel does not fire again (us)",
      &DvsSettings::refractory_period, 0, 1e6},
-    {"refractory-reset", "Refractory reset", "Where the reference of a pixel is after an event",
-     &DvsSettings::refractory_reset},
+    {"refractory-reset", "Refractory reset", "Reference level of a pixel after an event",
+     &DvsSettings::refractory_reset, 0, 0, refractory_reset_type},
     {"exposure-pulse", "Exposure pulse",
-     "Cameras that give frames too couple them into their events: all signals rise by this much "
-     "for "
-     "a millisecond as an exposure begins (units of the response)",
+     "Rise of all signals for a millisecond when an exposure begins, in cameras that also capture "
+     "frames (units of the response)",
      &DvsSettings::exposure_pulse, 0, 10},
     {"exposure-lead", "Exposure lead",
-     "From the beginning of a frame's exposure to the frame's time, microseconds, up to the time "
-     "from frame to frame",
+     "Time from the start of a frame's exposure to the frame's timestamp, at most the time between "
+     "frames (us)",
      &DvsSettings::exposure_lead, 0, 1e6},
     {"latency", "Latency",
-     "From the crossing of a threshold to the event, microseconds; the refractory period begins "
-     "then. What lies behind the last frame is not sent",
+     "Time from the crossing of a threshold to the event, with which the refractory period begins "
+     "(us). Events past the last frame are not sent",
      &DvsSettings::latency, 0, 1e6},
-    {"latency-jitter", "Latency jitter", "Standard deviation of the latency, microseconds",
+    {"latency-jitter", "Latency jitter", "Standard deviation of the latency (us)",
      &DvsSettings::latency_jitter, 0, 1e6},
-    {"max-event-rate", "Highest event rate",
-     "What the readout takes, events a second: others wait, row by row, and a pixel that waits "
-     "makes no further event (0 = no limit)",
+    {"max-event-rate", "Maximum event rate",
+     "Capacity of the readout: further events wait, row by row, and a waiting pixel fires no other "
+     "event (events/s; 0 = no limit)",
      &DvsSettings::max_event_rate, 0, 1e12},
-    {"seed", "Seed", "Of all that is left to chance: the same gives the same events",
+    {"seed", "Seed", "Seed of all random numbers: the same seed gives the same events",
      &DvsSettings::seed},
 };
-constexpr std::size_t setting_count = std::size(table);
 
-/// What the application has set, copied once per frame.
+/// What the application has chosen.
 struct Choice {
-  std::mutex mutex;  // guards what follows
-  DvsPreset preset = default_preset;
-  DvsSettings own;
-  std::bitset<setting_count> is_own;
-};
+  DvsPreset preset = DvsPreset::ideal;
+  DvsSettings settings = eventcamera::settings_of(DvsPreset::ideal);
+  std::bitset<std::size(table)> overridden;  ///< settings that are not the preset's
 
-struct GstEventSimDvs {
-  GstEventSimulator parent;
-  Choice* choice;
-};
-
-struct GstEventSimDvsClass {
-  GstEventSimulatorClass parent_class;
+  void take_preset(const GValue* value) {
+    read_value(value, preset);
+    const DvsSettings old = std::exchange(settings, eventcamera::settings_of(preset));
+    for (std::size_t i = 0; i < overridden.size(); ++i)
+      if (overridden[i])
+        std::visit([&](auto member) { settings.*member = old.*member; }, table[i].member);
+  }
 };
 
 }  // namespace
 
-static GType preset_get_type() {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {static_cast<int>(DvsPreset::ideal), "Neither noise nor delay; lin-log", "ideal"},
-        {static_cast<int>(DvsPreset::esim), "ESIM: the same with a logarithm", "esim"},
-        {static_cast<int>(DvsPreset::v2e_clean), "v2e, clean: mismatch alone", "v2e-clean"},
-        {static_cast<int>(DvsPreset::v2e_noisy), "v2e, noisy: in dim light", "v2e-noisy"},
-        {static_cast<int>(DvsPreset::icns), "IEBCS, the simulator of the ICNS", "icns"},
-        {static_cast<int>(DvsPreset::davis346), "iniVation DAVIS346", "davis346"},
-        {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636", "gen4"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstEventSimDvsPreset", values);
-  }();
-  return type;
-}
+G_DECLARE_FINAL_TYPE(GstEventSimDvs, gst_event_sim_dvs, GST, EVENT_SIM_DVS, GstEventSimulator)
 
-static GType response_get_type() {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {static_cast<int>(Response::log), "ln(log-eps + light)", "log"},
-        {static_cast<int>(Response::lin_log), "Linear up to grey level 20, ln(light) above (v2e)",
-         "lin-log"},
-        {static_cast<int>(Response::linear),
-         "ln(255) light: for video whose gamma has made it nearly logarithmic", "linear"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstEventSimDvsResponse", values);
-  }();
-  return type;
-}
-
-static GType upsampling_get_type() {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {static_cast<int>(Upsampling::linear),
-         "In each pixel on a straight line, in units of the response", "linear"},
-        {static_cast<int>(Upsampling::motion),
-         "Along dense optical flow, in steps of a pixel at most", "motion"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstEventSimDvsUpsampling", values);
-  }();
-  return type;
-}
-
-static GType refractory_reset_get_type() {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {static_cast<int>(RefractoryReset::level),
-         "At the level that was crossed; crossings within the refractory period are lost", "level"},
-        {static_cast<int>(RefractoryReset::signal), "At the signal as the refractory period ends",
-         "signal"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstEventSimDvsRefractoryReset", values);
-  }();
-  return type;
-}
+struct _GstEventSimDvs {
+  GstEventSimulator parent;
+  GuardedSettings<Choice> choice;
+};
 
 G_DEFINE_TYPE(GstEventSimDvs, gst_event_sim_dvs, GST_TYPE_EVENT_SIMULATOR)
 GST_ELEMENT_REGISTER_DEFINE(eventsim_dvs, "eventsim-dvs", GST_RANK_NONE,
                             gst_event_sim_dvs_get_type())
 
-static Choice& choice_of(void* object) {
-  return *G_TYPE_CHECK_INSTANCE_CAST(object, gst_event_sim_dvs_get_type(), GstEventSimDvs)->choice;
+static GuardedSettings<Choice>& choice_of(GObject* object) {
+  return GST_EVENT_SIM_DVS(object)->choice;
 }
 
-/// The preset's, where the application has not set its own.
-static DvsSettings settings_of(const Choice& choice) {
-  DvsSettings settings = eventcamera::settings_of(choice.preset);
-  for (std::size_t i = 0; i < setting_count; ++i)
-    if (choice.is_own[i])
-      std::visit([&](auto member) { settings.*member = choice.own.*member; }, table[i].member);
-  return settings;
-}
-
-static std::unique_ptr<eventcamera::Simulator> create(GstEventSimulator*,
-                                                      const eventcamera::LumaFormat& format) {
+static std::unique_ptr<eventcamera::Simulator> create(const eventcamera::LumaFormat& format) {
   return eventcamera::make_dvs_simulator(format);
 }
 
 static void configure(GstEventSimulator* element, eventcamera::Simulator& simulator) {
-  auto& choice = choice_of(element);
-  const std::lock_guard lock(choice.mutex);
-  static_cast<DvsSimulator&>(simulator).set(settings_of(choice));
-}
-
-/* a setting's value, its GValue, and its GParamSpec, type by type */
-
-static void read(const GValue* value, double& to) {
-  to = g_value_get_double(value);
-}
-static void read(const GValue* value, int& to) {
-  to = static_cast<int>(g_value_get_uint(value));
-}
-static void read(const GValue* value, bool& to) {
-  to = g_value_get_boolean(value) != FALSE;
-}
-static void read(const GValue* value, std::uint64_t& to) {
-  to = g_value_get_uint64(value);
-}
-template <class Enum>
-static void read(const GValue* value, Enum& to) {
-  to = static_cast<Enum>(g_value_get_enum(value));
-}
-
-static void write(double from, GValue* value) {
-  g_value_set_double(value, from);
-}
-static void write(int from, GValue* value) {
-  g_value_set_uint(value, static_cast<guint>(from));
-}
-static void write(bool from, GValue* value) {
-  g_value_set_boolean(value, from ? TRUE : FALSE);
-}
-static void write(std::uint64_t from, GValue* value) {
-  g_value_set_uint64(value, from);
-}
-template <class Enum>
-static void write(Enum from, GValue* value) {
-  g_value_set_enum(value, static_cast<int>(from));
+  static_cast<DvsSimulator&>(simulator).set(choice_of(G_OBJECT(element)).copy().settings);
 }
 
 static constexpr auto property_flags = static_cast<GParamFlags>(
     G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 
-static GParamSpec* spec_of(const Setting& s, double preset) {
-  return g_param_spec_double(s.name, s.nick, s.blurb, s.least, s.most, preset, property_flags);
-}
-static GParamSpec* spec_of(const Setting& s, int preset) {
-  return g_param_spec_uint(s.name, s.nick, s.blurb, static_cast<guint>(s.least),
-                           static_cast<guint>(s.most), static_cast<guint>(preset), property_flags);
-}
-static GParamSpec* spec_of(const Setting& s, bool preset) {
-  return g_param_spec_boolean(s.name, s.nick, s.blurb, preset ? TRUE : FALSE, property_flags);
-}
-static GParamSpec* spec_of(const Setting& s, std::uint64_t preset) {
-  return g_param_spec_uint64(s.name, s.nick, s.blurb, 0, G_MAXUINT64, preset, property_flags);
-}
-static GParamSpec* spec_of(const Setting& s, Response preset) {
-  return g_param_spec_enum(s.name, s.nick, s.blurb, response_get_type(), static_cast<int>(preset),
-                           property_flags);
-}
-static GParamSpec* spec_of(const Setting& s, Upsampling preset) {
-  return g_param_spec_enum(s.name, s.nick, s.blurb, upsampling_get_type(), static_cast<int>(preset),
-                           property_flags);
-}
-static GParamSpec* spec_of(const Setting& s, RefractoryReset preset) {
-  return g_param_spec_enum(s.name, s.nick, s.blurb, refractory_reset_get_type(),
-                           static_cast<int>(preset), property_flags);
+template <class Value>
+static GParamSpec* spec_of(const Setting& s, Value value) {
+  if constexpr (std::is_same_v<Value, double>)
+    return g_param_spec_double(s.name, s.nick, s.blurb, s.min, s.max, value, property_flags);
+  else if constexpr (std::is_same_v<Value, int>)
+    return g_param_spec_uint(s.name, s.nick, s.blurb, static_cast<guint>(s.min),
+                             static_cast<guint>(s.max), static_cast<guint>(value), property_flags);
+  else if constexpr (std::is_same_v<Value, bool>)
+    return g_param_spec_boolean(s.name, s.nick, s.blurb, value, property_flags);
+  else if constexpr (std::is_same_v<Value, std::uint64_t>)
+    return g_param_spec_uint64(s.name, s.nick, s.blurb, 0, G_MAXUINT64, value, property_flags);
+  else
+    return g_param_spec_enum(s.name, s.nick, s.blurb, s.type(), static_cast<int>(value),
+                             property_flags);
 }
 
-static bool is_setting(guint id) {
-  return id >= prop_first_setting && id < prop_first_setting + setting_count;
-}
-
-static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  auto& choice = choice_of(object);
-  if (id == prop_preset) {
-    const std::lock_guard lock(choice.mutex);
-    choice.preset = static_cast<DvsPreset>(g_value_get_enum(value));
-  } else if (is_setting(id)) {
-    const std::size_t i = id - prop_first_setting;
-    const std::lock_guard lock(choice.mutex);
-    std::visit([&](auto member) { read(value, choice.own.*member); }, table[i].member);
-    choice.is_own[i] = true;
-  } else {
-    gst_event_simulator_set_property(object, id, value, spec);
-  }
-}
-
-static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  auto& choice = choice_of(object);
-  if (id == prop_preset) {
-    const std::lock_guard lock(choice.mutex);
-    g_value_set_enum(value, static_cast<int>(choice.preset));
-  } else if (is_setting(id)) {
-    const std::lock_guard lock(choice.mutex);
-    const DvsSettings settings = settings_of(choice);
-    std::visit([&](auto member) { write(settings.*member, value); },
-               table[id - prop_first_setting].member);
-  } else {
-    gst_event_simulator_get_property(object, id, value, spec);
+static void install_properties(GObjectClass* klass) {
+  const Choice defaults;
+  Properties<choice_of> properties(klass);
+  properties.add(
+      [](Choice& choice, const GValue* value) { choice.take_preset(value); },
+      [](Choice& choice, GValue* value) { write_value(choice.preset, value); },
+      g_param_spec_enum("preset", "Preset",
+                        "Values of all properties that are not set themselves, before "
+                        "or after",
+                        preset_type(), static_cast<int>(defaults.preset), property_flags));
+  for (std::size_t i = 0; i < std::size(table); ++i) {
+    const auto add = [&](auto member) {
+      properties.add(
+          [member, i](Choice& choice, const GValue* value) {
+            read_value(value, choice.settings.*member);
+            choice.overridden[i] = true;
+          },
+          [member](Choice& choice, GValue* value) { write_value(choice.settings.*member, value); },
+          spec_of(table[i], defaults.settings.*member));
+    };
+    std::visit(add, table[i].member);
   }
 }
 
 static void finalize(GObject* object) {
-  delete &choice_of(object);
+  std::destroy_at(&choice_of(object));
   G_OBJECT_CLASS(gst_event_sim_dvs_parent_class)->finalize(object);
 }
 
 static void gst_event_sim_dvs_init(GstEventSimDvs* self) {
-  self->choice = new Choice();
+  std::construct_at(&self->choice);
 }
 
 static void gst_event_sim_dvs_class_init(GstEventSimDvsClass* klass) {
-  GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = set_property;
-  object_class->get_property = get_property;
-  object_class->finalize = finalize;
-  g_object_class_install_property(
-      object_class, prop_preset,
-      g_param_spec_enum("preset", "Preset",
-                        "What all other properties are that are not set themselves, in any order",
-                        preset_get_type(), static_cast<int>(default_preset), property_flags));
-  const DvsSettings defaults = eventcamera::settings_of(default_preset);
-  for (std::size_t i = 0; i < setting_count; ++i)
-    std::visit(
-        [&](auto member) {
-          g_object_class_install_property(object_class, prop_first_setting + static_cast<guint>(i),
-                                          spec_of(table[i], defaults.*member));
-        },
-        table[i].member);
-
+  G_OBJECT_CLASS(klass)->finalize = finalize;
+  install_properties(G_OBJECT_CLASS(klass));
   GstEventSimulatorClass* simulator_class = GST_EVENT_SIMULATOR_CLASS(klass);
   simulator_class->create = create;
   simulator_class->configure = configure;
-  gst_element_class_set_static_metadata(
-      GST_ELEMENT_CLASS(klass), "Event camera simulator: physical pixel", "Converter/Video",
-      "Turns video into events: simulates the pixels of an event camera and their noise",
-      "gst-eventsim");
-  gst_type_mark_as_plugin_api(preset_get_type(), static_cast<GstPluginAPIFlags>(0));
-  gst_type_mark_as_plugin_api(response_get_type(), static_cast<GstPluginAPIFlags>(0));
-  gst_type_mark_as_plugin_api(upsampling_get_type(), static_cast<GstPluginAPIFlags>(0));
-  gst_type_mark_as_plugin_api(refractory_reset_get_type(), static_cast<GstPluginAPIFlags>(0));
+  gst_event_simulator_class_describe(
+      simulator_class, "Event camera simulator: physical pixel",
+      "Turns video into events: simulates the pixels of an event camera and their noise");
 }

@@ -3,17 +3,19 @@
 
 #include <gst/video/video.h>
 
-#include <exception>
 #include <mutex>
 #include <new>
 #include <optional>
 #include <utility>
 
 #include "gst/base/drawn_video.hpp"
+#include "gst/base/errors.hpp"
 #include "gst/base/latency.hpp"
-#include "gst/base/output_buffers.hpp"
-#include "gst/base/output_caps.hpp"
-#include "gst/base/picture_formats.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/simulator_buffers.hpp"
+#include "gst/base/simulator_caps.hpp"
+#include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/flow/fixed_point.hpp"
@@ -24,26 +26,17 @@ GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 
 using eventcamera::Accumulator;
 using eventcamera::EventBuckets;
+using eventcamera::Image;
 using eventcamera::LumaView;
 using eventcamera::Nanoseconds;
-using eventcamera::Image;
 using eventcamera::Simulator;
 
 namespace {
 
-enum Property {
-  prop_0,
-  prop_positive_threshold,
-  prop_negative_threshold,
-  prop_interpolated_frames,
-  prop_n_threads,
-  prop_palette,
-};
-
 constexpr guint max_interpolated_frames = 255;
 constexpr guint default_interpolated_frames = 10;
 
-/// The latency is that of the framerate, or the longest interval seen, up to this.
+/// Latency limit: the latency is that of the framerate, or the longest interval seen.
 constexpr GstClockTime max_latency = GST_SECOND;
 
 /// What the application sets, copied once per buffer.
@@ -54,89 +47,48 @@ struct Settings {
 
 /// What exists between caps and stop.
 struct State {
-  GstVideoInfo video;              ///< what comes in
-  std::optional<Drawing> drawing;  ///< what goes out, unless events do
+  GstVideoInfo video;              ///< the input
+  std::optional<Drawing> drawing;  ///< the output, unless that is events
   std::unique_ptr<Simulator> simulator;
-  Image<guint8> gathered;      ///< luma that was packed
+  Image<guint8> gathered;      ///< luma of a packed format
   bool discontinuous = false;  ///< the next buffer does not follow on the last one
+};
+
+/// What exists between start and stop, whatever the caps.
+struct Stream {
+  std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
+  bool backwards = false;                       ///< the segment has been refused
+  WarnOnce warn_of_times;
+  WarnOnce warn_of_interlacing;
 };
 
 }  // namespace
 
 struct GstEventSimulatorPrivate {
-  std::mutex mutex;  // guards what follows; nothing is called under it
-  Settings settings;
+  GuardedSettings<Settings> settings;
+
+  std::mutex mutex;  // guards the latency; nothing is called under it
   GstClockTime latency = 0;
 
   // The streaming thread's, or nobody's while there is none.
   std::optional<State> state;
-  std::optional<Nanoseconds> handed_out_until;  // where the last interval of the segment ended
-  bool warned_of_times = false;
-  bool warned_of_interlacing = false;
-  bool backwards = false;  // the segment is one that was refused
+  Stream stream;
 };
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventSimulator, gst_event_simulator, GST_TYPE_BASE_TRANSFORM,
-                                 GST_DEBUG_CATEGORY_INIT(event_simulator_debug, "eventsim", 0,
-                                                         "event simulators"))
+                                 G_ADD_PRIVATE(GstEventSimulator)
+                                     GST_DEBUG_CATEGORY_INIT(event_simulator_debug, "eventsim", 0,
+                                                             "event simulators"))
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_simulator_parent_class)
+
+static GstEventSimulatorPrivate& priv_of(GstEventSimulator* self) {
+  return *static_cast<GstEventSimulatorPrivate*>(gst_event_simulator_get_instance_private(self));
+}
 
 /* properties */
 
-void gst_event_simulator_set_property(GObject* object, guint id, const GValue* value,
-                                      GParamSpec* spec) {
-  auto& settings = GST_EVENT_SIMULATOR(object)->priv->settings;
-  const std::lock_guard lock(GST_EVENT_SIMULATOR(object)->priv->mutex);
-  switch (id) {
-    case prop_positive_threshold:
-      settings.simulation.positive_threshold = g_value_get_double(value);
-      break;
-    case prop_negative_threshold:
-      settings.simulation.negative_threshold = g_value_get_double(value);
-      break;
-    case prop_interpolated_frames:
-      settings.simulation.interpolated_frames = static_cast<int>(g_value_get_uint(value));
-      break;
-    case prop_n_threads:
-      settings.simulation.threads = static_cast<int>(g_value_get_uint(value));
-      break;
-    case prop_palette:
-      settings.palette = static_cast<GstEventCameraPalette>(g_value_get_enum(value));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-      break;
-  }
-}
-
-void gst_event_simulator_get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  const auto& settings = GST_EVENT_SIMULATOR(object)->priv->settings;
-  const std::lock_guard lock(GST_EVENT_SIMULATOR(object)->priv->mutex);
-  switch (id) {
-    case prop_positive_threshold:
-      g_value_set_double(value, settings.simulation.positive_threshold);
-      break;
-    case prop_negative_threshold:
-      g_value_set_double(value, settings.simulation.negative_threshold);
-      break;
-    case prop_interpolated_frames:
-      g_value_set_uint(value, static_cast<guint>(settings.simulation.interpolated_frames));
-      break;
-    case prop_n_threads:
-      g_value_set_uint(value, static_cast<guint>(settings.simulation.threads));
-      break;
-    case prop_palette:
-      g_value_set_enum(value, settings.palette);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-      break;
-  }
-}
-
-static Settings settings_of(GstEventSimulator* self) {
-  const std::lock_guard lock(self->priv->mutex);
-  return self->priv->settings;
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return priv_of(GST_EVENT_SIMULATOR(object)).settings;
 }
 
 static constexpr auto property_flags = static_cast<GParamFlags>(
@@ -144,52 +96,62 @@ static constexpr auto property_flags = static_cast<GParamFlags>(
 
 void gst_event_simulator_class_install_thresholds(GstEventSimulatorClass* klass,
                                                   double grey_levels) {
-  GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  if (object_class->set_property == nullptr) {  // GObject lets no class inherit these
-    object_class->set_property = gst_event_simulator_set_property;
-    object_class->get_property = gst_event_simulator_get_property;
-  }
-  g_object_class_install_property(
-      object_class, prop_positive_threshold,
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  properties.add(
+      [](Settings& settings) -> double& { return settings.simulation.positive_threshold; },
       g_param_spec_double("positive-threshold", "Positive threshold",
-                          "An ON event needs a rise in brightness of more than this "
+                          "Minimum rise in brightness for an ON event, exclusive "
                           "(8-bit grey levels, whatever the depth of the video)",
                           0, 255, grey_levels, property_flags));
-  g_object_class_install_property(
-      object_class, prop_negative_threshold,
+  properties.add(
+      [](Settings& settings) -> double& { return settings.simulation.negative_threshold; },
       g_param_spec_double("negative-threshold", "Negative threshold",
-                          "An OFF event needs a fall in brightness of more than this "
+                          "Minimum fall in brightness for an OFF event, exclusive "
                           "(8-bit grey levels, a magnitude, whatever the depth of the video)",
                           0, 255, grey_levels, property_flags));
 }
 
 void gst_event_simulator_class_install_interpolated_frames(GstEventSimulatorClass* klass) {
-  g_object_class_install_property(
-      G_OBJECT_CLASS(klass), prop_interpolated_frames,
-      g_param_spec_uint("interpolated-frames", "Interpolated frames",
-                        "How many frames to make between two frames of the video; events get "
-                        "the times of these (no more are made than there are microseconds)",
-                        0, max_interpolated_frames, default_interpolated_frames, property_flags));
+  Properties<settings_of>(G_OBJECT_CLASS(klass))
+      .add([](Settings& settings) -> int& { return settings.simulation.interpolated_frames; },
+           g_param_spec_uint("interpolated-frames", "Interpolated frames",
+                             "Number of frames to interpolate between two frames of the video; "
+                             "events get their times (at most one frame per microsecond)",
+                             0, max_interpolated_frames, default_interpolated_frames,
+                             property_flags));
+}
+
+static void install_base_properties(GObjectClass* klass) {
+  Properties<settings_of> properties(klass);
+  properties.add([](Settings& settings) -> int& { return settings.simulation.threads; },
+                 g_param_spec_uint("n-threads", "Threads",
+                                   "Maximum number of threads for one frame (0 = one for each "
+                                   "processor); the events are the same for any number",
+                                   0, G_MAXINT, 0, property_flags));
+  properties.add(&Settings::palette,
+                 g_param_spec_enum("palette", "Palette", "Colours of accumulated-event video",
+                                   GST_TYPE_EVENT_CAMERA_PALETTE, GST_EVENT_CAMERA_PALETTE_DARK,
+                                   property_flags));
 }
 
 /* time */
 
 static GstClockTime latency_of(GstEventSimulator* self) {
-  const std::lock_guard lock(self->priv->mutex);
-  return self->priv->latency;
+  const std::lock_guard lock(priv_of(self).mutex);
+  return priv_of(self).latency;
 }
 
-/// Sinks are told when it changes.
+/// Posts a latency message when it changes.
 static void set_latency(GstEventSimulator* self, GstClockTime latency) {
   {
-    const std::lock_guard lock(self->priv->mutex);
-    if (std::exchange(self->priv->latency, latency) == latency) return;
+    const std::lock_guard lock(priv_of(self).mutex);
+    if (std::exchange(priv_of(self).latency, latency) == latency) return;
   }
   GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(latency));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
-/// Frames come as they come, whatever the caps say.
+/// The framerate in the caps may be missing or wrong.
 static void learn_latency(GstEventSimulator* self, GstClockTime interval) {
   const GstClockTime seen = MIN(interval, max_latency);
   if (seen > latency_of(self)) set_latency(self, seen);
@@ -197,50 +159,47 @@ static void learn_latency(GstEventSimulator* self, GstClockTime interval) {
 
 /// Makes the next frame a first frame.
 static void forget_frames(GstEventSimulator* self) {
-  auto& state = self->priv->state;
+  auto& state = priv_of(self).state;
   if (!state || !state->simulator->last_time()) return;
   state->simulator->reset();
   state->discontinuous = true;
 }
 
-/// Where time begins anew, so do intervals.
-static void begin_anew(GstEventSimulator* self) {
+/// Time starts over, and so do the intervals.
+static void start_over(GstEventSimulator* self) {
   forget_frames(self);
-  self->priv->handed_out_until.reset();
+  priv_of(self).stream.handed_out_until.reset();
 }
 
-/// Bad times come in droves: the first is reported to the application, all to the log.
 static void warn_of_times(GstEventSimulator* self, const char* what) {
-  GST_WARNING_OBJECT(self, "%s", what);
-  if (std::exchange(self->priv->warned_of_times, true)) return;
-  GST_ELEMENT_WARNING(self, STREAM, FORMAT,
-                      ("The timestamps of the video are broken: %s. No events are made across "
-                       "such a place.",
-                       what),
-                      ("An interval needs a PTS at both ends; videorate or a parser in front of "
-                       "this element can repair them."));
+  priv_of(self).stream.warn_of_times(
+      self,
+      {GST_STREAM_ERROR_FORMAT, std::string("Bad video timestamps: ") + what +
+                                    ". No events are made across it; videorate or a parser "
+                                    "upstream can repair timestamps."},
+      "an interval needs a PTS at both ends");
 }
 
-/// Whether a frame with this PTS can be taken, and readies the simulator for it.
+/// Prepares the simulator for the time of a frame. False where the frame has to be skipped.
 static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
-  if (GST_BUFFER_IS_DISCONT(buffer)) begin_anew(self);
+  if (GST_BUFFER_IS_DISCONT(buffer)) start_over(self);
   if (!GST_CLOCK_TIME_IS_VALID(pts) || pts > G_MAXINT64) {
     warn_of_times(self, "a frame has no PTS");
     forget_frames(self);
     return false;
   }
   const auto time = static_cast<Nanoseconds>(pts);
-  const auto last = self->priv->state->simulator->last_time();
+  const auto last = priv_of(self).state->simulator->last_time();
   if (last && time <= *last) {
-    warn_of_times(self, "a frame is not later than the one before");
+    warn_of_times(self, "a frame is not later than the previous one");
     forget_frames(self);
   } else if (last && time - *last > eventcamera::max_interval) {
-    warn_of_times(self, "two frames lie more than 71 minutes apart");
+    warn_of_times(self, "two frames are more than 71 minutes apart");
     forget_frames(self);
   }
   // An interval that begins with this frame would overlap the last one.
-  return !(self->priv->handed_out_until && time < *self->priv->handed_out_until);
+  return !(priv_of(self).stream.handed_out_until && time < *priv_of(self).stream.handed_out_until);
 }
 
 /* negotiation */
@@ -261,23 +220,25 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCap
   return event_simulator_fixate_output(other);
 }
 
-/// Fields of two moments in one frame: reported once.
-static void warn_of_interlacing(GstEventSimulator* self, GstBuffer* frame) {
-  const auto mode = GST_VIDEO_INFO_INTERLACE_MODE(&self->priv->state->video);
+/// The fields of an interlaced frame are of two moments.
+static void check_interlacing(GstEventSimulator* self, GstBuffer* frame) {
+  auto& priv = priv_of(self);
+  const auto mode = GST_VIDEO_INFO_INTERLACE_MODE(&priv.state->video);
   if (mode == GST_VIDEO_INTERLACE_MODE_PROGRESSIVE ||
       (mode == GST_VIDEO_INTERLACE_MODE_MIXED &&
-       !GST_BUFFER_FLAG_IS_SET(frame, GST_VIDEO_BUFFER_FLAG_INTERLACED)) ||
-      std::exchange(self->priv->warned_of_interlacing, true))
+       !GST_BUFFER_FLAG_IS_SET(frame, GST_VIDEO_BUFFER_FLAG_INTERLACED)))
     return;
-  GST_ELEMENT_WARNING(self, STREAM, FORMAT,
-                      ("The video is interlaced: every moving edge will fire line by line. Put a "
-                       "deinterlace element in front."),
-                      (nullptr));
+  priv.stream.warn_of_interlacing(
+      self,
+      {GST_STREAM_ERROR_FORMAT,
+       "The video is interlaced: moving edges will fire in every other row. Insert a deinterlace "
+       "element upstream."},
+      std::string("interlace-mode=") + gst_video_interlace_mode_to_string(mode));
 }
 
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
-  auto& state = self->priv->state;
+  auto& state = priv_of(self).state;
   GstVideoInfo video;
   GstVideoInfo drawn;
   if (!gst_video_info_from_caps(&video, in) ||
@@ -286,13 +247,19 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     return FALSE;
   }
   const auto luma = luma_format_of(video);
-  try {
+  const auto failure = [&](const std::exception&) -> Report {
+    state.reset();
+    return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for frames of " +
+                                                  std::to_string(luma.width) + "x" +
+                                                  std::to_string(luma.height) + " pixels."};
+  };
+  const bool made = guarded(self, failure, [&] {
     if (!state || luma_format_of(state->video) != luma) {
       const bool follows = state && (state->discontinuous || state->simulator->last_time());
       state.reset();  // before the next is made: frames can be large
       state.emplace(State{.video = video,
                           .drawing = std::nullopt,
-                          .simulator = GST_EVENT_SIMULATOR_GET_CLASS(self)->create(self, luma),
+                          .simulator = GST_EVENT_SIMULATOR_GET_CLASS(self)->create(luma),
                           .gathered = {},
                           .discontinuous = follows});
     }
@@ -302,23 +269,18 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
       state->drawing = Drawing{drawn, Accumulator(luma.width, luma.height)};
     state->gathered =
         has_packed_luma(video) ? Image<guint8>(luma.width, luma.height) : Image<guint8>();
-  } catch (const std::exception& error) {
-    state.reset();
-    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
-                      ("There is not enough memory for frames of %dx%d.", luma.width, luma.height),
-                      ("%s", error.what()));
-    return FALSE;
-  }
+  });
+  if (!made) return FALSE;
   if (GST_VIDEO_INFO_FPS_N(&video) > 0)
     set_latency(self, gst_util_uint64_scale_int(GST_SECOND, GST_VIDEO_INFO_FPS_D(&video),
                                                 GST_VIDEO_INFO_FPS_N(&video)));
   return TRUE;
 }
 
-/// Whether there is a state to work with. An error drops it whole, while the pads keep their caps:
-/// where the application goes on all the same, these make a new one.
+/// Whether there is a state to work with. An error drops it, while the pads keep their caps: where
+/// the application continues, these make a new one.
 static bool is_ready(GstEventSimulator* self) {
-  if (self->priv->state) return true;
+  if (priv_of(self).state) return true;
   auto* transform = GST_BASE_TRANSFORM(self);
   GstCaps* in = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SINK_PAD(transform));
   GstCaps* out = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform));
@@ -333,7 +295,7 @@ static bool is_ready(GstEventSimulator* self) {
 /// The events between the last frame and this one, or nullptr for a first frame. May throw.
 static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& frame,
                                     Nanoseconds time, const Settings& settings) {
-  auto& state = *self->priv->state;
+  auto& state = *priv_of(self).state;
   LumaView luma{luma_format_of(state.video), frame.first_component(), frame.stride()};
   if (has_packed_luma(state.video)) {
     eventcamera::unpack_luma(static_cast<const guint8*>(luma.data), luma.stride, state.gathered);
@@ -345,7 +307,7 @@ static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& f
   return state.simulator->push(luma, time, settings.simulation);
 }
 
-/// Says downstream that nothing happens in an interval.
+/// Tells downstream that an interval has no events.
 static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
                               guint32 seqnum) {
   GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(self);
@@ -355,7 +317,7 @@ static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanose
   return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
 }
 
-/// Makes a buffer that of an interval.
+/// Sets the times of an interval's buffer.
 static void set_times(GstBuffer* out, Nanoseconds start, Nanoseconds end, State& state) {
   GST_BUFFER_PTS(out) = static_cast<GstClockTime>(start);
   GST_BUFFER_DTS(out) = GST_CLOCK_TIME_NONE;
@@ -363,20 +325,24 @@ static void set_times(GstBuffer* out, Nanoseconds start, Nanoseconds end, State&
   if (std::exchange(state.discontinuous, false)) GST_BUFFER_FLAG_SET(out, GST_BUFFER_FLAG_DISCONT);
 }
 
-/// Takes a frame and hands out the interval that it ends, if it ends one.
+/// Takes a frame and hands out the interval that it ends, if any. May throw.
 static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffer** out) {
   auto* transform = GST_BASE_TRANSFORM(self);
-  auto& state = *self->priv->state;
-  const Settings settings = settings_of(self);
+  auto& state = *priv_of(self).state;
+  const Settings settings = priv_of(self).settings.copy();
 
-  warn_of_interlacing(self, in);
+  check_interlacing(self, in);
   if (!check_time(self, in)) return GST_FLOW_OK;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
   const auto start = state.simulator->last_time();
   const VideoFrame frame(state.video, in, GST_MAP_READ);
   if (!frame) {
     GST_ELEMENT_ERROR(self, RESOURCE, FAILED,
-                      ("A buffer could not be read as video of the negotiated format."), (nullptr));
+                      ("Cannot read a buffer as video of the negotiated format. Check the element "
+                       "upstream."),
+                      ("cannot map %" G_GSIZE_FORMAT " bytes as %s of %dx%d",
+                       gst_buffer_get_size(in), GST_VIDEO_INFO_NAME(&state.video),
+                       GST_VIDEO_INFO_WIDTH(&state.video), GST_VIDEO_INFO_HEIGHT(&state.video)));
     return GST_FLOW_ERROR;
   }
   const EventBuckets* events = simulate(self, frame, end, settings);
@@ -388,7 +354,7 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
                  events->size(), GST_TIME_ARGS(static_cast<GstClockTime>(*start)),
                  GST_TIME_ARGS(static_cast<GstClockTime>(end)));
 
-  self->priv->handed_out_until = end;
+  priv_of(self).stream.handed_out_until = end;
   GstFlowReturn result = GST_FLOW_OK;
   if (state.drawing) {
     result = event_simulator_draw_events(transform, *events, *state.drawing,
@@ -404,34 +370,27 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   return GST_FLOW_OK;
 }
 
-static void fail_for_want_of_memory(GstEventSimulator* self) {
-  self->priv->state.reset();
-  GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
-                    ("There is not enough memory for the events of a frame. Raise the "
-                     "thresholds, or lower interpolated-frames."),
-                    (nullptr));
+/// Runs what may throw. What is thrown is reported, and leaves the simulator unusable.
+template <class Work>
+static GstFlowReturn reported(GstEventSimulator* self, const Work& work) {
+  const auto failure = [&](const std::exception& error) -> Report {
+    priv_of(self).state.reset();
+    if (is_a<std::bad_alloc>(error))
+      return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+              "Not enough memory for the events of a frame. Raise the thresholds, or lower "
+              "interpolated-frames."};
+    return {GST_STREAM_ERROR_FAILED, "The simulation failed."};
+  };
+  return guarded(self, failure, work);
 }
 
 static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   *out = nullptr;
-  GstBuffer* in = std::exchange(transform->queued_buf, nullptr);
-  if (in == nullptr) return GST_FLOW_OK;
-  GstFlowReturn result = GST_FLOW_ERROR;
-  if (!is_ready(self)) {
-    result = GST_FLOW_NOT_NEGOTIATED;
-  } else {
-    try {
-      result = take_frame(self, in, out);
-    } catch (const std::bad_alloc&) {
-      fail_for_want_of_memory(self);
-    } catch (const std::exception& error) {
-      self->priv->state.reset();
-      GST_ELEMENT_ERROR(self, STREAM, FAILED, ("The simulation failed."), ("%s", error.what()));
-    }
-  }
-  gst_buffer_unref(in);
-  return result;
+  const OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
+  if (!in) return GST_FLOW_OK;
+  if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
+  return reported(self, [&] { return take_frame(self, in.get(), out); });
 }
 
 /* events, queries, states */
@@ -440,33 +399,35 @@ static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
   if (segment->rate < 0) {
-    if (std::exchange(self->priv->backwards, true)) return false;  // sent again, and still refused
-    GST_ELEMENT_ERROR(self, STREAM, FAILED, ("Events cannot be simulated backwards."),
-                      ("The segment has rate %g; play with a positive rate.", segment->rate));
+    if (std::exchange(priv_of(self).stream.backwards, true)) return false;  // sent again
+    GST_ELEMENT_ERROR(self, STREAM, FAILED,
+                      ("Cannot simulate events backwards. Play at a positive rate."),
+                      ("the segment has rate %g", segment->rate));
     return false;
   }
-  self->priv->backwards = false;
+  priv_of(self).stream.backwards = false;
   const GstSegment& current = GST_BASE_TRANSFORM(self)->segment;
   if (current.format != segment->format || current.rate != segment->rate ||
       current.base != segment->base || current.start != segment->start ||
       current.time != segment->time)
-    begin_anew(self);
+    start_over(self);
   return true;
 }
 
-/// Lets the last frame stand until `end` and sends what fires meanwhile. Where that is nothing, or
-/// pictures are wanted, of which a gap has none, it is a gap downstream too.
+/// Holds the last frame until `end` and sends the events of that time. Without events, or where
+/// video is the output, the gap stays a gap. May throw.
 static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum) {
   auto* transform = GST_BASE_TRANSFORM(self);
-  auto& state = *self->priv->state;
+  auto& state = *priv_of(self).state;
   const Nanoseconds start = *state.simulator->last_time();
   if (const auto configure = GST_EVENT_SIMULATOR_GET_CLASS(self)->configure)
     configure(self, *state.simulator);
-  const EventBuckets* events = state.simulator->hold_until(end, settings_of(self).simulation);
-  self->priv->handed_out_until = end;
+  const EventBuckets* events =
+      state.simulator->hold_until(end, priv_of(self).settings.copy().simulation);
+  priv_of(self).stream.handed_out_until = end;
   GstBuffer* out = nullptr;
   if (events != nullptr && events->size() > 0 && !state.drawing) {
-    const std::unique_ptr<GstBuffer, void (*)(GstBuffer*)> in(gst_buffer_new(), gst_buffer_unref);
+    const OwnedBuffer in(gst_buffer_new());
     if (event_simulator_write_events(transform, *events, state.simulator->threads(), in.get(),
                                      &out) != GST_FLOW_OK)
       return;
@@ -477,13 +438,13 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   }
 }
 
-/// Upstream has no frames for a while: the last one stands until a frame's length before the end of
-/// it, where the next interval can begin. Tells whether the event is to be sent on.
+/// Upstream has no frames for a while: the last one is held until a frame duration before the end
+/// of the gap, where the next interval can begin. Returns whether the event is to be forwarded.
 static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   GstClockTime pts = GST_CLOCK_TIME_NONE;
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   gst_event_parse_gap(event, &pts, &duration);
-  auto& state = self->priv->state;
+  auto& state = priv_of(self).state;
   const auto start = state ? state->simulator->last_time() : std::nullopt;
   if (!start) return true;
   const GstClockTime frame = latency_of(self);
@@ -492,11 +453,10 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
   const auto end = static_cast<Nanoseconds>(pts + rest);
   if (end <= *start) return false;
-  try {
+  reported(self, [&] {
     hold_until(self, end, gst_event_get_seqnum(event));
-  } catch (const std::bad_alloc&) {
-    fail_for_want_of_memory(self);
-  }
+    return GST_FLOW_OK;
+  });
   return false;
 }
 
@@ -517,7 +477,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       break;
     case GST_EVENT_STREAM_START:
     case GST_EVENT_FLUSH_STOP:
-      begin_anew(self);
+      start_over(self);
       break;
     default:
       break;
@@ -527,7 +487,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
-    // Upstream would leave frames out, and the events would hang on how busy the machine is.
+    // Upstream would skip frames, and the events would depend on the load of the machine.
     gst_event_unref(event);
     return TRUE;
   }
@@ -556,45 +516,30 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
 
 static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_SIMULATOR(transform);
-  self->priv->state.reset();
-  self->priv->handed_out_until.reset();
-  self->priv->warned_of_times = false;
-  self->priv->warned_of_interlacing = false;
-  self->priv->backwards = false;
-  const std::lock_guard lock(self->priv->mutex);
-  self->priv->latency = 0;
+  priv_of(self).state.reset();
+  priv_of(self).stream = {};
+  const std::lock_guard lock(priv_of(self).mutex);
+  priv_of(self).latency = 0;
   return TRUE;
 }
 
 /* type */
 
 static void finalize(GObject* object) {
-  delete GST_EVENT_SIMULATOR(object)->priv;
+  std::destroy_at(&priv_of(GST_EVENT_SIMULATOR(object)));
   G_OBJECT_CLASS(gst_event_simulator_parent_class)->finalize(object);
 }
 
 static void gst_event_simulator_init(GstEventSimulator* self) {
-  self->priv = new GstEventSimulatorPrivate();
-  // Frames that are late are simulated all the same: leaving one out would change the events.
+  std::construct_at(&priv_of(self));
+  // Late frames are simulated, too: skipping one would change the events.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }
 
 static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = gst_event_simulator_set_property;
-  object_class->get_property = gst_event_simulator_get_property;
   object_class->finalize = finalize;
-  g_object_class_install_property(
-      object_class, prop_n_threads,
-      g_param_spec_uint("n-threads", "Threads",
-                        "The most threads to use for one frame (0 = one for each processor); the "
-                        "events are the same for any number",
-                        0, G_MAXINT, 0, property_flags));
-  g_object_class_install_property(
-      object_class, prop_palette,
-      g_param_spec_enum("palette", "Palette", "The colours of accumulated-event video",
-                        GST_TYPE_EVENT_CAMERA_PALETTE, GST_EVENT_CAMERA_PALETTE_DARK,
-                        property_flags));
+  install_base_properties(object_class);
 
   static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE(
       "sink", GST_PAD_SINK, GST_PAD_ALWAYS,
@@ -625,4 +570,24 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->stop = stop;
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_SIMULATOR, static_cast<GstPluginAPIFlags>(0));
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
+}
+
+void gst_event_simulator_class_describe(GstEventSimulatorClass* klass, const char* long_name,
+                                        const char* description) {
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), long_name,
+                                        "Filter/Effect/Converter/Video", description,
+                                        "gst-eventsim");
+}
+
+static void method_class_init(gpointer klass, gpointer row) {
+  const auto& method = *static_cast<const EventSimulatorMethod*>(row);
+  auto* simulator_class = GST_EVENT_SIMULATOR_CLASS(klass);
+  simulator_class->create = method.create;
+  gst_event_simulator_class_install_thresholds(simulator_class, method.threshold);
+  if (method.interpolates) gst_event_simulator_class_install_interpolated_frames(simulator_class);
+  gst_event_simulator_class_describe(simulator_class, method.long_name, method.description);
+}
+
+GType event_simulator_type(const EventSimulatorMethod& method) {
+  return row_type(GST_TYPE_EVENT_SIMULATOR, method.type_name, method_class_init, &method);
 }

@@ -10,39 +10,25 @@
 /// The abstract base class of the simulator elements: video in, events or accumulated-event video
 /// out. It does all that GStreamer asks for; a subclass brings a Simulator and its properties.
 ///
-/// N frames give N - 1 intervals, the first frame after start, flush or a discontinuity being the
-/// one that the next is compared to. An interval has the PTS of its first frame and comes out with
-/// its last, so the latency is one frame. In the event stream an interval without events is a GAP.
+/// N frames give N - 1 intervals; the first frame after start, flush or a discontinuity is the one
+/// that the next is compared to. An interval has the PTS of its first frame and comes out with its
+/// last, so the latency is one frame. In the event stream an interval without events is a GAP.
 #define GST_TYPE_EVENT_SIMULATOR (gst_event_simulator_get_type())
-#define GST_EVENT_SIMULATOR(object) \
-  (G_TYPE_CHECK_INSTANCE_CAST((object), GST_TYPE_EVENT_SIMULATOR, GstEventSimulator))
-#define GST_EVENT_SIMULATOR_CLASS(klass) \
-  (G_TYPE_CHECK_CLASS_CAST((klass), GST_TYPE_EVENT_SIMULATOR, GstEventSimulatorClass))
-#define GST_EVENT_SIMULATOR_GET_CLASS(object) \
-  (G_TYPE_INSTANCE_GET_CLASS((object), GST_TYPE_EVENT_SIMULATOR, GstEventSimulatorClass))
+G_DECLARE_DERIVABLE_TYPE(GstEventSimulator, gst_event_simulator, GST, EVENT_SIMULATOR,
+                         GstBaseTransform)
 
-GType gst_event_simulator_get_type(void);
+using SimulatorMaker =
+    std::unique_ptr<eventcamera::Simulator> (*)(const eventcamera::LumaFormat& format);
 
-struct GstEventSimulatorPrivate;
-
-struct GstEventSimulator {
-  GstBaseTransform parent;
-  GstEventSimulatorPrivate* priv;
-};
-
-struct GstEventSimulatorClass {
+struct _GstEventSimulatorClass {
   GstBaseTransformClass parent_class;
 
-  /// Makes the simulator for frames of this format. Called when the format is known; may throw.
-  std::unique_ptr<eventcamera::Simulator> (*create)(GstEventSimulator* self,
-                                                    const eventcamera::LumaFormat& format);
-  /// Tells the simulator, which is one that create() made, the subclass's own settings. Called
-  /// before each frame. May be null.
+  /// Makes the simulator for frames of this format. May throw.
+  SimulatorMaker create;
+  /// Gives the simulator, which create() made, the settings of the subclass. Called before each
+  /// frame. May be null.
   void (*configure)(GstEventSimulator* self, eventcamera::Simulator& simulator);
 };
-
-/// The first property number that a subclass may use for its own.
-inline constexpr guint GST_EVENT_SIMULATOR_FIRST_OWN_PROPERTY = 100;
 
 /// For class_init: the properties positive-threshold and negative-threshold, both with this
 /// default.
@@ -52,8 +38,19 @@ void gst_event_simulator_class_install_thresholds(GstEventSimulatorClass* klass,
 /// For class_init: the property interpolated-frames.
 void gst_event_simulator_class_install_interpolated_frames(GstEventSimulatorClass* klass);
 
-/// For the set_property and get_property of a subclass that has its own: what it does not know
-/// itself.
-void gst_event_simulator_set_property(GObject* object, guint id, const GValue* value,
-                                      GParamSpec* spec);
-void gst_event_simulator_get_property(GObject* object, guint id, GValue* value, GParamSpec* spec);
+/// For class_init: what applications and users read about the element.
+void gst_event_simulator_class_describe(GstEventSimulatorClass* klass, const char* long_name,
+                                        const char* description);
+
+/// A simulator without properties of its own.
+struct EventSimulatorMethod {
+  const char* type_name;
+  const char* long_name;
+  const char* description;
+  double threshold;  ///< default of both, grey levels
+  bool interpolates;
+  SimulatorMaker create;
+};
+
+/// The type of the elements of a method, which lives as long as the process.
+GType event_simulator_type(const EventSimulatorMethod& method);

@@ -10,6 +10,7 @@
 #include "gst/base/copied_buffer.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/types.hpp"
 #include "gst/base/writable_events.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_writer_debug);
@@ -298,13 +299,5 @@ static void format_class_init(gpointer klass, gpointer data) {
 }
 
 GType event_writer_type(const EventFileFormat& format) {
-  const GType known = g_type_from_name(format.type_name);
-  if (known != G_TYPE_INVALID) return known;
-  GTypeInfo info = {};
-  info.class_size = sizeof(GstEventWriterClass);
-  info.class_init = format_class_init;
-  info.class_data = &format;
-  info.instance_size = sizeof(GstEventWriter);
-  return g_type_register_static(GST_TYPE_EVENT_WRITER, format.type_name, &info,
-                                static_cast<GTypeFlags>(0));
+  return row_type(GST_TYPE_EVENT_WRITER, format.type_name, format_class_init, &format);
 }

@@ -4,10 +4,10 @@
 #include <glib-object.h>
 
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <type_traits>
-#include <vector>
 
 /// What the application sets, at any time; the element works with a copy.
 template <class Settings>
@@ -73,8 +73,22 @@ void write_value(const Field& field, GValue* value) {
 #undef WRITE
 }
 
+/// How a property is read and written. Its GParamSpec keeps it.
+struct PropertyAccess {
+  std::function<void(GObject*, const GValue*)> set;
+  std::function<void(GObject*, GValue*)> get;
+
+  static GQuark quark() {
+    static const GQuark quark = g_quark_from_static_string("event-property-access");
+    return quark;
+  }
+  static const PropertyAccess& of(GParamSpec* spec) {
+    return *static_cast<PropertyAccess*>(g_param_spec_get_qdata(spec, quark()));
+  }
+};
+
 /// For class_init: properties that are fields of a class's settings. `settings_of` gives the
-/// GuardedSettings of an object.
+/// GuardedSettings of an object. A class may have properties of several settings.
 template <auto settings_of>
 class Properties {
  public:
@@ -82,40 +96,43 @@ class Properties {
       typename std::remove_reference_t<decltype(settings_of(static_cast<GObject*>(nullptr)))>::Type;
 
   explicit Properties(GObjectClass* klass) : klass_(klass) {
-    klass->set_property = set_property;
-    klass->get_property = get_property;
+    klass->set_property = [](GObject* object, guint, const GValue* value, GParamSpec* spec) {
+      PropertyAccess::of(spec).set(object, value);
+    };
+    klass->get_property = [](GObject* object, guint, GValue* value, GParamSpec* spec) {
+      PropertyAccess::of(spec).get(object, value);
+    };
   }
 
   /// Adds the property that is this field: a pointer to a member of Settings, or a function that
   /// returns a reference into it. Fields are numbers, enums, truths or strings.
   template <class Field>
   void add(Field field, GParamSpec* spec) {
-    fields().push_back(
-        {.read = [field](Settings& settings,
-                         const GValue* value) { read_value(value, std::invoke(field, settings)); },
-         .write = [field](Settings& settings,
-                          GValue* value) { write_value(std::invoke(field, settings), value); }});
-    g_object_class_install_property(klass_, static_cast<guint>(fields().size()), spec);
+    add([field](Settings& settings,
+                const GValue* value) { read_value(value, std::invoke(field, settings)); },
+        [field](Settings& settings, GValue* value) {
+          write_value(std::invoke(field, settings), value);
+        },
+        spec);
+  }
+
+  /// Adds the property that these functions set and get.
+  template <class Set, class Get>
+  void add(Set set, Get get, GParamSpec* spec) {
+    auto access = std::make_unique<PropertyAccess>();
+    access->set = [set](GObject* object, const GValue* value) {
+      settings_of(object).access([&](Settings& settings) { set(settings, value); });
+    };
+    access->get = [get](GObject* object, GValue* value) {
+      settings_of(object).access([&](Settings& settings) { get(settings, value); });
+    };
+    g_param_spec_set_qdata_full(spec, PropertyAccess::quark(), access.release(), [](gpointer last) {
+      const std::unique_ptr<PropertyAccess> owned(static_cast<PropertyAccess*>(last));
+    });
+    constexpr guint number = 1;  // properties are told apart by their GParamSpec
+    g_object_class_install_property(klass_, number, spec);
   }
 
  private:
-  struct Accessors {
-    std::function<void(Settings&, const GValue*)> read;
-    std::function<void(Settings&, GValue*)> write;
-  };
-
-  /// By property number, from 1 on.
-  static std::vector<Accessors>& fields() {
-    static std::vector<Accessors> fields;
-    return fields;
-  }
-  static void set_property(GObject* object, guint id, const GValue* value, GParamSpec*) {
-    settings_of(object).access([&](Settings& settings) { fields()[id - 1].read(settings, value); });
-  }
-  static void get_property(GObject* object, guint id, GValue* value, GParamSpec*) {
-    settings_of(object).access(
-        [&](Settings& settings) { fields()[id - 1].write(settings, value); });
-  }
-
   GObjectClass* klass_;
 };

@@ -65,7 +65,7 @@ TEST_P(EveryElement, DescribesItself) {
   Owned<GstElement> element(gst_element_factory_make(GetParam().element, nullptr));
   GstElementFactory* factory = gst_element_get_factory(element.get());
   EXPECT_STREQ(gst_element_factory_get_metadata(factory, GST_ELEMENT_METADATA_KLASS),
-               "Converter/Video");
+               "Filter/Effect/Converter/Video");
   EXPECT_EQ(gst_plugin_feature_get_rank(GST_PLUGIN_FEATURE(factory)), GST_RANK_NONE);
   guint count = 0;
   GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(element.get()), &count);

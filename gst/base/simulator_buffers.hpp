@@ -8,17 +8,17 @@
 #include "src/core/thread_pool.hpp"
 #include "src/render/accumulator.hpp"
 
-/// For class_init: what GstBaseTransform asks about buffers, in and out.
+/// For class_init: the functions of GstBaseTransform about buffers, in and out.
 void event_simulator_class_install_buffers(GstBaseTransformClass* klass);
 
-/// What accumulated events are drawn with.
+/// Accumulated-event video.
 struct Drawing {
   GstVideoInfo video;
   eventcamera::Accumulator accumulator;
 };
 
-/// Makes a buffer of an interval's events, of which there must be some. `in` is the frame that ends
-/// the interval. Throws std::bad_alloc.
+/// Makes a buffer of an interval's events, at least one. `in` is the frame that ends the interval.
+/// Throws std::bad_alloc.
 GstFlowReturn event_simulator_write_events(GstBaseTransform* transform,
                                            const eventcamera::EventBuckets& events,
                                            eventcamera::ThreadPool& threads, GstBuffer* in,

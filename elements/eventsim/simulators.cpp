@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/// The simulators without properties of their own: a table of methods. GstEventSimulator does the
+/// rest.
+#include "gst/base/eventsimulator.hpp"
+#include "src/simulate/diff.hpp"
+#include "src/simulate/frame.hpp"
+#include "src/simulate/sparse.hpp"
+
+/**
+ * SECTION:element-eventsim-frame
+ * @title: eventsim-frame
+ * @short_description: events from the difference frame
+ *
+ * Turns video into what an event camera would have seen: an ON event where a pixel became brighter
+ * than in the last frame by more than #GstEventSimFrame:positive-threshold, an OFF event where it
+ * became darker by more than #GstEventSimFrame:negative-threshold, all at the time of the frame
+ * (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA 2023, section III).
+ *
+ * The cheapest simulator, and the one without times between frames.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-frame ! videoconvert ! autovideosink
+ * ]|
+ */
+static const EventSimulatorMethod frame = {
+    .type_name = "GstEventSimFrame",
+    .long_name = "Event camera simulator: difference frame",
+    .description = "Turns video into events: where a frame differs from the one before",
+    .threshold = 20,
+    .interpolates = false,
+    .create = eventcamera::make_frame_simulator,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
+                            event_simulator_type(frame))
+
+/**
+ * SECTION:element-eventsim-sparse
+ * @title: eventsim-sparse
+ * @short_description: events from frames interpolated where pixels changed
+ *
+ * Turns video into what an event camera would have seen. Only the pixels that changed between two
+ * frames by more than the smaller threshold are tracked, with Lucas-Kanade, and drawn into each
+ * interpolated frame; what changed from one interpolated frame to the next by more than the
+ * thresholds fires (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA 2023,
+ * section III-B).
+ *
+ * For small objects that move before a still background; where the whole picture moves it is the
+ * slowest simulator.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc pattern=ball num-buffers=300 ! eventsim-sparse !
+ * application/x-event-camera ! filesink location=ball.xytp
+ * ]|
+ */
+static const EventSimulatorMethod sparse = {
+    .type_name = "GstEventSimSparse",
+    .long_name = "Event camera simulator: sparse interpolation",
+    .description =
+        "Turns video into events: tracks only the pixels that changed to interpolate "
+        "frames",
+    .threshold = 10,
+    .interpolates = true,
+    .create = eventcamera::make_sparse_simulator,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventsim_sparse, "eventsim-sparse", GST_RANK_NONE,
+                            event_simulator_type(sparse))
+
+/**
+ * SECTION:element-eventsim-diff
+ * @title: eventsim-diff
+ * @short_description: events from interpolated difference frames
+ *
+ * Turns video into what an event camera would have seen. The difference of two frames, where it
+ * exceeds the thresholds, is tracked into the difference of the next two with Lucas-Kanade; its
+ * pixels fire on the way (Ziegler et al., Real-time event simulation with frame-based cameras,
+ * ICRA 2023, section III-C).
+ *
+ * For objects of steady motion and look before a still background. The second frame of a stream has
+ * no earlier difference: its events are those of eventsim-frame.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 v4l2src ! eventsim-diff ! videoconvert ! autovideosink
+ * ]|
+ */
+static const EventSimulatorMethod diff = {
+    .type_name = "GstEventSimDiff",
+    .long_name = "Event camera simulator: difference interpolation",
+    .description =
+        "Turns video into events: tracks what changed from one difference frame to the "
+        "next",
+    .threshold = 20,
+    .interpolates = true,
+    .create = eventcamera::make_diff_simulator,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventsim_diff, "eventsim-diff", GST_RANK_NONE,
+                            event_simulator_type(diff))
