@@ -8,7 +8,7 @@
 #include <ctime>
 #include <vector>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 
 namespace bench {
 

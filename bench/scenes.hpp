@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "src/core/image.hpp"
-#include "src/core/step_times.hpp"
+#include "src/simulate/simulator.hpp"
 
 /// The videos on which the methods are timed.
 namespace bench {

@@ -6,7 +6,6 @@
 #include "src/core/event_buckets.hpp"
 #include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
-#include "src/simulate/bands.hpp"
 #include "src/simulate/simulator.hpp"
 
 /// The plain formulation, what our speed is compared with: each method as anyone would write it,

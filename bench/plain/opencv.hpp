@@ -10,7 +10,7 @@
 
 #include "src/core/luma.hpp"
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/fixed_point.hpp"
+#include "src/simulate/motion.hpp"
 
 /// OpenCV's optical flow with the parameters of the simulators.
 namespace plain {

@@ -39,15 +39,15 @@
 #include "elements/eventcam/report.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "src/core/arrivals.hpp"
+#include "src/core/event_validator.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/map_picture.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 #define GST_CAT_DEFAULT event_stats_debug
 
-using eventcamera::Arrivals;
 using eventcamera::EventStatistics;
+using eventcamera::EventValidator;
 using eventcamera::Nanoseconds;
 
 namespace {
@@ -75,13 +75,13 @@ struct Measurement {
   Measurement(int sensor_width, int sensor_height)
       : width(sensor_width),
         height(sensor_height),
-        arrivals(width, height),
+        validator(width, height),
         cumulative{.statistics = EventStatistics(width, height)},
         recent{.statistics = EventStatistics(width, height)} {}
 
   int width;
   int height;
-  Arrivals arrivals;
+  EventValidator validator;
   Part cumulative;
   Part recent;                       ///< since the last message
   std::optional<Nanoseconds> end{};  ///< in stream time
@@ -146,7 +146,7 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
 /// inter-event interval spans the jump.
 static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) {
   if (measurement.end && start + static_cast<Nanoseconds>(event_resolution) < *measurement.end) {
-    measurement.arrivals = Arrivals(measurement.width, measurement.height);
+    measurement.validator = EventValidator(measurement.width, measurement.height);
     for (auto* part : {&measurement.cumulative, &measurement.recent})
       part->statistics.forget_times();
     measurement.end.reset();
@@ -173,7 +173,7 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
     self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
-  const std::size_t skipped = measurement.arrivals.take(
+  const std::size_t skipped = measurement.validator.take(
       mapped.events(), start / 1000, [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
         measurement.cumulative.statistics.add(event);

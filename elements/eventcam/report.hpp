@@ -7,9 +7,9 @@
 #include <string>
 
 #include "gst/base/properties.hpp"
-#include "src/core/step_times.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/map_picture.hpp"
+#include "src/simulate/simulator.hpp"
 
 /// The files that an element writes what it has measured to; none where a path is empty.
 struct ReportFiles {

@@ -7,7 +7,6 @@
 
 #include "gst/base/errors.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "src/core/absolute_event.hpp"
 #include "src/core/event.hpp"
 
 /// The caps of a stream of events in memory.

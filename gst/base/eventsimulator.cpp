@@ -18,8 +18,8 @@
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "src/flow/fixed_point.hpp"
 #include "src/render/accumulator.hpp"
+#include "src/simulate/motion.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 #define GST_CAT_DEFAULT event_simulator_debug

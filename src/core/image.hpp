@@ -9,6 +9,20 @@
 
 namespace eventcamera {
 
+/// The pixels [left, right) x [top, bottom) of a picture.
+struct Box {
+  int left = 0;
+  int top = 0;
+  int right = 0;
+  int bottom = 0;
+
+  int width() const { return right - left; }
+  int height() const { return bottom - top; }
+  bool empty() const { return width() <= 0 || height() <= 0; }
+
+  friend bool operator==(const Box&, const Box&) = default;
+};
+
 /// A picture of one channel that somebody else owns, read in place. Any stride; nothing beyond a
 /// row's last pixel may be read.
 template <class Pixel>

@@ -34,4 +34,25 @@ struct LumaView {
 /// from `data` on: the one layout whose luma is no plane.
 void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Image<std::uint8_t>& out);
 
+/// A frame in 8 bits, as optical flow takes it: the frame itself if it has 8 bits, else its
+/// upper 8.
+class Grey8 {
+ public:
+  /// Valid as long as `frame` and until the next call.
+  ImageView<std::uint8_t> of(const LumaView& frame) {
+    if (frame.format.bits == 8) return frame.as<std::uint8_t>();
+    const auto picture = frame.as<std::uint16_t>();
+    if (upper_.width() != picture.width || upper_.height() != picture.height)
+      upper_ = Image<std::uint8_t>(picture.width, picture.height);
+    const int shift = frame.format.bits - 8;
+    for (int y = 0; y < picture.height; ++y)
+      for (int x = 0; x < picture.width; ++x)
+        upper_.at(x, y) = static_cast<std::uint8_t>(picture.row(y)[x] >> shift);
+    return upper_.view();
+  }
+
+ private:
+  Image<std::uint8_t> upper_;
+};
+
 }  // namespace eventcamera

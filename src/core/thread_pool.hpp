@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <exception>
@@ -66,6 +67,32 @@ class ThreadPool {
   std::condition_variable wake_;
   std::condition_variable done_;
   std::exception_ptr thrown_;
+};
+
+/// Runs body(y) for y = 0 ... rows - 1, many rows a round: a single row is too little for a thread.
+template <class Body>
+void for_each_row(ThreadPool& threads, int rows, const Body& body) {
+  constexpr int rows_per_round = 32;
+  threads.for_each((rows + rows_per_round - 1) / rows_per_round, [&](int round, int) {
+    const int end = std::min(rows, (round + 1) * rows_per_round);
+    for (int y = round * rows_per_round; y < end; ++y) body(y);
+  });
+}
+
+/// Frames are processed in bands of this many rows, so that the result does not depend on the
+/// number of threads.
+inline constexpr int rows_per_band = 16;
+
+inline int band_count(int height) {
+  return (height + rows_per_band - 1) / rows_per_band;
+}
+
+/// The rows [first, last) of a band.
+struct BandRows {
+  BandRows(int band, int height)
+      : first(band * rows_per_band), last(std::min(first + rows_per_band, height)) {}
+  int first;
+  int last;
 };
 
 }  // namespace eventcamera

@@ -7,12 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "src/core/grey8.hpp"
-#include "src/core/rows.hpp"
+#include "src/core/luma.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/dvs/denoise.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
-#include "src/simulate/bands.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/interpolated_row.hpp"
 

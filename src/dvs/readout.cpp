@@ -5,7 +5,7 @@
 #include <bit>
 #include <utility>
 
-#include "src/core/raster_order.hpp"
+#include "src/core/event.hpp"
 
 namespace eventcamera {
 namespace {

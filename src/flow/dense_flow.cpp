@@ -6,8 +6,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "src/flow/farneback/farneback.hpp"
-#include "src/flow/opencv_picture.hpp"
-#include "src/flow/opencv_threads.hpp"
+#include "src/flow/opencv.hpp"
 
 namespace eventcamera {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "src/core/box.hpp"
+#include "src/core/image.hpp"
 #include "src/flow/dense_flow.hpp"
 
 namespace eventcamera {

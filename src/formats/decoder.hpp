@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 
 namespace eventcamera {
 

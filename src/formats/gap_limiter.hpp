@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 
 namespace eventcamera {
 

@@ -6,9 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 #include "src/core/image.hpp"
-#include "src/core/step_times.hpp"
 
 namespace eventcamera {
 

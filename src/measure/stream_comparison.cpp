@@ -93,7 +93,8 @@ void EventMatcher::add(StreamRole role, const AbsoluteEvent& event) {
 }
 
 StreamComparison::StreamComparison(int width, int height)
-    : arriving_({.arrivals = Arrivals(width, height)}, {.arrivals = Arrivals(width, height)}),
+    : arriving_({.validator = EventValidator(width, height)},
+                {.validator = EventValidator(width, height)}),
       statistics_(EventStatistics(width, height), EventStatistics(width, height)),
       matcher_(width, height) {}
 
@@ -122,7 +123,7 @@ std::size_t StreamComparison::add(StreamRole role, std::span<const Event> events
     arriving.start = start;
     arriving.end = start;
   }
-  const std::size_t skipped = arriving.arrivals.take(
+  const std::size_t skipped = arriving.validator.take(
       events, start / 1000, [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); });
   arriving.end = std::max(arriving.end, end);
   if (this->start()) take_until(this->end() / 1000);
@@ -163,7 +164,7 @@ void StreamComparison::take_until(Microseconds end) {
     taken = 0;
   }
   rates_.extend_to(end);
-  for (const auto role : both_roles) arriving_[role].arrivals.pass(end);
+  for (const auto role : both_roles) arriving_[role].validator.pass(end);
 }
 
 ComparisonFigures StreamComparison::figures() const {

@@ -9,11 +9,9 @@
 #include <span>
 #include <vector>
 
-#include "src/core/absolute_event.hpp"
-#include "src/core/arrivals.hpp"
 #include "src/core/event.hpp"
+#include "src/core/event_validator.hpp"
 #include "src/core/image.hpp"
-#include "src/core/step_times.hpp"
 #include "src/measure/event_statistics.hpp"
 
 namespace eventcamera {
@@ -157,7 +155,7 @@ class StreamComparison {
 
  private:
   struct Arriving {
-    Arrivals arrivals;
+    EventValidator validator;
     std::vector<AbsoluteEvent> waiting{};  ///< for the other stream
     std::size_t taken = 0;                 ///< of those, the first ones
     std::optional<Nanoseconds> start{};

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 #include "src/core/image.hpp"
 
 namespace eventcamera {

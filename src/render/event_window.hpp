@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 #include "src/core/image.hpp"
 
 namespace eventcamera {

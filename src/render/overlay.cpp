@@ -24,12 +24,12 @@ std::pair<int, int> covered(int at, int sensor, int picture) {
 Overlay::Overlay(Size sensor, Size picture)
     : sensor_(sensor),
       picture_(picture),
-      arrivals_(sensor.width, sensor.height),
+      validator_(sensor.width, sensor.height),
       window_(sensor.width, sensor.height, {}),
       kinds_(picture.width, picture.height) {}
 
 std::size_t Overlay::add(std::span<const Event> events, Microseconds start) {
-  return arrivals_.take(events, start, [this](const AbsoluteEvent& event) { window_.add(event); });
+  return validator_.take(events, start, [this](const AbsoluteEvent& event) { window_.add(event); });
 }
 
 void Overlay::mark(int x, int y, std::uint8_t kind) {
@@ -42,7 +42,7 @@ void Overlay::mark(int x, int y, std::uint8_t kind) {
 void Overlay::draw(Microseconds start, Microseconds end, const Palette& palette, double opacity,
                    const PixelLayout& layout, std::byte* picture, std::ptrdiff_t stride) {
   window_.begin_after(start);
-  arrivals_.pass(end);
+  validator_.pass(end);
   for (int y = 0; y < sensor_.height; ++y) {
     const auto* row = window_.row(y);
     for (int x = 0; x < sensor_.width; ++x)

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "src/core/arrivals.hpp"
 #include "src/core/event.hpp"
+#include "src/core/event_validator.hpp"
 #include "src/core/image.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
@@ -39,7 +39,7 @@ class Overlay {
 
   Size sensor_;
   Size picture_;
-  Arrivals arrivals_;
+  EventValidator validator_;
   EventWindow window_;
   Image<std::uint8_t> kinds_;  ///< of the picture's pixels; all 0 between pictures
 };

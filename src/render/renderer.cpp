@@ -49,7 +49,7 @@ Renderer::Renderer(int width, int height, const RenderSettings& settings)
       height_(height),
       settings_(settings),
       memory_(make_memory(width, height, settings)),
-      arrivals_(width, height),
+      validator_(width, height),
       row_(static_cast<std::size_t>(width)) {}
 
 void Renderer::configure(const RenderSettings& settings) {
@@ -61,14 +61,14 @@ void Renderer::configure(const RenderSettings& settings) {
 
 void Renderer::reset() {
   memory_ = make_memory(width_, height_, settings_);
-  arrivals_ = Arrivals(width_, height_);
+  validator_ = EventValidator(width_, height_);
 }
 
 std::size_t Renderer::add(std::span<const Event> events, Microseconds start) {
   return std::visit(
       [&](auto& memory) {
-        return arrivals_.take(events, start,
-                              [&memory](const AbsoluteEvent& event) { memory.add(event); });
+        return validator_.take(events, start,
+                               [&memory](const AbsoluteEvent& event) { memory.add(event); });
       },
       memory_);
 }
@@ -95,7 +95,7 @@ void Renderer::shade_row(int y, Microseconds time) {
 
 void Renderer::draw(Microseconds start, Microseconds end, const PixelLayout& layout, std::byte* out,
                     std::ptrdiff_t stride) {
-  const auto time = arrivals_.pass(end);
+  const auto time = validator_.pass(end);
   if (auto* window = std::get_if<EventWindow>(&memory_)) window->begin_after(start);
   const auto pixels = pixels_of(settings_, layout);
   for (int y = 0; y < height_; ++y) {

@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "src/core/arrivals.hpp"
 #include "src/core/event.hpp"
+#include "src/core/event_validator.hpp"
 #include "src/render/decaying_sums.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
@@ -68,7 +68,7 @@ class Renderer {
   int height_;
   RenderSettings settings_;
   Memory memory_;
-  Arrivals arrivals_;
+  EventValidator validator_;
   std::vector<std::uint8_t> row_;  ///< shades, or kinds, of the pixels of a row
 };
 

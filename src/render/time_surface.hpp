@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 #include "src/core/image.hpp"
 
 namespace eventcamera {

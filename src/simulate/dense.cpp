@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "src/core/grey8.hpp"
+#include "src/core/luma.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/path.hpp"

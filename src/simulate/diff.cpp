@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "src/simulate/difference.hpp"
-#include "src/simulate/moving_point.hpp"
+#include "src/simulate/motion.hpp"
 
 namespace eventcamera {
 namespace {

@@ -5,11 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/core/box.hpp"
 #include "src/core/event_buckets.hpp"
 #include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
-#include "src/simulate/bands.hpp"
 #include "src/simulate/simulator.hpp"
 
 namespace eventcamera {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/simulate/frame.hpp"
 
-#include "src/simulate/bands.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/simulate/difference.hpp"
 
 namespace eventcamera {

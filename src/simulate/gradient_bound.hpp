@@ -3,7 +3,6 @@
 
 #include <cstdint>
 
-#include "src/core/box.hpp"
 #include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
 

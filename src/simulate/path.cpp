@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <array>
 
-#include "src/simulate/bands.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/simulate/fired_lanes-inl.hpp"
 #include "src/simulate/sampler-inl.hpp"
 

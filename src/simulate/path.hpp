@@ -4,7 +4,6 @@
 #include <cstdint>
 
 #include "src/core/event_buckets.hpp"
-#include "src/core/step_times.hpp"
 #include "src/core/thread_pool.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/dense.hpp"

@@ -12,7 +12,7 @@
 #include <cstdint>
 
 #include "src/core/image.hpp"
-#include "src/flow/fixed_point.hpp"
+#include "src/simulate/motion.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {

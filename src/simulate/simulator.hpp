@@ -2,11 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/luma.hpp"
-#include "src/core/step_times.hpp"
 #include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
@@ -31,6 +31,29 @@ struct Thresholds {
     };
     return {scale(settings.positive_threshold), scale(settings.negative_threshold)};
   }
+};
+
+/// The times of the steps of an interval (t0, t1]: step j of `count` is at t0 + (t1 - t0) * j /
+/// count, the last one at t1. A step takes at least a microsecond, the resolution of an event
+/// stream.
+class StepTimes {
+ public:
+  /// `duration` in (0, max_interval]; `wanted` steps, at least 1.
+  StepTimes(Nanoseconds duration, int wanted)
+      : duration_(duration),
+        count_(static_cast<int>(
+            std::clamp<Nanoseconds>(duration / 1000, 1, static_cast<Nanoseconds>(wanted)))) {}
+
+  Nanoseconds duration() const { return duration_; }
+  int count() const { return count_; }
+  /// Microseconds from t0 to step j (1 ... count), rounded down.
+  std::uint32_t microseconds(int j) const {
+    return static_cast<std::uint32_t>(duration_ * j / count_ / 1000);
+  }
+
+ private:
+  Nanoseconds duration_;
+  int count_;
 };
 
 /// Turns frames into the events between them. What follows from a frame is worked out in one call,

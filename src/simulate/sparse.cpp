@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "src/core/grey8.hpp"
+#include "src/core/luma.hpp"
 #include "src/simulate/difference.hpp"
-#include "src/simulate/moving_point.hpp"
+#include "src/simulate/motion.hpp"
 
 namespace eventcamera {
 namespace {

@@ -6,8 +6,8 @@
 #include <type_traits>
 
 #include "src/core/image.hpp"
-#include "src/flow/fixed_point.hpp"
 #include "src/simulate/dense.hpp"
+#include "src/simulate/motion.hpp"
 
 namespace eventcamera {
 

@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "src/core/event_buckets.hpp"
-#include "src/core/step_times.hpp"
+#include "src/simulate/simulator.hpp"
 
 namespace {
 

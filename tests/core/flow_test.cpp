@@ -8,11 +8,11 @@
 #include <thread>
 
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/fixed_point.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
-#include "src/flow/opencv_threads.hpp"
+#include "src/flow/opencv.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
+#include "src/simulate/motion.hpp"
 #include "tests/core/scene.hpp"
 
 namespace {

@@ -9,7 +9,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "src/flow/lucas_kanade/point_tracker.hpp"
-#include "src/flow/opencv_picture.hpp"
+#include "src/flow/opencv.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/lucas_kanade.hpp"

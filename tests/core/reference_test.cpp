@@ -6,7 +6,7 @@
 
 #include <cstring>
 
-#include "src/core/grey8.hpp"
+#include "src/core/luma.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"

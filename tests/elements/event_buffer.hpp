@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "gst/eventcamera/eventcamera.h"
-#include "src/core/absolute_event.hpp"
 #include "src/core/event.hpp"
 
 /// A buffer of events that count their times from its PTS.

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera::aedat_files {

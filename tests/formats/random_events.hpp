@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera::random_events {

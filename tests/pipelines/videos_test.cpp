@@ -16,7 +16,7 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/flow/dense_flow.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
-#include "src/flow/opencv_picture.hpp"
+#include "src/flow/opencv.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/flow/fixed_point.hpp"
 #include "src/simulate/dense.hpp"
+#include "src/simulate/motion.hpp"
 #include "tests/reference/differences.hpp"
 
 namespace eventcamera::reference {

@@ -6,12 +6,10 @@
 #include <cstdlib>
 #include <vector>
 
-#include "src/core/box.hpp"
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
-#include "src/core/step_times.hpp"
-#include "src/flow/fixed_point.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
+#include "src/simulate/motion.hpp"
 #include "src/simulate/simulator.hpp"
 
 /// The equations of the simulators, written down literally: one picture after another, in plain

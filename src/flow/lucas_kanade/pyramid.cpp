@@ -9,7 +9,7 @@
 
 #include <algorithm>
 
-#include "src/core/rows.hpp"
+#include "src/core/thread_pool.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera {

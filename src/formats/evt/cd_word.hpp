@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 
 namespace eventcamera {
 

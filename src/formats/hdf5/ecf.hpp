@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "src/core/absolute_event.hpp"
+#include "src/core/event.hpp"
 
 namespace eventcamera {
 

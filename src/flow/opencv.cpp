@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/opencv_threads.hpp"
+#include "src/flow/opencv.hpp"
 
 #include <condition_variable>
 #include <mutex>

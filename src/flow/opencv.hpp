@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "src/core/image.hpp"
+
+namespace eventcamera {
+
+/// A picture as OpenCV's type, not copied. For reading only, which cv::Mat cannot express.
+inline cv::Mat opencv_picture(const ImageView<std::uint8_t>& picture) {
+  return {picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
+          static_cast<std::size_t>(picture.stride)};
+}
+
+/// Sets OpenCV's thread count during its lifetime.
+///
+/// OpenCV has one thread count for the whole process. Calls with the same count run in parallel; a
+/// call with another count waits until they have finished, and later calls queue behind it. The
+/// last one restores the count that the application had set.
+class OpenCvThreads {
+ public:
+  explicit OpenCvThreads(int threads);
+  ~OpenCvThreads();
+  OpenCvThreads(const OpenCvThreads&) = delete;
+  OpenCvThreads& operator=(const OpenCvThreads&) = delete;
+};
+
+}  // namespace eventcamera
