@@ -7,51 +7,21 @@
 
 #include "bench/plain/frame.hpp"
 #include "bench/plain/opencv.hpp"
+#include "src/core/thread_pool.hpp"
 
 namespace plain {
 
 /// Diff: the pixels of one difference frame move into the next.
 class DiffSimulator final : public Simulator {
  public:
-  explicit DiffSimulator(const LumaFormat& format)
-      : Simulator(format), last_(format.width, format.height), on_(format), off_(format) {}
+  explicit DiffSimulator(const LumaFormat& format) : Simulator(format) {}
 
  private:
-  /// One polarity of a difference frame: the pixels over the threshold, in raster order.
-  struct Kept {
-    std::vector<cv::Point2f> places;
-    std::vector<int> differences;  ///< I(i) - I(i-1) at each of them
-  };
-
-  /// One polarity of the last difference frame and of this one.
+  /// One polarity of the difference frame as a picture, 0 where it does not fire.
   struct Part {
-    explicit Part(const LumaFormat& format) : picture(format.width, format.height) {}
-
-    Kept last;
-    Kept now;
-    Image<std::uint8_t> picture;  ///< now as a picture, 0 where nothing is kept
+    int sign;
+    Image<std::uint8_t> picture;
     OpenCvTracker tracker;
-
-    void begin_next() {
-      for (const auto& place : now.places)
-        picture.at(static_cast<int>(place.x), static_cast<int>(place.y)) = 0;
-      std::swap(last, now);
-      now.places.clear();
-      now.differences.clear();
-    }
-
-    void keep(int x, int y, int difference) {
-      now.places.emplace_back(static_cast<float>(x), static_cast<float>(y));
-      now.differences.push_back(difference);
-      picture.at(x, y) = static_cast<std::uint8_t>(std::abs(difference));
-    }
-
-    bool keeps_near(int left, int top) const {
-      for (int y = std::max(top - 1, 0); y <= std::min(top + 1, picture.height() - 1); ++y)
-        for (int x = std::max(left - 1, 0); x <= std::min(left + 1, picture.width() - 1); ++x)
-          if (picture.at(x, y) != 0) return true;
-      return false;
-    }
   };
 
   struct MovingDifference {
@@ -61,51 +31,62 @@ class DiffSimulator final : public Simulator {
 
   void start(const LumaView& frame) override {
     last_.assign(frame.as<std::uint8_t>());
-    has_difference_ = false;
+    difference_ = {format().width, format().height};
   }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                 EventBuckets& events) override {
     const auto now = frame.as<std::uint8_t>();
     const int m = steps.count();
-    const int bands = band_count(now.height);
-    events.reset(m, bands);
-    // The events of the last step are the pixels that the difference frame keeps.
-    fire(last_.view(), now, m, steps.microseconds(m), Thresholds::of(settings, 8), threads(),
-         events);
-    on_.begin_next();
-    off_.begin_next();
-    for (int band = 0; band < bands; ++band)
-      for (const auto& event : events.bucket(m, band))
-        (event.polarity() == Polarity::on ? on_ : off_)
-            .keep(event.x, event.y(), now.row(event.y())[event.x] - last_.at(event.x, event.y()));
-    on_.tracker.push(on_.picture.view(), threads().threads());
-    off_.tracker.push(off_.picture.view(), threads().threads());
-    if (has_difference_ && m > 1) {
-      moving_.clear();
-      follow(on_, m);
-      follow(off_, m);
-      fire_between(steps, events);
+    const auto thresholds = Thresholds::of(settings, 8);
+    events.reset(m, band_count(now.height));
+    fire(last_.view(), now, m, steps.microseconds(m), thresholds, threads(), events);
+
+    std::swap(before_, difference_);
+    for_each_row(threads(), now.height, [&](int y) {
+      for (int x = 0; x < now.width; ++x) {
+        const int change = now.row(y)[x] - last_.at(x, y);
+        const bool fires = change > thresholds.positive || -change > thresholds.negative;
+        const int difference = fires ? change : 0;
+        difference_.at(x, y) = difference;
+        for (auto& part : parts_)
+          part.picture.at(x, y) = static_cast<std::uint8_t>(std::max(0, part.sign * difference));
+      }
+    });
+    moving_.clear();
+    for (auto& part : parts_) {
+      part.tracker.push(part.picture.view(), threads().threads());
+      if (m > 1) follow(part, m);
     }
-    has_difference_ = true;
+    fire_between(steps, events);
     copy(now, last_, threads());
   }
 
-  /// Makes the kept pixels of the last difference frame move towards this one.
+  /// Makes the pixels of one polarity move, if they end next to a pixel of that polarity.
   void follow(Part& part, int steps) {
-    const auto& kept = part.last;
-    for_each_moving(kept.places, part.tracker.track(kept.places, threads().threads()), steps,
-                    format(), [&](const MovingPoint& point) {
-                      if (part.keeps_near(point.x_at(steps), point.y_at(steps)))
-                        moving_.push_back({point, kept.differences[point.index]});
+    points_.clear();
+    for (int y = 0; y < before_.height(); ++y)
+      for (int x = 0; x < before_.width(); ++x)
+        if (part.sign * before_.at(x, y) > 0)
+          points_.emplace_back(static_cast<float>(x), static_cast<float>(y));
+    const auto arrives = [&](int end_x, int end_y) {
+      const auto& picture = part.picture;
+      for (int y = std::max(end_y - 1, 0); y <= std::min(end_y + 1, picture.height() - 1); ++y)
+        for (int x = std::max(end_x - 1, 0); x <= std::min(end_x + 1, picture.width() - 1); ++x)
+          if (picture.at(x, y) != 0) return true;
+      return false;
+    };
+    for_each_moving(points_, part.tracker.track(points_, threads().threads()), steps, format(),
+                    [&](const MovingPoint& point) {
+                      if (arrives(point.x_at(steps), point.y_at(steps)))
+                        moving_.push_back({point, before_.at(point.x, point.y)});
                     });
   }
 
-  /// At each pixel of an interpolated difference frame, the largest of the differences that meet
-  /// there fires.
+  /// At each pixel of an interpolated frame, the largest of the differences that meet there fires.
   void fire_between(const StepTimes& steps, EventBuckets& events) {
-    const auto size = static_cast<std::size_t>(threads().threads());
-    if (frames_.size() != size) frames_.assign(size, {format().width, format().height});
+    while (static_cast<int>(frames_.size()) < threads().threads())
+      frames_.emplace_back(format().width, format().height);
     threads().for_each(steps.count() - 1, [&](int i, int thread) {
       const int j = i + 1;
       auto& frame = frames_[static_cast<std::size_t>(thread)];
@@ -114,22 +95,24 @@ class DiffSimulator final : public Simulator {
         if (std::abs(difference) > std::abs(here) || difference == -here)
           here = difference == -here ? std::abs(difference) : difference;
       }
-      auto& out = events.bucket(j, 0);
       for (int y = 0; y < frame.height(); ++y) {
+        int* row = frame.row(y);
         for (int x = 0; x < frame.width(); ++x) {
-          const int difference = std::exchange(frame.at(x, y), 0);
-          if (difference == 0) continue;
-          out.push_back(Event::at(x, y, steps.microseconds(j),
-                                  difference > 0 ? Polarity::on : Polarity::off));
+          if (row[x] == 0) continue;
+          events.bucket(j, 0).push_back(
+              Event::at(x, y, steps.microseconds(j), row[x] > 0 ? Polarity::on : Polarity::off));
+          row[x] = 0;
         }
       }
     });
   }
 
-  Image<std::uint8_t> last_;
-  bool has_difference_ = false;
-  Part on_;
-  Part off_;
+  Image<std::uint8_t> last_{format().width, format().height};
+  Image<int> before_{format().width, format().height};
+  Image<int> difference_{format().width, format().height};
+  Part parts_[2] = {{1, {format().width, format().height}, {}},
+                    {-1, {format().width, format().height}, {}}};
+  std::vector<cv::Point2f> points_;
   std::vector<MovingDifference> moving_;
   std::vector<Image<int>> frames_;  ///< by thread; 0 where nothing fires
 };

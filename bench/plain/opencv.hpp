@@ -114,7 +114,6 @@ struct MovingPoint {
   int y;
   Motion dx;
   Motion dy;
-  std::size_t index;  ///< of the track
 
   int x_at(int j) const { return moved(x, dx, j); }
   int y_at(int j) const { return moved(y, dy, j); }
@@ -128,7 +127,7 @@ void for_each_moving(const std::vector<cv::Point2f>& points, const Tracks& track
     const cv::Point2f flow = tracks.ends[i] - points[i];
     if (tracks.found[i] == 0 || !std::isfinite(flow.x) || !std::isfinite(flow.y)) continue;
     const MovingPoint point{static_cast<int>(points[i].x), static_cast<int>(points[i].y),
-                            motion_per_step(flow.x, steps), motion_per_step(flow.y, steps), i};
+                            motion_per_step(flow.x, steps), motion_per_step(flow.y, steps)};
     const int x = point.x_at(steps);
     const int y = point.y_at(steps);
     if (x >= 0 && x < format.width && y >= 0 && y < format.height) visit(point);

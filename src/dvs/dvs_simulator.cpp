@@ -42,11 +42,7 @@ struct alignas(64) Scratch {
 template <class Pixel>
 class PixelSimulator final : public DvsSimulator {
  public:
-  explicit PixelSimulator(const LumaFormat& format)
-      : DvsSimulator(format),
-        last_(format.width, format.height),
-        now_(format.width, format.height),
-        pixels_(format.width, format.height) {}
+  explicit PixelSimulator(const LumaFormat& format) : DvsSimulator(format) {}
 
  private:
   void start(const LumaView& frame) override {
@@ -256,9 +252,9 @@ class PixelSimulator final : public DvsSimulator {
     });
   }
 
-  Image<Pixel> last_;
-  Image<Pixel> now_;
-  PixelArray pixels_;
+  Image<Pixel> last_{format().width, format().height};
+  Image<Pixel> now_{format().width, format().height};
+  PixelArray pixels_{format().width, format().height};
   DvsSettings current_;  ///< of the pixels
   Random random_{0};
   std::vector<float> responses_;  ///< to each luma value

@@ -89,11 +89,8 @@ inline Image<double> pyramid_level(const Image<std::uint8_t>& picture, int level
 
 /// f(x, y) ~ b_y y + b_x x + a_yy y^2 + a_xx x^2 + 2 a_xy x y + c
 struct Polynomial {
-  double b_y;
-  double b_x;
-  double a_yy;
-  double a_xx;
-  double a_xy;
+  double b_y, b_x;
+  double a_yy, a_xx, a_xy;
 };
 
 /// The least-squares fit around (x, y), border replicated: under the weight, whose moments are m2
@@ -139,11 +136,8 @@ inline double border_weight(int x, int y, int width, int height) {
 
 /// A^T A d = A^T b for the flow d of one pixel, or the sum of many.
 struct Equations {
-  double g_yy = 0;
-  double g_xy = 0;
-  double g_xx = 0;
-  double h_y = 0;
-  double h_x = 0;
+  double g_yy = 0, g_xy = 0, g_xx = 0;
+  double h_y = 0, h_x = 0;
 
   Equations& operator+=(const Equations& o) {
     g_yy += o.g_yy;
