@@ -67,7 +67,7 @@ void decode_aedat4(benchmark::State& state, Aedat4Compression compression) {
     std::size_t decoded = 0;
     const auto take = [&] {
       while (const auto item = decoder.next()) {
-        const auto& of_item = std::get<Aedat4Events>(*item).events;
+        const auto& of_item = std::get<EventItem>(*item).events;
         benchmark::DoNotOptimize(of_item.data());
         decoded += of_item.size();
       }

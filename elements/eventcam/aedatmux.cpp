@@ -30,9 +30,9 @@
 #include <utility>
 #include <vector>
 
-#include "elements/eventcam/aedatframe.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/frame_buffer.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
@@ -109,7 +109,7 @@ static GstStaticPadTemplate events_template = GST_STATIC_PAD_TEMPLATE(
                     ", format = (string) XYTP, width = (int) [ 1, 32767 ], "
                     "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"));
 static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
-    "video", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(AEDAT_VIDEO_CAPS));
+    "video", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(RECORDED_VIDEO_CAPS));
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
     "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS("application/x-aedat, version = (int) 4"));
 
@@ -278,7 +278,7 @@ static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, By
   if (!state.video) return reject("no caps");
   const VideoFrame video(*state.video, buffer, GST_MAP_READ);
   if (!video) return reject("cannot map it as video of the negotiated format");
-  auto frame = aedat_frame_of(video.get());
+  auto frame = recorded_frame(video.get());
   frame.t = frame.begin = frame.end = frame.exposure_begin = frame.exposure_end = t;
   try {
     state.encoder->encode(frame, out);

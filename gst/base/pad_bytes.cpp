@@ -3,32 +3,54 @@
 
 #include <algorithm>
 
-#include "gst/base/pulling.hpp"
+/// Pulled at once, because upstream allocates as much.
+static constexpr std::size_t piece_size = std::size_t{1} << 18;
+static constexpr std::size_t max_read = std::size_t{1} << 20;
 
-/// Pulled at once: upstream allocates as much.
-static constexpr std::size_t piece_bytes = std::size_t{1} << 20;
+guint64 upstream_bytes(GstPad* sink) {
+  gint64 size = 0;
+  const bool known = gst_pad_peer_query_duration(sink, GST_FORMAT_BYTES, &size) != FALSE;
+  return known && size > 0 ? static_cast<guint64>(size) : 0;
+}
 
-PadBytes::PadBytes(GstPad* sink, GstFlowReturn& stop)
-    : sink_(sink), stop_(stop), size_(upstream_bytes(sink)) {}
+/// Null at the end of the file, and where bytes cannot be read.
+GstBuffer* PadBytes::pull(std::uint64_t position, std::size_t size) noexcept {
+  GstBuffer* buffer = nullptr;
+  const GstFlowReturn result =
+      gst_pad_pull_range(sink_, position, static_cast<guint>(size), &buffer);
+  if (result != GST_FLOW_EOS) flow_ = result;
+  return result == GST_FLOW_OK ? buffer : nullptr;
+}
 
-bool PadBytes::read(std::uint64_t position, std::span<std::uint8_t> out) noexcept {
-  while (!out.empty()) {
-    const auto wanted = std::min(out.size(), piece_bytes);
-    GstBuffer* piece = nullptr;
-    const GstFlowReturn result =
-        gst_pad_pull_range(sink_, position, static_cast<guint>(wanted), &piece);
-    if (result != GST_FLOW_OK) {
-      stop_ = result;
-      return false;
-    }
-    const gsize got = gst_buffer_extract(piece, 0, out.data(), wanted);
-    gst_buffer_unref(piece);
-    if (got == 0) {
-      stop_ = GST_FLOW_EOS;
-      return false;
-    }
-    position += got;
-    out = out.subspan(got);
+std::optional<std::size_t> PadBytes::read(std::uint64_t position,
+                                          std::span<std::uint8_t> out) noexcept {
+  std::size_t filled = 0;
+  while (filled < out.size()) {
+    const auto wanted = std::min(out.size() - filled, max_read);
+    const OwnedBuffer buffer(pull(position + filled, wanted));
+    if (failed()) return std::nullopt;
+    const gsize got = buffer ? gst_buffer_extract(buffer.get(), 0, out.data() + filled, wanted) : 0;
+    if (got == 0) break;
+    filled += got;
   }
-  return true;
+  return filled;
+}
+
+std::optional<std::span<const std::uint8_t>> PadBytes::piece(std::uint64_t position) {
+  release_piece();
+  OwnedBuffer buffer(pull(position, piece_size));
+  if (failed()) return std::nullopt;
+  if (!buffer) return std::span<const std::uint8_t>{};
+  if (!gst_buffer_map(buffer.get(), &map_, GST_MAP_READ)) {
+    flow_ = GST_FLOW_ERROR;
+    return std::nullopt;
+  }
+  piece_ = std::move(buffer);
+  return std::span<const std::uint8_t>(map_.data, map_.size);
+}
+
+void PadBytes::release_piece() {
+  if (!piece_) return;
+  gst_buffer_unmap(piece_.get(), &map_);
+  piece_.reset();
 }

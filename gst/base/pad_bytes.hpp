@@ -3,19 +3,38 @@
 
 #include <gst/gst.h>
 
+#include "gst/base/owned.hpp"
 #include "src/formats/byte_source.hpp"
+
+/// The size of the file that comes from upstream, in bytes; 0 where it is not known.
+guint64 upstream_bytes(GstPad* sink);
 
 /// The bytes of a file that is pulled.
 class PadBytes final : public eventcamera::ByteSource {
  public:
-  /// Of an element's sink pad. `stop` is told why bytes cannot be read; both outlive this.
-  PadBytes(GstPad* sink, GstFlowReturn& stop);
+  /// Of an element's sink pad, which outlives this.
+  explicit PadBytes(GstPad* sink) : sink_(sink), size_(upstream_bytes(sink)) {}
+  ~PadBytes() override { release_piece(); }
 
   std::uint64_t size() const override { return size_; }
-  bool read(std::uint64_t position, std::span<std::uint8_t> out) noexcept override;
+  std::optional<std::size_t> read(std::uint64_t position,
+                                  std::span<std::uint8_t> out) noexcept override;
+  std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override;
+  bool failed() const noexcept override { return flow_ != GST_FLOW_OK; }
+
+  /// Why bytes could not be read.
+  GstFlowReturn flow() const { return flow_; }
+
+  /// Forgets that bytes could not be read.
+  void retry() { flow_ = GST_FLOW_OK; }
 
  private:
+  GstBuffer* pull(std::uint64_t position, std::size_t size) noexcept;
+  void release_piece();
+
   GstPad* sink_;
-  GstFlowReturn& stop_;
   std::uint64_t size_;
+  GstFlowReturn flow_ = GST_FLOW_OK;
+  OwnedBuffer piece_;  ///< mapped
+  GstMapInfo map_ = {};
 };

@@ -37,11 +37,11 @@ class UsedPixels {
   int max_y_ = 0;
 };
 
-/// Leaves out events that lie outside the sensor, and returns how many.
-inline std::size_t erase_outside(std::vector<AbsoluteEvent>& events, SensorSize size) {
-  return std::erase_if(events, [&](const AbsoluteEvent& event) {
+/// Tells events that lie outside a sensor.
+inline auto is_outside(SensorSize size) {
+  return [size](const AbsoluteEvent& event) {
     return event.x >= size.width || event.y() >= size.height;
-  });
+  };
 }
 
 }  // namespace eventcamera

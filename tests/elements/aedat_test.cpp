@@ -24,11 +24,11 @@ using eventcamera::AbsoluteEvent;
 using eventcamera::Aedat4Compression;
 using eventcamera::Aedat4Decoder;
 using eventcamera::Aedat4Encoder;
-using eventcamera::Aedat4Events;
 using eventcamera::Aedat4Frame;
-using eventcamera::Aedat4Picture;
 using eventcamera::Aedat4PixelFormat;
 using eventcamera::Aedat4Settings;
+using eventcamera::EventItem;
+using eventcamera::FrameItem;
 using eventcamera::Microseconds;
 using eventcamera::Polarity;
 using eventcamera::SensorSize;
@@ -587,7 +587,7 @@ TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
       Player player(file.path(), between);
       ASSERT_TRUE(player.play()) << player.error;
       ASSERT_FALSE(player.warnings.empty());
-      EXPECT_TRUE(player.warnings.front().starts_with("The data are corrupt at byte " +
+      EXPECT_TRUE(player.warnings.front().starts_with("Corrupt data at byte " +
                                                       std::to_string(first_corruption) + ": "))
           << player.warnings.front();
       EXPECT_EQ(
@@ -636,7 +636,7 @@ TEST(AedatDemux, SaysWhereTheTableIsWrong) {
     Player player(file.path());
     ASSERT_TRUE(player.play()) << player.error;
     ASSERT_EQ(player.warnings.size(), 1U);
-    EXPECT_TRUE(player.warnings.front().starts_with("The data are corrupt at byte " +
+    EXPECT_TRUE(player.warnings.front().starts_with("Corrupt data at byte " +
                                                     std::to_string(fault.at) + ": " + fault.what))
         << player.warnings.front();
     EXPECT_TRUE(player.track("events_0").events == events);
@@ -747,9 +747,9 @@ Content content_of(const Bytes& bytes) {
   decoder.push(bytes);
   decoder.finish();
   while (const auto item = decoder.next()) {
-    if (const auto* const events = std::get_if<Aedat4Events>(&*item)) {
+    if (const auto* const events = std::get_if<EventItem>(&*item)) {
       content.events.insert(content.events.end(), events->events.begin(), events->events.end());
-    } else if (const auto* const picture = std::get_if<Aedat4Picture>(&*item)) {
+    } else if (const auto* const picture = std::get_if<FrameItem>(&*item)) {
       const auto& f = picture->frame;
       content.pictures.emplace_back(f.t, Bytes(f.pixels, f.pixels + f.height * f.stride));
     }

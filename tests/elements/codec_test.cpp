@@ -336,9 +336,9 @@ TEST_P(EveryFormat, WarnsOnceOfCorruptionAndTellsWhere) {
   const auto message = h.message(GST_MESSAGE_WARNING);
   ASSERT_TRUE(message);
   const auto text = text_of(message.get());
-  const auto found = text.find("corrupt at byte ");
+  const auto found = text.find("data at byte ");
   ASSERT_NE(found, std::string::npos) << text;
-  const auto position = std::stoul(text.substr(found + 16));
+  const auto position = std::stoul(text.substr(found + 13));
   EXPECT_LT(position, file.size());
   EXPECT_GE(position + 13, file.size());  // of the longest event
   EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// eventhdf5dec, eventhdf5src and eventhdf5sink: files of every layout there and back, pulled and
+// eventhdf5dec and eventhdf5sink: files of every layout there and back, pulled and
 // pushed, sought in, broken, and to places where none can be written.
 #include <algorithm>
 #include <filesystem>
@@ -179,14 +179,13 @@ class Player {
   Owned<GstBus> bus_;
 };
 
-TEST_P(Hdf5, IsReadPulledPushedAndFromItsSource) {
+TEST_P(Hdf5, IsReadPulledAndPushed) {
   const auto events = some_events();
   const auto path = written(events);
   for (const auto& launch :
        {"filesrc location=" + in_quotes(path) + " ! eventhdf5dec",
         "filesrc location=" + in_quotes(path) + " ! queue ! eventhdf5dec",
-        "filesrc blocksize=777 location=" + in_quotes(path) + " ! identity ! eventhdf5dec",
-        "eventhdf5src location=" + in_quotes(path)}) {
+        "filesrc blocksize=777 location=" + in_quotes(path) + " ! identity ! eventhdf5dec"}) {
     SCOPED_TRACE(launch);
     Player player(launch);
     for (int times = 0; times < 2; ++times) {
@@ -208,14 +207,15 @@ TEST_P(Hdf5, IsFoundByDecodebin) {
 }
 
 TEST_P(Hdf5, CutsByBufferTime) {
-  Player player("eventhdf5src buffer-time=100000000 location=" + in_quotes(written(some_events())));
+  Player player("filesrc location=" + in_quotes(written(some_events())) +
+                " ! eventhdf5dec buffer-time=100000000");
   ASSERT_TRUE(player.ends_well());
   EXPECT_EQ(player.buffers, 10);
 }
 
 TEST_P(Hdf5, IsSoughtIn) {
   const auto events = some_events();
-  Player player("eventhdf5src location=" + in_quotes(written(events)));
+  Player player("filesrc location=" + in_quotes(written(events)) + " ! eventhdf5dec");
   ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
   EXPECT_EQ(player.duration(), (events.back().t - events.front().t + 1) * 1000);
   for (const Microseconds start : {3'700'000, 100'000, 0, 499'999, 2'000'000, 3'999'000}) {
@@ -233,7 +233,7 @@ TEST_P(Hdf5, IsSoughtIn) {
 }
 
 TEST_P(Hdf5, IsSoughtInWhilePlaying) {
-  Player player("eventhdf5src location=" + in_quotes(written(some_events())));
+  Player player("filesrc location=" + in_quotes(written(some_events())) + " ! eventhdf5dec");
   ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
   gst_element_set_state(player.get(), GST_STATE_PLAYING);
   std::mt19937 random(3);
@@ -283,8 +283,8 @@ TEST_P(Hdf5, SurvivesBrokenFiles) {
 TEST_P(Hdf5, IsWritten) {
   const auto events = some_events();
   const auto path = folder_ / "out.h5";
-  Player player("eventhdf5src location=" + in_quotes(written(events)) +
-                " ! tee name=t  t. ! queue ! eventhdf5sink layout=" + GetParam() +
+  Player player("filesrc location=" + in_quotes(written(events)) +
+                " ! eventhdf5dec ! tee name=t  t. ! queue ! eventhdf5sink layout=" + GetParam() +
                 " location=" + in_quotes(path) + "  t. ! queue");
   ASSERT_TRUE(player.ends_well());
   // It is whole at the end of the stream, not only after the stop.
@@ -432,9 +432,10 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
   gst_element_set_state(nowhere.get(), GST_STATE_NULL);
 }
 
-TEST(Hdf5Src, SaysWhatCannotBeRead) {
+TEST(Hdf5Dec, SaysWhatCannotBeRead) {
   const Folder folder;
-  EXPECT_NE(Player("eventhdf5src location=" + in_quotes(folder / "none.h5")).error(), "");
+  EXPECT_NE(Player("filesrc location=" + in_quotes(folder / "none.h5") + " ! eventhdf5dec").error(),
+            "");
   std::ofstream(folder / "text.h5") << "t,x,y,p\n";
   for (const char* way : {"", "queue ! "})
     EXPECT_NE(

@@ -48,14 +48,14 @@ void take(Aedat4Decoder& decoder, Contents& out) {
   while (const auto item = decoder.next()) {
     ++out.items;
     out.events.resize(decoder.streams().size());
-    if (const auto* events = std::get_if<Aedat4Events>(&*item)) {
+    if (const auto* events = std::get_if<EventItem>(&*item)) {
       auto& all = out.events[events->stream];
       all.insert(all.end(), events->events.begin(), events->events.end());
-    } else if (const auto* picture = std::get_if<Aedat4Picture>(&*item)) {
+    } else if (const auto* picture = std::get_if<FrameItem>(&*item)) {
       const auto& frame = picture->frame;
       out.frames.push_back({frame, {frame.pixels, frame.pixels + frame.stride * frame.height}});
     } else {
-      const auto triggers = std::get<Aedat4Triggers>(*item).triggers;
+      const auto triggers = std::get<TriggerItem>(*item).triggers;
       out.triggers.insert(out.triggers.end(), triggers.begin(), triggers.end());
     }
   }

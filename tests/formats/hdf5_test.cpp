@@ -15,7 +15,7 @@
 #include "src/formats/hdf5/hdf5_filters.hpp"
 #include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
-#include "src/formats/memory_bytes.hpp"
+#include "src/formats/byte_source.hpp"
 #include "tests/formats/table_events.hpp"
 
 namespace {

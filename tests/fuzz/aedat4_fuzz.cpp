@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // AEDAT4, through the reader that tells AEDAT's versions apart, and its table of packets.
+#include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_reader.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
@@ -13,18 +14,18 @@ class Sum {
  public:
   void add(std::uint64_t number) { sum_ = (sum_ ^ number) * 0x9E3779B97F4A7C15U + (sum_ >> 29); }
 
-  void add(const Aedat4Events& item) {
+  void add(const EventItem& item) {
     for (const auto& event : item.events) {
       add(static_cast<std::uint64_t>(event.t));
       add(std::uint64_t{event.x} << 16 | event.y_p);
     }
   }
-  void add(const Aedat4Picture& item) {
+  void add(const FrameItem& item) {
     const auto& frame = item.frame;
     add(static_cast<std::uint64_t>(frame.t));
     for (std::ptrdiff_t i = 0; i < frame.stride * frame.height; ++i) add(frame.pixels[i]);
   }
-  void add(const Aedat4Triggers& item) {
+  void add(const TriggerItem& item) {
     for (const auto& trigger : item.triggers) {
       add(static_cast<std::uint64_t>(trigger.t));
       add(std::uint64_t{trigger.id} << 1 | (trigger.rising ? 1U : 0U));
@@ -49,7 +50,7 @@ struct Sums {
   std::vector<Microseconds> latest;  ///< of each stream
   std::uint64_t unsorted = 0;
 
-  void add(const Aedat4Events& item) {
+  void add(const EventItem& item) {
     events.add(item);
     if (latest.size() <= item.stream)
       latest.resize(item.stream + 1, std::numeric_limits<Microseconds>::min());
@@ -58,8 +59,8 @@ struct Sums {
       latest[item.stream] = std::max(latest[item.stream], event.t);
     }
   }
-  void add(const Aedat4Picture& item) { pictures.add(item); }
-  void add(const Aedat4Triggers& item) { triggers.add(item); }
+  void add(const FrameItem& item) { pictures.add(item); }
+  void add(const TriggerItem& item) { triggers.add(item); }
 
   friend bool operator==(const Sums&, const Sums&) = default;
 };
@@ -67,7 +68,7 @@ struct Sums {
 void take(AedatReader& reader, Sums& sums) {
   while (const auto item = reader.next()) {
     std::visit([&](const auto& some) { sums.add(some); }, *item);
-    if (const auto* const some = std::get_if<Aedat4Events>(&*item)) {
+    if (const auto* const some = std::get_if<EventItem>(&*item)) {
       require(some->stream < reader.streams().size(), "events are of a stream");
       require_within(reader.streams()[some->stream].size, some->events);
     }
@@ -85,7 +86,7 @@ void seek(AedatReader& reader, std::span<const std::uint8_t> bytes) {
     if (table && !table->empty())
       position = aedat4_position_of(*table, table->back().end).value_or(position);
   }
-  reader.resume(position);
+  reader.restart({.position = position});
   if (position < bytes.size()) reader.push(bytes.subspan(static_cast<std::size_t>(position)));
   Sums sums;
   take(reader, sums);
@@ -110,7 +111,7 @@ Sums sums_of(std::span<const std::uint8_t> bytes, Pieces pieces) {
   require(reader.corruption().unsorted == sums.unsorted, "disorder is counted");
   sums.rest.add(reader.corruption());
   sums.rest.add(reader.streams().size());
-  if (reader.version() == 4) {
+  if (reader.aedat4() != nullptr) {
     sums.rest.add(reader.aedat4()->skipped().imu_samples);
     if (pieces.longest == 0) seek(reader, bytes);
   }

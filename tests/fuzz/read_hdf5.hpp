@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/formats/hdf5/hdf5_reader.hpp"
-#include "src/formats/memory_bytes.hpp"
+#include "src/formats/byte_source.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace fuzz {

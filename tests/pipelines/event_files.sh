@@ -145,7 +145,7 @@ refused "No such file" nowhere.raw out.dat
 refused "the same file" ball.raw ./ball.raw
 head -c 100001 ball.raw >short.raw
 convert short.raw short.dat 2>warnings
-grep -q "corrupt at byte " warnings || fail "no warning about a truncated file"
+grep -q "Corrupt data at byte " warnings || fail "no warning about a truncated file"
 
 # Interrupted, it completes the file.
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw

@@ -9,6 +9,7 @@
 
 #include "src/formats/aedat/aedat4.fbs.h"
 #include "src/formats/aedat/aedat4_info_node.hpp"
+#include "src/formats/chunker.hpp"
 #include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
@@ -122,14 +123,17 @@ void Aedat4Decoder::push(std::span<const std::uint8_t> piece) {
   queue_.push(piece);
 }
 
-std::optional<Aedat4Item> Aedat4Decoder::next() {
+std::optional<Item> Aedat4Decoder::next() {
   while (true) {
     if (elements_.count > 0)
       return elements_.kind == Aedat4Kind::events ? next_events() : next_triggers();
     queue_.consume(std::exchange(packet_, 0));
     const bool ready = header_read() || read_header();
-    if (!ready || (scanning_ && !scan()) || !read_packet()) break;
-    if (picture_) return *std::exchange(picture_, std::nullopt);
+    if (!ready || (scanning_ && !scan()) || !read_packet()) {
+      if (finished_ && ready) note_missing_table();
+      break;
+    }
+    if (frame_) return *std::exchange(frame_, std::nullopt);
   }
   queue_.keep();
   return std::nullopt;
@@ -139,9 +143,10 @@ void Aedat4Decoder::resume(std::uint64_t position) {
   queue_.restart(position);
   elements_ = {};
   packet_ = 0;
-  picture_.reset();
+  frame_.reset();
   finished_ = false;
   scanning_ = false;
+  table_reported_ = false;
   std::fill(newest_.begin(), newest_.end(), std::numeric_limits<Microseconds>::min());
 }
 
@@ -188,7 +193,64 @@ bool Aedat4Decoder::read_header() {
     table_field_at_ = size_at + static_cast<std::uint64_t>(field - content.data());
   }
   queue_.consume(before + size);
+  read_table();
   return true;
+}
+
+bool Aedat4Decoder::open(ByteSource& source) {
+  source_ = &source;
+  return false;
+}
+
+void Aedat4Decoder::read_table() {
+  // The table of a recording of many days is larger, and is not read.
+  constexpr std::uint64_t max_table = std::uint64_t{1} << 26;
+  if (source_ == nullptr || !table_at_) return;
+  std::vector<std::uint8_t> bytes;
+  const auto size = source_->size();
+  if (size > *table_at_ && size - *table_at_ <= max_table) bytes.resize(size - *table_at_);
+  if (!bytes.empty() && source_->read(*table_at_, bytes) != bytes.size()) bytes.clear();
+  auto table = read_aedat4_table(bytes, compression_, packets_at_);
+  table_missing_ = !table;
+  if (table) table_ = std::move(*table);
+}
+
+/// A missing table is reported after all other corruption, which may be what moved it.
+void Aedat4Decoder::note_missing_table() {
+  if (!table_missing_ || std::exchange(table_reported_, true)) return;
+  const auto at = table_at_.value_or(0);
+  if (table_found_at_ && *table_found_at_ != at)
+    corruption_.note(table_field_at_, "the header names a place without a table of packets");
+  else if (source_->size() <= at)
+    corruption_.note(source_->size(), "the file ends before its table of packets");
+  else
+    corruption_.note(at, "here should be a table of its packets");
+}
+
+std::optional<SeekPoint> Aedat4Decoder::seek_point_before(Microseconds t) const {
+  if (!header_read()) return std::nullopt;
+  const bool from_start = table_.empty() || t == std::numeric_limits<Microseconds>::min();
+  return SeekPoint{
+      .t = t,
+      .position = from_start ? packets_at_ : aedat4_position_of(table_, t).value_or(*table_at_)};
+}
+
+std::optional<Microseconds> Aedat4Decoder::last_time() {
+  std::optional<Microseconds> last;
+  for (const auto& entry : table_) {
+    const auto stream = stream_of(entry.stream);
+    if (!stream || entry.end >= Chunker::max_time) continue;
+    const auto kind = streams_[*stream].kind;
+    if (kind == StreamKind::events || kind == StreamKind::frames)
+      last = std::max(last.value_or(entry.end), entry.end);
+  }
+  return last;
+}
+
+bool Aedat4Decoder::is_empty(std::size_t stream) const {
+  return !table_.empty() && std::ranges::none_of(table_, [&](const Aedat4TableEntry& entry) {
+    return entry.stream == streams_[stream].id;
+  });
 }
 
 Aedat4Decoder::Place Aedat4Decoder::place_at(std::size_t offset) {
@@ -357,7 +419,7 @@ const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, i
   }
   if (!elements) return broken_packet;
   elements_ = {kind, elements->data, elements->count, stream ? *stream : add_stream(id, kind)};
-  if (picture_) picture_->stream = elements_.stream;
+  if (frame_) frame_->stream = elements_.stream;
   if (kind == Aedat4Kind::imu) skipped_.imu_samples += std::exchange(elements_.count, 0);
   return nullptr;
 }
@@ -395,7 +457,7 @@ const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
     frame.begin = frame.exposure_begin = frame.t;
     frame.end = frame.exposure_end = frame.t + packet->exposure();
   }
-  picture_ = Aedat4Picture{0, frame};
+  frame_ = FrameItem{0, frame};
   return nullptr;
 }
 
@@ -417,9 +479,9 @@ bool Aedat4Decoder::has_sound_events(std::span<const std::uint8_t> content, int 
   return true;
 }
 
-Aedat4Item Aedat4Decoder::next_events() {
+Item Aedat4Decoder::next_events() {
   const auto count = std::min(elements_.count, block);
-  const Aedat4Events item{elements_.stream, checked_events(count)};
+  const EventItem item{elements_.stream, checked_events(count)};
   elements_.data += count * event_size;
   elements_.count -= count;
   return item;
@@ -463,7 +525,7 @@ std::span<const AbsoluteEvent> Aedat4Decoder::checked_events(std::size_t count) 
   return {events_.data(), kept};
 }
 
-Aedat4Item Aedat4Decoder::next_triggers() {
+Item Aedat4Decoder::next_triggers() {
   const auto count = std::min(elements_.count, block);
   triggers_.clear();
   for (std::size_t i = 0; i < count; ++i) {
@@ -477,7 +539,7 @@ Aedat4Item Aedat4Decoder::next_triggers() {
   }
   elements_.data += count * sizeof(flatbuffers::uoffset_t);
   elements_.count -= count;
-  return Aedat4Triggers{elements_.stream, triggers_};
+  return TriggerItem{elements_.stream, triggers_};
 }
 
 std::optional<std::size_t> Aedat4Decoder::stream_of(int id) const {

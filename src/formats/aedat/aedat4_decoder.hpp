@@ -5,58 +5,43 @@
 #include <optional>
 #include <span>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_compression.hpp"
+#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/byte_queue.hpp"
-#include "src/formats/decoder.hpp"
+#include "src/formats/reader.hpp"
 
 namespace eventcamera {
 
-/// Events of one packet, or a part of it. `stream` is an index into the decoder's streams().
-struct Aedat4Events {
-  std::size_t stream;
-  std::span<const AbsoluteEvent> events;
-};
-
-/// A packet's frame.
-struct Aedat4Picture {
-  std::size_t stream;
-  Aedat4Frame frame;
-};
-
-/// Triggers of one packet, or a part of it. Their id is what gave the edge: 0 the camera's input,
-/// 1 its generator, 2 a frame, 3 an exposure, 4 the zeroing of its clock.
-struct Aedat4Triggers {
-  std::size_t stream;
-  std::span<const Trigger> triggers;
-};
-
-using Aedat4Item = std::variant<Aedat4Events, Aedat4Picture, Aedat4Triggers>;
-
-/// Reads AEDAT4: streams of events, frames and triggers, in the file's order. Bytes come in pieces
-/// of any size, and how they are split changes nothing. A packet is the smallest unit that is
-/// whole or not.
+/// Reads AEDAT4: streams of events, frames and triggers. Bytes come in pieces of any size: how they
+/// are split changes nothing. A packet is the smallest unit that is read or skipped.
 ///
-///     decoder.push(piece);
-///     while (const auto item = decoder.next()) ...
-class Aedat4Decoder {
+/// The id of a trigger is what gave the edge: 0 the camera's input, 1 its generator, 2 a frame, 3
+/// an exposure, 4 the zeroing of its clock.
+class Aedat4Decoder final : public Reader {
  public:
   Aedat4Decoder();
-  Aedat4Decoder(const Aedat4Decoder&) = delete;
-  Aedat4Decoder& operator=(const Aedat4Decoder&) = delete;
 
-  /// Adds bytes, which stay borrowed until next() returns nothing; only then more may be pushed.
-  void push(std::span<const std::uint8_t> piece);
+  void push(std::span<const std::uint8_t> piece) override;
+  void finish() override { finished_ = true; }
+  std::optional<Item> next() override;
 
-  /// Says that no more bytes come.
-  void finish() { finished_ = true; }
+  /// The table of packets is read from it, as soon as the header tells where that is.
+  bool open(ByteSource& source) override;
 
-  /// What comes next, valid until the next call; nothing where that takes more bytes. Throws
-  /// UnsupportedFormat.
-  std::optional<Aedat4Item> next();
+  /// Those of the header, and any that packets named besides.
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const Corruption& corruption() const override { return corruption_; }
+
+  /// By the table of packets, where there is one; else before the first packet.
+  std::optional<SeekPoint> seek_point_before(Microseconds t) const override;
+  void restart(const SeekPoint& seek_point) override { resume(seek_point.position); }
+  std::optional<Microseconds> last_time() override;
+  bool is_empty(std::size_t stream) const override;
+  std::string format_name() const override { return "AEDAT 4.0"; }
+  std::uint64_t imu_samples() const override { return skipped_.imu_samples; }
 
   /// What is pushed next lies at `position`, where a packet should begin. The header has to have
   /// been read.
@@ -64,8 +49,6 @@ class Aedat4Decoder {
 
   bool header_read() const { return packets_at_ != 0; }
 
-  /// Those of the header, and any that packets named besides.
-  const std::vector<Aedat4Stream>& streams() const { return streams_; }
   Aedat4Compression compression() const { return compression_; }
 
   /// Where the first packet begins, once the header is read.
@@ -79,8 +62,6 @@ class Aedat4Decoder {
 
   /// Where something like a table was come upon.
   std::optional<std::uint64_t> table_found_at() const { return table_found_at_; }
-
-  const Corruption& corruption() const { return corruption_; }
 
   /// What is sound, but not handed over.
   struct Skipped {
@@ -111,10 +92,12 @@ class Aedat4Decoder {
   const char* read_frame(std::span<const std::uint8_t> content);
   std::optional<std::size_t> stream_of(int id) const;
   std::size_t add_stream(int id, Aedat4Kind kind);
+  void read_table();
+  void note_missing_table();
   void skip_corrupt(std::size_t packet, std::size_t sound, std::size_t work, bool sound_after);
-  Aedat4Item next_events();
+  Item next_events();
   std::span<const AbsoluteEvent> checked_events(std::size_t count);
-  Aedat4Item next_triggers();
+  Item next_triggers();
 
   ByteQueue queue_;
   bool finished_ = false;
@@ -124,14 +107,18 @@ class Aedat4Decoder {
   std::optional<std::uint64_t> table_at_;
   std::uint64_t table_field_at_ = 0;
   std::optional<std::uint64_t> table_found_at_;
+  ByteSource* source_ = nullptr;  ///< once it is opened
+  std::vector<Aedat4TableEntry> table_;
+  bool table_missing_ = false;  ///< where the header says that there is one
+  bool table_reported_ = false;
   Aedat4Compression compression_ = Aedat4Compression::none;
-  std::vector<Aedat4Stream> streams_;
+  std::vector<StreamInfo> streams_;
   std::vector<Microseconds> newest_;  ///< the latest event of each stream
   Aedat4Decompressor decompressor_;
 
   std::size_t packet_ = 0;  ///< bytes of the packet that is being handed over
   Elements elements_;
-  std::optional<Aedat4Picture> picture_;
+  std::optional<FrameItem> frame_;
   std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
 

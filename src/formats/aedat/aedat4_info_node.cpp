@@ -70,9 +70,9 @@ std::string_view attribute(std::string_view tag, std::string_view name) {
 }
 
 /// Walks through the tags and notes what the nodes outInfo/N and outInfo/N/info say.
-class Reader {
+class XmlReader {
  public:
-  explicit Reader(std::string_view xml) : xml_(xml) {}
+  explicit XmlReader(std::string_view xml) : xml_(xml) {}
 
   Aedat4InfoNode read() {
     info_.whole = walk() && path_.empty();
@@ -198,7 +198,7 @@ Aedat4Kind aedat4_kind(std::string_view identifier) {
 }
 
 Aedat4InfoNode read_info_node(std::string_view xml) {
-  return Reader(xml).read();
+  return XmlReader(xml).read();
 }
 
 std::string write_info_node(std::span<const Aedat4Stream> streams, Aedat4Compression compression) {

@@ -20,7 +20,7 @@ struct InputStorage {
   bool read(std::uint64_t position, std::span<std::uint8_t> out) const {
     const auto size = source->size();
     if (position > size || out.size() > size - position) return false;
-    return source->read(position, out);
+    return source->read(position, out) == out.size();
   }
 
   static bool write(std::uint64_t /*position*/, std::span<const std::uint8_t> /*bytes*/) {

@@ -18,7 +18,7 @@ struct Hdf5Reader::File {
     handle = {};
   }
 
-  std::unique_ptr<ByteSource> bytes;  ///< none where the library reads by itself
+  std::unique_ptr<ByteSource> bytes;  ///< none where the reader does not own them
   Hdf5Handle handle;
 };
 
@@ -44,10 +44,17 @@ bool is_signed(ByteSource& bytes) {
   const auto size = bytes.size();
   for (std::uint64_t at = 0; at + signature.size() <= size; at = at == 0 ? 512 : 2 * at) {
     std::array<std::uint8_t, 8> found = {};
-    if (!bytes.read(at, found)) return false;
+    if (bytes.read(at, found) != found.size()) return false;
     if (found == signature) return true;
   }
   return false;
+}
+
+Hdf5Handle open_source(ByteSource& bytes) {
+  if (!is_signed(bytes)) throw UnsupportedFormat("This is not an HDF5 file");
+  auto file = open_hdf5(bytes);
+  if (!file) throw UnsupportedFormat("This HDF5 file is corrupt, cut short, or being written");
+  return file;
 }
 
 }  // namespace
@@ -61,12 +68,16 @@ Hdf5Reader::Hdf5Reader(const std::filesystem::path& path)
 
 Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes)
     : Hdf5Reader([&] {
-        if (!is_signed(*bytes)) throw UnsupportedFormat("This is not an HDF5 file");
         File file;
+        file.handle = open_source(*bytes);
         file.bytes = std::move(bytes);
-        file.handle = open_hdf5(*file.bytes);
-        if (!file.handle)
-          throw UnsupportedFormat("This HDF5 file is corrupt, cut short, or being written");
+        return file;
+      }()) {}
+
+Hdf5Reader::Hdf5Reader(ByteSource& bytes)
+    : Hdf5Reader([&] {
+        File file;
+        file.handle = open_source(bytes);
         return file;
       }()) {}
 
@@ -147,6 +158,89 @@ void Hdf5Reader::seek(Microseconds t) {
   not_before_ = t;
   validator_.restart();
   if (triggers_) triggers_->seek(t);
+}
+
+namespace {
+
+/// The events of a file as items.
+class Hdf5Items final : public Reader {
+ public:
+  void push(std::span<const std::uint8_t> piece) override {
+    constexpr std::size_t max_collected = std::size_t{1} << 28;
+    if (piece.size() > max_collected - collected_.size())
+      throw UnsupportedFormat("an HDF5 file this large has to be pulled, as from filesrc");
+    collected_.insert(collected_.end(), piece.begin(), piece.end());
+  }
+
+  void finish() override {
+    file_ = std::make_unique<Hdf5Reader>(std::make_unique<MemoryBytes>(std::move(collected_)));
+    tell_size();
+  }
+
+  bool open(ByteSource& source) override {
+    file_ = std::make_unique<Hdf5Reader>(source);
+    opened_ = true;
+    tell_size();
+    return true;
+  }
+
+  std::optional<Item> next() override {
+    if (!file_) return std::nullopt;
+    while (true) {
+      const bool after_events = std::exchange(triggers_due_, false);
+      if (!after_events) {
+        events_.clear();
+        triggers_due_ = file_->read(read_at_once, events_) > 0;
+        if (triggers_due_) return EventItem{0, events_};
+      }
+      triggers_.clear();
+      if (file_->read_triggers(read_at_once, triggers_) > 0) return TriggerItem{0, triggers_};
+      if (!after_events) return std::nullopt;
+    }
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+
+  const Corruption& corruption() const override {
+    static const Corruption none;
+    return file_ ? file_->corruption() : none;
+  }
+
+  /// Of a file that is pushed, all bytes are needed again.
+  std::optional<SeekPoint> seek_point_before(Microseconds t) const override {
+    if (!opened_) return std::nullopt;
+    return SeekPoint{.t = t};
+  }
+
+  void restart(const SeekPoint& seek_point) override {
+    triggers_due_ = false;
+    file_->seek(seek_point.t);
+  }
+
+  std::optional<Microseconds> last_time() override {
+    const auto range = file_ ? file_->time_range() : std::nullopt;
+    if (!range) return std::nullopt;
+    return range->last;
+  }
+
+ private:
+  static constexpr std::size_t read_at_once = std::size_t{1} << 14;
+
+  void tell_size() { streams_.front().size = file_->size(); }
+
+  std::vector<std::uint8_t> collected_;
+  std::unique_ptr<Hdf5Reader> file_;  ///< once it can be read
+  std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
+  std::vector<AbsoluteEvent> events_;
+  std::vector<Trigger> triggers_;
+  bool triggers_due_ = false;
+  bool opened_ = false;  ///< not collected
+};
+
+}  // namespace
+
+std::unique_ptr<Reader> make_hdf5_reader() {
+  return std::make_unique<Hdf5Items>();
 }
 
 }  // namespace eventcamera

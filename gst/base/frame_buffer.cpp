@@ -1,46 +1,46 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "elements/eventcam/aedatframe.hpp"
+#include "gst/base/frame_buffer.hpp"
 
 #include <algorithm>
 #include <new>
 
-using eventcamera::Aedat4Frame;
-using eventcamera::Aedat4PixelFormat;
+using eventcamera::Frame;
+using eventcamera::PixelFormat;
 
-static GstVideoFormat video_format(Aedat4PixelFormat format) {
+static GstVideoFormat video_format(PixelFormat format) {
   switch (format) {
-    case Aedat4PixelFormat::grey8:
+    case PixelFormat::grey8:
       return GST_VIDEO_FORMAT_GRAY8;
-    case Aedat4PixelFormat::grey16:
+    case PixelFormat::grey16:
       return GST_VIDEO_FORMAT_GRAY16_LE;
-    case Aedat4PixelFormat::bgr:
+    case PixelFormat::bgr:
       return GST_VIDEO_FORMAT_BGR;
-    case Aedat4PixelFormat::bgra:
+    case PixelFormat::bgra:
       return GST_VIDEO_FORMAT_BGRA;
   }
   return GST_VIDEO_FORMAT_UNKNOWN;
 }
 
-static Aedat4PixelFormat pixel_format(GstVideoFormat format) {
+static PixelFormat pixel_format(GstVideoFormat format) {
   switch (format) {
     case GST_VIDEO_FORMAT_GRAY16_LE:
-      return Aedat4PixelFormat::grey16;
+      return PixelFormat::grey16;
     case GST_VIDEO_FORMAT_BGR:
-      return Aedat4PixelFormat::bgr;
+      return PixelFormat::bgr;
     case GST_VIDEO_FORMAT_BGRA:
-      return Aedat4PixelFormat::bgra;
+      return PixelFormat::bgra;
     default:
-      return Aedat4PixelFormat::grey8;
+      return PixelFormat::grey8;
   }
 }
 
-bool aedat_frame_info(const Aedat4Frame& frame, GstVideoInfo* info) {
+bool frame_video_info(const Frame& frame, GstVideoInfo* info) {
   return gst_video_info_set_format(info, video_format(frame.format),
                                    static_cast<guint>(frame.width),
                                    static_cast<guint>(frame.height));
 }
 
-GstBuffer* aedat_frame_buffer(const Aedat4Frame& frame, const GstVideoInfo* info) {
+GstBuffer* frame_buffer(const Frame& frame, const GstVideoInfo* info) {
   const gsize size = GST_VIDEO_INFO_SIZE(info);
   // GStreamer's own allocation would end the process where memory is short.
   auto* const memory = static_cast<guint8*>(g_try_malloc0(size));
@@ -52,8 +52,8 @@ GstBuffer* aedat_frame_buffer(const Aedat4Frame& frame, const GstVideoInfo* info
   return gst_buffer_new_wrapped(memory, size);
 }
 
-Aedat4Frame aedat_frame_of(const GstVideoFrame* video) {
-  Aedat4Frame frame;
+Frame recorded_frame(const GstVideoFrame* video) {
+  Frame frame;
   frame.format = pixel_format(GST_VIDEO_FRAME_FORMAT(video));
   frame.width = GST_VIDEO_FRAME_WIDTH(video);
   frame.height = GST_VIDEO_FRAME_HEIGHT(video);

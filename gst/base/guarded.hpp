@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <mutex>
+#include <utility>
+
+/// A value that is reached with its lock held, and in no other way:
+///
+///     const auto shared = shared_.lock();
+///     shared->duration = duration;
+template <class Value>
+class Guarded {
+ public:
+  class Access {
+   public:
+    explicit Access(Guarded& guarded) : lock_(guarded.mutex_), value_(guarded.value_) {}
+    Value* operator->() const { return &value_; }
+    Value& operator*() const { return value_; }
+
+   private:
+    std::lock_guard<std::mutex> lock_;
+    Value& value_;
+  };
+
+  Access lock() { return Access(*this); }
+
+ private:
+  std::mutex mutex_;
+  Value value_;
+};

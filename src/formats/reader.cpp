@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/reader.hpp"
+
+#include <algorithm>
+
+namespace eventcamera {
+
+/// Decoded at once: few enough for the cache, however large the pieces are.
+constexpr std::size_t block_size = std::size_t{1} << 16;
+
+std::optional<Item> DecoderReader::next() {
+  while (true) {
+    if (std::exchange(events_due_, false) && !decoded_.events.empty())
+      return EventItem{0, decoded_.events};
+    if (std::exchange(triggers_due_, false) && !decoded_.triggers.empty())
+      return TriggerItem{0, decoded_.triggers};
+    decoded_.events.clear();
+    decoded_.triggers.clear();
+    if (!rest_.empty()) {
+      const auto block = rest_.first(std::min(rest_.size(), block_size));
+      rest_ = rest_.subspan(block.size());
+      decoder_->decode(block, decoded_);
+    } else if (std::exchange(finish_due_, false)) {
+      decoder_->finish(decoded_);
+    } else {
+      return std::nullopt;
+    }
+    streams_.front().size = decoder_->size();
+    events_due_ = triggers_due_ = true;
+  }
+}
+
+void DecoderReader::restart(const SeekPoint& seek_point) {
+  rest_ = {};
+  finish_due_ = events_due_ = triggers_due_ = false;
+  decoder_->restart(seek_point);
+}
+
+}  // namespace eventcamera

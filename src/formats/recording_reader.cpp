@@ -1,0 +1,501 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/recording_reader.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace eventcamera {
+
+namespace {
+
+/// The start of a file that is surveyed: in bytes, or in events where the reader reads by itself.
+constexpr std::uint64_t max_surveyed_bytes = std::uint64_t{1} << 24;
+constexpr std::uint64_t max_surveyed_events = std::uint64_t{1} << 22;
+/// Items are held for this long, or up to this size.
+constexpr std::size_t max_held = std::size_t{1} << 24;
+constexpr Microseconds max_hold = 1'000'000;
+/// A stream that is further behind the others is silent.
+constexpr Microseconds max_lag = 500'000;
+/// The clock of EVT3, the shortest of all, begins again after this time, and so do the others.
+constexpr Microseconds clock_range = Microseconds{1} << 24;
+constexpr Microseconds always = std::numeric_limits<Microseconds>::min();
+
+bool is_shown(StreamKind kind) {
+  return kind == StreamKind::events || kind == StreamKind::frames;
+}
+
+bool is_time(Microseconds t) {
+  return t >= -Chunker::max_time && t <= Chunker::max_time;
+}
+
+}  // namespace
+
+RecordingReader::RecordingReader(MakeReader make_reader, Microseconds chunk_length, Clock clock)
+    : make_reader_(std::move(make_reader)),
+      chunk_length_(chunk_length),
+      clock_(clock),
+      reader_(make_reader_()) {
+  learn_streams();
+  if (clock_ == Clock::file) return;
+  begun_ = true;
+  for (auto& stream : streams_) show(stream);
+}
+
+/* input */
+
+void RecordingReader::push(std::span<const std::uint8_t> bytes, std::optional<Interval> interval) {
+  const auto lock = reading();
+  reader_->push(bytes);
+  interval_ = interval;
+  finished_ = finishing_ = drained_ = false;
+}
+
+void RecordingReader::finish() {
+  const auto lock = reading();
+  reader_->finish();
+  finished_ = true;
+}
+
+void RecordingReader::discard() {
+  const auto lock = reading();
+  while (reader_->next()) continue;
+}
+
+void RecordingReader::interrupt() {
+  finished_ = finishing_ = drained_ = false;
+  shift_.reset();
+  for (auto& stream : streams_) start_chunker(stream);
+  next_stream_ = 0;
+  newest_ = caught_up_ = 0;
+}
+
+bool RecordingReader::reach(Microseconds t) {
+  auto& chunker = streams_.front().chunker;
+  if (shift_) chunker.reach(t - *shift_);
+  next_stream_ = 0;
+  return chunker.first().has_value();
+}
+
+/// Of the reader, or of the items that were held.
+std::optional<Item> RecordingReader::next_item() {
+  if (begun_ && held_next_ < held_.size()) {
+    const auto& held = held_[held_next_++];
+    if (held.frame) return FrameItem{held.stream, *held.frame};
+    return EventItem{held.stream, held.events};
+  }
+  if (begun_) held_.clear();
+  held_next_ = 0;
+  while (true) {
+    if (const auto item = read_item()) return item;
+    if (source_ == nullptr || finished_) return std::nullopt;
+    if (reads_itself_) {
+      finished_ = !source_->failed();
+      return std::nullopt;
+    }
+    const auto piece = source_->piece(position_);
+    if (!piece) return std::nullopt;
+    position_ += piece->size();
+    if (piece->empty())
+      finish();
+    else
+      push(*piece);
+  }
+}
+
+std::optional<Item> RecordingReader::read_item() {
+  const auto lock = reading();
+  const auto item = reader_->next();
+  learn_streams();
+  return item;
+}
+
+void RecordingReader::learn_streams() {
+  const auto& known = reader_->streams();
+  for (std::size_t i = 0; i < std::min(known.size(), streams_.size()); ++i) {
+    if (known[i].kind != streams_[i].info.kind)
+      throw std::runtime_error("the streams of the file are not those that it had before");
+    // Some formats tell the size only after their first bytes.
+    if (!streams_[i].size_guessed && known[i].size != SensorSize{})
+      streams_[i].info.size = known[i].size;
+  }
+  for (auto i = streams_.size(); i < known.size(); ++i) {
+    const auto kind = known[i].kind;
+    const auto number = std::ranges::count_if(
+        streams_, [kind](const Stream& other) { return other.info.kind == kind; });
+    streams_.push_back({.info = known[i],
+                        .number = static_cast<unsigned>(number),
+                        .position = start_,
+                        .first = {},
+                        .latest = {},
+                        .first_frame = {},
+                        .chunker = Chunker(chunk_length_)});
+  }
+}
+
+/* the start of a file */
+
+/// Reads ahead for the origin, the duration, and sizes that the file does not tell, and goes back.
+/// False where bytes cannot be read.
+bool RecordingReader::survey() {
+  {
+    const auto lock = reading();
+    reader_ = make_reader_();
+    reads_itself_ = reader_->open(*source_);
+  }
+  streams_.clear();
+  position_ = 0;
+  start_due_ = finished_ = false;
+  std::uint64_t events = 0;
+  while (!is_surveyed(events)) {
+    const auto item = next_item();
+    if (!item && !finished_) return false;
+    if (!item) break;
+    std::visit([this](const auto& some) { note(some); }, *item);
+    if (const auto* const some = std::get_if<EventItem>(&*item)) events += some->events.size();
+  }
+  if (finished_) finish_chunkers();
+  const bool is_whole = finished_;
+  const auto last = reader_->last_time();
+  if (source_->failed()) return false;
+  begin();
+  learn_duration(last, is_whole);
+  seek(start_, stop_);
+  return true;
+}
+
+bool RecordingReader::is_surveyed(std::uint64_t events) const {
+  if (reads_itself_ ? events >= max_surveyed_events : position_ >= max_surveyed_bytes) return true;
+  const bool sizes_known = std::ranges::all_of(streams_, [](const Stream& stream) {
+    return stream.info.kind != StreamKind::events || stream.info.size.width > 0;
+  });
+  const auto last = sizes_known && is_origin_known() ? reader_->last_time() : std::nullopt;
+  return last && *last < Chunker::max_time;
+}
+
+void RecordingReader::note(const EventItem& item) {
+  auto& stream = streams_[item.stream];
+  stream.used.include(item.events);
+  // It tells which times are to be believed.
+  stream.chunker.push(item.events);
+  while (stream.chunker.next()) stream.is_sampled = true;
+  stream.first = stream.chunker.first();
+  if (stream.first) stream.latest = stream.chunker.latest();
+}
+
+void RecordingReader::note(const FrameItem& item) {
+  auto& stream = streams_[item.stream];
+  const auto t = item.frame.t;
+  if (!is_time(t)) return;
+  stream.first = std::min(stream.first.value_or(t), t);
+  stream.latest = std::max(stream.latest.value_or(t), t);
+  if (!stream.first_frame) stream.first_frame = item.frame;
+}
+
+void RecordingReader::note(const TriggerItem& item) {
+  counts_.triggers += item.triggers.size();
+}
+
+void RecordingReader::hold(const Item& item) {
+  if (const auto* const events = std::get_if<EventItem>(&item)) {
+    held_.push_back({events->stream, {events->events.begin(), events->events.end()}, {}, {}});
+    held_size_ += sizeof(HeldItem) + events->events.size_bytes();
+  } else if (const auto* const some = std::get_if<FrameItem>(&item)) {
+    const auto& frame = some->frame;
+    auto& held = held_.emplace_back(HeldItem{
+        some->stream, {}, frame, {frame.pixels, frame.pixels + frame.height * frame.stride}});
+    held.frame->pixels = held.pixels.data();
+    held_size_ += sizeof(HeldItem) + held.pixels.size();
+  }
+}
+
+/// Whether enough is known to begin: the first time of every stream, and events to guess the size
+/// of a sensor by.
+bool RecordingReader::is_origin_known() const {
+  if (held_size_ >= max_held) return true;
+  bool awaited = false;
+  auto first = std::numeric_limits<Microseconds>::max();
+  auto last = always;
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    const auto& stream = streams_[i];
+    if (!stream.first) {
+      awaited |= is_shown(stream.info.kind) && !reader_->is_empty(i);
+      continue;
+    }
+    const bool of_events = stream.info.kind == StreamKind::events;
+    awaited |= of_events && stream.info.size.width <= 0 && !stream.is_sampled;
+    first = std::min(first, *stream.first);
+    last = std::max(last, of_events ? *stream.latest : *stream.first);
+  }
+  return last >= first && (!awaited || last - first >= max_hold);
+}
+
+/// Takes the earliest time of any stream for the origin, and shows the streams.
+void RecordingReader::begin() {
+  std::optional<Microseconds> origin;
+  for (const auto& stream : streams_)
+    if (stream.first) origin = std::min(origin.value_or(*stream.first), *stream.first);
+  {
+    const auto lock = reading();
+    origin_ = origin.value_or(0);
+  }
+  begun_ = true;
+  for (auto& stream : streams_) {
+    const bool is_stream_of_events = stream.info.kind == StreamKind::events &&
+                                     (stream.info.size != SensorSize{} || streams_.size() == 1);
+    if ((is_shown(stream.info.kind) && stream.first) || is_stream_of_events) show(stream);
+  }
+  if (!start_due_) throw UnsupportedFormat("the file has neither events nor frames");
+}
+
+/// `told` is the time of the last item, where the file tells it; else what was surveyed counts,
+/// which may be all.
+void RecordingReader::learn_duration(std::optional<Microseconds> told, bool is_whole) {
+  auto last = origin_ - 1;
+  for (const auto& stream : streams_) last = std::max(last, stream.latest.value_or(last));
+  const auto surveyed = last + 1 - origin_;
+  const bool is_told = told && *told >= origin_ && *told < Chunker::max_time;
+  duration_is_exact_ = is_told || is_whole;
+  if (is_told) {
+    duration_ = *told + 1 - origin_;
+  } else if (is_whole) {
+    duration_ = surveyed;
+  } else if (!reads_itself_) {
+    const auto scale = static_cast<double>(std::max(source_->size(), position_)) /
+                       static_cast<double>(std::max<std::uint64_t>(position_, 1));
+    duration_ = static_cast<Microseconds>(
+        std::min(static_cast<double>(surveyed) * scale, static_cast<double>(Chunker::max_time)));
+  }
+}
+
+/* seeking */
+
+std::optional<SeekPoint> RecordingReader::seek_point_before(Microseconds start) const {
+  const auto lock = reading();
+  return reader_->seek_point_before(start > 0 ? origin_ + start : always);
+}
+
+void RecordingReader::seek(Microseconds start, std::optional<Microseconds> stop) {
+  start_ = start;
+  stop_ = stop;
+  if (begun_) restart(seek_point_before(start), start, stop);
+}
+
+void RecordingReader::restart(const std::optional<SeekPoint>& seek_point, Microseconds start,
+                              std::optional<Microseconds> stop) {
+  {
+    const auto lock = reading();
+    if (seek_point) {
+      reader_->restart(*seek_point);
+      before_ = reader_->corruption();
+      imu_samples_before_ = reader_->imu_samples();
+    } else {
+      reader_ = make_reader_();
+      if (source_ != nullptr) reads_itself_ = reader_->open(*source_);
+      before_ = {};
+      imu_samples_before_ = 0;
+    }
+  }
+  position_ = seek_point ? seek_point->position : 0;
+  start_ = newest_ = caught_up_ = start;
+  stop_ = stop;
+  finished_ = finishing_ = drained_ = false;
+  held_.clear();
+  held_next_ = held_size_ = next_stream_ = 0;
+  output_due_.reset();
+  counts_ = {};
+  for (auto& stream : streams_) {
+    stream.position = start;
+    stream.outside = 0;
+    stream.chunker = begun_ ? Chunker(chunk_length_, origin_ + start) : Chunker(chunk_length_);
+  }
+}
+
+/* output */
+
+void RecordingReader::show(Stream& stream) {
+  stream.shown = true;
+  start_due_ = true;
+  if (stream.info.kind != StreamKind::events) return;
+  if (stream.info.size.width <= 0 || stream.info.size.height <= 0) {
+    stream.info.size = stream.used.sensor();
+    stream.size_guessed = true;
+  }
+  start_chunker(stream);
+}
+
+/// Chunks begin at the start of the segment; those of words, and of the stream that the origin is
+/// of, with its first event.
+void RecordingReader::start_chunker(Stream& stream) {
+  const bool from_first_event =
+      clock_ == Clock::stream || (start_ == 0 && (!begun_ || stream.first == origin_));
+  stream.chunker =
+      from_first_event ? Chunker(chunk_length_) : Chunker(chunk_length_, origin_ + start_);
+}
+
+std::optional<RecordingReader::Output> RecordingReader::next() {
+  if (source_ != nullptr && !begun_ && !survey()) return std::nullopt;
+  while (true) {
+    if (const auto output = next_output()) return output;
+    if (drained_ || is_past_stop()) return std::nullopt;
+    if (const auto item = next_item()) {
+      if (begun_) {
+        std::visit([this](const auto& some) { take(some); }, *item);
+      } else {
+        std::visit([this](const auto& some) { note(some); }, *item);
+        hold(*item);
+        if (is_origin_known()) begin();
+      }
+    } else if (!finished_) {
+      return std::nullopt;
+    } else if (!begun_) {
+      finish_chunkers();
+      begin();
+    } else if (!std::exchange(finishing_, true)) {
+      finish_chunkers();
+    } else {
+      drained_ = true;
+      if (source_ != nullptr && newest_ > start_ && !std::exchange(duration_is_exact_, true))
+        duration_ = newest_;
+    }
+  }
+}
+
+/// What is ready to be handed out.
+std::optional<RecordingReader::Output> RecordingReader::next_output() {
+  if (std::exchange(start_due_, false)) return Start{};
+  if (output_due_) return std::exchange(output_due_, std::nullopt);
+  if (!begun_) return std::nullopt;
+  if (const auto chunk = next_chunk()) return *chunk;
+  return std::nullopt;
+}
+
+void RecordingReader::take(const EventItem& item) {
+  if (item.events.empty()) return;
+  auto& stream = streams_[item.stream];
+  if (!stream.shown) {
+    stream.used.include(item.events);
+    show(stream);
+  }
+  auto events = item.events;
+  if (stream.size_guessed && std::ranges::any_of(events, is_outside(stream.info.size))) {
+    within_.assign(events.begin(), events.end());
+    stream.outside += std::erase_if(within_, is_outside(stream.info.size));
+    events = within_;
+  }
+  if (clock_ == Clock::stream && !shift_ && interval_) set_shift(item.events.front().t);
+  stream.chunker.push(events);
+  next_stream_ = 0;
+}
+
+void RecordingReader::take(const FrameItem& item) {
+  auto& stream = streams_[item.stream];
+  const auto t = item.frame.t;
+  if (!is_time(t)) {
+    ++counts_.stray;
+    return;
+  }
+  if (!stream.shown) {
+    stream.first_frame = item.frame;
+    show(stream);
+  }
+  if (t < origin_) {
+    ++counts_.late;
+    return;
+  }
+  const auto time = t - origin_;
+  if (time < start_ || !advance(stream, time, time)) return;
+  ++counts_.frames;
+  output_due_ = TimedFrame{item.stream, time, item.frame};
+}
+
+void RecordingReader::take(const TriggerItem& item) {
+  counts_.triggers += item.triggers.size();
+  output_due_ = item;
+}
+
+/// Moves the clock of words to that of the interval that they come in. Where the clocks differ only
+/// by what the words' is cut short by, no microsecond is lost.
+void RecordingReader::set_shift(Microseconds first) {
+  first = std::clamp(first, -Chunker::max_time, Chunker::max_time);
+  const auto start = interval_->start;
+  const auto into = ((first - start) % clock_range + clock_range) % clock_range;
+  shift_ = start + (into <= interval_->duration ? into : 0) - first;
+}
+
+std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
+  while (true) {
+    for (; next_stream_ < streams_.size(); ++next_stream_) {
+      auto& stream = streams_[next_stream_];
+      if (!stream.shown) continue;
+      while (const auto interval = stream.chunker.next()) {
+        const auto start = interval->start - origin_ + shift_.value_or(0);
+        if (!advance(stream, start, start + interval->duration)) continue;
+        counts_.events += interval->events.size();
+        return Chunk{next_stream_, start, interval->duration, interval->events};
+      }
+      const auto silent_until = newest_ - max_lag;
+      if (stream.info.kind == StreamKind::frames && silent_until - stream.position >= max_lag) {
+        const auto start = stream.position;
+        if (advance(stream, start, silent_until))
+          return Chunk{next_stream_, start, silent_until - start, {}};
+      }
+    }
+    if (newest_ == caught_up_) return std::nullopt;
+    catch_up();
+  }
+}
+
+/// Lets streams that are far behind the newest item be silent.
+void RecordingReader::catch_up() {
+  caught_up_ = newest_;
+  for (auto& stream : streams_)
+    if (stream.shown && stream.info.kind == StreamKind::events &&
+        stream.position < newest_ - max_lag)
+      stream.chunker.reach(origin_ + newest_ - max_lag);
+  next_stream_ = 0;
+}
+
+/// Notes that a stream was handed out until `end`. False where `start` is past the segment.
+bool RecordingReader::advance(Stream& stream, Microseconds start, Microseconds end) {
+  stream.position = std::max(stream.position, end);
+  newest_ = std::max(newest_, end);
+  return !stop_ || start < *stop_;
+}
+
+bool RecordingReader::is_past_stop() const {
+  if (!stop_ || !begun_) return false;
+  if (newest_ - max_lag >= *stop_) return true;
+  return std::ranges::all_of(streams_, [this](const Stream& stream) {
+    return !stream.shown || stream.position >= *stop_;
+  });
+}
+
+void RecordingReader::finish_chunkers() {
+  for (auto& stream : streams_) {
+    if (stream.info.kind != StreamKind::events || (begun_ && !stream.shown)) continue;
+    stream.chunker.finish();
+    if (!begun_) note(EventItem{static_cast<std::size_t>(&stream - streams_.data()), {}});
+  }
+  next_stream_ = 0;
+}
+
+RecordingReader::Counts RecordingReader::counts() const {
+  Counts counts = counts_;
+  const auto& corruption = reader_->corruption();
+  counts.corrupt_places = corruption.places - before_.places;
+  counts.outside = corruption.outside - before_.outside;
+  counts.imu_samples = reader_->imu_samples() - imu_samples_before_;
+  for (const auto& stream : streams_) {
+    counts.outside += stream.outside;
+    if (!begun_) continue;
+    const auto& dropped = stream.chunker.dropped();
+    counts.late += dropped.late;
+    counts.stray += dropped.stray;
+    counts.repeated += dropped.repeated;
+  }
+  return counts;
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Recordings without GStreamer: pushed and pulled they give equal items, they are seeked in, and
+// tell their duration.
+#include "src/formats/recording_reader.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <tuple>
+
+#include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/aedat/aedat_reader.hpp"
+#include "src/formats/evt/raw.hpp"
+#include "src/formats/numpy/npy_decoder.hpp"
+#include "src/formats/numpy/npy_encoder.hpp"
+#include "tests/formats/pieces.hpp"
+#include "tests/formats/recordings.hpp"
+
+namespace eventcamera {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using Events = std::vector<AbsoluteEvent>;
+
+constexpr SensorSize sensor{320, 240};
+constexpr Microseconds chunk_length = 10'000;
+
+/// A dot that runs through the rows for a second, from 2 s on, and again after a silence of three.
+Events some_events() {
+  Events events;
+  for (int i = 0; i < 20'000; ++i) {
+    const Microseconds t = 2'000'000 + 50 * i + (i >= 10'000 ? 3'000'000 : 0);
+    events.push_back(AbsoluteEvent::at(i % sensor.width, i / sensor.width, t,
+                                       i % 3 == 0 ? Polarity::off : Polarity::on));
+  }
+  return events;
+}
+
+/// A file, and how it is read.
+struct File {
+  std::string name;
+  Bytes bytes;
+  RecordingReader::MakeReader make_reader;
+};
+
+File raw_file() {
+  const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
+  return {"raw", recordings::encode(*encoder, some_events()),
+          [] { return std::make_unique<DecoderReader>(make_prophesee_raw_decoder()); }};
+}
+
+/// Tells no size, and can only be read from its start.
+File npy_file() {
+  NpyEncoder encoder;
+  return {"npy", recordings::encode(encoder, some_events()),
+          [] { return std::make_unique<DecoderReader>(std::make_unique<NpyDecoder>()); }};
+}
+
+/// Events, and a frame every 100 ms from 50 ms before them on, whose pixels tell its number.
+File aedat_file(bool has_table) {
+  Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::lz4, true, has_table});
+  Bytes bytes;
+  const auto events = some_events();
+  std::span<const AbsoluteEvent> rest(events);
+  for (int i = 0; i < 40; ++i) {
+    const auto t = events.front().t - 50'000 + i * 100'000;
+    const auto count = std::ranges::find_if(rest, [t](auto e) { return e.t >= t; }) - rest.begin();
+    encoder.encode(rest.first(static_cast<std::size_t>(count)), bytes);
+    rest = rest.subspan(static_cast<std::size_t>(count));
+    const Bytes pixels(15, static_cast<std::uint8_t>(i));
+    encoder.encode({t, t, t, t, t, PixelFormat::grey8, 5, 3, 0, 0, pixels.data(), 5}, bytes);
+  }
+  encoder.encode(rest, bytes);
+  encoder.finish(bytes);
+  if (const auto patch = encoder.patch())
+    std::ranges::copy(patch->bytes, bytes.begin() + static_cast<std::ptrdiff_t>(patch->position));
+  return {has_table ? "aedat_with_a_table" : "aedat_without_a_table", std::move(bytes),
+          [] { return std::make_unique<AedatReader>(); }};
+}
+
+std::vector<File> all_files() {
+  std::vector<File> files{raw_file(), npy_file()};
+  files.push_back(aedat_file(true));
+  files.push_back(aedat_file(false));
+  return files;
+}
+
+/// All that comes out.
+struct Outcome {
+  using Chunk = std::tuple<std::size_t, Microseconds, Microseconds, std::vector<Event>>;
+  using Picture = std::tuple<std::size_t, Microseconds, std::uint8_t>;
+
+  std::size_t starts = 0;
+  std::vector<Chunk> chunks;
+  std::vector<Picture> pictures;
+
+  void take(const RecordingReader::Start& /*start*/) { ++starts; }
+  void take(const RecordingReader::Chunk& chunk) {
+    EXPECT_GE(starts, 1U);
+    chunks.emplace_back(chunk.stream, chunk.start, chunk.duration,
+                        std::vector<Event>(chunk.events.begin(), chunk.events.end()));
+  }
+  void take(const RecordingReader::TimedFrame& item) {
+    pictures.emplace_back(item.stream, item.time, item.frame.pixels[0]);
+  }
+  void take(const TriggerItem& /*item*/) {}
+
+  void take_all(RecordingReader& reader) {
+    while (const auto output = reader.next())
+      std::visit([this](const auto& item) { take(item); }, *output);
+  }
+
+  /// Of one stream; silences are left out.
+  Events events(Microseconds origin) const {
+    Events events;
+    for (const auto& [stream, start, duration, of_chunk] : chunks)
+      for (const auto& event : of_chunk) {
+        EXPECT_LT(event.t, duration);
+        events.push_back({origin + start + event.t, event.x, event.y_p});
+      }
+    return events;
+  }
+
+  void expect_no_overlap() const {
+    std::map<std::size_t, Microseconds> end;
+    for (const auto& [stream, start, duration, of_chunk] : chunks) {
+      EXPECT_GE(start, end[stream]);
+      end[stream] = start + duration;
+    }
+  }
+};
+
+Events from(const Events& events, Microseconds start, Microseconds stop) {
+  Events found;
+  std::ranges::copy_if(events, std::back_inserter(found),
+                       [&](const auto& event) { return event.t >= start && event.t < stop; });
+  return found;
+}
+
+class Recording : public testing::TestWithParam<File> {
+ protected:
+  Microseconds origin() const {
+    return GetParam().name.starts_with("aedat") ? 1'950'000 : 2'000'000;
+  }
+  RecordingReader reader() const { return {GetParam().make_reader, chunk_length}; }
+};
+INSTANTIATE_TEST_SUITE_P(, Recording, testing::ValuesIn(all_files()),
+                         [](const auto& test) { return test.param.name; });
+
+TEST_P(Recording, IsTheSamePushedAndPulled) {
+  MemoryBytes bytes(GetParam().bytes);
+  RecordingReader pulled(GetParam().make_reader, chunk_length);
+  pulled.open(bytes);
+  Outcome expected;
+  expected.take_all(pulled);
+  EXPECT_TRUE(pulled.at_end());
+  EXPECT_EQ(expected.starts, 1U);
+  EXPECT_EQ(pulled.origin(), origin());
+  EXPECT_EQ(expected.events(origin()), some_events());
+  expected.expect_no_overlap();
+  EXPECT_EQ(pulled.counts().events, some_events().size());
+  EXPECT_EQ(pulled.counts().frames, expected.pictures.size());
+  EXPECT_EQ(pulled.counts().corrupt_places, 0U);
+  for (const std::size_t size : {1UL, 0UL, 1UL << 24}) {
+    RecordingReader pushed(GetParam().make_reader, chunk_length);
+    Outcome outcome;
+    for (const auto piece : pieces::of(GetParam().bytes, size)) {
+      const Bytes copy(piece.begin(), piece.end());
+      pushed.push(copy);
+      outcome.take_all(pushed);
+    }
+    EXPECT_FALSE(pushed.at_end());
+    pushed.finish();
+    outcome.take_all(pushed);
+    EXPECT_TRUE(pushed.at_end());
+    EXPECT_EQ(pushed.origin(), origin());
+    EXPECT_EQ(outcome.events(origin()), some_events());
+    outcome.expect_no_overlap();
+    EXPECT_EQ(outcome.pictures, expected.pictures);
+    EXPECT_EQ(pushed.streams().size(), pulled.streams().size());
+  }
+}
+
+TEST_P(Recording, TellsItsDuration) {
+  MemoryBytes bytes(GetParam().bytes);
+  RecordingReader reader(GetParam().make_reader, chunk_length);
+  reader.open(bytes);
+  EXPECT_FALSE(reader.duration());
+  ASSERT_TRUE(reader.next());
+  EXPECT_EQ(reader.duration(), 5'999'950 + 1 - origin());
+}
+
+TEST_P(Recording, IsSeekedIn) {
+  MemoryBytes bytes(GetParam().bytes);
+  RecordingReader reader(GetParam().make_reader, chunk_length);
+  reader.open(bytes);
+  reader.seek(3'700'000, std::nullopt);  // before anything is known
+  const auto expect_from = [&](Microseconds start, std::optional<Microseconds> stop) {
+    Outcome outcome;
+    outcome.starts = 1;
+    outcome.take_all(reader);
+    const auto end = origin() + stop.value_or(10'000'000);
+    EXPECT_EQ(from(outcome.events(origin()), 0, end), from(some_events(), origin() + start, end));
+    EXPECT_EQ(reader.at_end(), !stop);
+    EXPECT_EQ(reader.is_past_stop(), stop.has_value());
+    for (const auto& [stream, time, number] : outcome.pictures) {
+      EXPECT_GE(time, start);
+      EXPECT_LT(time, stop.value_or(10'000'000));
+      EXPECT_EQ(time, 100'000 * number);
+    }
+    EXPECT_EQ(reader.counts().frames, outcome.pictures.size());
+  };
+  expect_from(3'700'000, std::nullopt);
+  for (const Microseconds start : {100'000, 0, 3'999'000}) {
+    reader.seek(start, std::nullopt);
+    expect_from(start, std::nullopt);
+  }
+  reader.seek(300'000, 400'000);
+  expect_from(300'000, 400'000);
+}
+
+TEST_P(Recording, IsRestartedWhereItIsPushed) {
+  const auto& bytes = GetParam().bytes;
+  RecordingReader reader(GetParam().make_reader, chunk_length);
+  Outcome all;
+  reader.push(bytes);
+  all.take_all(reader);
+  for (const Microseconds start : {3'700'000, 0}) {
+    const auto seek_point = reader.seek_point_before(start);
+    reader.restart(seek_point, start, std::nullopt);
+    Outcome outcome;
+    outcome.starts = 1;
+    reader.push(std::span(bytes).subspan(seek_point.value_or(SeekPoint{}).position));
+    outcome.take_all(reader);
+    reader.finish();
+    outcome.take_all(reader);
+    EXPECT_EQ(outcome.events(origin()), from(some_events(), origin() + start, 10'000'000));
+  }
+}
+
+TEST(RecordingReader, GuessesTheSizeOfASensor) {
+  const auto file = npy_file();
+  for (const std::size_t size : {1UL, 1UL << 24}) {
+    RecordingReader reader(file.make_reader, chunk_length);
+    for (const auto piece : pieces::of(file.bytes, size)) {
+      reader.push(piece);
+      if (reader.next()) break;
+    }
+    ASSERT_EQ(reader.streams().size(), 1U);
+    EXPECT_TRUE(reader.streams().front().size_guessed);
+    EXPECT_EQ(reader.streams().front().info.size, (SensorSize{320, 320})) << size;
+  }
+}
+
+TEST(RecordingReader, LeavesOutWhatLiesOutsideASizeThatIsSet) {
+  const auto file = npy_file();
+  RecordingReader reader(file.make_reader, chunk_length);
+  reader.push(file.bytes);
+  reader.finish();
+  ASSERT_TRUE(std::holds_alternative<RecordingReader::Start>(*reader.next()));
+  reader.set_size(0, {160, 240});
+  Outcome outcome;
+  outcome.starts = 1;
+  outcome.take_all(reader);
+  const auto within =
+      std::ranges::count_if(some_events(), [](auto event) { return event.x < 160; });
+  EXPECT_EQ(outcome.events(0).size(), static_cast<std::size_t>(within));
+  EXPECT_EQ(reader.counts().outside, some_events().size() - static_cast<std::size_t>(within));
+}
+
+/// Words of a stream have its time, from their first event on.
+TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
+  const Events events{AbsoluteEvent::at(1, 2, 12'000, Polarity::on),
+                      AbsoluteEvent::at(3, 4, 19'000, Polarity::off)};
+  const auto encoder = make_evt_encoder(EvtFormat::evt3, sensor);
+  const auto bytes = recordings::encode(*encoder, events);
+  RecordingReader reader(
+      [] { return std::make_unique<DecoderReader>(make_evt_decoder(EvtFormat::evt3, sensor)); },
+      chunk_length, RecordingReader::Clock::stream);
+  EXPECT_FALSE(reader.reach(5'000'000));
+  const Microseconds hours = Microseconds{5} * 3600 * 1'000'000;
+  reader.push(bytes, RecordingReader::Interval{hours, 10'000});
+  Outcome outcome;
+  outcome.take_all(reader);
+  EXPECT_TRUE(outcome.chunks.empty());
+  EXPECT_TRUE(reader.reach(hours + 60'000'000));
+  outcome.take_all(reader);
+  EXPECT_EQ(outcome.events(0).size(), 2U);
+  EXPECT_EQ(std::get<1>(outcome.chunks.front()), hours);
+  EXPECT_TRUE(std::get<3>(outcome.chunks.back()).empty());
+}
+
+TEST(RecordingReader, SaysWhatIsNoRecording) {
+  const auto make = [] { return std::make_unique<DecoderReader>(make_prophesee_raw_decoder()); };
+  RecordingReader pushed(make, chunk_length);
+  pushed.finish();
+  EXPECT_THROW(pushed.next(), UnsupportedFormat);
+  MemoryBytes empty({});
+  RecordingReader pulled(make, chunk_length);
+  pulled.open(empty);
+  EXPECT_THROW(pulled.next(), UnsupportedFormat);
+}
+
+/// Bytes of which none can be read, once.
+class Broken final : public ByteSource {
+ public:
+  explicit Broken(Bytes bytes) : bytes_(std::move(bytes)) {}
+  std::uint64_t size() const override { return bytes_.size(); }
+  std::optional<std::size_t> read(std::uint64_t position,
+                                  std::span<std::uint8_t> out) noexcept override {
+    if (failed()) return std::nullopt;
+    return bytes_.read(position, out);
+  }
+  std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override {
+    if (failed()) return std::nullopt;
+    return bytes_.piece(position);
+  }
+  bool failed() const noexcept override { return failed_; }
+
+  bool failed_ = true;
+
+ private:
+  MemoryBytes bytes_;
+};
+
+TEST_P(Recording, IsReadWhereBytesCanBeReadAgain) {
+  Broken bytes(GetParam().bytes);
+  RecordingReader reader(GetParam().make_reader, chunk_length);
+  reader.open(bytes);
+  EXPECT_FALSE(reader.next());
+  EXPECT_FALSE(reader.at_end());
+  bytes.failed_ = false;
+  Outcome outcome;
+  outcome.take_all(reader);
+  EXPECT_EQ(outcome.events(origin()), some_events());
+}
+
+}  // namespace
+}  // namespace eventcamera
