@@ -18,7 +18,6 @@
  * ]|
  */
 #include "gst/base/eventsimulator.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "src/simulate/dense.hpp"
 
@@ -35,30 +34,8 @@ struct Settings {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventSimDense, gst_event_sim_dense, GST, EVENT_SIM_DENSE, GstEventSimulator)
-
-struct _GstEventSimDense {
-  GstEventSimulator parent;
-  GuardedSettings<Settings> settings;
-};
-
-G_DEFINE_TYPE(GstEventSimDense, gst_event_sim_dense, GST_TYPE_EVENT_SIMULATOR)
-GST_ELEMENT_REGISTER_DEFINE(eventsim_dense, "eventsim-dense", GST_RANK_NONE,
-                            gst_event_sim_dense_get_type())
-
 static GuardedSettings<Settings>& settings_of(GObject* object) {
-  return GST_EVENT_SIM_DENSE(object)->settings;
-}
-
-static std::unique_ptr<eventcamera::Simulator> create(const eventcamera::LumaFormat& format) {
-  return eventcamera::make_dense_simulator(format);
-}
-
-static void configure(GstEventSimulator* element, eventcamera::Simulator& simulator) {
-  const Settings settings = GST_EVENT_SIM_DENSE(element)->settings.copy();
-  auto& dense = static_cast<DenseSimulator&>(simulator);
-  dense.set_flow(settings.flow);
-  dense.set_interpolation(settings.interpolation);
+  return event_simulator_settings<Settings>(object);
 }
 
 static GType flow_type() {
@@ -83,30 +60,11 @@ static GType interpolation_type() {
   return enum_type("GstEventSimInterpolation", values);
 }
 
-static void finalize(GObject* object) {
-  std::destroy_at(&settings_of(object));
-  G_OBJECT_CLASS(gst_event_sim_dense_parent_class)->finalize(object);
-}
-
-static void gst_event_sim_dense_init(GstEventSimDense* self) {
-  std::construct_at(&self->settings);
-}
-
-static void gst_event_sim_dense_class_init(GstEventSimDenseClass* klass) {
-  G_OBJECT_CLASS(klass)->finalize = finalize;
-  GstEventSimulatorClass* simulator_class = GST_EVENT_SIMULATOR_CLASS(klass);
-  simulator_class->create = create;
-  simulator_class->configure = configure;
-  gst_event_simulator_class_install_thresholds(simulator_class, 2);
-  gst_event_simulator_class_install_interpolated_frames(simulator_class);
-  gst_event_simulator_class_describe(
-      simulator_class, "Event camera simulator: dense interpolation",
-      "Turns video into events: interpolates frames with dense optical flow");
-
+static void install_properties(GObjectClass* klass) {
   constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                   GST_PARAM_MUTABLE_PLAYING);
   const Settings defaults;
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  Properties<settings_of> properties(klass);
   properties.add(&Settings::flow,
                  g_param_spec_enum("flow", "Flow", "Method of finding the motion between frames",
                                    flow_type(), static_cast<int>(defaults.flow), flags));
@@ -115,3 +73,28 @@ static void gst_event_sim_dense_class_init(GstEventSimDenseClass* klass) {
       g_param_spec_enum("interpolation", "Interpolation", "Method of interpolating frames",
                         interpolation_type(), static_cast<int>(defaults.interpolation), flags));
 }
+
+static void configure(eventcamera::Simulator& simulator, GObject* object) {
+  const Settings settings = settings_of(object).copy();
+  auto& dense = static_cast<DenseSimulator&>(simulator);
+  dense.set_flow(settings.flow);
+  dense.set_interpolation(settings.interpolation);
+}
+
+static const EventSimulatorMethod dense = {
+    .type_name = "GstEventSimDense",
+    .long_name = "Event camera simulator: dense interpolation",
+    .description = "Turns video into events: interpolates frames with dense optical flow",
+    .threshold = 2,
+    .interpolates = true,
+    .create = [](const eventcamera::LumaFormat& format) -> std::unique_ptr<eventcamera::Simulator> {
+      return eventcamera::make_dense_simulator(format);
+    },
+    .make_settings = []() -> std::shared_ptr<void> {
+      return std::make_shared<GuardedSettings<Settings>>();
+    },
+    .install_properties = install_properties,
+    .configure = configure,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventsim_dense, "eventsim-dense", GST_RANK_NONE,
+                            event_simulator_type(dense))

@@ -34,7 +34,6 @@
 #include <variant>
 
 #include "gst/base/eventsimulator.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/dvs_simulator.hpp"
@@ -208,27 +207,8 @@ struct Choice {
 
 }  // namespace
 
-G_DECLARE_FINAL_TYPE(GstEventSimDvs, gst_event_sim_dvs, GST, EVENT_SIM_DVS, GstEventSimulator)
-
-struct _GstEventSimDvs {
-  GstEventSimulator parent;
-  GuardedSettings<Choice> choice;
-};
-
-G_DEFINE_TYPE(GstEventSimDvs, gst_event_sim_dvs, GST_TYPE_EVENT_SIMULATOR)
-GST_ELEMENT_REGISTER_DEFINE(eventsim_dvs, "eventsim-dvs", GST_RANK_NONE,
-                            gst_event_sim_dvs_get_type())
-
 static GuardedSettings<Choice>& choice_of(GObject* object) {
-  return GST_EVENT_SIM_DVS(object)->choice;
-}
-
-static std::unique_ptr<eventcamera::Simulator> create(const eventcamera::LumaFormat& format) {
-  return eventcamera::make_dvs_simulator(format);
-}
-
-static void configure(GstEventSimulator* element, eventcamera::Simulator& simulator) {
-  static_cast<DvsSimulator&>(simulator).set(choice_of(G_OBJECT(element)).copy().settings);
+  return event_simulator_settings<Choice>(object);
 }
 
 static constexpr auto property_flags = static_cast<GParamFlags>(
@@ -274,22 +254,24 @@ static void install_properties(GObjectClass* klass) {
   }
 }
 
-static void finalize(GObject* object) {
-  std::destroy_at(&choice_of(object));
-  G_OBJECT_CLASS(gst_event_sim_dvs_parent_class)->finalize(object);
+static void configure(eventcamera::Simulator& simulator, GObject* object) {
+  static_cast<DvsSimulator&>(simulator).set(choice_of(object).copy().settings);
 }
 
-static void gst_event_sim_dvs_init(GstEventSimDvs* self) {
-  std::construct_at(&self->choice);
-}
-
-static void gst_event_sim_dvs_class_init(GstEventSimDvsClass* klass) {
-  G_OBJECT_CLASS(klass)->finalize = finalize;
-  install_properties(G_OBJECT_CLASS(klass));
-  GstEventSimulatorClass* simulator_class = GST_EVENT_SIMULATOR_CLASS(klass);
-  simulator_class->create = create;
-  simulator_class->configure = configure;
-  gst_event_simulator_class_describe(
-      simulator_class, "Event camera simulator: physical pixel",
-      "Turns video into events: simulates the pixels of an event camera and their noise");
-}
+static const EventSimulatorMethod dvs = {
+    .type_name = "GstEventSimDvs",
+    .long_name = "Event camera simulator: physical pixel",
+    .description =
+        "Turns video into events: simulates the pixels of an event camera and their "
+        "noise",
+    .threshold = std::nullopt,
+    .create = [](const eventcamera::LumaFormat& format) -> std::unique_ptr<eventcamera::Simulator> {
+      return eventcamera::make_dvs_simulator(format);
+    },
+    .make_settings = []() -> std::shared_ptr<void> {
+      return std::make_shared<GuardedSettings<Choice>>();
+    },
+    .install_properties = install_properties,
+    .configure = configure,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventsim_dvs, "eventsim-dvs", GST_RANK_NONE, event_simulator_type(dvs))

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/// The simulators without properties of their own: a table of methods. GstEventSimulator does the
-/// rest.
+/// The simulators without properties of their own: a table of methods.
 #include "gst/base/eventsimulator.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
@@ -28,7 +27,6 @@ static const EventSimulatorMethod frame = {
     .long_name = "Event camera simulator: difference frame",
     .description = "Turns video into events: where a frame differs from the one before",
     .threshold = 20,
-    .interpolates = false,
     .create = eventcamera::make_frame_simulator,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,

@@ -12,7 +12,6 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
-#include "gst/base/properties.hpp"
 #include "gst/base/simulator_buffers.hpp"
 #include "gst/base/simulator_caps.hpp"
 #include "gst/base/types.hpp"
@@ -66,6 +65,7 @@ struct Stream {
 
 struct GstEventSimulatorPrivate {
   GuardedSettings<Settings> settings;
+  std::shared_ptr<void> method_settings;
 
   std::mutex mutex;  // guards the latency; nothing is called under it
   GstClockTime latency = 0;
@@ -73,6 +73,15 @@ struct GstEventSimulatorPrivate {
   // The streaming thread's, or nobody's while there is none.
   std::optional<State> state;
   Stream stream;
+};
+
+#define GST_TYPE_EVENT_SIMULATOR (gst_event_simulator_get_type())
+G_DECLARE_DERIVABLE_TYPE(GstEventSimulator, gst_event_simulator, GST, EVENT_SIMULATOR,
+                         GstBaseTransform)
+
+struct _GstEventSimulatorClass {
+  GstBaseTransformClass parent_class;
+  const EventSimulatorMethod* method;
 };
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventSimulator, gst_event_simulator, GST_TYPE_BASE_TRANSFORM,
@@ -85,6 +94,20 @@ static GstEventSimulatorPrivate& priv_of(GstEventSimulator* self) {
   return *static_cast<GstEventSimulatorPrivate*>(gst_event_simulator_get_instance_private(self));
 }
 
+static const EventSimulatorMethod& method_of(GstEventSimulator* self) {
+  return *GST_EVENT_SIMULATOR_GET_CLASS(self)->method;
+}
+
+void* event_simulator_settings(GObject* object) {
+  return priv_of(GST_EVENT_SIMULATOR(object)).method_settings.get();
+}
+
+/// Gives the simulator the settings of its method.
+static void configure(GstEventSimulator* self) {
+  if (const auto configure = method_of(self).configure)
+    configure(*priv_of(self).state->simulator, G_OBJECT(self));
+}
+
 /* properties */
 
 static GuardedSettings<Settings>& settings_of(GObject* object) {
@@ -94,9 +117,8 @@ static GuardedSettings<Settings>& settings_of(GObject* object) {
 static constexpr auto property_flags = static_cast<GParamFlags>(
     G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 
-void gst_event_simulator_class_install_thresholds(GstEventSimulatorClass* klass,
-                                                  double grey_levels) {
-  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+static void install_thresholds(GObjectClass* klass, double grey_levels) {
+  Properties<settings_of> properties(klass);
   properties.add(
       [](Settings& settings) -> double& { return settings.simulation.positive_threshold; },
       g_param_spec_double("positive-threshold", "Positive threshold",
@@ -111,14 +133,13 @@ void gst_event_simulator_class_install_thresholds(GstEventSimulatorClass* klass,
                           0, 255, grey_levels, property_flags));
 }
 
-void gst_event_simulator_class_install_interpolated_frames(GstEventSimulatorClass* klass) {
-  Properties<settings_of>(G_OBJECT_CLASS(klass))
-      .add([](Settings& settings) -> int& { return settings.simulation.interpolated_frames; },
-           g_param_spec_uint("interpolated-frames", "Interpolated frames",
-                             "Number of frames to interpolate between two frames of the video; "
-                             "events get their times (at most one frame per microsecond)",
-                             0, max_interpolated_frames, default_interpolated_frames,
-                             property_flags));
+static void install_interpolated_frames(GObjectClass* klass) {
+  Properties<settings_of>(klass).add(
+      [](Settings& settings) -> int& { return settings.simulation.interpolated_frames; },
+      g_param_spec_uint("interpolated-frames", "Interpolated frames",
+                        "Number of frames to interpolate between two frames of the video; "
+                        "events get their times (at most one frame per microsecond)",
+                        0, max_interpolated_frames, default_interpolated_frames, property_flags));
 }
 
 static void install_base_properties(GObjectClass* klass) {
@@ -259,7 +280,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
       state.reset();  // before the next is made: frames can be large
       state.emplace(State{.video = video,
                           .drawing = std::nullopt,
-                          .simulator = GST_EVENT_SIMULATOR_GET_CLASS(self)->create(luma),
+                          .simulator = method_of(self).create(luma),
                           .gathered = {},
                           .discontinuous = follows});
     }
@@ -302,8 +323,7 @@ static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& f
     luma.data = state.gathered.row(0);
     luma.stride = state.gathered.stride();
   }
-  if (const auto configure = GST_EVENT_SIMULATOR_GET_CLASS(self)->configure)
-    configure(self, *state.simulator);
+  configure(self);
   return state.simulator->push(luma, time, settings.simulation);
 }
 
@@ -420,8 +440,7 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
   const Nanoseconds start = *state.simulator->last_time();
-  if (const auto configure = GST_EVENT_SIMULATOR_GET_CLASS(self)->configure)
-    configure(self, *state.simulator);
+  configure(self);
   const EventBuckets* events =
       state.simulator->hold_until(end, priv_of(self).settings.copy().simulation);
   priv_of(self).stream.handed_out_until = end;
@@ -525,6 +544,14 @@ static gboolean stop(GstBaseTransform* transform) {
 
 /* type */
 
+/// The method is not yet known in init.
+static void constructed(GObject* object) {
+  auto* self = GST_EVENT_SIMULATOR(object);
+  if (const auto make_settings = method_of(self).make_settings)
+    priv_of(self).method_settings = make_settings();
+  G_OBJECT_CLASS(gst_event_simulator_parent_class)->constructed(object);
+}
+
 static void finalize(GObject* object) {
   std::destroy_at(&priv_of(GST_EVENT_SIMULATOR(object)));
   G_OBJECT_CLASS(gst_event_simulator_parent_class)->finalize(object);
@@ -538,6 +565,7 @@ static void gst_event_simulator_init(GstEventSimulator* self) {
 
 static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->constructed = constructed;
   object_class->finalize = finalize;
   install_base_properties(object_class);
 
@@ -572,20 +600,16 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
 }
 
-void gst_event_simulator_class_describe(GstEventSimulatorClass* klass, const char* long_name,
-                                        const char* description) {
-  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), long_name,
-                                        "Filter/Effect/Converter/Video", description,
-                                        "gst-eventsim");
-}
-
 static void method_class_init(gpointer klass, gpointer row) {
   const auto& method = *static_cast<const EventSimulatorMethod*>(row);
-  auto* simulator_class = GST_EVENT_SIMULATOR_CLASS(klass);
-  simulator_class->create = method.create;
-  gst_event_simulator_class_install_thresholds(simulator_class, method.threshold);
-  if (method.interpolates) gst_event_simulator_class_install_interpolated_frames(simulator_class);
-  gst_event_simulator_class_describe(simulator_class, method.long_name, method.description);
+  auto* object_class = G_OBJECT_CLASS(klass);
+  GST_EVENT_SIMULATOR_CLASS(klass)->method = &method;
+  if (method.threshold) install_thresholds(object_class, *method.threshold);
+  if (method.interpolates) install_interpolated_frames(object_class);
+  if (method.install_properties != nullptr) method.install_properties(object_class);
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), method.long_name,
+                                        "Filter/Effect/Converter/Video", method.description,
+                                        "gst-eventsim");
 }
 
 GType event_simulator_type(const EventSimulatorMethod& method) {
