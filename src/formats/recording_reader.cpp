@@ -224,7 +224,11 @@ bool RecordingReader::is_origin_known() const {
       continue;
     }
     const bool of_events = stream.info.kind == StreamKind::events;
-    awaited |= of_events && stream.info.size.width <= 0 && !stream.is_sampled;
+    if (of_events && stream.info.size.width <= 0) {
+      // A file that came as a whole is held, to guess by as much of it as possible.
+      if (finished_) return false;
+      awaited |= !stream.is_sampled;
+    }
     first = std::min(first, *stream.first);
     last = std::max(last, of_events ? *stream.latest : *stream.first);
   }
