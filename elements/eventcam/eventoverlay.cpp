@@ -4,10 +4,10 @@
  * @title: eventoverlay
  * @short_description: draws events over video
  *
- * Draws a stream of events, which comes in on the pad `events`, over the video that comes in on the
- * pad `sink`: over each frame the events of the interval that begins with it, or those of the last
- * #GstEventOverlay:accumulation-time of that interval. The two are synchronized by their
- * running times. The events of a sensor of another size are scaled to the video.
+ * Draws the events of the pad `events` over the video of the pad `sink`: over each frame the events
+ * of the interval that begins with it, or of the last #GstEventOverlay:accumulation-time of that
+ * interval. The two are synchronized by their running times. The events of a sensor of another size
+ * are scaled to the video.
  *
  * ## Example launch line
  * |[

@@ -4,20 +4,19 @@
  * @title: eventrender
  * @short_description: draws events as video
  *
- * Turns a stream of events into video, at the framerate that downstream asks for (30/1 where it
- * leaves the choice). A picture has the time of the interval that it ends: what it shows is the
- * state at PTS + duration.
+ * Turns a stream of events into video, at the framerate that downstream asks for (default 30/1). A
+ * picture shows the state at the end of its interval, PTS + duration.
  *
  * - `accumulate`: where ON, OFF or both fired within a window;
  * - `decay`: the sum of ON minus OFF, which fades exponentially;
  * - `time-surface`: how long ago a pixel fired, by the polarity of its last event;
  * - `count`: ON minus OFF within a window.
  *
- * The window is as long as a picture, or #GstEventRender:accumulation-time, however often pictures
- * come: windows may overlap. #GstEventRender:event-count and #GstEventRender:area-event-count limit
- * it by what happens instead of by time.
+ * The window is as long as a picture lasts, or #GstEventRender:accumulation-time; then windows may
+ * overlap. #GstEventRender:event-count and #GstEventRender:area-event-count limit it by the number
+ * of events instead of by time.
  *
- * Pictures come where no event does, too: as GAP events pass and, from a live source, by the clock.
+ * Without events there are pictures too: through GAP events and, from a live source, by the clock.
  * At framerate 0/1 each buffer of events becomes one picture.
  *
  * ## Example launch line

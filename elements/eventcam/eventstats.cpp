@@ -27,16 +27,12 @@
 #include <gst/base/gstbasetransform.h>
 
 #include <algorithm>
-#include <exception>
 #include <limits>
-#include <memory>
-#include <mutex>
-#include <new>
 #include <optional>
-#include <span>
-#include <utility>
+#include <string>
 
 #include "elements/eventcam/report.hpp"
+#include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event_validator.hpp"
@@ -140,6 +136,15 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
          [&] { return eventcamera::draw_map(measurement.cumulative.statistics.map()); });
 }
 
+/// Starts to measure a sensor of this size.
+static bool measure(GstEventStats* self, int width, int height) {
+  const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                      "Not enough memory to count the events of " + std::to_string(width) + " x " +
+                          std::to_string(height) +
+                          " pixels; free memory, or lower the resolution."};
+  return guarded(self, report, [&] { self->priv->measurement.emplace(width, height); });
+}
+
 /* events */
 
 /// Adds an interval. Time between intervals counts as time without events; where time goes back, no
@@ -220,8 +225,8 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       conclude(self, self->priv->settings.copy());
       break;
     case GST_EVENT_FLUSH_STOP:
-      if (auto& measurement = self->priv->measurement)
-        measurement.emplace(measurement->width, measurement->height);
+      if (const auto& measurement = self->priv->measurement)
+        measure(self, measurement->width, measurement->height);
       break;
     default:
       break;
@@ -240,17 +245,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
     return TRUE;
   // Each sensor is measured on its own.
   if (measurement) conclude(self, {});
-  try {
-    measurement.emplace(info.width, info.height);
-  } catch (const std::bad_alloc& error) {
-    GST_ELEMENT_ERROR(self, RESOURCE, NO_SPACE_LEFT,
-                      ("Not enough memory to count the events of %d x %d pixels; free memory, or "
-                       "lower the resolution.",
-                       info.width, info.height),
-                      ("%s", error.what()));
-    return FALSE;
-  }
-  return TRUE;
+  return measure(self, info.width, info.height) ? TRUE : FALSE;
 }
 
 static gboolean start(GstBaseTransform* transform) {

@@ -156,7 +156,7 @@ void StreamComparison::take_until(Microseconds end) {
     rates_.add(role, event.t);
   }
   for (const auto role : both_roles) {
-    // Not each time: a long buffer may be taken in many short pieces.
+    // Not each time, since a long buffer may be taken in many short pieces.
     auto& waiting = arriving_[role].waiting;
     auto& taken = arriving_[role].taken;
     if (2 * taken < waiting.size()) continue;

@@ -4,14 +4,14 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/render/accumulator.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants to come after that.
+// Must come after foreach_target.h.
 #include <hwy/highway.h>
 
 #ifndef EVENTCAMERA_KIND_TABLES
 #define EVENTCAMERA_KIND_TABLES
 namespace eventcamera {
 
-/// Byte by byte of a pixel, what it is for each kind; a table that SIMD code shuffles.
+/// For each byte of a pixel, a table of its value by kind, which SIMD code looks up.
 struct KindTables {
   KindTables(const Palette& palette, const PixelLayout& layout) {
     const auto pixels = pixels_by_kind(palette, layout);
@@ -34,7 +34,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Bytes = hn::ScalableTag<std::uint8_t>;
 using Vector = hn::Vec<Bytes>;
 
-/// Draws pixels of so many bytes.
+/// Draws pixels of this many bytes.
 template <int bytes>
 class RowPainter {
  public:
@@ -42,14 +42,14 @@ class RowPainter {
     store(hn::Zero(Bytes()), silent_);
   }
 
-  /// Draws a row, and makes it as if nothing had fired.
+  /// Draws a row and clears it.
   void draw(std::uint8_t* fired, int width, std::uint8_t* out) const {
     const int lanes = static_cast<int>(hn::Lanes(Bytes()));
     if (HWY_TARGET == HWY_SCALAR || width < lanes) {  // a vector of one pixel shuffles no tables
       draw_pixels(fired, width, out);
       return;
     }
-    // Where the width is no multiple of a vector, the last one begins within the last but one.
+    // The last vector overlaps the last but one where the width is not a multiple of it.
     const int end = width - lanes;
     const auto last = hn::LoadU(Bytes(), fired + end);
     for (int x = 0; x < end; x += lanes)
@@ -123,7 +123,7 @@ namespace eventcamera {
 HWY_EXPORT(draw_pixels);
 
 void Accumulator::add(std::span<const Event> events) {
-  // In locals: a byte that is written might else be any of these.
+  // In locals, since a byte that is written may alias a member.
   std::uint8_t* const fired = fired_.row(0);
   const auto stride = static_cast<std::size_t>(fired_.stride());
   for (const auto event : events)
@@ -141,7 +141,7 @@ void Accumulator::add(const EventBuckets& events, ThreadPool& threads) {
                    [&](int band, int) { add_band(events, static_cast<std::size_t>(band)); });
 }
 
-/// A band after the other, so that its rows stay in the cache from step to step.
+/// One band at a time, so that its rows stay in the cache from step to step.
 void Accumulator::add_band(const EventBuckets& events, std::size_t band) {
   const auto buckets = events.buckets();
   for (std::size_t i = band; i < buckets.size(); i += static_cast<std::size_t>(events.bands()))

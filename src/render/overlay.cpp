@@ -9,7 +9,7 @@
 namespace eventcamera {
 namespace {
 
-/// The pixels that a sensor's pixel covers along one side of the picture: [first, second), at least
+/// The pixels that a sensor pixel covers along one axis of the picture: [first, second), at least
 /// one.
 std::pair<int, int> covered(int at, int sensor, int picture) {
   const auto place = [sensor, picture](int x) {

@@ -42,7 +42,7 @@ class Renderer {
 
   void configure(const RenderSettings& settings);
 
-  /// Forgets all events, and time.
+  /// Forgets all events and their times.
   void reset();
 
   /// Takes sorted events that count their times from `start`. A late event is moved to the time of
