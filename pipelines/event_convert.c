@@ -179,14 +179,21 @@ static void print_progress(GstElement* pipeline, guint64 events) {
              isatty(STDERR_FILENO) ? "" : "\n");
 }
 
+/* Prints an error or a warning, and its cause, which follows the place in the debug text. */
 static void print_message(GstMessage* message) {
+  const gboolean fatal = GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR;
   GError* error = NULL;
-  if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR)
-    gst_message_parse_error(message, &error, NULL);
+  gchar* debug = NULL;
+  const gchar* cause;
+  if (fatal)
+    gst_message_parse_error(message, &error, &debug);
   else
-    gst_message_parse_warning(message, &error, NULL);
-  g_printerr("%s%s: %s\n", isatty(STDERR_FILENO) ? "\n" : "",
-             GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR ? "error" : "warning", error->message);
+    gst_message_parse_warning(message, &error, &debug);
+  g_printerr("%s%s: %s\n", isatty(STDERR_FILENO) ? "\n" : "", fatal ? "error" : "warning",
+             error->message);
+  cause = debug != NULL ? strchr(debug, '\n') : NULL;
+  if (cause != NULL && cause[1] != '\0') g_printerr("  %s\n", cause + 1);
+  g_free(debug);
   g_clear_error(&error);
 }
 

@@ -139,7 +139,7 @@ refused "not an HDF5 file" words.h5 out.dat
 (
   trap '' XFSZ
   ulimit -f 20
-  refused "cannot be written: File too large" ball.raw large.h5
+  refused "File too large" ball.raw large.h5
 )
 refused "No such file" nowhere.raw out.dat
 refused "the same file" ball.raw ./ball.raw
