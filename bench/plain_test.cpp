@@ -5,7 +5,7 @@
 
 #include "bench/methods.hpp"
 #include "bench/scenes.hpp"
-#include "src/simulate/path.hpp"
+#include "src/simulate/interpolation.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/reference/dense.hpp"
 #include "tests/reference/diff.hpp"
@@ -61,7 +61,7 @@ TEST_P(Plain, FrameEqualsTheSimulator) {
   EXPECT_TRUE(events == events_of(*make_frame_simulator(format), 20));
 }
 
-TEST_P(Plain, DenseAfterTheFlowEqualsThePath) {
+TEST_P(Plain, DenseAfterTheFlowEqualsTheKernel) {
   ThreadPool threads;
   threads.set_threads(GetParam());
   for (const auto method : {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback}) {
@@ -71,8 +71,8 @@ TEST_P(Plain, DenseAfterTheFlowEqualsThePath) {
     plain::DenseInterpolation(format.width, format.height)
         .fire(last.view(), now.view(), flow, steps, {3, 3}, threads, plain_events);
     EventBuckets events;
-    PathWalker().fire(
-        Path<std::uint8_t>{
+    InterpolationKernel().fire(
+        InterpolatedInterval<std::uint8_t>{
             {last.view(), now.view(), steps.count()}, flow, Interpolation::forward, steps, {3, 3}},
         threads, events);
     EXPECT_GT(events.size(), 100U);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "bench/benchmarks.hpp"
 #include "bench/playback.hpp"
-#include "src/simulate/path.hpp"
+#include "src/simulate/interpolation.hpp"
 
 namespace bench {
 namespace {
@@ -65,14 +65,15 @@ void time_plain_after_flow(benchmark::State& state, const Pairs& pairs, const St
 
 void time_our_after_flow(benchmark::State& state, const Pairs& pairs, const StepTimes& steps,
                          const Thresholds& thresholds, int threads) {
-  PathWalker walker;
+  InterpolationKernel kernel;
   time_pairs(state, pairs, threads, [&](const Pair& pair, ThreadPool& pool, EventBuckets& events) {
-    walker.fire(Path<std::uint8_t>{{pair.last->view(), pair.now->view(), steps.count()},
-                                   pair.flow_view(),
-                                   Interpolation::forward,
-                                   steps,
-                                   thresholds},
-                pool, events);
+    kernel.fire(
+        InterpolatedInterval<std::uint8_t>{{pair.last->view(), pair.now->view(), steps.count()},
+                                           pair.flow_view(),
+                                           Interpolation::forward,
+                                           steps,
+                                           thresholds},
+        pool, events);
   });
 }
 

@@ -13,7 +13,7 @@
 #include "src/dvs/pixel_solver.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
-#include "src/simulate/interpolated_row.hpp"
+#include "src/simulate/interpolation.hpp"
 
 namespace eventcamera {
 namespace {

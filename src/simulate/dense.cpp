@@ -8,7 +8,7 @@
 #include "src/core/luma.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
-#include "src/simulate/path.hpp"
+#include "src/simulate/interpolation.hpp"
 
 namespace eventcamera {
 namespace {
@@ -31,16 +31,16 @@ class InterpolatingSimulator final : public DenseSimulator {
                 EventBuckets& events) override {
     now_.assign(frame.as<Pixel>());
     const auto thresholds = Thresholds::of(settings, format().bits);
-    const Path<Pixel> path{{last_.view(), now_.view(), steps.count()},
-                           find_flow(thresholds),
-                           interpolation_,
-                           steps,
-                           thresholds};
-    walker_.fire(path, threads(), events);
+    const InterpolatedInterval<Pixel> interval{{last_.view(), now_.view(), steps.count()},
+                                               find_flow(thresholds),
+                                               interpolation_,
+                                               steps,
+                                               thresholds};
+    kernel_.fire(interval, threads(), events);
     std::swap(last_, now_);
   }
 
-  /// What has not changed by more than a threshold does not fire, so it need not move.
+  /// Only pixels that changed by more than a threshold can fire, so flow is needed only there.
   ImageView<Flow> find_flow(const Thresholds& thresholds) {
     if (!finder_ || finder_->method() != flow_)
       finder_.emplace(flow_, format().width, format().height);
@@ -54,7 +54,7 @@ class InterpolatingSimulator final : public DenseSimulator {
 
   Image<Pixel> last_;
   Image<Pixel> now_;
-  PathWalker walker_;
+  InterpolationKernel kernel_;
   std::optional<RegionOfInterestFlow> finder_;
   Grey8 last_grey_;
   Grey8 grey_;

@@ -5,14 +5,9 @@
 
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/simulator.hpp"
+#include "src/simulate/warp.hpp"
 
 namespace eventcamera {
-
-/// How dense flow makes the frame I(a) between I(i-1) and I(i), 0 < a < 1.
-enum class Interpolation {
-  forward,  ///< I(i-1)(x - a F(x))
-  blend,    ///< (1 - a) I(i-1)(x - a F(x)) + a I(i)(x + (1 - a) F(x))
-};
 
 /// Dense frame interpolation (paper, section III-A): flow F from I(i-1) to I(i), interpolated
 /// frames sampled bilinearly with the border continued, I(1) = I(i); then each difference of

@@ -1,43 +1,38 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/simulate/difference.hpp"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/simulate/difference.cpp"
-#include <hwy/foreach_target.h>
-// Highway wants to come after that.
-#include <hwy/highway.h>
-
-#include <algorithm>
 #include <bit>
 #include <cstdlib>
 #include <limits>
 
-#include "src/simulate/fired_lanes-inl.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/simulate/difference.cpp"
+#include <hwy/foreach_target.h>
+// Once for each target.
+#include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
 /// In words of 64 pixels.
 constexpr int max_vector = (hn::MaxLanes(hn::ScalableTag<std::uint8_t>()) + 63) / 64;
 
-/// A threshold in all lanes; one that no difference exceeds is cut to what a pixel can be.
+/// A threshold in all lanes, clamped to the largest pixel, which no difference exceeds.
 template <class Pixel>
 auto in_lanes(hn::ScalableTag<Pixel> pixels, int threshold) {
   return hn::Set(pixels, static_cast<Pixel>(std::min(
                              threshold, static_cast<int>(std::numeric_limits<Pixel>::max()))));
 }
 
-/// Gathers events of a row without a branch for each, and hands them on many at a time.
+/// Collects the events of a row without a branch for each, and appends many at a time.
 class RowEvents {
  public:
   RowEvents(int y, std::uint32_t t, std::vector<Event>& out) : y_(y), t_(t), out_(out) {}
 
   /// Bit i of `fired` is the pixel x + i, and bit i of `on` tells whether it is ON.
   void add(std::uint64_t fired, std::uint64_t on, int x) {
-    if (size_ + 64 > room) flush();
+    if (size_ + 64 > capacity) flush();
     const FiredLanes tag;
     const int lanes = static_cast<int>(hn::Lanes(tag));
     const auto mask = [&](std::uint64_t bits) {
@@ -57,13 +52,13 @@ class RowEvents {
   }
 
  private:
-  static constexpr int room = 512;
+  static constexpr int capacity = 512;
 
   int y_;
   std::uint32_t t_;
   std::vector<Event>& out_;
   int size_ = 0;
-  Event events_[room + 16];
+  Event events_[capacity + 16];
 };
 
 template <class Pixel>
@@ -75,11 +70,10 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint
   const auto negative = in_lanes<Pixel>(pixels, thresholds.negative);
   const auto zero = hn::Zero(pixels);
   RowEvents events(y, t, out);
-  int x = 0;
-  for (; x + lanes <= width; x += lanes) {
-    const auto a = hn::LoadU(pixels, before + x);
-    const auto b = hn::LoadU(pixels, now + x);
-    // What is left of a rise or a fall beyond its threshold.
+  for (int x = 0; x < width; x += lanes) {
+    const auto a = load_first(pixels, before + x, width - x);
+    const auto b = load_first(pixels, now + x, width - x);
+    // By how much a rise or a fall exceeds its threshold.
     const auto rise = hn::SaturatedSub(hn::SaturatedSub(b, a), positive);
     const auto fall = hn::SaturatedSub(hn::SaturatedSub(a, b), negative);
     const auto fired = hn::Ne(hn::Or(rise, fall), zero);
@@ -91,13 +85,6 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint
     for (int i = 0; i * 64 < lanes; ++i) events.add(fired_bits[i], on_bits[i], x + 64 * i);
   }
   events.flush();
-  for (; x < width; ++x) {
-    const int difference = now[x] - before[x];
-    if (difference > thresholds.positive)
-      out.push_back(Event::at(x, y, t, Polarity::on));
-    else if (-difference > thresholds.negative)
-      out.push_back(Event::at(x, y, t, Polarity::off));
-  }
 }
 
 void fire_row_8(const std::uint8_t* before, const std::uint8_t* now, int width, int y,

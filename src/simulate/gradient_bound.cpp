@@ -1,21 +1,19 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/simulate/gradient_bound.hpp"
 
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/gradient_bound.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants to come after that.
-#include <hwy/highway.h>
-
-#include <algorithm>
+// Once for each target.
+#include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-/// Columns are looked at this many at once, and no vector is wider.
+/// Columns that are measured at once. No vector is wider.
 constexpr int columns_at_once = 16;
 using Bytes = hn::CappedTag<std::uint8_t, columns_at_once>;
 
@@ -39,8 +37,8 @@ class LargestDifference {
   HWY_ALIGN std::uint8_t columns_[columns_at_once] = {};
 };
 
-/// A row of 4x4 cells, from row `top` of the picture on. What lies past the right border is measured
-/// too: the bound is too large at worst.
+/// A row of 4x4 cells, from row `top` of the picture on. What lies past the right border is
+/// measured too: the bound is too large at worst.
 void measure_row(const ImageView<std::uint8_t>& picture, int top, std::uint8_t* x_out,
                  std::uint8_t* y_out) {
   const int bottom = std::min(top + 4, picture.height);
@@ -66,11 +64,12 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace eventcamera {
-namespace {
 
 HWY_EXPORT(measure_row);
 
-/// The largest of 4x4 small cells makes a large one.
+namespace {
+
+/// A large cell is the largest of 4x4 small ones.
 void gather_row(const Image<std::uint8_t>& small, int row, Image<std::uint8_t>& large) {
   for (int column = 0; column < large.width(); ++column) {
     std::uint8_t largest = 0;

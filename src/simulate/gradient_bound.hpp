@@ -8,11 +8,11 @@
 
 namespace eventcamera {
 
-/// How much neighbouring pixels of a picture differ at most, cell by cell: 4x4 pixels for looking
-/// near, 16x16 for looking far.
+/// Upper bounds of the differences of neighbouring pixels, by cells: of 4x4 pixels for small boxes,
+/// of 16x16 for large ones.
 class GradientBound {
  public:
-  /// `picture` must be the view of an Image: SIMD code reads behind its end.
+  /// `picture` must be the view of an Image: SIMD code reads past its rows.
   void measure(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
   struct Bound {
@@ -20,7 +20,7 @@ class GradientBound {
     int y;  ///< of a pixel and the one below it
   };
 
-  /// The largest in a box, which may reach beyond the picture, or in a little more.
+  /// The bound in a box, or in a little more. The box may reach beyond the picture.
   Bound within(const Box& box) const;
 
  private:

@@ -6,13 +6,18 @@
 #include <type_traits>
 
 #include "src/core/image.hpp"
-#include "src/simulate/dense.hpp"
 #include "src/simulate/motion.hpp"
 
 namespace eventcamera {
 
-/// The bilinear sample of a picture at (x, y), which are in 1/65536 of a pixel and rounded to 1/64;
-/// the border goes on for ever. In 1/4096 of a grey level, exactly.
+/// How the flow makes the frame I(a) between I(i-1) and I(i), 0 < a < 1.
+enum class Interpolation {
+  forward,  ///< I(i-1)(x - a F(x))
+  blend,    ///< (1 - a) I(i-1)(x - a F(x)) + a I(i)(x + (1 - a) F(x))
+};
+
+/// The bilinear sample of a picture at (x, y) in 1/65536 of a pixel, rounded to 1/64; the border is
+/// replicated. In 1/4096 of a grey level, exactly.
 template <class Pixel>
 std::int32_t sample(const ImageView<Pixel>& picture, std::int32_t x, std::int32_t y) {
   const int qx = std::clamp((x + 512) >> 10, 0, (picture.width - 1) * 64);

@@ -13,7 +13,7 @@
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
-#include "src/simulate/path.hpp"
+#include "src/simulate/interpolation.hpp"
 #include "src/simulate/sparse.hpp"
 #include "tests/core/scene.hpp"
 
@@ -158,9 +158,9 @@ TEST(Allocations, AreNotMadeByPhysicalPixels) {
   EXPECT_EQ(allocations_of<std::uint16_t>(limited, 12), 0);
 }
 
-/// Paths along a flow that turns, so that tiles differ from frame to frame.
+/// Interpolation along a flow that turns, so that tiles differ from frame to frame.
 template <class Pixel>
-int allocations_of_paths(int bits, Interpolation interpolation) {
+int allocations_of_interpolation(int bits, Interpolation interpolation) {
   const auto frames = frames_of_a_drift<Pixel>(bits);
   std::vector<Image<Flow>> flows;
   for (int i = 0; i < frames_a_round; ++i) {
@@ -172,17 +172,17 @@ int allocations_of_paths(int bits, Interpolation interpolation) {
   }
   ThreadPool pool;
   pool.set_threads(threads);
-  PathWalker walker;
+  InterpolationKernel kernel;
   EventBuckets events;
   return allocations_in_steady_state([&](int i) {
     const auto& last = frames[static_cast<std::size_t>(i)];
     const auto& now = frames[static_cast<std::size_t>((i + 1) % frames_a_round)];
     const StepTimes steps(scene::frame_time, 11);
-    walker.fire(Path<Pixel>{{last.view(), now.view(), steps.count()},
-                            flows[static_cast<std::size_t>(i)].view(),
-                            interpolation,
-                            steps,
-                            {3 << (bits - 8), 3 << (bits - 8)}},
+    kernel.fire(InterpolatedInterval<Pixel>{{last.view(), now.view(), steps.count()},
+                                            flows[static_cast<std::size_t>(i)].view(),
+                                            interpolation,
+                                            steps,
+                                            {3 << (bits - 8), 3 << (bits - 8)}},
                 pool, events);
     EXPECT_GT(events.size(), 1000U);
   });
@@ -190,8 +190,8 @@ int allocations_of_paths(int bits, Interpolation interpolation) {
 
 TEST(Allocations, AreNotMadeByDenseInterpolationOnceTheFlowIsFound) {
   for (const auto interpolation : {Interpolation::forward, Interpolation::blend}) {
-    EXPECT_EQ(allocations_of_paths<std::uint8_t>(8, interpolation), 0);
-    EXPECT_EQ(allocations_of_paths<std::uint16_t>(12, interpolation), 0);
+    EXPECT_EQ(allocations_of_interpolation<std::uint8_t>(8, interpolation), 0);
+    EXPECT_EQ(allocations_of_interpolation<std::uint16_t>(12, interpolation), 0);
   }
 }
 

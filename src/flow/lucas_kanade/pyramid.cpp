@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/lucas_kanade/pyramid.hpp"
 
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/pyramid.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants to come after that.
-#include <hwy/highway.h>
-
-#include <algorithm>
-
-#include "src/core/thread_pool.hpp"
+// Once for each target.
+#include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
 
 using Words = hn::CappedTag<std::uint16_t, 16>;
 using Slopes = hn::CappedTag<std::int16_t, 16>;

@@ -1,23 +1,21 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/lucas_kanade/search.hpp"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
-#include <hwy/foreach_target.h>
-// Highway wants to come after that.
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
+#include <hwy/foreach_target.h>
+// Once for each target.
+#include "src/core/simd-inl.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
 
 /// A row of a window, or a part of it.
 using Values = hn::CappedTag<std::int16_t, 16>;

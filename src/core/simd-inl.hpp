@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Events of lanes that fired, in SIMD. Included once for each SIMD target, by what foreach_target.h
-// compiles.
-#if defined(EVENTCAMERA_FIRED_LANES_INL) == defined(HWY_TARGET_TOGGLE)
-#ifdef EVENTCAMERA_FIRED_LANES_INL
-#undef EVENTCAMERA_FIRED_LANES_INL
+// What SIMD kernels share. Included once for each SIMD target, after foreach_target.h.
+#if defined(EVENTCAMERA_SIMD_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef EVENTCAMERA_SIMD_INL
+#undef EVENTCAMERA_SIMD_INL
 #else
-#define EVENTCAMERA_FIRED_LANES_INL
+#define EVENTCAMERA_SIMD_INL
 #endif
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cstdint>
 
 #include "src/core/event.hpp"
@@ -19,7 +19,16 @@ namespace eventcamera::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Where pixels are and which way they fired, as the upper half of an Event has it.
+/// Loads a vector of which only the first `count` elements are in memory; the rest is 0.
+template <class Tag, class T>
+HWY_INLINE hn::Vec<Tag> load_first(Tag tag, const T* from, int count) {
+  if (HWY_LIKELY(count >= static_cast<int>(hn::Lanes(tag)))) return hn::LoadU(tag, from);
+  HWY_ALIGN T elements[hn::MaxLanes(tag)] = {};
+  std::copy_n(from, count, elements);
+  return hn::Load(tag, elements);
+}
+
+/// Coordinates and polarities of pixels, as the upper half of an Event has them.
 using FiredLanes = hn::CappedTag<std::uint32_t, 16>;
 
 /// A row of pixels from x on, all of them OFF.
@@ -28,8 +37,8 @@ inline hn::Vec<FiredLanes> off_events(int x, int y) {
                 hn::Set(FiredLanes(), static_cast<std::uint32_t>(y) << 16));
 }
 
-/// Writes an event for each lane that fired, one after the other without a branch for each. What
-/// lies behind them is overwritten, as far as there are lanes.
+/// Writes an event for each lane that fired, one after another without branches. Writes as many
+/// events as there are lanes; those past the fired ones are garbage.
 inline void store_fired(hn::Vec<FiredLanes> off_events, hn::Mask<FiredLanes> fired,
                         hn::Mask<FiredLanes> on, std::uint32_t t, Event* out) {
   const FiredLanes lanes;

@@ -1,0 +1,460 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/simulate/interpolation.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/simulate/interpolation.cpp"
+#include <hwy/foreach_target.h>
+// Once for each target.
+#include "src/core/simd-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+/// Pixels that are skipped together or not at all. No vector is wider.
+constexpr int tile_width = 16;
+constexpr int tile_height = 4;
+static_assert(rows_per_band % tile_height == 0);
+
+using Words = hn::CappedTag<std::int32_t, tile_width>;
+using Floats = hn::CappedTag<float, tile_width>;
+using Bytes = hn::Rebind<std::uint8_t, Words>;
+using Vector = hn::Vec<Words>;
+
+/// Where samples lie, for a vector of positions in 1/65536 of a pixel.
+struct SamplePlaces {
+  Vector x0;  ///< the pixel to the upper left
+  Vector y0;
+  Vector right;  ///< from there, in 1/64 of a pixel
+  Vector down;
+
+  SamplePlaces(Vector x, Vector y, Vector right_end, Vector lower_end) {
+    const auto zero = hn::Zero(Words());
+    const auto half = hn::Set(Words(), 512);
+    const auto low_bits = hn::Set(Words(), 63);
+    const auto qx = hn::Min(hn::Max(hn::ShiftRight<10>(hn::Add(x, half)), zero), right_end);
+    const auto qy = hn::Min(hn::Max(hn::ShiftRight<10>(hn::Add(y, half)), zero), lower_end);
+    x0 = hn::ShiftRight<6>(qx);
+    y0 = hn::ShiftRight<6>(qy);
+    right = hn::And(qx, low_bits);
+    down = hn::And(qy, low_bits);
+  }
+};
+
+/// sample() of warp.hpp for vectors, of the view of an Image.
+class Sampler {
+ public:
+  explicit Sampler(const ImageView<std::uint8_t>& picture)
+      : pixels_(reinterpret_cast<const std::int32_t*>(picture.data)),
+        stride_(hn::Set(Words(), static_cast<std::int32_t>(picture.stride))),
+        right_end_(hn::Set(Words(), (picture.width - 1) * 64)),
+        lower_end_(hn::Set(Words(), (picture.height - 1) * 64)),
+        last_row_(hn::Set(Words(), picture.height - 1)) {}
+
+  /// Samples at positions in 1/65536 of a pixel, in 1/4096 of a grey level.
+  Vector at(Vector x, Vector y) const {
+    const SamplePlaces at(x, y, right_end_, lower_end_);
+    const auto y1 = hn::Min(hn::Add(at.y0, hn::Set(Words(), 1)), last_row_);
+    const auto upper = between(hn::Add(hn::Mul(at.y0, stride_), at.x0), at.right);
+    const auto lower = between(hn::Add(hn::Mul(y1, stride_), at.x0), at.right);
+    return hn::Add(hn::ShiftLeft<6>(upper), hn::Mul(hn::Sub(lower, upper), at.down));
+  }
+
+ private:
+  /// Between a pixel and its right neighbour (whose weight is 0 where there is none), in 1/64.
+  Vector between(Vector offset, Vector right) const {
+    const auto byte = hn::Set(Words(), 255);
+    const auto pixels = hn::GatherOffset(Words(), pixels_, offset);
+    const auto a = hn::And(pixels, byte);
+    const auto b = hn::And(hn::ShiftRight<8>(pixels), byte);
+    return hn::Add(hn::ShiftLeft<6>(a), hn::Mul(hn::Sub(b, a), right));
+  }
+
+  const std::int32_t* pixels_;
+  Vector stride_;
+  Vector right_end_;
+  Vector lower_end_;
+  Vector last_row_;
+};
+
+/// The same samples, of an image that has each pixel beside the one below it: one gather a sample.
+class PairSampler {
+ public:
+  /// The pixel in the lower byte, the one below it in the upper.
+  explicit PairSampler(const ImageView<std::uint16_t>& pairs)
+      : pairs_(reinterpret_cast<const std::int32_t*>(pairs.data)),
+        stride_(hn::Set(Words(), static_cast<std::int32_t>(pairs.stride))),
+        right_end_(hn::Set(Words(), (pairs.width - 1) * 64)),
+        lower_end_(hn::Set(Words(), (pairs.height - 1) * 64)) {}
+
+  Vector at(Vector x, Vector y) const {
+    const SamplePlaces at(x, y, right_end_, lower_end_);
+    const auto offset = hn::Add(hn::Mul(at.y0, stride_), hn::Add(at.x0, at.x0));
+    const auto pairs = hn::GatherOffset(Words(), pairs_, offset);
+    // The left and the right column side by side, 16 bits each: no sum is longer.
+    const auto bytes = hn::Set(Words(), 0x00FF00FF);
+    const auto upper = hn::And(pairs, bytes);
+    const auto lower = hn::And(hn::ShiftRight<8>(pairs), bytes);
+    const auto columns =
+        hn::Add(hn::Mul(upper, hn::Sub(hn::Set(Words(), 64), at.down)), hn::Mul(lower, at.down));
+    const auto left = hn::And(columns, hn::Set(Words(), 0xFFFF));
+    const auto right = hn::ShiftRight<16>(columns);
+    return hn::Add(hn::ShiftLeft<6>(left), hn::Mul(hn::Sub(right, left), at.right));
+  }
+
+ private:
+  const std::int32_t* pairs_;
+  Vector stride_;
+  Vector right_end_;
+  Vector lower_end_;
+};
+
+/// A vector of pixels that move with the flow.
+struct MovingPixels {
+  Vector x;  ///< positions, 1/65536 of a pixel
+  Vector y;
+  Vector dx;  ///< displacements in one step, as motion_per_step() has them
+  Vector dy;
+
+  MovingPixels(const ImageView<Flow>& flow, int left, int row, int steps)
+      : x(hn::ShiftLeft<16>(hn::Iota(Words(), left))), y(hn::Set(Words(), row << 16)) {
+    const int count = std::min(static_cast<int>(hn::Lanes(Floats())), flow.width - left);
+    HWY_ALIGN float flows[2 * hn::MaxLanes(Floats())] = {};
+    std::copy_n(&flow.row(row)[left].x, 2 * count, flows);
+    hn::Vec<Floats> flow_x;
+    hn::Vec<Floats> flow_y;
+    hn::LoadInterleaved2(Floats(), flows, flow_x, flow_y);
+    dx = motion(flow_x, steps);
+    dy = motion(flow_y, steps);
+  }
+
+  /// The sample of the next frame that a pixel reaches in `left` steps.
+  Vector ahead(const Sampler& next, int left) const {
+    const auto steps = hn::Set(Words(), left);
+    return next.at(hn::Add(x, hn::Mul(steps, dx)), hn::Add(y, hn::Mul(steps, dy)));
+  }
+
+ private:
+  static Vector motion(hn::Vec<Floats> flow, int steps) {
+    const auto limit = hn::Set(Floats(), static_cast<float>(max_side));
+    const auto number = hn::IfThenElseZero(hn::Eq(flow, flow), flow);
+    const auto clamped = hn::Min(hn::Max(number, hn::Neg(limit)), limit);
+    return hn::NearestInt(
+        hn::Mul(clamped, hn::Set(Floats(), 65536.0F / static_cast<float>(steps))));
+  }
+};
+
+/// The blend of two samples at step j, in 1/2^20 of a grey level.
+Vector blend(Vector earlier, Vector later, int j, int steps) {
+  const int weight = blend_weight(j, steps);
+  return hn::Add(hn::Mul(earlier, hn::Set(Words(), 256 - weight)),
+                 hn::Mul(later, hn::Set(Words(), weight)));
+}
+
+/// Steps that are sampled before their events are looked for.
+constexpr int steps_at_once = 16;
+
+/// For each tile of a row of tiles, the first step to look at: 1; or, if nothing can fire before
+/// the last step, the last but one, or the last if the frame before it shows the last frame itself.
+using FirstSteps = std::array<int, max_side / tile_width>;
+
+/// Puts each pixel of some rows beside the one below it, those of the lowest row beside themselves.
+void pair_rows(const ImageView<std::uint8_t>& picture, int first, int last,
+               Image<std::uint16_t>& pairs) {
+  const hn::CappedTag<std::uint16_t, 32> words;
+  const hn::Rebind<std::uint8_t, decltype(words)> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(words));
+  for (int y = first; y < last; ++y) {
+    const std::uint8_t* here = picture.row(y);
+    const std::uint8_t* below = picture.row(std::min(y + 1, picture.height - 1));
+    std::uint16_t* out = pairs.row(y);
+    for (int x = 0; x < picture.width; x += lanes) {
+      const auto low = hn::PromoteTo(words, hn::LoadU(bytes, here + x));
+      const auto high = hn::PromoteTo(words, hn::LoadU(bytes, below + x));
+      hn::StoreU(hn::Or(low, hn::ShiftLeft<8>(high)), words, out + x);
+    }
+  }
+}
+
+template <Interpolation interpolation, class LastSampler>
+void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSampler& last, int y,
+              int band, const FirstSteps& first_steps, EventBuckets& events) {
+  const Words words;
+  const int lanes = static_cast<int>(hn::Lanes(words));
+  const int width = interval.flow.width;
+  const int steps = interval.steps.count();
+  const Sampler now(interval.warp.now);
+  const std::uint8_t* last_row = interval.warp.last.row(y);
+  const std::uint8_t* now_row = interval.warp.now.row(y);
+  const auto positive = hn::Set(words, interval.thresholds.positive);
+  const auto negative = hn::Set(words, interval.thresholds.negative);
+
+  for (int x = 0; x < width; x += lanes) {
+    const auto within = hn::FirstN(words, static_cast<std::size_t>(std::min(lanes, width - x)));
+    const auto off = off_events(x, y);
+    const auto fire = [&](Vector before, Vector after, int j) {
+      const auto difference = hn::Sub(after, before);
+      const auto on = hn::Gt(difference, positive);
+      const auto fired = hn::And(hn::Or(on, hn::Gt(hn::Neg(difference), negative)), within);
+      if (hn::AllFalse(words, fired)) return;
+      const FiredLanes tag;
+      Event here[hn::MaxLanes(tag)];
+      store_fired(off, hn::RebindMask(tag, fired), hn::RebindMask(tag, on),
+                  interval.steps.microseconds(j), here);
+      auto& out = events.bucket(j, band);
+      out.insert(out.end(), here, here + hn::CountTrue(words, fired));
+    };
+
+    auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
+    const auto end = hn::PromoteTo(words, hn::LoadU(Bytes(), now_row + x));
+    const int first = first_steps[static_cast<std::size_t>(x / tile_width)];
+    if (first == steps) {
+      fire(before, end, steps);
+      continue;
+    }
+    const MovingPixels pixels(interval.flow, x, y, steps);
+    auto from_x = hn::Sub(pixels.x, hn::Mul(pixels.dx, hn::Set(words, first - 1)));
+    auto from_y = hn::Sub(pixels.y, hn::Mul(pixels.dy, hn::Set(words, first - 1)));
+    const auto value_at = [&](int j) {
+      from_x = hn::Sub(from_x, pixels.dx);
+      from_y = hn::Sub(from_y, pixels.dy);
+      const auto earlier = last.at(from_x, from_y);
+      if constexpr (interpolation == Interpolation::forward) {
+        return hn::ShiftRight<12>(hn::Add(earlier, hn::Set(words, 2048)));
+      } else {
+        const auto sum = blend(earlier, pixels.ahead(now, steps - j), j, steps);
+        return hn::ShiftRight<20>(hn::Add(sum, hn::Set(words, 1 << 19)));
+      }
+    };
+    if (first > 1) {
+      before = value_at(first);
+    } else {
+      // Whether a pixel fires is hard to predict: sample ahead, so that no sample waits for it.
+      HWY_ALIGN std::int32_t values[steps_at_once * hn::MaxLanes(words)];
+      for (int begin = 1; begin < steps; begin += steps_at_once) {
+        const int count = std::min(steps_at_once, steps - begin);
+        for (int k = 0; k < count; ++k)
+          hn::Store(value_at(begin + k), words, values + std::ptrdiff_t{k} * lanes);
+        for (int k = 0; k < count; ++k) {
+          const auto value = hn::Load(words, values + std::ptrdiff_t{k} * lanes);
+          fire(before, value, begin + k);
+          before = value;
+        }
+      }
+    }
+    fire(before, end, steps);
+  }
+}
+
+/// The flows of a tile, and 0, lie within this range.
+struct FlowRange {
+  float min[2];  ///< x, y
+  float max[2];
+};
+
+FlowRange flow_range(const ImageView<Flow>& flow, const Box& tile) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  const int count = 2 * tile.width();
+  auto lowest = hn::Zero(floats);
+  auto highest = hn::Zero(floats);
+  FlowRange range{};
+  for (int y = tile.top; y < tile.bottom; ++y) {
+    const float* row = &flow.row(y)[tile.left].x;
+    for (int i = 0; i < count; i += lanes) {
+      const auto here = load_first(floats, row + i, count - i);
+      // NaN counts as 0.
+      const auto number = hn::IfThenElseZero(hn::Eq(here, here), here);
+      lowest = hn::Min(lowest, number);
+      highest = hn::Max(highest, number);
+    }
+  }
+  HWY_ALIGN float lane[hn::MaxLanes(Floats())];
+  hn::Store(lowest, floats, lane);
+  for (int i = 0; i < lanes; ++i) range.min[i % 2] = std::min(range.min[i % 2], lane[i]);
+  hn::Store(highest, floats, lane);
+  for (int i = 0; i < lanes; ++i) range.max[i % 2] = std::max(range.max[i % 2], lane[i]);
+  return range;
+}
+
+/// The first step of forward interpolation at which a tile must be looked at.
+int first_step(const InterpolatedInterval<std::uint8_t>& interval,
+               const GradientBound& gradient_bound, const Box& tile) {
+  const int steps = interval.steps.count();
+  const auto range = flow_range(interval.flow, tile);
+  const auto motion = [steps](float flow) { return std::int64_t{motion_per_step(flow, steps)}; };
+  std::int64_t dx = std::max(motion(range.max[0]), -motion(range.min[0]));
+  std::int64_t dy = std::max(motion(range.max[1]), -motion(range.min[1]));
+  // Positions are rounded to 1/64 of a pixel: less than half of that from its start, a sample is
+  // the pixel itself.
+  if (std::max(dx, dy) * (steps - 1) < 512) return steps;
+  // Rounding may lengthen a step.
+  dx += 1024;
+  dy += 1024;
+  // Over long distances, the search for the bound costs more than it saves.
+  constexpr int far = 64;
+  const auto reach = [&](float flow) {
+    return static_cast<int>(((motion(flow) + 1024) * steps >> 16) + 1);
+  };
+  const Box reached{tile.left - reach(range.max[0]), tile.top - reach(range.max[1]),
+                    tile.right + reach(-range.min[0]), tile.bottom + reach(-range.min[1])};
+  if (reached.width() > tile_width + 2 * far || reached.height() > tile_height + 2 * far) return 1;
+  const auto bound = gradient_bound.within(reached);
+  const std::int64_t threshold =
+      std::min(interval.thresholds.positive, interval.thresholds.negative);
+  return dx * bound.x + dy * bound.y <= threshold << 16 ? std::max(1, steps - 1) : 1;
+}
+
+void fire_band_forward(const InterpolatedInterval<std::uint8_t>& interval,
+                       const ImageView<std::uint16_t>& last_pairs,
+                       const GradientBound& gradient_bound, int band, EventBuckets& events) {
+  const PairSampler last(last_pairs);
+  const BandRows rows(band, interval.flow.height);
+  const int width = interval.flow.width;
+  FirstSteps first_steps;
+  for (int top = rows.first; top < rows.last; top += tile_height) {
+    const int bottom = std::min(top + tile_height, rows.last);
+    for (int left = 0; left < width; left += tile_width)
+      first_steps[static_cast<std::size_t>(left / tile_width)] = first_step(
+          interval, gradient_bound, {left, top, std::min(left + tile_width, width), bottom});
+    for (int y = top; y < bottom; ++y)
+      fire_row<Interpolation::forward>(interval, last, y, band, first_steps, events);
+  }
+}
+
+void fire_band_blend(const InterpolatedInterval<std::uint8_t>& interval, int band,
+                     EventBuckets& events) {
+  const Sampler last(interval.warp.last);
+  const BandRows rows(band, interval.flow.height);
+  FirstSteps first_steps;
+  first_steps.fill(1);
+  for (int y = rows.first; y < rows.last; ++y)
+    fire_row<Interpolation::blend>(interval, last, y, band, first_steps, events);
+}
+
+void interpolate_row_8(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
+                       std::uint16_t* out) {
+  const Words words;
+  const hn::Rebind<std::uint16_t, Words> shades;
+  const Sampler last(warp.last);
+  const Sampler now(warp.now);
+  for (int x = 0; x < flow.width; x += static_cast<int>(hn::Lanes(words))) {
+    const MovingPixels pixels(flow, x, y, warp.steps);
+    const auto sum =
+        blend(pixels.ahead(last, -j), pixels.ahead(now, warp.steps - j), j, warp.steps);
+    // From 1/2^20 of a grey level to 1/257.
+    const auto grey = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 1 << 7)));
+    const auto value =
+        hn::ShiftRight<12>(hn::Add(hn::Mul(grey, hn::Set(words, 257)), hn::Set(words, 1 << 11)));
+    hn::StoreU(hn::DemoteTo(shades, value), shades, out + x);
+  }
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(pair_rows);
+HWY_EXPORT(fire_band_forward);
+HWY_EXPORT(fire_band_blend);
+HWY_EXPORT(interpolate_row_8);
+
+namespace {
+
+template <Interpolation interpolation>
+void fire_row_16(const InterpolatedInterval<std::uint16_t>& interval, int y, int band,
+                 EventBuckets& events) {
+  const int steps = interval.steps.count();
+  for (int x = 0; x < interval.flow.width; ++x) {
+    const Flow& flow = interval.flow.row(y)[x];
+    const Motion dx = motion_per_step(flow.x, steps);
+    const Motion dy = motion_per_step(flow.y, steps);
+    int before = interval.warp.last.row(y)[x];
+    for (int j = 1; j <= steps; ++j) {
+      const int value = j < steps ? interval.warp.template at<interpolation>(x, y, dx, dy, j)
+                                  : interval.warp.now.row(y)[x];
+      const int difference = value - before;
+      if (difference > interval.thresholds.positive || -difference > interval.thresholds.negative)
+        events.bucket(j, band).push_back(Event::at(x, y, interval.steps.microseconds(j),
+                                                   difference > 0 ? Polarity::on : Polarity::off));
+      before = value;
+    }
+  }
+}
+
+template <Interpolation interpolation>
+void fire_band_16(const InterpolatedInterval<std::uint16_t>& interval, int band,
+                  EventBuckets& events) {
+  const BandRows rows(band, interval.flow.height);
+  for (int y = rows.first; y < rows.last; ++y)
+    fire_row_16<interpolation>(interval, y, band, events);
+}
+
+}  // namespace
+
+void InterpolationKernel::fire(const InterpolatedInterval<std::uint8_t>& interval,
+                               ThreadPool& threads, EventBuckets& events) {
+  const int bands = band_count(interval.flow.height);
+  events.reset(interval.steps.count(), bands);
+  if (interval.interpolation == Interpolation::forward) {
+    gradient_bound_.measure(interval.warp.last, threads);
+    if (last_pairs_.width() != interval.flow.width || last_pairs_.height() != interval.flow.height)
+      last_pairs_ = Image<std::uint16_t>(interval.flow.width, interval.flow.height);
+    threads.for_each(bands, [&](int band, int) {
+      const BandRows rows(band, interval.flow.height);
+      HWY_DYNAMIC_DISPATCH(pair_rows)(interval.warp.last, rows.first, rows.last, last_pairs_);
+    });
+    threads.for_each(bands, [&](int band, int) {
+      HWY_DYNAMIC_DISPATCH(fire_band_forward)
+      (interval, last_pairs_.view(), gradient_bound_, band, events);
+    });
+  } else {
+    threads.for_each(bands, [&](int band, int) {
+      HWY_DYNAMIC_DISPATCH(fire_band_blend)(interval, band, events);
+    });
+  }
+}
+
+void InterpolationKernel::fire(const InterpolatedInterval<std::uint16_t>& interval,
+                               ThreadPool& threads, EventBuckets& events) {
+  const int bands = band_count(interval.flow.height);
+  events.reset(interval.steps.count(), bands);
+  threads.for_each(bands, [&](int band, int) {
+    if (interval.interpolation == Interpolation::forward)
+      fire_band_16<Interpolation::forward>(interval, band, events);
+    else
+      fire_band_16<Interpolation::blend>(interval, band, events);
+  });
+}
+
+void interpolate_row(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
+                     std::uint16_t* out) {
+  HWY_DYNAMIC_DISPATCH(interpolate_row_8)(warp, flow, y, j, out);
+}
+
+void interpolate_row(const Warp<std::uint16_t>& warp, const ImageView<Flow>& flow, int y, int j,
+                     std::uint16_t* out) {
+  for (int x = 0; x < flow.width; ++x) {
+    const Flow& here = flow.row(y)[x];
+    out[x] = warp.at<Interpolation::blend>(x, y, motion_per_step(here.x, warp.steps),
+                                           motion_per_step(here.y, warp.steps), j);
+  }
+}
+
+void widen_row(const std::uint8_t* luma, int width, std::uint16_t* out) {
+  for (int x = 0; x < width; ++x) out[x] = static_cast<std::uint16_t>(luma[x] * 257);
+}
+
+void widen_row(const std::uint16_t* luma, int width, std::uint16_t* out) {
+  std::copy_n(luma, width, out);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "src/core/event_buckets.hpp"
+#include "src/core/thread_pool.hpp"
+#include "src/flow/dense_flow.hpp"
+#include "src/simulate/gradient_bound.hpp"
+#include "src/simulate/simulator.hpp"
+#include "src/simulate/warp.hpp"
+
+namespace eventcamera {
+
+/// Two frames, the frames interpolated between them, and the thresholds of the pixels.
+template <class Pixel>
+struct InterpolatedInterval {
+  Warp<Pixel> warp;  ///< 8-bit frames must be views of Images: SIMD code reads past their rows
+  ImageView<Flow> flow;
+  Interpolation interpolation;
+  StepTimes steps;
+  Thresholds thresholds;
+};
+
+/// Fires the events of interpolated frames, pixel by pixel through all steps; the frames themselves
+/// are never written.
+///
+/// Most pixels cannot fire before the last step, which a bound tells exactly: a step of (dx, dy)
+/// pixels changes a bilinear sample by at most |dx| gx + |dy| gy, where gx and gy are the largest
+/// differences of neighbours within reach. Tiles whose bound does not exceed the thresholds skip to
+/// the last step.
+class InterpolationKernel {
+ public:
+  /// Replaces what `events` held.
+  void fire(const InterpolatedInterval<std::uint8_t>& interval, ThreadPool& threads,
+            EventBuckets& events);
+  void fire(const InterpolatedInterval<std::uint16_t>& interval, ThreadPool& threads,
+            EventBuckets& events);
+
+ private:
+  GradientBound gradient_bound_;
+  Image<std::uint16_t> last_pairs_;  ///< the last frame, each pixel beside the one below it
+};
+
+/// A row of the blended frame of step j = 1 ... steps - 1 between two frames, in 16 bits from 8-bit
+/// frames (which must be views of Images), so that the dark has more shades; else in their own
+/// depth. `out` has 16 elements more than a row.
+void interpolate_row(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
+                     std::uint16_t* out);
+void interpolate_row(const Warp<std::uint16_t>& warp, const ImageView<Flow>& flow, int y, int j,
+                     std::uint16_t* out);
+
+/// A row of a frame in the depth of interpolate_row().
+void widen_row(const std::uint8_t* luma, int width, std::uint16_t* out);
+void widen_row(const std::uint16_t* luma, int width, std::uint16_t* out);
+
+}  // namespace eventcamera
