@@ -10,15 +10,15 @@
 
 namespace eventcamera {
 
-/// The events of one interval, as kernels leave them: a bucket for each step and, within a step,
-/// for each band of rows. Threads fill buckets of their own; read in order, the buckets are the
+/// The events of one interval as kernels produce them: a bucket for each step and, within a step,
+/// for each band of rows. Each thread fills buckets of its own; in order, the buckets are the
 /// sorted events of the interval.
 class EventBuckets {
  public:
-  /// On a cache line of its own: threads fill neighbours at the same time.
+  /// On a cache line of its own: threads fill neighbouring buckets concurrently.
   struct alignas(64) Bucket : std::vector<Event> {};
 
-  /// Empties the buckets, keeps their memory.
+  /// Empties the buckets and keeps their memory.
   void reset(int steps, int bands) {
     bands_ = static_cast<std::size_t>(bands);
     buckets_.resize(static_cast<std::size_t>(steps) * bands_);
@@ -33,7 +33,7 @@ class EventBuckets {
   std::span<const Bucket> buckets() const { return buckets_; }
   int bands() const { return static_cast<int>(bands_); }
 
-  /// How many events there are in all.
+  /// Number of events in all buckets.
   std::size_t size() const;
 
   /// Writes size() events, sorted by time and within a time in raster order.
@@ -41,7 +41,7 @@ class EventBuckets {
   void copy_to(Event* out, ThreadPool& threads) const;
 
  private:
-  /// Those from `first` up to `last` of the sorted events.
+  /// Copies the sorted events [first, last).
   void copy_part(std::size_t first, std::size_t last, Event* out) const;
 
   std::vector<Bucket> buckets_;

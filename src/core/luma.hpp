@@ -8,7 +8,7 @@
 
 namespace eventcamera {
 
-/// What stays the same from one frame of a stream to the next.
+/// What all frames of a stream have in common.
 struct LumaFormat {
   int width = 0;
   int height = 0;
@@ -17,7 +17,7 @@ struct LumaFormat {
   friend bool operator==(const LumaFormat&, const LumaFormat&) = default;
 };
 
-/// The brightness of one frame, where it lies.
+/// The luma of one frame, not copied.
 struct LumaView {
   LumaFormat format;
   const void* data = nullptr;
@@ -30,8 +30,8 @@ struct LumaView {
   }
 };
 
-/// Gathers the luma of a packed 4:2:2 picture (YUY2, UYVY, ...), whose luma is every second byte
-/// from `data` on: the one layout whose luma is no plane.
+/// Copies the luma of a packed 4:2:2 picture (YUY2, UYVY, ...), every second byte from `data` on:
+/// the only layout whose luma is not a plane.
 void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Image<std::uint8_t>& out);
 
 /// A frame in 8 bits, as optical flow takes it: the frame itself if it has 8 bits, else its

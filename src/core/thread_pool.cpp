@@ -25,7 +25,7 @@ ThreadPool::~ThreadPool() {
 }
 
 void ThreadPool::set_threads(int threads) {
-  // Asked once: the C library reads it out of a file.
+  // Asked once: the C library reads it from a file.
   static const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int wanted = threads == 0 ? processors : std::clamp(threads, 1, processors);
   if (wanted == this->threads()) return;

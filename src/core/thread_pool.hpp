@@ -11,14 +11,14 @@
 
 namespace eventcamera {
 
-/// A few threads that wait for loops to share. Its owner calls from one thread at a time.
+/// Threads that share loops. To be called from one thread at a time.
 ///
 /// The loops of a frame follow each other closely and may be shorter than it takes to wake a
-/// thread. So before a thread sleeps it yields for a while, and a loop does not wait for threads
+/// thread. So a thread yields for a while before it sleeps, and a loop does not wait for threads
 /// that come too late for it.
 ///
-/// Which thread runs which round of a loop is left to chance, so a round may write only what is
-/// its own; then the result is the same for any number of threads.
+/// Any thread may run any round of a loop, so a round may write only its own data; then the result
+/// is the same for any number of threads.
 class ThreadPool {
  public:
   ThreadPool() = default;
@@ -26,12 +26,12 @@ class ThreadPool {
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
 
-  /// How many threads the next loops use, this one counted in; 0 = one for each processor.
+  /// Sets the number of threads of the next loops, including the caller; 0 = one per processor.
   void set_threads(int threads);
   int threads() const { return static_cast<int>(workers_.size()) + 1; }
 
-  /// Runs body(i, thread) for i = 0 ... count - 1 and returns when all are done; `thread` tells
-  /// the threads apart (0 ... threads() - 1). What a body throws is thrown here, after the loop.
+  /// Runs body(i, thread) for i = 0 ... count - 1, thread = 0 ... threads() - 1, and returns when
+  /// all are done. An exception of a body is rethrown here, after the loop.
   template <class Body>
   void for_each(int count, const Body& body) {
     run(
@@ -52,18 +52,18 @@ class ThreadPool {
 
   std::vector<std::thread> workers_;
 
-  // The loop under way: written while it is closed.
+  // The current loop: written while it is closed.
   Round round_ = nullptr;
   const void* body_ = nullptr;
   int count_ = 0;
   std::atomic<int> next_ = 0;
 
   static constexpr int closed = -1;
-  std::atomic<int> inside_ = closed;  ///< workers in the loop under way
-  std::atomic<unsigned> loops_ = 0;   ///< begun so far; tells workers of the next
+  std::atomic<int> inside_ = closed;  ///< workers in the current loop
+  std::atomic<unsigned> loops_ = 0;   ///< started so far; tells workers of the next
   std::atomic<bool> stop_ = false;
 
-  std::mutex mutex_;  ///< held to change what a sleeper waits for, and guards thrown_
+  std::mutex mutex_;  ///< guards thrown_, and what sleepers wait for
   std::condition_variable wake_;
   std::condition_variable done_;
   std::exception_ptr thrown_;

@@ -11,12 +11,12 @@
 namespace eventcamera {
 namespace {
 
-/// OpenCV's DIS needs a few patches on each side; smaller pictures are continued beyond their
-/// border to this many pixels.
+/// OpenCV's DIS needs a few patches on each side: the border of smaller pictures is replicated up
+/// to this many pixels.
 constexpr int min_side = 64;
 
-/// Dense inverse search (Kroeger et al., ECCV 2016). Spatial propagation is OpenCV's addition and
-/// stays off: the paper's code has none.
+/// Dense inverse search (Kroeger et al., ECCV 2016). Spatial propagation, an addition of OpenCV
+/// that the paper's code does not have, is off.
 class DisFlow final : public DenseFlow {
  public:
   struct Quality {
@@ -44,7 +44,7 @@ class DisFlow final : public DenseFlow {
 
   ImageView<Flow> flow(ThreadPool& threads) override {
     const OpenCvThreads limit(threads.threads());
-    flow_.release();  // else the last flow would be where the search begins
+    flow_.release();  // or the search would start at the last flow
     dis_->calc(last_, next_, flow_);
     static_assert(sizeof(Flow) == 2 * sizeof(float));
     return {flow_.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow_.step[0]), width_, height_};

@@ -8,34 +8,33 @@
 
 namespace eventcamera {
 
-/// Pixels from a place in the earlier frame to the same thing in the later one.
+/// Displacement of a pixel from the earlier frame to the later one, in pixels.
 struct Flow {
   float x;
   float y;
 };
 
-/// How dense flow is found.
+/// Algorithms of dense flow.
 enum class FlowMethod {
   dis_lq,     ///< DIS, low quality and fast: patches of 4, overlap 0.05, 8 iterations, 3 scales
   dis_hq,     ///< DIS, high quality: patches of 8, overlap 0.4, 32 iterations
   farneback,  ///< Farneback: 3 levels, window 15, 3 iterations, polynomials of 5 pixels
 };
 
-/// Dense optical flow between 8-bit pictures of any size. What can be told from one picture alone
-/// is told once, though a picture is the later one first, then the earlier one.
+/// Dense optical flow between 8-bit pictures of any size. What follows from one picture alone is
+/// computed once, although each picture serves twice: first as the later, then as the earlier one.
 class DenseFlow {
  public:
   virtual ~DenseFlow() = default;
 
-  /// Makes the next picture the later one, and what was so the earlier one. It need not outlive the
-  /// call.
+  /// Makes `picture` the later one, and the later one the earlier. It need not outlive the call.
   virtual void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) = 0;
 
-  /// The flow from the earlier picture to the later one, after two push() of one size. It is good
-  /// until the next call, and the same for any number of threads.
+  /// The flow from the earlier picture to the later one, after two push() of one size. Valid until
+  /// the next call; the same for any number of threads.
   virtual ImageView<Flow> flow(ThreadPool& threads) = 0;
 
-  /// The flow between two pictures, whatever came before.
+  /// The flow between two pictures, independent of earlier calls.
   ImageView<Flow> find(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                        ThreadPool& threads) {
     push(from, threads);

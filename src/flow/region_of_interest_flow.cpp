@@ -7,14 +7,13 @@
 namespace eventcamera {
 namespace {
 
-/// What moves carries its surroundings along this far, in pixels: the reach of a window on a coarse
-/// scale.
+/// Pixels around a change whose flow it affects: the reach of a window on a coarse scale.
 constexpr int surroundings = 48;
 
-/// Sides are multiples of this, so that the same finder serves what grows and shrinks a little.
+/// Side lengths are multiples of this, so that regions of similar size share a DenseFlow.
 constexpr int side_step = 64;
 
-/// A range of at least first ... last and its surroundings, as the sides of a part are.
+/// The range of a region in one direction: at least from ... to and its surroundings.
 struct Range {
   int first;
   int last;
@@ -47,8 +46,8 @@ ImageView<Flow> RegionOfInterestFlow::find(const ImageView<std::uint8_t>& from,
   const Range columns(changed.left, changed.right, width_);
   const Range rows(changed.top, changed.bottom, height_);
   const Box part{columns.first, rows.first, columns.last, rows.last};
-  // More than half of a picture is sought through as a whole: what is known of `to` then serves the
-  // next call.
+  // From half of the picture on the whole is searched: what is computed of `to` serves the next
+  // call.
   if (2 * static_cast<std::int64_t>(part.width()) * part.height() >
       static_cast<std::int64_t>(width_) * height_)
     return find_in_whole(from, to, threads);

@@ -8,8 +8,8 @@
 
 namespace eventcamera {
 
-/// Dense flow between the pictures of a sequence, sought only around what has changed: elsewhere
-/// it is 0. A still camera sees little change, and then most of the work falls away.
+/// Dense flow between the pictures of a sequence, searched only around what has changed; 0
+/// elsewhere. A still camera sees little change, which saves most of the work.
 class RegionOfInterestFlow {
  public:
   /// Of pictures of this size.
@@ -17,9 +17,8 @@ class RegionOfInterestFlow {
 
   FlowMethod method() const { return method_; }
 
-  /// The flow from a picture, which must be the `to` of the call before if there was one, to the
-  /// next, where `changed` holds all that has changed between them. Good until the next call, and
-  /// the same for any number of threads.
+  /// The flow from a picture, which must be the `to` of the previous call, to the next; `changed`
+  /// holds all pixels that differ. Valid until the next call; the same for any number of threads.
   ImageView<Flow> find(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                        const Box& changed, ThreadPool& threads);
 

@@ -11,15 +11,15 @@
 
 namespace eventcamera {
 
-/// What every simulator may be told anew before each frame.
+/// Settings of all simulators; may change before each frame.
 struct Settings {
   double positive_threshold = 20;  ///< C+, 8-bit grey levels; a rise must exceed it
   double negative_threshold = 20;  ///< C-, 8-bit grey levels, a magnitude; a fall must exceed it
   int interpolated_frames = 10;    ///< n, between two frames; 0 or more
-  int threads = 0;                 ///< the most threads for one frame; 0 = one for each processor
+  int threads = 0;                 ///< thread limit for one frame; 0 = one per processor
 };
 
-/// C+ and C- in the grey levels of a picture: integers, since its differences are.
+/// C+ and C- in grey levels of a frame, integers like its differences.
 struct Thresholds {
   int positive;
   int negative;
@@ -56,36 +56,34 @@ class StepTimes {
   int count_;
 };
 
-/// Turns frames into the events between them. What follows from a frame is worked out in one call,
-/// so a method may live on any processor behind this face. The same frames, times and settings
-/// give the same events, whatever the number of threads.
+/// Turns frames into the events between them, all in one call per frame, so that an implementation
+/// may run on any processor. The same frames, times and settings give the same events for any
+/// number of threads.
 class Simulator {
  public:
   virtual ~Simulator() = default;
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;
 
-  /// Takes the next frame, in the format the simulator was made for. `time` must lie after that
-  /// of the last frame, by max_interval at most.
-  /// Returns the sorted events of (time of the last frame, time], good until the next call; or
-  /// nullptr for the first frame, to which the next is compared.
-  /// Throws std::bad_alloc, or what OpenCV throws; the simulator is then good for nothing but being
-  /// destroyed.
+  /// Takes the next frame, in the simulator's format. `time` must be later than that of the last
+  /// frame, by max_interval at most.
+  /// Returns the sorted events of (time of the last frame, time], valid until the next call;
+  /// nullptr for the first frame. Throws std::bad_alloc or what OpenCV throws; after that the
+  /// simulator may only be destroyed.
   const EventBuckets* push(const LumaView& frame, Nanoseconds time, const Settings& settings);
 
   /// The time of the last frame, if there is one.
   std::optional<Nanoseconds> last_time() const { return last_time_; }
 
-  /// Says that the last frame still stood at `time`, which must not lie before it: the events up
-  /// to the next frame are those of (time, time of the next frame]. Without effect where there is
-  /// no last frame. Returns what fired in (time of the last frame, time] although nothing changed,
-  /// sorted and good until the next call; or nullptr where that cannot be.
+  /// Extends the last frame, if any, to `time`, which must not be before it: the next interval
+  /// starts at `time`. Returns the sorted events of (time of the last frame, time], which fired
+  /// although nothing changed, valid until the next call; nullptr if the simulator has none.
   const EventBuckets* hold_until(Nanoseconds time, const Settings& settings = {});
 
   /// Forgets all frames: the next one is a first frame.
   void reset();
 
-  /// What it works with, for what is done with its events between its calls.
+  /// Its threads, for use between its calls.
   ThreadPool& threads() { return threads_; }
 
  protected:
@@ -95,10 +93,10 @@ class Simulator {
 
   /// Keeps the first frame.
   virtual void start(const LumaView& frame) = 0;
-  /// Fills `events` from the last frame and this one, and keeps this one.
+  /// Fills `events` from the last frame and this one, which it keeps.
   virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                         EventBuckets& events) = 0;
-  /// Fills `events` with what the pixels do of themselves while the last frame stands, if they do.
+  /// Fills `events` with what fires while the frame does not change; false if nothing can.
   virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
 
  private:

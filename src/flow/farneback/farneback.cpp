@@ -5,7 +5,7 @@
 #include <cassert>
 #include <utility>
 
-#include "src/flow/farneback/room.hpp"
+#include "src/flow/farneback/scratch.hpp"
 
 namespace eventcamera {
 namespace {
@@ -14,20 +14,20 @@ constexpr int halvings = 3;
 constexpr int iterations = 3;
 constexpr int min_side = 32;  ///< of a shrunk picture
 
-/// A band of polynomials needs some more rows of the picture on both sides, which are worked out
-/// twice: bands are not thin.
+/// Bands of polynomials share rows of the picture with their neighbours, which are computed twice,
+/// so bands are not thin.
 constexpr int rows_per_expansion = 32;
 
 int expansion_bands(int height) {
   return (height + rows_per_expansion - 1) / rows_per_expansion;
 }
 
-/// A band of flow goes through all iterations while its polynomials are in the cache, and needs
-/// some more rows for each: bands are thick, but so that each thread has some.
+/// A band of flow goes through all iterations while its polynomials are in the cache; each
+/// iteration needs more rows around it. So bands are thick, but enough for all threads.
 int flow_bands(int height, int threads) {
-  constexpr int thinnest = 60;
-  constexpr int thickest = 160;
-  return std::clamp(height / thinnest, 1, std::max(2 * threads, height / thickest));
+  constexpr int min_rows = 60;
+  constexpr int max_rows = 160;
+  return std::clamp(height / min_rows, 1, std::max(2 * threads, height / max_rows));
 }
 
 }  // namespace
@@ -76,9 +76,10 @@ void FarnebackFlow::expand(const ImageView<std::uint8_t>& picture, Level& level,
   const int first = band * rows_per_expansion;
   const int last = std::min(first + rows_per_expansion, level.pyramid.height());
   const int end = level.pyramid.height() - 1;
-  const auto room = static_cast<std::size_t>(level.pyramid.width()) + Resampling::spare;
+  const auto padded_width = static_cast<std::size_t>(level.pyramid.width()) + row_padding;
   const auto row = [&](int y) {
-    return room_in(scratch.rows[static_cast<std::size_t>(y) % scratch.rows.size()], room);
+    return scratch_of(scratch.rows[static_cast<std::size_t>(y) % scratch.rows.size()],
+                      padded_width);
   };
   int known = std::max(0, first - reach);
   for (int y = first; y < last; ++y) {
@@ -122,7 +123,7 @@ void FarnebackFlow::find_rows(const Level* coarser, Level& level, int first, int
   const auto rows_of = [&](int iteration) -> FlowRows {
     if (iteration == iterations) return {level.flow.row(0), static_cast<std::ptrdiff_t>(stride), 0};
     auto& flow = scratch.flows[static_cast<std::size_t>(iteration) % 2];
-    Flow* rows = room_in(flow, stride * static_cast<std::size_t>(last_of(0) - first_of(0)));
+    Flow* rows = scratch_of(flow, stride * static_cast<std::size_t>(last_of(0) - first_of(0)));
     return {rows, static_cast<std::ptrdiff_t>(stride), first_of(iteration)};
   };
   start_rows(coarser, level, last_of(0), scratch, rows_of(0));
@@ -131,15 +132,15 @@ void FarnebackFlow::find_rows(const Level* coarser, Level& level, int first, int
                      scratch.update, rows_of(i));
 }
 
-/// Where the rows up to `last` begin: at the flow of the coarser level, or at no motion.
+/// Initializes the rows up to `last` from the flow of the coarser level, or with 0.
 void FarnebackFlow::start_rows(const Level* coarser, const Level& level, int last, Scratch& scratch,
                                const FlowRows& out) {
   if (coarser == nullptr) {
     std::fill_n(out.row(out.first), (last - out.first) * out.stride, Flow{0, 0});
     return;
   }
-  const auto room = 2 * static_cast<std::size_t>(coarser->flow.width() + Resampling::spare);
-  float* between = room_in(scratch.coarser_row, room);
+  const auto padded_width = 2 * static_cast<std::size_t>(coarser->flow.width() + row_padding);
+  float* between = scratch_of(scratch.coarser_row, padded_width);
   for (int y = out.first; y < last; ++y) {
     const int upper = level.rows.first()[y];
     const int lower = std::min(upper + 1, coarser->flow.height() - 1);

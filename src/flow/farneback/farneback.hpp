@@ -7,12 +7,11 @@
 #include "src/flow/dense_flow.hpp"
 #include "src/flow/farneback/flow_update.hpp"
 #include "src/flow/farneback/polynomial_expansion.hpp"
-#include "src/flow/farneback/pyramid_level.hpp"
-#include "src/flow/farneback/resampling.hpp"
+#include "src/flow/farneback/pyramid.hpp"
 
 namespace eventcamera {
 
-/// Farneback's flow (SCIA 2003), from coarse to fine. Between two equal pictures it is 0.
+/// Farneback's flow (SCIA 2003), from coarse to fine; 0 between equal pictures.
 class FarnebackFlow final : public DenseFlow {
  public:
   void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) override;
@@ -31,7 +30,7 @@ class FarnebackFlow final : public DenseFlow {
     Resampling rows;
   };
 
-  /// What one thread works with.
+  /// Of one thread.
   struct Scratch {
     PyramidLevel::Scratch pyramid;
     std::array<std::vector<float>, 2 * PolynomialExpansion::reach + 1> rows;

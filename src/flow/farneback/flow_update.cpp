@@ -1,37 +1,34 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/farneback/flow_update.hpp"
 
+#include <algorithm>
+
+#include "src/flow/farneback/scratch.hpp"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/flow_update.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants to come after that.
-#include <hwy/highway.h>
-
-#include <algorithm>
-
-#include "src/flow/farneback/resampling.hpp"
-#include "src/flow/farneback/room.hpp"
+// Once for each target.
+#include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Floats = hn::CappedTag<float, Resampling::spare>;
+using Floats = hn::CappedTag<float, row_padding>;
 using Words = hn::Rebind<std::int32_t, Floats>;
 using Vector = hn::Vec<Floats>;
 constexpr int coefficients = PolynomialExpansion::coefficients;
 /// Of the symmetric 2x2 matrix and the right side.
 constexpr int equations = 5;
 
-/// So many pixels of a row are taken from one step to the next.
+/// Pixels of a row that go through all steps together.
 constexpr int chunk = 64;
 
-/// What is known of the pixels of a chunk.
+/// Intermediate values of the pixels of a chunk.
 struct Chunk {
-  HWY_ALIGN std::int32_t offset[chunk];  ///< where the polynomials begin that a pixel came to
-  HWY_ALIGN float right[chunk];          ///< and how far it lies beyond that pixel
+  HWY_ALIGN std::int32_t offset[chunk];  ///< of the polynomials where the flow ends
+  HWY_ALIGN float right[chunk];          ///< from that pixel on
   HWY_ALIGN float down[chunk];
   HWY_ALIGN float weight[chunk];  ///< of the mean of both polynomials' a
   HWY_ALIGN float
@@ -39,8 +36,8 @@ struct Chunk {
   HWY_ALIGN float fifth[chunk];
 };
 
-/// Follows the flow. Where it leads out of the picture there is no later polynomial: a zero one is
-/// read, and the earlier one's a counts twice.
+/// Follows the flow. Outside the picture there is no later polynomial: a zero one is read, and the
+/// earlier one's a counts twice.
 void follow(const PolynomialExpansion& to, const Flow* flow, int x, int y, int count,
             Chunk& result) {
   const Floats floats;
@@ -74,7 +71,7 @@ void follow(const PolynomialExpansion& to, const Flow* flow, int x, int y, int c
   }
 }
 
-/// Takes the later polynomials, bilinearly, together with the earlier ones.
+/// Combines the later polynomials, interpolated bilinearly, with the earlier ones.
 void combine(const float* from, const PolynomialExpansion& to, int count, Chunk& result) {
   HWY_ALIGN static constexpr float signs[8] = {-1, -1, 1, 1, 1, 1, 1, 1};
   const float* upper_row = to.row(0);
@@ -98,7 +95,7 @@ void combine(const float* from, const PolynomialExpansion& to, int count, Chunk&
   const int quarter = static_cast<int>(hn::Lanes(four));
   for (int i = 0; i < count; ++i) {
     float* out = result.four + std::ptrdiff_t{4} * i;
-    if (hn::Lanes(eight) == 8) {  // the last four go where the next pixel's first four will
+    if (hn::Lanes(eight) == 8) {  // the last four are overwritten by the next pixel
       hn::StoreU(combined(eight, i, 0), eight, out);
       result.fifth[i] = out[4];
     } else {
@@ -108,19 +105,23 @@ void combine(const float* from, const PolynomialExpansion& to, int count, Chunk&
   }
 }
 
-/// Three rows of equations, and thirteen rows of their sums over three: slots by row number.
+/// Three rows of equations, and thirteen rows of their sums over three: ring buffers by row number.
 struct Rows {
-  int room;  ///< floats for one number a pixel
+  int padded_width;  ///< floats in a row of one equation
   float* tensors;
   float* threes;
   float* window;  ///< sums over fifteen rows, each with `reach` pixels before and after
 
-  float* tensor_row(int i) const { return tensors + std::ptrdiff_t{i % 3} * equations * room; }
-  float* three_row(int i) const { return threes + std::ptrdiff_t{i % 13} * equations * room; }
+  float* tensor_row(int i) const {
+    return tensors + std::ptrdiff_t{i % 3} * equations * padded_width;
+  }
+  float* three_row(int i) const {
+    return threes + std::ptrdiff_t{i % 13} * equations * padded_width;
+  }
 };
 
-/// The i-th row of equations, those of row y, and the sums over the last fifteen rows, which mean
-/// something once there are as many.
+/// The i-th row of equations, those of row y, and the sums over the last fifteen rows, which are
+/// valid once there are fifteen.
 void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
              int y, float row_weight, const float* column_weights, int i, const Rows& rows,
              Chunk& pixels) {
@@ -133,7 +134,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
   const float* earlier_threes[4];
   for (int k = 0; k < 4; ++k) earlier_threes[k] = rows.three_row(i + 13 - 3 * (4 - k));
   float* window = rows.window + FlowUpdate::reach;
-  const std::ptrdiff_t room = rows.room;
+  const std::ptrdiff_t padded_width = rows.padded_width;
   for (int left = 0; left < from.width(); left += chunk) {
     const int count = std::min(chunk, from.width() - left);
     follow(to, flow, left, y, count, pixels);
@@ -164,7 +165,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
       b_x = hn::Mul(b_x, weight);
       const auto xy_squared = hn::Mul(a_xy, a_xy);
       const auto put = [&](int equation, Vector value) {
-        // All of a vector's pixels side by side: one address for the five.
+        // The equations of a vector side by side: one address for all five.
         const std::ptrdiff_t at = std::ptrdiff_t{equations} * x + std::ptrdiff_t{equation} * lanes;
         const auto recent = [&](const float* row) { return hn::LoadU(floats, row + at); };
         const auto sum = hn::Add(hn::Add(recent(tensor_2), recent(tensor_1)), value);
@@ -172,7 +173,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
         hn::StoreU(sum, floats, three + at);
         auto all = hn::Add(recent(earlier_threes[0]), recent(earlier_threes[1]));
         all = hn::Add(hn::Add(all, recent(earlier_threes[2])), recent(earlier_threes[3]));
-        hn::StoreU(hn::Add(all, sum), floats, window + equation * room + x);
+        hn::StoreU(hn::Add(all, sum), floats, window + equation * padded_width + x);
       };
       put(0, hn::Add(hn::Mul(a_yy, a_yy), xy_squared));
       put(1, hn::Mul(hn::Add(a_yy, a_xx), a_xy));
@@ -193,20 +194,19 @@ void add_threes(const float* row, int width, float* out) {
                floats, out + x);
 }
 
-/// The flow of a row from its equations' sums over three pixels of fifteen rows. Products of
-/// sums nearly cancel each other wherever things move across their edges only, so they are taken
-/// in double.
-void solve_row(const float* threes, int room, int width, Flow* flow) {
+/// The flow of a row from its equations' sums over three pixels of fifteen rows. Products of sums
+/// nearly cancel at straight edges, so they are computed in double.
+void solve_row(const float* threes, int padded_width, int width, Flow* flow) {
   const hn::CappedTag<double, 8> doubles;
   const hn::Rebind<float, decltype(doubles)> floats;
   using Doubles = hn::Vec<decltype(doubles)>;
   const int lanes = static_cast<int>(hn::Lanes(doubles));
   constexpr int side = 2 * FlowUpdate::reach + 1;
-  // Where there is nothing to see, this makes the flow 0.
+  // Makes the flow 0 where there is no texture.
   const auto regular = hn::Set(doubles, 1e-3 * side * side * side * side);
   for (int x = 0; x < width; x += lanes) {
     const auto window = [&](int equation) {
-      const float* row = threes + std::ptrdiff_t{equation} * room + x;
+      const float* row = threes + std::ptrdiff_t{equation} * padded_width + x;
       auto sum = hn::LoadU(floats, row);
       for (int k = 3; k < side; k += 3) sum = hn::Add(sum, hn::LoadU(floats, row + k));
       return hn::PromoteTo(doubles, sum);
@@ -229,27 +229,29 @@ void solve_row(const float* threes, int room, int width, Flow* flow) {
 
 void solve_window(const Rows& rows, int width, float* threes, Flow* flow) {
   for (int equation = 0; equation < equations; ++equation) {
-    const std::ptrdiff_t at = std::ptrdiff_t{equation} * rows.room;
+    const std::ptrdiff_t at = std::ptrdiff_t{equation} * rows.padded_width;
     float* window = rows.window + at + FlowUpdate::reach;
     std::fill_n(window - FlowUpdate::reach, FlowUpdate::reach, window[0]);
     std::fill_n(window + width, FlowUpdate::reach, window[width - 1]);
     add_threes(rows.window + at, width + 2 * FlowUpdate::reach - 2, threes + at);
   }
-  solve_row(threes, rows.room, width, flow);
+  solve_row(threes, rows.padded_width, width, flow);
 }
 
 void update_rows(const PolynomialExpansion& from, const PolynomialExpansion& to,
                  const FlowRows& flow, int first, int last, const float* column_weights,
                  const float* row_weights, FlowUpdate::Scratch& scratch, const FlowRows& out) {
-  const int room = from.width() + 2 * FlowUpdate::reach + Resampling::spare;
-  const auto row_size = static_cast<std::size_t>(equations) * static_cast<std::size_t>(room);
-  const Rows rows{room, room_in(scratch.tensors, 3 * row_size),
-                  room_in(scratch.threes, 13 * row_size), room_in(scratch.window_rows, row_size)};
-  float* row_threes = room_in(scratch.row_threes, row_size);
+  const int padded_width = from.width() + 2 * FlowUpdate::reach + row_padding;
+  const auto row_size =
+      static_cast<std::size_t>(equations) * static_cast<std::size_t>(padded_width);
+  const Rows rows{padded_width, scratch_of(scratch.tensors, 3 * row_size),
+                  scratch_of(scratch.threes, 13 * row_size),
+                  scratch_of(scratch.window_rows, row_size)};
+  float* row_threes = scratch_of(scratch.row_threes, row_size);
   Chunk pixels{};
   const int before = first - FlowUpdate::reach;
   for (int i = 0; before + i < last + FlowUpdate::reach; ++i) {
-    const int y = std::clamp(before + i, 0, from.height() - 1);  // the border goes on
+    const int y = std::clamp(before + i, 0, from.height() - 1);  // the border is replicated
     add_row(from, to, flow.row(y), y, row_weights[y], column_weights, i, rows, pixels);
     if (i >= 2 * FlowUpdate::reach)
       solve_window(rows, from.width(), row_threes, out.row(before + i - FlowUpdate::reach));
@@ -262,14 +264,15 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace eventcamera {
-namespace {
 
 HWY_EXPORT(update_rows);
 
-/// Near the border, where polynomials were fitted to pixels that are not there, they count less.
+namespace {
+
+/// Polynomials near the border, fitted to replicated pixels, weigh less.
 std::vector<float> border_weights(int length) {
   constexpr float weights[FlowUpdate::border] = {0.14F, 0.14F, 0.4472F, 0.4472F, 0.4472F};
-  std::vector<float> result(static_cast<std::size_t>(length) + Resampling::spare, 1.0F);
+  std::vector<float> result(static_cast<std::size_t>(length) + row_padding, 1.0F);
   for (int i = 0; i < std::min(FlowUpdate::border, length); ++i) {
     result[i] *= weights[i];
     result[length - 1 - i] *= weights[i];

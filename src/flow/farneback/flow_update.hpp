@@ -9,7 +9,7 @@
 
 namespace eventcamera {
 
-/// The rows of a flow from `first` on, with Resampling::spare pixels behind each.
+/// The rows of a flow from `first` on, with row_padding pixels past the end of each.
 struct FlowRows {
   Flow* data;
   std::ptrdiff_t stride;  ///< pixels from one row to the next
@@ -20,16 +20,14 @@ struct FlowRows {
 
 /// One iteration of Farneback's method: from a flow to a better one.
 ///
-/// If a pixel of the earlier picture went along its flow, the polynomials there and where it came
-/// to would differ by a shift, and that shift solves two linear equations. They are summed up in
-/// least squares over a window, and solved for the flow of its middle. Every number comes about in
-/// the same way wherever the work on rows begins and ends.
+/// The polynomials at both ends of a pixel's flow differ by a shift, which solves two linear
+/// equations. They are summed over a window, as least squares, and solved for the flow of its
+/// centre. The result does not depend on how the rows are divided.
 class FlowUpdate {
  public:
-  static constexpr int reach = 7;   ///< pixels each way from the middle of a window
-  static constexpr int border = 5;  ///< pixels from the border in which polynomials count less
+  static constexpr int reach = 7;   ///< pixels each way from the centre of a window
+  static constexpr int border = 5;  ///< width of the border where polynomials weigh less
 
-  /// What the work on some rows needs.
   struct Scratch {
     std::vector<float> tensors;  ///< the equations of the last rows
     std::vector<float> threes;   ///< and their sums over three rows
@@ -40,8 +38,8 @@ class FlowUpdate {
   FlowUpdate() = default;
   FlowUpdate(int width, int height);
 
-  /// Fills the rows [first, last) of `out`. That takes `reach` more rows of `flow` on both sides,
-  /// as far as there are any.
+  /// Fills rows [first, last) of `out` from `reach` more rows of `flow` on both sides, as far as
+  /// there are any.
   void run(const PolynomialExpansion& from, const PolynomialExpansion& to, const FlowRows& flow,
            int first, int last, Scratch& scratch, const FlowRows& out) const;
 

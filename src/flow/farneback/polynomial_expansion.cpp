@@ -1,25 +1,22 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/farneback/polynomial_expansion.hpp"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/farneback/polynomial_expansion.cpp"
-#include <hwy/foreach_target.h>
-// Highway wants to come after that.
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "src/flow/farneback/resampling.hpp"
-#include "src/flow/farneback/room.hpp"
+#include "src/flow/farneback/scratch.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/farneback/polynomial_expansion.cpp"
+#include <hwy/foreach_target.h>
+// Once for each target.
+#include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Floats = hn::CappedTag<float, Resampling::spare>;
+using Floats = hn::CappedTag<float, row_padding>;
 constexpr int reach = PolynomialExpansion::reach;
 
 void fit_columns(const PolynomialExpansion::Window& window, int width, const FitKernels& kernels,
@@ -45,7 +42,7 @@ void fit_columns(const PolynomialExpansion::Window& window, int width, const Fit
   }
 }
 
-/// `four` has room for four coefficients a pixel, `fifth` for the last.
+/// `four` holds four coefficients a pixel, `fifth` for the last.
 void fit_row(const float* smooth, const float* slope, const float* bend, int width,
              const FitKernels& kernels, float* four, float* fifth, float* out) {
   const Floats floats;
@@ -86,12 +83,9 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace eventcamera {
-namespace {
 
 HWY_EXPORT(fit_columns);
 HWY_EXPORT(fit_row);
-
-}  // namespace
 
 FitKernels::FitKernels() {
   constexpr double sigma = 1.2;
@@ -108,8 +102,7 @@ FitKernels::FitKernels() {
     second += 2 * weight[k] * k * k;
     fourth += 2 * weight[k] * k * k * k * k;
   }
-  // The normal equations fall apart: x, y and x y are orthogonal to all else, and x^2 - second is,
-  // too.
+  // The normal equations decouple: x, y, x y and x^2 - second are orthogonal to all others.
   for (int k = 0; k < count; ++k) {
     smooth[k] = static_cast<float>(weight[k]);
     slope[k] = static_cast<float>(weight[k] * k / second);
@@ -121,22 +114,22 @@ PolynomialExpansion::PolynomialExpansion(int width, int height)
     : width_(width),
       height_(height),
       data_(static_cast<std::size_t>(stride()) * (static_cast<std::size_t>(height) + 2) +
-            Resampling::spare) {}
+            row_padding) {}
 
 void PolynomialExpansion::fit(int y, const Window& window, Scratch& scratch) {
   static const FitKernels kernels;
-  const auto room = static_cast<std::size_t>(width_) + std::size_t{2} * reach + Resampling::spare;
+  const auto padded_width = static_cast<std::size_t>(width_) + std::size_t{2} * reach + row_padding;
   std::array<float*, 3> rows;
   for (std::size_t i = 0; i < rows.size(); ++i)
-    rows[i] = room_in(scratch.column_sums[i], room) + reach;
+    rows[i] = scratch_of(scratch.column_sums[i], padded_width) + reach;
   HWY_DYNAMIC_DISPATCH(fit_columns)(window, width_, kernels, rows[0], rows[1], rows[2]);
   for (float* row : rows) {
     std::fill_n(row - reach, reach, row[0]);
     std::fill_n(row + width_, reach, row[width_ - 1]);
   }
-  float* four = room_in(scratch.coefficients, coefficients * room);
+  float* four = scratch_of(scratch.coefficients, coefficients * padded_width);
   HWY_DYNAMIC_DISPATCH(fit_row)
-  (rows[0], rows[1], rows[2], width_, kernels, four, four + 4 * room,
+  (rows[0], rows[1], rows[2], width_, kernels, four, four + 4 * padded_width,
    data_.data() + std::ptrdiff_t{y} * stride());
 }
 

@@ -7,13 +7,13 @@
 
 namespace eventcamera {
 
-/// The quadratic polynomials that a picture looks like around each of its pixels, under a Gaussian
-/// weight: b_y y + b_x x + a_yy y^2 + a_xx x^2 + a_xy x y, with (0, 0) at the pixel itself. The
-/// constant, which says nothing about motion, is left out.
+/// Quadratic polynomials fitted to a picture around each pixel, with a Gaussian weight:
+/// b_y y + b_x x + a_yy y^2 + a_xx x^2 + a_xy x y, with (0, 0) at the pixel. The constant, which
+/// does not depend on motion, is left out.
 class PolynomialExpansion {
  public:
-  static constexpr int coefficients = 5;  ///< in the order above
-  static constexpr int reach = 5;         ///< pixels each way that a polynomial is fitted to
+  static constexpr int coefficients = 5;                   ///< in the order above
+  static constexpr int reach = 5;                          ///< pixels each way of a fit
   using Window = std::array<const float*, 2 * reach + 1>;  ///< rows y - reach ... y + reach
 
   PolynomialExpansion() = default;
@@ -23,11 +23,10 @@ class PolynomialExpansion {
   int height() const { return height_; }
   /// Floats from one row to the next.
   int stride() const { return coefficients * (width_ + 1); }
-  /// The polynomials of a row, one after the other. Right of the last one and below the last row
-  /// may be read, too: what is there is finite. Two rows of zeros come below the last one.
+  /// The polynomials of a row. One more on the right may be read, which is finite, and two rows of
+  /// zeros below the last one.
   const float* row(int y) const { return data_.data() + std::ptrdiff_t{y} * stride(); }
 
-  /// What the work on a row needs.
   struct Scratch {
     std::array<std::vector<float>, 3> column_sums;
     std::vector<float> coefficients;
@@ -41,9 +40,9 @@ class PolynomialExpansion {
   std::vector<float> data_;
 };
 
-/// The least-squares fit is linear in the pixels, and its weights are products of one along the
-/// column and one along the row: each coefficient is one kernel down the columns, then one along
-/// the rows. These are their halves from the middle on; the slope is odd, the others are even.
+/// The kernels of the least-squares fit, which is separable: each coefficient is one kernel along
+/// the columns, then one along the rows. Halves from the centre on; the slope is odd, the others
+/// even.
 struct FitKernels {
   static constexpr int count = PolynomialExpansion::reach + 1;
   FitKernels();

@@ -15,30 +15,30 @@ struct Point {
   int y;
 };
 
-/// Where a tracked point went.
+/// The result of tracking a point.
 struct Track {
   Flow flow;
   bool found;  ///< false: the point was lost
 };
 
-/// Pyramidal Lucas-Kanade from the last picture to the next: 15x15 pixels on 4 levels, as in the
-/// paper's code, each point on its own. 8-bit pictures of one size, any size.
+/// Pyramidal Lucas-Kanade from the last picture to the next, each point on its own: 15x15 pixels on
+/// 4 levels, as in the paper's code. 8-bit pictures, all of the same size.
 class PointTracker {
  public:
-  /// Makes the next picture the one tracked to, and what was the next the one tracked from.
+  /// Makes `picture` the one tracked to, and the previous one the one tracked from.
   void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
-  /// Follows points of the last picture, in raster order and each once, into the next, after two
-  /// push(). A track for each point, good until the next call, the same for any number of threads.
+  /// Tracks points of the last picture, unique and in raster order, into the next, after two
+  /// push(). A track per point, valid until the next call; the same for any number of threads.
   std::span<const Track> track(std::span<const Point> points, ThreadPool& threads);
 
  private:
-  /// Pixels that are followed together: on the uppermost level the points of each fraction of a
-  /// pixel are a tile, on the others several.
+  /// Pixels that are tracked together: on the coarsest level, a tile for each fraction of a pixel;
+  /// on the others several.
   static constexpr int block_side = Tile::side << (Pyramid::max_levels - 1);
   static constexpr int tiles_a_block = 1 << 2 * (Pyramid::max_levels - 1);
 
-  /// The points of a block, in the order of the tiles that they are in on a level.
+  /// The points of a block, ordered by their tiles on a level.
   struct Block {
     std::vector<std::uint32_t> points;
     std::vector<std::uint32_t> ordered;

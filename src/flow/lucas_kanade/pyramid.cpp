@@ -18,11 +18,11 @@ using Slopes = hn::CappedTag<std::int16_t, 16>;
 template <class Lanes>
 using BytesFor = hn::Rebind<std::uint8_t, Lanes>;
 
-/// The longest blurred row: a picture's, two pixels more each side, and a vector's rest.
+/// Length limit of a blurred row: a picture's, two pixels more on each side, and a vector.
 constexpr int max_row = 16384 + 64;
 
 // NOLINTBEGIN(clang-analyzer-core.uninitialized.Assign): the second loop reads what the first
-// wrote, and what a vector reads beyond it goes nowhere.
+// wrote; what a vector reads beyond it is not used.
 /// A row of the next level, from the rows about row 2y of this one. Writes up to a vector more.
 void halve_row(const Image<std::uint8_t>& picture, int y, std::uint8_t* out, int width) {
   const Words words;
@@ -103,7 +103,7 @@ HWY_EXPORT(slope_row);
 
 namespace {
 
-/// Where a position beyond the border is reflected to: the border pixel itself is not repeated.
+/// The position that one beyond the border is reflected to; the border pixel is not repeated.
 int reflected(int p, int size) {
   if (size == 1) return 0;
   const int period = 2 * (size - 1);

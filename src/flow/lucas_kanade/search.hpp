@@ -15,11 +15,11 @@ struct Tile {
 
   int left;
   int top;
-  int right;  ///< what every point lies beyond its pixel, in eighths
+  int right;  ///< offset of every point from its pixel, in eighths
   int down;
 };
 
-/// A point of a tile on its way into the same level of another picture.
+/// The search for a point of a tile on the same level of another picture.
 struct Search {
   int x;  ///< its pixel, within the tile
   int y;
@@ -27,14 +27,14 @@ struct Search {
   bool found;  ///< out: false where the window has too little texture or has left the picture
 };
 
-/// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): a window of 15x15 pixels is
-/// moved until its squared difference no longer falls; at most 10 times, or until a move is shorter
-/// than 0.03 pixel or turns back. Needs `from`'s slopes. No more searches than a tile has pixels.
+/// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): a window of 15x15 pixels moves
+/// until its squared difference no longer falls; at most 10 times, or until a move is shorter than
+/// 0.03 pixel or turns back. Needs the slopes of `from`. At most one search per pixel of the tile.
 ///
-/// The sum over the window that a move follows from is bilinear in where the window lies: between
-/// its values with the window on the four pixels about it, which are integers. So a window is gone
-/// through once for each pixel that a search comes by, not once a move, and the rest is a little
-/// floating point, the same on every processor.
+/// The sum over a window that determines a move is bilinear in the window's position: interpolated
+/// between the sums at the four pixels around it, which are integers. So the window is summed once
+/// per pixel that a search visits, not once per move, and the remaining floating-point arithmetic
+/// is the same on every processor.
 void search_tile(const Pyramid::Level& from, const Pyramid::Level& to, const Tile& tile,
                  std::span<Search> searches);
 

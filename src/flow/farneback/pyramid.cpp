@@ -1,47 +1,80 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/flow/farneback/pyramid_level.hpp"
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/flow/farneback/pyramid_level.cpp"
-#include <hwy/foreach_target.h>
-// Highway wants to come after that.
-#include <hwy/highway.h>
+#include "src/flow/farneback/pyramid.hpp"
 
 #include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
 
-#include "src/flow/farneback/room.hpp"
+#include "src/flow/farneback/scratch.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/farneback/pyramid.cpp"
+#include <hwy/foreach_target.h>
+// Once for each target.
+#include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Floats = hn::CappedTag<float, Resampling::spare>;
+using Floats = hn::CappedTag<float, row_padding>;
 using Words = hn::Rebind<std::int32_t, Floats>;
 using Bytes = hn::Rebind<std::uint8_t, Floats>;
+using Vector = hn::Vec<Floats>;
+
+Vector between(Vector a, Vector b, Vector weight) {
+  return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
+}
+
+void resample_one(const float* row, const Resampling& resampling, float* out) {
+  const Floats floats;
+  const Words words;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  for (int x = 0; x < resampling.size(); x += lanes) {
+    const auto first = hn::LoadU(words, resampling.first() + x);
+    const auto a = hn::GatherIndex(floats, row, first);
+    const auto b = hn::GatherIndex(floats, row + 1, first);
+    hn::StoreU(between(a, b, hn::LoadU(floats, resampling.weight() + x)), floats, out + x);
+  }
+}
+
+void resample_two(const float* upper, const float* lower, float weight, int width,
+                  const Resampling& resampling, float factor, float* row, float* out) {
+  const Floats floats;
+  const Words words;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  const auto down = hn::Set(floats, weight);
+  const auto times = hn::Set(floats, factor);
+  for (int i = 0; i < 2 * width; i += lanes) {
+    const auto a = hn::LoadU(floats, upper + i);
+    const auto b = hn::LoadU(floats, lower + i);
+    hn::StoreU(hn::Mul(between(a, b, down), times), floats, row + i);
+  }
+  float* end = row + std::ptrdiff_t{2} * width;
+  end[0] = end[-2];
+  end[1] = end[-1];
+  for (int x = 0; x < resampling.size(); x += lanes) {
+    const auto first = hn::ShiftLeft<1>(hn::LoadU(words, resampling.first() + x));
+    const auto right = hn::LoadU(floats, resampling.weight() + x);
+    const auto at = [&](int i) { return hn::GatherIndex(floats, row + i, first); };
+    hn::StoreInterleaved2(between(at(0), at(2), right), between(at(1), at(3), right), floats,
+                          out + std::ptrdiff_t{2} * x);
+  }
+}
 
 /// out = the sum of weight[t] rows[t]
 void add_rows(const std::uint8_t* const* rows, const float* weights, int count, int width,
               float* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
-  int x = 0;
-  for (; x + lanes <= width; x += lanes) {
+  for (int x = 0; x < width; x += lanes) {
     auto sum = hn::Zero(floats);
     for (int t = 0; t < count; ++t) {
-      const auto pixels = hn::PromoteTo(Words(), hn::LoadU(Bytes(), rows[t] + x));
+      const auto pixels = hn::PromoteTo(Words(), load_first(Bytes(), rows[t] + x, width - x));
       sum = hn::Add(sum, hn::Mul(hn::Set(floats, weights[t]), hn::ConvertTo(floats, pixels)));
     }
     hn::StoreU(sum, floats, out + x);
-  }
-  for (; x < width; ++x) {  // not one byte further: the picture is somebody else's
-    float sum = 0;
-    for (int t = 0; t < count; ++t) sum += weights[t] * static_cast<float>(rows[t][x]);
-    out[x] = sum;
   }
 }
 
@@ -67,10 +100,35 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace eventcamera {
-namespace {
 
+HWY_EXPORT(resample_one);
+HWY_EXPORT(resample_two);
 HWY_EXPORT(add_rows);
 HWY_EXPORT(blur_row);
+
+Resampling::Resampling(int from, int to)
+    : size_(to), first_(to + row_padding, 0), weight_(to + row_padding, 0.0F) {
+  const double ratio = static_cast<double>(from) / to;
+  for (int i = 0; i < to; ++i) {
+    const double place = (i + 0.5) * ratio - 0.5;
+    const int before = static_cast<int>(std::floor(place));
+    if (before < 0) continue;
+    first_[i] = before < from - 1 ? before : from - 1;
+    weight_[i] = before < from - 1 ? static_cast<float>(place - before) : 0.0F;
+  }
+}
+
+void resample_row(const float* row, const Resampling& resampling, float* out) {
+  HWY_DYNAMIC_DISPATCH(resample_one)(row, resampling, out);
+}
+
+void resample_pairs(const float* upper, const float* lower, float weight, int width,
+                    const Resampling& resampling, float factor, float* between, float* out) {
+  HWY_DYNAMIC_DISPATCH(resample_two)
+  (upper, lower, weight, width, resampling, factor, between, out);
+}
+
+namespace {
 
 constexpr int max_kernel = 19;
 
@@ -91,7 +149,7 @@ int shrunk(int length, int level) {
   return static_cast<int>(std::lrint(std::ldexp(length, -level)));
 }
 
-/// The place of a pixel beyond the border: mirrored in the outermost one.
+/// The index of a pixel beyond the border: mirrored at the outermost one.
 int mirrored(int i, int length) {
   if (length == 1) return 0;
   while (i < 0 || i >= length) i = i < 0 ? -i : 2 * (length - 1) - i;
@@ -111,9 +169,9 @@ void PyramidLevel::row(const ImageView<std::uint8_t>& picture, int y, Scratch& s
   const int count = static_cast<int>(kernel_.size());
   const int reach = count / 2;
   const int width = picture.width;
-  const auto room = static_cast<std::size_t>(width) + Resampling::spare;
+  const auto padded_width = static_cast<std::size_t>(width) + row_padding;
 
-  // Blurred rows are mixed before they are summed: one kernel, longer by a row.
+  // Blur and interpolation between two rows in one kernel, longer by a row.
   std::array<const std::uint8_t*, max_kernel + 1> rows;
   std::array<float, max_kernel + 1> weights{};
   const float lower = rows_.weight()[y];
@@ -123,7 +181,8 @@ void PyramidLevel::row(const ImageView<std::uint8_t>& picture, int y, Scratch& s
   }
   for (int t = 0; t <= count; ++t)
     rows[t] = picture.row(mirrored(rows_.first()[y] - reach + t, picture.height));
-  float* sums = room_in(scratch.column_sums, room + 2 * static_cast<std::size_t>(reach)) + reach;
+  float* sums =
+      scratch_of(scratch.column_sums, padded_width + 2 * static_cast<std::size_t>(reach)) + reach;
   HWY_DYNAMIC_DISPATCH(add_rows)
   (rows.data(), weights.data(), lower > 0 ? count + 1 : count, width, sums);
 
@@ -131,7 +190,7 @@ void PyramidLevel::row(const ImageView<std::uint8_t>& picture, int y, Scratch& s
     sums[-k] = sums[mirrored(-k, width)];
     sums[width - 1 + k] = sums[mirrored(width - 1 + k, width)];
   }
-  float* blurred = full_size_ ? out : room_in(scratch.blurred, room);
+  float* blurred = full_size_ ? out : scratch_of(scratch.blurred, padded_width);
   HWY_DYNAMIC_DISPATCH(blur_row)(sums - reach, kernel_.data(), reach, width, blurred);
   if (!full_size_) resample_row(blurred, columns_, out);
 }
