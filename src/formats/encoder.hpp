@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "src/core/event.hpp"
@@ -17,7 +19,7 @@ struct FilePatch {
 };
 
 /// Writes one event format. Events come sorted by time and within the sensor, in pieces of any
-/// size: how they are split changes nothing in what a reader makes of the file.
+/// size: how they are split does not change what a reader makes of the file.
 class Encoder {
  public:
   virtual ~Encoder() = default;
@@ -25,17 +27,34 @@ class Encoder {
   Encoder& operator=(const Encoder&) = delete;
 
   /// Appends the bytes of `events` to `out`, the header before the first.
-  virtual void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) = 0;
+  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
+    put_header(out);
+    append(events, out);
+  }
 
-  /// Appends what ends the file; the header, too, where nothing was encoded.
-  virtual void finish(std::vector<std::uint8_t>& out) = 0;
+  /// Appends what ends the file; the header, too, if nothing was encoded.
+  void finish(std::vector<std::uint8_t>& out) {
+    put_header(out);
+    append_end(out);
+  }
 
   /// What to write into the header after finish(), where the file can be seeked in. Our readers do
   /// without it.
   virtual std::optional<FilePatch> patch() const { return std::nullopt; }
 
  protected:
-  Encoder() = default;
+  explicit Encoder(std::string header = {}) : header_(std::move(header)) {}
+
+  virtual void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) = 0;
+  virtual void append_end(std::vector<std::uint8_t>& /*out*/) {}
+
+ private:
+  void put_header(std::vector<std::uint8_t>& out) {
+    out.insert(out.end(), header_.begin(), header_.end());
+    header_.clear();
+  }
+
+  std::string header_;  ///< empty once it is written
 };
 
 }  // namespace eventcamera

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include "src/formats/prophesee_header.hpp"
 #include "src/formats/text/csv_decoder.hpp"
-#include "src/formats/text_header.hpp"
 
 namespace eventcamera {
 namespace {
@@ -37,7 +37,7 @@ std::optional<Recognised> by_magic(Bytes bytes) {
 /// the size of its events.
 std::optional<Recognised> by_text_header(Bytes bytes) {
   if (!has_at(0, "% ", bytes)) return std::nullopt;
-  TextHeader header;
+  PropheseeHeader header;
   while (const auto line = header.take(bytes, false)) {
     bytes = bytes.subspan(line);
     if (!header.value("evt").empty() || header.value("format").starts_with("EVT"))

@@ -3,10 +3,10 @@
 
 #include <array>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include "src/formats/decoder.hpp"
+#include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
 
@@ -69,14 +69,6 @@ class UnitReader {
  protected:
   UnitReader() = default;
 };
-
-/// A little-endian number.
-template <class Word>
-Word load(const std::uint8_t* bytes) {
-  Word word;
-  std::memcpy(&word, bytes, sizeof word);
-  return word;
-}
 
 /// What is within the sensor.
 class Bounds {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+// What encoders of binary formats share.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +21,7 @@ class WordWriter {
   WordWriter(const WordWriter&) = delete;
   WordWriter& operator=(const WordWriter&) = delete;
 
-  /// Before every put(): how many will follow at the most.
+  /// Call it before put(), with the largest number of words that may follow.
   void reserve(std::size_t words) {
     const auto needed = used_ + words * sizeof(Word);
     if (needed > out_.size()) out_.resize(needed);
@@ -36,10 +37,10 @@ class WordWriter {
   std::size_t used_;
 };
 
-/// Room is made for so many events at once.
+/// Space is reserved for this many events at once.
 constexpr std::size_t events_at_once = 2048;
 
-/// Encodes events by `write(few, words)`, which finds room for `words_at_once`.
+/// Encodes events by `write(few, words)`, with space reserved for `words_at_once`.
 template <class Word, class Write>
 void write_events(std::span<const AbsoluteEvent> events, std::size_t words_at_once,
                   std::vector<std::uint8_t>& out, const Write& write) {
@@ -51,5 +52,26 @@ void write_events(std::span<const AbsoluteEvent> events, std::size_t words_at_on
     write(few, words);
   }
 }
+
+/// Times for formats that fill a pause with words: a pause of more than half a day, also before the
+/// first event, is left out. So a stray time, or one since 1970, does not fill the disk.
+class GapLimiter {
+ public:
+  static constexpr Microseconds max_gap = Microseconds{12} * 3600 * 1'000'000;
+
+  /// Call it at least for every event after a long pause.
+  void reach(Microseconds t) {
+    const auto gap = static_cast<std::uint64_t>(t) - static_cast<std::uint64_t>(last_);
+    if (t > last_ && gap > static_cast<std::uint64_t>(max_gap)) left_out_ += gap;
+    last_ = t;
+  }
+
+  /// The time to write. Unsigned, so that no time makes it overflow.
+  std::uint64_t written(Microseconds t) const { return static_cast<std::uint64_t>(t) - left_out_; }
+
+ private:
+  Microseconds last_ = 0;
+  std::uint64_t left_out_ = 0;
+};
 
 }  // namespace eventcamera

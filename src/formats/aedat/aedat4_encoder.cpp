@@ -18,13 +18,6 @@ namespace {
 constexpr std::size_t max_events = 4096;
 constexpr int max_side = 32767;
 
-template <class Number>
-void append(Number number, std::vector<std::uint8_t>& out) {
-  const auto at = out.size();
-  out.resize(at + sizeof number);
-  std::memcpy(out.data() + at, &number, sizeof number);
-}
-
 bool is_side(int pixels) {
   return pixels > 0 && pixels <= max_side;
 }
@@ -41,7 +34,7 @@ Aedat4Encoder::Aedat4Encoder(Aedat4Settings settings)
 
 Aedat4Encoder::~Aedat4Encoder() = default;
 
-void Aedat4Encoder::encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
+void Aedat4Encoder::append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
   write_header(out);
   while (held_.size() + events.size() >= max_events) {
     // A whole packet is written from where it lies.
@@ -90,7 +83,7 @@ void Aedat4Encoder::flush(std::vector<std::uint8_t>& out) {
   held_.clear();
 }
 
-void Aedat4Encoder::finish(std::vector<std::uint8_t>& out) {
+void Aedat4Encoder::append_end(std::vector<std::uint8_t>& out) {
   flush(out);
   if (!settings_.table) return;
   patch_.emplace(FilePatch{table_field_at_, std::vector<std::uint8_t>(sizeof position_)});
@@ -143,11 +136,11 @@ void Aedat4Encoder::write_events(std::span<const AbsoluteEvent> events,
 void Aedat4Encoder::write_packet(int stream, std::int64_t elements, Microseconds start,
                                  Microseconds end, std::vector<std::uint8_t>& out) {
   const auto at = out.size();
-  append(std::int32_t{stream}, out);
-  append(std::int32_t{0}, out);
+  out.resize(at + aedat4_packet_header);
   compressor_->compress({builder_->GetBufferPointer(), builder_->GetSize()}, out);
   const auto size = static_cast<std::int32_t>(out.size() - at - aedat4_packet_header);
-  std::memcpy(out.data() + at + sizeof(std::int32_t), &size, sizeof size);
+  const std::int32_t header[] = {stream, size};
+  std::memcpy(out.data() + at, header, sizeof header);
   if (settings_.table) table_.push_back({position_, stream, size, elements, start, end});
   position_ += out.size() - at;
 }

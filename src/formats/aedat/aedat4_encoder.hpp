@@ -40,8 +40,7 @@ class Aedat4Encoder final : public Encoder {
   explicit Aedat4Encoder(Aedat4Settings settings);
   ~Aedat4Encoder() override;
 
-  /// Events are held back until there are enough of them for a packet.
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
+  using Encoder::encode;
 
   /// Appends the events that are held back, and then the frame. Throws std::invalid_argument for
   /// one that AEDAT4 cannot hold.
@@ -50,12 +49,13 @@ class Aedat4Encoder final : public Encoder {
   /// Appends the header, and the events that are held back.
   void flush(std::vector<std::uint8_t>& out);
 
-  void finish(std::vector<std::uint8_t>& out) override;
-
   /// The table's position: until it is written, the header says that there is no table.
   std::optional<FilePatch> patch() const override { return patch_; }
 
  private:
+  /// Events are held back until there are enough of them for a packet.
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
+  void append_end(std::vector<std::uint8_t>& out) override;
   void write_header(std::vector<std::uint8_t>& out);
   void write_events(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out);
   void write_packet(int stream, std::int64_t elements, Microseconds start, Microseconds end,

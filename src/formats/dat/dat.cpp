@@ -5,7 +5,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "src/formats/text_header.hpp"
+#include "src/formats/prophesee_header.hpp"
+#include "src/formats/time_base.hpp"
 #include "src/formats/unit_decoder.hpp"
 #include "src/formats/word_writer.hpp"
 
@@ -19,33 +20,20 @@ enum Type : std::uint8_t { event_2d = 0x00, event_cd = 0x0c, event_trigger = 0x0
 
 constexpr std::uint8_t record_size = 8;
 
-/// The whole time of records.
-class Clock {
- public:
-  Microseconds follow(std::uint32_t t) {
-    const bool wrapped = t < last_ && last_ - t > std::uint32_t{1} << 31;
-    laps_ += std::uint64_t{wrapped} << 32;
-    last_ = t;
-    return time();
-  }
-  Microseconds time() const { return static_cast<Microseconds>(laps_ + last_); }
-  void restore(Microseconds time) {
-    last_ = static_cast<std::uint32_t>(time);
-    laps_ = static_cast<std::uint64_t>(time) - last_;
-  }
-
- private:
-  std::uint64_t laps_ = 0;
-  std::uint32_t last_ = 0;
-};
-
 class DatReader : public UnitReader {
  public:
-  State state() const final { return {clock_.time(), 0}; }
-  void restore(const State& state) final { clock_.restore(state.clock); }
+  State state() const final { return {static_cast<Microseconds>(time_.time()), 0}; }
+  void restore(const State& state) final { time_.restore(state.clock, true); }
 
  protected:
-  Clock clock_;
+  using Time = TimeBase<32, 0>;
+
+  static Microseconds next(Time& time, const std::uint8_t* record) {
+    time.follow(little_endian<std::uint32_t>(record));
+    return static_cast<Microseconds>(time.time());
+  }
+
+  Time time_;
 };
 
 template <int version>
@@ -59,11 +47,11 @@ class DatEventReader final : public DatReader {
     const auto* const end =
         from + record_size * std::min((to - from) / record_size, batch.full() - event);
     const auto bounds = bounds_;
-    auto clock = clock_;
+    auto time = time_;
     std::uint64_t outside = 0;
     for (; from != end; from += record_size) {
-      const auto t = clock.follow(load<std::uint32_t>(from));
-      const auto word = load<std::uint32_t>(from + 4);
+      const auto t = next(time, from);
+      const auto word = little_endian<std::uint32_t>(from + 4);
       const auto x = version == 1 ? word & 0x1ff : word & 0x3fff;
       const auto y = version == 1 ? word >> 9 & 0xff : word >> 14 & 0x3fff;
       const bool on = version == 1 ? (word >> 17 & 1) != 0 : word >> 28 != 0;
@@ -73,7 +61,7 @@ class DatEventReader final : public DatReader {
       event += static_cast<int>(inside);
       outside += static_cast<std::uint64_t>(!inside);
     }
-    clock_ = clock;
+    time_ = time;
     batch.end = event;
     batch.outside(outside);
     return from;
@@ -87,16 +75,15 @@ class DatTriggerReader final : public DatReader {
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
     for (; to - from >= record_size; from += record_size) {
-      const auto t = clock_.follow(load<std::uint32_t>(from));
-      const auto word = load<std::uint32_t>(from + 4);
+      const auto t = next(time_, from);
+      const auto word = little_endian<std::uint32_t>(from + 4);
       batch.triggers->push_back({t, static_cast<std::uint16_t>(word >> 26), (word & 15) != 0});
     }
     return from;
   }
 };
 
-/// Writers of two minds add "T0", the time of the first event since some day; a recording's time
-/// is its own here.
+/// Some writers add "T0", the time of the first event since some day; it is ignored.
 class DatDecoder final : public UnitDecoder {
  private:
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended) override {
@@ -104,7 +91,7 @@ class DatDecoder final : public UnitDecoder {
       const auto taken = header_.take(bytes, ended);
       if (!header_.ended() || taken != 0) return taken;
     }
-    if (!header_.found()) throw UnsupportedFormat("no DAT file: it does not begin with a header");
+    if (!header_.found()) throw UnsupportedFormat("not a DAT file: no header");
     if (bytes.size() < 2) return 0;
     begin_records(bytes[0], bytes[1]);
     return 2;
@@ -112,67 +99,51 @@ class DatDecoder final : public UnitDecoder {
 
   void begin_records(std::uint8_t type, std::uint8_t bytes) {
     if (!header_.value("evt").empty() || header_.value("format").starts_with("EVT"))
-      throw UnsupportedFormat("no DAT file: it is RAW, which evtdec reads");
+      throw UnsupportedFormat("not a DAT file but RAW; use evtdec");
     if (bytes != record_size)
-      throw UnsupportedFormat("DAT files with events of " + std::to_string(bytes) +
-                              " bytes cannot be read");
-    // What does not tell its version is older than versions.
+      throw UnsupportedFormat("unsupported DAT event size of " + std::to_string(bytes) + " bytes");
+    // Files without a version are older than versions.
     const auto version = header_.value("Version");
     if (version != "2" && version != "1" && !version.empty())
-      throw UnsupportedFormat("DAT files of version '" + version + "' cannot be read");
-    SensorSize size{TextHeader::number(header_.value("Width"), max_side),
-                    TextHeader::number(header_.value("Height"), max_side)};
+      throw UnsupportedFormat("unsupported DAT version '" + version + "'");
+    SensorSize size{PropheseeHeader::number(header_.value("Width"), max_side),
+                    PropheseeHeader::number(header_.value("Height"), max_side)};
     if (size.width == 0 || size.height == 0) size = version == "2" ? SensorSize{} : first_camera;
     if (type == event_trigger)
       begin(std::make_unique<DatTriggerReader>(), size);
     else if (type != event_2d && type != event_cd)
-      throw UnsupportedFormat("DAT files of the type " + std::to_string(type) + " cannot be read");
+      throw UnsupportedFormat("unsupported DAT event type " + std::to_string(type));
     else if (version == "2")
       begin(std::make_unique<DatEventReader<2>>(size), size);
     else
       begin(std::make_unique<DatEventReader<1>>(size), size);
   }
 
-  /// Whose files do not tell its size.
+  /// Its files do not give its size.
   static constexpr SensorSize first_camera{304, 240};
 
-  TextHeader header_;
+  PropheseeHeader header_;
 };
 
 class DatEncoder final : public Encoder {
  public:
   explicit DatEncoder(SensorSize size)
-      : header_("% Data file containing CD events.\n% Version 2\n% Height " +
+      : Encoder("% Data file containing CD events.\n% Version 2\n% Height " +
                 std::to_string(size.height) + "\n% Width " + std::to_string(size.width) +
-                "\n% end\n") {
-    header_ += {static_cast<char>(event_cd), static_cast<char>(record_size)};
-  }
+                "\n% end\n" + static_cast<char>(event_cd) + static_cast<char>(record_size)) {}
 
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
-    write_header(out);
-    WordWriter<std::uint64_t> words(out);
-    while (!events.empty()) {
-      const auto few = events.first(std::min<std::size_t>(events.size(), 4096));
-      events = events.subspan(few.size());
-      words.reserve(few.size());
+ private:
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
+    const auto write = [](std::span<const AbsoluteEvent> few, WordWriter<std::uint64_t>& words) {
       for (const auto& event : few) {
         const auto place = (std::uint32_t{event.x} & 0x3fff) |
                            (static_cast<std::uint32_t>(event.y_p) & 0x3fff) << 14 |
                            static_cast<std::uint32_t>(event.y_p >> 15) << 28;
         words.put(std::uint64_t{place} << 32 | static_cast<std::uint32_t>(event.t));
       }
-    }
+    };
+    write_events<std::uint64_t>(events, events_at_once, out, write);
   }
-
-  void finish(std::vector<std::uint8_t>& out) override { write_header(out); }
-
- private:
-  void write_header(std::vector<std::uint8_t>& out) {
-    out.insert(out.end(), header_.begin(), header_.end());
-    header_.clear();
-  }
-
-  std::string header_;  // empty once it is written
 };
 
 }  // namespace
@@ -183,7 +154,7 @@ std::unique_ptr<Decoder> make_dat_decoder() {
 
 std::unique_ptr<Encoder> make_dat_encoder(SensorSize size) {
   if (size.width < 1 || size.height < 1 || size.width > max_side || size.height > max_side)
-    throw std::invalid_argument("DAT files are for sensors of 1x1 to 16384x16384 pixels");
+    throw std::invalid_argument("DAT files support sensors of 1x1 to 16384x16384 pixels");
   return std::make_unique<DatEncoder>(size);
 }
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <string_view>
 
-#include "src/formats/gap_limiter.hpp"
 #include "src/formats/unit_decoder.hpp"
 #include "src/formats/word_writer.hpp"
 
@@ -51,8 +50,8 @@ class EsReader final : public UnitReader {
       }
       if (to - from < 5) break;
       t += step;
-      const auto x = load<std::uint16_t>(from + 1);
-      const auto y = height_ - 1 - load<std::uint16_t>(from + 3);
+      const auto x = little_endian<std::uint16_t>(from + 1);
+      const auto y = height_ - 1 - little_endian<std::uint16_t>(from + 3);
       const auto row = static_cast<std::uint32_t>(y);
       from += 5;
       const auto inside = static_cast<int>(bounds_.contain(x, row));
@@ -83,13 +82,14 @@ class EsDecoder final : public UnitDecoder {
     const auto known = std::min(bytes.size(), magic.size());
     if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(known),
                     magic.begin()))
-      throw UnsupportedFormat("no Event Stream: it does not begin with these words");
+      throw UnsupportedFormat("not an Event Stream: wrong signature");
     if (bytes.size() < header_size) return 0;
     const auto* at = bytes.data() + magic.size();
     if (at[0] != version)
-      throw UnsupportedFormat("Event Streams of version " + std::to_string(at[0]) + "." +
-                              std::to_string(at[1]) + " cannot be read");
-    const SensorSize size{load<std::uint16_t>(at + 4), load<std::uint16_t>(at + 6)};
+      throw UnsupportedFormat("unsupported Event Stream version " + std::to_string(at[0]) + "." +
+                              std::to_string(at[1]));
+    const SensorSize size{little_endian<std::uint16_t>(at + 4),
+                          little_endian<std::uint16_t>(at + 6)};
     switch (at[3]) {
       case dvs:
         begin_events<1>(size);
@@ -98,13 +98,12 @@ class EsDecoder final : public UnitDecoder {
         begin_events<2>(size);
         break;
       case generic:
-        throw UnsupportedFormat("an Event Stream of generic events, which are no pixels");
+        throw UnsupportedFormat("unsupported Event Stream of generic events: they have no pixel");
       case colour:
-        throw UnsupportedFormat("an Event Stream of colour events, which have no polarity");
+        throw UnsupportedFormat("unsupported Event Stream of colour events: they have no polarity");
       case amd:
       default:
-        throw UnsupportedFormat("an Event Stream of events of the type " + std::to_string(at[3]) +
-                                ", which cannot be read");
+        throw UnsupportedFormat("unsupported Event Stream type " + std::to_string(at[3]));
     }
     return header_size;
   }
@@ -112,23 +111,38 @@ class EsDecoder final : public UnitDecoder {
   template <int flag_bits>
   void begin_events(SensorSize size) {
     if (size.width == 0 || size.height == 0 || size.height > max_rows)
-      throw UnsupportedFormat("an Event Stream of an impossible sensor of " +
+      throw UnsupportedFormat("Event Stream with an impossible sensor size of " +
                               std::to_string(size.width) + "x" + std::to_string(size.height));
     begin(std::make_unique<EsReader<flag_bits>>(size), size);
   }
 };
 
+/// As its one character in the header.
+constexpr char low(int number) {
+  return static_cast<char>(number & 255);
+}
+constexpr char high(int number) {
+  return static_cast<char>(number >> 8);
+}
+
 class EsEncoder final : public Encoder {
  public:
-  explicit EsEncoder(SensorSize size) : size_(size) {}
+  explicit EsEncoder(SensorSize size)
+      : Encoder(std::string(magic) + std::string{version, 0, 0, dvs, low(size.width),
+                                                 high(size.width), low(size.height),
+                                                 high(size.height)}),
+        height_(size.height) {}
 
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
-    write_header(out);
+ private:
+  static constexpr std::size_t bytes_at_once = 5 * events_at_once;
+  static constexpr std::uint32_t max_step = 127;
+
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint8_t>& bytes) {
       for (const auto& event : few) {
         const auto step = reach(event.t, bytes);
         const auto x = std::uint32_t{event.x};
-        const auto y = static_cast<std::uint32_t>(size_.height - 1 - event.y());
+        const auto y = static_cast<std::uint32_t>(height_ - 1 - event.y());
         const auto on = static_cast<std::uint32_t>(event.y_p >> 15);
         for (const auto byte : {step << 1 | on, x & 255, x >> 8, y & 255, y >> 8})
           bytes.put(static_cast<std::uint8_t>(byte));
@@ -137,19 +151,13 @@ class EsEncoder final : public Encoder {
     write_events<std::uint8_t>(events, bytes_at_once, out, write);
   }
 
-  void finish(std::vector<std::uint8_t>& out) override { write_header(out); }
-
- private:
-  static constexpr std::size_t bytes_at_once = 5 * events_at_once;
-  static constexpr std::uint32_t max_step = 127;
-
-  /// Fills the silence before an event; what is left of it is returned.
+  /// Fills the pause before an event, and returns what is left of it.
   std::uint32_t reach(Microseconds t, WordWriter<std::uint8_t>& bytes) {
-    // Where times are not sorted, time stands still: there are no steps back.
+    // Where times are not sorted, time stands still: a step back cannot be written.
     t = std::max(t, last_);
     last_ = t;
-    silence_.reach(t);
-    auto step = silence_.written(t) - written_;
+    gaps_.reach(t);
+    auto step = gaps_.written(t) - written_;
     written_ += step;
     if (step >= max_step) [[unlikely]] {
       bytes.reserve(step / max_step + bytes_at_once);
@@ -158,20 +166,8 @@ class EsEncoder final : public Encoder {
     return static_cast<std::uint32_t>(step);
   }
 
-  void write_header(std::vector<std::uint8_t>& out) {
-    if (started_) return;
-    started_ = true;
-    out.insert(out.end(), magic.begin(), magic.end());
-    const auto width = static_cast<unsigned>(size_.width);
-    const auto height = static_cast<unsigned>(size_.height);
-    for (const auto byte :
-         {0U + version, 0U, 0U, 0U + dvs, width & 255, width >> 8, height & 255, height >> 8})
-      out.push_back(static_cast<std::uint8_t>(byte));
-  }
-
-  SensorSize size_;
-  bool started_ = false;
-  GapLimiter silence_;
+  int height_;
+  GapLimiter gaps_;
   Microseconds last_ = 0;
   std::uint64_t written_ = 0;  // the time of the last byte
 };
@@ -184,7 +180,7 @@ std::unique_ptr<Decoder> make_event_stream_decoder() {
 
 std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size) {
   if (size.width < 1 || size.height < 1 || size.width > 65535 || size.height > max_rows)
-    throw std::invalid_argument("an Event Stream is of 1x1 to 65535x32768 pixels");
+    throw std::invalid_argument("Event Streams support sensors of 1x1 to 65535x32768 pixels");
   return std::make_unique<EsEncoder>(size);
 }
 

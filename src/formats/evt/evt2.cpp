@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/evt/evt2.hpp"
-
+// EVT2: words of 32 bits, each an event, or the high bits of the time.
 #include <algorithm>
 
-#include "src/formats/evt/cd_reader.hpp"
-#include "src/formats/evt/cd_word.hpp"
-#include "src/formats/evt/high_time_writer.hpp"
-#include "src/formats/word_writer.hpp"
+#include "src/formats/evt/words.hpp"
 
 namespace eventcamera {
 namespace {
@@ -21,14 +17,17 @@ enum Type : std::uint32_t {
   continued = 0xf,
 };
 
-class Evt2Reader final : public CdReader {
+/// An event is one of these only before the time is known.
+constexpr auto ignored = 1U << cd_off | 1U << cd_on | 1U << imu | 1U << others | 1U << continued;
+
+class Evt2Reader final : public CdReader<CdTypes{time_high, ext_trigger, ignored}> {
  public:
-  explicit Evt2Reader(SensorSize size) : CdReader(size) {}
+  explicit Evt2Reader(SensorSize size) : CdReader(size, "EVT2 word of unknown type") {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
     for (; !time_.known() && to - from >= 4; from += 4)
-      read_other(CdWord{load<std::uint32_t>(from)}, from, batch);
+      read_other(CdWord{little_endian<std::uint32_t>(from)}, from, 4, batch);
     auto* event = batch.begin();
     const auto* const end = from + 4 * std::min((to - from) / 4, batch.full() - event);
     const auto bounds = bounds_;
@@ -36,12 +35,12 @@ class Evt2Reader final : public CdReader {
     auto count = time_.count();
     std::uint64_t outside = 0;
     for (; from != end; from += 4) {
-      const CdWord word{load<std::uint32_t>(from)};
+      const CdWord word{little_endian<std::uint32_t>(from)};
       const bool is_event = word.type() <= cd_on;
       const bool is_time = word.type() == time_high && word.count() >= count;
       if (!(is_event || is_time)) [[unlikely]] {
         time_.follow(count);
-        read_other(word, from, batch);
+        read_other(word, from, 4, batch);
         time = time_.time();
         count = time_.count();
         continue;
@@ -51,7 +50,7 @@ class Evt2Reader final : public CdReader {
       time += std::uint64_t{ticks} << 6;
       count += ticks;
       const bool inside = bounds.contain(word.x(), word.y());
-      *event = word.event(time, word.type() & 1);
+      *event = word.event(time);
       event += static_cast<int>(is_event) & static_cast<int>(inside);
       outside += static_cast<std::uint64_t>(static_cast<int>(is_event) & static_cast<int>(!inside));
     }
@@ -60,52 +59,22 @@ class Evt2Reader final : public CdReader {
     batch.outside(outside);
     return from;
   }
-
- private:
-  /// All but an event or a time that goes on.
-  void read_other(CdWord word, const std::uint8_t* at, Batch& batch) {
-    switch (word.type()) {
-      case time_high:
-        time_.follow(word.count());
-        break;
-      case ext_trigger:
-        read_trigger(word, batch);
-        break;
-      case cd_off:  // with a time that is not yet known
-      case cd_on:
-      case imu:
-      case others:
-      case continued:
-        break;
-      default:
-        batch.bad(at, 4, "a word of a type that EVT2 does not have");
-    }
-  }
 };
 
-class Evt2Encoder final : public Encoder {
- public:
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
-    const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint32_t>& words) {
-      for (const auto& event : few) {
-        if (time_.is_new(event.t)) {
-          time_.reach(event.t, words, words_at_once,
-                      [](std::uint64_t count) { return CdWord::time_high(time_high, count).bits; });
-        }
-        words.put(CdWord::at(event.y_p >> 15, time_.written(event.t), event.x,
-                             static_cast<std::uint32_t>(event.y()))
-                      .bits);
-      }
-    };
-    write_events<std::uint32_t>(events, words_at_once, out, write);
+struct Evt2Format {
+  using Word = std::uint32_t;
+
+  static Word time_high(std::uint64_t count) {
+    return CdWord::time_high(Type::time_high, count).bits;
   }
 
-  void finish(std::vector<std::uint8_t>&) override {}
-
- private:
-  static constexpr std::size_t words_at_once = 2 * events_at_once;
-
-  HighTimeWriter time_;
+  static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
+                         WordWriter<Word>& words) {
+    const auto& event = events.front();
+    const auto y = static_cast<std::uint32_t>(event.y());
+    words.put(CdWord::at(event.y_p >> 15, time, event.x, y).bits);
+    return 1;
+  }
 };
 
 }  // namespace
@@ -114,8 +83,8 @@ std::unique_ptr<UnitReader> make_evt2_reader(SensorSize size) {
   return std::make_unique<Evt2Reader>(size);
 }
 
-std::unique_ptr<Encoder> make_evt2_encoder() {
-  return std::make_unique<Evt2Encoder>();
+std::unique_ptr<Encoder> make_evt2_encoder(std::string header) {
+  return std::make_unique<CdEncoder<Evt2Format>>(std::move(header));
 }
 
 }  // namespace eventcamera

@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/evt/evt3.hpp"
-
+// EVT3: words of 16 bits, each a change of what is known of the events that follow, or some events.
 #include <algorithm>
-#include <bit>
 
-#include "src/formats/evt/cd_word.hpp"
-#include "src/formats/evt/time_high.hpp"
-#include "src/formats/gap_limiter.hpp"
-#include "src/formats/word_writer.hpp"
+#include "src/formats/evt/words.hpp"
 
 namespace eventcamera {
 namespace {
@@ -34,7 +29,7 @@ constexpr std::uint32_t nowhere = 0x1fff;
 
 class Evt3Reader final : public UnitReader {
  public:
-  explicit Evt3Reader(SensorSize size) : bounds_(size, 2048) {}
+  explicit Evt3Reader(SensorSize size) : bounds_(size, max_evt_side) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
@@ -78,7 +73,7 @@ class Evt3Reader final : public UnitReader {
     std::uint64_t seen = 0;
     const auto* const end = from + 2 * std::min((to - from) / 2, batch.full() - event);
     for (; from != end; from += 2) {
-      const std::uint32_t word = load<std::uint16_t>(from);
+      const std::uint32_t word = little_endian<std::uint16_t>(from);
       const auto type = word >> 12;
       // A TIME_HIGH that says nothing new is frequent, too.
       const auto is_common =
@@ -103,7 +98,7 @@ class Evt3Reader final : public UnitReader {
 
   /// Reads any word, or the words of a vector.
   const std::uint8_t* read_any(const std::uint8_t* at, const std::uint8_t* to, Batch& batch) {
-    const std::uint32_t word = load<std::uint16_t>(at);
+    const std::uint32_t word = little_endian<std::uint16_t>(at);
     const auto t = time_.time() + low_;
     switch (const auto type = word >> 12) {
       case addr_y:
@@ -120,7 +115,7 @@ class Evt3Reader final : public UnitReader {
         polarity_ = word & polarity_bit;
         if (to - at < 8) break;
         // What cameras and we write: all of it at once.
-        const auto masks = load<std::uint64_t>(at) >> 16;
+        const auto masks = little_endian<std::uint64_t>(at) >> 16;
         if ((masks & 0xf000f000f000) != 0x500040004000) break;
         const auto mask = (masks & 0xfff) | (masks >> 4 & 0xfff000) | (masks >> 8 & 0xff000000);
         expand_at(t, base_, polarity_, static_cast<std::uint32_t>(mask), batch);
@@ -130,7 +125,7 @@ class Evt3Reader final : public UnitReader {
       case vect_12:
       case vect_8: {
         if (base_ == nowhere) {
-          batch.bad(at, 2, "a vector of events without a place");
+          batch.bad(at, 2, "EVT3 vector without a base column");
           break;
         }
         expand_at(t, base_, polarity_, word & (type == vect_12 ? 0xfff : 0xff), batch);
@@ -156,7 +151,7 @@ class Evt3Reader final : public UnitReader {
       case continued_12:
         break;
       default:
-        batch.bad(at, 2, "a word of a type that EVT3 does not have");
+        batch.bad(at, 2, "EVT3 word of unknown type");
     }
     return at + 2;
   }
@@ -178,18 +173,23 @@ class Evt3Reader final : public UnitReader {
   }
 
   Bounds bounds_;
-  TimeHigh<12, 12> time_;
+  TimeBase<12, 12> time_;
   std::uint32_t low_ = 0;
   std::uint32_t y_ = nowhere;
   std::uint32_t base_ = nowhere;
   std::uint32_t polarity_ = 0;  // of vectors
 };
 
+/// What it writes every known reader reads alike: vectors only as the whole of VECT_BASE_X,
+/// VECT_12, VECT_12, VECT_8 and within the sensor, TIME_LOW after every TIME_HIGH, and a TIME_HIGH
+/// for every 4096 microseconds, through pauses, too.
 class Evt3Encoder final : public Encoder {
  public:
-  explicit Evt3Encoder(SensorSize size) : width_(static_cast<std::uint32_t>(size.width)) {}
+  Evt3Encoder(SensorSize size, std::string header)
+      : Encoder(std::move(header)), width_(static_cast<std::uint32_t>(size.width)) {}
 
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
+ private:
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint16_t>& words) {
       for (std::size_t i = 0; i < few.size();) {
         const auto& event = few[i];
@@ -214,12 +214,9 @@ class Evt3Encoder final : public Encoder {
     write_events<std::uint16_t>(events, words_at_once, out, write);
   }
 
-  void finish(std::vector<std::uint8_t>&) override {}
-
- private:
   static constexpr std::size_t words_at_once = 4 * events_at_once;
   static constexpr std::uint32_t none = ~std::uint32_t{0};
-  static constexpr std::uint64_t max_steps = (GapLimiter::longest >> 12) + 2;
+  static constexpr std::uint64_t max_steps = (GapLimiter::max_gap >> 12) + 2;
 
   struct Vector {
     std::size_t events = 0;  ///< 0: not worth its words
@@ -232,10 +229,10 @@ class Evt3Encoder final : public Encoder {
   }
 
   void reach(Microseconds t, WordWriter<std::uint16_t>& words) {
-    auto time = silence_.written(t);
+    auto time = gaps_.written(t);
     if (time >> 12 != high_) {
-      silence_.reach(t);
-      time = silence_.written(t);
+      gaps_.reach(t);
+      time = gaps_.written(t);
       // From zero on, each: readers follow the wraps by them.
       const auto steps = (time >> 12) - high_;
       if (steps > 1 && steps <= max_steps) {
@@ -277,7 +274,7 @@ class Evt3Encoder final : public Encoder {
   }
 
   std::uint32_t width_;
-  GapLimiter silence_;
+  GapLimiter gaps_;
   std::uint64_t high_ = ~std::uint64_t{0};  // one before the first
   std::uint32_t low_ = none;
   std::uint32_t y_ = none;
@@ -289,8 +286,8 @@ std::unique_ptr<UnitReader> make_evt3_reader(SensorSize size) {
   return std::make_unique<Evt3Reader>(size);
 }
 
-std::unique_ptr<Encoder> make_evt3_encoder(SensorSize size) {
-  return std::make_unique<Evt3Encoder>(size);
+std::unique_ptr<Encoder> make_evt3_encoder(SensorSize size, std::string header) {
+  return std::make_unique<Evt3Encoder>(size, std::move(header));
 }
 
 }  // namespace eventcamera

@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/evt/evt4.hpp"
-
-#include <algorithm>
-#include <bit>
-
-#include "src/formats/evt/cd_reader.hpp"
-#include "src/formats/evt/cd_word.hpp"
-#include "src/formats/evt/high_time_writer.hpp"
-#include "src/formats/word_writer.hpp"
+// EVT4: words of 32 bits, each an event, the high bits of the time, or the head of a vector, whose
+// second word is a mask of 32 pixels of a row.
+#include "src/formats/evt/words.hpp"
 
 namespace eventcamera {
 namespace {
@@ -24,56 +18,41 @@ enum Type : std::uint32_t {
   padding = 0xf,
 };
 
-class Evt4Reader final : public CdReader {
+constexpr auto ignored = 1U << others | 1U << continued | 1U << padding;
+
+class Evt4Reader final : public CdReader<CdTypes{time_high, ext_trigger, ignored}> {
  public:
-  explicit Evt4Reader(SensorSize size) : CdReader(size) {}
+  explicit Evt4Reader(SensorSize size) : CdReader(size, "EVT4 word of unknown type") {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
     auto* event = batch.begin();
     const auto* const full = batch.full();
     std::uint64_t outside = 0;
-    // A vector is one unit, so that nothing is between its words.
     for (; to - from >= 4 && event < full; from += 4) {
-      const CdWord word{load<std::uint32_t>(from)};
+      const CdWord word{little_endian<std::uint32_t>(from)};
       switch (word.type()) {
         case cd_off:
         case cd_on:
           if (time_.known()) {
             const bool inside = bounds_.contain(word.x(), word.y());
-            *event = word.event(time_.time(), word.type() & 1);
+            *event = word.event(time_.time());
             event += static_cast<int>(inside);
             outside += static_cast<std::uint64_t>(!inside);
           }
-          break;
+          continue;
         case cd_vec_off:
-        case cd_vec_on: {
-          if (to - from < 8) {
-            batch.end = event;
-            batch.outside(outside);
-            return from;
-          }
+        case cd_vec_on:
+          // A vector is one unit, so that nothing comes between its words.
+          if (to - from < 8) break;
           from += 4;
-          if (!time_.known()) break;
-          const auto mask = load<std::uint32_t>(from);
-          const auto valid = bounds_.of_32(word.x(), word.y());
-          event = expand(mask & valid, word.event(time_.time(), word.type() & 1), event);
-          outside += static_cast<std::uint64_t>(std::popcount(mask & ~valid));
-          break;
-        }
-        case time_high:
-          time_.follow(word.count());
-          break;
-        case ext_trigger:
-          read_trigger(word, batch);
-          break;
-        case others:
-        case continued:
-        case padding:
-          break;
+          event = read_masked(word, little_endian<std::uint32_t>(from), event, outside);
+          continue;
         default:
-          batch.bad(from, 4, "a word of a type that EVT4 does not have");
+          read_other(word, from, 4, batch);
+          continue;
       }
+      break;
     }
     batch.end = event;
     batch.outside(outside);
@@ -81,40 +60,28 @@ class Evt4Reader final : public CdReader {
   }
 };
 
-class Evt4Encoder final : public Encoder {
- public:
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
-    const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint32_t>& words) {
-      while (!few.empty()) {
-        const auto& first = few.front();
-        if (time_.is_new(first.t)) {
-          time_.reach(first.t, words, words_at_once,
-                      [](std::uint64_t count) { return CdWord::time_high(time_high, count).bits; });
-        }
-        const auto masked = first_masked(few);
-        const std::uint32_t on = first.y_p >> 15;
-        const auto y = static_cast<std::uint32_t>(first.y());
-        const auto time = time_.written(first.t);
-        // A vector is two words.
-        if (masked.count > 2) {
-          words.put(CdWord::at(cd_vec_off + on, time, masked.base, y).bits);
-          words.put(masked.mask);
-        } else {
-          for (const auto& event : few.first(masked.count))
-            words.put(CdWord::at(cd_off + on, time, event.x, y).bits);
-        }
-        few = few.subspan(masked.count);
-      }
-    };
-    write_events<std::uint32_t>(events, words_at_once, out, write);
+struct Evt4Format {
+  using Word = std::uint32_t;
+
+  static Word time_high(std::uint64_t count) {
+    return CdWord::time_high(Type::time_high, count).bits;
   }
 
-  void finish(std::vector<std::uint8_t>&) override {}
-
- private:
-  static constexpr std::size_t words_at_once = 2 * events_at_once;
-
-  HighTimeWriter time_;
+  static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
+                         WordWriter<Word>& words) {
+    const auto masked = first_masked(events);
+    const std::uint32_t on = events.front().y_p >> 15;
+    const auto y = static_cast<std::uint32_t>(events.front().y());
+    // A vector is two words.
+    if (masked.count > 2) {
+      words.put(CdWord::at(cd_vec_off + on, time, masked.base, y).bits);
+      words.put(masked.mask);
+    } else {
+      for (const auto& event : events.first(masked.count))
+        words.put(CdWord::at(cd_off + on, time, event.x, y).bits);
+    }
+    return masked.count;
+  }
 };
 
 }  // namespace
@@ -123,8 +90,8 @@ std::unique_ptr<UnitReader> make_evt4_reader(SensorSize size) {
   return std::make_unique<Evt4Reader>(size);
 }
 
-std::unique_ptr<Encoder> make_evt4_encoder() {
-  return std::make_unique<Evt4Encoder>();
+std::unique_ptr<Encoder> make_evt4_encoder(std::string header) {
+  return std::make_unique<CdEncoder<Evt4Format>>(std::move(header));
 }
 
 }  // namespace eventcamera

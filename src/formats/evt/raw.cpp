@@ -1,22 +1,33 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/evt/raw.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
-#include <utility>
+#include <string_view>
 
-#include "src/formats/evt/evt2.hpp"
-#include "src/formats/evt/evt21.hpp"
-#include "src/formats/evt/evt3.hpp"
-#include "src/formats/evt/evt4.hpp"
-#include "src/formats/text_header.hpp"
+#include "src/formats/evt/words.hpp"
+#include "src/formats/prophesee_header.hpp"
 #include "src/formats/unit_decoder.hpp"
 
 namespace eventcamera {
 namespace {
 
-/// Columns and rows are numbers of 11 bits.
-constexpr int max_side = 2048;
+/// What a RAW header calls a format.
+struct Name {
+  EvtFormat format;
+  std::string_view version;
+  std::string_view name;
+  std::string_view options;
+};
+
+constexpr Name names[] = {
+    {EvtFormat::evt2, "2.0", "EVT2", ""},
+    {EvtFormat::evt21, "2.1", "EVT21", ";endianness=little"},
+    {EvtFormat::evt21_legacy, "2.1", "EVT21", ";endianness=legacy"},
+    {EvtFormat::evt3, "3.0", "EVT3", ""},
+    {EvtFormat::evt4, "4.0", "EVT4", ""},
+};
 
 std::unique_ptr<UnitReader> make_reader(EvtFormat format, SensorSize size) {
   switch (format) {
@@ -31,68 +42,70 @@ std::unique_ptr<UnitReader> make_reader(EvtFormat format, SensorSize size) {
     case EvtFormat::evt4:
       return make_evt4_reader(size);
   }
-  throw std::invalid_argument("no such format");
+  throw std::invalid_argument("no such EVT format");
 }
 
-/// The value of "format", such as "EVT3;height=720;width=1280".
-class FormatValue {
- public:
-  explicit FormatValue(const std::string& value) : value_(value) {}
-
-  std::string name() const { return value_.substr(0, value_.find(';')); }
-
-  std::string option(const std::string& key) const {
-    const auto found = value_.find(';' + key + '=');
-    if (found == std::string::npos) return {};
-    const auto first = found + key.size() + 2;
-    return value_.substr(first, value_.find(';', first) - first);
+std::unique_ptr<Encoder> make_encoder(EvtFormat format, SensorSize size,
+                                      const std::string& header) {
+  if (size.width < 1 || size.height < 1 || size.width > max_evt_side || size.height > max_evt_side)
+    throw std::invalid_argument("EVT words support sensors of 1x1 to 2048x2048 pixels");
+  switch (format) {
+    case EvtFormat::evt2:
+      return make_evt2_encoder(header);
+    case EvtFormat::evt21:
+      return make_evt21_encoder(Evt21Order::little, header);
+    case EvtFormat::evt21_legacy:
+      return make_evt21_encoder(Evt21Order::legacy, header);
+    case EvtFormat::evt3:
+      return make_evt3_encoder(size, header);
+    case EvtFormat::evt4:
+      return make_evt4_encoder(header);
   }
-
- private:
-  std::string value_;
-};
-
-EvtFormat format_of(const TextHeader& header) {
-  const FormatValue value(header.value("format"));
-  const auto version = header.value("evt");
-  auto name = value.name();
-  // Headers from before "format", and of some other writers, tell only the version.
-  if (name.empty() && version == "2.0") name = "EVT2";
-  if (name.empty() && version == "2.1") name = "EVT21";
-  if (name.empty() && version == "3.0") name = "EVT3";
-  if (name.empty() && version == "4.0") name = "EVT4";
-  if (name == "EVT2") return EvtFormat::evt2;
-  if (name == "EVT3") return EvtFormat::evt3;
-  if (name == "EVT4") return EvtFormat::evt4;
-  if (name == "EVT21") {
-    auto order = value.option("endianness");
-    if (order.empty()) order = header.value("endianness");
-    // Writers that know of two orders tell which it is. Before them there were only cameras with
-    // the legacy one, and they tell their system.
-    if (order.empty()) order = header.value("system_ID").empty() ? "little" : "legacy";
-    if (order == "little") return EvtFormat::evt21;
-    if (order == "legacy") return EvtFormat::evt21_legacy;
-    throw UnsupportedFormat("EVT21 words in the byte order '" + order + "' cannot be read");
-  }
-  if (name.empty())
-    throw UnsupportedFormat("the RAW header does not tell the format of the events");
-  throw UnsupportedFormat("RAW files of the format '" + name + "' cannot be read");
+  throw std::invalid_argument("no such EVT format");
 }
 
-SensorSize size_of(const TextHeader& header) {
-  const FormatValue format(header.value("format"));
-  SensorSize size{TextHeader::number(format.option("width"), max_side),
-                  TextHeader::number(format.option("height"), max_side)};
-  if (size.width == 0 || size.height == 0) {
-    const auto geometry = header.value("geometry");
-    const auto cross = geometry.find('x');
-    if (cross != std::string::npos)
-      size = {TextHeader::number(geometry.substr(0, cross), max_side),
-              TextHeader::number(geometry.substr(cross + 1), max_side)};
-  }
-  // Files of the first cameras tell none; one that cannot be is none.
-  if (size.width == 0 || size.height == 0) return {};
-  return size;
+/// An option of the value of "format", such as the height in "EVT3;height=720;width=1280".
+std::string option(const std::string& format, const std::string& key) {
+  const auto found = format.find(';' + key + '=');
+  if (found == std::string::npos) return {};
+  const auto first = found + key.size() + 2;
+  return format.substr(first, format.find(';', first) - first);
+}
+
+EvtFormat format_of(const PropheseeHeader& header) {
+  const auto format = header.value("format");
+  const auto name = format.substr(0, format.find(';'));
+  // Headers from before "format", and those of some other writers, give only the version.
+  const auto* const known = name.empty()
+                                ? std::ranges::find(names, header.value("evt"), &Name::version)
+                                : std::ranges::find(names, name, &Name::name);
+  if (known == std::end(names))
+    throw UnsupportedFormat(name.empty() ? "no event format in the RAW header"
+                                         : "unsupported RAW format '" + name + "'");
+  if (known->format != EvtFormat::evt21) return known->format;
+  auto order = option(format, "endianness");
+  if (order.empty()) order = header.value("endianness");
+  // Writers that know of two orders name theirs. Before them there were only cameras with the
+  // legacy one, and they name their system.
+  if (order.empty()) order = header.value("system_ID").empty() ? "little" : "legacy";
+  if (order == "little") return EvtFormat::evt21;
+  if (order == "legacy") return EvtFormat::evt21_legacy;
+  throw UnsupportedFormat("unsupported byte order '" + order + "' of EVT21 words");
+}
+
+/// 0x0 where it is missing, as in files of the first cameras, or impossible.
+SensorSize size_of(const PropheseeHeader& header) {
+  const auto size_from = [](const std::string& width, const std::string& height) {
+    const SensorSize size{PropheseeHeader::number(width, max_evt_side),
+                          PropheseeHeader::number(height, max_evt_side)};
+    return size.width == 0 || size.height == 0 ? SensorSize{} : size;
+  };
+  const auto format = header.value("format");
+  const auto size = size_from(option(format, "width"), option(format, "height"));
+  const auto geometry = header.value("geometry");
+  const auto cross = geometry.find('x');
+  if (size != SensorSize{} || cross == std::string::npos) return size;
+  return size_from(geometry.substr(0, cross), geometry.substr(cross + 1));
 }
 
 class RawDecoder final : public UnitDecoder {
@@ -100,76 +113,28 @@ class RawDecoder final : public UnitDecoder {
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended) override {
     const auto taken = header_.take(bytes, ended);
     if (header_.ended()) {
-      if (!header_.found())
-        throw UnsupportedFormat("no RAW file of Prophesee: it does not begin with a header");
+      if (!header_.found()) throw UnsupportedFormat("not a Prophesee RAW file: no header");
       const auto size = size_of(header_);
       begin(make_reader(format_of(header_), size), size);
     }
     return taken;
   }
 
-  TextHeader header_;
+  PropheseeHeader header_;
 };
 
 /// Without the date of writing, so that the same events make the same file.
 std::string header_text(EvtFormat format, SensorSize size) {
   const auto width = std::to_string(size.width);
   const auto height = std::to_string(size.height);
-  std::string version;
-  std::string name;
-  switch (format) {
-    case EvtFormat::evt2:
-      version = "2.0";
-      name = "EVT2";
-      break;
-    case EvtFormat::evt21:
-      version = "2.1";
-      name = "EVT21;endianness=little";
-      break;
-    case EvtFormat::evt21_legacy:
-      version = "2.1";
-      name = "EVT21;endianness=legacy";
-      break;
-    case EvtFormat::evt3:
-      version = "3.0";
-      name = "EVT3";
-      break;
-    case EvtFormat::evt4:
-      version = "4.0";
-      name = "EVT4";
-      break;
-  }
+  const auto& written = *std::ranges::find(names, format, &Name::format);
   // OpenEB looks for the plugin that reads the file by the integrators, and other readers only at
   // "evt", or "geometry".
-  return "% camera_integrator_name Prophesee\n% evt " + version + "\n% format " + name +
+  return "% camera_integrator_name Prophesee\n% evt " + std::string(written.version) +
+         "\n% format " + std::string(written.name) + std::string(written.options) +
          ";height=" + height + ";width=" + width + "\n% geometry " + width + "x" + height +
          "\n% plugin_integrator_name Prophesee\n% end\n";
 }
-
-class RawEncoder final : public Encoder {
- public:
-  RawEncoder(EvtFormat format, SensorSize size)
-      : header_(header_text(format, size)), words_(make_evt_encoder(format, size)) {}
-
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
-    write_header(out);
-    words_->encode(events, out);
-  }
-
-  void finish(std::vector<std::uint8_t>& out) override {
-    write_header(out);
-    words_->finish(out);
-  }
-
- private:
-  void write_header(std::vector<std::uint8_t>& out) {
-    out.insert(out.end(), header_.begin(), header_.end());
-    header_.clear();
-  }
-
-  std::string header_;  // empty once it is written
-  std::unique_ptr<Encoder> words_;
-};
 
 }  // namespace
 
@@ -178,7 +143,7 @@ std::unique_ptr<Decoder> make_prophesee_raw_decoder() {
 }
 
 std::unique_ptr<Encoder> make_prophesee_raw_encoder(EvtFormat format, SensorSize size) {
-  return std::make_unique<RawEncoder>(format, size);
+  return make_encoder(format, size, header_text(format, size));
 }
 
 std::unique_ptr<Decoder> make_evt_decoder(EvtFormat format, SensorSize size) {
@@ -186,21 +151,7 @@ std::unique_ptr<Decoder> make_evt_decoder(EvtFormat format, SensorSize size) {
 }
 
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size) {
-  if (size.width < 1 || size.height < 1 || size.width > max_side || size.height > max_side)
-    throw std::invalid_argument("EVT words are for sensors of 1x1 to 2048x2048 pixels");
-  switch (format) {
-    case EvtFormat::evt2:
-      return make_evt2_encoder();
-    case EvtFormat::evt21:
-      return make_evt21_encoder(Evt21Order::little);
-    case EvtFormat::evt21_legacy:
-      return make_evt21_encoder(Evt21Order::legacy);
-    case EvtFormat::evt3:
-      return make_evt3_encoder(size);
-    case EvtFormat::evt4:
-      return make_evt4_encoder();
-  }
-  throw std::invalid_argument("no such format");
+  return make_encoder(format, size, {});
 }
 
 }  // namespace eventcamera

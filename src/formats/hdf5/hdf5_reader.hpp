@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "src/formats/byte_source.hpp"
-#include "src/formats/event_validator.hpp"
+#include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
 #include "src/formats/reader.hpp"
 

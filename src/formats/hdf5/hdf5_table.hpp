@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_validator.hpp"
+#include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_dataset.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
 

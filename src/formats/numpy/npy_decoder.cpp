@@ -8,9 +8,7 @@
 #include <limits>
 #include <optional>
 
-#include "src/formats/event_column.hpp"
 #include "src/formats/little_endian.hpp"
-#include "src/formats/numpy/npy.hpp"
 
 namespace eventcamera {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_validator.hpp"
+#include "src/formats/event_table.hpp"
 #include "src/formats/numpy/npy_header.hpp"
 
 namespace eventcamera {

@@ -2,11 +2,10 @@
 #include "src/formats/numpy/npy_encoder.hpp"
 
 #include <cstring>
-#include <limits>
 #include <string>
 #include <string_view>
 
-#include "src/formats/numpy/npy.hpp"
+#include "src/formats/numpy/npy_header.hpp"
 
 namespace eventcamera {
 
@@ -29,11 +28,7 @@ std::string shape(std::uint64_t count) {
   return text;
 }
 
-}  // namespace
-
-void NpyEncoder::begin(std::vector<std::uint8_t>& out) {
-  if (begun_) return;
-  begun_ = true;
+std::string header_text() {
   std::string header(npy_magic);
   header += {'\x01', '\x00', static_cast<char>(header_bytes - preamble), '\x00'};
   header += before_count;
@@ -41,11 +36,14 @@ void NpyEncoder::begin(std::vector<std::uint8_t>& out) {
   header += after_count;
   header.resize(header_bytes - 1, ' ');
   header += '\n';
-  out.insert(out.end(), header.begin(), header.end());
+  return header;
 }
 
-void NpyEncoder::encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
-  begin(out);
+}  // namespace
+
+NpyEncoder::NpyEncoder() : Encoder(header_text()) {}
+
+void NpyEncoder::append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
   count_ += events.size();
   auto end = out.size();
   out.resize(end + events.size() * event_bytes);
@@ -58,10 +56,6 @@ void NpyEncoder::encode(std::span<const AbsoluteEvent> events, std::vector<std::
     at[12] = static_cast<std::uint8_t>(event.polarity());
     end += event_bytes;
   }
-}
-
-void NpyEncoder::finish(std::vector<std::uint8_t>& out) {
-  begin(out);
 }
 
 std::optional<FilePatch> NpyEncoder::patch() const {

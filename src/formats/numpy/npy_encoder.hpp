@@ -6,22 +6,20 @@
 namespace eventcamera {
 
 /// Writes NumPy's format: a structured array of x, y (uint16), t (int64, microseconds) and p
-/// (uint8, 1 = ON). The header, which comes first, has to say how many events there are. Until
-/// patch() is written over it it claims more than any file holds: our decoder then reads to the
-/// end, and numpy.load() refuses rather than give less than there is.
+/// (uint8, 1 = ON). The header, which comes first, gives the number of events. Until patch() is
+/// written over it, it claims more than any file holds: our decoder then reads to the end, and
+/// numpy.load() fails rather than return too few.
 class NpyEncoder final : public Encoder {
  public:
   static constexpr std::size_t event_bytes = 13;
 
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
-  void finish(std::vector<std::uint8_t>& out) override;
+  NpyEncoder();
 
   std::optional<FilePatch> patch() const override;
 
  private:
-  void begin(std::vector<std::uint8_t>& out);
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
 
-  bool begun_ = false;
   std::uint64_t count_ = 0;
 };
 

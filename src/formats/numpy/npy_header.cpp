@@ -4,8 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "src/formats/decoder.hpp"
-#include "src/formats/event_column.hpp"
+#include "src/formats/event_table.hpp"
 
 namespace eventcamera {
 

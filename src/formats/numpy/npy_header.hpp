@@ -3,9 +3,15 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string_view>
 
 namespace eventcamera {
+
+constexpr std::string_view npy_magic = "\x93NUMPY";
+
+/// A claimed number of events that means it was unknown: the array goes to the end of the file.
+constexpr std::uint64_t npy_unknown_count = std::numeric_limits<std::int64_t>::max();
 
 /// A number in an element of the array.
 struct NpyField {

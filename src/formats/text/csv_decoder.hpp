@@ -8,9 +8,7 @@
 #include <vector>
 
 #include "src/formats/decoder.hpp"
-#include "src/formats/event_column.hpp"
-#include "src/formats/event_validator.hpp"
-#include "src/formats/text/csv_dialect.hpp"
+#include "src/formats/event_table.hpp"
 #include "src/formats/text/decimal.hpp"
 
 namespace eventcamera {

@@ -3,76 +3,103 @@
 
 #include <algorithm>
 #include <charconv>
+#include <string>
 
 namespace eventcamera {
 
 namespace {
 
-/// More than the longest line: a time of 19 digits, a sign and three noughts, and the rest.
+using enum TimeUnit;
+using Column = EventColumn;
+using Header = CsvDialect::Header;
+
+constexpr ColumnOrder txyp = {Column::t, Column::x, Column::y, Column::p};
+constexpr ColumnOrder xypt = {Column::x, Column::y, Column::p, Column::t};
+constexpr ColumnOrder xytp = {Column::x, Column::y, Column::t, Column::p};
+
+constexpr NamedCsvDialect dialects[] = {
+    {"names",
+     "t,x,y,p in microseconds below a line of names",
+     {txyp, ',', microseconds, Header::names, false, false}},
+    {"metavision",
+     "x,y,p,t in microseconds below a line %geometry:W,H",
+     {xypt, ',', microseconds, Header::geometry, false, false}},
+    {"aestream", "t,x,y,p in microseconds", {txyp, ',', microseconds, Header::none, false, false}},
+    {"faery",
+     "t,x,y,p in microseconds below t,x@W,y@H,on",
+     {txyp, ',', microseconds, Header::names_and_size, false, true}},
+    {"rpg",
+     "t x y p in seconds, the Event Camera Dataset's",
+     {txyp, ' ', seconds, Header::none, false, false}},
+    {"e2vid",
+     "t x y p in seconds below a line W H",
+     {txyp, ' ', seconds, Header::size, false, false}},
+    {"v2e",
+     "t x y p in seconds below comments",
+     {txyp, ' ', seconds, Header::comment, false, false}},
+    {"esim",
+     "t x y p in nanoseconds, rpg_esim's benchmark",
+     {txyp, ' ', nanoseconds, Header::none, false, false}},
+    {"esim-py", "x,y,t,p in seconds, OFF is -1", {xytp, ',', seconds, Header::none, true, false}},
+    {"dvs-voltmeter",
+     "t x y p in microseconds",
+     {txyp, ' ', microseconds, Header::none, false, false}},
+};
+
+/// More than the longest line: a time of 19 digits, a sign and three zeros, and the rest.
 constexpr std::size_t max_line = 64;
-constexpr std::size_t events_at_once = 1024;
+constexpr std::size_t batch_size = 1024;
 
 template <class Number>
 char* write_number(char* at, Number number) {
   return std::to_chars(at, at + max_line, number).ptr;
 }
 
-}  // namespace
-
-std::string CsvEncoder::header() const {
-  const std::string end = dialect_.carriage_return ? "\r\n" : "\n";
-  const auto width = std::to_string(size_.width);
-  const auto height = std::to_string(size_.height);
+std::string header_text(const CsvDialect& dialect, SensorSize size) {
+  const std::string end = dialect.carriage_return ? "\r\n" : "\n";
+  const auto width = std::to_string(size.width);
+  const auto height = std::to_string(size.height);
+  const bool sized = dialect.header == Header::names_and_size;
+  const std::string names_of[] = {"t", sized ? "x@" + width : "x", sized ? "y@" + height : "y",
+                                  sized ? "on" : "p"};
   std::string names;
-  for (const auto column : dialect_.order) {
-    const bool sized = dialect_.header == CsvDialect::Header::names_and_size;
-    if (!names.empty()) names += dialect_.separator;
-    switch (column) {
-      case EventColumn::t:
-        names += "t";
-        break;
-      case EventColumn::x:
-        names += sized ? "x@" + width : "x";
-        break;
-      case EventColumn::y:
-        names += sized ? "y@" + height : "y";
-        break;
-      case EventColumn::p:
-        names += sized ? "on" : "p";
-        break;
-    }
+  for (const auto column : dialect.order) {
+    if (!names.empty()) names += dialect.separator;
+    names += names_of[static_cast<std::size_t>(column)];
   }
-  switch (dialect_.header) {
-    case CsvDialect::Header::none:
+  switch (dialect.header) {
+    case Header::none:
       return {};
-    case CsvDialect::Header::names:
-    case CsvDialect::Header::names_and_size:
+    case Header::names:
+    case Header::names_and_size:
       return names + end;
-    case CsvDialect::Header::geometry:
+    case Header::geometry:
       return "%geometry:" + width + "," + height + end;
-    case CsvDialect::Header::size:
-      return width + dialect_.separator + height + end;
-    case CsvDialect::Header::comment:
+    case Header::size:
+      return width + dialect.separator + height + end;
+    case Header::comment:
       return "# " + names + end;
   }
   return {};
 }
 
-void CsvEncoder::begin(std::vector<std::uint8_t>& out) {
-  if (begun_) return;
-  begun_ = true;
-  const auto text = header();
-  out.insert(out.end(), text.begin(), text.end());
+}  // namespace
+
+std::span<const NamedCsvDialect> csv_dialects() {
+  return dialects;
 }
 
+CsvEncoder::CsvEncoder(const CsvDialect& dialect, SensorSize size)
+    : Encoder(header_text(dialect, size)), dialect_(dialect) {}
+
 char* CsvEncoder::write(char* at, Microseconds t) const {
-  if (dialect_.unit == TimeUnit::microseconds) return write_number(at, t);
+  if (dialect_.unit == microseconds) return write_number(at, t);
   auto magnitude = static_cast<std::uint64_t>(t);
   if (t < 0) {
     *at++ = '-';
     magnitude = 0 - magnitude;
   }
-  if (dialect_.unit == TimeUnit::nanoseconds) {
+  if (dialect_.unit == nanoseconds) {
     at = write_number(at, magnitude);
     if (magnitude == 0) return at;
     return std::fill_n(at, 3, '0');
@@ -88,16 +115,16 @@ char* CsvEncoder::write(char* at, Microseconds t) const {
 char* CsvEncoder::write(char* at, const AbsoluteEvent& event) const {
   for (const auto column : dialect_.order) {
     switch (column) {
-      case EventColumn::t:
+      case Column::t:
         at = write(at, event.t);
         break;
-      case EventColumn::x:
+      case Column::x:
         at = write_number(at, event.x);
         break;
-      case EventColumn::y:
+      case Column::y:
         at = write_number(at, event.y());
         break;
-      case EventColumn::p:
+      case Column::p:
         if (event.polarity() == Polarity::on) {
           *at++ = '1';
         } else if (dialect_.minus_one) {
@@ -116,20 +143,15 @@ char* CsvEncoder::write(char* at, const AbsoluteEvent& event) const {
   return at;
 }
 
-void CsvEncoder::encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
-  begin(out);
-  char text[events_at_once * max_line];
+void CsvEncoder::append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
+  char text[batch_size * max_line];
   while (!events.empty()) {
-    const auto count = std::min(events.size(), events_at_once);
+    const auto count = std::min(events.size(), batch_size);
     char* at = text;
     for (const auto& event : events.first(count)) at = write(at, event);
     out.insert(out.end(), text, at);
     events = events.subspan(count);
   }
-}
-
-void CsvEncoder::finish(std::vector<std::uint8_t>& out) {
-  begin(out);
 }
 
 }  // namespace eventcamera

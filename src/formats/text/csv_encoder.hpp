@@ -1,31 +1,55 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <string>
+#include <cstdint>
+#include <span>
+#include <string_view>
 
-#include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
-#include "src/formats/text/csv_dialect.hpp"
+#include "src/formats/event_table.hpp"
 
 namespace eventcamera {
+
+/// How a text file of events is written.
+struct CsvDialect {
+  /// What comes before the first event.
+  enum class Header : std::uint8_t {
+    none,
+    names,           ///< t,x,y,p
+    names_and_size,  ///< t,x@640,y@480,on
+    geometry,        ///< %geometry:640,480
+    size,            ///< 640 480
+    comment,         ///< # t x y p
+  };
+
+  ColumnOrder order = {EventColumn::t, EventColumn::x, EventColumn::y, EventColumn::p};
+  char separator = ',';
+  TimeUnit unit = TimeUnit::microseconds;
+  Header header = Header::names;
+  bool minus_one = false;        ///< OFF is -1, else 0
+  bool carriage_return = false;  ///< lines end with CR LF
+};
+
+struct NamedCsvDialect {
+  std::string_view name;
+  std::string_view description;
+  CsvDialect dialect;
+};
+
+/// The dialects that other tools write and read.
+std::span<const NamedCsvDialect> csv_dialects();
 
 /// Writes lines of text.
 class CsvEncoder final : public Encoder {
  public:
-  CsvEncoder(const CsvDialect& dialect, SensorSize size) : dialect_(dialect), size_(size) {}
-
-  void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
-  void finish(std::vector<std::uint8_t>& out) override;
+  CsvEncoder(const CsvDialect& dialect, SensorSize size);
 
  private:
-  std::string header() const;
-  void begin(std::vector<std::uint8_t>& out);
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
   char* write(char* at, Microseconds t) const;
   char* write(char* at, const AbsoluteEvent& event) const;
 
   CsvDialect dialect_;
-  SensorSize size_;
-  bool begun_ = false;
 };
 
 }  // namespace eventcamera

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/event_column.hpp"
+#include "src/formats/event_table.hpp"
 
 #include <algorithm>
 #include <string>

@@ -11,7 +11,7 @@ namespace eventcamera {
 
 /// The lines "% key value" before the data of Prophesee's files. "% end" ends them, and so does, in
 /// older files, what is no such line.
-class TextHeader {
+class PropheseeHeader {
  public:
   /// Takes a line from the front of `bytes` and returns its length; 0 where it is not yet whole or
   /// the header has ended. `ended`: no more bytes will come. Throws UnsupportedFormat where there

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/text_header.hpp"
+#include "src/formats/prophesee_header.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -21,7 +21,7 @@ std::string_view trimmed(std::string_view text) {
 
 }  // namespace
 
-std::size_t TextHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
+std::size_t PropheseeHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
   if (ended_) return 0;
   const auto looked_at = bytes.first(std::min(bytes.size(), max_line));
   // Binary data may begin as a line does, but hardly goes on as text.
@@ -48,12 +48,12 @@ std::size_t TextHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
   return length;
 }
 
-std::string TextHeader::value(const std::string& key) const {
+std::string PropheseeHeader::value(const std::string& key) const {
   const auto found = values_.find(key);
   return found == values_.end() ? std::string() : found->second;
 }
 
-int TextHeader::number(const std::string& text, int largest) {
+int PropheseeHeader::number(const std::string& text, int largest) {
   int number = 0;
   const auto end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, number);

@@ -1,20 +1,38 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+// Events as rows of numbers: in text, NumPy's arrays and HDF5.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 
-/// Takes the numbers that are read from a table: an event outside the sensor is dropped, one
-/// earlier than another before it is delivered, and both are counted.
+enum class EventColumn : std::uint8_t { t, x, y, p };
+
+/// The column that a name means in any tool, in upper or lower case. What follows a space, '@',
+/// '[' or '(' (a unit, a size) is ignored.
+std::optional<EventColumn> event_column_named(std::string_view name);
+
+using ColumnOrder = std::array<EventColumn, 4>;
+
+/// The order that a word such as "txyp" means; nothing where a letter is missing or not one of
+/// these.
+std::optional<ColumnOrder> column_order(std::string_view letters);
+
+enum class TimeUnit : std::uint8_t { seconds, microseconds, nanoseconds };
+
+/// Makes events of the numbers in a row: one outside the sensor is dropped, one earlier than
+/// another before it is kept, and both are counted.
 class EventValidator {
  public:
-  /// 0x0 where the size is not known: all that AbsoluteEvent can hold is inside.
+  /// 0x0 is an unknown size: all that AbsoluteEvent can hold is inside.
   void set_size(SensorSize size) {
     x_end_ = size.width > 0 ? static_cast<std::uint64_t>(std::min(size.width, max_x)) : max_x;
     y_end_ = size.height > 0 ? static_cast<std::uint64_t>(std::min(size.height, max_y)) : max_y;
@@ -35,7 +53,7 @@ class EventValidator {
         {t, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y | (on ? 0x8000 : 0))});
   }
 
-  /// What comes next may be earlier.
+  /// The next event may be earlier.
   void restart() { latest_ = std::numeric_limits<Microseconds>::min(); }
 
  private:

@@ -7,24 +7,25 @@
 
 namespace eventcamera {
 
-/// The clock that TIME_HIGH words drive: they carry `bits` of a count of 2^`shift` microseconds.
+/// The time base of a file whose times are cut short: it stores `bits` of a count of 2^`shift`
+/// microseconds, such as a TIME_HIGH word's.
 ///
-/// A count that falls has wrapped if it falls by more than half its range. Less is an error, as
-/// sensors make them: single bits of these words flip. Then the clock goes back, and the next sound
-/// word puts it right.
+/// A count that falls by more than half its range has wrapped. Less is an error, as sensors make
+/// them: single bits of these words flip. Then the time base goes back, and the next intact word
+/// corrects it.
 template <int bits, int shift>
-class TimeHigh {
+class TimeBase {
  public:
   bool known() const { return known_; }
   std::uint32_t count() const { return count_; }
 
   /// In microseconds; unsigned, so that no file can make it overflow.
-  std::uint64_t time() const { return laps_ + (std::uint64_t{count_} << shift); }
+  std::uint64_t time() const { return wraps_ + (std::uint64_t{count_} << shift); }
 
   void follow(std::uint32_t count) {
     constexpr auto half = std::uint32_t{1} << (bits - 1);
-    if (known_ && count < count_ && count_ - count > half)
-      laps_ += std::uint64_t{1} << (bits + shift);
+    const bool wrapped = count < count_ && count_ - count > half;
+    wraps_ += std::uint64_t{wrapped} << (bits + shift);
     count_ = count;
     known_ = true;
   }
@@ -36,14 +37,14 @@ class TimeHigh {
   void restore(Microseconds clock, bool known) {
     const auto time = static_cast<std::uint64_t>(clock);
     count_ = static_cast<std::uint32_t>(time >> shift) & mask;
-    laps_ = time - (std::uint64_t{count_} << shift);
+    wraps_ = time - (std::uint64_t{count_} << shift);
     known_ = known;
   }
 
  private:
-  static constexpr std::uint32_t mask = (std::uint32_t{1} << bits) - 1;
+  static constexpr std::uint32_t mask = ~std::uint32_t{0} >> (32 - bits);
 
-  std::uint64_t laps_ = 0;
+  std::uint64_t wraps_ = 0;  ///< what the wraps so far add, in microseconds
   std::uint32_t count_ = 0;
   bool known_ = false;
 };
