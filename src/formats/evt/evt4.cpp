@@ -69,16 +69,17 @@ struct Evt4Format {
 
   static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
                          WordWriter<Word>& words) {
+    const auto& first = events.front();
     const auto masked = first_masked(events);
-    const std::uint32_t on = events.front().y_p >> 15;
-    const auto y = static_cast<std::uint32_t>(events.front().y());
-    // A vector is two words.
+    const std::uint32_t on = first.y_p >> 15;
+    const auto y = static_cast<std::uint32_t>(first.y());
+    // A vector is two words, as two events are.
     if (masked.count > 2) {
       words.put(CdWord::at(cd_vec_off + on, time, masked.base, y).bits);
       words.put(masked.mask);
     } else {
-      for (const auto& event : events.first(masked.count))
-        words.put(CdWord::at(cd_off + on, time, event.x, y).bits);
+      words.put(CdWord::at(cd_off + on, time, first.x, y).bits);
+      if (masked.count == 2) words.put(CdWord::at(cd_off + on, time, events[1].x, y).bits);
     }
     return masked.count;
   }

@@ -164,7 +164,8 @@ class CdEncoder final : public Encoder {
     const auto write = [&](std::span<const AbsoluteEvent> few, Words& words) {
       while (!few.empty()) {
         const auto t = few.front().t;
-        if (gaps_.written(t) >> 6 != time_high_) put_time_high(t, words);
+        if (gaps_.written(t) >> 6 != time_high_) [[unlikely]]
+          put_time_high(t, words);
         few = few.subspan(Format::put(few, gaps_.written(t), words));
       }
     };
@@ -175,7 +176,7 @@ class CdEncoder final : public Encoder {
     gaps_.reach(t);
     const auto count = gaps_.written(t) >> 6;
     const auto wraps = (count >> bits) - (time_high_ == none ? 0 : time_high_ >> bits);
-    if (wraps != 0 && wraps <= max_wraps) {
+    if (wraps != 0 && wraps <= max_wraps) [[unlikely]] {
       // Readers know a wrap by the fall from nearly the largest count to nearly zero (OpenEB allows
       // 10 ms), so each is written out.
       words.reserve(2 * wraps + 1 + words_at_once);
