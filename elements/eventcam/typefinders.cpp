@@ -7,20 +7,20 @@
 
 using eventcamera::FileKind;
 
-/// The first bytes, as many as there are up to as many as are looked at.
+/// The start of the file, as much of it as recognise() examines.
 static std::span<const guint8> first_bytes(GstTypeFind* find) {
-  constexpr guint64 most = eventcamera::max_recognised_bytes;
+  constexpr guint64 max_bytes = eventcamera::max_recognised_bytes;
   const guint64 length = gst_type_find_get_length(find);
-  // The length is not always known, and asking for more than there is gives nothing.
-  for (auto count = static_cast<guint>(length > 0 ? std::min(length, most) : most); count > 0;
-       count /= 2)
+  // The length is not always known, and a peek past the end returns nothing.
+  for (auto count = static_cast<guint>(length > 0 ? std::min(length, max_bytes) : max_bytes);
+       count > 0; count /= 2)
     if (const guint8* bytes = gst_type_find_peek(find, 0, count)) return {bytes, count};
   return {};
 }
 
 template <FileKind kind>
 static void find_kind(GstTypeFind* find, gpointer media_type) {
-  const auto found = eventcamera::recognise(first_bytes(find));
+  const auto found = eventcamera::recognise(first_bytes(find), kind);
   if (!found || found->kind != kind) return;
   const auto probability = found->certain ? GST_TYPE_FIND_MAXIMUM : GST_TYPE_FIND_NEARLY_CERTAIN;
   const auto* const name = static_cast<const char*>(media_type);
@@ -31,7 +31,7 @@ static void find_kind(GstTypeFind* find, gpointer media_type) {
     gst_type_find_suggest_empty_simple(find, probability, name);
 }
 
-/// Its caps are `media_type`, at most with fields.
+/// Suggests caps of `media_type`.
 #define REGISTER(name, kind, media_type, extensions)                                           \
   GST_TYPE_FIND_REGISTER_DEFINE(name, media_type, GST_RANK_PRIMARY, find_kind<FileKind::kind>, \
                                 extensions, nullptr, const_cast<char*>(media_type), nullptr)

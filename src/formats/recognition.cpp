@@ -20,7 +20,7 @@ bool has_at(std::size_t at, std::string_view magic, Bytes bytes) {
 
 constexpr std::string_view hdf5_magic("\x89HDF\r\n\x1a\n", 8);
 
-/// What the first bytes alone tell.
+/// Formats that begin with a signature.
 std::optional<Recognised> by_magic(Bytes bytes) {
   constexpr std::string_view aedat = "#!AER-DAT";
   if (has_at(0, aedat, bytes) && has_at(aedat.size() + 1, ".", bytes)) {
@@ -33,8 +33,8 @@ std::optional<Recognised> by_magic(Bytes bytes) {
   return std::nullopt;
 }
 
-/// Both begin with lines "% key value". RAW tells its words there; behind DAT's come the type and
-/// the size of its events.
+/// RAW and DAT begin with lines "% key value". RAW names its words there; after DAT's come the type
+/// and the size of its events.
 std::optional<Recognised> by_text_header(Bytes bytes) {
   if (!has_at(0, "% ", bytes)) return std::nullopt;
   PropheseeHeader header;
@@ -50,11 +50,11 @@ std::optional<Recognised> by_text_header(Bytes bytes) {
   return std::nullopt;
 }
 
-/// Whether the reader itself makes events of it, without a line that is none.
+/// Whether CsvDecoder makes an event of every line.
 bool is_csv(Bytes bytes) {
-  constexpr std::size_t looked_at = 4096;
+  constexpr std::size_t max_bytes = 4096;
   constexpr std::size_t min_events = 3;
-  bytes = bytes.first(std::min(bytes.size(), looked_at));
+  bytes = bytes.first(std::min(bytes.size(), max_bytes));
   const auto is_text = [](std::uint8_t byte) {
     return byte >= ' ' || (byte >= '\t' && byte <= '\r');
   };
@@ -67,7 +67,7 @@ bool is_csv(Bytes bytes) {
   return decoded.events.size() >= min_events && decoder.corruption().places == 0;
 }
 
-/// Behind a user block, which may be anything, of a power of two.
+/// HDF5 after a user block, which may hold anything; its size is a power of two.
 std::optional<Recognised> by_user_block(Bytes bytes) {
   for (const std::size_t block : {512, 1024, 2048, 4096, 8192})
     if (has_at(block, hdf5_magic, bytes)) return Recognised{FileKind::hdf5, 0, false};
@@ -76,16 +76,18 @@ std::optional<Recognised> by_user_block(Bytes bytes) {
 
 }  // namespace
 
-std::optional<Recognised> recognise(Bytes start) {
+std::optional<Recognised> recognise(Bytes start, std::optional<FileKind> wanted) {
   start = start.first(std::min(start.size(), max_recognised_bytes));
+  if (const auto found = by_magic(start)) return found;
+  const auto after_block = by_user_block(start);
   try {
-    if (const auto found = by_magic(start)) return found;
     if (const auto found = by_text_header(start)) return found;
-    if (is_csv(start)) return Recognised{FileKind::csv};
+    const bool may_be_csv = !wanted || *wanted == FileKind::csv || after_block;
+    if (may_be_csv && is_csv(start)) return Recognised{FileKind::csv};
   } catch (const UnsupportedFormat&) {
-    // It is not text of events; a user block still may be anything.
+    // Not text of events; a user block may still hold anything.
   }
-  return by_user_block(start);
+  return after_block;
 }
 
 }  // namespace eventcamera

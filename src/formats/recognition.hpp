@@ -19,21 +19,24 @@ enum class FileKind : std::uint8_t {
   prophesee_raw,
 };
 
-/// What a file seems to be.
 struct Recognised {
   FileKind kind;
   int version = 0;      ///< of AEDAT
-  bool certain = true;  ///< else another kind of file may well begin like this, too
+  bool certain = true;  ///< false: other kinds of files may begin like this, too
 
   friend constexpr bool operator==(const Recognised&, const Recognised&) = default;
 };
 
-/// More bytes of a file's beginning than these are not looked at.
+/// At most this much of a file's beginning is examined.
 constexpr std::size_t max_recognised_bytes = 16384;
 
-/// What a file that begins with these bytes is; nothing where it is none that we read, or where
-/// that takes more bytes. More bytes do not make another kind of it, unless it was text: what is
-/// text so far may be none in the end.
-std::optional<Recognised> recognise(std::span<const std::uint8_t> start);
+/// The kind of a file that begins with these bytes; nothing where it is unknown, or where that
+/// takes more bytes. More bytes do not turn it into another kind, unless it was text: what is text
+/// so far may be none in the end.
+///
+/// `wanted` is the only kind that matters to the caller: other kinds may then be missed. It saves a
+/// trial decode, which text takes to be recognised as CSV.
+std::optional<Recognised> recognise(std::span<const std::uint8_t> start,
+                                    std::optional<FileKind> wanted = std::nullopt);
 
 }  // namespace eventcamera

@@ -13,6 +13,7 @@
 namespace {
 
 using namespace eventcamera;
+using namespace std::string_literals;
 using namespace std::string_view_literals;
 
 std::optional<Recognised> recognise(std::string_view text) {
@@ -46,6 +47,25 @@ TEST(Recognition, LeavesOtherFilesAlone) {
         "1,2,100,1\n3,4,200,0\n5,6,300,1\n\0"sv})
     EXPECT_EQ(recognise(text), std::nullopt) << text;
   EXPECT_EQ(recognise(std::string(2047, '\0').append(hdf5)), std::nullopt);
+}
+
+TEST(Recognition, FindsTheSameWhereOneKindIsWanted) {
+  for (const auto& text :
+       {""s, "#!AER-DAT4."s, "Event Stream"s, "\x93NUMPY"s, std::string(hdf5), "% evt 3.0\n"s,
+        "% Version 2\n% end\n\x0c\x08"s, std::string(lines_of_events),
+        std::string("% a comment\n").append(lines_of_events), "A text of words.\n"s,
+        std::string(2048, '\0').append(hdf5), std::string(2048, '\n').append(hdf5)}) {
+    const std::span bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+    const auto found = eventcamera::recognise(bytes);
+    for (const auto kind : {FileKind::aedat, FileKind::csv, FileKind::event_stream, FileKind::hdf5,
+                            FileKind::npy, FileKind::prophesee_dat, FileKind::prophesee_raw}) {
+      const auto wanted = eventcamera::recognise(bytes, kind);
+      if (found && found->kind == kind)
+        EXPECT_EQ(wanted, found) << text;
+      else
+        EXPECT_TRUE(!wanted || wanted->kind != kind) << text;
+    }
+  }
 }
 
 TEST(Recognition, AHeaderSaysMoreThanLinesThatWouldBeEvents) {
