@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Any bytes as the chunks of a sound HDF5 file. Five bytes come first: the layout, the filters, the
 // rows of a chunk, the rows of the file, and the type of a number.
-#include "src/formats/hdf5/hdf5_attribute.hpp"
+#include "src/formats/hdf5/hdf5_handle.hpp"
 #include "tests/fuzz/read_hdf5.hpp"
 #include "tests/fuzz/small_hdf5.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/hdf5_attribute.hpp"
+#include "src/formats/hdf5/hdf5_handle.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
 #include "tests/fuzz/seed.hpp"

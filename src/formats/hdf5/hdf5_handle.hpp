@@ -3,7 +3,10 @@
 
 #include <hdf5.h>
 
+#include <cstdint>
 #include <mutex>
+#include <optional>
+#include <string>
 #include <utility>
 
 namespace eventcamera {
@@ -34,8 +37,8 @@ class Hdf5Handle {
   Close close_ = nullptr;
 };
 
-/// While it lives this thread alone is in the library, which may have been built without locks,
-/// and the library does not print its errors.
+/// While it lives, only this thread uses the library, which may have been built without locks, and
+/// the library does not print its errors.
 class Hdf5Session {
  public:
   Hdf5Session() : lock_(mutex()) {
@@ -60,5 +63,14 @@ class Hdf5Session {
   H5E_auto2_t print_ = nullptr;
   void* print_data_ = nullptr;
 };
+
+/// A text that is attached to a group or dataset.
+std::optional<std::string> read_text_attribute(hid_t object, const char* name);
+
+/// A whole number that is attached to a group or dataset.
+std::optional<std::int64_t> read_number_attribute(hid_t object, const char* name);
+
+/// Attaches a text, of variable length as Metavision's readers expect. False where that fails.
+bool write_text_attribute(hid_t object, const char* name, const std::string& text);
 
 }  // namespace eventcamera

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "src/formats/hdf5/hdf5_input.hpp"
+#include "src/formats/hdf5/hdf5_file.hpp"
 #include "src/formats/hdf5/hdf5_table.hpp"
 
 namespace eventcamera {

@@ -5,7 +5,7 @@
 #include <charconv>
 
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/hdf5_attribute.hpp"
+#include "src/formats/hdf5/hdf5_handle.hpp"
 
 namespace eventcamera {
 
@@ -16,6 +16,19 @@ constexpr int max_side = 65536;
 
 std::uint64_t block_end(std::uint64_t row, std::uint64_t rows) {
   return std::min(rows, (row / block_rows + 1) * block_rows);
+}
+
+/// The first row that is not before a place; `is_before(row)` is sorted.
+template <class IsBefore>
+std::uint64_t first_row(std::uint64_t rows, const IsBefore& is_before) {
+  std::uint64_t first = 0;
+  while (rows > 0) {
+    const auto half = rows / 2;
+    const bool before = is_before(first + half);
+    if (before) first += half + 1;
+    rows = before ? rows - half - 1 : half;
+  }
+  return first;
 }
 
 /// Two numbers such as 1280x720.
@@ -82,19 +95,11 @@ class NumberTable : public Hdf5Table {
   }
 
   std::uint64_t row_before(Microseconds t) override {
-    std::uint64_t first = 0;
-    for (auto count = rows_; count > 0;) {
-      const auto step = count / 2;
-      const auto time = time_at(first + step);
-      // What cannot be read is taken for late, as that goes over no event.
-      if (time && *time < t) {
-        first += step + 1;
-        count -= step + 1;
-      } else {
-        count = step;
-      }
-    }
-    return first;
+    // A row that cannot be read counts as late, so that no event is skipped.
+    return first_row(rows_, [&](std::uint64_t row) {
+      const auto time = time_at(row);
+      return time && *time < t;
+    });
   }
 
   std::optional<Microseconds> time_at(std::uint64_t row) override {
@@ -205,17 +210,10 @@ class DsecTable final : public NumberTable {
   Microseconds lap_of(std::uint64_t row) override {
     constexpr std::uint64_t lap_milliseconds = lap / 1000;
     if (!wraps_ || !index_ || index_->rows() <= lap_milliseconds) return 0;
-    std::uint64_t milliseconds = 0;
-    for (auto count = index_->rows(); count > 0;) {
-      const auto step = count / 2;
-      const auto indexed_row = indexed(milliseconds + step);
-      if (indexed_row && *indexed_row <= row) {
-        milliseconds += step + 1;
-        count -= step + 1;
-      } else {
-        count = step;
-      }
-    }
+    const auto milliseconds = first_row(index_->rows(), [&](std::uint64_t at) {
+      const auto indexed_row = indexed(at);
+      return indexed_row && *indexed_row <= row;
+    });
     std::vector<std::int64_t> t;
     if (milliseconds == 0 || milliseconds > INT64_MAX / 1000 || !t_dataset().read(row, 1, t))
       return 0;
@@ -327,18 +325,11 @@ class MetavisionTable final : public Hdf5Table {
   }
 
   std::uint64_t row_before(Microseconds t) override {
-    // The last part that begins before t.
-    std::uint64_t first = 0;
-    for (auto count = (rows() + step_ - 1) / step_; count > 0;) {
-      const auto half = count / 2;
-      const auto time = first_time((first + half) * step_);
-      if (time && *time < t) {
-        first += half + 1;
-        count -= half + 1;
-      } else {
-        count = half;
-      }
-    }
+    // The last chunk that begins before t.
+    const auto first = first_row((rows() + step_ - 1) / step_, [&](std::uint64_t chunk) {
+      const auto time = first_time(chunk * step_);
+      return time && *time < t;
+    });
     return first == 0 ? 0 : (first - 1) * step_;
   }
 
@@ -440,16 +431,9 @@ bool Hdf5Triggers::read(std::size_t count, std::vector<Trigger>& out, Corruption
 }
 
 void Hdf5Triggers::seek(Microseconds t) {
-  row_ = 0;
-  for (auto count = dataset_.rows(); count > 0;) {
-    const auto step = count / 2;
-    if (dataset_.read(row_ + step, 1, numbers_) && numbers_[0] < t) {
-      row_ += step + 1;
-      count -= step + 1;
-    } else {
-      count = step;
-    }
-  }
+  row_ = first_row(dataset_.rows(), [&](std::uint64_t row) {
+    return dataset_.read(row, 1, numbers_) && numbers_[0] < t;
+  });
 }
 
 }  // namespace eventcamera

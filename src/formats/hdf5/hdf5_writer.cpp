@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -10,9 +11,7 @@
 #include <vector>
 
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/hdf5_attribute.hpp"
-#include "src/formats/hdf5/hdf5_handle.hpp"
-#include "src/formats/hdf5/hdf5_output.hpp"
+#include "src/formats/hdf5/hdf5_file.hpp"
 
 namespace eventcamera {
 
@@ -31,14 +30,14 @@ using Compression = Hdf5Writer::Compression;
 constexpr Microseconds max_recording = 7LL * 24 * 3600 * 1'000'000;
 
 void check(bool done) {
-  if (!done) throw std::runtime_error("The HDF5 library cannot write the file");
+  if (!done) throw std::runtime_error("the HDF5 library failed to write the file");
 }
 
 /// Microseconds since the recording's first event.
 Microseconds since(Microseconds first, Microseconds t) {
   Microseconds passed = 0;
   if (__builtin_sub_overflow(t, first, &passed) || passed > max_recording)
-    throw std::invalid_argument("An HDF5 file of events cannot be longer than a week");
+    throw std::invalid_argument("an HDF5 recording cannot be longer than a week");
   return passed;
 }
 
@@ -48,7 +47,7 @@ Hdf5Handle make_group(hid_t file, const char* name) {
   return group;
 }
 
-/// A dataset of rows that is written from the front.
+/// A dataset whose rows are appended.
 class GrowingDataset {
  public:
   GrowingDataset(hid_t parent, const char* name, hid_t stored, hid_t memory, hsize_t chunk,
@@ -112,17 +111,55 @@ class GrowingDataset {
   hsize_t rows_ = 0;
 };
 
+/// A growing dataset of Row, written a chunk at a time.
+template <class Row>
+class BufferedDataset : public GrowingDataset {
+ public:
+  BufferedDataset(hid_t parent, const char* name, hid_t stored, hid_t memory, hsize_t chunk,
+                  Compression compression)
+      : GrowingDataset(parent, name, stored, memory, chunk, compression), chunk_(chunk) {}
+
+  void put(const Row& row) {
+    buffer_.push_back(row);
+    if (buffer_.size() == chunk_) flush();
+  }
+
+  void flush() {
+    append(buffer_.data(), buffer_.size());
+    buffer_.clear();
+  }
+
+  /// Those in the buffer included.
+  hsize_t count() const { return rows() + buffer_.size(); }
+
+ private:
+  hsize_t chunk_;
+  std::vector<Row> buffer_;
+};
+
+struct Member {
+  const char* name;
+  std::size_t offset;
+  hid_t type;
+};
+
+Hdf5Handle make_compound(std::size_t size, std::initializer_list<Member> members) {
+  Hdf5Handle type(H5Tcreate(H5T_COMPOUND, size), H5Tclose);
+  for (const auto& member : members) H5Tinsert(type.get(), member.name, member.offset, member.type);
+  return type;
+}
+
 class DsecLayout final : public Hdf5Writer::Layout {
  public:
   DsecLayout(hid_t file, const Hdf5Writer::Settings& settings)
       : file_(file),
         compression_(settings.compression),
         group_(make_group(file, "events")),
-        p_out_(group_.get(), "p", H5T_STD_U8LE, H5T_NATIVE_UINT8, chunk, compression_),
-        x_out_(group_.get(), "x", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression_),
-        y_out_(group_.get(), "y", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression_),
-        t_out_(group_.get(), "t", H5T_STD_U32LE, H5T_NATIVE_UINT64, chunk, compression_),
-        index_out_(file, "ms_to_idx", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, compression_) {
+        p_(group_.get(), "p", H5T_STD_U8LE, H5T_NATIVE_UINT8, chunk, compression_),
+        x_(group_.get(), "x", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression_),
+        y_(group_.get(), "y", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression_),
+        t_(group_.get(), "t", H5T_STD_U32LE, H5T_NATIVE_UINT64, chunk, compression_),
+        index_(file, "ms_to_idx", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, compression_) {
     write_number(file, "width", settings.size.width);
     write_number(file, "height", settings.size.height);
   }
@@ -132,15 +169,11 @@ class DsecLayout final : public Hdf5Writer::Layout {
       if (!first_) first_ = event.t;
       const auto t = static_cast<std::uint64_t>(since(*first_, event.t));
       if (t > std::numeric_limits<std::uint32_t>::max() && !wide_) widen();
-      for (; indexed_ * 1000 <= t; ++indexed_) {
-        index_.push_back(p_out_.rows() + t_.size());
-        if (index_.size() == chunk) flush_index();
-      }
-      p_.push_back(static_cast<std::uint8_t>(event.polarity()));
-      x_.push_back(event.x);
-      y_.push_back(static_cast<std::uint16_t>(event.y()));
-      t_.push_back(t);
-      if (t_.size() == chunk) flush();
+      for (; index_.count() * 1000 <= t;) index_.put(t_.count());
+      p_.put(static_cast<std::uint8_t>(event.polarity()));
+      x_.put(event.x);
+      y_.put(static_cast<std::uint16_t>(event.y()));
+      t_.put(t);
     }
   }
 
@@ -148,7 +181,7 @@ class DsecLayout final : public Hdf5Writer::Layout {
 
   void close() override {
     flush();
-    flush_index();
+    index_.flush();
     const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
     const Hdf5Handle offset(H5Dcreate2(file_, "t_offset", H5T_STD_I64LE, space.get(), H5P_DEFAULT,
                                        H5P_DEFAULT, H5P_DEFAULT),
@@ -167,47 +200,38 @@ class DsecLayout final : public Hdf5Writer::Layout {
     check(H5Awrite(attribute.get(), H5T_NATIVE_INT, &number) >= 0);
   }
 
-  /// DSEC's times are of 32 bits, 71 minutes. A longer recording gets 64, which readers take, too.
+  /// DSEC stores times in 32 bits, 71 minutes. A longer recording gets 64, which readers accept.
   void widen() {
     flush();
     wide_ = true;
-    GrowingDataset wide(group_.get(), "t64", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, compression_);
+    Times wide(group_.get(), "t64", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, compression_);
     std::vector<std::uint64_t> times(chunk);
-    while (wide.rows() < t_out_.rows()) {
-      const auto count = std::min(chunk, t_out_.rows() - wide.rows());
-      t_out_.read(wide.rows(), count, times.data());
+    while (wide.rows() < t_.rows()) {
+      const auto count = std::min(chunk, t_.rows() - wide.rows());
+      t_.read(wide.rows(), count, times.data());
       wide.append(times.data(), count);
     }
-    t_out_ = std::move(wide);
+    t_ = std::move(wide);
     check(H5Ldelete(group_.get(), "t", H5P_DEFAULT) >= 0 &&
           H5Lmove(group_.get(), "t64", group_.get(), "t", H5P_DEFAULT, H5P_DEFAULT) >= 0);
   }
 
   void flush() {
-    p_out_.append(p_.data(), p_.size());
-    x_out_.append(x_.data(), x_.size());
-    y_out_.append(y_.data(), y_.size());
-    t_out_.append(t_.data(), t_.size());
-    p_.clear();
-    x_.clear();
-    y_.clear();
-    t_.clear();
+    p_.flush();
+    x_.flush();
+    y_.flush();
+    t_.flush();
   }
 
-  void flush_index() {
-    index_out_.append(index_.data(), index_.size());
-    index_.clear();
-  }
+  using Times = BufferedDataset<std::uint64_t>;
 
   hid_t file_;
   Compression compression_;
   Hdf5Handle group_;
-  GrowingDataset p_out_, x_out_, y_out_, t_out_, index_out_;
-  std::vector<std::uint8_t> p_;
-  std::vector<std::uint16_t> x_, y_;
-  std::vector<std::uint64_t> t_;  ///< since the first event
-  std::vector<std::uint64_t> index_;
-  std::uint64_t indexed_ = 0;  ///< milliseconds that the index has
+  BufferedDataset<std::uint8_t> p_;
+  BufferedDataset<std::uint16_t> x_, y_;
+  Times t_;                               ///< since the first event
+  BufferedDataset<std::uint64_t> index_;  ///< for each millisecond, the first event at or after it
   std::optional<Microseconds> first_;
   bool wide_ = false;
 };
@@ -229,14 +253,14 @@ class MetavisionIndex {
     const auto passed = since(*first_, t);
     // The entry of a period is the first event of the last period before that has any.
     for (const auto periods = passed / period; count_ <= periods; ++count_) {
-      put(last_);
+      out_.put(last_);
       if (count_ == periods) last_ = {id, passed};
     }
   }
 
   void close() {
-    if (first_) put(last_);
-    flush();
+    if (first_) out_.put(last_);
+    out_.flush();
   }
 
  private:
@@ -249,25 +273,12 @@ class MetavisionIndex {
   };
 
   static Hdf5Handle make_type() {
-    Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(Entry)), H5Tclose);
-    H5Tinsert(type.get(), "id", offsetof(Entry, id), H5T_NATIVE_UINT64);
-    H5Tinsert(type.get(), "ts", offsetof(Entry, t), H5T_NATIVE_INT64);
-    return type;
-  }
-
-  void put(const Entry& entry) {
-    entries_.push_back(entry);
-    if (entries_.size() == chunk) flush();
-  }
-
-  void flush() {
-    out_.append(entries_.data(), entries_.size());
-    entries_.clear();
+    return make_compound(sizeof(Entry), {{"id", offsetof(Entry, id), H5T_NATIVE_UINT64},
+                                         {"ts", offsetof(Entry, t), H5T_NATIVE_INT64}});
   }
 
   Hdf5Handle type_;
-  GrowingDataset out_;
-  std::vector<Entry> entries_;
+  BufferedDataset<Entry> out_;
   std::optional<Microseconds> first_;
   Microseconds count_ = 0;
   Entry last_ = {0, -1};
@@ -282,8 +293,8 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
         trigger_type_(make_trigger_type()),
         events_out_(cd_.get(), "events", event_type_.get(), event_type_.get(), chunk,
                     Compression::none, ecf_filter),
-        triggers_out_(trigger_.get(), "events", trigger_type_.get(), trigger_type_.get(), chunk,
-                      Compression::none),
+        triggers_(trigger_.get(), "events", trigger_type_.get(), trigger_type_.get(), chunk,
+                  Compression::none),
         event_index_(cd_.get()),
         trigger_index_(trigger_.get()) {
     const auto width = std::to_string(settings.size.width);
@@ -304,19 +315,18 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
 
   void append(std::span<const Trigger> triggers) override {
     for (const auto& trigger : triggers) {
-      trigger_index_.add(triggers_out_.rows() + triggers_.size(), trigger.t);
+      trigger_index_.add(triggers_.count(), trigger.t);
       TriggerRow row;
       row.p = trigger.rising ? 1 : 0;
       row.t = trigger.t;
       row.id = static_cast<std::int16_t>(trigger.id);
-      triggers_.push_back(row);
-      if (triggers_.size() == chunk) flush_triggers();
+      triggers_.put(row);
     }
   }
 
   void close() override {
     flush_events();
-    flush_triggers();
+    triggers_.flush();
     event_index_.close();
     trigger_index_.close();
   }
@@ -338,20 +348,16 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
   static_assert(sizeof(EventRow) == 16 && sizeof(TriggerRow) == 24);
 
   static Hdf5Handle make_event_type() {
-    Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(EventRow)), H5Tclose);
-    H5Tinsert(type.get(), "x", offsetof(EventRow, x), H5T_NATIVE_UINT16);
-    H5Tinsert(type.get(), "y", offsetof(EventRow, y), H5T_NATIVE_UINT16);
-    H5Tinsert(type.get(), "p", offsetof(EventRow, p), H5T_NATIVE_INT16);
-    H5Tinsert(type.get(), "t", offsetof(EventRow, t), H5T_NATIVE_INT64);
-    return type;
+    return make_compound(sizeof(EventRow), {{"x", offsetof(EventRow, x), H5T_NATIVE_UINT16},
+                                            {"y", offsetof(EventRow, y), H5T_NATIVE_UINT16},
+                                            {"p", offsetof(EventRow, p), H5T_NATIVE_INT16},
+                                            {"t", offsetof(EventRow, t), H5T_NATIVE_INT64}});
   }
 
   static Hdf5Handle make_trigger_type() {
-    Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(TriggerRow)), H5Tclose);
-    H5Tinsert(type.get(), "p", offsetof(TriggerRow, p), H5T_NATIVE_INT16);
-    H5Tinsert(type.get(), "t", offsetof(TriggerRow, t), H5T_NATIVE_INT64);
-    H5Tinsert(type.get(), "id", offsetof(TriggerRow, id), H5T_NATIVE_INT16);
-    return type;
+    return make_compound(sizeof(TriggerRow), {{"p", offsetof(TriggerRow, p), H5T_NATIVE_INT16},
+                                              {"t", offsetof(TriggerRow, t), H5T_NATIVE_INT64},
+                                              {"id", offsetof(TriggerRow, id), H5T_NATIVE_INT16}});
   }
 
   void flush_events() {
@@ -362,17 +368,12 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
     events_.clear();
   }
 
-  void flush_triggers() {
-    triggers_out_.append(triggers_.data(), triggers_.size());
-    triggers_.clear();
-  }
-
   Hdf5Handle cd_, trigger_;
   Hdf5Handle event_type_, trigger_type_;
-  GrowingDataset events_out_, triggers_out_;
+  GrowingDataset events_out_;
+  BufferedDataset<TriggerRow> triggers_;
   MetavisionIndex event_index_, trigger_index_;
   std::vector<AbsoluteEvent> events_;
-  std::vector<TriggerRow> triggers_;
   std::vector<std::uint8_t> encoded_;
 };
 
@@ -384,12 +385,12 @@ std::unique_ptr<Hdf5Writer::Layout> make_layout(hid_t file, const Hdf5Writer::Se
 void check(const Hdf5Writer::Settings& settings) {
   const auto [width, height] = settings.size;
   if (settings.layout == Hdf5Layout::v2e)
-    throw std::invalid_argument("HDF5 files of v2e's layout are only read");
+    throw std::invalid_argument("v2e's HDF5 layout can only be read");
   const bool ecf = settings.layout == Hdf5Layout::metavision;
-  const int most = ecf ? ecf_most_pixels : 32768;
-  if (width <= 0 || height <= 0 || width > most || height > most)
-    throw std::invalid_argument("An HDF5 file of events needs the sensor's size, at most " +
-                                std::to_string(most) + " pixels in a row or column");
+  const int max_side = ecf ? ecf_most_pixels : 32768;
+  if (width <= 0 || height <= 0 || width > max_side || height > max_side)
+    throw std::invalid_argument("HDF5 files need a sensor size of at most " +
+                                std::to_string(max_side) + " pixels in a row or column");
 }
 
 }  // namespace
@@ -409,7 +410,7 @@ Hdf5Writer::~Hdf5Writer() {
   try {
     close();
   } catch (const std::exception&) {
-    // Nobody is left to be told.
+    // A destructor cannot report it.
   }
   layout_.reset();
   file_.reset();
@@ -419,10 +420,10 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   const Hdf5Session session;
   file_->output.check();
   for (const auto& event : events) {
-    if (event.t < latest_) throw std::invalid_argument("Events are not sorted by time");
+    if (event.t < latest_) throw std::invalid_argument("events are not sorted by time");
     latest_ = event.t;
     if (event.x >= size_.width || event.y() >= size_.height)
-      throw std::invalid_argument("An event is outside the sensor");
+      throw std::invalid_argument("event outside the sensor");
   }
   layout_->append(events);
   file_->output.check();

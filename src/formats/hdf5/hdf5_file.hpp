@@ -6,9 +6,14 @@
 #include <span>
 #include <vector>
 
+#include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
 
 namespace eventcamera {
+
+/// Opens a file of the HDF5 library, to be read from a source that has to live for as long. An
+/// empty handle where the library cannot.
+Hdf5Handle open_hdf5(ByteSource& source);
 
 /// A file that the HDF5 library writes. The library does not survive a write that fails, as on a
 /// full disk: it crashes as it closes the file, or as the process ends. So to the library every

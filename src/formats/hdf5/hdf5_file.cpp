@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/hdf5/hdf5_file.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <memory>
+#include <stdexcept>
+#include <system_error>
+#include <type_traits>
+
+namespace eventcamera {
+
+namespace {
+
+/// Lets the HDF5 library reach the bytes of a file through a Storage: a few pointers, copied, that
+/// have name, features (H5FD_FEAT_*), is_writable, size(), read(), write() and truncate().
+template <class Storage>
+class Hdf5Driver {
+  static_assert(std::is_trivially_copyable_v<Storage>);
+
+ public:
+  /// With these properties of access the library opens a file that lies there. Empty where it
+  /// cannot.
+  static Hdf5Handle access_to(const Storage& storage) {
+    static const H5FD_class_t driver = make();
+    static const hid_t id = H5FDregister(&driver);
+    Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    if (id < 0 || H5Pset_driver(access.get(), id, &storage) < 0) return {};
+    return access;
+  }
+
+ private:
+  /// What the library knows of an open file.
+  struct File : H5FD_t {
+    explicit File(const Storage& of) : H5FD_t(), storage(of) {}
+
+    Storage storage;
+    haddr_t end = 0;  ///< of what the library takes to be in use
+  };
+
+  static File& file_of(H5FD_t* file) { return *static_cast<File*>(file); }
+  static const File& file_of(const H5FD_t* file) { return *static_cast<const File*>(file); }
+
+  static H5FD_t* open(const char* /*name*/, unsigned flags, hid_t access, haddr_t /*most*/) {
+    if ((flags & H5F_ACC_RDWR) != 0 && !Storage::is_writable) return nullptr;
+    const auto* const storage = static_cast<const Storage*>(H5Pget_driver_info(access));
+    return storage == nullptr ? nullptr : std::make_unique<File>(*storage).release();
+  }
+
+  static herr_t close(H5FD_t* file) {
+    const std::unique_ptr<File> last(&file_of(file));
+    return 0;
+  }
+
+  static herr_t tell_features(const H5FD_t* /*file*/, unsigned long* flags) {
+    if (flags != nullptr) *flags = Storage::features;
+    return 0;
+  }
+
+  static haddr_t end_in_use(const H5FD_t* file, H5FD_mem_t /*type*/) { return file_of(file).end; }
+
+  static herr_t set_end_in_use(H5FD_t* file, H5FD_mem_t /*type*/, haddr_t end) {
+    file_of(file).end = end;
+    return 0;
+  }
+
+  static haddr_t end_of_file(const H5FD_t* file, H5FD_mem_t /*type*/) {
+    return file_of(file).storage.size();
+  }
+
+  static herr_t read(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t position,
+                     std::size_t bytes, void* out) {
+    return file_of(file).storage.read(position, {static_cast<std::uint8_t*>(out), bytes}) ? 0 : -1;
+  }
+
+  static herr_t write(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t position,
+                      std::size_t bytes, const void* from) {
+    const std::span written(static_cast<const std::uint8_t*>(from), bytes);
+    return file_of(file).storage.write(position, written) ? 0 : -1;
+  }
+
+  static herr_t truncate(H5FD_t* file, hid_t /*transfer*/, hbool_t /*closing*/) {
+    file_of(file).storage.truncate(file_of(file).end);
+    return 0;
+  }
+
+  static H5FD_class_t make() {
+    H5FD_class_t driver = {};
+#ifdef H5FD_CLASS_VERSION
+    driver.version = H5FD_CLASS_VERSION;
+#endif
+    driver.name = Storage::name;
+    driver.maxaddr = INT64_MAX;
+    driver.fc_degree = H5F_CLOSE_STRONG;
+    driver.fapl_size = sizeof(Storage);
+    driver.open = open;
+    driver.close = close;
+    driver.query = tell_features;
+    driver.get_eoa = end_in_use;
+    driver.set_eoa = set_end_in_use;
+    driver.get_eof = end_of_file;
+    driver.read = read;
+    driver.write = write;
+    driver.truncate = truncate;
+    return driver;
+  }
+};
+
+/// A file that is only read.
+struct InputStorage {
+  static constexpr const char* name = "eventcamera";
+  static constexpr bool is_writable = false;
+  /// The library reads its small structures, and the data, in larger pieces.
+  static constexpr unsigned long features =
+      H5FD_FEAT_ACCUMULATE_METADATA_READ | H5FD_FEAT_DATA_SIEVE;
+
+  std::uint64_t size() const { return source->size(); }
+
+  bool read(std::uint64_t position, std::span<std::uint8_t> out) const {
+    const auto size = source->size();
+    if (position > size || out.size() > size - position) return false;
+    return source->read(position, out);
+  }
+
+  static bool write(std::uint64_t /*position*/, std::span<const std::uint8_t> /*bytes*/) {
+    return false;
+  }
+
+  static void truncate(std::uint64_t /*size*/) {}
+
+  ByteSource* source;
+};
+
+/// A file that is written.
+struct OutputStorage {
+  static constexpr const char* name = "eventcamera output";
+  static constexpr bool is_writable = true;
+  /// The library gathers what is small.
+  static constexpr unsigned long features = H5FD_FEAT_AGGREGATE_METADATA |
+                                            H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
+                                            H5FD_FEAT_AGGREGATE_SMALLDATA;
+
+  std::uint64_t size() const { return output->size(); }
+
+  bool read(std::uint64_t position, std::span<std::uint8_t> out) const {
+    output->read(position, out);
+    return true;
+  }
+
+  bool write(std::uint64_t position, std::span<const std::uint8_t> bytes) const {
+    output->write(position, bytes);
+    return true;
+  }
+
+  void truncate(std::uint64_t size) const { output->truncate(size); }
+
+  Hdf5Output* output;
+};
+
+}  // namespace
+
+Hdf5Handle open_hdf5(ByteSource& source) {
+  const Hdf5Session session;
+  const auto access = Hdf5Driver<InputStorage>::access_to({&source});
+  if (!access) return {};
+  return {H5Fopen("events", H5F_ACC_RDONLY, access.get()), H5Fclose};
+}
+
+Hdf5Output::Hdf5Output(const std::filesystem::path& path) : path_(path) {
+  constexpr mode_t mode = 0666;
+  fd_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, mode);
+  if (fd_ < 0) fail(errno);
+  // As the library itself does: who reads a file that is being written is told so.
+  if ((flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) || ftruncate(fd_, 0) != 0) {
+    const int error = errno;
+    close(fd_);
+    fail(error);
+  }
+}
+
+Hdf5Output::~Hdf5Output() {
+  close(fd_);
+}
+
+Hdf5Handle Hdf5Output::create() {
+  const Hdf5Session session;
+  const auto access = Hdf5Driver<OutputStorage>::access_to({this});
+  if (!access) return {};
+  return {H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
+}
+
+void Hdf5Output::fail(int error) const {
+  throw std::runtime_error(path_.string() +
+                           " cannot be written: " + std::generic_category().message(error));
+}
+
+void Hdf5Output::check() const {
+  if (error_ != 0) fail(error_);
+}
+
+void Hdf5Output::read(std::uint64_t position, std::span<std::uint8_t> out) const {
+  auto left = out;
+  for (auto at = position; !left.empty();) {
+    const auto got = pread(fd_, left.data(), left.size(), static_cast<off_t>(at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) break;
+    at += static_cast<std::uint64_t>(got);
+    left = left.subspan(static_cast<std::size_t>(got));
+  }
+  std::ranges::fill(left, 0);
+  for (const auto& [start, bytes] : unwritten_) {
+    const auto begin = std::max(position, start);
+    const auto end = std::min(position + out.size(), start + bytes.size());
+    if (begin >= end) continue;
+    std::ranges::copy(std::span(bytes).subspan(begin - start, end - begin),
+                      out.begin() + static_cast<std::ptrdiff_t>(begin - position));
+  }
+}
+
+void Hdf5Output::write(std::uint64_t position, std::span<const std::uint8_t> bytes) {
+  size_ = std::max<std::uint64_t>(size_, position + bytes.size());
+  while (!bytes.empty() && error_ == 0) {
+    const auto put = pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(position));
+    if (put < 0 && errno != EINTR) error_ = errno;
+    if (put <= 0) continue;
+    position += static_cast<std::uint64_t>(put);
+    bytes = bytes.subspan(static_cast<std::size_t>(put));
+  }
+  if (!bytes.empty()) unwritten_.push_back({position, {bytes.begin(), bytes.end()}});
+}
+
+void Hdf5Output::truncate(std::uint64_t size) {
+  if (size_ == size || error_ != 0) return;
+  size_ = size;
+  if (ftruncate(fd_, static_cast<off_t>(size)) != 0) error_ = errno;
+}
+
+}  // namespace eventcamera
