@@ -39,7 +39,7 @@ std::size_t PropheseeHeader::take(std::span<const std::uint8_t> bytes, bool ende
 
   const auto length = static_cast<std::size_t>(stop - looked_at.begin()) + 1;
   length_ += length;
-  if (length_ > max_header) throw UnsupportedFormat("the header does not end");
+  if (length_ > max_header) throw UnsupportedFormat("endless header");
   found_ = true;
   const auto line = trimmed({reinterpret_cast<const char*>(looked_at.data()) + 1, length - 2});
   const auto key = line.substr(0, line.find(' '));

@@ -23,24 +23,13 @@ TEST(Aedat2, Davis) {
   const auto events = random_events::make(davis346, 30'000, 1, 0, {hour});
   const auto bytes =
       aedat_files::aedat2_davis(events, davis346, "eu.seebetter.ini.chips.davis.Davis346blue");
-  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}, std::size_t{0}}) {
-    Aedat2Decoder decoder;
-    EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
-    EXPECT_EQ(decoder.size(), davis346);
-    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-    EXPECT_EQ(decoder.corruption().unsorted + decoder.corruption().outside, 0U);
-  }
+  pieces::expect_events<Aedat2Decoder>(bytes, events, davis346);
 }
 
 TEST(Aedat2, Dvs128) {
   const auto events = random_events::make(dvs128, 30'000, 2, 5, {hour});
   const auto bytes = aedat_files::aedat2_dvs128(events);
-  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}, std::size_t{0}}) {
-    Aedat2Decoder decoder;
-    EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
-    EXPECT_EQ(decoder.size(), dvs128);
-    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-  }
+  pieces::expect_events<Aedat2Decoder>(bytes, events, dvs128);
 }
 
 TEST(Aedat2, AddressesAsTheFormatHasThem) {

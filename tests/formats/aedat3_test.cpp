@@ -20,13 +20,7 @@ constexpr Microseconds hour = 3'600'000'000;
 TEST(Aedat3, PolarityEventsOfAllTimes) {
   const auto events = random_events::make(davis346, 30'000, 1, 0, {300 * hour});
   const auto bytes = aedat_files::aedat3(events, "DAVIS346C", 1000);
-  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}, std::size_t{0}}) {
-    Aedat3Decoder decoder;
-    EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
-    EXPECT_EQ(decoder.size(), davis346);
-    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
-    EXPECT_EQ(decoder.corruption().unsorted + decoder.corruption().outside, 0U);
-  }
+  pieces::expect_events<Aedat3Decoder>(bytes, events, davis346);
 }
 
 TEST(Aedat3, AnUnknownCameraHasNoSize) {

@@ -76,12 +76,7 @@ TEST(Dat, FollowsWrapsAndCountsDisorder) {
 
 TEST(Dat, IsAnErrorThatSaysWhy) {
   const auto error = [](const std::vector<std::uint8_t>& bytes) {
-    try {
-      decode(*make_dat_decoder(), bytes);
-    } catch (const UnsupportedFormat& exception) {
-      return std::string(exception.what());
-    }
-    return std::string();
+    return recordings::refusal(*make_dat_decoder(), bytes);
   };
   EXPECT_NE(error({}), "");
   EXPECT_NE(error({'%', ' ', 'a', '\n'}), "");

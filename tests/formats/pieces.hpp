@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <random>
@@ -36,6 +38,19 @@ inline Decoded decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
   }
   decoder.finish(out);
   return out;
+}
+
+/// The file has these events and this sensor, and no fault, however it is split.
+template <class Reader>
+void expect_events(std::span<const std::uint8_t> bytes, const std::vector<AbsoluteEvent>& events,
+                   SensorSize size) {
+  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}, std::size_t{0}}) {
+    Reader reader;
+    EXPECT_TRUE(decoded(reader, bytes, piece).events == events);
+    EXPECT_EQ(reader.size(), size);
+    EXPECT_EQ(reader.corruption().places, 0U) << reader.corruption().first;
+    EXPECT_EQ(reader.corruption().unsorted + reader.corruption().outside, 0U);
+  }
 }
 
 }  // namespace eventcamera::pieces

@@ -199,13 +199,7 @@ TEST(RawHeader, TellsTheOrderOfEvt21) {
 
 TEST(RawHeader, IsAnErrorThatSaysWhy) {
   const auto error = [](const std::string& file) {
-    Decoded decoded;
-    try {
-      decoder_after(file, decoded);
-    } catch (const UnsupportedFormat& exception) {
-      return std::string(exception.what());
-    }
-    return std::string();
+    return recordings::refusal(*make_prophesee_raw_decoder(), Bytes(file.begin(), file.end()));
   };
   EXPECT_NE(error(""), "");
   EXPECT_NE(error("%"), "");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "src/formats/decoder.hpp"
@@ -88,6 +89,16 @@ Decoded decode(Decoder& decoder, std::span<const std::uint8_t> bytes, const Next
 
 inline Decoded decode(Decoder& decoder, std::span<const std::uint8_t> bytes) {
   return decode(decoder, bytes, [&] { return bytes.size(); });
+}
+
+/// Why a decoder does not read a file; empty where it does.
+inline std::string refusal(Decoder& decoder, std::span<const std::uint8_t> bytes) {
+  try {
+    decode(decoder, bytes);
+  } catch (const UnsupportedFormat& exception) {
+    return exception.what();
+  }
+  return {};
 }
 
 }  // namespace recordings

@@ -5,14 +5,10 @@
 #include <cctype>
 #include <string_view>
 
-#include "src/formats/header_line.hpp"
-
 namespace eventcamera {
 
 namespace {
 
-constexpr std::string_view magic = "#!AER-DAT2.0";
-constexpr std::string_view header_end = "#End Of ASCII Header";
 constexpr std::size_t record_size = 8;
 
 // DAVIS: bits of an address.
@@ -62,7 +58,7 @@ SensorSize size_of(const std::string& chip) {
                             {"davis640", {640, 480}}, {"davisrgbw640", {640, 480}}};
   for (const auto& known : chips)
     if (chip.find(known.name) != std::string::npos) return known.size;
-  throw UnsupportedFormat("this AEDAT 2.0 file is of a " + chip + ", which cannot be read");
+  throw UnsupportedFormat("unsupported camera in the AEDAT 2.0 header: " + chip);
 }
 
 }  // namespace
@@ -76,52 +72,32 @@ void Aedat2Decoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
 void Aedat2Decoder::finish(Decoded& out) {
   finished_ = true;
   if (!header_read_ && !read_header()) {
-    if (first_line_)
-      throw UnsupportedFormat("this is not AEDAT 2.0: it does not begin with #!AER-DAT2.0");
-    if (in_line_) corruption_.note(queue_.position(), "the file ends within its header");
+    if (header_.in_first_line()) throw header_.wrong_magic();
+    if (header_.in_line()) corruption_.note(queue_.position(), "truncated AEDAT 2.0 header");
     end_header();
   }
   read_records(out);
   if (queue_.size() > 0 && !scanning_)
-    corruption_.note(queue_.position(), "a record that the end of the file cuts off");
+    corruption_.note(queue_.position(), "truncated AEDAT 2.0 record");
 }
 
 bool Aedat2Decoder::read_header() {
-  while (true) {
-    if (first_line_ && !in_line_) {
-      const auto start = queue_.peek(std::min(queue_.size(), magic.size()));
-      const auto count = std::min(start.size(), magic.size());
-      if (!std::equal(magic.begin(), magic.begin() + static_cast<std::ptrdiff_t>(count),
-                      start.begin()))
-        throw UnsupportedFormat("this is not AEDAT 2.0: it does not begin with #!AER-DAT2.0");
-      if (count < magic.size()) return false;
-    }
-    if (!in_line_) {
-      const auto next = queue_.peek(1);
-      if (next.empty()) return false;
-      if (next.front() != '#') break;
-      in_line_ = true;
-    }
-    if (!take_header_line(queue_, line_)) return false;
-    in_line_ = false;
-    first_line_ = false;
-    if (line_.starts_with(header_end)) break;
-    take_line();
-    line_.clear();
-  }
+  auto next = header_.next(queue_);
+  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) take_line(header_.line());
+  if (next == AedatHeader::Next::more) return false;
   end_header();
   return true;
 }
 
 /// Notes what a line of the header says.
-void Aedat2Decoder::take_line() {
+void Aedat2Decoder::take_line(const std::string& line) {
   constexpr std::string_view chip = "# AEChip:";
-  if (line_.starts_with(chip)) {
-    const auto name = lowercase(std::string_view(line_).substr(chip.size()));
+  if (line.starts_with(chip)) {
+    const auto name = lowercase(std::string_view(line).substr(chip.size()));
     size_ = size_of(name);
     davis_ = name.find("dvs128") == std::string::npos;
   }
-  if (line_.find("v2e") != std::string::npos) of_v2e_ = true;
+  if (line.find("v2e") != std::string::npos) of_v2e_ = true;
 }
 
 void Aedat2Decoder::end_header() {
@@ -161,7 +137,7 @@ bool Aedat2Decoder::read_odd_record(Decoded& out) {
     sound_behind &= within_sensor(record_at(bytes.data() + i * record_size).address);
   const bool within = within_sensor(record.address);
   if (!sound_behind) {
-    corruption_.note(queue_.position(), "bytes that are no records");
+    corruption_.note(queue_.position(), "no AEDAT 2.0 records here");
     queue_.consume(1);
     scanning_ = true;
     return true;
@@ -169,7 +145,7 @@ bool Aedat2Decoder::read_odd_record(Decoded& out) {
   if (!within)
     ++corruption_.outside;
   else if (behind > 0 && !far(record_at(bytes.data() + record_size).t))
-    corruption_.note(queue_.position(), "a time far from those around it");
+    corruption_.note(queue_.position(), "timestamp far from those around it");
   else
     append(record, out);
   queue_.consume(record_size);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
 #include "src/formats/decoder.hpp"
 
@@ -32,7 +33,7 @@ class Aedat2Decoder final : public Decoder {
   };
 
   bool read_header();
-  void take_line();
+  void take_line(const std::string& line);
   void end_header();
   void read_records(Decoded& out);
   bool read_odd_record(Decoded& out);
@@ -47,9 +48,7 @@ class Aedat2Decoder final : public Decoder {
   ByteQueue queue_;
   bool finished_ = false;
 
-  std::string line_;  ///< of the header, as far as it has come
-  bool in_line_ = false;
-  bool first_line_ = true;
+  AedatHeader header_{"#!AER-DAT2.0", "#End Of ASCII Header"};
   bool of_v2e_ = false;
   bool header_read_ = false;
   std::uint64_t data_at_ = 0;

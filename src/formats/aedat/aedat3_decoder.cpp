@@ -4,15 +4,12 @@
 #include <algorithm>
 #include <string_view>
 
-#include "src/formats/header_line.hpp"
 #include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
 
 namespace {
 
-constexpr std::string_view magic = "#!AER-DAT3.1";
-constexpr std::string_view header_end = "#!END-HEADER";
 constexpr std::size_t packet_header_size = 28;
 constexpr std::size_t event_size = 8;
 constexpr std::int64_t max_packet = std::int64_t{64} << 20;
@@ -84,49 +81,30 @@ void Aedat3Decoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
 void Aedat3Decoder::finish(Decoded& out) {
   finished_ = true;
   if (!header_read_ && !read_header())
-    throw UnsupportedFormat(first_line_
-                                ? "this is not AEDAT 3.1: it does not begin with #!AER-DAT3.1"
-                                : "this AEDAT 3.1 file ends within its header");
+    throw header_.in_first_line() ? header_.wrong_magic()
+                                  : UnsupportedFormat("truncated AEDAT 3.1 header");
   read_packets(out);
   const bool within = packet_.events != 0 || packet_.rest != 0;
   if (!scanning_ && (within || queue_.size() > 0))
-    corruption_.note(queue_.position(), "a packet that the end of the file cuts off");
+    corruption_.note(queue_.position(), "truncated AEDAT 3.1 packet");
 }
 
 bool Aedat3Decoder::read_header() {
-  while (true) {
-    if (first_line_ && line_.empty()) {
-      const auto start = queue_.peek(std::min(queue_.size(), magic.size()));
-      const auto count = std::min(start.size(), magic.size());
-      if (!std::equal(magic.begin(), magic.begin() + static_cast<std::ptrdiff_t>(count),
-                      start.begin()))
-        throw UnsupportedFormat("this is not AEDAT 3.1: it does not begin with #!AER-DAT3.1");
-      if (count < magic.size()) return false;
-    }
-    if (line_.empty()) {
-      const auto next = queue_.peek(1);
-      if (next.empty()) return false;
-      if (next.front() != '#')
-        throw UnsupportedFormat("the header of this AEDAT 3.1 file does not end with #!END-HEADER");
-    }
-    if (!take_header_line(queue_, line_)) return false;
-    first_line_ = false;
-    if (line_.starts_with(header_end)) break;
-    take_line();
-    line_.clear();
-  }
-  header_read_ = true;
-  return true;
+  auto next = header_.next(queue_);
+  for (; next == AedatHeader::Next::line; next = header_.next(queue_)) take_line(header_.line());
+  if (next == AedatHeader::Next::data)
+    throw UnsupportedFormat("the AEDAT 3.1 header does not end with #!END-HEADER");
+  header_read_ = next == AedatHeader::Next::last;
+  return header_read_;
 }
 
 /// Notes what a line of the header says.
-void Aedat3Decoder::take_line() {
-  if (line_.starts_with("#Format:") && line_.find("RAW") == std::string::npos)
-    throw UnsupportedFormat("this AEDAT 3.1 file is compressed, which cannot be read: " +
-                            line_.substr(1));
+void Aedat3Decoder::take_line(const std::string& line) {
+  if (line.starts_with("#Format:") && line.find("RAW") == std::string::npos)
+    throw UnsupportedFormat("unsupported compression of AEDAT 3.1: " + line.substr(1));
   // A camera is one source; what filters make of its events are others of the same size.
-  if ((line_.starts_with("#Source") || line_.starts_with("#-Source")) && size_ == SensorSize{})
-    size_ = size_of(line_);
+  if ((line.starts_with("#Source") || line.starts_with("#-Source")) && size_ == SensorSize{})
+    size_ = size_of(line);
 }
 
 void Aedat3Decoder::read_packets(Decoded& out) {
@@ -149,7 +127,7 @@ bool Aedat3Decoder::read_packet_header() {
   const auto bytes = queue_.peek(packet_header_size);
   if (bytes.empty()) return false;
   if (!begins_packet(bytes.data())) {
-    corruption_.note(queue_.position(), "bytes that are no packet");
+    corruption_.note(queue_.position(), "no AEDAT 3.1 packet here");
     scanning_ = true;
     return true;
   }
@@ -190,15 +168,15 @@ bool Aedat3Decoder::read_events(Decoded& out) {
   for (std::size_t k = 1; k <= behind && (k + 1) * event_size <= next.size(); ++k)
     sound_behind &= !is_odd(next.data() + k * event_size);
   if (next.size() >= packet_header_size && begins_packet(next.data())) {
-    corruption_.note(queue_.position(), "a packet that is shorter than it says");
+    corruption_.note(queue_.position(), "AEDAT 3.1 packet shorter than its header says");
     packet_ = {};
   } else if (!sound_behind) {
-    corruption_.note(queue_.position(), "bytes that are no events");
+    corruption_.note(queue_.position(), "no AEDAT 3.1 events here");
     packet_ = {};
     scanning_ = true;
   } else {
     if (little_endian<std::int32_t>(next.data() + 4) < 0)
-      corruption_.note(queue_.position(), "an event at an impossible time");
+      corruption_.note(queue_.position(), "event with a negative timestamp");
     else
       ++corruption_.outside;
     --packet_.events;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
 #include "src/formats/decoder.hpp"
 
@@ -27,7 +28,7 @@ class Aedat3Decoder final : public Decoder {
   };
 
   bool read_header();
-  void take_line();
+  void take_line(const std::string& line);
   void read_packets(Decoded& out);
   bool read_packet_header();
   bool read_events(Decoded& out);
@@ -38,8 +39,7 @@ class Aedat3Decoder final : public Decoder {
 
   ByteQueue queue_;
   bool finished_ = false;
-  std::string line_;  ///< of the header, as far as it has come
-  bool first_line_ = true;
+  AedatHeader header_{"#!AER-DAT3.1", "#!END-HEADER"};
   bool header_read_ = false;
   bool scanning_ = false;  ///< for the next place that looks like a packet
   Packet packet_;

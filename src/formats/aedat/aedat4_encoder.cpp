@@ -29,7 +29,7 @@ Aedat4Encoder::Aedat4Encoder(Aedat4Settings settings)
       compressor_(std::make_unique<Aedat4Compressor>(settings_.compression)),
       builder_(std::make_unique<flatbuffers::FlatBufferBuilder>()) {
   if (!is_side(settings_.size.width) || !is_side(settings_.size.height))
-    throw std::invalid_argument("AEDAT4 has sensors from 1x1 to 32767x32767 pixels");
+    throw std::invalid_argument("AEDAT4 supports sensors of 1x1 to 32767x32767 pixels");
 }
 
 Aedat4Encoder::~Aedat4Encoder() = default;
@@ -53,12 +53,12 @@ void Aedat4Encoder::append(std::span<const AbsoluteEvent> events, std::vector<st
 }
 
 void Aedat4Encoder::encode(const Aedat4Frame& frame, std::vector<std::uint8_t>& out) {
-  if (!settings_.frames) throw std::invalid_argument("this AEDAT4 file has no stream of frames");
+  if (!settings_.frames) throw std::invalid_argument("this AEDAT4 file has no frame stream");
   const auto row = static_cast<std::size_t>(frame.width) *
                    static_cast<std::size_t>(bytes_per_pixel(frame.format));
   if (!is_side(frame.width) || !is_side(frame.height) ||
       row * static_cast<std::size_t>(frame.height) > aedat4_largest_packet / 2)
-    throw std::invalid_argument("a frame of a size that does not go into AEDAT4");
+    throw std::invalid_argument("frame too large for AEDAT4");
   flush(out);
   builder_->Clear();
   std::uint8_t* pixels = nullptr;

@@ -105,26 +105,51 @@ bool take_times(Reader& reader, std::span<AbsoluteEvent> events) {
   return true;
 }
 
-void put_rows(std::span<const AbsoluteEvent> events, Writer& writer) {
+/// Writes runs of equal values: Word has the value in its upper bits and the count in the others;
+/// where all of these are set, the count follows.
+template <class Word, unsigned count_mask, class Value>
+void put_runs(std::span<const AbsoluteEvent> events, Writer& writer, const Value& value) {
   for (std::size_t i = 0; i < events.size();) {
-    const auto count = run(events, i, [](const AbsoluteEvent& event) { return event.y(); });
-    const auto y = static_cast<unsigned>(events[i].y());
-    writer.put(static_cast<std::uint16_t>(y << 5 | std::min<std::size_t>(count, 31)));
-    if (count >= 31) writer.put(static_cast<std::uint16_t>(count));
+    const auto count = run(events, i, value);
+    const auto bits = static_cast<unsigned>(value(events[i]));
+    writer.put(
+        static_cast<Word>(bits * (count_mask + 1) | std::min<std::size_t>(count, count_mask)));
+    if (count >= count_mask) writer.put(static_cast<std::uint16_t>(count));
     i += count;
   }
 }
 
-bool take_rows(Reader& reader, std::span<AbsoluteEvent> events) {
+template <class Word, unsigned count_mask, class SetValue>
+bool take_runs(Reader& reader, std::span<AbsoluteEvent> events, const SetValue& set_value) {
   for (std::size_t i = 0; i < events.size();) {
-    const auto word = reader.take<std::uint16_t>();
-    std::size_t count = word & 31;
-    if (count == 31) count = reader.take<std::uint16_t>();
+    const unsigned word = reader.take<Word>();
+    std::size_t count = word & count_mask;
+    if (count == count_mask) count = reader.take<std::uint16_t>();
     if (reader.ended() || count > events.size() - i) return false;
-    for (auto& event : events.subspan(i, count)) event.y_p = word >> 5;
+    const auto value = static_cast<std::uint16_t>(word / (count_mask + 1));
+    for (auto& event : events.subspan(i, count)) set_value(event, value);
     i += count;
   }
   return true;
+}
+
+void put_rows(std::span<const AbsoluteEvent> events, Writer& writer) {
+  put_runs<std::uint16_t, 31>(events, writer, [](const AbsoluteEvent& event) { return event.y(); });
+}
+
+bool take_rows(Reader& reader, std::span<AbsoluteEvent> events) {
+  return take_runs<std::uint16_t, 31>(reader, events,
+                                      [](AbsoluteEvent& event, std::uint16_t y) { event.y_p = y; });
+}
+
+void put_polarities(std::span<const AbsoluteEvent> events, Writer& writer) {
+  put_runs<std::uint8_t, 127>(events, writer, polarity_bit);
+}
+
+bool take_polarities(Reader& reader, std::span<AbsoluteEvent> events) {
+  return take_runs<std::uint8_t, 127>(reader, events, [](AbsoluteEvent& event, std::uint16_t on) {
+    event.y_p |= static_cast<std::uint16_t>(on << 15);
+  });
 }
 
 void put_columns(std::span<const AbsoluteEvent> events, Writer& writer) {
@@ -146,37 +171,14 @@ bool take_columns(Reader& reader, std::span<AbsoluteEvent> events) {
     if (reader.ended()) return false;
     const unsigned x = word >> 5;
     events[i++].x = static_cast<std::uint16_t>(x);
-    // Other writers' last mask may go on behind the last event.
+    // Other writers' last mask may go on past the last event.
     for (unsigned j = 0; j < 5 && i < events.size(); ++j)
       if ((word & 16 >> j) != 0) events[i++].x = static_cast<std::uint16_t>(x + j + 1);
   }
   return true;
 }
 
-void put_polarities(std::span<const AbsoluteEvent> events, Writer& writer) {
-  for (std::size_t i = 0; i < events.size();) {
-    const auto count = run(events, i, polarity_bit);
-    const auto bit = static_cast<unsigned>(polarity_bit(events[i]));
-    writer.put(static_cast<std::uint8_t>(bit << 7 | std::min<std::size_t>(count, 127)));
-    if (count >= 127) writer.put(static_cast<std::uint16_t>(count));
-    i += count;
-  }
-}
-
-bool take_polarities(Reader& reader, std::span<AbsoluteEvent> events) {
-  for (std::size_t i = 0; i < events.size();) {
-    const auto byte = reader.take<std::uint8_t>();
-    std::size_t count = byte & 127;
-    if (count == 127) count = reader.take<std::uint16_t>();
-    if (reader.ended() || count > events.size() - i) return false;
-    const auto bit = static_cast<std::uint16_t>((byte & 0x80) << 8);
-    for (auto& event : events.subspan(i, count)) event.y_p |= bit;
-    i += count;
-  }
-  return true;
-}
-
-/// Four events' numbers, with noughts behind the last event.
+/// Four events' numbers, with zeros past the last event.
 template <class Number>
 std::array<std::uint32_t, 4> group(std::span<const AbsoluteEvent> events, std::size_t first,
                                    const Number& number) {

@@ -23,7 +23,7 @@ constexpr std::uint64_t max_holes = 1024;
 constexpr std::size_t min_cache_bytes = std::size_t{1} << 20;
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
-  throw UnsupportedFormat("This HDF5 file's dataset " + path + " " + why);
+  throw UnsupportedFormat("HDF5 dataset " + path + " " + why);
 }
 
 }  // namespace
@@ -53,7 +53,7 @@ Hdf5Dataset::Hdf5Dataset(hid_t parent, const std::string& path) : path_(path) {
     refuse(path, "has elements that are too large");
   if (const auto number = number_of(type_.get())) numbers_.push_back(*number);
 
-  if (H5Sget_simple_extent_type(space.get()) == H5S_NULL) refuse(path, "holds nothing");
+  if (H5Sget_simple_extent_type(space.get()) == H5S_NULL) refuse(path, "is empty by declaration");
   const int rank = H5Sget_simple_extent_ndims(space.get());
   if (rank < 0 || rank > 2) refuse(path, "has too many dimensions");
   extent_.resize(static_cast<std::size_t>(rank));
@@ -87,7 +87,7 @@ void Hdf5Dataset::check_chunks() {
 /// Finds out how many of the rows that the file claims are there.
 void Hdf5Dataset::check_storage(hid_t file) {
   hsize_t file_bytes = 0;
-  if (H5Fget_filesize(file, &file_bytes) < 0) refuse(path_, "is in no file");
+  if (H5Fget_filesize(file, &file_bytes) < 0) refuse(path_, "has a file of unknown size");
   file_bytes_ = file_bytes;
   const std::uint64_t claimed = claimed_rows();
   const auto row_bytes = columns() * type_bytes_;
@@ -104,7 +104,7 @@ void Hdf5Dataset::check_storage(hid_t file) {
       return;
     }
     case H5D_CONTIGUOUS: {
-      if (H5Pget_external_count(creation_.get()) != 0) refuse(path_, "lies in another file");
+      if (H5Pget_external_count(creation_.get()) != 0) refuse(path_, "is stored in another file");
       const auto offset = H5Dget_offset(dataset_.get());
       if (offset == HADDR_UNDEF || offset > file_bytes_) return;
       rows_ = std::min<std::uint64_t>({claimed, (file_bytes_ - offset) / row_bytes,
@@ -115,7 +115,7 @@ void Hdf5Dataset::check_storage(hid_t file) {
       rows_ = std::min<std::uint64_t>(claimed, H5Dget_storage_size(dataset_.get()) / row_bytes);
       return;
     default:
-      refuse(path_, "is stored in a way that is not read");
+      refuse(path_, "has an unsupported storage layout");
   }
 }
 
@@ -239,7 +239,7 @@ std::optional<Hdf5Dataset::Number> Hdf5Dataset::number_of(hid_t type) {
 
 void Hdf5Dataset::choose(std::span<const char* const> members) {
   if (H5Tget_class(type_.get()) != H5T_COMPOUND || columns() != 1)
-    refuse(path_, "does not hold rows");
+    refuse(path_, "does not hold rows of named members");
   for (const auto* const member : members) {
     const int found = H5Tget_member_index(type_.get(), member);
     const auto index = static_cast<unsigned>(found);
@@ -247,7 +247,7 @@ void Hdf5Dataset::choose(std::span<const char* const> members) {
     auto number = number_of(type.get());
     if (number) number->offset = H5Tget_member_offset(type_.get(), index);
     if (!number || number->offset > type_bytes_ || number->bytes > type_bytes_ - number->offset)
-      refuse(path_, std::string("has no integer ") + member);
+      refuse(path_, std::string("has no integer member ") + member);
     numbers_.push_back(*number);
   }
 }

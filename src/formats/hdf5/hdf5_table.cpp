@@ -78,7 +78,7 @@ class NumberTable : public Hdf5Table {
     }
     next_row_ = end;
     if (unread != nullptr) {
-      note(corruption, *unread, row, "a part of a dataset cannot be read");
+      note(corruption, *unread, row, "unreadable part of an HDF5 dataset");
       return end;
     }
     for (std::size_t i = 0; i < t_.size(); ++i) {
@@ -86,7 +86,7 @@ class NumberTable : public Hdf5Table {
       last_ = t_[i];
       Microseconds t = 0;
       if (__builtin_add_overflow(t_[i], offset_ + lap_, &t)) {
-        note(corruption, t_dataset(), row, "a time is out of range");
+        note(corruption, t_dataset(), row, "timestamp out of range");
         continue;
       }
       validator.take(t, x_[i], y_[i], p_[i] > 0, out, corruption);
@@ -146,7 +146,7 @@ class DsecTable final : public NumberTable {
     rows_ = columns_[0].rows();
     for (auto& column : columns_) {
       if (column.rank() != 1 || !column.is_integers())
-        throw UnsupportedFormat("This HDF5 file's /events are no columns of integers");
+        throw UnsupportedFormat("HDF5 group /events must hold columns of integers");
       column.require_filters();
       rows_ = std::min(rows_, column.rows());
       claimed_rows_ = std::max(claimed_rows_, column.claimed_rows());
@@ -158,7 +158,7 @@ class DsecTable final : public NumberTable {
       constexpr Microseconds most = INT64_MAX / 2;
       if (!offset.is_integers() || offset.rows() != 1 || offset.columns() != 1 ||
           !offset.read(0, 1, number) || number[0] > most || number[0] < -most)
-        throw UnsupportedFormat("This HDF5 file's /t_offset is no time");
+        throw UnsupportedFormat("HDF5 dataset /t_offset is not a time");
       offset_ = number[0];
     }
     if (Hdf5Dataset::exists(file, "ms_to_idx", H5O_TYPE_DATASET)) {
@@ -238,8 +238,7 @@ class V2eTable final : public NumberTable {
  public:
   explicit V2eTable(hid_t file) : events_(file, "events") {
     if (events_.rank() != 2 || events_.columns() != columns || !events_.is_integers())
-      throw UnsupportedFormat(
-          "This HDF5 file's /events are no rows of four integers t, x, y and p");
+      throw UnsupportedFormat("HDF5 dataset /events must hold rows of four integers t, x, y and p");
     events_.require_filters();
     rows_ = events_.rows();
     claimed_rows_ = events_.claimed_rows();
@@ -283,15 +282,14 @@ class V2eTable final : public NumberTable {
 class MetavisionTable final : public Hdf5Table {
  public:
   explicit MetavisionTable(hid_t file) : events_(file, "CD/events") {
-    if (events_.rank() != 1) throw UnsupportedFormat("This HDF5 file's /CD/events are no rows");
+    if (events_.rank() != 1) throw UnsupportedFormat("HDF5 dataset /CD/events must hold rows");
     constexpr const char* members[] = {"t", "x", "y", "p"};
     events_.choose(members);
     compressed_ = events_.has_only_filter(ecf_filter);
     if (compressed_) {
       step_ = events_.chunk_rows();
       if (step_ == 0 || step_ > ecf_most_events)
-        throw UnsupportedFormat(
-            "This HDF5 file's /CD/events have chunks that are too large for ECF");
+        throw UnsupportedFormat("HDF5 dataset /CD/events has chunks too large for ECF");
     } else {
       events_.require_filters();
     }
@@ -310,12 +308,12 @@ class MetavisionTable final : public Hdf5Table {
     const auto chunk = row / step_;
     const auto end = chunk_end(chunk);
     if (!read_chunk(chunk)) {
-      note(corruption, events_, row, "a chunk of events is corrupt");
+      note(corruption, events_, row, "corrupt ECF chunk");
       return end;
     }
     const auto begin = chunk * step_;
     if (decoded_.size() < end - begin)
-      note(corruption, events_, row, "a chunk has fewer events than it should");
+      note(corruption, events_, row, "ECF chunk with too few events");
     for (auto i = row - begin; i < std::min<std::uint64_t>(decoded_.size(), end - begin); ++i) {
       const auto& event = decoded_[i];
       validator.take(event.t, event.x, event.y(), event.polarity() == Polarity::on, out,
@@ -371,7 +369,7 @@ class MetavisionTable final : public Hdf5Table {
       is_read = events_.read(row, end - row, numbers_);
     }
     if (!is_read) {
-      note(corruption, events_, row, "a part of a dataset cannot be read");
+      note(corruption, events_, row, "unreadable part of an HDF5 dataset");
       return end;
     }
     for (std::size_t i = 0; i < numbers_.size(); i += 4)
@@ -399,13 +397,12 @@ std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file) {
   if (Hdf5Dataset::exists(file, "events", H5O_TYPE_DATASET))
     return std::make_unique<V2eTable>(file);
   throw UnsupportedFormat(
-      "This HDF5 file has none of the layouts that are read: /events/t (DSEC), /events (v2e), "
-      "/CD/events (Metavision)");
+      "unknown HDF5 layout: no /events/t (DSEC), /events (v2e) or /CD/events (Metavision)");
 }
 
 Hdf5Triggers::Hdf5Triggers(hid_t file) : dataset_(file, "EXT_TRIGGER/events") {
   if (dataset_.rank() != 1)
-    throw UnsupportedFormat("This HDF5 file's /EXT_TRIGGER/events are no rows");
+    throw UnsupportedFormat("HDF5 dataset /EXT_TRIGGER/events must hold rows");
   constexpr const char* members[] = {"t", "p", "id"};
   dataset_.choose(members);
   dataset_.require_filters();
@@ -424,7 +421,7 @@ bool Hdf5Triggers::read(std::size_t count, std::vector<Trigger>& out, Corruption
       out.push_back(
           {numbers_[i], static_cast<std::uint16_t>(numbers_[i + 2]), numbers_[i + 1] > 0});
   } else {
-    note(corruption, dataset_, row_, "a part of a dataset cannot be read");
+    note(corruption, dataset_, row_, "unreadable part of an HDF5 dataset");
   }
   row_ = end;
   return true;

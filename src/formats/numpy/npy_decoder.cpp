@@ -92,18 +92,18 @@ bool NpyDecoder::take_header(std::span<const std::uint8_t>& bytes) {
   const bool long_enough = take();
   const auto known = std::min(rest_.size(), npy_magic.size());
   if (std::memcmp(rest_.data(), npy_magic.data(), known) != 0)
-    throw UnsupportedFormat("This is not a NumPy file");
+    throw UnsupportedFormat("not a NumPy file");
   if (!long_enough) return false;
   const int version = rest_[npy_magic.size()];
   if (version < 1 || version > 3)
-    throw UnsupportedFormat("This NumPy file is of a version that is not known");
+    throw UnsupportedFormat("unsupported NumPy version " + std::to_string(version));
   needed += version == 1 ? 2 : 4;
   if (!take()) return false;
   const std::size_t length = version == 1
                                  ? little_endian<std::uint16_t>(rest_.data() + version_end)
                                  : little_endian<std::uint32_t>(rest_.data() + version_end);
   const auto header_begin = needed;
-  if (length > max_header) throw UnsupportedFormat("This NumPy file's header is too long");
+  if (length > max_header) throw UnsupportedFormat("NumPy header too long");
   needed += length;
   if (!take()) return false;
 
@@ -139,17 +139,17 @@ void NpyDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   if (left_ > 0) {
     rest_.assign(bytes.begin(), bytes.end());
   } else if (!bytes.empty() && !after_end_) {
-    corruption_.note(position_, "bytes after the last event");
+    corruption_.note(position_, "bytes after the last event of the NumPy array");
     after_end_ = true;
   }
 }
 
 void NpyDecoder::finish(Decoded& /*out*/) {
-  if (!header_read_) throw UnsupportedFormat("This NumPy file ends within its header");
+  if (!header_read_) throw UnsupportedFormat("truncated NumPy header");
   if (!rest_.empty()) {
-    corruption_.note(position_, "the last event is not whole");
+    corruption_.note(position_, "truncated last event");
   } else if (left_ > 0 && header_.count != npy_unknown_count) {
-    corruption_.note(position_, "there are fewer events than the header says");
+    corruption_.note(position_, "fewer events than the NumPy header says");
   }
 }
 
@@ -180,7 +180,7 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
     if (t && x && y && p) {
       validator_.take(*t, *x, *y, *p > 0, out.events, corruption_);
     } else {
-      corruption_.note(position_, "a number is out of range");
+      corruption_.note(position_, "number out of range");
     }
   }
 }

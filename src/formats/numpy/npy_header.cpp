@@ -74,9 +74,7 @@ class Literal {
     if (!rest_.empty()) fail();
   }
 
-  [[noreturn]] static void fail() {
-    throw UnsupportedFormat("This NumPy file's header is not of a structured array");
-  }
+  [[noreturn]] static void fail() { throw UnsupportedFormat("not a structured NumPy array"); }
 
  private:
   void skip_blanks() {
@@ -98,8 +96,7 @@ Type read_type(std::string_view text) {
   if (text.size() < 3) Literal::fail();
   Literal size(text.substr(2));
   const auto number = size.integer();
-  if (number > max_element_bytes)
-    throw UnsupportedFormat("This NumPy file's elements are too large");
+  if (number > max_element_bytes) throw UnsupportedFormat("NumPy array elements too large");
   // A character of a string of U has four bytes.
   return {text[0], text[1], static_cast<std::uint32_t>(number) * (text[1] == 'U' ? 4 : 1)};
 }
@@ -150,8 +147,7 @@ void read_fields(Literal& literal, NpyHeader& header) {
     }
     literal.expect(',');
     if (!literal.starts_with_string())
-      throw UnsupportedFormat(
-          "This NumPy file's fields have fields of their own, which is not read");
+      throw UnsupportedFormat("unsupported NumPy fields with fields of their own");
     const auto type = read_type(literal.string());
     std::uint64_t bytes = type.bytes;
     bool one = true;
@@ -160,7 +156,7 @@ void read_fields(Literal& literal, NpyHeader& header) {
       while (!literal.take(')')) {
         const auto extent = literal.integer();
         if (extent > max_element_bytes || (bytes *= extent) > max_element_bytes)
-          throw UnsupportedFormat("This NumPy file's elements are too large");
+          throw UnsupportedFormat("NumPy array elements too large");
         if (!literal.take(',')) {
           literal.expect(')');
           break;
@@ -174,13 +170,13 @@ void read_fields(Literal& literal, NpyHeader& header) {
       const auto index = static_cast<std::size_t>(*column);
       const auto number = one ? number_of(type, header.element_bytes) : std::nullopt;
       if (!number || known[index])
-        throw UnsupportedFormat("This NumPy file's field '" + std::string(name) +
+        throw UnsupportedFormat("NumPy field '" + std::string(name) +
                                 "' is not a number of 8 to 64 bits");
       header.fields[index] = *number;
       known[index] = true;
     }
     if (header.element_bytes + bytes > max_element_bytes)
-      throw UnsupportedFormat("This NumPy file's elements are too large");
+      throw UnsupportedFormat("NumPy array elements too large");
     header.element_bytes += static_cast<std::uint32_t>(bytes);
     if (!literal.take(',')) {
       literal.expect(']');
@@ -188,7 +184,7 @@ void read_fields(Literal& literal, NpyHeader& header) {
     }
   }
   for (const bool is_known : known)
-    if (!is_known) throw UnsupportedFormat("This NumPy file's array has no fields t, x, y and p");
+    if (!is_known) throw UnsupportedFormat("no fields t, x, y and p in the NumPy array");
 }
 
 }  // namespace
@@ -205,21 +201,18 @@ NpyHeader read_npy_header(std::string_view dictionary) {
     if (key == "descr" && !has_fields) {
       if (literal.starts_with_string())
         throw UnsupportedFormat(
-            "This NumPy file has an array of single numbers; a structured array of x, y, t and p "
-            "is read");
+            "NumPy array of plain numbers; a structured array of x, y, t and p is needed");
       read_fields(literal, header);
       has_fields = true;
     } else if (key == "fortran_order") {
       literal.boolean();  // in one dimension both orders are the same
     } else if (key == "shape" && !has_shape) {
       literal.expect('(');
-      if (literal.take(')'))
-        throw UnsupportedFormat("This NumPy file has no array of one dimension");
-      header.count = literal.integer();
+      has_shape = !literal.take(')');
+      if (has_shape) header.count = literal.integer();
       literal.take(',');
-      if (!literal.take(')'))
-        throw UnsupportedFormat("This NumPy file has no array of one dimension");
-      has_shape = true;
+      if (!has_shape || !literal.take(')'))
+        throw UnsupportedFormat("the NumPy array must have one dimension");
     } else {
       Literal::fail();
     }

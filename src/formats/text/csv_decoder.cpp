@@ -183,7 +183,7 @@ void CsvDecoder::read_head() {
     if (!header && !is_comment(line)) samples.push_back(line);
   }
   if (!empty && text.size() == head_.size())
-    throw UnsupportedFormat("This is not text of events: no line ends");
+    throw UnsupportedFormat("not CSV events: no line ends");
 
   if (settings_.size != SensorSize{}) size_ = settings_.size;
   validator_.set_size(size_);
@@ -238,8 +238,7 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   const auto known =
       std::ranges::count_if(columns_, [](auto column) { return column.has_value(); });
   if (known < 4 && !settings_.order)
-    throw UnsupportedFormat(
-        "This is not text of events: its first line names no columns t, x, y and p. Set the order");
+    throw UnsupportedFormat("no columns t, x, y and p in the first line");
   return true;
 }
 
@@ -283,8 +282,7 @@ void CsvDecoder::find_columns(const std::vector<std::string_view>& samples) {
   };
   if (!columns_.empty()) {
     if (!samples.empty() && times_of(columns_, 0).empty())
-      throw UnsupportedFormat(
-          "This is not text of events: its lines do not have the columns expected");
+      throw UnsupportedFormat("not CSV events: no line has the expected columns");
     return;
   }
 
@@ -314,8 +312,8 @@ void CsvDecoder::find_columns(const std::vector<std::string_view>& samples) {
     return;
   }
   throw UnsupportedFormat(
-      "This is not text of events, or its columns cannot be told from its first lines: set the "
-      "order");
+      "not CSV events, or an unknown column order; name the columns t, x, y and p in the first "
+      "line");
 }
 
 void CsvDecoder::find_unit(const std::vector<std::string_view>& samples) {
@@ -334,7 +332,7 @@ void CsvDecoder::read_text(std::string_view text, Decoded& out) {
     const auto end = text.find('\n');
     const auto part = text.substr(0, end);
     if (!skipping_ && rest_.size() + part.size() > max_line) {
-      corruption_.note(position_, "a line is too long");
+      corruption_.note(position_, "line too long");
       position_ += rest_.size();
       rest_.clear();
       skipping_ = true;
@@ -358,7 +356,7 @@ void CsvDecoder::read_text(std::string_view text, Decoded& out) {
     text.remove_prefix(static_cast<std::size_t>(read_lines(begin, begin + last + 1, out) - begin));
   }
   if (text.size() > max_line) {
-    corruption_.note(position_, "a line is too long");
+    corruption_.note(position_, "line too long");
     position_ += text.size();
     skipping_ = true;
   } else {
@@ -384,7 +382,7 @@ const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out
         static_cast<const char*>(std::memchr(at, '\n', static_cast<std::size_t>(end - at)));
     const std::string_view line(at, static_cast<std::size_t>(line_end - at));
     if (line.size() > max_line) {
-      corruption_.note(position_, "a line is too long");
+      corruption_.note(position_, "line too long");
     } else {
       read_line(line, out);
     }
@@ -446,7 +444,7 @@ void CsvDecoder::read_line(std::string_view line, Decoded& out) {
   const auto count = split(line, fields);
   const auto row = read_row(std::span(fields).first(count), columns_, power_);
   if (!row) {
-    corruption_.note(position_, "a line is no event");
+    corruption_.note(position_, "line without an event");
     return;
   }
   validator_.take(row->t.value, row->x, row->y, row->on, out.events, corruption_);
