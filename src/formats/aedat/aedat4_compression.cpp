@@ -32,16 +32,17 @@ bool begins_compressed(Aedat4Compression compression, std::span<const std::uint8
                                   (is_lz4(compression) ? lz4_magic : zstd_magic);
 }
 
-void Aedat4Decompressor::Deleter::operator()(LZ4F_dctx_s* context) const {
+void Aedat4CompressionDeleter::operator()(LZ4F_dctx_s* context) const {
   LZ4F_freeDecompressionContext(context);
 }
 
-void Aedat4Decompressor::Deleter::operator()(ZSTD_DCtx_s* context) const {
+void Aedat4CompressionDeleter::operator()(ZSTD_DCtx_s* context) const {
   ZSTD_freeDCtx(context);
 }
 
-Aedat4Decompressor::Aedat4Decompressor() = default;
-Aedat4Decompressor::~Aedat4Decompressor() = default;
+void Aedat4CompressionDeleter::operator()(ZSTD_CCtx_s* context) const {
+  ZSTD_freeCCtx(context);
+}
 
 std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress(
     Aedat4Compression compression, std::span<const std::uint8_t> payload, std::size_t limit) {
@@ -88,7 +89,7 @@ std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress_zstd(
   if (!zstd_) throw std::bad_alloc();
   if (content_.empty()) grow(limit);
   // In one go, so that the content is its own window: the stream decoder would allocate one as
-  // large as the frame claims. Where the content is larger than we thought we begin again.
+  // large as the frame claims. Starts over where the content is larger than expected.
   while (true) {
     const auto size =
         ZSTD_decompressDCtx(zstd_.get(), content_.data(), content_.size(), payload.data(), used);
@@ -106,10 +107,6 @@ bool Aedat4Decompressor::grow(std::size_t limit) {
   return true;
 }
 
-void Aedat4Compressor::Deleter::operator()(ZSTD_CCtx_s* context) const {
-  ZSTD_freeCCtx(context);
-}
-
 Aedat4Compressor::Aedat4Compressor(Aedat4Compression compression) : compression_(compression) {
   if (compression != Aedat4Compression::zstd && compression != Aedat4Compression::zstd_high) return;
   zstd_.reset(ZSTD_createCCtx());
@@ -118,8 +115,6 @@ Aedat4Compressor::Aedat4Compressor(Aedat4Compression compression) : compression_
       zstd_.get(), ZSTD_c_compressionLevel,
       compression == Aedat4Compression::zstd ? ZSTD_CLEVEL_DEFAULT : zstd_high_level);
 }
-
-Aedat4Compressor::~Aedat4Compressor() = default;
 
 void Aedat4Compressor::compress(std::span<const std::uint8_t> content,
                                 std::vector<std::uint8_t>& out) {

@@ -15,14 +15,16 @@ struct ZSTD_CCtx_s;
 
 namespace eventcamera {
 
+/// Frees what lz4 and zstd work with.
+struct Aedat4CompressionDeleter {
+  void operator()(LZ4F_dctx_s* context) const;
+  void operator()(ZSTD_DCtx_s* context) const;
+  void operator()(ZSTD_CCtx_s* context) const;
+};
+
 /// Undoes the compression of a packet. Memory follows what comes out, never what the bytes claim.
 class Aedat4Decompressor {
  public:
-  Aedat4Decompressor();
-  ~Aedat4Decompressor();
-  Aedat4Decompressor(const Aedat4Decompressor&) = delete;
-  Aedat4Decompressor& operator=(const Aedat4Decompressor&) = delete;
-
   struct Content {
     std::span<const std::uint8_t> bytes;  ///< valid until the next call
     std::size_t used;                     ///< how many bytes of the payload made them
@@ -42,12 +44,8 @@ class Aedat4Decompressor {
   std::optional<Content> decompress_zstd(std::span<const std::uint8_t> payload, std::size_t limit);
   bool grow(std::size_t limit);
 
-  struct Deleter {
-    void operator()(LZ4F_dctx_s* context) const;
-    void operator()(ZSTD_DCtx_s* context) const;
-  };
-  std::unique_ptr<LZ4F_dctx_s, Deleter> lz4_;
-  std::unique_ptr<ZSTD_DCtx_s, Deleter> zstd_;
+  std::unique_ptr<LZ4F_dctx_s, Aedat4CompressionDeleter> lz4_;
+  std::unique_ptr<ZSTD_DCtx_s, Aedat4CompressionDeleter> zstd_;
   std::vector<std::uint8_t> content_;
 };
 
@@ -55,19 +53,13 @@ class Aedat4Decompressor {
 class Aedat4Compressor {
  public:
   explicit Aedat4Compressor(Aedat4Compression compression);
-  ~Aedat4Compressor();
-  Aedat4Compressor(const Aedat4Compressor&) = delete;
-  Aedat4Compressor& operator=(const Aedat4Compressor&) = delete;
 
   /// Appends `content`, compressed, to `out`.
   void compress(std::span<const std::uint8_t> content, std::vector<std::uint8_t>& out);
 
  private:
-  struct Deleter {
-    void operator()(ZSTD_CCtx_s* context) const;
-  };
   Aedat4Compression compression_;
-  std::unique_ptr<ZSTD_CCtx_s, Deleter> zstd_;
+  std::unique_ptr<ZSTD_CCtx_s, Aedat4CompressionDeleter> zstd_;
 };
 
 /// Whether `bytes` begin like a frame of `compression`, which is not `none`.

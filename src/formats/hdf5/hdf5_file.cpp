@@ -10,162 +10,131 @@
 #include <memory>
 #include <stdexcept>
 #include <system_error>
-#include <type_traits>
 
 namespace eventcamera {
 
 namespace {
 
-/// Lets the HDF5 library reach the bytes of a file through a Storage: a few pointers, copied, that
-/// have name, features (H5FD_FEAT_*), is_writable, size(), read(), write() and truncate().
-template <class Storage>
-class Hdf5Driver {
-  static_assert(std::is_trivially_copyable_v<Storage>);
-
- public:
-  /// With these properties of access the library opens a file that lies there. Empty where it
-  /// cannot.
-  static Hdf5Handle access_to(const Storage& storage) {
-    static const H5FD_class_t driver = make();
-    static const hid_t id = H5FDregister(&driver);
-    Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    if (id < 0 || H5Pset_driver(access.get(), id, &storage) < 0) return {};
-    return access;
-  }
-
- private:
-  /// What the library knows of an open file.
-  struct File : H5FD_t {
-    explicit File(const Storage& of) : H5FD_t(), storage(of) {}
-
-    Storage storage;
-    haddr_t end = 0;  ///< of what the library takes to be in use
-  };
-
-  static File& file_of(H5FD_t* file) { return *static_cast<File*>(file); }
-  static const File& file_of(const H5FD_t* file) { return *static_cast<const File*>(file); }
-
-  static H5FD_t* open(const char* /*name*/, unsigned flags, hid_t access, haddr_t /*most*/) {
-    if ((flags & H5F_ACC_RDWR) != 0 && !Storage::is_writable) return nullptr;
-    const auto* const storage = static_cast<const Storage*>(H5Pget_driver_info(access));
-    return storage == nullptr ? nullptr : std::make_unique<File>(*storage).release();
-  }
-
-  static herr_t close(H5FD_t* file) {
-    const std::unique_ptr<File> last(&file_of(file));
-    return 0;
-  }
-
-  static herr_t tell_features(const H5FD_t* /*file*/, unsigned long* flags) {
-    if (flags != nullptr) *flags = Storage::features;
-    return 0;
-  }
-
-  static haddr_t end_in_use(const H5FD_t* file, H5FD_mem_t /*type*/) { return file_of(file).end; }
-
-  static herr_t set_end_in_use(H5FD_t* file, H5FD_mem_t /*type*/, haddr_t end) {
-    file_of(file).end = end;
-    return 0;
-  }
-
-  static haddr_t end_of_file(const H5FD_t* file, H5FD_mem_t /*type*/) {
-    return file_of(file).storage.size();
-  }
-
-  static herr_t read(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t position,
-                     std::size_t bytes, void* out) {
-    return file_of(file).storage.read(position, {static_cast<std::uint8_t*>(out), bytes}) ? 0 : -1;
-  }
-
-  static herr_t write(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t position,
-                      std::size_t bytes, const void* from) {
-    const std::span written(static_cast<const std::uint8_t*>(from), bytes);
-    return file_of(file).storage.write(position, written) ? 0 : -1;
-  }
-
-  static herr_t truncate(H5FD_t* file, hid_t /*transfer*/, hbool_t /*closing*/) {
-    file_of(file).storage.truncate(file_of(file).end);
-    return 0;
-  }
-
-  static H5FD_class_t make() {
-    H5FD_class_t driver = {};
-#ifdef H5FD_CLASS_VERSION
-    driver.version = H5FD_CLASS_VERSION;
-#endif
-    driver.name = Storage::name;
-    driver.maxaddr = INT64_MAX;
-    driver.fc_degree = H5F_CLOSE_STRONG;
-    driver.fapl_size = sizeof(Storage);
-    driver.open = open;
-    driver.close = close;
-    driver.query = tell_features;
-    driver.get_eoa = end_in_use;
-    driver.set_eoa = set_end_in_use;
-    driver.get_eof = end_of_file;
-    driver.read = read;
-    driver.write = write;
-    driver.truncate = truncate;
-    return driver;
-  }
+/// Where the bytes of a file are: in one of these.
+struct Storage {
+  ByteSource* input = nullptr;
+  Hdf5Output* output = nullptr;
 };
 
-/// A file that is only read.
-struct InputStorage {
-  static constexpr const char* name = "eventcamera";
-  static constexpr bool is_writable = false;
-  /// The library reads its small structures, and the data, in larger pieces.
-  static constexpr unsigned long features =
-      H5FD_FEAT_ACCUMULATE_METADATA_READ | H5FD_FEAT_DATA_SIEVE;
+/// What the library knows of an open file.
+struct File : H5FD_t {
+  explicit File(const Storage& of) : H5FD_t(), storage(of) {}
 
-  std::uint64_t size() const { return source->size(); }
-
-  bool read(std::uint64_t position, std::span<std::uint8_t> out) const {
-    const auto size = source->size();
-    if (position > size || out.size() > size - position) return false;
-    return source->read(position, out);
-  }
-
-  static bool write(std::uint64_t /*position*/, std::span<const std::uint8_t> /*bytes*/) {
-    return false;
-  }
-
-  static void truncate(std::uint64_t /*size*/) {}
-
-  ByteSource* source;
+  Storage storage;
+  haddr_t end = 0;  ///< of what the library takes to be in use
 };
 
-/// A file that is written.
-struct OutputStorage {
-  static constexpr const char* name = "eventcamera output";
-  static constexpr bool is_writable = true;
-  /// The library gathers what is small.
-  static constexpr unsigned long features = H5FD_FEAT_AGGREGATE_METADATA |
-                                            H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
-                                            H5FD_FEAT_AGGREGATE_SMALLDATA;
+File& file_of(H5FD_t* file) {
+  return *static_cast<File*>(file);
+}
+const File& file_of(const H5FD_t* file) {
+  return *static_cast<const File*>(file);
+}
 
-  std::uint64_t size() const { return output->size(); }
+H5FD_t* open_file(const char* /*name*/, unsigned flags, hid_t access, haddr_t /*max_size*/) {
+  const auto* const storage = static_cast<const Storage*>(H5Pget_driver_info(access));
+  const bool writes = (flags & H5F_ACC_RDWR) != 0;
+  if (storage == nullptr || (writes && storage->output == nullptr)) return nullptr;
+  return std::make_unique<File>(*storage).release();
+}
 
-  bool read(std::uint64_t position, std::span<std::uint8_t> out) const {
+herr_t close_file(H5FD_t* file) {
+  const std::unique_ptr<File> last(&file_of(file));
+  return 0;
+}
+
+/// The library reads its small structures, and the data, in larger pieces, and gathers what is
+/// small before it writes.
+herr_t query_features(const H5FD_t* file, unsigned long* flags) {
+  if (flags == nullptr) return 0;
+  *flags = file != nullptr && file_of(file).storage.output != nullptr
+               ? H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA |
+                     H5FD_FEAT_DATA_SIEVE | H5FD_FEAT_AGGREGATE_SMALLDATA
+               : H5FD_FEAT_ACCUMULATE_METADATA_READ | H5FD_FEAT_DATA_SIEVE;
+  return 0;
+}
+
+haddr_t end_in_use(const H5FD_t* file, H5FD_mem_t /*type*/) {
+  return file_of(file).end;
+}
+
+herr_t set_end_in_use(H5FD_t* file, H5FD_mem_t /*type*/, haddr_t end) {
+  file_of(file).end = end;
+  return 0;
+}
+
+haddr_t end_of_file(const H5FD_t* file, H5FD_mem_t /*type*/) {
+  const auto& [input, output] = file_of(file).storage;
+  return output != nullptr ? output->size() : input->size();
+}
+
+herr_t read_file(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t position,
+                 std::size_t bytes, void* to) {
+  const auto& [input, output] = file_of(file).storage;
+  const std::span out(static_cast<std::uint8_t*>(to), bytes);
+  if (output != nullptr) {
     output->read(position, out);
-    return true;
+    return 0;
   }
+  const auto size = input->size();
+  const bool inside = position <= size && bytes <= size - position;
+  return inside && input->read(position, out) ? 0 : -1;
+}
 
-  bool write(std::uint64_t position, std::span<const std::uint8_t> bytes) const {
-    output->write(position, bytes);
-    return true;
-  }
+herr_t write_file(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t position,
+                  std::size_t bytes, const void* from) {
+  auto* const output = file_of(file).storage.output;
+  if (output == nullptr) return -1;
+  output->write(position, {static_cast<const std::uint8_t*>(from), bytes});
+  return 0;
+}
 
-  void truncate(std::uint64_t size) const { output->truncate(size); }
+herr_t truncate_file(H5FD_t* file, hid_t /*transfer*/, hbool_t /*closing*/) {
+  const auto& opened = file_of(file);
+  if (opened.storage.output != nullptr) opened.storage.output->truncate(opened.end);
+  return 0;
+}
 
-  Hdf5Output* output;
-};
+H5FD_class_t make_driver() {
+  H5FD_class_t driver = {};
+#ifdef H5FD_CLASS_VERSION
+  driver.version = H5FD_CLASS_VERSION;
+#endif
+  driver.name = "eventcamera";
+  driver.maxaddr = INT64_MAX;
+  driver.fc_degree = H5F_CLOSE_STRONG;
+  driver.fapl_size = sizeof(Storage);
+  driver.open = open_file;
+  driver.close = close_file;
+  driver.query = query_features;
+  driver.get_eoa = end_in_use;
+  driver.set_eoa = set_end_in_use;
+  driver.get_eof = end_of_file;
+  driver.read = read_file;
+  driver.write = write_file;
+  driver.truncate = truncate_file;
+  return driver;
+}
+
+/// Properties with which the library opens a file in `storage`. Empty where it cannot.
+Hdf5Handle access_to(const Storage& storage) {
+  static const H5FD_class_t driver = make_driver();
+  static const hid_t id = H5FDregister(&driver);
+  Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  if (id < 0 || H5Pset_driver(access.get(), id, &storage) < 0) return {};
+  return access;
+}
 
 }  // namespace
 
 Hdf5Handle open_hdf5(ByteSource& source) {
   const Hdf5Session session;
-  const auto access = Hdf5Driver<InputStorage>::access_to({&source});
+  const auto access = access_to({.input = &source});
   if (!access) return {};
   return {H5Fopen("events", H5F_ACC_RDONLY, access.get()), H5Fclose};
 }
@@ -188,7 +157,7 @@ Hdf5Output::~Hdf5Output() {
 
 Hdf5Handle Hdf5Output::create() {
   const Hdf5Session session;
-  const auto access = Hdf5Driver<OutputStorage>::access_to({this});
+  const auto access = access_to({.output = this});
   if (!access) return {};
   return {H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
 }

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::uint64_t block_rows = 16384;
 constexpr int max_side = 65536;
+constexpr std::size_t columns = 4;  // t, x, y and p
 
 std::uint64_t block_end(std::uint64_t row, std::uint64_t rows) {
   return std::min(rows, (row / block_rows + 1) * block_rows);
@@ -44,7 +45,7 @@ SensorSize read_geometry(std::string_view text) {
   return size;
 }
 
-/// Finding the position takes long, and only the first is told.
+/// Finding the position takes long, and only the first is reported.
 void note(Corruption& corruption, const Hdf5Dataset& dataset, std::uint64_t row, const char* what) {
   corruption.note(corruption.places == 0 ? dataset.position(row) : 0, what);
 }
@@ -57,12 +58,10 @@ SensorSize size_of_attributes(hid_t object) {
   return {static_cast<int>(*width), static_cast<int>(*height)};
 }
 
-/// Layouts with a row of plain numbers for an event.
+/// Layouts whose events are plain numbers.
 class NumberTable : public Hdf5Table {
  public:
-  SensorSize size() const override { return size_; }
-  std::uint64_t rows() const override { return rows_; }
-  std::uint64_t claimed_rows() const override { return claimed_rows_; }
+  using Hdf5Table::Hdf5Table;
 
   std::uint64_t read(std::uint64_t row, EventValidator& validator, std::vector<AbsoluteEvent>& out,
                      Corruption& corruption) override {
@@ -126,8 +125,6 @@ class NumberTable : public Hdf5Table {
   /// What the laps of a clock of 32 bits have added up to before a row.
   virtual Microseconds lap_of(std::uint64_t /*row*/) { return 0; }
 
-  SensorSize size_;
-  std::uint64_t rows_ = 0, claimed_rows_ = 0;
   Microseconds offset_ = 0;
   bool wraps_ = false;  ///< times are of 32 bits and start again after 71 minutes
   std::vector<std::int64_t> t_, x_, y_, p_;
@@ -141,7 +138,8 @@ class NumberTable : public Hdf5Table {
 class DsecTable final : public NumberTable {
  public:
   explicit DsecTable(hid_t file)
-      : columns_{{Hdf5Dataset(file, "events/t"), Hdf5Dataset(file, "events/x"),
+      : NumberTable(Hdf5Layout::dsec),
+        columns_{{Hdf5Dataset(file, "events/t"), Hdf5Dataset(file, "events/x"),
                   Hdf5Dataset(file, "events/y"), Hdf5Dataset(file, "events/p")}} {
     rows_ = columns_[0].rows();
     for (auto& column : columns_) {
@@ -174,8 +172,6 @@ class DsecTable final : public NumberTable {
       size_ = size_of_attributes(events.get());
     }
   }
-
-  Hdf5Layout layout() const override { return Hdf5Layout::dsec; }
 
   std::uint64_t row_before(Microseconds t) override {
     Microseconds since = 0;
@@ -230,31 +226,22 @@ class DsecTable final : public NumberTable {
     return static_cast<std::uint64_t>(row[0]);
   }
 
-  std::array<Hdf5Dataset, 4> columns_;  ///< t, x, y, p
-  std::optional<Hdf5Dataset> index_;    ///< by millisecond, the first event at or after it
+  std::array<Hdf5Dataset, columns> columns_;  ///< t, x, y, p
+  std::optional<Hdf5Dataset> index_;          ///< by millisecond, the first event at or after it
 };
 
-class V2eTable final : public NumberTable {
+/// v2e's layout, and Metavision's where it is not compressed.
+class RowTable final : public NumberTable {
  public:
-  explicit V2eTable(hid_t file) : events_(file, "events") {
-    if (events_.rank() != 2 || events_.columns() != columns || !events_.is_integers())
-      throw UnsupportedFormat("HDF5 dataset /events must hold rows of four integers t, x, y and p");
+  /// `events` holds t, x, y and p, of 32 bits if `wraps`.
+  RowTable(Hdf5Layout layout, Hdf5Dataset events, SensorSize size, bool wraps)
+      : NumberTable(layout), events_(std::move(events)) {
     events_.require_filters();
+    size_ = size;
     rows_ = events_.rows();
     claimed_rows_ = events_.claimed_rows();
-    wraps_ = events_.is_unsigned_32();
-    if (Hdf5Dataset::exists(file, "frame", H5O_TYPE_DATASET)) {
-      const Hdf5Handle frame(H5Dopen2(file, "frame", H5P_DEFAULT), H5Dclose);
-      const Hdf5Handle space(H5Dget_space(frame.get()), H5Sclose);
-      hsize_t extent[3] = {};  // frames, rows, columns
-      if (H5Sget_simple_extent_ndims(space.get()) == 3 &&
-          H5Sget_simple_extent_dims(space.get(), extent, nullptr) == 3 && extent[1] <= max_side &&
-          extent[2] <= max_side && extent[1] > 0 && extent[2] > 0)
-        size_ = {static_cast<int>(extent[2]), static_cast<int>(extent[1])};
-    }
+    wraps_ = wraps;
   }
-
-  Hdf5Layout layout() const override { return Hdf5Layout::v2e; }
 
  protected:
   Hdf5Dataset& t_dataset() override { return events_; }
@@ -273,45 +260,33 @@ class V2eTable final : public NumberTable {
   std::uint64_t chunk_end(std::uint64_t row) const override { return events_.chunk_end(row); }
 
  private:
-  static constexpr std::size_t columns = 4;
-
   Hdf5Dataset events_;
   std::vector<std::int64_t> numbers_;
 };
 
-class MetavisionTable final : public Hdf5Table {
+/// Metavision's layout, compressed with ECF.
+class EcfTable final : public Hdf5Table {
  public:
-  explicit MetavisionTable(hid_t file) : events_(file, "CD/events") {
-    if (events_.rank() != 1) throw UnsupportedFormat("HDF5 dataset /CD/events must hold rows");
-    constexpr const char* members[] = {"t", "x", "y", "p"};
-    events_.choose(members);
-    compressed_ = events_.has_only_filter(ecf_filter);
-    if (compressed_) {
-      step_ = events_.chunk_rows();
-      if (step_ == 0 || step_ > ecf_most_events)
-        throw UnsupportedFormat("HDF5 dataset /CD/events has chunks too large for ECF");
-    } else {
-      events_.require_filters();
-    }
-    if (const auto geometry = read_text_attribute(file, "geometry"))
-      size_ = read_geometry(*geometry);
+  EcfTable(Hdf5Dataset events, SensorSize size)
+      : Hdf5Table(Hdf5Layout::metavision),
+        events_(std::move(events)),
+        chunk_rows_(events_.chunk_rows()) {
+    if (chunk_rows_ == 0 || chunk_rows_ > ecf_most_events)
+      throw UnsupportedFormat("HDF5 dataset /CD/events has chunks too large for ECF");
+    size_ = size;
+    rows_ = events_.rows();
+    claimed_rows_ = events_.claimed_rows();
   }
-
-  Hdf5Layout layout() const override { return Hdf5Layout::metavision; }
-  SensorSize size() const override { return size_; }
-  std::uint64_t rows() const override { return events_.rows(); }
-  std::uint64_t claimed_rows() const override { return events_.claimed_rows(); }
 
   std::uint64_t read(std::uint64_t row, EventValidator& validator, std::vector<AbsoluteEvent>& out,
                      Corruption& corruption) override {
-    if (!compressed_) return read_rows(row, validator, out, corruption);
-    const auto chunk = row / step_;
-    const auto end = chunk_end(chunk);
+    const auto chunk = row / chunk_rows_;
+    const auto begin = chunk * chunk_rows_;
+    const auto end = std::min(rows_, begin + chunk_rows_);
     if (!read_chunk(chunk)) {
       note(corruption, events_, row, "corrupt ECF chunk");
       return end;
     }
-    const auto begin = chunk * step_;
     if (decoded_.size() < end - begin)
       note(corruption, events_, row, "ECF chunk with too few events");
     for (auto i = row - begin; i < std::min<std::uint64_t>(decoded_.size(), end - begin); ++i) {
@@ -324,78 +299,72 @@ class MetavisionTable final : public Hdf5Table {
 
   std::uint64_t row_before(Microseconds t) override {
     // The last chunk that begins before t.
-    const auto first = first_row((rows() + step_ - 1) / step_, [&](std::uint64_t chunk) {
-      const auto time = first_time(chunk * step_);
+    const auto first = first_row((rows_ + chunk_rows_ - 1) / chunk_rows_, [&](std::uint64_t chunk) {
+      const auto time = read_stored(chunk) ? ecf_first_time(stored_) : std::nullopt;
       return time && *time < t;
     });
-    return first == 0 ? 0 : (first - 1) * step_;
+    return first == 0 ? 0 : (first - 1) * chunk_rows_;
   }
 
   std::optional<Microseconds> time_at(std::uint64_t row) override {
-    if (row >= rows()) return std::nullopt;
-    if (!compressed_) return first_time(row);
-    const auto chunk = row / step_;
-    const auto at = row - chunk * step_;
-    if (!read_chunk(chunk) || at >= decoded_.size()) return std::nullopt;
+    const auto at = row % chunk_rows_;
+    if (row >= rows_ || !read_chunk(row / chunk_rows_) || at >= decoded_.size())
+      return std::nullopt;
     return decoded_[at].t;
   }
 
  private:
-  std::uint64_t chunk_end(std::uint64_t chunk) const {
-    return std::min(rows(), (chunk + 1) * step_);
-  }
-
-  bool read_stored(std::uint64_t row) {
-    return events_.read_chunk(row, ecf_most_bytes(step_), stored_);
+  bool read_stored(std::uint64_t chunk) {
+    return events_.read_chunk(chunk * chunk_rows_, ecf_most_bytes(chunk_rows_), stored_);
   }
 
   bool read_chunk(std::uint64_t chunk) {
     decoded_.clear();
-    return read_stored(chunk * step_) && decode_ecf(stored_, decoded_);
-  }
-
-  std::optional<Microseconds> first_time(std::uint64_t row) {
-    if (compressed_) return read_stored(row) ? ecf_first_time(stored_) : std::nullopt;
-    if (!events_.read(row, 1, numbers_)) return std::nullopt;
-    return numbers_[0];
-  }
-
-  std::uint64_t read_rows(std::uint64_t row, EventValidator& validator,
-                          std::vector<AbsoluteEvent>& out, Corruption& corruption) {
-    auto end = block_end(row, rows());
-    bool is_read = events_.read(row, end - row, numbers_);
-    if (!is_read) {
-      end = std::min(end, events_.chunk_end(row));
-      is_read = events_.read(row, end - row, numbers_);
-    }
-    if (!is_read) {
-      note(corruption, events_, row, "unreadable part of an HDF5 dataset");
-      return end;
-    }
-    for (std::size_t i = 0; i < numbers_.size(); i += 4)
-      validator.take(numbers_[i], numbers_[i + 1], numbers_[i + 2], numbers_[i + 3] > 0, out,
-                     corruption);
-    return end;
+    return read_stored(chunk) && decode_ecf(stored_, decoded_);
   }
 
   Hdf5Dataset events_;
-  bool compressed_ = false;
-  std::uint64_t step_ = block_rows;  ///< rows that are read at once
-  SensorSize size_;
+  std::uint64_t chunk_rows_;
   std::vector<std::uint8_t> stored_;
   std::vector<AbsoluteEvent> decoded_;
-  std::vector<std::int64_t> numbers_;
 };
+
+std::unique_ptr<Hdf5Table> open_v2e(hid_t file) {
+  Hdf5Dataset events(file, "events");
+  if (events.rank() != 2 || events.columns() != columns || !events.is_integers())
+    throw UnsupportedFormat("HDF5 dataset /events must hold rows of four integers t, x, y and p");
+  SensorSize size;
+  if (Hdf5Dataset::exists(file, "frame", H5O_TYPE_DATASET)) {
+    const Hdf5Handle frame(H5Dopen2(file, "frame", H5P_DEFAULT), H5Dclose);
+    const Hdf5Handle space(H5Dget_space(frame.get()), H5Sclose);
+    hsize_t extent[3] = {};  // frames, rows, columns
+    if (H5Sget_simple_extent_ndims(space.get()) == 3 &&
+        H5Sget_simple_extent_dims(space.get(), extent, nullptr) == 3 && extent[1] <= max_side &&
+        extent[2] <= max_side && extent[1] > 0 && extent[2] > 0)
+      size = {static_cast<int>(extent[2]), static_cast<int>(extent[1])};
+  }
+  const bool wraps = events.is_unsigned_32();
+  return std::make_unique<RowTable>(Hdf5Layout::v2e, std::move(events), size, wraps);
+}
+
+std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
+  Hdf5Dataset events(file, "CD/events");
+  if (events.rank() != 1) throw UnsupportedFormat("HDF5 dataset /CD/events must hold rows");
+  constexpr const char* members[] = {"t", "x", "y", "p"};
+  events.choose(members);
+  const auto size = read_geometry(read_text_attribute(file, "geometry").value_or(""));
+  if (events.has_only_filter(ecf_filter))
+    return std::make_unique<EcfTable>(std::move(events), size);
+  return std::make_unique<RowTable>(Hdf5Layout::metavision, std::move(events), size, false);
+}
 
 }  // namespace
 
 std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file) {
-  if (Hdf5Dataset::exists(file, "CD/events", H5O_TYPE_DATASET))
-    return std::make_unique<MetavisionTable>(file);
+  if (Hdf5Dataset::exists(file, "CD/events", H5O_TYPE_DATASET)) return open_metavision(file);
   if (Hdf5Dataset::exists(file, "events/t", H5O_TYPE_DATASET))
     return std::make_unique<DsecTable>(file);
-  if (Hdf5Dataset::exists(file, "events", H5O_TYPE_DATASET))
-    return std::make_unique<V2eTable>(file);
+  if (Hdf5Dataset::exists(file, "events", H5O_TYPE_DATASET)) return open_v2e(file);
   throw UnsupportedFormat(
       "unknown HDF5 layout: no /events/t (DSEC), /events (v2e) or /CD/events (Metavision)");
 }

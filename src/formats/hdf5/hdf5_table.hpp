@@ -22,13 +22,13 @@ class Hdf5Table {
   /// Throws UnsupportedFormat where the file has no layout that is known, or is wrong in its own.
   static std::unique_ptr<Hdf5Table> open(hid_t file);
 
-  virtual Hdf5Layout layout() const = 0;
-  virtual SensorSize size() const = 0;
-  virtual std::uint64_t rows() const = 0;
-  virtual std::uint64_t claimed_rows() const = 0;
+  Hdf5Layout layout() const { return layout_; }
+  SensorSize size() const { return size_; }
+  std::uint64_t rows() const { return rows_; }
+  std::uint64_t claimed_rows() const { return claimed_rows_; }
 
-  /// Reads a bounded number of rows from `row` on, and returns the row behind them. What is
-  /// corrupt is noted and left out.
+  /// Reads a bounded number of rows from `row` on, and returns the row after them. What is corrupt
+  /// is noted and left out.
   virtual std::uint64_t read(std::uint64_t row, EventValidator& validator,
                              std::vector<AbsoluteEvent>& out, Corruption& corruption) = 0;
 
@@ -38,7 +38,11 @@ class Hdf5Table {
   virtual std::optional<Microseconds> time_at(std::uint64_t row) = 0;
 
  protected:
-  Hdf5Table() = default;
+  explicit Hdf5Table(Hdf5Layout layout) : layout_(layout) {}
+
+  Hdf5Layout layout_;
+  SensorSize size_;
+  std::uint64_t rows_ = 0, claimed_rows_ = 0;
 };
 
 /// The triggers of Metavision's layout.

@@ -22,6 +22,15 @@ struct Hdf5Writer::File {
   Hdf5Handle handle;
 };
 
+/// Writes the datasets of one layout.
+class Hdf5Writer::Layout {
+ public:
+  virtual ~Layout() = default;
+  virtual void append(std::span<const AbsoluteEvent> events) = 0;
+  virtual void append(std::span<const Trigger> triggers) = 0;
+  virtual void close() = 0;
+};
+
 namespace {
 
 using Compression = Hdf5Writer::Compression;

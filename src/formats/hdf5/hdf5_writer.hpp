@@ -23,23 +23,11 @@ class Hdf5Writer {
     SensorSize size;
   };
 
-  /// What a layout is written with.
-  class Layout {
-   public:
-    virtual ~Layout() = default;
-    Layout(const Layout&) = delete;
-    Layout& operator=(const Layout&) = delete;
-    virtual void append(std::span<const AbsoluteEvent> events) = 0;
-    virtual void append(std::span<const Trigger> triggers) = 0;
-    virtual void close() = 0;
-
-   protected:
-    Layout() = default;
-  };
+  class Layout;
 
   /// Overwrites what is there.
   Hdf5Writer(const std::filesystem::path& path, const Settings& settings);
-  /// Closes the file; whoever wants to know whether that went well calls close().
+  /// Closes the file without an error; call close() to get it.
   ~Hdf5Writer();
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
