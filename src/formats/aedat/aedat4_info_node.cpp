@@ -21,11 +21,11 @@ constexpr std::array<std::pair<std::string_view, char>, 5> entities{
 std::string unescaped(std::string_view text) {
   std::string plain;
   while (!text.empty()) {
-    const auto entity = std::find_if(entities.begin(), entities.end(), [&](const auto& candidate) {
-      return text.starts_with(candidate.first);
-    });
-    plain += entity != entities.end() ? entity->second : text.front();
-    text.remove_prefix(entity != entities.end() ? entity->first.size() : 1);
+    const auto* const entity = std::ranges::find_if(
+        entities, [&](const auto& candidate) { return text.starts_with(candidate.first); });
+    const bool found = entity != entities.end();
+    plain += found ? entity->second : text.front();
+    text.remove_prefix(found ? entity->first.size() : 1);
   }
   return plain;
 }
@@ -34,12 +34,8 @@ std::string escaped(std::string_view text) {
   std::string safe;
   for (const char c : text) {
     const auto* const entity =
-        std::find_if(entities.begin(), entities.end(),
-                     [&](const auto& candidate) { return candidate.second == c; });
-    if (entity != entities.end())
-      safe += entity->first;
-    else
-      safe += c;
+        std::ranges::find(entities, c, &std::pair<std::string_view, char>::second);
+    safe += entity != entities.end() ? entity->first : std::string_view(&c, 1);
   }
   return safe;
 }
@@ -125,7 +121,7 @@ class XmlReader {
     named_ = id.has_value();
     if (!named_) return true;
     if (streams.size() == max_streams ||
-        std::any_of(streams.begin(), streams.end(), [&](auto& s) { return s.id == *id; }))
+        std::ranges::find(streams, *id, &Aedat4Stream::id) != streams.end())
       return false;
     info_.streams.emplace_back().id = *id;
     return true;
@@ -159,25 +155,12 @@ std::string text_attribute(const std::string& key, const std::string& value,
   return "<attr key=\"" + key + "\" type=\"" + type + "\">" + escaped(value) + "</attr>";
 }
 
-const char* name_of(Aedat4Compression compression) {
-  switch (compression) {
-    case Aedat4Compression::none:
-      return "NONE";
-    case Aedat4Compression::lz4:
-      return "LZ4";
-    case Aedat4Compression::lz4_high:
-      return "LZ4_HIGH";
-    case Aedat4Compression::zstd:
-      return "ZSTD";
-    case Aedat4Compression::zstd_high:
-      return "ZSTD_HIGH";
-  }
-  return "";
-}
+/// By Aedat4Compression.
+constexpr const char* compression_names[] = {"NONE", "LZ4", "LZ4_HIGH", "ZSTD", "ZSTD_HIGH"};
 
 struct KindText {
   Aedat4Kind kind;
-  const char* identifier;
+  std::string_view identifier;
   const char* name;
   const char* description;
 };
@@ -192,8 +175,7 @@ constexpr std::array<KindText, 4> kinds{{
 }  // namespace
 
 Aedat4Kind aedat4_kind(std::string_view identifier) {
-  const auto* const text = std::find_if(
-      kinds.begin(), kinds.end(), [&](const auto& kind) { return identifier == kind.identifier; });
+  const auto* const text = std::ranges::find(kinds, identifier, &KindText::identifier);
   return text != kinds.end() ? text->kind : Aedat4Kind::other;
 }
 
@@ -205,17 +187,16 @@ std::string write_info_node(std::span<const Aedat4Stream> streams, Aedat4Compres
   const std::string path = "/mainloop/Recorder/outInfo/";
   std::string inside;
   for (const auto& stream : streams) {
-    const auto* const text = std::find_if(
-        kinds.begin(), kinds.end(), [&](const auto& kind) { return kind.kind == stream.kind; });
+    const auto* const text = std::ranges::find(kinds, stream.kind, &KindText::kind);
     if (text == kinds.end()) continue;
     const auto id = std::to_string(stream.id);
     const auto stream_path = path + id + "/";
     inside += node(id, stream_path,
-                   text_attribute("compression", name_of(compression)) +
+                   text_attribute("compression", compression_names[static_cast<int>(compression)]) +
                        text_attribute("originalModuleName", "gst-eventsim") +
                        text_attribute("originalOutputName", text->name) +
                        text_attribute("typeDescription", text->description) +
-                       text_attribute("typeIdentifier", text->identifier) +
+                       text_attribute("typeIdentifier", std::string(text->identifier)) +
                        node("info", stream_path + "info/",
                             text_attribute("sizeX", std::to_string(stream.size.width), "int") +
                                 text_attribute("sizeY", std::to_string(stream.size.height), "int") +

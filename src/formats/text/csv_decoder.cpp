@@ -45,6 +45,12 @@ std::optional<int> read_extent(std::string_view text) {
   return static_cast<int>(number->value);
 }
 
+/// 0x0 where one of the texts is not an extent.
+SensorSize read_size(std::string_view width, std::string_view height) {
+  const SensorSize size{read_extent(width).value_or(0), read_extent(height).value_or(0)};
+  return size.width > 0 && size.height > 0 ? size : SensorSize{};
+}
+
 std::optional<bool> read_polarity(std::string_view text) {
   if (text == "1") return true;
   if (text == "0") return false;
@@ -55,17 +61,8 @@ std::optional<bool> read_polarity(std::string_view text) {
   return number->value == 1;
 }
 
-int power_of(TimeUnit unit) {
-  switch (unit) {
-    case TimeUnit::seconds:
-      return 6;
-    case TimeUnit::microseconds:
-      return 0;
-    case TimeUnit::nanoseconds:
-      return -3;
-  }
-  return 0;
-}
+/// Powers of ten from a TimeUnit to microseconds.
+constexpr int powers[] = {6, 0, -3};
 
 /// The digits that eight characters begin with, and their value.
 struct Digits {
@@ -203,19 +200,16 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   Fields fields;
   if (line.starts_with(geometry)) {
     if (split(line.substr(geometry.size()), fields) != 2) return true;
-    const auto width = read_extent(fields[0]);
-    const auto height = read_extent(fields[1]);
-    if (width && height) size_ = {*width, *height};
+    const auto size = read_size(fields[0], fields[1]);
+    if (size != SensorSize{}) size_ = size;
     return true;
   }
   if (is_comment(line)) return true;
   const auto count = split(line, fields);
   if (count == 2) {
-    const auto width = read_extent(fields[0]);
-    const auto height = read_extent(fields[1]);
-    if (!width || !height || size_ != SensorSize{}) return false;
-    size_ = {*width, *height};
-    return true;
+    if (size_ != SensorSize{}) return false;
+    size_ = read_size(fields[0], fields[1]);
+    return size_ != SensorSize{};
   }
   std::string_view first = fields[0];
   if (first.starts_with('"')) first.remove_prefix(1);
@@ -324,7 +318,7 @@ void CsvDecoder::find_unit(const std::vector<std::string_view>& samples) {
     const auto row = read_row(std::span(fields).first(count), columns_, 0);
     if (row && row->t.has_fraction) unit = TimeUnit::seconds;
   }
-  power_ = power_of(settings_.unit.value_or(unit));
+  power_ = powers[static_cast<std::size_t>(settings_.unit.value_or(unit))];
 }
 
 void CsvDecoder::read_text(std::string_view text, Decoded& out) {
