@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // EVT3: words of 16 bits, each a change of what is known of the events that follow, or some events.
 #include <algorithm>
+#include <utility>
 
 #include "src/formats/evt/words.hpp"
+#include "src/formats/time_base.hpp"
+#include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
 namespace {

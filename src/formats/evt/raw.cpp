@@ -2,7 +2,6 @@
 #include "src/formats/evt/raw.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -28,41 +27,6 @@ constexpr Name names[] = {
     {EvtFormat::evt3, "3.0", "EVT3", ""},
     {EvtFormat::evt4, "4.0", "EVT4", ""},
 };
-
-std::unique_ptr<UnitReader> make_reader(EvtFormat format, SensorSize size) {
-  switch (format) {
-    case EvtFormat::evt2:
-      return make_evt2_reader(size);
-    case EvtFormat::evt21:
-      return make_evt21_reader(Evt21Order::little, size);
-    case EvtFormat::evt21_legacy:
-      return make_evt21_reader(Evt21Order::legacy, size);
-    case EvtFormat::evt3:
-      return make_evt3_reader(size);
-    case EvtFormat::evt4:
-      return make_evt4_reader(size);
-  }
-  throw std::invalid_argument("no such EVT format");
-}
-
-std::unique_ptr<Encoder> make_encoder(EvtFormat format, SensorSize size,
-                                      const std::string& header) {
-  if (size.width < 1 || size.height < 1 || size.width > max_evt_side || size.height > max_evt_side)
-    throw std::invalid_argument("EVT words support sensors of 1x1 to 2048x2048 pixels");
-  switch (format) {
-    case EvtFormat::evt2:
-      return make_evt2_encoder(header);
-    case EvtFormat::evt21:
-      return make_evt21_encoder(Evt21Order::little, header);
-    case EvtFormat::evt21_legacy:
-      return make_evt21_encoder(Evt21Order::legacy, header);
-    case EvtFormat::evt3:
-      return make_evt3_encoder(size, header);
-    case EvtFormat::evt4:
-      return make_evt4_encoder(header);
-  }
-  throw std::invalid_argument("no such EVT format");
-}
 
 /// An option of the value of "format", such as the height in "EVT3;height=720;width=1280".
 std::string option(const std::string& format, const std::string& key) {
@@ -115,7 +79,7 @@ class RawDecoder final : public UnitDecoder {
     if (header_.ended()) {
       if (!header_.found()) throw UnsupportedFormat("not a Prophesee RAW file: no header");
       const auto size = size_of(header_);
-      begin(make_reader(format_of(header_), size), size);
+      begin(make_evt_reader(format_of(header_), size), size);
     }
     return taken;
   }
@@ -143,15 +107,15 @@ std::unique_ptr<Decoder> make_prophesee_raw_decoder() {
 }
 
 std::unique_ptr<Encoder> make_prophesee_raw_encoder(EvtFormat format, SensorSize size) {
-  return make_encoder(format, size, header_text(format, size));
+  return make_evt_encoder(format, size, header_text(format, size));
 }
 
 std::unique_ptr<Decoder> make_evt_decoder(EvtFormat format, SensorSize size) {
-  return std::make_unique<UnitDecoder>(make_reader(format, size), size);
+  return std::make_unique<UnitDecoder>(make_evt_reader(format, size), size);
 }
 
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size) {
-  return make_encoder(format, size, {});
+  return make_evt_encoder(format, size, std::string());
 }
 
 }  // namespace eventcamera

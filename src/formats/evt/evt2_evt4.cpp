@@ -1,0 +1,399 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// EVT2, EVT2.1 and EVT4, whose words are alike: an event, or a mask of 32 pixels of a row, with the
+// low bits of its time; or the high bits of the time.
+#include <algorithm>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+#include "src/formats/evt/words.hpp"
+#include "src/formats/time_base.hpp"
+#include "src/formats/word_writer.hpp"
+
+namespace eventcamera {
+namespace {
+
+/// A word of EVT2 or EVT4, or the upper half of one of EVT2.1.
+struct CdWord {
+  std::uint32_t bits;
+
+  /// `time` is cut to its low bits.
+  static constexpr CdWord at(std::uint32_t type, std::uint64_t time, std::uint32_t x,
+                             std::uint32_t y) {
+    return {type << 28 | (static_cast<std::uint32_t>(time) & 63) << 22 | (x & 0x7ff) << 11 |
+            (y & 0x7ff)};
+  }
+  /// `count` is of 64 microseconds.
+  static constexpr CdWord time_high(std::uint32_t type, std::uint64_t count) {
+    return {type << 28 | (static_cast<std::uint32_t>(count) & 0x0fffffff)};
+  }
+
+  constexpr std::uint32_t type() const { return bits >> 28; }
+  constexpr std::uint32_t count() const { return bits & 0x0fffffff; }
+  constexpr std::uint32_t time_low() const { return bits >> 22 & 63; }
+  constexpr std::uint32_t x() const { return bits >> 11 & 0x7ff; }
+  constexpr std::uint32_t y() const { return bits & 0x7ff; }
+
+  /// `time` is that of the last TIME_HIGH; the polarity is the lowest bit of the type.
+  constexpr AbsoluteEvent event(std::uint64_t time) const {
+    return {static_cast<Microseconds>(time + time_low()), static_cast<std::uint16_t>(x()),
+            static_cast<std::uint16_t>(y() | (type() & 1) << 15)};
+  }
+
+  constexpr Trigger trigger(std::uint64_t time) const {
+    return {static_cast<Microseconds>(time + time_low()),
+            static_cast<std::uint16_t>(bits >> 8 & 31), (bits & 1) != 0};
+  }
+};
+
+/// The types of words without events.
+struct CdTypes {
+  std::uint32_t time_high;
+  std::uint32_t trigger;
+  std::uint32_t ignored;  ///< a bit for each type
+};
+
+/// All that it remembers of earlier words is the time.
+template <CdTypes types>
+class CdReader : public UnitReader {
+ public:
+  State state() const override { return time_.state(); }
+  void restore(const State& state) override { time_.restore(state.clock, state.rest != 0); }
+
+ protected:
+  CdReader(SensorSize size, const char* unknown_type)
+      : bounds_(size, max_evt_side), unknown_type_(unknown_type) {}
+
+  /// Reads a word, of so many bytes, that holds no event.
+  void read_other(CdWord word, const std::uint8_t* at, std::size_t bytes, Batch& batch) {
+    if (word.type() == types.time_high) {
+      time_.follow(word.count());
+    } else if (word.type() == types.trigger) {
+      if (time_.known()) batch.triggers->push_back(word.trigger(time_.time()));
+    } else if ((types.ignored >> word.type() & 1) == 0) {
+      batch.bad(at, bytes, unknown_type_);
+    }
+  }
+
+  /// Writes the events of a mask from `word`'s pixel on, where the time is known. Counts those
+  /// outside the sensor, and returns the end of the others.
+  AbsoluteEvent* read_masked(CdWord word, std::uint32_t mask, AbsoluteEvent* events,
+                             std::uint64_t& outside) const {
+    if (!time_.known()) return events;
+    const auto valid = bounds_.of_32(word.x(), word.y());
+    outside += static_cast<std::uint64_t>(std::popcount(mask & ~valid));
+    return expand(mask & valid, word.event(time_.time()), events);
+  }
+
+  Bounds bounds_;
+  TimeBase<28, 6> time_;
+
+ private:
+  const char* unknown_type_;
+};
+
+/// Events of one time, polarity and row, within 32 pixels from `base` on.
+struct MaskedEvents {
+  std::uint32_t base;
+  std::uint32_t mask = 0;
+  std::size_t count = 0;
+};
+
+/// The first of some events, as far as one mask holds them. A sensor's words begin at multiples of
+/// 32, and hold what comes in the order of columns.
+inline MaskedEvents first_masked(std::span<const AbsoluteEvent> events) {
+  const auto& first = events.front();
+  MaskedEvents masked{.base = first.x & ~31U};
+  auto& count = masked.count;
+  do {
+    masked.mask |= std::uint32_t{1} << (events[count].x & 31);
+    ++count;
+  } while (count < events.size() && events[count].t == first.t && events[count].y_p == first.y_p &&
+           events[count].x > events[count - 1].x && events[count].x - masked.base < 32);
+  return masked;
+}
+
+/// Format::put() writes the first of some events, at most two words for each, and returns how many
+/// events that was.
+template <class Format>
+class CdEncoder final : public Encoder {
+ public:
+  explicit CdEncoder(std::string header) : Encoder(std::move(header)) {}
+
+ private:
+  using Words = WordWriter<typename Format::Word>;
+
+  static constexpr std::size_t words_at_once = 2 * events_at_once;
+  static constexpr int bits = 28;
+  static constexpr std::uint64_t max_wraps = (GapLimiter::max_gap >> (bits + 6)) + 1;
+  static constexpr std::uint64_t none = ~std::uint64_t{0};
+
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
+    const auto write = [&](std::span<const AbsoluteEvent> few, Words& words) {
+      while (!few.empty()) {
+        const auto t = few.front().t;
+        if (gaps_.written(t) >> 6 != time_high_) [[unlikely]]
+          put_time_high(t, words);
+        few = few.subspan(Format::put(few, gaps_.written(t), words));
+      }
+    };
+    write_events<typename Format::Word>(events, words_at_once, out, write);
+  }
+
+  static typename Format::Word time_high(std::uint64_t count) {
+    return Format::word(CdWord::time_high(Format::types.time_high, count));
+  }
+
+  void put_time_high(Microseconds t, Words& words) {
+    gaps_.reach(t);
+    const auto count = gaps_.written(t) >> 6;
+    const auto wraps = (count >> bits) - (time_high_ == none ? 0 : time_high_ >> bits);
+    if (wraps != 0 && wraps <= max_wraps) [[unlikely]] {
+      // Readers know a wrap by the fall from nearly the largest count to nearly zero (OpenEB allows
+      // 10 ms), so each is written out.
+      words.reserve(2 * wraps + 1 + words_at_once);
+      for (std::uint64_t i = 0; i < wraps; ++i) {
+        words.put(time_high((std::uint64_t{1} << bits) - 1));
+        words.put(time_high(0));
+      }
+    }
+    words.put(time_high(count));
+    time_high_ = count;
+  }
+
+  GapLimiter gaps_;
+  std::uint64_t time_high_ = none;
+};
+
+/// Words of 32 bits: an event, or a TIME_HIGH.
+struct Evt2 {
+  using Word = std::uint32_t;
+
+  enum Type : std::uint32_t { cd_off, cd_on, imu = 0xd, others = 0xe, continued = 0xf };
+
+  /// Events are ignored before the time is known.
+  static constexpr CdTypes types{
+      .time_high = 0x8,
+      .trigger = 0xa,
+      .ignored = 1U << cd_off | 1U << cd_on | 1U << imu | 1U << others | 1U << continued};
+
+  static constexpr Word word(CdWord word) { return word.bits; }
+
+  static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
+                         WordWriter<Word>& words) {
+    const auto& event = events.front();
+    const auto y = static_cast<std::uint32_t>(event.y());
+    words.put(CdWord::at(event.y_p >> 15, time, event.x, y).bits);
+    return 1;
+  }
+};
+
+class Evt2Reader final : public CdReader<Evt2::types> {
+ public:
+  explicit Evt2Reader(SensorSize size) : CdReader(size, "EVT2 word of unknown type") {}
+
+  const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
+                           Batch& batch) override {
+    for (; !time_.known() && to - from >= 4; from += 4)
+      read_other(CdWord{little_endian<std::uint32_t>(from)}, from, 4, batch);
+    auto* event = batch.begin();
+    const auto* const end = from + 4 * std::min((to - from) / 4, batch.full() - event);
+    const auto bounds = bounds_;
+    auto time = time_.time();
+    auto count = time_.count();
+    std::uint64_t outside = 0;
+    for (; from != end; from += 4) {
+      const CdWord word{little_endian<std::uint32_t>(from)};
+      const bool is_event = word.type() <= Evt2::cd_on;
+      const bool is_time = word.type() == Evt2::types.time_high && word.count() >= count;
+      if (!(is_event || is_time)) [[unlikely]] {
+        time_.follow(count);
+        read_other(word, from, 4, batch);
+        time = time_.time();
+        count = time_.count();
+        continue;
+      }
+      // Events and times alternate as no processor can guess, so no branch tells them apart.
+      const auto ticks = is_time ? word.count() - count : 0;
+      time += std::uint64_t{ticks} << 6;
+      count += ticks;
+      const bool inside = bounds.contain(word.x(), word.y());
+      *event = word.event(time);
+      event += static_cast<int>(is_event) & static_cast<int>(inside);
+      outside += static_cast<std::uint64_t>(static_cast<int>(is_event) & static_cast<int>(!inside));
+    }
+    if (time_.known()) time_.follow(count);
+    batch.end = event;
+    batch.outside(outside);
+    return from;
+  }
+};
+
+constexpr CdTypes evt21_types{
+    .time_high = 0x8, .trigger = 0xa, .ignored = 1U << Evt2::others | 1U << Evt2::continued};
+
+/// Words of 64 bits: the upper half as in EVT2, the lower half a mask. They are little-endian, or
+/// as Gen4.1 and IMX636 cameras have it: the upper half first, each half little-endian.
+template <EvtFormat format>
+struct Evt21 {
+  using Word = std::uint64_t;
+
+  static constexpr CdTypes types = evt21_types;
+
+  static constexpr Word in_order(Word word) {
+    return format == EvtFormat::evt21_legacy ? std::rotl(word, 32) : word;
+  }
+
+  static constexpr Word word(CdWord upper, std::uint32_t lower = 0) {
+    return in_order(std::uint64_t{upper.bits} << 32 | lower);
+  }
+
+  static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
+                         WordWriter<Word>& words) {
+    const auto& first = events.front();
+    const auto masked = first_masked(events);
+    const auto y = static_cast<std::uint32_t>(first.y());
+    words.put(word(CdWord::at(first.y_p >> 15, time, masked.base, y), masked.mask));
+    return masked.count;
+  }
+};
+
+template <EvtFormat format>
+class Evt21Reader final : public CdReader<evt21_types> {
+ public:
+  explicit Evt21Reader(SensorSize size)
+      : CdReader<evt21_types>(size, "EVT2.1 word of unknown type") {}
+
+  const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
+                           Batch& batch) override {
+    auto* event = batch.begin();
+    const auto* const full = batch.full();
+    std::uint64_t outside = 0;
+    for (; to - from >= 8 && event < full; from += 8) {
+      const auto bits = Evt21<format>::in_order(little_endian<std::uint64_t>(from));
+      const CdWord upper{static_cast<std::uint32_t>(bits >> 32)};
+      if (upper.type() <= Evt2::cd_on)
+        event = read_masked(upper, static_cast<std::uint32_t>(bits), event, outside);
+      else
+        read_other(upper, from, 8, batch);
+    }
+    batch.end = event;
+    batch.outside(outside);
+    return from;
+  }
+};
+
+/// Words of 32 bits: an event, a TIME_HIGH, or the head of a vector, whose second word is a mask.
+struct Evt4 {
+  using Word = std::uint32_t;
+
+  enum Type : std::uint32_t {
+    others = 0x6,
+    continued = 0x7,
+    cd_off = 0xa,
+    cd_on = 0xb,
+    cd_vec_off = 0xc,
+    cd_vec_on = 0xd,
+    padding = 0xf,
+  };
+
+  static constexpr CdTypes types{
+      .time_high = 0xe, .trigger = 0x9, .ignored = 1U << others | 1U << continued | 1U << padding};
+
+  static constexpr Word word(CdWord word) { return word.bits; }
+
+  static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
+                         WordWriter<Word>& words) {
+    const auto& first = events.front();
+    const auto masked = first_masked(events);
+    const std::uint32_t on = first.y_p >> 15;
+    const auto y = static_cast<std::uint32_t>(first.y());
+    // A vector is two words, as two events are.
+    if (masked.count > 2) {
+      words.put(CdWord::at(cd_vec_off + on, time, masked.base, y).bits);
+      words.put(masked.mask);
+    } else {
+      words.put(CdWord::at(cd_off + on, time, first.x, y).bits);
+      if (masked.count == 2) words.put(CdWord::at(cd_off + on, time, events[1].x, y).bits);
+    }
+    return masked.count;
+  }
+};
+
+class Evt4Reader final : public CdReader<Evt4::types> {
+ public:
+  explicit Evt4Reader(SensorSize size) : CdReader(size, "EVT4 word of unknown type") {}
+
+  const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
+                           Batch& batch) override {
+    auto* event = batch.begin();
+    const auto* const full = batch.full();
+    std::uint64_t outside = 0;
+    for (; to - from >= 4 && event < full; from += 4) {
+      const CdWord word{little_endian<std::uint32_t>(from)};
+      switch (word.type()) {
+        case Evt4::cd_off:
+        case Evt4::cd_on:
+          if (time_.known()) {
+            const bool inside = bounds_.contain(word.x(), word.y());
+            *event = word.event(time_.time());
+            event += static_cast<int>(inside);
+            outside += static_cast<std::uint64_t>(!inside);
+          }
+          continue;
+        case Evt4::cd_vec_off:
+        case Evt4::cd_vec_on:
+          // A vector is one unit, so that nothing comes between its words.
+          if (to - from < 8) break;
+          from += 4;
+          event = read_masked(word, little_endian<std::uint32_t>(from), event, outside);
+          continue;
+        default:
+          read_other(word, from, 4, batch);
+          continue;
+      }
+      break;
+    }
+    batch.end = event;
+    batch.outside(outside);
+    return from;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<UnitReader> make_evt_reader(EvtFormat format, SensorSize size) {
+  switch (format) {
+    case EvtFormat::evt2:
+      return std::make_unique<Evt2Reader>(size);
+    case EvtFormat::evt21:
+      return std::make_unique<Evt21Reader<EvtFormat::evt21>>(size);
+    case EvtFormat::evt21_legacy:
+      return std::make_unique<Evt21Reader<EvtFormat::evt21_legacy>>(size);
+    case EvtFormat::evt3:
+      return make_evt3_reader(size);
+    case EvtFormat::evt4:
+      return std::make_unique<Evt4Reader>(size);
+  }
+  throw std::invalid_argument("no such EVT format");
+}
+
+std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size, std::string header) {
+  if (size.width < 1 || size.height < 1 || size.width > max_evt_side || size.height > max_evt_side)
+    throw std::invalid_argument("EVT words support sensors of 1x1 to 2048x2048 pixels");
+  switch (format) {
+    case EvtFormat::evt2:
+      return std::make_unique<CdEncoder<Evt2>>(std::move(header));
+    case EvtFormat::evt21:
+      return std::make_unique<CdEncoder<Evt21<EvtFormat::evt21>>>(std::move(header));
+    case EvtFormat::evt21_legacy:
+      return std::make_unique<CdEncoder<Evt21<EvtFormat::evt21_legacy>>>(std::move(header));
+    case EvtFormat::evt3:
+      return make_evt3_encoder(size, std::move(header));
+    case EvtFormat::evt4:
+      return std::make_unique<CdEncoder<Evt4>>(std::move(header));
+  }
+  throw std::invalid_argument("no such EVT format");
+}
+
+}  // namespace eventcamera
