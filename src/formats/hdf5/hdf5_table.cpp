@@ -366,7 +366,7 @@ std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file) {
     return std::make_unique<DsecTable>(file);
   if (Hdf5Dataset::exists(file, "events", H5O_TYPE_DATASET)) return open_v2e(file);
   throw UnsupportedFormat(
-      "unknown HDF5 layout: no /events/t (DSEC), /events (v2e) or /CD/events (Metavision)");
+      "none of the known HDF5 layouts: /events/t (DSEC), /events (v2e), /CD/events (Metavision)");
 }
 
 Hdf5Triggers::Hdf5Triggers(hid_t file) : dataset_(file, "EXT_TRIGGER/events") {
