@@ -83,7 +83,7 @@ herr_t read_file(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t 
   }
   const auto size = input->size();
   const bool inside = position <= size && bytes <= size - position;
-  return inside && input->read(position, out) ? 0 : -1;
+  return inside && input->read(position, out) == bytes ? 0 : -1;
 }
 
 herr_t write_file(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t position,
