@@ -30,7 +30,7 @@ enum class TimeUnit : std::uint8_t { seconds, microseconds, nanoseconds };
 
 /// Makes events of the numbers in a row: one outside the sensor is dropped, one earlier than
 /// another before it is kept, and both are counted.
-class EventValidator {
+class RowValidator {
  public:
   /// 0x0 is an unknown size: all that AbsoluteEvent can hold is inside.
   void set_size(SensorSize size) {

@@ -64,7 +64,7 @@ class Hdf5Reader {
   SensorSize size_;
   std::unique_ptr<Hdf5Table> table_;
   std::unique_ptr<Hdf5Triggers> triggers_;
-  EventValidator validator_;
+  RowValidator validator_;
   Corruption corruption_;
 
   std::uint64_t row_ = 0;              ///< to be read next

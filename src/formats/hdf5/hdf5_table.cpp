@@ -63,7 +63,7 @@ class NumberTable : public Hdf5Table {
  public:
   using Hdf5Table::Hdf5Table;
 
-  std::uint64_t read(std::uint64_t row, EventValidator& validator, std::vector<AbsoluteEvent>& out,
+  std::uint64_t read(std::uint64_t row, RowValidator& validator, std::vector<AbsoluteEvent>& out,
                      Corruption& corruption) override {
     if (row != next_row_) {
       lap_ = lap_of(row);
@@ -278,7 +278,7 @@ class EcfTable final : public Hdf5Table {
     claimed_rows_ = events_.claimed_rows();
   }
 
-  std::uint64_t read(std::uint64_t row, EventValidator& validator, std::vector<AbsoluteEvent>& out,
+  std::uint64_t read(std::uint64_t row, RowValidator& validator, std::vector<AbsoluteEvent>& out,
                      Corruption& corruption) override {
     const auto chunk = row / chunk_rows_;
     const auto begin = chunk * chunk_rows_;

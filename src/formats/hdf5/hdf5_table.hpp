@@ -29,7 +29,7 @@ class Hdf5Table {
 
   /// Reads a bounded number of rows from `row` on, and returns the row after them. What is corrupt
   /// is noted and left out.
-  virtual std::uint64_t read(std::uint64_t row, EventValidator& validator,
+  virtual std::uint64_t read(std::uint64_t row, RowValidator& validator,
                              std::vector<AbsoluteEvent>& out, Corruption& corruption) = 0;
 
   /// A row with no event of time `t` or later before it, and not many before that.

@@ -34,7 +34,7 @@ class NpyDecoder final : public Decoder {
   std::uint64_t position_ = 0;      ///< of what is read next
   std::uint64_t left_ = 0;          ///< elements that the header claims and that have not come
   bool after_end_ = false;
-  EventValidator validator_;
+  RowValidator validator_;
 };
 
 }  // namespace eventcamera

@@ -79,7 +79,7 @@ class CsvDecoder final : public Decoder {
   char separator_ = ',';  ///< between the fields of the first line
   bool plain_ = false;    ///< four columns, so that most lines need not be split
   int power_ = 0;         ///< of ten, from the time's unit to microseconds
-  EventValidator validator_;
+  RowValidator validator_;
 
   std::string rest_;  ///< the beginning of a line whose end has not come
   bool skipping_ = false;
