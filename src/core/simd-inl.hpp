@@ -19,10 +19,10 @@ namespace eventcamera::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Loads a vector of which only the first `count` elements are in memory; the rest is 0.
+/// Loads a vector of which only the first `count` elements are in memory; the rest is 0. For the
+/// end of a row: too slow for all of it.
 template <class Tag, class T>
-HWY_INLINE hn::Vec<Tag> load_first(Tag tag, const T* from, int count) {
-  if (HWY_LIKELY(count >= static_cast<int>(hn::Lanes(tag)))) return hn::LoadU(tag, from);
+hn::Vec<Tag> load_first(Tag tag, const T* from, int count) {
   HWY_ALIGN T elements[hn::MaxLanes(tag)] = {};
   std::copy_n(from, count, elements);
   return hn::Load(tag, elements);

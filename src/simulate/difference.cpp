@@ -70,20 +70,23 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint
   const auto negative = in_lanes<Pixel>(pixels, thresholds.negative);
   const auto zero = hn::Zero(pixels);
   RowEvents events(y, t, out);
-  for (int x = 0; x < width; x += lanes) {
-    const auto a = load_first(pixels, before + x, width - x);
-    const auto b = load_first(pixels, now + x, width - x);
+  const auto fire = [&](int x, auto a, auto b) {
     // By how much a rise or a fall exceeds its threshold.
     const auto rise = hn::SaturatedSub(hn::SaturatedSub(b, a), positive);
     const auto fall = hn::SaturatedSub(hn::SaturatedSub(a, b), negative);
     const auto fired = hn::Ne(hn::Or(rise, fall), zero);
-    if (hn::AllFalse(pixels, fired)) continue;
+    if (hn::AllFalse(pixels, fired)) return;
     std::uint64_t fired_bits[max_vector] = {};
     std::uint64_t on_bits[max_vector] = {};
     hn::StoreMaskBits(pixels, fired, reinterpret_cast<std::uint8_t*>(fired_bits));
     hn::StoreMaskBits(pixels, hn::Ne(rise, zero), reinterpret_cast<std::uint8_t*>(on_bits));
     for (int i = 0; i * 64 < lanes; ++i) events.add(fired_bits[i], on_bits[i], x + 64 * i);
-  }
+  };
+  int x = 0;
+  for (; x + lanes <= width; x += lanes)
+    fire(x, hn::LoadU(pixels, before + x), hn::LoadU(pixels, now + x));
+  if (x < width)
+    fire(x, load_first(pixels, before + x, width - x), load_first(pixels, now + x, width - x));
   events.flush();
 }
 

@@ -123,8 +123,12 @@ struct MovingPixels {
   MovingPixels(const ImageView<Flow>& flow, int left, int row, int steps)
       : x(hn::ShiftLeft<16>(hn::Iota(Words(), left))), y(hn::Set(Words(), row << 16)) {
     const int count = std::min(static_cast<int>(hn::Lanes(Floats())), flow.width - left);
-    HWY_ALIGN float flows[2 * hn::MaxLanes(Floats())] = {};
-    std::copy_n(&flow.row(row)[left].x, 2 * count, flows);
+    const float* flows = &flow.row(row)[left].x;
+    HWY_ALIGN float tail[2 * hn::MaxLanes(Floats())] = {};
+    if (count < static_cast<int>(hn::Lanes(Floats()))) {
+      std::copy_n(flows, 2 * count, tail);
+      flows = tail;
+    }
     hn::Vec<Floats> flow_x;
     hn::Vec<Floats> flow_y;
     hn::LoadInterleaved2(Floats(), flows, flow_x, flow_y);
@@ -266,7 +270,8 @@ FlowRange flow_range(const ImageView<Flow>& flow, const Box& tile) {
   for (int y = tile.top; y < tile.bottom; ++y) {
     const float* row = &flow.row(y)[tile.left].x;
     for (int i = 0; i < count; i += lanes) {
-      const auto here = load_first(floats, row + i, count - i);
+      const auto here = HWY_LIKELY(i + lanes <= count) ? hn::LoadU(floats, row + i)
+                                                       : load_first(floats, row + i, count - i);
       // NaN counts as 0.
       const auto number = hn::IfThenElseZero(hn::Eq(here, here), here);
       lowest = hn::Min(lowest, number);

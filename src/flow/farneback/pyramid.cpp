@@ -68,14 +68,19 @@ void add_rows(const std::uint8_t* const* rows, const float* weights, int count, 
               float* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
-  for (int x = 0; x < width; x += lanes) {
+  const auto add = [&](int x, const auto& load) {
     auto sum = hn::Zero(floats);
     for (int t = 0; t < count; ++t) {
-      const auto pixels = hn::PromoteTo(Words(), load_first(Bytes(), rows[t] + x, width - x));
+      const auto pixels = hn::PromoteTo(Words(), load(rows[t] + x));
       sum = hn::Add(sum, hn::Mul(hn::Set(floats, weights[t]), hn::ConvertTo(floats, pixels)));
     }
     hn::StoreU(sum, floats, out + x);
-  }
+  };
+  int x = 0;
+  for (; x + lanes <= width; x += lanes)
+    add(x, [](const std::uint8_t* pixels) { return hn::LoadU(Bytes(), pixels); });
+  if (x < width)  // the picture is not ours: nothing past its rows may be read
+    add(x, [&](const std::uint8_t* pixels) { return load_first(Bytes(), pixels, width - x); });
 }
 
 /// out[x] = the sum of kernel[t] row[x + t], with a symmetric kernel
