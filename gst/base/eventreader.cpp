@@ -47,8 +47,8 @@ GstClockTime nanoseconds(Microseconds t) {
 }
 
 /// Where a segment begins and ends, in whole microseconds.
-Microseconds start_of(const GstSegment& segment) {
-  return static_cast<Microseconds>(segment.start / GST_USECOND);
+Microseconds position_of(const GstSegment& segment) {
+  return static_cast<Microseconds>(segment.position / GST_USECOND);
 }
 std::optional<Microseconds> stop_of(const GstSegment& segment) {
   if (!GST_CLOCK_TIME_IS_VALID(segment.stop)) return std::nullopt;
@@ -119,7 +119,7 @@ class EventReader {
   gboolean take_segment(GstEvent* event);
   void take_gap(GstEvent* event);
   void take_end();
-  void drain();
+  GstFlowReturn drain();
 
   GstFlowReturn step();
   GstFlowReturn hand_out();
@@ -162,7 +162,7 @@ class EventReader {
   std::shared_ptr<RecordingReader> recording_;
   bool is_consuming_ = false;         ///< the recording was given bytes
   GstFlowReturn flow_ = GST_FLOW_OK;  ///< once it is something else, pushed bytes are refused
-  guint64 corrupt_places_ = 0;        ///< as far as buffers tell of them
+  guint64 corrupt_places_ = 0;        ///< for which a buffer had DISCONT
   WarnOnce warn_of_corruption_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;
@@ -389,15 +389,17 @@ void EventReader::close_recording() {
 
 Report EventReader::report_of(const std::exception& error) const {
   if (is_a<UnsupportedFormat>(error))
-    return {GST_STREAM_ERROR_WRONG_TYPE, std::string("This cannot be read: ") + error.what() + "."};
+    return {GST_STREAM_ERROR_WRONG_TYPE,
+            std::string("Cannot read this file: ") + error.what() + "."};
   if (is_a<std::bad_alloc>(error))
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
             "There is not enough memory for the events. Lower buffer-time."};
   return {format_.has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE,
-          "This cannot be read."};
+          "Cannot read this file. Check that it is whole and of the format that its name says."};
 }
 
-/// Runs what may throw. Where bytes could not be pulled, that is the result, whatever it led to.
+/// Runs code that may throw. If bytes could not be pulled, returns that flow instead of the error
+/// that it caused.
 template <class Work>
 GstFlowReturn EventReader::guard(const Work& work) {
   return guarded(
@@ -440,7 +442,7 @@ GstFlowReturn EventReader::pull() {
     bytes_.emplace(sink_);
     open_recording();
     const auto segment = shared_.lock()->segment;
-    recording_->seek(start_of(segment), stop_of(segment));
+    recording_->seek(position_of(segment), stop_of(segment));
   }
   bytes_->retry();
   GstFlowReturn result = step();
@@ -458,7 +460,8 @@ GstFlowReturn EventReader::pull() {
 GstFlowReturn EventReader::chain(GstBuffer* buffer) {
   const OwnedBuffer owner(buffer);
   if (is_timed() && GST_BUFFER_IS_DISCONT(buffer)) {
-    drain();
+    const GstFlowReturn drained = drain();
+    if (drained != GST_FLOW_OK) return drained;
     for (auto& pad : pads_) pad->interrupt();
     for (auto& pad : pads_) pad->need_segment(false);
   }
@@ -482,7 +485,7 @@ GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
   const Mapped mapped(buffer);
   if (!mapped.is_mapped) {
     post_message(element_, GST_MESSAGE_ERROR,
-                 {GST_RESOURCE_ERROR_READ, "A buffer of the file cannot be read."},
+                 {GST_RESOURCE_ERROR_READ, "Cannot read a buffer of the file."},
                  "gst_buffer_map() for reading failed");
     return GST_FLOW_ERROR;
   }
@@ -498,7 +501,13 @@ GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
   if (result == GST_FLOW_OK && interval && has_end)
     result = take_interval_end(static_cast<Microseconds>(
         (GST_BUFFER_PTS(buffer) + GST_BUFFER_DURATION(buffer)) / GST_USECOND));
-  if (result != GST_FLOW_OK) recording_->discard();
+  if (result != GST_FLOW_OK) {
+    try {
+      recording_->discard();
+    } catch (const std::exception& error) {
+      GST_DEBUG_OBJECT(element_, "dropped bytes cannot be read: %s", error.what());
+    }
+  }
   shared_.lock()->pushed_bytes += mapped.map.size;
   return result;
 }
@@ -520,6 +529,7 @@ GstFlowReturn EventReader::hand_out() {
 gboolean EventReader::sink_event(GstEvent* event) {
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_STREAM_START:
+      drain();  // into the stream that ends here
       gst_event_replace(&stream_start_, event);
       gst_event_unref(event);
       for (auto& pad : pads_) pad->reset();
@@ -537,6 +547,7 @@ gboolean EventReader::sink_event(GstEvent* event) {
       seqnum_ = gst_event_get_seqnum(event);
       gst_event_unref(event);
       take_end();
+      is_consuming_ = false;
       end_output(flow_ != GST_FLOW_OK && flow_ != GST_FLOW_EOS);
       return TRUE;
     case GST_EVENT_FLUSH_STOP:
@@ -564,11 +575,11 @@ gboolean EventReader::forward(GstEvent* event) {
 }
 
 /// Hands out everything, where what comes next does not follow on it.
-void EventReader::drain() {
+GstFlowReturn EventReader::drain() {
   if (is_consuming_) take_end();
   if (recording_) recording_->interrupt();
   is_consuming_ = false;
-  flow_ = GST_FLOW_OK;
+  return std::exchange(flow_, GST_FLOW_OK);
 }
 
 void EventReader::take_end() {
@@ -615,17 +626,27 @@ gboolean EventReader::take_segment(GstEvent* event) {
     const auto shared = shared_.lock();
     was_timed = std::exchange(shared->is_timed, timed);
     shared->pushed_bytes = segment->format == GST_FORMAT_BYTES ? start : 0;
-    restart = std::exchange(shared->restart, std::nullopt);
+    restart = shared->restart;
   }
   if (timed) {
     if (!was_timed) close_recording();
     for (auto& pad : pads_) pad->need_segment(false);
     return forward(event);
   }
+  const guint32 seqnum = gst_event_get_seqnum(event);
   gst_event_unref(event);
+  const bool is_sought = restart && restart->seek_point.value_or(SeekPoint{}).position == start;
+  if (restart && !is_sought && seqnum != restart->seqnum) {
+    // Of an earlier seek: the one that is pending flushes what follows.
+    flow_ = GST_FLOW_FLUSHING;
+    return TRUE;
+  }
+  shared_.lock()->restart.reset();
   interrupt_output();
-  if (!restart || restart->seek_point.value_or(SeekPoint{}).position != start) {
+  // A seek point is of no use for a recording that was closed meanwhile.
+  if (!is_sought || (restart->seek_point && !recording_)) {
     close_recording();  // another file
+    seqnum_ = seqnum;
     const auto shared = shared_.lock();
     shared->duration = GST_CLOCK_TIME_NONE;
     gst_segment_init(&shared->segment, GST_FORMAT_TIME);
@@ -640,7 +661,7 @@ gboolean EventReader::take_segment(GstEvent* event) {
   corrupt_places_ = 0;
   return guard([&] {
            if (!recording_) open_recording();
-           recording_->restart(restart->seek_point, start_of(restart->segment),
+           recording_->restart(restart->seek_point, position_of(restart->segment),
                                stop_of(restart->segment));
            return GST_FLOW_OK;
          }) == GST_FLOW_OK;
@@ -933,7 +954,7 @@ void EventReader::set_duration(GstClockTime duration) {
     gst_element_post_message(element_, gst_message_new_duration_changed(GST_OBJECT(element_)));
 }
 
-/// Bytes that are pushed tell only by and by how long it all is.
+/// In push mode the duration is extrapolated from the bytes received so far.
 GstClockTime EventReader::duration() {
   guint64 pushed = 0;
   GstClockTime position = 0;
@@ -957,14 +978,14 @@ gboolean EventReader::src_query(GstPad* pad, GstQuery* query) {
   switch (GST_QUERY_TYPE(query)) {
     case GST_QUERY_POSITION: {
       gst_query_parse_position(query, &format, nullptr);
-      if (format != GST_FORMAT_TIME) break;
+      if (format != GST_FORMAT_TIME) return FALSE;
       const auto position = shared_.lock()->segment.position;
       gst_query_set_position(query, format, static_cast<gint64>(position));
       return TRUE;
     }
     case GST_QUERY_DURATION: {
       gst_query_parse_duration(query, &format, nullptr);
-      if (format != GST_FORMAT_TIME) break;
+      if (format != GST_FORMAT_TIME) return FALSE;
       const GstClockTime length = duration();
       if (!GST_CLOCK_TIME_IS_VALID(length)) return FALSE;
       gst_query_set_duration(query, format, static_cast<gint64>(length));
@@ -972,7 +993,7 @@ gboolean EventReader::src_query(GstPad* pad, GstQuery* query) {
     }
     case GST_QUERY_SEEKING:
       gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
-      if (format != GST_FORMAT_TIME) break;
+      if (format != GST_FORMAT_TIME) return FALSE;
       gst_query_set_seeking(query, format, can_seek(), 0, static_cast<gint64>(duration()));
       return TRUE;
     case GST_QUERY_SEGMENT: {
@@ -1029,7 +1050,7 @@ bool EventReader::seek(GstEvent* event) {
   restart.seqnum = request.seqnum();
   if (is_pulling) return seek_pulling(restart.segment, restart.seqnum, request.flushes());
   if (!request.flushes()) return false;
-  if (recording) restart.seek_point = recording->seek_point_before(start_of(restart.segment));
+  if (recording) restart.seek_point = recording->seek_point_before(position_of(restart.segment));
   return seek_pushed(restart, request.rate());
 }
 
@@ -1064,15 +1085,15 @@ bool EventReader::seek_pulling(const GstSegment& segment, guint32 seqnum, bool f
   interrupt_output();
   const GstFlowReturn result = guard([&] {
     if (bytes_) bytes_->retry();
-    if (recording_) recording_->seek(start_of(segment), stop_of(segment));
+    if (recording_) recording_->seek(position_of(segment), stop_of(segment));
     return GST_FLOW_OK;
   });
-  gst_pad_start_task(sink_, loop, this, nullptr);
+  if (shared_.lock()->is_pulling) gst_pad_start_task(sink_, loop, this, nullptr);
   GST_PAD_STREAM_UNLOCK(sink_);
   return result == GST_FLOW_OK;
 }
 
-/// Upstream flushes and then sends a segment of bytes; there the seek is done.
+/// Upstream flushes, then sends a segment of bytes; the seek completes when that arrives.
 bool EventReader::seek_pushed(Restart restart, gdouble rate) {
   GstEvent* const event = with_seqnum(
       gst_event_new_seek(rate, GST_FORMAT_BYTES, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET,

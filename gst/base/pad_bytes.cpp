@@ -42,6 +42,8 @@ std::optional<std::span<const std::uint8_t>> PadBytes::piece(std::uint64_t posit
   if (failed()) return std::nullopt;
   if (!buffer) return std::span<const std::uint8_t>{};
   if (!gst_buffer_map(buffer.get(), &map_, GST_MAP_READ)) {
+    GST_ELEMENT_ERROR(GST_PAD_PARENT(sink_), RESOURCE, READ, ("Cannot read a buffer of the file."),
+                      ("gst_buffer_map() for reading failed at byte %" G_GUINT64_FORMAT, position));
     flow_ = GST_FLOW_ERROR;
     return std::nullopt;
   }

@@ -82,9 +82,10 @@ bool ReaderPad::send_caps(SensorSize size) {
 
 bool ReaderPad::send_caps(const GstVideoInfo& info) {
   if (video_ && gst_video_info_is_equal(&*video_, &info)) return true;
-  video_ = info;
   const OwnedCaps caps(gst_video_info_to_caps(&info));
-  return push_caps(caps.get());
+  const bool taken = push_caps(caps.get());
+  if (taken) video_ = info;
+  return taken;
 }
 
 bool ReaderPad::push_caps(GstCaps* caps) {

@@ -300,7 +300,7 @@ TEST_P(EveryFormat, SaysWhenItIsUnsupportedFormat) {
     push_file(h, file, 4000);
     const auto message = h.message(GST_MESSAGE_ERROR);
     ASSERT_TRUE(message);
-    EXPECT_NE(text_of(message.get()).find("This cannot be read: "), std::string::npos);
+    EXPECT_NE(text_of(message.get()).find("Cannot read this file: "), std::string::npos);
     EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
 
     const TemporaryFile temporary(file);
@@ -308,7 +308,7 @@ TEST_P(EveryFormat, SaysWhenItIsUnsupportedFormat) {
     const auto pulled = player.play();
     ASSERT_TRUE(pulled);
     EXPECT_EQ(GST_MESSAGE_TYPE(pulled.get()), GST_MESSAGE_ERROR);
-    EXPECT_NE(text_of(pulled.get()).find("This cannot be read: "), std::string::npos);
+    EXPECT_NE(text_of(pulled.get()).find("Cannot read this file: "), std::string::npos);
   }
 }
 
@@ -319,7 +319,7 @@ TEST_P(EveryFormat, IsNoFileWithoutAByte) {
     const auto message = player.play();
     ASSERT_TRUE(message);
     ASSERT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_ERROR);
-    EXPECT_TRUE(text_of(message.get()).starts_with("This cannot be read: ")) << way;
+    EXPECT_TRUE(text_of(message.get()).starts_with("Cannot read this file: ")) << way;
   }
 }
 
@@ -411,6 +411,46 @@ TEST_P(EveryFormat, IsPulledAndSoughtIn) {
     ASSERT_TRUE(player.pause());
     EXPECT_FALSE(player.seek(GST_SECOND, GST_CLOCK_TIME_NONE, -1));
   }
+}
+
+TEST_P(EveryFormat, KeepsItsPlaceWhenTheRateChanges) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(file.path(), way + format().reader);
+    ASSERT_TRUE(player.pause());
+    ASSERT_TRUE(gst_element_seek(player.get(), 2, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                 GST_SEEK_TYPE_NONE, 0, GST_SEEK_TYPE_NONE, 0));
+    ASSERT_TRUE(player.pause());
+    ASSERT_TRUE(player.ends_well());
+    ASSERT_FALSE(player.events.empty());
+    EXPECT_GT(player.events.front().t, events.front().t) << "it went back to the start";
+    EXPECT_EQ(player.events.back(), events.back());
+  }
+}
+
+TEST_P(EveryFormat, EndsEachOfTwoFilesInItsOwnStream) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  Player player(file.path(), "queue ! c.  filesrc location=" + in_quotes(file.path()) +
+                                 " ! concat name=c ! " + format().reader);
+  struct Streams {
+    Player& player;
+    std::vector<std::size_t> start_at;
+  } streams{player, {}};
+  const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(player.get()), "sink"));
+  gst_pad_add_probe(
+      GST_BASE_SINK_PAD(sink.get()), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
+        auto& to = *static_cast<Streams*>(data);
+        if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_STREAM_START)
+          to.start_at.push_back(to.player.events.size());
+        return GST_PAD_PROBE_OK;
+      },
+      &streams, nullptr);
+  ASSERT_TRUE(player.ends_well());
+  EXPECT_EQ(player.events.size(), 2 * events.size());
+  EXPECT_EQ(streams.start_at, (std::vector<std::size_t>{0, events.size()}));
 }
 
 TEST_P(EveryFormat, IsFoundByDecodebin) {

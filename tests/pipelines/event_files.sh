@@ -126,9 +126,9 @@ refused() { # WORDS ARGUMENT...
   cat errors
   grep -q -e "$words" errors || fail "the error does not say \"$words\""
 }
-refused "cannot be read" words.txt words.raw
+refused "Cannot read" words.txt words.raw
 cp words.txt words.raw
-refused "cannot be read" words.raw out.dat
+refused "Cannot read" words.raw out.dat
 refused "unknown extension" ball.raw ball.mp3
 refused "choose one of EVT2 EVT21 EVT3 EVT4" ball.raw other.raw --format=EVT5
 refused "does not apply to .dat" ball.raw ball.dat --dialect=rpg
