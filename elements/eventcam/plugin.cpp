@@ -13,14 +13,15 @@
 #define HDF5_ELEMENTS(X)
 #endif
 
-#define ELEMENTS(X)                                                                         \
-  AEDAT_ELEMENTS(X)                                                                         \
-  HDF5_ELEMENTS(X)                                                                          \
-  X(eventcsvdec)                                                                            \
-  X(eventcsvenc)                                                                            \
-  X(eventdatdec)                                                                            \
-  X(eventdatenc) X(eventesdec) X(eventesenc) X(eventcompare) X(eventoverlay) X(eventrender) \
-      X(eventstats) X(evtdec) X(evtenc) X(eventnpydec) X(eventnpyenc)
+#define ELEMENTS(X)                                                                        \
+  AEDAT_ELEMENTS(X)                                                                        \
+  HDF5_ELEMENTS(X)                                                                         \
+  X(eventcsvdec)                                                                           \
+  X(eventcsvenc)                                                                           \
+  X(eventdatdec)                                                                           \
+  X(eventdatenc)                                                                           \
+  X(eventesdec) X(eventesenc) X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats) \
+      X(evtdec) X(evtenc) X(eventnpydec) X(eventnpyenc)
 #define TYPE_FINDERS(X) \
   X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(propheseedat) X(propheseeraw)
 

@@ -39,8 +39,8 @@ struct Event {
 };
 static_assert(sizeof(Event) == 8);
 
-/// The time of an event in microseconds. One at the start of its interval (start, end], by rounding,
-/// is moved inside.
+/// The time of an event in microseconds. One at the start of its interval (start, end], by
+/// rounding, is moved inside.
 constexpr Microseconds time_of(const Event& event, Microseconds start) {
   return start + (event.t == 0 ? 1 : event.t);
 }

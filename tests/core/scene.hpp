@@ -14,10 +14,10 @@
 namespace scene {
 
 using eventcamera::Event;
-using eventcamera::LumaView;
-using eventcamera::Nanoseconds;
 using eventcamera::Image;
 using eventcamera::ImageView;
+using eventcamera::LumaView;
+using eventcamera::Nanoseconds;
 using eventcamera::Settings;
 using eventcamera::Simulator;
 

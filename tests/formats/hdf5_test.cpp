@@ -12,10 +12,10 @@
 #include <iterator>
 #include <thread>
 
+#include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
 #include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
-#include "src/formats/byte_source.hpp"
 #include "tests/formats/table_events.hpp"
 
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/byte_source.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace fuzz {
