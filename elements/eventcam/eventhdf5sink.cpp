@@ -141,8 +141,9 @@ static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
   priv->writable.begin_file({info.width, info.height});
   const auto [location, layout, compression] = priv->settings.copy();
   const Hdf5Writer::Settings settings{layout, compression, {info.width, info.height}};
-  return reported(self,
-                  [&] { priv->state.writer = std::make_unique<Hdf5Writer>(location, settings); });
+  return reported(self, [&, &path = location] {
+    priv->state.writer = std::make_unique<Hdf5Writer>(path, settings);
+  });
 }
 
 static gboolean start(GstBaseSink* sink) {

@@ -13,15 +13,13 @@
 #define HDF5_ELEMENTS(X)
 #endif
 
+// clang-format off
 #define ELEMENTS(X)                                                                        \
-  AEDAT_ELEMENTS(X)                                                                        \
-  HDF5_ELEMENTS(X)                                                                         \
-  X(eventcsvdec)                                                                           \
-  X(eventcsvenc)                                                                           \
-  X(eventdatdec)                                                                           \
-  X(eventdatenc)                                                                           \
-  X(eventesdec) X(eventesenc) X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats) \
-      X(evtdec) X(evtenc) X(eventnpydec) X(eventnpyenc)
+  AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X)                                                       \
+  X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats)                             \
+  X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
+  X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc)
+// clang-format on
 #define TYPE_FINDERS(X) \
   X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(propheseedat) X(propheseeraw)
 

@@ -118,6 +118,7 @@ void gst_event_aggregator_class_add_templates(GstEventAggregatorClass* klass,
   G_DEFINE_TYPE_WITH_CODE(Type, type, GST_TYPE_EVENT_AGGREGATOR,                              \
                           GST_DEBUG_CATEGORY_INIT(GST_CAT_DEFAULT, #element, 0, description)) \
   GST_ELEMENT_REGISTER_DEFINE(element, #element, rank, type##_get_type())                     \
+  /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */               \
   static void type##_init(Type* self) {                                                       \
     gst_event_aggregator_make<Inside>(GST_EVENT_AGGREGATOR(self));                            \
   }                                                                                           \
