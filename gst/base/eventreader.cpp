@@ -148,7 +148,7 @@ class EventReader {
   bool can_seek();
   bool seek(GstEvent* event);
   bool seek_pulling(const GstSegment& segment, guint32 seqnum, bool flush);
-  bool seek_pushed(Restart restart, gdouble rate);
+  bool seek_pushed(const Restart& restart, gdouble rate);
 
   GstElement* element_;
   GstPad* sink_;
@@ -1094,13 +1094,13 @@ bool EventReader::seek_pulling(const GstSegment& segment, guint32 seqnum, bool f
 }
 
 /// Upstream flushes, then sends a segment of bytes; the seek completes when that arrives.
-bool EventReader::seek_pushed(Restart restart, gdouble rate) {
+bool EventReader::seek_pushed(const Restart& restart, gdouble rate) {
   GstEvent* const event = with_seqnum(
       gst_event_new_seek(rate, GST_FORMAT_BYTES, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET,
                          static_cast<gint64>(restart.seek_point.value_or(SeekPoint{}).position),
                          GST_SEEK_TYPE_NONE, -1),
       restart.seqnum);
-  shared_.lock()->restart = std::move(restart);
+  shared_.lock()->restart = restart;
   if (gst_pad_push_event(sink_, event)) return true;
   shared_.lock()->restart.reset();
   return false;
