@@ -40,7 +40,8 @@ class InterpolatingSimulator final : public DenseSimulator {
     std::swap(last_, now_);
   }
 
-  /// Only pixels that changed by more than a threshold can fire, so flow is needed only there.
+  /// Only pixels that changed by more than a threshold can fire, so flow is needed only around
+  /// them.
   ImageView<Flow> find_flow(const Thresholds& thresholds) {
     if (!finder_ || finder_->method() != flow_)
       finder_.emplace(flow_, format().width, format().height);

@@ -9,9 +9,9 @@
 
 namespace eventcamera {
 
-/// Dense frame interpolation (paper, section III-A): flow F from I(i-1) to I(i), interpolated
-/// frames sampled bilinearly with the border continued, I(1) = I(i); then each difference of
-/// neighbours is thresholded, at the time of its later frame.
+/// Dense frame interpolation (paper, section III-A): frames between I(i-1) and I(i) are sampled
+/// bilinearly along the flow F from I(i-1) to I(i), with replicated borders; I(1) = I(i).
+/// Differences of successive frames are thresholded and timed at the later frame.
 class DenseSimulator : public Simulator {
  public:
   void set_flow(FlowMethod flow) { flow_ = flow; }
@@ -23,7 +23,7 @@ class DenseSimulator : public Simulator {
   Interpolation interpolation_ = Interpolation::forward;
 };
 
-/// Neither side of `format` may exceed max_side.
+/// Width and height of `format` must not exceed max_side.
 std::unique_ptr<DenseSimulator> make_dense_simulator(const LumaFormat& format);
 
 }  // namespace eventcamera

@@ -13,10 +13,10 @@
 namespace eventcamera {
 namespace {
 
-/// A difference frame, ON and OFF apart: pixels that exceeded the threshold, in raster order.
+/// Pixels of a difference frame that exceeded the threshold of one polarity, in raster order.
 struct Kept {
   std::vector<Point> places;
-  std::vector<int> differences;  ///< I(i) - I(i-1) at each of them
+  std::vector<int> differences;  ///< I(i) - I(i-1) at each pixel
 
   void clear() {
     places.clear();
@@ -24,19 +24,19 @@ struct Kept {
   }
 };
 
-/// A kept pixel of the last difference frame on its way into this one.
+/// A kept pixel of the last difference frame, moving towards this one.
 struct MovingDifference {
   MovingPoint point;
   int difference;
 };
 
-/// One polarity of the difference frames.
+/// One polarity of the last two difference frames.
 struct Part {
   Part(int width, int height) : picture(width, height) {}
 
   Kept last;
   Kept now;
-  Image<std::uint8_t> picture;  ///< now as a picture in 8 bits, 0 where nothing is kept
+  Image<std::uint8_t> picture;  ///< `now` as an 8-bit image, 0 for pixels not kept
   PointTracker tracker;
 
   void begin_next() {
@@ -52,7 +52,7 @@ struct Part {
         static_cast<std::uint8_t>(std::max(1, std::abs(difference) >> shift));
   }
 
-  /// Whether this difference frame keeps anything within a pixel of a place.
+  /// True if a pixel of this difference frame is kept within one pixel of `place`.
   bool keeps_near(const Point& place) const {
     const int bottom = std::min(place.y + 1, picture.height() - 1);
     const int right = std::min(place.x + 1, picture.width() - 1);
@@ -63,7 +63,7 @@ struct Part {
   }
 };
 
-/// What fires in one interpolated difference frame.
+/// Pixels that fire in one interpolated difference frame.
 class FiredPixels {
  public:
   FiredPixels(int width, int height)
@@ -71,7 +71,7 @@ class FiredPixels {
         words_((width + 63) / 64),
         taken_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)) {}
 
-  /// Of the differences that land on a pixel the largest wins, and ON where ON and OFF are equal.
+  /// The largest difference on a pixel wins; ON wins over an equal OFF.
   void add(const Point& place, int difference) {
     int& strongest = strongest_.at(place.x, place.y);
     if (std::abs(difference) > std::abs(strongest) || difference == -strongest)
@@ -79,7 +79,7 @@ class FiredPixels {
     taken_[word(place)] |= std::uint64_t{1} << (place.x % 64);
   }
 
-  /// Fires all that has landed, in raster order, and is empty again.
+  /// Emits the accumulated pixels in raster order and clears them.
   void fire(std::uint32_t t, std::vector<Event>& out) {
     for (int y = 0; y < strongest_.height(); ++y) {
       for (int x = 0; x < strongest_.width(); x += 64) {
@@ -99,8 +99,8 @@ class FiredPixels {
   }
 
   Image<int> strongest_;
-  int words_;                         ///< of 64 pixels, in a row
-  std::vector<std::uint64_t> taken_;  ///< a bit a pixel: something has landed
+  int words_;                         ///< 64-pixel words per row
+  std::vector<std::uint64_t> taken_;  ///< one bit per pixel that fires
 };
 
 template <class Pixel>
@@ -138,7 +138,7 @@ class DiffSimulator final : public Simulator {
     last_.assign(now);
   }
 
-  /// D(i) = I(i) - I(i-1), kept where it fires, each polarity apart.
+  /// Keeps D(i) = I(i) - I(i-1) at pixels that fired, separately for each polarity.
   void keep_difference(const ImageView<Pixel>& now, int last_step, EventBuckets& events) {
     on_.begin_next();
     off_.begin_next();
@@ -152,7 +152,7 @@ class DiffSimulator final : public Simulator {
     }
   }
 
-  /// Sets the kept pixels of the last difference frame moving towards this one.
+  /// Tracks the kept pixels of the last difference frame into this one.
   void follow(Part& part, int steps) {
     const auto& places = part.last.places;
     const auto tracks = part.tracker.track(places, threads());
@@ -179,7 +179,7 @@ class DiffSimulator final : public Simulator {
   Part on_;
   Part off_;
   std::vector<MovingDifference> moving_;
-  std::vector<FiredPixels> fired_pixels_;  // one a thread
+  std::vector<FiredPixels> fired_pixels_;  // one per thread
 };
 
 }  // namespace

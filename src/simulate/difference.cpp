@@ -8,29 +8,29 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/difference.cpp"
 #include <hwy/foreach_target.h>
-// Once for each target.
+// Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// In words of 64 pixels.
+/// Maximum vector size, in words of 64 pixels.
 constexpr int max_vector = (hn::MaxLanes(hn::ScalableTag<std::uint8_t>()) + 63) / 64;
 
-/// A threshold in all lanes, clamped to the largest pixel, which no difference exceeds.
+/// A threshold in all lanes, clamped to the largest pixel value, which no difference exceeds.
 template <class Pixel>
 auto in_lanes(hn::ScalableTag<Pixel> pixels, int threshold) {
   return hn::Set(pixels, static_cast<Pixel>(std::min(
                              threshold, static_cast<int>(std::numeric_limits<Pixel>::max()))));
 }
 
-/// Collects the events of a row without a branch for each, and appends many at a time.
+/// Collects the events of a row without a branch per event, and appends many at a time.
 class RowEvents {
  public:
   RowEvents(int y, std::uint32_t t, std::vector<Event>& out) : y_(y), t_(t), out_(out) {}
 
-  /// Bit i of `fired` is the pixel x + i, and bit i of `on` tells whether it is ON.
+  /// Bit i of `fired` is set if pixel x + i fired, bit i of `on` if its event is ON.
   void add(std::uint64_t fired, std::uint64_t on, int x) {
     if (size_ + 64 > capacity) flush();
     const FiredLanes tag;
@@ -71,7 +71,7 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, std::uint
   const auto zero = hn::Zero(pixels);
   RowEvents events(y, t, out);
   const auto fire = [&](int x, auto a, auto b) {
-    // By how much a rise or a fall exceeds its threshold.
+    // Excess over the threshold.
     const auto rise = hn::SaturatedSub(hn::SaturatedSub(b, a), positive);
     const auto fall = hn::SaturatedSub(hn::SaturatedSub(a, b), negative);
     const auto fired = hn::Ne(hn::Or(rise, fall), zero);

@@ -12,15 +12,15 @@
 
 namespace eventcamera {
 
-/// Fires where a row of pixels changed by more than the thresholds: ON where now - before > C+,
-/// OFF where before - now > C- (paper, section III-A).
+/// Appends the events of a row of pixels: ON where now - before > C+, OFF where before - now > C-
+/// (paper, section III-A).
 void fire_differences(const std::uint8_t* before, const std::uint8_t* now, int width, int y,
                       std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out);
 void fire_differences(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
                       std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out);
 
-/// The pixels of a row that changed by more than a threshold all lie in [first, last), which is
-/// empty where there are none.
+/// Smallest range [first, last) of a row that holds all pixels that changed by more than a
+/// threshold; empty if none did.
 struct ChangedColumns {
   int first;
   int last;
@@ -30,7 +30,7 @@ ChangedColumns changed_columns(const std::uint8_t* before, const std::uint8_t* n
 ChangedColumns changed_columns(const std::uint16_t* before, const std::uint16_t* now, int width,
                                int threshold);
 
-/// The smallest box that holds those of a picture.
+/// Smallest box that holds all pixels of a frame that changed by more than `threshold`.
 template <class Pixel>
 Box changed_box(const ImageView<Pixel>& before, const ImageView<Pixel>& now, int threshold) {
   Box box;
@@ -43,7 +43,7 @@ Box changed_box(const ImageView<Pixel>& before, const ImageView<Pixel>& now, int
   return box;
 }
 
-/// fire_differences() for whole pictures, into the buckets of one step, which has their bands.
+/// fire_differences() for whole frames, into the buckets of one step, one per band of rows.
 template <class Pixel>
 void fire_differences(const ImageView<Pixel>& before, const ImageView<Pixel>& now, int step,
                       std::uint32_t t, const Thresholds& thresholds, ThreadPool& threads,

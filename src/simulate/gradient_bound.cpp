@@ -6,18 +6,18 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/gradient_bound.cpp"
 #include <hwy/foreach_target.h>
-// Once for each target.
+// Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// Columns that are measured at once. No vector is wider.
+/// Columns measured at once; vectors are capped at this width.
 constexpr int columns_at_once = 16;
 using Bytes = hn::CappedTag<std::uint8_t, columns_at_once>;
 
-/// The largest |a - b| of some rows, column by column.
+/// Largest |a - b| over the added rows, per column.
 class LargestDifference {
  public:
   void add(const std::uint8_t* a, const std::uint8_t* b) {
@@ -37,8 +37,8 @@ class LargestDifference {
   HWY_ALIGN std::uint8_t columns_[columns_at_once] = {};
 };
 
-/// A row of 4x4 cells, from row `top` of the picture on. What lies past the right border is
-/// measured too: the bound is too large at worst.
+/// Measures the row of 4x4 cells that starts at row `top`. Reads past the right border, which can
+/// only make the bound larger.
 void measure_row(const ImageView<std::uint8_t>& picture, int top, std::uint8_t* x_out,
                  std::uint8_t* y_out) {
   const int bottom = std::min(top + 4, picture.height);
@@ -69,7 +69,7 @@ HWY_EXPORT(measure_row);
 
 namespace {
 
-/// A large cell is the largest of 4x4 small ones.
+/// Each large cell is the maximum of its 4x4 small cells.
 void gather_row(const Image<std::uint8_t>& small, int row, Image<std::uint8_t>& large) {
   for (int column = 0; column < large.width(); ++column) {
     std::uint8_t largest = 0;

@@ -8,23 +8,23 @@
 
 namespace eventcamera {
 
-/// Upper bounds of the differences of neighbouring pixels, by cells: of 4x4 pixels for small boxes,
-/// of 16x16 for large ones.
+/// Upper bounds of the differences between neighbouring pixels, per cell: 4x4 pixels for small
+/// boxes, 16x16 for large ones.
 class GradientBound {
  public:
   /// `picture` must be the view of an Image: SIMD code reads past its rows.
   void measure(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
   struct Bound {
-    int x;  ///< of a pixel and the one to its right, grey levels
-    int y;  ///< of a pixel and the one below it
+    int x;  ///< between a pixel and its right neighbour, grey levels
+    int y;  ///< between a pixel and the one below it, grey levels
   };
 
-  /// The bound in a box, or in a little more. The box may reach beyond the picture.
+  /// Bound for `box`, rounded out to whole cells. `box` may extend beyond the image.
   Bound within(const Box& box) const;
 
  private:
-  /// Square cells of one size.
+  /// Maxima per square cell of one size.
   struct Cells {
     int side = 0;
     Image<std::uint8_t> x;

@@ -8,14 +8,14 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/interpolation.cpp"
 #include <hwy/foreach_target.h>
-// Once for each target.
+// Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// Pixels that are skipped together or not at all. No vector is wider.
+/// Tile size: pixels of a tile are skipped together or not at all. Vectors are capped at its width.
 constexpr int tile_width = 16;
 constexpr int tile_height = 4;
 static_assert(rows_per_band % tile_height == 0);
@@ -25,11 +25,11 @@ using Floats = hn::CappedTag<float, tile_width>;
 using Bytes = hn::Rebind<std::uint8_t, Words>;
 using Vector = hn::Vec<Words>;
 
-/// Where samples lie, for a vector of positions in 1/65536 of a pixel.
+/// Bilinear sample positions for a vector of positions in 1/65536 of a pixel.
 struct SamplePlaces {
-  Vector x0;  ///< the pixel to the upper left
+  Vector x0;  ///< upper-left pixel
   Vector y0;
-  Vector right;  ///< from there, in 1/64 of a pixel
+  Vector right;  ///< offset from it, 1/64 of a pixel
   Vector down;
 
   SamplePlaces(Vector x, Vector y, Vector right_end, Vector lower_end) {
@@ -45,7 +45,7 @@ struct SamplePlaces {
   }
 };
 
-/// sample() of warp.hpp for vectors, of the view of an Image.
+/// Vector version of sample() in warp.hpp. Needs the view of an Image.
 class Sampler {
  public:
   explicit Sampler(const ImageView<std::uint8_t>& picture)
@@ -55,7 +55,7 @@ class Sampler {
         lower_end_(hn::Set(Words(), (picture.height - 1) * 64)),
         last_row_(hn::Set(Words(), picture.height - 1)) {}
 
-  /// Samples at positions in 1/65536 of a pixel, in 1/4096 of a grey level.
+  /// Positions in 1/65536 of a pixel; samples in 1/4096 of a grey level.
   Vector at(Vector x, Vector y) const {
     const SamplePlaces at(x, y, right_end_, lower_end_);
     const auto y1 = hn::Min(hn::Add(at.y0, hn::Set(Words(), 1)), last_row_);
@@ -65,7 +65,8 @@ class Sampler {
   }
 
  private:
-  /// Between a pixel and its right neighbour (whose weight is 0 where there is none), in 1/64.
+  /// Interpolates between a pixel and its right neighbour (weight 0 at the right border), in 1/64
+  /// of a grey level.
   Vector between(Vector offset, Vector right) const {
     const auto byte = hn::Set(Words(), 255);
     const auto pixels = hn::GatherOffset(Words(), pixels_, offset);
@@ -81,10 +82,11 @@ class Sampler {
   Vector last_row_;
 };
 
-/// The same samples, of an image that has each pixel beside the one below it: one gather a sample.
+/// The same samples from an image that pairs each pixel with the one below it: one gather per
+/// sample.
 class PairSampler {
  public:
-  /// The pixel in the lower byte, the one below it in the upper.
+  /// `pairs` has each pixel in the low byte and the one below it in the high byte.
   explicit PairSampler(const ImageView<std::uint16_t>& pairs)
       : pairs_(reinterpret_cast<const std::int32_t*>(pairs.data)),
         stride_(hn::Set(Words(), static_cast<std::int32_t>(pairs.stride))),
@@ -95,7 +97,7 @@ class PairSampler {
     const SamplePlaces at(x, y, right_end_, lower_end_);
     const auto offset = hn::Add(hn::Mul(at.y0, stride_), hn::Add(at.x0, at.x0));
     const auto pairs = hn::GatherOffset(Words(), pairs_, offset);
-    // The left and the right column side by side, 16 bits each: no sum is longer.
+    // Left and right column in 16 bits each, which no sum exceeds.
     const auto bytes = hn::Set(Words(), 0x00FF00FF);
     const auto upper = hn::And(pairs, bytes);
     const auto lower = hn::And(hn::ShiftRight<8>(pairs), bytes);
@@ -113,11 +115,11 @@ class PairSampler {
   Vector lower_end_;
 };
 
-/// A vector of pixels that move with the flow.
+/// A vector of pixels moving with the flow.
 struct MovingPixels {
   Vector x;  ///< positions, 1/65536 of a pixel
   Vector y;
-  Vector dx;  ///< displacements in one step, as motion_per_step() has them
+  Vector dx;  ///< displacement per step, same as motion_per_step()
   Vector dy;
 
   MovingPixels(const ImageView<Flow>& flow, int left, int row, int steps)
@@ -136,7 +138,7 @@ struct MovingPixels {
     dy = motion(flow_y, steps);
   }
 
-  /// The sample of the next frame that a pixel reaches in `left` steps.
+  /// Samples of `next` at the positions reached in `left` steps.
   Vector ahead(const Sampler& next, int left) const {
     const auto steps = hn::Set(Words(), left);
     return next.at(hn::Add(x, hn::Mul(steps, dx)), hn::Add(y, hn::Mul(steps, dy)));
@@ -152,21 +154,22 @@ struct MovingPixels {
   }
 };
 
-/// The blend of two samples at step j, in 1/2^20 of a grey level.
+/// Blends two samples at step j, in 1/2^20 of a grey level.
 Vector blend(Vector earlier, Vector later, int j, int steps) {
   const int weight = blend_weight(j, steps);
   return hn::Add(hn::Mul(earlier, hn::Set(Words(), 256 - weight)),
                  hn::Mul(later, hn::Set(Words(), weight)));
 }
 
-/// Steps that are sampled before their events are looked for.
+/// Steps sampled in one go before their differences are thresholded.
 constexpr int steps_at_once = 16;
 
-/// For each tile of a row of tiles, the first step to look at: 1; or, if nothing can fire before
-/// the last step, the last but one, or the last if the frame before it shows the last frame itself.
+/// First step to evaluate, per tile of a row of tiles: 1, or, if nothing can fire before the last
+/// step, steps - 1, or `steps` if even the frame of step steps - 1 equals the last frame there.
 using FirstSteps = std::array<int, max_side / tile_width>;
 
-/// Puts each pixel of some rows beside the one below it, those of the lowest row beside themselves.
+/// Pairs each pixel of rows [first, last) with the one below it, those of the bottom row with
+/// themselves.
 void pair_rows(const ImageView<std::uint8_t>& picture, int first, int last,
                Image<std::uint16_t>& pairs) {
   const hn::CappedTag<std::uint16_t, 32> words;
@@ -237,7 +240,7 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
     if (first > 1) {
       before = value_at(first);
     } else {
-      // Whether a pixel fires is hard to predict: sample ahead, so that no sample waits for it.
+      // The branch on firing is hard to predict: sample ahead, so that no sample waits for it.
       HWY_ALIGN std::int32_t values[steps_at_once * hn::MaxLanes(words)];
       for (int begin = 1; begin < steps; begin += steps_at_once) {
         const int count = std::min(steps_at_once, steps - begin);
@@ -254,7 +257,7 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
   }
 }
 
-/// The flows of a tile, and 0, lie within this range.
+/// Range that holds the flows of a tile, and 0.
 struct FlowRange {
   float min[2];  ///< x, y
   float max[2];
@@ -286,7 +289,7 @@ FlowRange flow_range(const ImageView<Flow>& flow, const Box& tile) {
   return range;
 }
 
-/// The first step of forward interpolation at which a tile must be looked at.
+/// First step of forward interpolation to evaluate in a tile, see FirstSteps.
 int first_step(const InterpolatedInterval<std::uint8_t>& interval,
                const GradientBound& gradient_bound, const Box& tile) {
   const int steps = interval.steps.count();
@@ -294,13 +297,13 @@ int first_step(const InterpolatedInterval<std::uint8_t>& interval,
   const auto motion = [steps](float flow) { return std::int64_t{motion_per_step(flow, steps)}; };
   std::int64_t dx = std::max(motion(range.max[0]), -motion(range.min[0]));
   std::int64_t dy = std::max(motion(range.max[1]), -motion(range.min[1]));
-  // Positions are rounded to 1/64 of a pixel: less than half of that from its start, a sample is
-  // the pixel itself.
+  // Positions are rounded to 1/64 of a pixel: a pixel that moves by less than half of that samples
+  // itself.
   if (std::max(dx, dy) * (steps - 1) < 512) return steps;
   // Rounding may lengthen a step.
   dx += 1024;
   dy += 1024;
-  // Over long distances, the search for the bound costs more than it saves.
+  // For long flows, finding the bound costs more than it saves.
   constexpr int far = 64;
   const auto reach = [&](float flow) {
     return static_cast<int>(((motion(flow) + 1024) * steps >> 16) + 1);
@@ -351,7 +354,7 @@ void interpolate_row_8(const Warp<std::uint8_t>& warp, const ImageView<Flow>& fl
     const MovingPixels pixels(flow, x, y, warp.steps);
     const auto sum =
         blend(pixels.ahead(last, -j), pixels.ahead(now, warp.steps - j), j, warp.steps);
-    // From 1/2^20 of a grey level to 1/257.
+    // From 1/2^20 of a grey level to 1/257 of one.
     const auto grey = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 1 << 7)));
     const auto value =
         hn::ShiftRight<12>(hn::Add(hn::Mul(grey, hn::Set(words, 257)), hn::Set(words, 1 << 11)));

@@ -12,7 +12,7 @@
 
 namespace eventcamera {
 
-/// Two frames, the frames interpolated between them, and the thresholds of the pixels.
+/// Two frames, how to interpolate between them, and the thresholds of the pixels.
 template <class Pixel>
 struct InterpolatedInterval {
   Warp<Pixel> warp;  ///< 8-bit frames must be views of Images: SIMD code reads past their rows
@@ -22,16 +22,16 @@ struct InterpolatedInterval {
   Thresholds thresholds;
 };
 
-/// Fires the events of interpolated frames, pixel by pixel through all steps; the frames themselves
-/// are never written.
+/// Generates the events of interpolated frames, pixel by pixel through all steps, without storing
+/// the frames.
 ///
-/// Most pixels cannot fire before the last step, which a bound tells exactly: a step of (dx, dy)
-/// pixels changes a bilinear sample by at most |dx| gx + |dy| gy, where gx and gy are the largest
-/// differences of neighbours within reach. Tiles whose bound does not exceed the thresholds skip to
-/// the last step.
+/// Most pixels cannot fire before the last step, and a conservative bound proves it: a step of (dx,
+/// dy) pixels changes a bilinear sample by at most |dx| gx + |dy| gy, where gx and gy are the
+/// largest differences of neighbours within reach. Tiles whose bound does not exceed the thresholds
+/// skip to the last step.
 class InterpolationKernel {
  public:
-  /// Replaces what `events` held.
+  /// Replaces the contents of `events`.
   void fire(const InterpolatedInterval<std::uint8_t>& interval, ThreadPool& threads,
             EventBuckets& events);
   void fire(const InterpolatedInterval<std::uint16_t>& interval, ThreadPool& threads,
@@ -39,18 +39,18 @@ class InterpolationKernel {
 
  private:
   GradientBound gradient_bound_;
-  Image<std::uint16_t> last_pairs_;  ///< the last frame, each pixel beside the one below it
+  Image<std::uint16_t> last_pairs_;  ///< the last frame, each pixel paired with the one below it
 };
 
-/// A row of the blended frame of step j = 1 ... steps - 1 between two frames, in 16 bits from 8-bit
-/// frames (which must be views of Images), so that the dark has more shades; else in their own
-/// depth. `out` has 16 elements more than a row.
+/// Writes a row of the blended frame of step j = 1 ... steps - 1. 8-bit frames (which must be views
+/// of Images) are widened to 16 bits, which keeps more shades in dark areas; deeper frames keep
+/// their depth. `out` must have 16 elements past the end of the row.
 void interpolate_row(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
                      std::uint16_t* out);
 void interpolate_row(const Warp<std::uint16_t>& warp, const ImageView<Flow>& flow, int y, int j,
                      std::uint16_t* out);
 
-/// A row of a frame in the depth of interpolate_row().
+/// Converts a row of a frame to the depth of interpolate_row().
 void widen_row(const std::uint8_t* luma, int width, std::uint16_t* out);
 void widen_row(const std::uint16_t* luma, int width, std::uint16_t* out);
 

@@ -10,11 +10,11 @@
 
 namespace eventcamera {
 
-/// Width and height limit of frames: positions and flows within them fit into a Motion.
+/// Width and height limit of frames; positions and flows within it fit into a Motion.
 inline constexpr int max_side = 16384;
 
 /// Displacement in one step, in 1/65536 of a pixel. All arithmetic after the conversion from float
-/// is integer, the same on every processor.
+/// is integer, so results are the same on every processor.
 using Motion = std::int32_t;
 
 /// The flow of an interval (pixels) divided by its steps. NaN counts as 0; flows are clamped to
@@ -33,7 +33,7 @@ inline int moved(int p, Motion motion, int j) {
       16);
 }
 
-/// A tracked pixel that moves through the steps of an interval, within the frame.
+/// A tracked pixel that stays within the frame through all steps of an interval.
 struct MovingPoint {
   Point start;
   Motion dx;
@@ -43,7 +43,7 @@ struct MovingPoint {
   Point at(int j) const { return {moved(start.x, dx, j), moved(start.y, dy, j)}; }
 };
 
-/// The motion along a track; none if the track was lost or leaves the frame.
+/// Returns the motion along a track; none if the track was lost or leaves the frame.
 inline std::optional<MovingPoint> moving_point(const Point& start, const Track& track, int steps,
                                                int width, int height) {
   if (!track.found) return std::nullopt;

@@ -19,12 +19,13 @@ struct Settings {
   int threads = 0;                 ///< thread limit for one frame; 0 = one per processor
 };
 
-/// C+ and C- in grey levels of a frame, integers like its differences.
+/// C+ and C- in the grey levels of a frame, integers like its pixel differences.
 struct Thresholds {
   int positive;
   int negative;
 
-  /// Thresholds scale with the depth, so that a picture in 16 bits fires like its 8-bit twin.
+  /// Scales the thresholds with the bit depth, so that 16-bit video gives the same events as its
+  /// 8-bit version.
   static Thresholds of(const Settings& settings, int bits) {
     const auto scale = [bits](double grey_levels) {
       return static_cast<int>(std::max(0.0, grey_levels) * ((1 << bits) - 1) / 255);
@@ -33,9 +34,9 @@ struct Thresholds {
   }
 };
 
-/// The times of the steps of an interval (t0, t1]: step j of `count` is at t0 + (t1 - t0) * j /
-/// count, the last one at t1. A step takes at least a microsecond, the resolution of an event
-/// stream.
+/// Times of the steps of an interval (t0, t1]: step j of `count` is at t0 + (t1 - t0) * j / count,
+/// the last at t1. A step lasts at least a microsecond, the resolution of an event stream, if the
+/// interval does.
 class StepTimes {
  public:
   /// `duration` in (0, max_interval]; `wanted` steps, at least 1.
@@ -56,34 +57,33 @@ class StepTimes {
   int count_;
 };
 
-/// Turns frames into the events between them, all in one call per frame, so that an implementation
-/// may run on any processor. The same frames, times and settings give the same events for any
-/// number of threads.
+/// Turns frames into the events between them. One call per frame does all the work, so that an
+/// implementation may run on any processor. The same frames, times and settings give the same
+/// events for any number of threads.
 class Simulator {
  public:
   virtual ~Simulator() = default;
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;
 
-  /// Takes the next frame, in the simulator's format. `time` must be later than that of the last
-  /// frame, by max_interval at most.
-  /// Returns the sorted events of (time of the last frame, time], valid until the next call;
-  /// nullptr for the first frame. Throws std::bad_alloc or what OpenCV throws; after that the
-  /// simulator may only be destroyed.
+  /// Processes the next frame, in the simulator's format. `time` must be later than that of the
+  /// last frame, by at most max_interval. Returns the sorted events of (time of the last frame,
+  /// time], valid until the next call; nullptr for the first frame. Throws std::bad_alloc or
+  /// cv::Exception; after that the simulator may only be destroyed.
   const EventBuckets* push(const LumaView& frame, Nanoseconds time, const Settings& settings);
 
-  /// The time of the last frame, if there is one.
+  /// Time of the last frame, if any.
   std::optional<Nanoseconds> last_time() const { return last_time_; }
 
-  /// Extends the last frame, if any, to `time`, which must not be before it: the next interval
-  /// starts at `time`. Returns the sorted events of (time of the last frame, time], which fired
-  /// although nothing changed, valid until the next call; nullptr if the simulator has none.
+  /// Holds the last frame, if any, until `time`, which must not be before it: the next interval
+  /// starts at `time`. Returns the sorted events of (time of the last frame, time] that fire
+  /// without any change (noise), valid until the next call; nullptr if the simulator has none.
   const EventBuckets* hold_until(Nanoseconds time, const Settings& settings = {});
 
-  /// Forgets all frames: the next one is a first frame.
+  /// Forgets all frames; the next one is a first frame.
   void reset();
 
-  /// Its threads, for use between its calls.
+  /// The simulator's threads, usable between its calls.
   ThreadPool& threads() { return threads_; }
 
  protected:
@@ -91,12 +91,12 @@ class Simulator {
 
   const LumaFormat& format() const { return format_; }
 
-  /// Keeps the first frame.
+  /// Stores the first frame.
   virtual void start(const LumaView& frame) = 0;
-  /// Fills `events` from the last frame and this one, which it keeps.
+  /// Fills `events` with the events between the last frame and this one, and stores this one.
   virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                         EventBuckets& events) = 0;
-  /// Fills `events` with what fires while the frame does not change; false if nothing can.
+  /// Fills `events` with those that fire while the frame does not change; false if there are none.
   virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
 
  private:

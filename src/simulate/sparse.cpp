@@ -13,29 +13,29 @@
 namespace eventcamera {
 namespace {
 
-/// A tracked pixel on its way, with the brightness that it carries.
+/// A tracked pixel in motion, with its brightness.
 template <class Pixel>
 struct MovingPixel {
   MovingPoint point;
   Pixel brightness;
 };
 
-/// What lies between two frames.
+/// Two frames and the pixels that move between them.
 template <class Pixel>
 struct Interval {
   ImageView<Pixel> last;
   ImageView<Pixel> now;
-  std::span<const MovingPixel<Pixel>> pixels;  ///< in raster order of where they start
-  const std::vector<char>& touched;            ///< rows that a pixel leaves or crosses
+  std::span<const MovingPixel<Pixel>> pixels;  ///< in raster order of their start points
+  const std::vector<char>& touched;            ///< rows that a pixel starts in or crosses
 };
 
-/// Paints the interpolated frames of an interval, one after another.
+/// Draws the interpolated frames of an interval, one after another.
 template <class Pixel>
 class Painter {
  public:
   Painter(int width, int height) : between_(width, height), before_(width, height) {}
 
-  /// The events of steps first ... last of the interval, into those steps' buckets.
+  /// Appends the events of steps first ... last to their buckets.
   void fire(const Interval<Pixel>& interval, int first, int last, const StepTimes& steps,
             const Thresholds& thresholds, EventBuckets& events) {
     paint(interval, first - 1);
@@ -55,7 +55,7 @@ class Painter {
   }
 
  private:
-  /// The touched rows of the frame of step j, into between_.
+  /// Draws the touched rows of the frame of step j into between_.
   void paint(const Interval<Pixel>& interval, int j) {
     for (int y = 0; y < between_.height(); ++y)
       if (interval.touched[static_cast<std::size_t>(y)] != 0)
@@ -74,7 +74,7 @@ class Painter {
 
   Image<Pixel> between_;
   Image<Pixel> before_;
-  std::vector<Pixel*> places_;  ///< of the pixels, in between_
+  std::vector<Pixel*> places_;  ///< targets of the moving pixels, in between_
 };
 
 template <class Pixel>
@@ -102,7 +102,7 @@ class SparseSimulator final : public Simulator {
     const int m = steps.count();
     events.reset(m, 1);
     const Interval<Pixel> interval{last_.view(), now, pixels_, touched_};
-    // Each thread paints steps that follow each other, so that all but the first frame serve twice.
+    // Each thread draws consecutive steps, so that all frames but the first are used twice.
     const int runs = std::min(threads().threads(), m);
     while (static_cast<int>(painters_.size()) < runs)
       painters_.emplace_back(format().width, format().height);
@@ -113,7 +113,7 @@ class SparseSimulator final : public Simulator {
     last_.assign(now);
   }
 
-  /// The pixels whose change exceeds `threshold`, in raster order.
+  /// Finds the pixels whose change exceeds `threshold`, in raster order.
   void find_changed(const ImageView<Pixel>& now, int threshold) {
     changes_.reset(1, band_count(now.height));
     fire_differences(last_.view(), now, 1, 0, {threshold, threshold}, threads(), changes_);
@@ -122,7 +122,7 @@ class SparseSimulator final : public Simulator {
       for (const auto& change : bucket) changed_.push_back({change.x, change.y()});
   }
 
-  /// Sets the changed pixels moving towards this frame.
+  /// Tracks the changed pixels into this frame.
   void follow_changed(int steps) {
     pixels_.clear();
     std::fill(touched_.begin(), touched_.end(), 0);
@@ -144,7 +144,7 @@ class SparseSimulator final : public Simulator {
   std::vector<Point> changed_;
   std::vector<MovingPixel<Pixel>> pixels_;
   std::vector<char> touched_;
-  std::vector<Painter<Pixel>> painters_;  ///< one a thread
+  std::vector<Painter<Pixel>> painters_;  ///< one per thread
 };
 
 }  // namespace

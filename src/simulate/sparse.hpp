@@ -7,13 +7,12 @@
 
 namespace eventcamera {
 
-/// Sparse frame interpolation (paper, section III-B): only the pixels that changed by more than the
+/// Sparse frame interpolation (paper, section III-B): only pixels that changed by more than the
 /// smaller threshold are tracked, with Lucas-Kanade from I(i-1) to I(i); a track that is lost or
-/// leaves the picture is dropped. In the interpolated frame I(a) the brightness of a tracked pixel
-/// stands at p + a f, rounded (where several meet, that of the last in raster order); a place that
-/// a tracked pixel has left shows I(i), what it uncovered; the rest is I(i-1). I(1) = I(i). Then
-/// each difference of neighbours is thresholded, at the time of its later frame.
-/// Neither side of `format` may exceed max_side.
+/// leaves the frame is dropped. The interpolated frame I(a) is I(i-1), except that each tracked
+/// pixel p with flow f is drawn at p + a f, rounded (the last in raster order wins), and the pixel
+/// it left shows the uncovered background, I(i). I(1) = I(i). Differences of successive frames are
+/// thresholded and timed at the later frame. Width and height of `format` must not exceed max_side.
 std::unique_ptr<Simulator> make_sparse_simulator(const LumaFormat& format);
 
 }  // namespace eventcamera

@@ -10,14 +10,14 @@
 
 namespace eventcamera {
 
-/// How the flow makes the frame I(a) between I(i-1) and I(i), 0 < a < 1.
+/// How the frame I(a) between I(i-1) and I(i), 0 < a < 1, is sampled along the flow F.
 enum class Interpolation {
   forward,  ///< I(i-1)(x - a F(x))
   blend,    ///< (1 - a) I(i-1)(x - a F(x)) + a I(i)(x + (1 - a) F(x))
 };
 
-/// The bilinear sample of a picture at (x, y) in 1/65536 of a pixel, rounded to 1/64; the border is
-/// replicated. In 1/4096 of a grey level, exactly.
+/// Bilinear sample of an image at (x, y), in 1/65536 of a pixel, rounded to 1/64; the border is
+/// replicated. The result is exact, in 1/4096 of a grey level.
 template <class Pixel>
 std::int32_t sample(const ImageView<Pixel>& picture, std::int32_t x, std::int32_t y) {
   const int qx = std::clamp((x + 512) >> 10, 0, (picture.width - 1) * 64);
@@ -33,19 +33,20 @@ std::int32_t sample(const ImageView<Pixel>& picture, std::int32_t x, std::int32_
          (lower[x0] * (64 - right) + lower[x1] * right) * down;
 }
 
-/// The weight of the later frame in step j of a blend, in 1/256.
+/// Weight of the later frame in step j of a blend, in 1/256.
 inline int blend_weight(int j, int steps) {
   return (j * 256 + steps / 2) / steps;
 }
 
-/// The pixel (x, y) of the interpolated frames between two frames.
+/// Pixels of the interpolated frames between two frames.
 template <class Pixel>
 struct Warp {
   ImageView<Pixel> last;
   ImageView<Pixel> now;
   int steps;
 
-  /// Step j = 1 ... steps - 1 of a pixel that moves by (dx, dy) a step; rounded to a grey level.
+  /// Pixel (x, y) of step j = 1 ... steps - 1, moving by (dx, dy) per step; rounded to a grey
+  /// level.
   template <Interpolation interpolation>
   Pixel at(int x, int y, Motion dx, Motion dy, int j) const {
     const std::int32_t px = x << 16;
