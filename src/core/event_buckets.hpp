@@ -10,15 +10,14 @@
 
 namespace eventcamera {
 
-/// The events of one interval as kernels produce them: a bucket for each step and, within a step,
-/// for each band of rows. Each thread fills buckets of its own; in order, the buckets are the
-/// sorted events of the interval.
+/// Events of one interval as kernels produce them: a bucket per step and band of rows. Each thread
+/// fills its own buckets; concatenated in order, they are the sorted events of the interval.
 class EventBuckets {
  public:
-  /// On a cache line of its own: threads fill neighbouring buckets concurrently.
+  /// On its own cache line, because threads fill neighbouring buckets concurrently.
   struct alignas(64) Bucket : std::vector<Event> {};
 
-  /// Empties the buckets and keeps their memory.
+  /// Empties the buckets but keeps their memory.
   void reset(int steps, int bands) {
     bands_ = static_cast<std::size_t>(bands);
     buckets_.resize(static_cast<std::size_t>(steps) * bands_);
@@ -36,7 +35,7 @@ class EventBuckets {
   /// Number of events in all buckets.
   std::size_t size() const;
 
-  /// Writes size() events, sorted by time and within a time in raster order.
+  /// Writes size() events, sorted by time, then in raster order.
   void copy_to(Event* out) const;
   void copy_to(Event* out, ThreadPool& threads) const;
 

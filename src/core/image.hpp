@@ -9,7 +9,7 @@
 
 namespace eventcamera {
 
-/// The pixels [left, right) x [top, bottom) of a picture.
+/// The pixels [left, right) x [top, bottom) of an image.
 struct Box {
   int left = 0;
   int top = 0;
@@ -23,8 +23,8 @@ struct Box {
   friend bool operator==(const Box&, const Box&) = default;
 };
 
-/// A picture of one channel that somebody else owns, read in place. Any stride; nothing beyond a
-/// row's last pixel may be read.
+/// Non-owning view of a single-channel image. Any stride; nothing past the last pixel of a row may
+/// be read.
 template <class Pixel>
 struct ImageView {
   const Pixel* data = nullptr;
@@ -37,11 +37,11 @@ struct ImageView {
   }
 };
 
-/// A picture of one channel that owns its pixels, with an optional margin around them.
+/// Single-channel image that owns its pixels, with an optional margin around them.
 ///
-/// Rows begin on a cache line. Past the last pixel of a row (and its margin) lie at least 64 bytes
-/// and 16 pixels that may be read and written: a kernel may load and store whole vectors to the end
-/// of any row. They are 0 until then.
+/// Rows start on a cache line. At least 64 bytes and 16 pixels past the end of a row (and its
+/// margin) may be read and written, so that kernels can load and store whole vectors up to the end
+/// of any row. They are initially 0.
 template <class Pixel>
 class Image {
  public:
@@ -64,7 +64,7 @@ class Image {
   const Pixel& at(int x, int y) const { return row(y)[x]; }
   ImageView<Pixel> view() const { return {row(0), stride_, width_, height_}; }
 
-  /// Copies a picture of the same size.
+  /// Copies an image of the same size.
   void assign(const ImageView<Pixel>& other) {
     for (int y = 0; y < height_; ++y) assign_row(y, other.row(y));
   }

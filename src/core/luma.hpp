@@ -8,34 +8,34 @@
 
 namespace eventcamera {
 
-/// What all frames of a stream have in common.
+/// Frame format, constant within a stream.
 struct LumaFormat {
   int width = 0;
   int height = 0;
-  int bits = 8;  ///< 8: a byte a pixel; 9 to 16: a 16-bit word a pixel, white is 2^bits - 1
+  int bits = 8;  ///< 8: one byte per pixel; 9 to 16: one 16-bit word per pixel; white is 2^bits - 1
 
   friend bool operator==(const LumaFormat&, const LumaFormat&) = default;
 };
 
-/// The luma of one frame, not copied.
+/// Non-owning view of the luma of one frame.
 struct LumaView {
   LumaFormat format;
   const void* data = nullptr;
   std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
 
-  /// Pixel is std::uint8_t where format.bits is 8, std::uint16_t otherwise.
+  /// Pixel must be std::uint8_t if format.bits is 8, std::uint16_t otherwise.
   template <class Pixel>
   ImageView<Pixel> as() const {
     return {static_cast<const Pixel*>(data), stride, format.width, format.height};
   }
 };
 
-/// Copies the luma of a packed 4:2:2 picture (YUY2, UYVY, ...), every second byte from `data` on:
+/// Copies the luma of a packed 4:2:2 frame (YUY2, UYVY, ...), every second byte starting at `data`:
 /// the only layout whose luma is not a plane.
 void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Image<std::uint8_t>& out);
 
-/// A frame in 8 bits, as optical flow takes it: the frame itself if it has 8 bits, else its
-/// upper 8.
+/// Converts frames to the 8 bits that optical flow works on: 8-bit frames are passed through,
+/// deeper ones are reduced to their upper 8 bits.
 class Grey8 {
  public:
   /// Valid as long as `frame` and until the next call.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What SIMD kernels share. Included once for each SIMD target, after foreach_target.h.
+// Shared by SIMD kernels. Included once per SIMD target, after foreach_target.h.
 #if defined(EVENTCAMERA_SIMD_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef EVENTCAMERA_SIMD_INL
 #undef EVENTCAMERA_SIMD_INL
@@ -19,8 +19,7 @@ namespace eventcamera::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Loads a vector of which only the first `count` elements are in memory; the rest is 0. For the
-/// end of a row: too slow for all of it.
+/// Loads the first `count` elements of a vector; the rest is 0. For the end of a row only: slow.
 template <class Tag, class T>
 hn::Vec<Tag> load_first(Tag tag, const T* from, int count) {
   HWY_ALIGN T elements[hn::MaxLanes(tag)] = {};
@@ -28,17 +27,17 @@ hn::Vec<Tag> load_first(Tag tag, const T* from, int count) {
   return hn::Load(tag, elements);
 }
 
-/// Coordinates and polarities of pixels, as the upper half of an Event has them.
+/// Coordinates and polarities of pixels, as in the upper half of an Event.
 using FiredLanes = hn::CappedTag<std::uint32_t, 16>;
 
-/// A row of pixels from x on, all of them OFF.
+/// OFF events of the pixels of a row, from x on.
 inline hn::Vec<FiredLanes> off_events(int x, int y) {
   return hn::Or(hn::Iota(FiredLanes(), static_cast<std::uint32_t>(x)),
                 hn::Set(FiredLanes(), static_cast<std::uint32_t>(y) << 16));
 }
 
-/// Writes an event for each lane that fired, one after another without branches. Writes as many
-/// events as there are lanes; those past the fired ones are garbage.
+/// Writes an event for each lane that fired, contiguously and without branches. Always writes as
+/// many events as there are lanes; those past the fired ones are garbage.
 inline void store_fired(hn::Vec<FiredLanes> off_events, hn::Mask<FiredLanes> fired,
                         hn::Mask<FiredLanes> on, std::uint32_t t, Event* out) {
   const FiredLanes lanes;

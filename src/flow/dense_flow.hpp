@@ -14,27 +14,28 @@ struct Flow {
   float y;
 };
 
-/// Algorithms of dense flow.
+/// Dense-flow algorithms.
 enum class FlowMethod {
   dis_lq,     ///< DIS, low quality and fast: patches of 4, overlap 0.05, 8 iterations, 3 scales
   dis_hq,     ///< DIS, high quality: patches of 8, overlap 0.4, 32 iterations
   farneback,  ///< Farneback: 3 levels, window 15, 3 iterations, polynomials of 5 pixels
 };
 
-/// Dense optical flow between 8-bit pictures of any size. What follows from one picture alone is
-/// computed once, although each picture serves twice: first as the later, then as the earlier one.
+/// Dense optical flow between 8-bit images of any size. Each image serves twice, first as the
+/// later, then as the earlier one; what depends on it alone is computed only once.
 class DenseFlow {
  public:
   virtual ~DenseFlow() = default;
 
-  /// Makes `picture` the later one, and the later one the earlier. It need not outlive the call.
+  /// Makes `picture` the later image, and the previous one the earlier image. `picture` need not
+  /// outlive the call.
   virtual void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) = 0;
 
-  /// The flow from the earlier picture to the later one, after two push() of one size. Valid until
-  /// the next call; the same for any number of threads.
+  /// Returns the flow from the earlier image to the later one. Needs two push() of the same size
+  /// first. Valid until the next call; the same for any number of threads.
   virtual ImageView<Flow> flow(ThreadPool& threads) = 0;
 
-  /// The flow between two pictures, independent of earlier calls.
+  /// Returns the flow between two images, independent of earlier calls.
   ImageView<Flow> find(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                        ThreadPool& threads) {
     push(from, threads);

@@ -11,19 +11,19 @@
 namespace eventcamera {
 namespace {
 
-/// OpenCV's DIS needs a few patches on each side: the border of smaller pictures is replicated up
-/// to this many pixels.
+/// Minimum width and height for OpenCV's DIS, which needs several patches along each side. Smaller
+/// images are padded by replicating their border.
 constexpr int min_side = 64;
 
-/// Dense inverse search (Kroeger et al., ECCV 2016). Spatial propagation, an addition of OpenCV
-/// that the paper's code does not have, is off.
+/// Dense inverse search (Kroeger et al., ECCV 2016), without the spatial propagation that OpenCV
+/// adds.
 class DisFlow final : public DenseFlow {
  public:
   struct Quality {
     int patch;
     int stride;  ///< patch * (1 - overlap)
     int iterations;
-    int finest_scale;  ///< flow is found down to 1 / 2^finest_scale of the size
+    int finest_scale;  ///< the finest level has 1 / 2^finest_scale of the size
   };
 
   explicit DisFlow(const Quality& quality) {
@@ -44,7 +44,7 @@ class DisFlow final : public DenseFlow {
 
   ImageView<Flow> flow(ThreadPool& threads) override {
     const OpenCvThreads limit(threads.threads());
-    flow_.release();  // or the search would start at the last flow
+    flow_.release();  // otherwise the search would start from the last flow
     dis_->calc(last_, next_, flow_);
     static_assert(sizeof(Flow) == 2 * sizeof(float));
     return {flow_.ptr<Flow>(), static_cast<std::ptrdiff_t>(flow_.step[0]), width_, height_};
@@ -59,7 +59,7 @@ class DisFlow final : public DenseFlow {
   int height_ = 0;
 };
 
-/// The scale at which OpenCV's DIS starts.
+/// Scale at which OpenCV's DIS starts.
 int coarsest_scale(int width, int height, int patch) {
   const auto [shorter, longer] = std::minmax({width, height});
   return std::min(static_cast<int>(std::lround(std::log2(longer / (4.0 * patch)))),

@@ -8,7 +8,7 @@
 namespace eventcamera {
 namespace {
 
-std::mutex mutex;  // guards what follows, and OpenCV's thread count
+std::mutex mutex;  // guards the variables below and OpenCV's thread count
 std::condition_variable changed;
 unsigned next_ticket = 0;  // first come, first served: no starvation
 unsigned serving = 0;

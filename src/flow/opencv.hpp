@@ -7,7 +7,7 @@
 
 namespace eventcamera {
 
-/// A picture as OpenCV's type, not copied. For reading only, which cv::Mat cannot express.
+/// Wraps an image in a cv::Mat without copying. Read-only, which cv::Mat cannot express.
 inline cv::Mat opencv_picture(const ImageView<std::uint8_t>& picture) {
   return {picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
           static_cast<std::size_t>(picture.stride)};
@@ -15,9 +15,9 @@ inline cv::Mat opencv_picture(const ImageView<std::uint8_t>& picture) {
 
 /// Sets OpenCV's thread count during its lifetime.
 ///
-/// OpenCV has one thread count for the whole process. Calls with the same count run in parallel; a
-/// call with another count waits until they have finished, and later calls queue behind it. The
-/// last one restores the count that the application had set.
+/// OpenCV has one thread count per process. Objects with the same count coexist; one with another
+/// count waits until they are gone, and later ones queue behind it. The last one restores the
+/// application's count.
 class OpenCvThreads {
  public:
   explicit OpenCvThreads(int threads);

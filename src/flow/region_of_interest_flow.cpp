@@ -7,13 +7,15 @@
 namespace eventcamera {
 namespace {
 
-/// Pixels around a change whose flow it affects: the reach of a window on a coarse scale.
+/// Distance up to which a change affects the flow, in pixels: the reach of a window on a coarse
+/// scale.
 constexpr int surroundings = 48;
 
-/// Side lengths are multiples of this, so that regions of similar size share a DenseFlow.
+/// Region sides are rounded up to multiples of this, so that regions of similar size share a
+/// DenseFlow.
 constexpr int side_step = 64;
 
-/// The range of a region in one direction: at least from ... to and its surroundings.
+/// Extent of a region along one axis: at least [from, to) and its surroundings.
 struct Range {
   int first;
   int last;
@@ -46,8 +48,8 @@ ImageView<Flow> RegionOfInterestFlow::find(const ImageView<std::uint8_t>& from,
   const Range columns(changed.left, changed.right, width_);
   const Range rows(changed.top, changed.bottom, height_);
   const Box part{columns.first, rows.first, columns.last, rows.last};
-  // From half of the picture on the whole is searched: what is computed of `to` serves the next
-  // call.
+  // A region of more than half the frame is extended to the whole frame, because then the work on
+  // `to` is reused by the next call.
   if (2 * static_cast<std::int64_t>(part.width()) * part.height() >
       static_cast<std::int64_t>(width_) * height_)
     return find_in_whole(from, to, threads);

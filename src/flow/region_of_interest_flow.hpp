@@ -8,17 +8,18 @@
 
 namespace eventcamera {
 
-/// Dense flow between the pictures of a sequence, searched only around what has changed; 0
-/// elsewhere. A still camera sees little change, which saves most of the work.
+/// Dense flow between successive frames, computed only around changed pixels; 0 elsewhere. Saves
+/// most of the work if the camera does not move.
 class RegionOfInterestFlow {
  public:
-  /// Of pictures of this size.
+  /// For frames of this size.
   RegionOfInterestFlow(FlowMethod method, int width, int height);
 
   FlowMethod method() const { return method_; }
 
-  /// The flow from a picture, which must be the `to` of the previous call, to the next; `changed`
-  /// holds all pixels that differ. Valid until the next call; the same for any number of threads.
+  /// Returns the flow between two frames; `from` must be the `to` of the previous call, and
+  /// `changed` must hold all pixels that differ. Valid until the next call; the same for any number
+  /// of threads.
   ImageView<Flow> find(const ImageView<std::uint8_t>& from, const ImageView<std::uint8_t>& to,
                        const Box& changed, ThreadPool& threads);
 
@@ -37,7 +38,7 @@ class RegionOfInterestFlow {
   std::unique_ptr<DenseFlow> part_;
   int part_width_ = 0;
   int part_height_ = 0;
-  Image<Flow> flow_;  ///< 0 outside of filled_
+  Image<Flow> flow_;  ///< 0 outside filled_
   Box filled_;
 };
 

@@ -12,18 +12,18 @@ namespace {
 
 constexpr int halvings = 3;
 constexpr int iterations = 3;
-constexpr int min_side = 32;  ///< of a shrunk picture
+constexpr int min_side = 32;  ///< of a pyramid level
 
-/// Bands of polynomials share rows of the picture with their neighbours, which are computed twice,
-/// so bands are not thin.
+/// Neighbouring bands of polynomials share image rows, which are computed twice, so bands must not
+/// be thin.
 constexpr int rows_per_expansion = 32;
 
 int expansion_bands(int height) {
   return (height + rows_per_expansion - 1) / rows_per_expansion;
 }
 
-/// A band of flow goes through all iterations while its polynomials are in the cache; each
-/// iteration needs more rows around it. So bands are thick, but enough for all threads.
+/// A band of flow goes through all iterations while its polynomials are in the cache, and each
+/// iteration needs more rows around it. So bands are thick, but numerous enough for all threads.
 int flow_bands(int height, int threads) {
   constexpr int min_rows = 60;
   constexpr int max_rows = 160;
@@ -109,7 +109,7 @@ ImageView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
   return levels_.front().flow.view();
 }
 
-/// Rows [first, last) of a level's flow.
+/// Computes rows [first, last) of a level's flow.
 void FarnebackFlow::find_rows(const Level* coarser, Level& level, int first, int last,
                               Scratch& scratch) {
   const int height = level.flow.height();
@@ -132,7 +132,7 @@ void FarnebackFlow::find_rows(const Level* coarser, Level& level, int first, int
                      scratch.update, rows_of(i));
 }
 
-/// Initializes the rows up to `last` from the flow of the coarser level, or with 0.
+/// Initializes the rows of `out` before `last` from the flow of the coarser level, or with 0.
 void FarnebackFlow::start_rows(const Level* coarser, const Level& level, int last, Scratch& scratch,
                                const FlowRows& out) {
   if (coarser == nullptr) {

@@ -11,7 +11,7 @@
 
 namespace eventcamera {
 
-/// Farneback's flow (SCIA 2003), from coarse to fine; 0 between equal pictures.
+/// Farneback's method (SCIA 2003), coarse to fine; the flow between equal images is 0.
 class FarnebackFlow final : public DenseFlow {
  public:
   void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) override;
@@ -30,7 +30,7 @@ class FarnebackFlow final : public DenseFlow {
     Resampling rows;
   };
 
-  /// Of one thread.
+  /// Scratch memory of one thread.
   struct Scratch {
     PyramidLevel::Scratch pyramid;
     std::array<std::vector<float>, 2 * PolynomialExpansion::reach + 1> rows;
@@ -49,7 +49,7 @@ class FarnebackFlow final : public DenseFlow {
 
   int width_ = 0;
   int height_ = 0;
-  std::vector<Level> levels_;  ///< the finest is the first
+  std::vector<Level> levels_;  ///< finest first
   std::vector<Scratch> scratch_;
 };
 

@@ -8,7 +8,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/flow_update.cpp"
 #include <hwy/foreach_target.h>
-// Once for each target.
+// Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -19,25 +19,24 @@ using Floats = hn::CappedTag<float, row_padding>;
 using Words = hn::Rebind<std::int32_t, Floats>;
 using Vector = hn::Vec<Floats>;
 constexpr int coefficients = PolynomialExpansion::coefficients;
-/// Of the symmetric 2x2 matrix and the right side.
+/// Coefficients of the normal equations: symmetric 2x2 matrix and right-hand side.
 constexpr int equations = 5;
 
-/// Pixels of a row that go through all steps together.
+/// Pixels of a row that are processed together.
 constexpr int chunk = 64;
 
-/// Intermediate values of the pixels of a chunk.
+/// Intermediate values per pixel of a chunk.
 struct Chunk {
-  HWY_ALIGN std::int32_t offset[chunk];  ///< of the polynomials where the flow ends
-  HWY_ALIGN float right[chunk];          ///< from that pixel on
+  HWY_ALIGN std::int32_t offset[chunk];  ///< of the later polynomials, at the end of the flow
+  HWY_ALIGN float right[chunk];          ///< sub-pixel offset from that pixel
   HWY_ALIGN float down[chunk];
-  HWY_ALIGN float weight[chunk];  ///< of the mean of both polynomials' a
-  HWY_ALIGN float
-      four[4 * chunk + 4];  ///< of the earlier polynomial: b minus the later one's, a plus
+  HWY_ALIGN float weight[chunk];        ///< 1 / number of polynomials that a is a mean of
+  HWY_ALIGN float four[4 * chunk + 4];  ///< earlier b - later b, earlier a + later a
   HWY_ALIGN float fifth[chunk];
 };
 
-/// Follows the flow. Outside the picture there is no later polynomial: a zero one is read, and the
-/// earlier one's a counts twice.
+/// Follows the flow to the later polynomials. There is none outside the image: a zero one is read,
+/// and the earlier one's a counts twice.
 void follow(const PolynomialExpansion& to, const Flow* flow, int x, int y, int count,
             Chunk& result) {
   const Floats floats;
@@ -95,7 +94,7 @@ void combine(const float* from, const PolynomialExpansion& to, int count, Chunk&
   const int quarter = static_cast<int>(hn::Lanes(four));
   for (int i = 0; i < count; ++i) {
     float* out = result.four + std::ptrdiff_t{4} * i;
-    if (hn::Lanes(eight) == 8) {  // the last four are overwritten by the next pixel
+    if (hn::Lanes(eight) == 8) {  // the next pixel overwrites the upper four
       hn::StoreU(combined(eight, i, 0), eight, out);
       result.fifth[i] = out[4];
     } else {
@@ -105,9 +104,9 @@ void combine(const float* from, const PolynomialExpansion& to, int count, Chunk&
   }
 }
 
-/// Three rows of equations, and thirteen rows of their sums over three: ring buffers by row number.
+/// Ring buffers of three rows of equations, and of thirteen rows of their sums over three rows.
 struct Rows {
-  int padded_width;  ///< floats in a row of one equation
+  int padded_width;  ///< floats per row of one equation
   float* tensors;
   float* threes;
   float* window;  ///< sums over fifteen rows, each with `reach` pixels before and after
@@ -120,8 +119,8 @@ struct Rows {
   }
 };
 
-/// The i-th row of equations, those of row y, and the sums over the last fifteen rows, which are
-/// valid once there are fifteen.
+/// Computes the i-th row of equations, those of image row y, and the sums over the last fifteen
+/// rows, which are valid from the fifteenth row on.
 void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
              int y, float row_weight, const float* column_weights, int i, const Rows& rows,
              Chunk& pixels) {
@@ -165,7 +164,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
       b_x = hn::Mul(b_x, weight);
       const auto xy_squared = hn::Mul(a_xy, a_xy);
       const auto put = [&](int equation, Vector value) {
-        // The equations of a vector side by side: one address for all five.
+        // The five equations of a vector of pixels are adjacent, so one address serves all.
         const std::ptrdiff_t at = std::ptrdiff_t{equations} * x + std::ptrdiff_t{equation} * lanes;
         const auto recent = [&](const float* row) { return hn::LoadU(floats, row + at); };
         const auto sum = hn::Add(hn::Add(recent(tensor_2), recent(tensor_1)), value);
@@ -184,7 +183,7 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
   }
 }
 
-/// Sums along a row over three pixels: out[x] = row[x] + row[x + 1] + row[x + 2].
+/// out[x] = row[x] + row[x + 1] + row[x + 2]
 void add_threes(const float* row, int width, float* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -194,15 +193,15 @@ void add_threes(const float* row, int width, float* out) {
                floats, out + x);
 }
 
-/// The flow of a row from its equations' sums over three pixels of fifteen rows. Products of sums
-/// nearly cancel at straight edges, so they are computed in double.
+/// Solves for the flow of a row. `threes` are the sums of the equations over fifteen rows and three
+/// pixels. At straight edges the products of sums nearly cancel, so they are computed in double.
 void solve_row(const float* threes, int padded_width, int width, Flow* flow) {
   const hn::CappedTag<double, 8> doubles;
   const hn::Rebind<float, decltype(doubles)> floats;
   using Doubles = hn::Vec<decltype(doubles)>;
   const int lanes = static_cast<int>(hn::Lanes(doubles));
   constexpr int side = 2 * FlowUpdate::reach + 1;
-  // Makes the flow 0 where there is no texture.
+  // Regularization: the flow is 0 where there is no texture.
   const auto regular = hn::Set(doubles, 1e-3 * side * side * side * side);
   for (int x = 0; x < width; x += lanes) {
     const auto window = [&](int equation) {

@@ -9,7 +9,7 @@
 
 namespace eventcamera {
 
-/// The rows of a flow from `first` on, with row_padding pixels past the end of each.
+/// Rows of a flow field, starting with row `first`, each padded by row_padding pixels.
 struct FlowRows {
   Flow* data;
   std::ptrdiff_t stride;  ///< pixels from one row to the next
@@ -18,19 +18,19 @@ struct FlowRows {
   Flow* row(int y) const { return data + (y - first) * stride; }
 };
 
-/// One iteration of Farneback's method: from a flow to a better one.
+/// One iteration of Farneback's method, which refines a flow.
 ///
 /// The polynomials at both ends of a pixel's flow differ by a shift, which solves two linear
-/// equations. They are summed over a window, as least squares, and solved for the flow of its
-/// centre. The result does not depend on how the rows are divided.
+/// equations. These are summed over a window (least squares) and solved for the flow of its centre.
+/// The result does not depend on how rows are divided between calls.
 class FlowUpdate {
  public:
   static constexpr int reach = 7;   ///< pixels each way from the centre of a window
   static constexpr int border = 5;  ///< width of the border where polynomials weigh less
 
   struct Scratch {
-    std::vector<float> tensors;  ///< the equations of the last rows
-    std::vector<float> threes;   ///< and their sums over three rows
+    std::vector<float> tensors;  ///< equations of the last rows
+    std::vector<float> threes;   ///< their sums over three rows
     std::vector<float> window_rows;
     std::vector<float> row_threes;
   };
@@ -38,8 +38,8 @@ class FlowUpdate {
   FlowUpdate() = default;
   FlowUpdate(int width, int height);
 
-  /// Fills rows [first, last) of `out` from `reach` more rows of `flow` on both sides, as far as
-  /// there are any.
+  /// Fills rows [first, last) of `out`. Reads these rows of `flow` and `reach` more on each side,
+  /// as far as they exist.
   void run(const PolynomialExpansion& from, const PolynomialExpansion& to, const FlowRows& flow,
            int first, int last, Scratch& scratch, const FlowRows& out) const;
 

@@ -9,7 +9,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/polynomial_expansion.cpp"
 #include <hwy/foreach_target.h>
-// Once for each target.
+// Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -42,7 +42,7 @@ void fit_columns(const PolynomialExpansion::Window& window, int width, const Fit
   }
 }
 
-/// `four` holds four coefficients a pixel, `fifth` for the last.
+/// `four` and `fifth` are scratch for the first four coefficients per pixel and the last one.
 void fit_row(const float* smooth, const float* slope, const float* bend, int width,
              const FitKernels& kernels, float* four, float* fifth, float* out) {
   const Floats floats;
@@ -95,7 +95,7 @@ FitKernels::FitKernels() {
     weight[k] = std::exp(-k * k / (2 * sigma * sigma));
     sum += k == 0 ? weight[k] : 2 * weight[k];
   }
-  double second = 0;  // moments of the weight
+  double second = 0;  // moments of the weights
   double fourth = 0;
   for (int k = 0; k < count; ++k) {
     weight[k] /= sum;

@@ -7,13 +7,13 @@
 
 namespace eventcamera {
 
-/// Quadratic polynomials fitted to a picture around each pixel, with a Gaussian weight:
-/// b_y y + b_x x + a_yy y^2 + a_xx x^2 + a_xy x y, with (0, 0) at the pixel. The constant, which
-/// does not depend on motion, is left out.
+/// Quadratic polynomials fitted to an image around each pixel with Gaussian weights: b_y y + b_x x
+/// + a_yy y^2 + a_xx x^2 + a_xy x y, with (0, 0) at the pixel. The constant term, which flow does
+/// not need, is left out.
 class PolynomialExpansion {
  public:
-  static constexpr int coefficients = 5;                   ///< in the order above
-  static constexpr int reach = 5;                          ///< pixels each way of a fit
+  static constexpr int coefficients = 5;  ///< in the order above
+  static constexpr int reach = 5;         ///< pixels each way from the centre of a fit
   using Window = std::array<const float*, 2 * reach + 1>;  ///< rows y - reach ... y + reach
 
   PolynomialExpansion() = default;
@@ -23,8 +23,8 @@ class PolynomialExpansion {
   int height() const { return height_; }
   /// Floats from one row to the next.
   int stride() const { return coefficients * (width_ + 1); }
-  /// The polynomials of a row. One more on the right may be read, which is finite, and two rows of
-  /// zeros below the last one.
+  /// Polynomials of a row. One more past its end may be read, which is finite, and two rows of
+  /// zeros below the last row.
   const float* row(int y) const { return data_.data() + std::ptrdiff_t{y} * stride(); }
 
   struct Scratch {
@@ -40,16 +40,16 @@ class PolynomialExpansion {
   std::vector<float> data_;
 };
 
-/// The kernels of the least-squares fit, which is separable: each coefficient is one kernel along
-/// the columns, then one along the rows. Halves from the centre on; the slope is odd, the others
-/// even.
+/// Kernels of the least-squares fit, which is separable: each coefficient is one kernel along the
+/// columns, then one along the rows. Only the half from the centre on is stored; `slope` is odd,
+/// the others are even.
 struct FitKernels {
   static constexpr int count = PolynomialExpansion::reach + 1;
   FitKernels();
 
-  float smooth[count];  ///< the Gaussian
-  float slope[count];   ///< of x with `smooth` across, and of x y with `slope` across
-  float bend[count];    ///< of x^2 with `smooth` across
+  float smooth[count];  ///< Gaussian
+  float slope[count];   ///< for x, with `smooth` across; for x y, with `slope` across
+  float bend[count];    ///< for x^2, with `smooth` across
 };
 
 }  // namespace eventcamera

@@ -11,7 +11,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/pyramid.cpp"
 #include <hwy/foreach_target.h>
-// Once for each target.
+// Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -63,7 +63,7 @@ void resample_two(const float* upper, const float* lower, float weight, int widt
   }
 }
 
-/// out = the sum of weight[t] rows[t]
+/// out = sum over t of weights[t] * rows[t]
 void add_rows(const std::uint8_t* const* rows, const float* weights, int count, int width,
               float* out) {
   const Floats floats;
@@ -79,11 +79,11 @@ void add_rows(const std::uint8_t* const* rows, const float* weights, int count, 
   int x = 0;
   for (; x + lanes <= width; x += lanes)
     add(x, [](const std::uint8_t* pixels) { return hn::LoadU(Bytes(), pixels); });
-  if (x < width)  // the picture is not ours: nothing past its rows may be read
+  if (x < width)  // reading past the rows of a view is not allowed
     add(x, [&](const std::uint8_t* pixels) { return load_first(Bytes(), pixels, width - x); });
 }
 
-/// out[x] = the sum of kernel[t] row[x + t], with a symmetric kernel
+/// out[x] = sum over t of kernel[t] * row[x + t], with a symmetric kernel
 void blur_row(const float* row, const float* kernel, int reach, int width, float* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -154,7 +154,7 @@ int shrunk(int length, int level) {
   return static_cast<int>(std::lrint(std::ldexp(length, -level)));
 }
 
-/// The index of a pixel beyond the border: mirrored at the outermost one.
+/// Mirrors an index past the border at the outermost pixel.
 int mirrored(int i, int length) {
   if (length == 1) return 0;
   while (i < 0 || i >= length) i = i < 0 ? -i : 2 * (length - 1) - i;
@@ -176,7 +176,7 @@ void PyramidLevel::row(const ImageView<std::uint8_t>& picture, int y, Scratch& s
   const int width = picture.width;
   const auto padded_width = static_cast<std::size_t>(width) + row_padding;
 
-  // Blur and interpolation between two rows in one kernel, longer by a row.
+  // Blur and interpolation between two rows in one kernel, one row longer.
   std::array<const std::uint8_t*, max_kernel + 1> rows;
   std::array<float, max_kernel + 1> weights{};
   const float lower = rows_.weight()[y];

@@ -6,11 +6,12 @@
 
 namespace eventcamera {
 
-/// Elements past the end of a row that SIMD kernels may read and write. No vector is longer.
+/// Elements past the end of a row that SIMD kernels may read and write; also the maximum vector
+/// length.
 inline constexpr int row_padding = 16;
 
-/// At least `count` elements, with what they held before. The vector only grows: once it has seen
-/// the largest of several sizes in turn, it allocates no more.
+/// Returns at least `count` elements, which keep their values. The vector never shrinks, so sizes
+/// that alternate cause no allocations once the largest was seen.
 template <class T>
 T* scratch_of(std::vector<T>& vector, std::size_t count) {
   if (vector.size() < count) vector.resize(count);

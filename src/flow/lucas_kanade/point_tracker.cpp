@@ -8,16 +8,16 @@
 namespace eventcamera {
 namespace {
 
-/// Where a point of a block lies on a level, in one direction.
+/// Position of a point of a block on a pyramid level, along one axis.
 class Place {
  public:
   Place(int position, std::size_t level) : position_(position), level_(static_cast<int>(level)) {}
 
-  /// In eighths of a pixel.
+  /// In 1/8 of a pixel.
   int fraction() const { return (position_ & mask(level_)) << (top_level - level_); }
   int tile() const { return position_ >> level_ >> bits_of_tile; }
   int within_tile() const { return position_ >> level_ & mask(bits_of_tile); }
-  /// Its tile and its fraction together: on every level as many.
+  /// Tile and fraction combined; has the same range on every level.
   int group() const { return tile() << level_ | (position_ & mask(level_)); }
 
  private:

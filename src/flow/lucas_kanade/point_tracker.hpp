@@ -15,30 +15,31 @@ struct Point {
   int y;
 };
 
-/// The result of tracking a point.
+/// Result of tracking a point.
 struct Track {
   Flow flow;
   bool found;  ///< false: the point was lost
 };
 
-/// Pyramidal Lucas-Kanade from the last picture to the next, each point on its own: 15x15 pixels on
-/// 4 levels, as in the paper's code. 8-bit pictures, all of the same size.
+/// Pyramidal Lucas-Kanade from the last image to the next, each point independently: windows of
+/// 15x15 pixels on 4 levels, as in the paper's code. 8-bit images, all of the same size.
 class PointTracker {
  public:
-  /// Makes `picture` the one tracked to, and the previous one the one tracked from.
+  /// Makes `picture` the image tracked to, and the previous one the image tracked from.
   void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
-  /// Tracks points of the last picture, unique and in raster order, into the next, after two
-  /// push(). A track per point, valid until the next call; the same for any number of threads.
+  /// Tracks points of the last image, unique and in raster order, into the next. Needs two push()
+  /// first. Returns a track per point, valid until the next call; the same for any number of
+  /// threads.
   std::span<const Track> track(std::span<const Point> points, ThreadPool& threads);
 
  private:
-  /// Pixels that are tracked together: on the coarsest level, a tile for each fraction of a pixel;
-  /// on the others several.
+  /// Side of a block of pixels tracked together: on the coarsest level, one tile per sub-pixel
+  /// offset; on finer levels, more tiles and fewer offsets.
   static constexpr int block_side = Tile::side << (Pyramid::max_levels - 1);
   static constexpr int tiles_a_block = 1 << 2 * (Pyramid::max_levels - 1);
 
-  /// The points of a block, ordered by their tiles on a level.
+  /// Points of a block, and the same ordered by their tiles on a level.
   struct Block {
     std::vector<std::uint32_t> points;
     std::vector<std::uint32_t> ordered;
@@ -51,8 +52,8 @@ class PointTracker {
   Pyramid last_;
   Pyramid next_;
   bool has_slopes_ = false;
-  std::vector<std::size_t> rows_;  ///< where the points of each row begin
-  std::vector<Block> blocks_;      ///< one a thread
+  std::vector<std::size_t> rows_;  ///< index of the first point of each row
+  std::vector<Block> blocks_;      ///< one per thread
   std::vector<Track> tracks_;
 };
 

@@ -6,7 +6,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/pyramid.cpp"
 #include <hwy/foreach_target.h>
-// Once for each target.
+// Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -18,12 +18,13 @@ using Slopes = hn::CappedTag<std::int16_t, 16>;
 template <class Lanes>
 using BytesFor = hn::Rebind<std::uint8_t, Lanes>;
 
-/// Length limit of a blurred row: a picture's, two pixels more on each side, and a vector.
+/// Length limit of a blurred row: an image row, two pixels more on each side, and a vector.
 constexpr int max_row = 16384 + 64;
 
 // NOLINTBEGIN(clang-analyzer-core.uninitialized.Assign): the second loop reads what the first
 // wrote; what a vector reads beyond it is not used.
-/// A row of the next level, from the rows about row 2y of this one. Writes up to a vector more.
+/// Computes row y of the next level from the rows around row 2y of this one. Writes up to a vector
+/// past the end.
 void halve_row(const Image<std::uint8_t>& picture, int y, std::uint8_t* out, int width) {
   const Words words;
   const BytesFor<Words> bytes;
@@ -63,7 +64,7 @@ void halve_row(const Image<std::uint8_t>& picture, int y, std::uint8_t* out, int
 
 // NOLINTEND(clang-analyzer-core.uninitialized.Assign)
 
-/// A row of both slopes; up to a vector of 0 more.
+/// Computes a row of both gradients, followed by up to a vector of zeros.
 void slope_row(const Image<std::uint8_t>& picture, int y, std::int16_t* out_x,
                std::int16_t* out_y) {
   const Slopes slopes;
@@ -103,7 +104,7 @@ HWY_EXPORT(slope_row);
 
 namespace {
 
-/// The position that one beyond the border is reflected to; the border pixel is not repeated.
+/// Reflects a position at the border; the border pixel is not repeated.
 int reflected(int p, int size) {
   if (size == 1) return 0;
   const int period = 2 * (size - 1);

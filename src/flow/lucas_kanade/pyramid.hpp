@@ -9,26 +9,28 @@
 
 namespace eventcamera {
 
-/// A picture and its halves, blurred with (1 4 6 4 1) / 16 each way and subsampled by 2, while both
-/// sides are longer than `min_side`; at most `max_levels`.
+/// Gaussian pyramid of an image: each level is the previous one blurred with (1 4 6 4 1) / 16 each
+/// way and subsampled by 2, while both sides are longer than `min_side`; at most `max_levels`
+/// levels.
 class Pyramid {
  public:
-  /// The picture, reflected at its border, and its slopes by Scharr's operator, in 1/32 of a grey
-  /// level per pixel and 0 beyond the border. All with a margin.
+  /// The image, reflected at its border, and its Scharr gradients, in 1/32 of a grey level per
+  /// pixel, 0 beyond the border. All with a margin.
   struct Level {
     Image<std::uint8_t> picture;
     Image<std::int16_t> slope_x;
     Image<std::int16_t> slope_y;
   };
 
-  static constexpr int margin = 16;  ///< how far windows reach over the border
+  static constexpr int margin = 16;  ///< pixels that windows may extend past the border
   static constexpr int max_levels = 4;
   static constexpr int min_side = 15;
 
-  /// Computes the levels of a picture of any size; reuses the memory of one of the same size.
+  /// Computes the levels of an image of any size; reuses the memory of the last one if the size is
+  /// the same.
   void build(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
-  /// Computes the slopes, which only the picture tracked from needs.
+  /// Computes the gradients, which only the image tracked from needs.
   void build_slopes(ThreadPool& threads);
 
   const std::vector<Level>& levels() const { return levels_; }

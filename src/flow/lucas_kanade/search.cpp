@@ -10,41 +10,42 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
 #include <hwy/foreach_target.h>
-// Once for each target.
+// Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// A row of a window, or a part of it.
+/// A window row, or part of it if vectors are shorter.
 using Values = hn::CappedTag<std::int16_t, 16>;
 using Bytes = hn::Rebind<std::uint8_t, Values>;
 using Sums = hn::Repartition<std::int32_t, Values>;
 using Value = hn::Vec<Values>;
 using Sum = hn::Vec<Sums>;
 
-/// One lane a point.
+/// One lane per point.
 using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
 
 constexpr int window = 15;
 constexpr int half_window = window / 2;
-/// A row of the window takes up 16 values, the last of them without weight.
+/// A window row is processed as 16 values; the last one has weight 0.
 constexpr int row_values = 16;
 constexpr int max_moves = 10;
 constexpr float min_move = 0.03F;
-/// Two moves that cancel each other to this much stand for one half way.
+/// Two successive moves that cancel to within this distance oscillate: the search ends halfway.
 constexpr float turning_back = 0.01F;
-/// The least eigenvalue of the slopes' mean products that can be followed.
+/// Minimum eigenvalue of the mean gradient matrix (structure tensor) for a point to be trackable.
 constexpr float min_texture = 1e-4F;
-/// Products of slopes (32 a grey level) in the units of min_texture.
+/// Scale from gradient products (gradients are in 1/32 of a grey level) to the units of
+/// min_texture.
 constexpr float slope_product = 1.0F / (1 << 20);
-/// Products of a slope and a value (4 a grey level), in the same units.
+/// Scale from products of a gradient and a grey value (in 1/4 of a grey level) to the same units.
 constexpr float mismatch_product = slope_product * 8;
 
-/// Calls body(row) for the rows of a window; several to a round, so that what goes from one to the
-/// next stays where it is.
+/// Calls body(row) for each row of a window, unrolled so that values carried from row to row stay
+/// in registers.
 template <class Body>
 HWY_INLINE void for_each_row(const Body& body) {
   static_assert(window % 5 == 0);
@@ -57,13 +58,13 @@ HWY_INLINE void for_each_row(const Body& body) {
   }
 }
 
-/// What the windows of a tile's points cover of the first picture, bilinearly where the points lie
-/// between pixels.
+/// The part of the first image covered by the windows of a tile's points, resampled bilinearly at
+/// the sub-pixel offset that the points share.
 class Patch {
  public:
   static constexpr int stride = 2 * row_values;
 
-  /// For points in rows first_row ... last_row of the tile.
+  /// Covers points in rows first_row ... last_row of the tile.
   Patch(const Pyramid::Level& level, const Tile& tile, int first_row, int last_row)
       : first_row_(first_row) {
     const int rows = last_row - first_row + window;
@@ -83,7 +84,7 @@ class Patch {
     interpolate(tile, rows, load_from(level.slope_y), slope_y_);
   }
 
-  /// Where a point's window begins in these; its rows lie `stride` apart.
+  /// Index of the first value of a point's window; its rows are `stride` values apart.
   int index(int x, int y) const { return (y - first_row_) * stride + x; }
   const std::int16_t* grey() const { return grey_; }
   const std::int16_t* slope_x() const { return slope_x_; }
@@ -121,14 +122,15 @@ class Patch {
   int first_row_;
 };
 
-/// A sum of the products of a column of vectors: 32 bits hold 15 of the largest.
+/// Lane-wise sum of the products of two columns of vectors. 32 bits hold 15 of the largest
+/// products.
 template <class Factors = Values>
 class ProductSum {
  public:
   using Factor = hn::Vec<Factors>;
   using Lanes = hn::Repartition<std::int32_t, Factors>;
 
-  // Written out, or GCC 12 makes it without the target's instructions.
+  // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
   ProductSum() : low_(hn::Zero(Lanes())), high_(hn::Zero(Lanes())) {}
   void add(Factor a, Factor b) { low_ = hn::ReorderWidenMulAccumulate(Lanes(), a, b, low_, high_); }
   hn::Vec<Lanes> lanes() const { return hn::Add(low_, high_); }
@@ -138,10 +140,11 @@ class ProductSum {
   hn::Vec<Lanes> high_;
 };
 
-/// The parts that a row of a window makes in four sums.
+/// Partial sums per ProductSum in the output of store_parts(): one per 128-bit block.
 constexpr std::ptrdiff_t parts = hn::MaxLanes(Sums()) == 8 ? 2 : 1;
 
-/// Takes the lanes of four sums together: out[4 * part + k] is a part of sum k.
+/// Reduces the lanes of four sums within 128-bit blocks: out[4 * part + k] is a partial sum of sum
+/// k.
 template <class Factors>
 HWY_INLINE void store_parts(const ProductSum<Factors>& sum0, const ProductSum<Factors>& sum1,
                             const ProductSum<Factors>& sum2, const ProductSum<Factors>& sum3,
@@ -163,7 +166,7 @@ HWY_INLINE void store_parts(const ProductSum<Factors>& sum0, const ProductSum<Fa
 #endif
 }
 
-// A row of both slopes of a window, and a row of pixels to multiply both with.
+// A window row of both gradients, and a row of pixels to multiply both with.
 #if HWY_MAX_BYTES >= 64
 using BothValues = hn::FixedTag<std::int16_t, 32>;
 using Both = hn::Vec<BothValues>;
@@ -216,7 +219,7 @@ HWY_INLINE void store_both_parts(const BothSum& sum0, const BothSum& sum1, const
 }
 #endif
 
-/// The points of a tile on their way, a lane each.
+/// Searches for the points of a tile, one lane per point.
 class Points {
  public:
   Points(const Pyramid::Level& to, const Tile& tile, std::span<const Search> searches,
@@ -301,7 +304,7 @@ class Points {
  private:
   static constexpr int most = Tile::side * Tile::side;
 
-  /// The sums over a point's window that stay.
+  /// Computes the sums over a point's window that stay constant during its search.
   void see(int i) {
     const Values values;
     const int lanes = static_cast<int>(hn::Lanes(values));
@@ -342,15 +345,15 @@ class Points {
     here_y_[i] = static_cast<std::int32_t>(sums[5]);
   }
 
-  /// All ones where a row of a window has weight.
+  /// Mask of a window row: all bits set, except in the last of the 16 values.
   static Value weights(int column) {
     HWY_ALIGN static constexpr std::int16_t weight[row_values] = {-1, -1, -1, -1, -1, -1, -1, -1,
                                                                   -1, -1, -1, -1, -1, -1, -1, 0};
     return hn::Load(Values(), weight + column);
   }
 
-  /// The sums over the products of slope and (there - here), with the window on each of the four
-  /// pixels about where it lies in the other picture.
+  /// Computes the sums of gradient * (there - here) with the window at each of the four pixels
+  /// around its position in the other image.
   void mismatch(int i) {
     const Values values;
     const int lanes = static_cast<int>(hn::Lanes(values));
@@ -392,7 +395,8 @@ class Points {
     store(part + 4 * parts, here_y_[i], mismatch_y_ + std::ptrdiff_t{4} * i);
   }
 
-  /// Notes where points are, which of them have come to another pixel, and which have left.
+  /// Stores the pixels that points are in, queues points that entered another pixel in moved_, and
+  /// deactivates points that left the image.
   template <class Mask>
   void locate(int i, Mask active, hn::Vec<Floats> flow_x, hn::Vec<Floats> flow_y) {
     const Floats floats;
@@ -420,7 +424,7 @@ class Points {
       moved_[moved_count_++] = static_cast<std::int16_t>(i + std::countr_zero(bits));
   }
 
-  /// The moves that Newton's method makes.
+  /// Moves a vector of points by one Gauss-Newton step.
   template <class Mask>
   void move(int i, Mask active, bool has_before) {
     const Floats floats;
@@ -485,7 +489,7 @@ class Points {
   float right_;
   float down_;
   int moved_count_ = 0;
-  int window_[most];  ///< where it begins in the patch
+  int window_[most];  ///< index of its first value in the patch
   HWY_ALIGN float left_[most];
   HWY_ALIGN float top_[most];
   HWY_ALIGN float flow_x_[most];
@@ -500,11 +504,11 @@ class Points {
   HWY_ALIGN float active_[most];
   HWY_ALIGN float cell_x_[most];
   HWY_ALIGN float cell_y_[most];
-  HWY_ALIGN std::int32_t at_[most];  ///< where the window begins in the other picture
+  HWY_ALIGN std::int32_t at_[most];  ///< offset of the window in the other image
   std::int32_t here_x_[most];
   std::int32_t here_y_[most];
-  /// With the window on each of the four pixels about it: upper left, upper right, lower left and
-  /// lower right.
+  /// Sums with the window at each of the four pixels around its position: upper left, upper right,
+  /// lower left and lower right.
   HWY_ALIGN std::int32_t mismatch_x_[4 * most];
   HWY_ALIGN std::int32_t mismatch_y_[4 * most];
   std::int16_t moved_[most];

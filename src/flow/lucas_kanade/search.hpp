@@ -8,33 +8,34 @@
 
 namespace eventcamera {
 
-/// 16x16 pixels of a level: points that share a fraction of a pixel are searched for together.
+/// 16x16 pixels of a level. Points of a tile that share a sub-pixel offset are searched for
+/// together.
 struct Tile {
   static constexpr int side = 16;
-  static constexpr int fractions = 8;  ///< a point lies at eighths of a pixel
+  static constexpr int fractions = 8;  ///< points lie at multiples of 1/8 of a pixel
 
   int left;
   int top;
-  int right;  ///< offset of every point from its pixel, in eighths
+  int right;  ///< offset of every point from its pixel, in 1/8
   int down;
 };
 
-/// The search for a point of a tile on the same level of another picture.
+/// Search for a point of a tile on the same level of another image.
 struct Search {
   int x;  ///< its pixel, within the tile
   int y;
-  Flow flow;   ///< in: where the search starts; out: where it ended
-  bool found;  ///< out: false where the window has too little texture or has left the picture
+  Flow flow;   ///< in: start of the search; out: its result
+  bool found;  ///< out: false if the window has too little texture or left the image
 };
 
-/// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): a window of 15x15 pixels moves
-/// until its squared difference no longer falls; at most 10 times, or until a move is shorter than
-/// 0.03 pixel or turns back. Needs the slopes of `from`. At most one search per pixel of the tile.
+/// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): moves a window of 15x15 pixels
+/// towards the minimum of its squared difference, at most 10 times, until a move is shorter than
+/// 0.03 pixels or undoes the last one. Needs the gradients of `from`. At most one search per pixel
+/// of the tile.
 ///
-/// The sum over a window that determines a move is bilinear in the window's position: interpolated
-/// between the sums at the four pixels around it, which are integers. So the window is summed once
-/// per pixel that a search visits, not once per move, and the remaining floating-point arithmetic
-/// is the same on every processor.
+/// The window sum that determines a move is bilinear in the window's position, so it is
+/// interpolated between the integer sums at the four pixels around it. The window is summed once
+/// per pixel that a search visits, not once per move, and results are the same on every processor.
 void search_tile(const Pyramid::Level& from, const Pyramid::Level& to, const Tile& tile,
                  std::span<Search> searches);
 
