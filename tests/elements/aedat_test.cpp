@@ -24,12 +24,12 @@ using eventcamera::AbsoluteEvent;
 using eventcamera::Aedat4Compression;
 using eventcamera::Aedat4Decoder;
 using eventcamera::Aedat4Encoder;
-using eventcamera::Aedat4Frame;
-using eventcamera::Aedat4PixelFormat;
 using eventcamera::Aedat4Settings;
 using eventcamera::EventItem;
+using eventcamera::Frame;
 using eventcamera::FrameItem;
 using eventcamera::Microseconds;
+using eventcamera::PixelFormat;
 using eventcamera::Polarity;
 using eventcamera::SensorSize;
 using Bytes = std::vector<std::uint8_t>;
@@ -92,7 +92,7 @@ Bytes aedat4(const Events& events, Aedat4Compression compression = Aedat4Compres
 }
 
 /// Events, and a frame every 40 ms whose pixels tell its number; the first is before the events.
-Bytes aedat4_with_frames(const Events& events, Aedat4PixelFormat format, int frames) {
+Bytes aedat4_with_frames(const Events& events, PixelFormat format, int frames) {
   Aedat4Encoder encoder({sensor, "", Aedat4Compression::zstd, true, true});
   Bytes bytes;
   std::span<const AbsoluteEvent> rest(events);
@@ -393,7 +393,7 @@ TEST(AedatDemux, HandsOutTheEventsOfEveryVersion) {
 
 TEST(AedatDemux, PiecesOfAnySizeChangeNothing) {
   const auto events = steady_events(300'000, 100);
-  const File file(aedat4_with_frames(events, Aedat4PixelFormat::grey8, 7));
+  const File file(aedat4_with_frames(events, PixelFormat::grey8, 7));
   for (const int size : {1, 7, 100, 4096}) {
     Player player(file.path(), "identity");
     Owned<GstElement> source(gst_bin_get_by_name(GST_BIN(player.pipeline()), "source"));
@@ -406,13 +406,13 @@ TEST(AedatDemux, PiecesOfAnySizeChangeNothing) {
 
 TEST(AedatDemux, PutsFramesInSyncWithEvents) {
   const struct {
-    Aedat4PixelFormat format;
+    PixelFormat format;
     const char* name;
     std::size_t size;
-  } formats[] = {{Aedat4PixelFormat::grey8, "GRAY8", 8 * 3},
-                 {Aedat4PixelFormat::grey16, "GRAY16_LE", 12 * 3},
-                 {Aedat4PixelFormat::bgr, "BGR", 16 * 3},
-                 {Aedat4PixelFormat::bgra, "BGRA", 20 * 3}};
+  } formats[] = {{PixelFormat::grey8, "GRAY8", 8 * 3},
+                 {PixelFormat::grey16, "GRAY16_LE", 12 * 3},
+                 {PixelFormat::bgr, "BGR", 16 * 3},
+                 {PixelFormat::bgra, "BGRA", 20 * 3}};
   const auto events = steady_events(2'000'000, 1'000, of_1970);
   for (const auto& [format, name, size] : formats) {
     const File file(aedat4_with_frames(events, format, 50));
@@ -475,12 +475,11 @@ TEST(AedatDemux, TellsOfSilenceInFewWords) {
 /// Frames go on where events end, and events where frames end.
 TEST(AedatDemux, KeepsSilentStreamsGoing) {
   const auto few = steady_events(10'000, 100);
-  const File frames(aedat4_with_frames(few, Aedat4PixelFormat::grey8, 250));
+  const File frames(aedat4_with_frames(few, PixelFormat::grey8, 250));
   Player player(frames.path());
   ASSERT_TRUE(player.play()) << player.error;
   EXPECT_GE(player.track("events_0").end, 9 * GST_SECOND);
-  const File events(
-      aedat4_with_frames(steady_events(10'000'000, 1'000), Aedat4PixelFormat::grey8, 2));
+  const File events(aedat4_with_frames(steady_events(10'000'000, 1'000), PixelFormat::grey8, 2));
   Player other(events.path());
   ASSERT_TRUE(other.play()) << other.error;
   EXPECT_GE(other.track("video_0").end, 9 * GST_SECOND);
@@ -532,7 +531,7 @@ TEST(AedatDemux, Seeks) {
 
 TEST(AedatDemux, SeeksWhilePlayingAgainAndAgain) {
   const auto events = steady_events(10'000'000, 100);
-  const File file(aedat4_with_frames(events, Aedat4PixelFormat::bgr, 250));
+  const File file(aedat4_with_frames(events, PixelFormat::bgr, 250));
   Player player(file.path());
   player.preroll();
   player.set_state(GST_STATE_PLAYING);
@@ -675,7 +674,7 @@ TEST(AedatDemux, SaysWhereAFileHasNoEvents) {
 
 TEST(AedatDemux, PlaysAgainAfterAStop) {
   const auto events = steady_events(500'000, 100);
-  const File file(aedat4_with_frames(events, Aedat4PixelFormat::grey8, 10));
+  const File file(aedat4_with_frames(events, PixelFormat::grey8, 10));
   for (const char* between : {"", "identity"}) {
     Player player(file.path(), between);
     for (int times = 0; times < 3; ++times) {
@@ -736,7 +735,7 @@ struct Content {
   Events events;
   std::vector<std::pair<Microseconds, Bytes>> pictures;
   bool table = false;
-  std::vector<eventcamera::Aedat4Stream> streams;
+  std::vector<eventcamera::StreamInfo> streams;
   Aedat4Compression compression = Aedat4Compression::none;
 };
 
@@ -780,9 +779,8 @@ bool run(const std::string& launch) {
 TEST(AedatMux, WritesWhatTheDemuxerReads) {
   const auto events = steady_events(1'500'000, 70);
   const char* const compressions[] = {"none", "lz4", "lz4-high", "zstd", "zstd-high"};
-  const Aedat4PixelFormat formats[] = {Aedat4PixelFormat::grey8, Aedat4PixelFormat::grey16,
-                                       Aedat4PixelFormat::bgr, Aedat4PixelFormat::bgra,
-                                       Aedat4PixelFormat::grey8};
+  const PixelFormat formats[] = {PixelFormat::grey8, PixelFormat::grey16, PixelFormat::bgr,
+                                 PixelFormat::bgra, PixelFormat::grey8};
   for (std::size_t i = 0; i < 5; ++i) {
     SCOPED_TRACE(compressions[i]);
     const File in(aedat4_with_frames(events, formats[i], 30));
@@ -814,7 +812,7 @@ TEST(AedatMux, WritesWhatTheDemuxerReads) {
 
 TEST(AedatMux, KeepsTheTimesOfAFile) {
   const auto events = steady_events(300'000, 70, of_1970 + 123'457);
-  const File in(aedat4_with_frames(events, Aedat4PixelFormat::grey8, 5));
+  const File in(aedat4_with_frames(events, PixelFormat::grey8, 5));
   const File out{Bytes{}};
   ASSERT_TRUE(
       run("filesrc location=" + in_quotes(in.path()) +

@@ -32,7 +32,7 @@ constexpr std::array compressions{Aedat4Compression::none, Aedat4Compression::lz
                                   Aedat4Compression::zstd_high};
 
 struct Picture {
-  Aedat4Frame frame;
+  Frame frame;
   Bytes pixels;
 };
 
@@ -166,12 +166,12 @@ TEST(Aedat4, AnySplitOfTheBytesGivesTheSame) {
 
 TEST(Aedat4, FramesOfEveryFormatAmongEvents) {
   const auto events = some_events(100);
-  for (const auto format : {Aedat4PixelFormat::grey8, Aedat4PixelFormat::grey16,
-                            Aedat4PixelFormat::bgr, Aedat4PixelFormat::bgra}) {
+  for (const auto format :
+       {PixelFormat::grey8, PixelFormat::grey16, PixelFormat::bgr, PixelFormat::bgra}) {
     Bytes pixels(64 * 50);
     std::iota(pixels.begin(), pixels.end(), std::uint8_t{0});
     const auto t = events[49].t;
-    const Aedat4Frame frame{t, t - 9, t + 9, t - 5, t + 5, format, 13, 50, 3, 4, pixels.data(), 64};
+    const Frame frame{t, t - 9, t + 9, t - 5, t + 5, format, 13, 50, 3, 4, pixels.data(), 64};
     Aedat4Encoder encoder(
         {{346, 260}, "a \"<camera>\" & more", Aedat4Compression::lz4, true, true});
     Bytes bytes;
@@ -189,7 +189,7 @@ TEST(Aedat4, FramesOfEveryFormatAmongEvents) {
     Aedat4Decoder decoder;
     const auto contents = decoded(decoder, bytes);
     ASSERT_EQ(decoder.streams().size(), 2U);
-    EXPECT_EQ(decoder.streams()[1].kind, Aedat4Kind::frames);
+    EXPECT_EQ(decoder.streams()[1].kind, StreamKind::frames);
     EXPECT_EQ(decoder.streams()[1].source, "a \"<camera>\" & more");
     EXPECT_TRUE(contents.events[0] == events);
     ASSERT_EQ(contents.frames.size(), 1U);
@@ -216,7 +216,7 @@ TEST(Aedat4, FramesThatCannotBeWrittenAreRefused) {
   Bytes bytes;
   Aedat4Encoder without({{346, 260}, ""});
   std::uint8_t pixel = 0;
-  Aedat4Frame frame{0, 0, 0, 0, 0, Aedat4PixelFormat::grey8, 1, 1, 0, 0, &pixel, 1};
+  Frame frame{0, 0, 0, 0, 0, PixelFormat::grey8, 1, 1, 0, 0, &pixel, 1};
   EXPECT_THROW(without.encode(frame, bytes), std::invalid_argument);
   Aedat4Encoder with({{346, 260}, "", Aedat4Compression::none, true});
   frame.width = 40'000;
@@ -245,7 +245,7 @@ TEST(Aedat4, EveryTriggerSource) {
       {1000, 4, true},  {1001, 0, true}, {1002, 0, false}, {1003, 0, true}, {1004, 1, true},
       {1005, 1, false}, {1006, 2, true}, {1007, 2, false}, {1008, 3, true}, {1009, 3, false}};
   EXPECT_EQ(contents.triggers, expected);
-  EXPECT_EQ(decoder.streams()[0].kind, Aedat4Kind::triggers);
+  EXPECT_EQ(decoder.streams()[0].kind, StreamKind::triggers);
   EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
 }
 
@@ -608,7 +608,7 @@ TEST(Aedat4, ARecordingOfADavis346) {
     for (const auto& [frame, pixels] : contents.frames) {
       EXPECT_EQ(frame.width, 346);
       EXPECT_EQ(frame.height, 260);
-      EXPECT_EQ(frame.format, Aedat4PixelFormat::grey8);
+      EXPECT_EQ(frame.format, PixelFormat::grey8);
     }
     EXPECT_EQ(contents.frames[1].frame.t - contents.frames[0].frame.t, 40'000);
     EXPECT_EQ(contents.frames[2].frame.t - contents.frames[1].frame.t, 40'000);
@@ -653,9 +653,9 @@ TEST(Aedat4, PythonsLibrariesReadWhatWeWrite) {
       Bytes bytes;
       encoder.encode(events, bytes);
       const Bytes pixels(346 * 260, 3);
-      encoder.encode({events.back().t, 0, 0, 0, 0, Aedat4PixelFormat::grey8, 346, 260, 0, 0,
-                      pixels.data(), 346},
-                     bytes);
+      encoder.encode(
+          {events.back().t, 0, 0, 0, 0, PixelFormat::grey8, 346, 260, 0, 0, pixels.data(), 346},
+          bytes);
       finish(encoder, bytes);
       const auto path = folder + "/" + std::to_string(static_cast<int>(compression)) +
                         (table ? "t" : "") + ".aedat4";

@@ -47,8 +47,7 @@ inline std::vector<Seed> aedat4_seeds() {
     Aedat4Encoder encoder({size, "seed", compression, true, true});
     std::vector<std::uint8_t> bytes;
     encoder.encode(std::span(events).first(10), bytes);
-    encoder.encode({1500, 0, 0, 0, 0, Aedat4PixelFormat::bgr, 4, 4, 0, 0, pixels.data(), 12},
-                   bytes);
+    encoder.encode({1500, 0, 0, 0, 0, PixelFormat::bgr, 4, 4, 0, 0, pixels.data(), 12}, bytes);
     encoder.encode(std::span(events).subspan(10), bytes);
     encoder.finish(bytes);
     const auto name = std::to_string(static_cast<int>(compression));

@@ -20,11 +20,6 @@ enum class Aedat4Compression : std::uint8_t {
   zstd_high = 4,
 };
 
-using Aedat4Kind = StreamKind;
-using Aedat4Stream = StreamInfo;
-using Aedat4PixelFormat = PixelFormat;
-using Aedat4Frame = Frame;
-
 /// The file's first line.
 constexpr std::string_view aedat4_magic = "#!AER-DAT4.0\r\n";
 

@@ -126,7 +126,7 @@ void Aedat4Decoder::push(std::span<const std::uint8_t> piece) {
 std::optional<Item> Aedat4Decoder::next() {
   while (true) {
     if (elements_.count > 0)
-      return elements_.kind == Aedat4Kind::events ? next_events() : next_triggers();
+      return elements_.kind == StreamKind::events ? next_events() : next_triggers();
     queue_.consume(std::exchange(packet_, 0));
     const bool ready = header_read() || read_header();
     if (!ready || (scanning_ && !scan()) || !read_packet()) {
@@ -399,20 +399,20 @@ const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, i
       aedat4_kind({reinterpret_cast<const char*>(content.data()) + identifier_at, identifier_size});
   const auto stream = stream_of(id);
   if (stream && streams_[*stream].kind != kind) return "a packet of another kind than its stream";
-  if (kind == Aedat4Kind::other) {
+  if (kind == StreamKind::other) {
     ++skipped_.packets;
     return nullptr;
   }
-  const bool of_tables = kind == Aedat4Kind::triggers || kind == Aedat4Kind::imu;
+  const bool of_tables = kind == StreamKind::triggers || kind == StreamKind::imu;
   if (of_tables && compression_ == Aedat4Compression::none)
     content = decompressor_.aligned(content);
 
   std::optional<Plain> elements = Plain{};
-  if (kind == Aedat4Kind::frames) {
+  if (kind == StreamKind::frames) {
     if (const char* const corruption = read_frame(content)) return corruption;
-  } else if (kind == Aedat4Kind::events) {
+  } else if (kind == StreamKind::events) {
     elements = elements_of<aedat4::EventPacket>(content, "EVTS", Address::any);
-  } else if (kind == Aedat4Kind::triggers) {
+  } else if (kind == StreamKind::triggers) {
     elements = elements_of<aedat4::TriggerPacket>(content, "TRIG", Address::aligned);
   } else {
     elements = elements_of<aedat4::ImuPacket>(content, "IMUS", Address::aligned);
@@ -420,14 +420,14 @@ const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, i
   if (!elements) return broken_packet;
   elements_ = {kind, elements->data, elements->count, stream ? *stream : add_stream(id, kind)};
   if (frame_) frame_->stream = elements_.stream;
-  if (kind == Aedat4Kind::imu) skipped_.imu_samples += std::exchange(elements_.count, 0);
+  if (kind == StreamKind::imu) skipped_.imu_samples += std::exchange(elements_.count, 0);
   return nullptr;
 }
 
 const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
   const auto* const packet = verified<aedat4::Frame>(content, "FRME", Address::any);
   if (packet == nullptr) return broken_packet;
-  const auto format = static_cast<Aedat4PixelFormat>(packet->format());
+  const auto format = static_cast<PixelFormat>(packet->format());
   const auto pixel = bytes_per_pixel(format);
   if (pixel == 0) {
     ++skipped_.frames;
@@ -440,18 +440,18 @@ const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
   for (const auto t : {packet->t(), packet->begin_t(), packet->end_t(), packet->exposure_begin_t(),
                        packet->exposure_end_t(), packet->exposure()})
     if (!is_time(t)) return "a frame at an impossible time";
-  Aedat4Frame frame{packet->t(),
-                    packet->begin_t(),
-                    packet->end_t(),
-                    packet->exposure_begin_t(),
-                    packet->exposure_end_t(),
-                    format,
-                    packet->width(),
-                    packet->height(),
-                    packet->offset_x(),
-                    packet->offset_y(),
-                    pixels.data,
-                    std::ptrdiff_t{1} * packet->width() * pixel};
+  Frame frame{packet->t(),
+              packet->begin_t(),
+              packet->end_t(),
+              packet->exposure_begin_t(),
+              packet->exposure_end_t(),
+              format,
+              packet->width(),
+              packet->height(),
+              packet->offset_x(),
+              packet->offset_y(),
+              pixels.data,
+              std::ptrdiff_t{1} * packet->width() * pixel};
   // Newer files give the time and how long the exposure took, and nothing else.
   if (frame.begin == 0 && frame.end == 0 && frame.exposure_begin == 0 && frame.exposure_end == 0) {
     frame.begin = frame.exposure_begin = frame.t;
@@ -549,7 +549,7 @@ std::optional<std::size_t> Aedat4Decoder::stream_of(int id) const {
 }
 
 /// Adds a stream that the header does not list.
-std::size_t Aedat4Decoder::add_stream(int id, Aedat4Kind kind) {
+std::size_t Aedat4Decoder::add_stream(int id, StreamKind kind) {
   streams_.push_back({id, kind, {}, {}});
   newest_.push_back(std::numeric_limits<Microseconds>::min());
   return streams_.size() - 1;

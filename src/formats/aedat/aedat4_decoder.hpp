@@ -76,7 +76,7 @@ class Aedat4Decoder final : public Reader {
 
   /// A packet's elements that have not been handed over.
   struct Elements {
-    Aedat4Kind kind = Aedat4Kind::other;
+    StreamKind kind = StreamKind::other;
     const std::uint8_t* data = nullptr;
     std::size_t count = 0;
     std::size_t stream = 0;
@@ -91,7 +91,7 @@ class Aedat4Decoder final : public Reader {
   const char* read_content(std::span<const std::uint8_t> content, int id);
   const char* read_frame(std::span<const std::uint8_t> content);
   std::optional<std::size_t> stream_of(int id) const;
-  std::size_t add_stream(int id, Aedat4Kind kind);
+  std::size_t add_stream(int id, StreamKind kind);
   void read_table();
   void note_missing_table();
   void skip_corrupt(std::size_t packet, std::size_t sound, std::size_t work, bool sound_after);

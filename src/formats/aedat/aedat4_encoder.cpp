@@ -52,7 +52,7 @@ void Aedat4Encoder::append(std::span<const AbsoluteEvent> events, std::vector<st
   held_.insert(held_.end(), events.begin(), events.end());
 }
 
-void Aedat4Encoder::encode(const Aedat4Frame& frame, std::vector<std::uint8_t>& out) {
+void Aedat4Encoder::encode(const Frame& frame, std::vector<std::uint8_t>& out) {
   if (!settings_.frames) throw std::invalid_argument("this AEDAT4 file has no frame stream");
   const auto row = static_cast<std::size_t>(frame.width) *
                    static_cast<std::size_t>(bytes_per_pixel(frame.format));
@@ -95,10 +95,10 @@ void Aedat4Encoder::append_end(std::vector<std::uint8_t>& out) {
 
 void Aedat4Encoder::write_header(std::vector<std::uint8_t>& out) {
   if (position_ != 0) return;
-  std::vector<Aedat4Stream> streams{
-      {event_stream, Aedat4Kind::events, settings_.size, settings_.source}};
+  std::vector<StreamInfo> streams{
+      {event_stream, StreamKind::events, settings_.size, settings_.source}};
   if (settings_.frames)
-    streams.push_back({frame_stream, Aedat4Kind::frames, settings_.size, settings_.source});
+    streams.push_back({frame_stream, StreamKind::frames, settings_.size, settings_.source});
   flatbuffers::FlatBufferBuilder builder;
   // The table's position has to have a place, though it is not known yet.
   builder.ForceDefaults(true);

@@ -44,7 +44,7 @@ class Aedat4Encoder final : public Encoder {
 
   /// Appends the events that are held back, and then the frame. Throws std::invalid_argument for
   /// one that AEDAT4 cannot hold.
-  void encode(const Aedat4Frame& frame, std::vector<std::uint8_t>& out);
+  void encode(const Frame& frame, std::vector<std::uint8_t>& out);
 
   /// Appends the header, and the events that are held back.
   void flush(std::vector<std::uint8_t>& out);

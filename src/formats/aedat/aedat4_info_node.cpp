@@ -121,7 +121,7 @@ class XmlReader {
     named_ = id.has_value();
     if (!named_) return true;
     if (streams.size() == max_streams ||
-        std::ranges::find(streams, *id, &Aedat4Stream::id) != streams.end())
+        std::ranges::find(streams, *id, &StreamInfo::id) != streams.end())
       return false;
     info_.streams.emplace_back().id = *id;
     return true;
@@ -159,31 +159,31 @@ std::string text_attribute(const std::string& key, const std::string& value,
 constexpr const char* compression_names[] = {"NONE", "LZ4", "LZ4_HIGH", "ZSTD", "ZSTD_HIGH"};
 
 struct KindText {
-  Aedat4Kind kind;
+  StreamKind kind;
   std::string_view identifier;
   const char* name;
   const char* description;
 };
 
 constexpr std::array<KindText, 4> kinds{{
-    {Aedat4Kind::events, "EVTS", "events", "Array of events (polarity ON/OFF)."},
-    {Aedat4Kind::frames, "FRME", "frames", "Standard frame (8-bit image)."},
-    {Aedat4Kind::triggers, "TRIG", "triggers", "External triggers and special signals."},
-    {Aedat4Kind::imu, "IMUS", "imu", "Inertial Measurement Unit data samples."},
+    {StreamKind::events, "EVTS", "events", "Array of events (polarity ON/OFF)."},
+    {StreamKind::frames, "FRME", "frames", "Standard frame (8-bit image)."},
+    {StreamKind::triggers, "TRIG", "triggers", "External triggers and special signals."},
+    {StreamKind::imu, "IMUS", "imu", "Inertial Measurement Unit data samples."},
 }};
 
 }  // namespace
 
-Aedat4Kind aedat4_kind(std::string_view identifier) {
+StreamKind aedat4_kind(std::string_view identifier) {
   const auto* const text = std::ranges::find(kinds, identifier, &KindText::identifier);
-  return text != kinds.end() ? text->kind : Aedat4Kind::other;
+  return text != kinds.end() ? text->kind : StreamKind::other;
 }
 
 Aedat4InfoNode read_info_node(std::string_view xml) {
   return XmlReader(xml).read();
 }
 
-std::string write_info_node(std::span<const Aedat4Stream> streams, Aedat4Compression compression) {
+std::string write_info_node(std::span<const StreamInfo> streams, Aedat4Compression compression) {
   const std::string path = "/mainloop/Recorder/outInfo/";
   std::string inside;
   for (const auto& stream : streams) {
