@@ -31,9 +31,9 @@ FORMATS = {
     "npy": "NumPy",
     "csv-names": "CSV, whole microseconds",
     "csv-rpg": "TXT, fractional seconds",
-    "dsec": "HDF5 of DSEC, uncompressed",
-    "dsec-gzip": "HDF5 of DSEC, gzip",
-    "metavision": "HDF5 of Metavision",
+    "dsec": "DSEC HDF5, uncompressed",
+    "dsec-gzip": "DSEC HDF5, gzip",
+    "metavision": "Metavision HDF5",
     "ecf": "ECF without HDF5",
 }
 VERBS = {"decode": "read", "encode": "write"}

@@ -18,6 +18,6 @@ def replace_tables(path, source, text):
 
 def run_on(context):
     """When and on what a run of Google Benchmark was made."""
-    return (f"Run on {context['date'][:10]} on {context['num_cpus']} processors"
-            f" of {context['mhz_per_cpu']} MHz; load average at the start"
+    return (f"Run on {context['date'][:10]} on {context['num_cpus']} CPUs at"
+            f" {context['mhz_per_cpu']} MHz; initial load average"
             f" {context['load_avg'][0]:.1f}.\n")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// The plain formulations make the same events as ours: as the frame simulator and the dense path,
+// The naive implementations make the same events as ours: as the frame simulator and the dense path,
 // and, given the same flow, as the equations that all simulators are compared with.
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
   plots.py BENCHMARKS.json DIRECTORY
 
-DIRECTORY/runtimes.png: the runtimes of the paper, beside the plain formulation and ours here.
+DIRECTORY/runtimes.png: the runtimes of the paper, beside the naive implementation and ours here.
 DIRECTORY/growth.png: how the methods' cost grows."""
 import json
 import os
@@ -136,7 +136,7 @@ def draw_runtimes(runs, path):
         handles,
         [
             "the paper's figures: its footage, measured on its machine (i7-9700, RTX 2080 Ti)",
-            "plain formulation: our footage, our machine, two threads",
+            "naive implementation: our footage, our machine, two threads",
             "ours: the same footage, machine and threads",
         ],
         loc="lower center",
@@ -209,7 +209,7 @@ def draw_growth(runs, path):
         plt.Line2D([], [], color=INK, linewidth=1.9, marker="o", markersize=4),
         plt.Line2D([], [], color=INK, linewidth=1.4, linestyle=":"),
     ]
-    names = [LABELS[method] for method in COLOURS] + ["ours", "plain formulation"]
+    names = [LABELS[method] for method in COLOURS] + ["ours", "naive implementation"]
     figure.legend(lines, names, loc="lower center", ncol=6, frameon=False)
     figure.tight_layout(rect=(0, 0.04, 1, 1), h_pad=2.5, w_pad=2.5)
     figure.savefig(path, dpi=110)

@@ -74,7 +74,7 @@ class Scene:
 SCENES = {
     "slider": Scene("slider-depth, a DAVIS240C on a slider, 240x180", "slider-depth", "images.txt",
                     "events-t-x-y-p.txt.gz", 2, 2),
-    "davis": Scene("a DAVIS346 before a workbench, 346x260", "events",
+    "davis": Scene("a DAVIS346 in front of a workbench, 346x260", "events",
                    "davis346-frames-events-imu.aedat4", "davis346-frames-events-imu.aedat4", 1, 1),
 }
 
@@ -191,8 +191,8 @@ def table(result):
         lines.append("| " + " | ".join(cells) + " |")
     calibrated = rows[CALIBRATED]["element"]
     lag = f"{1000 * result['lag']:.1f} ms" if result["lag"] != 0 else "not estimated"
-    lines += ["", f"Frame intervals: {result['calibrated']} to calibrate, the next"
-              f" {result['measured']} to measure. Lag of the frames: {lag}. Calibrated element:"
+    lines += ["", f"Frame intervals: {result['calibrated']} for calibration, the next"
+              f" {result['measured']} for measurement. Frame lag: {lag}. Calibrated element:"
               f" `{calibrated}`.", ""]
     return "\n".join([f"### {result['title'][0].upper()}{result['title'][1:]}", ""] + lines)
 

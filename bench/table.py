@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Prints the tables of a benchmark run, a row per method and a column per scene: speed relative to
-the plain formulation, and milliseconds per frame.
+the naive implementation, and milliseconds per frame.
 
   table.py BENCHMARKS.json [PAGE.md]
 
@@ -67,7 +67,7 @@ def table(times, rows, threads, header, cell):
 
 
 def beside(other, text):
-    """What a cell says about our time and that of the other formulation."""
+    """What a cell says about our time and that of the other implementation."""
 
     def cell(times, scene, method, threads):
         ours = times.get((scene, method, "ours", threads))
@@ -78,9 +78,9 @@ def beside(other, text):
 
 
 beside_plain = beside("plain", lambda ours, plain: (
-    f"**{plain / ours:.1f}×** {milliseconds(ours)} ms (plain {milliseconds(plain)})"))
+    f"**{plain / ours:.1f}×** {milliseconds(ours)} ms (naive {milliseconds(plain)})"))
 beside_memcpy = beside("memcpy", lambda ours, memcpy: (
-    f"**{ours / memcpy:.1f}** memcpy, {milliseconds(ours)} ms"))
+    f"**{ours / memcpy:.1f}×** memcpy ({milliseconds(ours)} ms)"))
 
 
 def main():

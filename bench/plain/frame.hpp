@@ -8,7 +8,7 @@
 #include "src/core/thread_pool.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// The plain formulation, what our speed is compared with: each method as anyone would write it,
+/// The naive implementation that our speed is compared with: each method as anyone would write it,
 /// OpenCV's optical flow, one picture after another and simple loops over its pixels, on all
 /// threads. 8-bit pictures.
 namespace plain {
