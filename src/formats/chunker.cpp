@@ -10,18 +10,18 @@ bool earlier(const AbsoluteEvent& a, const AbsoluteEvent& b) {
   return a.t < b.t;
 }
 
-/// By time, then in raster order; OFF and ON alike.
+/// Sorts by time, then in raster order, regardless of polarity.
 std::uint64_t key(const Event& event) {
   return std::uint64_t{event.t} << 32 | static_cast<std::uint64_t>(event.y()) << 16 | event.x;
 }
 
-/// Puts events that are sorted by time into raster order within each time, and returns how many it
-/// removes because another has their pixel and time.
+/// Puts events sorted by time into raster order within each time. Removes events with the pixel and
+/// time of another one, and returns their number.
 std::uint64_t order_ties(std::vector<Event>& events) {
   const auto before = [](const Event& a, const Event& b) { return key(a) < key(b); };
   bool ordered = true;
   for (std::size_t i = 1; i < events.size(); ++i)
-    ordered &= key(events[i - 1]) < key(events[i]);  // nearly always, and without a branch
+    ordered &= key(events[i - 1]) < key(events[i]);  // branch-free; nearly always true
   if (ordered) return 0;
   for (auto from = events.begin(); from != events.end();) {
     const auto to =
@@ -43,7 +43,7 @@ Chunker::Chunker(Microseconds length, Microseconds start)
 
 void Chunker::push(std::span<const AbsoluteEvent> events) {
   if (events.empty()) return;
-  // Nearly always all is as it should be, and nothing has to be looked at one by one.
+  // Fast path: nearly always the events are in order and can be added at once.
   if (ahead_.empty() && latest_ != never && events.front().t >= std::max(latest_, start_) &&
       events.back().t <= latest_ + settled &&
       std::is_sorted(events.begin(), events.end(), earlier)) {
@@ -62,7 +62,7 @@ void Chunker::place(const AbsoluteEvent& event) {
   if (!ahead_.empty()) {
     if (event.t >= ahead_.front().t - settled) {
       ahead_.push_back(event);
-      // The clock goes on from where it jumped to.
+      // The clock continues from where it jumped to.
       if (event.t - ahead_.front().t >= settled || ahead_.size() >= max_ahead) believe_ahead();
       return;
     }
@@ -125,7 +125,7 @@ std::optional<Chunker::Interval> Chunker::next() {
   }
   sort();
   if (end > due) {
-    // The last interval ends with the last event; one that is too full, in the middle.
+    // The last interval ends with the last event; an overfull one is cut at its median.
     const auto middle = kept_[head_ + waiting / 2].t;
     return hand_out(finished_ ? due : std::max(middle, start_ + 1));
   }
@@ -144,7 +144,7 @@ Chunker::Interval Chunker::hand_out(Microseconds end) {
   });
   dropped_.repeated += order_ties(handed_out_);
   head_ = static_cast<std::size_t>(to - kept_.begin());
-  // What was handed out makes room once it is the greater part, so that little is moved.
+  // Erase returned events once they are the greater part, so that little is moved.
   if (head_ > kept_.size() / 2) {
     kept_.erase(kept_.begin(), to);
     head_ = 0;

@@ -12,55 +12,55 @@
 
 namespace eventcamera {
 
-/// Cuts the events of a recording into intervals of equal length, each sorted by time and, within a
-/// time, in raster order. A time is a whole microsecond, rounded down, so an interval is of those
-/// from its start to before its end.
+/// Cuts the events of a recording into intervals of equal length, each sorted by time, then in
+/// raster order. Times are whole microseconds, rounded down, so an interval includes its start and
+/// excludes its end.
 ///
-/// Events may come out of order by up to `settled`; later ones are dropped. So are those of a clock
-/// that jumps ahead and soon comes back, as a bit that flips makes it, and the second of two events
-/// of the same pixel and time.
+/// Events may be out of order by up to `settled`; later ones are dropped. So are events of a clock
+/// that jumps ahead and soon comes back, as after a flipped bit, and the second of two events with
+/// the same pixel and time.
 class Chunker {
  public:
-  /// Sensors' own disorder, and the time for which a clock that errs does so, are shorter.
+  /// Longer than the disorder of sensors, and than a clock stays wrong after a flipped bit.
   static constexpr Microseconds settled = 10'000;
-  /// Times beyond, in either direction, are errors: 142 years.
+  /// Times beyond this, in either direction, are errors: 142 years.
   static constexpr Microseconds max_time = Microseconds{1} << 52;
-  /// Memory is bounded: an interval that has more is cut in two.
+  /// Bounds the memory: an interval with more events is cut in two.
   static constexpr std::size_t max_events = std::size_t{1} << 22;
 
   struct Interval {
     Microseconds start;
     Microseconds duration;
-    std::span<const Event> events;  ///< none: a silence, of any length; they stay until next()
+    std::span<const Event> events;  ///< empty: a silence, of any length; valid until next()
   };
 
   struct Dropped {
-    std::uint64_t late = 0;      ///< their interval was handed out
-    std::uint64_t stray = 0;     ///< of a time that was an error
-    std::uint64_t repeated = 0;  ///< of the pixel and time of another
+    std::uint64_t late = 0;      ///< their interval was already returned
+    std::uint64_t stray = 0;     ///< with an erroneous time
+    std::uint64_t repeated = 0;  ///< with the pixel and time of another event
   };
 
-  /// The first interval begins with the first event.
+  /// The first interval begins at the first event.
   explicit Chunker(Microseconds length) : length_(length) {}
 
-  /// The first interval begins at `start`, and what is before is left out.
+  /// The first interval begins at `start`; earlier events are ignored.
   Chunker(Microseconds length, Microseconds start);
 
   void push(std::span<const AbsoluteEvent> events);
 
-  /// Says that nothing earlier than `t` will come any more.
+  /// Declares that nothing earlier than `t` will follow.
   void reach(Microseconds t);
 
-  /// Says that nothing will come any more.
+  /// Declares the end of the events.
   void finish();
 
-  /// The next interval, if nothing more can come that belongs to it.
+  /// Returns the next interval if it is complete.
   std::optional<Interval> next();
 
-  /// When the first interval begins; nothing while that is not known.
+  /// Start of the first interval; nothing if not known yet.
   std::optional<Microseconds> first() const { return first_; }
 
-  /// The time of the latest event; only where first() is known.
+  /// Time of the latest event; valid only if first() is known.
   Microseconds latest() const { return latest_; }
 
   const Dropped& dropped() const { return dropped_; }
@@ -79,15 +79,15 @@ class Chunker {
   Microseconds length_;
   std::optional<Microseconds> first_;
   bool given_start_ = false;
-  Microseconds start_ = never;    ///< of the next interval, once first_ is known
-  Microseconds latest_ = never;   ///< of what is kept
-  Microseconds reached_ = never;  ///< nothing earlier will come
+  Microseconds start_ = never;    ///< start of the next interval, once first_ is known
+  Microseconds latest_ = never;   ///< latest time of kept events
+  Microseconds reached_ = never;  ///< nothing earlier will follow
   bool finished_ = false;
 
-  std::vector<AbsoluteEvent> kept_;  ///< its first head_ are handed out
+  std::vector<AbsoluteEvent> kept_;  ///< the first head_ of them were returned
   std::size_t head_ = 0;
   bool sorted_ = true;
-  std::vector<AbsoluteEvent> ahead_;  ///< far ahead of latest_: not yet believed
+  std::vector<AbsoluteEvent> ahead_;  ///< far ahead of latest_: not yet trusted
   std::vector<Event> handed_out_;
   Dropped dropped_;
 };

@@ -5,7 +5,7 @@
 
 namespace eventcamera {
 
-/// Decoded at once: few enough for the cache, however large the pieces are.
+/// Bytes decoded at once; the output stays in the cache, however large the pieces are.
 constexpr std::size_t block_size = std::size_t{1} << 16;
 
 std::optional<Item> DecoderReader::next() {

@@ -16,18 +16,18 @@
 
 namespace eventcamera {
 
-/// What a stream of a recording carries.
+/// Content of a stream of a recording.
 enum class StreamKind : std::uint8_t { events, frames, triggers, imu, other };
 
-/// One of the streams of a recording.
+/// A stream of a recording.
 struct StreamInfo {
-  int id = 0;  ///< in the file
+  int id = 0;  ///< its ID in the file
   StreamKind kind = StreamKind::other;
-  SensorSize size;     ///< 0x0 where the file does not say
-  std::string source;  ///< the camera's name
+  SensorSize size;     ///< 0x0 if not stated in the file
+  std::string source;  ///< name of the camera
 };
 
-/// How the pixels of a frame are stored; the numbers are those of AEDAT4.
+/// Pixel format of a frame; the values are those of AEDAT4.
 enum class PixelFormat : std::uint8_t { grey8 = 0, grey16 = 2, bgr = 16, bgra = 24 };
 
 constexpr int bytes_per_pixel(PixelFormat format) {
@@ -44,7 +44,7 @@ constexpr int bytes_per_pixel(PixelFormat format) {
   return 0;
 }
 
-/// A picture that a camera took.
+/// A frame of a camera.
 struct Frame {
   Microseconds t = 0;
   Microseconds begin = 0;
@@ -54,13 +54,13 @@ struct Frame {
   PixelFormat format = PixelFormat::grey8;
   int width = 0;
   int height = 0;
-  int x = 0;  ///< of its left column on the sensor
-  int y = 0;  ///< of its top row
+  int x = 0;  ///< left column on the sensor
+  int y = 0;  ///< top row on the sensor
   const std::uint8_t* pixels = nullptr;
-  std::ptrdiff_t stride = 0;  ///< bytes from row to row
+  std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
 };
 
-/// Some events of a stream. `stream` is an index into the reader's streams().
+/// Events of a stream. `stream` is an index into the reader's streams().
 struct EventItem {
   std::size_t stream;
   std::span<const AbsoluteEvent> events;
@@ -72,7 +72,7 @@ struct FrameItem {
   Frame frame;
 };
 
-/// Some triggers of a stream.
+/// Triggers of a stream.
 struct TriggerItem {
   std::size_t stream;
   std::span<const Trigger> triggers;
@@ -80,59 +80,58 @@ struct TriggerItem {
 
 using Item = std::variant<EventItem, FrameItem, TriggerItem>;
 
-/// Reads the items of a recording in the order of the file, whatever its format.
+/// Reads the items of a recording of any format, in file order.
 ///
-///     reader.push(piece);
-///     while (const auto item = reader.next()) ...
+/// reader.push(piece);     while (const auto item = reader.next()) ...
 class Reader {
  public:
   virtual ~Reader() = default;
   Reader(const Reader&) = delete;
   Reader& operator=(const Reader&) = delete;
 
-  /// Adds bytes, which stay borrowed until next() returns nothing; only then more may be pushed.
+  /// Adds bytes, which must stay valid until next() returns nothing; only then more may be pushed.
   virtual void push(std::span<const std::uint8_t> piece) = 0;
 
-  /// Says that no more bytes come.
+  /// Declares the end of the bytes.
   virtual void finish() = 0;
 
-  /// Gives access to all bytes of the file, for as long as the reader lives. True where the reader
-  /// reads them itself from then on, and none are to be pushed.
+  /// Gives access to all bytes of the file; `source` must outlive the reader. True if the reader
+  /// reads from it directly and no bytes must be pushed.
   virtual bool open(ByteSource& /*source*/) { return false; }
 
-  /// The next item, valid until the next call; nothing where that takes more bytes. Throws
+  /// Returns the next item, valid until the next call; nothing if more bytes are needed. Throws
   /// UnsupportedFormat.
   virtual std::optional<Item> next() = 0;
 
-  /// The streams that are known so far.
+  /// Streams known so far.
   virtual const std::vector<StreamInfo>& streams() const = 0;
 
   virtual const Corruption& corruption() const = 0;
 
-  /// Where to restart to get everything at `t` or later; nothing where a new reader has to begin
-  /// at the start of the file.
+  /// Where to restart to get everything at `t` or later; nothing if that takes a new reader at the
+  /// start of the file.
   virtual std::optional<SeekPoint> seek_point_before(Microseconds t) const = 0;
 
-  /// The next bytes are those at the position of this seek point.
+  /// Continues at a seek point: the next bytes are those at its position.
   virtual void restart(const SeekPoint& seek_point) = 0;
 
-  /// The time of the last event or frame, where the file tells it.
+  /// Time of the last event or frame, if the file states it.
   virtual std::optional<Microseconds> last_time() { return std::nullopt; }
 
-  /// Whether the file tells that a stream has no items.
+  /// True if the file states that a stream has no items.
   virtual bool is_empty(std::size_t /*stream*/) const { return false; }
 
-  /// The name of the format, for a user; empty where it says no more than the media type.
+  /// Name of the format for users; empty if it adds nothing to the media type.
   virtual std::string format_name() const { return {}; }
 
-  /// How many samples of inertial sensors were left out.
+  /// Number of skipped IMU samples.
   virtual std::uint64_t imu_samples() const { return 0; }
 
  protected:
   Reader() = default;
 };
 
-/// Reads a format that is one stream of events, and triggers, by its decoder.
+/// Reader for formats with a single stream of events (and triggers), on top of their decoder.
 class DecoderReader final : public Reader {
  public:
   explicit DecoderReader(std::unique_ptr<Decoder> decoder) : decoder_(std::move(decoder)) {
@@ -155,7 +154,7 @@ class DecoderReader final : public Reader {
   std::span<const std::uint8_t> rest_;
   bool finish_due_ = false;
   Decoded decoded_;
-  bool events_due_ = false;  ///< those in decoded_ are to be handed out
+  bool events_due_ = false;  ///< events in decoded_ are to be returned
   bool triggers_due_ = false;
 };
 

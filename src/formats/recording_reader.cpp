@@ -10,15 +10,17 @@ namespace eventcamera {
 
 namespace {
 
-/// The start of a file that is surveyed: in bytes, or in events where the reader reads by itself.
+/// Limit of the survey at the start of a file, in bytes, or in events if the reader reads from the
+/// source itself.
 constexpr std::uint64_t max_surveyed_bytes = std::uint64_t{1} << 24;
 constexpr std::uint64_t max_surveyed_events = std::uint64_t{1} << 22;
-/// Items are held for this long, or up to this size.
+/// Limits of held items, in bytes and in time.
 constexpr std::size_t max_held = std::size_t{1} << 24;
 constexpr Microseconds max_hold = 1'000'000;
-/// A stream that is further behind the others is silent.
+/// A stream lagging by more than this is treated as silent.
 constexpr Microseconds max_lag = 500'000;
-/// The clock of EVT3, the shortest of all, begins again after this time, and so do the others.
+/// Wrap period of the EVT3 clock, the shortest of all; those of the other formats are multiples of
+/// it.
 constexpr Microseconds clock_range = Microseconds{1} << 24;
 constexpr Microseconds always = std::numeric_limits<Microseconds>::min();
 
@@ -78,7 +80,7 @@ bool RecordingReader::reach(Microseconds t) {
   return chunker.first().has_value();
 }
 
-/// Of the reader, or of the items that were held.
+/// Next item from the held items, else from the reader.
 std::optional<Item> RecordingReader::next_item() {
   if (begun_ && held_next_ < held_.size()) {
     const auto& held = held_[held_next_++];
@@ -115,8 +117,8 @@ void RecordingReader::learn_streams() {
   const auto& known = reader_->streams();
   for (std::size_t i = 0; i < std::min(known.size(), streams_.size()); ++i) {
     if (known[i].kind != streams_[i].info.kind)
-      throw std::runtime_error("the streams of the file are not those that it had before");
-    // Some formats tell the size only after their first bytes.
+      throw std::runtime_error("the file changed while it was read: its streams are different now");
+    // Some formats state the size only after their first bytes.
     if (!streams_[i].size_guessed && known[i].size != SensorSize{})
       streams_[i].info.size = known[i].size;
   }
@@ -136,8 +138,8 @@ void RecordingReader::learn_streams() {
 
 /* the start of a file */
 
-/// Reads ahead for the origin, the duration, and sizes that the file does not tell, and goes back.
-/// False where bytes cannot be read.
+/// Reads ahead to find the origin, the duration and sizes not stated in the file, then goes back.
+/// False if bytes cannot be read.
 bool RecordingReader::survey() {
   {
     const auto lock = reading();
@@ -177,7 +179,7 @@ bool RecordingReader::is_surveyed(std::uint64_t events) const {
 void RecordingReader::note(const EventItem& item) {
   auto& stream = streams_[item.stream];
   stream.used.include(item.events);
-  // It tells which times are to be believed.
+  // The chunker rejects erroneous times.
   stream.chunker.push(item.events);
   while (stream.chunker.next()) stream.is_sampled = true;
   stream.first = stream.chunker.first();
@@ -210,8 +212,8 @@ void RecordingReader::hold(const Item& item) {
   }
 }
 
-/// Whether enough is known to begin: the first time of every stream, and events to guess the size
-/// of a sensor by.
+/// True if enough is known to begin: the first time of every stream, and enough events to guess
+/// unknown sensor sizes.
 bool RecordingReader::is_origin_known() const {
   if (held_size_ >= max_held) return true;
   bool awaited = false;
@@ -225,7 +227,7 @@ bool RecordingReader::is_origin_known() const {
     }
     const bool of_events = stream.info.kind == StreamKind::events;
     if (of_events && stream.info.size.width <= 0) {
-      // A file that came as a whole is held, to guess by as much of it as possible.
+      // All bytes are there: hold on, to guess from as many events as possible.
       if (finished_) return false;
       awaited |= !stream.is_sampled;
     }
@@ -235,7 +237,7 @@ bool RecordingReader::is_origin_known() const {
   return last >= first && (!awaited || last - first >= max_hold);
 }
 
-/// Takes the earliest time of any stream for the origin, and shows the streams.
+/// Makes the earliest time of all streams the origin, and shows the streams.
 void RecordingReader::begin() {
   std::optional<Microseconds> origin;
   for (const auto& stream : streams_)
@@ -253,8 +255,8 @@ void RecordingReader::begin() {
   if (!start_due_) throw UnsupportedFormat("the file has neither events nor frames");
 }
 
-/// `told` is the time of the last item, where the file tells it; else what was surveyed counts,
-/// which may be all.
+/// `told` is the time of the last item if the file states it. Otherwise the duration follows from
+/// the surveyed part, exactly if that `is_whole`.
 void RecordingReader::learn_duration(std::optional<Microseconds> told, bool is_whole) {
   auto last = origin_ - 1;
   for (const auto& stream : streams_) last = std::max(last, stream.latest.value_or(last));
@@ -329,8 +331,8 @@ void RecordingReader::show(Stream& stream) {
   start_chunker(stream);
 }
 
-/// Chunks begin at the start of the segment; those of words, and of the stream that the origin is
-/// of, with its first event.
+/// Chunks begin at the start of the segment, except that those of words, and of the stream that
+/// defines the origin, begin at the first event.
 void RecordingReader::start_chunker(Stream& stream) {
   const bool from_first_event =
       clock_ == Clock::stream || (start_ == 0 && (!begun_ || stream.first == origin_));
@@ -366,7 +368,7 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
   }
 }
 
-/// What is ready to be handed out.
+/// Next output that needs no further items.
 std::optional<RecordingReader::Output> RecordingReader::next_output() {
   if (std::exchange(start_due_, false)) return Start{};
   if (output_due_) return std::exchange(output_due_, std::nullopt);
@@ -419,8 +421,8 @@ void RecordingReader::take(const TriggerItem& item) {
   output_due_ = item;
 }
 
-/// Moves the clock of words to that of the interval that they come in. Where the clocks differ only
-/// by what the words' is cut short by, no microsecond is lost.
+/// Shifts the clock of words to that of their interval. If the two differ only by wraps of the
+/// words' clock, event times are preserved exactly.
 void RecordingReader::set_shift(Microseconds first) {
   first = std::clamp(first, -Chunker::max_time, Chunker::max_time);
   const auto start = interval_->start;
@@ -451,7 +453,7 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
   }
 }
 
-/// Lets streams that are far behind the newest item be silent.
+/// Treats event streams that lag far behind the newest item as silent.
 void RecordingReader::catch_up() {
   caught_up_ = newest_;
   for (auto& stream : streams_)
@@ -461,7 +463,7 @@ void RecordingReader::catch_up() {
   next_stream_ = 0;
 }
 
-/// Notes that a stream was handed out until `end`. False where `start` is past the segment.
+/// Records that a stream was returned up to `end`. False if `start` is past the segment.
 bool RecordingReader::advance(Stream& stream, Microseconds start, Microseconds end) {
   stream.position = std::max(stream.position, end);
   newest_ = std::max(newest_, end);

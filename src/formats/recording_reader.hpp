@@ -17,54 +17,54 @@
 
 namespace eventcamera {
 
-/// Plays a recording: what its Reader reads becomes chunks of events, frames and triggers with
-/// times from one origin, the time of the first event or frame. Knows streams, duration and seek
-/// points, and counts what was read and left out.
+/// Plays a recording: turns the items of its Reader into chunks of events, frames and triggers,
+/// timed from a common origin, the time of the first event or frame. Knows streams, duration and
+/// seek points, and counts items read and dropped.
 ///
-/// In push mode bytes come as they come, and the first items are held until the time origin is
-/// known. In pull mode the start of the file is surveyed first, up to 16 MiB of it: then the
-/// duration is exact or estimated, and the size of a sensor that the file does not tell is known.
+/// In push mode the first items are held until the time origin is known. In pull mode the start of
+/// the file, up to 16 MiB, is surveyed first: this gives an exact or estimated duration, and the
+/// sensor size if the file does not state it.
 ///
-///     recording.push(bytes);  // or open(), once
-///     while (const auto output = recording.next()) ...
+/// recording.push(bytes);  // or open(), once     while (const auto output = recording.next()) ...
 class RecordingReader {
  public:
-  /// Makes the reader of the file, which is at its start. May throw.
+  /// Creates a Reader for the file, positioned at its start. May throw.
   using MakeReader = std::function<std::unique_ptr<Reader>()>;
 
-  /// Whether the times of the file count, or those of a stream of words that carries them.
+  /// Source of output times: the file's own times, or those of the buffers that carry encoded
+  /// words.
   enum class Clock : std::uint8_t { file, stream };
 
   RecordingReader(MakeReader make_reader, Microseconds chunk_length, Clock clock = Clock::file);
 
-  /// One of the streams of the file.
+  /// A stream of the file.
   struct Stream {
     StreamInfo info;
-    unsigned number = 0;                 ///< among those of its kind
-    bool shown = false;                  ///< it has items, or may have
-    bool size_guessed = false;           ///< the file does not tell info.size
-    Microseconds position = 0;           ///< where its next item begins at the earliest
+    unsigned number = 0;                 ///< index among streams of its kind
+    bool shown = false;                  ///< it has items, or may have some
+    bool size_guessed = false;           ///< info.size is not stated in the file
+    Microseconds position = 0;           ///< earliest start of its next item
     std::uint64_t outside = 0;           ///< events outside a guessed size
-    std::optional<Microseconds> first;   ///< its earliest time in the file, as far as surveyed
-    std::optional<Microseconds> latest;  ///< its latest one
-    std::optional<Frame> first_frame;    ///< for its format: the pixels are gone
+    std::optional<Microseconds> first;   ///< earliest time in the surveyed part of the file
+    std::optional<Microseconds> latest;  ///< latest time in it
+    std::optional<Frame> first_frame;    ///< format only: its pixels are no longer valid
     UsedPixels used = {};
-    bool is_sampled = false;  ///< used is of an interval at least
+    bool is_sampled = false;  ///< `used` covers at least one interval
     Chunker chunker;
   };
 
-  /// Streams that were not shown before are shown. Comes before the first item of each.
+  /// More streams are shown. Precedes the first item of each of them.
   struct Start {};
 
-  /// Events of an interval. Times are microseconds since the origin.
+  /// Events of an interval. Its times are microseconds since the origin.
   struct Chunk {
     std::size_t stream;
     Microseconds start;
     Microseconds duration;
-    std::span<const Event> events;  ///< none: a silence, of a stream of any kind
+    std::span<const Event> events;  ///< empty: a gap, in a stream of any kind
   };
 
-  /// A frame, and its time since the origin.
+  /// A frame and its time since the origin.
   struct TimedFrame {
     std::size_t stream;
     Microseconds time;
@@ -73,69 +73,71 @@ class RecordingReader {
 
   using Output = std::variant<Start, Chunk, TimedFrame, TriggerItem>;
 
-  /// The time of the stream that words come in.
+  /// Stream time of a buffer of encoded words.
   struct Interval {
     Microseconds start;
     Microseconds duration;
   };
 
-  /// Push mode: adds bytes, borrowed until next() returns nothing or discard() is called. Words
-  /// may say when they are: their clock is moved so that the first event lies within `interval`.
+  /// Push mode: adds bytes, which must stay valid until next() returns nothing or discard() is
+  /// called. Words may have an `interval`: their clock is shifted so that the first event lies
+  /// within it.
   void push(std::span<const std::uint8_t> bytes, std::optional<Interval> interval = std::nullopt);
 
-  /// Push mode: no more bytes come.
+  /// Push mode: marks the end of the bytes.
   void finish();
 
-  /// Words: nothing before `t` will come any more. False where no event has come yet.
+  /// Words: nothing earlier than `t` will follow. False if no event was read yet.
   bool reach(Microseconds t);
 
-  /// Reads what was pushed, and drops it.
+  /// Reads the pushed bytes and drops their items.
   void discard();
 
-  /// Words: what comes next does not follow on what came.
+  /// Words: the next input is discontinuous.
   void interrupt();
 
-  /// Pull mode: the bytes of the file, which outlive this. Call it before next().
+  /// Pull mode: sets the source of bytes, which must outlive this object. Call before next().
   void open(ByteSource& source) { source_ = &source; }
 
-  /// The next item, valid until the next call. Nothing where that takes more bytes, where bytes
-  /// cannot be read, or after the end. May throw.
+  /// Returns the next item, valid until the next call. Nothing if more bytes are needed, if bytes
+  /// cannot be read, and after the end. May throw.
   std::optional<Output> next();
 
-  /// Whether everything up to the end of the file was handed out.
+  /// True once everything up to the end of the file was returned.
   bool at_end() const { return drained_; }
 
-  /// Whether everything up to the end of the segment was handed out.
+  /// True once everything up to the end of the segment was returned.
   bool is_past_stop() const;
 
-  /// Pull mode: goes on with what is at `start` or later, up to `stop`, in time since the origin.
+  /// Pull mode: continues with items at `start` or later, up to `stop`, in time since the origin.
   void seek(Microseconds start, std::optional<Microseconds> stop);
 
-  /// Push mode: where bytes have to go on for a seek to `start`; from any thread. The start of the
-  /// file where nothing better is known.
+  /// Push mode: where to resume pushing bytes for a seek to `start`; nothing means the start of the
+  /// file. May be called from any thread.
   std::optional<SeekPoint> seek_point_before(Microseconds start) const;
 
-  /// Push mode: the next bytes are those at the seek point, or at the start of the file.
+  /// Push mode: the next bytes are those at the seek point, or at the start of the file if there is
+  /// none.
   void restart(const std::optional<SeekPoint>& seek_point, Microseconds start,
                std::optional<Microseconds> stop);
 
   const std::vector<Stream>& streams() const { return streams_; }
 
-  /// Replaces a size that was guessed.
+  /// Replaces a guessed size.
   void set_size(std::size_t stream, SensorSize size) { streams_[stream].info.size = size; }
 
   std::string format_name() const { return reader_->format_name(); }
 
-  /// The time of the file that output counts from; only after a Start.
+  /// Time in the file that output times count from; valid after a Start.
   Microseconds origin() const { return origin_; }
 
-  /// The length of the file, where it is known, told by the file or estimated.
+  /// Duration of the file, if known: stored in it, measured or estimated.
   std::optional<Microseconds> duration() const { return duration_; }
 
-  /// Up to where items were handed out, in time since the origin.
+  /// End of the returned items, in time since the origin.
   Microseconds position() const { return newest_; }
 
-  /// What was read and left out since the start, or the last seek.
+  /// Numbers of items read and dropped since the start or the last seek.
   struct Counts {
     std::uint64_t events = 0;
     std::uint64_t frames = 0;
@@ -143,9 +145,9 @@ class RecordingReader {
     std::uint64_t imu_samples = 0;
     std::uint64_t corrupt_places = 0;
     std::uint64_t outside = 0;   ///< events outside the sensor
-    std::uint64_t late = 0;      ///< events and frames whose interval was handed out
-    std::uint64_t stray = 0;     ///< events and frames of a time that was an error
-    std::uint64_t repeated = 0;  ///< events of the pixel and time of another
+    std::uint64_t late = 0;      ///< events and frames of an interval already returned
+    std::uint64_t stray = 0;     ///< events and frames with an erroneous time
+    std::uint64_t repeated = 0;  ///< events with the pixel and time of another one
   };
   Counts counts() const;
 
@@ -153,7 +155,7 @@ class RecordingReader {
   const Corruption& corruption() const { return reader_->corruption(); }
 
  private:
-  /// An item from before the origin was known.
+  /// An item read before the origin was known.
   struct HeldItem {
     std::size_t stream;
     std::vector<AbsoluteEvent> events;
@@ -197,15 +199,15 @@ class RecordingReader {
   Microseconds origin_ = 0;
 
   ByteSource* source_ = nullptr;  ///< in pull mode
-  bool reads_itself_ = false;     ///< the reader, from the source
-  std::uint64_t position_ = 0;    ///< of the next byte to pull
+  bool reads_itself_ = false;     ///< the reader reads from the source
+  std::uint64_t position_ = 0;    ///< offset of the next byte to pull
 
-  std::vector<Stream> streams_;  ///< the reader's, with the same indices
+  std::vector<Stream> streams_;  ///< same indices as in the reader
   bool begun_ = false;           ///< the origin is known
   bool start_due_ = false;
-  bool finished_ = false;   ///< there are no more bytes
-  bool finishing_ = false;  ///< nor more items
-  bool drained_ = false;    ///< nor more chunks
+  bool finished_ = false;   ///< no more bytes
+  bool finishing_ = false;  ///< no more items either
+  bool drained_ = false;    ///< no more chunks either
   std::vector<HeldItem> held_;
   std::size_t held_next_ = 0;
   std::size_t held_size_ = 0;  ///< in bytes
@@ -215,16 +217,16 @@ class RecordingReader {
   std::optional<Microseconds> duration_;
   bool duration_is_exact_ = false;
 
-  std::optional<Interval> interval_;   ///< of the words that are read
-  std::optional<Microseconds> shift_;  ///< from the clock of words to the stream's
-  std::vector<AbsoluteEvent> within_;  ///< a guessed size
+  std::optional<Interval> interval_;   ///< interval of the words being read
+  std::optional<Microseconds> shift_;  ///< offset from the clock of words to that of the stream
+  std::vector<AbsoluteEvent> within_;  ///< events within a guessed size
   std::optional<Output> output_due_;   ///< a frame or triggers
-  std::size_t next_stream_ = 0;        ///< that may have a chunk
-  Microseconds newest_ = 0;            ///< the greatest position of a stream
-  Microseconds caught_up_ = 0;         ///< newest_, when the others caught up with it
-  Corruption before_;                  ///< the reader's, when it was restarted
+  std::size_t next_stream_ = 0;        ///< next stream to ask for a chunk
+  Microseconds newest_ = 0;            ///< maximum position of all streams
+  Microseconds caught_up_ = 0;         ///< newest_ at the last catch_up()
+  Corruption before_;                  ///< the reader's corruption at its last restart
   std::uint64_t imu_samples_before_ = 0;
-  Counts counts_;  ///< but for what reader and chunkers count
+  Counts counts_;  ///< without those that reader and chunkers count
 };
 
 }  // namespace eventcamera

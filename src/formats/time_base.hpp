@@ -7,19 +7,18 @@
 
 namespace eventcamera {
 
-/// The time base of a file whose times are cut short: it stores `bits` of a count of 2^`shift`
-/// microseconds, such as a TIME_HIGH word's.
+/// Unwraps a counter of `bits` bits in units of 2^`shift` microseconds, such as that of TIME_HIGH
+/// words.
 ///
-/// A count that falls by more than half its range has wrapped. Less is an error, as sensors make
-/// them: single bits of these words flip. Then the time base goes back, and the next intact word
-/// corrects it.
+/// A count that falls by more than half its range has wrapped. A smaller fall is a sensor error,
+/// such as a flipped bit: the time base then goes back, and the next intact word corrects it.
 template <int bits, int shift>
 class TimeBase {
  public:
   bool known() const { return known_; }
   std::uint32_t count() const { return count_; }
 
-  /// In microseconds; unsigned, so that no file can make it overflow.
+  /// In microseconds; unsigned, because overflow must be well-defined for any file.
   std::uint64_t time() const { return wraps_ + (std::uint64_t{count_} << shift); }
 
   void follow(std::uint32_t count) {
@@ -44,7 +43,7 @@ class TimeBase {
  private:
   static constexpr std::uint32_t mask = ~std::uint32_t{0} >> (32 - bits);
 
-  std::uint64_t wraps_ = 0;  ///< what the wraps so far add, in microseconds
+  std::uint64_t wraps_ = 0;  ///< sum of the wraps so far, in microseconds
   std::uint32_t count_ = 0;
   bool known_ = false;
 };

@@ -19,7 +19,7 @@ std::size_t UnitDecoder::read_header(std::span<const std::uint8_t>, bool) {
   return 0;
 }
 
-/// Takes what there is of the header from the front of what is left.
+/// Consumes the header, as far as it is there, from the front of rest_.
 void UnitDecoder::read_headers(bool ended) {
   std::size_t taken = 0;
   while (!reader_) {
@@ -40,7 +40,7 @@ void UnitDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
     const auto read = read_units(rest_, out);
     rest_.erase(rest_.begin(), rest_.begin() + static_cast<std::ptrdiff_t>(read));
   } else if (!rest_.empty()) {
-    // What the last bytes began.
+    // Complete the unit that the last bytes began.
     const auto before = rest_.size();
     const auto more = std::min(bytes.size(), UnitReader::longest);
     rest_.insert(rest_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(more));
@@ -56,7 +56,7 @@ void UnitDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
 void UnitDecoder::finish(Decoded& out) {
   if (!reader_) {
     read_headers(true);
-    if (!reader_) throw UnsupportedFormat("the file ends before its header does");
+    if (!reader_) throw UnsupportedFormat("the file ends within its header");
     const auto read = read_units(rest_, out);
     rest_.erase(rest_.begin(), rest_.begin() + static_cast<std::ptrdiff_t>(read));
   }
@@ -73,7 +73,7 @@ void UnitDecoder::restart(const SeekPoint& seek_point) {
 }
 
 std::size_t UnitDecoder::read_units(std::span<const std::uint8_t> bytes, Decoded& out) {
-  // SeekPoints are noted between batches, and silence must not make them rare.
+  // Seek points are recorded between batches; silence must not make them rare.
   constexpr std::ptrdiff_t max_batch = 1 << 15;
   const auto* from = bytes.data();
   const auto* const to = from + bytes.size();
@@ -97,7 +97,7 @@ std::size_t UnitDecoder::read_units(std::span<const std::uint8_t> bytes, Decoded
 void UnitDecoder::deliver(Decoded& out) {
   const std::span events(batch_.begin(), batch_.end);
   if (events.empty()) return;
-  // Nearly all batches are sorted, and seeing that takes no chain of maxima.
+  // Nearly all batches are sorted, which is cheaper to check than to compute running maxima.
   bool sorted = events.front().t >= latest_;
   for (std::size_t i = 1; i < events.size(); ++i) sorted &= events[i - 1].t <= events[i].t;
   if (sorted) {

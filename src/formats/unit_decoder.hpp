@@ -11,10 +11,10 @@
 
 namespace eventcamera {
 
-/// A decoder of a format that is a header and then units of a few bytes each.
+/// Decoder for formats with a header followed by units of a few bytes.
 class UnitDecoder : public Decoder {
  public:
-  /// Without a header.
+  /// For data without a header.
   UnitDecoder(std::unique_ptr<UnitReader> reader, SensorSize size);
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) final;
@@ -24,8 +24,8 @@ class UnitDecoder : public Decoder {
  protected:
   UnitDecoder() = default;
 
-  /// Takes some of the header from the front of `bytes`, and returns how much; 0 where that takes
-  /// more bytes. Where the header ends, calls begin(). `ended`: no more will come. Throws
+  /// Consumes part of the header from the front of `bytes` and returns its size; 0 if more bytes
+  /// are needed. Calls begin() at the end of the header. `ended`: no more bytes will follow. Throws
   /// UnsupportedFormat.
   virtual std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended);
 
@@ -36,9 +36,9 @@ class UnitDecoder : public Decoder {
   std::size_t read_units(std::span<const std::uint8_t> bytes, Decoded& out);
   void deliver(Decoded& out);
 
-  std::unique_ptr<UnitReader> reader_;  // none before the header is read
-  std::vector<std::uint8_t> rest_;      // of what was given, where it is not yet whole
-  std::uint64_t position_ = 0;          // of what is read next
+  std::unique_ptr<UnitReader> reader_;  // null until the header is read
+  std::vector<std::uint8_t> rest_;      // incomplete header or unit
+  std::uint64_t position_ = 0;          // offset of the next byte to read
   Microseconds latest_ = std::numeric_limits<Microseconds>::min();
   Batch batch_{corruption_};
 };

@@ -10,20 +10,20 @@
 
 namespace eventcamera {
 
-/// What a UnitReader fills: a few thousand events, so that they stay in the cache.
+/// Output of a UnitReader: a few thousand events, few enough to stay in the cache.
 class Batch {
  public:
-  /// Of one unit, at the most.
+  /// Maximum number of events in one unit.
   static constexpr std::size_t events_per_unit = 32;
 
   explicit Batch(Corruption& corruption) : corruption_(corruption) {}
 
   AbsoluteEvent* begin() { return events_.data(); }
 
-  /// Where no other unit is read.
+  /// From here on no further unit is read.
   AbsoluteEvent* full() { return events_.data() + events_.size() - events_per_unit; }
 
-  /// Notes that the bytes at `at` are no unit. Such units in a row are one place.
+  /// Records that the bytes at `at` are not a valid unit. Consecutive bad units count as one place.
   void bad(const std::uint8_t* at, std::size_t bytes, const char* what) {
     const auto position = start_position + static_cast<std::uint64_t>(at - start);
     if (position != bad_end_) corruption_.note(position, what);
@@ -32,10 +32,10 @@ class Batch {
 
   void outside(std::uint64_t events) { corruption_.outside += events; }
 
-  AbsoluteEvent* end = nullptr;              ///< of the events
+  AbsoluteEvent* end = nullptr;              ///< end of the events
   std::vector<Trigger>* triggers = nullptr;  ///< appended to
-  const std::uint8_t* start = nullptr;       ///< of the bytes
-  std::uint64_t start_position = 0;          ///< in the file
+  const std::uint8_t* start = nullptr;       ///< start of the bytes
+  std::uint64_t start_position = 0;          ///< its offset in the file
 
  private:
   std::array<AbsoluteEvent, 4096> events_;
@@ -43,7 +43,7 @@ class Batch {
   std::uint64_t bad_end_ = ~std::uint64_t{0};
 };
 
-/// Reads a format's units: words, or some bytes that are an event.
+/// Reads the units of a format: words, or fixed-size events.
 class UnitReader {
  public:
   struct State {
@@ -51,18 +51,18 @@ class UnitReader {
     std::uint64_t rest = 0;
   };
 
-  /// Of the longest unit, in bytes.
+  /// Size of the longest unit, in bytes.
   static constexpr std::size_t longest = 8;
 
   virtual ~UnitReader() = default;
   UnitReader(const UnitReader&) = delete;
   UnitReader& operator=(const UnitReader&) = delete;
 
-  /// Reads units, until the batch is full or what is left is none; returns where that is.
+  /// Reads units until the batch is full or no whole unit is left; returns the first byte not read.
   virtual const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                                    Batch& batch) = 0;
 
-  /// All that the reader knows of what it has read. At the start of the data it is State{}.
+  /// Complete state of the reader; State{} at the start of the data.
   virtual State state() const = 0;
   virtual void restore(const State& state) = 0;
 
@@ -70,10 +70,10 @@ class UnitReader {
   UnitReader() = default;
 };
 
-/// What is within the sensor.
+/// Bounds of a sensor.
 class Bounds {
  public:
-  /// A sensor of unknown size is as large as it can be.
+  /// A sensor of unknown size has sides of `largest` pixels.
   constexpr Bounds(SensorSize size, int largest)
       : width_(static_cast<std::uint32_t>(size.width > 0 ? size.width : largest)),
         height_(static_cast<std::uint32_t>(size.height > 0 ? size.height : largest)) {}
@@ -82,7 +82,7 @@ class Bounds {
     return static_cast<bool>(static_cast<int>(x < width_) & static_cast<int>(y < height_));
   }
 
-  /// Of 32 pixels from (x, y) to the right, those within: bit i is (x + i, y).
+  /// Mask of the 32 pixels from (x, y) to the right: bit i is set if (x + i, y) is within.
   constexpr std::uint32_t of_32(std::uint32_t x, std::uint32_t y) const {
     if (x >= width_ || y >= height_) return 0;
     const auto left = width_ - x;
