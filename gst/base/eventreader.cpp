@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "gst/base/copied_buffer.hpp"
+#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/frame_buffer.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
@@ -96,6 +96,7 @@ class EventReader {
     RecordingReader::Counts counts;
     std::optional<Restart> restart;  ///< push mode: asked for and not yet done
     guint64 pushed_bytes = 0;        ///< since the start of the file
+    guint32 last_seek = GST_SEQNUM_INVALID;
     bool is_pulling = false;
     bool is_timed = false;  ///< upstream has times of its own
     std::shared_ptr<RecordingReader> recording;
@@ -147,7 +148,7 @@ class EventReader {
 
   bool can_seek();
   bool seek(GstEvent* event);
-  bool seek_pulling(const GstSegment& segment, guint32 seqnum, bool flush);
+  bool seek_pulling(const SeekRequest& request);
   bool seek_pushed(const Restart& restart, gdouble rate);
 
   GstElement* element_;
@@ -471,24 +472,8 @@ GstFlowReturn EventReader::chain(GstBuffer* buffer) {
 
 /// May throw.
 GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
-  struct Mapped {
-    explicit Mapped(GstBuffer* buffer_) : buffer(buffer_) {
-      is_mapped = gst_buffer_map(buffer, &map, GST_MAP_READ) != FALSE;
-    }
-    ~Mapped() {
-      if (is_mapped) gst_buffer_unmap(buffer, &map);
-    }
-    GstBuffer* buffer;
-    GstMapInfo map = {};
-    bool is_mapped;
-  };
-  const Mapped mapped(buffer);
-  if (!mapped.is_mapped) {
-    post_message(element_, GST_MESSAGE_ERROR,
-                 {GST_RESOURCE_ERROR_READ, "Cannot read a buffer of the file."},
-                 "gst_buffer_map() for reading failed");
-    return GST_FLOW_ERROR;
-  }
+  const MappedBytes bytes(element_, OwnedBuffer(gst_buffer_ref(buffer)));
+  if (!bytes.is_mapped()) return GST_FLOW_ERROR;
   if (!recording_) open_recording();
   is_consuming_ = true;
   std::optional<RecordingReader::Interval> interval;
@@ -496,7 +481,7 @@ GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
   if (is_timed() && GST_BUFFER_PTS_IS_VALID(buffer))
     interval = {static_cast<Microseconds>(GST_BUFFER_PTS(buffer) / GST_USECOND),
                 has_end ? static_cast<Microseconds>(GST_BUFFER_DURATION(buffer) / GST_USECOND) : 0};
-  recording_->push({mapped.map.data, mapped.map.size}, interval);
+  recording_->push(bytes.get(), interval);
   GstFlowReturn result = hand_out();
   if (result == GST_FLOW_OK && interval && has_end)
     result = take_interval_end(static_cast<Microseconds>(
@@ -508,7 +493,7 @@ GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
       GST_DEBUG_OBJECT(element_, "dropped bytes cannot be read: %s", error.what());
     }
   }
-  shared_.lock()->pushed_bytes += mapped.map.size;
+  shared_.lock()->pushed_bytes += bytes.get().size();
   return result;
 }
 
@@ -1041,6 +1026,8 @@ bool EventReader::seek(GstEvent* event) {
   std::shared_ptr<RecordingReader> recording;
   {
     const auto shared = shared_.lock();
+    // A bin sends the same seek to each of its sinks, and so it comes through each of our pads.
+    if (shared->last_seek == request.seqnum()) return true;
     is_pulling = shared->is_pulling;
     recording = shared->recording;
     restart.segment = shared->segment;
@@ -1048,16 +1035,18 @@ bool EventReader::seek(GstEvent* event) {
   }
   if (!request.apply(restart.segment)) return false;
   restart.seqnum = request.seqnum();
-  if (is_pulling) return seek_pulling(restart.segment, restart.seqnum, request.flushes());
-  if (!request.flushes()) return false;
-  if (recording) restart.seek_point = recording->seek_point_before(position_of(restart.segment));
-  return seek_pushed(restart, request.rate());
+  if (!is_pulling && !request.flushes()) return false;
+  if (!is_pulling && recording)
+    restart.seek_point = recording->seek_point_before(position_of(restart.segment));
+  const bool done = is_pulling ? seek_pulling(request) : seek_pushed(restart, request.rate());
+  if (done) shared_.lock()->last_seek = request.seqnum();
+  return done;
 }
 
-bool EventReader::seek_pulling(const GstSegment& segment, guint32 seqnum, bool flush) {
+bool EventReader::seek_pulling(const SeekRequest& request) {
   // The streaming thread may be adding pads.
   const auto send_all = [&](GstEvent* event) {
-    gst_event_set_seqnum(event, seqnum);
+    gst_event_set_seqnum(event, request.seqnum());
     gst_pad_push_event(sink_, gst_event_ref(event));
     gst_element_foreach_src_pad(
         element_,
@@ -1068,18 +1057,21 @@ bool EventReader::seek_pulling(const GstSegment& segment, guint32 seqnum, bool f
         event);
     gst_event_unref(event);
   };
-  if (flush)
+  if (request.flushes())
     send_all(gst_event_new_flush_start());
   else
     gst_pad_pause_task(sink_);
   GST_PAD_STREAM_LOCK(sink_);
-  if (flush) send_all(gst_event_new_flush_stop(TRUE));
+  if (request.flushes()) send_all(gst_event_new_flush_stop(TRUE));
+  GstSegment segment;
   {
     const auto shared = shared_.lock();
-    shared->segment = segment;
+    shared->segment.duration = shared->duration;
+    request.apply(shared->segment);  // from the position at which output has stopped
     shared->counts = {};
+    segment = shared->segment;
   }
-  seqnum_ = seqnum;
+  seqnum_ = request.seqnum();
   corrupt_places_ = 0;
   gst_flow_combiner_reset(combiner_);
   interrupt_output();

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "gst/base/copied_buffer.hpp"
+#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/types.hpp"

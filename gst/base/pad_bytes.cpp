@@ -2,6 +2,7 @@
 #include "gst/base/pad_bytes.hpp"
 
 #include <algorithm>
+#include <utility>
 
 /// Pulled at once, because upstream allocates as much.
 static constexpr std::size_t piece_size = std::size_t{1} << 18;
@@ -37,22 +38,12 @@ std::optional<std::size_t> PadBytes::read(std::uint64_t position,
 }
 
 std::optional<std::span<const std::uint8_t>> PadBytes::piece(std::uint64_t position) {
-  release_piece();
+  piece_.reset();
   OwnedBuffer buffer(pull(position, piece_size));
   if (failed()) return std::nullopt;
   if (!buffer) return std::span<const std::uint8_t>{};
-  if (!gst_buffer_map(buffer.get(), &map_, GST_MAP_READ)) {
-    GST_ELEMENT_ERROR(GST_PAD_PARENT(sink_), RESOURCE, READ, ("Cannot read a buffer of the file."),
-                      ("gst_buffer_map() for reading failed at byte %" G_GUINT64_FORMAT, position));
-    flow_ = GST_FLOW_ERROR;
-    return std::nullopt;
-  }
-  piece_ = std::move(buffer);
-  return std::span<const std::uint8_t>(map_.data, map_.size);
-}
-
-void PadBytes::release_piece() {
-  if (!piece_) return;
-  gst_buffer_unmap(piece_.get(), &map_);
-  piece_.reset();
+  piece_.emplace(GST_PAD_PARENT(sink_), std::move(buffer));
+  if (piece_->is_mapped()) return piece_->get();
+  flow_ = GST_FLOW_ERROR;
+  return std::nullopt;
 }

@@ -3,7 +3,7 @@
 
 #include <gst/gst.h>
 
-#include "gst/base/owned.hpp"
+#include "gst/base/buffer_bytes.hpp"
 #include "src/formats/byte_source.hpp"
 
 /// The size of the file that comes from upstream, in bytes; 0 where it is not known.
@@ -14,7 +14,6 @@ class PadBytes final : public eventcamera::ByteSource {
  public:
   /// Of an element's sink pad, which outlives this.
   explicit PadBytes(GstPad* sink) : sink_(sink), size_(upstream_bytes(sink)) {}
-  ~PadBytes() override { release_piece(); }
 
   std::uint64_t size() const override { return size_; }
   std::optional<std::size_t> read(std::uint64_t position,
@@ -30,11 +29,9 @@ class PadBytes final : public eventcamera::ByteSource {
 
  private:
   GstBuffer* pull(std::uint64_t position, std::size_t size) noexcept;
-  void release_piece();
 
   GstPad* sink_;
   std::uint64_t size_;
   GstFlowReturn flow_ = GST_FLOW_OK;
-  OwnedBuffer piece_;  ///< mapped
-  GstMapInfo map_ = {};
+  std::optional<MappedBytes> piece_;
 };

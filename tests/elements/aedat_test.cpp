@@ -256,6 +256,7 @@ class Player {
   std::vector<std::string> warnings;
   std::string error;
   std::atomic<int> no_more_pads = 0;
+  std::atomic<int> flushes = 0;  ///< of all pads together
 
  private:
   static void added(GstElement*, GstPad* pad, Player* self) {
@@ -278,7 +279,8 @@ class Player {
     }
     gst_pad_add_probe(pad,
                       static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
-                                                   GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
+                                                   GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
+                                                   GST_PAD_PROBE_TYPE_EVENT_FLUSH),
                       seen, self, nullptr);
     GstPad* const in = gst_element_get_static_pad(queue, "sink");
     gst_pad_link(pad, in);
@@ -293,6 +295,8 @@ class Player {
     auto& track = self->tracks_[GST_PAD_NAME(pad)];
     if ((GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER) != 0)
       see(track, GST_PAD_PROBE_INFO_BUFFER(info), g_str_has_prefix(GST_PAD_NAME(pad), "events"));
+    else if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_FLUSH_STOP)
+      ++self->flushes;
     else
       see(track, GST_PAD_PROBE_INFO_EVENT(info));
     return GST_PAD_PROBE_OK;
@@ -534,6 +538,8 @@ TEST(AedatDemux, SeeksWhilePlayingAgainAndAgain) {
   const File file(aedat4_with_frames(events, PixelFormat::bgr, 250));
   Player player(file.path());
   player.preroll();
+  ASSERT_TRUE(player.seek(GST_SECOND));
+  EXPECT_EQ(player.flushes, 2) << "the bin sends a seek to both sinks; it is done once";
   player.set_state(GST_STATE_PLAYING);
   recordings::Random random(3);
   for (int i = 0; i < 60; ++i) {
