@@ -249,6 +249,34 @@ TEST(Aedat4, EveryTriggerSource) {
   EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
 }
 
+TEST(Aedat4, AlignmentMayCountFromAnywhere) {
+  const std::vector<aedat_files::TriggerSource> sources{{1000, 1}, {1001, 2}};
+  const std::vector<Aedat4TableEntry> entries{{110, 0, 50, 10, 5, 9}, {168, 1, 20, 1, 7, 7}};
+  const auto table = aedat4_table_content(entries);
+  const Bytes table_body(table.begin() + 4, table.end());
+  for (const std::size_t off_by : {0, 1, 2, 4}) {
+    SCOPED_TRACE(off_by);
+    auto bytes = aedat_files::aedat4_header("", 0, 5000, off_by);
+    aedat_files::add_packet(bytes, 7, aedat_files::triggers_content(sources, off_by));
+    Aedat4Decoder decoder;
+    EXPECT_EQ(decoded(decoder, bytes).triggers,
+              (std::vector<Trigger>{{1000, 0, true}, {1001, 0, false}}));
+    EXPECT_EQ(decoder.table_at(), 5000U);
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+
+    Aedat4Decoder of_xml;
+    decoded(of_xml, aedat_files::aedat4_header(aedat_files::xml_of_one_stream, 0, -1, off_by));
+    ASSERT_EQ(of_xml.streams().size(), 1U);
+    EXPECT_EQ(of_xml.streams()[0].size, (SensorSize{346, 260}));
+
+    const auto moved = aedat_files::moved(table_body, off_by);
+    Bytes content;
+    aedat_files::add_little(content, static_cast<std::int64_t>(moved.size()), 4);
+    aedat_files::add(content, moved);
+    EXPECT_EQ(read_aedat4_table(content, Aedat4Compression::none, 110), entries);
+  }
+}
+
 TEST(Aedat4, StreamsThatTheHeaderDoesNotListAreFound) {
   const auto events = some_events(100);
   auto bytes = aedat_files::aedat4_header("");

@@ -123,9 +123,21 @@ inline constexpr std::string_view xml_of_one_stream =
     "<attr key=\"sizeX\" type=\"int\">346</attr><attr key=\"sizeY\" type=\"int\">260</attr>"
     "</node></node></node></dv>";
 
-/// `xml` as the header's text; an empty one is left out.
-inline Bytes aedat4_header(std::string_view xml, int compression = 0, std::int64_t table = -1) {
-  Bytes body;  // numbers of eight bytes lie at multiples of eight, counted from its size
+/// Moves what lies in a FlatBuffer's body of which the root's position is the first number.
+inline Bytes moved(const Bytes& body, std::size_t by) {
+  Bytes bytes;
+  add_little(bytes, body[0] + static_cast<std::int64_t>(by), 4);
+  bytes.insert(bytes.end(), body.begin() + 4, body.begin() + 8);
+  bytes.resize(bytes.size() + by);
+  bytes.insert(bytes.end(), body.begin() + 8, body.end());
+  return bytes;
+}
+
+/// `xml` as the header's text; an empty one is left out. Numbers of eight bytes lie at multiples of
+/// eight, counted from the body's size, where they are not `off_by` bytes.
+inline Bytes aedat4_header(std::string_view xml, int compression = 0, std::int64_t table = -1,
+                           std::size_t off_by = 0) {
+  Bytes body;
   add_little(body, 20, 4);  // to the root
   add(body, "IOHE");
   add_little(body, 10, 2);                    // 8: the vtable: its size,
@@ -141,6 +153,7 @@ inline Bytes aedat4_header(std::string_view xml, int compression = 0, std::int64
   add_little(body, static_cast<std::int64_t>(xml.size()), 4);
   add(body, xml);
   body.push_back(0);
+  body = moved(body, off_by);
   Bytes bytes;
   add(bytes, "#!AER-DAT4.0\r\n");
   add_little(bytes, static_cast<std::int64_t>(body.size()), 4);
@@ -149,7 +162,8 @@ inline Bytes aedat4_header(std::string_view xml, int compression = 0, std::int64
 }
 
 /// A FlatBuffer of one table with one vector of `count` elements, which `elements` begins with.
-inline Bytes vector_packet(std::string_view identifier, const Bytes& elements, std::size_t count) {
+inline Bytes vector_packet(std::string_view identifier, const Bytes& elements, std::size_t count,
+                           std::size_t off_by = 0) {
   Bytes body;
   add_little(body, 16, 4);  // to the root
   add(body, identifier);
@@ -161,6 +175,7 @@ inline Bytes vector_packet(std::string_view identifier, const Bytes& elements, s
   add_little(body, 4, 4);  // to the vector
   add_little(body, static_cast<std::int64_t>(count), 4);
   add(body, elements);
+  body = moved(body, off_by);
   Bytes bytes;
   add_little(bytes, static_cast<std::int64_t>(body.size()), 4);
   add(bytes, body);
@@ -184,7 +199,7 @@ struct TriggerSource {
 };
 
 /// Tables with a time in 64 bits and, where it is not left out, a byte.
-inline Bytes triggers_content(std::span<const TriggerSource> triggers) {
+inline Bytes triggers_content(std::span<const TriggerSource> triggers, std::size_t off_by = 0) {
   const auto count = static_cast<std::int64_t>(triggers.size());
   const auto first = (4 * count + 8 + 7) / 8 * 8;  // of the tables, from the vector's data
   Bytes elements;
@@ -199,7 +214,7 @@ inline Bytes triggers_content(std::span<const TriggerSource> triggers) {
     add_little(elements, triggers[static_cast<std::size_t>(i)].source, 4);
     add_little(elements, triggers[static_cast<std::size_t>(i)].t, 8);
   }
-  return vector_packet("TRIG", elements, triggers.size());
+  return vector_packet("TRIG", elements, triggers.size(), off_by);
 }
 
 inline void add_packet(Bytes& bytes, int stream, const Bytes& payload) {

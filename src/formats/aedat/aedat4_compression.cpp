@@ -49,12 +49,6 @@ std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress(
   return is_lz4(compression) ? decompress_lz4(payload, limit) : decompress_zstd(payload, limit);
 }
 
-std::span<const std::uint8_t> Aedat4Decompressor::aligned(std::span<const std::uint8_t> bytes) {
-  if (content_.size() < bytes.size()) content_.resize(bytes.size());
-  std::copy(bytes.begin(), bytes.end(), content_.begin());
-  return {content_.data(), bytes.size()};
-}
-
 std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress_lz4(
     std::span<const std::uint8_t> payload, std::size_t limit) {
   if (!lz4_) {

@@ -36,9 +36,6 @@ class Aedat4Decompressor {
                                     std::span<const std::uint8_t> payload,
                                     std::size_t limit = aedat4_largest_packet);
 
-  /// A copy of `bytes` at an address that suits every number.
-  std::span<const std::uint8_t> aligned(std::span<const std::uint8_t> bytes);
-
  private:
   std::optional<Content> decompress_lz4(std::span<const std::uint8_t> payload, std::size_t limit);
   std::optional<Content> decompress_zstd(std::span<const std::uint8_t> payload, std::size_t limit);

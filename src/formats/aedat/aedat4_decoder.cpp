@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "src/formats/aedat/aedat4.fbs.h"
+#include "src/formats/aedat/aedat4_flatbuffer.hpp"
 #include "src/formats/aedat/aedat4_info_node.hpp"
 #include "src/formats/chunker.hpp"
 #include "src/formats/little_endian.hpp"
@@ -16,7 +16,8 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::size_t size_prefix = sizeof(flatbuffers::uoffset_t);
+using aedat4::size_prefix;
+
 constexpr std::size_t identifier_at = 2 * size_prefix;
 constexpr std::size_t identifier_size = 4;
 /// What of a payload tells that it is one.
@@ -37,46 +38,7 @@ constexpr std::size_t decompressing = std::size_t{4} << 20;
 constexpr std::size_t event_size = sizeof(aedat4::Event);
 static_assert(event_size == sizeof(AbsoluteEvent));
 
-/// The bytes or structs of a verified vector, which may lie at any address.
-struct Plain {
-  const std::uint8_t* data = nullptr;
-  std::size_t count = 0;
-};
-
-Plain plain(const void* vector) {
-  if (vector == nullptr) return {};
-  const auto* const bytes = static_cast<const std::uint8_t*>(vector);
-  return {bytes + size_prefix, flatbuffers::ReadScalar<flatbuffers::uoffset_t>(bytes)};
-}
-
 constexpr const char* broken_packet = "a packet whose FlatBuffer is corrupt";
-
-/// Packets of bytes and structs are read where they lie in the file, at any address; those of
-/// tables are aligned first.
-enum class Address { any, aligned };
-
-template <class Table>
-const Table* verified(std::span<const std::uint8_t> content, const char* identifier,
-                      Address address) {
-  // The Verifier reads an identifier before it knows that there is room for one.
-  if (content.size() < payload_head) return nullptr;
-  flatbuffers::Verifier::Options options;
-  options.max_tables = static_cast<flatbuffers::uoffset_t>(content.size());
-  options.check_alignment = address == Address::aligned;
-  flatbuffers::Verifier verifier(content.data(), content.size(), options);
-  if (!verifier.VerifySizePrefixedBuffer<Table>(identifier)) return nullptr;
-  const auto* const root = content.data() + size_prefix;
-  return reinterpret_cast<const Table*>(root +
-                                        flatbuffers::ReadScalar<flatbuffers::uoffset_t>(root));
-}
-
-template <class Packet>
-std::optional<Plain> elements_of(std::span<const std::uint8_t> content, const char* identifier,
-                                 Address address) {
-  const auto* const packet = verified<Packet>(content, identifier, address);
-  if (packet == nullptr) return std::nullopt;
-  return plain(packet->elements());
-}
 
 bool is_time(Microseconds t) {
   return t > -aedat4_last_time && t < aedat4_last_time;
@@ -170,16 +132,16 @@ bool Aedat4Decoder::read_header() {
     if (finished_) throw UnsupportedFormat("this AEDAT4 file ends within its header");
     return false;
   }
-  const auto content = decompressor_.aligned(bytes.subspan(size_at, size_prefix + size));
-  const auto* const header = verified<aedat4::Header>(content, "IOHE", Address::aligned);
+  const auto content = bytes.subspan(size_at, size_prefix + size);
+  const auto* const header = aedat4::verified<aedat4::Header>(content, "IOHE");
   if (header == nullptr) throw UnsupportedFormat("the header of this AEDAT4 file is corrupt");
   if (header->compression() < 0 ||
       header->compression() > static_cast<int>(Aedat4Compression::zstd_high))
     throw UnsupportedFormat("this AEDAT4 file is compressed in a way that we do not know, number " +
                             std::to_string(header->compression()));
   compression_ = static_cast<Aedat4Compression>(header->compression());
-  if (header->info_node() != nullptr) {
-    auto info = read_info_node(header->info_node()->string_view());
+  if (const auto xml = aedat4::elements_of(header->info_node()); xml.data != nullptr) {
+    auto info = read_info_node({reinterpret_cast<const char*>(xml.data), xml.count});
     if (!info.whole) corruption_.note(size_at, "the header's XML is corrupt");
     streams_ = std::move(info.streams);
   }
@@ -403,19 +365,15 @@ const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, i
     ++skipped_.packets;
     return nullptr;
   }
-  const bool of_tables = kind == StreamKind::triggers || kind == StreamKind::imu;
-  if (of_tables && compression_ == Aedat4Compression::none)
-    content = decompressor_.aligned(content);
-
-  std::optional<Plain> elements = Plain{};
+  std::optional<aedat4::Elements> elements = aedat4::Elements{};
   if (kind == StreamKind::frames) {
     if (const char* const corruption = read_frame(content)) return corruption;
   } else if (kind == StreamKind::events) {
-    elements = elements_of<aedat4::EventPacket>(content, "EVTS", Address::any);
+    elements = aedat4::verified_elements<aedat4::EventPacket>(content, "EVTS");
   } else if (kind == StreamKind::triggers) {
-    elements = elements_of<aedat4::TriggerPacket>(content, "TRIG", Address::aligned);
+    elements = aedat4::verified_elements<aedat4::Tables<aedat4::Trigger>>(content, "TRIG");
   } else {
-    elements = elements_of<aedat4::ImuPacket>(content, "IMUS", Address::aligned);
+    elements = aedat4::verified_elements<aedat4::Tables<aedat4::Imu>>(content, "IMUS");
   }
   if (!elements) return broken_packet;
   elements_ = {kind, elements->data, elements->count, stream ? *stream : add_stream(id, kind)};
@@ -425,7 +383,7 @@ const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, i
 }
 
 const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
-  const auto* const packet = verified<aedat4::Frame>(content, "FRME", Address::any);
+  const auto* const packet = aedat4::verified<aedat4::Frame>(content, "FRME");
   if (packet == nullptr) return broken_packet;
   const auto format = static_cast<PixelFormat>(packet->format());
   const auto pixel = bytes_per_pixel(format);
@@ -433,7 +391,7 @@ const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
     ++skipped_.frames;
     return nullptr;
   }
-  const auto pixels = plain(packet->pixels());
+  const auto pixels = aedat4::elements_of(packet->pixels());
   if (packet->width() <= 0 || packet->height() <= 0 ||
       pixels.count != std::size_t{1} * packet->width() * packet->height() * pixel)
     return "a frame that has not the pixels that it should";
@@ -463,7 +421,7 @@ const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
 
 /// Whether the events of a packet are all as a camera gives them. Other packets pass.
 bool Aedat4Decoder::has_sound_events(std::span<const std::uint8_t> content, int id) const {
-  const auto elements = elements_of<aedat4::EventPacket>(content, "EVTS", Address::any);
+  const auto elements = aedat4::verified_elements<aedat4::EventPacket>(content, "EVTS");
   const auto stream = stream_of(id);
   if (!elements || !stream) return true;
   const auto limit = limit_of(streams_[*stream].size);

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 
-#include "src/formats/aedat/aedat4.fbs.h"
 #include "src/formats/aedat/aedat4_compression.hpp"
+#include "src/formats/aedat/aedat4_flatbuffer.hpp"
+#include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
 
@@ -12,7 +13,6 @@ namespace {
 
 /// A recording of a day fits.
 constexpr std::size_t max_table = std::size_t{512} << 20;
-constexpr std::size_t min_table = 12;
 /// Even of evenly spaced packets a table shrinks to no less than a fifth; what grows more is none.
 constexpr std::size_t max_growth = 16;
 /// What an entry takes, so that those which share their bytes do not fill the memory.
@@ -32,32 +32,26 @@ std::optional<std::vector<Aedat4TableEntry>> read_aedat4_table(std::span<const s
         decompressor.decompress(compression, bytes, std::min(max_table, max_growth * bytes.size()));
     if (!decompressed) return std::nullopt;
     content = decompressed->bytes;
-  } else {
-    content = decompressor.aligned(bytes);
   }
-  // The Verifier reads an identifier before it knows that there is room for one.
-  if (content.size() < min_table) return std::nullopt;
-  flatbuffers::Verifier::Options options;
-  options.max_tables = static_cast<flatbuffers::uoffset_t>(content.size());
-  flatbuffers::Verifier verifier(content.data(), content.size(), options);
-  if (!verifier.VerifySizePrefixedBuffer<aedat4::FileTable>(identifier)) return std::nullopt;
+  const auto entries =
+      aedat4::verified_elements<aedat4::Tables<aedat4::TableEntry>>(content, identifier);
+  if (!entries || entries->count > content.size() / min_entry) return std::nullopt;
 
-  std::vector<Aedat4TableEntry> table;
-  const auto* const entries =
-      flatbuffers::GetSizePrefixedRoot<aedat4::FileTable>(content.data())->table();
-  if (entries == nullptr) return table;
-  if (entries->size() > content.size() / min_entry) return std::nullopt;
   const auto first = static_cast<std::int64_t>(packets_at);
-  const bool of_headers = std::any_of(entries->begin(), entries->end(), [&](const auto* entry) {
-    return entry->byte_offset() == first;
-  });
+  bool of_headers = false;
+  for (std::size_t i = 0; i < entries->count; ++i)
+    of_headers |= entries->table<aedat4::TableEntry>(i)->byte_offset() == first;
   const auto before = static_cast<std::int64_t>(of_headers ? 0 : aedat4_packet_header);
-  for (const auto* entry : *entries) {
-    const auto* const packet = entry->packet_info();
-    if (packet == nullptr || packet->size() < 0 || entry->byte_offset() < first + before) continue;
-    table.push_back({static_cast<std::uint64_t>(entry->byte_offset() - before), packet->stream_id(),
-                     packet->size(), entry->num_elements(), entry->timestamp_start(),
-                     entry->timestamp_end()});
+  std::vector<Aedat4TableEntry> table;
+  for (std::size_t i = 0; i < entries->count; ++i) {
+    const auto* const entry = entries->table<aedat4::TableEntry>(i);
+    const auto* const packet = reinterpret_cast<const std::uint8_t*>(entry->packet_info());
+    if (packet == nullptr || entry->byte_offset() < first + before) continue;
+    const auto stream = little_endian<std::int32_t>(packet);
+    const auto size = little_endian<std::int32_t>(packet + sizeof stream);
+    if (size < 0) continue;
+    table.push_back({static_cast<std::uint64_t>(entry->byte_offset() - before), stream, size,
+                     entry->num_elements(), entry->timestamp_start(), entry->timestamp_end()});
   }
   return table;
 }
