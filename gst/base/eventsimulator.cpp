@@ -10,6 +10,7 @@
 
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/errors.hpp"
+#include "gst/base/frame_clock.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/simulator_buffers.hpp"
@@ -57,7 +58,9 @@ struct State {
 struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
   bool backwards = false;                       ///< the segment has been refused
+  FrameClock clock;                             ///< of frames without a PTS
   WarnOnce warn_of_times;
+  WarnOnce warn_of_no_pts;
   WarnOnce warn_of_interlacing;
 };
 
@@ -201,12 +204,37 @@ static void warn_of_times(GstEventSimulator* self, const char* what) {
       "an interval needs a PTS at both ends");
 }
 
+/// Sets the PTS of a frame that has none. False where nothing tells it.
+static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
+  using Source = FrameClock::Source;
+  auto& stream = priv_of(self).stream;
+  const GstVideoInfo& video = priv_of(self).state->video;
+  const auto source = stream.clock.stamp(GST_BASE_TRANSFORM(self), video, frame);
+  if (source == Source::upstream) return true;
+  const char* text =
+      "The video has neither timestamps nor a framerate, so there are no events. Set the PTS of "
+      "its buffers, or a framerate in its caps.";
+  if (source == Source::arrival)
+    text =
+        "The video has no timestamps: events are timed by when its frames arrive. Set "
+        "do-timestamp=true on the source, or the PTS of its buffers.";
+  else if (source == Source::framerate)
+    text =
+        "The video has no timestamps: events are timed by its framerate. Set the PTS of its "
+        "buffers if frames are not evenly spaced.";
+  stream.warn_of_no_pts(self, {GST_STREAM_ERROR_FORMAT, text},
+                        "a buffer has no PTS; the framerate in the caps is " +
+                            std::to_string(GST_VIDEO_INFO_FPS_N(&video)) + "/" +
+                            std::to_string(GST_VIDEO_INFO_FPS_D(&video)));
+  return source != Source::nowhere;
+}
+
 /// Prepares the simulator for the time of a frame. False where the frame has to be skipped.
 static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
   if (GST_BUFFER_IS_DISCONT(buffer)) start_over(self);
-  if (!GST_CLOCK_TIME_IS_VALID(pts) || pts > G_MAXINT64) {
-    warn_of_times(self, "a frame has no PTS");
+  if (pts > G_MAXINT64) {
+    warn_of_times(self, "the PTS of a frame is out of range");
     forget_frames(self);
     return false;
   }
@@ -407,13 +435,33 @@ static GstFlowReturn reported(GstEventSimulator* self, const Work& work) {
 static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   *out = nullptr;
-  const OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
+  OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
   if (!in) return GST_FLOW_OK;
   if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
+  if (!give_pts(self, in)) return GST_FLOW_OK;
   return reported(self, [&] { return take_frame(self, in.get(), out); });
 }
 
 /* events, queries, states */
+
+/// Sources of bytes have no times: theirs becomes the segment of the times that frames get.
+static GstEvent* segment_of_times(GstEvent* event) {
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event, &segment);
+  if (segment->format == GST_FORMAT_TIME) return event;
+  GstSegment times;
+  gst_segment_init(&times, GST_FORMAT_TIME);
+  GstEvent* replacement = gst_event_new_segment(&times);
+  gst_event_set_seqnum(replacement, gst_event_get_seqnum(event));
+  gst_event_unref(event);
+  return replacement;
+}
+
+/// Time begins anew, and nothing follows on what was before.
+static void start_timeline(GstEventSimulator* self) {
+  start_over(self);
+  priv_of(self).stream.clock.start_over();
+}
 
 static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   const GstSegment* segment = nullptr;
@@ -430,7 +478,7 @@ static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   if (current.format != segment->format || current.rate != segment->rate ||
       current.base != segment->base || current.start != segment->start ||
       current.time != segment->time)
-    start_over(self);
+    start_timeline(self);
   return true;
 }
 
@@ -483,6 +531,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
+      event = segment_of_times(event);
       if (!take_segment(self, event)) {
         gst_event_unref(event);
         return FALSE;
@@ -496,7 +545,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       break;
     case GST_EVENT_STREAM_START:
     case GST_EVENT_FLUSH_STOP:
-      start_over(self);
+      start_timeline(self);
       break;
     default:
       break;

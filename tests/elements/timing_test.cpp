@@ -120,18 +120,74 @@ TEST_P(EveryElement, BeginsAnewInAnotherSegmentButNotInTheSame) {
   expect_interval(5 * GST_SECOND, 5 * GST_SECOND + 40 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, WarnsOnceOfFramesWithoutPts) {
+TEST_P(EveryElement, TimesFramesWithoutPtsByTheFramerate) {
+  gst_harness_set_live(h.get(), FALSE);
   h.caps(video);
-  flash(0);
-  EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
-  EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
-  flash(120 * GST_MSECOND);
-  EXPECT_FALSE(h.pull());
-  flash(160 * GST_MSECOND);
-  expect_interval(120 * GST_MSECOND, 160 * GST_MSECOND);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
+  expect_interval(0, 40 * GST_MSECOND);
+  expect_interval(40 * GST_MSECOND, 80 * GST_MSECOND);
+  flash(200 * GST_MSECOND);  // the others follow on the last one that has a time
+  flash(GST_CLOCK_TIME_NONE);
+  expect_interval(80 * GST_MSECOND, 200 * GST_MSECOND);
+  expect_interval(200 * GST_MSECOND, 240 * GST_MSECOND);
   const auto warning = h.message(GST_MESSAGE_WARNING);
   ASSERT_TRUE(warning);
-  EXPECT_NE(text_of(warning.get()).find("no PTS"), std::string::npos);
+  EXPECT_NE(text_of(warning.get()).find("no timestamps"), std::string::npos);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST_P(EveryElement, TimesFramesWithoutPtsByTheSegmentAfterASeek) {
+  gst_harness_set_live(h.get(), FALSE);
+  h.caps(video);
+  flash(GST_CLOCK_TIME_NONE);
+  flush({h.get()});
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 5 * GST_SECOND;
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  flash(GST_CLOCK_TIME_NONE);
+  flash(GST_CLOCK_TIME_NONE);
+  expect_interval(5 * GST_SECOND, 5 * GST_SECOND + 40 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, TimesFramesOfALiveSourceWithoutPtsByTheClock) {
+  h.caps(uneven);
+  for (const auto now : {7, 50, 81}) {
+    gst_harness_set_time(h.get(), static_cast<GstClockTime>(now) * GST_MSECOND);
+    EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
+  }
+  expect_interval(7 * GST_MSECOND, 50 * GST_MSECOND);
+  expect_interval(50 * GST_MSECOND, 81 * GST_MSECOND);
+  const auto warning = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(text_of(warning.get()).find("arrive"), std::string::npos);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST_P(EveryElement, TimesTheFramesOfASourceOfBytes) {
+  gst_harness_set_live(h.get(), FALSE);
+  h.caps(video);
+  GstSegment bytes;
+  gst_segment_init(&bytes, GST_FORMAT_BYTES);
+  gst_harness_push_event(h.get(), gst_event_new_segment(&bytes));
+  flash(GST_CLOCK_TIME_NONE);
+  flash(GST_CLOCK_TIME_NONE);
+  expect_interval(0, 40 * GST_MSECOND);
+  Owned<GstEvent> last;
+  while (Owned<GstEvent> event = h.pull_event(GST_EVENT_SEGMENT)) last = std::move(event);
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(last.get(), &segment);
+  EXPECT_EQ(segment->format, GST_FORMAT_TIME);
+}
+
+TEST_P(EveryElement, WarnsOnceWhereNothingTellsTheTimesOfFrames) {
+  gst_harness_set_live(h.get(), FALSE);
+  h.caps(uneven);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
+  EXPECT_FALSE(h.pull());
+  const auto warning = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(text_of(warning.get()).find("framerate in its caps"), std::string::npos);
   EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
 }
 
