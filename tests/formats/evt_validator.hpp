@@ -148,8 +148,41 @@ inline std::string evt2(Bytes bytes, SensorSize size) {
   return evt2_or_4(bytes, size, {0x0, 0x1, 0x8}, {none, none, none});
 }
 
+/// What makes OpenEB's robust decoder of EVT4 drop events.
+inline std::string dropped_evt4(Bytes bytes, SensorSize size) {
+  const auto words = words_of<std::uint32_t>(bytes);
+  std::int64_t base = -1;     // of the last TIME_HIGH that it believed
+  std::int64_t pending = -1;  // a jump that it does not believe yet
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const auto type = words[i] >> 28;
+    if (type == 0xe) {
+      constexpr std::int64_t lap = std::int64_t{1} << 34;
+      auto time = static_cast<std::int64_t>(words[i] & 0x0fffffff) << 6;
+      if (base >= 0) time += base / lap * lap;
+      if (base >= time + lap / 2) time += lap;
+      const auto near = [time](std::int64_t t) { return time >= t && time <= t + 64; };
+      if (pending >= 0 && (near(pending) || near(base))) {
+        base = time;
+        pending = -1;
+      } else if (pending >= 0 || (base >= 0 && (time < base || time >= base + 1000))) {
+        pending = time;
+      } else {
+        base = time;
+      }
+    } else if (pending >= 0) {
+      return at(i, "an event after a jump in time");
+    } else if (type == 0xc || type == 0xd) {
+      if (static_cast<int>(words[i] >> 11 & 0x7ff) + 32 > size.width)
+        return at(i, "a vector that leaves the sensor");
+      ++i;
+    }
+  }
+  return {};
+}
+
 inline std::string evt4(Bytes bytes, SensorSize size) {
-  return evt2_or_4(bytes, size, {0xa, 0xb, 0xe}, {0xc, 0xd, 0x10});
+  const auto wrong = evt2_or_4(bytes, size, {0xa, 0xb, 0xe}, {0xc, 0xd, 0x10});
+  return wrong.empty() ? dropped_evt4(bytes, size) : wrong;
 }
 
 inline std::string evt21(Bytes bytes, SensorSize size, bool legacy) {

@@ -38,7 +38,9 @@ inline std::vector<Format> all() {
                                                      {"evt4", EvtFormat::evt4}};
   for (const auto& [name, format] : words) {
     const auto evt = format;
-    const auto pause = evt == EvtFormat::evt3 ? 90 * minutes : 700 * minutes;
+    const auto pause = evt == EvtFormat::evt3   ? 90 * minutes
+                       : evt == EvtFormat::evt4 ? 10 * minutes
+                                                : 700 * minutes;
     formats.push_back({name, 2048, pause,
                        [evt](SensorSize size) { return make_evt_decoder(evt, size); },
                        [evt](SensorSize size) { return make_evt_encoder(evt, size); }});

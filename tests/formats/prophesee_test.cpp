@@ -65,7 +65,7 @@ TEST(Written, Evt3IsWhatEveryReaderReadsAlike) {
   }
 }
 
-TEST(Written, Evt2AndEvt21AndEvt4AreSoundWordByWord) {
+TEST(Written, WordsAreSoundOneByOne) {
   Random random(2);
   for (int i = 0; i < 100; ++i) {
     const SensorSize size{1 + below(random, 2048), 1 + below(random, 2048)};
@@ -77,8 +77,45 @@ TEST(Written, Evt2AndEvt21AndEvt4AreSoundWordByWord) {
     ASSERT_EQ(evt_validator::evt2(bytes(EvtFormat::evt2), size), "");
     ASSERT_EQ(evt_validator::evt21(bytes(EvtFormat::evt21), size, false), "");
     ASSERT_EQ(evt_validator::evt21(bytes(EvtFormat::evt21_legacy), size, true), "");
-    ASSERT_EQ(evt_validator::evt4(bytes(EvtFormat::evt4), size), "");
   }
+  for (int i = 0; i < 100; ++i) {
+    const SensorSize size{1 + below(random, 2048), 1 + below(random, 2048)};
+    const auto recording = random_events(random, size, 3000, i % 20 == 0 ? 60'000'000 : 100'000);
+    const auto encoder = make_evt_encoder(EvtFormat::evt4, size);
+    ASSERT_EQ(evt_validator::evt4(encode(*encoder, recording), size), "");
+  }
+}
+
+TEST(Written, Evt4KeepsTimeAliveThroughSilence) {
+  const auto recording =
+      events({AbsoluteEvent::at(1, 2, 5, on), AbsoluteEvent::at(1, 2, 3'000'005, on)});
+  const auto bytes = encode(*make_evt_encoder(EvtFormat::evt4, vga), recording);
+  EXPECT_EQ(evt_validator::evt4(bytes, vga), "");
+  // A step for every 960 us, and the two events.
+  EXPECT_EQ(bytes.size() / 4, 1U + 3'000'000 / 960 + 2U);
+  EXPECT_EQ(read(EvtFormat::evt4, bytes).decoded.events, recording);
+}
+
+TEST(Written, Evt4IsBelievedAfterEveryWrap) {
+  for (const auto start : {Microseconds{0}, Microseconds{1} << 34}) {
+    const auto recording =
+        events({AbsoluteEvent::at(1, 2, start + (Microseconds{1} << 34) - 700, on),
+                AbsoluteEvent::at(3, 4, start + (Microseconds{1} << 34) + 700, off)});
+    const auto bytes = encode(*make_evt_encoder(EvtFormat::evt4, vga), recording);
+    EXPECT_EQ(evt_validator::evt4(bytes, vga), "") << start;
+    EXPECT_LT(bytes.size(), 100U);
+    EXPECT_EQ(read(EvtFormat::evt4, bytes).decoded.events, recording);
+  }
+}
+
+TEST(Written, Evt4HasNoVectorPastTheSensor) {
+  std::vector<AbsoluteEvent> row;
+  for (int x = 0; x < 346; ++x) row.push_back(AbsoluteEvent::at(x, 7, 9, on));
+  const auto bytes = encode(*make_evt_encoder(EvtFormat::evt4, {346, 260}), row);
+  EXPECT_EQ(evt_validator::evt4(bytes, {346, 260}), "");
+  // Ten vectors, and 26 events.
+  EXPECT_EQ(bytes.size() / 4, 1U + 10 * 2U + 26U);
+  EXPECT_EQ(read(EvtFormat::evt4, bytes, {346, 260}).decoded.events, row);
 }
 
 TEST(Written, TheValidatorFindsWhatItIsFor) {
@@ -94,6 +131,13 @@ TEST(Written, TheValidatorFindsWhatItIsFor) {
   EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x3000 + 609, 0x4001, 0x4001, 0x5001}));
   EXPECT_FALSE(wrong({0x8000, 0x6001, 0x0002, 0x3000 + 608, 0x4001, 0x4001, 0x5001}));
   EXPECT_TRUE(wrong({0x8000, 0x6001, 480, 0x2003}));
+  const auto wrong_evt4 = [](std::initializer_list<std::uint32_t> words) {
+    return !evt_validator::evt4(words32(words), vga).empty();
+  };
+  EXPECT_FALSE(wrong_evt4({0xe0000000, 0xb0000000, 0xe000000f, 0xb0000000}));
+  EXPECT_TRUE(wrong_evt4({0xe0000000, 0xb0000000, 0xe0000010, 0xb0000000}));
+  EXPECT_FALSE(wrong_evt4({0xe0000000, 0xe0000010, 0xe0000010, 0xb0000000}));
+  EXPECT_TRUE(wrong_evt4({0xe0000000, 0xc0000000 | 620 << 11, 1}));
 }
 
 TEST(Written, Evt3GroupsWhatPays) {

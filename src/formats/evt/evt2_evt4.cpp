@@ -118,7 +118,8 @@ inline MaskedEvents first_masked(std::span<const AbsoluteEvent> events) {
 template <class Format>
 class CdEncoder final : public Encoder {
  public:
-  explicit CdEncoder(std::string header) : Encoder(std::move(header)) {}
+  CdEncoder(SensorSize size, std::string header)
+      : Encoder(std::move(header)), width_(static_cast<std::uint32_t>(size.width)) {}
 
  private:
   using Words = WordWriter<typename Format::Word>;
@@ -134,7 +135,7 @@ class CdEncoder final : public Encoder {
         const auto t = few.front().t;
         if (gaps_.written(t) >> 6 != time_high_) [[unlikely]]
           put_time_high(t, words);
-        few = few.subspan(Format::put(few, gaps_.written(t), words));
+        few = few.subspan(Format::put(few, gaps_.written(t), width_, words));
       }
     };
     write_events<typename Format::Word>(events, words_at_once, out, write);
@@ -147,20 +148,40 @@ class CdEncoder final : public Encoder {
   void put_time_high(Microseconds t, Words& words) {
     gaps_.reach(t);
     const auto count = gaps_.written(t) >> 6;
-    const auto wraps = (count >> bits) - (time_high_ == none ? 0 : time_high_ >> bits);
-    if (wraps != 0 && wraps <= max_wraps) [[unlikely]] {
-      // Readers know a wrap by the fall from nearly the largest count to nearly zero (OpenEB allows
-      // 10 ms), so each is written out.
-      words.reserve(2 * wraps + 1 + words_at_once);
-      for (std::uint64_t i = 0; i < wraps; ++i) {
-        words.put(time_high((std::uint64_t{1} << bits) - 1));
-        words.put(time_high(0));
-      }
-    }
+    const bool first = time_high_ == none;
+    if (Format::has_steady_time && !first)
+      put_steps(count, words);
+    else
+      put_wraps(count, words);
     words.put(time_high(count));
     time_high_ = count;
   }
 
+  /// Readers know a wrap by the fall from nearly the largest count to nearly zero (OpenEB allows
+  /// 10 ms), so each is written out. OpenEB's robust decoder believes a jump that is repeated.
+  void put_wraps(std::uint64_t count, Words& words) {
+    const auto wraps = (count >> bits) - (time_high_ == none ? 0 : time_high_ >> bits);
+    if (wraps == 0 || wraps > max_wraps) [[likely]]
+      return;
+    constexpr auto last = (std::uint64_t{1} << bits) - 1;
+    words.reserve(3 * wraps + 2 + words_at_once);
+    for (std::uint64_t i = 0; i < wraps; ++i)
+      for (const auto jump : {last, last, std::uint64_t{0}}) words.put(time_high(jump));
+    words.put(time_high(count));
+  }
+
+  /// Fills a pause, so that no TIME_HIGH is 1000 microseconds or more after the one before it.
+  void put_steps(std::uint64_t count, Words& words) {
+    constexpr std::uint64_t step = 999 >> 6;
+    constexpr auto max_steps = (GapLimiter::max_gap >> 6) / step + 1;
+    const auto steps = (count - time_high_ - 1) / step;
+    if (steps == 0 || steps > max_steps) [[likely]]
+      return;
+    words.reserve(steps + 1 + words_at_once);
+    for (std::uint64_t i = 1; i <= steps; ++i) words.put(time_high(time_high_ + i * step));
+  }
+
+  std::uint32_t width_;
   GapLimiter gaps_;
   std::uint64_t time_high_ = none;
 };
@@ -168,6 +189,8 @@ class CdEncoder final : public Encoder {
 /// Words of 32 bits: an event, or a TIME_HIGH.
 struct Evt2 {
   using Word = std::uint32_t;
+
+  static constexpr bool has_steady_time = false;
 
   enum Type : std::uint32_t { cd_off, cd_on, imu = 0xd, others = 0xe, continued = 0xf };
 
@@ -180,7 +203,7 @@ struct Evt2 {
   static constexpr Word word(CdWord word) { return word.bits; }
 
   static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
-                         WordWriter<Word>& words) {
+                         std::uint32_t /*width*/, WordWriter<Word>& words) {
     const auto& event = events.front();
     const auto y = static_cast<std::uint32_t>(event.y());
     words.put(CdWord::at(event.y_p >> 15, time, event.x, y).bits);
@@ -239,6 +262,7 @@ struct Evt21 {
   using Word = std::uint64_t;
 
   static constexpr CdTypes types = evt21_types;
+  static constexpr bool has_steady_time = false;
 
   static constexpr Word in_order(Word word) {
     return format == EvtFormat::evt21_legacy ? std::rotl(word, 32) : word;
@@ -249,7 +273,7 @@ struct Evt21 {
   }
 
   static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
-                         WordWriter<Word>& words) {
+                         std::uint32_t /*width*/, WordWriter<Word>& words) {
     const auto& first = events.front();
     const auto masked = first_masked(events);
     const auto y = static_cast<std::uint32_t>(first.y());
@@ -287,6 +311,9 @@ class Evt21Reader final : public CdReader<evt21_types> {
 struct Evt4 {
   using Word = std::uint32_t;
 
+  /// OpenEB's robust decoder drops events after a pause without TIME_HIGH.
+  static constexpr bool has_steady_time = true;
+
   enum Type : std::uint32_t {
     others = 0x6,
     continued = 0x7,
@@ -303,18 +330,19 @@ struct Evt4 {
   static constexpr Word word(CdWord word) { return word.bits; }
 
   static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
-                         WordWriter<Word>& words) {
+                         std::uint32_t width, WordWriter<Word>& words) {
     const auto& first = events.front();
     const auto masked = first_masked(events);
     const std::uint32_t on = first.y_p >> 15;
     const auto y = static_cast<std::uint32_t>(first.y());
-    // A vector is two words, as two events are.
-    if (masked.count > 2) {
+    // A vector is two words, as two events are. OpenEB's robust decoder drops one of which any of
+    // the 32 pixels lies outside the sensor.
+    if (masked.count > 2 && masked.base + 32 <= width) {
       words.put(CdWord::at(cd_vec_off + on, time, masked.base, y).bits);
       words.put(masked.mask);
     } else {
-      words.put(CdWord::at(cd_off + on, time, first.x, y).bits);
-      if (masked.count == 2) words.put(CdWord::at(cd_off + on, time, events[1].x, y).bits);
+      for (const auto& event : events.first(masked.count))
+        words.put(CdWord::at(cd_off + on, time, event.x, y).bits);
     }
     return masked.count;
   }
@@ -383,15 +411,15 @@ std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size, std
     throw std::invalid_argument("EVT words support sensors of 1x1 to 2048x2048 pixels");
   switch (format) {
     case EvtFormat::evt2:
-      return std::make_unique<CdEncoder<Evt2>>(std::move(header));
+      return std::make_unique<CdEncoder<Evt2>>(size, std::move(header));
     case EvtFormat::evt21:
-      return std::make_unique<CdEncoder<Evt21<EvtFormat::evt21>>>(std::move(header));
+      return std::make_unique<CdEncoder<Evt21<EvtFormat::evt21>>>(size, std::move(header));
     case EvtFormat::evt21_legacy:
-      return std::make_unique<CdEncoder<Evt21<EvtFormat::evt21_legacy>>>(std::move(header));
+      return std::make_unique<CdEncoder<Evt21<EvtFormat::evt21_legacy>>>(size, std::move(header));
     case EvtFormat::evt3:
       return make_evt3_encoder(size, std::move(header));
     case EvtFormat::evt4:
-      return std::make_unique<CdEncoder<Evt4>>(std::move(header));
+      return std::make_unique<CdEncoder<Evt4>>(size, std::move(header));
   }
   throw std::invalid_argument("no such EVT format");
 }
