@@ -899,12 +899,12 @@ void EventReader::note_progress() {
 
 GstStructure* EventReader::stats() {
   const auto counts = shared_.lock()->counts;
-  GstStructure* const stats = gst_structure_new(
-      format_.has_many_streams ? "application/x-aedat-demux-stats"
-                               : "application/x-event-decoder-stats",
-      "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64, counts.triggers,
-      "corrupt-places", G_TYPE_UINT64, counts.corrupt_places, "outside", G_TYPE_UINT64,
-      counts.outside, "repeated", G_TYPE_UINT64, counts.repeated, nullptr);
+  GstStructure* const stats =
+      gst_structure_new(format_.has_many_streams ? "application/x-aedat-demux-stats"
+                                                 : "application/x-event-decoder-stats",
+                        "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64,
+                        counts.triggers, "corrupt-places", G_TYPE_UINT64, counts.corrupt_places,
+                        "outside", G_TYPE_UINT64, counts.outside, nullptr);
   if (format_.has_many_streams)
     gst_structure_set(stats, "frames", G_TYPE_UINT64, counts.frames, "imu-samples", G_TYPE_UINT64,
                       counts.imu_samples, "untimely", G_TYPE_UINT64, counts.late + counts.stray,
@@ -920,18 +920,14 @@ void EventReader::warn_of_dropped() {
   const auto counts = recording_->counts();
   const auto text_of = [](guint64 number) { return std::to_string(number); };
   const auto untimely = counts.late + counts.stray;
-  GST_INFO_OBJECT(element_,
-                  "%" G_GUINT64_FORMAT " corrupt places, %" G_GUINT64_FORMAT
-                  " triggers, %" G_GUINT64_FORMAT " events repeated",
-                  guint64{counts.corrupt_places}, guint64{counts.triggers},
-                  guint64{counts.repeated});
+  GST_INFO_OBJECT(element_, "%" G_GUINT64_FORMAT " corrupt places, %" G_GUINT64_FORMAT " triggers",
+                  guint64{counts.corrupt_places}, guint64{counts.triggers});
   if (untimely + counts.outside == 0) return;
   post_message(element_, GST_MESSAGE_WARNING,
                {format_.has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE,
                 text_of(counts.outside) + " events outside the sensor, and " + text_of(untimely) +
                     " items with times out of order, were left out."},
-               text_of(counts.late) + " late, " + text_of(counts.stray) + " at stray times, " +
-                   text_of(counts.repeated) + " repeated");
+               text_of(counts.late) + " late, " + text_of(counts.stray) + " at stray times");
 }
 
 void EventReader::set_duration(GstClockTime duration) {

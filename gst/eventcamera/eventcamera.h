@@ -11,9 +11,13 @@
  * - `framerate`: buffers a second, 0/1 where it varies.
  *
  * A buffer holds the events of the interval (t0, t1] that it stands for: its PTS is t0, its
- * duration t1 - t0, and its memory an array of events sorted by time, ties in raster order. The
- * time of an event is floor(PTS / 1000) + t microseconds. Intervals never overlap. An interval
- * without events is a GAP event.
+ * duration t1 - t0, and its memory an array of events sorted by time. The time of an event is
+ * floor(PTS / 1000) + t microseconds. Intervals never overlap. An interval without events is a GAP
+ * event.
+ *
+ * Simulators put events of the same time into raster order, and no pixel fires twice in a
+ * microsecond. Recordings keep every event of the file, in its own order within a time: a pixel may
+ * have several, of the same polarity or of both.
  */
 #pragma once
 

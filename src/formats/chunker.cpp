@@ -10,32 +10,6 @@ bool earlier(const AbsoluteEvent& a, const AbsoluteEvent& b) {
   return a.t < b.t;
 }
 
-/// Sorts by time, then in raster order, regardless of polarity.
-std::uint64_t key(const Event& event) {
-  return std::uint64_t{event.t} << 32 | static_cast<std::uint64_t>(event.y()) << 16 | event.x;
-}
-
-/// Puts events sorted by time into raster order within each time. Removes events with the pixel and
-/// time of another one, and returns their number.
-std::uint64_t order_ties(std::vector<Event>& events) {
-  const auto before = [](const Event& a, const Event& b) { return key(a) < key(b); };
-  bool ordered = true;
-  for (std::size_t i = 1; i < events.size(); ++i)
-    ordered &= key(events[i - 1]) < key(events[i]);  // branch-free; nearly always true
-  if (ordered) return 0;
-  for (auto from = events.begin(); from != events.end();) {
-    const auto to =
-        std::find_if(from, events.end(), [&](const Event& e) { return e.t != from->t; });
-    if (!std::is_sorted(from, to, before)) std::stable_sort(from, to, before);
-    from = to;
-  }
-  const auto end = std::unique(events.begin(), events.end(),
-                               [](const Event& a, const Event& b) { return key(a) == key(b); });
-  const auto removed = static_cast<std::uint64_t>(events.end() - end);
-  events.erase(end, events.end());
-  return removed;
-}
-
 }  // namespace
 
 Chunker::Chunker(Microseconds length, Microseconds start)
@@ -142,7 +116,6 @@ Chunker::Interval Chunker::hand_out(Microseconds end) {
   std::transform(from, to, handed_out_.begin(), [this](const AbsoluteEvent& event) {
     return Event{static_cast<std::uint32_t>(event.t - start_), event.x, event.y_p};
   });
-  dropped_.repeated += order_ties(handed_out_);
   head_ = static_cast<std::size_t>(to - kept_.begin());
   // Erase returned events once they are the greater part, so that little is moved.
   if (head_ > kept_.size() / 2) {

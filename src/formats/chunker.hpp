@@ -12,13 +12,12 @@
 
 namespace eventcamera {
 
-/// Cuts the events of a recording into intervals of equal length, each sorted by time, then in
-/// raster order. Times are whole microseconds, rounded down, so an interval includes its start and
-/// excludes its end.
+/// Cuts the events of a recording into intervals of equal length, each sorted by time. Events
+/// with the same time keep the order in which they came. Times are whole microseconds, rounded
+/// down, so an interval includes its start and excludes its end.
 ///
 /// Events may be out of order by up to `settled`; later ones are dropped. So are events of a clock
-/// that jumps ahead and soon comes back, as after a flipped bit, and the second of two events with
-/// the same pixel and time.
+/// that jumps ahead and soon comes back, as after a flipped bit.
 class Chunker {
  public:
   /// Longer than the disorder of sensors, and than a clock stays wrong after a flipped bit.
@@ -35,9 +34,8 @@ class Chunker {
   };
 
   struct Dropped {
-    std::uint64_t late = 0;      ///< their interval was already returned
-    std::uint64_t stray = 0;     ///< with an erroneous time
-    std::uint64_t repeated = 0;  ///< with the pixel and time of another event
+    std::uint64_t late = 0;   ///< their interval was already returned
+    std::uint64_t stray = 0;  ///< with an erroneous time
   };
 
   /// The first interval begins at the first event.

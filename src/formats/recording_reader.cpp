@@ -499,7 +499,6 @@ RecordingReader::Counts RecordingReader::counts() const {
     const auto& dropped = stream.chunker.dropped();
     counts.late += dropped.late;
     counts.stray += dropped.stray;
-    counts.repeated += dropped.repeated;
   }
   return counts;
 }

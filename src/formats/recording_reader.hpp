@@ -144,10 +144,9 @@ class RecordingReader {
     std::uint64_t triggers = 0;
     std::uint64_t imu_samples = 0;
     std::uint64_t corrupt_places = 0;
-    std::uint64_t outside = 0;   ///< events outside the sensor
-    std::uint64_t late = 0;      ///< events and frames of an interval already returned
-    std::uint64_t stray = 0;     ///< events and frames with an erroneous time
-    std::uint64_t repeated = 0;  ///< events with the pixel and time of another one
+    std::uint64_t outside = 0;  ///< events outside the sensor
+    std::uint64_t late = 0;     ///< events and frames of an interval already returned
+    std::uint64_t stray = 0;    ///< events and frames with an erroneous time
   };
   Counts counts() const;
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fstream>
 #include <sstream>
+#include <tuple>
 
 #include "src/formats/chunker.hpp"
 #include "tests/elements/event_buffer.hpp"
@@ -234,6 +235,21 @@ TEST_P(EveryFormat, IsReadAsItWasWrittenHoweverItIsSplit) {
     EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
     EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
   }
+}
+
+TEST_P(EveryFormat, KeepsEveryEventOfATimeInTheFilesOrder) {
+  // Of one microsecond, and of one pixel more than once, against raster order.
+  std::vector<AbsoluteEvent> events;
+  for (const Microseconds t : {5'000, 5'001, 25'000})
+    for (const auto& [x, y, polarity] :
+         {std::tuple(9, 9, Polarity::on), std::tuple(1, 2, Polarity::off),
+          std::tuple(1, 2, Polarity::on), std::tuple(1, 2, Polarity::on),
+          std::tuple(2, 2, Polarity::on), std::tuple(0, 0, Polarity::off)})
+      events.push_back(AbsoluteEvent::at(x, y, t, polarity));
+  auto h = Harness::with_late_pad(format().reader);
+  begin_file(h, format());
+  push_file(h, file_of(format(), events), 1000);
+  EXPECT_EQ(pull_events(h), events);
 }
 
 TEST_P(EveryFormat, BeginsAtTheFirstEventAndTellsSilence) {

@@ -2,12 +2,14 @@
 // Files that cameras recorded, against counts and sums that another reader made.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "src/formats/evt/raw.hpp"
+#include "src/formats/recording_reader.hpp"
 #include "tests/formats/evt_validator.hpp"
 #include "tests/formats/recordings.hpp"
 
@@ -71,6 +73,24 @@ TEST(Recorded, Evt3Of640x480) {
   EXPECT_EQ(sums.t, 2'885'601'049'874);
   EXPECT_EQ(decoder->corruption().places, 0U);
   EXPECT_EQ(decoder->corruption().outside, 0U);
+}
+
+TEST(Recorded, PlaysEveryEventInTheOrderOfTheFile) {
+  for (const std::string name : {"evt3-1280x720-triggers.raw", "evt3-640x480-triggers.raw"}) {
+    if (!std::filesystem::exists(path(name))) GTEST_SKIP() << "no " << path(name);
+    auto events = recordings::decode(*make_prophesee_raw_decoder(), bytes_of(name)).events;
+    std::ranges::stable_sort(events, {}, &AbsoluteEvent::t);
+    MemoryBytes bytes(bytes_of(name));
+    RecordingReader reader(
+        [] { return std::make_unique<DecoderReader>(make_prophesee_raw_decoder()); }, 10'000);
+    reader.open(bytes);
+    std::vector<AbsoluteEvent> played;
+    while (const auto output = reader.next())
+      if (const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output))
+        for (const auto& event : chunk->events)
+          played.push_back({reader.origin() + chunk->start + event.t, event.x, event.y_p});
+    EXPECT_TRUE(played == events) << name;
+  }
 }
 
 TEST(Recorded, WrittenAgainInEveryFormatIsTheSame) {
