@@ -3,15 +3,18 @@
 
 #include <gst/video/video.h>
 
-#include <mutex>
+#include <algorithm>
 #include <new>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/frame_clock.hpp"
+#include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
+#include "gst/base/learnt_latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/simulator_buffers.hpp"
 #include "gst/base/simulator_caps.hpp"
@@ -36,8 +39,8 @@ namespace {
 constexpr guint max_interpolated_frames = 255;
 constexpr guint default_interpolated_frames = 10;
 
-/// Latency limit: the latency is that of the framerate, or the longest interval seen.
-constexpr GstClockTime max_latency = GST_SECOND;
+/// Limit of the latency from intervals.
+constexpr Nanoseconds max_latency = GST_SECOND;
 
 /// What the application sets, copied once per buffer.
 struct Settings {
@@ -70,8 +73,7 @@ struct GstEventSimulatorPrivate {
   GuardedSettings<Settings> settings;
   std::shared_ptr<void> method_settings;
 
-  std::mutex mutex;  // guards the latency; nothing is called under it
-  GstClockTime latency = 0;
+  Guarded<LearntLatency> latency;  // that of an interval; nothing is called under its lock
 
   // The streaming thread's, or nobody's while there is none.
   std::optional<State> state;
@@ -161,24 +163,24 @@ static void install_base_properties(GObjectClass* klass) {
 /* time */
 
 static GstClockTime latency_of(GstEventSimulator* self) {
-  const std::lock_guard lock(priv_of(self).mutex);
-  return priv_of(self).latency;
+  return static_cast<GstClockTime>(priv_of(self).latency.lock()->value());
 }
 
-/// Posts a latency message when it changes.
-static void set_latency(GstEventSimulator* self, GstClockTime latency) {
-  {
-    const std::lock_guard lock(priv_of(self).mutex);
-    if (std::exchange(priv_of(self).latency, latency) == latency) return;
-  }
+/// Posts a message where this changes the latency.
+template <class Change>
+static void change_latency(GstEventSimulator* self, const Change& change) {
+  const GstClockTime before = latency_of(self);
+  change(*priv_of(self).latency.lock());
+  const GstClockTime latency = latency_of(self);
+  if (latency == before) return;
   GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(latency));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
 /// The framerate in the caps may be missing or wrong.
-static void learn_latency(GstEventSimulator* self, GstClockTime interval) {
-  const GstClockTime seen = MIN(interval, max_latency);
-  if (seen > latency_of(self)) set_latency(self, seen);
+static void learn_latency(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
+  change_latency(
+      self, [&](LearntLatency& latency) { latency.add(end, std::min(end - start, max_latency)); });
 }
 
 /// Makes the next frame a first frame.
@@ -320,9 +322,10 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
         has_packed_luma(video) ? Image<guint8>(luma.width, luma.height) : Image<guint8>();
   });
   if (!made) return FALSE;
-  if (GST_VIDEO_INFO_FPS_N(&video) > 0)
-    set_latency(self, gst_util_uint64_scale_int(GST_SECOND, GST_VIDEO_INFO_FPS_D(&video),
-                                                GST_VIDEO_INFO_FPS_N(&video)));
+  if (const GstClockTime duration = frame_duration(video); duration > 0)
+    change_latency(self, [duration](LearntLatency& latency) {
+      latency.expect(static_cast<Nanoseconds>(duration));
+    });
   return TRUE;
 }
 
@@ -395,7 +398,7 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   }
   const EventBuckets* events = simulate(self, frame, end, settings);
   if (events == nullptr) return GST_FLOW_OK;
-  learn_latency(self, static_cast<GstClockTime>(end - *start));
+  learn_latency(self, *start, end);
   GST_LOG_OBJECT(self,
                  "%" G_GSIZE_FORMAT " events in the interval from %" GST_TIME_FORMAT
                  " to %" GST_TIME_FORMAT,
@@ -586,8 +589,7 @@ static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   priv_of(self).state.reset();
   priv_of(self).stream = {};
-  const std::lock_guard lock(priv_of(self).mutex);
-  priv_of(self).latency = 0;
+  *priv_of(self).latency.lock() = {};
   return TRUE;
 }
 

@@ -288,7 +288,34 @@ TEST_P(EveryElement, LearnsThatFramesComeSlowerThanTheCapsSay) {
   flash(40 * GST_MSECOND);
   EXPECT_EQ(gst_harness_query_latency(h.get()), 40 * GST_MSECOND);
   flash(120 * GST_MSECOND);
+  flash(200 * GST_MSECOND);
   EXPECT_EQ(gst_harness_query_latency(h.get()), 80 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, DoesNotDelayTheViewAfterOnePause) {
+  h.caps(video);
+  h.message(GST_MESSAGE_LATENCY);
+  GstClockTime time = 0;
+  for (int i = 0; i < 10; ++i) flash(time += 40 * GST_MSECOND);
+  time += 800 * GST_MSECOND;
+  for (int i = 0; i < 30; ++i) {
+    flash(time += 40 * GST_MSECOND);
+    EXPECT_EQ(gst_harness_query_latency(h.get()), 40 * GST_MSECOND);
+  }
+  EXPECT_FALSE(h.message(GST_MESSAGE_LATENCY));
+}
+
+TEST_P(EveryElement, ReturnsToItsLatencyWithinASecond) {
+  h.caps(video);
+  GstClockTime time = 0;
+  for (int i = 0; i < 4; ++i) flash(time += 300 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 300 * GST_MSECOND);
+  while (h.message(GST_MESSAGE_LATENCY)) {
+  }
+  for (int i = 0; i < 25; ++i) flash(time += 40 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 40 * GST_MSECOND);
+  EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
+  EXPECT_FALSE(h.message(GST_MESSAGE_LATENCY));
 }
 
 TEST_P(EveryElement, KeepsLatenessFromUpstream) {
@@ -312,6 +339,7 @@ TEST_P(EveryElement, LearnsItsLatencyWhereTheFramerateVaries) {
   flash(50 * GST_MSECOND);
   EXPECT_FALSE(h.message(GST_MESSAGE_LATENCY));
   flash(10 * GST_SECOND);
+  flash(20 * GST_SECOND);
   EXPECT_EQ(gst_harness_query_latency(h.get()), GST_SECOND);
 }
 
