@@ -82,7 +82,8 @@ using Item = std::variant<EventItem, FrameItem, TriggerItem>;
 
 /// Reads the items of a recording of any format, in file order.
 ///
-/// reader.push(piece);     while (const auto item = reader.next()) ...
+///     reader.push(piece);
+///     while (const auto item = reader.next()) ...
 class Reader {
  public:
   virtual ~Reader() = default;

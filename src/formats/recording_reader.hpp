@@ -25,7 +25,8 @@ namespace eventcamera {
 /// the file, up to 16 MiB, is surveyed first: this gives an exact or estimated duration, and the
 /// sensor size if the file does not state it.
 ///
-/// recording.push(bytes);  // or open(), once     while (const auto output = recording.next()) ...
+///     recording.push(bytes);  // or open(), once
+///     while (const auto output = recording.next()) ...
 class RecordingReader {
  public:
   /// Creates a Reader for the file, positioned at its start. May throw.
