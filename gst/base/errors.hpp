@@ -9,11 +9,10 @@
 #include <type_traits>
 #include <utility>
 
-/// How elements report errors and warnings. A report has two parts: a text for the user (what
-/// failed, on what, what to do) and the cause for whoever debugs it (call, errno, caps, the text of
-/// an exception).
+/// Error and warning messages of elements. A message has two parts: a text for the user (what
+/// failed, on what, what to do), and the cause for debugging (call, errno, caps, exception text).
 
-/// The domain and code of a message: any of GStreamer's error enumerations.
+/// Domain and code of a message, from any of GStreamer's error enums.
 struct ErrorCode {
   ErrorCode(GstCoreError error) : domain(GST_CORE_ERROR), code(error) {}
   ErrorCode(GstLibraryError error) : domain(GST_LIBRARY_ERROR), code(error) {}
@@ -24,8 +23,8 @@ struct ErrorCode {
   int code;
 };
 
-/// Where a function with this default argument is called: std::source_location, which clang 14 does
-/// not have.
+/// Call site of a function with this default argument. Replaces std::source_location, which clang
+/// 14 lacks.
 struct CallSite {
   explicit CallSite(const char* file_ = __builtin_FILE(),
                     const char* function_ = __builtin_FUNCTION(), int line_ = __builtin_LINE())
@@ -36,13 +35,13 @@ struct CallSite {
   int line;
 };
 
-/// What the user is told.
+/// User-visible part of a message.
 struct Report {
   ErrorCode code;
   std::string text;
 };
 
-/// As GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, where code and text are values.
+/// Like GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, with code and text as values.
 inline void post_message(gpointer element, GstMessageType type, const Report& report,
                          const std::string& cause, CallSite at = CallSite()) {
   gst_element_message_full(GST_ELEMENT(element), type, report.code.domain, report.code.code,
@@ -50,7 +49,7 @@ inline void post_message(gpointer element, GstMessageType type, const Report& re
                            at.function, at.line);
 }
 
-/// A warning that is posted once, because what it warns of tends to repeat. Each is logged.
+/// Posts a warning only the first time, and logs it every time. For conditions that tend to repeat.
 class WarnOnce {
  public:
   void operator()(gpointer element, const Report& report, const std::string& cause,
@@ -62,17 +61,17 @@ class WarnOnce {
       post_message(element, GST_MESSAGE_WARNING, report, cause, at);
   }
 
-  /// For a new stream: the next warning is posted again.
+  /// For a new stream: posts the next warning again.
   void reset() { posted_ = false; }
 
  private:
   bool posted_ = false;
 };
 
-/// Runs `work`, which may throw, where an exception must not pass: in a function that GStreamer
-/// calls. An exception becomes an error message of `element`; `report` tells what the message says:
-/// a Report, or a function that makes one of the exception. The result is then GST_FLOW_ERROR, or
-/// false, or nullptr. Work without a result gives true when it is done.
+/// Runs `work` in a function called by GStreamer, which exceptions must not leave. An exception is
+/// posted as an error message of `element`; `report` is its Report, or a function that makes one
+/// from the exception. The result is then GST_FLOW_ERROR, false or nullptr. If `work` returns void,
+/// the result is true on success.
 template <class MakeReport, std::invocable Work>
 auto guarded(gpointer element, const MakeReport& report, const Work& work,
              CallSite at = CallSite()) {
@@ -98,7 +97,7 @@ auto guarded(gpointer element, const MakeReport& report, const Work& work,
     return Result{};
 }
 
-/// Whether an exception is of this type.
+/// True if an exception is of this type.
 template <class Exception>
 bool is_a(const std::exception& error) {
   return dynamic_cast<const Exception*>(&error) != nullptr;

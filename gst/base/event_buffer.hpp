@@ -9,12 +9,12 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event.hpp"
 
-/// The caps of a stream of events in memory.
+/// Caps of an event stream in memory format.
 #define EVENT_CAPS            \
   GST_EVENT_CAMERA_MEDIA_TYPE \
   ", format = (string) XYTP, width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ]"
 
-/// The events of a buffer, mapped while this lives.
+/// Maps the events of a buffer for reading.
 class MappedEvents {
  public:
   explicit MappedEvents(GstBuffer* buffer)
@@ -25,16 +25,16 @@ class MappedEvents {
   MappedEvents(const MappedEvents&) = delete;
   MappedEvents& operator=(const MappedEvents&) = delete;
 
-  /// False where the buffer's size is not a multiple of an event's. Then nothing else may be
-  /// called.
+  /// False if mapping failed, for example because the buffer ends in a partial event. Nothing else
+  /// may be called then.
   explicit operator bool() const { return mapped_; }
 
-  /// The core's events are laid out as the application's are.
+  /// The core's Event has the layout of GstEventCameraEvent.
   std::span<const eventcamera::Event> events() const {
     return {reinterpret_cast<const eventcamera::Event*>(map_.events), map_.n_events};
   }
 
-  /// The time that those of the events count from, in microseconds.
+  /// Time that event times are relative to, in microseconds.
   eventcamera::Microseconds start() const {
     return static_cast<eventcamera::Microseconds>(map_.start);
   }
@@ -44,31 +44,31 @@ class MappedEvents {
   bool mapped_;
 };
 
-/// An interval of time, (start, end].
+/// A time interval (start, end].
 struct EventInterval {
   GstClockTime start;
   GstClockTime end;
 };
 
-/// Times closer than this are the same: events have microseconds.
+/// Resolution of event times; times closer than this count as equal.
 inline constexpr GstClockTime event_resolution = GST_USECOND;
 
-/// The interval of a buffer of events: up to its last event where it has no duration, nothing where
-/// it has no PTS.
+/// Interval of a buffer of events. Without a duration it ends at the last event; without a PTS
+/// there is none.
 std::optional<EventInterval> interval_of(GstBuffer* buffer);
 
-/// Why events of a buffer are skipped.
+/// Reason for skipping events of a buffer.
 enum class EventFault { no_pts, partial_event, beyond_sensor };
 
-/// Warns the user of an element of events that it has to skip: of each fault once a stream.
+/// Posts warnings about events that an element skips, once per fault and stream.
 class EventFaults {
  public:
-  /// `verb` is what the element does with events: "draw".
+  /// `verb` is what the element does with events, such as "draw".
   explicit EventFaults(const char* verb) : verb_(verb) {}
 
   void warn(gpointer element, EventFault fault, GstBuffer* buffer);
 
-  /// Another stream begins.
+  /// For a new stream: warnings are posted again.
   void reset() { warnings_ = {}; }
 
  private:

@@ -26,7 +26,7 @@ EventAggregator::EventAggregator(GstAggregator* element, const Role& role)
 
 GstAggregatorPad* EventAggregator::pad(const char* name) const {
   GstPad* pad = gst_element_get_static_pad(GST_ELEMENT(element_), name);
-  gst_object_unref(pad);  // the element owns it, as long as it lives
+  gst_object_unref(pad);  // the element keeps it alive
   return GST_AGGREGATOR_PAD(pad);
 }
 
@@ -45,8 +45,8 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
   return running;
 }
 
-/// Whether what comes to a pad would take a seek. GstAggregator flushes before it asks, and never
-/// plays on where the answer is no.
+/// True if upstream of a pad would accept a seek. GstAggregator flushes before it forwards a seek,
+/// and never resumes if that fails.
 static bool would_seek(GstAggregatorPad* pad, const SeekRequest& request) {
   if (!request.plays_on_from_time()) return false;
   GstQuery* query = gst_query_new_seeking(GST_FORMAT_TIME);
@@ -58,7 +58,8 @@ static bool would_seek(GstAggregatorPad* pad, const SeekRequest& request) {
   return seekable && request.apply(segment);
 }
 
-/// Answers which caps a pad takes whose buffers go on as they come: what downstream takes.
+/// Answers a caps query on a pad whose buffers are passed through: the caps that downstream
+/// accepts.
 static void answer_caps_of_passed(GstAggregator* aggregator, GstAggregatorPad* pad,
                                   GstQuery* query) {
   GstCaps* filter = nullptr;
@@ -70,7 +71,7 @@ static void answer_caps_of_passed(GstAggregator* aggregator, GstAggregatorPad* p
   gst_query_set_caps_result(query, result.get());
 }
 
-/// What GstAggregator calls.
+/// Virtual functions of GstAggregator.
 struct EventAggregatorFunctions {
   static EventAggregator& of(GstAggregator* element) {
     return gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(element));
@@ -163,7 +164,8 @@ struct EventAggregatorFunctions {
   }
 
   static gboolean src_query(GstAggregator* element, GstQuery* query) {
-    if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING)  // GstAggregator says that nothing can
+    if (GST_QUERY_TYPE(query) ==
+        GST_QUERY_SEEKING)  // GstAggregator always answers that seeking is impossible
       return gst_pad_peer_query(GST_PAD(of(element).main_pad_), query);
     return PARENT_AGGREGATOR_CLASS->src_query(element, query);
   }

@@ -10,19 +10,19 @@
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
 
-/// What an element does with the event streams, and video, of its sink pads. A subclass of
-/// GstEventAggregator brings one, which lives as long as the element.
+/// Implementation of an element that combines event streams and video. Each subclass of
+/// GstEventAggregator owns one, which lives as long as the element.
 ///
-/// One sink pad is the main one: the output has its segment, and the element is as seekable as what
-/// comes to it. A seek goes to all pads, or to none where one of them would refuse it.
+/// One sink pad is the main pad: its segment is that of the output, and its upstream answers
+/// seeking queries. A seek is forwarded to all pads, or to none if one of them would refuse it.
 ///
-/// Functions are called by the source pad's thread, or while there is none.
+/// Called from the source pad's thread only, or while there is none.
 class EventAggregator {
  public:
   struct Role {
-    const char* verb;               ///< what it does with events, in messages: "draw"
-    const char* main_pad = "sink";  ///< a name
-    /// Whether the buffers of the main pad go on as they come, with their caps.
+    const char* verb;               ///< what it does with events, for messages: "draw"
+    const char* main_pad = "sink";  ///< name of the main pad
+    /// Output buffers are those of the main pad, with its caps.
     bool passes_main_pad = true;
   };
 
@@ -31,31 +31,32 @@ class EventAggregator {
   EventAggregator(const EventAggregator&) = delete;
   EventAggregator& operator=(const EventAggregator&) = delete;
 
-  /// False where the element cannot start; it has reported why.
+  /// False, after reporting why, if the element cannot start.
   virtual bool start() { return true; }
   /// Drops all state.
   virtual void stop() = 0;
-  /// Drops the events so far: what comes next does not follow on them. May throw.
+  /// Drops all pending events, because the next input is discontinuous. May throw.
   virtual void flush() = 0;
-  /// Drops what takes memory, when there is too little.
+  /// Frees as much memory as possible, after an allocation failed.
   virtual void release_memory() { flush(); }
 
-  /// False where these caps are refused. May throw.
+  /// False if `caps` are refused. May throw.
   virtual bool take_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
-  /// A segment comes to the main pad, where the last one still is. May throw.
+  /// Handles a new segment of the main pad, which still has the last one. May throw.
   virtual void take_segment(const GstSegment&) {}
-  /// As GstAggregatorClass::aggregate. May throw.
+  /// Like GstAggregatorClass::aggregate. May throw.
   virtual GstFlowReturn aggregate(bool timed_out) = 0;
-  /// When to go on without further input, from live sources.
+  /// Like GstAggregatorClass::get_next_time: when to continue without further input from live
+  /// sources.
   virtual GstClockTime next_time() { return GST_CLOCK_TIME_NONE; }
 
  protected:
   GstAggregator* element() const { return element_; }
-  /// A sink pad by its name.
+  /// Returns a sink pad by name.
   GstAggregatorPad* pad(const char* name) const;
   GstAggregatorPad* main_pad() const { return main_pad_; }
 
-  /// Warns of events that are skipped.
+  /// Warns about skipped events.
   void warn(EventFault fault, GstBuffer* buffer) { faults_.warn(element_, fault, buffer); }
 
  private:
@@ -68,14 +69,14 @@ class EventAggregator {
   EventFaults faults_;
 };
 
-/// The segment of a pad: from 0 on where none has come, since live sources send theirs with their
+/// Segment of a pad. It starts at 0 if none was received, because live sources send theirs with the
 /// first buffer.
 GstSegment segment_of(GstAggregatorPad* pad);
 
-/// The running time of a pad's `time`; none outside the segment.
+/// Running time of `time` on a pad; none outside its segment.
 std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time);
 
-/// The abstract base class of elements that take event streams: a shell round an EventAggregator.
+/// Abstract base class of elements that combine event streams: a wrapper around an EventAggregator.
 #define GST_TYPE_EVENT_AGGREGATOR (gst_event_aggregator_get_type())
 G_DECLARE_DERIVABLE_TYPE(GstEventAggregator, gst_event_aggregator, GST, EVENT_AGGREGATOR,
                          GstAggregator)
@@ -84,32 +85,32 @@ struct _GstEventAggregatorClass {
   GstAggregatorClass parent_class;
 };
 
-/// Adds the sink pads of the templates.
+/// Adds a sink pad per template.
 void gst_event_aggregator_add_pads(GstEventAggregator* self);
 
 void gst_event_aggregator_set_inside(GstEventAggregator* self,
                                      std::unique_ptr<EventAggregator> inside);
 EventAggregator& gst_event_aggregator_inside(GstEventAggregator* self);
 
-/// For the init function of a subclass: makes its pads, and then what is inside of it.
+/// For the init function of a subclass: creates its pads, then its EventAggregator.
 template <class Inside>
 void gst_event_aggregator_make(GstEventAggregator* self) {
   gst_event_aggregator_add_pads(self);
   gst_event_aggregator_set_inside(self, std::make_unique<Inside>(GST_AGGREGATOR(self)));
 }
 
-/// What is inside of an element of this kind.
+/// Returns the EventAggregator of an element, of class `Inside`.
 template <class Inside>
 Inside& inside_of(gpointer element) {
   return static_cast<Inside&>(gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(element)));
 }
 
-/// For class_init: the pad templates, as GstAggregator wants them.
+/// For class_init: adds pad templates with the pad type that GstAggregator requires.
 void gst_event_aggregator_class_add_templates(GstEventAggregatorClass* klass,
                                               std::initializer_list<GstStaticPadTemplate*> list);
 
-/// Defines the type of an element with an EventAggregator of class `Inside`, which has `settings`,
-/// and registers the element. Its class_init is to follow.
+/// Defines and registers the type of an element with an EventAggregator of class `Inside`, which
+/// must have a member `settings`. The type's class_init must follow.
 #define DEFINE_EVENT_AGGREGATOR(Type, type, OBJECT, Inside, element, rank, description)       \
   G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventAggregator)                           \
   struct _##Type {                                                                            \

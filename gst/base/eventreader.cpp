@@ -39,14 +39,14 @@ enum Property : guint { prop_buffer_time = 1, prop_stats };
 
 constexpr GstClockTime default_buffer_time = 10 * GST_MSECOND;
 
-/// A step has read all that there is.
+/// Returned by step() if no output is available.
 constexpr GstFlowReturn nothing_ready = GST_FLOW_CUSTOM_SUCCESS;
 
 GstClockTime nanoseconds(Microseconds t) {
   return static_cast<GstClockTime>(std::max<Microseconds>(t, 0)) * GST_USECOND;
 }
 
-/// Where a segment begins and ends, in whole microseconds.
+/// Bounds of a segment in whole microseconds, rounded outwards.
 Microseconds position_of(const GstSegment& segment) {
   return static_cast<Microseconds>(segment.position / GST_USECOND);
 }
@@ -55,16 +55,16 @@ std::optional<Microseconds> stop_of(const GstSegment& segment) {
   return static_cast<Microseconds>((segment.stop + GST_USECOND - 1) / GST_USECOND);
 }
 
-/// A seek that upstream has been asked for.
+/// A seek that upstream was asked for.
 struct Restart {
   GstSegment segment = {};
-  std::optional<SeekPoint> seek_point;  ///< none: the start of the file
+  std::optional<SeekPoint> seek_point;  ///< unset: the start of the file
   guint32 seqnum = GST_SEQNUM_INVALID;
 };
 
 }  // namespace
 
-/// The state of an element, and what it does: the GStreamer side of a RecordingReader.
+/// Implementation of the element: connects a RecordingReader to pads, events, queries and messages.
 class EventReader {
  public:
   EventReader(GstElement* element, const RecordingFormat& format);
@@ -86,19 +86,20 @@ class EventReader {
   gboolean src_query(GstPad* pad, GstQuery* query);
 
  private:
-  /// What more than one thread uses. Nothing is called while it is locked.
+  /// State shared between threads; make no calls while holding the lock.
   struct Shared {
     Shared() { gst_segment_init(&segment, GST_FORMAT_TIME); }
 
     GstClockTime buffer_time = default_buffer_time;
-    GstSegment segment = {};  ///< as if the file began at 0; its position is that of the output
+    GstSegment segment =
+        {};  ///< relative to the start of the file; its position is that of the output
     GstClockTime duration = GST_CLOCK_TIME_NONE;
     RecordingReader::Counts counts;
-    std::optional<Restart> restart;  ///< push mode: asked for and not yet done
-    guint64 pushed_bytes = 0;        ///< since the start of the file
+    std::optional<Restart> restart;  ///< push mode: pending seek
+    guint64 pushed_bytes = 0;        ///< offset in the file
     guint32 last_seek = GST_SEQNUM_INVALID;
     bool is_pulling = false;
-    bool is_timed = false;  ///< upstream has times of its own
+    bool is_timed = false;  ///< times come from upstream
     std::shared_ptr<RecordingReader> recording;
   };
 
@@ -157,24 +158,24 @@ class EventReader {
 
   Guarded<Shared> shared_;
 
-  // Under the stream lock of the sink pad, or nobody's while there is no streaming thread.
-  OwnedCaps caps_;                 ///< of the input
-  std::optional<PadBytes> bytes_;  ///< in pull mode
+  // Accessed under the sink pad's stream lock only, or while there is no streaming thread.
+  OwnedCaps caps_;                 ///< input caps
+  std::optional<PadBytes> bytes_;  ///< pull mode only
   std::shared_ptr<RecordingReader> recording_;
-  bool is_consuming_ = false;         ///< the recording was given bytes
-  GstFlowReturn flow_ = GST_FLOW_OK;  ///< once it is something else, pushed bytes are refused
-  guint64 corrupt_places_ = 0;        ///< for which a buffer had DISCONT
+  bool is_consuming_ = false;         ///< bytes were passed to the recording
+  GstFlowReturn flow_ = GST_FLOW_OK;  ///< anything else refuses pushed bytes
+  guint64 corrupt_places_ = 0;        ///< already signalled by DISCONT and a warning
   WarnOnce warn_of_corruption_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;
   std::map<std::size_t, ReaderPad*> pad_of_stream_;
   GstFlowCombiner* combiner_ = gst_flow_combiner_new();
   bool has_no_more_pads_ = false;
-  bool output_due_ = true;            ///< caps, segments or held events are to be sent before data
+  bool output_due_ = true;            ///< caps, segments or held events must be sent before data
   GstEvent* stream_start_ = nullptr;  ///< upstream's
   guint group_ = GST_GROUP_ID_INVALID;
   guint32 seqnum_ = GST_SEQNUM_INVALID;
-  std::vector<GstEvent*> held_;  ///< until caps and segments are sent
+  std::vector<GstEvent*> held_;  ///< serialized events waiting for caps and segments
 };
 
 /* type */
@@ -226,7 +227,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   return result;
 }
 
-/// The format is the subclass's, which is not yet known in init.
+/// Creates the reader here, because the subclass's format is not yet known in init.
 static void constructed(GObject* object) {
   auto* const klass = G_TYPE_INSTANCE_GET_CLASS(object, GST_TYPE_EVENT_READER, GstEventReaderClass);
   reinterpret_cast<GstEventReader*>(object)->reader =
@@ -251,14 +252,14 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
   g_object_class_install_property(
       object_class, prop_buffer_time,
       g_param_spec_uint64("buffer-time", "Buffer time",
-                          "How much time a buffer covers (nanoseconds, in whole microseconds)",
+                          "Duration of a buffer of events (nanoseconds, in whole microseconds)",
                           GST_USECOND, 10 * GST_SECOND, default_buffer_time,
                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                    GST_PARAM_MUTABLE_READY)));
   g_object_class_install_property(
       object_class, prop_stats,
       g_param_spec_boxed("stats", "Statistics",
-                         "What was read since the start or the last seek, and what was left out",
+                         "Numbers of items read and dropped since the start or the last seek",
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_READER, static_cast<GstPluginAPIFlags>(0));
@@ -298,7 +299,7 @@ GType event_reader_type(const RecordingFormat& format) {
 
 /* life */
 
-/// Bytes are pulled where upstream can seek, else they are pushed.
+/// Chooses pull mode if upstream supports random access, else push mode.
 static gboolean choose_mode(GstPad* sink, GstObject* /*parent*/) {
   GstQuery* const query = gst_query_new_scheduling();
   const bool pulls = gst_pad_peer_query(sink, query) != FALSE &&
@@ -367,7 +368,7 @@ static void unref_caps(GstCaps* caps) {
   if (caps != nullptr) gst_caps_unref(caps);
 }
 
-/// Makes ready to read a file from its start, or words. May throw.
+/// Creates the recording, to read a file from its start or a stream of words. May throw.
 void EventReader::open_recording() {
   const std::shared_ptr<GstCaps> caps(caps_ ? gst_caps_copy(caps_.get()) : nullptr, unref_caps);
   auto make = [make_reader = format_.make_reader, caps] { return make_reader(caps.get()); };
@@ -396,11 +397,11 @@ Report EventReader::report_of(const std::exception& error) const {
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
             "There is not enough memory for the events. Lower buffer-time."};
   return {format_.has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE,
-          "Cannot read this file. Check that it is whole and of the format that its name says."};
+          "Cannot read this file. Check that it is complete and that its extension matches its "
+          "format."};
 }
 
-/// Runs code that may throw. If bytes could not be pulled, returns that flow instead of the error
-/// that it caused.
+/// Runs `work`; reports any exception. If the cause is a failed pull, returns its flow instead.
 template <class Work>
 GstFlowReturn EventReader::guard(const Work& work) {
   return guarded(
@@ -435,7 +436,7 @@ void EventReader::loop(gpointer data) {
   self.end_output(result != GST_FLOW_EOS);
 }
 
-/// Hands out what comes next. GST_FLOW_EOS at the end of the file, or of the segment.
+/// Pushes the next output. Returns GST_FLOW_EOS at the end of the file or of the segment.
 GstFlowReturn EventReader::pull() {
   if (!recording_) {
     OwnedCaps caps(gst_pad_peer_query_caps(sink_, nullptr));
@@ -497,13 +498,13 @@ GstFlowReturn EventReader::take_buffer(GstBuffer* buffer) {
   return result;
 }
 
-/// Upstream says that all before this time has come. May throw.
+/// Handles the end of an upstream interval: nothing earlier will follow. May throw.
 GstFlowReturn EventReader::take_interval_end(Microseconds end) {
   recording_->reach(end);
   return hand_out();
 }
 
-/// Hands out what is ready. May throw.
+/// Pushes all available output. May throw.
 GstFlowReturn EventReader::hand_out() {
   GstFlowReturn result = GST_FLOW_OK;
   while (result == GST_FLOW_OK) result = step();
@@ -514,7 +515,7 @@ GstFlowReturn EventReader::hand_out() {
 gboolean EventReader::sink_event(GstEvent* event) {
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_STREAM_START:
-      drain();  // into the stream that ends here
+      drain();  // into the stream that ends here, before the new one
       gst_event_replace(&stream_start_, event);
       gst_event_unref(event);
       for (auto& pad : pads_) pad->reset();
@@ -550,7 +551,7 @@ gboolean EventReader::sink_event(GstEvent* event) {
   }
 }
 
-/// Sends an event on in order, and takes it.
+/// Forwards an event in order. Takes ownership of `event`.
 gboolean EventReader::forward(GstEvent* event) {
   if (output_due_)
     held_.push_back(event);
@@ -559,7 +560,7 @@ gboolean EventReader::forward(GstEvent* event) {
   return TRUE;
 }
 
-/// Hands out everything, where what comes next does not follow on it.
+/// Pushes all pending output before a discontinuity.
 GstFlowReturn EventReader::drain() {
   if (is_consuming_) take_end();
   if (recording_) recording_->interrupt();
@@ -592,13 +593,13 @@ gboolean EventReader::take_caps(GstEvent* event) {
   return TRUE;
 }
 
-/// A file has its own times, whatever the segment that it comes in.
+/// True for words without a header; files have their own times, whatever their segment.
 bool EventReader::carries_words() const {
   return caps_ && gst_structure_has_name(gst_caps_get_structure(caps_.get(), 0),
                                          GST_EVENT_CAMERA_MEDIA_TYPE);
 }
 
-/// Takes the event.
+/// Takes ownership of `event`.
 gboolean EventReader::take_segment(GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
@@ -622,13 +623,13 @@ gboolean EventReader::take_segment(GstEvent* event) {
   gst_event_unref(event);
   const bool is_sought = restart && restart->seek_point.value_or(SeekPoint{}).position == start;
   if (restart && !is_sought && seqnum != restart->seqnum) {
-    // Of an earlier seek: the one that is pending flushes what follows.
+    // The segment belongs to an earlier seek; the pending one will flush what follows.
     flow_ = GST_FLOW_FLUSHING;
     return TRUE;
   }
   shared_.lock()->restart.reset();
   interrupt_output();
-  // A seek point is of no use for a recording that was closed meanwhile.
+  // A seek point is useless for a recording that was closed meanwhile.
   if (!is_sought || (restart->seek_point && !recording_)) {
     close_recording();  // another file
     seqnum_ = seqnum;
@@ -652,7 +653,7 @@ gboolean EventReader::take_segment(GstEvent* event) {
          }) == GST_FLOW_OK;
 }
 
-/// Takes the event.
+/// Takes ownership of `event`.
 void EventReader::take_gap(GstEvent* event) {
   GstClockTime pts = GST_CLOCK_TIME_NONE;
   GstClockTime duration = GST_CLOCK_TIME_NONE;
@@ -682,7 +683,7 @@ GstFlowReturn EventReader::step() {
   return std::visit([this](const auto& item) { return push(item); }, *output);
 }
 
-/// Streams that were not shown before are known.
+/// New streams are known.
 GstFlowReturn EventReader::push(const RecordingReader::Start& /*start*/) {
   if (const auto length = recording_->duration()) set_duration(nanoseconds(*length));
   return begin_output();
@@ -738,7 +739,7 @@ ReaderPad& EventReader::pad_of(std::size_t index) {
   return *found;
 }
 
-/// Sends everything that has to be sent before data.
+/// Sends all events that must precede data.
 GstFlowReturn EventReader::begin_output() {
   output_due_ = false;
   start_streams();
@@ -756,8 +757,8 @@ GstFlowReturn EventReader::begin_output() {
   return GST_FLOW_OK;
 }
 
-/// Starts streams, and adds their pads: of many only when their caps are known, a single one
-/// before, as what is linked then may have to tell the size of the sensor.
+/// Starts streams and adds their pads. With many streams, pads have caps before they are added; a
+/// single pad is added first, because the linked element may determine the sensor size.
 void EventReader::start_streams() {
   const auto& streams = recording_->streams();
   const bool is_upstreams = is_timed() && stream_start_ != nullptr;
@@ -803,7 +804,8 @@ void EventReader::start_streams() {
   if (!std::exchange(has_no_more_pads_, true)) gst_element_no_more_pads(element_);
 }
 
-/// A size that the file does not tell is what downstream insists on, or else what events fit into.
+/// If the file does not state the sensor size, uses the size in downstream's caps, else one that
+/// all events fit into.
 void EventReader::guess_size(std::size_t index) {
   const auto& stream = recording_->streams()[index];
   if (!stream.size_guessed) return;
@@ -817,7 +819,7 @@ void EventReader::guess_size(std::size_t index) {
         gst_structure_get_int(structure, "height", &size.height))
       recording_->set_size(index, size);
   }
-  GST_INFO_OBJECT(element_, "the file does not tell the sensor's size; %dx%d is assumed",
+  GST_INFO_OBJECT(element_, "the file does not state the sensor size; assuming %dx%d",
                   stream.info.size.width, stream.info.size.height);
 }
 
@@ -843,13 +845,13 @@ void EventReader::send_segment(ReaderPad& pad) {
   pad.send_segment(segment, seqnum_);
 }
 
-/// What comes next does not follow on what was sent.
+/// Marks the next output as discontinuous.
 void EventReader::interrupt_output() {
   for (auto& pad : pads_) pad->interrupt();
   output_due_ = true;
 }
 
-/// Ends the streams, or the segment where a seek asked for one: the application is told.
+/// Ends the streams with EOS, or the segment with SEGMENT_DONE if a segment seek was requested.
 void EventReader::end_output(bool failed) {
   const auto segment = shared_.lock()->segment;
   if (failed || (segment.flags & GST_SEGMENT_FLAG_SEGMENT) == 0) {
@@ -865,15 +867,15 @@ void EventReader::end_output(bool failed) {
   push_to_pads(with_seqnum(gst_event_new_segment_done(GST_FORMAT_TIME, position), seqnum_));
 }
 
-/// Takes the event.
+/// Takes ownership of `event`.
 void EventReader::push_to_pads(GstEvent* event) {
   for (auto& pad : pads_) gst_pad_push_event(pad->get(), gst_event_ref(event));
   gst_event_unref(event);
 }
 
-/* what is told of a file */
+/* progress, statistics and warnings */
 
-/// Notes how far output is, what was read, and corruption that is new.
+/// Updates position and counts, and reports new corruption.
 void EventReader::note_progress() {
   const auto counts = recording_->counts();
   const auto position = nanoseconds(recording_->position());
@@ -891,7 +893,7 @@ void EventReader::note_progress() {
         element_,
         {format_.has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE,
          "Corrupt data at byte " + at + ": " + corruption.first +
-             "; skipping it. The property stats counts what is left out."},
+             "; skipping it. The stats property counts what is dropped."},
         "first corruption at byte " + at + ": " + corruption.first);
   }
   corrupt_places_ = counts.corrupt_places;
@@ -915,7 +917,7 @@ GstStructure* EventReader::stats() {
   return stats;
 }
 
-/// Tells, at the end, what was left out.
+/// Posts a warning at the end about dropped items.
 void EventReader::warn_of_dropped() {
   const auto counts = recording_->counts();
   const auto text_of = [](guint64 number) { return std::to_string(number); };
@@ -926,7 +928,7 @@ void EventReader::warn_of_dropped() {
   post_message(element_, GST_MESSAGE_WARNING,
                {format_.has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE,
                 text_of(counts.outside) + " events outside the sensor, and " + text_of(untimely) +
-                    " items with times out of order, were left out."},
+                    " items with times out of order, were dropped."},
                text_of(counts.late) + " late, " + text_of(counts.stray) + " at stray times");
 }
 
@@ -1040,7 +1042,7 @@ bool EventReader::seek(GstEvent* event) {
 }
 
 bool EventReader::seek_pulling(const SeekRequest& request) {
-  // The streaming thread may be adding pads.
+  // The streaming thread may add pads concurrently, so iterate safely.
   const auto send_all = [&](GstEvent* event) {
     gst_event_set_seqnum(event, request.seqnum());
     gst_pad_push_event(sink_, gst_event_ref(event));
@@ -1081,7 +1083,8 @@ bool EventReader::seek_pulling(const SeekRequest& request) {
   return result == GST_FLOW_OK;
 }
 
-/// Upstream flushes, then sends a segment of bytes; the seek completes when that arrives.
+/// Forwards a seek as a seek in bytes. Upstream flushes and sends a BYTES segment, which completes
+/// the seek.
 bool EventReader::seek_pushed(const Restart& restart, gdouble rate) {
   GstEvent* const event = with_seqnum(
       gst_event_new_seek(rate, GST_FORMAT_BYTES, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET,

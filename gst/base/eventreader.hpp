@@ -7,35 +7,34 @@
 
 #include "src/formats/reader.hpp"
 
-/// A format of recordings, for an element that reads it: bytes in, streams of events and video out.
+/// A recording format, and the element that reads it: bytes in, streams of events and video out.
 ///
-/// Events come in buffers of `buffer-time`; a silence is one GAP, however long. PTS are the times
-/// of the file, so that nothing is lost where they are written again. The segments of all streams
-/// start at the first event or frame of the file, so that running time and stream time begin at 0
-/// there, and streams are in sync. A file with times before 0 is moved to begin at 0.
+/// Events come in buffers of duration `buffer-time`; a silence of any length is one GAP. PTS are
+/// the times of the file, so that they survive when written again. The segments of all streams
+/// start at the first event or frame of the file, so that running time and stream time are 0 there
+/// and streams are in sync. A file with negative times is shifted to start at 0.
 ///
-/// Bytes are pulled where upstream can seek, as filesrc can: then duration and seeking are exact
-/// for files of up to 16 MiB and for those that tell their duration; the duration of others is
-/// estimated until their end was read. In push mode, seeking works where upstream can seek to a
-/// byte.
+/// Bytes are pulled if upstream supports it, as filesrc does: duration and seeking are then exact
+/// for files up to 16 MiB and those that store their duration; the duration of other files is
+/// estimated until their end has been read. In push mode, seeking works if upstream can seek in
+/// bytes.
 ///
-/// Source pads appear when their streams are known. An element of one stream has a pad "src", which
-/// stays after a stop; others have pads "events_%u" and "video_%u".
+/// Source pads appear once their streams are known. An element with a single stream has a pad
+/// "src", which it keeps after a stop; others have pads "events_%u" and "video_%u".
 ///
-/// Words without a header may come in a TIME segment, as from an encoder or a network. Then times
-/// are upstream's: the clock of the words is moved so that the first event of a buffer lies within
-/// it.
+/// Words without a header may arrive in a TIME segment, as from an encoder or a network. Times are
+/// then upstream's: the clock of the words is shifted so that the first event of a buffer lies
+/// within that buffer's interval.
 struct RecordingFormat {
   const char* type_name;
   const char* long_name;
   const char* description;
-  const char* caps;  ///< of the input
+  const char* caps;  ///< input caps
   bool has_many_streams = false;
 
-  /// Makes the reader of a file, or of a stream with these caps; null where they are not known. May
-  /// throw.
+  /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown. May throw.
   std::unique_ptr<eventcamera::Reader> (*make_reader)(const GstCaps* caps);
 };
 
-/// The type of the elements that read a format, which lives as long as the process.
+/// Returns the element type that reads `format`, which must have static storage duration.
 GType event_reader_type(const RecordingFormat& format);

@@ -42,25 +42,25 @@ constexpr guint default_interpolated_frames = 10;
 /// Limit of the latency from intervals.
 constexpr Nanoseconds max_latency = GST_SECOND;
 
-/// What the application sets, copied once per buffer.
+/// User-settable values, copied once per buffer.
 struct Settings {
   eventcamera::Settings simulation;
   GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
 };
 
-/// What exists between caps and stop.
+/// State from caps to stop.
 struct State {
-  GstVideoInfo video;              ///< the input
-  std::optional<Drawing> drawing;  ///< the output, unless that is events
+  GstVideoInfo video;              ///< input format
+  std::optional<Drawing> drawing;  ///< video output; none if the output is events
   std::unique_ptr<Simulator> simulator;
-  Image<guint8> gathered;      ///< luma of a packed format
-  bool discontinuous = false;  ///< the next buffer does not follow on the last one
+  Image<guint8> gathered;      ///< luma copied from a packed format
+  bool discontinuous = false;  ///< the next buffer is discontinuous
 };
 
-/// What exists between start and stop, whatever the caps.
+/// State from start to stop, independent of caps.
 struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
-  bool backwards = false;                       ///< the segment has been refused
+  bool backwards = false;                       ///< the segment was refused
   FrameClock clock;                             ///< of frames without a PTS
   WarnOnce warn_of_times;
   WarnOnce warn_of_no_pts;
@@ -75,7 +75,7 @@ struct GstEventSimulatorPrivate {
 
   Guarded<LearntLatency> latency;  // that of an interval; nothing is called under its lock
 
-  // The streaming thread's, or nobody's while there is none.
+  // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
   Stream stream;
 };
@@ -107,7 +107,7 @@ void* event_simulator_settings(GObject* object) {
   return priv_of(GST_EVENT_SIMULATOR(object)).method_settings.get();
 }
 
-/// Gives the simulator the settings of its method.
+/// Passes the settings of the method to the simulator.
 static void configure(GstEventSimulator* self) {
   if (const auto configure = method_of(self).configure)
     configure(*priv_of(self).state->simulator, G_OBJECT(self));
@@ -177,7 +177,7 @@ static void change_latency(GstEventSimulator* self, const Change& change) {
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
-/// The framerate in the caps may be missing or wrong.
+/// Raises the latency to the observed interval: the framerate in the caps may be missing or wrong.
 static void learn_latency(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
   change_latency(
       self, [&](LearntLatency& latency) { latency.add(end, std::min(end - start, max_latency)); });
@@ -191,7 +191,7 @@ static void forget_frames(GstEventSimulator* self) {
   state->discontinuous = true;
 }
 
-/// Time starts over, and so do the intervals.
+/// Restarts at a first frame, for a new timeline.
 static void start_over(GstEventSimulator* self) {
   forget_frames(self);
   priv_of(self).stream.handed_out_until.reset();
@@ -231,7 +231,8 @@ static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
   return source != Source::nowhere;
 }
 
-/// Prepares the simulator for the time of a frame. False where the frame has to be skipped.
+/// Validates the time of a frame and prepares the simulator for it. False if the frame must be
+/// skipped.
 static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
   if (GST_BUFFER_IS_DISCONT(buffer)) start_over(self);
@@ -249,7 +250,7 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
     warn_of_times(self, "two frames are more than 71 minutes apart");
     forget_frames(self);
   }
-  // An interval that begins with this frame would overlap the last one.
+  // An interval starting with this frame would overlap the last one.
   return !(priv_of(self).stream.handed_out_until && time < *priv_of(self).stream.handed_out_until);
 }
 
@@ -271,7 +272,7 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCap
   return event_simulator_fixate_output(other);
 }
 
-/// The fields of an interlaced frame are of two moments.
+/// Warns about interlaced video, whose two fields are taken at different times.
 static void check_interlacing(GstEventSimulator* self, GstBuffer* frame) {
   auto& priv = priv_of(self);
   const auto mode = GST_VIDEO_INFO_INTERLACE_MODE(&priv.state->video);
@@ -307,7 +308,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   const bool made = guarded(self, failure, [&] {
     if (!state || luma_format_of(state->video) != luma) {
       const bool follows = state && (state->discontinuous || state->simulator->last_time());
-      state.reset();  // before the next is made: frames can be large
+      state.reset();  // before allocating the next: frames can be large
       state.emplace(State{.video = video,
                           .drawing = std::nullopt,
                           .simulator = method_of(self).create(luma),
@@ -329,8 +330,8 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   return TRUE;
 }
 
-/// Whether there is a state to work with. An error drops it, while the pads keep their caps: where
-/// the application continues, these make a new one.
+/// Ensures that there is a state. Errors drop it while the pads keep their caps; if the application
+/// continues, it is recreated from these. False if that fails.
 static bool is_ready(GstEventSimulator* self) {
   if (priv_of(self).state) return true;
   auto* transform = GST_BASE_TRANSFORM(self);
@@ -344,7 +345,7 @@ static bool is_ready(GstEventSimulator* self) {
 
 /* frames in, intervals out */
 
-/// The events between the last frame and this one, or nullptr for a first frame. May throw.
+/// Returns the events between the last frame and this one, or nullptr for a first frame. May throw.
 static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& frame,
                                     Nanoseconds time, const Settings& settings) {
   auto& state = *priv_of(self).state;
@@ -358,7 +359,7 @@ static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& f
   return state.simulator->push(luma, time, settings.simulation);
 }
 
-/// Tells downstream that an interval has no events.
+/// Pushes a GAP for an interval without events.
 static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
                               guint32 seqnum) {
   GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(self);
@@ -368,7 +369,7 @@ static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanose
   return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
 }
 
-/// Sets the times of an interval's buffer.
+/// Sets the timestamps and flags of an interval's buffer.
 static void set_times(GstBuffer* out, Nanoseconds start, Nanoseconds end, State& state) {
   GST_BUFFER_PTS(out) = static_cast<GstClockTime>(start);
   GST_BUFFER_DTS(out) = GST_CLOCK_TIME_NONE;
@@ -376,7 +377,7 @@ static void set_times(GstBuffer* out, Nanoseconds start, Nanoseconds end, State&
   if (std::exchange(state.discontinuous, false)) GST_BUFFER_FLAG_SET(out, GST_BUFFER_FLAG_DISCONT);
 }
 
-/// Takes a frame and hands out the interval that it ends, if any. May throw.
+/// Processes a frame and outputs the interval that it ends, if any. May throw.
 static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffer** out) {
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
@@ -421,7 +422,7 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   return GST_FLOW_OK;
 }
 
-/// Runs what may throw. What is thrown is reported, and leaves the simulator unusable.
+/// Runs `work`; reports any exception and drops the state, because the simulator is then unusable.
 template <class Work>
 static GstFlowReturn reported(GstEventSimulator* self, const Work& work) {
   const auto failure = [&](const std::exception& error) -> Report {
@@ -470,7 +471,7 @@ static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
   if (segment->rate < 0) {
-    if (std::exchange(priv_of(self).stream.backwards, true)) return false;  // sent again
+    if (std::exchange(priv_of(self).stream.backwards, true)) return false;  // repeated segment
     GST_ELEMENT_ERROR(self, STREAM, FAILED,
                       ("Cannot simulate events backwards. Play at a positive rate."),
                       ("the segment has rate %g", segment->rate));
@@ -485,8 +486,8 @@ static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   return true;
 }
 
-/// Holds the last frame until `end` and sends the events of that time. Without events, or where
-/// video is the output, the gap stays a gap. May throw.
+/// Holds the last frame until `end` and pushes the events of that time. Pushes a GAP if there are
+/// none or the output is video. May throw.
 static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum) {
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
@@ -508,8 +509,8 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   }
 }
 
-/// Upstream has no frames for a while: the last one is held until a frame duration before the end
-/// of the gap, where the next interval can begin. Returns whether the event is to be forwarded.
+/// Handles a GAP from upstream: holds the last frame until one frame duration before the end of the
+/// gap, where the next interval begins. Returns true if the event must be forwarded.
 static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   GstClockTime pts = GST_CLOCK_TIME_NONE;
   GstClockTime duration = GST_CLOCK_TIME_NONE;
@@ -558,7 +559,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
-    // Upstream would skip frames, and the events would depend on the load of the machine.
+    // If upstream dropped frames, events would depend on the machine's load.
     gst_event_unref(event);
     return TRUE;
   }
@@ -595,7 +596,7 @@ static gboolean stop(GstBaseTransform* transform) {
 
 /* type */
 
-/// The method is not yet known in init.
+/// Creates the method's settings here, because the method is not yet known in init.
 static void constructed(GObject* object) {
   auto* self = GST_EVENT_SIMULATOR(object);
   if (const auto make_settings = method_of(self).make_settings)
@@ -610,7 +611,7 @@ static void finalize(GObject* object) {
 
 static void gst_event_simulator_init(GstEventSimulator* self) {
   std::construct_at(&priv_of(self));
-  // Late frames are simulated, too: skipping one would change the events.
+  // Never drop late frames: that would change the events.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }
 

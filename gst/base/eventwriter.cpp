@@ -22,10 +22,10 @@ namespace {
 
 constexpr guint prop_variant = 1;
 
-/// The file that is written, from caps to stop.
+/// State of the file being written, from caps to stop.
 struct State {
   GstEventCameraInfo info;
-  OwnedCaps caps;  ///< of the output
+  OwnedCaps caps;  ///< output caps
   std::unique_ptr<Encoder> encoder;
   bool written = false;
 };
@@ -39,10 +39,10 @@ struct GstEventWriterPrivate {
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
-  // The streaming thread's, or nobody's while there is none.
+  // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
   WritableEvents writable;
-  std::vector<guint8> bytes;  ///< encoded, not yet pushed
+  std::vector<guint8> bytes;  ///< encoded but not yet pushed
 };
 
 #define GST_TYPE_EVENT_WRITER (gst_event_writer_get_type())
@@ -66,7 +66,7 @@ static const EventFileFormat& format_of(GstEventWriter* self) {
   return *GST_EVENT_WRITER_GET_CLASS(self)->format;
 }
 
-/// Runs what may throw, and reports what is thrown.
+/// Runs `work`; reports any exception.
 template <class Work>
 static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
   return guarded(
@@ -111,7 +111,7 @@ static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
   gst_event_parse_caps(event, &caps);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {
-    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are no events", caps);
+    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
     return FALSE;
   }
   if (priv.state && priv.state->info.width == info.width && priv.state->info.height == info.height)
@@ -123,7 +123,7 @@ static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
 
 /* data */
 
-/// Pushes what is encoded. May throw.
+/// Pushes the encoded bytes. May throw.
 static GstFlowReturn push_bytes(GstEventWriter* self, GstClockTime pts, GstClockTime duration) {
   auto& priv = priv_of(self);
   if (priv.bytes.empty()) return GST_FLOW_OK;
@@ -148,7 +148,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   });
 }
 
-/// Writes what belongs into the header. May throw.
+/// Overwrites part of the header. May throw.
 static GstFlowReturn push_patch(GstEventWriter* self, eventcamera::FilePatch patch) {
   auto& priv = priv_of(self);
   if (!can_seek_bytes(priv.src)) {
@@ -232,7 +232,7 @@ static void get_property(GObject* object, guint, GValue* value, GParamSpec*) {
   g_value_set_enum(value, priv_of(GST_EVENT_WRITER(object)).variant);
 }
 
-/// The pads are those of the format, which is not yet known in init.
+/// Creates the pads here, because the format is not yet known in init.
 static void constructed(GObject* object) {
   auto* element = GST_ELEMENT(object);
   auto* element_class = GST_ELEMENT_GET_CLASS(element);

@@ -42,7 +42,7 @@ bool frame_video_info(const Frame& frame, GstVideoInfo* info) {
 
 GstBuffer* frame_buffer(const Frame& frame, const GstVideoInfo* info) {
   const gsize size = GST_VIDEO_INFO_SIZE(info);
-  // GStreamer's own allocation would end the process where memory is short.
+  // GStreamer's own allocator would abort the process if memory is short.
   auto* const memory = static_cast<guint8*>(g_try_malloc0(size));
   if (memory == nullptr) throw std::bad_alloc();
   const auto row = frame.width * eventcamera::bytes_per_pixel(frame.format);

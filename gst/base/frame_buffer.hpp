@@ -5,16 +5,16 @@
 
 #include "src/formats/reader.hpp"
 
-/// The video that frames of recordings are in GStreamer.
+/// Caps of the video frames of recordings.
 #define RECORDED_VIDEO_CAPS                                                                      \
   "video/x-raw, format = (string) { GRAY8, GRAY16_LE, BGR, BGRA }, width = (int) [ 1, 32767 ], " \
   "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"
 
-/// The video of frames like this one. False where there is none so large.
+/// Fills in the video info for frames like this one. False if they are too large.
 bool frame_video_info(const eventcamera::Frame& frame, GstVideoInfo* info);
 
-/// Makes a buffer of a frame's pixels, without a time. Throws std::bad_alloc.
+/// Returns a new buffer with the pixels of a frame, without timestamps. Throws std::bad_alloc.
 GstBuffer* frame_buffer(const eventcamera::Frame& frame, const GstVideoInfo* info);
 
-/// A mapped frame of RECORDED_VIDEO_CAPS as recordings have it, without a time.
+/// View of a mapped video frame of RECORDED_VIDEO_CAPS as a recording's frame, without a time.
 eventcamera::Frame recorded_frame(const GstVideoFrame* video);

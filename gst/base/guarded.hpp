@@ -4,7 +4,7 @@
 #include <mutex>
 #include <utility>
 
-/// A value that is reached with its lock held, and in no other way:
+/// A value that is accessible only while its lock is held:
 ///
 ///     const auto shared = shared_.lock();
 ///     shared->duration = duration;

@@ -3,7 +3,7 @@
 
 #include <gst/gst.h>
 
-/// Answers a source pad's latency query: upstream's, and an element's own added to it.
+/// Answers a latency query on a source pad: upstream's latency plus the element's own.
 inline gboolean answer_latency(GstPad* sink, GstQuery* query, GstClockTime own) {
   if (!gst_pad_peer_query(sink, query)) return FALSE;
   gboolean live = FALSE;

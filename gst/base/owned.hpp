@@ -5,7 +5,7 @@
 
 #include <memory>
 
-/// GStreamer's objects, with an owner.
+/// Owning pointers to GStreamer objects.
 
 struct Unref {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-/// Pulled at once, because upstream allocates as much.
+/// Limits on a single pull, because upstream allocates a buffer of that size.
 static constexpr std::size_t piece_size = std::size_t{1} << 18;
 static constexpr std::size_t max_read = std::size_t{1} << 20;
 
@@ -14,7 +14,7 @@ guint64 upstream_bytes(GstPad* sink) {
   return known && size > 0 ? static_cast<guint64>(size) : 0;
 }
 
-/// Null at the end of the file, and where bytes cannot be read.
+/// Returns null at the end of the file and if reading fails.
 GstBuffer* PadBytes::pull(std::uint64_t position, std::size_t size) noexcept {
   GstBuffer* buffer = nullptr;
   const GstFlowReturn result =

@@ -6,13 +6,13 @@
 #include "gst/base/buffer_bytes.hpp"
 #include "src/formats/byte_source.hpp"
 
-/// The size of the file that comes from upstream, in bytes; 0 where it is not known.
+/// Size of the upstream file in bytes; 0 if unknown.
 guint64 upstream_bytes(GstPad* sink);
 
-/// The bytes of a file that is pulled.
+/// Bytes of a file pulled from upstream.
 class PadBytes final : public eventcamera::ByteSource {
  public:
-  /// Of an element's sink pad, which outlives this.
+  /// `sink` must outlive this object.
   explicit PadBytes(GstPad* sink) : sink_(sink), size_(upstream_bytes(sink)) {}
 
   std::uint64_t size() const override { return size_; }
@@ -21,10 +21,10 @@ class PadBytes final : public eventcamera::ByteSource {
   std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override;
   bool failed() const noexcept override { return flow_ != GST_FLOW_OK; }
 
-  /// Why bytes could not be read.
+  /// Reason for a failed read.
   GstFlowReturn flow() const { return flow_; }
 
-  /// Forgets that bytes could not be read.
+  /// Clears a failed read.
   void retry() { flow_ = GST_FLOW_OK; }
 
  private:

@@ -9,7 +9,7 @@
 #include <string>
 #include <type_traits>
 
-/// What the application sets, at any time; the element works with a copy.
+/// Settings that the application may change at any time; the element works with a copy.
 template <class Settings>
 class GuardedSettings {
  public:
@@ -26,11 +26,11 @@ class GuardedSettings {
   }
 
  private:
-  mutable std::mutex mutex_;  // nothing is called under it
+  mutable std::mutex mutex_;  // make no calls while holding it
   Settings settings_;
 };
 
-// The types that properties have: numbers, enums and truths.
+// Types of properties besides strings: numbers, enums and booleans.
 #define FOR_EACH_PROPERTY_TYPE(X) \
   X(BOOLEAN, boolean) X(ENUM, enum) X(UINT, uint) X(UINT64, uint64) X(DOUBLE, double)
 
@@ -73,7 +73,7 @@ void write_value(const Field& field, GValue* value) {
 #undef WRITE
 }
 
-/// How a property is read and written. Its GParamSpec keeps it.
+/// Setter and getter of a property, stored in its GParamSpec.
 struct PropertyAccess {
   std::function<void(GObject*, const GValue*)> set;
   std::function<void(GObject*, GValue*)> get;
@@ -87,8 +87,8 @@ struct PropertyAccess {
   }
 };
 
-/// For class_init: properties that are fields of a class's settings. `settings_of` gives the
-/// GuardedSettings of an object. A class may have properties of several settings.
+/// For class_init: installs properties that are fields of the settings. `settings_of` returns the
+/// GuardedSettings of an object. A class may have properties in several settings.
 template <auto settings_of>
 class Properties {
  public:
@@ -104,8 +104,8 @@ class Properties {
     };
   }
 
-  /// Adds the property that is this field: a pointer to a member of Settings, or a function that
-  /// returns a reference into it. Fields are numbers, enums, truths or strings.
+  /// Adds a property stored in `field`: a pointer to a member of Settings, or a function that
+  /// returns a reference into it. Fields are numbers, enums, booleans or strings.
   template <class Field>
   void add(Field field, GParamSpec* spec) {
     add([field](Settings& settings,
@@ -116,7 +116,7 @@ class Properties {
         spec);
   }
 
-  /// Adds the property that these functions set and get.
+  /// Adds a property with a custom setter and getter.
   template <class Set, class Get>
   void add(Set set, Get get, GParamSpec* spec) {
     auto access = std::make_unique<PropertyAccess>();
@@ -129,7 +129,7 @@ class Properties {
     g_param_spec_set_qdata_full(spec, PropertyAccess::quark(), access.release(), [](gpointer last) {
       const std::unique_ptr<PropertyAccess> owned(static_cast<PropertyAccess*>(last));
     });
-    constexpr guint number = 1;  // properties are told apart by their GParamSpec
+    constexpr guint number = 1;  // properties are distinguished by their GParamSpec
     g_object_class_install_property(klass_, number, spec);
   }
 

@@ -10,11 +10,11 @@
 
 #include "src/formats/recording_reader.hpp"
 
-/// A source pad of an element that reads files: a stream of the file, and what goes through the pad
-/// before its data.
+/// Source pad for one stream of a file, with the state of its events: stream-start, caps, tags and
+/// segment.
 class ReaderPad {
  public:
-  /// Makes the pad, and activates it. It is not yet the element's.
+  /// Creates the pad without adding it to an element.
   ReaderPad(GstPadTemplate* templ, const std::string& name);
   ~ReaderPad();
   ReaderPad(const ReaderPad&) = delete;
@@ -24,38 +24,38 @@ class ReaderPad {
   const std::string& name() const { return name_; }
   bool is_added() const { return GST_OBJECT_PARENT(pad_) != nullptr; }
 
-  /// Forgets what was sent, because another stream comes.
+  /// Forgets what was sent, for a new stream.
   void reset();
 
-  /// What comes next does not follow on what was sent, and needs a segment.
+  /// Marks the next data as discontinuous; a new segment is due.
   void interrupt();
 
-  /// Data is missing before what comes next.
+  /// Marks the next data as discontinuous, in the same segment.
   void interrupt_data() { discontinuous_ = true; }
 
-  /// Begins a stream of video, which events are to players, because they are drawn.
+  /// Starts a new stream. Event streams have type video, because players draw them.
   void start_stream(GstElement* element, guint group);
 
-  /// Begins a stream as upstream did.
+  /// Starts a stream with upstream's stream-start event. Takes ownership of `upstream`.
   void start_stream(GstEvent* upstream);
   bool is_started() const { return started_; }
 
-  /// Names the file's format, and the camera of the stream.
+  /// Sends tags with the file format and the camera model.
   void send_tags(const std::string& format, const std::string& camera);
 
-  /// Sends caps that were not sent before. False where they are refused.
+  /// Sends caps unless already sent. False if they are refused.
   bool send_caps(eventcamera::SensorSize size);
   bool send_caps(const GstVideoInfo& info);
   bool has_video() const { return video_.has_value(); }
 
-  /// Sends a segment, where that is due.
+  /// Sends a segment if one is due.
   void send_segment(const GstSegment& segment, guint32 seqnum);
   void need_segment(bool due) { segment_due_ = due; }
 
   GstFlowReturn push(GstBuffer* buffer, GstClockTime pts);
   GstFlowReturn push_gap(GstClockTime pts, GstClockTime duration);
 
-  /// Where sending caps failed.
+  /// Flow return after send_caps() failed.
   GstFlowReturn refusal() const;
 
  private:
@@ -66,14 +66,14 @@ class ReaderPad {
   bool started_ = false;
   bool segment_due_ = true;
   bool discontinuous_ = true;
-  eventcamera::SensorSize size_;  ///< of the caps
+  eventcamera::SensorSize size_;  ///< size in the caps sent last
   std::optional<GstVideoInfo> video_;
 };
 
-/// The caps of events that are read from a file: they come in intervals of no frame.
+/// Caps of events read from a file, which have no framerate.
 #define FILE_EVENTS_CAPS                                                             \
   "application/x-event-camera, format = (string) XYTP, width = (int) [ 1, 65535 ], " \
   "height = (int) [ 1, 32768 ], framerate = (fraction) 0/1"
 
-/// Gives an event the number of the seek that it belongs to, if any; takes and returns it.
+/// Sets the seqnum of `event`, if valid, and returns `event`.
 GstEvent* with_seqnum(GstEvent* event, guint32 seqnum);

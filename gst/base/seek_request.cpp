@@ -8,7 +8,7 @@ SeekRequest::SeekRequest(GstEvent* event) : seqnum_(gst_event_get_seqnum(event))
                        &stop_);
 }
 
-/// Where one end of a segment comes to lie, as gst_segment_do_seek() has it.
+/// Start or stop of the segment after the seek, computed as in gst_segment_do_seek().
 static guint64 place(GstSeekType type, gint64 asked, guint64 kept, guint64 duration) {
   const bool is_known = GST_CLOCK_TIME_IS_VALID(duration);
   if (type == GST_SEEK_TYPE_SET && asked < 0) return GST_CLOCK_TIME_NONE;
@@ -19,10 +19,10 @@ static guint64 place(GstSeekType type, gint64 asked, guint64 kept, guint64 durat
 }
 
 bool SeekRequest::apply(GstSegment& segment) const {
-  // That would take an end before the beginning for a mistake of ours.
+  // gst_segment_do_seek() asserts start <= stop.
   const auto start = place(start_type_, start_, segment.start, segment.duration);
   const auto stop = place(stop_type_, stop_, segment.stop, segment.duration);
-  if (start > stop) return false;  // no end is the largest of numbers
+  if (start > stop) return false;  // GST_CLOCK_TIME_NONE (no stop) is the largest value
   return gst_segment_do_seek(&segment, rate_, format_, flags_, start_type_,
                              static_cast<guint64>(start_), stop_type_, static_cast<guint64>(stop_),
                              nullptr) != FALSE;

@@ -3,20 +3,19 @@
 
 #include <gst/gst.h>
 
-/// What a seek event asks for.
+/// Parsed seek event.
 class SeekRequest {
  public:
   explicit SeekRequest(GstEvent* event);
 
-  /// Whether it asks for a time to play forwards from.
+  /// True for a seek in time with a positive rate.
   bool plays_on_from_time() const { return format_ == GST_FORMAT_TIME && rate_ > 0; }
   bool flushes() const { return (flags_ & GST_SEEK_FLAG_FLUSH) != 0; }
   double rate() const { return rate_; }
   GstFormat format() const { return format_; }
   guint32 seqnum() const { return seqnum_; }
 
-  /// Makes a segment the one that is asked for. False where there is none such: then it is of no
-  /// use.
+  /// Applies the seek to `segment`. False if the seek is invalid; `segment` is then unspecified.
   bool apply(GstSegment& segment) const;
 
  private:

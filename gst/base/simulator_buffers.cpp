@@ -23,14 +23,14 @@ G_DECLARE_FINAL_TYPE(GstEventPool, gst_event_pool, GST, EVENT_POOL, GstBufferPoo
 
 struct _GstEventPool {
   GstBufferPool parent;
-  std::atomic<gsize> idle;  ///< bytes in buffers that have returned
+  std::atomic<gsize> idle;  ///< bytes in buffers waiting in the pool
   gsize needed;             ///< bytes that a recent interval needed: a maximum that decays
 };
 
 G_DEFINE_TYPE(GstEventPool, gst_event_pool, GST_TYPE_BUFFER_POOL)
 #define PARENT_POOL_CLASS GST_BUFFER_POOL_CLASS(gst_event_pool_parent_class)
 
-/// Buffers that return when this much lies idle are freed, unless they are all there is.
+/// Limit of idle memory in a pool. Returned buffers beyond it are freed, unless the pool is empty.
 static constexpr gsize max_idle = gsize{64} << 20;
 
 static constexpr gsize min_capacity = 4096;
@@ -51,7 +51,7 @@ static GstFlowReturn acquire_buffer(GstBufferPool* pool, GstBuffer** buffer,
 static void release_buffer(GstBufferPool* pool, GstBuffer* buffer) {
   auto& idle = GST_EVENT_POOL(pool)->idle;
   const gsize capacity = capacity_of(buffer);
-  // GstBufferPool frees a buffer whose memory has changed, and so this one.
+  // This flag makes GstBufferPool free the buffer.
   if (idle > 0 && idle + capacity > max_idle)
     GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_TAG_MEMORY);
   if (!GST_BUFFER_FLAG_IS_SET(buffer, GST_BUFFER_FLAG_TAG_MEMORY) &&
@@ -74,8 +74,8 @@ static void gst_event_pool_class_init(GstEventPoolClass* klass) {
   pool_class->stop = stop_pool;
 }
 
-/// Gives an empty buffer of the pool `size` bytes to write, more than 0. False where memory is
-/// short. From one thread at a time.
+/// Gives an empty buffer of the pool `size` > 0 bytes to write. False if memory is short. Not
+/// thread-safe.
 static bool reserve(GstBuffer* buffer, gsize size) {
   gsize& needed = GST_EVENT_POOL(buffer->pool)->needed;
   needed = std::max(size, needed - needed / 64);
@@ -83,12 +83,12 @@ static bool reserve(GstBuffer* buffer, gsize size) {
   const gsize capacity = capacity_of(buffer);
   if (capacity < size || capacity / 4 > wanted) {
     gst_buffer_remove_all_memory(buffer);
-    // GStreamer's own allocation would end the process where memory is short.
+    // GStreamer's own allocator would abort the process if memory is short.
     void* memory = g_try_malloc(wanted);
     if (memory == nullptr) return false;
     gst_buffer_append_memory(buffer, gst_memory_new_wrapped(static_cast<GstMemoryFlags>(0), memory,
                                                             wanted, 0, wanted, memory, g_free));
-    // The memory is the buffer's own, as if it had come with it.
+    // Keep this memory with the buffer when it returns to the pool.
     GST_BUFFER_FLAG_UNSET(buffer, GST_BUFFER_FLAG_TAG_MEMORY);
   }
   gst_buffer_set_size(buffer, static_cast<gssize>(size));
@@ -97,17 +97,18 @@ static bool reserve(GstBuffer* buffer, gsize size) {
 
 /* negotiation */
 
-/// The defaults of GstBaseTransform.
+/// Default virtual functions of GstBaseTransform.
 static const GstBaseTransformClass* base_class() {
   return GST_BASE_TRANSFORM_CLASS(g_type_class_peek(GST_TYPE_BASE_TRANSFORM));
 }
 
 static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide, GstQuery* query) {
-  gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr);  // any stride is welcome
+  gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE,
+                                nullptr);  // any stride is supported
   return base_class()->propose_allocation(transform, decide, query);
 }
 
-/// Events come from a pool of ours, whatever downstream offers: their buffers are of any size.
+/// Always uses a GstEventPool, because downstream's pools have buffers of a fixed size.
 static void decide_on_event_pool(GstQuery* query) {
   while (gst_query_get_n_allocation_pools(query) > 0)
     gst_query_remove_nth_allocation_pool(query, 0);
@@ -137,13 +138,13 @@ static gboolean transform_size(GstBaseTransform*, GstPadDirection direction, Gst
   return TRUE;
 }
 
-/// An interval takes over nothing from the frame that ends it.
+/// Intervals inherit no metadata from the frame that ends them.
 static gboolean copy_no_metadata(GstBaseTransform*, GstBuffer*, GstBuffer*) {
   return TRUE;
 }
 
-/// Never called, since the simulators have a generate_output(). But only a class with a transform()
-/// gets buffers of its own to write to, instead of its input's.
+/// Never called, because generate_output() is overridden. GstBaseTransform allocates output buffers
+/// only for classes that have a transform().
 static GstFlowReturn transform_not_in_place(GstBaseTransform*, GstBuffer*, GstBuffer*) {
   return GST_FLOW_NOT_SUPPORTED;
 }

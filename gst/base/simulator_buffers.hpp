@@ -8,23 +8,23 @@
 #include "src/core/thread_pool.hpp"
 #include "src/render/accumulator.hpp"
 
-/// For class_init: the functions of GstBaseTransform about buffers, in and out.
+/// For class_init: installs the virtual functions for input and output buffers.
 void event_simulator_class_install_buffers(GstBaseTransformClass* klass);
 
-/// Accumulated-event video.
+/// State of accumulated-event video output.
 struct Drawing {
   GstVideoInfo video;
   eventcamera::Accumulator accumulator;
 };
 
-/// Makes a buffer of an interval's events, at least one. `in` is the frame that ends the interval.
-/// Throws std::bad_alloc.
+/// Writes the events of an interval, at least one, to a new buffer. `in` is the frame that ends the
+/// interval. Throws std::bad_alloc.
 GstFlowReturn event_simulator_write_events(GstBaseTransform* transform,
                                            const eventcamera::EventBuckets& events,
                                            eventcamera::ThreadPool& threads, GstBuffer* in,
                                            GstBuffer** out);
 
-/// Makes a picture of an interval's events.
+/// Draws the events of an interval into a new buffer.
 GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform,
                                           const eventcamera::EventBuckets& events, Drawing& drawing,
                                           const eventcamera::Palette& palette,

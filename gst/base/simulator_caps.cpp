@@ -8,7 +8,7 @@
 
 namespace {
 
-/// A structure named `name` with those of these fields that `from` has.
+/// Returns a structure `name` with a copy of these `fields`, as far as `from` has them.
 GstStructure* with_fields_of(const GstStructure* from, const char* name,
                              std::initializer_list<const char*> fields) {
   GstStructure* to = gst_structure_new_empty(name);
@@ -28,7 +28,7 @@ void set_formats(GstStructure* structure, const char* formats) {
 }  // namespace
 
 eventcamera::LumaFormat luma_format_of(const GstVideoInfo& info) {
-  // P010 and its kin have their bits at the top of the word, so white is as in 16 bits.
+  // P010 and similar formats use the upper bits of the word, so white is the same as in 16 bits.
   const auto bits =
       GST_VIDEO_INFO_COMP_DEPTH(&info, 0) + GST_VIDEO_FORMAT_INFO_SHIFT(info.finfo, 0);
   return {GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info), static_cast<int>(bits)};

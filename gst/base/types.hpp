@@ -3,9 +3,9 @@
 
 #include <gst/gst.h>
 
-/// GObject types that are made from tables. A table lives as long as the process.
+/// GObject types made from tables, which must have static storage duration.
 
-/// The type of a property with these values, the last of which has no name. For class_init.
+/// For class_init: returns an enum type with these values, terminated by one without a name.
 inline GType enum_type(const char* name, const GEnumValue* values) {
   GType type = g_type_from_name(name);
   if (type == G_TYPE_INVALID) {
@@ -15,8 +15,8 @@ inline GType enum_type(const char* name, const GEnumValue* values) {
   return type;
 }
 
-/// The type of an element that a row of a table describes: `parent`, with a class_init that gets
-/// the row.
+/// Returns the element type that a row of a table describes: a subclass of `parent` whose
+/// class_init receives the row as class data.
 inline GType row_type(GType parent, const char* name, GClassInitFunc class_init,
                       gconstpointer row) {
   const GType known = g_type_from_name(name);

@@ -6,15 +6,15 @@
 #include <cstddef>
 #include <cstdint>
 
-/// How long a frame lasts; 0 where the framerate varies.
+/// Duration of a frame; 0 if the framerate is variable.
 inline GstClockTime frame_duration(const GstVideoInfo& video) {
   if (GST_VIDEO_INFO_FPS_N(&video) <= 0) return 0;
   return gst_util_uint64_scale_int(GST_SECOND, GST_VIDEO_INFO_FPS_D(&video),
                                    GST_VIDEO_INFO_FPS_N(&video));
 }
 
-/// The first plane of a buffer mapped as video, while it lives; its stride is that of the buffer's
-/// GstVideoMeta, if it has one.
+/// Maps a buffer as video and gives access to its first plane, with the stride of its GstVideoMeta,
+/// if any.
 class VideoFrame {
  public:
   VideoFrame(const GstVideoInfo& info, GstBuffer* buffer, GstMapFlags flags)
@@ -26,15 +26,15 @@ class VideoFrame {
   VideoFrame(const VideoFrame&) = delete;
   VideoFrame& operator=(const VideoFrame&) = delete;
 
-  /// Whether the buffer could be mapped and its rows are where it says. Nothing else may be asked
-  /// where this is false.
+  /// True if the buffer could be mapped and its rows lie within its memory. Nothing else may be
+  /// called if false.
   explicit operator bool() const { return fits_; }
 
   const GstVideoFrame* get() const { return &frame_; }
   std::byte* data() const {
     return static_cast<std::byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0));
   }
-  /// Where the first component begins: not at the first byte in some packed formats.
+  /// Start of the first component, which is not at the first byte in some packed formats.
   std::byte* first_component() const {
     return reinterpret_cast<std::byte*>(GST_VIDEO_FRAME_COMP_DATA(&frame_, 0));
   }
@@ -42,7 +42,7 @@ class VideoFrame {
   std::ptrdiff_t stride() const { return GST_VIDEO_FRAME_PLANE_STRIDE(&frame_, 0); }
 
  private:
-  /// GStreamer believes what a GstVideoMeta says of stride and offset; we look first.
+  /// GStreamer does not check the strides and offsets of a GstVideoMeta.
   bool rows_fit(const GstVideoInfo& info) const {
     const std::ptrdiff_t row =
         std::ptrdiff_t{GST_VIDEO_INFO_WIDTH(&info)} * GST_VIDEO_INFO_COMP_PSTRIDE(&info, 0);

@@ -12,25 +12,26 @@
 #include "gst/base/event_buffer.hpp"
 #include "src/formats/decoder.hpp"
 
-/// Whether downstream of a source pad can seek in the bytes that it is given.
+/// True if downstream of a source pad can seek in bytes.
 bool can_seek_bytes(GstPad* src);
 
-/// What the elements that write event files have in common. Picks the events that a file can hold,
-/// sorted by time and within the sensor, and counts the others. The user is warned of these as soon
-/// as events are written again, and at the file's end where there are more by then.
+/// Filter for elements that write event files. Passes events that a file can hold, sorted by time
+/// and within the sensor, and counts the others. Posts a warning about these once valid events
+/// follow, and again at the end of the file if there are more by then.
 class WritableEvents {
  public:
-  /// Warnings are of this code, which tells what the element does with a file.
+  /// `code` is the error code of the warnings.
   WritableEvents(GstElement* element, GstStreamError code) : element_(element), code_(code) {}
 
-  /// Nothing is written yet: any time may come first.
+  /// Starts a new file, whose first event may have any time.
   void begin_file(eventcamera::SensorSize sensor);
 
-  /// Whether events of this sensor can go on in the file; an error where not.
+  /// True if events of this sensor can be added to the file; reports an error if not.
   bool accepts(eventcamera::SensorSize sensor) const;
 
-  /// Hands the writable events of a buffer to `write`, in blocks that stay in the cache. False with
-  /// an error where it is no buffer of events. Throws what `write` does.
+  /// Passes the writable events of a buffer to `write`, in blocks that fit into the cache. Reports
+  /// an error and returns false if `buffer` is not a valid buffer of events. Throws what `write`
+  /// throws.
   template <class Write>
   bool take(GstBuffer* buffer, const Write& write) {
     constexpr std::size_t block = 1 << 14;
@@ -47,18 +48,19 @@ class WritableEvents {
     return true;
   }
 
-  /// The writable ones of `events`, whose times count from `start`. Valid until the next call.
+  /// Returns the writable ones of `events`, whose times are relative to `start`. Valid until the
+  /// next call.
   std::span<const eventcamera::AbsoluteEvent> pick(std::span<const eventcamera::Event> events,
                                                    eventcamera::Microseconds start);
 
   void end_file();
 
-  /// What to report where writing throws: `otherwise`, unless memory is short or the format cannot
+  /// Report for an exception from writing: `otherwise`, unless memory is short or the format cannot
   /// hold the stream.
   static Report failure(const std::exception& error, const Report& otherwise);
 
  private:
-  /// The events that are left out for one reason.
+  /// Counters of events dropped for one reason.
   struct LeftOut {
     guint64 count = 0;
     guint64 reported = 0;
@@ -72,7 +74,7 @@ class WritableEvents {
   GstElement* element_;
   GstStreamError code_;
   eventcamera::SensorSize sensor_;
-  eventcamera::Microseconds latest_ = 0;  ///< of what is written
+  eventcamera::Microseconds latest_ = 0;  ///< latest time written
   std::vector<eventcamera::AbsoluteEvent> picked_;
   LeftOut earlier_;
   LeftOut outside_;

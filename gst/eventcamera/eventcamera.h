@@ -2,15 +2,15 @@
 /**
  * SECTION:eventcamera
  * @title: GstEventCamera
- * @short_description: the event streams of event cameras
+ * @short_description: event streams of event cameras
  *
  * Events travel in buffers with the caps `application/x-event-camera`:
  *
- * - `format`: `XYTP`, events as they lie in memory (#GstEventCameraEvent);
+ * - `format`: `XYTP`, an array of #GstEventCameraEvent;
  * - `width`, `height`: of the sensor, in pixels; every x < width, every y < height;
- * - `framerate`: buffers a second, 0/1 where it varies.
+ * - `framerate`: buffers per second, 0/1 if variable.
  *
- * A buffer holds the events of the interval (t0, t1] that it stands for: its PTS is t0, its
+ * A buffer holds the events of an interval (t0, t1]: its PTS is t0, its
  * duration t1 - t0, and its memory an array of events sorted by time. The time of an event is
  * floor(PTS / 1000) + t microseconds. Intervals never overlap. An interval without events is a GAP
  * event.
@@ -32,21 +32,21 @@ G_BEGIN_DECLS
 /**
  * GST_EVENT_CAMERA_MEDIA_TYPE:
  *
- * The name of the caps of event streams.
+ * The media type of event streams.
  */
 #define GST_EVENT_CAMERA_MEDIA_TYPE "application/x-event-camera"
 
 /**
  * GST_EVENT_CAMERA_MAX_WIDTH:
  *
- * The widest sensor whose x fits into an event.
+ * The maximum sensor width: x must fit into an event.
  */
 #define GST_EVENT_CAMERA_MAX_WIDTH 65535
 
 /**
  * GST_EVENT_CAMERA_MAX_HEIGHT:
  *
- * The tallest sensor whose y fits into an event.
+ * The maximum sensor height: y must fit into an event.
  */
 #define GST_EVENT_CAMERA_MAX_HEIGHT 32768
 
@@ -60,7 +60,7 @@ typedef struct _GstEventCameraMap GstEventCameraMap;
  * @x: column, from the left
  * @y_p: row from the top in bits 0 to 14; bit 15 is the polarity: 1 = ON (brighter), 0 = OFF
  *
- * One event as it lies in a buffer of format XYTP: 8 bytes, little-endian.
+ * One event of a buffer of format XYTP: 8 bytes, little-endian.
  */
 struct _GstEventCameraEvent {
   guint32 t;
@@ -122,10 +122,10 @@ GType gst_event_camera_info_get_type(void);
  * GstEventCameraInfo:
  * @width: of the sensor, in pixels
  * @height: of the sensor, in pixels
- * @fps_n: buffers a second, numerator; 0 where it varies
- * @fps_d: buffers a second, denominator
+ * @fps_n: numerator of the buffers per second; 0 if variable
+ * @fps_d: denominator of the buffers per second
  *
- * What the caps of a stream of format XYTP say.
+ * Parsed caps of an event stream of format XYTP.
  */
 struct _GstEventCameraInfo {
   gint width;
@@ -139,19 +139,19 @@ struct _GstEventCameraInfo {
 
 /**
  * gst_event_camera_info_from_caps:
- * @info: (out caller-allocates): is filled in
+ * @info: (out caller-allocates): the result
  * @caps: fixed caps
  *
- * Reads the caps of an event stream of format XYTP. A framerate that is missing counts as 0/1.
+ * Parses the caps of an event stream of format XYTP. A missing framerate counts as 0/1.
  *
- * Returns: %FALSE where @caps are anything else; @info is then left alone
+ * Returns: %FALSE if @caps are anything else; @info is then unchanged
  */
 GST_EVENT_CAMERA_API
 gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps* caps);
 
 /**
  * gst_event_camera_info_to_caps:
- * @info: what the caps shall say
+ * @info: the content of the caps
  *
  * Returns: (transfer full): the caps of an event stream of format XYTP
  */
@@ -161,8 +161,8 @@ GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info);
 /**
  * GstEventCameraMap:
  * @events: (array length=n_events): the events of the buffer, sorted by time
- * @n_events: how many there are
- * @start: the time in microseconds from which each event's t counts, floor(PTS / 1000)
+ * @n_events: the number of events
+ * @start: the time that each event's t is relative to, in microseconds: floor(PTS / 1000)
  *
  * The events of a mapped buffer.
  */
@@ -179,24 +179,24 @@ struct _GstEventCameraMap {
 
 /**
  * gst_event_camera_map:
- * @map: (out caller-allocates): is filled in; gst_event_camera_unmap() it when done
+ * @map: (out caller-allocates): the mapped events; release with gst_event_camera_unmap()
  * @buffer: a buffer of an event stream of format XYTP, with a PTS
  *
- * Maps a buffer for reading its events. Nothing is copied where the buffer is one memory at
+ * Maps a buffer to read its events. Nothing is copied if the buffer is a single memory at
  * an address that is a multiple of 4. Events
- * are not looked at: whoever uses x and y as indices checks them against the caps.
+ * are not validated: check x and y against the caps before you use them as indices.
  *
- * Returns: %FALSE where @buffer cannot be mapped, has no PTS, or is no whole number of events;
- *     @map is then not to be unmapped
+ * Returns: %FALSE if @buffer cannot be mapped, has no PTS, or ends in a partial event;
+ *     @map must then not be unmapped
  */
 GST_EVENT_CAMERA_API
 gboolean gst_event_camera_map(GstEventCameraMap* map, GstBuffer* buffer);
 
 /**
  * gst_event_camera_unmap:
- * @map: a map that gst_event_camera_map() filled in
+ * @map: a map filled in by gst_event_camera_map()
  *
- * Gives the buffer free again. The events may not be read any more.
+ * Releases the buffer. The events must not be accessed afterwards.
  */
 GST_EVENT_CAMERA_API
 void gst_event_camera_unmap(GstEventCameraMap* map);
