@@ -4,7 +4,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/denoise.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants to come after that.
+// Must come after HWY_TARGET_INCLUDE.
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 template <class Pixel>
 void denoise_row(const Pixel* above, const Pixel* here, const Pixel* below, int width, int limit,
                  Pixel* out) {
-  using Wide = hwy::MakeSigned<hwy::MakeWide<Pixel>>;  // holds 16 differences
+  using Wide = hwy::MakeSigned<hwy::MakeWide<Pixel>>;  // holds a sum of 16 differences
   const hn::ScalableTag<Wide> wide;
   const hn::Rebind<Pixel, decltype(wide)> pixels;
   const int lanes = static_cast<int>(hn::Lanes(wide));

@@ -18,7 +18,7 @@
 namespace eventcamera {
 namespace {
 
-/// Whether the pixels have the same properties under both.
+/// True if both give each pixel the same traits.
 bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
   return a.positive_threshold == b.positive_threshold &&
          a.negative_threshold == b.negative_threshold && a.threshold_sigma == b.threshold_sigma &&
@@ -30,13 +30,13 @@ bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
   return a.linear_light == b.linear_light && a.response == b.response && a.log_eps == b.log_eps;
 }
 
-/// Events per second, more than any array makes.
+/// Event rate that no array reaches, events per second.
 constexpr double unlimited = 1e18;
 
-/// The working memory of a thread.
+/// Scratch memory of a thread.
 struct alignas(64) Scratch {
   Candidates candidates;
-  std::vector<std::uint16_t> luma;  ///< a row, with padding for vectors
+  std::vector<std::uint16_t> luma;  ///< a row, padded for vectors
 };
 
 template <class Pixel>
@@ -84,7 +84,7 @@ class PixelSimulator final : public DvsSimulator {
       kept.assign(frame.as<Pixel>());
   }
 
-  /// Returns the duration of the interval, microseconds.
+  /// Returns the duration of the interval in microseconds.
   double begin(const StepTimes& interval) {
     if (settings_ != current_) change_to(settings_);
     const double duration = static_cast<double>(interval.duration()) / 1000;
@@ -103,12 +103,12 @@ class PixelSimulator final : public DvsSimulator {
     if (!readout_) readout_.emplace(format().width, format().height);
     sorter_.finish(sorted_, threads());
     readout_->pass(sorted_, duration, is_limited ? current_.max_event_rate : unlimited, events);
-    if (!is_limited) readout_.reset();  // no event waits in it any more
+    if (!is_limited) readout_.reset();  // no events are waiting any more
   }
 
-  /// The light changes on a straight line in each pixel.
+  /// Advances all pixels with linear interpolation.
   void advance_straight(double duration, bool is_exposed) {
-    finder_.reset();  // its last frame is no longer the last one
+    finder_.reset();  // it would miss this frame
     plan(duration, 1, is_exposed);
     const bool is_widened = luma_bits(current_) != format().bits;
     for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
@@ -142,7 +142,7 @@ class PixelSimulator final : public DvsSimulator {
     });
   }
 
-  /// Prepares what all pixels share in the next interval.
+  /// Prepares the sub-intervals and tables of the next interval, which all pixels share.
   void plan(double duration, int steps, bool is_exposed) {
     divide_interval(duration, steps, pulse_.next(current_, duration, is_exposed),
                     sub_interval_count_, sub_intervals_);
@@ -165,7 +165,7 @@ class PixelSimulator final : public DvsSimulator {
     return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), changed, threads());
   }
 
-  /// Returns the number of steps in which nothing moves by more than a pixel each.
+  /// Returns the number of steps needed for motions of at most one pixel per step.
   int steps_of(const ImageView<Flow>& flow) {
     const int bands = band_count(format().height);
     max_squares_.assign(static_cast<std::size_t>(bands), 0);
@@ -196,7 +196,7 @@ class PixelSimulator final : public DvsSimulator {
     PixelSolver(current_, random_, sub_interval).solve(pixels, candidates, tables, events);
   }
 
-  /// Bits of the luma that the pixels see.
+  /// Bit depth of the luma that is passed to the pixels.
   int luma_bits(const DvsSettings& settings) const {
     const bool is_widened = settings.upsampling == Upsampling::motion && sizeof(Pixel) == 1;
     return is_widened ? 16 : format().bits;
@@ -214,7 +214,7 @@ class PixelSimulator final : public DvsSimulator {
     current_ = settings;
   }
 
-  /// Changes settings during a video: pixels keep their state, unless its units changed.
+  /// Changes settings mid-stream. Pixels keep their state unless its units changed.
   void change_to(const DvsSettings& settings) {
     const bool is_comparable = have_same_response(settings, current_);
     const bool had_bandwidth = current_.cutoff_hz > 0;
@@ -228,7 +228,7 @@ class PixelSimulator final : public DvsSimulator {
       });
   }
 
-  /// Sets the pixels as if the last frame had stood for long.
+  /// Settles the pixels as if the last frame had been constant for long.
   void settle() {
     pulse_.reset();
     const int widening = luma_bits(current_) == format().bits ? 1 : 257;
@@ -242,7 +242,7 @@ class PixelSimulator final : public DvsSimulator {
     });
   }
 
-  /// Calls body(rows, scratch, events) for each band of rows, on all threads.
+  /// Calls body(rows, scratch, events) for each band of rows, in parallel.
   template <class Body>
   void for_each_band(const Body& body) {
     threads().for_each(band_count(format().height), [&](int band, int thread) {
@@ -255,12 +255,12 @@ class PixelSimulator final : public DvsSimulator {
   Image<Pixel> last_{format().width, format().height};
   Image<Pixel> now_{format().width, format().height};
   PixelArray pixels_{format().width, format().height};
-  DvsSettings current_;  ///< of the pixels
+  DvsSettings current_;  ///< applied to the pixels
   Random random_{0};
-  std::vector<float> responses_;  ///< to each luma value
+  std::vector<float> responses_;  ///< by luma value
   ExposurePulse pulse_;
-  std::vector<SubInterval> sub_intervals_;  ///< of the interval, in order of time
-  std::vector<ShadeTables> tables_;         ///< for each duration of a sub-interval
+  std::vector<SubInterval> sub_intervals_;  ///< of the current interval, in order of time
+  std::vector<ShadeTables> tables_;         ///< one per duration of sub-intervals
   std::uint64_t sub_interval_count_ = 0;    ///< before this interval
   EventSorter sorter_;
   EventBuckets sorted_;
@@ -270,7 +270,7 @@ class PixelSimulator final : public DvsSimulator {
   std::optional<RegionOfInterestFlow> finder_;
   Grey8 last_grey_;
   Grey8 grey_;
-  std::vector<float> max_squares_;  ///< of the flow's length, by band
+  std::vector<float> max_squares_;  ///< maximum squared length of the flow, by band
 };
 
 }  // namespace

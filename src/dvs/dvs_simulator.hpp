@@ -8,12 +8,12 @@
 
 namespace eventcamera {
 
-/// A physical pixel array: logarithmic light, a photoreceptor of limited bandwidth, memory,
-/// mismatch, leak, shot noise, refractory time, readout. Each crossing of a threshold has its own
-/// time. The thresholds are those of DvsSettings; of Settings only the threads count.
+/// Simulates a physical pixel array: logarithmic response, photoreceptor bandwidth, reference
+/// level, threshold mismatch, leak, shot noise, refractory period, readout. Each threshold crossing
+/// has its own time. Thresholds come from DvsSettings; only `threads` of Settings is used.
 class DvsSimulator : public Simulator {
  public:
-  /// For the frames to come.
+  /// Applies to the next frames.
   void set(const DvsSettings& settings) { settings_ = settings; }
 
  protected:

@@ -13,23 +13,23 @@
 
 namespace eventcamera {
 
-/// The light of a luma value, both shares of white: the same, or what the transfer function of sRGB
-/// (IEC 61966-2-1) made the luma from.
+/// Light of a luma value, both relative to white: the same value, or with the sRGB transfer
+/// function (IEC 61966-2-1) undone.
 inline double light_of(double luma, bool linear_light) {
   if (!linear_light) return luma;
   return luma <= 0.04045 ? luma / 12.92 : std::pow((luma + 0.055) / 1.055, 2.4);
 }
 
-/// What the photoreceptor makes of light, 0 ... 1.
+/// Response of the photoreceptor to light in [0, 1].
 inline double response_of(double light, Response response, double log_eps) {
-  constexpr double linear_up_to = 20;  // 8-bit grey levels, v2e's
+  constexpr double linear_up_to = 20;  // 8-bit grey levels, as in v2e
   if (response == Response::log) return std::log(log_eps + light);
   if (response == Response::linear) return std::log(255.0) * light;
   const double x = 255 * light;
   return x <= linear_up_to ? x * std::log(linear_up_to) / linear_up_to : std::log(x);
 }
 
-/// The response to each luma value of a bit depth, 8 to 16.
+/// Responses to all luma values of a bit depth, 8 to 16.
 inline std::vector<float> responses(const DvsSettings& settings, int bits) {
   std::vector<float> values(std::size_t{1} << bits);
   const auto white = static_cast<double>(values.size() - 1);
@@ -40,18 +40,18 @@ inline std::vector<float> responses(const DvsSettings& settings, int bits) {
   return values;
 }
 
-/// Shot noise is counted in fixed-point numbers, in units of 1/noise_unit events.
+/// Shot noise is counted in fixed point, in units of 1/noise_unit events.
 inline constexpr double noise_unit = 1 << 27;
 
-/// The bandwidth of a photoreceptor and its noise depend on the light (v2e). They need not be
-/// exact, so luma is reduced to this many shades.
+/// Number of shades of luma for bandwidth and noise, which depend on the light (v2e) but need not
+/// be exact.
 inline constexpr int shades = 256;
 
-/// What happens to a pixel of each shade in a sub-interval.
+/// Bandwidth and noise of pixels of each shade in a sub-interval.
 struct ShadeTables {
   std::array<float, shades> exponent;           ///< k = bandwidth times duration
-  std::array<float, shades> decay_factor;       ///< exp(-k), of a lag behind the light
-  std::array<float, shades> mean_decay_factor;  ///< (1 - exp(-k)) / k, over the duration
+  std::array<float, shades> decay_factor;       ///< exp(-k), decay of the lag behind the light
+  std::array<float, shades> mean_decay_factor;  ///< (1 - exp(-k)) / k, its mean over the duration
   std::array<std::uint32_t, shades> noise;      ///< expected shot noise, 1/noise_unit
 
   std::array<double, shades> bandwidth;  ///< 1/us
@@ -60,14 +60,14 @@ struct ShadeTables {
   double duration;  ///< microseconds
 
   ShadeTables(const DvsSettings& settings, double microseconds) : duration(microseconds) {
-    constexpr double min_cutoff_hz = 1e-3;  // slower is all the same: minutes
+    constexpr double min_cutoff_hz = 1e-3;  // minutes; slower makes no difference
     constexpr double noise_at_white = 0.25;
     const double max_bandwidth =
         2 * std::numbers::pi * std::max(settings.cutoff_hz, min_cutoff_hz) / 1e6;
     const double max_noise_rate = settings.shot_noise_rate_hz / 1e6;
     for (std::size_t i = 0; i < shades; ++i) {
       const double light = light_of(static_cast<double>(i) / 255, settings.linear_light);
-      // How fast a photoreceptor is, and how quiet, compared with one that sees white: in (0, 1].
+      // In (0, 1]; scales the bandwidth, and reduces the noise, relative to a dark pixel.
       const double brightness = (light + settings.dark_light) / (1 + settings.dark_light);
       bandwidth[i] = max_bandwidth * brightness;
       const double k = bandwidth[i] * duration;

@@ -9,13 +9,13 @@ namespace {
 
 using Purpose = Random::Purpose;
 
-/// A threshold of 0 would fire for ever.
+/// A threshold of 0 would fire forever.
 constexpr double min_threshold = 1e-3;
 
-/// Mismatch leaves this share of a threshold at least.
+/// Minimum threshold under mismatch, as a fraction of the mean.
 constexpr double min_share = 0.1;
 
-/// The leak rates of hot pixels, log-uniform.
+/// Range of the additional leak rate of hot pixels, log-uniform.
 constexpr double min_hot_hz = 10;
 constexpr double max_hot_hz = 1000;
 
@@ -51,7 +51,7 @@ PixelTraits Mismatch::of(std::uint64_t pixel) const {
   const double negative = fixed_threshold(pixel, Polarity::off);
   double leak_rate_hz = settings_.leak_rate_hz;
   if (settings_.leak_spread > 0 && leak_rate_hz > 0) {
-    // The mean over all pixels is the set rate.
+    // Keeps the mean over all pixels at the configured rate.
     const double spread = settings_.leak_spread * std::numbers::ln10;
     leak_rate_hz *= std::exp(spread * random_.normal(pixel, Purpose::leak) - spread * spread / 2);
   }
@@ -65,7 +65,7 @@ double Mismatch::leaked(std::uint64_t pixel, const PixelTraits& traits, double n
   if (traits.leak <= 0) return 0;
   const double max_age = traits.positive_threshold / traits.leak;
   const double u = random_.uniform(pixel, Purpose::leak_phase);
-  // The age of a reference that is reset by noise, and by the leak's own event in any case.
+  // Age of a reference that is reset by noise, and at max_age by a leak event.
   const double age = noise_rate > 0
                          ? -std::log1p(u * std::expm1(-noise_rate * max_age)) / noise_rate
                          : u * max_age;

@@ -12,12 +12,12 @@
 
 namespace eventcamera {
 
-/// Random numbers without state: each is a hash of what it is for, so it does not depend on the
-/// order in which pixels are processed. The hash is the finalizer of SplitMix64, applied once for
-/// each of seed, pixel, purpose and counter.
+/// Stateless random numbers: each is a hash of seed, pixel, purpose and counter, so it does not
+/// depend on the order in which pixels are processed. The hash applies the finalizer of SplitMix64
+/// once for each of the four.
 class Random {
  public:
-  /// What a number is for; numbers for different purposes are independent.
+  /// Use of a number; numbers for different purposes are independent.
   enum class Purpose : std::uint64_t {
     positive_threshold = 1,
     negative_threshold,
@@ -26,7 +26,7 @@ class Random {
     defect,
     heat,
     first_noise,
-    event,  ///< what happens to a pixel as time passes
+    event,  ///< everything that happens to a pixel over time
   };
 
   explicit Random(std::uint64_t seed) : key_(mixed(seed + 0x9e3779b97f4a7c15)) {}
@@ -66,9 +66,10 @@ class Random {
   std::uint64_t key_;
 };
 
-/// Draws how much shot noise is to be expected before a pixel's next noise event, 1/noise_unit.
-/// Shot noise is a Poisson process whose rate depends on the light: its next event comes when the
-/// integral of the rate has used up this budget, drawn from the exponential distribution of mean 1.
+/// Draws the noise budget of a pixel: the expected shot noise until its next noise event,
+/// 1/noise_unit. Shot noise is a Poisson process whose rate depends on the light: its next event
+/// fires when the integral of the rate has used up the budget, which is exponentially distributed
+/// with mean 1.
 inline std::uint32_t draw_noise_budget(const Random& random, std::uint64_t pixel,
                                        Random::Purpose purpose, std::uint64_t counter) {
   const double drawn = random.exponential(pixel, purpose, counter) * noise_unit;
@@ -79,10 +80,10 @@ inline std::uint32_t draw_noise_budget(const Random& random, std::uint64_t pixel
 struct PixelTraits {
   double positive_threshold;  ///< infinite if the pixel is dead
   double negative_threshold;
-  double leak;  ///< how much its reference falls per microsecond
+  double leak;  ///< fall of the reference per microsecond
 };
 
-/// The differences between pixels, determined by the seed.
+/// Differences between pixels, determined by the seed.
 class Mismatch {
  public:
   Mismatch(const DvsSettings& settings, const Random& random)
@@ -90,11 +91,11 @@ class Mismatch {
 
   PixelTraits of(std::uint64_t pixel) const;
 
-  /// The threshold after another event, `counter`, where thresholds change from event to event.
+  /// Threshold after event `counter`, if thresholds vary between events.
   double next_threshold(std::uint64_t pixel, Polarity polarity, std::uint64_t counter) const;
 
-  /// How far the reference has fallen when the first frame comes, if noise of this rate (1/us)
-  /// resets it: the camera has been on for long.
+  /// Fall of the reference before the first frame, if noise of this rate (1/us) resets it: the
+  /// camera has been on for long.
   double leaked(std::uint64_t pixel, const PixelTraits& traits, double noise_rate) const;
 
  private:
@@ -104,19 +105,19 @@ class Mismatch {
   const Random& random_;
 };
 
-/// A row of pixels: what each of them is, and its state.
+/// Traits and state of a row of pixels.
 struct PixelRow {
   int y;
-  std::uint64_t first_number;  ///< of the pixel x = 0
+  std::uint64_t first_number;  ///< number of the pixel at x = 0
 
-  float* target;     ///< the response to the light now
-  float* signal;     ///< what the photoreceptor has made of it so far
-  float* reference;  ///< what the signal is compared with
+  float* target;     ///< response to the current light
+  float* signal;     ///< output of the photoreceptor
+  float* reference;  ///< level that the signal is compared to
   float* positive;   ///< thresholds; infinite if the pixel is dead
   float* negative;
-  float* leak;                  ///< how much the reference falls per microsecond
-  float* refractory_left;       ///< microseconds until the pixel can fire again, or 0
-  std::uint32_t* noise_budget;  ///< expected shot noise before its next event, 1/noise_unit
+  float* leak;                  ///< fall of the reference per microsecond
+  float* refractory_left;       ///< microseconds until the pixel can fire again; 0 = now
+  std::uint32_t* noise_budget;  ///< expected shot noise until the next noise event, 1/noise_unit
 };
 
 class PixelArray {
@@ -126,10 +127,10 @@ class PixelArray {
   int width() const { return target_.width(); }
   PixelRow row(int y);
 
-  /// Draws the thresholds and the leak of a row of pixels.
+  /// Draws the thresholds and leak of a row of pixels.
   void draw_traits(int y, const DvsSettings& settings, const Random& random);
 
-  /// Resets a row as if its target had been constant for long, and draws its first noise budgets.
+  /// Resets a row as if its target had been constant for long, and draws its initial noise budgets.
   void settle(int y, const DvsSettings& settings, const Random& random);
 
  private:

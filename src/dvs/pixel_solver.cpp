@@ -10,18 +10,18 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
-/// Between two events of a pixel, microseconds: the resolution of their times.
+/// Minimum time between two events of a pixel, microseconds: the resolution of event times.
 constexpr double min_gap = 1;
 
-/// A pixel makes at most this many events in one sub-interval, those that its refractory period
-/// swallows included; after that its reference is set to its signal. White after black is 35 events
-/// at common thresholds.
+/// Limit of events of a pixel in one sub-interval, including those lost in its refractory period;
+/// at the limit its reference is set to its signal. A change from black to white is 35 events at
+/// common thresholds.
 constexpr int max_events = 512;
 
-/// More random numbers than a pixel draws in a sub-interval.
+/// Upper bound of the random numbers that a pixel draws in a sub-interval.
 constexpr std::uint64_t draws_per_sub_interval = 1 << 16;
 
-/// What the light does to one pixel within a sub-interval.
+/// Signal and noise of one pixel within a sub-interval.
 struct PixelLight {
   Trajectory signal;
   double last_signal;     ///< at the end of the sub-interval
@@ -51,7 +51,7 @@ class Pixel {
         held_(settings.refractory_reset == RefractoryReset::signal && ready_ > 0),
         expected_noise_(light.expected_noise),
         noise_budget_(pixels.noise_budget[x]) {
-    // A falling reference is the same as a signal that rises relative to it.
+    // A falling reference is equivalent to a rising signal.
     above_leak_.slope += leak_;
     end_ = {sub_interval.duration, light.last_signal + leak_ * sub_interval.duration};
   }
@@ -84,7 +84,7 @@ class Pixel {
     store();
   }
 
-  /// The same, where the signal is a straight line and events are crossings and nothing more.
+  /// solve() for a linear signal and events that are crossings without side effects.
   void solve_straight() {
     const bool rises = above_leak_.slope > 0;
     const double step = rises ? positive_ : -negative_;
@@ -105,7 +105,7 @@ class Pixel {
 
   bool is_straight() const { return above_leak_.lag == 0 && above_leak_.slope != 0; }
 
-  /// The same, where events are crossings and nothing more.
+  /// solve() for events that are crossings without side effects.
   void solve_curved() {
     const Crossings crossings(above_leak_, end_);
     TrajectoryPoint now{0, above_leak_.offset + above_leak_.lag};
@@ -123,8 +123,8 @@ class Pixel {
     store();
   }
 
-  /// The same, where a single noise event is all that happens; returns false without effect where
-  /// more may happen. An event must not change the thresholds.
+  /// solve() for a single noise event; returns false, without effect, if more may happen. Events
+  /// must not change the thresholds.
   bool solve_lone_noise() {
     const double t = next_noise();
     if (held_ || t < ready_ || t > end_.t) return false;
@@ -145,7 +145,7 @@ class Pixel {
   }
 
  private:
-  /// The time of the next shot noise event; never, if not within this sub-interval.
+  /// Time of the next shot noise event; `never` if not within this sub-interval.
   double next_noise() const {
     const double then = passed_noise_ + noise_budget_;
     if (expected_noise_ < 1 || then > expected_noise_) return never;
@@ -165,7 +165,7 @@ class Pixel {
     if (t >= ready_) fire_noise(now.value, t);
   }
 
-  /// Fires a noise event where the signal has this value.
+  /// Fires a noise event at this value of the signal.
   void fire_noise(double value, double t) {
     const bool is_on = (random_.bits(number_, Random::Purpose::event, draw_++) >> 63) != 0;
     reference_ = value;
@@ -177,7 +177,7 @@ class Pixel {
     if (crossing.point.t >= ready_) fire(crossing.point.t, crossing.polarity);
   }
 
-  /// Makes an event and begins the refractory period.
+  /// Emits an event and starts the refractory period.
   void fire(double crossed, Polarity polarity) {
     double t = crossed + settings_.latency;
     if (settings_.latency_jitter > 0) {
@@ -195,8 +195,8 @@ class Pixel {
     }
   }
 
-  /// Noise is lost while the pixel is held or after max_events. When the next noise comes after
-  /// that does not depend on what came before.
+  /// Drops noise that is due while the pixel is held or after max_events, and draws the next. Noise
+  /// has no memory, so its new budget starts at the end of the sub-interval.
   void skip_noise() {
     if (expected_noise_ < 1 || passed_noise_ + noise_budget_ > expected_noise_) return;
     draw_noise();
@@ -223,15 +223,15 @@ class Pixel {
   std::uint64_t draw_;
   const BandEvents& events_;
 
-  Trajectory above_leak_;  ///< the signal relative to a reference that does not leak
+  Trajectory above_leak_;  ///< the signal relative to a reference without leak
   TrajectoryPoint end_{};
   double reference_;
   double positive_;
   double negative_;
-  double leak_;      ///< per microsecond
-  double ready_;     ///< the earliest time of its next event
-  double released_;  ///< the end of the refractory period
-  bool held_;        ///< in reset until then
+  double leak_;      ///< fall of the reference per microsecond
+  double ready_;     ///< earliest time of the next event
+  double released_;  ///< end of the refractory period
+  bool held_;        ///< in reset until released_
   double expected_noise_;
   double passed_noise_ = 0;
   double noise_budget_;

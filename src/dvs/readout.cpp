@@ -10,7 +10,7 @@
 namespace eventcamera {
 namespace {
 
-/// An interval is divided into 2 to this power time slices at most: enough for threads to share.
+/// Log2 of the maximum number of time slices of an interval: enough for threads to share.
 constexpr int slice_bits = 6;
 
 }  // namespace
@@ -92,7 +92,7 @@ void Readout::pass(const EventBuckets& in, double duration, double events_per_se
   const double time_per_event = 1e6 / events_per_second;
   out.reset(1, 1);
   auto& left = out.bucket(1, 0);
-  // Serves rows until `time`.
+  // Reads rows until `time`.
   const auto serve_until = [&](double time) {
     while (queue_count_ > 0 && idle_from_ < time) {
       const int row = row_queue_[queue_first_];

@@ -8,17 +8,17 @@
 
 namespace eventcamera {
 
-/// Sorts the events of an interval, which the bands of rows make in any order: by time, and within
-/// a microsecond in raster order.
+/// Sorts the events of an interval, which bands of rows add in any order, by time, then in raster
+/// order.
 class EventSorter {
  public:
-  /// Begins an interval of `duration` microseconds with the events that the last one deferred.
+  /// Begins an interval of `duration` microseconds with the deferred events of the last one.
   void begin(double duration, int bands);
   /// Drops the deferred events.
   void reset() { deferred_.clear(); }
 
   /// Adds an event `t` microseconds after the start of the interval; past its end, the event is
-  /// deferred to the next interval. Each band may have a thread of its own.
+  /// deferred to the next interval. Different bands may be added from different threads.
   void add(int band, double t, int x, int y, Polarity polarity) {
     if (t > duration_) {
       deferred_[static_cast<std::size_t>(band)].push_back({t, Event::at(x, y, 0, polarity)});
@@ -29,7 +29,7 @@ class EventSorter {
         .push_back(Event::at(x, y, microseconds, polarity));
   }
 
-  /// Fills `events`, a bucket for each time slice.
+  /// Fills `events`, one bucket per time slice.
   void finish(EventBuckets& events, ThreadPool& threads);
 
  private:
@@ -50,7 +50,7 @@ class EventSorter {
   std::vector<Counts> counts_;      ///< by thread
 };
 
-/// What collects the events of one band of rows.
+/// Adds the events of one band of rows to a sorter.
 struct BandEvents {
   EventSorter& sorter;
   int band;
@@ -58,19 +58,19 @@ struct BandEvents {
   void add(double t, int x, int y, Polarity polarity) const { sorter.add(band, t, x, y, polarity); }
 };
 
-/// The arbiter between the pixels and the outside: takes the events of one row at a time, the
-/// longest waiting row first, each event at its share of a second. The events of a row leave
-/// together and get the time at which they do. A pixel that waits makes no other event, so events
-/// that come too fast for the readout are lost there, and no more wait than there are pixels.
+/// Arbiter of the readout: reads one row at a time, the longest waiting row first, at a limited
+/// event rate. The events of a row leave together and get the time at which they leave. A waiting
+/// pixel drops further events, so events beyond the rate of the readout are lost, and at most one
+/// event per pixel is waiting.
 class Readout {
  public:
   Readout(int width, int height);
 
-  /// Drops the events that wait.
+  /// Drops the waiting events.
   void reset();
 
-  /// Takes the events of an interval of `duration` microseconds, and fills `out`, sorted, with
-  /// those that leave within it; the others leave in the next one.
+  /// Admits the events of an interval of `duration` microseconds, and fills `out` with those that
+  /// leave within it, sorted; the others stay for the next one.
   void pass(const EventBuckets& in, double duration, double events_per_second, EventBuckets& out);
 
  private:
@@ -78,7 +78,7 @@ class Readout {
 
   struct WaitingEvent {
     Event event;
-    int next;  ///< in its row
+    int next;  ///< next one of its row
   };
   struct Row {
     int first = none;
@@ -94,13 +94,13 @@ class Readout {
   }
 
   int width_;
-  std::vector<WaitingEvent> waiting_;  ///< linked lists: one for each row, one of free places
+  std::vector<WaitingEvent> waiting_;  ///< linked lists: one per row, and one of free entries
   int free_ = none;
   std::vector<Row> rows_;
-  std::vector<int> row_queue_;  ///< a ring of the rows in which events wait
+  std::vector<int> row_queue_;  ///< ring of the rows with waiting events
   std::size_t queue_first_ = 0;
   std::size_t queue_count_ = 0;
-  std::vector<std::uint8_t> waits_;  ///< by pixel
+  std::vector<std::uint8_t> waits_;  ///< by pixel: 1 if its event is waiting
   double idle_from_ = 0;             ///< microseconds after the start of the interval
 };
 

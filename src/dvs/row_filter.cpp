@@ -4,7 +4,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/row_filter.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants to come after that.
+// Must come after HWY_TARGET_INCLUDE.
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -57,12 +57,12 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
     auto target = hn::GatherIndex(floats, responses, value);
     const auto last_target = hn::LoadU(floats, targets + x);
     if (is_partial) target = hn::Add(last_target, hn::Mul(hn::Sub(target, last_target), share));
-    // A rise of all signals is the same as a fall of all references.
+    // A rise of all signals is equivalent to a fall of all references.
     const auto leaked = hn::Add(hn::Mul(hn::LoadU(floats, leaks + x), duration), rise);
 
     auto last_signal = last_target;
     auto signal = target;
-    auto margin = hn::Set(floats, rounding);  // beyond the values at both ends
+    auto margin = hn::Set(floats, rounding);  // excess beyond the values at both ends
     if (row_filter.has_bandwidth) {
       last_signal = hn::LoadU(floats, signals + x);
       const auto decay_factor = hn::GatherIndex(floats, tables.decay_factor.data(), shade);
@@ -72,7 +72,7 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
       const auto lag = hn::Sub(last_signal, last_target);
       signal = hn::Add(hn::Sub(target, hn::Mul(hn::Sub(target, last_target), mean_decay_factor)),
                        hn::Mul(lag, decay_factor));
-      // Between the ends it may turn, not beyond the tangents at both.
+      // The signal may turn in between, but not beyond the tangents at both ends.
       const auto first_slope = hn::Sub(leaked, hn::Mul(lag, exponent));
       const auto last_slope = hn::Add(leaked, hn::Mul(hn::Sub(target, signal), exponent));
       const auto turns = hn::Lt(hn::Mul(first_slope, last_slope), zero);

@@ -6,7 +6,7 @@
 namespace eventcamera {
 namespace {
 
-constexpr double min_duration = 1;  // of a sub-interval, microseconds
+constexpr double min_duration = 1;  // minimum duration of a sub-interval, microseconds
 
 double rise_within(double begin, double end, std::span<const PulseEdge> edges) {
   double rise = 0;

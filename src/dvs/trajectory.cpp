@@ -6,26 +6,26 @@
 namespace eventcamera {
 namespace {
 
-/// Of a crossing's time, microseconds.
+/// Precision of crossing times, microseconds.
 constexpr double precision = 0.001;
 
-/// More than bisection alone needs for that precision in any interval.
+/// More than bisection needs for that precision in any interval.
 constexpr int max_iterations = 64;
 
 }  // namespace
 
-/// Where slope = bandwidth lag.
+/// Turning point after `from`: slope = bandwidth lag.
 TrajectoryPoint Crossings::turn_after(TrajectoryPoint from) const {
   const double final_lag = trajectory_.slope / trajectory_.bandwidth;
   const double ratio = lag_at(from) / final_lag;
-  if (!(ratio > 1)) return from;  // rounding
+  if (!(ratio > 1)) return from;  // due to rounding
   const double t = from.t + std::log(ratio) / trajectory_.bandwidth;
   return t < end_.t ? TrajectoryPoint{t, trajectory_.offset + trajectory_.slope * t + final_lag}
                     : end_;
 }
 
-/// Returns when a level between `a` and `b`, crossed once there or missed by rounding, is crossed:
-/// Halley's method with bisection as its fallback.
+/// Returns the time at which a level is crossed between `a` and `b`, where it is crossed once, or
+/// missed by rounding. Halley's method with bisection as fallback.
 double Crossings::time_of(double level, TrajectoryPoint a, TrajectoryPoint b) const {
   const double rise = level - a.value;
   const double duration = b.t - a.t;
@@ -35,8 +35,8 @@ double Crossings::time_of(double level, TrajectoryPoint a, TrajectoryPoint b) co
   const double bandwidth = trajectory_.bandwidth;
   const double lag = lag_at(a);
   const bool rises = b.value > a.value;
-  // Since a: slope t - lag (1 - exp(-bandwidth t)) = rise. With (2 - x) / (2 + x) for exp(-x) this
-  // is a quadratic equation.
+  // Relative to a: slope t - lag (1 - exp(-bandwidth t)) = rise. Approximating exp(-x) by (2 - x) /
+  // (2 + x) gives a quadratic equation.
   const double half = slope - bandwidth * (lag + rise / 2);
   const double root = std::sqrt(std::max(0.0, half * half + 2 * slope * bandwidth * rise));
   double t = 2 * rise / (half + (rises ? root : -root));
@@ -57,7 +57,7 @@ double Crossings::time_of(double level, TrajectoryPoint a, TrajectoryPoint b) co
     const bool is_within = next >= early && next <= late;
     t = is_within ? next : (early + late) / 2;
     if (late - early < precision) break;
-    // The error after a step that is not too long is of third order in it, and larger near a turn.
+    // The error after a short step is of third order in the step, and larger near a turn.
     const double slope_there = slope_here - curvature * step;
     const double min_slope_squared = std::min(slope_here * slope_here, slope_there * slope_there);
     const double error =

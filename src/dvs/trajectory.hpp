@@ -10,13 +10,13 @@
 
 namespace eventcamera {
 
-/// exp(-x) of x >= 0 with a relative error of 1e-12: the same on every machine, without a branch,
-/// and inline.
+/// exp(-x) for x >= 0 with a relative error of 1e-12: identical on every machine, branch-free and
+/// inline.
 inline double decay(double x) {
   constexpr double log2_e = 1.4426950408889634;
   constexpr double ln_2 = 0.6931471805599453;
-  constexpr double to_integers = 0x1.8p52;  // doubles of this size are integers
-  x = std::min(x, 700.0);                   // the result is close to 0 beyond
+  constexpr double to_integers = 0x1.8p52;  // doubles of this magnitude are integers
+  x = std::min(x, 700.0);                   // beyond, the result is close to 0
   const double shifted = x * log2_e + to_integers;
   const double r = (shifted - to_integers) * ln_2 - x;  // |r| <= ln_2 / 2
   const double r2 = r * r;
@@ -30,8 +30,8 @@ inline double decay(double x) {
   return mantissa * std::bit_cast<double>(exponent);
 }
 
-/// A signal of a pixel over the time t of a sub-interval, from 0 to its end, microseconds:
-/// offset + slope t + lag exp(-bandwidth t).
+/// Signal of a pixel over the time t in a sub-interval, microseconds: offset + slope t + lag
+/// exp(-bandwidth t).
 struct Trajectory {
   double offset = 0;
   double slope = 0;
@@ -48,8 +48,7 @@ struct Trajectory {
     return {.offset = from, .slope = (to - from) / duration};
   }
 
-  /// The exact output of a one-pole low-pass filter that is at `signal` when its input starts on a
-  /// straight line.
+  /// Exact output of a one-pole low-pass filter at `signal` whose input changes linearly.
   static Trajectory low_pass(double signal, double from, double to, double duration,
                              double bandwidth) {
     const double slope = (to - from) / duration;
@@ -64,20 +63,20 @@ struct TrajectoryPoint {
   double value;
 };
 
-/// Where a trajectory reaches a level.
+/// Point at which a trajectory reaches a level.
 struct Crossing {
   TrajectoryPoint point;
   Polarity polarity;
 };
 
-/// A level that is missed by less counts as reached: floats are rounded this much, over several
-/// events, on the way up from a grey level and back to it.
+/// A level missed by less than this counts as reached. Float rounding accumulates to this much over
+/// several events from one grey level to another and back.
 inline constexpr float rounding = 2e-6F;
 
-/// Finds the exact times at which a trajectory crosses levels.
+/// Finds exact times at which a trajectory crosses levels.
 class Crossings {
  public:
-  /// Up to the point `end`.
+  /// Considers the trajectory up to the point `end`.
   Crossings(const Trajectory& trajectory, TrajectoryPoint end)
       : sign_(trajectory.lag < 0 ? -1 : 1),
         trajectory_{sign_ * trajectory.offset, sign_ * trajectory.slope, sign_ * trajectory.lag,
@@ -86,7 +85,7 @@ class Crossings {
         last_slope_(slope_at(end_)) {}
 
   /// Returns the first point from `from` on at which the trajectory is at or above `upper` (ON), or
-  /// at or below `lower` (OFF), if there is one.
+  /// at or below `lower` (OFF), if any.
   std::optional<Crossing> first(double lower, double upper, TrajectoryPoint from) const;
 
  private:
@@ -99,8 +98,9 @@ class Crossings {
   TrajectoryPoint turn_after(TrajectoryPoint from) const;
   double time_of(double level, TrajectoryPoint a, TrajectoryPoint b) const;
 
-  /// The trajectory times `sign_`: its slope never decreases. So it may turn once, from falling to
-  /// rising, and of two levels around it only the lower one can be crossed and crossed back.
+  /// The trajectory times `sign_` has a slope that never decreases. So it may turn once, from
+  /// falling to rising, and of two levels around it only the lower one can be crossed in both
+  /// directions.
   double sign_;
   Trajectory trajectory_;
   TrajectoryPoint end_;
@@ -121,7 +121,7 @@ inline std::optional<Crossing> Crossings::first(double lower, double upper,
   const double first_slope = slope_at(start);
   const bool ends_near = end_.value <= near;
   if (!ends_near && first_slope < 0 && last_slope_ > 0) {
-    // It stays above the point where the tangents at both ends meet, which needs no logarithm.
+    // It stays above the intersection of the tangents at both ends, which is cheap to compute.
     const double rise = end_.value - start.value;
     const double to_meeting =
         (rise - last_slope_ * (end_.t - start.t)) / (first_slope - last_slope_);
