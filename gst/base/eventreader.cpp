@@ -91,8 +91,7 @@ class EventReader {
     Shared() { gst_segment_init(&segment, GST_FORMAT_TIME); }
 
     GstClockTime buffer_time = default_buffer_time;
-    GstSegment segment =
-        {};  ///< relative to the start of the file; its position is that of the output
+    GstSegment segment = {};  ///< relative to the origin; its position is that of the output
     GstClockTime duration = GST_CLOCK_TIME_NONE;
     RecordingReader::Counts counts;
     std::optional<Restart> restart;  ///< push mode: pending seek

@@ -91,15 +91,15 @@ static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent* e
 /**
  * GstEventCameraPalette:
  * @GST_EVENT_CAMERA_PALETTE_LIGHT: on white: ON blue, OFF dark, both dark blue
- * @GST_EVENT_CAMERA_PALETTE_DARK: on the dark: ON white, OFF blue, both light blue
+ * @GST_EVENT_CAMERA_PALETTE_DARK: on dark: ON white, OFF blue, both light blue
  * @GST_EVENT_CAMERA_PALETTE_GREY: on grey: ON white, OFF black, both dark grey
  * @GST_EVENT_CAMERA_PALETTE_RED_BLUE: on white: ON blue, OFF red, both purple
- * @GST_EVENT_CAMERA_PALETTE_VIRIDIS: from purple by green to yellow, perceptually uniform
- * @GST_EVENT_CAMERA_PALETTE_MAGMA: from black by red to light yellow, perceptually uniform
+ * @GST_EVENT_CAMERA_PALETTE_VIRIDIS: from purple over green to yellow, perceptually uniform
+ * @GST_EVENT_CAMERA_PALETTE_MAGMA: from black over red to light yellow, perceptually uniform
  *
- * The colours of drawn events. Where events are accumulated: of a pixel without events, with ON
- * events, with OFF events, and with both. Where pixels have shades, the first four palettes shade
- * ON and OFF apart, and the uniform ones show how much, whichever polarity.
+ * The colours of drawn events. In accumulated-event video, the colour of a pixel says whether it has
+ * no events, ON events, OFF events or both. In modes with shades, the first four palettes shade ON
+ * and OFF separately, and the uniform ones show the magnitude, regardless of polarity.
  */
 typedef enum {
   GST_EVENT_CAMERA_PALETTE_LIGHT,
@@ -183,8 +183,8 @@ struct _GstEventCameraMap {
  * @buffer: a buffer of an event stream of format XYTP, with a PTS
  *
  * Maps a buffer to read its events. Nothing is copied if the buffer is a single memory at
- * an address that is a multiple of 4. Events
- * are not validated: check x and y against the caps before you use them as indices.
+ * an address that is a multiple of 4. Events are not validated: check x and y against the caps
+ * before you use them as indices.
  *
  * Returns: %FALSE if @buffer cannot be mapped, has no PTS, or ends in a partial event;
  *     @map must then not be unmapped
