@@ -10,10 +10,9 @@
  * - `width`, `height`: of the sensor, in pixels; every x < width, every y < height;
  * - `framerate`: buffers per second, 0/1 if variable.
  *
- * A buffer holds the events of an interval (t0, t1]: its PTS is t0, its
- * duration t1 - t0, and its memory an array of events sorted by time. The time of an event is
- * floor(PTS / 1000) + t microseconds. Intervals never overlap. An interval without events is a GAP
- * event.
+ * A buffer holds the events of an interval (t0, t1]: its PTS is t0, its duration t1 - t0, and its
+ * memory an array of events sorted by time. The time of an event is floor(PTS / 1000) + t
+ * microseconds. Intervals never overlap. An interval without events is a GAP event.
  *
  * Simulators put events of the same time into raster order, and no pixel fires twice in a
  * microsecond. Recordings keep every event of the file, in its own order within a time: a pixel may
@@ -97,9 +96,9 @@ static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent* e
  * @GST_EVENT_CAMERA_PALETTE_VIRIDIS: from purple over green to yellow, perceptually uniform
  * @GST_EVENT_CAMERA_PALETTE_MAGMA: from black over red to light yellow, perceptually uniform
  *
- * The colours of drawn events. In accumulated-event video, the colour of a pixel says whether it has
- * no events, ON events, OFF events or both. In modes with shades, the first four palettes shade ON
- * and OFF separately, and the uniform ones show the magnitude, regardless of polarity.
+ * The colours of drawn events. In accumulated-event video, they distinguish pixels with no events,
+ * ON events, OFF events and both. In modes with shades, the first four palettes shade ON and OFF
+ * separately, and the uniform ones show the magnitude, regardless of polarity.
  */
 typedef enum {
   GST_EVENT_CAMERA_PALETTE_LIGHT,

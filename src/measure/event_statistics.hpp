@@ -11,28 +11,28 @@
 
 namespace eventcamera {
 
-/// How many events each pixel has.
+/// Number of events per pixel.
 using EventMap = Image<std::uint32_t>;
 
-/// The quantiles of inter-event intervals that are measured.
+/// Quantiles of the inter-event intervals that are measured.
 inline constexpr std::array interval_shares = {0.05, 0.25, 0.5, 0.75, 0.95};
 
-/// A stream in a few numbers.
+/// Summary statistics of a stream.
 struct StreamFigures {
   std::uint64_t events = 0;
-  double rate = 0;      ///< events a second
-  double on_share = 0;  ///< of ON among the events
-  double mean = 0;      ///< over all pixels, of events per pixel and second
-  double std_dev = 0;   ///< their standard deviation
-  /// From a pixel's event to its next: the quantiles of interval_shares.
+  double rate = 0;      ///< events per second
+  double on_share = 0;  ///< fraction of ON events
+  double mean = 0;      ///< over all pixels, events per pixel and second
+  double std_dev = 0;   ///< over all pixels, events per pixel and second
+  /// Quantiles (interval_shares) of the time between successive events of a pixel.
   std::array<Microseconds, interval_shares.size()> intervals{};
 };
 
-/// Lengths of intervals, in bins that grow with them: exact up to 63 microseconds, and to 1/32 of
-/// the interval beyond.
+/// Histogram of interval lengths with logarithmic bins: exact up to 63 microseconds, accurate to
+/// 1/32 beyond.
 class IntervalHistogram {
  public:
-  /// Counts an interval of 0 or more.
+  /// Adds an interval, which must not be negative.
   void add(Microseconds interval) {
     ++bins_[bin_of(static_cast<std::uint64_t>(interval))];
     ++count_;
@@ -40,16 +40,16 @@ class IntervalHistogram {
 
   std::uint64_t count() const { return count_; }
 
-  /// Returns the length that this share, in [0, 1], of the intervals do not exceed, as the middle
-  /// of its bin; 0 without intervals.
+  /// Returns the `share` quantile, `share` in [0, 1], as the middle of its bin; 0 without
+  /// intervals.
   Microseconds quantile(double share) const;
 
   void clear() { *this = {}; }
 
  private:
-  static constexpr unsigned step_bits = 5;  ///< of the bins of an octave
+  static constexpr unsigned step_bits = 5;  ///< log2 of the bins per octave
   static constexpr std::uint64_t steps = 1U << step_bits;
-  static constexpr std::uint64_t exact = 2 * steps;  ///< intervals below have a bin each
+  static constexpr std::uint64_t exact = 2 * steps;  ///< shorter intervals have a bin each
 
   static constexpr std::size_t bin_of(std::uint64_t interval) {
     if (interval < exact) return interval;
@@ -62,19 +62,21 @@ class IntervalHistogram {
     const std::uint64_t first = (bin - steps * shift) << shift;
     return static_cast<Microseconds>(first + (std::uint64_t{1} << shift) / 2);
   }
-  static constexpr std::size_t bin_count = steps * (63 - step_bits - 1) + exact;  ///< up to 63 bits
+  static constexpr std::size_t bin_count =
+      steps * (63 - step_bits - 1) + exact;  ///< for intervals of up to 63 bits
 
   std::array<std::uint64_t, bin_count> bins_{};
   std::uint64_t count_ = 0;
 };
 
-/// Counts a stream. Its memory depends on the sensor, not on the length of the stream.
+/// Collects statistics of a stream. Memory depends on the sensor size, not on the length of the
+/// stream.
 class EventStatistics {
  public:
   /// Throws std::bad_alloc.
   EventStatistics(int width, int height);
 
-  /// Takes an event inside the picture, not before the last one.
+  /// Adds an event, which must lie inside the sensor and not be earlier than the last one.
   void add(const AbsoluteEvent& event) {
     auto& last = last_.at(event.x, event.y());
     if (last != never) intervals_.add(event.t - last);
@@ -83,13 +85,13 @@ class EventStatistics {
     ++(event.polarity() == Polarity::on ? on_ : off_);
   }
 
-  /// Counts from 0 again. Pixels remember their last events, so that no interval is lost.
+  /// Resets all counts. Pixels remember their last events, so that no interval is lost.
   void restart();
 
-  /// Forgets the last events, so that no interval spans a jump in time.
+  /// Forgets the last events, so that no interval spans a discontinuity.
   void forget_times();
 
-  /// The figures of all since the last restart, which took `duration`.
+  /// Returns the statistics since the last restart(), `duration` ago.
   StreamFigures figures(Nanoseconds duration) const;
 
   const EventMap& map() const { return map_; }
@@ -104,7 +106,7 @@ class EventStatistics {
   std::uint64_t off_ = 0;
 };
 
-/// Pearson's correlation of two maps of one size; 0 where one is the same everywhere.
+/// Pearson correlation of two maps of the same size; 0 if one is constant.
 double correlation(const EventMap& a, const EventMap& b);
 
 }  // namespace eventcamera

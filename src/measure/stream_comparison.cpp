@@ -12,7 +12,7 @@ constexpr Microseconds max_distance = match_distances.back();
 constexpr Microseconds no_match = std::numeric_limits<Microseconds>::max();
 constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
 
-/// Infinite without an earlier event: a difference from `never` would overflow.
+/// no_match without an earlier event, because a difference to `never` would overflow.
 Microseconds distance_between(Microseconds earlier, Microseconds later) {
   if (earlier == never) return no_match;
   return later - earlier;
@@ -156,7 +156,7 @@ void StreamComparison::take_until(Microseconds end) {
     rates_.add(role, event.t);
   }
   for (const auto role : both_roles) {
-    // Not each time, since a long buffer may be taken in many short pieces.
+    // Not every time, because a long buffer may be processed in many short pieces.
     auto& waiting = arriving_[role].waiting;
     auto& taken = arriving_[role].taken;
     if (2 * taken < waiting.size()) continue;

@@ -25,7 +25,7 @@ constexpr StreamRole other(StreamRole role) {
   return role == StreamRole::reference ? StreamRole::candidate : StreamRole::reference;
 }
 
-/// One of something for each of the two streams.
+/// One value per stream.
 template <class Type>
 class PerRole {
  public:
@@ -39,8 +39,8 @@ class PerRole {
   std::array<Type, 2> both_{};
 };
 
-/// Event counts of both streams in time bins of one length. The first bin has a millisecond; bins
-/// are joined in pairs whenever there are too many, so that a day has as many as a second.
+/// Event counts of both streams in time bins of equal length. Bins start at a millisecond and are
+/// merged in pairs whenever there are too many, so that memory does not grow with time.
 class RateCurve {
  public:
   using Bin = PerRole<std::uint64_t>;
@@ -48,7 +48,7 @@ class RateCurve {
 
   explicit RateCurve(Microseconds start = 0) : start_(start), covered_(start) {}
 
-  /// Takes an event after the start, and after `end` of the last extend_to().
+  /// Adds an event, which must be after the start and after `end` of the last extend_to().
   void add(StreamRole role, Microseconds time) {
     if (time > covered_) extend_to(time);
     ++bins_.back()[role];
@@ -58,63 +58,64 @@ class RateCurve {
   void extend_to(Microseconds end);
 
   Microseconds bin_length() const { return length_; }
-  /// The first begins at the start.
+  /// The first bin begins at the start.
   std::span<const Bin> bins() const { return bins_; }
 
  private:
-  /// Of time after the start: (start, start + length] is bin 0.
+  /// Bin of a `time` after the start; (start, start + length] is bin 0.
   std::size_t bin_of(Microseconds time) const {
     return static_cast<std::size_t>((time - start_ - 1) / length_);
   }
   void join_bins();
 
   Microseconds start_;
-  Microseconds covered_;  ///< where the last bin ends
+  Microseconds covered_;  ///< end of the last bin
   Microseconds length_ = 1000;
   std::vector<Bin> bins_;
 };
 
-/// How far apart in time matching events may be, from near to far.
+/// Maximum distances in time of matching events, in increasing order.
 inline constexpr std::array<Microseconds, 3> match_distances = {1'000, 5'000, 10'000};
 
-/// The number of events that have a match within each of match_distances.
+/// Numbers of events with a match within each of match_distances.
 using MatchCounts = std::array<std::uint64_t, match_distances.size()>;
 
 /// Counts the events of each stream that have a match: an event of the other stream with the same
-/// polarity, at the same pixel or one of the eight around it, not too far away in time. Several
-/// events may match the same one.
+/// polarity, at the same pixel or one of its eight neighbours, close in time. Several events may
+/// match the same one.
 ///
-/// What came before an event is known when it comes: each pixel remembers its last event of either
-/// polarity. For what comes after it, an event without a near enough match waits at its pixel until
-/// one comes, or can come no more.
+/// Earlier matches are known when an event is added, because each pixel remembers its last event of
+/// either polarity. For later matches, an event without a close enough match waits at its pixel
+/// until one is added or it is too late for one.
 class EventMatcher {
  public:
   /// Throws std::bad_alloc, as does add().
   EventMatcher(int width, int height);
 
-  /// Takes an event inside the picture, not before the last one of either stream.
+  /// Adds an event, which must lie inside the sensor and not be earlier than the last one of either
+  /// stream.
   void add(StreamRole role, const AbsoluteEvent& event);
 
-  /// Counts of the events so far, matched with those so far.
+  /// Counts of matches among the events so far.
   const MatchCounts& matched(StreamRole role) const { return streams_[role].matched; }
 
  private:
-  using Number = std::uint64_t;  ///< of waiting events, in the order of time; 0 = none
+  using Number = std::uint64_t;  ///< index of a waiting event, in order of time; 0 = none
   static constexpr std::size_t max_waiting = std::size_t{1} << 23;
 
   struct Pixel {
-    Microseconds last;  ///< event
-    Number waiting;     ///< the last one to wait here
+    Microseconds last;  ///< time of the last event
+    Number waiting;     ///< latest waiting event at this pixel
   };
   struct Waiting {
     Microseconds time;
-    Microseconds nearest;  ///< distance of the nearest match
-    Number before;         ///< the one that waited at the same pixel before
+    Microseconds nearest;  ///< distance to the nearest match so far
+    Number before;         ///< previous waiting event at the same pixel
   };
   struct Stream {
     std::array<Image<Pixel>, 2> pixels;  ///< by polarity, with a margin of one
     std::deque<Waiting> waiting;
-    Number first = 1;  ///< in `waiting`
+    Number first = 1;  ///< number of the first event in `waiting`
     MatchCounts matched{};
   };
 
@@ -125,27 +126,27 @@ class EventMatcher {
   PerRole<Stream> streams_;
 };
 
-/// How alike two streams are.
+/// Similarity of two streams.
 struct ComparisonFigures {
-  Nanoseconds start = 0;  ///< of the time that both streams cover
+  Nanoseconds start = 0;  ///< start of the time covered by both streams
   Nanoseconds end = 0;
   PerRole<StreamFigures> streams;
-  double map_correlation = 0;  ///< of the events of each pixel
-  /// Of the events of each stream, those that have a match in the other.
+  double map_correlation = 0;  ///< correlation of the event counts per pixel
+  /// Fraction of events with a match in the other stream, per stream and match distance.
   PerRole<std::array<double, match_distances.size()>> match_shares;
 };
 
-/// Compares two streams of one sensor over the time that both cover.
+/// Compares two streams of the same sensor over the time that both cover.
 class StreamComparison {
  public:
   /// Throws std::bad_alloc, as does add().
   StreamComparison(int width, int height);
 
-  /// The stream that is known less far: whose events must come next.
+  /// The stream that lags behind; its events are needed next.
   StreamRole behind() const;
 
-  /// Takes the sorted events of (start, end] of one stream, which count their times from `start`.
-  /// Returns how many were skipped since they lie outside the picture.
+  /// Adds the sorted events of (start, end] of one stream, with times relative to `start`. Returns
+  /// the number of events skipped because they lie outside the sensor.
   std::size_t add(StreamRole role, std::span<const Event> events, Nanoseconds start,
                   Nanoseconds end);
 
@@ -156,16 +157,16 @@ class StreamComparison {
  private:
   struct Arriving {
     EventValidator validator;
-    std::vector<AbsoluteEvent> waiting{};  ///< for the other stream
-    std::size_t taken = 0;                 ///< of those, the first ones
+    std::vector<AbsoluteEvent> waiting{};  ///< events waiting for the other stream
+    std::size_t taken = 0;  ///< number of events at the front of `waiting` already processed
     std::optional<Nanoseconds> start{};
     Nanoseconds end = 0;
   };
 
-  /// What both streams cover, where they do.
+  /// Start of the time covered by both streams; none if they do not overlap yet.
   std::optional<Nanoseconds> start() const;
   Nanoseconds end() const;
-  /// Takes the waiting events up to `end`, of both streams in the order of time.
+  /// Processes the waiting events of both streams up to `end`, in order of time.
   void take_until(Microseconds end);
 
   PerRole<Arriving> arriving_;

@@ -11,7 +11,7 @@
 #define EVENTCAMERA_KIND_TABLES
 namespace eventcamera {
 
-/// For each byte of a pixel, a table of its value by kind, which SIMD code looks up.
+/// Lookup tables for SIMD code: the value of each byte of a pixel, by kind.
 struct KindTables {
   KindTables(const Palette& palette, const PixelLayout& layout) {
     const auto pixels = pixels_by_kind(palette, layout);
@@ -45,11 +45,11 @@ class RowPainter {
   /// Draws a row and clears it.
   void draw(std::uint8_t* fired, int width, std::uint8_t* out) const {
     const int lanes = static_cast<int>(hn::Lanes(Bytes()));
-    if (HWY_TARGET == HWY_SCALAR || width < lanes) {  // a vector of one pixel shuffles no tables
+    if (HWY_TARGET == HWY_SCALAR || width < lanes) {  // table lookups need a full vector
       draw_pixels(fired, width, out);
       return;
     }
-    // The last vector overlaps the last but one where the width is not a multiple of it.
+    // The last vector overlaps the one before if the width is not a multiple of the vector length.
     const int end = width - lanes;
     const auto last = hn::LoadU(Bytes(), fired + end);
     for (int x = 0; x < end; x += lanes)
@@ -92,7 +92,8 @@ class RowPainter {
   }
 
   const KindTables& kinds_;
-  HWY_ALIGN std::uint8_t silent_[bytes * hn::MaxLanes(Bytes())];  ///< a vector of them
+  HWY_ALIGN std::uint8_t
+      silent_[bytes * hn::MaxLanes(Bytes())];  ///< a vector of pixels without events
 };
 
 template <int bytes>
@@ -123,7 +124,7 @@ namespace eventcamera {
 HWY_EXPORT(draw_pixels);
 
 void Accumulator::add(std::span<const Event> events) {
-  // In locals, since a byte that is written may alias a member.
+  // In locals, because the bytes written might alias members.
   std::uint8_t* const fired = fired_.row(0);
   const auto stride = static_cast<std::size_t>(fired_.stride());
   for (const auto event : events)
@@ -141,7 +142,7 @@ void Accumulator::add(const EventBuckets& events, ThreadPool& threads) {
                    [&](int band, int) { add_band(events, static_cast<std::size_t>(band)); });
 }
 
-/// One band at a time, so that its rows stay in the cache from step to step.
+/// Adds one band at a time, so that its rows stay in the cache from step to step.
 void Accumulator::add_band(const EventBuckets& events, std::size_t band) {
   const auto buckets = events.buckets();
   for (std::size_t i = band; i < buckets.size(); i += static_cast<std::size_t>(events.bands()))

@@ -11,17 +11,17 @@
 
 namespace eventcamera {
 
-/// Accumulates events into a picture of which polarities fired at each pixel.
+/// Accumulates events into an image of the polarities that fired at each pixel.
 class Accumulator {
  public:
   Accumulator(int width, int height) : fired_(width, height) {}
 
-  /// Takes events, all of them inside the picture.
+  /// Adds events, which must all lie inside the picture.
   void add(std::span<const Event> events);
   void add(const EventBuckets& events);
   void add(const EventBuckets& events, ThreadPool& threads);
 
-  /// Draws what was accumulated and starts over. `stride` in bytes.
+  /// Draws the accumulated events and starts over. `stride` in bytes.
   void draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
 

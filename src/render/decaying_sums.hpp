@@ -11,7 +11,7 @@
 
 namespace eventcamera {
 
-/// Exponential decay, exp(-age / time constant), from a table.
+/// Table of the exponential decay exp(-age / time constant).
 class Exponential {
  public:
   /// `time_constant` must be above 0.
@@ -21,7 +21,7 @@ class Exponential {
       table_[i] = std::exp(-static_cast<float>(i) / steps_per_constant);
   }
 
-  /// Exact at age 0, within 0.01 % elsewhere; 0 where less than 1/3000 is left.
+  /// Exact at age 0, else accurate to 0.01 %; 0 below 1/3000.
   float after(Microseconds age) const {
     const float steps = static_cast<float>(age) * steps_per_microsecond_;
     if (!(steps < max_steps)) return 0;
@@ -38,14 +38,14 @@ class Exponential {
   std::array<float, static_cast<std::size_t>(max_steps) + 1> table_;
 };
 
-/// A sum of ON minus OFF for each pixel, which fades exponentially.
+/// Exponentially decaying sum of ON minus OFF events per pixel.
 class DecayingSums {
  public:
   /// Sums are clamped to [-`max`, `max`].
   DecayingSums(int width, int height, Microseconds time_constant, float max)
       : exponential_(time_constant), max_(max), sums_(width, height) {}
 
-  /// Takes an event inside the picture, not before the last one.
+  /// Adds an event, which must lie inside the picture and not be earlier than the last one.
   void add(const AbsoluteEvent& event) {
     auto& sum = sums_.at(event.x, event.y());
     const float step = event.polarity() == Polarity::on ? 1.0F : -1.0F;
@@ -53,7 +53,8 @@ class DecayingSums {
     sum.time = event.t;
   }
 
-  /// A row's sums at a time that is not before any event, as shares of the maximum.
+  /// Passes the sums of a row to `take`, as fractions of the maximum. `time` must not be before any
+  /// event.
   template <class Take>
   void read_row(int y, Microseconds time, const Take& take) const {
     const auto* row = sums_.row(y);
@@ -64,7 +65,7 @@ class DecayingSums {
  private:
   struct Sum {
     float value = 0;
-    Microseconds time = 0;  ///< of the last event
+    Microseconds time = 0;  ///< time of the last event
   };
 
   Exponential exponential_;

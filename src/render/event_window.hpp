@@ -10,7 +10,7 @@
 
 namespace eventcamera {
 
-/// A queue of events in a ring buffer that grows up to `max_size`.
+/// Queue of events: a ring buffer that grows up to `max_size`.
 class RecentEvents {
  public:
   static constexpr std::size_t max_size = std::size_t{1} << 23;
@@ -33,7 +33,7 @@ class RecentEvents {
   }
 
  private:
-  /// To a power of two, so that an index wraps by a mask.
+  /// Capacities are powers of two, so that indices wrap with a mask.
   void grow() {
     std::vector<AbsoluteEvent> larger(ring_.empty() ? 1024 : 2 * ring_.size());
     for (std::size_t i = 0; i < size_; ++i) larger[i] = ring_[(first_ + i) & (ring_.size() - 1)];
@@ -48,15 +48,15 @@ class RecentEvents {
 
 /// Limits of a window besides its length in time; 0 = no limit.
 struct WindowLimits {
-  std::size_t events = 0;       ///< in all
-  std::size_t area_events = 0;  ///< in any one area
-  int area_side = 16;           ///< areas are squares of so many pixels
+  std::size_t events = 0;       ///< in the window
+  std::size_t area_events = 0;  ///< in each area
+  int area_side = 16;           ///< side of the square areas, pixels
 
   friend bool operator==(const WindowLimits&, const WindowLimits&) = default;
 };
 
-/// The latest events, and how many of them each pixel has. Consecutive windows may overlap: an
-/// event costs work when it comes and when it leaves, not with each picture in between.
+/// Sliding window of the latest events, with counts per pixel. Windows of successive pictures may
+/// overlap at no extra cost: an event costs work only when it enters and when it leaves.
 class EventWindow {
  public:
   struct Counts {
@@ -66,11 +66,11 @@ class EventWindow {
 
   EventWindow(int width, int height, const WindowLimits& limits);
 
-  /// Takes an event inside the picture, not before the last one, and drops the oldest ones that the
-  /// limits no longer allow.
+  /// Adds an event, which must lie inside the picture and not be earlier than the last one, and
+  /// drops the oldest events beyond the limits.
   void add(const AbsoluteEvent& event);
 
-  /// Drops the events up to this time.
+  /// Drops the events at or before `time`.
   void begin_after(Microseconds time);
 
   const Counts* row(int y) const { return counts_.row(y); }
@@ -83,10 +83,10 @@ class EventWindow {
   RecentEvents events_;
   Image<Counts> counts_;
   int areas_across_;
-  std::vector<std::size_t> areas_;  ///< events in each, where they are limited
+  std::vector<std::size_t> areas_;  ///< number of events per area; empty if not limited
 };
 
-/// Which polarities a pixel has: bit 0 OFF, bit 1 ON.
+/// Polarities that a pixel has: bit 0 OFF, bit 1 ON.
 constexpr std::uint8_t kind_of(const EventWindow::Counts& counts) {
   return static_cast<std::uint8_t>((counts.off > 0 ? 1 : 0) + (counts.on > 0 ? 2 : 0));
 }

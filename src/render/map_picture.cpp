@@ -15,7 +15,7 @@
 namespace eventcamera {
 namespace {
 
-/// The event count that is shown in full colour.
+/// Event count shown in full colour.
 float full_scale(const Image<std::uint32_t>& map) {
   std::vector<std::uint32_t> counts;
   for (int y = 0; y < map.height(); ++y)
@@ -27,7 +27,7 @@ float full_scale(const Image<std::uint32_t>& map) {
   return static_cast<float>(*top);
 }
 
-/// Draws from column `left` on; value(x, y) is in [-1, 1].
+/// Draws a map at column `left`; value(x, y) is in [-1, 1].
 template <class Value>
 void draw(RgbPicture& picture, int left, const Image<std::uint32_t>& map, PaletteName palette,
           const Value& value) {

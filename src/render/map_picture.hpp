@@ -9,22 +9,22 @@
 
 namespace eventcamera {
 
-/// A picture in 24-bit RGB.
+/// 24-bit RGB image.
 struct RgbPicture {
   int width = 0;
   int height = 0;
   std::vector<std::uint8_t> pixels{};
 
-  /// Writes a PNG. Throws std::runtime_error, which says why it cannot.
+  /// Writes a PNG file. Throws std::runtime_error with the reason.
   void write_png(const std::string& path) const;
 };
 
-/// The events of each pixel from black, for none, to light yellow, for the 99.5 % quantile of the
-/// pixels that have any. Throws std::bad_alloc.
+/// Draws the event count per pixel, from black (none) to light yellow (99.5 % quantile of the
+/// pixels with events). Throws std::bad_alloc.
 RgbPicture draw_map(const Image<std::uint32_t>& map);
 
-/// The reference, the candidate and their difference, next to each other and in one scale: blue
-/// where the candidate has more events, red where it has fewer. Throws std::bad_alloc.
+/// Draws the reference, the candidate and their difference side by side, on the same scale: blue if
+/// the candidate has more events, red if it has fewer. Throws std::bad_alloc.
 RgbPicture draw_maps(const Image<std::uint32_t>& reference, const Image<std::uint32_t>& candidate);
 
 }  // namespace eventcamera

@@ -9,8 +9,7 @@
 namespace eventcamera {
 namespace {
 
-/// The pixels that a sensor pixel covers along one axis of the picture: [first, second), at least
-/// one.
+/// Pixels that a sensor pixel covers along one axis of the frame: [first, second), at least one.
 std::pair<int, int> covered(int at, int sensor, int picture) {
   const auto place = [sensor, picture](int x) {
     return static_cast<int>(std::int64_t{x} * picture / sensor);

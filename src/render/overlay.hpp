@@ -20,17 +20,17 @@ struct Size {
   friend bool operator==(const Size&, const Size&) = default;
 };
 
-/// Draws the events of a window over pictures, scaled to their size. Events and pictures come in
-/// the order of time.
+/// Draws the events of a time window over video frames, scaled to their size. Events and frames
+/// must be passed in order of time.
 class Overlay {
  public:
   /// Throws std::bad_alloc, as does add().
   Overlay(Size sensor, Size picture);
 
-  /// As Renderer::add().
+  /// Like Renderer::add().
   std::size_t add(std::span<const Event> events, Microseconds start);
 
-  /// Draws the events of (start, end] over a picture; `opacity` from 0 to 1. `stride` in bytes.
+  /// Draws the events of (start, end] over a frame; `opacity` from 0 to 1, `stride` in bytes.
   void draw(Microseconds start, Microseconds end, const Palette& palette, double opacity,
             const PixelLayout& layout, std::byte* picture, std::ptrdiff_t stride);
 
@@ -41,7 +41,7 @@ class Overlay {
   Size picture_;
   EventValidator validator_;
   EventWindow window_;
-  Image<std::uint8_t> kinds_;  ///< of the picture's pixels; all 0 between pictures
+  Image<std::uint8_t> kinds_;  ///< per pixel of the frame; all 0 between calls
 };
 
 }  // namespace eventcamera

@@ -17,10 +17,10 @@ constexpr Palette grey = {
 constexpr Palette red_blue = {
     .none = {255, 255, 255}, .off = {232, 56, 56}, .on = {32, 64, 224}, .both = {110, 0, 110}};
 
-/// A colour scale: a polynomial over [0, 1] for each of red, green and blue.
+/// Colour map: one polynomial over [0, 1] each for red, green and blue.
 using Scale = std::array<std::array<double, 7>, 3>;
 
-// Fitted by least squares to Matplotlib's scales of these names, within 6 of 255.
+// Least-squares fits to Matplotlib's colour maps of these names, accurate to 6 of 255.
 constexpr Scale viridis = {{{68.5, 51.3, -180.0, -1122.9, 1945.3, 564.9, -1074.8},
                             {1.1, 362.5, 17.7, -1376.2, 3504.7, -3458.6, 1179.7},
                             {84.3, 354.9, 104.9, -5494.1, 15897.8, -18220.6, 7308.8}}};
@@ -57,7 +57,7 @@ double from_linear(double value) {
   return 255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1 / 2.4) - 0.055);
 }
 
-/// A colour in Oklab (B. Ottosson, 2020), which is perceptually uniform.
+/// Colour in the perceptually uniform space Oklab (B. Ottosson, 2020).
 struct Oklab {
   double l, a, b;
 
@@ -95,7 +95,7 @@ Colour between(const Colour& from, const Colour& to, double share) {
   return Oklab{mix(a.l, b.l), mix(a.a, b.a), mix(a.b, b.b)}.colour();
 }
 
-/// The colour of each shade's value.
+/// Calls `colour_of` for the value of each shade.
 template <class ColourOf>
 Shades make_shades(const ColourOf& colour_of) {
   Shades made;

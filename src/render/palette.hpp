@@ -14,8 +14,7 @@ struct Colour {
   std::uint8_t blue;
 };
 
-/// The colours of accumulated events. The four of a palette differ in brightness too, for grey
-/// pictures.
+/// Colours of accumulated events. The four also differ in brightness, for grey output.
 struct Palette {
   Colour none;  ///< no event
   Colour off;   ///< OFF only
@@ -27,36 +26,36 @@ enum class PaletteName { light, dark, grey, red_blue, viridis, magma };
 
 const Palette& palette(PaletteName name);
 
-/// The colours of values from -1 to 1, by shade().
+/// Colours of values from -1 to 1, indexed by shade().
 using Shades = std::array<Colour, 256>;
 
-/// The shade of a value, clamped to [-1, 1].
+/// Index of a value, clamped to [-1, 1].
 constexpr std::uint8_t shade(float value) {
   const float scaled = 127 * std::clamp(value, -1.0F, 1.0F);
   return static_cast<std::uint8_t>(128.5F + scaled);
 }
 
-/// From the colour of no event to that of OFF below 0 and to that of ON above, in perceptually even
-/// steps. Viridis and magma show the magnitude alone.
+/// Perceptually uniform shades from the colour of no event to that of OFF for negative values, and
+/// to that of ON for positive ones. Viridis and magma show only the magnitude.
 const Shades& shades(PaletteName name);
 
-/// Where a picture's pixels go: one byte of grey, or bytes of red, green, blue and, in some
-/// layouts, one that is filled with 255.
+/// Layout of output pixels: one byte of grey, or bytes of red, green, blue and, in some layouts,
+/// one set to 255.
 struct PixelLayout {
-  int bytes = 1;                     ///< of a pixel: 1 = grey, else 3 or 4
-  int red = 0, green = 1, blue = 2;  ///< their places in it; unused for grey
+  int bytes = 1;                     ///< per pixel: 1 = grey, else 3 or 4
+  int red = 0, green = 1, blue = 2;  ///< byte offsets; unused for grey
 };
 
-/// The bytes of a pixel; as many as the layout has.
+/// Bytes of a pixel; only the first `bytes` of the layout are used.
 using PixelBytes = std::array<std::uint8_t, 4>;
 
-/// Brightness as BT.601 weighs it.
+/// BT.601 luma.
 constexpr std::uint8_t luma(const Colour& colour) {
   return static_cast<std::uint8_t>(
       (299 * colour.red + 587 * colour.green + 114 * colour.blue + 500) / 1000);
 }
 
-/// A pixel of this colour.
+/// Pixel of a colour.
 constexpr PixelBytes pixel(const Colour& colour, const PixelLayout& layout) {
   if (layout.bytes == 1) return {luma(colour)};
   PixelBytes bytes{255, 255, 255, 255};
@@ -66,7 +65,7 @@ constexpr PixelBytes pixel(const Colour& colour, const PixelLayout& layout) {
   return bytes;
 }
 
-/// The pixels of each kind of pixel, by the bits of the polarities that fired: 1 OFF, 2 ON.
+/// Pixels by kind, the bits of the polarities that fired: 1 OFF, 2 ON.
 constexpr std::array<PixelBytes, 4> pixels_by_kind(const Palette& palette,
                                                    const PixelLayout& layout) {
   return {pixel(palette.none, layout), pixel(palette.off, layout), pixel(palette.on, layout),

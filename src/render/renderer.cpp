@@ -8,7 +8,7 @@
 namespace eventcamera {
 namespace {
 
-/// The pixel of each shade or kind.
+/// Pixel of each shade or kind.
 using Pixels = std::array<PixelBytes, 256>;
 
 template <std::size_t bytes>

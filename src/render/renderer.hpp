@@ -17,27 +17,27 @@
 namespace eventcamera {
 
 enum class RenderMode {
-  accumulate,    ///< which polarities fired within a window
-  decay,         ///< the sum of ON minus OFF, fading exponentially
-  time_surface,  ///< how recent the last event is, by its polarity
+  accumulate,    ///< polarities that fired within a window
+  decay,         ///< exponentially decaying sum of ON minus OFF
+  time_surface,  ///< age and polarity of the last event
   count,         ///< ON minus OFF within a window
 };
 
-/// A change of any but the palette starts a new picture.
+/// A change of any setting except the palette forgets all events.
 struct RenderSettings {
   RenderMode mode = RenderMode::accumulate;
   PaletteName palette = PaletteName::dark;
-  WindowLimits limits{};                 ///< of accumulate and count
-  Microseconds time_constant = 100'000;  ///< of decay, and how long time_surface looks back
-  float full_scale = 2;                  ///< events that decay and count show in full colour
+  WindowLimits limits{};                 ///< for accumulate and count
+  Microseconds time_constant = 100'000;  ///< of decay; maximum age for time_surface
+  float full_scale = 2;  ///< number of events shown in full colour by decay and count
 
   friend bool operator==(const RenderSettings&, const RenderSettings&) = default;
 };
 
-/// Draws the events up to a moment as a picture. Events and pictures come in the order of time.
+/// Draws pictures of the events up to given times. Events and pictures must be in order of time.
 class Renderer {
  public:
-  /// Up to 65535 x 32768 pixels. Throws std::bad_alloc, as do configure() and add().
+  /// At most 65535 x 32768 pixels. Throws std::bad_alloc, as do configure() and add().
   Renderer(int width, int height, const RenderSettings& settings);
 
   void configure(const RenderSettings& settings);
@@ -45,12 +45,12 @@ class Renderer {
   /// Forgets all events and their times.
   void reset();
 
-  /// Takes sorted events that count their times from `start`. A late event is moved to the time of
-  /// the last one, or to after the last picture; one outside the picture is skipped. Returns how
-  /// many were skipped.
+  /// Adds sorted events whose times are relative to `start`. A late event is moved to the time of
+  /// the last one, or to just after the last picture; events outside the picture are skipped.
+  /// Returns the number of skipped events.
   std::size_t add(std::span<const Event> events, Microseconds start);
 
-  /// Draws the picture at `end`. The window of accumulate and count is (start, end]. `stride` in
+  /// Draws the picture at `end`. The window for accumulate and count is (start, end]. `stride` in
   /// bytes.
   void draw(Microseconds start, Microseconds end, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
@@ -69,7 +69,7 @@ class Renderer {
   RenderSettings settings_;
   Memory memory_;
   EventValidator validator_;
-  std::vector<std::uint8_t> row_;  ///< shades, or kinds, of the pixels of a row
+  std::vector<std::uint8_t> row_;  ///< shades or kinds of the pixels of a row
 };
 
 }  // namespace eventcamera

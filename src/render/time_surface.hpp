@@ -6,20 +6,20 @@
 
 namespace eventcamera {
 
-/// How long ago the last event of each pixel was, and its polarity.
+/// Age and polarity of the last event of each pixel.
 class TimeSurface {
  public:
-  /// Events older than `max_age`, which is above 0, are forgotten.
+  /// Events older than `max_age` > 0 are ignored.
   TimeSurface(int width, int height, Microseconds max_age)
       : max_age_(max_age), last_(width, height) {}
 
-  /// Takes an event inside the picture, not before the last one.
+  /// Adds an event, which must lie inside the picture and not be earlier than the last one.
   void add(const AbsoluteEvent& event) {
     last_.at(event.x, event.y()) = {event.t, event.polarity() == Polarity::on ? 1.0F : -1.0F};
   }
 
-  /// How recent a row's events are at a time that is not before any of them: from 1, just now, down
-  /// to 0; negative where the last event is OFF.
+  /// Passes a value per pixel of a row to `take`: from 1 for an event at `time` down to 0 at
+  /// `max_age`; negative if the last event is OFF. `time` must not be before any event.
   template <class Take>
   void read_row(int y, Microseconds time, const Take& take) const {
     const auto* row = last_.row(y);
