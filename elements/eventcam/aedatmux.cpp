@@ -4,16 +4,15 @@
  * @title: aedatmux
  * @short_description: writes AEDAT 4, events and frames in one file
  *
- * Writes one event stream, video beside it, or both, in the order of their times. The times in the
- * file are those of the event stream, floor(PTS / 1000) + t microseconds; video is synchronised to
- * it.
+ * Writes one event stream, one video stream, or both, in order of time. The times in the file are
+ * those of the event stream, floor(PTS / 1000) + t microseconds; video is synchronised to it.
  *
- * A flushing seek truncates the file and starts over. Events that are earlier than what is written,
- * or lie outside the sensor, are left out; a warning says how many.
+ * A flushing seek truncates the file and starts over. Events that are earlier than those already
+ * written, or outside the sensor, are dropped; a warning says how many.
  *
- * The file is written from start to end, and can go through a network. Where downstream can seek,
- * as filesink can, the file also ends with a table of its packets, which its header points to, so
- * that readers can seek and know the duration.
+ * The file is written sequentially, so it can be streamed over a network. If downstream can seek,
+ * as filesink can, the file also ends with a table of its packets, which lets readers seek and know
+ * the duration.
  *
  * ## Example launch line
  * |[
@@ -55,7 +54,7 @@ struct Settings {
   Aedat4Compression compression = Aedat4Compression::lz4;
 };
 
-/// Events wait for no more than this to become a packet.
+/// Maximum time that events wait to be written as a packet.
 constexpr Microseconds max_wait = 100'000;
 
 struct UnrefPad {
@@ -65,14 +64,14 @@ using Pad = std::unique_ptr<GstAggregatorPad, UnrefPad>;
 
 using Bytes = std::vector<guint8>;
 
-/// The file that is written, from caps to stop.
+/// State of the file being written, from caps to stop.
 struct State {
-  SensorSize size;  ///< of the event stream
+  SensorSize size;  ///< size of the event stream
   std::optional<GstVideoInfo> video;
-  std::string source;                      ///< the camera's name
-  std::unique_ptr<Aedat4Encoder> encoder;  ///< none before the header
-  gint64 shift = 0;                        ///< nanoseconds from the running time to the file's
-  Microseconds flushed = 0;                ///< when events were last made a packet
+  std::string source;                      ///< name of the camera
+  std::unique_ptr<Aedat4Encoder> encoder;  ///< null until the header is written
+  gint64 shift = 0;                        ///< offset from running time to file time, nanoseconds
+  Microseconds flushed = 0;                ///< file time of the last flushed packet
   WarnOnce warn;
 };
 
@@ -83,7 +82,7 @@ struct GstAedatMuxPrivate {
 
   GuardedSettings<Settings> settings;
 
-  // The streaming thread's, or nobody's while there is none.
+  // Accessed by the streaming thread only, or while there is none.
   State state;
   WritableEvents writable;
 };
@@ -134,7 +133,7 @@ static Pad pad_named(GstAedatMux* self, const char* name) {
   return Pad(pad == nullptr ? nullptr : GST_AGGREGATOR_PAD(pad));
 }
 
-/// GST_CLOCK_TIME_NONE where it has none.
+/// Running time of a buffer; GST_CLOCK_TIME_NONE if it has none.
 static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
   GST_OBJECT_LOCK(pad);
   const GstSegment segment = pad->segment;
@@ -143,7 +142,7 @@ static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
   return gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
 }
 
-/// The pad whose next buffer is the earliest; one without a time comes before all. None where no
+/// Returns the pad with the earliest next buffer; a buffer without a time comes first. Null if no
 /// pad has a buffer.
 static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   Pad earliest;
@@ -161,7 +160,7 @@ static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   return earliest;
 }
 
-/// Warns of input that is left out.
+/// Warns about dropped input.
 static void warn(GstAedatMux* self, const char* what, const std::string& cause) {
   self->priv->state.warn(self, {GST_STREAM_ERROR_MUX, std::string("Left out ") + what + "."},
                          cause);
@@ -169,7 +168,7 @@ static void warn(GstAedatMux* self, const char* what, const std::string& cause) 
 
 /* output */
 
-/// Takes what is in `bytes`.
+/// Pushes `bytes` downstream.
 static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = false) {
   if (bytes.empty()) return GST_FLOW_OK;
   auto owner = std::make_unique<Bytes>(std::move(bytes));
@@ -182,7 +181,7 @@ static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = fa
   return gst_aggregator_finish_buffer(GST_AGGREGATOR(self), buffer);
 }
 
-/// Sets the output's caps, with the header for those who come in later.
+/// Sends the caps, with the header as streamheader for late joiners.
 static void send_caps(GstAedatMux* self, const Bytes& header) {
   const OwnedCaps caps(
       gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr));
@@ -198,7 +197,7 @@ static void send_caps(GstAedatMux* self, const Bytes& header) {
   gst_aggregator_set_src_caps(GST_AGGREGATOR(self), caps.get());
 }
 
-/// Lets the next buffer go to `position` of the file.
+/// Positions the next buffer at `position` in the file.
 static void send_segment(GstAedatMux* self, guint64 position) {
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_BYTES);
@@ -206,7 +205,8 @@ static void send_segment(GstAedatMux* self, guint64 position) {
   gst_aggregator_update_segment(GST_AGGREGATOR(self), &segment);
 }
 
-/// From the running time to the PTS of the event stream, or of the video where there is none.
+/// Offset from running time to the PTS of the event stream, or of the video if there is no event
+/// stream.
 static gint64 shift_of(GstAedatMux* self) {
   Pad pad = pad_named(self, events_name);
   if (!pad) pad = pad_named(self, video_name);
@@ -239,7 +239,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   return push_bytes(self, std::move(header), true);
 }
 
-/// Writes the end of the file, and its place into the header. May throw.
+/// Writes the end of the file, and patches the header. May throw.
 static GstFlowReturn end_file(GstAedatMux* self) {
   State& state = self->priv->state;
   self->priv->writable.end_file();
@@ -252,12 +252,12 @@ static GstFlowReturn end_file(GstAedatMux* self) {
   return push_bytes(self, std::move(patch->bytes));
 }
 
-/// The file's time of a running time, in microseconds.
+/// Converts running time to file time, in microseconds.
 static Microseconds file_time(const State& state, GstClockTime running) {
   return std::max<gint64>(static_cast<gint64>(running) + state.shift, 0) / 1000;
 }
 
-/// Adds the events of a buffer that begins at `start`. May throw.
+/// Encodes the events of a buffer that starts at `start`. May throw.
 static void write_events(GstAedatMux* self, GstBuffer* buffer, Microseconds start, Bytes& out) {
   State& state = self->priv->state;
   const MappedEvents mapped(buffer);
@@ -269,7 +269,7 @@ static void write_events(GstAedatMux* self, GstBuffer* buffer, Microseconds star
   state.encoder->encode(self->priv->writable.pick(mapped.events(), start), out);
 }
 
-/// Adds a frame. May throw.
+/// Encodes a frame. May throw.
 static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, Bytes& out) {
   State& state = self->priv->state;
   const auto reject = [&](const char* cause) {
@@ -320,14 +320,14 @@ static bool is_at_end(GstAedatMux* self, const char* name) {
   return !pad || gst_aggregator_pad_is_eos(pad.get());
 }
 
-/// Whether the header can be written.
+/// True if enough is known to write the header.
 static bool is_known(GstAedatMux* self) {
   const State& state = self->priv->state;
   if (state.size != SensorSize{}) return true;
   return is_at_end(self, events_name) && state.video;
 }
 
-/// Writes the header, the earliest buffer, or what ends the file. May throw.
+/// Writes the header, the earliest buffer, or the end of the file. May throw.
 static GstFlowReturn write_some(GstAedatMux* self) {
   auto& encoder = self->priv->state.encoder;
   const bool ended = is_at_end(self, events_name) && is_at_end(self, video_name);
@@ -357,7 +357,7 @@ static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) 
       [&] { return write_some(self); });
 }
 
-/// Live, no pad is waited for longer than until the time of the earliest buffer.
+/// Live pipelines wait for other pads until the running time of the earliest buffer.
 static GstClockTime get_next_time(GstAggregator* aggregator) {
   auto* self = GST_AEDAT_MUX(aggregator);
   GstClockTime time = GST_CLOCK_TIME_NONE;
@@ -405,7 +405,7 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
 static gboolean src_event(GstAggregator* aggregator, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_SEEK)
     return PARENT_AGGREGATOR_CLASS->src_event(aggregator, event);
-  gst_event_unref(event);  // a file is written once, from its beginning
+  gst_event_unref(event);  // a file is written once, from its start
   return FALSE;
 }
 
@@ -447,7 +447,7 @@ static gboolean stop(GstAggregator* aggregator) {
   return TRUE;
 }
 
-/// After a flush: filesink has truncated the file, and a demuxer expects a header.
+/// After a flush, filesink has truncated the file, so start with a new header.
 static GstFlowReturn flush(GstAggregator* aggregator) {
   State& state = GST_AEDAT_MUX(aggregator)->priv->state;
   state.encoder.reset();
@@ -502,5 +502,5 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   aggregator_class->start = start;
   aggregator_class->stop = stop;
   aggregator_class->flush = flush;
-  aggregator_class->negotiate = nullptr;  // the caps are the header's
+  aggregator_class->negotiate = nullptr;  // send_caps() sets the caps
 }

@@ -2,25 +2,25 @@
 /**
  * SECTION:element-eventcompare
  * @title: eventcompare
- * @short_description: measures how alike two streams of events are
+ * @short_description: measures the similarity of two event streams
  *
  * Compares the stream on the pad `candidate`, which it passes through, with the one on the pad
- * `reference`, over the time that both cover. The two are synchronized by their stream times, and
- * must be of sensors of the same size. At EOS of the candidate, or on stop, it posts an element
- * message `eventcompare`:
+ * `reference`, over the time that both cover. The two are synchronized by stream time, and their
+ * sensors must have the same size. At EOS of the candidate, or on stop, it posts an element message
+ * `eventcompare`:
  *
- * - `start`, `end` (#gint64): the time that both cover, in stream time (ns);
- * - `reference`, `candidate` (#GstStructure): the figures of each, as #GstEventStats has them;
- * - `map-correlation` (#gdouble): Pearson's, of the events per pixel;
- * - `reference-matches`, `candidate-matches` (#GstStructure): the shares of the events of either
+ * - `start`, `end` (#gint64): the time covered by both, in stream time (ns);
+ * - `reference`, `candidate` (#GstStructure): the statistics of each, as in #GstEventStats;
+ * - `map-correlation` (#gdouble): Pearson correlation of the events per pixel;
+ * - `reference-matches`, `candidate-matches` (#GstStructure): the fractions of the events of each
  *   stream that have a match in the other, of the same polarity, at the same pixel or next to it
  *   (#gdouble, `within-1ms`, `within-5ms`, `within-10ms`);
  * - `rate-curve` (#GstStructure): event counts in bins of `bin` ns (#guint64), as two arrays,
  *   `reference` and `candidate`.
  *
- * The same is written to #GstEventCompare:location as JSON, and to #GstEventCompare:map a picture
- * of the events per pixel: of the reference, of the candidate and of their difference, blue where
- * the candidate has more and red where it has fewer.
+ * The same is written to #GstEventCompare:location as JSON. #GstEventCompare:map shows the events
+ * per pixel of the reference, of the candidate and of their difference, blue if the candidate has
+ * more and red if it has fewer.
  *
  * ## Example launch line
  * |[
@@ -84,15 +84,15 @@ class EventCompare final : public EventAggregator {
 
   const PerRole<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
 
-  // The source pad's thread's, or nobody's while there is none.
+  // Accessed by the source pad's thread only, or while there is none.
   PerRole<std::optional<Sensor>> sensors_;
-  std::optional<StreamComparison> comparison_;  // once both sensors are known
-  bool concluded_ = true;                       // no events have come since the last report
+  std::optional<StreamComparison> comparison_;  // set once both sensors are known
+  bool concluded_ = true;                       // no events since the last report
 };
 
 /* figures */
 
-/// Moves a structure into a field of another.
+/// Moves a structure into a field of another one.
 void put_structure(GstStructure* structure, const char* field, GstStructure* value) {
   gst_structure_set(structure, field, GST_TYPE_STRUCTURE, value, nullptr);
   gst_structure_free(value);
@@ -141,7 +141,7 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   return structure;
 }
 
-/// Posts and writes the figures; those of no events where the comparison has not begun.
+/// Posts and writes the statistics; those of empty streams if the comparison has not begun.
 void EventCompare::conclude() {
   concluded_ = true;
   const StreamComparison nothing(1, 1);
@@ -154,7 +154,7 @@ void EventCompare::conclude() {
 
 /* events */
 
-/// Takes a buffer into the comparison. May throw.
+/// Adds a buffer to the comparison. May throw.
 void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   const auto interval = interval_of(buffer);
   const MappedEvents mapped(buffer);
@@ -174,7 +174,7 @@ bool EventCompare::is_over(StreamRole role) const {
   return gst_aggregator_pad_is_eos(pads_[role]) && !gst_aggregator_pad_has_buffer(pads_[role]);
 }
 
-/// Returns whether there is anything to compare, now that caps have come. May throw.
+/// Starts the comparison once both sensors are known. Returns true if it is running. May throw.
 bool EventCompare::begin() {
   const auto& reference = sensors_[StreamRole::reference];
   const auto& candidate = sensors_[StreamRole::candidate];
@@ -186,7 +186,7 @@ bool EventCompare::begin() {
   return true;
 }
 
-/// Takes the next buffer of either stream. May throw.
+/// Processes the next buffer of either stream. May throw.
 GstFlowReturn EventCompare::take_next() {
   const bool comparing = begin();
   const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
@@ -243,7 +243,7 @@ void EventCompare::stop() {
 }  // namespace
 
 DEFINE_EVENT_AGGREGATOR(GstEventCompare, gst_event_compare, EVENT_COMPARE, EventCompare,
-                        eventcompare, GST_RANK_NONE, "how alike two streams of events are")
+                        eventcompare, GST_RANK_NONE, "similarity of event streams")
 
 static void gst_event_compare_class_init(GstEventCompareClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
@@ -261,5 +261,5 @@ static void gst_event_compare_class_init(GstEventCompareClass* klass) {
       GST_EVENT_AGGREGATOR_CLASS(klass), {&reference_template, &candidate_template, &src_template});
   gst_element_class_set_static_metadata(
       GST_ELEMENT_CLASS(klass), "Event comparison", "Filter/Analyzer",
-      "Measures how alike two streams of events are", "gst-eventsim");
+      "Measures the similarity of two event streams", "gst-eventsim");
 }

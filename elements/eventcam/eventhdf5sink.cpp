@@ -4,12 +4,12 @@
  * @title: eventhdf5sink
  * @short_description: writes HDF5 files of events
  *
- * Writes events as an HDF5 file in the layout of DSEC or of Metavision, whose arrays h5py reads as
- * they are. The times written are those of the PTS.
+ * Writes events as an HDF5 file in the layout of DSEC or Metavision, whose arrays can be read
+ * directly with h5py. Written times are those of the PTS.
  *
- * The file is complete at the end of the stream, or when the pipeline is stopped before. A flushing
- * seek truncates the file and starts over. Events that are earlier than what is written, or lie
- * outside the sensor, are left out; a warning says how many.
+ * The file is complete at the end of the stream, or when the pipeline is stopped. A flushing seek
+ * truncates the file and starts over. Events that are earlier than those already written, or
+ * outside the sensor, are dropped; a warning says how many.
  *
  * ## Example launch line
  * |[
@@ -44,11 +44,11 @@ struct Settings {
   Hdf5Writer::Compression compression = Hdf5Writer::Compression::gzip;
 };
 
-/// The file, from caps to stop.
+/// State of the file, from caps to stop.
 struct State {
   GstEventCameraInfo info = {};
-  std::unique_ptr<Hdf5Writer> writer;  ///< none before caps, and after the end
-  bool begun = false;                  ///< there are events in it
+  std::unique_ptr<Hdf5Writer> writer;  ///< null before caps and after the end
+  bool begun = false;                  ///< events were written
   bool ended = false;
 };
 
@@ -59,7 +59,7 @@ struct GstEventHdf5SinkPrivate {
 
   GuardedSettings<Settings> settings;
 
-  // The streaming thread's, or nobody's while there is none.
+  // Accessed by the streaming thread only, or while there is none.
   State state;
   WritableEvents writable;
 };
@@ -107,8 +107,7 @@ static GType compression_type() {
 
 /* the file */
 
-/// Runs what may throw. What is thrown is reported, and ends the file: nothing of it can be saved
-/// by writing on.
+/// Runs `work`; reports any exception and ends the file, because writing on could not repair it.
 template <class Work>
 static bool reported(GstEventHdf5Sink* self, const Work& work) {
   return guarded(
@@ -124,7 +123,7 @@ static bool reported(GstEventHdf5Sink* self, const Work& work) {
       work);
 }
 
-/// Writes what is held back, and closes the file.
+/// Writes pending events and closes the file.
 static bool end_file(GstEventHdf5Sink* self) {
   State& state = self->priv->state;
   state.ended = true;
@@ -133,10 +132,10 @@ static bool end_file(GstEventHdf5Sink* self) {
   return !writer || reported(self, [&] { writer->close(); });
 }
 
-/// Begins a file of events of this sensor, and overwrites what is there.
+/// Starts a new file for events of this sensor, overwriting any existing file.
 static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
   auto* priv = self->priv;
-  priv->state = State();  // to the library two open files of one name are one
+  priv->state = State();  // close first: HDF5 treats two open files of the same name as one
   priv->state.info = info;
   priv->writable.begin_file({info.width, info.height});
   const auto [location, layout, compression] = priv->settings.copy();
@@ -166,7 +165,7 @@ static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
   const State& state = self->priv->state;
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {
-    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are no events", caps);
+    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
     return FALSE;
   }
   if (state.ended) return TRUE;
@@ -192,7 +191,7 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   return written ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/// The file is complete before the application hears of the end, and starts over after a flush.
+/// Completes the file before EOS is posted to the application, and starts over after a flush.
 static gboolean event(GstBaseSink* sink, GstEvent* event) {
   auto* self = GST_EVENT_HDF5_SINK(sink);
   const State& state = self->priv->state;

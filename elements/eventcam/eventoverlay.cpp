@@ -4,10 +4,10 @@
  * @title: eventoverlay
  * @short_description: draws events over video
  *
- * Draws the events of the pad `events` over the video of the pad `sink`: over each frame the events
- * of the interval that begins with it, or of the last #GstEventOverlay:accumulation-time of that
- * interval. The two are synchronized by their running times. The events of a sensor of another size
- * are scaled to the video.
+ * Draws the events of the pad `events` over the video of the pad `sink`. Each frame shows the
+ * events of the interval that it starts, or those of the #GstEventOverlay:accumulation-time before
+ * the interval's end. The two are synchronized by running time. Events are scaled to the video if
+ * the sensor has a different size.
  *
  * ## Example launch line
  * |[
@@ -38,7 +38,7 @@ using eventcamera::Size;
 
 namespace {
 
-/// What the application sets, copied once per frame.
+/// User-settable values, copied once per frame.
 struct Settings {
   GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_RED_BLUE;
   gdouble opacity = 1;
@@ -69,17 +69,17 @@ class EventOverlay final : public EventAggregator {
 
   GstAggregatorPad* const events_pad_ = pad("events");
 
-  // The source pad's thread's, or nobody's while there is none.
+  // Accessed by the source pad's thread only, or while there is none.
   std::optional<GstVideoInfo> video_;
   std::optional<Size> sensor_;
-  std::optional<Overlay> overlay_;  // once both are known
-  gsize taken_ = 0;                 // events of the buffer that is queued first
-  GstClockTime known_ = 0;          // events are in up to this running time
+  std::optional<Overlay> overlay_;  // set once both are known
+  gsize taken_ = 0;                 // number of processed events of the first queued buffer
+  GstClockTime known_ = 0;          // running time up to which events are complete
 };
 
 /* time */
 
-/// An interval in running time.
+/// Converts an interval to running time.
 std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
                                               const EventInterval& interval) {
   const auto start = running_time(pad, interval.start);
@@ -87,7 +87,7 @@ std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
   return EventInterval{*start, *start + (interval.end - interval.start)};
 }
 
-/// How long a frame stands, in running time.
+/// Interval that a frame is shown, in running time.
 std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) const {
   const GstClockTime start = GST_BUFFER_PTS(frame);
   if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
@@ -99,7 +99,7 @@ std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) c
 
 /* events */
 
-/// Takes the events of a buffer up to some running time. Returns whether these were all. May throw.
+/// Adds the events of a buffer up to running time `end`. Returns true if these were all. May throw.
 bool EventOverlay::take_events(GstBuffer* buffer, GstClockTime start, GstClockTime end) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
@@ -114,8 +114,8 @@ bool EventOverlay::take_events(GstBuffer* buffer, GstClockTime start, GstClockTi
   return due.size() == rest.size();
 }
 
-/// Takes what is due of the buffer that is queued first. Returns whether more is to come before
-/// `end`, a running time. May throw.
+/// Adds the events of the first queued buffer up to running time `end`. Returns true if more are
+/// needed to reach `end`. May throw.
 bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
   const auto interval = interval_of(buffer);
   const auto running = interval ? running_interval(events_pad_, *interval) : std::nullopt;
@@ -129,8 +129,8 @@ bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
   return known_ + event_resolution <= end;
 }
 
-/// Takes the events up to `end`, a running time. Returns whether these are all that there will be,
-/// as far as can be known. May throw.
+/// Adds the events up to running time `end`. Returns true if no more are expected before `end`. May
+/// throw.
 bool EventOverlay::take_events_until(GstClockTime end) {
   while (known_ + event_resolution <= end) {
     const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(events_pad_));
@@ -160,7 +160,7 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
   return GST_FLOW_OK;
 }
 
-/// Draws on the frame that is queued first, and pushes it. May throw.
+/// Draws on the first queued frame and pushes it. May throw.
 GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& interval,
                                        bool timed_out) {
   if (interval && sensor_) {
@@ -182,11 +182,11 @@ GstFlowReturn EventOverlay::aggregate(bool timed_out) {
   if (frame == nullptr)
     return gst_aggregator_pad_is_eos(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
   const auto interval = video_ ? interval_of_frame(frame) : std::nullopt;
-  gst_buffer_unref(frame);  // else it could not be drawn on where it lies
+  gst_buffer_unref(frame);  // otherwise it would not be writable in place
   return video_ ? take_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
 }
 
-/// When a frame from a live source goes on without events.
+/// Time at which a live frame is pushed without waiting for events.
 GstClockTime EventOverlay::next_time() {
   const OwnedBuffer frame(gst_aggregator_pad_peek_buffer(main_pad()));
   if (!frame || !GST_BUFFER_PTS_IS_VALID(frame.get())) return GST_CLOCK_TIME_NONE;
@@ -253,8 +253,8 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
                         GST_TYPE_EVENT_CAMERA_PALETTE, defaults.palette, flags));
   properties.add(&Settings::opacity,
                  g_param_spec_double("opacity", "Opacity",
-                                     "How much of the video events cover (0 = nothing, 1 = all)", 0,
-                                     1, defaults.opacity, flags));
+                                     "Opacity of drawn events (0 = invisible, 1 = opaque)", 0, 1,
+                                     defaults.opacity, flags));
   properties.add(
       &Settings::accumulation_time,
       g_param_spec_uint64("accumulation-time", "Accumulation time",

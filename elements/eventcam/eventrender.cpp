@@ -4,20 +4,20 @@
  * @title: eventrender
  * @short_description: draws events as video
  *
- * Turns a stream of events into video, at the framerate that downstream asks for (default 30/1). A
+ * Turns an event stream into video, at the framerate that downstream requests (default 30/1). A
  * picture shows the state at the end of its interval, PTS + duration.
  *
- * - `accumulate`: where ON, OFF or both fired within a window;
- * - `decay`: the sum of ON minus OFF, which fades exponentially;
- * - `time-surface`: how long ago a pixel fired, by the polarity of its last event;
+ * - `accumulate`: pixels with ON, OFF or both within a window;
+ * - `decay`: the exponentially decaying sum of ON minus OFF;
+ * - `time-surface`: age and polarity of the last event of each pixel;
  * - `count`: ON minus OFF within a window.
  *
- * The window is as long as a picture lasts, or #GstEventRender:accumulation-time; then windows may
- * overlap. #GstEventRender:event-count and #GstEventRender:area-event-count limit it by the number
- * of events instead of by time.
+ * The window is as long as a picture's interval, or #GstEventRender:accumulation-time; windows may
+ * then overlap. #GstEventRender:event-count and #GstEventRender:area-event-count limit the window
+ * by the number of events instead of by time.
  *
- * Without events there are pictures too: through GAP events and, from a live source, by the clock.
- * At framerate 0/1 each buffer of events becomes one picture.
+ * Pictures continue without events: through GAP events and, from a live source, by the clock. At
+ * framerate 0/1 each buffer of events becomes one picture.
  *
  * ## Example launch line
  * |[
@@ -51,16 +51,16 @@ using eventcamera::RenderSettings;
 
 namespace {
 
-/// A gap between buffers is drawn through up to this length, which no interval exceeds.
+/// Maximum gap between buffers that is filled with pictures; no interval is longer.
 constexpr GstClockTime max_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
 
-/// How long to wait for the first input of a live source.
+/// Maximum time to wait for the first input of a live source.
 constexpr GstClockTime max_wait = 200 * GST_MSECOND;
 
-/// How far decay and time-surface look back by default.
+/// Default time constant of decay and maximum age of time-surface.
 constexpr GstClockTime default_memory = 100 * GST_MSECOND;
 
-/// What the application sets, copied once per picture.
+/// User-settable values, copied once per picture.
 struct Settings {
   RenderMode mode = RenderMode::accumulate;
   GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
@@ -71,8 +71,8 @@ struct Settings {
   gdouble full_scale = 2;
 };
 
-/// Those of the core; what a mode does not use keeps its default, so that changing it does not
-/// start a new picture.
+/// Converts to the core's settings. Settings that a mode does not use keep their defaults, so that
+/// changing them does not reset the picture.
 RenderSettings core_settings(const Settings& settings) {
   RenderSettings core;
   core.mode = settings.mode;
@@ -89,7 +89,7 @@ RenderSettings core_settings(const Settings& settings) {
   return core;
 }
 
-/// Where the window of the picture of an interval begins.
+/// Start of the window for the picture of an interval.
 Microseconds window_start(const Settings& settings, const EventInterval& interval) {
   if (settings.accumulation_time > 0)
     return interval.end > settings.accumulation_time
@@ -99,7 +99,7 @@ Microseconds window_start(const Settings& settings, const EventInterval& interva
   return static_cast<Microseconds>(interval.start / 1000);
 }
 
-/// The intervals of pictures at a framerate, one after the other.
+/// Successive intervals of pictures at a framerate.
 class FrameTimes {
  public:
   FrameTimes(GstClockTime origin, const GstVideoInfo& video)
@@ -107,15 +107,15 @@ class FrameTimes {
         fps_n_(static_cast<guint64>(GST_VIDEO_INFO_FPS_N(&video))),
         fps_d_(static_cast<guint64>(GST_VIDEO_INFO_FPS_D(&video))) {}
 
-  /// Rounded up: the intervals of others at the same framerate, rounded down each, then end within
-  /// ours.
+  /// Interval of the picture's events. Rounded up, so that intervals of other elements at the same
+  /// framerate, which are rounded down, end within it.
   EventInterval events() const {
     const auto at = [this](guint64 index) {
       return origin_ + gst_util_uint64_scale_ceil(index, fps_d_ * GST_SECOND, fps_n_);
     };
     return {at(index_), at(index_ + 1)};
   }
-  /// What the picture's buffer says.
+  /// Timestamps of the picture's buffer.
   EventInterval picture() const {
     const auto at = [this](guint64 index) {
       return origin_ + gst_util_uint64_scale(index, fps_d_ * GST_SECOND, fps_n_);
@@ -131,12 +131,12 @@ class FrameTimes {
   guint64 index_ = 0;
 };
 
-/// What exists between caps and stop.
+/// State from caps to stop.
 struct State {
   int width;
   int height;
   Renderer renderer;
-  std::optional<GstVideoInfo> video{};  ///< what goes out, once that is negotiated
+  std::optional<GstVideoInfo> video{};  ///< output format, once negotiated
 
   bool has_framerate() const { return GST_VIDEO_INFO_FPS_N(&*video) > 0; }
 };
@@ -175,22 +175,22 @@ class EventRender final : public EventAggregator {
   GstFlowReturn push_next_picture();
   void drain();
 
-  std::mutex mutex_;           // guards what follows; nothing is called under it
-  GstClockTime earliest_ = 0;  // running time before which pictures would come too late
+  std::mutex mutex_;           // guards earliest_; make no calls while holding it
+  GstClockTime earliest_ = 0;  // running time before which pictures are too late
 
-  // The source pad's thread's, or nobody's while there is none.
+  // Accessed by the source pad's thread only, or while there is none.
   std::optional<State> state_;
-  std::optional<FrameTimes> times_;  // of the next picture, once the first event is near
-  std::optional<gsize> taken_;       // events of the buffer that is queued first, once looked at
-  GstClockTime known_ = 0;           // events are in up to here
-  std::optional<GstClockTime> waiting_since_;  // for the first event, in running time
-  bool discontinuous_ = false;                 // the next picture does not follow on the last one
+  std::optional<FrameTimes> times_;  // interval of the next picture, once the first event is near
+  std::optional<gsize> taken_;       // number of processed events of the first queued buffer
+  GstClockTime known_ = 0;           // time up to which events are complete
+  std::optional<GstClockTime> waiting_since_;  // for the first event; running time
+  bool discontinuous_ = false;                 // the next picture is discontinuous
 };
 
 /* events */
 
-/// Draws the events of a buffer up to some time; all of them where none is given. Returns whether
-/// these were all. May throw.
+/// Adds the events of a buffer up to `end`, or all if there is none. Returns true if these were
+/// all. May throw.
 bool EventRender::take_events(const MappedEvents& mapped, std::optional<GstClockTime> end,
                               GstBuffer* buffer) {
   const auto rest = mapped.events().subspan(std::min(*taken_, mapped.events().size()));
@@ -207,8 +207,8 @@ void EventRender::drop_buffer() {
   gst_aggregator_pad_drop_buffer(main_pad());
 }
 
-/// Moves on to the time of a buffer. Returns whether a picture is due before it can be taken. May
-/// throw.
+/// Advances to the time of a buffer. Returns true if a picture is due before the buffer can be
+/// processed. May throw.
 bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
   if (!taken_) {
     const bool returns =
@@ -224,7 +224,8 @@ bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
   return times_ && interval.start >= times_->events().end;
 }
 
-/// Takes what is due of a buffer, and pushes the picture that this completes. May throw.
+/// Adds the events of a buffer that are due, and pushes the picture that this completes, if any.
+/// May throw.
 GstFlowReturn EventRender::take_buffer(GstBuffer* buffer) {
   const auto interval = interval_of(buffer);
   if (!interval) {
@@ -253,7 +254,7 @@ GstFlowReturn EventRender::take_buffer(GstBuffer* buffer) {
   return push_picture(*interval, *interval);
 }
 
-/// A live source sends nothing: the first picture begins now.
+/// Starts the first picture now, because a live source sends nothing.
 void EventRender::begin_now() {
   const GstSegment segment = segment_of(main_pad());
   const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
@@ -264,7 +265,7 @@ void EventRender::begin_now() {
 
 GstFlowReturn EventRender::aggregate(bool timed_out) {
   GstAggregatorPad* pad = main_pad();
-  if (timed_out) waiting_since_.reset();  // where nothing can begin yet, wait as long again
+  if (timed_out) waiting_since_.reset();  // if no picture can start yet, wait once more
   if (!state_ || !state_->video) {
     if (gst_aggregator_pad_is_eos(pad)) return GST_FLOW_EOS;
     return gst_aggregator_pad_has_buffer(pad) ? GST_FLOW_NOT_NEGOTIATED
@@ -291,7 +292,7 @@ GstClockTime EventRender::next_time() {
 
 /* pictures */
 
-/// Whether sinks would drop a picture anyway.
+/// True if sinks would drop the picture anyway.
 bool EventRender::is_too_late(const EventInterval& picture) {
   const auto time = running_time(main_pad(), picture.start);
   const std::lock_guard lock(mutex_);
@@ -317,7 +318,7 @@ GstFlowReturn EventRender::acquire_buffer(GstBuffer** buffer) {
   GstBufferPool* pool = gst_aggregator_get_buffer_pool(element());
   if (pool == nullptr) return GST_FLOW_NOT_NEGOTIATED;
   GstFlowReturn result = GST_FLOW_ERROR;
-  if (gst_buffer_pool_set_active(pool, TRUE))  // GstAggregator leaves that to us
+  if (gst_buffer_pool_set_active(pool, TRUE))  // GstAggregator does not activate it
     result = gst_buffer_pool_acquire_buffer(pool, buffer, nullptr);
   else
     GST_ELEMENT_ERROR(element(), RESOURCE, SETTINGS,
@@ -347,7 +348,7 @@ GstFlowReturn EventRender::push_picture(const EventInterval& events, const Event
   return gst_aggregator_finish_buffer(element(), buffer.release());
 }
 
-/// Draws the picture that is due and pushes it. May throw.
+/// Draws the next picture and pushes it. May throw.
 GstFlowReturn EventRender::push_next_picture() {
   const EventInterval events = times_->events();
   const EventInterval picture = times_->picture();
@@ -357,12 +358,12 @@ GstFlowReturn EventRender::push_next_picture() {
   return push_picture(events, picture);
 }
 
-/// Whether anything is known of the picture that is due.
+/// True if there is input for the next picture.
 bool EventRender::has_begun_picture() const {
   return state_ && state_->video && times_ && known_ > times_->events().start + event_resolution;
 }
 
-/// Pushes what there is of the last picture before things change. May throw.
+/// Pushes the incomplete last picture before a change. May throw.
 void EventRender::drain() {
   if (has_begun_picture()) push_next_picture();
 }
@@ -399,7 +400,7 @@ bool EventRender::take_caps(GstAggregatorPad*, GstCaps* caps) {
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   if (state_ && state_->width == info.width && state_->height == info.height) return true;
   drain();
-  state_.reset();  // before the next is made: pictures can be large
+  state_.reset();  // before allocating the next: pictures can be large
   state_.emplace(State{info.width, info.height,
                        Renderer(info.width, info.height, core_settings(settings.copy()))});
   gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
@@ -426,7 +427,7 @@ void EventRender::take_qos(GstEvent* event) {
     earliest_ = late > 0 ? time + 2 * static_cast<GstClockTime>(late) : 0;
 }
 
-/// What comes next does not follow on what was drawn. May throw.
+/// Forgets all events, because the next input is discontinuous. May throw.
 void EventRender::start_over() {
   if (state_) state_->renderer.reset();
   discontinuous_ = times_.has_value();
@@ -458,12 +459,12 @@ DEFINE_EVENT_AGGREGATOR(GstEventRender, gst_event_render, EVENT_RENDER, EventRen
 static GType gst_event_render_mode_get_type() {
   static const GType type = [] {
     static const GEnumValue values[] = {
-        {static_cast<gint>(RenderMode::accumulate), "Which polarities fired within a window",
+        {static_cast<gint>(RenderMode::accumulate), "Polarities that fired within a window",
          "accumulate"},
-        {static_cast<gint>(RenderMode::decay), "The sum of ON minus OFF, fading exponentially",
+        {static_cast<gint>(RenderMode::decay), "Exponentially decaying sum of ON minus OFF",
          "decay"},
-        {static_cast<gint>(RenderMode::time_surface),
-         "How long ago the last event was, by its polarity", "time-surface"},
+        {static_cast<gint>(RenderMode::time_surface), "Age and polarity of the last event",
+         "time-surface"},
         {static_cast<gint>(RenderMode::count), "ON minus OFF within a window", "count"},
         {0, nullptr, nullptr},
     };
@@ -489,9 +490,9 @@ static void install_properties(GObjectClass* object_class) {
       &Settings::accumulation_time,
       g_param_spec_uint64(
           "accumulation-time", "Accumulation time",
-          "Length of the window of accumulate and count, time in which decay fades to 1/e, and "
-          "how far time-surface looks back (ns; 0 = one frame, or as long as the counts allow, for "
-          "accumulate and count, and 100 ms for the others)",
+          "Length of the window of accumulate and count, time constant of decay, maximum age of "
+          "time-surface (ns; 0 = one frame, or as long as the counts allow, for accumulate and "
+          "count, and 100 ms for the others)",
           0, std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
   properties.add(
       &Settings::event_count,
@@ -519,7 +520,7 @@ static void install_properties(GObjectClass* object_class) {
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
 }
 
-/// QoS is not for upstream, which would skip events.
+/// Consumes QoS events: upstream would skip events.
 static gboolean src_event(GstAggregator* element, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_QOS)
     return GST_AGGREGATOR_CLASS(gst_event_render_parent_class)->src_event(element, event);

@@ -2,22 +2,22 @@
 /**
  * SECTION:element-eventstats
  * @title: eventstats
- * @short_description: measures a stream of events
+ * @short_description: measures an event stream
  *
- * Passes events through and posts an element message `eventstats` every #GstEventStats:interval of
- * stream time, with the figures since the last one, and at EOS or on stop, with those of the whole
- * stream. An interval ends with a buffer.
+ * Passes events through and posts element messages `eventstats`: every #GstEventStats:interval of
+ * stream time with the statistics since the last one, and at EOS or on stop with those of the whole
+ * stream. Intervals end at buffer boundaries.
  *
- * - `cumulative` (#gboolean): whether the figures are of the whole stream;
- * - `start`, `end` (#gint64): the time that they cover, in stream time (ns);
+ * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream;
+ * - `start`, `end` (#gint64): the time covered, in stream time (ns);
  * - `events` (#guint64), `rate` (#gdouble, events per second);
- * - `on-share` (#gdouble): the share of ON events;
- * - `mean`, `std-dev` (#gdouble): over all pixels, of events per pixel and second;
- * - `interval-p5`, `-p25`, `-p50`, `-p75`, `-p95` (#guint64, ns): the percentiles of the time from
- *   a pixel's event to its next, to 3 %.
+ * - `on-share` (#gdouble): the fraction of ON events;
+ * - `mean`, `std-dev` (#gdouble): over all pixels, events per pixel and second;
+ * - `interval-p5`, `-p25`, `-p50`, `-p75`, `-p95` (#guint64, ns): percentiles of the time between
+ *   successive events of a pixel, accurate to 3 %.
  *
- * At EOS or on stop (Ctrl-C), the figures of the whole stream are written to
- * #GstEventStats:location as JSON, and a picture of the events per pixel to #GstEventStats:map.
+ * At EOS or on stop (Ctrl-C), the statistics of the whole stream are written to
+ * #GstEventStats:location as JSON, and an image of the events per pixel to #GstEventStats:map.
  *
  * ## Example launch line
  * |[
@@ -48,12 +48,12 @@ using eventcamera::Nanoseconds;
 
 namespace {
 
-/// What the application sets.
+/// User-settable values.
 struct Settings : ReportFiles {
   GstClockTime interval = GST_SECOND;
 };
 
-/// What is measured over a part of the stream.
+/// Statistics of a part of the stream.
 struct Part {
   EventStatistics statistics;
   std::optional<Nanoseconds> start{};  ///< in stream time
@@ -66,7 +66,7 @@ struct Part {
   }
 };
 
-/// What is measured of one sensor.
+/// Statistics of the stream of one sensor.
 struct Measurement {
   Measurement(int sensor_width, int sensor_height)
       : width(sensor_width),
@@ -81,13 +81,13 @@ struct Measurement {
   Part cumulative;
   Part recent;                       ///< since the last message
   std::optional<Nanoseconds> end{};  ///< in stream time
-  bool concluded = true;             ///< no events have come since the last report
+  bool concluded = true;             ///< no events since the last report
 };
 
 struct Private {
   GuardedSettings<Settings> settings;
 
-  // The streaming thread's, or nobody's while there is none.
+  // Accessed by the streaming thread only, or while there is none.
   std::optional<Measurement> measurement;
   EventFaults faults{"count"};
 };
@@ -103,7 +103,7 @@ struct _GstEventStats {
 
 G_DEFINE_TYPE_WITH_CODE(GstEventStats, gst_event_stats, GST_TYPE_BASE_TRANSFORM,
                         GST_DEBUG_CATEGORY_INIT(event_stats_debug, "eventstats", 0,
-                                                "what a stream of events is like"))
+                                                "statistics of event streams"))
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
 GST_ELEMENT_REGISTER_DEFINE(eventstats, "eventstats", GST_RANK_NONE, gst_event_stats_get_type())
 
@@ -122,12 +122,12 @@ static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulati
   return structure;
 }
 
-/// Posts a message; it owns the structure.
+/// Posts a message. Takes ownership of `structure`.
 static void post(GstEventStats* self, GstStructure* structure) {
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_element(GST_OBJECT(self), structure));
 }
 
-/// Reports the figures of the whole stream; those of no events where no caps have come.
+/// Reports the statistics of the whole stream; those of an empty stream if no caps were received.
 static void conclude(GstEventStats* self, const ReportFiles& files) {
   Measurement nothing(1, 1);
   auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
@@ -136,7 +136,7 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
          [&] { return eventcamera::draw_map(measurement.cumulative.statistics.map()); });
 }
 
-/// Starts to measure a sensor of this size.
+/// Starts measuring a sensor of this size.
 static bool measure(GstEventStats* self, int width, int height) {
   const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
                       "Not enough memory to count the events of " + std::to_string(width) + " x " +
@@ -147,8 +147,8 @@ static bool measure(GstEventStats* self, int width, int height) {
 
 /* events */
 
-/// Adds an interval. Time between intervals counts as time without events; where time goes back, no
-/// inter-event interval spans the jump.
+/// Adds an interval. Time between intervals counts as time without events; if time goes backwards,
+/// no inter-event interval spans the discontinuity.
 static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) {
   if (measurement.end && start + static_cast<Nanoseconds>(event_resolution) < *measurement.end) {
     measurement.validator = EventValidator(measurement.width, measurement.height);
@@ -243,7 +243,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
   if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
   if (measurement && measurement->width == info.width && measurement->height == info.height)
     return TRUE;
-  // Each sensor is measured on its own.
+  // Each sensor size is measured separately.
   if (measurement) conclude(self, {});
   return measure(self, info.width, info.height) ? TRUE : FALSE;
 }
@@ -280,13 +280,13 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
   object_class->finalize = finalize;
 
   Properties<settings_of> properties(object_class);
-  properties.add(&Settings::interval,
-                 g_param_spec_uint64(
-                     "interval", "Interval",
-                     "Time between messages with figures, in stream time (ns; 0 = at EOS only)", 0,
-                     std::numeric_limits<gint64>::max(), Settings().interval,
-                     static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                              GST_PARAM_MUTABLE_PLAYING)));
+  properties.add(
+      &Settings::interval,
+      g_param_spec_uint64("interval", "Interval",
+                          "Time between statistics messages, in stream time (ns; 0 = at EOS only)",
+                          0, std::numeric_limits<gint64>::max(), Settings().interval,
+                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                   GST_PARAM_MUTABLE_PLAYING)));
   add_report_properties(properties, "PNG file of the events per pixel, written at EOS or on stop");
 
   static GstStaticPadTemplate sink_template =
@@ -297,7 +297,7 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
   gst_element_class_add_static_pad_template(element_class, &sink_template);
   gst_element_class_add_static_pad_template(element_class, &src_template);
   gst_element_class_set_static_metadata(element_class, "Event statistics", "Filter/Analyzer",
-                                        "Measures a stream of events", "gst-eventsim");
+                                        "Measures an event stream", "gst-eventsim");
 
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->start = start;

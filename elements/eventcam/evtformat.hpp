@@ -7,13 +7,13 @@
 
 #include "src/formats/evt/raw.hpp"
 
-/// The caps of words without a header.
+/// Caps of words without a header.
 #define EVT_WORDS_CAPS                                                             \
   "application/x-event-camera, format = (string) { EVT2, EVT21, EVT3, EVT4 }, "    \
   "width = (int) [ 1, 2048 ], height = (int) [ 1, 2048 ], framerate = (fraction) " \
   "[ 0, max ]"
 
-/// By its name in caps; nothing where it has none.
+/// Format with this name in caps, if any.
 inline std::optional<eventcamera::EvtFormat> evt_format_named(const char* name) {
   if (g_strcmp0(name, "EVT2") == 0) return eventcamera::EvtFormat::evt2;
   if (g_strcmp0(name, "EVT21") == 0) return eventcamera::EvtFormat::evt21;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/// The elements that read event files: a table of formats. GstEventReader does the rest.
+/// The elements that read event files: a table of formats for GstEventReader.
 #include "elements/eventcam/evtformat.hpp"
 #include "gst/base/eventreader.hpp"
 #include "src/formats/dat/dat.hpp"
@@ -20,7 +20,7 @@ using eventcamera::Reader;
 
 namespace {
 
-/// The reader of a format that its decoder alone can read.
+/// Creates a reader for a format with a decoder.
 template <std::unique_ptr<Decoder> (*make_decoder)()>
 std::unique_ptr<Reader> decoded_by(const GstCaps* /*caps*/) {
   return std::make_unique<DecoderReader>(make_decoder());
@@ -31,7 +31,7 @@ std::unique_ptr<Reader> decoded_by(const GstCaps* /*caps*/) {
   return std::make_unique<DecoderReader>(std::make_unique<FormatDecoder>());
 }
 
-/// Words without a header are what their caps say.
+/// Words without a header have their format and size in the caps; files have a header.
 std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps) {
   if (caps != nullptr) {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
@@ -52,9 +52,9 @@ std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps) {
  * @title: evtdec
  * @short_description: reads RAW files and EVT words
  *
- * Reads Prophesee's RAW files, and words without a header whose caps tell what they are: EVT2,
- * EVT2.1, EVT3 and EVT4. Events come out in buffers of #GstEventReader:buffer-time; triggers
- * are counted and left out.
+ * Reads Prophesee RAW files, and words without a header whose format is in the caps: EVT2, EVT2.1,
+ * EVT3 and EVT4. Events are output in buffers of #GstEventReader:buffer-time; triggers are counted
+ * and dropped.
  *
  * ## Example launch line
  * |[
@@ -76,8 +76,8 @@ GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_typ
  * @title: eventdatdec
  * @short_description: reads DAT files
  *
- * Reads Prophesee's DAT files, versions 1 and 2. Events come out in buffers of
- * #GstEventReader:buffer-time; triggers are counted and left out.
+ * Reads Prophesee DAT files, versions 1 and 2. Events are output in buffers of
+ * #GstEventReader:buffer-time; triggers are counted and dropped.
  *
  * ## Example launch line
  * |[
@@ -99,8 +99,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  * @title: eventesdec
  * @short_description: reads Event Stream files
  *
- * Reads Event Stream 2.0, DVS and ATIS events; of the latter, the changes. Events come out in
- * buffers of #GstEventReader:buffer-time.
+ * Reads Event Stream 2.0 files with DVS or ATIS events (of the latter, only the change events).
+ * Events are output in buffers of #GstEventReader:buffer-time.
  *
  * ## Example launch line
  * |[
@@ -122,9 +122,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  * @title: eventcsvdec
  * @short_description: reads text files of events
  *
- * Reads text with an event a line: its columns, their separators and the unit of time are found
- * in the first lines. Where they do not tell the sensor's size, it is what downstream's caps
- * insist on, or else the smallest known sensor that the first events fit into.
+ * Reads text with one event per line. Columns, separators and time unit are detected from the first
+ * lines. If these do not state the sensor size, it is taken from downstream's caps, or else is that
+ * of the smallest known sensor that the first events fit into.
  *
  * ## Example launch line
  * |[
@@ -146,9 +146,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * @title: eventnpydec
  * @short_description: reads NumPy files of events
  *
- * Reads NumPy's structured arrays with the fields t, x, y and p. They do not tell the sensor's
- * size: it is what downstream's caps insist on, or else the smallest known sensor that the
- * first events fit into.
+ * Reads structured NumPy arrays with the fields t, x, y and p. They do not contain the sensor size:
+ * it is taken from downstream's caps, or else is that of the smallest known sensor that the first
+ * events fit into.
  *
  * ## Example launch line
  * |[
@@ -171,13 +171,13 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_
  * @title: eventhdf5dec
  * @short_description: reads HDF5 files of events
  *
- * Reads the events of HDF5 files: DSEC's, Metavision's (compressed with ECF) and v2e's. They
- * come out in buffers of #GstEventReader:buffer-time; triggers are counted and left out.
+ * Reads the events of HDF5 files from DSEC, Metavision (compressed with ECF) and v2e. They are
+ * output in buffers of #GstEventReader:buffer-time; triggers are counted and dropped.
  *
- * An HDF5 file is read all over the place, so its bytes should be pulled, as from filesrc.
- * Where they are pushed the file is collected in memory, up to 256 MiB, and read at its end.
+ * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
+ * mode the file is collected in memory, up to 256 MiB, and read at its end.
  *
- * Files with Blosc, as DSEC publishes them, need HDF5's plugin of that name (Debian:
+ * Files compressed with Blosc, such as those published by DSEC, need HDF5's Blosc plugin (Debian:
  * hdf5-filter-plugin-blosc-serial).
  *
  * ## Example launch line
@@ -202,22 +202,21 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * @title: aedatdemux
  * @short_description: reads AEDAT, the files of DAVIS and DVS cameras
  *
- * Takes an AEDAT 4 file apart into its event streams and its frames. AEDAT 2.0 and 3.1 are read
- * as one event stream. Triggers and IMU samples are counted and left out.
+ * Splits an AEDAT 4 file into its event streams and video streams. AEDAT 2.0 and 3.1 are read as
+ * one event stream. Triggers and IMU samples are counted and dropped.
  *
- * PTS are the file's own times, so that nothing is lost where they are written again. The
- * segments of all streams start at one time origin, the first thing that any of them has, so
- * that playback starts at once, and events and frames are in sync. A file with times before 0
- * is moved to begin at 0.
+ * PTS are the times of the file, so that they survive when written again. The segments of all
+ * streams start at the first event or frame of any of them, so that playback starts at once and
+ * events and frames are in sync. A file with negative times is shifted to start at 0.
  *
- * A file is pulled where upstream can seek, as filesrc does. A table of packets at its end
- * makes seeking fast and tells the duration; without one the duration is exact for files of up
- * to 16 MiB, and estimated for longer ones until their end was read.
+ * The file is pulled if upstream supports it, as filesrc does. A table of packets at its end makes
+ * seeking fast and stores the duration; without one the duration is exact for files up to 16 MiB,
+ * and estimated for longer ones until their end has been read.
  *
- * Corrupt input is skipped; the first place is reported as a warning, and `stats` counts them.
+ * Corrupt input is skipped; the first place is reported as a warning, and `stats` counts all
+ * places.
  *
- * A stream that has no frame or event in the first second may get its pad only when the first
- * one comes.
+ * A stream without a frame or event in the first second may get its pad only at its first one.
  *
  * ## Example launch line
  * |[

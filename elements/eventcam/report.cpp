@@ -30,7 +30,7 @@ static_assert(interval_names.size() == interval_shares.size());
 
 JsonNode* node_of(const GstStructure* structure);
 
-/// What these structures hold: numbers and truths, and structures and arrays of them.
+/// Converts numbers, booleans, structures and arrays, the only types in these structures.
 JsonNode* node_of(const GValue* value) {
   if (GST_VALUE_HOLDS_STRUCTURE(value)) return node_of(gst_value_get_structure(value));
   if (GST_VALUE_HOLDS_ARRAY(value)) {
@@ -61,7 +61,7 @@ JsonNode* node_of(const GstStructure* structure) {
   return node;
 }
 
-/// Why a file cannot be written; nothing where it can, or is not to be.
+/// Returns why a file cannot be written; nothing if it can, or if `path` is empty.
 std::optional<std::string> obstacle_to(const std::string& path) {
   if (path.empty()) return std::nullopt;
   const Owned<gchar> folder(g_path_get_dirname(path.c_str()));
@@ -71,7 +71,7 @@ std::optional<std::string> obstacle_to(const std::string& path) {
   return std::nullopt;
 }
 
-/// Throws std::runtime_error, which says why it cannot.
+/// Throws std::runtime_error with the reason.
 void write_json(const GstStructure* structure, const std::string& path) {
   const Owned<JsonNode> root(node_of(structure));
   const Owned<JsonGenerator> generator(json_generator_new());
@@ -127,7 +127,7 @@ void report(gpointer element, const ReportFiles& files, GstStructure* figures,
     if (!files.map.empty()) draw().write_png(files.map);
   } catch (const std::exception& error) {
     GST_ELEMENT_ERROR(element, RESOURCE, WRITE,
-                      ("Cannot write the figures; check the folder and the free space."),
+                      ("Cannot write the statistics; check the folder and the free space."),
                       ("%s", error.what()));
   }
   gst_element_post_message(GST_ELEMENT(element),

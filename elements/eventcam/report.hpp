@@ -11,13 +11,13 @@
 #include "src/render/map_picture.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// The files that an element writes what it has measured to; none where a path is empty.
+/// Files that an element writes its results to; none if a path is empty.
 struct ReportFiles {
-  std::string location{};  ///< of the figures, as JSON
-  std::string map{};       ///< of the picture of events per pixel
+  std::string location{};  ///< statistics, as JSON
+  std::string map{};       ///< image of the events per pixel, as PNG
 };
 
-/// For class_init: the properties location and map, of settings that have ReportFiles.
+/// For class_init: adds the properties location and map, for settings derived from ReportFiles.
 template <class Properties>
 void add_report_properties(Properties& properties, const char* map_blurb) {
   constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
@@ -25,21 +25,20 @@ void add_report_properties(Properties& properties, const char* map_blurb) {
   properties.add(
       &ReportFiles::location,
       g_param_spec_string("location", "Location",
-                          "JSON file of the figures, written at EOS or on stop", "", flags));
+                          "JSON file of the statistics, written at EOS or on stop", "", flags));
   properties.add(&ReportFiles::map, g_param_spec_string("map", "Map", map_blurb, "", flags));
 }
 
-/// The stream time of a time of a segment.
+/// Converts a timestamp of a segment to stream time.
 eventcamera::Nanoseconds stream_time(const GstSegment& segment, GstClockTime time);
 
-/// Sets the fields of a message that describe one stream.
+/// Sets the fields for the statistics of one stream.
 void put_figures(GstStructure* structure, const eventcamera::StreamFigures& figures);
 
-/// Whether these files can be written, as far as their folders tell; where not, that is an error of
-/// the element.
+/// Checks that the folders of these files exist. Posts an error and returns false if not.
 bool can_report(gpointer element, const ReportFiles& files);
 
-/// Writes the figures, with the structures within them as objects and their arrays as arrays, and
-/// the picture, and posts the figures, which it takes.
+/// Writes `figures` as JSON (nested structures as objects, arrays as arrays) and the image, and
+/// posts `figures` as an element message. Takes ownership of `figures`.
 void report(gpointer element, const ReportFiles& files, GstStructure* figures,
             const std::function<eventcamera::RgbPicture()>& draw);

@@ -7,11 +7,11 @@
 
 using eventcamera::FileKind;
 
-/// The start of the file, as much of it as recognise() examines.
+/// Peeks at the start of the file, as much as recognise() examines.
 static std::span<const guint8> first_bytes(GstTypeFind* find) {
   constexpr guint64 max_bytes = eventcamera::max_recognised_bytes;
   const guint64 length = gst_type_find_get_length(find);
-  // The length is not always known, and a peek past the end returns nothing.
+  // The length may be unknown, and a peek past the end returns nothing, so try shorter ones.
   for (auto count = static_cast<guint>(length > 0 ? std::min(length, max_bytes) : max_bytes);
        count > 0; count /= 2)
     if (const guint8* bytes = gst_type_find_peek(find, 0, count)) return {bytes, count};
@@ -31,7 +31,7 @@ static void find_kind(GstTypeFind* find, gpointer media_type) {
     gst_type_find_suggest_empty_simple(find, probability, name);
 }
 
-/// Suggests caps of `media_type`.
+/// Registers a typefinder that suggests caps of `media_type`.
 #define REGISTER(name, kind, media_type, extensions)                                           \
   GST_TYPE_FIND_REGISTER_DEFINE(name, media_type, GST_RANK_PRIMARY, find_kind<FileKind::kind>, \
                                 extensions, nullptr, const_cast<char*>(media_type), nullptr)

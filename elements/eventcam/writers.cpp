@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/// The elements that write event files: a table of formats. GstEventWriter does the rest.
+/// The elements that write event files: a table of formats for GstEventWriter.
 #include <vector>
 
 #include "elements/eventcam/evtformat.hpp"
@@ -19,9 +19,9 @@ using eventcamera::SensorSize;
  * @title: evtenc
  * @short_description: writes RAW files and EVT words
  *
- * Writes events as a Prophesee RAW file of the words that #GstEvtEnc:format says. Where downstream
- * asks for `application/x-event-camera` with the format EVT2, EVT21, EVT3 or EVT4, it gives these
- * words without a header.
+ * Writes events as a Prophesee RAW file with words of #GstEvtEnc:format. If downstream requests
+ * `application/x-event-camera` with the format EVT2, EVT21, EVT3 or EVT4, writes these words
+ * without a header.
  *
  * ## Example launch line
  * |[
@@ -59,7 +59,8 @@ static std::unique_ptr<eventcamera::Encoder> make_evt(SensorSize size, int varia
   return make_prophesee_raw_encoder(static_cast<EvtFormat>(variant), size);
 }
 
-/// Of words, the format of the property if downstream takes it, else any that it takes.
+/// For words without a header, prefers the format of the property, else any that downstream
+/// accepts.
 static GstCaps* fixate_evt(const GstEventCameraInfo& info, int variant, GstCaps* caps) {
   caps = gst_caps_make_writable(caps);
   GstStructure* structure = gst_caps_get_structure(caps, 0);
@@ -90,8 +91,8 @@ GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_typ
  * @title: eventdatenc
  * @short_description: writes DAT files
  *
- * Writes events as a DAT file of version 2. Its timestamps have 32 bits: readers may take a pause
- * of more than 35 minutes for one that is 71 minutes shorter.
+ * Writes events as a DAT file, version 2. Timestamps have 32 bits: readers may mistake a pause of
+ * more than 35 minutes for one that is 71 minutes shorter.
  *
  * ## Example launch line
  * |[
@@ -116,7 +117,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  * @title: eventesenc
  * @short_description: writes Event Stream files
  *
- * Writes events as an Event Stream 2.0 of DVS events. A pause costs one byte for every 127
+ * Writes events as an Event Stream 2.0 file of DVS events. Pauses take one byte per 127
  * microseconds.
  *
  * ## Example launch line
@@ -141,7 +142,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
  * @title: eventcsvenc
  * @short_description: writes text files of events
  *
- * Writes a line for each event, in the #GstEventCsvEnc:dialect of the tool that is to read it.
+ * Writes one line per event, in the #GstEventCsvEnc:dialect of the tool that will read it.
  *
  * ## Example launch line
  * |[

@@ -2,23 +2,23 @@
 /**
  * SECTION:element-eventsim-dvs
  * @title: eventsim-dvs
- * @short_description: events of a physical event-camera pixel
+ * @short_description: events from a physical pixel model
  *
- * Turns video into what an event camera would have seen, with the pixel itself simulated: the
- * response to light, photoreceptor bandwidth, a reference level that is kept from frame to frame,
- * threshold mismatch, leak, shot noise, hot and dead pixels, the refractory period, latency, and
- * the limits of the readout. Each event has the time at which its pixel's signal crossed its
- * threshold, to the microsecond.
+ * Turns video into the events that an event camera would have seen, by simulating its pixels:
+ * response to light, photoreceptor bandwidth, a reference level stored across frames, threshold
+ * mismatch, leak, shot noise, hot and dead pixels, refractory period, latency, and the limits of
+ * the readout. Each event has the time at which its pixel's signal crossed its threshold, to the
+ * microsecond.
  *
- * A preset sets all of it; properties that are set, before the preset or after it, override it.
- * Thresholds are in units of the response: with log and lin-log a threshold of 0.2 is a change of
- * light by 22 %; linear has as many units from black to white as lin-log, ln(255) = 5.54, so that
- * 0.2 is 9.2 grey levels of 8-bit video.
+ * A preset sets all of these; properties that are set explicitly, before or after the preset,
+ * override it. Thresholds are in units of the response: with log and lin-log a threshold of 0.2 is
+ * a change of light by 22 %; linear has as many units from black to white as lin-log, ln(255) =
+ * 5.54, so that 0.2 is 9.2 grey levels of 8-bit video.
  *
- * Sensor noise of a webcam is not light: where a still or dark scene fires, denoise removes the
- * noise and keeps the edges.
+ * If the sensor noise of a webcam makes a static or dark scene fire, denoise removes the noise and
+ * keeps the edges.
  *
- * The same video, settings and seed give the same events, whatever the number of threads.
+ * The same video, settings and seed give the same events for any number of threads.
  *
  * ## Example launch lines
  * |[
@@ -51,7 +51,7 @@ static GType response_type() {
       {static_cast<int>(Response::lin_log), "Linear up to grey level 20, ln(light) above (v2e)",
        "lin-log"},
       {static_cast<int>(Response::linear),
-       "ln(255) light: for video whose gamma has made it nearly logarithmic", "linear"},
+       "ln(255) light: for video that is nearly logarithmic due to its gamma", "linear"},
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventSimDvsResponse", values);
@@ -60,9 +60,9 @@ static GType response_type() {
 static GType upsampling_type() {
   static const GEnumValue values[] = {
       {static_cast<int>(Upsampling::linear),
-       "In each pixel on a straight line, in units of the response", "linear"},
+       "Linear interpolation per pixel, in units of the response", "linear"},
       {static_cast<int>(Upsampling::motion),
-       "Along dense optical flow, in steps of at most one pixel", "motion"},
+       "Motion along dense optical flow, in steps of at most one pixel", "motion"},
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventSimDvsUpsampling", values);
@@ -71,8 +71,8 @@ static GType upsampling_type() {
 static GType refractory_reset_type() {
   static const GEnumValue values[] = {
       {static_cast<int>(RefractoryReset::level),
-       "At the level that was crossed; crossings within the refractory period are lost", "level"},
-      {static_cast<int>(RefractoryReset::signal), "At the signal when the refractory period ends",
+       "The level that was crossed; crossings within the refractory period are lost", "level"},
+      {static_cast<int>(RefractoryReset::signal), "The signal at the end of the refractory period",
        "signal"},
       {0, nullptr, nullptr},
   };
@@ -95,7 +95,7 @@ static GType preset_type() {
 
 namespace {
 
-/// A property that is a member of DvsSettings.
+/// A property stored in a member of DvsSettings.
 struct Setting {
   const char* name;
   const char* nick;
@@ -106,7 +106,7 @@ struct Setting {
       member;
   double min = 0;
   double max = 0;
-  GType (*type)() = nullptr;  ///< of an enum
+  GType (*type)() = nullptr;  ///< for enums
 };
 
 const Setting table[] = {
@@ -115,8 +115,8 @@ const Setting table[] = {
      "is not light (grey levels, white is 255; 0 = off)",
      &DvsSettings::denoise, 0, 255},
     {"linear-light", "Linear light",
-     "Undo the transfer function of sRGB (IEC 61966-2-1) first, to get the light that the camera "
-     "saw; otherwise luma is taken as light",
+     "Undo the sRGB transfer function (IEC 61966-2-1) first, to recover the light that the camera "
+     "saw; otherwise luma is used as light",
      &DvsSettings::linear_light},
     {"response", "Response", "Response of the photoreceptor to light", &DvsSettings::response, 0, 0,
      response_type},
@@ -124,8 +124,8 @@ const Setting table[] = {
      "Light that response=log adds before the logarithm, which limits how dark pixels get (white "
      "is 1)",
      &DvsSettings::log_eps, 1e-6, 1},
-    {"upsampling", "Upsampling", "How the light changes between two frames",
-     &DvsSettings::upsampling, 0, 0, upsampling_type},
+    {"upsampling", "Upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0,
+     0, upsampling_type},
     {"max-steps", "Maximum steps",
      "Maximum number of steps between two frames with upsampling=motion; there are as many as the "
      "pixels that the fastest point moves",
@@ -134,7 +134,7 @@ const Setting table[] = {
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
      &DvsSettings::cutoff_hz, 0, 1e6},
     {"dark-light", "Dark light",
-     "Light that is always there (white is 1): the bandwidth is proportional to (light + "
+     "Background light (white is 1): the bandwidth is proportional to (light + "
      "dark-light) / (1 + dark-light), and light reduces shot noise to as little as a quarter",
      &DvsSettings::dark_light, 1e-6, 1},
     {"positive-threshold", "Positive threshold",
@@ -144,22 +144,21 @@ const Setting table[] = {
      "Fall below the reference level that fires an OFF event (units of the response, a magnitude)",
      &DvsSettings::negative_threshold, 1e-3, 10},
     {"threshold-sigma", "Threshold mismatch",
-     "Standard deviation of each threshold from pixel to pixel (units of the response)",
+     "Standard deviation of the thresholds between pixels (units of the response)",
      &DvsSettings::threshold_sigma, 0, 10},
     {"threshold-jitter", "Threshold jitter",
-     "Standard deviation of each threshold from event to event (units of the response)",
+     "Standard deviation of the thresholds between events (units of the response)",
      &DvsSettings::threshold_jitter, 0, 10},
     {"leak-rate-hz", "Leak rate",
      "Mean rate of ON events of a pixel without change, from the leak of its reference level (Hz)",
      &DvsSettings::leak_rate_hz, 0, 1e4},
-    {"leak-spread", "Leak spread",
-     "Standard deviation of the leak rate from pixel to pixel (decades)", &DvsSettings::leak_spread,
-     0, 1},
+    {"leak-spread", "Leak spread", "Standard deviation of the leak rate between pixels (decades)",
+     &DvsSettings::leak_spread, 0, 1},
     {"shot-noise-rate-hz", "Shot-noise rate",
      "Rate of random events of a pixel in the dark, ON and OFF together (Hz)",
      &DvsSettings::shot_noise_rate_hz, 0, 1e4},
     {"hot-pixels", "Hot pixels",
-     "Fraction of pixels that leak 10 to 1000 ON events per second, whatever they see",
+     "Fraction of pixels that leak 10 to 1000 ON events per second, regardless of light",
      &DvsSettings::hot_pixels, 0, 1},
     {"dead-pixels", "Dead pixels", "Fraction of pixels that never fire", &DvsSettings::dead_pixels,
      0, 1},
@@ -190,11 +189,11 @@ const Setting table[] = {
      &DvsSettings::seed},
 };
 
-/// What the application has chosen.
+/// User-settable values.
 struct Choice {
   DvsPreset preset = DvsPreset::ideal;
   DvsSettings settings = eventcamera::settings_of(DvsPreset::ideal);
-  std::bitset<std::size(table)> overridden;  ///< settings that are not the preset's
+  std::bitset<std::size(table)> overridden;  ///< settings that override the preset
 
   void take_preset(const GValue* value) {
     read_value(value, preset);
@@ -237,7 +236,7 @@ static void install_properties(GObjectClass* klass) {
       [](Choice& choice, const GValue* value) { choice.take_preset(value); },
       [](Choice& choice, GValue* value) { write_value(choice.preset, value); },
       g_param_spec_enum("preset", "Preset",
-                        "Values of all properties that are not set themselves, before "
+                        "Values of all properties that are not set explicitly, before "
                         "or after",
                         preset_type(), static_cast<int>(defaults.preset), property_flags));
   for (std::size_t i = 0; i < std::size(table); ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/// The simulators without properties of their own: a table of methods.
+/// Simulators without properties of their own: a table of methods.
 #include "gst/base/eventsimulator.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
@@ -10,12 +10,13 @@
  * @title: eventsim-frame
  * @short_description: events from the difference frame
  *
- * Turns video into what an event camera would have seen: an ON event where a pixel became brighter
- * than in the last frame by more than #GstEventSimFrame:positive-threshold, an OFF event where it
- * became darker by more than #GstEventSimFrame:negative-threshold, all at the time of the frame
- * (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA 2023, section III).
+ * Turns video into the events that an event camera would have seen: an ON event if a pixel became
+ * brighter than in the last frame by more than #GstEventSimFrame:positive-threshold, an OFF event
+ * if it became darker by more than #GstEventSimFrame:negative-threshold, all at the time of the
+ * frame (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA 2023, section
+ * III).
  *
- * The cheapest simulator, and the one without times between frames.
+ * The cheapest simulator, and the only one without event times between frames.
  *
  * ## Example launch line
  * |[
@@ -37,13 +38,13 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
  * @title: eventsim-sparse
  * @short_description: events from frames interpolated where pixels changed
  *
- * Turns video into what an event camera would have seen. Only the pixels that changed between two
- * frames by more than the smaller threshold are tracked, with Lucas-Kanade, and drawn into each
- * interpolated frame; what changed from one interpolated frame to the next by more than the
- * thresholds fires (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA 2023,
- * section III-B).
+ * Turns video into the events that an event camera would have seen. Only pixels that changed
+ * between two frames by more than the smaller threshold are tracked, with Lucas-Kanade, and drawn
+ * into each interpolated frame; pixels that change between successive interpolated frames by more
+ * than the thresholds fire (Ziegler et al., Real-time event simulation with frame-based cameras,
+ * ICRA 2023, section III-B).
  *
- * For small objects that move before a still background; where the whole picture moves it is the
+ * For small objects that move in front of a static background; if everything moves, it is the
  * slowest simulator.
  *
  * ## Example launch line
@@ -70,13 +71,13 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_sparse, "eventsim-sparse", GST_RANK_NONE,
  * @title: eventsim-diff
  * @short_description: events from interpolated difference frames
  *
- * Turns video into what an event camera would have seen. The difference of two frames, where it
- * exceeds the thresholds, is tracked into the difference of the next two with Lucas-Kanade; its
- * pixels fire on the way (Ziegler et al., Real-time event simulation with frame-based cameras,
- * ICRA 2023, section III-C).
+ * Turns video into the events that an event camera would have seen. Pixels whose difference between
+ * two frames exceeds the thresholds are tracked into the next difference frame with Lucas-Kanade,
+ * and fire on the way (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA
+ * 2023, section III-C).
  *
- * For objects of steady motion and look before a still background. The second frame of a stream has
- * no earlier difference: its events are those of eventsim-frame.
+ * For objects of steady motion and appearance in front of a static background. The second frame of
+ * a stream has no earlier difference: its events are those of eventsim-frame.
  *
  * ## Example launch line
  * |[
