@@ -151,7 +151,7 @@ void add_hdf5(const std::string& name, Hdf5Layout layout, Hdf5Writer::Compressio
 int main(int argc, char** argv) {
   for (const auto* const name : {"names", "metavision", "rpg"}) add_csv(name);
   add(
-      "npy", [] { return NpyEncoder(); }, [] { return NpyDecoder(size); });
+      "npy", [] { return NpyEncoder(); }, [] { return NpyDecoder({.size = size}); });
   add_ecf();
   add_hdf5("dsec", Hdf5Layout::dsec, Hdf5Writer::Compression::none);
   add_hdf5("dsec-gzip", Hdf5Layout::dsec, Hdf5Writer::Compression::gzip);

@@ -32,5 +32,6 @@ fi
 
 without -Deventsim -Daedat
 without -Deventsim -Dhdf5
+without -Deventsim -Dnpz
 without -Deventcam # finds OpenCV, although it is not in the prefix
 [ "$(plugins)" = "./eventsim/libgsteventsim.so " ] || fail "built $(plugins)"

@@ -13,15 +13,21 @@
 #define HDF5_ELEMENTS(X)
 #endif
 
+#ifdef HAVE_NPZ
+#define NPZ_ELEMENTS(X) X(eventnpzdec)
+#else
+#define NPZ_ELEMENTS(X)
+#endif
+
 // clang-format off
 #define ELEMENTS(X)                                                                        \
-  AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X)                                                       \
+  AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X)                                       \
   X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats)                             \
   X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
   X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc)
 // clang-format on
 #define TYPE_FINDERS(X) \
-  X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(propheseedat) X(propheseeraw)
+  X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(npz) X(propheseedat) X(propheseeraw)
 
 #define DECLARE_ELEMENT(name) GST_ELEMENT_REGISTER_DECLARE(name)
 #define DECLARE_TYPE_FINDER(name) GST_TYPE_FIND_REGISTER_DECLARE(name)

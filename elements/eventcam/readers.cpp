@@ -13,26 +13,31 @@
 #ifdef HAVE_HDF5
 #include "src/formats/hdf5/hdf5_reader.hpp"
 #endif
+#ifdef HAVE_NPZ
+#include "src/formats/numpy/npz_reader.hpp"
+#endif
 
 using eventcamera::Decoder;
 using eventcamera::DecoderReader;
 using eventcamera::Reader;
+using eventcamera::TableSettings;
 
 namespace {
 
 /// Creates a reader for a format with a decoder.
 template <std::unique_ptr<Decoder> (*make_decoder)()>
-std::unique_ptr<Reader> decoded_by(const GstCaps* /*caps*/) {
+std::unique_ptr<Reader> decoded_by(const GstCaps* /*caps*/, const TableSettings& /*table*/) {
   return std::make_unique<DecoderReader>(make_decoder());
 }
 
-template <class FormatDecoder>
-std::unique_ptr<Reader> decoded_by(const GstCaps* /*caps*/) {
-  return std::make_unique<DecoderReader>(std::make_unique<FormatDecoder>());
+/// The reader of a table.
+template <class TableDecoder>
+std::unique_ptr<Reader> table_read_by(const GstCaps* /*caps*/, const TableSettings& table) {
+  return std::make_unique<DecoderReader>(std::make_unique<TableDecoder>(table));
 }
 
 /// Words without a header have their format and size in the caps; files have a header.
-std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps) {
+std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const TableSettings& /*table*/) {
   if (caps != nullptr) {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
     if (const auto words = evt_format_named(gst_structure_get_string(structure, "format"))) {
@@ -123,8 +128,10 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  * @short_description: reads text files of events
  *
  * Reads text with one event per line. Columns, separators and time unit are detected from the first
- * lines. If these do not state the sensor size, it is taken from downstream's caps, or else is that
- * of the smallest known sensor that the first events fit into.
+ * lines, unless #GstEventCsvDec:column-order and #GstEventCsvDec:time-unit are set. A file that may
+ * be in microseconds or in nanoseconds is refused until the unit is set. If the lines do not state
+ * the sensor size, it is taken from downstream's caps, or else is that of the smallest known sensor
+ * that the first events fit into.
  *
  * ## Example launch line
  * |[
@@ -137,7 +144,8 @@ static const RecordingFormat csv = {
     .long_name = "CSV reader",
     .description = "Reads CSV files of events",
     .caps = "application/x-event-csv",
-    .make_reader = decoded_by<eventcamera::CsvDecoder>,
+    .is_table = true,
+    .make_reader = table_read_by<eventcamera::CsvDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_reader_type(csv))
 
@@ -146,9 +154,11 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * @title: eventnpydec
  * @short_description: reads NumPy files of events
  *
- * Reads structured NumPy arrays with the fields t, x, y and p. They do not contain the sensor size:
- * it is taken from downstream's caps, or else is that of the smallest known sensor that the first
- * events fit into.
+ * Reads structured NumPy arrays with the fields t, x, y and p, and arrays of the shape (N, 4), whose
+ * columns are detected from the first rows, unless #GstEventNpyDec:column-order is set. Integer
+ * times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit or a name
+ * such as t_ns says otherwise. Arrays do not contain the sensor size: it is taken from downstream's
+ * caps, or else is that of the smallest known sensor that the first events fit into.
  *
  * ## Example launch line
  * |[
@@ -161,9 +171,38 @@ static const RecordingFormat npy = {
     .long_name = "NumPy reader",
     .description = "Reads NumPy files of events",
     .caps = "application/x-npy",
-    .make_reader = decoded_by<eventcamera::NpyDecoder>,
+    .is_table = true,
+    .make_reader = table_read_by<eventcamera::NpyDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_reader_type(npy))
+
+#ifdef HAVE_NPZ
+/**
+ * SECTION:element-eventnpzdec
+ * @title: eventnpzdec
+ * @short_description: reads NumPy archives of events
+ *
+ * Reads archives of numpy.savez() and numpy.savez_compressed(): arrays named t, x, y and p, or an
+ * array as eventnpydec reads it, with the same properties. An archive should be pulled, as from
+ * filesrc. Where it is pushed it is collected in memory, up to 256 MiB, and read at its end.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=events.npz ! eventnpzdec ! evtenc ! filesink
+ * location=events.raw
+ * ]|
+ */
+static const RecordingFormat npz = {
+    .type_name = "GstEventNpzDec",
+    .long_name = "NumPy archive reader",
+    .description = "Reads NumPy archives of events",
+    .caps = "application/x-npz",
+    .is_table = true,
+    .make_reader = [](const GstCaps*,
+                      const TableSettings& table) { return eventcamera::make_npz_reader(table); },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_reader_type(npz))
+#endif
 
 #ifdef HAVE_HDF5
 /**
@@ -191,7 +230,8 @@ static const RecordingFormat hdf5 = {
     .long_name = "HDF5 reader",
     .description = "Reads HDF5 files of events: DSEC, Metavision, v2e",
     .caps = "application/x-hdf5",
-    .make_reader = [](const GstCaps*) { return eventcamera::make_hdf5_reader(); },
+    .make_reader = [](const GstCaps*,
+                      const TableSettings&) { return eventcamera::make_hdf5_reader(); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, event_reader_type(hdf5))
 #endif
@@ -230,7 +270,7 @@ static const RecordingFormat aedat = {
     .description = "Reads events and frames from AEDAT files",
     .caps = "application/x-aedat, version = (int) { 2, 3, 4 }",
     .has_many_streams = true,
-    .make_reader = [](const GstCaps*) -> std::unique_ptr<Reader> {
+    .make_reader = [](const GstCaps*, const TableSettings&) -> std::unique_ptr<Reader> {
       return std::make_unique<eventcamera::AedatReader>();
     },
 };

@@ -8,6 +8,7 @@
 #include <map>
 #include <new>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -17,8 +18,10 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pad_bytes.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/base/reader_pad.hpp"
 #include "gst/base/seek_request.hpp"
+#include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/formats/recording_reader.hpp"
 
@@ -35,7 +38,7 @@ using eventcamera::UnsupportedFormat;
 
 namespace {
 
-enum Property : guint { prop_buffer_time = 1, prop_stats };
+enum Property : guint { prop_buffer_time = 1, prop_stats, prop_time_unit, prop_column_order };
 
 constexpr GstClockTime default_buffer_time = 10 * GST_MSECOND;
 
@@ -44,6 +47,37 @@ constexpr GstFlowReturn nothing_ready = GST_FLOW_CUSTOM_SUCCESS;
 
 GstClockTime nanoseconds(Microseconds t) {
   return static_cast<GstClockTime>(std::max<Microseconds>(t, 0)) * GST_USECOND;
+}
+
+/// What the application knows of a table.
+struct TableProperties {
+  gint time_unit = 0;  ///< 0: found, else one more than the TimeUnit
+  std::string column_order;
+
+  /// Throws UnsupportedFormat.
+  eventcamera::TableSettings settings() const {
+    eventcamera::TableSettings settings;
+    if (time_unit > 0) settings.unit = static_cast<eventcamera::TimeUnit>(time_unit - 1);
+    if (column_order.empty()) return settings;
+    auto columns = eventcamera::columns_of(column_order);
+    if (!columns)
+      throw UnsupportedFormat("column-order \"" + column_order +
+                              "\" must have each of t, x, y and p once, and '-' for others");
+    settings.columns = *std::move(columns);
+    return settings;
+  }
+};
+
+GType time_unit_type() {
+  static const GEnumValue units[] = {
+      {0, "Told by the file, or found by its first rows", "auto"},
+      {1, "Seconds", "seconds"},
+      {2, "Milliseconds", "milliseconds"},
+      {3, "Microseconds", "microseconds"},
+      {4, "Nanoseconds", "nanoseconds"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventTimeUnit", units);
 }
 
 /// Bounds of a segment in whole microseconds, rounded outwards.
@@ -74,6 +108,11 @@ class EventReader {
 
   void set_buffer_time(GstClockTime time) { shared_.lock()->buffer_time = time; }
   GstClockTime buffer_time() { return shared_.lock()->buffer_time; }
+  void set_time_unit(gint unit) { shared_.lock()->table.time_unit = unit; }
+  void set_column_order(std::string order) {
+    shared_.lock()->table.column_order = std::move(order);
+  }
+  TableProperties table() { return shared_.lock()->table; }
   GstStructure* stats();
 
   /// Forgets the file.
@@ -91,6 +130,7 @@ class EventReader {
     Shared() { gst_segment_init(&segment, GST_FORMAT_TIME); }
 
     GstClockTime buffer_time = default_buffer_time;
+    TableProperties table;
     GstSegment segment = {};  ///< relative to the origin; its position is that of the output
     GstClockTime duration = GST_CLOCK_TIME_NONE;
     RecordingReader::Counts counts;
@@ -204,19 +244,42 @@ static EventReader& reader_of(gpointer object) {
 }
 
 static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  if (id == prop_buffer_time)
-    reader_of(object).set_buffer_time(g_value_get_uint64(value));
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  auto& reader = reader_of(object);
+  std::string text;
+  switch (id) {
+    case prop_buffer_time:
+      reader.set_buffer_time(g_value_get_uint64(value));
+      break;
+    case prop_time_unit:
+      reader.set_time_unit(g_value_get_enum(value));
+      break;
+    case prop_column_order:
+      read_value(value, text);
+      reader.set_column_order(std::move(text));
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  }
 }
 
 static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  if (id == prop_buffer_time)
-    g_value_set_uint64(value, reader_of(object).buffer_time());
-  else if (id == prop_stats)
-    g_value_take_boxed(value, reader_of(object).stats());
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  auto& reader = reader_of(object);
+  switch (id) {
+    case prop_buffer_time:
+      g_value_set_uint64(value, reader.buffer_time());
+      break;
+    case prop_stats:
+      g_value_take_boxed(value, reader.stats());
+      break;
+    case prop_time_unit:
+      g_value_set_enum(value, reader.table().time_unit);
+      break;
+    case prop_column_order:
+      write_value(reader.table().column_order, value);
+      break;
+    default:
+      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
+  }
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
@@ -271,9 +334,29 @@ static void add_template(GstElementClass* klass, const char* name, GstPadDirecti
                                      gst_pad_template_new(name, direction, presence, owned.get()));
 }
 
+static void add_table_properties(GObjectClass* klass) {
+  klass->set_property = set_property;
+  klass->get_property = get_property;
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                  GST_PARAM_MUTABLE_READY);
+  g_object_class_install_property(
+      klass, prop_time_unit,
+      g_param_spec_enum("time-unit", "Time unit",
+                        "Unit of the times in the file; needed where the file is refused because "
+                        "its first rows do not tell",
+                        time_unit_type(), 0, flags));
+  g_object_class_install_property(
+      klass, prop_column_order,
+      g_param_spec_string("column-order", "Column order",
+                          "What the columns are: a letter t, x, y or p each, - for others, as in "
+                          "xytp; empty = told by the file, or found by its first rows",
+                          "", flags));
+}
+
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const RecordingFormat*>(data);
   static_cast<GstEventReaderClass*>(klass)->format = &format;
+  if (format.is_table) add_table_properties(G_OBJECT_CLASS(klass));
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   const char* const name = format.has_many_streams ? "events_%u" : "src";
   add_template(element_class, "sink", GST_PAD_SINK, GST_PAD_ALWAYS, format.caps);
@@ -357,9 +440,11 @@ void EventReader::reset() {
   seqnum_ = GST_SEQNUM_INVALID;
   const auto shared = shared_.lock();
   const auto buffer_time = shared->buffer_time;
+  const auto table = shared->table;
   const bool is_pulling = shared->is_pulling;
   *shared = {};
   shared->buffer_time = buffer_time;
+  shared->table = table;
   shared->is_pulling = is_pulling;
 }
 
@@ -370,7 +455,9 @@ static void unref_caps(GstCaps* caps) {
 /// Creates the recording, to read a file from its start or a stream of words. May throw.
 void EventReader::open_recording() {
   const std::shared_ptr<GstCaps> caps(caps_ ? gst_caps_copy(caps_.get()) : nullptr, unref_caps);
-  auto make = [make_reader = format_.make_reader, caps] { return make_reader(caps.get()); };
+  auto make = [make_reader = format_.make_reader, caps, settings = table().settings()] {
+    return make_reader(caps.get(), settings);
+  };
   close_recording();
   const auto length = static_cast<Microseconds>(buffer_time() / GST_USECOND);
   recording_ = std::make_shared<RecordingReader>(

@@ -16,17 +16,37 @@ namespace eventcamera {
 
 enum class EventColumn : std::uint8_t { t, x, y, p };
 
-/// The column that a name means in any tool, in upper or lower case. What follows a space, '@',
-/// '[' or '(' (a unit, a size) is ignored.
-std::optional<EventColumn> event_column_named(std::string_view name);
+enum class TimeUnit : std::uint8_t { seconds, milliseconds, microseconds, nanoseconds };
 
-using ColumnOrder = std::array<EventColumn, 4>;
+/// The power of ten by which a time in this unit is microseconds.
+constexpr int power_of(TimeUnit unit) {
+  constexpr int powers[] = {6, 3, 0, -3};
+  return powers[static_cast<std::size_t>(unit)];
+}
 
-/// The order that a word such as "txyp" means; nothing where a letter is missing or not one of
-/// these.
-std::optional<ColumnOrder> column_order(std::string_view letters);
+/// What the name of a column says.
+struct ColumnName {
+  EventColumn column;
+  std::optional<TimeUnit> unit = std::nullopt;  ///< of a time
+};
 
-enum class TimeUnit : std::uint8_t { seconds, microseconds, nanoseconds };
+/// The column that a name means in any tool, in upper or lower case. A unit may follow a time, as
+/// in t_ns and "time [s]"; what else follows a space, '@', '[' or '(' is ignored.
+std::optional<ColumnName> column_named(std::string_view name);
+
+/// Where the columns of events are. Those without a value are ignored.
+using Columns = std::vector<std::optional<EventColumn>>;
+
+/// The columns that letters such as "txyp" mean, '-' being one to ignore; nothing where not each of
+/// t, x, y and p is there once.
+std::optional<Columns> columns_of(std::string_view letters);
+
+/// What is known of a table beforehand; the rest is found in its header and its first rows.
+struct TableSettings {
+  Columns columns = {};
+  std::optional<TimeUnit> unit = std::nullopt;
+  SensorSize size = {};  ///< 0x0: what the header says
+};
 
 /// Makes events of the numbers in a row: one outside the sensor is dropped, one earlier than
 /// another before it is kept, and both are counted.

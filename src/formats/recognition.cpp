@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "src/formats/little_endian.hpp"
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 
@@ -18,6 +19,16 @@ bool has_at(std::size_t at, std::string_view magic, Bytes bytes) {
                             [](std::uint8_t byte) { return static_cast<char>(byte); });
 }
 
+/// A ZIP archive whose first file is a NumPy array.
+bool is_npz(Bytes bytes) {
+  constexpr std::size_t name_begin = 30;
+  constexpr std::string_view ending = ".npy";
+  if (!has_at(0, {"PK\x03\x04", 4}, bytes) || bytes.size() < name_begin) return false;
+  const std::size_t name_size = little_endian<std::uint16_t>(bytes.data() + 26);
+  return name_size >= ending.size() &&
+         has_at(name_begin + name_size - ending.size(), ending, bytes);
+}
+
 constexpr std::string_view hdf5_magic("\x89HDF\r\n\x1a\n", 8);
 
 /// Formats that begin with a signature.
@@ -29,6 +40,7 @@ std::optional<Recognised> by_magic(Bytes bytes) {
   }
   if (has_at(0, "Event Stream", bytes)) return Recognised{FileKind::event_stream};
   if (has_at(0, "\x93NUMPY", bytes)) return Recognised{FileKind::npy};
+  if (is_npz(bytes)) return Recognised{FileKind::npz};
   if (has_at(0, hdf5_magic, bytes)) return Recognised{FileKind::hdf5};
   return std::nullopt;
 }
@@ -50,7 +62,8 @@ std::optional<Recognised> by_text_header(Bytes bytes) {
   return std::nullopt;
 }
 
-/// Whether CsvDecoder makes an event of every line.
+/// Whether CsvDecoder makes an event of every line. The unit of time does not matter here: who
+/// reads the file reports one that cannot be found.
 bool is_csv(Bytes bytes) {
   constexpr std::size_t max_bytes = 4096;
   constexpr std::size_t min_events = 3;
@@ -60,7 +73,7 @@ bool is_csv(Bytes bytes) {
   };
   if (!std::ranges::all_of(bytes, is_text)) return false;
   while (!bytes.empty() && bytes.back() != '\n') bytes = bytes.first(bytes.size() - 1);
-  CsvDecoder decoder;
+  CsvDecoder decoder({.unit = TimeUnit::microseconds});
   Decoded decoded;
   decoder.decode(bytes, decoded);
   decoder.finish(decoded);

@@ -15,6 +15,7 @@ enum class FileKind : std::uint8_t {
   event_stream,
   hdf5,
   npy,
+  npz,
   prophesee_dat,
   prophesee_raw,
 };

@@ -783,4 +783,40 @@ TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
   EXPECT_NE(text_of(message.get()).find("9920 events outside the sensor"), std::string::npos);
 }
 
+TEST(EventCsvDec, TakesTimesInTheUnitThatIsFoundOrSet) {
+  const Format esim = {"esim", "eventcsvenc dialect=esim", "eventcsvdec",
+                       "application/x-event-csv"};
+  const auto file = file_of(esim, some_events());
+  for (const char* const reader : {"eventcsvdec", "eventcsvdec time-unit=nanoseconds"}) {
+    auto h = Harness::with_late_pad(reader);
+    begin_file(h, esim);
+    push_file(h, file, 1000);
+    EXPECT_EQ(pull_events(h), some_events()) << reader;
+  }
+
+  const TemporaryFile unclear("1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n");
+  Player refused(unclear.path(), "eventcsvdec");
+  const auto message = refused.play();
+  ASSERT_TRUE(message);
+  ASSERT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_ERROR);
+  EXPECT_NE(text_of(message.get()).find("set time-unit"), std::string::npos);
+  Player set(unclear.path(), "eventcsvdec time-unit=nanoseconds");
+  EXPECT_TRUE(set.ends_well());
+  EXPECT_EQ(set.events, (std::vector<AbsoluteEvent>{AbsoluteEvent::at(2, 3, 1, Polarity::on),
+                                                    AbsoluteEvent::at(4, 5, 2, Polarity::off),
+                                                    AbsoluteEvent::at(6, 7, 3, Polarity::on)}));
+}
+
+TEST(EventCsvDec, TakesColumnsInTheOrderThatIsSet) {
+  const TemporaryFile file("1,3,2,5\n0,5,4,7\n");
+  Player player(file.path(), "eventcsvdec column-order=pyxt");
+  EXPECT_TRUE(player.ends_well());
+  EXPECT_EQ(player.events, (std::vector<AbsoluteEvent>{AbsoluteEvent::at(2, 3, 5, Polarity::on),
+                                                       AbsoluteEvent::at(4, 5, 7, Polarity::off)}));
+  Player wrong(file.path(), "eventcsvdec column-order=pyxx");
+  const auto message = wrong.play();
+  ASSERT_TRUE(message);
+  EXPECT_NE(text_of(message.get()).find("column-order \"pyxx\" must have"), std::string::npos);
+}
+
 }  // namespace

@@ -42,7 +42,7 @@ TEST(Npy, ComesBack) {
     NpyEncoder encoder;
     const auto unpatched = encoded(encoder, events);
     for (const auto& bytes : {unpatched, patched(encoder, unpatched)}) {
-      NpyDecoder decoder(size);
+      NpyDecoder decoder({.size = size});
       EXPECT_TRUE(decoded(decoder, bytes) == events);
       EXPECT_EQ(decoder.corruption().places + decoder.corruption().unsorted +
                     decoder.corruption().outside,
@@ -100,6 +100,65 @@ TEST(Npy, SmallElements) {
                                              AbsoluteEvent::at(7, 8, 0x605, Polarity::off)}));
 }
 
+/// An array of the shape (N, 4).
+template <class Number>
+Bytes rows_of(const std::string& type, std::initializer_list<Number> numbers) {
+  auto bytes = with_header("{'descr': '" + type + "', 'fortran_order': False, 'shape': (" +
+                           std::to_string(numbers.size() / 4) + ", 4), }");
+  for (const auto number : numbers) append(bytes, number, type.front() == '>');
+  return bytes;
+}
+
+TEST(Npy, RowsOfNumbers) {
+  const Events expected = {AbsoluteEvent::at(3, 4, 10, Polarity::on),
+                           AbsoluteEvent::at(5, 6, 12, Polarity::off)};
+  for (const auto& bytes : {rows_of<std::uint32_t>("<u4", {10, 3, 4, 1, 12, 5, 6, 0}),
+                            rows_of<std::int64_t>(">i8", {3, 4, 1, 10, 5, 6, -1, 12}),
+                            rows_of<double>("<f8", {10e-6, 3, 4, 1, 12e-6, 5, 6, 0}),
+                            rows_of<double>("<f8", {3, 4, 10e-6, 1, 5, 6, 12e-6, -1}),
+                            rows_of<double>("<f8", {10, 3, 4, 1, 12, 5, 6, 0})}) {
+    NpyDecoder decoder;
+    EXPECT_EQ(decoded(decoder, bytes), expected);
+    EXPECT_EQ(decoder.corruption().places, 0U);
+    expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, bytes);
+  }
+  const auto mirrored = rows_of<std::int32_t>("<i4", {1, 4, 3, 10'499, 0, 6, 5, 11'500});
+  EXPECT_THROW(
+      {
+        NpyDecoder decoder;
+        decoded(decoder, mirrored);
+      },
+      UnsupportedFormat);
+  NpyDecoder decoder({.columns = *columns_of("pyxt"), .unit = TimeUnit::nanoseconds});
+  EXPECT_EQ(decoded(decoder, mirrored), expected);
+}
+
+TEST(Npy, UnitByTheNameOrTheNumbers) {
+  const auto first_time = [](const std::string& name, const std::string& type, auto first,
+                             auto second) {
+    auto bytes = with_header("{'descr': [('" + name + "', '" + type +
+                             "'), ('x', '<u2'), ('y', '<u2'), ('p', '<i4')], 'fortran_order': "
+                             "False, 'shape': (2,)}");
+    for (const auto t : {first, second}) {
+      append(bytes, t);
+      append<std::uint64_t>(bytes, 0);
+    }
+    NpyDecoder decoder;
+    const auto events = decoded(decoder, bytes);
+    EXPECT_EQ(events.size(), 2U);
+    return events.empty() ? -1 : events.front().t;
+  };
+  EXPECT_EQ(first_time("t", "<i8", std::int64_t{1500}, std::int64_t{2500}), 1500);
+  EXPECT_EQ(first_time("t_ns", "<i8", std::int64_t{1500}, std::int64_t{2500}), 2);
+  EXPECT_EQ(first_time("time_ms", "<u8", std::uint64_t{1500}, std::uint64_t{2500}), 1'500'000);
+  EXPECT_EQ(first_time("ts", "<i8", std::int64_t{1'468'939'993'067'416'019},
+                       std::int64_t{1'468'939'993'067'416'020}),
+            1'468'939'993'067'416);
+  EXPECT_EQ(first_time("t", "<f8", 1.5, 2.0), 1'500'000);
+  EXPECT_EQ(first_time("t", "<f8", 1500.0, 2500.0), 1500);
+  EXPECT_EQ(first_time("t_s", "<f4", 1500.0F, 2500.0F), 1'500'000'000);
+}
+
 TEST(Npy, WhatIsWrongIsSkippedAndCounted) {
   auto bytes = with_header(
       "{'descr': [('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4')], 'fortran_order': False, "
@@ -149,7 +208,15 @@ TEST(Npy, WhatIsNoneIsRefused) {
   refused(bytes_of("\x93NUMPY"));
   refused(bytes_of(std::string("\x93NUMPY\x04\0\x10\0", 10)));
   refused(bytes_of(std::string("\x93NUMPY\x02\0\xff\xff\xff\xff", 12) + "{'descr'"));
-  refused(with_header("{'descr': '<f8', 'fortran_order': False, 'shape': (5, 4), }"));
+  for (const std::string array : {"'<f8', 'fortran_order': True, 'shape': (5, 4)",
+                                  "'<f8', 'fortran_order': False, 'shape': (4, 500)",
+                                  "'<f8', 'fortran_order': False, 'shape': (5, 3)",
+                                  "'<f8', 'fortran_order': False, 'shape': (5,)",
+                                  "'<f8', 'fortran_order': False, 'shape': (5, 0)",
+                                  "'<c8', 'fortran_order': False, 'shape': (5, 4)",
+                                  "'<f8', 'fortran_order': False, 'shape': (5, 4, 1)",
+                                  "'<f8', 'fortran_order': False, 'shape': ()"})
+    refused(with_header("{'descr': " + array + ", }"));
   for (const std::string descr :
        {"[]", "[('t', '<u8')]", "[('t', '<u8'), ('x', '<i4'), ('y', '<i4')]",
         "[('t', '<u8'), ('x', '<i4'), ('y', '<i4'), ('p', '<i4'), ('p', '<i4')]",

@@ -160,6 +160,30 @@ class OtherReaders(TableTest):
                     self.file.write_bytes(stream.getvalue())
                     self.assert_read('npy', expected)
 
+    def test_we_load_numpys_rows(self):
+        events = random_events(30_000, 5)
+        for order in ('txyp', 'xypt', 'xytp'):
+            for dtype, unit in (('<i8', 1), ('>u4', 1), ('<f8', 1), ('<f8', 1e6)):
+                with open(self.file, 'wb') as file:
+                    np.save(file, np.stack([events[name] / (unit if name == 't' else 1) for name in order],
+                                           axis=1).astype(dtype))
+                self.assert_read('npy', events)
+
+    def test_we_load_numpys_archives(self):
+        events = random_events(30_000, 6)
+        structured = np.zeros(30_000, [('t', '<i8'), ('x', '<u2'), ('y', '<u2'), ('p', 'u1')])
+        for name in 'txyp':
+            structured[name] = events[name]
+        for save in (np.savez, np.savez_compressed):
+            for arrays in ({**events, 'size': np.array([1280, 720])},
+                           {'ts': events['t'] / 1e6, 'xs': events['x'], 'ys': events['y'], 'ps': events['p'] > 0},
+                           {'t_ns': events['t'] * 1000, **{name: events[name].astype('u2') for name in 'xyp'}},
+                           {'events': structured},
+                           {'arr_0': np.stack([events[name] for name in 'xytp'], axis=1)}):
+                with open(self.file, 'wb') as file:
+                    save(file, **arrays)
+                self.assert_read('npz', events)
+
     def test_numpy_reads_our_text(self):
         events = random_events(20_000, 3)
         for kind, names, delimiter, unit, skipped in (
@@ -177,6 +201,9 @@ class OtherReaders(TableTest):
         np.savetxt(self.file, table)
         self.assert_read('csv', events)
         np.savetxt(self.file, table, fmt='%.9f %d %d %d')
+        self.assert_read('csv', events)
+        # All of an array become floating-point numbers.
+        np.savetxt(self.file, np.stack([events[name] for name in 'txyp'], axis=1))
         self.assert_read('csv', events)
         np.savetxt(self.file, np.stack([events[name] for name in 'xypt'], axis=1), fmt='%d',
                    delimiter=', ', header='x,y,p,t')

@@ -21,6 +21,8 @@ std::optional<Recognised> recognise(std::string_view text) {
 }
 
 constexpr auto hdf5 = "\x89HDF\r\n\x1a\n"sv;
+constexpr auto npz =
+    "PK\x03\x04-\0\0\0\0\0\0\0!\0....\xff\xff\xff\xff\xff\xff\xff\xff\x05\0\x14\0t.npy"sv;
 constexpr auto lines_of_events = "1,2,100,1\n3,4,200,0\n5,6,300,1\n"sv;
 
 TEST(Recognition, KnowsFilesByTheirFirstBytes) {
@@ -28,6 +30,7 @@ TEST(Recognition, KnowsFilesByTheirFirstBytes) {
   EXPECT_EQ(recognise("#!AER-DAT4."), (Recognised{FileKind::aedat, 4}));
   EXPECT_EQ(recognise("Event Stream"), Recognised{FileKind::event_stream});
   EXPECT_EQ(recognise("\x93NUMPY"), Recognised{FileKind::npy});
+  EXPECT_EQ(recognise(npz), Recognised{FileKind::npz});
   EXPECT_EQ(recognise(hdf5), Recognised{FileKind::hdf5});
   EXPECT_EQ(recognise("% evt 3.0\n"), Recognised{FileKind::prophesee_raw});
   EXPECT_EQ(recognise("% date 1\n% format EVT4;height=1;width=1\n"),
@@ -46,19 +49,24 @@ TEST(Recognition, LeavesOtherFilesAlone) {
         "1,2,100,1\n3,4,200,0\n"sv, "1,2,100,1\n3,4,200,0\n5,6,300,1\nfour\n"sv,
         "1,2,100,1\n3,4,200,0\n5,6,300,1\n\0"sv})
     EXPECT_EQ(recognise(text), std::nullopt) << text;
+  EXPECT_EQ(recognise(npz.substr(0, npz.size() - 1)), std::nullopt);
+  EXPECT_EQ(recognise(std::string(npz.substr(0, npz.size() - 3)) + "txt"), std::nullopt);
+  // Its unit is missing, and reading it says so.
+  EXPECT_EQ(recognise("1000 1 2 1\n2000 1 2 1\n3000 1 2 1\n"), Recognised{FileKind::csv});
   EXPECT_EQ(recognise(std::string(2047, '\0').append(hdf5)), std::nullopt);
 }
 
 TEST(Recognition, FindsTheSameWhereOneKindIsWanted) {
   for (const auto& text :
-       {""s, "#!AER-DAT4."s, "Event Stream"s, "\x93NUMPY"s, std::string(hdf5), "% evt 3.0\n"s,
-        "% Version 2\n% end\n\x0c\x08"s, std::string(lines_of_events),
+       {""s, "#!AER-DAT4."s, "Event Stream"s, "\x93NUMPY"s, std::string(hdf5), std::string(npz),
+        "% evt 3.0\n"s, "% Version 2\n% end\n\x0c\x08"s, std::string(lines_of_events),
         std::string("% a comment\n").append(lines_of_events), "A text of words.\n"s,
         std::string(2048, '\0').append(hdf5), std::string(2048, '\n').append(hdf5)}) {
     const std::span bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
     const auto found = eventcamera::recognise(bytes);
-    for (const auto kind : {FileKind::aedat, FileKind::csv, FileKind::event_stream, FileKind::hdf5,
-                            FileKind::npy, FileKind::prophesee_dat, FileKind::prophesee_raw}) {
+    for (const auto kind :
+         {FileKind::aedat, FileKind::csv, FileKind::event_stream, FileKind::hdf5, FileKind::npy,
+          FileKind::npz, FileKind::prophesee_dat, FileKind::prophesee_raw}) {
       const auto wanted = eventcamera::recognise(bytes, kind);
       if (found && found->kind == kind)
         EXPECT_EQ(wanted, found) << text;

@@ -12,6 +12,7 @@
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/numpy/npz_reader.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
 
@@ -74,6 +75,15 @@ void read_file(const std::string& kind, const std::string& file, const std::stri
     while (reader.read(10'000, out.events) > 0) {
     }
     corruption = reader.corruption();
+  } else if (kind == "npz") {
+    MemoryBytes bytes(load(file));
+    const auto reader = make_npz_reader();
+    reader->open(bytes);
+    while (const auto item = reader->next()) {
+      const auto events = std::get<EventItem>(*item).events;
+      out.events.insert(out.events.end(), events.begin(), events.end());
+    }
+    corruption = reader->corruption();
   } else {
     const std::unique_ptr<Decoder> decoder =
         kind == "npy" ? std::unique_ptr<Decoder>(std::make_unique<NpyDecoder>())

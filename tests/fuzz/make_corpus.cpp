@@ -66,7 +66,8 @@ int main(int argc, char** argv) {
   const std::filesystem::path corpus = argv[1];
   std::map<std::string, std::vector<Seed>> files = {
       {"aedat2", aedat2_seeds()}, {"aedat3", aedat3_seeds()}, {"aedat4", aedat4_seeds()},
-      {"csv", csv_seeds()},       {"hdf5", hdf5_seeds()},     {"npy", npy_seeds()}};
+      {"csv", csv_seeds()},       {"hdf5", hdf5_seeds()},     {"npy", npy_seeds()},
+      {"npz", npz_seeds()}};
   for (const auto& format : formats::all()) {
     if (format.name.starts_with("evt"))
       write(corpus / format.name, seeds_of(format));

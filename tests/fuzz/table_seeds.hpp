@@ -10,6 +10,7 @@
 #include "src/formats/hdf5/hdf5_handle.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
+#include "tests/formats/npz_file.hpp"
 #include "tests/fuzz/seed.hpp"
 #include "tests/fuzz/small_hdf5.hpp"
 
@@ -28,6 +29,9 @@ inline std::vector<Seed> csv_seeds() {
     seeds.push_back(
         {std::string(name), recordings::encode(encoder, few_events(1, {640, 480}, 20))});
   }
+  seeds.push_back({"index", bytes_of(",t_ns,x,y,p\n0,1500,3,4,1\n1,2500,5,6,0\n")});
+  seeds.push_back(
+      {"floats", bytes_of("1.0e+01 3.0e+00 4.0e+00 1.0e+00\n1.2e+01 5.0e+00 6.0e+00 0.0e+00\n")});
   seeds.push_back(
       {"other", bytes_of("# a comment\n\"X\"; Y ;Pol;time [s]\r\n1;2;true;1e-3\n3;4;-1;.5\n"
                          "1.0e0;2.00;false;0.0010005\n\n7;8\n")});
@@ -43,7 +47,24 @@ inline std::vector<Seed> npy_seeds() {
                         "'shape': (3,), }");
   other.resize(12 + 0xa0, ' ');
   other.resize(other.size() + 3 * 30, 0x3c);
-  return {{"ours", ours}, {"other", other}};
+  const std::vector<double> numbers = {0.5, 3, 4, 1, 0.75, 5, 6, 0};
+  return {{"ours", ours}, {"other", other}, {"rows", npz_file::array("'<f8'", "(2, 4)", numbers)}};
+}
+
+inline std::vector<Seed> npz_seeds() {
+  std::vector<Seed> seeds;
+  const auto rows = npy_seeds().back().bytes;
+  for (const bool is_compressed : {false, true}) {
+    const std::string how = is_compressed ? "-packed" : "-stored";
+    seeds.push_back({"columns" + how,
+                     npz_file::archive({{"t_ns.npy", npz_file::column<double>("<f8", {10, 20})},
+                                        {"x.npy", npz_file::column<std::uint16_t>("<u2", {1, 2})},
+                                        {"y.npy", npz_file::column<std::int32_t>("<i4", {3, 4})},
+                                        {"p.npy", npz_file::column<std::uint8_t>("|b1", {0, 1})}},
+                                       is_compressed)});
+    seeds.push_back({"rows" + how, npz_file::archive({{"arr_0.npy", rows}}, is_compressed)});
+  }
+  return seeds;
 }
 
 inline std::vector<Seed> ecf_seeds() {

@@ -6,15 +6,15 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <optional>
+#include <string>
+#include <utility>
 
 #include "src/formats/little_endian.hpp"
+#include "src/formats/table_sample.hpp"
 
 namespace eventcamera {
 
 namespace {
-
-constexpr std::size_t max_header = 65536;
 
 double half_of(std::uint16_t bits) {
   const int exponent = bits >> 10 & 31;
@@ -25,35 +25,57 @@ double half_of(std::uint16_t bits) {
   return (bits & 0x8000) != 0 ? -magnitude : magnitude;
 }
 
-/// The number that a field has, rounded to the nearest after a floating-point one is multiplied;
-/// nothing where 64 bits do not hold it.
-std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t* element,
-                                      double factor) {
+std::uint64_t word_of(const NpyField& field, const std::uint8_t* element) {
   std::uint64_t word = 0;
   std::memcpy(&word, element + field.offset, field.bytes);
-  if (field.big_endian) word = __builtin_bswap64(word) >> (64 - 8 * field.bytes);
+  return field.big_endian ? __builtin_bswap64(word) >> (64 - 8 * field.bytes) : word;
+}
+
+double floating_of(const NpyField& field, const std::uint8_t* element) {
+  const auto word = word_of(field, element);
+  if (field.bytes == 8) return std::bit_cast<double>(word);
+  if (field.bytes == 4) return std::bit_cast<float>(static_cast<std::uint32_t>(word));
+  return half_of(static_cast<std::uint16_t>(word));
+}
+
+/// An integer times a power of ten, rounded to the nearest; nothing where 64 bits do not hold it.
+std::optional<std::int64_t> scaled(std::int64_t number, int power) {
+  for (; power > 0; --power)
+    if (__builtin_mul_overflow(number, 10, &number)) return std::nullopt;
+  std::int64_t divisor = 1;
+  for (; power < 0; ++power) divisor *= 10;
+  return number / divisor + 2 * (number % divisor) / divisor;
+}
+
+/// The number that a field has times a power of ten, rounded to the nearest; nothing where 64 bits
+/// do not hold it.
+std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t* element,
+                                      int power = 0) {
   const unsigned unused = 64 - 8 * field.bytes;
   switch (field.kind) {
     case NpyField::Kind::signed_integer:
-      return static_cast<std::int64_t>(word << unused) >> unused;
+      return scaled(static_cast<std::int64_t>(word_of(field, element) << unused) >> unused, power);
     case NpyField::Kind::unsigned_integer:
-    case NpyField::Kind::boolean:
+    case NpyField::Kind::boolean: {
+      const auto word = word_of(field, element);
       if (word > std::numeric_limits<std::int64_t>::max()) return std::nullopt;
-      return static_cast<std::int64_t>(word);
+      return scaled(static_cast<std::int64_t>(word), power);
+    }
     case NpyField::Kind::floating:
       break;
   }
-  double number = 0;
-  if (field.bytes == 8) {
-    number = std::bit_cast<double>(word);
-  } else if (field.bytes == 4) {
-    number = std::bit_cast<float>(static_cast<std::uint32_t>(word));
-  } else {
-    number = half_of(static_cast<std::uint16_t>(word));
-  }
-  number = std::round(number * factor);
+  constexpr double factors[] = {1e-3, 1, 1e3, 1e6};
+  const double factor = factors[power / 3 + 1];
+  const double number = std::round(floating_of(field, element) * factor);
   if (!(std::abs(number) < 0x1p63)) return std::nullopt;  // nor where it is no number
   return static_cast<std::int64_t>(number);
+}
+
+TableNumber sample_of(const NpyField& field, const std::uint8_t* element) {
+  if (field.kind == NpyField::Kind::floating)
+    return {floating_of(field, element), TableNumber::Form::floating};
+  const auto number = number_of(field, element);
+  return {number ? static_cast<double>(*number) : std::numeric_limits<double>::quiet_NaN()};
 }
 
 /// How to take a little-endian integer out of 8 bytes that lie within the element.
@@ -77,54 +99,88 @@ struct Window {
 
 }  // namespace
 
-bool NpyDecoder::take_header(std::span<const std::uint8_t>& bytes) {
-  constexpr std::size_t version_end = npy_magic.size() + 2;
-  // As many bytes as are needed to know how many are needed.
-  std::size_t needed = version_end;
-  const auto take = [&] {
-    if (needed > rest_.size()) {
-      const auto count = std::min(needed - rest_.size(), bytes.size());
-      rest_.insert(rest_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
-      bytes = bytes.subspan(count);
-    }
-    return rest_.size() >= needed;
-  };
-  const bool long_enough = take();
-  const auto known = std::min(rest_.size(), npy_magic.size());
-  if (std::memcmp(rest_.data(), npy_magic.data(), known) != 0)
-    throw UnsupportedFormat("not a NumPy file");
-  if (!long_enough) return false;
-  const int version = rest_[npy_magic.size()];
-  if (version < 1 || version > 3)
-    throw UnsupportedFormat("unsupported NumPy version " + std::to_string(version));
-  needed += version == 1 ? 2 : 4;
-  if (!take()) return false;
-  const std::size_t length = version == 1
-                                 ? little_endian<std::uint16_t>(rest_.data() + version_end)
-                                 : little_endian<std::uint32_t>(rest_.data() + version_end);
-  const auto header_begin = needed;
-  if (length > max_header) throw UnsupportedFormat("NumPy header too long");
-  needed += length;
-  if (!take()) return false;
+NpyDecoder::NpyDecoder(const TableSettings& settings) : settings_(settings) {
+  size_ = settings.size;
+  validator_.set_size(size_);
+}
 
-  header_ = read_npy_header({reinterpret_cast<const char*>(rest_.data()) + header_begin, length});
-  plain_ = header_.element_bytes >= sizeof(std::uint64_t) &&
-           std::ranges::all_of(header_.fields, [](const NpyField& field) {
+NpyDecoder::NpyDecoder(const NpyHeader& header, const TableSettings& settings)
+    : NpyDecoder(settings) {
+  begin(header);
+}
+
+void NpyDecoder::begin(NpyHeader header) {
+  constexpr std::uint64_t max_sample = std::uint64_t{1} << 20;
+  left_ = header.count;
+  position_ = preamble_.size();
+  const auto rows =
+      std::clamp<std::uint64_t>(max_sample / header.element_bytes, 1, TableSample::max_rows);
+  sample_bytes_ = static_cast<std::size_t>(std::min(rows, left_) * header.element_bytes);
+  header_ = std::move(header);
+}
+
+/// Reads the first elements, once it is found out what they are.
+void NpyDecoder::read_sample(Decoded& out) {
+  const auto elements = std::exchange(rest_, {});
+  const auto whole = elements.size() / header_->element_bytes;
+  const auto end = whole * header_->element_bytes;
+  find_layout(std::span(elements).first(end));
+  read_elements(elements.data(), whole, out);
+  rest_.assign(elements.begin() + static_cast<std::ptrdiff_t>(end), elements.end());
+}
+
+void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
+  const bool has_names = header_->columns.empty();
+  const auto fields = has_names ? std::span<const NpyField>(header_->fields) : header_->columns;
+  TableSample sample;
+  for (; !elements.empty(); elements = elements.subspan(header_->element_bytes)) {
+    TableSample::Row row;
+    for (const auto& field : fields) row.push_back(sample_of(field, elements.data()));
+    sample.add(std::move(row));
+  }
+  auto columns = has_names ? columns_of("txyp") : std::optional(settings_.columns);
+  if (columns->empty()) columns = sample.find_columns();
+  if (!columns || columns->size() != fields.size())
+    throw UnsupportedFormat("unknown columns in the NumPy array; set column-order for all " +
+                            std::to_string(fields.size()) +
+                            " of them, or save a structured array of x, y, t and p");
+  if (!has_names)
+    for (std::size_t i = 0; i < columns->size(); ++i)
+      if (const auto column = (*columns)[i])
+        header_->fields[static_cast<std::size_t>(*column)] = header_->columns[i];
+
+  auto unit = settings_.unit ? settings_.unit : header_->unit;
+  if (!unit) unit = sample.find_unit(*columns, false);
+  if (!unit)
+    throw UnsupportedFormat(
+        "the first times of the NumPy array do not tell their unit; set "
+        "time-unit");
+  power_ = power_of(*unit);
+  plain_ = power_ == 0 && header_->element_bytes >= sizeof(std::uint64_t) &&
+           std::ranges::all_of(header_->fields, [](const NpyField& field) {
              // Of 64 bits without a sign not all fit.
              return field.kind != NpyField::Kind::floating &&
                     (!field.big_endian || field.bytes == 1) &&
                     (field.kind == NpyField::Kind::signed_integer || field.bytes < 8);
            });
-  left_ = header_.count;
-  position_ = rest_.size();
-  rest_.clear();
-  header_read_ = true;
-  return true;
+  layout_known_ = true;
 }
 
 void NpyDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
-  if (bytes.empty() || (!header_read_ && !take_header(bytes))) return;
-  const std::size_t size = header_.element_bytes;
+  if (bytes.empty()) return;
+  if (!header_) {
+    auto header = preamble_.take(bytes);
+    if (!header) return;
+    begin(*std::move(header));
+  }
+  if (!layout_known_) {
+    const auto count = std::min(sample_bytes_ - rest_.size(), bytes.size());
+    rest_.insert(rest_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
+    bytes = bytes.subspan(count);
+    if (rest_.size() < sample_bytes_) return;
+    read_sample(out);
+  }
+  const std::size_t size = header_->element_bytes;
   if (!rest_.empty()) {
     const auto count = std::min(size - rest_.size(), bytes.size());
     rest_.insert(rest_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
@@ -144,21 +200,22 @@ void NpyDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   }
 }
 
-void NpyDecoder::finish(Decoded& /*out*/) {
-  if (!header_read_) throw UnsupportedFormat("truncated NumPy header");
+void NpyDecoder::finish(Decoded& out) {
+  if (!header_) throw UnsupportedFormat("truncated NumPy header");
+  if (!layout_known_) read_sample(out);
   if (!rest_.empty()) {
     corruption_.note(position_, "truncated last event");
-  } else if (left_ > 0 && header_.count != npy_unknown_count) {
+  } else if (left_ > 0 && header_->count != npy_unknown_count) {
     corruption_.note(position_, "fewer events than the NumPy header says");
   }
 }
 
 void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, Decoded& out) {
-  const auto size = header_.element_bytes;
+  const auto size = header_->element_bytes;
   const auto* const end = bytes + count * size;
   left_ -= count;
   const auto field = [&](EventColumn column) -> const NpyField& {
-    return header_.fields[static_cast<std::size_t>(column)];
+    return header_->fields[static_cast<std::size_t>(column)];
   };
   const auto& t_field = field(EventColumn::t);
   const auto& x_field = field(EventColumn::x);
@@ -171,12 +228,11 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
                       corruption_);
     return;
   }
-  const double microseconds = t_field.kind == NpyField::Kind::floating ? 1e6 : 1;
   for (; bytes < end; bytes += size, position_ += size) {
-    const auto t = number_of(t_field, bytes, microseconds);
-    const auto x = number_of(x_field, bytes, 1);
-    const auto y = number_of(y_field, bytes, 1);
-    const auto p = number_of(p_field, bytes, 1);
+    const auto t = number_of(t_field, bytes, power_);
+    const auto x = number_of(x_field, bytes);
+    const auto y = number_of(y_field, bytes);
+    const auto p = number_of(p_field, bytes);
     if (t && x && y && p) {
       validator_.take(*t, *x, *y, *p > 0, out.events, corruption_);
     } else {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <string>
+#include <cstddef>
+#include <optional>
 
 #include "src/formats/decoder.hpp"
 #include "src/formats/event_table.hpp"
@@ -10,27 +11,33 @@
 namespace eventcamera {
 
 /// Reads NumPy's format, versions 1.0 to 3.0: a structured array with fields t, x, y and p in any
-/// order, each an integer or floating-point number of any width and byte order. A floating-point t
-/// is in seconds, an integer one in microseconds. Polarity is ON where it is more than 0.
+/// order, or rows of numbers whose columns are found by the first rows. Numbers are integers or
+/// floating-point numbers of any width and byte order. The unit of time is told by the name of its
+/// field, or found by the first rows: TableSample. Polarity is ON where it is more than 0.
 class NpyDecoder final : public Decoder {
  public:
-  /// The file does not tell the sensor's size; where it is 0x0 no event is outside.
-  explicit NpyDecoder(SensorSize size = {}) {
-    size_ = size;
-    validator_.set_size(size);
-  }
+  explicit NpyDecoder(const TableSettings& settings = {});
+
+  /// Reads elements only, as a header would tell of them.
+  NpyDecoder(const NpyHeader& header, const TableSettings& settings);
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
 
  private:
-  bool take_header(std::span<const std::uint8_t>& bytes);
+  void begin(NpyHeader header);
+  void read_sample(Decoded& out);
+  void find_layout(std::span<const std::uint8_t> elements);
   void read_elements(const std::uint8_t* bytes, std::uint64_t count, Decoded& out);
 
-  bool header_read_ = false;
-  NpyHeader header_;
+  TableSettings settings_;
+  NpyPreamble preamble_;
+  std::optional<NpyHeader> header_;
+  std::size_t sample_bytes_ = 0;  ///< of the first elements, which tell the layout
+  bool layout_known_ = false;
+  int power_ = 0;       ///< of ten, from the time's unit to microseconds
   bool plain_ = false;  ///< all fields are little-endian integers, 8 bytes or more together
-  std::vector<std::uint8_t> rest_;  ///< of the header, or the beginning of an element
+  std::vector<std::uint8_t> rest_;  ///< the first elements, or the beginning of one
   std::uint64_t position_ = 0;      ///< of what is read next
   std::uint64_t left_ = 0;          ///< elements that the header claims and that have not come
   bool after_end_ = false;

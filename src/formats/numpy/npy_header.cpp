@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/numpy/npy_header.hpp"
 
-#include <optional>
+#include <algorithm>
+#include <cstring>
 #include <string>
 
-#include "src/formats/event_table.hpp"
+#include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
 
@@ -74,7 +75,7 @@ class Literal {
     if (!rest_.empty()) fail();
   }
 
-  [[noreturn]] static void fail() { throw UnsupportedFormat("not a structured NumPy array"); }
+  [[noreturn]] static void fail() { throw UnsupportedFormat("not a NumPy array"); }
 
  private:
   void skip_blanks() {
@@ -166,13 +167,14 @@ void read_fields(Literal& literal, NpyHeader& header) {
     }
     literal.expect(')');
 
-    if (const auto column = event_column_named(name)) {
-      const auto index = static_cast<std::size_t>(*column);
+    if (const auto column = column_named(name)) {
+      const auto index = static_cast<std::size_t>(column->column);
       const auto number = one ? number_of(type, header.element_bytes) : std::nullopt;
       if (!number || known[index])
         throw UnsupportedFormat("NumPy field '" + std::string(name) +
                                 "' is not a number of 8 to 64 bits");
       header.fields[index] = *number;
+      if (column->column == EventColumn::t) header.unit = column->unit;
       known[index] = true;
     }
     if (header.element_bytes + bytes > max_element_bytes)
@@ -187,32 +189,61 @@ void read_fields(Literal& literal, NpyHeader& header) {
     if (!is_known) throw UnsupportedFormat("no fields t, x, y and p in the NumPy array");
 }
 
+/// The extents: (3,) or (3, 4).
+std::vector<std::uint64_t> read_shape(Literal& literal) {
+  std::vector<std::uint64_t> shape;
+  literal.expect('(');
+  while (!literal.take(')')) {
+    if (shape.size() == 2) throw UnsupportedFormat("the NumPy array has more than two dimensions");
+    shape.push_back(literal.integer());
+    if (!literal.take(',')) {
+      literal.expect(')');
+      break;
+    }
+  }
+  return shape;
+}
+
+/// Makes the columns of an array of plain numbers.
+void make_columns(const Type& type, bool by_columns, const std::vector<std::uint64_t>& shape,
+                  NpyHeader& header) {
+  constexpr std::uint64_t max_columns = 16;
+  const auto count = shape.size() == 2 ? shape[1] : 1;
+  if (count == 0 || count > max_columns || (by_columns && count > 1 && shape[0] > 1))
+    throw UnsupportedFormat(
+        "a row of the NumPy array must be an event: save numpy.ascontiguousarray(events) of the "
+        "shape (N, 4)");
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const auto field = number_of(type, header.element_bytes);
+    if (!field) throw UnsupportedFormat("the NumPy array is not of numbers of 8 to 64 bits");
+    header.columns.push_back(*field);
+    header.element_bytes += type.bytes;
+  }
+}
+
 }  // namespace
 
 NpyHeader read_npy_header(std::string_view dictionary) {
   NpyHeader header;
+  std::optional<Type> type;
   bool has_fields = false;
-  bool has_shape = false;
+  bool by_columns = false;
+  std::optional<std::vector<std::uint64_t>> shape;
   Literal literal(dictionary);
   literal.expect('{');
   while (!literal.take('}')) {
     const auto key = literal.string();
     literal.expect(':');
-    if (key == "descr" && !has_fields) {
-      if (literal.starts_with_string())
-        throw UnsupportedFormat(
-            "NumPy array of plain numbers; a structured array of x, y, t and p is needed");
-      read_fields(literal, header);
-      has_fields = true;
+    if (key == "descr" && !has_fields && !type) {
+      has_fields = !literal.starts_with_string();
+      if (has_fields)
+        read_fields(literal, header);
+      else
+        type = read_type(literal.string());
     } else if (key == "fortran_order") {
-      literal.boolean();  // in one dimension both orders are the same
-    } else if (key == "shape" && !has_shape) {
-      literal.expect('(');
-      has_shape = !literal.take(')');
-      if (has_shape) header.count = literal.integer();
-      literal.take(',');
-      if (!has_shape || !literal.take(')'))
-        throw UnsupportedFormat("the NumPy array must have one dimension");
+      by_columns = literal.boolean();
+    } else if (key == "shape" && !shape) {
+      shape = read_shape(literal);
     } else {
       Literal::fail();
     }
@@ -222,8 +253,47 @@ NpyHeader read_npy_header(std::string_view dictionary) {
     }
   }
   literal.expect_end();
-  if (!has_fields || !has_shape) Literal::fail();
+  if ((!has_fields && !type) || !shape) Literal::fail();
+  if (shape->empty() || (has_fields && shape->size() > 1))
+    throw UnsupportedFormat("the NumPy array must have one dimension");
+  header.count = shape->front();
+  if (type) make_columns(*type, by_columns, *shape, header);
   return header;
+}
+
+std::optional<NpyHeader> NpyPreamble::take(std::span<const std::uint8_t>& bytes) {
+  constexpr std::size_t max_header = 65536;
+  constexpr std::size_t version_end = npy_magic.size() + 2;
+  if (taken_.empty() && bytes.empty()) return std::nullopt;
+  // As many bytes as are needed to know how many are needed.
+  std::size_t needed = version_end;
+  const auto take = [&] {
+    if (needed > taken_.size()) {
+      const auto count = std::min(needed - taken_.size(), bytes.size());
+      taken_.insert(taken_.end(), bytes.begin(),
+                    bytes.begin() + static_cast<std::ptrdiff_t>(count));
+      bytes = bytes.subspan(count);
+    }
+    return taken_.size() >= needed;
+  };
+  const bool long_enough = take();
+  const auto known = std::min(taken_.size(), npy_magic.size());
+  if (std::memcmp(taken_.data(), npy_magic.data(), known) != 0)
+    throw UnsupportedFormat("not a NumPy file");
+  if (!long_enough) return std::nullopt;
+  const int version = taken_[npy_magic.size()];
+  if (version < 1 || version > 3)
+    throw UnsupportedFormat("unsupported NumPy version " + std::to_string(version));
+  needed += version == 1 ? 2 : 4;
+  if (!take()) return std::nullopt;
+  const std::size_t length = version == 1
+                                 ? little_endian<std::uint16_t>(taken_.data() + version_end)
+                                 : little_endian<std::uint32_t>(taken_.data() + version_end);
+  const auto header_begin = needed;
+  if (length > max_header) throw UnsupportedFormat("NumPy header too long");
+  needed += length;
+  if (!take()) return std::nullopt;
+  return read_npy_header({reinterpret_cast<const char*>(taken_.data()) + header_begin, length});
 }
 
 }  // namespace eventcamera

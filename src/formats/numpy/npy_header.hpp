@@ -4,7 +4,12 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <span>
 #include <string_view>
+#include <vector>
+
+#include "src/formats/event_table.hpp"
 
 namespace eventcamera {
 
@@ -25,13 +30,30 @@ struct NpyField {
 
 /// What a NumPy file's header says of its array of events.
 struct NpyHeader {
-  std::array<NpyField, 4> fields;  ///< by EventColumn
+  std::array<NpyField, 4> fields;  ///< by EventColumn, if there are no `columns`
+  std::optional<TimeUnit> unit;    ///< that the name of the time tells
+  std::vector<NpyField> columns;   ///< of an array of plain numbers, which have no names
   std::uint32_t element_bytes = 0;
   std::uint64_t count = 0;
 };
 
-/// Reads the header's dictionary. Throws UnsupportedFormat where it is not of a structured array of
-/// one dimension that has fields t, x, y and p.
+/// Reads the header's dictionary. Throws UnsupportedFormat where it is neither of a structured
+/// array of one dimension that has fields t, x, y and p, nor of an array of numbers: one column, or
+/// up to 16 of them in rows.
 NpyHeader read_npy_header(std::string_view dictionary);
+
+/// Reads what comes before the array, in pieces of any size.
+class NpyPreamble {
+ public:
+  /// Takes as much from the front of `bytes` as belongs to it; nothing where that is not yet all.
+  /// Throws UnsupportedFormat.
+  std::optional<NpyHeader> take(std::span<const std::uint8_t>& bytes);
+
+  /// In bytes, as far as it was taken.
+  std::size_t size() const { return taken_.size(); }
+
+ private:
+  std::vector<std::uint8_t> taken_;
+};
 
 }  // namespace eventcamera

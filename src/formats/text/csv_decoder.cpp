@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cstring>
+#include <limits>
 
 #include "src/formats/text/decimal.hpp"
 
@@ -61,8 +63,31 @@ std::optional<bool> read_polarity(std::string_view text) {
   return number->value == 1;
 }
 
-/// Powers of ten from a TimeUnit to microseconds.
-constexpr int powers[] = {6, 0, -3};
+/// What stands between quotes.
+std::string_view unquoted(std::string_view field) {
+  if (field.size() < 2 || field.front() != '"' || field.back() != '"') return field;
+  return field.substr(1, field.size() - 2);
+}
+
+bool is_letter(char letter) {
+  letter = static_cast<char>(letter | 0x20);
+  return letter >= 'a' && letter <= 'z';
+}
+
+TableNumber sample_of(std::string_view field) {
+  if (is_word(field, "true")) return {1};
+  if (is_word(field, "false")) return {0};
+  const auto decimal = read_decimal(field, 0);
+  if (!decimal) return {std::numeric_limits<double>::quiet_NaN()};
+  if (!decimal->has_fraction) return {static_cast<double>(decimal->value)};
+  double value = 0;
+  if (field.front() == '+') field.remove_prefix(1);
+  std::from_chars(field.data(), field.data() + field.size(), value);
+  const auto point = field.find('.');
+  const bool has_decimals = point != std::string_view::npos && field.size() - point > 2 &&
+                            field.find_first_of("eE") == std::string_view::npos;
+  return {value, has_decimals ? TableNumber::Form::decimals : TableNumber::Form::floating};
+}
 
 /// The digits that eight characters begin with, and their value.
 struct Digits {
@@ -105,7 +130,7 @@ inline bool read_plain_integer(const char*& at, std::uint64_t& value) {
 
 }  // namespace
 
-CsvDecoder::CsvDecoder(const CsvSettings& settings) : settings_(settings) {}
+CsvDecoder::CsvDecoder(const TableSettings& settings) : settings_(settings) {}
 
 void CsvDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -164,7 +189,7 @@ std::size_t CsvDecoder::split(std::string_view line, Fields& fields) {
 /// Finds out what the head's lines are, and where the events begin.
 void CsvDecoder::read_head() {
   in_head_ = false;
-  std::vector<std::string_view> samples;
+  TableSample sample;
   std::string_view text = head_;
   constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
@@ -175,23 +200,28 @@ void CsvDecoder::read_head() {
     if (end == std::string_view::npos) break;
     const auto line = trimmed(text.substr(0, end));
     text.remove_prefix(end + 1);
-    const bool header = samples.empty() && read_header_line(line);
+    const bool header = sample.empty() && read_header_line(line);
     if (header) position_ = head_.size() - text.size();
-    if (!header && !is_comment(line)) samples.push_back(line);
+    if (header || is_comment(line)) continue;
+    if (sample.empty()) {
+      const auto mark = line.find_first_of(",; \t");
+      if (mark != std::string_view::npos) separator_ = line[mark];
+    }
+    Fields fields;
+    const auto count = split(line, fields);
+    TableSample::Row row(count);
+    std::transform(fields.begin(), fields.begin() + static_cast<std::ptrdiff_t>(count), row.begin(),
+                   sample_of);
+    sample.add(std::move(row));
   }
   if (!empty && text.size() == head_.size())
     throw UnsupportedFormat("not CSV events: no line ends");
 
   if (settings_.size != SensorSize{}) size_ = settings_.size;
   validator_.set_size(size_);
-  if (settings_.order) columns_.assign(settings_.order->begin(), settings_.order->end());
-  find_columns(samples);
-  find_unit(samples);
+  find_columns(sample);
+  find_unit(sample);
   plain_ = columns_.size() == 4;
-  if (!samples.empty()) {
-    const auto mark = samples.front().find_first_of(",; \t");
-    if (mark != std::string_view::npos) separator_ = samples.front()[mark];
-  }
 }
 
 /// Whether this line, before the first event, is none. Takes what it says.
@@ -211,18 +241,20 @@ bool CsvDecoder::read_header_line(std::string_view line) {
     size_ = read_size(fields[0], fields[1]);
     return size_ != SensorSize{};
   }
-  std::string_view first = fields[0];
-  if (first.starts_with('"')) first.remove_prefix(1);
-  const char letter = count == 0 || first.empty() ? '0' : static_cast<char>(first[0] | 0x20);
-  if (letter < 'a' || letter > 'z' || !columns_.empty()) return false;
+  const auto names = std::span(fields).first(count);
+  // The column of an index may have no name.
+  const auto named =
+      std::ranges::find_if(names, [](std::string_view name) { return !unquoted(name).empty(); });
+  if (has_names_ || named == names.end() || !is_letter(unquoted(*named).front())) return false;
 
+  has_names_ = true;
   SensorSize size;
-  for (auto field : std::span(fields).first(count)) {
-    if (field.size() >= 2 && field.front() == '"' && field.back() == '"')
-      field = field.substr(1, field.size() - 2);
-    auto column = event_column_named(field);
+  for (const auto field : names) {
+    const auto name = column_named(unquoted(field));
+    auto column = name ? std::optional(name->column) : std::nullopt;
     if (std::ranges::find(columns_, column) != columns_.end()) column.reset();
     columns_.push_back(column);
+    if (column == EventColumn::t) unit_ = name->unit;
     if (const auto at = field.find('@'); at != std::string_view::npos) {
       if (column == EventColumn::x) size.width = read_extent(field.substr(at + 1)).value_or(0);
       if (column == EventColumn::y) size.height = read_extent(field.substr(at + 1)).value_or(0);
@@ -231,7 +263,7 @@ bool CsvDecoder::read_header_line(std::string_view line) {
   if (size.width > 0 && size.height > 0) size_ = size;
   const auto known =
       std::ranges::count_if(columns_, [](auto column) { return column.has_value(); });
-  if (known < 4 && !settings_.order)
+  if (known < 4 && settings_.columns.empty())
     throw UnsupportedFormat("no columns t, x, y and p in the first line");
   return true;
 }
@@ -261,64 +293,33 @@ std::optional<CsvDecoder::Row> CsvDecoder::read_row(
   return row;
 }
 
-void CsvDecoder::find_columns(const std::vector<std::string_view>& samples) {
-  // Times of the samples that are events with these columns.
-  const auto times_of = [&](const Columns& columns, int power) {
-    std::vector<std::int64_t> times;
-    for (const auto sample : samples) {
-      Fields fields;
-      const auto count = split(sample, fields);
-      const auto row = read_row(std::span(fields).first(count), columns, power);
-      if (row && row->x >= 0 && row->x < 0x10000 && row->y >= 0 && row->y < 0x8000)
-        times.push_back(row->t.value);
-    }
-    return times;
-  };
-  if (!columns_.empty()) {
-    if (!samples.empty() && times_of(columns_, 0).empty())
-      throw UnsupportedFormat("not CSV events: no line has the expected columns");
+void CsvDecoder::find_columns(const TableSample& sample) {
+  if (!settings_.columns.empty()) {
+    columns_ = settings_.columns;
+  } else if (!has_names_) {
+    auto found = sample.find_columns();
+    if (!found)
+      throw UnsupportedFormat(
+          "not CSV events, or an unknown column order; set column-order, or name the columns t, x, "
+          "y and p in the first line");
+    columns_ = *std::move(found);
     return;
+  } else if (sample.has_columns(columns_.size() + 1)) {
+    columns_.insert(columns_.begin(), std::nullopt);  // an index that has no name
   }
-
-  std::array<bool, 4> has_fraction{};
-  for (const auto sample : samples) {
-    Fields fields;
-    if (split(sample, fields) != has_fraction.size()) continue;
-    for (std::size_t i = 0; i < has_fraction.size(); ++i) {
-      const auto number = read_decimal(fields[i], 0);
-      if (number && number->has_fraction) has_fraction[i] = true;
-    }
-  }
-  const bool one_is_time = std::ranges::count(has_fraction, true) == 1;
-  for (const auto letters : {"txyp", "xypt", "xytp"}) {
-    const auto order = *column_order(letters);
-    const auto at = std::ranges::find(order, EventColumn::t) - order.begin();
-    const bool fraction = has_fraction[static_cast<std::size_t>(at)];
-    Columns columns(order.begin(), order.end());
-    if (samples.empty()) {
-      columns_ = columns;
-      return;
-    }
-    const auto times = times_of(columns, fraction ? 6 : 0);
-    if (times.size() * 2 < samples.size()) continue;
-    if (one_is_time ? !fraction : !std::ranges::is_sorted(times)) continue;
-    columns_ = columns;
-    return;
-  }
-  throw UnsupportedFormat(
-      "not CSV events, or an unknown column order; name the columns t, x, y and p in the first "
-      "line");
+  if (!sample.empty() && !sample.has_events(columns_))
+    throw UnsupportedFormat("not CSV events: no line has the expected columns");
 }
 
-void CsvDecoder::find_unit(const std::vector<std::string_view>& samples) {
-  auto unit = TimeUnit::microseconds;
-  for (const auto sample : samples) {
-    Fields fields;
-    const auto count = split(sample, fields);
-    const auto row = read_row(std::span(fields).first(count), columns_, 0);
-    if (row && row->t.has_fraction) unit = TimeUnit::seconds;
-  }
-  power_ = powers[static_cast<std::size_t>(settings_.unit.value_or(unit))];
+void CsvDecoder::find_unit(const TableSample& sample) {
+  const bool is_either = !has_names_ && (separator_ == ' ' || separator_ == '\t');
+  auto unit = settings_.unit ? settings_.unit : unit_;
+  if (!unit) unit = sample.find_unit(columns_, is_either);
+  if (!unit)
+    throw UnsupportedFormat(
+        "the first lines do not tell the unit of time; set time-unit, or name the column t_s, t_us "
+        "or t_ns in the first line");
+  power_ = power_of(*unit);
 }
 
 void CsvDecoder::read_text(std::string_view text, Decoded& out) {
@@ -411,6 +412,9 @@ const char* CsvDecoder::read_plain_line(const char* at, Row& row) const {
             if (digits.count == 8) at += read_digits(at).count;
             value += (digits.value * powers_of_ten[8 - digits.count] + 50) / 100;
           }
+        } else if (power_ == 3) {
+          if (value > 1'000'000'000'000) return nullptr;
+          value *= 1000;
         } else if (power_ == -3) {
           value = (value + 500) / 1000;
         }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -9,6 +10,8 @@
 #include "src/formats/event_table.hpp"
 
 namespace eventcamera {
+
+using ColumnOrder = std::array<EventColumn, 4>;
 
 /// How a text file of events is written.
 struct CsvDialect {

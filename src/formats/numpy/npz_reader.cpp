@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/numpy/npz_reader.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "src/formats/numpy/npy_decoder.hpp"
+#include "src/formats/numpy/zip_archive.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::size_t block_size = std::size_t{1} << 16;
+constexpr std::size_t rows_at_once = std::size_t{1} << 12;
+
+/// A source of what an NpyDecoder reads.
+class Elements {
+ public:
+  virtual ~Elements() = default;
+  Elements(const Elements&) = delete;
+  Elements& operator=(const Elements&) = delete;
+
+  /// The next bytes, valid until the next call; none at the end. Nothing where the archive is
+  /// corrupt.
+  virtual std::optional<std::span<const std::uint8_t>> next() = 0;
+
+ protected:
+  Elements() = default;
+};
+
+/// An array of the archive, and its file from the first element on.
+struct ArrayFile {
+  ZipEntry entry;
+  NpyHeader header;
+  std::vector<std::uint8_t> rest;  ///< read, not yet taken
+};
+
+/// Reads the header of an array. Throws UnsupportedFormat.
+ArrayFile open_array(ZipArchive& archive, std::size_t index) {
+  auto entry = archive.open(index);
+  NpyPreamble preamble;
+  std::array<std::uint8_t, 128> block;  // where NumPy's headers of numbers end
+  while (true) {
+    const auto count = entry.read(block);
+    std::span<const std::uint8_t> bytes = std::span(block).first(count.value_or(0));
+    if (bytes.empty())
+      throw UnsupportedFormat(archive.names()[index] + " in the NumPy archive has no header");
+    if (auto header = preamble.take(bytes))
+      return {std::move(entry), *std::move(header), {bytes.begin(), bytes.end()}};
+  }
+}
+
+/// An array of events.
+class WholeArray final : public Elements {
+ public:
+  explicit WholeArray(ArrayFile array) : array_(std::move(array)) {}
+
+  std::optional<std::span<const std::uint8_t>> next() override {
+    block_ = std::exchange(array_.rest, {});
+    if (!block_.empty()) return block_;
+    block_.resize(block_size);
+    const auto count = array_.entry.read(block_);
+    if (!count) return std::nullopt;
+    return std::span(block_).first(*count);
+  }
+
+ private:
+  ArrayFile array_;
+  std::vector<std::uint8_t> block_;
+};
+
+/// Arrays of a column each, joined to elements of t, x, y and p.
+class JoinedColumns final : public Elements {
+ public:
+  explicit JoinedColumns(std::vector<ArrayFile> arrays) : arrays_(std::move(arrays)) {
+    header_.count = std::numeric_limits<std::uint64_t>::max();
+    for (std::size_t i = 0; i < arrays_.size(); ++i) {
+      auto& field = header_.fields[i] = arrays_[i].header.columns.front();
+      field.offset = header_.element_bytes;
+      header_.element_bytes += field.bytes;
+      header_.count = std::min(header_.count, arrays_[i].header.count);
+    }
+  }
+
+  NpyHeader header(std::optional<TimeUnit> unit) const {
+    auto header = header_;
+    header.unit = unit;
+    return header;
+  }
+
+  std::optional<std::span<const std::uint8_t>> next() override {
+    std::size_t rows = rows_at_once;
+    for (auto& [entry, header, rest] : arrays_) {
+      const auto had = rest.size();
+      const auto wanted = rows_at_once * header.element_bytes;
+      if (had < wanted) {
+        rest.resize(wanted);
+        const auto count = entry.read(std::span(rest).subspan(had));
+        if (!count) return std::nullopt;
+        rest.resize(had + *count);
+      }
+      rows = std::min(rows, rest.size() / header.element_bytes);
+    }
+    joined_.resize(rows * header_.element_bytes);
+    for (std::size_t i = 0; i < arrays_.size(); ++i) {
+      auto& rest = arrays_[i].rest;
+      const auto& field = header_.fields[i];
+      for (std::size_t row = 0; row < rows; ++row)
+        std::copy_n(rest.data() + row * field.bytes, field.bytes,
+                    joined_.data() + row * header_.element_bytes + field.offset);
+      rest.erase(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(rows * field.bytes));
+    }
+    return joined_;
+  }
+
+ private:
+  std::vector<ArrayFile> arrays_;  ///< by EventColumn
+  NpyHeader header_;               ///< of the elements
+  std::vector<std::uint8_t> joined_;
+};
+
+/// A name of the archive without folders and ending; empty where it is not an array.
+std::string_view array_name(std::string_view name) {
+  constexpr std::string_view ending = ".npy";
+  if (!name.ends_with(ending)) return {};
+  name.remove_suffix(ending.size());
+  return name.substr(name.rfind('/') + 1);
+}
+
+/// What is open of an archive.
+class Archive {
+ public:
+  /// Throws UnsupportedFormat.
+  Archive(ByteSource& source, const TableSettings& settings) : archive_(source) {
+    if (!open_columns(settings)) open_first_array(settings);
+  }
+
+  /// Reads the next events. False at the end.
+  bool read(Decoded& out) {
+    if (ended_) return false;
+    const auto bytes = elements_->next();
+    ended_ = !bytes || bytes->empty();
+    if (ended_)
+      decoder_->finish(out);
+    else
+      decoder_->decode(*bytes, out);
+    corruption_ = decoder_->corruption();
+    if (!bytes) corruption_.note(0, "the ZIP archive cannot be unpacked further");
+    return true;
+  }
+
+  SensorSize size() const { return decoder_->size(); }
+  const Corruption& corruption() const { return corruption_; }
+
+ private:
+  /// False where they are not all there.
+  bool open_columns(const TableSettings& settings) {
+    std::array<std::optional<std::size_t>, 4> indices;
+    std::optional<TimeUnit> unit;
+    for (std::size_t i = 0; i < archive_.names().size(); ++i) {
+      const auto name = column_named(array_name(archive_.names()[i]));
+      if (!name) continue;
+      auto& index = indices[static_cast<std::size_t>(name->column)];
+      if (index) continue;
+      index = i;
+      if (name->column == EventColumn::t) unit = name->unit;
+    }
+    std::vector<ArrayFile> arrays;
+    for (const auto& index : indices) {
+      if (!index) return false;
+      arrays.push_back(open_array(archive_, *index));
+      if (arrays.back().header.columns.size() != 1)
+        throw UnsupportedFormat(archive_.names()[*index] +
+                                " in the NumPy archive is not an array of one column");
+    }
+    auto joined = std::make_unique<JoinedColumns>(std::move(arrays));
+    decoder_ = std::make_unique<NpyDecoder>(joined->header(unit), settings);
+    elements_ = std::move(joined);
+    return true;
+  }
+
+  void open_first_array(const TableSettings& settings) {
+    std::string cause;
+    for (std::size_t i = 0; i < archive_.names().size(); ++i) {
+      if (array_name(archive_.names()[i]).empty()) continue;
+      try {
+        auto array = open_array(archive_, i);
+        if (array.header.columns.size() == 1) continue;
+        decoder_ = std::make_unique<NpyDecoder>(array.header, settings);
+        elements_ = std::make_unique<WholeArray>(std::move(array));
+        return;
+      } catch (const UnsupportedFormat& error) {
+        cause = std::string("; of ") + archive_.names()[i] + ": " + error.what();
+      }
+    }
+    throw UnsupportedFormat("the NumPy archive has neither arrays t, x, y and p nor one of events" +
+                            cause);
+  }
+
+  ZipArchive archive_;
+  std::unique_ptr<Elements> elements_;
+  std::unique_ptr<NpyDecoder> decoder_;
+  Corruption corruption_;
+  bool ended_ = false;
+};
+
+/// The events of an archive as items.
+class NpzReader final : public Reader {
+ public:
+  explicit NpzReader(const TableSettings& settings) : settings_(settings) {}
+
+  void push(std::span<const std::uint8_t> piece) override {
+    constexpr std::size_t max_collected = std::size_t{1} << 28;
+    if (piece.size() > max_collected - collected_.size())
+      throw UnsupportedFormat("a NumPy archive this large has to be pulled, as from filesrc");
+    collected_.insert(collected_.end(), piece.begin(), piece.end());
+  }
+
+  void finish() override {
+    bytes_ = std::make_unique<MemoryBytes>(std::move(collected_));
+    open(*bytes_);
+  }
+
+  bool open(ByteSource& source) override {
+    archive_ = std::make_unique<Archive>(source, settings_);
+    streams_.front().size = archive_->size();
+    return true;
+  }
+
+  std::optional<Item> next() override {
+    do {
+      decoded_.events.clear();
+      if (!archive_ || !archive_->read(decoded_)) return std::nullopt;
+    } while (decoded_.events.empty());
+    return EventItem{0, decoded_.events};
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+
+  const Corruption& corruption() const override {
+    static const Corruption none;
+    return archive_ ? archive_->corruption() : none;
+  }
+
+  /// Arrays are unpacked from their beginning.
+  std::optional<SeekPoint> seek_point_before(Microseconds /*t*/) const override {
+    return std::nullopt;
+  }
+  void restart(const SeekPoint& /*seek_point*/) override {}
+
+ private:
+  TableSettings settings_;
+  std::vector<std::uint8_t> collected_;
+  std::unique_ptr<MemoryBytes> bytes_;  ///< that were collected
+  std::unique_ptr<Archive> archive_;    ///< once it can be read
+  std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
+  Decoded decoded_;
+};
+
+}  // namespace
+
+std::unique_ptr<Reader> make_npz_reader(const TableSettings& settings) {
+  return std::make_unique<NpzReader>(settings);
+}
+
+}  // namespace eventcamera

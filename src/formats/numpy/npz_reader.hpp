@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <memory>
+
+#include "src/formats/event_table.hpp"
+#include "src/formats/reader.hpp"
+
+namespace eventcamera {
+
+/// Reads NumPy's archives: arrays named t, x, y and p, or one array of events as in an .npy file.
+/// The bytes are opened, or pushed: then they are collected in memory, up to 256 MiB, and read at
+/// their end, because that is where an archive lists its arrays.
+std::unique_ptr<Reader> make_npz_reader(const TableSettings& settings = {});
+
+}  // namespace eventcamera

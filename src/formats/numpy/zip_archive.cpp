@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/numpy/zip_archive.hpp"
+
+#include <algorithm>
+
+#include "src/formats/decoder.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+/// Of a directory, which the library keeps in memory. Arrays have some 100 bytes there.
+constexpr std::uint64_t max_directory_bytes = std::uint64_t{1} << 22;
+
+}  // namespace
+
+std::optional<std::size_t> ZipEntry::read(std::span<std::uint8_t> out) {
+  std::size_t filled = 0;
+  while (filled < out.size()) {
+    const auto count = zip_fread(file_.get(), out.data() + filled, out.size() - filled);
+    if (count < 0) return std::nullopt;
+    if (count == 0) break;
+    filled += static_cast<std::size_t>(count);
+  }
+  return filled;
+}
+
+zip_int64_t ZipArchive::call(void* data, void* to, zip_uint64_t size, zip_source_cmd_t command) {
+  auto& input = *static_cast<Input*>(data);
+  switch (command) {
+    case ZIP_SOURCE_SUPPORTS:
+      return zip_source_make_command_bitmap(ZIP_SOURCE_SUPPORTS, ZIP_SOURCE_OPEN, ZIP_SOURCE_READ,
+                                            ZIP_SOURCE_CLOSE, ZIP_SOURCE_STAT, ZIP_SOURCE_ERROR,
+                                            ZIP_SOURCE_FREE, ZIP_SOURCE_SEEK, ZIP_SOURCE_TELL, -1);
+    case ZIP_SOURCE_OPEN:
+      input.position = 0;
+      return 0;
+    case ZIP_SOURCE_READ: {
+      const bool is_too_much = !input.is_open && size > max_directory_bytes - input.directory_bytes;
+      const auto count =
+          is_too_much ? std::nullopt
+                      : input.source->read(input.position, {static_cast<std::uint8_t*>(to), size});
+      if (!count) {
+        zip_error_set(&input.error, ZIP_ER_READ, 0);
+        return -1;
+      }
+      if (!input.is_open) input.directory_bytes += *count;
+      input.position += *count;
+      return static_cast<zip_int64_t>(*count);
+    }
+    case ZIP_SOURCE_SEEK: {
+      const auto position = zip_source_seek_compute_offset(input.position, input.source->size(), to,
+                                                           size, &input.error);
+      if (position < 0) return -1;
+      input.position = static_cast<std::uint64_t>(position);
+      return 0;
+    }
+    case ZIP_SOURCE_TELL:
+      return static_cast<zip_int64_t>(input.position);
+    case ZIP_SOURCE_STAT: {
+      auto& stat = *static_cast<zip_stat_t*>(to);
+      zip_stat_init(&stat);
+      stat.size = input.source->size();
+      stat.valid = ZIP_STAT_SIZE;
+      return sizeof stat;
+    }
+    case ZIP_SOURCE_ERROR:
+      return zip_error_to_data(&input.error, to, size);
+    case ZIP_SOURCE_CLOSE:
+    case ZIP_SOURCE_FREE:
+      return 0;
+    default:
+      zip_error_set(&input.error, ZIP_ER_OPNOTSUPP, 0);
+      return -1;
+  }
+}
+
+ZipArchive::ZipArchive(ByteSource& source)
+    : input_(std::make_unique<Input>(Input{.source = &source})), archive_(nullptr, zip_discard) {
+  zip_error_t error;
+  zip_error_init(&error);
+  zip_source_t* const bytes = zip_source_function_create(call, input_.get(), &error);
+  archive_.reset(bytes != nullptr ? zip_open_from_source(bytes, ZIP_RDONLY, &error) : nullptr);
+  const std::string cause = zip_error_strerror(&error);
+  zip_error_fini(&error);
+  if (!archive_) {
+    zip_source_free(bytes);
+    throw UnsupportedFormat("the ZIP archive cannot be opened: " + cause);
+  }
+  input_->is_open = true;
+  const auto count = zip_get_num_entries(archive_.get(), 0);
+  for (zip_int64_t i = 0; i < count; ++i) {
+    const char* const name =
+        zip_get_name(archive_.get(), static_cast<zip_uint64_t>(i), ZIP_FL_ENC_RAW);
+    names_.emplace_back(name != nullptr ? name : "");
+  }
+}
+
+ZipEntry ZipArchive::open(std::size_t index) {
+  zip_file_t* const file = zip_fopen_index(archive_.get(), index, 0);
+  if (file == nullptr)
+    throw UnsupportedFormat(
+        names_[index] + " in the ZIP archive cannot be unpacked: " + zip_strerror(archive_.get()));
+  return ZipEntry(file);
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/table_sample.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace eventcamera {
+
+namespace {
+
+using Form = TableNumber::Form;
+
+bool is_whole(double value) {
+  return std::trunc(value) == value;
+}
+
+bool is_within(double value, double first, double end) {
+  return is_whole(value) && value >= first && value < end;
+}
+
+/// Whether the number can be in this column.
+bool fits(double value, EventColumn column) {
+  switch (column) {
+    case EventColumn::t:
+      return std::isfinite(value);
+    case EventColumn::x:
+      return is_within(value, 0, 0x10000);
+    case EventColumn::y:
+      return is_within(value, 0, 0x8000);
+    case EventColumn::p:
+      return is_within(value, -1, 2);
+  }
+  return false;
+}
+
+/// Of whole numbers that are either. Thousands, again and again, are nanoseconds that were
+/// microseconds once; and gaps of less than 10, between many events, would be too short for
+/// nanoseconds.
+std::optional<TimeUnit> unit_by_gaps(const std::vector<TableNumber>& times) {
+  constexpr std::size_t many = 16;
+  constexpr double short_gap = 10;
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < times.size(); ++i)
+    if (times[i].value > times[i - 1].value) gaps.push_back(times[i].value - times[i - 1].value);
+  if (std::ranges::all_of(times, [](auto t) { return std::fmod(t.value, 1000) == 0; }))
+    return gaps.size() >= many ? std::optional(TimeUnit::nanoseconds) : std::nullopt;
+  std::ranges::sort(gaps);
+  const bool is_dense = !gaps.empty() && gaps[gaps.size() / 4] < short_gap;
+  return is_dense ? std::optional(TimeUnit::microseconds) : std::nullopt;
+}
+
+}  // namespace
+
+bool TableSample::has_columns(std::size_t count) const {
+  return !rows_.empty() &&
+         std::ranges::all_of(rows_, [count](const Row& row) { return row.size() == count; });
+}
+
+/// Whether the first of five columns does, as an index of pandas.
+bool TableSample::counts_rows() const {
+  if (!has_columns(5)) return false;
+  for (std::size_t i = 1; i < rows_.size(); ++i)
+    if (rows_[i].front().value != rows_[i - 1].front().value + 1) return false;
+  return true;
+}
+
+/// Of the rows that are events.
+std::vector<TableNumber> TableSample::times_of(const Columns& columns) const {
+  std::vector<TableNumber> times;
+  for (const auto& row : rows_) {
+    if (row.size() != columns.size()) continue;
+    bool is_event = true;
+    for (std::size_t i = 0; i < row.size(); ++i)
+      is_event = is_event && (!columns[i] || fits(row[i].value, *columns[i]));
+    if (!is_event) continue;
+    const auto at = std::ranges::find(columns, std::optional(EventColumn::t)) - columns.begin();
+    times.push_back(row[static_cast<std::size_t>(at)]);
+  }
+  return times;
+}
+
+std::optional<Columns> TableSample::find_columns() const {
+  const std::size_t skipped = counts_rows() ? 1 : 0;
+  // The only column with a number of which this holds.
+  const auto only_column = [&](const auto& holds) {
+    std::optional<std::size_t> only;
+    std::size_t count = 0;
+    for (auto i = skipped; i < skipped + 4; ++i) {
+      const bool is_one = std::ranges::any_of(
+          rows_, [&](const Row& row) { return row.size() == skipped + 4 && holds(row[i]); });
+      if (!is_one) continue;
+      only = i;
+      ++count;
+    }
+    return count == 1 ? only : std::nullopt;
+  };
+  auto time = only_column(
+      [](TableNumber number) { return std::isfinite(number.value) && !is_whole(number.value); });
+  if (!time) time = only_column([](TableNumber number) { return number.form != Form::integer; });
+
+  for (const auto* const letters : {"txyp", "xypt", "xytp"}) {
+    auto columns = *columns_of(letters);
+    columns.insert(columns.begin(), skipped, std::nullopt);
+    if (rows_.empty()) return columns;
+    const auto times = times_of(columns);
+    if (times.size() * 2 < rows_.size()) continue;
+    const bool is_it = time ? columns[*time] == EventColumn::t
+                            : std::ranges::is_sorted(times, {}, &TableNumber::value);
+    if (is_it) return columns;
+  }
+  return std::nullopt;
+}
+
+std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_either) const {
+  // Years from 1973 on: no recording that starts at 0 lasts as long.
+  constexpr double least_date_in_microseconds = 1e14;
+  constexpr double least_date_in_nanoseconds = 1e17;
+  const auto times = times_of(columns);
+  if (times.empty()) return TimeUnit::microseconds;
+  if (!std::ranges::all_of(times, is_whole, &TableNumber::value)) return TimeUnit::seconds;
+  const auto last = std::ranges::max(times, {}, &TableNumber::value).value;
+  if (last >= least_date_in_nanoseconds) return TimeUnit::nanoseconds;
+  if (last >= least_date_in_microseconds) return TimeUnit::microseconds;
+  const auto form = std::ranges::max(times, {}, &TableNumber::form).form;
+  if (form == Form::integer) return is_either ? unit_by_gaps(times) : TimeUnit::microseconds;
+
+  // Whole numbers all the same: microseconds that were made floating-point numbers, as the
+  // coordinates may have been; or the full seconds of a file that writes all decimals.
+  const bool are_all_floating = std::ranges::any_of(rows_, [&](const Row& row) {
+    if (row.size() != columns.size()) return false;
+    for (std::size_t i = 0; i < row.size(); ++i)
+      if (columns[i] == EventColumn::x && row[i].form != Form::integer) return true;
+    return false;
+  });
+  if (form == Form::decimals && !are_all_floating) return TimeUnit::seconds;
+  const bool differ = times.front().value != times.back().value;
+  return differ ? std::optional(TimeUnit::microseconds) : std::nullopt;
+}
+
+}  // namespace eventcamera
