@@ -11,18 +11,18 @@
 namespace eventcamera {
 
 static_assert(std::endian::native == std::endian::little,
-              "events are handed on as they lie in memory, and XYTP is little-endian");
+              "events are passed on in memory layout, and XYTP is little-endian");
 
-/// Time on a recording's own clock, past every wrap of its format.
+/// Time on a recording's own clock, with all wraps of its format undone.
 using Microseconds = std::int64_t;
 using Nanoseconds = std::int64_t;
 
-/// The longest interval whose microseconds fit into an event's 32 bits (71 minutes).
+/// Longest interval whose microseconds fit into the 32 bits of an event (71 minutes).
 inline constexpr Nanoseconds max_interval = Nanoseconds{0xffffffff} * 1000;
 
 enum class Polarity : std::uint8_t { off = 0, on = 1 };
 
-/// One event, laid out as caps format XYTP has it.
+/// One event, in the layout of caps format XYTP.
 struct Event {
   std::uint32_t t;    ///< microseconds after the start of the interval, rounded down
   std::uint16_t x;    ///< column, from the left
@@ -39,13 +39,13 @@ struct Event {
 };
 static_assert(sizeof(Event) == 8);
 
-/// The time of an event in microseconds. One at the start of its interval (start, end], by
-/// rounding, is moved inside.
+/// Time of an event in microseconds. Rounding may put it at the start of its interval (start, end];
+/// it is then moved inside.
 constexpr Microseconds time_of(const Event& event, Microseconds start) {
   return start + (event.t == 0 ? 1 : event.t);
 }
 
-/// Of sorted events whose times count from `start`, those that are not later than `end`.
+/// Returns those of sorted events, with times relative to `start`, that are not later than `end`.
 inline std::span<const Event> events_until(std::span<const Event> events, Microseconds start,
                                            Microseconds end) {
   const auto first_after =
@@ -61,7 +61,7 @@ inline bool is_before(const Event& a, const Event& b) {
   return a.t != b.t ? a.t < b.t : place(a) < place(b);
 }
 
-/// Sorts events into that order that are sorted by time alone, and mostly in order already.
+/// Puts events that are sorted by time, and nearly in that order already, into that order.
 inline void sort_within_times(std::vector<Event>& events) {
   for (auto run = events.begin(); run != events.end();) {
     const auto end =
@@ -71,7 +71,7 @@ inline void sort_within_times(std::vector<Event>& events) {
   }
 }
 
-/// An event with its 64-bit time.
+/// Event with a 64-bit time.
 struct AbsoluteEvent {
   Microseconds t;
   std::uint16_t x;    ///< column, from the left
@@ -87,10 +87,10 @@ struct AbsoluteEvent {
   friend constexpr bool operator==(const AbsoluteEvent&, const AbsoluteEvent&) = default;
 };
 
-/// An edge on a camera's trigger input.
+/// Edge on a trigger input of a camera.
 struct Trigger {
   Microseconds t;
-  std::uint16_t id;  ///< of the input
+  std::uint16_t id;  ///< ID of the input
   bool rising;
 
   friend constexpr bool operator==(const Trigger&, const Trigger&) = default;

@@ -27,7 +27,7 @@ void EventBuckets::copy_to(Event* out, ThreadPool& threads) const {
 }
 
 void EventBuckets::copy_part(std::size_t first, std::size_t last, Event* out) const {
-  std::size_t before = 0;  // events in the buckets seen
+  std::size_t before = 0;  // number of events in the buckets so far
   for (const auto& bucket : buckets()) {
     const std::size_t begin = std::max(first, before);
     const std::size_t end = std::min(last, before + bucket.size());

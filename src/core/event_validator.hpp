@@ -10,14 +10,14 @@
 
 namespace eventcamera {
 
-/// Makes sure that events lie inside the sensor and are sorted by time.
+/// Ensures that events lie inside the sensor and are sorted by time.
 class EventValidator {
  public:
   EventValidator(int width, int height) : width_(width), height_(height) {}
 
-  /// Calls take() for events whose times count from `start`. A late event gets the time of the
-  /// event before it, or the first time after the last pass(); an event outside the
-  /// sensor is dropped. Returns the number of dropped events.
+  /// Calls take() for each event; event times are relative to `start`. A late event gets the time
+  /// of the previous one, or the first time after the last pass(); events outside the sensor are
+  /// dropped. Returns the number of dropped events.
   template <class Take>
   std::size_t take(std::span<const Event> events, Microseconds start, const Take& take) {
     std::size_t dropped = 0;
@@ -32,8 +32,8 @@ class EventValidator {
     return dropped;
   }
 
-  /// A picture was drawn up to `end`. Returns `end`, or the time of the last event if that is
-  /// later.
+  /// Declares that a picture was drawn up to `end`. Returns `end`, or the time of the last event if
+  /// that is later.
   Microseconds pass(Microseconds end) {
     const auto latest = std::max(earliest_, end);
     earliest_ = std::max(earliest_, end + 1);

@@ -7,7 +7,7 @@
 namespace eventcamera {
 namespace {
 
-/// Whether a condition comes true within some 50 microseconds of yielding.
+/// Yields until a condition is true, for about 50 microseconds. Returns its final value.
 template <class Condition>
 bool soon(const Condition& condition) {
   constexpr int tries = 100;
@@ -25,7 +25,7 @@ ThreadPool::~ThreadPool() {
 }
 
 void ThreadPool::set_threads(int threads) {
-  // Asked once: the C library reads it from a file.
+  // Cached, because the C library reads it from a file.
   static const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int wanted = threads == 0 ? processors : std::clamp(threads, 1, processors);
   if (wanted == this->threads()) return;

@@ -11,14 +11,14 @@
 
 namespace eventcamera {
 
-/// Threads that share loops. To be called from one thread at a time.
+/// Pool of threads for parallel loops. Must be called from one thread at a time.
 ///
-/// The loops of a frame follow each other closely and may be shorter than it takes to wake a
-/// thread. So a thread yields for a while before it sleeps, and a loop does not wait for threads
-/// that come too late for it.
+/// The loops of a frame follow each other closely and may be shorter than the wake-up time of a
+/// thread. So threads yield for a while before they sleep, and a loop does not wait for threads
+/// that arrive too late.
 ///
-/// Any thread may run any round of a loop, so a round may write only its own data; then the result
-/// is the same for any number of threads.
+/// Any thread may run any round of a loop. Each round must write only its own data; the result is
+/// then the same for any number of threads.
 class ThreadPool {
  public:
   ThreadPool() = default;
@@ -31,7 +31,7 @@ class ThreadPool {
   int threads() const { return static_cast<int>(workers_.size()) + 1; }
 
   /// Runs body(i, thread) for i = 0 ... count - 1, thread = 0 ... threads() - 1, and returns when
-  /// all are done. An exception of a body is rethrown here, after the loop.
+  /// all are done. An exception from a body is rethrown after the loop.
   template <class Body>
   void for_each(int count, const Body& body) {
     run(
@@ -52,7 +52,7 @@ class ThreadPool {
 
   std::vector<std::thread> workers_;
 
-  // The current loop: written while it is closed.
+  // The current loop; written only while inside_ is closed.
   Round round_ = nullptr;
   const void* body_ = nullptr;
   int count_ = 0;
@@ -60,16 +60,17 @@ class ThreadPool {
 
   static constexpr int closed = -1;
   std::atomic<int> inside_ = closed;  ///< workers in the current loop
-  std::atomic<unsigned> loops_ = 0;   ///< started so far; tells workers of the next
+  std::atomic<unsigned> loops_ = 0;   ///< number of loops started; signals workers
   std::atomic<bool> stop_ = false;
 
-  std::mutex mutex_;  ///< guards thrown_, and what sleepers wait for
+  std::mutex mutex_;  ///< guards thrown_ and the conditions
   std::condition_variable wake_;
   std::condition_variable done_;
   std::exception_ptr thrown_;
 };
 
-/// Runs body(y) for y = 0 ... rows - 1, many rows a round: a single row is too little for a thread.
+/// Runs body(y) for y = 0 ... rows - 1 in rounds of many rows, because single rows are too little
+/// work.
 template <class Body>
 void for_each_row(ThreadPool& threads, int rows, const Body& body) {
   constexpr int rows_per_round = 32;
@@ -79,7 +80,7 @@ void for_each_row(ThreadPool& threads, int rows, const Body& body) {
   });
 }
 
-/// Frames are processed in bands of this many rows, so that the result does not depend on the
+/// Rows per band. Frames are processed in bands of fixed size, so that results do not depend on the
 /// number of threads.
 inline constexpr int rows_per_band = 16;
 
@@ -87,7 +88,7 @@ inline int band_count(int height) {
   return (height + rows_per_band - 1) / rows_per_band;
 }
 
-/// The rows [first, last) of a band.
+/// Rows [first, last) of a band.
 struct BandRows {
   BandRows(int band, int height)
       : first(band * rows_per_band), last(std::min(first + rows_per_band, height)) {}

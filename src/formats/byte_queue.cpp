@@ -7,7 +7,7 @@ namespace eventcamera {
 
 namespace {
 
-/// Consumed bytes that may lie in front of the kept ones before these are moved.
+/// Consumed bytes at the front of kept_ from which on the rest is moved to the front.
 constexpr std::size_t max_consumed = 4096;
 
 }  // namespace
@@ -34,7 +34,7 @@ void ByteQueue::consume(std::size_t count) {
   piece_ = piece_.subspan(count - from_kept);
   const auto kept = kept_.size() - head_;
   if (kept > copied_) return;
-  // What is left lies in the piece as well: from here on it is read there.
+  // The rest is also in the piece, so continue to read it there.
   piece_ = {piece_.data() - kept, piece_.size() + kept};
   kept_.clear();
   head_ = 0;

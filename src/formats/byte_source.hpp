@@ -10,33 +10,33 @@
 
 namespace eventcamera {
 
-/// The bytes of a file, wherever they come from, read at any position.
+/// Random access to the bytes of a file from any source.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
   ByteSource(const ByteSource&) = delete;
   ByteSource& operator=(const ByteSource&) = delete;
 
-  /// The size of the file; 0 where it is not known.
+  /// Size of the file; 0 if unknown.
   virtual std::uint64_t size() const = 0;
 
-  /// Fills `out` from a position on, and returns how many bytes that are: fewer only at the end of
-  /// the file. Nothing where they cannot be read.
+  /// Reads bytes at `position` into `out` and returns their number, which is smaller only at the
+  /// end of the file. Nothing if reading fails.
   virtual std::optional<std::size_t> read(std::uint64_t position,
                                           std::span<std::uint8_t> out) noexcept = 0;
 
-  /// The bytes from a position on, as many as are read at once, valid until the next call; none at
-  /// the end of the file. Nothing where they cannot be read.
+  /// Returns bytes at `position`, as many as are read at once, valid until the next call; empty at
+  /// the end of the file. Nothing if reading fails.
   virtual std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) = 0;
 
-  /// Whether bytes could not be read of late.
+  /// True if the last read failed.
   virtual bool failed() const noexcept { return false; }
 
  protected:
   ByteSource() = default;
 };
 
-/// A file in memory.
+/// File in memory.
 class MemoryBytes final : public ByteSource {
  public:
   explicit MemoryBytes(std::vector<std::uint8_t> bytes) : bytes_(std::move(bytes)) {}

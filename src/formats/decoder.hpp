@@ -14,7 +14,7 @@
 
 namespace eventcamera {
 
-/// The sensor's size in pixels.
+/// Sensor size in pixels.
 struct SensorSize {
   int width = 0;
   int height = 0;
@@ -22,28 +22,28 @@ struct SensorSize {
   friend constexpr bool operator==(const SensorSize&, const SensorSize&) = default;
 };
 
-/// What a decoder hands over; it only appends.
+/// Output of a decoder, which only appends.
 struct Decoded {
   std::vector<AbsoluteEvent> events;
   std::vector<Trigger> triggers;
 };
 
-/// The bytes are not of this format at all, or of a version or codec that cannot be read; what()
-/// says so in words for a user.
+/// Thrown if the bytes are not of this format, or of an unsupported version or codec. what() is a
+/// message for users.
 class UnsupportedFormat : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// What was wrong with the bytes so far. A decoder skips it and goes on at the next sound place.
+/// Corruption found so far. A decoder skips it and continues at the next valid place.
 struct Corruption {
-  std::uint64_t places = 0;    ///< how many
-  std::uint64_t first_at = 0;  ///< byte position of the first, from the file's start
-  std::string first;           ///< what it is, in words for a user
+  std::uint64_t places = 0;    ///< number of corrupt places
+  std::uint64_t first_at = 0;  ///< byte offset of the first in the file
+  std::string first;           ///< description of the first, for users
   std::uint64_t unsorted = 0;  ///< events earlier than one before them, delivered as read
   std::uint64_t outside = 0;   ///< events outside the sensor, dropped
 
-  /// Notes one more place.
+  /// Records one more place.
   void note(std::uint64_t at, const char* what) {
     if (places++ == 0) {
       first_at = at;
@@ -52,15 +52,16 @@ struct Corruption {
   }
 };
 
-/// A position in a file where a decoder can resume as if it had read everything before it.
+/// Position in a file at which a decoder can resume as if it had read everything before.
 struct SeekPoint {
-  Microseconds t = 0;          ///< of the latest event before it; the lowest number where none is
-  std::uint64_t position = 0;  ///< bytes from the start of the file
+  Microseconds t = 0;  ///< time of the latest event before it; the minimum value if there is none
+  std::uint64_t position = 0;  ///< offset in the file, bytes
   Microseconds clock = 0;      ///< private to the decoder
   std::uint64_t state = 0;     ///< private to the decoder
 };
 
-/// The seek points of the part of a file that was read: few, however long the file is.
+/// Seek points of the part of a file that was read. Their number is bounded for files of any
+/// length.
 class SeekPoints {
  public:
   bool due(std::uint64_t position) const { return position >= next_; }
@@ -75,7 +76,8 @@ class SeekPoints {
     next_ = seek_point.position + spacing_;
   }
 
-  /// The last seek point with nothing at `t` or later before it; none before the header is read.
+  /// Returns the last seek point without events at `t` or later before it; none before the header
+  /// is read.
   std::optional<SeekPoint> before(Microseconds t) const {
     if (known_.empty()) return std::nullopt;
     const auto later = std::partition_point(known_.begin() + 1, known_.end(),
@@ -91,35 +93,35 @@ class SeekPoints {
   std::uint64_t next_ = 0;
 };
 
-/// Reads one event format. Bytes come in pieces of any size: how they are split changes nothing.
-/// Memory is bounded by the pieces given and by the format's largest unit, never by a length that
-/// the bytes claim.
+/// Decodes one event format. Bytes are passed in pieces of any size; the split does not affect the
+/// result. Memory is bounded by the size of the pieces and the format's largest unit, never by a
+/// length stated in the bytes.
 class Decoder {
  public:
   virtual ~Decoder() = default;
   Decoder(const Decoder&) = delete;
   Decoder& operator=(const Decoder&) = delete;
 
-  /// Appends what `bytes` completes. Throws UnsupportedFormat.
+  /// Appends all events and triggers completed by `bytes`. Throws UnsupportedFormat.
   virtual void decode(std::span<const std::uint8_t> bytes, Decoded& out) = 0;
 
-  /// Says that there are no more bytes: what is whole is appended, a rest is corruption. Throws
-  /// UnsupportedFormat where there was not even a header.
+  /// Declares the end of the bytes: appends what is complete and reports a partial rest as
+  /// corruption. Throws UnsupportedFormat if the header is incomplete.
   virtual void finish(Decoded& out) = 0;
 
-  /// Where to restart to get every event at `t` or later, and some before. Nothing before the
-  /// header is read, and in formats that can be read from their beginning only. Times are cut short
-  /// and wrap in many formats: seek points are of what was read, and a seek past it restarts at the
-  /// last.
+  /// Where to restart to get every event at `t` or later, and some before. None before the header
+  /// is read, and for formats that can only be read from the start. Because times wrap in many
+  /// formats, seek points exist only for the part that was read; a seek past it restarts at the
+  /// last one.
   std::optional<SeekPoint> seek_point_before(Microseconds t) const {
     return seek_points_.before(t);
   }
 
-  /// The next bytes are those at the position of this seek point. Corruption that is read again
-  /// counts again.
+  /// Continues at a seek point: the next bytes are those at its position. Corruption that is read
+  /// again counts again.
   virtual void restart(const SeekPoint& /*seek_point*/) {}
 
-  /// The sensor's size, once its header is read or it is known from elsewhere; 0x0 before.
+  /// Sensor size, once the header is read or if known from elsewhere; 0x0 before.
   SensorSize size() const { return size_; }
 
   const Corruption& corruption() const { return corruption_; }

@@ -12,34 +12,34 @@
 
 namespace eventcamera {
 
-/// Bytes that overwrite what was written at a position of the file.
+/// Bytes to overwrite at a position in the file.
 struct FilePatch {
   std::uint64_t position;
   std::vector<std::uint8_t> bytes;
 };
 
-/// Writes one event format. Events come sorted by time and within the sensor, in pieces of any
-/// size: how they are split does not change what a reader makes of the file.
+/// Encodes one event format. Events must be sorted by time and within the sensor, in pieces of any
+/// size; the split does not affect what a reader gets.
 class Encoder {
  public:
   virtual ~Encoder() = default;
   Encoder(const Encoder&) = delete;
   Encoder& operator=(const Encoder&) = delete;
 
-  /// Appends the bytes of `events` to `out`, the header before the first.
+  /// Appends the encoded `events` to `out`, preceded by the header on the first call.
   void encode(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
     put_header(out);
     append(events, out);
   }
 
-  /// Appends what ends the file; the header, too, if nothing was encoded.
+  /// Appends the end of the file, preceded by the header if nothing was encoded.
   void finish(std::vector<std::uint8_t>& out) {
     put_header(out);
     append_end(out);
   }
 
-  /// What to write into the header after finish(), where the file can be seeked in. Our readers do
-  /// without it.
+  /// Patch for the header, to be written after finish() if the output is seekable. This project's
+  /// readers do not need it.
   virtual std::optional<FilePatch> patch() const { return std::nullopt; }
 
  protected:
@@ -54,7 +54,7 @@ class Encoder {
     header_.clear();
   }
 
-  std::string header_;  ///< empty once it is written
+  std::string header_;  ///< empty once written
 };
 
 }  // namespace eventcamera

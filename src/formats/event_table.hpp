@@ -48,11 +48,11 @@ struct TableSettings {
   SensorSize size = {};  ///< 0x0: what the header says
 };
 
-/// Makes events of the numbers in a row: one outside the sensor is dropped, one earlier than
-/// another before it is kept, and both are counted.
+/// Makes events from the numbers of rows. Events outside the sensor are dropped, events earlier
+/// than a previous one are kept, and both are counted.
 class RowValidator {
  public:
-  /// 0x0 is an unknown size: all that AbsoluteEvent can hold is inside.
+  /// 0x0 means unknown: all coordinates that fit into an AbsoluteEvent are inside.
   void set_size(SensorSize size) {
     x_end_ = size.width > 0 ? static_cast<std::uint64_t>(std::min(size.width, max_x)) : max_x;
     y_end_ = size.height > 0 ? static_cast<std::uint64_t>(std::min(size.height, max_y)) : max_y;
@@ -73,7 +73,7 @@ class RowValidator {
         {t, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y | (on ? 0x8000 : 0))});
   }
 
-  /// The next event may be earlier.
+  /// Allows the next event to be earlier.
   void restart() { latest_ = std::numeric_limits<Microseconds>::min(); }
 
  private:

@@ -8,7 +8,7 @@
 
 namespace eventcamera {
 
-/// A number as it lies in a file, little-endian and at any address.
+/// Reads a little-endian number at any alignment.
 template <class Number>
 Number little_endian(const std::uint8_t* bytes) {
   Number number;

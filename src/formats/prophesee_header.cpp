@@ -24,7 +24,7 @@ std::string_view trimmed(std::string_view text) {
 std::size_t PropheseeHeader::take(std::span<const std::uint8_t> bytes, bool ended) {
   if (ended_) return 0;
   const auto looked_at = bytes.first(std::min(bytes.size(), max_line));
-  // Binary data may begin as a line does, but hardly goes on as text.
+  // Binary data may look like the start of a line, but is unlikely to continue as text.
   const auto stop = std::find_if(looked_at.begin(), looked_at.end(), [](std::uint8_t byte) {
     return byte < ' ' && byte != '\t' && byte != '\r';
   });
@@ -39,7 +39,7 @@ std::size_t PropheseeHeader::take(std::span<const std::uint8_t> bytes, bool ende
 
   const auto length = static_cast<std::size_t>(stop - looked_at.begin()) + 1;
   length_ += length;
-  if (length_ > max_header) throw UnsupportedFormat("endless header");
+  if (length_ > max_header) throw UnsupportedFormat("the header is too long");
   found_ = true;
   const auto line = trimmed({reinterpret_cast<const char*>(looked_at.data()) + 1, length - 2});
   const auto key = line.substr(0, line.find(' '));

@@ -9,24 +9,24 @@
 
 namespace eventcamera {
 
-/// The lines "% key value" before the data of Prophesee's files. "% end" ends them, and so does, in
-/// older files, what is no such line.
+/// Header lines "% key value" of Prophesee files. The header ends with "% end" or, in older files,
+/// at the first byte that does not start such a line.
 class PropheseeHeader {
  public:
-  /// Takes a line from the front of `bytes` and returns its length; 0 where it is not yet whole or
-  /// the header has ended. `ended`: no more bytes will come. Throws UnsupportedFormat where there
-  /// is too much.
+  /// Reads a line from the front of `bytes` and returns its length; 0 if it is incomplete or the
+  /// header has ended. `ended`: no more bytes will follow. Throws UnsupportedFormat if the header
+  /// is too long.
   std::size_t take(std::span<const std::uint8_t> bytes, bool ended);
 
   bool ended() const { return ended_; }
 
-  /// Whether there was any line.
+  /// True if there was any line.
   bool found() const { return found_; }
 
-  /// Empty where there is none.
+  /// Value of a key; empty if there is none.
   std::string value(const std::string& key) const;
 
-  /// A number from 1 to `largest`, else 0.
+  /// Parses a number from 1 to `largest`; 0 if it is not one.
   static int number(const std::string& text, int largest);
 
  private:

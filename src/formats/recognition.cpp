@@ -31,7 +31,7 @@ bool is_npz(Bytes bytes) {
 
 constexpr std::string_view hdf5_magic("\x89HDF\r\n\x1a\n", 8);
 
-/// Formats that begin with a signature.
+/// Recognises formats with a signature.
 std::optional<Recognised> by_magic(Bytes bytes) {
   constexpr std::string_view aedat = "#!AER-DAT";
   if (has_at(0, aedat, bytes) && has_at(aedat.size() + 1, ".", bytes)) {
@@ -45,8 +45,8 @@ std::optional<Recognised> by_magic(Bytes bytes) {
   return std::nullopt;
 }
 
-/// RAW and DAT begin with lines "% key value". RAW names its words there; after DAT's come the type
-/// and the size of its events.
+/// Recognises RAW and DAT, which start with lines "% key value". RAW names its words there; in DAT,
+/// the type and size of its events follow.
 std::optional<Recognised> by_text_header(Bytes bytes) {
   if (!has_at(0, "% ", bytes)) return std::nullopt;
   PropheseeHeader header;
@@ -62,7 +62,7 @@ std::optional<Recognised> by_text_header(Bytes bytes) {
   return std::nullopt;
 }
 
-/// Whether CsvDecoder makes an event of every line. The unit of time does not matter here: who
+/// True if CsvDecoder decodes every line as an event. The unit of time does not matter here: who
 /// reads the file reports one that cannot be found.
 bool is_csv(Bytes bytes) {
   constexpr std::size_t max_bytes = 4096;
@@ -80,7 +80,7 @@ bool is_csv(Bytes bytes) {
   return decoded.events.size() >= min_events && decoder.corruption().places == 0;
 }
 
-/// HDF5 after a user block, which may hold anything; its size is a power of two.
+/// Recognises HDF5 after a user block with any content, whose size is a power of two.
 std::optional<Recognised> by_user_block(Bytes bytes) {
   for (const std::size_t block : {512, 1024, 2048, 4096, 8192})
     if (has_at(block, hdf5_magic, bytes)) return Recognised{FileKind::hdf5, 0, false};
@@ -98,7 +98,7 @@ std::optional<Recognised> recognise(Bytes start, std::optional<FileKind> wanted)
     const bool may_be_csv = !wanted || *wanted == FileKind::csv || after_block;
     if (may_be_csv && is_csv(start)) return Recognised{FileKind::csv};
   } catch (const UnsupportedFormat&) {
-    // Not text of events; a user block may still hold anything.
+    // Not a text of events, but possibly a user block.
   }
   return after_block;
 }

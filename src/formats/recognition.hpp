@@ -8,7 +8,7 @@
 
 namespace eventcamera {
 
-/// A kind of file, each with a reader of its own.
+/// Kinds of files, each with its own reader.
 enum class FileKind : std::uint8_t {
   aedat,
   csv,
@@ -22,21 +22,20 @@ enum class FileKind : std::uint8_t {
 
 struct Recognised {
   FileKind kind;
-  int version = 0;      ///< of AEDAT
-  bool certain = true;  ///< false: other kinds of files may begin like this, too
+  int version = 0;      ///< AEDAT only
+  bool certain = true;  ///< false: other kinds of files may start like this, too
 
   friend constexpr bool operator==(const Recognised&, const Recognised&) = default;
 };
 
-/// At most this much of a file's beginning is examined.
+/// Maximum number of bytes examined at the start of a file.
 constexpr std::size_t max_recognised_bytes = 16384;
 
-/// The kind of a file that begins with these bytes; nothing where it is unknown, or where that
-/// takes more bytes. More bytes do not turn it into another kind, unless it was text: what is text
-/// so far may be none in the end.
+/// Returns the kind of a file that starts with these bytes; nothing if it is unknown or more bytes
+/// are needed. More bytes do not change the kind, except for text, which may turn out to be binary.
 ///
-/// `wanted` is the only kind that matters to the caller: other kinds may then be missed. It saves a
-/// trial decode, which text takes to be recognised as CSV.
+/// If `wanted` is set, other kinds may be missed. This saves the trial decode that recognises text
+/// as CSV.
 std::optional<Recognised> recognise(std::span<const std::uint8_t> start,
                                     std::optional<FileKind> wanted = std::nullopt);
 

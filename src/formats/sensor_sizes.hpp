@@ -10,8 +10,8 @@
 
 namespace eventcamera {
 
-/// The smallest of the sensors that are sold that has a pixel (x, y); where none has, one that ends
-/// there. So is a file read that does not tell its sensor.
+/// Returns the smallest commercial sensor that contains (x, y), or a size that just contains it if
+/// there is none. Used for files that do not state the sensor size.
 constexpr SensorSize sensor_with(int x, int y) {
   constexpr SensorSize sensors[] = {{128, 128}, {240, 180}, {304, 240}, {320, 320}, {346, 260},
                                     {480, 360}, {640, 480}, {768, 512}, {1280, 720}};
@@ -20,7 +20,7 @@ constexpr SensorSize sensor_with(int x, int y) {
   return {std::max(x + 1, sensors[8].width), std::max(y + 1, sensors[8].height)};
 }
 
-/// The part of a sensor that events come from, where a file does not tell its size.
+/// Extent of the pixels with events, to guess a sensor size that the file does not state.
 class UsedPixels {
  public:
   void include(std::span<const AbsoluteEvent> events) {
@@ -37,7 +37,7 @@ class UsedPixels {
   int max_y_ = 0;
 };
 
-/// Tells events that lie outside a sensor.
+/// Predicate for events outside a sensor.
 inline auto is_outside(SensorSize size) {
   return [size](const AbsoluteEvent& event) {
     return event.x >= size.width || event.y() >= size.height;

@@ -12,7 +12,7 @@
 
 namespace eventcamera {
 
-/// Appends little-endian words to bytes.
+/// Appends little-endian words to a byte vector.
 template <class Word>
 class WordWriter {
  public:
@@ -21,7 +21,7 @@ class WordWriter {
   WordWriter(const WordWriter&) = delete;
   WordWriter& operator=(const WordWriter&) = delete;
 
-  /// Call it before put(), with the largest number of words that may follow.
+  /// Must be called before put(), with the maximum number of words that may follow.
   void reserve(std::size_t words) {
     const auto needed = used_ + words * sizeof(Word);
     if (needed > out_.size()) out_.resize(needed);
@@ -37,10 +37,11 @@ class WordWriter {
   std::size_t used_;
 };
 
-/// Space is reserved for this many events at once.
+/// Number of events for which space is reserved at once.
 constexpr std::size_t events_at_once = 2048;
 
-/// Encodes events by `write(few, words)`, with space reserved for `words_at_once`.
+/// Encodes events with `write(few, words)`, after reserving space for `words_at_once` words each
+/// time.
 template <class Word, class Write>
 void write_events(std::span<const AbsoluteEvent> events, std::size_t words_at_once,
                   std::vector<std::uint8_t>& out, const Write& write) {
@@ -53,20 +54,20 @@ void write_events(std::span<const AbsoluteEvent> events, std::size_t words_at_on
   }
 }
 
-/// Times for formats that fill a pause with words: a pause of more than half a day, also before the
-/// first event, is left out. So a stray time, or one since 1970, does not fill the disk.
+/// Limits pauses for formats that fill them with words: pauses of more than half a day, also before
+/// the first event, are removed. So a stray time, or one since 1970, does not fill the disk.
 class GapLimiter {
  public:
   static constexpr Microseconds max_gap = Microseconds{12} * 3600 * 1'000'000;
 
-  /// Call it at least for every event after a long pause.
+  /// Must be called at least for every event after a long pause.
   void reach(Microseconds t) {
     const auto gap = static_cast<std::uint64_t>(t) - static_cast<std::uint64_t>(last_);
     if (t > last_ && gap > static_cast<std::uint64_t>(max_gap)) left_out_ += gap;
     last_ = t;
   }
 
-  /// The time to write. Unsigned, so that no time makes it overflow.
+  /// Returns the time to write; unsigned, because overflow must be well-defined.
   std::uint64_t written(Microseconds t) const { return static_cast<std::uint64_t>(t) - left_out_; }
 
  private:
