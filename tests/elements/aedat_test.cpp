@@ -620,10 +620,11 @@ TEST(AedatDemux, SaysWhereTheTableIsWrong) {
   far[field_at + 5] = 1;
   auto near = whole;
   near[field_at] ^= 0x10;
-  const Fault faults[] = {{table_at, "here should be a table", overwritten},
-                          {table_at, "the file ends before its table", cut},
-                          {field_at, "the header names a place without a table", far},
-                          {field_at, "the header names a place without a table", near}};
+  const Fault faults[] = {
+      {table_at, "the packet table that the header states is missing", overwritten},
+      {table_at, "the file ends before its packet table", cut},
+      {field_at, "the header has a wrong position for the packet table", far},
+      {field_at, "the header has a wrong position for the packet table", near}};
   for (const auto& fault : faults) {
     const File file(fault.bytes);
     Player player(file.path());

@@ -11,27 +11,26 @@ namespace {
 
 constexpr std::size_t record_size = 8;
 
-// DAVIS: bits of an address.
-constexpr std::uint32_t davis_sample = 0x80000000;  // of a frame or of the IMU
+// Address bits of DAVIS cameras.
+constexpr std::uint32_t davis_sample = 0x80000000;  // frame or IMU sample
 constexpr std::uint32_t davis_external = 1U << 10;
 constexpr std::uint32_t davis_on = 1U << 11;
 constexpr std::uint32_t davis_falling = 2;
 constexpr std::uint32_t edge_mask = 7;
-// DVS128.
+// Address bits of the DVS128.
 constexpr std::uint32_t dvs128_external = 0x8000;
 constexpr std::uint32_t dvs128_largest = 0xffff;
 constexpr std::uint32_t dvs128_off = 1;
 
-/// Times are 32 bits wide. Backwards by less is disorder, by more is a wrap.
+/// Times have 32 bits. A larger step backwards than max_disorder is a wrap.
 constexpr std::int64_t wrap = std::int64_t{1} << 32;
 constexpr std::int64_t max_disorder = 1'000'000;
-/// A step of time that is larger is compared with the next record's before it is believed.
+/// A larger step of time is checked against the next record before it is trusted.
 constexpr std::int64_t large_step = 60'000'000;
 
-/// So many sound records in a row are a sound place.
+/// Number of consecutive valid records after which scanning stops.
 constexpr std::size_t sound_records = 8;
-/// Of the records behind an odd one, so many have to be within the sensor for it to be the only
-/// one.
+/// Number of valid records that must follow an odd one for it to be skipped alone.
 constexpr std::size_t records_behind = 4;
 
 std::string lowercase(std::string_view text) {
@@ -46,7 +45,7 @@ std::uint32_t big_endian(const std::uint8_t* bytes) {
          std::uint32_t{bytes[2]} << 8 | std::uint32_t{bytes[3]};
 }
 
-/// The sensor of a chip that a header names.
+/// Sensor size of a chip named in the header.
 SensorSize size_of(const std::string& chip) {
   struct Chip {
     std::string_view name;
@@ -89,7 +88,7 @@ bool Aedat2Decoder::read_header() {
   return true;
 }
 
-/// Notes what a line of the header says.
+/// Evaluates a line of the header.
 void Aedat2Decoder::take_line(const std::string& line) {
   constexpr std::string_view chip = "# AEChip:";
   if (line.starts_with(chip)) {
@@ -125,7 +124,7 @@ void Aedat2Decoder::read_records(Decoded& out) {
   }
 }
 
-/// Takes a record that its address or its time makes odd. False where that takes more bytes.
+/// Handles a record with an odd address or time. False if more bytes are needed.
 bool Aedat2Decoder::read_odd_record(Decoded& out) {
   const auto wanted = record_size * (1 + records_behind);
   if (queue_.size() < wanted && !finished_) return false;
@@ -152,7 +151,7 @@ bool Aedat2Decoder::read_odd_record(Decoded& out) {
   return true;
 }
 
-/// Goes on to where records look sound. False where that takes more bytes.
+/// Skips to the next valid records. False if more bytes are needed.
 bool Aedat2Decoder::scan() {
   constexpr auto wanted = record_size * sound_records;
   while (true) {
@@ -180,19 +179,19 @@ bool Aedat2Decoder::within_sensor(std::uint32_t address) const {
          static_cast<int>(address >> 12 & 0x3ff) < size_.width;
 }
 
-/// Whether `t` is a large step from the last time, or a wrap.
+/// True if `t` is a large step from the last time, possibly over a wrap.
 bool Aedat2Decoder::far(std::int32_t t) const {
   if (!last_) return false;
   const auto step = unwrapped(t) - (wraps_ + *last_);
   return step > large_step;
 }
 
-/// The whole time.
+/// Returns the time with wraps undone.
 Microseconds Aedat2Decoder::unwrapped(std::int32_t t) const {
   if (!last_) return t;
   const auto step = std::int64_t{t} - *last_;
   if (step < -max_disorder) return wraps_ + wrap + t;
-  if (step > wrap - max_disorder) return wraps_ - wrap + t;  // late, from before the wrap
+  if (step > wrap - max_disorder) return wraps_ - wrap + t;  // late event from before the wrap
   return wraps_ + t;
 }
 
@@ -205,7 +204,7 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
   const auto address = record.address;
   if (davis_) {
     if ((address & davis_sample) != 0) return;
-    // v2e marks noise with the bit of external events, and leaves them their pixel.
+    // v2e marks noise events with the bit of external events, but keeps their pixel address.
     if ((address & ~(davis_external | edge_mask)) == 0 && (address & davis_external) != 0) {
       out.triggers.push_back({t, 0, (address & edge_mask) != davis_falling});
       return;
@@ -214,7 +213,7 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
     out.triggers.push_back({t, 0, true});
     return;
   }
-  // Rows count from the bottom and columns from the right.
+  // Rows are counted from the bottom and columns from the right.
   const auto x = static_cast<int>(davis_ ? address >> 12 & 0x3ff : address >> 1 & 0x7f);
   const auto y = static_cast<int>(davis_ ? address >> 22 & 0x1ff : address >> 8 & 0x7f);
   const bool on = davis_ ? (address & davis_on) != 0 : (address & dvs128_off) == 0;

@@ -12,18 +12,18 @@
 
 namespace eventcamera {
 
-/// Reads AEDAT 2.0 of DAVIS cameras and of the DVS128. Frames and IMU samples are left out.
+/// Decodes AEDAT 2.0 of DAVIS cameras and the DVS128. Skips frames and IMU samples.
 class Aedat2Decoder final : public Decoder {
  public:
-  /// `assumed` is the sensor's size where the header names no camera: 128x128 is a DVS128, another
-  /// a DAVIS of that size. Where it is 0x0, too, v2e's files are of a DAVIS346, which is what it
-  /// writes, and others of a DVS128, whose files are older than the naming of cameras.
+  /// `assumed` is the sensor size to use if the header names no camera: 128x128 means a DVS128, any
+  /// other size a DAVIS. If it is 0x0, files of v2e are read as DAVIS346, which v2e writes, and
+  /// others as DVS128, whose oldest files do not name the camera.
   explicit Aedat2Decoder(SensorSize assumed = {}) : assumed_(assumed) {}
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
 
-  /// Where the first record lies, once the header has been read.
+  /// Position of the first record, once the header is read.
   std::uint64_t data_at() const { return data_at_; }
 
  private:
@@ -54,10 +54,10 @@ class Aedat2Decoder final : public Decoder {
   std::uint64_t data_at_ = 0;
   bool davis_ = false;
 
-  bool scanning_ = false;             ///< for the next place where records look sound
-  std::int64_t wraps_ = 0;            ///< what the wraps so far add to a time
-  std::optional<std::int32_t> last_;  ///< the latest record's time in the file
-  Microseconds newest_ = std::numeric_limits<Microseconds>::min();  ///< the latest event
+  bool scanning_ = false;             ///< searching for the next valid records
+  std::int64_t wraps_ = 0;            ///< sum of the wraps so far
+  std::optional<std::int32_t> last_;  ///< time of the latest record, as stored
+  Microseconds newest_ = std::numeric_limits<Microseconds>::min();  ///< time of the latest event
 };
 
 }  // namespace eventcamera

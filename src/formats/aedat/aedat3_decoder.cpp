@@ -13,15 +13,15 @@ namespace {
 constexpr std::size_t packet_header_size = 28;
 constexpr std::size_t event_size = 8;
 constexpr std::int64_t max_packet = std::int64_t{64} << 20;
-/// Its times end at 2^60 microseconds.
+/// Limits times to 2^60 microseconds.
 constexpr std::int32_t max_overflow = 1 << 29;
 constexpr int widest = 8192;
-/// So many events behind one that cannot be have to be sound for it to be the only one.
+/// Number of valid events that must follow an invalid one for it to be skipped alone.
 constexpr std::uint64_t events_behind = 4;
 
 enum Type : int { special = 0, polarity = 1, last_type = 31 };
 
-/// An event's bits.
+/// Bits of an event.
 constexpr std::uint32_t valid = 1;
 constexpr std::uint32_t on = 2;
 
@@ -32,7 +32,7 @@ int y_of(std::uint32_t data) {
   return static_cast<int>(data >> 2 & 0x7fff);
 }
 
-/// The header of a packet.
+/// Packet header.
 struct PacketHeader {
   int type;
   int source;
@@ -98,11 +98,11 @@ bool Aedat3Decoder::read_header() {
   return header_read_;
 }
 
-/// Notes what a line of the header says.
+/// Evaluates a line of the header.
 void Aedat3Decoder::take_line(const std::string& line) {
   if (line.starts_with("#Format:") && line.find("RAW") == std::string::npos)
     throw UnsupportedFormat("unsupported compression of AEDAT 3.1: " + line.substr(1));
-  // A camera is one source; what filters make of its events are others of the same size.
+  // The camera and the filters of its events are separate sources, all of the same size.
   if ((line.starts_with("#Source") || line.starts_with("#-Source")) && size_ == SensorSize{})
     size_ = size_of(line);
 }
@@ -141,7 +141,7 @@ bool Aedat3Decoder::read_packet_header() {
   return true;
 }
 
-/// Reads events of the packet as far as they have come. False where that takes more bytes.
+/// Reads the available events of the packet. False if more bytes are needed.
 bool Aedat3Decoder::read_events(Decoded& out) {
   const auto bytes = queue_.peek(event_size);
   const auto count = std::min<std::uint64_t>(bytes.size() / event_size, packet_.events);
@@ -158,8 +158,8 @@ bool Aedat3Decoder::read_events(Decoded& out) {
   queue_.consume(i * event_size);
   if (!odd) return true;
 
-  // One that cannot be: an event that is corrupt, or the next packet where this one should go on,
-  // or bytes are missing and nothing here is an event.
+  // Invalid event: either it is corrupt, or this packet is short and the next one starts here, or
+  // bytes are missing and the data is misaligned.
   const auto behind = std::min<std::uint64_t>(packet_.events - 1, events_behind);
   const auto wanted = std::max(packet_header_size, (1 + behind) * event_size);
   if (queue_.size() < wanted && !finished_) return false;
@@ -185,7 +185,7 @@ bool Aedat3Decoder::read_events(Decoded& out) {
   return true;
 }
 
-/// Goes on to where a packet of events seems to begin. False where that takes more bytes.
+/// Skips to the next likely packet of events. False if more bytes are needed.
 bool Aedat3Decoder::scan() {
   while (true) {
     const auto bytes = queue_.peek(packet_header_size);
@@ -215,8 +215,8 @@ bool Aedat3Decoder::begins_packet(const std::uint8_t* bytes) const {
   return std::int64_t{header.capacity} * header.event_size <= max_packet;
 }
 
-/// Whether an event is outside the sensor or at no time. Where the sensor is not known, what looks
-/// like a packet's header counts as odd, too: it has a row beyond any sensor.
+/// True if an event is outside the sensor or has an invalid time. With an unknown sensor size, a
+/// packet header read as an event counts as odd, too, because its row is beyond any sensor.
 bool Aedat3Decoder::is_odd(const std::uint8_t* event) const {
   const auto data = little_endian<std::uint32_t>(event);
   if (little_endian<std::int32_t>(event + 4) < 0) return true;
@@ -237,7 +237,8 @@ void Aedat3Decoder::append(const std::uint8_t* event, Decoded& out) {
     return;
   }
   struct Input {
-    std::uint32_t rising;  ///< the type of its rising edge; the falling edge and the pulse follow
+    std::uint32_t
+        rising;  ///< type of the rising edge; those of the falling edge and the pulse follow
     std::uint16_t id;
   };
   constexpr Input inputs[] = {{2, 0}, {6, 1}, {9, 2}};

@@ -11,19 +11,19 @@
 
 namespace eventcamera {
 
-/// Reads AEDAT 3.1: polarity events, and edges on the camera's inputs. Frames, IMU samples and what
-/// else there is are left out. The size stays 0x0 where the header names no camera that we know.
+/// Decodes AEDAT 3.1: polarity events, and edges on the camera's inputs. Skips frames, IMU samples
+/// and all other packets. The size stays 0x0 if the header names no known camera.
 class Aedat3Decoder final : public Decoder {
  public:
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
 
  private:
-  /// What is left of the packet that is being read.
+  /// Rest of the packet being read.
   struct Packet {
     int type = 0;
-    std::uint64_t events = 0;  ///< of 8 bytes, to be read
-    std::uint64_t rest = 0;    ///< bytes behind them, to be skipped
+    std::uint64_t events = 0;  ///< number of 8-byte events to read
+    std::uint64_t rest = 0;    ///< number of bytes to skip after them
     Microseconds overflow = 0;
   };
 
@@ -41,7 +41,7 @@ class Aedat3Decoder final : public Decoder {
   bool finished_ = false;
   AedatHeader header_{"#!AER-DAT3.1", "#!END-HEADER"};
   bool header_read_ = false;
-  bool scanning_ = false;  ///< for the next place that looks like a packet
+  bool scanning_ = false;  ///< searching for the next packet
   Packet packet_;
   Microseconds newest_ = std::numeric_limits<Microseconds>::min();
 };

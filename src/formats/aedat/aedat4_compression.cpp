@@ -71,7 +71,7 @@ std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress_lz4(
     filled += to;
     if (filled > limit) return std::nullopt;
     if (result == 0) return Content{{content_.data(), filled}, used};
-    if (from == 0 && to == 0) return std::nullopt;  // the payload ends before the frame does
+    if (from == 0 && to == 0) return std::nullopt;  // the payload is truncated
   }
 }
 
@@ -82,8 +82,8 @@ std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress_zstd(
   if (!zstd_) zstd_.reset(ZSTD_createDCtx());
   if (!zstd_) throw std::bad_alloc();
   if (content_.empty()) grow(limit);
-  // In one go, so that the content is its own window: the stream decoder would allocate one as
-  // large as the frame claims. Starts over where the content is larger than expected.
+  // Decompresses in one call, so that the output serves as window: the streaming decoder would
+  // allocate a window of the size stated in the frame. Starts over if the output is too small.
   while (true) {
     const auto size =
         ZSTD_decompressDCtx(zstd_.get(), content_.data(), content_.size(), payload.data(), used);

@@ -15,23 +15,23 @@ struct ZSTD_CCtx_s;
 
 namespace eventcamera {
 
-/// Frees what lz4 and zstd work with.
+/// Frees contexts of lz4 and zstd.
 struct Aedat4CompressionDeleter {
   void operator()(LZ4F_dctx_s* context) const;
   void operator()(ZSTD_DCtx_s* context) const;
   void operator()(ZSTD_CCtx_s* context) const;
 };
 
-/// Undoes the compression of a packet. Memory follows what comes out, never what the bytes claim.
+/// Decompresses packets. Memory grows with the actual output, not with sizes stated in the data.
 class Aedat4Decompressor {
  public:
   struct Content {
     std::span<const std::uint8_t> bytes;  ///< valid until the next call
-    std::size_t used;                     ///< how many bytes of the payload made them
+    std::size_t used;                     ///< number of bytes of the payload consumed
   };
 
-  /// The content of the frame at the front of `payload`; nothing where that is corrupt, or larger
-  /// than `limit`. The compression is not `none`.
+  /// Returns the content of the compressed frame at the front of `payload`; nothing if it is
+  /// corrupt or larger than `limit`. `compression` must not be `none`.
   std::optional<Content> decompress(Aedat4Compression compression,
                                     std::span<const std::uint8_t> payload,
                                     std::size_t limit = aedat4_largest_packet);
@@ -51,7 +51,7 @@ class Aedat4Compressor {
  public:
   explicit Aedat4Compressor(Aedat4Compression compression);
 
-  /// Appends `content`, compressed, to `out`.
+  /// Appends the compressed `content` to `out`.
   void compress(std::span<const std::uint8_t> content, std::vector<std::uint8_t>& out);
 
  private:
@@ -59,7 +59,7 @@ class Aedat4Compressor {
   std::unique_ptr<ZSTD_CCtx_s, Aedat4CompressionDeleter> zstd_;
 };
 
-/// Whether `bytes` begin like a frame of `compression`, which is not `none`.
+/// True if `bytes` start like a frame of `compression`, which must not be `none`.
 bool begins_compressed(Aedat4Compression compression, std::span<const std::uint8_t> bytes);
 
 }  // namespace eventcamera

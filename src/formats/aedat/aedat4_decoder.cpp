@@ -20,19 +20,19 @@ using aedat4::size_prefix;
 
 constexpr std::size_t identifier_at = 2 * size_prefix;
 constexpr std::size_t identifier_size = 4;
-/// What of a payload tells that it is one.
+/// Bytes of a payload needed to recognise it.
 constexpr std::size_t payload_head = identifier_at + identifier_size;
 constexpr std::size_t packet_head = aedat4_packet_header + payload_head;
 
 constexpr std::size_t max_header = std::size_t{16} << 20;
 constexpr int max_unlisted_streams = 256;
 constexpr int widest = 32768;
-/// Elements handed over at once: they stay in the cache of the second level.
+/// Elements returned at once; they fit into the L2 cache.
 constexpr std::size_t block = 4096;
-/// Looking into a packet whose size is corrupt for the one after it costs work a second time. A
-/// file made for that may not have more of it than this.
+/// Searching a packet with a corrupt size for the next one repeats work. This bounds that work in
+/// malicious files, in bytes.
 constexpr std::size_t max_credit = std::size_t{256} << 20;
-/// What a packet that does not decompress counts for, besides its bytes.
+/// Work charged for a failed decompression, besides the packet's bytes.
 constexpr std::size_t decompressing = std::size_t{4} << 20;
 
 constexpr std::size_t event_size = sizeof(aedat4::Event);
@@ -44,7 +44,7 @@ bool is_time(Microseconds t) {
   return t > -aedat4_last_time && t < aedat4_last_time;
 }
 
-/// The event that lies at `bytes`, its column and row unchecked.
+/// Returns the event at `bytes`, without checking column and row.
 AbsoluteEvent event_at(const std::uint8_t* bytes) {
   // t:64, x:16, y:16, on:8, padding:24
   const auto word = little_endian<std::uint64_t>(bytes + 8);
@@ -57,7 +57,7 @@ int row_at(const std::uint8_t* bytes) {
   return little_endian<std::uint16_t>(bytes + 10);
 }
 
-/// No event of a sensor of this size reaches so far.
+/// Limit of valid coordinates; an unknown size gives the maximum.
 SensorSize limit_of(SensorSize size) {
   return {size.width != 0 ? size.width : widest, size.height != 0 ? size.height : widest};
 }
@@ -137,7 +137,7 @@ bool Aedat4Decoder::read_header() {
   if (header == nullptr) throw UnsupportedFormat("the header of this AEDAT4 file is corrupt");
   if (header->compression() < 0 ||
       header->compression() > static_cast<int>(Aedat4Compression::zstd_high))
-    throw UnsupportedFormat("this AEDAT4 file is compressed in a way that we do not know, number " +
+    throw UnsupportedFormat("this AEDAT4 file has an unknown compression, number " +
                             std::to_string(header->compression()));
   compression_ = static_cast<Aedat4Compression>(header->compression());
   if (const auto xml = aedat4::elements_of(header->info_node()); xml.data != nullptr) {
@@ -165,7 +165,7 @@ bool Aedat4Decoder::open(ByteSource& source) {
 }
 
 void Aedat4Decoder::read_table() {
-  // The table of a recording of many days is larger, and is not read.
+  // Larger tables, of recordings of many days, are not read.
   constexpr std::uint64_t max_table = std::uint64_t{1} << 26;
   if (source_ == nullptr || !table_at_) return;
   std::vector<std::uint8_t> bytes;
@@ -177,16 +177,16 @@ void Aedat4Decoder::read_table() {
   if (table) table_ = std::move(*table);
 }
 
-/// A missing table is reported after all other corruption, which may be what moved it.
+/// A missing table is reported after all other corruption, which may be its cause.
 void Aedat4Decoder::note_missing_table() {
   if (!table_missing_ || std::exchange(table_reported_, true)) return;
   const auto at = table_at_.value_or(0);
   if (table_found_at_ && *table_found_at_ != at)
-    corruption_.note(table_field_at_, "the header names a place without a table of packets");
+    corruption_.note(table_field_at_, "the header has a wrong position for the packet table");
   else if (source_->size() <= at)
-    corruption_.note(source_->size(), "the file ends before its table of packets");
+    corruption_.note(source_->size(), "the file ends before its packet table");
   else
-    corruption_.note(at, "here should be a table of its packets");
+    corruption_.note(at, "the packet table that the header states is missing");
 }
 
 std::optional<SeekPoint> Aedat4Decoder::seek_point_before(Microseconds t) const {
@@ -260,9 +260,9 @@ bool Aedat4Decoder::read_packet() {
   const auto place = place_at(0);
   if (place == Place::more || place == Place::end) return false;
   if (place != Place::packet) {
-    // The table ends the packets, but what it may hide is looked for all the same.
+    // The table follows the last packet, but search for further packets all the same.
     if (place == Place::noise)
-      corruption_.note(queue_.position(), "bytes that are no packet");
+      corruption_.note(queue_.position(), "bytes that are not a packet");
     else if (!table_found_at_)
       table_found_at_ = queue_.position();
     queue_.consume(1);
@@ -277,7 +277,7 @@ bool Aedat4Decoder::read_packet() {
   auto bytes = queue_.peek(packet);
   if (bytes.empty()) {
     if (!finished_) return false;
-    corruption_.note(queue_.position(), "a packet that the end of the file cuts off");
+    corruption_.note(queue_.position(), "a packet truncated by the end of the file");
     queue_.consume(aedat4_packet_header);
     scanning_ = true;
     return true;
@@ -295,8 +295,8 @@ bool Aedat4Decoder::read_packet() {
   } else {
     used = size_prefix + prefix;
   }
-  // A size that is corrupt swallows packets or ends in the midst of one; what follows tells. Where
-  // nothing is compressed missing bytes show in no other way.
+  // A corrupt size swallows packets or ends within one, which shows in what follows. Without
+  // compression, missing bytes show in no other way.
   bool sound_after = true;
   if (used != size || compression_ == Aedat4Compression::none) {
     const auto after = place_at(packet);
@@ -315,7 +315,7 @@ bool Aedat4Decoder::read_packet() {
     corruption = "a packet that does not decompress";
   else if (compression_ == Aedat4Compression::none && !sound_after &&
            !has_sound_events(content, id))
-    corruption = "a packet that lacks bytes";
+    corruption = "a packet with missing bytes";
   else
     corruption = read_content(content, id);
   if (corruption == nullptr) {
@@ -334,14 +334,14 @@ bool Aedat4Decoder::read_packet() {
     sound_after = after != Place::noise;
   }
   corruption_.note(queue_.position(), corruption);
-  // A frame that decompresses hides no packets.
+  // A packet that decompresses contains no further packets.
   const auto sound = compression_ == Aedat4Compression::none ? 0 : used;
   skip_corrupt(packet, sound, size + (used == 0 ? decompressing : content.size()), sound_after);
   return true;
 }
 
-/// Goes on behind a corrupt packet of `packet` bytes where something sound follows it, else with
-/// looking through it for the packets that it has swallowed.
+/// Skips a corrupt packet of `packet` bytes if it is followed by something valid, else searches it
+/// for packets that it has swallowed.
 void Aedat4Decoder::skip_corrupt(std::size_t packet, std::size_t sound, std::size_t work,
                                  bool sound_after) {
   if (sound_after) {
@@ -354,13 +354,14 @@ void Aedat4Decoder::skip_corrupt(std::size_t packet, std::size_t sound, std::siz
   queue_.consume(affordable ? aedat4_packet_header + sound : packet);
 }
 
-/// Takes up a packet's content. Returns what is wrong with it.
+/// Reads the content of a packet. Returns a description of its corruption, or nullptr.
 const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, int id) {
   if (content.size() < payload_head) return broken_packet;
   const auto kind =
       aedat4_kind({reinterpret_cast<const char*>(content.data()) + identifier_at, identifier_size});
   const auto stream = stream_of(id);
-  if (stream && streams_[*stream].kind != kind) return "a packet of another kind than its stream";
+  if (stream && streams_[*stream].kind != kind)
+    return "a packet of a different kind than its stream";
   if (kind == StreamKind::other) {
     ++skipped_.packets;
     return nullptr;
@@ -394,7 +395,7 @@ const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
   const auto pixels = aedat4::elements_of(packet->pixels());
   if (packet->width() <= 0 || packet->height() <= 0 ||
       pixels.count != std::size_t{1} * packet->width() * packet->height() * pixel)
-    return "a frame that has not the pixels that it should";
+    return "a frame whose payload does not match its dimensions";
   for (const auto t : {packet->t(), packet->begin_t(), packet->end_t(), packet->exposure_begin_t(),
                        packet->exposure_end_t(), packet->exposure()})
     if (!is_time(t)) return "a frame at an impossible time";
@@ -410,7 +411,7 @@ const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
               packet->offset_y(),
               pixels.data,
               std::ptrdiff_t{1} * packet->width() * pixel};
-  // Newer files give the time and how long the exposure took, and nothing else.
+  // Newer files only have the time and the length of the exposure.
   if (frame.begin == 0 && frame.end == 0 && frame.exposure_begin == 0 && frame.exposure_end == 0) {
     frame.begin = frame.exposure_begin = frame.t;
     frame.end = frame.exposure_end = frame.t + packet->exposure();
@@ -419,7 +420,7 @@ const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
   return nullptr;
 }
 
-/// Whether the events of a packet are all as a camera gives them. Other packets pass.
+/// True if all events of a packet are valid and in order, and for all other packets.
 bool Aedat4Decoder::has_sound_events(std::span<const std::uint8_t> content, int id) const {
   const auto elements = aedat4::verified_elements<aedat4::EventPacket>(content, "EVTS");
   const auto stream = stream_of(id);
@@ -445,7 +446,7 @@ Item Aedat4Decoder::next_events() {
   return item;
 }
 
-/// The next `count` events. In a block without fault nothing is looked at twice.
+/// Returns the next `count` events without invalid ones. A valid block takes a single pass.
 std::span<const AbsoluteEvent> Aedat4Decoder::checked_events(std::size_t count) {
   const auto limit = limit_of(streams_[elements_.stream].size);
   const auto width = limit.width;
@@ -506,7 +507,7 @@ std::optional<std::size_t> Aedat4Decoder::stream_of(int id) const {
   return std::nullopt;
 }
 
-/// Adds a stream that the header does not list.
+/// Adds a stream that is not listed in the header.
 std::size_t Aedat4Decoder::add_stream(int id, StreamKind kind) {
   streams_.push_back({id, kind, {}, {}});
   newest_.push_back(std::numeric_limits<Microseconds>::min());

@@ -15,11 +15,11 @@
 
 namespace eventcamera {
 
-/// Reads AEDAT4: streams of events, frames and triggers. Bytes come in pieces of any size: how they
-/// are split changes nothing. A packet is the smallest unit that is read or skipped.
+/// Decodes AEDAT4: streams of events, frames and triggers. Bytes are passed in pieces of any size;
+/// the split does not affect the result. A packet is the smallest unit that is read or skipped.
 ///
-/// The id of a trigger is what gave the edge: 0 the camera's input, 1 its generator, 2 a frame, 3
-/// an exposure, 4 the zeroing of its clock.
+/// The ID of a trigger is the source of the edge: 0 the camera's input, 1 its generator, 2 a frame,
+/// 3 an exposure, 4 a reset of its clock.
 class Aedat4Decoder final : public Reader {
  public:
   Aedat4Decoder();
@@ -28,14 +28,14 @@ class Aedat4Decoder final : public Reader {
   void finish() override { finished_ = true; }
   std::optional<Item> next() override;
 
-  /// The table of packets is read from it, as soon as the header tells where that is.
+  /// Gives access to the packet table, which is read once the header has been.
   bool open(ByteSource& source) override;
 
-  /// Those of the header, and any that packets named besides.
+  /// Streams listed in the header, and any others found in packets.
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const Corruption& corruption() const override { return corruption_; }
 
-  /// By the table of packets, where there is one; else before the first packet.
+  /// Uses the packet table if there is one; otherwise the position of the first packet.
   std::optional<SeekPoint> seek_point_before(Microseconds t) const override;
   void restart(const SeekPoint& seek_point) override { resume(seek_point.position); }
   std::optional<Microseconds> last_time() override;
@@ -43,38 +43,37 @@ class Aedat4Decoder final : public Reader {
   std::string format_name() const override { return "AEDAT 4.0"; }
   std::uint64_t imu_samples() const override { return skipped_.imu_samples; }
 
-  /// What is pushed next lies at `position`, where a packet should begin. The header has to have
-  /// been read.
+  /// Continues at `position`, the start of a packet. The header must have been read.
   void resume(std::uint64_t position);
 
   bool header_read() const { return packets_at_ != 0; }
 
   Aedat4Compression compression() const { return compression_; }
 
-  /// Where the first packet begins, once the header is read.
+  /// Position of the first packet, once the header is read.
   std::uint64_t packets_at() const { return packets_at_; }
 
-  /// Where the table of packets begins, where the header says that there is one.
+  /// Position of the packet table, if the header states one.
   std::optional<std::uint64_t> table_at() const { return table_at_; }
 
-  /// Where the header says so.
+  /// Position of that field in the header.
   std::uint64_t table_field_at() const { return table_field_at_; }
 
-  /// Where something like a table was come upon.
+  /// Position where a table was found while reading, if any.
   std::optional<std::uint64_t> table_found_at() const { return table_found_at_; }
 
-  /// What is sound, but not handed over.
+  /// Numbers of valid items that are not returned.
   struct Skipped {
     std::uint64_t imu_samples = 0;
-    std::uint64_t frames = 0;   ///< of a pixel format that we do not know
-    std::uint64_t packets = 0;  ///< of other kinds
+    std::uint64_t frames = 0;   ///< with an unknown pixel format
+    std::uint64_t packets = 0;  ///< of unknown kinds
   };
   const Skipped& skipped() const { return skipped_; }
 
  private:
   enum class Place { more, end, packet, table, noise };
 
-  /// A packet's elements that have not been handed over.
+  /// Elements of a packet not returned yet.
   struct Elements {
     StreamKind kind = StreamKind::other;
     const std::uint8_t* data = nullptr;
@@ -101,28 +100,28 @@ class Aedat4Decoder final : public Reader {
 
   ByteQueue queue_;
   bool finished_ = false;
-  bool scanning_ = false;  ///< for the next place that looks like a packet
+  bool scanning_ = false;  ///< searching for the next packet
   bool listed_ = false;    ///< the header lists the streams
   std::uint64_t packets_at_ = 0;
   std::optional<std::uint64_t> table_at_;
   std::uint64_t table_field_at_ = 0;
   std::optional<std::uint64_t> table_found_at_;
-  ByteSource* source_ = nullptr;  ///< once it is opened
+  ByteSource* source_ = nullptr;  ///< set by open()
   std::vector<Aedat4TableEntry> table_;
-  bool table_missing_ = false;  ///< where the header says that there is one
+  bool table_missing_ = false;  ///< although the header states one
   bool table_reported_ = false;
   Aedat4Compression compression_ = Aedat4Compression::none;
   std::vector<StreamInfo> streams_;
-  std::vector<Microseconds> newest_;  ///< the latest event of each stream
+  std::vector<Microseconds> newest_;  ///< time of the latest event, by stream
   Aedat4Decompressor decompressor_;
 
-  std::size_t packet_ = 0;  ///< bytes of the packet that is being handed over
+  std::size_t packet_ = 0;  ///< size of the packet being returned
   Elements elements_;
   std::optional<FrameItem> frame_;
   std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
 
-  std::size_t credit_;  ///< work that may still be spent on looking into corrupt packets
+  std::size_t credit_;  ///< remaining work for searching corrupt packets
   Corruption corruption_;
   Skipped skipped_;
 };

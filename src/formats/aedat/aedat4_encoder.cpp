@@ -37,7 +37,7 @@ Aedat4Encoder::~Aedat4Encoder() = default;
 void Aedat4Encoder::append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
   write_header(out);
   while (held_.size() + events.size() >= max_events) {
-    // A whole packet is written from where it lies.
+    // Full packets are written directly from `events`.
     const auto count = max_events - held_.size();
     if (held_.empty()) {
       write_events(events.first(count), out);
@@ -100,7 +100,7 @@ void Aedat4Encoder::write_header(std::vector<std::uint8_t>& out) {
   if (settings_.frames)
     streams.push_back({frame_stream, StreamKind::frames, settings_.size, settings_.source});
   flatbuffers::FlatBufferBuilder builder;
-  // The table's position has to have a place, though it is not known yet.
+  // Reserve space for the table's position, which is not known yet.
   builder.ForceDefaults(true);
   const auto info = builder.CreateString(write_info_node(streams, settings_.compression));
   builder.FinishSizePrefixed(
@@ -132,7 +132,7 @@ void Aedat4Encoder::write_events(std::span<const AbsoluteEvent> events,
                events.back().t, out);
 }
 
-/// Writes what the builder holds.
+/// Writes the content of the builder as a packet.
 void Aedat4Encoder::write_packet(int stream, std::int64_t elements, Microseconds start,
                                  Microseconds end, std::vector<std::uint8_t>& out) {
   const auto at = out.size();

@@ -20,40 +20,40 @@ namespace eventcamera {
 
 class Aedat4Compressor;
 
-/// What an AEDAT4 file is to be.
+/// Settings of an AEDAT4 file.
 struct Aedat4Settings {
   SensorSize size;
-  std::string source;  ///< the camera's name
+  std::string source;  ///< name of the camera
   Aedat4Compression compression = Aedat4Compression::lz4;
-  bool frames = false;  ///< beside the stream of events there is one of frames
-  bool table = false;   ///< the file ends with a table of its packets; see Aedat4Encoder::patch()
+  bool frames = false;  ///< with a stream of frames
+  bool table = false;   ///< with a packet table at the end; see Aedat4Encoder::patch()
 };
 
-/// Writes AEDAT4: stream 0 has events, stream 1 frames. Nothing has to be written a second time;
-/// only where a table is wanted, whoever can seek in the file puts its position into the header.
+/// Encodes AEDAT4: stream 0 has events, stream 1 frames. Output is sequential, except that the
+/// position of the packet table, if any, is patched into the header.
 class Aedat4Encoder final : public Encoder {
  public:
   static constexpr int event_stream = 0;
   static constexpr int frame_stream = 1;
 
-  /// Throws std::invalid_argument where the size is none that AEDAT4 can have.
+  /// Throws std::invalid_argument if AEDAT4 does not support the size.
   explicit Aedat4Encoder(Aedat4Settings settings);
   ~Aedat4Encoder() override;
 
   using Encoder::encode;
 
-  /// Appends the events that are held back, and then the frame. Throws std::invalid_argument for
-  /// one that AEDAT4 cannot hold.
+  /// Appends all pending events, then the frame. Throws std::invalid_argument if AEDAT4 does not
+  /// support the frame.
   void encode(const Frame& frame, std::vector<std::uint8_t>& out);
 
-  /// Appends the header, and the events that are held back.
+  /// Appends the header and all pending events.
   void flush(std::vector<std::uint8_t>& out);
 
-  /// The table's position: until it is written, the header says that there is no table.
+  /// Position of the packet table. Until it is written, the header states that there is none.
   std::optional<FilePatch> patch() const override { return patch_; }
 
  private:
-  /// Events are held back until there are enough of them for a packet.
+  /// Keeps events pending until there are enough for a packet.
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
   void append_end(std::vector<std::uint8_t>& out) override;
   void write_header(std::vector<std::uint8_t>& out);
@@ -65,8 +65,8 @@ class Aedat4Encoder final : public Encoder {
   std::unique_ptr<Aedat4Compressor> compressor_;
   std::unique_ptr<flatbuffers::FlatBufferBuilder> builder_;
   std::vector<AbsoluteEvent> held_;
-  std::uint64_t position_ = 0;        ///< in the file, of what comes next
-  std::uint64_t table_field_at_ = 0;  ///< in the file, of the table's position
+  std::uint64_t position_ = 0;        ///< of the next bytes in the file
+  std::uint64_t table_field_at_ = 0;  ///< of the table position in the file
   std::vector<Aedat4TableEntry> table_;
   std::optional<FilePatch> patch_;
 };

@@ -8,16 +8,16 @@
 
 #include "src/formats/aedat/aedat4.fbs.h"
 
-/// Reading the FlatBuffers of AEDAT4 in place. Their address may be any, and so may be what their
-/// writer counted alignment from: nothing here needs a number to be aligned.
+/// Reads the FlatBuffers of AEDAT4 in place, at any alignment: neither their address nor the
+/// writer's alignment can be relied on.
 namespace eventcamera::aedat4 {
 
 inline constexpr std::size_t size_prefix = sizeof(flatbuffers::uoffset_t);
 
-/// The smallest FlatBuffer that has a size prefix and an identifier.
+/// Minimum size of a FlatBuffer with size prefix and identifier.
 inline constexpr std::size_t min_flatbuffer = 3 * size_prefix;
 
-/// The elements of a verified vector: bytes, structs, or offsets of tables.
+/// Elements of a verified vector: bytes, structs, or offsets of tables.
 struct Elements {
   const std::uint8_t* data = nullptr;
   std::size_t count = 0;
@@ -38,8 +38,8 @@ inline Elements elements_of(const void* vector) {
           flatbuffers::ReadScalar<flatbuffers::uoffset_t>(bytes)};
 }
 
-/// A table whose first field is a vector of tables. The verifier that flatc generates for it is
-/// defined for aligned vectors only.
+/// A table whose first field is a vector of tables. The verifier that flatc generates works for
+/// aligned vectors only.
 template <class Element>
 class Tables : private flatbuffers::Table {
  public:
@@ -63,10 +63,10 @@ class Tables : private flatbuffers::Table {
   static constexpr flatbuffers::voffset_t field = 4;
 };
 
-/// The root of a FlatBuffer with a size prefix; null where it is corrupt.
+/// Returns the root of a FlatBuffer with a size prefix; null if it is corrupt.
 template <class Root>
 const Root* verified(std::span<const std::uint8_t> content, const char* identifier) {
-  // The Verifier reads an identifier before it knows that there is room for one.
+  // The Verifier reads the identifier without checking the size first.
   if (content.size() < min_flatbuffer) return nullptr;
   flatbuffers::Verifier::Options options;
   options.max_tables = static_cast<flatbuffers::uoffset_t>(content.size());
@@ -78,7 +78,7 @@ const Root* verified(std::span<const std::uint8_t> content, const char* identifi
                                        flatbuffers::ReadScalar<flatbuffers::uoffset_t>(root));
 }
 
-/// The elements of a packet, or a table of packets; nothing where it is corrupt.
+/// Returns the elements of a packet or of the packet table; nothing if it is corrupt.
 template <class Root>
 std::optional<Elements> verified_elements(std::span<const std::uint8_t> content,
                                           const char* identifier) {

@@ -47,10 +47,10 @@ std::optional<int> number(std::string_view text) {
   return value;
 }
 
-/// The value of attribute `name` in a tag's text.
+/// Value of the attribute `name` in the text of a tag.
 std::string_view attribute(std::string_view tag, std::string_view name) {
   const auto is_name = [](char c) { return c != ' ' && c != '\t' && c != '\r' && c != '\n'; };
-  std::size_t before = 0;  // the end of the attribute before
+  std::size_t before = 0;  // end of the previous attribute
   for (auto equals = tag.find('='); equals != std::string_view::npos;
        equals = tag.find('=', equals + 1)) {
     if (equals + 1 >= tag.size() || (tag[equals + 1] != '"' && tag[equals + 1] != '\'')) return {};
@@ -65,7 +65,7 @@ std::string_view attribute(std::string_view tag, std::string_view name) {
   return {};
 }
 
-/// Walks through the tags and notes what the nodes outInfo/N and outInfo/N/info say.
+/// Parses the tags and collects the nodes outInfo/N and outInfo/N/info.
 class XmlReader {
  public:
   explicit XmlReader(std::string_view xml) : xml_(xml) {}
@@ -109,7 +109,7 @@ class XmlReader {
     return true;
   }
 
-  /// Whether we are `below` levels below outInfo.
+  /// True if the current node is `below` levels below outInfo.
   bool of_stream(std::size_t below) const {
     return path_.size() > below && path_[path_.size() - 1 - below] == "outInfo" &&
            (below == 1 || path_.back() == "info");
@@ -141,8 +141,8 @@ class XmlReader {
   }
 
   std::string_view xml_;
-  std::vector<std::string_view> path_;  ///< names of the open nodes
-  bool named_ = false;                  ///< the last stream's node has a number
+  std::vector<std::string_view> path_;  ///< names of open nodes
+  bool named_ = false;                  ///< the node of the last stream has a number
   Aedat4InfoNode info_;
 };
 
@@ -155,7 +155,7 @@ std::string text_attribute(const std::string& key, const std::string& value,
   return "<attr key=\"" + key + "\" type=\"" + type + "\">" + escaped(value) + "</attr>";
 }
 
-/// By Aedat4Compression.
+/// Indexed by Aedat4Compression.
 constexpr const char* compression_names[] = {"NONE", "LZ4", "LZ4_HIGH", "ZSTD", "ZSTD_HIGH"};
 
 struct KindText {

@@ -10,17 +10,17 @@
 
 namespace eventcamera {
 
-/// What the XML of an AEDAT4 header says.
+/// Content of the XML in an AEDAT4 header.
 struct Aedat4InfoNode {
   std::vector<StreamInfo> streams;
-  bool whole = true;  ///< false: the XML is corrupt, and the streams are what could be read of it
+  bool whole = true;  ///< false: the XML is corrupt, and `streams` is incomplete
 };
 
 Aedat4InfoNode read_info_node(std::string_view xml);
 
 std::string write_info_node(std::span<const StreamInfo> streams, Aedat4Compression compression);
 
-/// The kind of a stream whose packets have this four-character identifier.
+/// Kind of streams whose packets have this four-character identifier.
 StreamKind aedat4_kind(std::string_view identifier);
 
 }  // namespace eventcamera

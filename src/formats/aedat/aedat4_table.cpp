@@ -11,11 +11,12 @@ namespace eventcamera {
 
 namespace {
 
-/// A recording of a day fits.
+/// Large enough for recordings of a day.
 constexpr std::size_t max_table = std::size_t{512} << 20;
-/// Even of evenly spaced packets a table shrinks to no less than a fifth; what grows more is none.
+/// Tables compress to a fifth at best, even for evenly spaced packets; anything that grows more is
+/// not a table.
 constexpr std::size_t max_growth = 16;
-/// What an entry takes, so that those which share their bytes do not fill the memory.
+/// Minimum size of an entry, so that entries that share bytes cannot exhaust the memory.
 constexpr std::size_t min_entry = 24;
 constexpr const char* identifier = "FTAB";
 

@@ -10,30 +10,30 @@
 
 namespace eventcamera {
 
-/// What the table at an AEDAT4 file's end says of one packet.
+/// Entry for one packet in the table at the end of an AEDAT4 file.
 struct Aedat4TableEntry {
-  std::uint64_t position;  ///< in the file, of the packet's header
-  int stream;              ///< its id
-  int size;                ///< of the payload
+  std::uint64_t position;  ///< of the packet header in the file
+  int stream;              ///< stream ID
+  int size;                ///< payload size
   std::int64_t elements;
-  Microseconds start;  ///< of its first element
-  Microseconds end;    ///< of its last
+  Microseconds start;  ///< time of its first element
+  Microseconds end;    ///< time of its last element
 
   friend constexpr bool operator==(const Aedat4TableEntry&, const Aedat4TableEntry&) = default;
 };
 
-/// The table in `bytes`, which are what the file has from its table's position to its end; nothing
-/// where they are no table. Packets begin at `packets_at`: files differ in whether they give the
-/// position of a packet or of its payload, and the first tells which it is.
+/// Parses the table in `bytes`, the file from the table's position to its end; nothing if they are
+/// not a table. The first packet is at `packets_at`. Positions are those of packets or of their
+/// payloads, depending on the writer; the first entry shows which.
 std::optional<std::vector<Aedat4TableEntry>> read_aedat4_table(std::span<const std::uint8_t> bytes,
                                                                Aedat4Compression compression,
                                                                std::uint64_t packets_at);
 
-/// Where to read from to have everything that is not before `t`; nothing where all of it is.
+/// Returns the position from which to read everything at `t` or later; nothing if there is none.
 std::optional<std::uint64_t> aedat4_position_of(std::span<const Aedat4TableEntry> table,
                                                 Microseconds t);
 
-/// The table's content, as it is before compression.
+/// Serializes the table, before compression.
 std::vector<std::uint8_t> aedat4_table_content(std::span<const Aedat4TableEntry> table);
 
 }  // namespace eventcamera

@@ -10,21 +10,21 @@
 
 namespace eventcamera {
 
-/// The header of AEDAT 2.0 and 3.1: lines of text that begin with '#'.
+/// Header of AEDAT 2.0 and 3.1: lines of text starting with '#'.
 class AedatHeader {
  public:
   enum class Next {
-    more,  ///< takes more bytes
+    more,  ///< more bytes are needed
     line,  ///< another line was read
     last,  ///< the last line of the header was read
-    data,  ///< what comes next is no line of a header
+    data,  ///< the next bytes are not a header line
   };
 
-  /// `magic` begins the first line, and `last_line` the last.
+  /// The first line starts with `magic`, the last one with `last_line`.
   AedatHeader(std::string_view magic, std::string_view last_line)
       : magic_(magic), last_line_(last_line) {}
 
-  /// Takes a line from the front of `queue`. Throws UnsupportedFormat.
+  /// Reads a line from the front of `queue`. Throws UnsupportedFormat.
   Next next(ByteQueue& queue) {
     if (!in_line_) {
       line_.clear();
@@ -49,7 +49,7 @@ class AedatHeader {
     return line_.starts_with(last_line_) ? Next::last : Next::line;
   }
 
-  /// The line that was read last, without CR and LF.
+  /// The line read last, without CR and LF.
   const std::string& line() const { return line_; }
 
   bool in_first_line() const { return first_line_; }
@@ -64,7 +64,7 @@ class AedatHeader {
   /// Longer lines are cut to this length.
   static constexpr std::size_t max_line = 4096;
 
-  /// False where that takes more bytes.
+  /// False if more bytes are needed.
   bool begins_with_magic(ByteQueue& queue) const {
     const auto start = queue.peek(std::min(queue.size(), magic_.size()));
     const auto count = std::min(start.size(), magic_.size());

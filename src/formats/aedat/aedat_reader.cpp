@@ -40,7 +40,7 @@ std::optional<Item> AedatReader::next() {
   return reader_->next();
 }
 
-/// Makes the reader that the file's first line asks for. False where that takes more bytes.
+/// Creates the reader for the version in the first line. False if more bytes are needed.
 bool AedatReader::find_version() {
   const std::string_view text(reinterpret_cast<const char*>(start_.data()),
                               std::min(start_.size(), magic_size));
@@ -58,7 +58,7 @@ bool AedatReader::find_version() {
     reader_ = std::make_unique<DecoderReader>(std::make_unique<Aedat2Decoder>());
   else
     throw UnsupportedFormat("this is AEDAT " + std::string(version) +
-                            ", of which only 4.0, 3.1 and 2.0 can be read");
+                            "; only versions 4.0, 3.1 and 2.0 are supported");
   version_ = version;
   if (source_ != nullptr) reader_->open(*source_);
   reader_->push(start_);

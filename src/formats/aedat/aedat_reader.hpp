@@ -9,8 +9,8 @@ namespace eventcamera {
 
 class Aedat4Decoder;
 
-/// Reads AEDAT 4, 3.1 and 2.0, as the first line of the file says. The older ones are read as one
-/// stream of events, and triggers.
+/// Reads AEDAT 4, 3.1 and 2.0, according to the first line of the file. The older versions are read
+/// as a single stream of events (and triggers).
 class AedatReader final : public Reader {
  public:
   void push(std::span<const std::uint8_t> piece) override;
@@ -26,16 +26,16 @@ class AedatReader final : public Reader {
   std::string format_name() const override;
   std::uint64_t imu_samples() const override;
 
-  /// What reads AEDAT 4; nothing where the file is not AEDAT 4, or not known to be.
+  /// The AEDAT 4 decoder; null if the file is not AEDAT 4, or not yet known to be.
   const Aedat4Decoder* aedat4() const;
 
  private:
   bool find_version();
 
-  std::vector<std::uint8_t> start_;  ///< of the file: the pieces until its version is known
+  std::vector<std::uint8_t> start_;  ///< start of the file, collected until its version is known
   bool finished_ = false;
   ByteSource* source_ = nullptr;
-  std::string version_;  ///< empty before it is known
+  std::string version_;  ///< empty until known
   std::unique_ptr<Reader> reader_;
 };
 
