@@ -277,7 +277,7 @@ static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, By
   };
   if (!state.video) return reject("no caps");
   const VideoFrame video(*state.video, buffer, GST_MAP_READ);
-  if (!video) return reject("cannot map it as video of the negotiated format");
+  if (!video) return reject(video.fault().c_str());
   auto frame = recorded_frame(video.get());
   frame.t = frame.begin = frame.end = frame.exposure_begin = frame.exposure_end = t;
   try {

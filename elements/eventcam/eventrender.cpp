@@ -305,8 +305,9 @@ GstFlowReturn EventRender::draw(const EventInterval& events, GstBuffer* buffer) 
   const VideoFrame frame(*state_->video, buffer, GST_MAP_WRITE);
   if (!frame) {
     GST_ELEMENT_ERROR(element(), RESOURCE, FAILED,
-                      ("Cannot draw into a buffer from downstream; add a videoconvert."),
-                      ("gst_video_frame_map() failed for %" GST_PTR_FORMAT, buffer));
+                      ("Cannot draw into an output buffer: %s. Check the element downstream.",
+                       frame.fault().c_str()),
+                      ("%" GST_PTR_FORMAT, buffer));
     return GST_FLOW_ERROR;
   }
   state_->renderer.draw(window_start(current, events), static_cast<Microseconds>(events.end / 1000),

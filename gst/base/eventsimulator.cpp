@@ -389,12 +389,10 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   const auto start = state.simulator->last_time();
   const VideoFrame frame(state.video, in, GST_MAP_READ);
   if (!frame) {
-    GST_ELEMENT_ERROR(self, RESOURCE, FAILED,
-                      ("Cannot read a buffer as video of the negotiated format. Check the element "
-                       "upstream."),
-                      ("cannot map %" G_GSIZE_FORMAT " bytes as %s of %dx%d",
-                       gst_buffer_get_size(in), GST_VIDEO_INFO_NAME(&state.video),
-                       GST_VIDEO_INFO_WIDTH(&state.video), GST_VIDEO_INFO_HEIGHT(&state.video)));
+    GST_ELEMENT_ERROR(
+        self, RESOURCE, FAILED,
+        ("Cannot read a video frame: %s. Check the element upstream.", frame.fault().c_str()),
+        ("%" GST_PTR_FORMAT, in));
     return GST_FLOW_ERROR;
   }
   const EventBuckets* events = simulate(self, frame, end, settings);

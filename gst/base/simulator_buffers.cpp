@@ -186,9 +186,9 @@ GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform, const Eve
     const VideoFrame picture(drawing.video, prepared, GST_MAP_WRITE);
     if (!picture) {
       GST_ELEMENT_ERROR(transform, RESOURCE, FAILED,
-                        ("Cannot draw in an output buffer. Check the element downstream."),
-                        ("cannot map %" G_GSIZE_FORMAT " bytes as the negotiated video",
-                         gst_buffer_get_size(prepared)));
+                        ("Cannot draw into an output buffer: %s. Check the element downstream.",
+                         picture.fault().c_str()),
+                        ("%" GST_PTR_FORMAT, prepared));
       return GST_FLOW_ERROR;
     }
     drawing.accumulator.add(events, threads);

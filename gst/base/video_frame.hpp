@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 /// Duration of a frame; 0 if the framerate is variable.
 inline GstClockTime frame_duration(const GstVideoInfo& video) {
@@ -17,18 +18,30 @@ inline GstClockTime frame_duration(const GstVideoInfo& video) {
 /// if any.
 class VideoFrame {
  public:
-  VideoFrame(const GstVideoInfo& info, GstBuffer* buffer, GstMapFlags flags)
-      : mapped_(gst_video_frame_map(&frame_, &info, buffer, flags)),
-        fits_(mapped_ && rows_fit(info)) {}
+  VideoFrame(const GstVideoInfo& info, GstBuffer* buffer, GstMapFlags flags) {
+    const auto* const meta = gst_buffer_get_video_meta(buffer);
+    if (meta != nullptr && !holds(*meta, info)) {
+      fault_ = "its GstVideoMeta says " + text_of(meta->format, meta->width, meta->height) +
+               ", the caps say " + text_of(info);
+      return;
+    }
+    mapped_ = gst_video_frame_map(&frame_, &info, buffer, flags) != FALSE;
+    if (!mapped_ || !rows_fit(info))
+      fault_ = text_of(info) + " does not fit into its " +
+               std::to_string(gst_buffer_get_size(buffer)) + " bytes";
+  }
   ~VideoFrame() {
     if (mapped_) gst_video_frame_unmap(&frame_);
   }
   VideoFrame(const VideoFrame&) = delete;
   VideoFrame& operator=(const VideoFrame&) = delete;
 
-  /// True if the buffer could be mapped and its rows lie within its memory. Nothing else may be
+  /// True if the buffer could be mapped and its rows lie within its memory. Only fault() may be
   /// called if false.
-  explicit operator bool() const { return fits_; }
+  explicit operator bool() const { return fault_.empty(); }
+
+  /// What is wrong with the buffer, for a message.
+  const std::string& fault() const { return fault_; }
 
   const GstVideoFrame* get() const { return &frame_; }
   std::byte* data() const {
@@ -42,6 +55,24 @@ class VideoFrame {
   std::ptrdiff_t stride() const { return GST_VIDEO_FRAME_PLANE_STRIDE(&frame_, 0); }
 
  private:
+  static std::string text_of(GstVideoFormat format, guint width, guint height) {
+    return std::string(gst_video_format_to_string(format)) + " of " + std::to_string(width) + "x" +
+           std::to_string(height) + " pixels";
+  }
+  static std::string text_of(const GstVideoInfo& info) {
+    return text_of(GST_VIDEO_INFO_FORMAT(&info), static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info)),
+                   static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info)));
+  }
+
+  /// True if the frame that a GstVideoMeta describes contains one of the caps. GStreamer requires
+  /// it.
+  static bool holds(const GstVideoMeta& meta, const GstVideoInfo& info) {
+    return meta.format == GST_VIDEO_INFO_FORMAT(&info) &&
+           meta.width >= static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info)) &&
+           meta.height >= static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info)) &&
+           meta.n_planes >= GST_VIDEO_INFO_N_PLANES(&info);
+  }
+
   /// GStreamer does not check the strides and offsets of a GstVideoMeta.
   bool rows_fit(const GstVideoInfo& info) const {
     const std::ptrdiff_t row =
@@ -55,6 +86,6 @@ class VideoFrame {
   }
 
   GstVideoFrame frame_{};
-  bool mapped_;
-  bool fits_;
+  bool mapped_ = false;
+  std::string fault_;
 };

@@ -207,6 +207,33 @@ TEST(Stream, RefusesMetasThatLie) {
   EXPECT_EQ(push_with_meta("GRAY16_LE", 642, 1, 200000), GST_FLOW_ERROR);
 }
 
+TEST(Stream, RefusesFramesSmallerThanTheirCaps) {
+  struct Meta {
+    GstVideoFormat format;
+    guint width;
+    guint height;
+    guint planes;
+    const char* says;
+  };
+  for (const auto& meta : {Meta{GST_VIDEO_FORMAT_NV12, 60, 44, 2, "NV12 of 60x44 pixels"},
+                           Meta{GST_VIDEO_FORMAT_NV12, 62, 42, 2, "NV12 of 62x42 pixels"},
+                           Meta{GST_VIDEO_FORMAT_GRAY8, 62, 44, 1, "GRAY8 of 62x44 pixels"},
+                           Meta{GST_VIDEO_FORMAT_NV12, 62, 44, 1, "NV12 of 62x44 pixels"}})
+    for (const char* element : elements) {
+      Harness h(element);
+      h.caps(video(62, 44, "NV12"));
+      GstBuffer* buffer = h.flat(0, 100);
+      gsize offsets[GST_VIDEO_MAX_PLANES] = {0, 62 * 44};
+      gint strides[GST_VIDEO_MAX_PLANES] = {62, 62};
+      gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, meta.format, meta.width,
+                                     meta.height, meta.planes, offsets, strides);
+      EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR) << element;
+      const auto error = h.message(GST_MESSAGE_ERROR);
+      ASSERT_TRUE(error);
+      EXPECT_NE(text_of(error.get()).find(meta.says), std::string::npos) << text_of(error.get());
+    }
+}
+
 TEST(Stream, GivesPicturesNothingOfTheFrameThatEndsThem) {
   Harness h("eventsim-frame");
   h.caps(video(32, 24), "video/x-raw, format=GRAY8");
