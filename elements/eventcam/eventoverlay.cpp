@@ -9,6 +9,9 @@
  * the interval's end. The two are synchronized by running time. Events are scaled to the video if
  * the sensor has a different size.
  *
+ * Video from a live source waits for events no longer than its latency. Other video waits until the
+ * events of its interval have come, or a GAP event or EOS says that there are none.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball ! tee name=t  t. ! queue ! videoconvert ! eventoverlay
@@ -110,7 +113,7 @@ bool EventOverlay::take_events(GstBuffer* buffer, GstClockTime start, GstClockTi
   const auto rest = mapped.events().subspan(std::min(taken_, mapped.events().size()));
   const auto due = events_until(rest, origin, static_cast<Microseconds>(end / 1000));
   taken_ += due.size();
-  if (overlay_->add(due, origin) > 0) warn(EventFault::beyond_sensor, buffer);
+  if (overlay_ && overlay_->add(due, origin) > 0) warn(EventFault::beyond_sensor, buffer);
   return due.size() == rest.size();
 }
 
@@ -146,9 +149,10 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
   const Settings current = settings.copy();
   const VideoFrame frame(*video_, buffer, static_cast<GstMapFlags>(GST_MAP_READWRITE));
   if (!frame) {
-    GST_ELEMENT_ERROR(element(), RESOURCE, FAILED,
-                      ("Cannot draw on a video frame; add a videoconvert before this."),
-                      ("gst_video_frame_map() failed for %" GST_PTR_FORMAT, buffer));
+    GST_ELEMENT_ERROR(
+        element(), RESOURCE, FAILED,
+        ("Cannot draw on a video frame: %s. Check the element upstream.", frame.fault().c_str()),
+        ("%" GST_PTR_FORMAT, buffer));
     return GST_FLOW_ERROR;
   }
   const auto end = static_cast<Microseconds>(interval.end / 1000);
@@ -163,8 +167,8 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
 /// Draws on the first queued frame and pushes it. May throw.
 GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& interval,
                                        bool timed_out) {
-  if (interval && sensor_) {
-    if (!overlay_)
+  if (interval) {
+    if (sensor_ && !overlay_)
       overlay_.emplace(*sensor_,
                        Size{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)});
     if (!take_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -186,11 +190,13 @@ GstFlowReturn EventOverlay::aggregate(bool timed_out) {
   return video_ ? take_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
 }
 
-/// Time at which a live frame is pushed without waiting for events.
+/// Time at which a live frame is pushed without waiting for events: at once if it has no time, and
+/// at the end of the video.
 GstClockTime EventOverlay::next_time() {
   const OwnedBuffer frame(gst_aggregator_pad_peek_buffer(main_pad()));
-  if (!frame || !GST_BUFFER_PTS_IS_VALID(frame.get())) return GST_CLOCK_TIME_NONE;
-  return running_time(main_pad(), GST_BUFFER_PTS(frame.get())).value_or(GST_CLOCK_TIME_NONE);
+  if (!frame) return gst_aggregator_pad_is_eos(main_pad()) ? 0 : GST_CLOCK_TIME_NONE;
+  if (!GST_BUFFER_PTS_IS_VALID(frame.get())) return 0;
+  return running_time(main_pad(), GST_BUFFER_PTS(frame.get())).value_or(0);
 }
 
 /* negotiation, states */
@@ -206,9 +212,9 @@ bool EventOverlay::take_video_caps(const GstCaps* caps) {
   gst_aggregator_set_latency(element(), latency, latency);
   if (!gst_pad_is_linked(GST_PAD(events_pad_)))
     GST_ELEMENT_WARNING(element(), CORE, PAD,
-                        ("No output until events come in; link a source of events to the pad "
-                         "\"events\"."),
-                        ("The pad \"events\" is not linked."));
+                        ("No events to draw: link a source of events to the pad \"events\". Until "
+                         "then, video from a live source goes on as it is, and other video waits."),
+                        ("the pad \"events\" is not linked"));
   return true;
 }
 

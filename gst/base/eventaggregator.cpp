@@ -232,12 +232,23 @@ void gst_event_aggregator_class_add_templates(GstEventAggregatorClass* klass,
                                                          GST_TYPE_AGGREGATOR_PAD);
 }
 
+/// The sink pads that are linked. A latency query goes to the pads that the source pad names, and
+/// fails where one of them fails: then GstAggregator would take a live source for none.
+static GstIterator* iterate_linked_pads(GstPad*, GstObject* element) {
+  const auto compare = [](gconstpointer item, gconstpointer) {
+    return gst_pad_is_linked(GST_PAD(g_value_get_object(static_cast<const GValue*>(item)))) ? 0 : 1;
+  };
+  return gst_iterator_filter(gst_element_iterate_sink_pads(GST_ELEMENT(element)), compare, nullptr);
+}
+
 static void finalize(GObject* object) {
   delete &gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(object));
   G_OBJECT_CLASS(gst_event_aggregator_parent_class)->finalize(object);
 }
 
-static void gst_event_aggregator_init(GstEventAggregator*) {}
+static void gst_event_aggregator_init(GstEventAggregator* self) {
+  gst_pad_set_iterate_internal_links_function(GST_AGGREGATOR_SRC_PAD(self), iterate_linked_pads);
+}
 
 static void gst_event_aggregator_class_init(GstEventAggregatorClass* klass) {
   G_OBJECT_CLASS(klass)->finalize = finalize;

@@ -112,6 +112,53 @@ TEST_F(OverlayTest, GoesOnThroughGapsAndPastTheEndOfEvents) {
   EXPECT_EQ(rest, nullptr);
 }
 
+TEST_F(OverlayTest, GoesOnThroughGapsWithoutCaps) {
+  gst_harness_set_src_caps_str(video.get(),
+                               "video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1");
+  push_segment(events.get());
+  for (const GstClockTime pts : {0 * ms, 40 * ms, 80 * ms}) {
+    push_frame(pts);
+    gst_harness_push_event(events.get(), gst_event_new_gap(pts, 40 * ms));
+    EXPECT_EQ(drawn(), Places{});
+  }
+}
+
+TEST_F(OverlayTest, GoesOnWithoutEventsThatEndBeforeTheyBegin) {
+  gst_harness_set_src_caps_str(video.get(),
+                               "video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1");
+  gst_harness_push_event(events.get(), gst_event_new_eos());
+  for (const GstClockTime pts : {0 * ms, 40 * ms}) {
+    push_frame(pts);
+    EXPECT_EQ(drawn(), Places{});
+  }
+}
+
+TEST(LiveOverlay, GoesOnWhereNoEventsAreLinked) {
+  gst_init(nullptr, nullptr);
+  const Owned<GstElement> pipeline(GST_ELEMENT(gst_object_ref_sink(gst_parse_launch(
+      "videotestsrc is-live=true num-buffers=10 ! video/x-raw,format=GRAY8,framerate=50/1 ! "
+      "eventoverlay ! fakesink name=sink sync=true",
+      nullptr))));
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+  const Owned<GstMessage> end(gst_bus_timed_pop_filtered(
+      bus.get(), 20 * GST_SECOND,
+      static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING)));
+  ASSERT_TRUE(end);
+  ASSERT_EQ(GST_MESSAGE_TYPE(end.get()), GST_MESSAGE_WARNING);
+  EXPECT_NE(text_of(end.get()).find("link a source of events"), std::string::npos);
+  EXPECT_TRUE(
+      Owned<GstMessage>(gst_bus_timed_pop_filtered(bus.get(), 20 * GST_SECOND, GST_MESSAGE_EOS)));
+  const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
+  GstStructure* stats = nullptr;
+  guint64 rendered = 0;
+  g_object_get(sink.get(), "stats", &stats, nullptr);
+  gst_structure_get_uint64(stats, "rendered", &rendered);
+  gst_structure_free(stats);
+  EXPECT_EQ(rendered, 10U);
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
 TEST_F(OverlayTest, LeavesEventsBeyondTheSensorOut) {
   begin("width=8, height=4");
   push_frame(0);
