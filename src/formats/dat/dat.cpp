@@ -13,7 +13,7 @@
 namespace eventcamera {
 namespace {
 
-/// Columns and rows are numbers of 14 bits.
+/// Columns and rows have 14 bits.
 constexpr int max_side = 16384;
 
 enum Type : std::uint8_t { event_2d = 0x00, event_cd = 0x0c, event_trigger = 0x0e };
@@ -83,7 +83,7 @@ class DatTriggerReader final : public DatReader {
   }
 };
 
-/// Some writers add "T0", the time of the first event since some day; it is ignored.
+/// Ignores "T0", which some writers add: the time of the first event since some epoch.
 class DatDecoder final : public UnitDecoder {
  private:
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended) override {
@@ -102,7 +102,7 @@ class DatDecoder final : public UnitDecoder {
       throw UnsupportedFormat("not a DAT file but RAW; use evtdec");
     if (bytes != record_size)
       throw UnsupportedFormat("unsupported DAT event size of " + std::to_string(bytes) + " bytes");
-    // Files without a version are older than versions.
+    // Files without a version predate version numbers.
     const auto version = header_.value("Version");
     if (version != "2" && version != "1" && !version.empty())
       throw UnsupportedFormat("unsupported DAT version '" + version + "'");
@@ -119,7 +119,7 @@ class DatDecoder final : public UnitDecoder {
       begin(std::make_unique<DatEventReader<1>>(size), size);
   }
 
-  /// Its files do not give its size.
+  /// Sensor of the first camera, whose files do not state the size.
   static constexpr SensorSize first_camera{304, 240};
 
   PropheseeHeader header_;

@@ -8,14 +8,13 @@
 
 namespace eventcamera {
 
-/// Prophesee's DAT files ("DAT file format"), of events or of triggers, versions 1 and 2. Their
-/// times have 32 bits and wrap every 71 minutes: a wrap is known by a fall of more than half of
-/// that.
+/// Decodes Prophesee DAT files ("DAT file format") of events or triggers, versions 1 and 2. Their
+/// times have 32 bits and wrap every 71 minutes: a fall by more than half of that is a wrap.
 std::unique_ptr<Decoder> make_dat_decoder();
 
-/// Version 2. What is silent for more than 35 minutes may be read as silent for 71 minutes less:
-/// the format has nothing to fill silence with. The sensor has at most 16384x16384 pixels; throws
-/// std::invalid_argument.
+/// Encodes version 2. Readers may mistake a pause of more than 35 minutes for one that is 71
+/// minutes shorter, because the format cannot represent pauses. Throws std::invalid_argument for
+/// sensors of more than 16384x16384 pixels.
 std::unique_ptr<Encoder> make_dat_encoder(SensorSize size);
 
 }  // namespace eventcamera

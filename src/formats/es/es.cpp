@@ -16,13 +16,13 @@ constexpr std::string_view magic = "Event Stream";
 constexpr std::uint8_t version = 2;
 constexpr std::size_t header_size = magic.size() + 3 + 1 + 4;
 
-/// y_p of an event has 15 bits of row.
+/// y_p of an event has 15 bits for the row.
 constexpr int max_rows = 32768;
 
 enum Type : std::uint8_t { generic = 0, dvs = 1, atis = 2, amd = 3, colour = 4 };
 
-/// An event is a byte, of the microseconds since the last one and `flag_bits` flags, and x and y of
-/// 16 bits each. Where all bits of the microseconds are set it is that byte alone.
+/// An event is a byte with the microseconds since the last event and `flag_bits` flags, followed by
+/// x and y with 16 bits each. If all bits of the microseconds are set, it is that byte alone.
 template <int flag_bits>
 class EsReader final : public UnitReader {
  public:
@@ -32,7 +32,7 @@ class EsReader final : public UnitReader {
                            Batch& batch) override {
     constexpr std::uint32_t max_step = 0xff >> flag_bits;
     constexpr std::uint32_t flags = (1 << flag_bits) - 1;
-    // An ATIS event of which bit 0 is set is the start or the end of an exposure.
+    // An ATIS event with bit 0 set is the start or end of an exposure.
     constexpr std::uint32_t exposure = flag_bits == 2 ? 1 : 0;
     constexpr std::uint32_t on = flag_bits == 2 ? 2 : 1;
     auto* event = batch.begin();
@@ -43,7 +43,7 @@ class EsReader final : public UnitReader {
       const std::uint32_t byte = *from;
       const auto step = byte >> flag_bits;
       if (step == max_step) {
-        // As many of the longest steps as the flags say; none is a sign that readers may ignore.
+        // The flags are the number of maximum steps; readers may ignore 0.
         t += static_cast<std::uint64_t>(max_step) * (byte & flags);
         ++from;
         continue;
@@ -117,7 +117,7 @@ class EsDecoder final : public UnitDecoder {
   }
 };
 
-/// As its one character in the header.
+/// Low and high byte of a number in the header.
 constexpr char low(int number) {
   return static_cast<char>(number & 255);
 }
@@ -151,9 +151,9 @@ class EsEncoder final : public Encoder {
     write_events<std::uint8_t>(events, bytes_at_once, out, write);
   }
 
-  /// Fills the pause before an event, and returns what is left of it.
+  /// Fills the pause before an event, and returns the rest of it.
   std::uint32_t reach(Microseconds t, WordWriter<std::uint8_t>& bytes) {
-    // Where times are not sorted, time stands still: a step back cannot be written.
+    // Clamps decreasing times, because the format has no steps backwards.
     t = std::max(t, last_);
     last_ = t;
     gaps_.reach(t);
@@ -169,7 +169,7 @@ class EsEncoder final : public Encoder {
   int height_;
   GapLimiter gaps_;
   Microseconds last_ = 0;
-  std::uint64_t written_ = 0;  // the time of the last byte
+  std::uint64_t written_ = 0;  // time of the last byte
 };
 
 }  // namespace

@@ -8,13 +8,13 @@
 
 namespace eventcamera {
 
-/// Event Stream 2.0 as its authors' library sepia writes it: streams of DVS events, and of ATIS
-/// events, whose changes are read and whose exposures are not. Rows are counted from the bottom in
-/// these files, as the authors' tools do, and from the top here.
+/// Decodes Event Stream 2.0 as written by its authors' library sepia: streams of DVS events, and of
+/// ATIS events, of which exposures are skipped. Rows are counted from the bottom in these files, as
+/// in the authors' tools, and from the top here.
 std::unique_ptr<Decoder> make_event_stream_decoder();
 
-/// DVS events. The format fills silence with a byte for every 127 microseconds. The sensor has at
-/// most 32768 rows and 65535 columns; throws std::invalid_argument.
+/// Encodes DVS events. The format fills pauses with a byte per 127 microseconds. Throws
+/// std::invalid_argument for sensors of more than 65535x32768 pixels.
 std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size);
 
 }  // namespace eventcamera

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// EVT2, EVT2.1 and EVT4, whose words are alike: an event, or a mask of 32 pixels of a row, with the
-// low bits of its time; or the high bits of the time.
+// EVT2, EVT2.1 and EVT4, whose words are similar: an event, or a mask of 32 pixels of a row, with
+// the low bits of its time; or the high bits of the time.
 #include <algorithm>
 #include <span>
 #include <stdexcept>
@@ -13,17 +13,17 @@
 namespace eventcamera {
 namespace {
 
-/// A word of EVT2 or EVT4, or the upper half of one of EVT2.1.
+/// Word of EVT2 or EVT4, or upper half of a word of EVT2.1.
 struct CdWord {
   std::uint32_t bits;
 
-  /// `time` is cut to its low bits.
+  /// `time` is truncated to its low bits.
   static constexpr CdWord at(std::uint32_t type, std::uint64_t time, std::uint32_t x,
                              std::uint32_t y) {
     return {type << 28 | (static_cast<std::uint32_t>(time) & 63) << 22 | (x & 0x7ff) << 11 |
             (y & 0x7ff)};
   }
-  /// `count` is of 64 microseconds.
+  /// `count` is in units of 64 microseconds.
   static constexpr CdWord time_high(std::uint32_t type, std::uint64_t count) {
     return {type << 28 | (static_cast<std::uint32_t>(count) & 0x0fffffff)};
   }
@@ -34,7 +34,7 @@ struct CdWord {
   constexpr std::uint32_t x() const { return bits >> 11 & 0x7ff; }
   constexpr std::uint32_t y() const { return bits & 0x7ff; }
 
-  /// `time` is that of the last TIME_HIGH; the polarity is the lowest bit of the type.
+  /// `time` is that of the last TIME_HIGH. The polarity is the lowest bit of the type.
   constexpr AbsoluteEvent event(std::uint64_t time) const {
     return {static_cast<Microseconds>(time + time_low()), static_cast<std::uint16_t>(x()),
             static_cast<std::uint16_t>(y() | (type() & 1) << 15)};
@@ -46,14 +46,14 @@ struct CdWord {
   }
 };
 
-/// The types of words without events.
+/// Types of words without events.
 struct CdTypes {
   std::uint32_t time_high;
   std::uint32_t trigger;
-  std::uint32_t ignored;  ///< a bit for each type
+  std::uint32_t ignored;  ///< one bit per type
 };
 
-/// All that it remembers of earlier words is the time.
+/// Base of the readers; the only state is the time.
 template <CdTypes types>
 class CdReader : public UnitReader {
  public:
@@ -64,7 +64,7 @@ class CdReader : public UnitReader {
   CdReader(SensorSize size, const char* unknown_type)
       : bounds_(size, max_evt_side), unknown_type_(unknown_type) {}
 
-  /// Reads a word, of so many bytes, that holds no event.
+  /// Reads a word of size `bytes` without events.
   void read_other(CdWord word, const std::uint8_t* at, std::size_t bytes, Batch& batch) {
     if (word.type() == types.time_high) {
       time_.follow(word.count());
@@ -75,8 +75,8 @@ class CdReader : public UnitReader {
     }
   }
 
-  /// Writes the events of a mask from `word`'s pixel on, where the time is known. Counts those
-  /// outside the sensor, and returns the end of the others.
+  /// Writes the events of a mask, starting at the pixel of `word`, if the time is known. Counts
+  /// those outside the sensor. Returns the end of the written events.
   AbsoluteEvent* read_masked(CdWord word, std::uint32_t mask, AbsoluteEvent* events,
                              std::uint64_t& outside) const {
     if (!time_.known()) return events;
@@ -92,15 +92,15 @@ class CdReader : public UnitReader {
   const char* unknown_type_;
 };
 
-/// Events of one time, polarity and row, within 32 pixels from `base` on.
+/// Events with the same time, polarity and row, within 32 pixels from `base` on.
 struct MaskedEvents {
   std::uint32_t base;
   std::uint32_t mask = 0;
   std::size_t count = 0;
 };
 
-/// The first of some events, as far as one mask holds them. A sensor's words begin at multiples of
-/// 32, and hold what comes in the order of columns.
+/// Returns the events at the front that fit into one mask. As in words of sensors, masks start at
+/// multiples of 32 and events are in order of columns.
 inline MaskedEvents first_masked(std::span<const AbsoluteEvent> events) {
   const auto& first = events.front();
   MaskedEvents masked{.base = first.x & ~31U};
@@ -113,8 +113,8 @@ inline MaskedEvents first_masked(std::span<const AbsoluteEvent> events) {
   return masked;
 }
 
-/// Format::put() writes the first of some events, at most two words for each, and returns how many
-/// events that was.
+/// Format::put() encodes the first of the given events, with at most two words per event, and
+/// returns the number of encoded events.
 template <class Format>
 class CdEncoder final : public Encoder {
  public:
@@ -157,8 +157,9 @@ class CdEncoder final : public Encoder {
     time_high_ = count;
   }
 
-  /// Readers know a wrap by the fall from nearly the largest count to nearly zero (OpenEB allows
-  /// 10 ms), so each is written out. OpenEB's robust decoder believes a jump that is repeated.
+  /// Writes each wrap explicitly, because readers detect it by the fall from nearly the maximum
+  /// count to nearly 0 (OpenEB allows 10 ms). Jumps are repeated, so that OpenEB's robust decoder
+  /// accepts them.
   void put_wraps(std::uint64_t count, Words& words) {
     const auto wraps = (count >> bits) - (time_high_ == none ? 0 : time_high_ >> bits);
     if (wraps == 0 || wraps > max_wraps) [[likely]]
@@ -170,7 +171,7 @@ class CdEncoder final : public Encoder {
     words.put(time_high(count));
   }
 
-  /// Fills a pause, so that no TIME_HIGH is 1000 microseconds or more after the one before it.
+  /// Fills a pause, so that consecutive TIME_HIGH are less than 1000 microseconds apart.
   void put_steps(std::uint64_t count, Words& words) {
     constexpr std::uint64_t step = 999 >> 6;
     constexpr auto max_steps = (GapLimiter::max_gap >> 6) / step + 1;
@@ -186,7 +187,7 @@ class CdEncoder final : public Encoder {
   std::uint64_t time_high_ = none;
 };
 
-/// Words of 32 bits: an event, or a TIME_HIGH.
+/// 32-bit words: an event or a TIME_HIGH.
 struct Evt2 {
   using Word = std::uint32_t;
 
@@ -194,7 +195,7 @@ struct Evt2 {
 
   enum Type : std::uint32_t { cd_off, cd_on, imu = 0xd, others = 0xe, continued = 0xf };
 
-  /// Events are ignored before the time is known.
+  /// Events before the first TIME_HIGH are ignored.
   static constexpr CdTypes types{
       .time_high = 0x8,
       .trigger = 0xa,
@@ -236,7 +237,7 @@ class Evt2Reader final : public CdReader<Evt2::types> {
         count = time_.count();
         continue;
       }
-      // Events and times alternate as no processor can guess, so no branch tells them apart.
+      // Branch-free, because events and times alternate unpredictably.
       const auto ticks = is_time ? word.count() - count : 0;
       time += std::uint64_t{ticks} << 6;
       count += ticks;
@@ -255,8 +256,8 @@ class Evt2Reader final : public CdReader<Evt2::types> {
 constexpr CdTypes evt21_types{
     .time_high = 0x8, .trigger = 0xa, .ignored = 1U << Evt2::others | 1U << Evt2::continued};
 
-/// Words of 64 bits: the upper half as in EVT2, the lower half a mask. They are little-endian, or
-/// as Gen4.1 and IMX636 cameras have it: the upper half first, each half little-endian.
+/// 64-bit words: the upper half as in EVT2, the lower half a mask. They are little-endian or, in
+/// the legacy order of Gen4.1 and IMX636 cameras, the upper half first, each half little-endian.
 template <EvtFormat format>
 struct Evt21 {
   using Word = std::uint64_t;
@@ -307,7 +308,7 @@ class Evt21Reader final : public CdReader<evt21_types> {
   }
 };
 
-/// Words of 32 bits: an event, a TIME_HIGH, or the head of a vector, whose second word is a mask.
+/// 32-bit words: an event, a TIME_HIGH, or the start of a vector, whose second word is a mask.
 struct Evt4 {
   using Word = std::uint32_t;
 
@@ -335,8 +336,8 @@ struct Evt4 {
     const auto masked = first_masked(events);
     const std::uint32_t on = first.y_p >> 15;
     const auto y = static_cast<std::uint32_t>(first.y());
-    // A vector is two words, as two events are. OpenEB's robust decoder drops one of which any of
-    // the 32 pixels lies outside the sensor.
+    // A vector takes two words, like two events. OpenEB's robust decoder drops vectors with any of
+    // the 32 pixels outside the sensor.
     if (masked.count > 2 && masked.base + 32 <= width) {
       words.put(CdWord::at(cd_vec_off + on, time, masked.base, y).bits);
       words.put(masked.mask);
@@ -371,7 +372,7 @@ class Evt4Reader final : public CdReader<Evt4::types> {
           continue;
         case Evt4::cd_vec_off:
         case Evt4::cd_vec_on:
-          // A vector is one unit, so that nothing comes between its words.
+          // Both words of a vector are one unit.
           if (to - from < 8) break;
           from += 4;
           event = read_masked(word, little_endian<std::uint32_t>(from), event, outside);

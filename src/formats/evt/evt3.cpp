@@ -27,7 +27,7 @@ enum Type : std::uint32_t {
 
 constexpr std::uint32_t polarity_bit = 0x800;
 
-/// A row or column that no sensor has: there was none yet, or it is not one of events.
+/// Row or column beyond any sensor: none yet, or not one of events.
 constexpr std::uint32_t nowhere = 0x1fff;
 
 class Evt3Reader final : public UnitReader {
@@ -63,13 +63,12 @@ class Evt3Reader final : public UnitReader {
   static constexpr auto common_types = 1U << addr_y | 1U << addr_x | 1U << time_low | 1U << others |
                                        1U << continued_4 | 1U << continued_12;
 
-  /// Reads rows, events, the low bits of times and what is passed over, as far as there is nothing
-  /// else.
+  /// Fast path: reads rows, events, low bits of times and skipped words, up to any other word.
   const std::uint8_t* read_common(const std::uint8_t* from, const std::uint8_t* to, Batch& batch) {
     auto* event = batch.end;
     const auto bounds = bounds_;
     const auto same_high = time_high << 12 | time_.count();
-    // The low bits and the row are kept as they are added, the type among them.
+    // `low` includes the type bits of its word, which `high` compensates.
     const auto high = time_.time() - (time_low << 12);
     auto low = time_low << 12 | low_;
     auto y = y_;
@@ -78,12 +77,12 @@ class Evt3Reader final : public UnitReader {
     for (; from != end; from += 2) {
       const std::uint32_t word = little_endian<std::uint16_t>(from);
       const auto type = word >> 12;
-      // A TIME_HIGH that says nothing new is frequent, too.
+      // Repeated TIME_HIGH words are frequent, too.
       const auto is_common =
           (common_types >> type & 1) | static_cast<std::uint32_t>(word == same_high);
       if (is_common == 0) [[unlikely]]
         break;
-      // These come in an order that no processor could guess, so no branch tells them apart.
+      // Branch-free, because the order of these words is unpredictable.
       const auto x = word & 0x7ff;
       y = type == addr_y ? x : y;
       low = type == time_low ? word : low;
@@ -99,7 +98,7 @@ class Evt3Reader final : public UnitReader {
     return from;
   }
 
-  /// Reads any word, or the words of a vector.
+  /// Reads a word of any type, or the words of a vector.
   const std::uint8_t* read_any(const std::uint8_t* at, const std::uint8_t* to, Batch& batch) {
     const std::uint32_t word = little_endian<std::uint16_t>(at);
     const auto t = time_.time() + low_;
@@ -117,7 +116,7 @@ class Evt3Reader final : public UnitReader {
         base_ = word & 0x7ff;
         polarity_ = word & polarity_bit;
         if (to - at < 8) break;
-        // What cameras and we write: all of it at once.
+        // Complete vector, as cameras and Evt3Encoder write it.
         const auto masks = little_endian<std::uint64_t>(at) >> 16;
         if ((masks & 0xf000f000f000) != 0x500040004000) break;
         const auto mask = (masks & 0xfff) | (masks >> 4 & 0xfff000) | (masks >> 8 & 0xff000000);
@@ -159,7 +158,7 @@ class Evt3Reader final : public UnitReader {
     return at + 2;
   }
 
-  /// Events in a row, unless there is none yet, or no time.
+  /// Adds events of the current row, if row and time are known.
   void expand_at(std::uint64_t t, std::uint32_t x, std::uint32_t polarity, std::uint32_t mask,
                  Batch& batch) {
     if (!time_.known() || y_ == nowhere) return;
@@ -180,12 +179,12 @@ class Evt3Reader final : public UnitReader {
   std::uint32_t low_ = 0;
   std::uint32_t y_ = nowhere;
   std::uint32_t base_ = nowhere;
-  std::uint32_t polarity_ = 0;  // of vectors
+  std::uint32_t polarity_ = 0;  // polarity of vectors
 };
 
-/// What it writes every known reader reads alike: vectors only as the whole of VECT_BASE_X,
-/// VECT_12, VECT_12, VECT_8 and within the sensor, TIME_LOW after every TIME_HIGH, and a TIME_HIGH
-/// for every 4096 microseconds, through pauses, too.
+/// Restricted to what all known readers interpret equally: vectors are complete (VECT_BASE_X,
+/// VECT_12, VECT_12, VECT_8) and within the sensor, every TIME_HIGH is followed by a TIME_LOW, and
+/// there is a TIME_HIGH every 4096 microseconds, including pauses.
 class Evt3Encoder final : public Encoder {
  public:
   Evt3Encoder(SensorSize size, std::string header)
@@ -222,7 +221,7 @@ class Evt3Encoder final : public Encoder {
   static constexpr std::uint64_t max_steps = (GapLimiter::max_gap >> 12) + 2;
 
   struct Vector {
-    std::size_t events = 0;  ///< 0: not worth its words
+    std::size_t events = 0;  ///< 0: a vector does not pay off
     std::uint32_t base = 0;
     std::uint32_t mask = 0;
   };
@@ -236,7 +235,7 @@ class Evt3Encoder final : public Encoder {
     if (time >> 12 != high_) {
       gaps_.reach(t);
       time = gaps_.written(t);
-      // From zero on, each: readers follow the wraps by them.
+      // Write every TIME_HIGH from 0 on, because readers count wraps by them.
       const auto steps = (time >> 12) - high_;
       if (steps > 1 && steps <= max_steps) {
         words.reserve(steps + words_at_once);
@@ -256,9 +255,9 @@ class Evt3Encoder final : public Encoder {
     return word(time_high, static_cast<std::uint32_t>(high) & 0xfff);
   }
 
-  /// The events from `first` on that go into one vector.
+  /// Returns the events from `first` on that fit into one vector.
   Vector vector_at(std::span<const AbsoluteEvent> events, std::size_t first) const {
-    // Four words: as many as four events have.
+    // A vector takes four words, like four events.
     constexpr std::size_t least = 5;
     if (width_ < 32 || first + least > events.size()) return {};
     const auto& event = events[first];
@@ -278,7 +277,7 @@ class Evt3Encoder final : public Encoder {
 
   std::uint32_t width_;
   GapLimiter gaps_;
-  std::uint64_t high_ = ~std::uint64_t{0};  // one before the first
+  std::uint64_t high_ = ~std::uint64_t{0};  // one before 0
   std::uint32_t low_ = none;
   std::uint32_t y_ = none;
 };

@@ -12,7 +12,7 @@
 namespace eventcamera {
 namespace {
 
-/// What a RAW header calls a format.
+/// Names of a format in RAW headers.
 struct Name {
   EvtFormat format;
   std::string_view version;
@@ -28,7 +28,7 @@ constexpr Name names[] = {
     {EvtFormat::evt4, "4.0", "EVT4", ""},
 };
 
-/// An option of the value of "format", such as the height in "EVT3;height=720;width=1280".
+/// Returns an option in the value of "format", such as the height in "EVT3;height=720;width=1280".
 std::string option(const std::string& format, const std::string& key) {
   const auto found = format.find(';' + key + '=');
   if (found == std::string::npos) return {};
@@ -39,7 +39,7 @@ std::string option(const std::string& format, const std::string& key) {
 EvtFormat format_of(const PropheseeHeader& header) {
   const auto format = header.value("format");
   const auto name = format.substr(0, format.find(';'));
-  // Headers from before "format", and those of some other writers, give only the version.
+  // Older headers, and those of some other writers, have only the version.
   const auto* const known = name.empty()
                                 ? std::ranges::find(names, header.value("evt"), &Name::version)
                                 : std::ranges::find(names, name, &Name::name);
@@ -49,15 +49,15 @@ EvtFormat format_of(const PropheseeHeader& header) {
   if (known->format != EvtFormat::evt21) return known->format;
   auto order = option(format, "endianness");
   if (order.empty()) order = header.value("endianness");
-  // Writers that know of two orders name theirs. Before them there were only cameras with the
-  // legacy one, and they name their system.
+  // Writers that know both orders state theirs. Older files are from cameras with the legacy order,
+  // which state their system.
   if (order.empty()) order = header.value("system_ID").empty() ? "little" : "legacy";
   if (order == "little") return EvtFormat::evt21;
   if (order == "legacy") return EvtFormat::evt21_legacy;
   throw UnsupportedFormat("unsupported byte order '" + order + "' of EVT21 words");
 }
 
-/// 0x0 where it is missing, as in files of the first cameras, or impossible.
+/// 0x0 if it is missing, as in files of the first cameras, or invalid.
 SensorSize size_of(const PropheseeHeader& header) {
   const auto size_from = [](const std::string& width, const std::string& height) {
     const SensorSize size{PropheseeHeader::number(width, max_evt_side),
@@ -87,13 +87,12 @@ class RawDecoder final : public UnitDecoder {
   PropheseeHeader header_;
 };
 
-/// Without the date of writing, so that the same events make the same file.
+/// Does not include the date, so that the same events give the same file.
 std::string header_text(EvtFormat format, SensorSize size) {
   const auto width = std::to_string(size.width);
   const auto height = std::to_string(size.height);
   const auto& written = *std::ranges::find(names, format, &Name::format);
-  // OpenEB looks for the plugin that reads the file by the integrators, and other readers only at
-  // "evt", or "geometry".
+  // OpenEB selects its plugin by the integrators; other readers only look at "evt" or "geometry".
   return "% camera_integrator_name Prophesee\n% evt " + std::string(written.version) +
          "\n% format " + std::string(written.name) + std::string(written.options) +
          ";height=" + height + ";width=" + width + "\n% geometry " + width + "x" + height +

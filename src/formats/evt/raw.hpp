@@ -8,16 +8,17 @@
 
 namespace eventcamera {
 
-/// The words of a RAW file.
+/// Formats of the words in a RAW file.
 enum class EvtFormat { evt2, evt21, evt21_legacy, evt3, evt4 };
 
-/// Prophesee's RAW files ("RAW file format"): a header of text, and words that it names.
+/// Decodes Prophesee RAW files ("RAW file format"): a text header, and words of the format that it
+/// names.
 std::unique_ptr<Decoder> make_prophesee_raw_decoder();
 
-/// The sensor has at most 2048x2048 pixels; throws std::invalid_argument.
+/// Throws std::invalid_argument for sensors of more than 2048x2048 pixels.
 std::unique_ptr<Encoder> make_prophesee_raw_encoder(EvtFormat format, SensorSize size);
 
-/// The words without the header.
+/// Words without a header.
 std::unique_ptr<Decoder> make_evt_decoder(EvtFormat format, SensorSize size);
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size);
 

@@ -13,19 +13,19 @@
 
 namespace eventcamera {
 
-/// Columns and rows are numbers of 11 bits.
+/// Columns and rows have 11 bits.
 constexpr int max_evt_side = 2048;
 
-/// A size of 0x0 is unknown.
+/// A size of 0x0 means unknown.
 std::unique_ptr<UnitReader> make_evt_reader(EvtFormat format, SensorSize size);
 std::unique_ptr<UnitReader> make_evt3_reader(SensorSize size);
 
-/// `header` comes before the words.
+/// `header` is written before the words.
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size, std::string header);
 std::unique_ptr<Encoder> make_evt3_encoder(SensorSize size, std::string header);
 
-/// Writes an event for each set bit of `mask`: bit i is i pixels to the right of `first`. Returns
-/// the end of the events.
+/// Writes an event for each set bit i of `mask`, i pixels to the right of `first`. Returns the end
+/// of the events.
 inline AbsoluteEvent* expand(std::uint32_t mask, const AbsoluteEvent& first,
                              AbsoluteEvent* events) {
   for (; mask != 0; mask &= mask - 1)

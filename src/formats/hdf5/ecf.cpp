@@ -12,8 +12,8 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::uint32_t all_packed = 2;  // y, x and p of an event stand together
-constexpr std::uint32_t xp_packed = 1;   // x and p stand together
+constexpr std::uint32_t all_packed = 2;  // y, x and p of an event are packed together
+constexpr std::uint32_t xp_packed = 1;   // x and p are packed together
 constexpr std::size_t header_bytes = 12;
 
 class Writer {
@@ -31,7 +31,7 @@ class Writer {
   std::vector<std::uint8_t>& out_;
 };
 
-/// Takes numbers from the front; past the end they are 0, and ended() says so.
+/// Reads numbers from the front. Past the end they are 0 and ended() is true.
 class Reader {
  public:
   explicit Reader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
@@ -54,7 +54,7 @@ class Reader {
   bool ended_ = false;
 };
 
-/// How many events from `first` on have the same value as it.
+/// Number of consecutive events from `first` on with the same value.
 template <class Value>
 std::size_t run(std::span<const AbsoluteEvent> events, std::size_t first, const Value& value) {
   auto end = first + 1;
@@ -105,8 +105,8 @@ bool take_times(Reader& reader, std::span<AbsoluteEvent> events) {
   return true;
 }
 
-/// Writes runs of equal values: Word has the value in its upper bits and the count in the others;
-/// where all of these are set, the count follows.
+/// Writes runs of equal values: Word has the value in its upper bits and the count in the lower
+/// ones; if all of the latter are set, the count follows.
 template <class Word, unsigned count_mask, class Value>
 void put_runs(std::span<const AbsoluteEvent> events, Writer& writer, const Value& value) {
   for (std::size_t i = 0; i < events.size();) {
@@ -171,14 +171,14 @@ bool take_columns(Reader& reader, std::span<AbsoluteEvent> events) {
     if (reader.ended()) return false;
     const unsigned x = word >> 5;
     events[i++].x = static_cast<std::uint16_t>(x);
-    // Other writers' last mask may go on past the last event.
+    // The last mask of other writers may extend past the last event.
     for (unsigned j = 0; j < 5 && i < events.size(); ++j)
       if ((word & 16 >> j) != 0) events[i++].x = static_cast<std::uint16_t>(x + j + 1);
   }
   return true;
 }
 
-/// Four events' numbers, with zeros past the last event.
+/// Numbers of four events, with zeros past the last event.
 template <class Number>
 std::array<std::uint32_t, 4> group(std::span<const AbsoluteEvent> events, std::size_t first,
                                    const Number& number) {
@@ -241,7 +241,7 @@ bool take_xp_packed(Reader& reader, std::span<AbsoluteEvent> events) {
   return true;
 }
 
-/// How to pack, from what the first quarter looks like: runs pay only where there are some.
+/// Chooses the packing by the first quarter of the events: runs pay off only if they are common.
 std::uint32_t packing(std::span<const AbsoluteEvent> events) {
   const auto sample = events.first(events.size() < 16 ? events.size() : events.size() / 4);
   std::size_t same_row = 0;

@@ -15,7 +15,7 @@ namespace eventcamera {
 
 namespace {
 
-/// Of a chunk, which the library unpacks as a whole.
+/// Limit for chunks, because the library decompresses a chunk as a whole.
 constexpr std::size_t max_chunk_bytes = std::size_t{64} << 20;
 constexpr std::size_t max_type_bytes = 4096;
 constexpr std::size_t max_columns = 4;
@@ -84,7 +84,7 @@ void Hdf5Dataset::check_chunks() {
   own_filters_ = std::ranges::all_of(filters_, is_own_hdf5_filter);
 }
 
-/// Finds out how many of the rows that the file claims are there.
+/// Determines how many of the rows stated in the file are actually stored.
 void Hdf5Dataset::check_storage(hid_t file) {
   hsize_t file_bytes = 0;
   if (H5Fget_filesize(file, &file_bytes) < 0) refuse(path_, "has a file of unknown size");
@@ -97,7 +97,7 @@ void Hdf5Dataset::check_storage(hid_t file) {
       const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
       if (claimed > 0 && H5Dget_num_chunks(dataset_.get(), space.get(), &chunks) < 0)
         refuse(path_, "has a corrupt index of its chunks");
-      // A file with holes is read to its end, but one that is mostly hole is not.
+      // Limits holes: they are read, unless they make up most of the file.
       const auto max_chunks = 2 * std::min<std::uint64_t>(chunks, UINT32_MAX) + max_holes;
       const auto most = std::min<std::uint64_t>(max_chunks, UINT64_MAX / chunk_[0]) * chunk_[0];
       rows_ = std::min<std::uint64_t>(claimed, most);
@@ -119,7 +119,7 @@ void Hdf5Dataset::check_storage(hid_t file) {
   }
 }
 
-/// Loads a row of chunks.
+/// Loads one row of chunks.
 bool Hdf5Dataset::load(std::uint64_t block) {
   if (loaded_block_ == block) return true;
   loaded_block_.reset();
@@ -131,7 +131,7 @@ bool Hdf5Dataset::load(std::uint64_t block) {
   std::vector<std::uint8_t> bytes;
   for (std::uint64_t column = 0; column < all_columns; column += chunk_stride) {
     const hsize_t offset[] = {block * chunk_[0], column};
-    // A chunk that does not shrink is stored a little larger.
+    // Incompressible chunks are stored slightly larger.
     const auto most = chunk_bytes_ + chunk_bytes_ / 64 + 1024;
     std::uint32_t left_out = 0;
     if (!read_stored(offset, most, bytes, left_out) ||
@@ -150,7 +150,7 @@ bool Hdf5Dataset::load(std::uint64_t block) {
   return true;
 }
 
-/// Reads rows as they are stored.
+/// Reads rows in their stored form.
 bool Hdf5Dataset::read_elements(std::uint64_t first, std::uint64_t count,
                                 std::vector<std::uint8_t>& out) {
   const auto row_bytes = columns() * type_bytes_;
@@ -181,7 +181,7 @@ bool Hdf5Dataset::read_elements(std::uint64_t first, std::uint64_t count,
   return true;
 }
 
-/// Reads a number of each element, and puts it where it belongs in each of the rows of `out`.
+/// Widens one number of each element to 64 bits and stores it at its place in the rows of `out`.
 template <class Unsigned>
 void Hdf5Dataset::widen(const std::uint8_t* element, const Number& number,
                         std::span<std::int64_t> out) const {
@@ -219,10 +219,10 @@ bool Hdf5Dataset::read(std::uint64_t first, std::uint64_t count, std::vector<std
   return true;
 }
 
-/// What kind of integer a type is; nothing where it is none that is read.
+/// Returns the properties of an integer type; nothing if it is not a supported one.
 std::optional<Hdf5Dataset::Number> Hdf5Dataset::number_of(hid_t type) {
   const auto kind = H5Tget_class(type);
-  // h5py writes truth values as an enumeration of two bytes' values.
+  // h5py writes booleans as an enumeration of bytes.
   const Hdf5Handle integer(kind == H5T_ENUM ? H5Tget_super(type) : H5Tcopy(type), H5Tclose);
   if (H5Tget_class(integer.get()) != H5T_INTEGER) return std::nullopt;
   Number number;
@@ -255,8 +255,8 @@ void Hdf5Dataset::choose(std::span<const char* const> members) {
 bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t most,
                               std::vector<std::uint8_t>& out, std::uint32_t& left_out) {
   if (filters_.empty()) {
-    // The library reads as many bytes as the file's index says, and will not tell beforehand how
-    // many those are: at most as many as there are. Memory that nothing is written to is not taken.
+    // The library reads as many bytes as the file's index states, without reporting the number
+    // beforehand, but not more than the file has. Untouched pages of this buffer take no memory.
     if (!room_) {
       const auto max_bytes = std::min<std::uint64_t>(file_bytes_, UINT32_MAX);
       room_.reset(static_cast<std::uint8_t*>(
@@ -313,8 +313,8 @@ void Hdf5Dataset::require_filters() {
     refuse(path_, "is compressed with the HDF5 filter " + name +
                       ", whose plugin is not installed (or not in HDF5_PLUGIN_PATH)");
   }
-  // The library unpacks a chunk as a whole; one that its cache cannot hold would be unpacked again
-  // for every part of it.
+  // The library decompresses whole chunks. A chunk that does not fit into its cache would be
+  // decompressed again for every part.
   const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   H5Pset_chunk_cache(access.get(), H5D_CHUNK_CACHE_NSLOTS_DEFAULT,
                      std::max(min_cache_bytes, chunk_bytes_), 1.0);

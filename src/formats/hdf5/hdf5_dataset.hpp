@@ -13,14 +13,14 @@
 
 namespace eventcamera {
 
-/// A dataset of rows of integers, in a file that is not trusted: it lies in the file itself, its
-/// chunks are of a bearable size, and there are no more rows than are stored.
+/// Dataset with rows of integers in an untrusted file. Ensures that it is stored in the file
+/// itself, chunk sizes are bounded, and there are no more rows than are stored.
 class Hdf5Dataset {
  public:
-  /// Whether there is such a thing at all; links that lead out of the file do not count.
+  /// True if there is an object of this type at `path`; links to other files do not count.
   static bool exists(hid_t parent, const std::string& path, H5O_type_t type);
 
-  /// Throws UnsupportedFormat where it is not as it should be.
+  /// Throws UnsupportedFormat if the dataset is missing or invalid.
   Hdf5Dataset(hid_t parent, const std::string& path);
 
   int rank() const { return static_cast<int>(extent_.size()); }
@@ -32,36 +32,35 @@ class Hdf5Dataset {
     return is_integers() && numbers_[0].bytes == 4 && !numbers_[0].is_signed;
   }
 
-  /// Chooses the members of a compound that are read. Throws UnsupportedFormat where one is not
-  /// there or no integer.
+  /// Selects the members of a compound type to read. Throws UnsupportedFormat if one is missing or
+  /// not an integer.
   void choose(std::span<const char* const> members);
 
-  /// Reads some rows: of each all columns, or the chosen members. False where the file is corrupt
-  /// there.
+  /// Reads rows, with all columns or the chosen members. False if the file is corrupt there.
   bool read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out);
 
-  /// Rows in a chunk; 0 where the dataset is not chunked.
+  /// Rows per chunk; 0 if the dataset is not chunked.
   std::uint64_t chunk_rows() const { return chunk_.empty() ? 0 : chunk_[0]; }
-  /// The first row behind the chunk of a row.
+  /// First row after the chunk of a row.
   std::uint64_t chunk_end(std::uint64_t row) const {
     return chunk_.empty() ? rows_
                           : std::min<std::uint64_t>(rows_, (row / chunk_[0] + 1) * chunk_[0]);
   }
-  /// Whether this filter, and no other, is applied to chunks.
+  /// True if this is the only filter of the chunks.
   bool has_only_filter(int filter) const { return filters_.size() == 1 && filters_[0] == filter; }
-  /// The stored bytes of the chunk that begins with a row; nothing where it is not there, or larger
+  /// Reads the stored bytes of the chunk that starts at a row. False if it is missing or larger
   /// than `most`.
   bool read_chunk(std::uint64_t row, std::size_t most, std::vector<std::uint8_t>& out);
 
-  /// Where a row's chunk, or the row, lies in the file; 0 where that is not known. Slow: the
-  /// library looks through all chunks.
+  /// Position of a row, or its chunk, in the file; 0 if unknown. Slow: the library searches all
+  /// chunks.
   std::uint64_t position(std::uint64_t row) const;
 
-  /// Throws UnsupportedFormat where a filter is missing that the dataset needs.
+  /// Throws UnsupportedFormat if a filter that the dataset needs is not available.
   void require_filters();
 
  private:
-  /// An integer in an element.
+  /// Integer within an element.
   struct Number {
     std::size_t offset = 0;
     std::size_t bytes = 0;
@@ -82,21 +81,21 @@ class Hdf5Dataset {
 
   std::string path_;
   Hdf5Handle dataset_, type_, creation_;
-  std::size_t type_bytes_ = 0;   ///< of an element
-  std::vector<Number> numbers_;  ///< what is read of an element
+  std::size_t type_bytes_ = 0;   ///< size of an element
+  std::vector<Number> numbers_;  ///< numbers to read of each element
   std::vector<hsize_t> extent_;
   std::uint64_t rows_ = 0;
   std::uint64_t file_bytes_ = 0;
-  std::vector<hsize_t> chunk_;  ///< its extent; empty where there are no chunks
+  std::vector<hsize_t> chunk_;  ///< extent of a chunk; empty if not chunked
   std::size_t chunk_bytes_ = 0;
 
   std::vector<int> filters_;
-  bool own_filters_ = false;  ///< we undo them, with bounds that the library does not have
+  bool own_filters_ = false;  ///< applied by hdf5_filters.hpp, with bounds that the library lacks
   struct Free {
     void operator()(std::uint8_t* bytes) const { std::free(bytes); }
   };
-  std::unique_ptr<std::uint8_t, Free> room_;  ///< for a chunk of a size that is not known
-  std::vector<std::uint8_t> loaded_;          ///< the rows of one row of chunks
+  std::unique_ptr<std::uint8_t, Free> room_;  ///< for chunks of unknown size
+  std::vector<std::uint8_t> loaded_;          ///< rows of one row of chunks
   std::optional<std::uint64_t> loaded_block_;
 };
 

@@ -15,18 +15,18 @@ namespace eventcamera {
 
 namespace {
 
-/// Where the bytes of a file are: in one of these.
+/// Storage of a file: one of these.
 struct Storage {
   ByteSource* input = nullptr;
   Hdf5Output* output = nullptr;
 };
 
-/// What the library knows of an open file.
+/// State of an open file, for the library.
 struct File : H5FD_t {
   explicit File(const Storage& of) : H5FD_t(), storage(of) {}
 
   Storage storage;
-  haddr_t end = 0;  ///< of what the library takes to be in use
+  haddr_t end = 0;  ///< end of the space that the library has allocated
 };
 
 File& file_of(H5FD_t* file) {
@@ -48,8 +48,7 @@ herr_t close_file(H5FD_t* file) {
   return 0;
 }
 
-/// The library reads its small structures, and the data, in larger pieces, and gathers what is
-/// small before it writes.
+/// Lets the library aggregate metadata and small data, for fewer and larger reads and writes.
 herr_t query_features(const H5FD_t* file, unsigned long* flags) {
   if (flags == nullptr) return 0;
   *flags = file != nullptr && file_of(file).storage.output != nullptr
@@ -121,7 +120,7 @@ H5FD_class_t make_driver() {
   return driver;
 }
 
-/// Properties with which the library opens a file in `storage`. Empty where it cannot.
+/// Returns the access properties to open a file in `storage`; empty on failure.
 Hdf5Handle access_to(const Storage& storage) {
   static const H5FD_class_t driver = make_driver();
   static const hid_t id = H5FDregister(&driver);
@@ -143,7 +142,7 @@ Hdf5Output::Hdf5Output(const std::filesystem::path& path) : path_(path) {
   constexpr mode_t mode = 0666;
   fd_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, mode);
   if (fd_ < 0) fail(errno);
-  // As the library itself does: who reads a file that is being written is told so.
+  // Locks the file like the library does, so that readers detect that it is being written.
   if ((flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) || ftruncate(fd_, 0) != 0) {
     const int error = errno;
     close(fd_);

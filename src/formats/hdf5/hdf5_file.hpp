@@ -11,28 +11,29 @@
 
 namespace eventcamera {
 
-/// Opens a file of the HDF5 library, to be read from a source that has to live for as long. An
-/// empty handle where the library cannot.
+/// Opens an HDF5 file for reading from `source`, which must outlive the handle. The handle is empty
+/// on failure.
 Hdf5Handle open_hdf5(ByteSource& source);
 
-/// A file that the HDF5 library writes. The library does not survive a write that fails, as on a
-/// full disk: it crashes as it closes the file, or as the process ends. So to the library every
-/// write succeeds, and whoever calls it looks here for what went wrong, and then writes no more.
+/// Output file for the HDF5 library. The library does not survive a failed write, as on a full
+/// disk: it crashes when it closes the file or when the process ends. So every write succeeds for
+/// the library; callers must call check() and stop writing after an error.
 class Hdf5Output {
  public:
-  /// Overwrites what is there. Throws std::runtime_error.
+  /// Overwrites an existing file. Throws std::runtime_error.
   explicit Hdf5Output(const std::filesystem::path& path);
   ~Hdf5Output();
   Hdf5Output(const Hdf5Output&) = delete;
   Hdf5Output& operator=(const Hdf5Output&) = delete;
 
-  /// The library's handle, which must be closed before this is gone. Empty where it cannot.
+  /// Creates the library's handle, which must be closed before this object is destroyed. Empty on
+  /// failure.
   Hdf5Handle create();
 
-  /// Throws std::runtime_error where something could not be written.
+  /// Throws std::runtime_error if a write failed.
   void check() const;
 
-  // For the library.
+  // Called by the library.
   void read(std::uint64_t position, std::span<std::uint8_t> out) const;
   void write(std::uint64_t position, std::span<const std::uint8_t> bytes);
   void truncate(std::uint64_t size);
@@ -48,9 +49,10 @@ class Hdf5Output {
 
   std::filesystem::path path_;
   int fd_ = -1;
-  int error_ = 0;                 ///< the first, as of errno
-  std::uint64_t size_ = 0;        ///< as the library sees it
-  std::vector<Piece> unwritten_;  ///< what the library may read again as it closes the file
+  int error_ = 0;           ///< first error, as in errno
+  std::uint64_t size_ = 0;  ///< as seen by the library
+  std::vector<Piece>
+      unwritten_;  ///< failed writes, which the library may read again when it closes the file
 };
 
 }  // namespace eventcamera

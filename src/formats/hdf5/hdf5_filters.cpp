@@ -12,7 +12,7 @@ namespace eventcamera {
 
 namespace {
 
-/// Unpacks zlib's format. False where it is corrupt or more than `most` bytes long.
+/// Decompresses zlib data. False if it is corrupt or larger than `most` bytes.
 bool inflate_within(std::size_t most, std::vector<std::uint8_t>& bytes) {
   std::vector<std::uint8_t> out(most);
   auto size = static_cast<uLongf>(most);
@@ -22,7 +22,8 @@ bool inflate_within(std::size_t most, std::vector<std::uint8_t>& bytes) {
   return true;
 }
 
-/// Puts the bytes of numbers together again that lie apart: first all first bytes, and so on.
+/// Undoes the shuffle filter, which stores all first bytes of the numbers, then all second bytes,
+/// and so on.
 void unshuffle(std::size_t number_bytes, std::vector<std::uint8_t>& bytes) {
   const auto count = bytes.size() / number_bytes;
   if (count == 0) return;
@@ -37,7 +38,7 @@ void unshuffle(std::size_t number_bytes, std::vector<std::uint8_t>& bytes) {
   bytes = std::move(out);
 }
 
-/// Fletcher's sum of the bytes, two at a time, the first of which is the more significant.
+/// Fletcher-32 checksum over big-endian 16-bit words.
 std::uint32_t fletcher_sum(std::span<const std::uint8_t> bytes) {
   std::uint64_t low = 0;
   std::uint64_t high = 0;
@@ -50,7 +51,7 @@ std::uint32_t fletcher_sum(std::span<const std::uint8_t> bytes) {
   return static_cast<std::uint32_t>(fold(high) << 16 | fold(low));
 }
 
-/// Takes the sum off the end. False where it is not that of the bytes before it.
+/// Removes the checksum at the end. False if it does not match the bytes before it.
 bool take_fletcher_sum(std::vector<std::uint8_t>& bytes) {
   if (bytes.size() < sizeof(std::uint32_t)) return false;
   bytes.resize(bytes.size() - sizeof(std::uint32_t));
@@ -72,7 +73,7 @@ bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t left_out,
     if ((left_out >> i & 1) != 0) continue;
     switch (filters[i]) {
       case H5Z_FILTER_DEFLATE:
-        // Further filters may have added a sum each.
+        // Each further filter may have added a checksum.
         if (!inflate_within(chunk_bytes + 4 * filters.size(), bytes)) return false;
         break;
       case H5Z_FILTER_FLETCHER32:

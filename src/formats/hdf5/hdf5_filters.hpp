@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// The filters that the HDF5 library packs chunks with. They are undone here, as the library trusts
-// the sizes that a chunk tells.
+// Filters that the HDF5 library applies to chunks. They are undone here, because the library trusts
+// sizes stated in a chunk.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,11 @@
 
 namespace eventcamera {
 
-/// Whether it is one of them: deflate, shuffle or Fletcher's sum.
+/// True for a supported filter: deflate, shuffle or Fletcher-32.
 bool is_own_hdf5_filter(int filter);
 
-/// Undoes the filters of a chunk of numbers of so many bytes, the last first; a set bit of
-/// `left_out` says that this filter was not applied. False where that does not make `chunk_bytes`.
+/// Undoes the filters of a chunk of numbers of the given size, the last filter first. Set bits of
+/// `left_out` mark filters that were not applied. False if the result does not have `chunk_bytes`.
 bool undo_hdf5_filters(std::span<const int> filters, std::uint32_t left_out,
                        std::size_t number_bytes, std::size_t chunk_bytes,
                        std::vector<std::uint8_t>& bytes);

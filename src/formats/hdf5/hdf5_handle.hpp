@@ -11,7 +11,7 @@
 
 namespace eventcamera {
 
-/// An identifier of the HDF5 library, closed at the end.
+/// RAII wrapper of an HDF5 identifier.
 class Hdf5Handle {
  public:
   using Close = herr_t (*)(hid_t);
@@ -37,8 +37,8 @@ class Hdf5Handle {
   Close close_ = nullptr;
 };
 
-/// While it lives, only this thread uses the library, which may have been built without locks, and
-/// the library does not print its errors.
+/// Scope in which only this thread uses the library, which may not be thread-safe, and the library
+/// does not print errors.
 class Hdf5Session {
  public:
   Hdf5Session() : lock_(mutex()) {
@@ -46,7 +46,7 @@ class Hdf5Session {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }
   ~Hdf5Session() {
-    // Errors that a thread leaves behind keep the library from closing at the process's end.
+    // Pending errors of a thread would keep the library from closing at process exit.
     H5Eclear2(H5E_DEFAULT);
     H5Eset_auto2(H5E_DEFAULT, print_, print_data_);
   }
@@ -64,13 +64,13 @@ class Hdf5Session {
   void* print_data_ = nullptr;
 };
 
-/// A text that is attached to a group or dataset.
+/// Reads a string attribute of a group or dataset.
 std::optional<std::string> read_text_attribute(hid_t object, const char* name);
 
-/// A whole number that is attached to a group or dataset.
+/// Reads an integer attribute of a group or dataset.
 std::optional<std::int64_t> read_number_attribute(hid_t object, const char* name);
 
-/// Attaches a text, of variable length as Metavision's readers expect. False where that fails.
+/// Writes a string attribute, of variable length as Metavision readers expect. False on failure.
 bool write_text_attribute(hid_t object, const char* name, const std::string& text);
 
 }  // namespace eventcamera

@@ -5,7 +5,7 @@
 
 namespace eventcamera {
 
-/// How events lie in an HDF5 file.
+/// Layout of events in an HDF5 file.
 enum class Hdf5Layout : std::uint8_t {
   dsec,        ///< /events/{t,x,y,p}, /ms_to_idx, /t_offset
   v2e,         ///< /events, rows of t, x, y, p

@@ -18,7 +18,7 @@ struct Hdf5Reader::File {
     handle = {};
   }
 
-  std::unique_ptr<ByteSource> bytes;  ///< none where the reader does not own them
+  std::unique_ptr<ByteSource> bytes;  ///< null if not owned by the reader
   Hdf5Handle handle;
 };
 
@@ -38,7 +38,7 @@ Hdf5Handle open_path(const std::filesystem::path& path) {
   return file;
 }
 
-/// A user's block of a power of two may lie before the file.
+/// Checks the signature, which may follow a user block whose size is a power of two.
 bool is_signed(ByteSource& bytes) {
   constexpr std::array<std::uint8_t, 8> signature = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
   const auto size = bytes.size();
@@ -113,7 +113,7 @@ std::optional<Hdf5Reader::TimeRange> Hdf5Reader::time_range() const {
   return TimeRange{*first, *last};
 }
 
-/// Reads on until there is an event to hand over, or the end is reached.
+/// Reads until there are events to return, or to the end.
 void Hdf5Reader::fill() {
   while (taken_ == events_.size() && row_ < table_->rows()) {
     events_.clear();
@@ -162,7 +162,7 @@ void Hdf5Reader::seek(Microseconds t) {
 
 namespace {
 
-/// The events of a file as items.
+/// Reader for the events of a file.
 class Hdf5Items final : public Reader {
  public:
   void push(std::span<const std::uint8_t> piece) override {
@@ -206,7 +206,7 @@ class Hdf5Items final : public Reader {
     return file_ ? file_->corruption() : none;
   }
 
-  /// Of a file that is pushed, all bytes are needed again.
+  /// A pushed file must be pushed again as a whole.
   std::optional<SeekPoint> seek_point_before(Microseconds t) const override {
     if (!opened_) return std::nullopt;
     return SeekPoint{.t = t};
@@ -229,12 +229,12 @@ class Hdf5Items final : public Reader {
   void tell_size() { streams_.front().size = file_->size(); }
 
   std::vector<std::uint8_t> collected_;
-  std::unique_ptr<Hdf5Reader> file_;  ///< once it can be read
+  std::unique_ptr<Hdf5Reader> file_;  ///< set once the file can be read
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
   bool triggers_due_ = false;
-  bool opened_ = false;  ///< not collected
+  bool opened_ = false;  ///< opened, not collected
 };
 
 }  // namespace

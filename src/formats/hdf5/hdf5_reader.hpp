@@ -15,17 +15,17 @@ namespace eventcamera {
 class Hdf5Table;
 class Hdf5Triggers;
 
-/// Reads an HDF5 file of events, whichever layout it has. Rows that are corrupt are left out.
+/// Reads the events of an HDF5 file of any known layout. Skips corrupt rows.
 class Hdf5Reader {
  public:
   struct TimeRange {
     Microseconds first, last;
   };
 
-  /// Throws UnsupportedFormat, or std::runtime_error where the file cannot be opened.
+  /// Throws UnsupportedFormat, or std::runtime_error if the file cannot be opened.
   explicit Hdf5Reader(const std::filesystem::path& path);
   explicit Hdf5Reader(std::unique_ptr<ByteSource> bytes);
-  /// Of bytes that outlive the reader.
+  /// `bytes` must outlive the reader.
   explicit Hdf5Reader(ByteSource& bytes);
   ~Hdf5Reader();
   Hdf5Reader(const Hdf5Reader&) = delete;
@@ -33,19 +33,19 @@ class Hdf5Reader {
 
   Hdf5Layout layout() const { return layout_; }
 
-  /// The sensor's size, where the file tells it; else 0x0.
+  /// Sensor size; 0x0 if not stated in the file.
   SensorSize size() const { return size_; }
 
-  /// How many events there are.
+  /// Number of events.
   std::uint64_t count() const;
 
-  /// The times of the first and the last event; nothing where there are none.
+  /// Times of the first and last event; nothing if there are none.
   std::optional<TimeRange> time_range() const;
 
-  /// Appends up to `count` events, fewer only at the end, and returns how many.
+  /// Appends up to `count` events, fewer only at the end, and returns their number.
   std::size_t read(std::size_t count, std::vector<AbsoluteEvent>& out);
 
-  /// The same for triggers, which only Metavision's layout has.
+  /// The same for triggers, which only the Metavision layout has.
   std::size_t read_triggers(std::size_t count, std::vector<Trigger>& out);
 
   /// Goes to the first event and the first trigger at `t` or later.
@@ -67,14 +67,14 @@ class Hdf5Reader {
   RowValidator validator_;
   Corruption corruption_;
 
-  std::uint64_t row_ = 0;              ///< to be read next
-  std::vector<AbsoluteEvent> events_;  ///< read, the first taken_ of them handed over
+  std::uint64_t row_ = 0;              ///< next row to read
+  std::vector<AbsoluteEvent> events_;  ///< events read; the first taken_ were returned
   std::size_t taken_ = 0;
-  std::optional<Microseconds> not_before_;  ///< until an event is there
+  std::optional<Microseconds> not_before_;  ///< set until an event was found
 };
 
-/// Reads an HDF5 file that is opened, or one that is pushed: that is collected in memory, up to
-/// 256 MiB, and read at its end, because what is needed next lies anywhere in it.
+/// Creates a reader for HDF5 files. A pushed file is collected in memory, up to 256 MiB, and read
+/// at its end, because HDF5 needs random access.
 std::unique_ptr<Reader> make_hdf5_reader();
 
 }  // namespace eventcamera

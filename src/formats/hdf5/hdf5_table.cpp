@@ -19,7 +19,7 @@ std::uint64_t block_end(std::uint64_t row, std::uint64_t rows) {
   return std::min(rows, (row / block_rows + 1) * block_rows);
 }
 
-/// The first row that is not before a place; `is_before(row)` is sorted.
+/// Returns the first row for which `is_before(row)`, which must be sorted, is false.
 template <class IsBefore>
 std::uint64_t first_row(std::uint64_t rows, const IsBefore& is_before) {
   std::uint64_t first = 0;
@@ -32,7 +32,7 @@ std::uint64_t first_row(std::uint64_t rows, const IsBefore& is_before) {
   return first;
 }
 
-/// Two numbers such as 1280x720.
+/// Parses a size such as 1280x720.
 SensorSize read_geometry(std::string_view text) {
   SensorSize size;
   const char* const end = text.data() + text.size();
@@ -45,7 +45,8 @@ SensorSize read_geometry(std::string_view text) {
   return size;
 }
 
-/// Finding the position takes long, and only the first is reported.
+/// Looks up the position for the first corruption only, because that is slow and only the first is
+/// reported.
 void note(Corruption& corruption, const Hdf5Dataset& dataset, std::uint64_t row, const char* what) {
   corruption.note(corruption.places == 0 ? dataset.position(row) : 0, what);
 }
@@ -58,7 +59,7 @@ SensorSize size_of_attributes(hid_t object) {
   return {static_cast<int>(*width), static_cast<int>(*height)};
 }
 
-/// Layouts whose events are plain numbers.
+/// Base of layouts with events as plain numbers.
 class NumberTable : public Hdf5Table {
  public:
   using Hdf5Table::Hdf5Table;
@@ -94,7 +95,7 @@ class NumberTable : public Hdf5Table {
   }
 
   std::uint64_t row_before(Microseconds t) override {
-    // A row that cannot be read counts as late, so that no event is skipped.
+    // An unreadable row counts as late, so that no event is skipped.
     return first_row(rows_, [&](std::uint64_t row) {
       const auto time = time_at(row);
       return time && *time < t;
@@ -116,17 +117,17 @@ class NumberTable : public Hdf5Table {
 
   virtual Hdf5Dataset& t_dataset() = 0;
 
-  /// Reads t_, x_, y_ and p_. Returns the dataset that cannot be read.
+  /// Reads t_, x_, y_ and p_. Returns the dataset that could not be read, or nullptr.
   virtual const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) = 0;
 
-  /// The first row that lies in another chunk than this one.
+  /// First row after the chunk of this row.
   virtual std::uint64_t chunk_end(std::uint64_t row) const = 0;
 
-  /// What the laps of a clock of 32 bits have added up to before a row.
+  /// Sum of the wraps of a 32-bit clock before a row.
   virtual Microseconds lap_of(std::uint64_t /*row*/) { return 0; }
 
   Microseconds offset_ = 0;
-  bool wraps_ = false;  ///< times are of 32 bits and start again after 71 minutes
+  bool wraps_ = false;  ///< times have 32 bits and wrap after 71 minutes
   std::vector<std::int64_t> t_, x_, y_, p_;
 
  private:
@@ -177,7 +178,7 @@ class DsecTable final : public NumberTable {
     Microseconds since = 0;
     if (index_ && !__builtin_sub_overflow(t, offset_, &since) && since >= 0) {
       const auto row = indexed(static_cast<std::uint64_t>(since / 1000));
-      // The index may be wrong: then it is as if there was none.
+      // Ignore the index if it is wrong.
       if (row && *row <= rows_ && *row > 0) {
         const auto before = time_at(*row - 1);
         const auto at = time_at(*row);
@@ -227,13 +228,13 @@ class DsecTable final : public NumberTable {
   }
 
   std::array<Hdf5Dataset, columns> columns_;  ///< t, x, y, p
-  std::optional<Hdf5Dataset> index_;          ///< by millisecond, the first event at or after it
+  std::optional<Hdf5Dataset> index_;          ///< first event at or after each millisecond
 };
 
-/// v2e's layout, and Metavision's where it is not compressed.
+/// The v2e layout, and the uncompressed Metavision layout.
 class RowTable final : public NumberTable {
  public:
-  /// `events` holds t, x, y and p, of 32 bits if `wraps`.
+  /// `events` has columns t, x, y and p, with 32 bits if `wraps`.
   RowTable(Hdf5Layout layout, Hdf5Dataset events, SensorSize size, bool wraps)
       : NumberTable(layout), events_(std::move(events)) {
     events_.require_filters();
@@ -264,7 +265,7 @@ class RowTable final : public NumberTable {
   std::vector<std::int64_t> numbers_;
 };
 
-/// Metavision's layout, compressed with ECF.
+/// The Metavision layout with ECF compression.
 class EcfTable final : public Hdf5Table {
  public:
   EcfTable(Hdf5Dataset events, SensorSize size)
@@ -298,7 +299,7 @@ class EcfTable final : public Hdf5Table {
   }
 
   std::uint64_t row_before(Microseconds t) override {
-    // The last chunk that begins before t.
+    // Last chunk that begins before t.
     const auto first = first_row((rows_ + chunk_rows_ - 1) / chunk_rows_, [&](std::uint64_t chunk) {
       const auto time = read_stored(chunk) ? ecf_first_time(stored_) : std::nullopt;
       return time && *time < t;

@@ -12,14 +12,14 @@
 
 namespace eventcamera {
 
-/// The events of an HDF5 file as rows, whichever layout it has.
+/// Events of an HDF5 file of any layout, as rows.
 class Hdf5Table {
  public:
   virtual ~Hdf5Table() = default;
   Hdf5Table(const Hdf5Table&) = delete;
   Hdf5Table& operator=(const Hdf5Table&) = delete;
 
-  /// Throws UnsupportedFormat where the file has no layout that is known, or is wrong in its own.
+  /// Throws UnsupportedFormat if the layout is unknown or invalid.
   static std::unique_ptr<Hdf5Table> open(hid_t file);
 
   Hdf5Layout layout() const { return layout_; }
@@ -27,12 +27,12 @@ class Hdf5Table {
   std::uint64_t rows() const { return rows_; }
   std::uint64_t claimed_rows() const { return claimed_rows_; }
 
-  /// Reads a bounded number of rows from `row` on, and returns the row after them. What is corrupt
-  /// is noted and left out.
+  /// Reads a bounded number of rows from `row` on, and returns the row after them. Skips corrupt
+  /// data and records it in `corruption`.
   virtual std::uint64_t read(std::uint64_t row, RowValidator& validator,
                              std::vector<AbsoluteEvent>& out, Corruption& corruption) = 0;
 
-  /// A row with no event of time `t` or later before it, and not many before that.
+  /// Returns a row close to `t`, without events at `t` or later before it.
   virtual std::uint64_t row_before(Microseconds t) = 0;
 
   virtual std::optional<Microseconds> time_at(std::uint64_t row) = 0;
@@ -45,10 +45,10 @@ class Hdf5Table {
   std::uint64_t rows_ = 0, claimed_rows_ = 0;
 };
 
-/// The triggers of Metavision's layout.
+/// Triggers of the Metavision layout.
 class Hdf5Triggers {
  public:
-  /// Nothing where the file has none.
+  /// Returns null if the file has none.
   static std::unique_ptr<Hdf5Triggers> open(hid_t file);
 
   /// Appends a bounded number of triggers from the next row on. False at the end.
@@ -60,7 +60,7 @@ class Hdf5Triggers {
 
   Hdf5Dataset dataset_;
   std::uint64_t row_ = 0;
-  std::vector<std::int64_t> numbers_;  ///< of each row t, p and id
+  std::vector<std::int64_t> numbers_;  ///< t, p and id of each row
 };
 
 }  // namespace eventcamera

@@ -22,7 +22,7 @@ struct Hdf5Writer::File {
   Hdf5Handle handle;
 };
 
-/// Writes the datasets of one layout.
+/// Writer for the datasets of one layout.
 class Hdf5Writer::Layout {
  public:
   virtual ~Layout() = default;
@@ -35,14 +35,15 @@ namespace {
 
 using Compression = Hdf5Writer::Compression;
 
-/// Of a recording: both layouts have an index that grows with time, events or not.
+/// Maximum duration of a recording, because both layouts have an index that grows with time even
+/// without events.
 constexpr Microseconds max_recording = 7LL * 24 * 3600 * 1'000'000;
 
 void check(bool done) {
   if (!done) throw std::runtime_error("the HDF5 library failed to write the file");
 }
 
-/// Microseconds since the recording's first event.
+/// Microseconds since the first event of the recording.
 Microseconds since(Microseconds first, Microseconds t) {
   Microseconds passed = 0;
   if (__builtin_sub_overflow(t, first, &passed) || passed > max_recording)
@@ -56,7 +57,7 @@ Hdf5Handle make_group(hid_t file, const char* name) {
   return group;
 }
 
-/// A dataset whose rows are appended.
+/// Dataset with rows appended.
 class GrowingDataset {
  public:
   GrowingDataset(hid_t parent, const char* name, hid_t stored, hid_t memory, hsize_t chunk,
@@ -64,7 +65,7 @@ class GrowingDataset {
       : memory_(memory) {
     constexpr hsize_t none = 0;
     constexpr hsize_t no_limit = H5S_UNLIMITED;
-    constexpr unsigned quickest = 1;  // more makes events hardly smaller
+    constexpr unsigned quickest = 1;  // higher levels hardly make events smaller
     const Hdf5Handle space(H5Screate_simple(1, &none, &no_limit), H5Sclose);
     const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
     check(H5Pset_chunk(creation.get(), 1, &chunk) >= 0);
@@ -87,7 +88,7 @@ class GrowingDataset {
     check(H5Dwrite(dataset_.get(), memory_, memory.get(), space.get(), H5P_DEFAULT, rows) >= 0);
   }
 
-  /// Appends a chunk that the filter has been applied to.
+  /// Appends an already filtered chunk.
   void append_chunk(std::span<const std::uint8_t> chunk, hsize_t count) {
     const auto begin = rows_;
     extend(count);
@@ -120,7 +121,7 @@ class GrowingDataset {
   hsize_t rows_ = 0;
 };
 
-/// A growing dataset of Row, written a chunk at a time.
+/// Growing dataset of Row, written one chunk at a time.
 template <class Row>
 class BufferedDataset : public GrowingDataset {
  public:
@@ -138,7 +139,7 @@ class BufferedDataset : public GrowingDataset {
     buffer_.clear();
   }
 
-  /// Those in the buffer included.
+  /// Includes the rows in the buffer.
   hsize_t count() const { return rows() + buffer_.size(); }
 
  private:
@@ -209,7 +210,8 @@ class DsecLayout final : public Hdf5Writer::Layout {
     check(H5Awrite(attribute.get(), H5T_NATIVE_INT, &number) >= 0);
   }
 
-  /// DSEC stores times in 32 bits, 71 minutes. A longer recording gets 64, which readers accept.
+  /// DSEC stores times with 32 bits (71 minutes). Longer recordings get 64 bits, which readers
+  /// accept.
   void widen() {
     flush();
     wide_ = true;
@@ -239,13 +241,13 @@ class DsecLayout final : public Hdf5Writer::Layout {
   Hdf5Handle group_;
   BufferedDataset<std::uint8_t> p_;
   BufferedDataset<std::uint16_t> x_, y_;
-  Times t_;                               ///< since the first event
-  BufferedDataset<std::uint64_t> index_;  ///< for each millisecond, the first event at or after it
+  Times t_;                               ///< relative to the first event
+  BufferedDataset<std::uint64_t> index_;  ///< first event at or after each millisecond
   std::optional<Microseconds> first_;
   bool wide_ = false;
 };
 
-/// For each 2 ms since the first event, the event to read from.
+/// Index of the first event to read for each 2 ms since the first event.
 class MetavisionIndex {
  public:
   explicit MetavisionIndex(hid_t group)
@@ -260,7 +262,7 @@ class MetavisionIndex {
           std::to_string(static_cast<Microseconds>(0 - static_cast<std::uint64_t>(t)))));
     }
     const auto passed = since(*first_, t);
-    // The entry of a period is the first event of the last period before that has any.
+    // The entry of a period is the first event of the last earlier period with events.
     for (const auto periods = passed / period; count_ <= periods; ++count_) {
       out_.put(last_);
       if (count_ == periods) last_ = {id, passed};
@@ -343,7 +345,7 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
  private:
   static constexpr hsize_t chunk = 16384;
 
-  /// As Metavision's events lie in memory.
+  /// Memory layout of Metavision events.
   struct EventRow {
     std::uint16_t x, y;
     std::int16_t p;
@@ -419,7 +421,7 @@ Hdf5Writer::~Hdf5Writer() {
   try {
     close();
   } catch (const std::exception&) {
-    // A destructor cannot report it.
+    // A destructor cannot report errors.
   }
   layout_.reset();
   file_.reset();

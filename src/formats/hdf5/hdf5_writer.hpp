@@ -11,31 +11,31 @@
 
 namespace eventcamera {
 
-/// Writes an HDF5 file of events. Every function throws std::runtime_error where the file cannot be
-/// written, and std::invalid_argument where the layout cannot hold what it is given.
+/// Writes events to an HDF5 file. All functions throw std::runtime_error if the file cannot be
+/// written, and std::invalid_argument if the layout does not support the data.
 class Hdf5Writer {
  public:
   enum class Compression : std::uint8_t { none, gzip };
 
   struct Settings {
     Hdf5Layout layout = Hdf5Layout::dsec;         ///< dsec or metavision
-    Compression compression = Compression::gzip;  ///< of DSEC; Metavision's is always ECF
+    Compression compression = Compression::gzip;  ///< for DSEC; Metavision always uses ECF
     SensorSize size;
   };
 
   class Layout;
 
-  /// Overwrites what is there.
+  /// Overwrites an existing file.
   Hdf5Writer(const std::filesystem::path& path, const Settings& settings);
-  /// Closes the file without an error; call close() to get it.
+  /// Closes the file, ignoring errors; call close() to get them.
   ~Hdf5Writer();
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
 
-  /// Events come sorted by time and within the sensor.
+  /// Events must be sorted by time and within the sensor.
   void append(std::span<const AbsoluteEvent> events);
 
-  /// Triggers are kept by Metavision's layout alone; DSEC has no place for them.
+  /// Ignored by the DSEC layout, which has no triggers.
   void append(std::span<const Trigger> triggers);
 
   void close();
