@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later
  *
- * Converts event files; the extensions of the names select the formats:
+ * Converts event files: IN is recognised by its content, the extension of OUT selects its format.
  *
  *   event-convert recording.raw recording.dat
  *   event-convert --format=EVT2 recording.aedat4 recording.raw
  */
 #include <errno.h>
+#include <gst/base/gsttypefindhelper.h>
 #include <gst/gst.h>
 #include <signal.h>
 #include <stdio.h>
@@ -13,50 +14,81 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* Texts are printed as they are: names are bytes, messages are UTF-8. g_print() would replace what
+ * the locale lacks. */
+#define PRINT_ERROR(...) fprintf(stderr, __VA_ARGS__)
+
+typedef struct {
+  const char* media_type;
+  const char* element;
+  gboolean is_table; /* the options --time-unit and --column-order apply */
+} Reader;
+
+static const Reader readers[] = {
+    {"application/x-prophesee-raw", "evtdec", FALSE},
+    {"application/x-prophesee-dat", "eventdatdec", FALSE},
+    {"application/x-es", "eventesdec", FALSE},
+    {"application/x-event-csv", "eventcsvdec name=reader", TRUE},
+    {"application/x-npy", "eventnpydec name=reader", TRUE},
+    {"application/x-npz", "eventnpzdec name=reader", TRUE},
+    /* Frames in the same file are left out. */
+    {"application/x-aedat", "aedatdemux name=demuxer demuxer.events_0", FALSE},
+    {"application/x-hdf5", "eventhdf5dec", FALSE},
+};
+
 typedef struct {
   const char* extension;
   const char* description;
-  const char* reader;
+  const char* media_type;
   const char* writer; /* an element name=writer; NULL where the format is only read */
   const char* option; /* the writer's property that an option of this program sets, or NULL */
 } Format;
 
-/* Frames in the same file are left out. */
-#define AEDAT_READER "aedatdemux name=demuxer demuxer.events_0"
-
 static const Format formats[] = {
-    {".raw", "Prophesee RAW", "evtdec", "evtenc name=writer ! filesink name=out", "format"},
-    {".dat", "Prophesee DAT", "eventdatdec", "eventdatenc name=writer ! filesink name=out", NULL},
-    {".es", "Event Stream", "eventesdec", "eventesenc name=writer ! filesink name=out", NULL},
-    {".csv", "text", "eventcsvdec", "eventcsvenc name=writer ! filesink name=out", "dialect"},
-    {".txt", "text, dialect rpg by default", "eventcsvdec",
+    {".raw", "Prophesee RAW", "application/x-prophesee-raw",
+     "evtenc name=writer ! filesink name=out", "format"},
+    {".dat", "Prophesee DAT", "application/x-prophesee-dat",
+     "eventdatenc name=writer ! filesink name=out", NULL},
+    {".es", "Event Stream", "application/x-es", "eventesenc name=writer ! filesink name=out", NULL},
+    {".csv", "text", "application/x-event-csv", "eventcsvenc name=writer ! filesink name=out",
+     "dialect"},
+    {".txt", "text, dialect rpg by default", "application/x-event-csv",
      "eventcsvenc name=writer dialect=rpg ! filesink name=out", "dialect"},
-    {".npy", "NumPy array", "eventnpydec", "eventnpyenc name=writer ! filesink name=out", NULL},
-    {".aedat4", "AEDAT 4, without its frames", AEDAT_READER,
+    {".npy", "NumPy array", "application/x-npy", "eventnpyenc name=writer ! filesink name=out",
+     NULL},
+    {".npz", "NumPy archive, read only", "application/x-npz", NULL, NULL},
+    {".aedat4", "AEDAT 4, without its frames", "application/x-aedat",
      "aedatmux name=writer ! filesink name=out", "compression"},
-    {".aedat", "AEDAT 2.0 and 3.1, read only", AEDAT_READER, NULL, NULL},
-    {".h5", "HDF5, written in the layout of DSEC", "eventhdf5dec", "eventhdf5sink name=writer",
-     "compression"},
-    {".hdf5", "HDF5, written in the layout of Metavision", "eventhdf5dec",
+    {".aedat", "AEDAT 2.0 and 3.1, read only", "application/x-aedat", NULL, NULL},
+    {".h5", "HDF5, written in the layout of DSEC", "application/x-hdf5",
+     "eventhdf5sink name=writer", "compression"},
+    {".hdf5", "HDF5, written in the layout of Metavision", "application/x-hdf5",
      "eventhdf5sink name=writer layout=metavision", NULL},
 };
 
-static gchar* evt_format;
-static gchar* dialect;
-static gchar* compression;
+typedef struct {
+  const char* name; /* of a property, too */
+  gboolean is_of_reader;
+  gchar* value; /* NULL where it is not given */
+} Option;
 
-static const GOptionEntry options[] = {
-    {"format", 'f', 0, G_OPTION_ARG_STRING, &evt_format, "Words of a .raw file", "NAME"},
-    {"dialect", 'd', 0, G_OPTION_ARG_STRING, &dialect, "Dialect of a .csv or .txt file", "NAME"},
-    {"compression", 'c', 0, G_OPTION_ARG_STRING, &compression,
-     "Compression of an .aedat4 or .h5 file", "NAME"},
-    G_OPTION_ENTRY_NULL,
+static Option properties[] = {
+    {"format", FALSE, NULL},   {"dialect", FALSE, NULL},     {"compression", FALSE, NULL},
+    {"time-unit", TRUE, NULL}, {"column-order", TRUE, NULL},
 };
 
-static const gchar* option_value(const char* name) {
-  if (strcmp(name, "format") == 0) return evt_format;
-  return strcmp(name, "dialect") == 0 ? dialect : compression;
-}
+static const GOptionEntry options[] = {
+    {"format", 'f', 0, G_OPTION_ARG_STRING, &properties[0].value, "Words of a .raw file", "NAME"},
+    {"dialect", 'd', 0, G_OPTION_ARG_STRING, &properties[1].value, "Dialect of a .csv or .txt file",
+     "NAME"},
+    {"compression", 'c', 0, G_OPTION_ARG_STRING, &properties[2].value,
+     "Compression of an .aedat4 or .h5 file", "NAME"},
+    {"time-unit", 'u', 0, G_OPTION_ARG_STRING, &properties[3].value,
+     "Unit of the times in text or NumPy files that are read", "NAME"},
+    {"column-order", 'o', 0, G_OPTION_ARG_STRING, &properties[4].value,
+     "Columns of text or NumPy files that are read, such as txyp", "LETTERS"},
+    G_OPTION_ENTRY_NULL,
+};
 
 /* The names that an option accepts: the values of the element's property. */
 static gchar* names_of(GObject* element, const char* property) {
@@ -81,7 +113,9 @@ static void append_names(GString* text, const char* what, const char* factory,
 
 /* The part of --help that follows the options. */
 static gchar* help(void) {
-  GString* text = g_string_new("Formats, by the extension of a file's name:\n");
+  GString* text = g_string_new(
+      "IN is recognised by its content, or else by its extension. Formats, by the extension of "
+      "OUT:\n");
   for (gsize i = 0; i < G_N_ELEMENTS(formats); ++i)
     g_string_append_printf(text, "  %-8s %s\n", formats[i].extension, formats[i].description);
   g_string_append(text, "\nNames that options accept:\n");
@@ -89,11 +123,12 @@ static gchar* help(void) {
   append_names(text, ".csv and .txt", "eventcsvenc", "dialect");
   append_names(text, ".aedat4", "aedatmux", "compression");
   append_names(text, ".h5", "eventhdf5sink", "compression");
+  append_names(text, "text and NumPy", "eventcsvdec", "time-unit");
   g_string_append(text, "\nExit status: 0 = converted, 1 = failed or interrupted, 2 = wrong usage");
   return g_string_free(text, FALSE);
 }
 
-/* The format that a file's extension selects; prints an error and returns NULL for others. */
+/* The format that a file's extension selects, or NULL. */
 static const Format* format_of(const char* path) {
   for (gsize i = 0; i < G_N_ELEMENTS(formats); ++i) {
     const gsize length = strlen(formats[i].extension);
@@ -101,42 +136,106 @@ static const Format* format_of(const char* path) {
         g_ascii_strcasecmp(path + strlen(path) - length, formats[i].extension) == 0)
       return &formats[i];
   }
-  g_printerr("%s: unknown extension; known are", path);
-  for (gsize i = 0; i < G_N_ELEMENTS(formats); ++i) g_printerr(" %s", formats[i].extension);
-  g_printerr("\n");
   return NULL;
 }
 
-/* Whether a file can be written in this format, with the options that were given. */
-static gboolean can_write(const Format* format) {
-  if (format->writer == NULL) {
-    g_printerr("%s files can only be read\n", format->extension);
+static const Reader* reader_of(const char* media_type) {
+  for (gsize i = 0; i < G_N_ELEMENTS(readers); ++i)
+    if (strcmp(media_type, readers[i].media_type) == 0) return &readers[i];
+  return NULL;
+}
+
+/* The reader of a file, by its content, or by its extension where the content tells nothing. Prints
+ * an error and returns NULL where there is none. */
+static const Reader* find_reader(const char* path) {
+  static guint8 start[1 << 14];
+  const Format* format = format_of(path);
+  const Reader* reader = NULL;
+  GstCaps* caps;
+  FILE* file = fopen(path, "rb");
+  const gsize size = file != NULL ? fread(start, 1, sizeof start, file) : 0;
+  if (file == NULL || ferror(file)) {
+    PRINT_ERROR("%s: %s\n", path, g_strerror(errno));
+    if (file != NULL) fclose(file);
+    return NULL;
+  }
+  fclose(file);
+  caps = size > 0 ? gst_type_find_helper_for_data(NULL, start, size, NULL) : NULL;
+  if (caps != NULL) {
+    reader = reader_of(gst_structure_get_name(gst_caps_get_structure(caps, 0)));
+    gst_caps_unref(caps);
+  }
+  if (reader == NULL && format != NULL) reader = reader_of(format->media_type);
+  if (reader == NULL)
+    PRINT_ERROR("%s: neither its content nor its extension is that of a known format; see --help\n",
+                path);
+  return reader;
+}
+
+/* Whether a file can be written in this format. */
+static gboolean can_write(const char* path, const Format* format) {
+  struct stat out;
+  if (stat(path, &out) == 0 && S_ISDIR(out.st_mode)) {
+    PRINT_ERROR("%s is a directory; name a file in it\n", path);
     return FALSE;
   }
-  for (const GOptionEntry* option = options; option->long_name != NULL; ++option) {
-    if (option_value(option->long_name) != NULL &&
-        g_strcmp0(format->option, option->long_name) != 0) {
-      g_printerr("--%s does not apply to %s files\n", option->long_name, format->extension);
-      return FALSE;
-    }
+  if (format == NULL) {
+    PRINT_ERROR("%s: unknown extension; known are", path);
+    for (gsize i = 0; i < G_N_ELEMENTS(formats); ++i)
+      if (formats[i].writer != NULL) PRINT_ERROR(" %s", formats[i].extension);
+    PRINT_ERROR("\n");
+    return FALSE;
+  }
+  if (format->writer == NULL) {
+    PRINT_ERROR("%s files can only be read\n", format->extension);
+    return FALSE;
   }
   return TRUE;
 }
 
-static gboolean set_option(GstElement* pipeline, const char* name) {
-  GstElement* writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
-  GParamSpec* spec = g_object_class_find_property(G_OBJECT_GET_CLASS(writer), name);
-  GEnumClass* values = G_PARAM_SPEC_ENUM(spec)->enum_class;
-  const GEnumValue* value = g_enum_get_value_by_nick(values, option_value(name));
-  if (value == NULL) {
-    gchar* names = names_of(G_OBJECT(writer), name);
-    g_printerr("--%s: no \"%s\"; choose one of%s\n", name, option_value(name), names);
-    g_free(names);
-  } else {
-    g_object_set(writer, name, value->value, NULL);
+/* Whether the options that were given apply to the files. */
+static gboolean options_apply(const Reader* reader, const Format* format) {
+  for (gsize i = 0; i < G_N_ELEMENTS(properties); ++i) {
+    const Option* option = &properties[i];
+    if (option->value == NULL) continue;
+    if (option->is_of_reader ? reader->is_table : g_strcmp0(format->option, option->name) == 0)
+      continue;
+    if (option->is_of_reader)
+      PRINT_ERROR("--%s applies only where text or NumPy files are read\n", option->name);
+    else
+      PRINT_ERROR("--%s does not apply to %s files\n", option->name, format->extension);
+    return FALSE;
   }
-  gst_object_unref(writer);
-  return value != NULL;
+  return TRUE;
+}
+
+/* Sets the properties that options give. */
+static gboolean set_options(GstElement* pipeline) {
+  gboolean ok = TRUE;
+  for (gsize i = 0; i < G_N_ELEMENTS(properties) && ok; ++i) {
+    const Option* option = &properties[i];
+    GstElement* element;
+    GParamSpec* spec;
+    if (option->value == NULL) continue;
+    element = gst_bin_get_by_name(GST_BIN(pipeline), option->is_of_reader ? "reader" : "writer");
+    spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element), option->name);
+    if (G_IS_PARAM_SPEC_ENUM(spec)) {
+      const GEnumValue* value =
+          g_enum_get_value_by_nick(G_PARAM_SPEC_ENUM(spec)->enum_class, option->value);
+      ok = value != NULL;
+      if (ok) {
+        g_object_set(element, option->name, value->value, NULL);
+      } else {
+        gchar* names = names_of(G_OBJECT(element), option->name);
+        PRINT_ERROR("--%s: no \"%s\"; choose one of%s\n", option->name, option->value, names);
+        g_free(names);
+      }
+    } else {
+      g_object_set(element, option->name, option->value, NULL);
+    }
+    gst_object_unref(element);
+  }
+  return ok;
 }
 
 /* Writing starts before reading ends, so it would destroy the input. */
@@ -146,7 +245,7 @@ static gboolean same_file(const char* a, const char* b) {
          of_a.st_ino == of_b.st_ino;
 }
 
-/* Output goes to a file beside OUT, so that only a complete file replaces an existing one. */
+/* Output goes to a file beside OUT, so that only a whole one replaces an existing file. */
 static gchar* unfinished(const char* path) {
   return g_strconcat(path, ".part", NULL);
 }
@@ -174,9 +273,9 @@ static void print_progress(GstElement* pipeline, guint64 events) {
   if (!gst_element_query_position(pipeline, GST_FORMAT_TIME, &position) ||
       !gst_element_query_duration(pipeline, GST_FORMAT_TIME, &duration) || duration <= 0)
     return;
-  g_printerr("%s%3.0f %%, %" G_GUINT64_FORMAT " events%s", isatty(STDERR_FILENO) ? "\r" : "",
-             CLAMP(100.0 * (gdouble)position / (gdouble)duration, 0.0, 100.0), events,
-             isatty(STDERR_FILENO) ? "" : "\n");
+  PRINT_ERROR("%s%3.0f %%, %" G_GUINT64_FORMAT " events%s", isatty(STDERR_FILENO) ? "\r" : "",
+              CLAMP(100.0 * (gdouble)position / (gdouble)duration, 0.0, 100.0), events,
+              isatty(STDERR_FILENO) ? "" : "\n");
 }
 
 /* Prints an error or a warning, and its cause, which follows the place in the debug text. */
@@ -189,10 +288,10 @@ static void print_message(GstMessage* message) {
     gst_message_parse_error(message, &error, &debug);
   else
     gst_message_parse_warning(message, &error, &debug);
-  g_printerr("%s%s: %s\n", isatty(STDERR_FILENO) ? "\n" : "", fatal ? "error" : "warning",
-             error->message);
+  PRINT_ERROR("%s%s: %s\n", isatty(STDERR_FILENO) ? "\n" : "", fatal ? "error" : "warning",
+              error->message);
   cause = debug != NULL ? strchr(debug, '\n') : NULL;
-  if (cause != NULL && cause[1] != '\0') g_printerr("  %s\n", cause + 1);
+  if (cause != NULL && cause[1] != '\0') PRINT_ERROR("  %s\n", cause + 1);
   g_free(debug);
   g_clear_error(&error);
 }
@@ -230,12 +329,26 @@ static gboolean run(GstElement* pipeline, const guint64* events) {
   }
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(bus);
-  if (interrupted) g_printerr("interrupted\n");
   return ok;
 }
 
+/* Gives the file its name, if it is whole: FALSE where it is not. */
+static gboolean finish(const char* part, const char* path, gboolean ok) {
+  if (!ok) {
+    remove(part);
+  } else if (interrupted && access(path, F_OK) == 0) {
+    PRINT_ERROR("interrupted: %s stays as it was; the events so far are in %s\n", path, part);
+  } else if (rename(part, path) != 0) {
+    PRINT_ERROR("%s: %s; the events are in %s\n", path, g_strerror(errno), part);
+    ok = FALSE;
+  } else if (interrupted) {
+    PRINT_ERROR("interrupted: %s has the events so far\n", path);
+  }
+  return ok && !interrupted;
+}
+
 int main(int argc, char** argv) {
-  const Format* from;
+  const Reader* from;
   const Format* to;
   GOptionContext* context;
   GstElement* pipeline;
@@ -257,30 +370,29 @@ int main(int argc, char** argv) {
   ok = g_option_context_parse(context, &argc, &argv, &error);
   g_option_context_free(context);
   if (!ok || argc != 3) {
-    g_printerr("%s; see %s --help\n", ok ? "needs IN and OUT" : error->message, g_get_prgname());
+    PRINT_ERROR("%s; see %s --help\n", ok ? "needs IN and OUT" : error->message, g_get_prgname());
     g_clear_error(&error);
     return 2;
   }
-  from = format_of(argv[1]);
   to = format_of(argv[2]);
-  if (from == NULL || to == NULL || !can_write(to)) return 2;
-  if (access(argv[1], R_OK) != 0) {
-    g_printerr("%s: %s\n", argv[1], g_strerror(errno));
-    return 1;
-  }
+  if (!can_write(argv[2], to)) return 2;
+  from = find_reader(argv[1]);
+  if (from == NULL) return 1;
+  if (!options_apply(from, to)) return 2;
   if (same_file(argv[1], argv[2])) {
-    g_printerr("%s and %s are the same file\n", argv[1], argv[2]);
+    PRINT_ERROR("%s and %s are the same file\n", argv[1], argv[2]);
     return 2;
   }
-  line = g_strdup_printf("filesrc name=in ! %s ! queue name=events ! %s", from->reader, to->writer);
+  line =
+      g_strdup_printf("filesrc name=in ! %s ! queue name=events ! %s", from->element, to->writer);
   pipeline = gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
   g_free(line);
   if (pipeline == NULL) {
-    g_printerr("%s\n", error->message);
+    PRINT_ERROR("%s\n", error->message);
     g_clear_error(&error);
     return 1;
   }
-  if (to->option != NULL && option_value(to->option) != NULL && !set_option(pipeline, to->option)) {
+  if (!set_options(pipeline)) {
     gst_object_unref(pipeline);
     return 2;
   }
@@ -296,16 +408,10 @@ int main(int argc, char** argv) {
   signal(SIGINT, interrupt);
   ok = run(pipeline, &events);
   gst_object_unref(pipeline);
-  if (!ok) {
-    remove(part);
-  } else if (rename(part, argv[2]) != 0) {
-    g_printerr("%s: %s\n", argv[2], g_strerror(errno));
-    ok = FALSE;
-  }
+  ok = finish(part, argv[2], ok);
   g_free(part);
-  if (interrupted) return 1;
   if (ok)
-    g_print("%s%" G_GUINT64_FORMAT " events from %s to %s\n", isatty(STDERR_FILENO) ? "\r" : "",
-            events, argv[1], argv[2]);
+    printf("%s%" G_GUINT64_FORMAT " events from %s to %s\n", isatty(STDERR_FILENO) ? "\r" : "",
+           events, argv[1], argv[2]);
   return ok ? 0 : 1;
 }

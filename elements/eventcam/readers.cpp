@@ -154,11 +154,11 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * @title: eventnpydec
  * @short_description: reads NumPy files of events
  *
- * Reads structured NumPy arrays with the fields t, x, y and p, and arrays of the shape (N, 4), whose
- * columns are detected from the first rows, unless #GstEventNpyDec:column-order is set. Integer
- * times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit or a name
- * such as t_ns says otherwise. Arrays do not contain the sensor size: it is taken from downstream's
- * caps, or else is that of the smallest known sensor that the first events fit into.
+ * Reads structured NumPy arrays with the fields t, x, y and p, and arrays of the shape (N, 4),
+ * whose columns are detected from the first rows, unless #GstEventNpyDec:column-order is set.
+ * Integer times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit or a
+ * name such as t_ns says otherwise. Arrays do not contain the sensor size: it is taken from
+ * downstream's caps, or else is that of the smallest known sensor that the first events fit into.
  *
  * ## Example launch line
  * |[

@@ -33,6 +33,48 @@ for in in "${!types[@]}"; do
   done
 done
 
+# The content of a file tells its format, whatever its name is.
+for ending in "${!types[@]}"; do
+  cp "ball.$ending" "content of $ending.bin"
+  convert "content of $ending.bin" content.csv
+  cmp ball.csv content.csv || fail "ball.$ending without an extension has other events"
+done
+cp ball.npy misnamed.dat
+convert misnamed.dat misnamed.csv
+cmp ball.csv misnamed.csv || fail "NumPy events named .dat are others"
+
+# Names are printed as they are, whatever the locale.
+LC_ALL=C convert ball.raw "Bälle über 物.dat" >named
+grep -q "to Bälle über 物.dat" named || fail "the name was printed as $(cat named)"
+LC_ALL=C convert "Bälle über 物.dat" named.csv
+cmp ball.csv named.csv || fail "the name was not found"
+if LC_ALL=C convert "kein Bällchen.dat" none.csv 2>named; then fail "no file was converted"; fi
+grep -q "kein Bällchen.dat: No such file" named || fail "the error says $(cat named)"
+
+# Text and NumPy of other tools.
+convert --dialect=esim ball.raw esim.csv
+convert --time-unit=nanoseconds esim.csv esim-back.csv
+cmp ball.csv esim-back.csv || fail "esim.csv in nanoseconds has other events"
+convert --column-order=txyp --time-unit=microseconds ball.csv set.csv
+cmp ball.csv set.csv || fail "ball.csv with its columns and unit set has other events"
+/usr/bin/python3 - ball.csv <<'PYTHON'
+import sys
+
+import numpy as np
+
+t, x, y, p = np.loadtxt(sys.argv[1], delimiter=",", skiprows=1, dtype=np.int64).T
+np.savez("columns.npz", t_ns=t * 1000, x=x.astype("u2"), y=y.astype("u2"), p=p > 0)
+np.savez_compressed("rows.npz", np.stack([x, y, t, p], axis=1))
+np.save("rows.npy", np.stack([t / 1e6, x, y, p], axis=1))
+PYTHON
+for file in columns.npz rows.npz rows.npy; do
+  convert $file numpy.csv
+  cmp ball.csv numpy.csv || fail "$file has other events"
+  gst-typefind-1.0 $file | grep -q " - application/x-${file##*.}" || fail "$file is not recognised"
+done
+timeout 60 "$GST_LAUNCH" -q filesrc location=rows.npz ! queue ! decodebin caps="application/x-event-camera,format=XYTP" ! eventcsvenc ! filesink location=pushed.csv
+cmp ball.csv pushed.csv || fail "rows.npz has other events in push mode"
+
 # Options of the formats.
 convert --format=EVT2 ball.raw evt2.raw
 grep -aq "format EVT2" evt2.raw || fail "the words are not EVT2"
@@ -133,6 +175,17 @@ refused "unknown extension" ball.raw ball.mp3
 refused "choose one of EVT2 EVT21 EVT3 EVT4" ball.raw other.raw --format=EVT5
 refused "does not apply to .dat" ball.raw ball.dat --dialect=rpg
 refused "can only be read" ball.raw ball.aedat
+refused "can only be read" ball.raw ball.npz
+refused "choose one of auto seconds" --time-unit=hours ball.csv other.raw
+refused "must have each of t, x, y and p once" --column-order=xy ball.csv other.raw
+refused "only where text or NumPy" --time-unit=seconds ball.raw other.raw
+printf '1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n' >unclear.txt
+refused "set time-unit" unclear.txt out.dat
+refused "neither its content nor its extension" /dev/null out.dat
+mkdir folder.raw
+refused "is a directory" ball.raw folder.raw
+refused "Is a directory" folder.raw out.dat
+[ ! -e folder.raw.part ] || fail "folder.raw.part is left"
 refused "No such file" ball.raw nowhere/at/all.h5
 cp words.txt words.h5
 refused "not an HDF5 file" words.h5 out.dat
@@ -160,6 +213,19 @@ for ending in raw npy aedat4 h5 hdf5; do
   grep -q "^[1-9][0-9]* events" count || fail "no events in interrupted.$ending"
   if grep -q warning: warnings; then fail "interrupted.$ending: $(cat warnings)"; fi
 done
+
+# A whole file is not replaced by one that is interrupted.
+cp ball.aedat4 kept.aedat4
+"$BUILD/pipelines/event-convert" --compression=zstd-high long.raw kept.aedat4 2>interruption &
+converting=$!
+while [ "$(stat -c %s kept.aedat4.part 2>/dev/null || echo 0)" -lt 10000 ]; do sleep 0.01; done
+kill -INT $converting
+if wait $converting; then fail "it was already done"; fi
+grep -q "interrupted: kept.aedat4 stays as it was; the events so far are in kept.aedat4.part" interruption ||
+  fail "the user is told: $(cat interruption)"
+cmp ball.aedat4 kept.aedat4 || fail "an interrupted file replaced a whole one"
+convert kept.aedat4.part kept.csv
+[ "$(wc -l <kept.csv)" -gt 100 ] || fail "the events so far are lost"
 
 # Recordings of cameras.
 recordings=$SHARED_DATA/events
