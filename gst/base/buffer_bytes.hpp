@@ -8,11 +8,11 @@
 
 #include "gst/base/owned.hpp"
 
-/// Makes a buffer of a copy of these bytes. Throws std::bad_alloc, where GStreamer's own allocation
-/// would end the process.
+/// Returns a new buffer with a copy of `bytes`. Throws std::bad_alloc; GStreamer's own allocator
+/// would abort the process.
 GstBuffer* copied_buffer(std::span<const std::byte> bytes);
 
-/// The bytes of a file's buffer, mapped for reading. If that fails, the element posts an error.
+/// Maps a buffer of a file for reading. Posts an error on the element if that fails.
 class MappedBytes {
  public:
   MappedBytes(GstElement* element, OwnedBuffer buffer);

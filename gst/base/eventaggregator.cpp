@@ -232,8 +232,8 @@ void gst_event_aggregator_class_add_templates(GstEventAggregatorClass* klass,
                                                          GST_TYPE_AGGREGATOR_PAD);
 }
 
-/// The sink pads that are linked. A latency query goes to the pads that the source pad names, and
-/// fails where one of them fails: then GstAggregator would take a live source for none.
+/// Iterates over linked sink pads only. A latency query is sent to the internal links of the source
+/// pad and fails if one of them fails; GstAggregator would then treat a live source as not live.
 static GstIterator* iterate_linked_pads(GstPad*, GstObject* element) {
   const auto compare = [](gconstpointer item, gconstpointer) {
     return gst_pad_is_linked(GST_PAD(g_value_get_object(static_cast<const GValue*>(item)))) ? 0 : 1;

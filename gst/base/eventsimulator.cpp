@@ -206,7 +206,7 @@ static void warn_of_times(GstEventSimulator* self, const char* what) {
       "an interval needs a PTS at both ends");
 }
 
-/// Sets the PTS of a frame that has none. False where nothing tells it.
+/// Sets the PTS of a frame without one. False if it cannot be determined.
 static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
   using Source = FrameClock::Source;
   auto& stream = priv_of(self).stream;

@@ -8,22 +8,22 @@
 
 #include "gst/base/owned.hpp"
 
-/// Gives a PTS to frames that come without one: the running time at which they arrive where the
-/// source is live, otherwise times of the caps' framerate.
+/// Timestamps frames without PTS: by the running time of their arrival if the source is live, else
+/// by the framerate in the caps.
 class FrameClock {
  public:
-  /// Where the PTS of a frame is from.
+  /// Origin of the PTS of a frame.
   enum class Source { upstream, framerate, arrival, nowhere };
 
-  /// Sets the PTS of a frame that has none, unless nothing tells it.
+  /// Sets the PTS of a frame without one, if it can be determined.
   Source stamp(GstBaseTransform* element, const GstVideoInfo& video, OwnedBuffer& frame);
 
-  /// Another segment begins.
+  /// For a new segment.
   void start_over() { next_.reset(); }
 
  private:
   std::optional<GstClockTime> time_of_arrival(GstBaseTransform* element);
 
   std::optional<GstClockTime> next_;  ///< end of the last frame
-  std::optional<bool> live_;          ///< whether upstream is, once asked
+  std::optional<bool> live_;          ///< result of the latency query, once made
 };

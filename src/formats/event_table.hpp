@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Events as rows of numbers: in text, NumPy's arrays and HDF5.
+// Events as rows of numbers, as in text, NumPy arrays and HDF5.
 #pragma once
 
 #include <algorithm>
@@ -18,34 +18,34 @@ enum class EventColumn : std::uint8_t { t, x, y, p };
 
 enum class TimeUnit : std::uint8_t { seconds, milliseconds, microseconds, nanoseconds };
 
-/// The power of ten by which a time in this unit is microseconds.
+/// Power of ten that converts this unit to microseconds.
 constexpr int power_of(TimeUnit unit) {
   constexpr int powers[] = {6, 3, 0, -3};
   return powers[static_cast<std::size_t>(unit)];
 }
 
-/// What the name of a column says.
+/// Meaning of a column name.
 struct ColumnName {
   EventColumn column;
-  std::optional<TimeUnit> unit = std::nullopt;  ///< of a time
+  std::optional<TimeUnit> unit = std::nullopt;  ///< for times
 };
 
-/// The column that a name means in any tool, in upper or lower case. A unit may follow a time, as
-/// in t_ns and "time [s]"; what else follows a space, '@', '[' or '(' is ignored.
+/// Returns the column for a name used by any tool, ignoring case. Times may have a unit, as in t_ns
+/// and "time [s]"; anything else from a space, '@', '[' or '(' on is ignored.
 std::optional<ColumnName> column_named(std::string_view name);
 
-/// Where the columns of events are. Those without a value are ignored.
+/// Meaning of each column of a table; columns without a value are ignored.
 using Columns = std::vector<std::optional<EventColumn>>;
 
-/// The columns that letters such as "txyp" mean, '-' being one to ignore; nothing where not each of
-/// t, x, y and p is there once.
+/// Parses letters such as "txyp", with '-' for ignored columns; nothing unless each of t, x, y and
+/// p occurs exactly once.
 std::optional<Columns> columns_of(std::string_view letters);
 
-/// What is known of a table beforehand; the rest is found in its header and its first rows.
+/// Known properties of a table; the others are detected from its header and first rows.
 struct TableSettings {
   Columns columns = {};
   std::optional<TimeUnit> unit = std::nullopt;
-  SensorSize size = {};  ///< 0x0: what the header says
+  SensorSize size = {};  ///< 0x0: as stated in the header
 };
 
 /// Makes events from the numbers of rows. Events outside the sensor are dropped, events earlier

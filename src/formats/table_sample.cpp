@@ -18,7 +18,7 @@ bool is_within(double value, double first, double end) {
   return is_whole(value) && value >= first && value < end;
 }
 
-/// Whether the number can be in this column.
+/// True if the number is valid in this column.
 bool fits(double value, EventColumn column) {
   switch (column) {
     case EventColumn::t:
@@ -33,8 +33,8 @@ bool fits(double value, EventColumn column) {
   return false;
 }
 
-/// Of whole numbers that are either. Thousands, again and again, are nanoseconds that were
-/// microseconds once; and gaps of less than 10, between many events, would be too short for
+/// Distinguishes microseconds from nanoseconds by the gaps between integer times. Multiples of 1000
+/// throughout are nanoseconds converted from microseconds; frequent gaps below 10 are too short for
 /// nanoseconds.
 std::optional<TimeUnit> unit_by_gaps(const std::vector<TableNumber>& times) {
   constexpr std::size_t many = 16;
@@ -56,7 +56,7 @@ bool TableSample::has_columns(std::size_t count) const {
          std::ranges::all_of(rows_, [count](const Row& row) { return row.size() == count; });
 }
 
-/// Whether the first of five columns does, as an index of pandas.
+/// True if the first of five columns counts rows, like an index of pandas.
 bool TableSample::counts_rows() const {
   if (!has_columns(5)) return false;
   for (std::size_t i = 1; i < rows_.size(); ++i)
@@ -64,7 +64,7 @@ bool TableSample::counts_rows() const {
   return true;
 }
 
-/// Of the rows that are events.
+/// Times of the rows that are events.
 std::vector<TableNumber> TableSample::times_of(const Columns& columns) const {
   std::vector<TableNumber> times;
   for (const auto& row : rows_) {
@@ -81,7 +81,7 @@ std::vector<TableNumber> TableSample::times_of(const Columns& columns) const {
 
 std::optional<Columns> TableSample::find_columns() const {
   const std::size_t skipped = counts_rows() ? 1 : 0;
-  // The only column with a number of which this holds.
+  // Returns the column with a number for which `holds` is true, if there is exactly one.
   const auto only_column = [&](const auto& holds) {
     std::optional<std::size_t> only;
     std::size_t count = 0;
@@ -112,7 +112,7 @@ std::optional<Columns> TableSample::find_columns() const {
 }
 
 std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_either) const {
-  // Years from 1973 on: no recording that starts at 0 lasts as long.
+  // Dates from 1973 on; no recording that starts at 0 is that long.
   constexpr double least_date_in_microseconds = 1e14;
   constexpr double least_date_in_nanoseconds = 1e17;
   const auto times = times_of(columns);
@@ -124,8 +124,8 @@ std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_e
   const auto form = std::ranges::max(times, {}, &TableNumber::form).form;
   if (form == Form::integer) return is_either ? unit_by_gaps(times) : TimeUnit::microseconds;
 
-  // Whole numbers all the same: microseconds that were made floating-point numbers, as the
-  // coordinates may have been; or the full seconds of a file that writes all decimals.
+  // Integer values in floating-point form are either microseconds converted to floating point, like
+  // the coordinates, or full seconds in a file that writes all decimals.
   const bool are_all_floating = std::ranges::any_of(rows_, [&](const Row& row) {
     if (row.size() != columns.size()) return false;
     for (std::size_t i = 0; i < row.size(); ++i)

@@ -9,45 +9,44 @@
 
 namespace eventcamera {
 
-/// A number in a row of a table.
+/// Number in a row of a table.
 struct TableNumber {
-  /// How it is written.
+  /// Notation of the number.
   enum class Form : std::uint8_t {
     integer,
     decimals,  ///< two or more, as in 0.003820
     floating,  ///< with an exponent, with one decimal, or in binary
   };
 
-  double value;  ///< not a number where the field is something else
+  double value;  ///< NaN if the field is not a number
   Form form = Form::integer;
 };
 
-/// The first rows of a table, by which its columns and its unit of time are found where nothing
-/// else tells them.
+/// The first rows of a table, to detect its columns and time unit if nothing else states them.
 class TableSample {
  public:
   using Row = std::vector<TableNumber>;
 
-  /// Rows enough to tell.
+  /// Number of rows sufficient for detection.
   static constexpr std::size_t max_rows = 256;
 
   void add(Row row) { rows_.push_back(std::move(row)); }
   bool empty() const { return rows_.empty(); }
 
-  /// Whether a row is an event of these columns.
+  /// True if any row is an event with these columns.
   bool has_events(const Columns& columns) const { return !times_of(columns).empty(); }
 
-  /// Whether every row has this many numbers.
+  /// True if every row has this many fields.
   bool has_columns(std::size_t count) const;
 
-  /// The time is the column that alone has fractions; else the first of txyp, xypt and xytp is
-  /// taken in which p is a polarity, x and y are coordinates and t never decreases. A column that
-  /// counts rows may come first. Nothing where no order fits.
+  /// Detects the columns. If only one column has fractions, it is the time. Otherwise returns the
+  /// first of txyp, xypt and xytp for which p is a polarity, x and y are coordinates and t never
+  /// decreases. A column that counts rows may precede them. Nothing if no order fits.
   std::optional<Columns> find_columns() const;
 
-  /// Seconds where a time has a fraction. Whole numbers are microseconds, and nanoseconds where
-  /// only these can be a date. Where `is_either`, it takes more to tell these apart: nothing where
-  /// the times do not tell.
+  /// Detects the time unit: seconds if a time has a fraction; otherwise microseconds, or
+  /// nanoseconds if only these give a plausible date. If `is_either`, the gaps between times decide
+  /// between the two; nothing if they are ambiguous.
   std::optional<TimeUnit> find_unit(const Columns& columns, bool is_either) const;
 
  private:

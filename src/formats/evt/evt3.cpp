@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// EVT3: words of 16 bits, each a change of what is known of the events that follow, or some events.
+// EVT3: 16-bit words, each of which updates the state for subsequent events, or adds events.
 #include <algorithm>
 #include <utility>
 

@@ -38,7 +38,8 @@ double floating_of(const NpyField& field, const std::uint8_t* element) {
   return half_of(static_cast<std::uint16_t>(word));
 }
 
-/// An integer times a power of ten, rounded to the nearest; nothing where 64 bits do not hold it.
+/// Multiplies an integer by a power of ten and rounds to nearest; nothing if the result exceeds 64
+/// bits.
 std::optional<std::int64_t> scaled(std::int64_t number, int power) {
   for (; power > 0; --power)
     if (__builtin_mul_overflow(number, 10, &number)) return std::nullopt;
@@ -47,8 +48,8 @@ std::optional<std::int64_t> scaled(std::int64_t number, int power) {
   return number / divisor + 2 * (number % divisor) / divisor;
 }
 
-/// The number that a field has times a power of ten, rounded to the nearest; nothing where 64 bits
-/// do not hold it.
+/// Multiplies the number in a field by a power of ten and rounds to nearest; nothing if the result
+/// exceeds 64 bits.
 std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t* element,
                                       int power = 0) {
   const unsigned unused = 64 - 8 * field.bytes;
@@ -67,7 +68,7 @@ std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t*
   constexpr double factors[] = {1e-3, 1, 1e3, 1e6};
   const double factor = factors[power / 3 + 1];
   const double number = std::round(floating_of(field, element) * factor);
-  if (!(std::abs(number) < 0x1p63)) return std::nullopt;  // nor where it is no number
+  if (!(std::abs(number) < 0x1p63)) return std::nullopt;  // also rejects NaN
   return static_cast<std::int64_t>(number);
 }
 
@@ -78,7 +79,7 @@ TableNumber sample_of(const NpyField& field, const std::uint8_t* element) {
   return {number ? static_cast<double>(*number) : std::numeric_limits<double>::quiet_NaN()};
 }
 
-/// How to take a little-endian integer out of 8 bytes that lie within the element.
+/// Reads a little-endian integer from 8 bytes within the element.
 struct Window {
   explicit Window(const NpyField& field, std::uint32_t element_bytes)
       : at(std::min(field.offset, element_bytes - 8)),
@@ -119,7 +120,7 @@ void NpyDecoder::begin(NpyHeader header) {
   header_ = std::move(header);
 }
 
-/// Reads the first elements, once it is found out what they are.
+/// Detects the layout from the first elements, then reads them.
 void NpyDecoder::read_sample(Decoded& out) {
   const auto elements = std::exchange(rest_, {});
   const auto whole = elements.size() / header_->element_bytes;
@@ -153,12 +154,12 @@ void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
   if (!unit) unit = sample.find_unit(*columns, false);
   if (!unit)
     throw UnsupportedFormat(
-        "the first times of the NumPy array do not tell their unit; set "
+        "the time unit of the NumPy array is ambiguous; set "
         "time-unit");
   power_ = power_of(*unit);
   plain_ = power_ == 0 && header_->element_bytes >= sizeof(std::uint64_t) &&
            std::ranges::all_of(header_->fields, [](const NpyField& field) {
-             // Of 64 bits without a sign not all fit.
+             // Unsigned 64-bit numbers may not fit.
              return field.kind != NpyField::Kind::floating &&
                     (!field.big_endian || field.bytes == 1) &&
                     (field.kind == NpyField::Kind::signed_integer || field.bytes < 8);

@@ -10,15 +10,15 @@
 
 namespace eventcamera {
 
-/// Reads NumPy's format, versions 1.0 to 3.0: a structured array with fields t, x, y and p in any
-/// order, or rows of numbers whose columns are found by the first rows. Numbers are integers or
-/// floating-point numbers of any width and byte order. The unit of time is told by the name of its
-/// field, or found by the first rows: TableSample. Polarity is ON where it is more than 0.
+/// Decodes NumPy files, versions 1.0 to 3.0: a structured array with fields t, x, y and p in any
+/// order, or rows of numbers whose columns are detected from the first rows. Numbers are integers
+/// or floating-point numbers of any width and byte order. The time unit is taken from the name of
+/// the field, or detected from the first rows (TableSample). A polarity above 0 is ON.
 class NpyDecoder final : public Decoder {
  public:
   explicit NpyDecoder(const TableSettings& settings = {});
 
-  /// Reads elements only, as a header would tell of them.
+  /// Reads only elements, as described by `header`.
   NpyDecoder(const NpyHeader& header, const TableSettings& settings);
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
@@ -33,13 +33,13 @@ class NpyDecoder final : public Decoder {
   TableSettings settings_;
   NpyPreamble preamble_;
   std::optional<NpyHeader> header_;
-  std::size_t sample_bytes_ = 0;  ///< of the first elements, which tell the layout
+  std::size_t sample_bytes_ = 0;  ///< size of the first elements, to detect the layout
   bool layout_known_ = false;
-  int power_ = 0;       ///< of ten, from the time's unit to microseconds
-  bool plain_ = false;  ///< all fields are little-endian integers, 8 bytes or more together
-  std::vector<std::uint8_t> rest_;  ///< the first elements, or the beginning of one
-  std::uint64_t position_ = 0;      ///< of what is read next
-  std::uint64_t left_ = 0;          ///< elements that the header claims and that have not come
+  int power_ = 0;       ///< power of ten from the time unit to microseconds
+  bool plain_ = false;  ///< all fields are little-endian integers, in elements of 8 bytes or more
+  std::vector<std::uint8_t> rest_;  ///< first elements, or start of an element
+  std::uint64_t position_ = 0;      ///< offset of the next byte to read
+  std::uint64_t left_ = 0;          ///< remaining elements according to the header
   bool after_end_ = false;
   RowValidator validator_;
 };

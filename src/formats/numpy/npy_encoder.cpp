@@ -11,7 +11,7 @@ namespace eventcamera {
 
 namespace {
 
-// The count is blank-padded to the longest, so that any fits.
+// The count is padded with blanks to its maximum length, so that it can be patched.
 constexpr std::string_view before_count =
     "{'descr': [('x', '<u2'), ('y', '<u2'), ('t', '<i8'), ('p', '|u1')], "
     "'fortran_order': False, 'shape': (";
@@ -21,7 +21,7 @@ constexpr std::size_t preamble = npy_magic.size() + 4;
 constexpr std::size_t header_bytes = 192;  // NumPy aligns the data to 64
 static_assert(preamble + before_count.size() + max_count + after_count.size() < header_bytes);
 
-/// A tuple of one, such as "50000,".
+/// Content of a tuple with one element, such as "50000,".
 std::string shape(std::uint64_t count) {
   auto text = std::to_string(count) + ',';
   text.resize(max_count, ' ');

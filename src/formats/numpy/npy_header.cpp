@@ -13,12 +13,12 @@ namespace {
 
 constexpr std::uint32_t max_element_bytes = 65536;
 
-/// Reads a literal of Python's, of the kinds that NumPy writes into a header.
+/// Parses Python literals of the kinds that NumPy writes into headers.
 class Literal {
  public:
   explicit Literal(std::string_view text) : rest_(text) {}
 
-  /// Goes over `mark` if it comes next.
+  /// Consumes `mark` if it is next.
   bool take(char mark) {
     skip_blanks();
     if (!rest_.starts_with(mark)) return false;
@@ -30,7 +30,7 @@ class Literal {
     if (!take(mark)) fail();
   }
 
-  /// What stands between quotes. Escapes do not occur in what we look for.
+  /// Parses a quoted string. Escapes are not needed for the expected strings.
   std::string_view string() {
     skip_blanks();
     if (rest_.empty() || (rest_.front() != '\'' && rest_.front() != '"')) fail();
@@ -66,7 +66,7 @@ class Literal {
     }
     if (digits == 0) fail();
     rest_.remove_prefix(digits);
-    if (rest_.starts_with('L')) rest_.remove_prefix(1);  // Python 2 wrote it
+    if (rest_.starts_with('L')) rest_.remove_prefix(1);  // written by Python 2
     return value;
   }
 
@@ -87,7 +87,7 @@ class Literal {
   std::string_view rest_;
 };
 
-/// A type such as <u2: byte order, kind and size in bytes.
+/// Type such as <u2: byte order, kind and size in bytes.
 struct Type {
   char order, kind;
   std::uint32_t bytes;
@@ -98,7 +98,7 @@ Type read_type(std::string_view text) {
   Literal size(text.substr(2));
   const auto number = size.integer();
   if (number > max_element_bytes) throw UnsupportedFormat("NumPy array elements too large");
-  // A character of a string of U has four bytes.
+  // Characters of U strings have four bytes.
   return {text[0], text[1], static_cast<std::uint32_t>(number) * (text[1] == 'U' ? 4 : 1)};
 }
 
@@ -131,7 +131,7 @@ std::optional<NpyField> number_of(const Type& type, std::uint32_t offset) {
   }
 }
 
-/// The fields: [('x', '<u2'), ('y', '<u2', (3,)), ('', '|V4'), (('title', 'p'), '|u1')].
+/// Parses fields: [('x', '<u2'), ('y', '<u2', (3,)), ('', '|V4'), (('title', 'p'), '|u1')].
 void read_fields(Literal& literal, NpyHeader& header) {
   std::array<bool, 4> known{};
   literal.expect('[');
@@ -189,7 +189,7 @@ void read_fields(Literal& literal, NpyHeader& header) {
     if (!is_known) throw UnsupportedFormat("no fields t, x, y and p in the NumPy array");
 }
 
-/// The extents: (3,) or (3, 4).
+/// Parses a shape: (3,) or (3, 4).
 std::vector<std::uint64_t> read_shape(Literal& literal) {
   std::vector<std::uint64_t> shape;
   literal.expect('(');
@@ -204,7 +204,7 @@ std::vector<std::uint64_t> read_shape(Literal& literal) {
   return shape;
 }
 
-/// Makes the columns of an array of plain numbers.
+/// Sets up the columns of an array of plain numbers.
 void make_columns(const Type& type, bool by_columns, const std::vector<std::uint64_t>& shape,
                   NpyHeader& header) {
   constexpr std::uint64_t max_columns = 16;
@@ -265,7 +265,7 @@ std::optional<NpyHeader> NpyPreamble::take(std::span<const std::uint8_t>& bytes)
   constexpr std::size_t max_header = 65536;
   constexpr std::size_t version_end = npy_magic.size() + 2;
   if (taken_.empty() && bytes.empty()) return std::nullopt;
-  // As many bytes as are needed to know how many are needed.
+  // Bytes needed to determine the next size.
   std::size_t needed = version_end;
   const auto take = [&] {
     if (needed > taken_.size()) {

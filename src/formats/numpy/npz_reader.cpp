@@ -15,14 +15,14 @@ namespace {
 constexpr std::size_t block_size = std::size_t{1} << 16;
 constexpr std::size_t rows_at_once = std::size_t{1} << 12;
 
-/// A source of what an NpyDecoder reads.
+/// Source of elements for an NpyDecoder.
 class Elements {
  public:
   virtual ~Elements() = default;
   Elements(const Elements&) = delete;
   Elements& operator=(const Elements&) = delete;
 
-  /// The next bytes, valid until the next call; none at the end. Nothing where the archive is
+  /// Returns the next bytes, valid until the next call; empty at the end. Nothing if the archive is
   /// corrupt.
   virtual std::optional<std::span<const std::uint8_t>> next() = 0;
 
@@ -30,18 +30,18 @@ class Elements {
   Elements() = default;
 };
 
-/// An array of the archive, and its file from the first element on.
+/// Array of the archive, with its file positioned after the header.
 struct ArrayFile {
   ZipEntry entry;
   NpyHeader header;
-  std::vector<std::uint8_t> rest;  ///< read, not yet taken
+  std::vector<std::uint8_t> rest;  ///< bytes read but not consumed
 };
 
 /// Reads the header of an array. Throws UnsupportedFormat.
 ArrayFile open_array(ZipArchive& archive, std::size_t index) {
   auto entry = archive.open(index);
   NpyPreamble preamble;
-  std::array<std::uint8_t, 128> block;  // where NumPy's headers of numbers end
+  std::array<std::uint8_t, 128> block;  // typical size of NumPy headers of plain numbers
   while (true) {
     const auto count = entry.read(block);
     std::span<const std::uint8_t> bytes = std::span(block).first(count.value_or(0));
@@ -52,7 +52,7 @@ ArrayFile open_array(ZipArchive& archive, std::size_t index) {
   }
 }
 
-/// An array of events.
+/// Single array of events.
 class WholeArray final : public Elements {
  public:
   explicit WholeArray(ArrayFile array) : array_(std::move(array)) {}
@@ -71,7 +71,7 @@ class WholeArray final : public Elements {
   std::vector<std::uint8_t> block_;
 };
 
-/// Arrays of a column each, joined to elements of t, x, y and p.
+/// Joins four arrays of one column each to elements of t, x, y and p.
 class JoinedColumns final : public Elements {
  public:
   explicit JoinedColumns(std::vector<ArrayFile> arrays) : arrays_(std::move(arrays)) {
@@ -117,11 +117,11 @@ class JoinedColumns final : public Elements {
 
  private:
   std::vector<ArrayFile> arrays_;  ///< by EventColumn
-  NpyHeader header_;               ///< of the elements
+  NpyHeader header_;               ///< header of the joined elements
   std::vector<std::uint8_t> joined_;
 };
 
-/// A name of the archive without folders and ending; empty where it is not an array.
+/// Name of an array in the archive without folder and extension; empty if it is not an array.
 std::string_view array_name(std::string_view name) {
   constexpr std::string_view ending = ".npy";
   if (!name.ends_with(ending)) return {};
@@ -129,7 +129,7 @@ std::string_view array_name(std::string_view name) {
   return name.substr(name.rfind('/') + 1);
 }
 
-/// What is open of an archive.
+/// An open archive.
 class Archive {
  public:
   /// Throws UnsupportedFormat.
@@ -155,7 +155,7 @@ class Archive {
   const Corruption& corruption() const { return corruption_; }
 
  private:
-  /// False where they are not all there.
+  /// Opens arrays t, x, y and p. False unless all of them exist.
   bool open_columns(const TableSettings& settings) {
     std::array<std::optional<std::size_t>, 4> indices;
     std::optional<TimeUnit> unit;
@@ -206,7 +206,7 @@ class Archive {
   bool ended_ = false;
 };
 
-/// The events of an archive as items.
+/// Reader for the events of an archive.
 class NpzReader final : public Reader {
  public:
   explicit NpzReader(const TableSettings& settings) : settings_(settings) {}
@@ -244,7 +244,7 @@ class NpzReader final : public Reader {
     return archive_ ? archive_->corruption() : none;
   }
 
-  /// Arrays are unpacked from their beginning.
+  /// Arrays can only be decompressed from their start.
   std::optional<SeekPoint> seek_point_before(Microseconds /*t*/) const override {
     return std::nullopt;
   }
@@ -253,8 +253,8 @@ class NpzReader final : public Reader {
  private:
   TableSettings settings_;
   std::vector<std::uint8_t> collected_;
-  std::unique_ptr<MemoryBytes> bytes_;  ///< that were collected
-  std::unique_ptr<Archive> archive_;    ///< once it can be read
+  std::unique_ptr<MemoryBytes> bytes_;  ///< collected bytes
+  std::unique_ptr<Archive> archive_;    ///< set once it can be read
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   Decoded decoded_;
 };

@@ -8,9 +8,9 @@
 
 namespace eventcamera {
 
-/// Reads NumPy's archives: arrays named t, x, y and p, or one array of events as in an .npy file.
-/// The bytes are opened, or pushed: then they are collected in memory, up to 256 MiB, and read at
-/// their end, because that is where an archive lists its arrays.
+/// Creates a reader for NumPy archives: arrays named t, x, y and p, or one array of events as in an
+/// .npy file. Pushed bytes are collected in memory, up to 256 MiB, and read at their end, because
+/// an archive's directory is at its end.
 std::unique_ptr<Reader> make_npz_reader(const TableSettings& settings = {});
 
 }  // namespace eventcamera

@@ -9,7 +9,7 @@ namespace eventcamera {
 
 namespace {
 
-/// Of a directory, which the library keeps in memory. Arrays have some 100 bytes there.
+/// Limit of the directory, which the library keeps in memory. It has about 100 bytes per array.
 constexpr std::uint64_t max_directory_bytes = std::uint64_t{1} << 22;
 
 }  // namespace

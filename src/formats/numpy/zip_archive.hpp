@@ -14,38 +14,39 @@
 
 namespace eventcamera {
 
-/// A file of a ZIP archive, which is read from its beginning on.
+/// File in a ZIP archive, read sequentially.
 class ZipEntry {
  public:
   explicit ZipEntry(zip_file_t* file) : file_(file, zip_fclose) {}
 
-  /// Fills `out`, and returns how many bytes that are: fewer only at the end. Nothing where the
-  /// archive is corrupt there.
+  /// Reads into `out` and returns the number of bytes, which is smaller only at the end. Nothing if
+  /// the archive is corrupt there.
   std::optional<std::size_t> read(std::span<std::uint8_t> out);
 
  private:
   std::unique_ptr<zip_file_t, int (*)(zip_file_t*)> file_;
 };
 
-/// A ZIP archive in bytes that outlive it.
+/// ZIP archive in a ByteSource.
 class ZipArchive {
  public:
-  /// Throws UnsupportedFormat where it is none, or lists more files than NumPy would write.
+  /// `source` must outlive the archive. Throws UnsupportedFormat if it is not a ZIP archive, or has
+  /// more files than NumPy would write.
   explicit ZipArchive(ByteSource& source);
 
-  /// The names of its files.
+  /// Names of the files.
   const std::vector<std::string>& names() const { return names_; }
 
-  /// Opens the file that has this index in names(). Throws UnsupportedFormat where that cannot be
-  /// unpacked.
+  /// Opens the file with this index in names(). Throws UnsupportedFormat if it cannot be
+  /// decompressed.
   ZipEntry open(std::size_t index);
 
  private:
-  /// For the library: where it reads.
+  /// Read state for the library.
   struct Input {
     ByteSource* source;
     std::uint64_t position = 0;
-    std::uint64_t directory_bytes = 0;  ///< read until the archive was open
+    std::uint64_t directory_bytes = 0;  ///< bytes read while opening the archive
     bool is_open = false;
     zip_error_t error = {};
   };

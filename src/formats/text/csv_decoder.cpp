@@ -17,7 +17,7 @@ constexpr std::size_t head_lines = 256;
 constexpr std::size_t max_head = 65536;
 constexpr std::size_t max_line = 4096;
 
-/// What read_plain_line() may look at from a line's first character on.
+/// Maximum number of characters that read_plain_line() examines.
 constexpr std::ptrdiff_t plain_line_reach = 128;
 
 constexpr bool is_blank(char letter) {
@@ -47,7 +47,7 @@ std::optional<int> read_extent(std::string_view text) {
   return static_cast<int>(number->value);
 }
 
-/// 0x0 where one of the texts is not an extent.
+/// 0x0 if one of the texts is not a valid extent.
 SensorSize read_size(std::string_view width, std::string_view height) {
   const SensorSize size{read_extent(width).value_or(0), read_extent(height).value_or(0)};
   return size.width > 0 && size.height > 0 ? size : SensorSize{};
@@ -63,7 +63,7 @@ std::optional<bool> read_polarity(std::string_view text) {
   return number->value == 1;
 }
 
-/// What stands between quotes.
+/// Removes quotes.
 std::string_view unquoted(std::string_view field) {
   if (field.size() < 2 || field.front() != '"' || field.back() != '"') return field;
   return field.substr(1, field.size() - 2);
@@ -89,7 +89,7 @@ TableNumber sample_of(std::string_view field) {
   return {value, has_decimals ? TableNumber::Form::decimals : TableNumber::Form::floating};
 }
 
-/// The digits that eight characters begin with, and their value.
+/// Digits at the front of eight characters, and their value.
 struct Digits {
   unsigned count;
   std::uint64_t value;
@@ -99,13 +99,13 @@ inline Digits read_digits(const char* at) {
   std::uint64_t word;
   std::memcpy(&word, at, sizeof word);
   word ^= 0x3030303030303030;
-  // What is no digit is now more than 9, and sets its byte's highest bit. A carry out of a byte
-  // disturbs only those behind it, and the first one counts.
+  // Non-digits are now above 9 and set the highest bit of their byte. Carries only affect later
+  // bytes, and only the first non-digit counts.
   const auto others = ((word + 0x7676767676767676) | word) & 0x8080808080808080;
   const auto count = static_cast<unsigned>(std::countr_zero(others)) / 8;
   if (count == 0) return {0, 0};
-  word <<= 64 - 8 * count;  // the last digit goes to the last byte, and noughts before the first
-  // Neighbours are joined to numbers of two, four and eight digits.
+  word <<= 64 - 8 * count;  // moves the last digit to the last byte, with zeros before the first
+  // Combine neighbours to numbers of two, four and eight digits.
   word = word * 10 + (word >> 8);
   word = ((word & 0x000000ff000000ff) * 0x000f424000000064 +
           ((word >> 16) & 0x000000ff000000ff) * 0x0000271000000001) >>
@@ -116,7 +116,7 @@ inline Digits read_digits(const char* at) {
 constexpr std::uint64_t powers_of_ten[] = {1,       10,        100,        1'000,      10'000,
                                            100'000, 1'000'000, 10'000'000, 100'000'000};
 
-/// Up to 16 digits; false where there are none, or more.
+/// Reads up to 16 digits; false if there are none, or more.
 inline bool read_plain_integer(const char*& at, std::uint64_t& value) {
   const auto digits = read_digits(at);
   at += digits.count;
@@ -160,7 +160,7 @@ void CsvDecoder::finish(Decoded& out) {
   rest_.clear();
 }
 
-/// Adds `text` to the head, up to the head's end, and returns how much that was.
+/// Appends `text` to the head, up to the head's end, and returns the number of characters appended.
 std::size_t CsvDecoder::take_head(std::string_view text) {
   std::size_t count = 0;
   while (count < text.size() && head_lines_ < head_lines && head_.size() < max_head) {
@@ -186,7 +186,7 @@ std::size_t CsvDecoder::split(std::string_view line, Fields& fields) {
   }
 }
 
-/// Finds out what the head's lines are, and where the events begin.
+/// Interprets the lines of the head and finds the start of the events.
 void CsvDecoder::read_head() {
   in_head_ = false;
   TableSample sample;
@@ -224,7 +224,7 @@ void CsvDecoder::read_head() {
   plain_ = columns_.size() == 4;
 }
 
-/// Whether this line, before the first event, is none. Takes what it says.
+/// Returns true for header lines before the first event, and evaluates them.
 bool CsvDecoder::read_header_line(std::string_view line) {
   constexpr std::string_view geometry = "%geometry:";
   Fields fields;
@@ -242,7 +242,7 @@ bool CsvDecoder::read_header_line(std::string_view line) {
     return size_ != SensorSize{};
   }
   const auto names = std::span(fields).first(count);
-  // The column of an index may have no name.
+  // An index column may be unnamed.
   const auto named =
       std::ranges::find_if(names, [](std::string_view name) { return !unquoted(name).empty(); });
   if (has_names_ || named == names.end() || !is_letter(unquoted(*named).front())) return false;
@@ -305,7 +305,7 @@ void CsvDecoder::find_columns(const TableSample& sample) {
     columns_ = *std::move(found);
     return;
   } else if (sample.has_columns(columns_.size() + 1)) {
-    columns_.insert(columns_.begin(), std::nullopt);  // an index that has no name
+    columns_.insert(columns_.begin(), std::nullopt);  // unnamed index column
   }
   if (!sample.empty() && !sample.has_events(columns_))
     throw UnsupportedFormat("not CSV events: no line has the expected columns");
@@ -317,7 +317,8 @@ void CsvDecoder::find_unit(const TableSample& sample) {
   if (!unit) unit = sample.find_unit(columns_, is_either);
   if (!unit)
     throw UnsupportedFormat(
-        "the first lines do not tell the unit of time; set time-unit, or name the column t_s, t_us "
+        "the time unit is ambiguous in the first lines; set time-unit, or name the column t_s, "
+        "t_us "
         "or t_ns in the first line");
   power_ = power_of(*unit);
 }
@@ -359,7 +360,7 @@ void CsvDecoder::read_text(std::string_view text, Decoded& out) {
   }
 }
 
-/// Reads whole lines, and returns `end`.
+/// Reads complete lines and returns `end`.
 const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out) {
   while (at < end) {
     if (plain_) {
@@ -387,8 +388,8 @@ const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out
   return end;
 }
 
-/// Reads a line as almost all are: numbers with no sign but of the polarity, one separator, no
-/// blanks. Returns what follows it, or nothing where it is written in any other way.
+/// Fast path for typical lines: numbers without sign (except for the polarity), one separator, no
+/// blanks. Returns the start of the next line, or nullptr for any other line.
 const char* CsvDecoder::read_plain_line(const char* at, Row& row) const {
   std::array<std::uint64_t, 4> values;
   for (const auto& column : columns_) {

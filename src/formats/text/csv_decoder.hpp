@@ -14,21 +14,20 @@
 
 namespace eventcamera {
 
-/// Reads lines of text. Fields stand between commas, semicolons or blanks; lines that begin with #
-/// or % are comments, and empty ones nothing.
+/// Decodes lines of text. Fields are separated by commas, semicolons or blanks; lines starting with
+/// # or % are comments; empty lines are ignored.
 ///
-/// What the settings leave open is found in the header and the first 256 lines:
-/// - the columns, by a line of names; more columns than four are allowed there, and ignored. Where
-///   there is none, by the numbers: TableSample;
-/// - the unit of time, by its column's name or by the numbers. Whole numbers between blanks below
-/// no
-///   names may be microseconds (DVS-Voltmeter) or nanoseconds (rpg_esim): where they do not tell,
-///   the file is refused. Finer digits are rounded to the nearest microsecond;
-/// - the sensor's size, by %geometry:W,H, by names such as x@W and y@H, or by a first line W H.
+/// Properties not given in the settings are detected from the header and the first 256 lines:
+/// - the columns, by a line of names, which may include further columns that are ignored, or
+///   by the numbers (TableSample);
+/// - the time unit, by the name of its column or by the numbers. Integer times in blank-separated
+///   columns without names may be microseconds (DVS-Voltmeter) or nanoseconds (rpg_esim); an
+///   ambiguous file is refused. Finer digits are rounded to the nearest microsecond;
+/// - the sensor size, by %geometry:W,H, by names such as x@W and y@H, or by a first line W H.
 ///
-/// Polarity is 0 or 1, -1 or 1, or false or true.
+/// Polarity is 0/1, -1/1 or false/true.
 ///
-/// A header or a comment alone is a recording without events; a file of no bytes is none.
+/// A file with only a header or comments is a recording without events; an empty file is an error.
 class CsvDecoder final : public Decoder {
  public:
   explicit CsvDecoder(const TableSettings& settings = {});
@@ -64,21 +63,21 @@ class CsvDecoder final : public Decoder {
 
   TableSettings settings_;
   bool in_head_ = true;
-  std::string head_;            ///< the first lines, until it is known what they are
-  std::size_t head_lines_ = 0;  ///< of them, those that may be events
-  bool line_begins_ = true;     ///< the next character of the head is a line's first
+  std::string head_;            ///< first lines, until they are interpreted
+  std::size_t head_lines_ = 0;  ///< number of lines in it that may be events
+  bool line_begins_ = true;     ///< the next character is the first of a line
 
   Columns columns_;
-  bool has_names_ = false;        ///< in the header, one of each column
-  std::optional<TimeUnit> unit_;  ///< that they tell
-  char separator_ = ',';          ///< between the fields of the first line
-  bool plain_ = false;            ///< four columns, so that most lines need not be split
-  int power_ = 0;                 ///< of ten, from the time's unit to microseconds
+  bool has_names_ = false;        ///< the header has column names
+  std::optional<TimeUnit> unit_;  ///< time unit in the names
+  char separator_ = ',';          ///< separator in the first line
+  bool plain_ = false;            ///< four columns, so that read_plain_line() can be used
+  int power_ = 0;                 ///< power of ten from the time unit to microseconds
   RowValidator validator_;
 
-  std::string rest_;  ///< the beginning of a line whose end has not come
+  std::string rest_;  ///< start of an incomplete line
   bool skipping_ = false;
-  std::uint64_t position_ = 0;  ///< of what is read next
+  std::uint64_t position_ = 0;  ///< offset of the next byte to read
 };
 
 }  // namespace eventcamera

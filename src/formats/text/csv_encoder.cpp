@@ -46,7 +46,8 @@ constexpr NamedCsvDialect dialects[] = {
      {txyp, ' ', microseconds, Header::none, false, false}},
 };
 
-/// More than the longest line: a time of 19 digits, a sign and three zeros, and the rest.
+/// Upper bound of the line length: a time of 19 digits, a sign and three zeros, and the other
+/// fields.
 constexpr std::size_t max_line = 64;
 constexpr std::size_t batch_size = 1024;
 

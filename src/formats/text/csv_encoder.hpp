@@ -13,9 +13,9 @@ namespace eventcamera {
 
 using ColumnOrder = std::array<EventColumn, 4>;
 
-/// How a text file of events is written.
+/// Format of a text file of events.
 struct CsvDialect {
-  /// What comes before the first event.
+  /// Lines before the first event.
   enum class Header : std::uint8_t {
     none,
     names,           ///< t,x,y,p
@@ -39,10 +39,10 @@ struct NamedCsvDialect {
   CsvDialect dialect;
 };
 
-/// The dialects that other tools write and read.
+/// Dialects of other tools.
 std::span<const NamedCsvDialect> csv_dialects();
 
-/// Writes lines of text.
+/// Encodes events as lines of text.
 class CsvEncoder final : public Encoder {
  public:
   CsvEncoder(const CsvDialect& dialect, SensorSize size);

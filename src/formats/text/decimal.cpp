@@ -12,7 +12,7 @@ constexpr bool is_digit(char letter) {
   return letter >= '0' && letter <= '9';
 }
 
-/// Reads digits into `number`, which stops to grow at a limit that no sound exponent reaches.
+/// Parses digits, saturating at a limit that no valid exponent reaches.
 int read_exponent(std::string_view digits) {
   int number = 0;
   for (const auto digit : digits) number = std::min(number * 10 + (digit - '0'), 100'000);
@@ -27,7 +27,7 @@ std::optional<Decimal> read_decimal(std::string_view text, int power) {
   bool negative = false;
   if (more() && (text[at] == '-' || text[at] == '+')) negative = text[at++] == '-';
 
-  // All digits count up to the 19th, which 64 bits can still hold.
+  // Up to 19 digits are exact in 64 bits.
   constexpr auto room = std::numeric_limits<std::uint64_t>::max() / 10 - 1;
   std::uint64_t digits = 0;
   bool whole = true;
@@ -67,7 +67,7 @@ std::optional<Decimal> read_decimal(std::string_view text, int power) {
     if (digits > most / 10) return std::nullopt;
     digits *= 10;
   }
-  // The last division rounds; those before it only cut, and half stays half or more.
+  // Only the last division rounds; the truncation before it cannot turn a half into less.
   for (; power < 0 && digits != 0; ++power) {
     const auto last = digits % 10;
     whole = whole && last == 0;

@@ -7,15 +7,15 @@
 
 namespace eventcamera {
 
-/// A decimal number of a text, times a power of ten.
+/// Decimal number of a text, multiplied by a power of ten.
 struct Decimal {
-  std::int64_t value;  ///< rounded to the nearest
-  bool whole;          ///< nothing was rounded off
+  std::int64_t value;  ///< rounded to nearest
+  bool whole;          ///< no digits were rounded off
   bool has_fraction;   ///< it has a decimal point or an exponent
 };
 
-/// Reads `text`, such as -12, 3.25 or 1e-6, times 10^`power`, without floating point. Nothing where
-/// it is not a number from end to end, or does not fit.
+/// Parses `text`, such as -12, 3.25 or 1e-6, multiplied by 10^`power`, without floating-point
+/// arithmetic. Nothing if it is not entirely a number, or out of range.
 std::optional<Decimal> read_decimal(std::string_view text, int power);
 
 }  // namespace eventcamera
