@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Events per second that the AEDAT codecs read and write on one core, compared with a memcpy of the
+// Events per second read and written by the AEDAT codecs on one core, compared to a memcpy of the
 // decoded events in the same run.
 #include <benchmark/benchmark.h>
 
@@ -19,7 +19,7 @@ using namespace eventcamera;
 
 constexpr SensorSize size{346, 260};
 constexpr std::size_t count = 2'000'000;
-/// Bytes that a decoder gets at once, as from a file source.
+/// Bytes per decode call, as from a file source.
 constexpr std::size_t piece = std::size_t{1} << 20;
 
 const std::vector<AbsoluteEvent>& events() {

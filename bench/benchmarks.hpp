@@ -5,14 +5,14 @@
 
 namespace bench {
 
-/// Every method on a scene, plain and ours: SCENE/METHOD/FORMULATION/threads:N.
+/// All methods on a scene, plain and optimized: SCENE/METHOD/FORMULATION/threads:N.
 void register_simulators(const Scene& scene);
 
-/// Events to a buffer, and a buffer to a picture, compared with a memcpy of the output:
+/// Events to a buffer, and a buffer to a picture, compared to a memcpy of the output:
 /// SCENE/STEP/FORMULATION/threads:1.
 void register_events(const Scene& scene);
 
-/// The scaling of the methods: growth/AXIS/METHOD/FORMULATION/VALUE.
+/// Scaling of the methods: growth/AXIS/METHOD/FORMULATION/VALUE.
 void register_growth(bool few_frames);
 
 }  // namespace bench

@@ -12,14 +12,14 @@
 
 namespace bench {
 
-/// The processor time of this thread, which does not depend on the load of the machine.
+/// CPU time of this thread, which does not depend on the load of the machine.
 inline double seconds_now() {
   timespec now;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// The seconds of a memcpy of these events, the minimum of several.
+/// Time of a memcpy of these events in seconds, minimum of several runs.
 inline double memcpy_seconds(const std::vector<eventcamera::AbsoluteEvent>& events) {
   std::vector<eventcamera::AbsoluteEvent> copy(events.size());
   double best = 1;
@@ -34,7 +34,7 @@ inline double memcpy_seconds(const std::vector<eventcamera::AbsoluteEvent>& even
 }
 
 /// Times `body`, which processes all of these events: million events per second, and the time as a
-/// multiple of that of a memcpy of them.
+/// multiple of a memcpy of them.
 template <class Body>
 void measure(benchmark::State& state, const std::vector<eventcamera::AbsoluteEvent>& events,
              const Body& body) {

@@ -20,8 +20,7 @@ struct Recording {
   std::vector<AbsoluteEvent> events;
 };
 
-/// Single pixels all over the sensor, 10 million per second: the worst case of formats that store
-/// rows and times once.
+/// Random pixels, 10 million per second: the worst case for formats that store rows and times once.
 Recording noise() {
   recordings::Random random(1);
   Recording recording{"noise", {}};
@@ -33,7 +32,7 @@ Recording noise() {
   return recording;
 }
 
-/// Moving edges as a simulator sees them: every 4 ms, row by row, runs of several pixels.
+/// Moving edges as from a simulator: every 4 ms, row by row, runs of several pixels.
 Recording edges() {
   recordings::Random random(2);
   Recording recording{"edges", {}};

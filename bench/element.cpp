@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What GStreamer adds to a frame: a whole pipeline compared with the core alone, events written and
-// drawn compared with a memcpy of the same bytes. Both of a pair take turns in one run; the
-// counters are medians over the turns: microseconds per frame, and ratios of wall-clock and
-// processor time.
+// Overhead of GStreamer per frame: a whole pipeline compared to the core alone, and events written
+// and drawn compared to a memcpy of the same bytes. Both sides of a comparison alternate in one
+// run. Counters are medians: microseconds per frame, and ratios of wall-clock and CPU time.
 //   meson devenv -C build-bench bench/element_bench
 #include <benchmark/benchmark.h>
 #include <gst/app/gstappsrc.h>
@@ -36,7 +35,7 @@ struct Scene {
   bench::Clip clip;
 };
 
-/// A texture that drifts.
+/// Drifting texture.
 Scene drift() {
   Scene scene{"drift-640x480", {}};
   for (int i = 0; i < 12; ++i)
@@ -116,7 +115,7 @@ class Pipeline {
     GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(pushed_++ * scene::frame_time);
     gst_app_src_push_buffer(source_, buffer);
   }
-  /// Called when the pipeline has processed all frames.
+  /// Called once the pipeline has processed all frames.
   void push_another() {
     if (left_ > 0) {
       --left_;
@@ -135,8 +134,8 @@ class Pipeline {
   std::atomic<bool> wants_more_ = false;
 };
 
-/// What a piece of work takes, microseconds: wall-clock time, and the processor time of all
-/// threads, which does not depend on other users of the machine.
+/// Duration of a piece of work, microseconds: wall-clock time, and CPU time of all threads, which
+/// does not depend on other users of the machine.
 struct Cost {
   double time;
   double processor;
@@ -157,7 +156,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Runs both in turns; each call processes `frames` frames.
+/// Runs both alternately; each call processes `frames` frames.
 void by_turns(benchmark::State& state, const char* base_name, int frames,
               const std::function<void()>& ours, const std::function<void()>& base) {
   std::vector<double> ours_times;
@@ -209,7 +208,7 @@ void register_pipeline(const Scene& scene, const Method& method, const std::stri
       ->UseRealTime();
 }
 
-/// `count` random events of an interval, all over the picture and the steps.
+/// `count` random events of an interval, evenly distributed over pixels and steps.
 EventBuckets random_events(int count, int width, int height) {
   std::minstd_rand random;
   constexpr int steps = interpolated_frames + 1;

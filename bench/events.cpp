@@ -9,7 +9,7 @@
 namespace bench {
 namespace {
 
-/// The events of an interval, as a simulator returns them and as a buffer holds them.
+/// Events of an interval, in buckets from a simulator and as the content of a buffer.
 struct Interval {
   EventBuckets buckets;
   std::vector<Event> buffer;
@@ -17,7 +17,7 @@ struct Interval {
 
 using Intervals = std::vector<Interval>;
 
-/// The first interval of each clip, by dense interpolation, which makes the most events.
+/// The first interval of each clip, with dense interpolation, which gives the most events.
 Intervals intervals_of(const Scene& scene) {
   const double threshold = dis_hq_method.threshold;
   const Settings settings{threshold, threshold, scene.interpolated_frames, 0};

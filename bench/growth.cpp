@@ -5,18 +5,18 @@
 namespace bench {
 namespace {
 
-/// A textured patch moves over a still texture.
+/// A textured patch that moves over a static texture.
 struct Setup {
   int width = 640;
   int height = 480;
-  double share = 0.1;  ///< of the picture that the patch covers
+  double share = 0.1;  ///< fraction of the frame that the patch covers
   int interpolated_frames = 10;
-  double threshold_factor = 1;  ///< times the method's threshold
+  double threshold_factor = 1;  ///< multiple of the method's threshold
 };
 
 constexpr int frame_count = 3;
 
-/// The share of pixels that differ between two pictures.
+/// Fraction of pixels that differ between two frames.
 double changed_share(const Picture& a, const Picture& b) {
   int changed = 0;
   for (int y = 0; y < a.height(); ++y)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// All benchmarks in one process. Takes the options of Google Benchmark, and --few-frames for a run
-// as short as possible.
+// Runs all benchmarks. Accepts the options of Google Benchmark, and --few-frames for the shortest
+// possible run.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

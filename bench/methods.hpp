@@ -22,7 +22,7 @@ using namespace eventcamera;
 
 using MakeSimulator = std::function<std::unique_ptr<Simulator>(const LumaFormat&)>;
 
-/// A method in both formulations, plain and ours.
+/// A method in both formulations, plain and optimized.
 struct Method {
   std::string name;
   double threshold;
@@ -45,7 +45,7 @@ inline Method dense_method(const std::string& name, FlowMethod flow) {
           }};
 }
 
-/// The thresholds are those of the settings.
+/// Thresholds are those of the settings.
 inline Method dvs_method(const std::string& name, const DvsSettings& settings) {
   return {name, 0, make_plain<plain::DvsSimulator>(settings), [settings](const auto& format) {
             auto simulator = make_dvs_simulator(format);

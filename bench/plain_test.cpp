@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// The naive implementations make the same events as ours: as the frame simulator and the dense path,
-// and, given the same flow, as the equations that all simulators are compared with.
+// The plain implementations give the same events as the frame simulator and the dense path, and,
+// with the same flow, as the reference equations.
 #include <gtest/gtest.h>
 
 #include "bench/methods.hpp"
@@ -24,7 +24,7 @@ class Plain : public testing::TestWithParam<int> {
     return scene::last_interval(simulator, {grey_levels, grey_levels, 10, GetParam()}, views);
   }
 
-  /// The tracks of points from one picture to the next, as the equations take them.
+  /// Tracks of points from one frame to the next, for the reference equations.
   static std::vector<Track> tracks_of(const Image<std::uint8_t>& from,
                                       const Image<std::uint8_t>& to,
                                       const std::vector<Point>& points) {
@@ -44,7 +44,7 @@ class Plain : public testing::TestWithParam<int> {
     return tracks;
   }
 
-  // The patch leaves at the right and the bottom, the background is still.
+  // The patch leaves at the right and the bottom; the background is static.
   const bench::Clip frames = bench::moving_patch(330, 200, 0.9, 3);
   const Image<std::uint8_t>& last = frames[1];
   const Image<std::uint8_t>& now = frames[2];

@@ -11,16 +11,16 @@
 
 namespace bench {
 
-/// A simulator that gets a clip forwards and backwards for ever.
+/// A simulator fed with a clip, forwards and backwards, forever.
 class Playback {
  public:
   Playback(const Clip& clip, std::unique_ptr<Simulator> simulator, const Settings& settings)
       : clip_(clip), simulator_(std::move(simulator)), settings_(settings) {
-    // The first interval is special, and memory grows in the next ones.
+    // Warm-up: the first interval is special, and memory grows in the next ones.
     while (pushed_ < period()) push();
   }
 
-  /// The number of frames forwards and backwards.
+  /// Number of frames, forwards and backwards.
   int period() const { return 2 * (static_cast<int>(clip_.size()) - 1); }
 
   const EventBuckets* push() {

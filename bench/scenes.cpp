@@ -61,7 +61,7 @@ Clip ball(int count) {
 }
 
 std::vector<Scene> scenes(bool few_frames) {
-  // The spans of the cars' video are when cars drive through.
+  // Spans of the cars video with moving cars.
   const Video videos[] = {
       {"driving-640x480", "driving-1280x720-25fps.mp4", {{0, 4}, {17, 4}, {34, 4}}, 640, 480, 20},
       {"cars-1280x720", "cars-768x432-12fps.mp4", {{66, 4}, {205, 4}, {325, 4}}, 1280, 720, 10},
@@ -89,7 +89,7 @@ Clip moving_patch(int width, int height, double share, int count) {
   for (int i = 0; i < count; ++i) {
     const int left = std::min((width - patch_width) / 2 + 4 * i, width - patch_width);
     const int top = std::min((height - patch_height) / 2 + 2 * i, height - patch_height);
-    // A patch without room to move shows a texture that moves.
+    // A patch that cannot move has a moving texture instead.
     const auto patch = scene::texture<std::uint8_t>(
         patch_width, patch_height, 8, 1000 + (left == width - patch_width ? -4.0 * i : 0.0),
         500 + (top == height - patch_height ? -2.0 * i : 0.0));

@@ -8,7 +8,7 @@
 #include "src/core/image.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// The videos on which the methods are timed.
+/// Videos for timing the methods.
 namespace bench {
 
 using Picture = eventcamera::Image<std::uint8_t>;
@@ -27,13 +27,13 @@ struct Scene {
 /// short as possible.
 std::vector<Scene> scenes(bool few_frames);
 
-/// A ball of 40 pixels that flies over a still, textured picture of 1280x720.
+/// A ball of 40 pixels that flies over a static, textured image of 1280x720.
 Clip ball(int count);
 
-/// A textured patch that covers `share` of the picture and moves over a still texture.
+/// A textured patch that covers `share` of the frame and moves over a static texture.
 Clip moving_patch(int width, int height, double share, int count);
 
-/// Frame i of a clip that is played forwards and backwards for ever.
+/// Frame i of a clip played forwards and backwards forever.
 inline const Picture& back_and_forth(const Clip& clip, std::int64_t i) {
   const auto period = 2 * (static_cast<std::int64_t>(clip.size()) - 1);
   const auto at = i % period;

@@ -28,9 +28,9 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr SensorSize size{1280, 720};
 constexpr std::size_t count = 1 << 20;
-constexpr std::size_t piece = 1 << 20;  // bytes that a decoder gets at once
+constexpr std::size_t piece = 1 << 20;  // bytes per decode call
 
-/// Ten events per microsecond: some in runs along rows, some anywhere.
+/// Ten events per microsecond: some in runs along rows, some at random pixels.
 Events make_events() {
   std::mt19937 random(1);
   const auto below = [&](int end) {

@@ -33,7 +33,7 @@ static void count_buffer(Count* count, GstBuffer* buffer) {
   gst_event_camera_unmap(&map);
 }
 
-/* Whether an error ended the pipeline; prints it. */
+/* Prints the error that ended the pipeline, if any. True if there was one. */
 static gboolean failed(GstBus* bus) {
   GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
   GError* error = NULL;
@@ -45,7 +45,7 @@ static gboolean failed(GstBus* bus) {
   return TRUE;
 }
 
-/* Counts to the end of the stream; prints a line for each second of it. */
+/* Counts events until the end of the stream; prints a line per second of the stream. */
 static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
   Count all = {0, 0};
   Count second = {0, 0};
@@ -86,7 +86,7 @@ static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
 
 static GstElement* pipeline;
 
-/* Ctrl-C ends the stream, so that sinks finish their files. */
+/* Ctrl-C ends the stream, so that sinks complete their files. */
 static gpointer wait_for_interrupt(gpointer signals) {
   int caught;
   if (sigwait(signals, &caught) != 0) return NULL;

@@ -31,7 +31,7 @@ static const Reader readers[] = {
     {"application/x-event-csv", "eventcsvdec name=reader", TRUE},
     {"application/x-npy", "eventnpydec name=reader", TRUE},
     {"application/x-npz", "eventnpzdec name=reader", TRUE},
-    /* Frames in the same file are left out. */
+    /* Frames in the same file are dropped. */
     {"application/x-aedat", "aedatdemux name=demuxer demuxer.events_0", FALSE},
     {"application/x-hdf5", "eventhdf5dec", FALSE},
 };
@@ -40,8 +40,8 @@ typedef struct {
   const char* extension;
   const char* description;
   const char* media_type;
-  const char* writer; /* an element name=writer; NULL where the format is only read */
-  const char* option; /* the writer's property that an option of this program sets, or NULL */
+  const char* writer; /* an element name=writer; NULL if the format is read-only */
+  const char* option; /* writer property that can be set by an option, or NULL */
 } Format;
 
 static const Format formats[] = {
@@ -67,9 +67,9 @@ static const Format formats[] = {
 };
 
 typedef struct {
-  const char* name; /* of a property, too */
+  const char* name; /* same as that of the property */
   gboolean is_of_reader;
-  gchar* value; /* NULL where it is not given */
+  gchar* value; /* NULL if not given */
 } Option;
 
 static Option properties[] = {
@@ -90,7 +90,7 @@ static const GOptionEntry options[] = {
     G_OPTION_ENTRY_NULL,
 };
 
-/* The names that an option accepts: the values of the element's property. */
+/* Values that an option accepts: those of the element's property. */
 static gchar* names_of(GObject* element, const char* property) {
   GString* names = g_string_new(NULL);
   GParamSpec* spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element), property);
@@ -111,7 +111,7 @@ static void append_names(GString* text, const char* what, const char* factory,
   gst_object_unref(element);
 }
 
-/* The part of --help that follows the options. */
+/* Part of --help after the options. */
 static gchar* help(void) {
   GString* text = g_string_new(
       "IN is recognised by its content, or else by its extension. Formats, by the extension of "
@@ -128,7 +128,7 @@ static gchar* help(void) {
   return g_string_free(text, FALSE);
 }
 
-/* The format that a file's extension selects, or NULL. */
+/* Format selected by a file's extension, or NULL. */
 static const Format* format_of(const char* path) {
   for (gsize i = 0; i < G_N_ELEMENTS(formats); ++i) {
     const gsize length = strlen(formats[i].extension);
@@ -172,7 +172,7 @@ static const Reader* find_reader(const char* path) {
   return reader;
 }
 
-/* Whether a file can be written in this format. */
+/* True if files can be written in this format. */
 static gboolean can_write(const char* path, const Format* format) {
   struct stat out;
   if (stat(path, &out) == 0 && S_ISDIR(out.st_mode)) {
@@ -193,7 +193,7 @@ static gboolean can_write(const char* path, const Format* format) {
   return TRUE;
 }
 
-/* Whether the options that were given apply to the files. */
+/* True if all given options apply to the files. */
 static gboolean options_apply(const Reader* reader, const Format* format) {
   for (gsize i = 0; i < G_N_ELEMENTS(properties); ++i) {
     const Option* option = &properties[i];
@@ -209,7 +209,7 @@ static gboolean options_apply(const Reader* reader, const Format* format) {
   return TRUE;
 }
 
-/* Sets the properties that options give. */
+/* Sets the properties given by options. */
 static gboolean set_options(GstElement* pipeline) {
   gboolean ok = TRUE;
   for (gsize i = 0; i < G_N_ELEMENTS(properties) && ok; ++i) {
@@ -245,12 +245,12 @@ static gboolean same_file(const char* a, const char* b) {
          of_a.st_ino == of_b.st_ino;
 }
 
-/* Output goes to a file beside OUT, so that only a whole one replaces an existing file. */
+/* Writes to a temporary file next to OUT, so that only a complete file replaces an existing one. */
 static gchar* unfinished(const char* path) {
   return g_strconcat(path, ".part", NULL);
 }
 
-/* Sets the location of an element; a writer that is a sink has its own. */
+/* Sets the location of the element `name`, or of the writer if it is the sink itself. */
 static void set_location(GstElement* pipeline, const char* name, const char* path) {
   GstElement* element = gst_bin_get_by_name(GST_BIN(pipeline), name);
   if (element == NULL) element = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
@@ -266,7 +266,7 @@ static GstPadProbeReturn count_events(GstPad* pad, GstPadProbeInfo* info, gpoint
   return GST_PAD_PROBE_OK;
 }
 
-/* One line, overwritten, on a terminal; a line a second elsewhere. */
+/* Prints a line that is overwritten on a terminal, or one line per second elsewhere. */
 static void print_progress(GstElement* pipeline, guint64 events) {
   gint64 position = 0;
   gint64 duration = 0;
@@ -278,7 +278,7 @@ static void print_progress(GstElement* pipeline, guint64 events) {
               isatty(STDERR_FILENO) ? "" : "\n");
 }
 
-/* Prints an error or a warning, and its cause, which follows the place in the debug text. */
+/* Prints an error or a warning with its cause: the debug text, after the code location. */
 static void print_message(GstMessage* message) {
   const gboolean fatal = GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR;
   GError* error = NULL;
@@ -298,13 +298,13 @@ static void print_message(GstMessage* message) {
 
 static volatile sig_atomic_t interrupted;
 
-/* The first Ctrl-C ends the file, so that its events so far can be read; the second kills. */
+/* The first Ctrl-C completes the file with the events so far; the second kills the program. */
 static void interrupt(int number) {
   interrupted = 1;
   signal(number, SIG_DFL);
 }
 
-/* Runs until the file is written; FALSE if it cannot be. */
+/* Runs until the file is written. FALSE on failure. */
 static gboolean run(GstElement* pipeline, const guint64* events) {
   GstBus* bus = gst_element_get_bus(pipeline);
   gboolean ended = FALSE;
@@ -332,7 +332,7 @@ static gboolean run(GstElement* pipeline, const guint64* events) {
   return ok;
 }
 
-/* Gives the file its name, if it is whole: FALSE where it is not. */
+/* Renames the file if it is complete. FALSE if it is not. */
 static gboolean finish(const char* part, const char* path, gboolean ok) {
   if (!ok) {
     remove(part);

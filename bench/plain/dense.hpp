@@ -7,7 +7,7 @@
 
 namespace plain {
 
-/// Dense interpolation, after the flow is found: forward.
+/// Dense forward interpolation with a given flow.
 class DenseInterpolation {
  public:
   DenseInterpolation(int width, int height)
@@ -46,7 +46,7 @@ class DenseInterpolation {
   Image<std::uint8_t> between_[2];
 };
 
-/// Dense interpolation, the flow counted in.
+/// Dense interpolation, including the flow.
 class DenseSimulator final : public Simulator {
  public:
   DenseSimulator(const LumaFormat& format, FlowMethod method)

@@ -11,13 +11,13 @@
 
 namespace plain {
 
-/// Diff: the pixels of one difference frame move into the next.
+/// Diff: moves the pixels of one difference frame into the next.
 class DiffSimulator final : public Simulator {
  public:
   explicit DiffSimulator(const LumaFormat& format) : Simulator(format) {}
 
  private:
-  /// One polarity of the difference frame as a picture, 0 where it does not fire.
+  /// One polarity of the difference frame as an image, 0 where nothing fires.
   struct Part {
     int sign;
     Image<std::uint8_t> picture;
@@ -62,7 +62,7 @@ class DiffSimulator final : public Simulator {
     copy(now, last_, threads());
   }
 
-  /// Makes the pixels of one polarity move, if they end next to a pixel of that polarity.
+  /// Moves the pixels of one polarity that end next to a pixel of that polarity.
   void follow(Part& part, int steps) {
     points_.clear();
     for (int y = 0; y < before_.height(); ++y)
@@ -83,7 +83,7 @@ class DiffSimulator final : public Simulator {
                     });
   }
 
-  /// At each pixel of an interpolated frame, the largest of the differences that meet there fires.
+  /// Fires the largest difference at each pixel of an interpolated frame.
   void fire_between(const StepTimes& steps, EventBuckets& events) {
     while (static_cast<int>(frames_.size()) < threads().threads())
       frames_.emplace_back(format().width, format().height);

@@ -34,8 +34,8 @@ inline void denoise(const ImageView<std::uint8_t>& frame, int limit, ThreadPool&
   });
 }
 
-/// The physical pixel as v2e computes it, from frame to frame: an Euler step of the low-pass
-/// filter, events spread evenly over the interval, noise at its end; thresholds, leak, shot noise.
+/// The physical pixel as computed by v2e, frame by frame: an Euler step of the low-pass filter,
+/// events spread evenly over the interval, noise at its end; thresholds, leak, shot noise.
 class DvsPixels {
  public:
   DvsPixels(int width, int height, const DvsSettings& settings)
@@ -158,8 +158,8 @@ class DvsPixels {
   std::vector<std::mt19937> random_;
 };
 
-/// Events from frame to frame or, with motion, from one interpolated picture to the next, as many
-/// as the longest flow has pixels.
+/// Events between frames or, with motion, between interpolated frames, whose number is the length
+/// of the longest flow in pixels.
 class DvsSimulator final : public Simulator {
  public:
   DvsSimulator(const LumaFormat& format, const DvsSettings& settings)

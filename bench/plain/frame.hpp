@@ -8,15 +8,15 @@
 #include "src/core/thread_pool.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// The naive implementation that our speed is compared with: each method as anyone would write it,
-/// OpenCV's optical flow, one picture after another and simple loops over its pixels, on all
-/// threads. 8-bit pictures.
+/// Plain implementations, as a baseline for speed: each method in its most direct form, with
+/// OpenCV's optical flow and simple loops over the pixels of one frame after another, on all
+/// threads. 8-bit frames.
 namespace plain {
 
 using namespace eventcamera;
 using Picture = ImageView<std::uint8_t>;
 
-/// Fires where the difference of two pictures exceeds the thresholds.
+/// Fires where the difference of two frames exceeds the thresholds.
 inline void fire(const Picture& before, const Picture& now, int step, std::uint32_t t,
                  const Thresholds& thresholds, ThreadPool& threads, EventBuckets& events) {
   threads.for_each(band_count(now.height), [&](int band, int) {
@@ -36,7 +36,7 @@ inline void fire(const Picture& before, const Picture& now, int step, std::uint3
   });
 }
 
-/// Copies a picture of the same size.
+/// Copies an image of the same size.
 inline void copy(const Picture& from, Image<std::uint8_t>& to, ThreadPool& threads) {
   threads.for_each(band_count(from.height), [&](int band, int) {
     const BandRows rows(band, from.height);

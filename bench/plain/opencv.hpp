@@ -26,7 +26,7 @@ inline void set_opencv_threads(int threads) {
   if (cv::getNumThreads() != threads) cv::setNumThreads(threads);
 }
 
-/// Dense flow between pictures of at least 64x64 pixels.
+/// Dense flow between frames of at least 64x64 pixels.
 class OpenCvFlow {
  public:
   OpenCvFlow(FlowMethod method, int width, int height) : method_(method) {
@@ -48,8 +48,8 @@ class OpenCvFlow {
       cv::calcOpticalFlowFarneback(opencv_picture(from), opencv_picture(to), flow_, 0.5, 3, 15, 3,
                                    5, 1.2, 0);
     } else {
-      flow_.release();  // or the search would begin at the last flow
-      // OpenCV's DIS wants rows without gaps.
+      flow_.release();  // otherwise the search would start from the last flow
+      // OpenCV's DIS requires contiguous rows.
       opencv_picture(from).copyTo(from_);
       opencv_picture(to).copyTo(to_);
       dis_->calc(from_, to_, flow_);
@@ -72,13 +72,13 @@ class OpenCvFlow {
   cv::Mat flow_;
 };
 
-/// The ends of tracks.
+/// Ends of tracks.
 struct Tracks {
   std::vector<cv::Point2f> ends;
   std::vector<unsigned char> found;
 };
 
-/// Pyramidal Lucas-Kanade from the last picture to the next.
+/// Pyramidal Lucas-Kanade from the last frame to the next.
 class OpenCvTracker {
  public:
   void push(const ImageView<std::uint8_t>& picture, int threads) {
@@ -119,7 +119,7 @@ struct MovingPoint {
   int y_at(int j) const { return moved(y, dy, j); }
 };
 
-/// Calls visit(MovingPoint) for each point whose track is found and ends in the picture.
+/// Calls visit(MovingPoint) for each point whose track was found and ends in the frame.
 template <class Visit>
 void for_each_moving(const std::vector<cv::Point2f>& points, const Tracks& tracks, int steps,
                      const LumaFormat& format, const Visit& visit) {

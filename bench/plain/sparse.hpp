@@ -9,7 +9,7 @@
 
 namespace plain {
 
-/// Sparse interpolation: only the changed pixels are tracked.
+/// Sparse interpolation: tracks only the changed pixels.
 class SparseSimulator final : public Simulator {
  public:
   explicit SparseSimulator(const LumaFormat& format)

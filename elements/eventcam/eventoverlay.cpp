@@ -264,7 +264,7 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
   properties.add(
       &Settings::accumulation_time,
       g_param_spec_uint64("accumulation-time", "Accumulation time",
-                          "How long an event is shown (ns; 0 = one frame)", 0,
+                          "Time that an event is shown (ns; 0 = one frame)", 0,
                           std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
 

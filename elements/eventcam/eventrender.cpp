@@ -323,7 +323,7 @@ GstFlowReturn EventRender::acquire_buffer(GstBuffer** buffer) {
     result = gst_buffer_pool_acquire_buffer(pool, buffer, nullptr);
   else
     GST_ELEMENT_ERROR(element(), RESOURCE, SETTINGS,
-                      ("Cannot get buffers to draw in; add a queue or a videoconvert after this."),
+                      ("Cannot get output buffers; add a queue or a videoconvert downstream."),
                       ("gst_buffer_pool_set_active() failed for %" GST_PTR_FORMAT, pool));
   gst_object_unref(pool);
   return result;

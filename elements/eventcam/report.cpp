@@ -66,7 +66,7 @@ std::optional<std::string> obstacle_to(const std::string& path) {
   if (path.empty()) return std::nullopt;
   const Owned<gchar> folder(g_path_get_dirname(path.c_str()));
   if (!g_file_test(folder.get(), G_FILE_TEST_IS_DIR))
-    return "There is no folder \"" + std::string(folder.get()) + "\".";
+    return "No such folder: \"" + std::string(folder.get()) + "\".";
   if (g_file_test(path.c_str(), G_FILE_TEST_IS_DIR)) return "\"" + path + "\" is a folder.";
   return std::nullopt;
 }

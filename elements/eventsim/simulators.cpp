@@ -26,7 +26,7 @@
 static const EventSimulatorMethod frame = {
     .type_name = "GstEventSimFrame",
     .long_name = "Event camera simulator: difference frame",
-    .description = "Turns video into events: where a frame differs from the one before",
+    .description = "Turns video into events: thresholds the difference of successive frames",
     .threshold = 20,
     .create = eventcamera::make_frame_simulator,
 };

@@ -341,10 +341,11 @@ static void add_table_properties(GObjectClass* klass) {
                                                   GST_PARAM_MUTABLE_READY);
   g_object_class_install_property(
       klass, prop_time_unit,
-      g_param_spec_enum("time-unit", "Time unit",
-                        "Unit of the times in the file; needed where the file is refused because "
-                        "its first rows do not tell",
-                        time_unit_type(), 0, flags));
+      g_param_spec_enum(
+          "time-unit", "Time unit",
+          "Unit of the times in the file; needed if the file is refused because its time unit is "
+          "ambiguous",
+          time_unit_type(), 0, flags));
   g_object_class_install_property(
       klass, prop_column_order,
       g_param_spec_string("column-order", "Column order",

@@ -9,7 +9,7 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event.hpp"
 
-/// A buffer of events that count their times from its PTS.
+/// Buffer of events whose times are relative to its PTS.
 inline GstBuffer* buffer_of(GstClockTime pts, const std::vector<eventcamera::Event>& events,
                             GstClockTime duration) {
   GstBuffer* buffer = events.empty()
@@ -20,7 +20,7 @@ inline GstBuffer* buffer_of(GstClockTime pts, const std::vector<eventcamera::Eve
   return buffer;
 }
 
-/// A buffer of the events of [start, start + 10 ms).
+/// Buffer of the events of [start, start + 10 ms).
 inline GstBuffer* buffer_of(std::span<const eventcamera::AbsoluteEvent> events,
                             eventcamera::Microseconds start) {
   std::vector<GstEventCameraEvent> stream;

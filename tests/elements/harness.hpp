@@ -14,12 +14,12 @@
 
 #include "gst/eventcamera/eventcamera.h"
 
-/// For launch lines: a path may have blanks.
+/// Quotes a path for a launch line; it may contain blanks.
 inline std::string in_quotes(const std::string& path) {
   return '"' + path + '"';
 }
 
-/// A simulator element between a source and a sink that the test plays.
+/// A simulator element between a source and a sink simulated by the test.
 namespace harness {
 
 struct Unref {
@@ -45,7 +45,7 @@ class Harness {
   explicit Harness(const std::string& launch)
       : Harness((gst_init(nullptr, nullptr), gst_harness_new_parse(launch.c_str())), launch) {}
 
-  /// Of an element whose source pad appears with its first output.
+  /// For elements whose source pad appears with its first output.
   static Harness with_late_pad(const std::string& launch) {
     gst_init(nullptr, nullptr);
     static GstStaticPadTemplate src =
@@ -70,7 +70,7 @@ class Harness {
     element_.reset(gst_harness_find_element(h_.get(), launch.substr(0, launch.find(' ')).c_str()));
   }
   ~Harness() {
-    // The test's bus is the element's until the end.
+    // The element keeps the test's bus until the end.
     gst_element_set_bus(h_->element, nullptr);
   }
 
@@ -87,8 +87,8 @@ class Harness {
     gst_caps_unref(caps);
   }
 
-  /// A frame whose luma is what `grey` says, in the negotiated format; `padding` bytes lie behind
-  /// each row, told by a GstVideoMeta.
+  /// A frame with luma `grey(x, y)` in the negotiated format. Each row is followed by `padding`
+  /// bytes, described by a GstVideoMeta.
   GstBuffer* frame(GstClockTime pts, const std::function<int(int x, int y)>& grey,
                    int padding = 0) const {
     gsize size = GST_VIDEO_INFO_SIZE(&info_);
@@ -138,17 +138,17 @@ class Harness {
 
   GstFlowReturn push(GstBuffer* buffer) { return gst_harness_push(h_.get(), buffer); }
 
-  /// The next buffer that came out, or none.
+  /// The next output buffer, or null.
   Buffer pull() { return Buffer(gst_harness_try_pull(h_.get())); }
 
-  /// The next event of this type that came out, or none; others before it are dropped.
+  /// The next output event of this type, or null; drops other events before it.
   Owned<GstEvent> pull_event(GstEventType type) {
     while (Owned<GstEvent> event{gst_harness_try_pull_event(h_.get())})
       if (GST_EVENT_TYPE(event.get()) == type) return event;
     return nullptr;
   }
 
-  /// The next message of this type on the bus, or none; others before it stay.
+  /// The next message of this type on the bus, or null; keeps other messages before it.
   Owned<GstMessage> message(GstMessageType type) {
     return Owned<GstMessage>(gst_bus_pop_filtered(bus_.get(), type));
   }
@@ -195,7 +195,7 @@ inline std::string text_of(GstMessage* message) {
   return text;
 }
 
-/// Plays an element of two sink pads, of which the first goes on to the source pad.
+/// Drives an element with two sink pads, the first of which is passed to the source pad.
 struct TwoInputs {
   TwoInputs(const std::string& launch, const char* first_pad, const char* second_pad) {
     gst_init(nullptr, nullptr);
@@ -224,14 +224,14 @@ inline void flush(std::initializer_list<GstHarness*> inputs) {
   for (auto* h : inputs) gst_harness_push_event(h, gst_event_new_flush_stop(TRUE));
 }
 
-/// Pushes the segment from 0 on.
+/// Pushes a segment that starts at 0.
 inline void push_segment(GstHarness* h) {
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   gst_harness_push_event(h, gst_event_new_segment(&segment));
 }
 
-/// Seeks backwards, which is refused without an error, and then pushes a segment that runs so.
+/// Seeks backwards, which is refused without an error, then pushes a segment with a negative rate.
 inline void play_backwards(Harness& h) {
   EXPECT_FALSE(gst_element_seek(h.element(), -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
                                 GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, GST_SECOND));

@@ -232,7 +232,7 @@ TEST_F(StatsTest, SaysBeforehandThatAFolderIsMissing) {
     for (const std::string property : {"location", "map"}) {
       const auto text =
           refusal_of(element + " " + property + "=" + in_quotes(path("nowhere/file")));
-      EXPECT_NE(text.find("There is no folder"), std::string::npos) << text;
+      EXPECT_NE(text.find("No such folder"), std::string::npos) << text;
       EXPECT_NE(text.find("nowhere"), std::string::npos) << text;
     }
     const auto text = refusal_of(element + " location=" + in_quotes(folder.string()));

@@ -9,7 +9,7 @@
 
 namespace eventcamera::reference {
 
-/// D = now - last where that exceeds a threshold, 0 elsewhere.
+/// D = now - last if that exceeds a threshold, else 0.
 template <class Pixel>
 Image<int> difference_frame(const Image<Pixel>& last, const Image<Pixel>& now,
                             const Thresholds& thresholds) {
@@ -34,7 +34,7 @@ inline Image<std::uint8_t> part_of(const Image<int>& difference, int sign, int b
   return part;
 }
 
-/// The pixels of a part, in raster order.
+/// Pixels of a part, in raster order.
 inline std::vector<Point> points_of(const Image<std::uint8_t>& part) {
   std::vector<Point> points;
   for (int y = 0; y < part.height(); ++y)
@@ -43,14 +43,14 @@ inline std::vector<Point> points_of(const Image<std::uint8_t>& part) {
   return points;
 }
 
-/// The pixels of one polarity of D(i-1) that are not 0, and their tracks.
+/// Nonzero pixels of one polarity of D(i-1), and their tracks.
 struct Tracked {
   std::vector<Point> points;
   std::vector<Track> tracks;
 };
 
-/// The events from D(i-1) = before to D(i) = now. A tracked pixel fires at each step if it ends
-/// next to a pixel of its polarity in `now`; where several meet, the largest difference fires.
+/// Events from D(i-1) = before to D(i) = now. A tracked pixel fires at each step if it ends next to
+/// a pixel of its polarity in `now`; of several on one pixel, the largest difference fires.
 inline std::vector<Event> diff(const Image<int>& before, const Image<int>& now, const Tracked& on,
                                const Tracked& off, const StepTimes& steps) {
   const int m = steps.count();

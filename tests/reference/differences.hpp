@@ -12,9 +12,9 @@
 #include "src/simulate/motion.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// The equations of the simulators, written down literally: one picture after another, in plain
-/// loops and double precision, which holds all their numbers exactly. The tests compare the
-/// simulators with them, event for event.
+/// Reference equations of the simulators, implemented literally: one frame after another, in plain
+/// loops and double precision, which represents all their numbers exactly. Tests compare the
+/// simulators to them, event by event.
 namespace eventcamera::reference {
 
 /// I(0), I(1/m) ... I(1).
@@ -41,7 +41,7 @@ std::vector<Event> differences(const Sequence<Pixel>& sequence, const StepTimes&
   return events;
 }
 
-/// The bounding box of the pixels where |now - last| exceeds the threshold.
+/// Bounding box of the pixels where |now - last| exceeds the threshold.
 template <class Pixel>
 Box changed_box(const Image<Pixel>& last, const Image<Pixel>& now, int threshold) {
   Box box;

@@ -10,7 +10,7 @@
 #include "src/core/image.hpp"
 #include "src/dvs/dvs_settings.hpp"
 
-/// The equations of the event camera's pixel, written down literally, in double precision and in
+/// Reference equations of the physical pixel, implemented literally, in double precision and in
 /// order of time.
 namespace eventcamera::reference {
 
@@ -44,10 +44,10 @@ struct TimedEvent {
   Polarity polarity;
 };
 
-/// ESIM's rule (Rebecq et al., CoRL 2018): L = ln(eps + I/255) changes on a straight line from a at
-/// t0 to b at t1. Each level r = ref + C, ref + 2C ... between them, in the direction of b, is
-/// crossed at t0 + (r - a)(t1 - t0)/(b - a), and the last of them becomes ref. With a single
-/// threshold all levels are (first L) + n C; n is counted, so that rounding does not add up.
+/// ESIM's rule (Rebecq et al., CoRL 2018): L = ln(eps + I/255) changes linearly from a at t0 to b
+/// at t1. Each level r = ref + C, ref + 2C ... between them, in the direction of b, is crossed at
+/// t0 + (r - a)(t1 - t0)/(b - a), and the last of them becomes ref. With a single threshold all
+/// levels are (first L) + n C; n is counted, so that rounding does not add up.
 class Esim {
  public:
   Esim(int width, int height, double log_eps, double threshold)
@@ -105,7 +105,7 @@ class DvsPixel {
     reference_ = signal_ - leaked;
   }
 
-  /// The events until the next frame, `microseconds` later.
+  /// Events until the next frame, `microseconds` later.
   std::vector<TimedEvent> push(double luma, int microseconds) {
     std::vector<TimedEvent> events;
     const double last = input_;

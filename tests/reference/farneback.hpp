@@ -14,7 +14,7 @@
 /// pyramid, window and border weights of OpenCV.
 namespace eventcamera::reference {
 
-/// A Gaussian at -reach ... reach, normalised to a sum of 1.
+/// Gaussian at -reach ... reach, normalised to a sum of 1.
 inline std::vector<double> gaussian(double sigma, int reach) {
   std::vector<double> weights(2 * static_cast<std::size_t>(reach) + 1);
   for (int k = -reach; k <= reach; ++k) weights[reach + k] = std::exp(-k * k / (2 * sigma * sigma));
@@ -30,13 +30,13 @@ inline Flow operator+(const Flow& a, const Flow& b) {
   return {a.x + b.x, a.y + b.y};
 }
 
-/// A position between two pixels of a line.
+/// Position between two pixels of a row.
 struct Between {
   int first;
   int second;
-  double weight;  ///< of the second
+  double weight;  ///< weight of the second
 
-  /// Of pixel i of a line of `to` pixels, on a line of `from`.
+  /// Position of pixel i of a row of `to` pixels, on a row of `from` pixels.
   Between(int i, int from, int to) {
     const double place = std::clamp((i + 0.5) * from / to - 0.5, 0.0, from - 1.0);
     first = static_cast<int>(place);
@@ -65,7 +65,7 @@ Image<T> resized(const Image<T>& plane, int width, int height) {
   return result;
 }
 
-/// A picture blurred and shrunk to 1 / 2^level; the border is mirrored.
+/// Image blurred and shrunk to 1 / 2^level; the border is mirrored.
 inline Image<double> pyramid_level(const Image<std::uint8_t>& picture, int level) {
   const double sigma = level == 0 ? std::sqrt(0.5 / std::log(2)) : ((1 << level) - 1) / 2.0;
   const int reach = level == 0 ? 1 : static_cast<int>(std::lrint(5 * sigma)) / 2;
@@ -93,8 +93,8 @@ struct Polynomial {
   double a_yy, a_xx, a_xy;
 };
 
-/// The least-squares fit around (x, y), border replicated: under the weight, whose moments are m2
-/// and m4, the functions x, y, x y, x^2 - m2 and y^2 - m2 are orthogonal to each other and to 1.
+/// Least-squares fit around (x, y), border replicated: under the weight with moments m2 and m4, the
+/// functions x, y, x y, x^2 - m2 and y^2 - m2 are orthogonal to each other and to 1.
 inline Polynomial fit(const Image<double>& picture, int x, int y) {
   constexpr int reach = 5;
   const auto weights = gaussian(1.2, reach);
@@ -127,7 +127,7 @@ inline Image<Polynomial> expansion(const Image<double>& picture) {
   return result;
 }
 
-/// The weight of the polynomial at (x, y) in a picture of this size.
+/// Weight of the polynomial at (x, y) in an image of this size.
 inline double border_weight(int x, int y, int width, int height) {
   constexpr double weights[] = {0.14, 0.14, 0.4472, 0.4472, 0.4472};
   const auto along = [&](int i) { return i < 5 ? weights[i] : 1; };
@@ -147,7 +147,7 @@ struct Equations {
     h_x += o.h_x;
     return *this;
   }
-  /// The solution of the mean of `count`, slightly regularised.
+  /// Solves the mean of `count` equations, slightly regularised.
   Flow solution(int count) const {
     const double determinant = g_yy * g_xx - g_xy * g_xy + 1e-3 * count * count;
     return {static_cast<float>((g_yy * h_x - g_xy * h_y) / determinant),
@@ -155,8 +155,8 @@ struct Equations {
   }
 };
 
-/// A is the mean of the A of both polynomials, b their difference in b plus A times the flow so
-/// far; the later polynomial is taken where that flow leads, and left out outside the picture.
+/// A is the mean of the A of both polynomials, b the difference of their b plus A times the current
+/// flow. The later polynomial is that at the end of the flow; there is none outside the image.
 inline Equations equations(const Image<Polynomial>& from, const Image<Polynomial>& to,
                            const Flow& flow, int x, int y) {
   const Polynomial& p = from.at(x, y);
@@ -194,7 +194,7 @@ inline Equations equations(const Image<Polynomial>& from, const Image<Polynomial
           w2 * (a_xy * b_y + a_xx * b_x)};
 }
 
-/// One iteration: for each pixel, the equations of 15x15 pixels, border replicated, are solved.
+/// One iteration: solves the equations of 15x15 pixels around each pixel, border replicated.
 inline Image<Flow> better_flow(const Image<Polynomial>& from, const Image<Polynomial>& to,
                                const Image<Flow>& flow) {
   Image<Equations> of_pixel(flow.width(), flow.height());

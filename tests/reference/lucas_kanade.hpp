@@ -12,7 +12,7 @@
 
 namespace eventcamera::reference {
 
-/// A picture mirrored at its border pixels.
+/// Image mirrored at its border pixels.
 struct Mirrored {
   const Image<std::uint8_t>& picture;
 
@@ -27,7 +27,7 @@ struct Mirrored {
   }
 };
 
-/// The next level of a pyramid.
+/// Next level of a pyramid.
 inline Image<std::uint8_t> halved(const Image<std::uint8_t>& picture) {
   constexpr int weight[] = {1, 4, 6, 4, 1};
   const Mirrored at{picture};
@@ -43,7 +43,7 @@ inline Image<std::uint8_t> halved(const Image<std::uint8_t>& picture) {
   return half;
 }
 
-/// Scharr's gradient, horizontal or vertical; 0 outside the picture.
+/// Scharr gradient, horizontal or vertical; 0 outside the image.
 inline int slope(const Image<std::uint8_t>& picture, int x, int y, bool across) {
   if (x < 0 || x >= picture.width() || y < 0 || y >= picture.height()) return 0;
   constexpr int weight[] = {3, 10, 3};
@@ -137,13 +137,13 @@ inline void search(const Image<std::uint8_t>& from, const Image<std::uint8_t>& t
   search.found = inside();
 }
 
-/// The track of a point: twice its flow on one level is where the search on the next begins.
+/// Tracks a point: twice its flow on one level is the start of the search on the next.
 inline Track track(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
                    const Point& point) {
   std::vector<std::pair<Image<std::uint8_t>, Image<std::uint8_t>>> levels{{from, to}};
   while (levels.size() < 4) {
     const auto& [a, b] = levels.back();
-    if (std::min(a.width(), a.height()) <= 30) break;  // its half would not exceed a window
+    if (std::min(a.width(), a.height()) <= 30) break;  // half of it would not exceed a window
     levels.emplace_back(halved(a), halved(b));
   }
   Search result{0, 0, {0, 0}, false};

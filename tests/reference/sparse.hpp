@@ -19,7 +19,8 @@ std::vector<Point> changed(const Image<Pixel>& last, const Image<Pixel>& now, in
 }
 
 /// `points` are changed() at the smaller threshold, `tracks` their tracks. At each step a tracked
-/// pixel shows what is behind it, from `now`, and covers the pixel that it has moved to.
+/// pixel uncovers the background from `now` where it was, and covers the pixel that it has moved
+/// to.
 template <class Pixel>
 std::vector<Event> sparse(const Image<Pixel>& last, const Image<Pixel>& now,
                           std::span<const Point> points, std::span<const Track> tracks,

@@ -404,7 +404,7 @@ std::unique_ptr<UnitReader> make_evt_reader(EvtFormat format, SensorSize size) {
     case EvtFormat::evt4:
       return std::make_unique<Evt4Reader>(size);
   }
-  throw std::invalid_argument("no such EVT format");
+  throw std::invalid_argument("unknown EVT format");
 }
 
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size, std::string header) {
@@ -422,7 +422,7 @@ std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size, std
     case EvtFormat::evt4:
       return std::make_unique<CdEncoder<Evt4>>(size, std::move(header));
   }
-  throw std::invalid_argument("no such EVT format");
+  throw std::invalid_argument("unknown EVT format");
 }
 
 }  // namespace eventcamera

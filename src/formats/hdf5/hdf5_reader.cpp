@@ -28,7 +28,7 @@ Hdf5Handle open_path(const std::filesystem::path& path) {
   const Hdf5Session session;
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
-    throw std::runtime_error("There is no file " + path.string());
+    throw std::runtime_error("No such file: " + path.string());
   const auto is_hdf5 = H5Fis_hdf5(path.c_str());
   if (is_hdf5 == 0) throw UnsupportedFormat(path.string() + " is not an HDF5 file");
   Hdf5Handle file(is_hdf5 > 0 ? H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT) : -1, H5Fclose);
