@@ -7,6 +7,9 @@
  * Writes one event stream, one video stream, or both, in order of time. The times in the file are
  * those of the event stream, floor(PTS / 1000) + t microseconds; video is synchronised to it.
  *
+ * A pad takes either, and learns which from its caps: `queue ! mux.` links both. The pads `events`
+ * and `video` take one kind, for applications that request pads by name.
+ *
  * A flushing seek truncates the file and starts over. Events that are earlier than those already
  * written, or outside the sensor, are dropped; a warning says how many.
  *
@@ -18,10 +21,13 @@
  * |[
  * gst-launch-1.0 filesrc location=in.raw ! decodebin caps="application/x-event-camera,format=XYTP"
  * ! aedatmux compression=zstd ! filesink location=out.aedat4
+ * gst-launch-1.0 filesrc location=davis.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! m.
+ * d.video_0 ! queue ! m.  aedatmux name=m ! filesink location=copy.aedat4
  * ]|
  */
 #include <gst/base/gstaggregator.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -99,14 +105,17 @@ G_DEFINE_TYPE_WITH_CODE(GstAedatMux, gst_aedat_mux, GST_TYPE_AGGREGATOR,
 GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mux_get_type())
 #define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_aedat_mux_parent_class)
 
-static constexpr const char* events_name = "events";
-static constexpr const char* video_name = "video";
+#define EVENTS_CAPS                                        \
+  GST_EVENT_CAMERA_MEDIA_TYPE                              \
+  ", format = (string) XYTP, width = (int) [ 1, 32767 ], " \
+  "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"
 
-static GstStaticPadTemplate events_template = GST_STATIC_PAD_TEMPLATE(
-    "events", GST_PAD_SINK, GST_PAD_REQUEST,
-    GST_STATIC_CAPS(GST_EVENT_CAMERA_MEDIA_TYPE
-                    ", format = (string) XYTP, width = (int) [ 1, 32767 ], "
-                    "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"));
+/// The first: links that name no pad take it.
+static GstStaticPadTemplate any_template =
+    GST_STATIC_PAD_TEMPLATE("sink_%u", GST_PAD_SINK, GST_PAD_REQUEST,
+                            GST_STATIC_CAPS(EVENTS_CAPS "; " RECORDED_VIDEO_CAPS));
+static GstStaticPadTemplate events_template =
+    GST_STATIC_PAD_TEMPLATE("events", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(EVENTS_CAPS));
 static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
     "video", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(RECORDED_VIDEO_CAPS));
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
@@ -128,9 +137,33 @@ static GType compression_type() {
 
 /* input */
 
-static Pad pad_named(GstAedatMux* self, const char* name) {
-  GstPad* const pad = gst_element_get_static_pad(GST_ELEMENT(self), name);
-  return Pad(pad == nullptr ? nullptr : GST_AGGREGATOR_PAD(pad));
+static std::vector<Pad> pads_of(GstAedatMux* self) {
+  std::vector<Pad> pads;
+  GST_OBJECT_LOCK(self);
+  for (const GList* list = GST_ELEMENT(self)->sinkpads; list != nullptr; list = list->next)
+    pads.emplace_back(GST_AGGREGATOR_PAD(gst_object_ref(list->data)));
+  GST_OBJECT_UNLOCK(self);
+  return pads;
+}
+
+enum class Kind { events, video, unknown };
+
+static Kind kind_of(const GstCaps* caps) {
+  bool has_events = false;
+  bool has_video = false;
+  for (guint i = 0; i < gst_caps_get_size(caps); ++i)
+    (gst_structure_has_name(gst_caps_get_structure(caps, i), GST_EVENT_CAMERA_MEDIA_TYPE)
+         ? has_events
+         : has_video) = true;
+  if (has_events == has_video) return Kind::unknown;
+  return has_events ? Kind::events : Kind::video;
+}
+
+/// What comes to a pad, as far as its caps tell by now.
+static Kind kind_of(GstAggregatorPad* pad) {
+  OwnedCaps caps(gst_pad_get_current_caps(GST_PAD(pad)));
+  if (!caps) caps.reset(gst_pad_get_pad_template_caps(GST_PAD(pad)));
+  return kind_of(caps.get());
 }
 
 /// Running time of a buffer; GST_CLOCK_TIME_NONE if it has none.
@@ -142,18 +175,17 @@ static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
   return gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
 }
 
-/// Returns the pad with the earliest next buffer; a buffer without a time comes first. Null if no
-/// pad has a buffer.
+/// Returns the pad with the earliest next buffer; a buffer without a time comes first, and events
+/// come before a frame of the same time. Null if no pad has a buffer.
 static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   Pad earliest;
-  for (const char* name : {events_name, video_name}) {
-    Pad pad = pad_named(self, name);
-    if (!pad) continue;
+  for (Pad& pad : pads_of(self)) {
     const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(pad.get()));
     if (!buffer) continue;
     const GstClockTime running = running_time(pad.get(), buffer.get());
     const GstClockTime from = GST_CLOCK_TIME_IS_VALID(running) ? running : 0;
-    if (earliest && from >= *time) continue;
+    if (earliest && from > *time) continue;
+    if (earliest && from == *time && kind_of(pad.get()) != Kind::events) continue;
     *time = from;
     earliest = std::move(pad);
   }
@@ -208,8 +240,9 @@ static void send_segment(GstAedatMux* self, guint64 position) {
 /// Offset from running time to the PTS of the event stream, or of the video if there is no event
 /// stream.
 static gint64 shift_of(GstAedatMux* self) {
-  Pad pad = pad_named(self, events_name);
-  if (!pad) pad = pad_named(self, video_name);
+  Pad pad;
+  for (Pad& other : pads_of(self))
+    if (!pad || kind_of(other.get()) == Kind::events) pad = std::move(other);
   if (!pad) return 0;
   GST_OBJECT_LOCK(pad.get());
   const GstSegment segment = pad->segment;
@@ -226,7 +259,8 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   if (state.size == SensorSize{} && state.video)
     settings.size = {GST_VIDEO_INFO_WIDTH(&*state.video), GST_VIDEO_INFO_HEIGHT(&*state.video)};
   settings.source = state.source;
-  settings.frames = static_cast<bool>(pad_named(self, video_name));
+  settings.frames = std::ranges::any_of(
+      pads_of(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
   settings.table = can_seek_bytes(GST_AGGREGATOR_SRC_PAD(self));
   settings.compression = self->priv->settings.copy().compression;
   self->priv->writable.begin_file(state.size);
@@ -304,7 +338,7 @@ static GstFlowReturn write_next(GstAedatMux* self) {
   Bytes out;
   const Microseconds t = file_time(state, running);
   const bool silent = gst_buffer_get_size(buffer.get()) == 0;
-  if (!silent && g_str_equal(GST_PAD_NAME(pad.get()), events_name))
+  if (!silent && kind_of(pad.get()) == Kind::events)
     write_events(self, buffer.get(), t, out);
   else if (!silent)
     write_frame(self, buffer.get(), t, out);
@@ -315,22 +349,23 @@ static GstFlowReturn write_next(GstAedatMux* self) {
   return push_bytes(self, std::move(out));
 }
 
-static bool is_at_end(GstAedatMux* self, const char* name) {
-  const Pad pad = pad_named(self, name);
-  return !pad || gst_aggregator_pad_is_eos(pad.get());
+static bool is_at_end(const Pad& pad) {
+  return gst_aggregator_pad_is_eos(pad.get());
 }
 
 /// True if enough is known to write the header.
 static bool is_known(GstAedatMux* self) {
   const State& state = self->priv->state;
   if (state.size != SensorSize{}) return true;
-  return is_at_end(self, events_name) && state.video;
+  return state.video && std::ranges::all_of(pads_of(self), [](const Pad& pad) {
+           return kind_of(pad.get()) == Kind::video || is_at_end(pad);
+         });
 }
 
 /// Writes the header, the earliest buffer, or the end of the file. May throw.
 static GstFlowReturn write_some(GstAedatMux* self) {
   auto& encoder = self->priv->state.encoder;
-  const bool ended = is_at_end(self, events_name) && is_at_end(self, video_name);
+  const bool ended = std::ranges::all_of(pads_of(self), is_at_end);
   if (!encoder) {
     if (!is_known(self)) {
       if (!ended) return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -368,7 +403,18 @@ static GstClockTime get_next_time(GstAggregator* aggregator) {
 
 static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
   State& state = self->priv->state;
-  if (!g_str_equal(GST_PAD_NAME(pad), events_name)) {
+  const Kind kind = kind_of(caps);
+  for (const Pad& other : pads_of(self)) {
+    if (other.get() == pad || kind_of(other.get()) != kind) continue;
+    GST_ELEMENT_ERROR(
+        self, STREAM, MUX,
+        ("Cannot write two streams of %s into one file; link one stream of events and "
+         "one of video.",
+         kind == Kind::events ? "events" : "video"),
+        ("pads %s and %s", GST_PAD_NAME(other.get()), GST_PAD_NAME(pad)));
+    return false;
+  }
+  if (kind == Kind::video) {
     GstVideoInfo video;
     if (!gst_video_info_from_caps(&video, caps)) return false;
     state.video = video;
@@ -419,15 +465,19 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
 }
 
 static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplate* templ,
-                                        const gchar*, const GstCaps*) {
+                                        const gchar* wanted, const GstCaps* caps) {
   auto* self = GST_AEDAT_MUX(aggregator);
   const gchar* const name = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
-  if (pad_named(self, name)) {
-    GST_WARNING_OBJECT(self, "there is a pad %s already", name);
-    return nullptr;
-  }
   if (GST_STATE(self) > GST_STATE_READY && self->priv->state.encoder) {
     GST_WARNING_OBJECT(self, "the header is written, and has no stream for a pad %s", name);
+    return nullptr;
+  }
+  if (g_str_equal(name, any_template.name_template))
+    return PARENT_AGGREGATOR_CLASS->create_new_pad(aggregator, templ, wanted, caps);
+  GstPad* const existing = gst_element_get_static_pad(GST_ELEMENT(self), name);
+  if (existing != nullptr) {
+    gst_object_unref(existing);
+    GST_WARNING_OBJECT(self, "there is a pad %s already", name);
     return nullptr;
   }
   return static_cast<GstAggregatorPad*>(g_object_new(GST_TYPE_AGGREGATOR_PAD, "name", name,
@@ -482,6 +532,8 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
                                                       GST_PARAM_MUTABLE_READY)));
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  gst_element_class_add_static_pad_template_with_gtype(element_class, &any_template,
+                                                       GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_add_static_pad_template_with_gtype(element_class, &events_template,
                                                        GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_add_static_pad_template_with_gtype(element_class, &video_template,

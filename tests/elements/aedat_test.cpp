@@ -820,6 +820,39 @@ TEST(AedatMux, KeepsTheTimesOfAFile) {
   EXPECT_TRUE(after.pictures == before.pictures);
 }
 
+TEST(AedatMux, LearnsFromItsCapsWhatComesToAPad) {
+  const auto events = steady_events(300'000, 70, of_1970 + 123'457);
+  const File in(aedat4_with_frames(events, PixelFormat::grey8, 5));
+  const auto before = content_of(in.bytes());
+  const std::string from = "filesrc location=" + in_quotes(in.path()) + " ! aedatdemux name=d  ";
+  const std::string to = "  aedatmux name=m ! filesink location=";
+  for (const char* links : {"d.events_0 ! queue ! m.  d.video_0 ! queue ! m.",
+                            "d.video_0 ! queue ! m.  d.events_0 ! queue ! m."}) {
+    SCOPED_TRACE(links);
+    const File out{Bytes{}};
+    ASSERT_TRUE(run(from + links + to + in_quotes(out.path())));
+    const auto after = content_of(out.bytes());
+    EXPECT_TRUE(after.events == before.events);
+    EXPECT_TRUE(after.pictures == before.pictures);
+  }
+
+  const Owned<GstElement> pipeline(gst_parse_launch(
+      (from + "d.events_0 ! tee name=t  t. ! queue ! m.  t. ! queue ! m.  aedatmux "
+              "name=m ! fakesink")
+          .c_str(),
+      nullptr));
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+  const Owned<GstMessage> message(
+      gst_bus_timed_pop_filtered(bus.get(), 20 * GST_SECOND, GST_MESSAGE_ERROR));
+  ASSERT_TRUE(message);
+  EXPECT_EQ(
+      text_of(message.get()),
+      "Cannot write two streams of events into one file; link one stream of events and one of "
+      "video.");
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
 TEST(AedatMux, NeedsNoSeeking) {
   const auto events = steady_events(300'000, 70);
   const File in(aedat4(events));
