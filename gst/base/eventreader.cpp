@@ -49,9 +49,9 @@ GstClockTime nanoseconds(Microseconds t) {
   return static_cast<GstClockTime>(std::max<Microseconds>(t, 0)) * GST_USECOND;
 }
 
-/// What the application knows of a table.
+/// Properties of a table that the application has set.
 struct TableProperties {
-  gint time_unit = 0;  ///< 0: found, else one more than the TimeUnit
+  gint time_unit = 0;  ///< 0: detect, else TimeUnit + 1
   std::string column_order;
 
   /// Throws UnsupportedFormat.

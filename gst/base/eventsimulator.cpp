@@ -61,7 +61,7 @@ struct State {
 struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
   bool backwards = false;                       ///< the segment was refused
-  FrameClock clock;                             ///< of frames without a PTS
+  FrameClock clock;                             ///< for frames without a PTS
   WarnOnce warn_of_times;
   WarnOnce warn_of_no_pts;
   WarnOnce warn_of_interlacing;
@@ -73,7 +73,7 @@ struct GstEventSimulatorPrivate {
   GuardedSettings<Settings> settings;
   std::shared_ptr<void> method_settings;
 
-  Guarded<LearntLatency> latency;  // that of an interval; nothing is called under its lock
+  Guarded<LearntLatency> latency;  // make no calls while holding its lock
 
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;

@@ -7,14 +7,14 @@
 
 #include "src/core/event.hpp"
 
-/// A latency learnt from measured delays. It rises to the second largest of the recent delays: one
-/// alone, such as a pause of the source, does not delay all that follows. It falls once all recent
-/// delays are clearly smaller.
+/// Latency learnt from measured delays. It rises to the second largest of the recent delays, so
+/// that a single one, such as a pause of the source, does not delay everything after it. It falls
+/// once all recent delays are clearly smaller.
 class LearntLatency {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
 
-  /// What is known without measuring; the latency does not fall below it.
+  /// Sets the latency known without measurement, which is the minimum.
   void expect(Nanoseconds expected) {
     if (expected_ == expected) return;
     recent_.clear();
@@ -22,7 +22,7 @@ class LearntLatency {
     value_ = expected;
   }
 
-  /// A delay that ended at `time`, of the stream.
+  /// Adds a delay that ended at stream time `time`.
   void add(Nanoseconds time, Nanoseconds delay) {
     if (!recent_.empty() && time < recent_.back().end) recent_.clear();
     recent_.push_back({time, delay});
@@ -40,7 +40,7 @@ class LearntLatency {
     Nanoseconds length;
   };
 
-  // How far back recent delays reach.
+  // Maximum age of recent delays.
   static constexpr Nanoseconds window = 500'000'000;
   static constexpr std::size_t min_count = 3;
   static constexpr std::size_t max_count = 100;

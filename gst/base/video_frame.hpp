@@ -40,7 +40,7 @@ class VideoFrame {
   /// called if false.
   explicit operator bool() const { return fault_.empty(); }
 
-  /// What is wrong with the buffer, for a message.
+  /// Description of the fault, for a message.
   const std::string& fault() const { return fault_; }
 
   const GstVideoFrame* get() const { return &frame_; }

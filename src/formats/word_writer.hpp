@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What encoders of binary formats share.
+// Shared by encoders of binary formats.
 #pragma once
 
 #include <algorithm>

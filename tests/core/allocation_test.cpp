@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Once a simulator has seen what its video is like, a frame costs no allocation any more. Counts
-// what the process asks of the heap, operator new included, whichever thread asks.
+// In steady state, a simulator allocates nothing per frame. Counts all heap allocations of the
+// process, operator new included, on all threads.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -23,7 +23,7 @@ std::atomic<int> allocations = 0;
 
 }  // namespace
 
-// In front of glibc's own, which they call by its other names.
+// Replace glibc's functions, and call these by their other names.
 extern "C" {
 
 void* __libc_malloc(std::size_t size);
@@ -68,12 +68,11 @@ constexpr int width = 160;
 constexpr int height = 120;
 constexpr int threads = 2;
 
-/// Seen again and again, frame by frame: what a simulator has to get used to.
+/// Frames that are repeated until a simulator is in steady state.
 constexpr int frames_a_round = 6;
 
-/// The allocations of some rounds, once everything has found its size. A thread that the others
-/// left nothing to do finds its own later, so a few allocations now and then are given another
-/// chance: what is allocated in every frame, or every round, stays.
+/// Allocations of some rounds in steady state. A thread that got no work so far may allocate later,
+/// so rounds with a few allocations are retried; allocations in every frame or round persist.
 template <class Frame>
 int allocations_in_steady_state(const Frame& take_frame) {
   constexpr int chances = 20;
@@ -95,7 +94,7 @@ std::vector<Image<Pixel>> frames_of_a_drift(int bits) {
   return frames;
 }
 
-/// The allocations of a simulator's frames; `make` makes it.
+/// Allocations per frame of the simulator that `make` creates.
 template <class Pixel>
 int allocations_of(std::unique_ptr<Simulator> (*make)(const LumaFormat&), int bits) {
   const auto frames = frames_of_a_drift<Pixel>(bits);
@@ -151,14 +150,14 @@ TEST(Allocations, AreNotMadeByPhysicalPixels) {
   EXPECT_EQ(allocations_of<std::uint8_t>(ideal, 8), 0);
   const auto limited = [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
     auto simulator = make_dvs_simulator(format);
-    // What bounds the readout is always the same.
+    // The limit of the readout is constant.
     simulator->set({.cutoff_hz = 100, .refractory_period = 100, .max_event_rate = 2e5});
     return simulator;
   };
   EXPECT_EQ(allocations_of<std::uint16_t>(limited, 12), 0);
 }
 
-/// Interpolation along a flow that turns, so that tiles differ from frame to frame.
+/// Interpolation along a rotating flow, so that tiles differ from frame to frame.
 template <class Pixel>
 int allocations_of_interpolation(int bits, Interpolation interpolation) {
   const auto frames = frames_of_a_drift<Pixel>(bits);

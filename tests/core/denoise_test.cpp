@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Denoising equals its plain reference on every SIMD target of this processor, takes noise away and
-// leaves edges.
+// Denoising equals its plain reference on every SIMD target of this processor, removes noise and
+// keeps edges.
 #include "src/dvs/denoise.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ using namespace eventcamera;
 template <class Pixel>
 void hold_to_the_reference(int width, int height, int bits, int limit) {
   const auto packed = scene::noise<Pixel>(width, height, bits, 7);
-  // The last row ends where its memory does, so that a sanitizer sees what is read behind it.
+  // The last row ends at the end of its memory, so that a sanitizer detects reads past it.
   const int stride = width + 5;
   std::vector<Pixel> memory(static_cast<std::size_t>(stride) * (height - 1) + width);
   for (int y = 0; y < height; ++y)
@@ -74,12 +74,12 @@ TEST(Denoise, TakesNoiseAwayAndLeavesEdges) {
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       before += std::pow(frame.at(x, y) - level(x), 2);
-      // Each of the three neighbours beyond the edge weighs as a difference of 6 at most.
+      // Each of the three neighbours beyond the edge contributes a difference of at most 6.
       EXPECT_NEAR(out.at(x, y), level(x), 8);
       if (x != width / 2 && x != width / 2 - 1) after += std::pow(out.at(x, y) - level(x), 2);
     }
   }
-  // The weights leave 3/8 of the deviation of noise; rounding adds to it, and the limit.
+  // The weights reduce the standard deviation of noise to 3/8; rounding and the limit add to it.
   EXPECT_LT(std::sqrt(after / before), 0.5);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// The physical pixel is compared with physics, and with its equations in double precision.
+// Compares the physical pixel to physics, and to its equations in double precision.
 #include "src/dvs/dvs_simulator.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ namespace {
 
 using namespace eventcamera;
 
-using reference::TimedEvent;  // `t` is the time since the first frame
+using reference::TimedEvent;  // `t` is relative to the first frame
 
 using Pixels = std::map<std::pair<int, int>, std::vector<TimedEvent>>;
 
@@ -42,9 +42,9 @@ Pixels by_pixel(const std::vector<TimedEvent>& events) {
   return pixels;
 }
 
-/// Expects as many events but for a share of `tolerance` (one is always tolerated), and at least a
-/// share of `equal_share` whose polarity is the expected one and whose time is up to `precision`
-/// microseconds off.
+/// Expects the same number of events, up to a fraction `tolerance` (or one event), and a fraction
+/// of at least `equal_share` with the expected polarity and a time that differs by at most
+/// `precision` microseconds.
 void expect_near(const std::vector<TimedEvent>& found, const std::vector<TimedEvent>& expected,
                  double tolerance, double equal_share, double precision) {
   const auto count = static_cast<double>(expected.size());
@@ -101,7 +101,7 @@ TEST(Decay, IsTheExponentialFunction) {
   EXPECT_LT(decay(1e300), 1e-300);
 }
 
-/// The first of many small steps at which a trajectory is beyond a level on either side, or -1.
+/// First of many small steps at which a trajectory is beyond one of the two levels, or -1.
 double plainly_crossed(const Trajectory& trajectory, double lower, double upper, double end) {
   constexpr int steps = 200'000;
   for (int i = 0; i <= steps; ++i) {
@@ -158,7 +158,7 @@ Image<std::uint8_t> flat(int width, int height, int grey) {
   return scene::flat<std::uint8_t>(width, height, grey);
 }
 
-/// Shows the same picture for `frames` frames.
+/// Repeats the same image for `frames` frames.
 void stand(Playback& playback, const Image<std::uint8_t>& picture, int frames,
            Nanoseconds frame_time) {
   for (int i = 0; i <= frames; ++i) playback.push(picture, 8, i * frame_time);
@@ -232,7 +232,7 @@ TEST(Dvs, MakesShotNoiseThatIsPoisson) {
     double on = 0;
     for (const auto& event : playback.events) on += event.polarity == Polarity::on;
     EXPECT_NEAR(on / static_cast<double>(playback.events.size()), 0.5, 0.01);
-    // Gaps that begin in the first half are not cut off; they are exponential.
+    // Gaps that begin in the first half are not truncated; they are exponentially distributed.
     double gaps = 0;
     double sum = 0;
     double squares = 0;
@@ -331,7 +331,7 @@ TEST(Dvs, AnswersASineOfLightWithAsManyOnAsOff) {
       int on = 0;
       for (const auto& event : events) on += event.polarity == Polarity::on ? 1 : -1;
       ASSERT_GT(events.size(), 200U);
-      // It may end a swing away from where it began, and the first one settles.
+      // It may end one swing away from its start, and the first one settles.
       ASSERT_LE(std::abs(on), cutoff_hz > 0 ? 4 : 1);
     }
   }
@@ -370,7 +370,7 @@ DvsSettings everything() {
           .seed = 11};
 }
 
-/// All events of a short film, whose rows have `padding` bytes past their end.
+/// All events of a short video whose rows have `padding` bytes past their end.
 template <class Pixel>
 std::vector<std::vector<Event>> film(int width, int height, int bits, const DvsSettings& settings,
                                      int threads, int padding = 0) {
@@ -492,7 +492,7 @@ TEST(Dvs, DoesNotSeeTheNoiseOfFramesThatAreDenoised) {
     std::minstd_rand random(9);
     std::normal_distribution<> normal(0, 2);
     for (int i = 0; i < 10; ++i) {
-      // A square moves over a still background.
+      // A square moves over a static background.
       auto frame = scene::square(80, 60, 10 + 3 * i, 20, 20, 90, 30);
       for (int y = 0; y < frame.height(); ++y)
         for (int x = 0; x < frame.width(); ++x)
@@ -528,7 +528,7 @@ TEST(Dvs, HasItsSharesOfHotAndDeadPixels) {
 }
 
 TEST(Dvs, FiresAllOverAsExposuresBegin) {
-  // The first pulse in a still scene, up and down by 0.45: ON when it passes 0.2 and 0.4, OFF when
+  // The first pulse in a static scene, up and down by 0.45: ON when it passes 0.2 and 0.4, OFF when
   // it passes 0.1 again.
   const auto first_pulse_is_at = [&](double begin, double lead) {
     Playback playback({9, 3, 8},
@@ -547,7 +547,7 @@ TEST(Dvs, FiresAllOverAsExposuresBegin) {
   };
   first_pulse_is_at(33'000, 7000);
   first_pulse_is_at(39'400, 600);  // ends after the frame
-  first_pulse_is_at(39'900, 0);    // an edge has to be within the interval
+  first_pulse_is_at(39'900, 0);    // an edge must be within the interval
   first_pulse_is_at(0, 40'000);
 
   Playback later({9, 3, 8}, {.exposure_pulse = 0.45, .exposure_lead = 40'001});
@@ -576,7 +576,7 @@ TEST(Dvs, SeesTheSameLightWhereAPulseCutsIt) {
     for (const auto& event : cut) cut_sum += event.t;
     EXPECT_NEAR(cut_sum / static_cast<double>(cut.size()), sum / static_cast<double>(whole.size()),
                 20);
-    // A pulse fires ON in pixels that were about to.
+    // A pulse fires ON in pixels that were about to fire.
     const auto pulsed = events_with(0.1);
     const auto on_within = [](const std::vector<TimedEvent>& events) {
       return std::count_if(events.begin(), events.end(), [](const TimedEvent& event) {
@@ -604,7 +604,7 @@ TEST(Dvs, SendsEventsAsLateAsItsLatency) {
   ASSERT_EQ(prompt.size(), 6U * 5U * 3U);
   ASSERT_EQ(late.size(), prompt.size());
   for (std::size_t i = 0; i < prompt.size(); ++i) EXPECT_NEAR(late[i].t, prompt[i].t + 25, 1);
-  // Past the end of the interval, none is lost; but a pixel makes one event at a time.
+  // No event is lost at the end of the interval, but a pixel has one pending event at a time.
   const auto later = play(45'000);
   EXPECT_EQ(later.size(), 6U * 5U);
   EXPECT_GT(later.front().t, 45'000);
@@ -630,10 +630,10 @@ TEST(Dvs, ReadsOutNoMoreThanItCan) {
   const auto slow = play(20'000);
   EXPECT_LT(slow.size(), all.size());
   EXPECT_GT(slow.size(), 3000U);
-  // At no time more than the rate, plus the rows under way.
+  // Never exceeds the rate, plus the rows being read.
   for (std::size_t i = 500; i < slow.size(); ++i)
     ASSERT_GE(slow[i].t - slow[i - 500].t, (500 - 2 * width) / 20'000.0 * second - 1);
-  // Events that leave together are of one row.
+  // Events that leave together belong to one row.
   for (std::size_t i = 1; i < slow.size(); ++i)
     ASSERT_TRUE(slow[i].t != slow[i - 1].t || slow[i].y == slow[i - 1].y);
 }
@@ -659,7 +659,7 @@ TEST(Dvs, FollowsMotion) {
     return sum / count;
   };
   EXPECT_LT(deviation(play(Upsampling::motion)), 0.7 * deviation(play(Upsampling::linear)));
-  // Where nothing moves, nothing fires.
+  // Static parts do not fire.
   Playback still({40, 30, 8}, DvsSettings{.upsampling = Upsampling::motion});
   stand(still, scene::texture<std::uint8_t>(40, 30, 8, 1, 2), 3, 40'000'000);
   EXPECT_TRUE(still.events.empty());

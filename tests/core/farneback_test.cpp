@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Farneback's flow equals its plain reference: sizes down to one pixel and up to four levels,
-// strides, textures and noise; it is the same bit for bit on every SIMD target that this processor
-// has, for any number of threads, and whatever came before.
+// strides, textures and noise. It is bit-identical on every SIMD target of this processor, for any
+// number of threads, and independent of earlier calls.
 #include "src/flow/farneback/farneback.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using namespace eventcamera;
 struct Case {
   int width;
   int height;
-  bool noise;  ///< two pictures that have nothing to do with each other; else a texture that moves
+  bool noise;  ///< two unrelated images; else a moving texture
 };
 
 void PrintTo(const Case& c, std::ostream* out) {
@@ -115,7 +115,7 @@ TEST_P(Farneback, DoesNotDependOnWhatCameBefore) {
   EXPECT_TRUE(equal(copy(flow.flow(threads)), flow_of(second, third, threads)));
 }
 
-/// Nothing outside of the view is read: not beside it, and nothing at all behind its end.
+/// Nothing outside the view is read, neither beside it nor past its end.
 TEST_P(Farneback, TakesAPartOfAPictureWhereItLies) {
   const int width = GetParam().width;
   const int height = GetParam().height;

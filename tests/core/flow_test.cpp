@@ -85,7 +85,7 @@ TEST_P(EveryFlow, KnowsThePicturesThatWerePushedBefore) {
     ASSERT_EQ(std::memcmp(a.row(y), b.row(y), 200 * sizeof(Flow)), 0) << "row " << y;
 }
 
-/// A square of texture that moves by (3, 1) over a still, textured ground.
+/// A textured square that moves by (3, 1) over a static textured background.
 struct MovingPatch {
   MovingPatch() : from(picture(0, 0)), to(picture(3, 1)) {}
   static Image<std::uint8_t> picture(int dx, int dy) {
@@ -183,7 +183,7 @@ TEST(FixedPoint, SharesAFlowOutOverTheSteps) {
 }
 
 TEST(FixedPoint, RoundsToTheNearestPixel) {
-  const Motion motion = motion_per_step(10, 4);  // 2.5 a step
+  const Motion motion = motion_per_step(10, 4);  // 2.5 per step
   EXPECT_EQ(moved(100, motion, 1), 103);
   EXPECT_EQ(moved(100, motion, 2), 105);
   EXPECT_EQ(moved(100, -motion, 1), 98);

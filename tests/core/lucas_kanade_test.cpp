@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Pyramids and searches equal their plain references on every SIMD target of this processor, and
-// tracks are no further from the truth than those of OpenCV. How close they come to OpenCV's on
-// real pictures is measured in tests/pipelines.
+// tracks are at least as accurate as OpenCV's. tests/pipelines compares them to OpenCV's on real
+// video.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -141,7 +141,7 @@ TEST(PointTracker, IsAsTrueAsOpenCv) {
   std::vector<float> error;
   cv::calcOpticalFlowPyrLK(opencv_picture(from.view()), opencv_picture(to.view()), starts, ends,
                            status, error, {15, 15}, 3, {3, 10, 0.03});
-  // Both lose some of them to a texture that repeats itself.
+  // Both lose some of them to repetitive texture.
   int ours = 0;
   int opencv = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {

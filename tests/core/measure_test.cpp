@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What is measured of streams, beside the same worked out from all of their events at once.
+// Compares measurements of streams to the same values computed from all events at once.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ struct Extent {
 
 using Stream = std::vector<AbsoluteEvent>;
 
-/// Sorted events by chance in (start, end]; some of the times are the same.
+/// Sorted random events in (start, end]; some times are equal.
 Stream stream_by_chance(Extent extent, std::size_t count, Microseconds start, Microseconds end,
                         unsigned seed) {
   std::mt19937 random(seed);
@@ -42,7 +42,7 @@ Stream stream_by_chance(Extent extent, std::size_t count, Microseconds start, Mi
   return stream;
 }
 
-/// Hands a stream on in buffers of lengths by chance, whose borders lie on microseconds.
+/// Passes a stream in buffers of random length, with boundaries at whole microseconds.
 class Feed {
  public:
   Feed(StreamRole role, const Stream& stream, Microseconds start, Microseconds end, unsigned seed)

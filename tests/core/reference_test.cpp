@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Every method equals its plain scalar reference, event for event: sizes down to one pixel, depths,
-// strides, steps, thresholds, textures and noise, motion over the border, numbers of threads; and
-// on every SIMD target that this processor has.
+// strides, steps, thresholds, textures and noise, motion across the border, numbers of threads, and
+// on every SIMD target of this processor.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -24,8 +24,8 @@ using namespace eventcamera;
 
 enum class Picture {
   noise,
-  texture,  ///< seen by a camera that moves
-  patch,    ///< something that moves before a texture that stands still
+  texture,  ///< seen by a moving camera
+  patch,    ///< an object that moves in front of a static texture
 };
 
 struct Case {
@@ -42,7 +42,7 @@ void PrintTo(const Case& c, std::ostream* out) {
        << ", picture " << static_cast<int>(c.picture) << ", " << c.threads << " threads";
 }
 
-/// A picture in memory whose rows lie apart, with rubbish between them.
+/// Image with garbage between its rows.
 template <class Pixel>
 class Padded {
  public:

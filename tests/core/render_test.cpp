@@ -59,7 +59,7 @@ TEST(Accumulator, BeginsAnewAfterDrawing) {
   EXPECT_TRUE(std::ranges::all_of(out, [](std::byte b) { return b == std::byte{128}; }));
 }
 
-/// Events by chance in buckets of some steps and bands; `share` of the pixels fire in a step.
+/// Random events in buckets by step and band; a fraction `share` of the pixels fires per step.
 EventBuckets events_by_chance(int width, int height, double share) {
   std::minstd_rand random(static_cast<unsigned>(width));
   std::bernoulli_distribution fires(share);
@@ -75,7 +75,7 @@ EventBuckets events_by_chance(int width, int height, double share) {
   return buckets;
 }
 
-/// The picture of events, pixel by pixel.
+/// Draws the events pixel by pixel.
 std::vector<std::byte> plainly_drawn(const EventBuckets& events, int width, int height, int stride,
                                      const Palette& palette, const PixelLayout& layout) {
   std::vector<std::byte> out(static_cast<std::size_t>(stride * height), std::byte{7});
@@ -110,7 +110,7 @@ const PixelLayout layouts[] = {{},
                                {.bytes = 4, .red = 2, .green = 1, .blue = 0},
                                {.bytes = 4, .red = 1, .green = 2, .blue = 3}};
 
-/// Pictures that are narrower than any vector, a vector, and somewhat wider.
+/// Pictures narrower than any vector, as wide as a vector, and slightly wider.
 void expect_pictures_as_drawn_plainly() {
   for (const int width : {1, 7, 15, 16, 17, 31, 32, 33, 63, 64, 65, 100, 129}) {
     for (const auto& layout : layouts) {

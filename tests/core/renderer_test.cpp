@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Pictures of known events, beside ones that are drawn from the definition of each mode.
+// Compares pictures of known events to ones drawn by the definition of each mode.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using namespace eventcamera;
 constexpr int width = 37;
 constexpr int height = 21;
 
-/// Sorted events by chance, of 1 ... duration microseconds.
+/// Sorted random events at 1 ... duration microseconds.
 std::vector<Event> events_by_chance(int count, int duration, unsigned seed) {
   std::minstd_rand random(seed);
   const auto below = [&random](int n) { return std::uniform_int_distribution<>(0, n - 1)(random); };
@@ -43,7 +43,7 @@ Picture draw(Renderer& renderer, Microseconds start, Microseconds end,
   return picture;
 }
 
-/// A grey picture, pixel by pixel.
+/// Draws a grey picture pixel by pixel.
 template <class Value>
 Picture plainly(const Value& grey_of) {
   Picture picture;
@@ -98,7 +98,7 @@ std::span<const Event> between(const std::vector<Event>& events, int start, int 
           std::upper_bound(events.begin(), events.end(), end, after)};
 }
 
-/// The largest difference of two pictures' bytes.
+/// Largest difference between the bytes of two pictures.
 int distance(const Picture& a, const Picture& b) {
   int most = a.size() == b.size() ? 0 : 255;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
@@ -123,7 +123,7 @@ TEST(Renderer, DrawsAnIntervalAsTheAccumulatorDoes) {
   }
 }
 
-/// Windows that are longer and shorter than the time from picture to picture.
+/// Windows longer and shorter than the time between pictures.
 TEST(Renderer, DrawsWindowsThatOverlap) {
   const auto events = events_by_chance(6000, 100'000, 2);
   for (const auto mode : {RenderMode::accumulate, RenderMode::count}) {
@@ -156,7 +156,7 @@ TEST(Renderer, DrawsTheLastSoManyEvents) {
   }
 }
 
-/// The longest run of last events of which no area has more than its share.
+/// Longest run of latest events with at most the limit in each area.
 TEST(Renderer, DrawsUntilAnAreaIsFull) {
   const auto events = events_by_chance(3000, 100'000, 4);
   constexpr int side = 8;
@@ -261,7 +261,7 @@ TEST(Renderer, ForgetsAllWhenReset) {
     const auto blank = draw(renderer, 0, 1'000'000);
     renderer.reset();
     renderer.add(events, 0);
-    EXPECT_NE(draw(renderer, 0, 1000), blank);  // time began anew too
+    EXPECT_NE(draw(renderer, 0, 1000), blank);  // time has started over, too
     renderer.reset();
     EXPECT_EQ(draw(renderer, 0, 1000), blank);
   }
@@ -281,7 +281,7 @@ TEST(Renderer, KeepsWhatItShowsWhenRepainted) {
   }
 }
 
-/// A window that takes for ever at a rate that knows no bounds.
+/// An infinite window at an unbounded event rate.
 TEST(Renderer, KeepsSoManyEventsAndNoMore) {
   constexpr std::size_t more = RecentEvents::max_size + 10;
   Renderer renderer(width, height, {.mode = RenderMode::count, .full_scale = 100});

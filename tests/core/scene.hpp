@@ -10,7 +10,7 @@
 
 #include "src/simulate/simulator.hpp"
 
-/// Hand-made pictures, and the events that a simulator makes of them.
+/// Synthetic images, and the events that a simulator generates from them.
 namespace scene {
 
 using eventcamera::Event;
@@ -31,7 +31,7 @@ Image<Pixel> flat(int width, int height, int grey) {
   return picture;
 }
 
-/// Every pixel by chance, in all `bits`.
+/// Random pixels in the full range of `bits`.
 template <class Pixel>
 Image<Pixel> noise(int width, int height, int bits, unsigned seed) {
   std::minstd_rand random(seed);
@@ -42,8 +42,7 @@ Image<Pixel> noise(int width, int height, int bits, unsigned seed) {
   return picture;
 }
 
-/// A cut-out of an endless smooth texture in full contrast: what a camera sees that looks at
-/// (left, top).
+/// A section of an infinite smooth texture with full contrast, as seen by a camera at (left, top).
 template <class Pixel>
 Image<Pixel> texture(int width, int height, int bits, double left, double top) {
   const double white = (1 << bits) - 1;
@@ -60,7 +59,7 @@ Image<Pixel> texture(int width, int height, int bits, double left, double top) {
   return picture;
 }
 
-/// A square with its upper left corner at (left, top) before a flat ground.
+/// A square with its upper left corner at (left, top) on a flat background.
 inline Image<std::uint8_t> square(int width, int height, int left, int top, int side,
                                   std::uint8_t grey, std::uint8_t ground) {
   auto picture = flat<std::uint8_t>(width, height, ground);
@@ -97,7 +96,7 @@ inline std::vector<Event> last_interval(Simulator& simulator, const Settings& se
   return events;
 }
 
-/// Whether events are sorted by time and, within a time, in raster order, each place once.
+/// True if events are sorted by time, then in raster order, with each pixel at most once per time.
 inline bool sorted(const std::vector<Event>& events) {
   for (std::size_t i = 1; i < events.size(); ++i) {
     const auto& a = events[i - 1];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Scenes whose events are known beforehand.
+// Scenes with known events.
 #include "src/simulate/simulator.hpp"
 
 #include <gtest/gtest.h>
@@ -84,7 +84,7 @@ TEST_P(EveryMethod, SeesNothingOnceASquareHasStopped) {
 TEST_P(EveryMethod, FiresEverywhereWhenTheLightGoesOn) {
   const auto events =
       events_of({scene::flat<std::uint8_t>(70, 50, 50), scene::flat<std::uint8_t>(70, 50, 200)});
-  // Blending brightens in steps; the others know no motion, and change with the new frame.
+  // Blending brightens in steps; the others detect no motion and change with the new frame.
   const std::size_t steps = std::string(GetParam().name) == "dense_blend" ? 11 : 1;
   EXPECT_EQ(events.size(), 70U * 50U * steps);
   for (const auto& event : events) ASSERT_EQ(event.polarity(), Polarity::on);
@@ -107,8 +107,8 @@ TEST_P(EveryMethod, WorksOnOnePixel) {
 
 TEST_P(EveryMethod, DrawsTheOutlineOfAMovingSquare) {
   const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
-  // It moves 8 pixels an interval to the right: the band that it enters, [72, 80), turns on,
-  // the one that it leaves, [48, 56), turns off.
+  // It moves to the right by 8 pixels per interval: the band that it enters, [72, 80), fires ON,
+  // the one that it leaves, [48, 56), fires OFF.
   std::map<Polarity, double> sum_x;
   std::map<Polarity, int> count;
   for (const auto& event : events_of({at(40), at(48), at(56)})) {
@@ -171,8 +171,8 @@ TEST_P(EveryMethod, GivesTheSameIn16Bits) {
   for (const auto& frame : narrow) wide.push_back(widened(frame));
   for (const auto& frame : wide) views.push_back(scene::luma(frame.view(), 16));
   const auto simulator = GetParam().make({90, 60, 16});
-  // Interpolated frames round to a finer grey level; half-way between two of the coarser ones, a
-  // threshold parts nearly the same steps.
+  // Interpolated frames are rounded to finer grey levels; a threshold halfway between two of the
+  // coarser ones separates nearly the same steps.
   half_a_level_more = 0.5;
   const auto in_16_bits = scene::last_interval(*simulator, settings(), views);
   const auto in_8_bits = events_of(narrow);
@@ -254,7 +254,7 @@ TEST(DiffSimulator, MovesTheEdgesOfASquareEvenly) {
 }
 
 TEST(SparseSimulator, CarriesATexturedPatchAlong) {
-  // A textured patch moves 8 pixels to the right before a flat ground.
+  // A textured patch moves 8 pixels to the right in front of a flat background.
   const auto patch = scene::texture<std::uint8_t>(24, 24, 8, 5, 9);
   const auto at = [&](int left) {
     auto picture = scene::flat<std::uint8_t>(120, 80, 128);
@@ -269,8 +269,8 @@ TEST(SparseSimulator, CarriesATexturedPatchAlong) {
   const auto b = at(48);
   const auto simulator = make_sparse_simulator({120, 80, 8});
   const auto events = scene::last_interval(*simulator, settings, {scene::luma(a), scene::luma(b)});
-  // The columns that the patch leaves show the ground from the step after which nothing of it
-  // stands there any more: column 40 from step 1, column 41 from step 2, and so on.
+  // Columns that the patch leaves show the background once it is gone: column 40 from step 1,
+  // column 41 from step 2, and so on.
   for (int column = 0; column < 8; ++column) {
     std::map<int, int> last_step;
     for (const auto& event : events)

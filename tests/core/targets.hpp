@@ -6,10 +6,10 @@
 
 #include <cstdint>
 
-/// The SIMD targets that this processor has.
+/// SIMD targets supported by this processor.
 namespace targets {
 
-/// Runs a body with each of them chosen in turn.
+/// Runs a body on each of them in turn.
 template <class Body>
 void for_each(const Body& body) {
   const auto choose = [](std::int64_t target) {
@@ -19,7 +19,7 @@ void for_each(const Body& body) {
   for (const auto target : hwy::SupportedAndGeneratedTargets()) {
     choose(target);
     body(hwy::TargetName(target));
-    choose(0);  // whichever is best
+    choose(0);  // back to the best one
   }
 }
 

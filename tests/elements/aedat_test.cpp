@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// aedatdemux and aedatmux, on files that the encoder makes, on broken ones, and on a recording.
+// aedatdemux and aedatmux on encoded files, on corrupt files, and on a recording.
 #include <atomic>
 #include <filesystem>
 #include <fstream>
@@ -35,7 +35,7 @@ using Bytes = std::vector<std::uint8_t>;
 using Events = std::vector<AbsoluteEvent>;
 
 constexpr SensorSize sensor{346, 260};
-/// Of a recording with the times of day.
+/// Start time of a recording with absolute times.
 constexpr Microseconds of_1970 = 1'700'000'000'000'000;
 constexpr const char* davis = "davis346-frames-events-imu.aedat4";
 
@@ -62,7 +62,7 @@ Events steady_events(Microseconds end, Microseconds step, Microseconds start = 0
   return events;
 }
 
-/// A file whose header tells of its table.
+/// A file with a table that is stated in its header.
 Bytes finished(Aedat4Encoder& encoder, Bytes bytes) {
   encoder.finish(bytes);
   if (const auto patch = encoder.patch())
@@ -79,7 +79,7 @@ Bytes aedat4(const Events& events, Aedat4Compression compression = Aedat4Compres
   return finished(encoder, bytes);
 }
 
-/// Events, and a frame every 40 ms whose pixels tell its number; the first is before the events.
+/// Events, and a frame every 40 ms whose pixels contain its number; the first is before the events.
 Bytes aedat4_with_frames(const Events& events, PixelFormat format, int frames) {
   Aedat4Encoder encoder({sensor, "", Aedat4Compression::zstd, true, true});
   Bytes bytes;
@@ -127,7 +127,7 @@ struct Picture {
   std::string bytes;
 };
 
-/// What came out of a pad since its last segment.
+/// Output of a pad since its last segment.
 struct Track {
   std::string caps;
   Events events;
@@ -139,10 +139,10 @@ struct Track {
   std::size_t eos = 0;
 };
 
-/// Plays files with aedatdemux, named d, and keeps what comes out of each of its pads.
+/// Plays files with aedatdemux, named d, and records the output of each of its pads.
 class Player {
  public:
-  /// `between` lies between the file and the demuxer; identity makes it push.
+  /// `between` is inserted between the file and the demuxer; identity forces push mode.
   explicit Player(const std::string& path, const std::string& between = "",
                   const std::string& properties = "") {
     gst_init(nullptr, nullptr);
@@ -164,7 +164,7 @@ class Player {
     ASSERT_NE(gst_element_set_state(pipeline_.get(), state), GST_STATE_CHANGE_FAILURE);
   }
 
-  /// Stops, and takes away what the pads were linked to.
+  /// Stops, and removes the elements linked to the pads.
   void stop() {
     set_state(GST_STATE_READY);
     for (GstElement* element : std::exchange(after_, {})) {
@@ -173,7 +173,7 @@ class Player {
     }
   }
 
-  /// To the end or an error; false for that, or where nothing happens any more.
+  /// Plays to the end. False after an error or a timeout.
   bool play() {
     set_state(GST_STATE_PLAYING);
     return wait();
@@ -342,7 +342,7 @@ class Player {
   std::vector<GstElement*> after_;  ///< the pipeline's
 };
 
-/// Pulled, and pushed in pieces of any size.
+/// In pull mode, and in push mode with pieces of any size.
 const char* const ways[] = {"", "identity", "identity ! identity name=i"};
 
 TEST(AedatDemux, HandsOutTheEventsOfEveryVersion) {
@@ -464,7 +464,7 @@ TEST(AedatDemux, TellsOfSilenceInFewWords) {
   EXPECT_GE(track.gaps, 1U);
 }
 
-/// Frames go on where events end, and events where frames end.
+/// Frames continue after the end of events, and events after the end of frames.
 TEST(AedatDemux, KeepsSilentStreamsGoing) {
   const auto few = steady_events(10'000, 100);
   const File frames(aedat4_with_frames(few, PixelFormat::grey8, 250));
@@ -509,7 +509,7 @@ TEST(AedatDemux, Seeks) {
     const auto track = player.track("events_0");
     EXPECT_EQ(track.events.front().t, zero + 2'000'000);
     EXPECT_EQ(track.events.back().t, zero + 2'999'800);
-    // The end stays where it is, which is before this.
+    // The stop position is kept, which is before this.
     EXPECT_FALSE(gst_element_seek(player.pipeline(), 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
                                   GST_SEEK_TYPE_SET, 5 * GST_SECOND, GST_SEEK_TYPE_NONE, -1));
     ASSERT_TRUE(player.seek(0, 3 * GST_SECOND, GST_SEEK_FLAG_SEGMENT));
@@ -542,7 +542,7 @@ TEST(AedatDemux, SeeksWhilePlayingAgainAndAgain) {
   EXPECT_EQ(player.track("video_0").pictures.size(), 50U);
 }
 
-/// Of the first corruption, as the decoder finds it without any element.
+/// The first corruption, as found by the decoder alone.
 std::uint64_t place_of_corruption(const Bytes& bytes) {
   Aedat4Decoder decoder;
   decoder.push(bytes);
@@ -574,7 +574,7 @@ TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
       bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at),
                   bytes.begin() + static_cast<std::ptrdiff_t>(at) + 33);
     const File file(bytes);
-    // Pulled, its table is missed, too; what is told of is the corruption that comes first.
+    // In pull mode its table is missing, too; the first corruption is reported.
     const auto first_corruption = place_of_corruption(bytes);
     for (const char* between : {"", "identity"}) {
       Player player(file.path(), between);
@@ -660,7 +660,7 @@ TEST(AedatDemux, SaysWhereAFileHasNoEvents) {
   Player player(empty.path());
   EXPECT_FALSE(player.play());
   EXPECT_NE(player.error.find("neither events nor frames"), std::string::npos) << player.error;
-  // Here there is a stream of them, though nothing is in it.
+  // There is a stream of events here, though it is empty.
   const File silent(aedat4({}));
   Player other(silent.path());
   EXPECT_TRUE(other.play()) << other.error;
@@ -693,7 +693,7 @@ TEST(AedatDemux, GoesThroughAllStates) {
   }
 }
 
-/// Flushed, a demuxer that is pushed to begins with the file's beginning again.
+/// After a flush in push mode, a demuxer starts over at the start of the file.
 TEST(AedatDemux, BeginsAnewAfterAFlush) {
   gst_init(nullptr, nullptr);
   const auto events = steady_events(200'000, 100);
@@ -734,7 +734,7 @@ struct Content {
   Aedat4Compression compression = Aedat4Compression::none;
 };
 
-/// What the decoder, without any element, reads in a file.
+/// Content of a file as read by the decoder alone.
 Content content_of(const Bytes& bytes) {
   Content content;
   Aedat4Decoder decoder;
@@ -795,7 +795,7 @@ TEST(AedatMux, WritesWhatTheDemuxerReads) {
       EXPECT_EQ(after.pictures[k].first, before.pictures[k].first + 3'000);
       EXPECT_TRUE(after.pictures[k].second == before.pictures[k].second);
     }
-    // The table is what tells the duration, and where to go on.
+    // Duration and seek positions come from the table.
     Player player(out.path());
     player.preroll();
     EXPECT_EQ(player.duration(), (before.events.back().t + 3'001) * 1000);
@@ -857,7 +857,7 @@ TEST(AedatMux, NeedsNoSeeking) {
   const auto events = steady_events(300'000, 70);
   const File in(aedat4(events));
   const File out{Bytes{}};
-  // What comes through the tee's branch goes on as a stream does.
+  // The branch of the tee continues as a stream.
   ASSERT_TRUE(run("filesrc location=" + in_quotes(in.path()) +
                   " ! aedatdemux ! aedatmux ! aedatdemux ! aedatmux compression=none ! filesink "
                   "location=" +
@@ -879,7 +879,7 @@ GstBuffer* events_buffer(GstClockTime pts, const std::vector<GstEventCameraEvent
 constexpr const char* xytp =
     "application/x-event-camera, format=XYTP, width=346, height=260, framerate=0/1";
 
-/// What is not pulled yet of what comes out until EOS.
+/// Output up to EOS that is not pulled yet.
 Bytes rest_of_file(GstHarness* h) {
   Bytes bytes;
   bool ended = false;
@@ -896,7 +896,7 @@ Bytes rest_of_file(GstHarness* h) {
   return bytes;
 }
 
-/// Pushes buffers into the muxer, and gives what comes out.
+/// Pushes buffers into the muxer and returns its output.
 Bytes muxed(const std::vector<GstBuffer*>& buffers, std::vector<std::string>* warnings = nullptr) {
   const Owned<GstHarness> h(gst_harness_new_with_padnames("aedatmux", "events", "src"));
   const Owned<GstBus> bus(gst_bus_new());
@@ -948,7 +948,7 @@ TEST(AedatMux, WritesAnewAfterAFlush) {
   EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_flush_start()));
   EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_flush_stop(TRUE)));
   while (Buffer(gst_harness_try_pull(h.get()))) continue;
-  // Where the stream goes on its running time is nought again.
+  // The running time of the continued stream is 0 again.
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   segment.start = segment.time = 500 * GST_MSECOND;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Where the buffers of intervals come from, and what their memory is.
+// Origin and memory of the buffers of intervals.
 #include <set>
 #include <tuple>
 
@@ -31,12 +31,12 @@ TEST_P(EveryOutput, ComesFromAPool) {
   EXPECT_LE(buffers.size(), 2U);
 }
 
-/// Frames of which so many rows change, one by one.
+/// Frames in which a given number of rows changes.
 class Rows {
  public:
   explicit Rows(Harness& h) : h_(h) {}
 
-  /// Pushes a frame and returns what comes out.
+  /// Pushes a frame and returns the output.
   Buffer change(int rows) {
     for (int y = 0; y < rows; ++y) bright_[y] = !bright_[y];
     EXPECT_EQ(h_.push(h_.frame(40 * GST_MSECOND * static_cast<GstClockTime>(count_++),
@@ -83,7 +83,7 @@ TEST(EventBuffers, GiveBackTheMemoryOfOneExtremeFrame) {
   Rows rows(h);
   rows.change(0);
   EXPECT_GE(room_of(rows.change(1000)), 8'000'000U);
-  EXPECT_GE(room_of(rows.change(1)), 8'000'000U);  // it may come again
+  EXPECT_GE(room_of(rows.change(1)), 8'000'000U);  // it may be needed again
   gsize room = 0;
   for (int i = 0; i < 300; ++i) room = room_of(rows.change(1));
   EXPECT_LE(room, 300'000U);

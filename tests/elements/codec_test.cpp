@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// The readers and writers of event files: every format there and back, pushed and pulled, whole,
-// in pieces, and broken.
+// Readers and writers of event files: round trips of every format, in push and pull mode, in one
+// piece or several, and corrupt.
 #include <glib/gstdio.h>
 
 #include <algorithm>
@@ -29,8 +29,8 @@ struct Format {
   const char* writer;
   const char* reader;
   const char* caps;
-  std::string end = {};    ///< what is no event; by default the file is cut short
-  bool tells_size = true;  ///< of the sensor
+  std::string end = {};    ///< invalid bytes at the end; by default the file is truncated
+  bool tells_size = true;  ///< the file states the sensor size
 };
 
 void PrintTo(const Format& format, std::ostream* out) {
@@ -52,8 +52,8 @@ std::string element_of(const char* launch) {
   return std::string(launch).substr(0, std::string(launch).find(' '));
 }
 
-/// Sorted, and no two of one pixel and time: a dot that runs through the rows for a second, from
-/// 2 s on, and again after a silence of three.
+/// Sorted events without duplicates: a dot that runs through the rows for a second, from 2 s on,
+/// and again after a silence of three seconds.
 std::vector<AbsoluteEvent> some_events() {
   std::vector<AbsoluteEvent> events;
   for (int i = 0; i < 20'000; ++i) {
@@ -70,7 +70,7 @@ std::string pull_bytes(Harness& h) {
   return bytes;
 }
 
-/// The file of these events, written by the element.
+/// File with these events, written by the element.
 std::string file_of(const Format& format, std::span<const AbsoluteEvent> events) {
   Harness h(format.writer);
   gst_harness_set_sink_caps_str(h.get(), format.caps);
@@ -118,7 +118,7 @@ void push_file(Harness& h, std::string_view file, std::size_t piece) {
   gst_harness_push_event(h.get(), gst_event_new_eos());
 }
 
-/// A file of the test's, gone with it.
+/// Temporary file, deleted with this object.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& content) {
@@ -139,7 +139,7 @@ class TemporaryFile {
   std::string path_;
 };
 
-/// A file, read by a pipeline.
+/// File read by a pipeline.
 class Player {
  public:
   Player(const std::string& path, const std::string& middle) {
@@ -172,7 +172,7 @@ class Player {
                        GST_STATE_CHANGE_SUCCESS;
   }
 
-  /// The message that ends it: EOS, an error, or none in time.
+  /// The message that ends it: EOS, an error, or none on timeout.
   Owned<GstMessage> play() {
     events.clear();
     gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING);
@@ -238,7 +238,7 @@ TEST_P(EveryFormat, IsReadAsItWasWrittenHoweverItIsSplit) {
 }
 
 TEST_P(EveryFormat, KeepsEveryEventOfATimeInTheFilesOrder) {
-  // Of one microsecond, and of one pixel more than once, against raster order.
+  // Events of the same microsecond, with repeated pixels, against raster order.
   std::vector<AbsoluteEvent> events;
   for (const Microseconds t : {5'000, 5'001, 25'000})
     for (const auto& [x, y, polarity] :
@@ -356,10 +356,10 @@ TEST_P(EveryFormat, WarnsOnceOfCorruptionAndTellsWhere) {
   ASSERT_NE(found, std::string::npos) << text;
   const auto position = std::stoul(text.substr(found + 13));
   EXPECT_LT(position, file.size());
-  EXPECT_GE(position + 13, file.size());  // of the longest event
+  EXPECT_GE(position + 13, file.size());  // size of the longest event
   EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
   EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
-  // Nearly all was whole.
+  // Nearly all events were intact.
   const auto read = pull_events(h);
   ASSERT_GT(read.size(), events.size() - 40);
   EXPECT_TRUE(std::equal(read.begin(), read.end(), events.begin()));
@@ -414,7 +414,7 @@ TEST_P(EveryFormat, IsPulledAndSoughtIn) {
                          [](const auto& event) { return event.t >= 2'000'000 + from; });
     EXPECT_EQ(player.events, expected);
 
-    // Back, and with an end.
+    // Backwards, and with a stop position.
     ASSERT_TRUE(player.pause());
     ASSERT_TRUE(player.seek(100 * GST_MSECOND));
     ASSERT_TRUE(player.seek(static_cast<GstClockTime>(from) * GST_USECOND,
@@ -423,7 +423,7 @@ TEST_P(EveryFormat, IsPulledAndSoughtIn) {
     std::erase_if(expected, [](const auto& event) { return event.t >= 2'000'000 + to; });
     EXPECT_EQ(player.events, expected);
 
-    // Beyond the end, and backwards.
+    // Past the end, and at a negative rate.
     ASSERT_TRUE(player.pause());
     EXPECT_FALSE(player.seek(GST_SECOND, GST_CLOCK_TIME_NONE, -1));
   }
@@ -486,7 +486,7 @@ TEST_P(EveryFormat, GoesThroughAllStates) {
     EXPECT_EQ(player.events.size(), 20'000U);
     EXPECT_TRUE(player.reaches(times % 2 == 0 ? GST_STATE_READY : GST_STATE_NULL));
   }
-  // Without data, and stopped in the middle.
+  // Without data, and stopped halfway.
   for (const auto& name : {element_of(format().reader), element_of(format().writer)}) {
     const Owned<GstElement> element(gst_element_factory_make(name.c_str(), nullptr));
     for (const auto state : {GST_STATE_PLAYING, GST_STATE_NULL, GST_STATE_PAUSED, GST_STATE_NULL})
@@ -522,7 +522,7 @@ TEST_P(EveryFormat, IsFreedWhileInUse) {
   }
 }
 
-/// A writer of `format`, with the caps of some events.
+/// Writer of `format`, with event caps.
 std::unique_ptr<Harness> writer_of(const Format& format) {
   auto h = std::make_unique<Harness>(format.writer);
   gst_harness_set_sink_caps_str(h->get(), format.caps);
@@ -572,7 +572,7 @@ TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
     EXPECT_EQ(h->push(buffer_of(events, 0)), GST_FLOW_OK);
   };
   push({3000});
-  // Another segment, whose times are earlier.
+  // Another segment with earlier times.
   push_segment(*h);
   for (int times = 0; times < 3; ++times) push({1000, 2000});
   EXPECT_FALSE(h->message(GST_MESSAGE_WARNING));
@@ -580,7 +580,7 @@ TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
   auto warning = h->message(GST_MESSAGE_WARNING);
   ASSERT_TRUE(warning);
   EXPECT_TRUE(text_of(warning.get()).starts_with("Left out 7 events earlier than"));
-  // What is left out then is told of once, at the end.
+  // Further dropped events are reported once, at the end.
   push({1000, 2000, 4999});
   push({6000});
   EXPECT_FALSE(h->message(GST_MESSAGE_WARNING));
@@ -681,7 +681,7 @@ std::string words_caps(const std::string& format) {
 }
 
 TEST_P(EveryWord, KeepsTheTimesOfItsBuffers) {
-  // Hours into the stream: further than the words' own clocks go.
+  // Hours into the stream, beyond the range of the words' clocks.
   const GstClockTime late = 5 * 3600 * GST_SECOND;
   Harness writer("evtenc");
   gst_harness_set_sink_caps_str(writer.get(), words_caps(GetParam()).c_str());
@@ -701,7 +701,7 @@ TEST_P(EveryWord, KeepsTheTimesOfItsBuffers) {
     EXPECT_EQ(GST_BUFFER_PTS(words.get()), static_cast<GstClockTime>(start) * GST_USECOND);
     reader.push(gst_buffer_ref(words.get()));
     while (const auto buffer = reader.pull()) append_events(buffer.get(), read);
-    // Nothing is held back for longer than an interval.
+    // Nothing is delayed by more than an interval.
     EXPECT_GE(read.size() + 4, expected.size());
   }
   gst_harness_push_event(reader.get(), gst_event_new_eos());

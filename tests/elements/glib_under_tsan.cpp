@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Tells ThreadSanitizer what GLib's locks guard and what its queues pass on, since it cannot see
-// futexes. Linked into a test, these functions replace GLib's own, which they call.
+// Makes the synchronization by GLib's locks and queues visible to ThreadSanitizer, which does not
+// see futexes. Linked into a test, these functions replace GLib's, and call them.
 #include <dlfcn.h>
 #include <glib-object.h>
 #include <sanitizer/tsan_interface.h>
 
 namespace {
 
-/// The function of that name that stands behind the one here.
+/// GLib's function of this name, which is replaced here.
 template <class Function>
 Function* behind(Function*, const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// eventhdf5dec and eventhdf5sink: files of every layout there and back, pulled and
-// pushed, sought in, broken, and to places where none can be written.
+// eventhdf5dec and eventhdf5sink: round trips of every layout, in pull and push mode, with seeks,
+// corrupt files and unwritable locations.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -27,7 +27,8 @@ constexpr int height = 240;
 constexpr const char* events_caps =
     "application/x-event-camera, format=XYTP, width=320, height=240, framerate=0/1";
 
-/// A dot that runs through the rows for a second, from 2 s on, and again after a silence of three.
+/// A dot that runs through the rows for a second, from 2 s on, and again after a silence of three
+/// seconds.
 Events some_events() {
   Events events;
   for (int i = 0; i < 50'000; ++i) {
@@ -95,7 +96,7 @@ void append_events(GstBuffer* buffer, Events& out) {
   for (const auto& event : events_of(buffer)) out.push_back({start + event.t, event.x, event.y_p});
 }
 
-/// A pipeline that ends in a fakesink of events.
+/// Pipeline that ends in a fakesink for events.
 class Player {
  public:
   explicit Player(const std::string& launch) {
@@ -261,7 +262,7 @@ TEST_P(Hdf5, SurvivesBrokenFiles) {
   const auto path = written(events);
   std::ifstream stream(path, std::ios::binary);
   const std::string whole(std::istreambuf_iterator<char>(stream), {});
-  // The library itself is not proof against corruption in its own structures, so only data is.
+  // The library is not robust against corruption of its own structures, so only data is corrupted.
   auto corrupt = whole;
   const auto middle = corrupt.size() / 2;
   for (std::size_t i = 0; i < 64; ++i)
@@ -287,16 +288,16 @@ TEST_P(Hdf5, IsWritten) {
                 " ! eventhdf5dec ! tee name=t  t. ! queue ! eventhdf5sink layout=" + GetParam() +
                 " location=" + in_quotes(path) + "  t. ! queue");
   ASSERT_TRUE(player.ends_well());
-  // It is whole at the end of the stream, not only after the stop.
+  // The file is complete at the end of the stream, not only after the stop.
   EXPECT_TRUE(read(path) == events);
-  // Again, over what is there.
+  // Again, overwriting the existing file.
   ASSERT_TRUE(player.reaches(GST_STATE_READY));
   ASSERT_TRUE(player.ends_well());
   ASSERT_TRUE(player.reaches(GST_STATE_NULL));
   EXPECT_TRUE(read(path) == events);
 }
 
-/// The sink, fed by the test.
+/// Sink fed by the test.
 class Sink {
  public:
   explicit Sink(const std::string& launch) {
@@ -356,7 +357,7 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
                          AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
   EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
   EXPECT_TRUE(sink.message(GST_MESSAGE_WARNING).starts_with("Left out 2 events outside"));
-  // Time goes back.
+  // Time goes backwards.
   EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);
   EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
   sink.end();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// eventstats and eventcompare: which events count, when figures come, and what is written.
+// eventstats and eventcompare: which events count, when statistics are posted, and what is written.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -48,7 +48,7 @@ gint64 time_in(const GstStructure* figures, const char* field) {
   return value;
 }
 
-/// A structure that lies in another.
+/// Nested structure.
 const GstStructure* within(const GstStructure* structure, const char* field) {
   const GValue* value = gst_structure_get_value(structure, field);
   return value != nullptr ? gst_value_get_structure(value) : nullptr;
@@ -62,7 +62,7 @@ class MeasureTest : public testing::Test {
   }
   ~MeasureTest() override { std::filesystem::remove_all(folder); }
 
-  /// As text for a launch line.
+  /// Path as text for a launch line.
   std::string path(const std::string& name) const { return (folder / name).string(); }
 
   const std::filesystem::path folder =
@@ -104,7 +104,7 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_EQ(count_in(cumulative), 4U);
   EXPECT_EQ(time_in(cumulative, "end"), gint64{1100 * ms});
   EXPECT_NEAR(number_in(cumulative, "rate"), 40, 1e-9);
-  // A pixel with 2, another with 2, and 30 with none, in a tenth of a second.
+  // Two pixels with 2 events each, and 30 with none, in a tenth of a second.
   EXPECT_NEAR(number_in(cumulative, "std-dev"), std::sqrt(8 / 32.0 - 1 / 64.0) * 10, 1e-9);
   EXPECT_NE(text_in(path("f.json")).find("\"events\" : 4"), std::string::npos);
   EXPECT_NE(text_in(path("f.json")).find("\"cumulative\" : true"), std::string::npos);
@@ -213,7 +213,7 @@ TEST_F(StatsTest, GoesOnWhereTimeGoesBackAndWherePtsAreMissing) {
   EXPECT_NEAR(number_in(structure_of(message), "rate"), 100, 1e-9);
 }
 
-/// Setting an element to PAUSED, and the error of it.
+/// Sets an element to PAUSED and returns its error.
 std::string refusal_of(const std::string& launch) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(GST_ELEMENT(gst_object_ref_sink(
@@ -266,7 +266,7 @@ class CompareTest : public MeasureTest {
 
   void end(GstHarness* h) { gst_harness_push_event(h, gst_event_new_eos()); }
 
-  /// The buffers that go on until EOS, and then the figures.
+  /// Buffers passed through until EOS, then the statistics.
   const GstStructure* conclude() {
     GstBuffer* last = nullptr;
     while (gst_harness_buffers_in_queue(candidate) > 0)
@@ -290,7 +290,7 @@ class CompareTest : public MeasureTest {
 TEST_F(CompareTest, ComparesWhatBothCoverAndPassesTheCandidate) {
   make("location=" + in_quotes(path("f.json")) + " map=" + in_quotes(path("map.png")));
   begin();
-  // The candidate begins 10 ms later; what of the reference lies before that does not count.
+  // The candidate starts 10 ms later; earlier events of the reference do not count.
   gst_harness_push(reference, buffer_of(0,
                                         {Event::at(1, 1, 5'000, Polarity::on),
                                          Event::at(1, 1, 15'000, Polarity::on),

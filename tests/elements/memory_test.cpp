@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// In steady state memory does not grow.
+// Memory does not grow in steady state.
 #include <malloc.h>
 
 #include <tuple>
@@ -13,8 +13,7 @@ using namespace harness;
 constexpr const char* video = "video/x-raw, format=GRAY8, width=64, height=48, framerate=25/1";
 constexpr const char* pictures = "video/x-raw, format=BGRx";
 
-/// A small square that flies over a texture, again and again; the frames' memory is shared by all
-/// of their buffers.
+/// A small square that flies over a texture repeatedly; all buffers of a frame share its memory.
 class Flight {
  public:
   explicit Flight(const Harness& h) {
@@ -35,7 +34,7 @@ class Flight {
   std::vector<Buffer> frames_;
 };
 
-/// Bytes that the process has from the heap.
+/// Heap memory used by the process, bytes.
 std::size_t bytes_in_use() {
   const auto info = mallinfo2();
   return info.uordblks + info.hblkhd;
@@ -58,7 +57,7 @@ TEST_P(Memory, DoesNotGrowOverTenThousandFrames) {
     ASSERT_EQ(buffer != nullptr, i > 0);
     if (i == 1'000) after_a_thousand = bytes_in_use();
   }
-  // Less than a pointer for each frame.
+  // Less than a pointer per frame.
   EXPECT_LE(bytes_in_use(), after_a_thousand + 64 * 1024);
 }
 

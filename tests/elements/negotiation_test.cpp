@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Which video goes in, what comes out, and in whose memory.
+// Accepted input, output formats, and the memory of output buffers.
 #include "tests/elements/harness.hpp"
 
 namespace {

@@ -38,7 +38,7 @@ class OverlayTest : public testing::Test {
     gst_harness_push(events.get(), buffer_of(pts, list, duration));
   }
 
-  /// The next frame's places that are not grey 100, and what they are.
+  /// Pixels of the next frame that differ from grey 100, and their values.
   std::vector<std::pair<int, int>> drawn() {
     const Buffer frame(gst_harness_pull(video.get()));
     if (!frame) return {{-1, -1}};

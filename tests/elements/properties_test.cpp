@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Defaults are those of the paper's table of settings, and what gst-inspect-1.0 tells is complete.
+// Defaults are those of the paper's table of settings, and the metadata shown by gst-inspect-1.0 is
+// complete.
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -21,7 +22,7 @@ struct Defaults {
   const char* element;
   double threshold;
   bool interpolates;
-  double unit = 1;  ///< of the thresholds that a test sets
+  double unit = 1;  ///< unit of the thresholds set by a test
 };
 
 class EveryElement : public testing::TestWithParam<Defaults> {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// eventrender: which pictures there are, when they are, and what they show.
+// eventrender: number, times and content of pictures.
 #include <algorithm>
 
 #include "gst/base/drawn_video.hpp"
@@ -24,7 +24,7 @@ std::string grey_at(const std::string& framerate) {
   return "video/x-raw, format=GRAY8, framerate=" + framerate;
 }
 
-/// ON in a column, half-way through an interval of 40 ms.
+/// ON in a column, halfway through an interval of 40 ms.
 std::vector<Event> column(int x) {
   std::vector<Event> events;
   for (int y = 0; y < height; ++y) events.push_back(Event::at(x, y, 20'000, Polarity::on));
@@ -67,7 +67,7 @@ class Render : public testing::Test {
     return h.push(buffer_of(pts, events, duration));
   }
 
-  /// Ends the stream, and gives all pictures that came out.
+  /// Ends the stream and returns all pictures.
   std::vector<Buffer> finish() {
     gst_harness_push_event(h.get(), gst_event_new_eos());
     std::vector<Buffer> pictures;
@@ -107,11 +107,11 @@ TEST_F(Render, DrawsAnIntervalAsSimulatorsDo) {
                     {120 * ms, 40 * ms, accumulated(column(3))}});
 }
 
-/// Intervals of a third of 100 ms, whose ends are rounded down; all fire at their very end.
+/// Intervals of a third of 100 ms, with ends rounded down; all fire at their very end.
 TEST_F(Render, KeepsIntervalsApartThatAreRounded) {
   begin(grey_at("30/1"));
   const auto time = [](guint64 i) { return gst_util_uint64_scale(i, GST_SECOND, 30); };
-  constexpr guint64 first = 1;  // where rounding begins
+  constexpr guint64 first = 1;  // makes rounding matter
   for (guint64 i = first; i < 20; ++i) {
     const auto duration = time(i + 1) - time(i);
     push(time(i),
@@ -405,7 +405,7 @@ TEST_F(Render, LeavesOutPicturesThatComeTooLate) {
     EXPECT_NE(GST_EVENT_TYPE(event.get()), GST_EVENT_QOS);
 }
 
-/// A live source and a clock that the test turns.
+/// Live source, and a clock controlled by the test.
 class RenderLive : public Render {
  protected:
   RenderLive() {
@@ -414,7 +414,7 @@ class RenderLive : public Render {
     gst_harness_set_upstream_latency(h.get(), 10 * ms);
   }
 
-  /// Turns the clock to a time for which the element must be waiting.
+  /// Sets the clock to a time for which the element must be waiting.
   void pass(GstClockTime time) {
     EXPECT_TRUE(gst_harness_wait_for_clock_id_waits(h.get(), 1, 10));
     gst_harness_set_time(h.get(), time);
@@ -436,7 +436,7 @@ TEST_F(RenderLive, DrawsByTheClockWhereNothingComes) {
   picture = wait_for_picture();
   ASSERT_TRUE(picture);
   EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 80 * ms);
-  // Late, and yet shown.
+  // Late, but shown.
   push(40 * ms, column(2));
   push(120 * ms, column(3));
   picture = wait_for_picture();
@@ -492,7 +492,7 @@ TEST_F(Render, IsFreedWhileInUse) {
   }
 }
 
-/// So that players plug it.
+/// Players autoplug it.
 TEST_F(Render, IsADecoderOfVideo) {
   GstElementFactory* factory = gst_element_get_factory(h.element());
   EXPECT_TRUE(gst_element_factory_list_is_type(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Every element through its states, again and again, with and without data.
+// Cycles every element through its states repeatedly, with and without data.
 #include "tests/elements/harness.hpp"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What stays the same while the stream changes: caps, memory, load.
+// Behaviour under stream changes: caps, memory, load.
 #include <atomic>
 #include <thread>
 
@@ -14,7 +14,7 @@ std::string video(int width, int height, const char* format = "GRAY8", int fps =
          ", height=" + std::to_string(height) + ", framerate=" + std::to_string(fps) + "/1";
 }
 
-/// A bright square on its way to the right.
+/// A bright square that moves to the right.
 int moving_square(int x, int y, int frame) {
   return x >= 4 + 3 * frame && x < 14 + 3 * frame && y >= 6 && y < 16 ? 220 : 40 + (x * 7 + y) % 9;
 }
@@ -31,7 +31,7 @@ std::vector<std::string> intervals(Harness& h, int frames, int padding = 0) {
   return bytes;
 }
 
-/// Whether its thresholds are those of a pixel, and its events have times of their own.
+/// True for elements with per-pixel thresholds and individual event times.
 bool is_physical(const std::string& element) {
   return element == "eventsim-dvs";
 }
@@ -83,7 +83,7 @@ TEST_P(EveryElement, BeginsAnewWhenTheSizeChanges) {
   EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 160 * GST_MSECOND);
   EXPECT_TRUE(GST_BUFFER_IS_DISCONT(buffer.get()));
   const auto events = events_of(buffer.get());
-  // A pixel with a memory fires at each threshold on the way.
+  // A pixel with a reference level fires at each threshold it passes.
   const std::size_t each = is_physical(GetParam()) ? 19 : 1;
   EXPECT_EQ(events.size(), each * 33U * 29U);
   EXPECT_NE(h.out_caps().find("width=(int)33"), std::string::npos);
@@ -171,7 +171,7 @@ TEST(Stream, RefusesFramesThatAreTooSmall) {
   EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
 }
 
-/// A frame whose meta says what is not so.
+/// A frame with an invalid meta.
 GstFlowReturn push_with_meta(const char* format, int stride, gsize offset, gsize size) {
   GstFlowReturn last = GST_FLOW_OK;
   for (const char* element : elements) {
@@ -198,12 +198,12 @@ GstFlowReturn push_with_meta(const char* format, int stride, gsize offset, gsize
 TEST(Stream, RefusesMetasThatLie) {
   EXPECT_EQ(push_with_meta("GRAY8", 320, 0, 76800), GST_FLOW_OK);
   EXPECT_EQ(push_with_meta("GRAY8", 400, 80, 96000), GST_FLOW_OK);
-  EXPECT_EQ(push_with_meta("GRAY8", 4096, 0, 76800), GST_FLOW_ERROR);  // beyond the buffer
+  EXPECT_EQ(push_with_meta("GRAY8", 4096, 0, 76800), GST_FLOW_ERROR);  // past the end of the buffer
   EXPECT_EQ(push_with_meta("GRAY8", 320, 80, 76800), GST_FLOW_ERROR);
   EXPECT_EQ(push_with_meta("GRAY8", 319, 0, 76800), GST_FLOW_ERROR);  // rows that overlap
   EXPECT_EQ(push_with_meta("GRAY8", 0, 0, 400), GST_FLOW_ERROR);
   EXPECT_EQ(push_with_meta("GRAY8", -320, 76480, 76800), GST_FLOW_ERROR);
-  EXPECT_EQ(push_with_meta("GRAY16_LE", 643, 0, 200000), GST_FLOW_ERROR);  // words at odd places
+  EXPECT_EQ(push_with_meta("GRAY16_LE", 643, 0, 200000), GST_FLOW_ERROR);  // unaligned words
   EXPECT_EQ(push_with_meta("GRAY16_LE", 642, 1, 200000), GST_FLOW_ERROR);
 }
 
@@ -292,7 +292,7 @@ TEST(EventCamera, MapsEventsAtAnyAddress) {
   EXPECT_TRUE(gst_event_camera_event_is_on(&map.events[0]));
   gst_event_camera_unmap(&map);
   gst_buffer_set_size(odd, 7);
-  EXPECT_FALSE(gst_event_camera_map(&map, odd));  // no whole number of events
+  EXPECT_FALSE(gst_event_camera_map(&map, odd));  // partial event
   gst_buffer_unref(odd);
   GST_BUFFER_PTS(whole) = GST_CLOCK_TIME_NONE;
   gst_buffer_set_size(whole, 8);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Intervals: their times, their order, and what breaks the thread between two frames.
+// Times and order of intervals, and discontinuities between frames.
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -65,7 +65,7 @@ TEST_P(EveryElement, DrawsAPictureOfAnIntervalWithoutEvents) {
   h.caps(video, "video/x-raw, format=GRAY8");
   h.push(h.flat(0, 90));
   GstBuffer* repeated = h.flat(40 * GST_MSECOND, 90);
-  GST_BUFFER_FLAG_SET(repeated, GST_BUFFER_FLAG_GAP);  // as videorate marks its copies
+  GST_BUFFER_FLAG_SET(repeated, GST_BUFFER_FLAG_GAP);  // as set by videorate on its copies
   h.push(repeated);
   const auto buffer = h.pull();
   ASSERT_TRUE(buffer);
@@ -126,7 +126,7 @@ TEST_P(EveryElement, TimesFramesWithoutPtsByTheFramerate) {
   for (int i = 0; i < 3; ++i) EXPECT_EQ(flash(GST_CLOCK_TIME_NONE), GST_FLOW_OK);
   expect_interval(0, 40 * GST_MSECOND);
   expect_interval(40 * GST_MSECOND, 80 * GST_MSECOND);
-  flash(200 * GST_MSECOND);  // the others follow on the last one that has a time
+  flash(200 * GST_MSECOND);  // the others continue from the last frame with a PTS
   flash(GST_CLOCK_TIME_NONE);
   expect_interval(80 * GST_MSECOND, 200 * GST_MSECOND);
   expect_interval(200 * GST_MSECOND, 240 * GST_MSECOND);
@@ -198,7 +198,7 @@ TEST_P(EveryElement, WarnsOfTimeThatRunsBackwards) {
   EXPECT_FALSE(h.pull());
   flash(140 * GST_MSECOND);
   expect_interval(60 * GST_MSECOND, 140 * GST_MSECOND);
-  EXPECT_EQ(flash(140 * GST_MSECOND), GST_FLOW_OK);  // standing still is no better
+  EXPECT_EQ(flash(140 * GST_MSECOND), GST_FLOW_OK);  // equal times are not accepted, either
   EXPECT_FALSE(h.pull());
   const auto warning = h.message(GST_MESSAGE_WARNING);
   ASSERT_TRUE(warning);
@@ -210,13 +210,13 @@ TEST_P(EveryElement, LetsNoIntervalsOverlap) {
   flash(0);
   flash(100 * GST_MSECOND);
   expect_interval(0, 100 * GST_MSECOND);
-  flash(60 * GST_MSECOND);  // neither begins an interval
+  flash(60 * GST_MSECOND);  // neither starts an interval
   flash(90 * GST_MSECOND);
   flash(140 * GST_MSECOND);
   EXPECT_FALSE(h.pull());
   flash(180 * GST_MSECOND);
   expect_interval(140 * GST_MSECOND, 180 * GST_MSECOND);
-  flash(0, GST_BUFFER_FLAG_DISCONT);  // time begins anew
+  flash(0, GST_BUFFER_FLAG_DISCONT);  // time starts over
   flash(40 * GST_MSECOND);
   expect_interval(0, 40 * GST_MSECOND);
 }
@@ -235,7 +235,7 @@ TEST_P(EveryElement, CutsIntervalsThatEventsCannotCount) {
 TEST_P(EveryElement, HoldsTheLastFrameThroughAGapOfTheVideo) {
   h.caps(video);
   gst_harness_push_event(h.get(), gst_event_new_gap(0, 10 * GST_MSECOND));
-  EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));  // nothing has begun: sent on as it is
+  EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));  // no interval has started: forwarded unchanged
   flash(10 * GST_MSECOND);
   gst_harness_push_event(h.get(), gst_event_new_gap(50 * GST_MSECOND, 100 * GST_MSECOND));
   const auto gap = h.pull_event(GST_EVENT_GAP);
