@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// AEDAT 2.0: files made byte by byte are read, through wraps and silences and in any split; broken
-// ones lose what is broken.
+// AEDAT 2.0: hand-made files are read, through wraps and silences and with any split; corrupt files
+// lose only the corrupt parts.
 #include <gtest/gtest.h>
 
 #include "src/formats/aedat/aedat2_decoder.hpp"
@@ -35,11 +35,11 @@ TEST(Aedat2, Dvs128) {
 TEST(Aedat2, AddressesAsTheFormatHasThem) {
   auto bytes = aedat_files::aedat2_header("Davis240C");
   aedat_files::add_record(bytes, 7U << 22 | 3U << 12 | 1U << 11, 1000);
-  aedat_files::add_record(bytes, 0x80000000U | 5U << 22 | 123, 1001);    // a frame's sample
-  aedat_files::add_record(bytes, 0x80000000U | 3U << 10, 1002);          // the IMU's
+  aedat_files::add_record(bytes, 0x80000000U | 5U << 22 | 123, 1001);    // frame sample
+  aedat_files::add_record(bytes, 0x80000000U | 3U << 10, 1002);          // IMU sample
   aedat_files::add_record(bytes, 1U << 10, 1003);                        // a trigger
-  aedat_files::add_record(bytes, 1U << 10 | 2, 1004);                    // a falling one
-  aedat_files::add_record(bytes, 9U << 22 | 4U << 12 | 1U << 10, 1005);  // v2e's noise
+  aedat_files::add_record(bytes, 1U << 10 | 2, 1004);                    // falling edge
+  aedat_files::add_record(bytes, 9U << 22 | 4U << 12 | 1U << 10, 1005);  // v2e noise event
   Aedat2Decoder decoder;
   const auto out = decoded(decoder, bytes);
   EXPECT_EQ(decoder.size(), (SensorSize{240, 180}));
@@ -126,7 +126,7 @@ TEST(Aedat2, ATimeFarFromItsNeighboursMovesNoOther) {
   const auto events = random_events::make(davis346, 100, 4, 1'000'000'000, {1000});
   auto bytes = aedat_files::aedat2_davis(events, davis346, "Davis346");
   bytes[bytes.size() - 8 * 50 + 4] ^= 0x40;
-  bytes[bytes.size() - 8 * 30] |= 0x7f;  // a row that is not there
+  bytes[bytes.size() - 8 * 30] |= 0x7f;  // a row outside the sensor
   Aedat2Decoder decoder;
   auto expected = events;
   expected.erase(expected.begin() + 70);
@@ -176,7 +176,8 @@ TEST(Aedat2, ARecordingWithALongHeader) {
     decoded(decoder, bytes, piece);
     EXPECT_EQ(decoder.data_at(), 4241U);
     EXPECT_EQ(decoder.size(), dvs128);
-    // What is there is "$$$...\r\n", no address of a DVS128; the last 6 bytes are no record.
+    // The content is "$$$...\r\n", which is no address of a DVS128; the last 6 bytes are a partial
+    // record.
     EXPECT_EQ(decoder.corruption().places, 1U);
     EXPECT_EQ(decoder.corruption().first_at, 4241U);
     EXPECT_EQ((bytes.size() - decoder.data_at()) % 8, 6U);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// AEDAT 3.1: files made byte by byte are read, through wraps and silences and in any split; broken
-// ones lose what is broken.
+// AEDAT 3.1: hand-made files are read, through wraps and silences and with any split; corrupt files
+// lose only the corrupt parts.
 #include <gtest/gtest.h>
 
 #include "src/formats/aedat/aedat3_decoder.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// AEDAT4: what is written is read back equal, by us, by a strict validator and by Python's
-// libraries; a recording of a camera gives the known counts; any split gives the same; broken files
-// lose what is broken and no more.
+// AEDAT4: written files are read back equal, by Aedat4Decoder, by a strict validator and by Python
+// libraries; a recording of a camera gives the known counts; the split does not matter; corrupt
+// files lose only the corrupt parts.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -36,9 +36,9 @@ struct Picture {
   Bytes pixels;
 };
 
-/// All that a decoder hands over.
+/// Complete output of a decoder.
 struct Contents {
-  std::vector<std::vector<AbsoluteEvent>> events;  ///< of each stream
+  std::vector<std::vector<AbsoluteEvent>> events;  ///< by stream
   std::vector<Picture> frames;
   std::vector<Trigger> triggers;
   std::size_t items = 0;
@@ -65,7 +65,7 @@ Contents decoded(Aedat4Decoder& decoder, std::span<const std::uint8_t> bytes,
                  std::size_t piece = std::size_t{1} << 20) {
   Contents contents;
   for (const auto part : pieces::of(bytes, piece)) {
-    // What was pushed is gone once it has been read.
+    // Pushed bytes are invalid once they have been read.
     auto copy = std::make_unique<std::uint8_t[]>(part.size());
     std::copy(part.begin(), part.end(), copy.get());
     decoder.push({copy.get(), part.size()});
@@ -77,7 +77,7 @@ Contents decoded(Aedat4Decoder& decoder, std::span<const std::uint8_t> bytes,
   return contents;
 }
 
-/// Ends the file, and does with it what whoever can seek does.
+/// Completes the file and applies the patch, as a seekable output does.
 void finish(Aedat4Encoder& encoder, Bytes& bytes) {
   encoder.finish(bytes);
   if (const auto patch = encoder.patch())
@@ -98,7 +98,7 @@ Bytes encoded(const Aedat4Settings& settings, std::span<const AbsoluteEvent> eve
   return bytes;
 }
 
-/// A file by hand of one stream, 346x260, with these packets.
+/// Hand-made file with one stream, 346x260, and these packets.
 Bytes file_of(std::initializer_list<std::span<const AbsoluteEvent>> packets) {
   auto bytes = aedat_files::aedat4_header(aedat_files::xml_of_one_stream);
   for (const auto& packet : packets)
@@ -385,7 +385,7 @@ TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoCorruption) {
     Bytes bytes;
     const auto events = some_events(9000);
     encoder.encode(events, bytes);
-    encoder.finish(bytes);  // and the header is left as it is
+    encoder.finish(bytes);  // without patching the header
     Aedat4Decoder decoder;
     EXPECT_TRUE(decoded(decoder, bytes, 100).events[0] == events);
     EXPECT_FALSE(decoder.table_at());
@@ -393,7 +393,7 @@ TEST(Aedat4, ATableFoundWhereTheHeaderNamesNoneIsNoCorruption) {
   }
 }
 
-/// Where each packet's header lies, and the end.
+/// Positions of the packet headers, and of the end.
 std::vector<std::size_t> packets_of(std::span<const std::uint8_t> bytes) {
   std::vector<std::size_t> at;
   for (const auto& packet : aedat4_validator::read(bytes).packets)
@@ -493,8 +493,8 @@ TEST(Aedat4, BombsAreCappedAndSkipped) {
   }
 }
 
-/// Each of its packets claims to hold all that follow. Looking into each of them in full would take
-/// hours.
+/// Each packet states a size that includes all following ones. Searching each of them completely
+/// would take hours.
 TEST(Aedat4, PacketsWithinPacketsTakeNoTimeToSpeakOf) {
   for (const auto compression : {Aedat4Compression::none, Aedat4Compression::lz4}) {
     auto bytes = encoded({{346, 260}, "", compression, false, false}, {});
@@ -507,7 +507,7 @@ TEST(Aedat4, PacketsWithinPacketsTakeNoTimeToSpeakOf) {
         aedat_files::add_little(bytes, 4, 4);
         aedat_files::add(bytes, "EVTS");
       } else {
-        // A frame whose block is stored as it is, and as large as it may be.
+        // A frame with an uncompressed block of maximum size.
         for (const int byte : {0x04, 0x22, 0x4d, 0x18, 0x40, 0x40, 0xc0})
           bytes.push_back(static_cast<std::uint8_t>(byte));
         aedat_files::add_little(bytes, std::int64_t{0x80010000}, 4);
@@ -519,7 +519,7 @@ TEST(Aedat4, PacketsWithinPacketsTakeNoTimeToSpeakOf) {
   }
 }
 
-/// Any byte may be wrong: the decoder ends, and hands over the same whatever the split.
+/// With any byte corrupted, the decoder terminates, with the same output for any split.
 TEST(Aedat4, RandomCorruptionEndsAndIsTheSameForAnySplit) {
   std::mt19937 random(5);
   const auto events = some_events(5000);
@@ -574,13 +574,13 @@ TEST(Aedat4, SeeksByTheTable) {
   }
 }
 
-/// A table of so many entries, all of which are the same bytes.
+/// A table with this many entries, all of which share the same bytes.
 Bytes shared_table(int entries) {
   Bytes bytes;
   const auto add = [&](std::initializer_list<int> numbers, int size) {
     for (const int number : numbers) aedat_files::add_little(bytes, number, size);
   };
-  const int entry = 32 + 4 * entries + 12;  // 4 behind a multiple of 8, as they are even
+  const int entry = 32 + 4 * entries + 12;  // 4 past a multiple of 8, as they are even
   add({entry + 20 - 4, 16}, 4);
   aedat_files::add(bytes, "FTAB");
   add({6, 8, 4, 0}, 2);
@@ -597,7 +597,7 @@ TEST(Aedat4, EntriesOfATableDoNotShareTheirBytes) {
 }
 
 TEST(Aedat4, TablesWithThePositionsOfHeadersAreUnderstood) {
-  // As it is, the first packet is at 1008 and its payload at 1016.
+  // The first packet is at 1008 and its payload at 1016.
   std::vector<Aedat4TableEntry> entries{{1008, 0, 50, 10, 5, 9}, {1066, 1, 20, 1, 7, 7}};
   EXPECT_EQ(*read_aedat4_table(aedat4_table_content(entries), Aedat4Compression::lz4, 1008),
             entries);

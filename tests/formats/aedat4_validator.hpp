@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Reads AEDAT4 strictly, byte by byte, with nothing of ours and no FlatBuffers: whatever is not
-// exactly as the format has it throws.
+// Strict AEDAT4 reader, independent of this project's code and of the FlatBuffers library: throws
+// on any deviation from the format.
 #pragma once
 
 #include <lz4frame.h>
@@ -31,7 +31,7 @@ Number number(View bytes, std::size_t at) {
   return value;
 }
 
-/// A FlatBuffer's table; positions count from the buffer's size prefix.
+/// Table of a FlatBuffer; positions are relative to the buffer's size prefix.
 class Table {
  public:
   Table(View buffer, std::size_t at) : buffer_(buffer), at_(at) {
@@ -50,7 +50,7 @@ class Table {
     return {buffer, 4 + number<std::uint32_t>(buffer, 4)};
   }
 
-  /// Where field `i` is stored; 0 where it is left out.
+  /// Position of field `i`; 0 if absent.
   std::size_t at(std::size_t i, std::size_t size) const {
     const auto offset =
         i < fields_ ? number<std::uint16_t>(buffer_, vtable_ + 4 + 2 * i) : std::uint16_t{0};
@@ -132,10 +132,10 @@ struct Entry {
 
 struct File {
   std::string xml;
-  std::vector<AbsoluteEvent> events;  ///< of stream 0
-  std::vector<Frame> frames;          ///< of stream 1
-  std::vector<Entry> packets;         ///< as they are
-  std::vector<Entry> table;           ///< as the file says
+  std::vector<AbsoluteEvent> events;  ///< events of stream 0
+  std::vector<Frame> frames;          ///< frames of stream 1
+  std::vector<Entry> packets;         ///< actual packets
+  std::vector<Entry> table;           ///< packets according to the table
   std::size_t max_packet = 0;         ///< events
 };
 

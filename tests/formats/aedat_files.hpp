@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// AEDAT files made for tests, byte by byte: nothing of what they test makes them.
+// Hand-made AEDAT files for tests, independent of the tested code.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ inline void add(Bytes& bytes, const Bytes& more) {
   bytes.insert(bytes.end(), more.begin(), more.end());
 }
 
-/// Appends the `size` low bytes of `number`, the lowest first.
+/// Appends the lowest `size` bytes of `number`, little-endian.
 inline void add_little(Bytes& bytes, std::int64_t number, int size) {
   for (int i = 0; i < size; ++i)
     bytes.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(number) >> (8 * i)));
@@ -92,7 +92,7 @@ inline void add_aedat3_packet_header(Bytes& bytes, int type, int event_size, std
   for (int i = 0; i < 3; ++i) add_little(bytes, number, 4);
 }
 
-/// A packet ends where the times wrap, or with `most` events.
+/// A packet ends at a wrap of the times, or after `most` events.
 inline Bytes aedat3(std::span<const AbsoluteEvent> events, std::string_view source,
                     std::size_t most) {
   auto bytes = aedat3_header(source);
@@ -123,7 +123,7 @@ inline constexpr std::string_view xml_of_one_stream =
     "<attr key=\"sizeX\" type=\"int\">346</attr><attr key=\"sizeY\" type=\"int\">260</attr>"
     "</node></node></node></dv>";
 
-/// Moves what lies in a FlatBuffer's body of which the root's position is the first number.
+/// Shifts the content of a FlatBuffer's body, whose first number is the position of the root.
 inline Bytes moved(const Bytes& body, std::size_t by) {
   Bytes bytes;
   add_little(bytes, body[0] + static_cast<std::int64_t>(by), 4);
@@ -161,7 +161,7 @@ inline Bytes aedat4_header(std::string_view xml, int compression = 0, std::int64
   return bytes;
 }
 
-/// A FlatBuffer of one table with one vector of `count` elements, which `elements` begins with.
+/// FlatBuffer of one table with one vector of `count` elements, at the front of `elements`.
 inline Bytes vector_packet(std::string_view identifier, const Bytes& elements, std::size_t count,
                            std::size_t off_by = 0) {
   Bytes body;
@@ -195,7 +195,7 @@ inline Bytes events_content(std::span<const AbsoluteEvent> events) {
 
 struct TriggerSource {
   Microseconds t;
-  int source;  ///< AEDAT 4's number
+  int source;  ///< value in AEDAT 4
 };
 
 /// Tables with a time in 64 bits and, where it is not left out, a byte.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Events cut into intervals: what is in them, in which order, and what is dropped.
+// Cutting events into intervals: content, order and dropped events.
 #include "src/formats/chunker.hpp"
 
 #include <gtest/gtest.h>
@@ -72,7 +72,7 @@ TEST(Chunker, MakesHardlyMoreThanOneGapOfASilence) {
   constexpr Microseconds year = Microseconds{365} * 86'400 * 1'000'000;
   Chunker chunker(length);
   const auto cuts = slice(chunker, std::vector{at(0), at(year), at(year + 1)});
-  // The last piece of it waits for what may be out of order.
+  // The last part waits for events that may be out of order.
   ASSERT_EQ(cuts.size(), 4U);
   EXPECT_EQ(cuts[1].start, length);
   EXPECT_TRUE(cuts[1].events.empty());
@@ -141,7 +141,7 @@ TEST(Chunker, DropsWhatComesTooLate) {
 TEST(Chunker, IgnoresAClockThatJumpsAheadAndComesBack) {
   std::vector<AbsoluteEvent> events;
   for (Microseconds t = 0; t < 100'000; t += 100) {
-    // As a bit of a high time that flips: for some hundred microseconds, now and then.
+    // Like flipped bits of a high time: occasionally, for some hundred microseconds.
     const bool flipped = t % 20'000 < 500;
     events.push_back(at(flipped ? t + 8'388'608 : t));
   }
@@ -182,7 +182,7 @@ TEST(Chunker, BoundsTheEventsOfAnInterval) {
   }
   chunker.finish();
   take_whole(chunker, cuts);
-  EXPECT_GT(chunker.dropped().late, 0U);  // once the microsecond is handed out
+  EXPECT_GT(chunker.dropped().late, 0U);  // once the microsecond was returned
 }
 
 TEST(Chunker, LeavesOutWhatIsBeforeItsStart) {

@@ -137,7 +137,7 @@ TEST(Csv, UnitByTheNameOfTheColumn) {
             (Events{on(3, 4, 1'000'000), off(5, 6, 2'000'000)}));
   EXPECT_EQ(read("t_ms,x,y,p\n1,3,4,1\n2,5,6,0\n" + std::string(200, '#')).events,
             (Events{on(3, 4, 1000), off(5, 6, 2000)}));
-  // What is set counts.
+  // Settings take precedence.
   EXPECT_EQ(read("t_us,x,y,p\n10000,3,4,1\n", {.unit = TimeUnit::nanoseconds}).events,
             Events{on(3, 4, 10)});
   EXPECT_THROW(read("t_kg,x,y,p\n10,3,4,1\n"), UnsupportedFormat);
@@ -158,11 +158,11 @@ TEST(Csv, WholeNumbersBetweenBlanksTellTheirUnitOrAreRefused) {
   // esim, of a camera with microseconds; and of DVS-Voltmeter.
   EXPECT_EQ(first_of(lines(5'000, 1000, 100, " ")), 5);
   EXPECT_EQ(first_of(lines(5'001, 1, 10, " ")), 5'001);
-  // Only one of the units can be a date.
+  // Only one of the units gives a plausible date.
   EXPECT_EQ(first_of(lines(1'468'939'993'067'416'019, 7, 100, " ")), 1'468'939'993'067'416);
   EXPECT_EQ(first_of(lines(1'468'939'993'067'416, 7, 100, " ")), 1'468'939'993'067'416);
   EXPECT_EQ(first_of(lines(1'468'939'993'067'416'019, 7, 100, ",")), 1'468'939'993'067'416);
-  // No tool writes nanoseconds between commas without saying so.
+  // No tool writes comma-separated nanoseconds without stating the unit.
   EXPECT_EQ(first_of(lines(5'000, 1000, 100, ",")), 5'000);
   EXPECT_EQ(first_of(lines(5'001, 7, 100, ",")), 5'001);
   for (const auto& text : {lines(5'001, 7, 100, " "), lines(5'000, 0, 1, " "),
@@ -184,7 +184,7 @@ TEST(Csv, FloatingPointMicroseconds) {
         "10.000000 3.000000 4.000000 1.000000\n12.000000 5.000000 6.000000 0.000000\n",
         "t,x,y,p\n10.0,3,4,1\n12.0,5,6,0\n"})
     EXPECT_EQ(read(text).events, expected) << text;
-  // Full seconds, with all decimals.
+  // Full seconds with all decimals.
   EXPECT_EQ(read("1.000000 3 4 1\n2.000000 5 6 0\n").events,
             (Events{on(3, 4, 1'000'000), off(5, 6, 2'000'000)}));
   EXPECT_THROW(read("1.0e+01 3.0e+00 4.0e+00 1.0e+00\n"), UnsupportedFormat);
@@ -201,7 +201,7 @@ TEST(Csv, IndexOfPandas) {
 }
 
 TEST(Csv, SecondsAreExact) {
-  // Also in long files, where lines are read the quick way.
+  // Also in long files, which take the fast path.
   std::string text;
   Events expected;
   for (int i = 0; i < 1000; ++i) {
@@ -249,7 +249,7 @@ TEST(Csv, ALongLineIsSkippedWithoutBeingKept) {
   text += "3,1,1,";
   text.append(1'000'000, '1');
   text += "\n4,1,1,1\n";
-  text += "5,1,1,1" + std::string(4089, ' ') + "\n";  // as long as can be
+  text += "5,1,1,1" + std::string(4089, ' ') + "\n";  // maximum length
   text += "6,1,1,1" + std::string(4090, ' ') + "\n";
   text += "7,1,1,1\n";
   const auto found = read(text);
@@ -295,9 +295,9 @@ TEST(Csv, EveryDialectComesBack) {
       CsvEncoder encoder(dialect, size);
       const auto bytes = encoded(encoder, events);
       TableSettings settings;
-      // Bursts and silences do not tell these apart.
+      // Bursts and silences make these ambiguous.
       if (name == "esim" || name == "dvs-voltmeter") settings.unit = dialect.unit;
-      // Of a sensor of a few pixels a time cannot be told from a coordinate.
+      // With a sensor of a few pixels, times and coordinates are indistinguishable.
       if (size.width < 100) settings.columns = {dialect.order.begin(), dialect.order.end()};
       CsvDecoder decoder(settings);
       EXPECT_TRUE(decoded(decoder, bytes) == events) << size.width;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// DAT files made by hand.
+// Hand-made DAT files.
 #include "src/formats/dat/dat.hpp"
 
 #include <gtest/gtest.h>

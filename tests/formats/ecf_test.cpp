@@ -101,7 +101,7 @@ TEST(Ecf, ComesBack) {
     for (unsigned seed = 0; seed < 60; ++seed)
       expect_comes_back(random_events(seed < 40 ? seed : seed * seed * 10, size, seed));
   expect_comes_back(random_events(ecf_most_events, {2048, 2048}, 1, -5'000'000'000));
-  // Runs at and around the lengths that are written in another way.
+  // Runs at and around the lengths at which the encoding changes.
   for (const std::size_t count : {14, 15, 16, 30, 31, 32, 126, 127, 128, 65534, 65535})
     expect_comes_back(Events(count, AbsoluteEvent::at(2047, 2047, 1LL << 62, Polarity::on)));
 }
@@ -134,7 +134,7 @@ TEST(Ecf, CorruptChunksAreRefused) {
     decode_ecf(corrupt, out);
     EXPECT_LE(out.size(), ecf_most_events);
   }
-  // More events than a chunk can have, a run of more than there are, a time of more than 64 bits.
+  // More events than a chunk can have, a run longer than the chunk, a time of more than 64 bits.
   EXPECT_FALSE(decode_ecf(Bytes{0, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3}, out));
   Bytes run = {4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2};
   run.resize(100);

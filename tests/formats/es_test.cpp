@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Event Streams made by hand.
+// Hand-made Event Streams.
 #include "src/formats/es/es.hpp"
 
 #include <gtest/gtest.h>
@@ -87,7 +87,7 @@ TEST(EventStream, LeavesNothingOutOfALongRecordingWithoutPauses) {
   std::vector<AbsoluteEvent> events;
   const auto step = Microseconds{11} * 3'600'000'000;
   events.push_back(AbsoluteEvent::at(1, 2, 0, Polarity::on));
-  // Steps that need no byte of their own must count, too, before a pause.
+  // Steps without a byte of their own must count, too, before a pause.
   for (int i = 0; i < 1000; ++i)
     events.push_back(AbsoluteEvent::at(1, 2, events.back().t + 100, Polarity::on));
   events.push_back(AbsoluteEvent::at(1, 2, step, Polarity::on));

@@ -9,8 +9,8 @@
 
 #include "src/formats/decoder.hpp"
 
-/// What every known reader of EVT words relies on, checked word by word. Each function returns what
-/// is wrong first, or nothing.
+/// Checks what all known readers of EVT words rely on, word by word. Each function returns the
+/// first fault, or nothing.
 namespace evt_validator {
 
 using eventcamera::SensorSize;
@@ -83,17 +83,17 @@ inline std::string evt3(Bytes bytes, SensorSize size) {
   return {};
 }
 
-/// The types of a format that has the fields of EVT2.
+/// Types of a format with the fields of EVT2.
 struct Types {
   std::uint32_t off, on, time_high;
 };
 
-/// The time of words as those of EVT2.
+/// Tracks the time of EVT2-like words.
 class Time {
  public:
   std::string high(std::uint32_t count) {
     constexpr std::uint32_t largest = (1U << 28) - 1;
-    // OpenEB follows a wrap where the time falls by all its range but 10 ms.
+    // OpenEB detects a wrap if the time falls by its range minus at most 10 ms.
     if (known_ && count < count_ && ((count_ - count) << 6) < (largest << 6) - 10'000)
       return "a TIME_HIGH that falls and is no wrap";
     known_ = true;
@@ -115,7 +115,7 @@ class Time {
   std::uint32_t low_ = 0;
 };
 
-/// EVT2, and what EVT4 has of it. `vectors`: the types of the heads of vectors, by polarity.
+/// Checks EVT2 and the common part of EVT4. `vectors`: types of vector heads, by polarity.
 inline std::string evt2_or_4(Bytes bytes, SensorSize size, Types types, Types vectors) {
   if (bytes.size() % 4 != 0) return "bytes are left over";
   const auto words = words_of<std::uint32_t>(bytes);
@@ -148,11 +148,11 @@ inline std::string evt2(Bytes bytes, SensorSize size) {
   return evt2_or_4(bytes, size, {0x0, 0x1, 0x8}, {none, none, none});
 }
 
-/// What makes OpenEB's robust decoder of EVT4 drop events.
+/// Conditions under which OpenEB's robust EVT4 decoder drops events.
 inline std::string dropped_evt4(Bytes bytes, SensorSize size) {
   const auto words = words_of<std::uint32_t>(bytes);
-  std::int64_t base = -1;     // of the last TIME_HIGH that it believed
-  std::int64_t pending = -1;  // a jump that it does not believe yet
+  std::int64_t base = -1;     // last TIME_HIGH that it accepted
+  std::int64_t pending = -1;  // jump that it has not accepted yet
   for (std::size_t i = 0; i < words.size(); ++i) {
     const auto type = words[i] >> 28;
     if (type == 0xe) {

@@ -14,11 +14,11 @@ namespace formats {
 
 using namespace eventcamera;
 
-/// A format that is both read and written.
+/// Format that can be read and written.
 struct Format {
   std::string name;
   int max_side;
-  Microseconds max_pause;  ///< that it can hold, or that tests have the time for
+  Microseconds max_pause;  ///< maximum that it supports, or that tests have time for
   std::function<std::unique_ptr<Decoder>(SensorSize)> make_decoder;
   std::function<std::unique_ptr<Encoder>(SensorSize)> make_encoder;
 };

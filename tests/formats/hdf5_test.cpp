@@ -183,7 +183,7 @@ TEST_F(Hdf5, WhatALayoutCannotHoldIsRefused) {
   }
 }
 
-/// As a full disk does, a limit lets writes fail from some byte on.
+/// Makes writes fail beyond a file size limit, like a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t most) {
@@ -218,7 +218,7 @@ TEST_F(Hdf5, AFullDiskIsToldAndSurvived) {
             << error.what();
       }
     }
-    // The library is as it was.
+    // The library still works.
     Hdf5Reader reader(write(events, settings));
     EXPECT_TRUE(read_all(reader) == events);
   }
@@ -237,7 +237,7 @@ TEST_F(Hdf5, CorruptChunksAreLeftOutAndCounted) {
   const auto events = random_events(60'000, {640, 480}, 2, 5);
   const auto file =
       contents(write(events, {Hdf5Layout::metavision, Compression::none, {640, 480}}));
-  // The head of the third chunk: how many events, and from when on.
+  // Header of the third chunk: number of events and first time.
   std::uint32_t count = 16384 << 2;
   Bytes head(12);
   std::memcpy(head.data() + 4, &events[16384 * 2].t, 8);

@@ -100,7 +100,7 @@ TEST(Npy, SmallElements) {
                                              AbsoluteEvent::at(7, 8, 0x605, Polarity::off)}));
 }
 
-/// An array of the shape (N, 4).
+/// Array of shape (N, 4).
 template <class Number>
 Bytes rows_of(const std::string& type, std::initializer_list<Number> numbers) {
   auto bytes = with_header("{'descr': '" + type + "', 'fortran_order': False, 'shape': (" +

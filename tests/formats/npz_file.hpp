@@ -15,10 +15,10 @@ namespace npz_file {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// A file of an archive: its name, and what is in it.
+/// File in an archive: name and content.
 using Member = std::pair<std::string, Bytes>;
 
-/// A NumPy array of `type`, such as <u2, in this shape.
+/// NumPy array of `type`, such as <u2, with this shape.
 template <class Number>
 Bytes array(const std::string& type, const std::string& shape, const std::vector<Number>& numbers) {
   std::string text = "{'descr': " + type + ", 'fortran_order': False, 'shape': " + shape + ", }";

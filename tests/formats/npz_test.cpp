@@ -29,7 +29,7 @@ Read all_of(Reader& reader) {
   return read;
 }
 
-/// What is pulled, after a check that the same comes where it is pushed.
+/// Output in pull mode, after checking that push mode gives the same.
 Read read(const Bytes& bytes, const TableSettings& settings = {}) {
   const auto pushed = make_npz_reader(settings);
   for (std::size_t at = 0; at < bytes.size(); at += 1000) {
@@ -54,7 +54,7 @@ std::vector<AbsoluteEvent> events_of(std::size_t count) {
   return events;
 }
 
-/// Arrays of these events, of numbers of any kind.
+/// Arrays of these events, with random number types.
 std::vector<Member> columns_of_events(const std::vector<AbsoluteEvent>& events) {
   std::vector<std::int64_t> t;
   std::vector<std::uint16_t> x;
@@ -124,13 +124,13 @@ TEST(Npz, WhatIsWrongIsToldAndWhatIsWholeIsRead) {
   for (std::size_t at = 300'000; at < 300'010; ++at) flipped[at] ^= 0xff;
   EXPECT_GT(read(flipped).corruption.places + read(flipped).corruption.unsorted, 0U);
 
-  // The sum of an array is wrong: what was unpacked before is kept.
+  // Wrong checksum of an array: events decompressed before are kept.
   auto changed = archive(columns_of_events(events), true);
   changed[changed.size() / 2] ^= 0x55;
   try {
     EXPECT_GT(read(changed).corruption.places, 0U);
   } catch (const UnsupportedFormat&) {
-    // It may be a header that was hit.
+    // A header may have been corrupted.
   }
 }
 
@@ -159,7 +159,7 @@ TEST(Npz, WhatIsNoneIsRefused) {
   refused(archive(wide, true), "not an array of one column");
 }
 
-/// Memory stays small, whatever an archive claims.
+/// Memory stays small for any sizes stated in an archive.
 TEST(Npz, ClaimsTakeNoMemory) {
   const auto grown = [](const Bytes& bytes) {
     rusage before = {};
@@ -171,14 +171,14 @@ TEST(Npz, ClaimsTakeNoMemory) {
       reader->open(source);
       while (reader->next()) continue;
     } catch (const UnsupportedFormat&) {
-      // Refused, as it may be.
+      // May be refused.
     }
     getrusage(RUSAGE_SELF, &after);
     return after.ru_maxrss - before.ru_maxrss;  // KiB
   };
   constexpr long limit = 65536;
 
-  // The end of a directory of 2^32 files, which is nowhere.
+  // End record of a missing directory of 2^32 files.
   Bytes claims = archive({{"t.npy", bytes_of("hello")}}, false);
   const auto end = claims.size() - 22;
   const auto put = [](Bytes& bytes, std::size_t at, std::uint64_t value, int count) {
@@ -202,7 +202,7 @@ TEST(Npz, ClaimsTakeNoMemory) {
     EXPECT_LT(grown(large), limit) << files;
   }
 
-  // Zeros, which are a thousandth of their size when packed, come in small pieces.
+  // Zeros, which compress to a thousandth of their size, are read in small pieces.
   const auto bomb = columns_of_events(std::vector<AbsoluteEvent>(1'000'000));
   MemoryBytes source(archive(bomb, true));
   EXPECT_LT(source.size(), 100'000U);

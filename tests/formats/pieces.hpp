@@ -13,7 +13,7 @@
 
 namespace eventcamera::pieces {
 
-/// Every piece has `size` bytes; 0: sizes at random, many of them tiny.
+/// Every piece has `size` bytes; 0: random sizes, many of them tiny.
 inline std::vector<std::span<const std::uint8_t>> of(std::span<const std::uint8_t> bytes,
                                                      std::size_t size, unsigned seed = 1) {
   std::mt19937 random(seed);
@@ -28,7 +28,7 @@ inline std::vector<std::span<const std::uint8_t>> of(std::span<const std::uint8_
   return pieces;
 }
 
-/// All of it, each piece in memory of its own.
+/// Decodes everything, each piece in its own memory.
 inline Decoded decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
                        std::size_t piece = std::size_t{1} << 20) {
   Decoded out;
@@ -40,7 +40,7 @@ inline Decoded decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
   return out;
 }
 
-/// The file has these events and this sensor, and no fault, however it is split.
+/// Expects these events and this sensor without corruption, for any split.
 template <class Reader>
 void expect_events(std::span<const std::uint8_t> bytes, const std::vector<AbsoluteEvent>& events,
                    SensorSize size) {

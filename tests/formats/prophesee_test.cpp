@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Prophesee's RAW files and their words: what is written, word by word, and what is read of words
-// made by hand.
+// Prophesee RAW files and their words: encoding word by word, and decoding of hand-made words.
 #include <gtest/gtest.h>
 
 #include <stdexcept>
@@ -53,7 +52,7 @@ std::vector<AbsoluteEvent> events(std::initializer_list<AbsoluteEvent> list) {
   return list;
 }
 
-// What is written.
+// Encoding.
 
 TEST(Written, Evt3IsWhatEveryReaderReadsAlike) {
   Random random(1);
@@ -91,7 +90,7 @@ TEST(Written, Evt4KeepsTimeAliveThroughSilence) {
       events({AbsoluteEvent::at(1, 2, 5, on), AbsoluteEvent::at(1, 2, 3'000'005, on)});
   const auto bytes = encode(*make_evt_encoder(EvtFormat::evt4, vga), recording);
   EXPECT_EQ(evt_validator::evt4(bytes, vga), "");
-  // A step for every 960 us, and the two events.
+  // One step per 960 us, and the two events.
   EXPECT_EQ(bytes.size() / 4, 1U + 3'000'000 / 960 + 2U);
   EXPECT_EQ(read(EvtFormat::evt4, bytes).decoded.events, recording);
 }
@@ -125,7 +124,7 @@ TEST(Written, TheValidatorFindsWhatItIsFor) {
   EXPECT_FALSE(wrong({0x8000, 0x6001, 0x0002, 0x2003, 0x8001, 0x6000, 0x2003}));
   EXPECT_TRUE(wrong({0x6001, 0x8000, 0x0002, 0x2003}));                  // TIME_LOW first
   EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x2003, 0x8001, 0x2003}));  // no TIME_LOW
-  EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x2003, 0x8002}));          // a step left out
+  EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x2003, 0x8002}));          // missing step
   EXPECT_TRUE(wrong({0x8000, 0x8000}));
   EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x3000, 0x4001, 0x5001}));  // no triplet
   EXPECT_TRUE(wrong({0x8000, 0x6001, 0x0002, 0x3000 + 609, 0x4001, 0x4001, 0x5001}));
@@ -155,7 +154,7 @@ TEST(Written, Evt3KeepsTimeAliveThroughSilence) {
   const auto recording =
       events({AbsoluteEvent::at(1, 2, 5, on), AbsoluteEvent::at(1, 2, 20'000'000, on)});
   const auto bytes = encode(*make_evt_encoder(EvtFormat::evt3, vga), recording);
-  // A step for every 4096 us, and 2 more words at the second event.
+  // One step per 4096 us, and 2 more words at the second event.
   EXPECT_EQ(bytes.size() / 2, 4U + 20'000'000 / 4096 + 2U);
 }
 
@@ -191,7 +190,7 @@ std::unique_ptr<Decoder> decoder_after(const std::string& header, Decoded& decod
   return decoder;
 }
 
-/// An event of EVT2 at (3, 2), 1 us, behind a header.
+/// EVT2 event at (3, 2), 1 us, after a header.
 std::string with_evt2(const std::string& header) {
   const auto bytes = words32({0x80000000, 0x10000000 | 1 << 22 | 3 << 11 | 2});
   return header + std::string(bytes.begin(), bytes.end());
@@ -217,7 +216,7 @@ TEST(RawHeader, IsReadAsWritersWriteIt) {
 }
 
 TEST(RawHeader, TakesDataThatBeginAsALineDoesForData) {
-  // 0x2025 are the low 16 bits of an event in EVT2, before which the header did not end.
+  // 0x2025 are the low 16 bits of an EVT2 event, before which the header did not end.
   const auto bytes = words32({0x00002025, 0x80000000, 0x10000000 | 3 << 11});
   Decoded decoded;
   decoder_after("% evt 2.0\n" + std::string(bytes.begin(), bytes.end()), decoded);
@@ -269,8 +268,8 @@ TEST(Evt2, ReadsEventsAndTriggersAndPassesOverTheRest) {
                     0x80000002,            // 128 us
                     0x00000000 | 5 << 22 | 639 << 11 | 479, 0xe0000000, 0xf0000001,
                     0xd0000000,                         // others, continued, IMU
-                    0xa0000000 | 6 << 22 | 1 << 8 | 1,  // a trigger of input 1 rises
-                    0xa0000000 | 7 << 22 | 1 << 8,      // and falls
+                    0xa0000000 | 6 << 22 | 1 << 8 | 1,  // rising trigger on input 1
+                    0xa0000000 | 7 << 22 | 1 << 8,      // falling edge
                     0x10000000 | 63U << 22}));
   EXPECT_EQ(decoded.events,
             events({AbsoluteEvent::at(639, 479, 133, off), AbsoluteEvent::at(0, 0, 191, on)}));
@@ -356,9 +355,9 @@ TEST(Evt3, ReadsEventsVectorsAndTriggers) {
                                   0x3010, 0x4003, 0x4800, 0x5081,  // OFF from x = 16 on
                                   0x8001,                          // the same again
                                   0x2004,                          //
-                                  0xa301,                          // a trigger of input 3 rises
+                                  0xa301,                          // rising trigger on input 3
                                   0xe015, 0xf000, 0xf000, 0x7016,  // others
-                                  0x8002, 0x2005}));               // time is 8192 us anew
+                                  0x8002, 0x2005}));               // time restarts at 8192 us
   EXPECT_EQ(decoded.events,
             events({AbsoluteEvent::at(3, 5, 4098, on), AbsoluteEvent::at(16, 5, 4098, off),
                     AbsoluteEvent::at(17, 5, 4098, off), AbsoluteEvent::at(39, 5, 4098, off),
@@ -376,7 +375,7 @@ TEST(Evt3, ReadsVectorsThatAreNoTriplets) {
 }
 
 TEST(Evt3, PassesOverWhatIsNoChange) {
-  // After EM_ADDR_Y, events are not changes of contrast until the next row.
+  // After EM_ADDR_Y, events are not contrast changes until the next row.
   const auto [decoded, corruption] =
       read(EvtFormat::evt3,
            evt3({0x8000, 0x6000, 0x0000, 0x1001, 0x2001, 0x3001, 0x4fff, 0x0002, 0x2003}));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Recordings that nobody recorded: bursts of one time, quick events, and silences of hours.
+// Synthetic recordings: bursts at the same time, fast events, and silences of hours.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 namespace eventcamera::random_events {
 
 struct Silence {
-  Microseconds most;  ///< no silence is longer
+  Microseconds most;  ///< maximum silence
 };
 
-/// `count` sorted events from `start` on.
+/// Returns `count` sorted events from `start` on.
 inline std::vector<AbsoluteEvent> make(SensorSize size, std::size_t count, unsigned seed,
                                        Microseconds start, Silence silence) {
   std::mt19937 random(seed);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What files are taken for, by their first bytes.
+// Recognition of files by their first bytes.
 #include "src/formats/recognition.hpp"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ TEST(Recognition, LeavesOtherFilesAlone) {
     EXPECT_EQ(recognise(text), std::nullopt) << text;
   EXPECT_EQ(recognise(npz.substr(0, npz.size() - 1)), std::nullopt);
   EXPECT_EQ(recognise(std::string(npz.substr(0, npz.size() - 3)) + "txt"), std::nullopt);
-  // Its unit is missing, and reading it says so.
+  // Its time unit is missing, which is reported on reading.
   EXPECT_EQ(recognise("1000 1 2 1\n2000 1 2 1\n3000 1 2 1\n"), Recognised{FileKind::csv});
   EXPECT_EQ(recognise(std::string(2047, '\0').append(hdf5)), std::nullopt);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Files that cameras recorded, against counts and sums that another reader made.
+// Compares recordings of cameras to counts and checksums from another reader.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -98,7 +98,7 @@ TEST(Recorded, WrittenAgainInEveryFormatIsTheSame) {
     if (!std::filesystem::exists(path(name))) GTEST_SKIP() << "no " << path(name);
     const auto decoder = make_prophesee_raw_decoder();
     auto events = recordings::decode(*decoder, bytes_of(name)).events;
-    // A camera's own order is not quite that of time.
+    // Events from cameras are not strictly sorted by time.
     std::stable_sort(events.begin(), events.end(),
                      [](const auto& a, const auto& b) { return a.t < b.t; });
     for (const auto format : {EvtFormat::evt2, EvtFormat::evt21, EvtFormat::evt21_legacy,

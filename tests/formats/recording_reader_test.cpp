@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Recordings without GStreamer: pushed and pulled they give equal items, they are seeked in, and
-// tell their duration.
+// Recordings without GStreamer: push and pull mode give equal items; seeking and duration.
 #include "src/formats/recording_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +26,8 @@ using Events = std::vector<AbsoluteEvent>;
 constexpr SensorSize sensor{320, 240};
 constexpr Microseconds chunk_length = 10'000;
 
-/// A dot that runs through the rows for a second, from 2 s on, and again after a silence of three.
+/// A dot that runs through the rows for a second, from 2 s on, and again after a silence of three
+/// seconds.
 Events some_events() {
   Events events;
   for (int i = 0; i < 20'000; ++i) {
@@ -38,7 +38,7 @@ Events some_events() {
   return events;
 }
 
-/// A file, and how it is read.
+/// File, and how to read it.
 struct File {
   std::string name;
   Bytes bytes;
@@ -51,14 +51,14 @@ File raw_file() {
           [] { return std::make_unique<DecoderReader>(make_prophesee_raw_decoder()); }};
 }
 
-/// Tells no size, and can only be read from its start.
+/// Without a stated size, and readable only from the start.
 File npy_file() {
   NpyEncoder encoder;
   return {"npy", recordings::encode(encoder, some_events()),
           [] { return std::make_unique<DecoderReader>(std::make_unique<NpyDecoder>()); }};
 }
 
-/// Events, and a frame every 100 ms from 50 ms before them on, whose pixels tell its number.
+/// Events, and a frame every 100 ms, starting 50 ms earlier, whose pixels contain its number.
 File aedat_file(bool has_table) {
   Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::lz4, true, has_table});
   Bytes bytes;
@@ -87,7 +87,7 @@ std::vector<File> all_files() {
   return files;
 }
 
-/// All that comes out.
+/// Complete output.
 struct Outcome {
   using Chunk = std::tuple<std::size_t, Microseconds, Microseconds, std::vector<Event>>;
   using Picture = std::tuple<std::size_t, Microseconds, std::uint8_t>;
@@ -112,7 +112,7 @@ struct Outcome {
       std::visit([this](const auto& item) { take(item); }, *output);
   }
 
-  /// Of one stream; silences are left out.
+  /// Events of one stream, without silences.
   Events events(Microseconds origin) const {
     Events events;
     for (const auto& [stream, start, duration, of_chunk] : chunks)
@@ -196,7 +196,7 @@ TEST_P(Recording, IsSeekedIn) {
   MemoryBytes bytes(GetParam().bytes);
   RecordingReader reader(GetParam().make_reader, chunk_length);
   reader.open(bytes);
-  reader.seek(3'700'000, std::nullopt);  // before anything is known
+  reader.seek(3'700'000, std::nullopt);  // before the survey
   const auto expect_from = [&](Microseconds start, std::optional<Microseconds> stop) {
     Outcome outcome;
     outcome.starts = 1;
@@ -270,7 +270,7 @@ TEST(RecordingReader, LeavesOutWhatLiesOutsideASizeThatIsSet) {
   EXPECT_EQ(reader.counts().outside, some_events().size() - static_cast<std::size_t>(within));
 }
 
-/// Words of a stream have its time, from their first event on.
+/// Words of a stream have stream time, starting with their first event.
 TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
   const Events events{AbsoluteEvent::at(1, 2, 12'000, Polarity::on),
                       AbsoluteEvent::at(3, 4, 19'000, Polarity::off)};
@@ -303,7 +303,7 @@ TEST(RecordingReader, SaysWhatIsNoRecording) {
   EXPECT_THROW(pulled.next(), UnsupportedFormat);
 }
 
-/// Bytes of which none can be read, once.
+/// A source that fails once.
 class Broken final : public ByteSource {
  public:
   explicit Broken(Bytes bytes) : bytes_(std::move(bytes)) {}

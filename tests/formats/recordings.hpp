@@ -20,8 +20,8 @@ inline int below(Random& random, int end) {
   return std::uniform_int_distribution<int>(0, end - 1)(random);
 }
 
-/// Events as cameras and simulators make them: noise, rows that fire at once, bursts, and pauses of
-/// any length up to `max_pause`.
+/// Typical events of cameras and simulators: noise, rows that fire at once, bursts, and pauses of
+/// up to `max_pause`.
 inline std::vector<AbsoluteEvent> random_events(Random& random, SensorSize size, std::size_t count,
                                                 Microseconds max_pause) {
   std::vector<AbsoluteEvent> events;
@@ -74,7 +74,7 @@ inline std::vector<std::uint8_t> encode(Encoder& encoder, std::span<const Absolu
   return bytes;
 }
 
-/// All of it, in pieces of as many bytes as `next_piece()` says.
+/// Decodes everything, in pieces of `next_piece()` bytes.
 template <class NextPiece>
 Decoded decode(Decoder& decoder, std::span<const std::uint8_t> bytes, const NextPiece& next_piece) {
   Decoded decoded;
@@ -91,7 +91,7 @@ inline Decoded decode(Decoder& decoder, std::span<const std::uint8_t> bytes) {
   return decode(decoder, bytes, [&] { return bytes.size(); });
 }
 
-/// Why a decoder does not read a file; empty where it does.
+/// Error of a decoder for a file; empty if it succeeds.
 inline std::string refusal(Decoder& decoder, std::span<const std::uint8_t> bytes) {
   try {
     decode(decoder, bytes);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Every format that is both read and written: what comes back is what was written.
+// Round trips of all formats that can be read and written.
 #include <gtest/gtest.h>
 
 #include "tests/formats/formats.hpp"
@@ -115,8 +115,8 @@ TEST_P(EveryFormat, WritesWhatReadsTheSameHoweverTheEventsAreSplit) {
 }
 
 TEST_P(EveryFormat, FollowsWrapsOfTheTime) {
-  // Past 24, 32 and 34 bits; as far as the format can be silent at once, and somewhat beyond the
-  // largest wrap.
+  // Past 24, 32 and 34 bits, up to the maximum pause of the format and slightly beyond the longest
+  // wrap period.
   std::vector<AbsoluteEvent> events;
   const SensorSize size{320, 240};
   const auto step = std::min(GetParam().max_pause, 30 * formats::minutes);
@@ -135,7 +135,7 @@ TEST_P(EveryFormat, FollowsWrapsOfTheTime) {
 }
 
 TEST_P(EveryFormat, LeavesOutAnAbsurdSilence) {
-  if (GetParam().name == "dat") return;  // which does not fill silence
+  if (GetParam().name == "dat") return;  // DAT does not fill pauses
   const SensorSize size{320, 240};
   const Microseconds now = 1'790'000'000'000'000;
   const std::vector events{AbsoluteEvent::at(1, 2, now, Polarity::on),
@@ -190,7 +190,7 @@ TEST_P(EveryFormat, GoesOnFromEverySeekPointAsIfItHadReadAll) {
     const auto skipped = events.size() - decoded.events.size();
     ASSERT_TRUE(std::equal(decoded.events.begin(), decoded.events.end(),
                            events.begin() + static_cast<std::ptrdiff_t>(skipped)));
-    // Nothing that was asked for is missing.
+    // No requested event is missing.
     if (skipped != 0) {
       ASSERT_LT(events[skipped - 1].t, wanted);
     }
@@ -198,7 +198,7 @@ TEST_P(EveryFormat, GoesOnFromEverySeekPointAsIfItHadReadAll) {
   expect_sound(decoder->corruption());
 }
 
-/// Whatever is done to a file, no event appears out of nothing, and the split changes nothing.
+/// Corruption creates no arbitrary events, and the split does not matter.
 TEST_P(EveryFormat, SurvivesCorruption) {
   Random random(7);
   const SensorSize size{640, 480};
@@ -251,7 +251,8 @@ TEST_P(EveryFormat, SurvivesCorruption) {
 TEST_P(EveryFormat, TellsACutFile) {
   Random random(8);
   const SensorSize size{640, 480};
-  // DAT and Event Stream files end with an event, and the words of the others are longer than 1.
+  // DAT and Event Stream files end with an event, and the words of the others are longer than a
+  // byte.
   const auto events = random_events(random, size, 100, 1000);
   auto bytes = encoded(size, events);
   bytes.pop_back();

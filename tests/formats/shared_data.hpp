@@ -10,7 +10,7 @@
 
 namespace eventcamera::shared_data {
 
-/// A recording of the shared folder; empty where that is missing.
+/// Recording in the shared data folder; empty if that is missing.
 inline std::vector<std::uint8_t> events_file(const std::string& name) {
   const char* const folder = std::getenv("SHARED_DATA");
   std::ifstream file(std::string(folder != nullptr ? folder : "../shared/data") + "/events/" + name,

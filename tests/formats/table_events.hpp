@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Events to write and to read, and the ways to cut bytes into pieces.
+// Events for round trips, and ways to split bytes into pieces.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ inline Bytes bytes_of(std::string_view text) {
   return {text.begin(), text.end()};
 }
 
-/// Events in bursts of one time, neighbours, rows, noise, and silence of hours.
+/// Bursts at the same time, neighbours, rows, noise, and silences of hours.
 inline std::vector<AbsoluteEvent> random_events(std::size_t count, SensorSize size, unsigned seed,
                                                 Microseconds first = 0) {
   std::mt19937 random(seed);
@@ -72,7 +72,7 @@ inline Bytes encoded(Encoder& encoder, std::span<const AbsoluteEvent> events,
   return bytes;
 }
 
-/// Feeds `bytes` in pieces of `size`, or of any size where it is 0.
+/// Feeds `bytes` in pieces of `size`, or of random sizes if it is 0.
 inline std::vector<AbsoluteEvent> decoded(Decoder& decoder, std::span<const std::uint8_t> bytes,
                                           std::size_t size = 0, unsigned seed = 1) {
   std::mt19937 random(seed);
@@ -87,7 +87,7 @@ inline std::vector<AbsoluteEvent> decoded(Decoder& decoder, std::span<const std:
   return out.events;
 }
 
-/// Whatever the pieces, a decoder says the same of these bytes.
+/// Expects the same output of a decoder for any split of these bytes.
 template <class Make>
 void expect_same_however_cut(const Make& make, std::span<const std::uint8_t> bytes) {
   auto whole = make();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Lets scripts write and read tables of events: table_files write|read KIND FILE RAW. RAW is
-// AbsoluteEvents as they lie in memory. Prints what was wrong with the file that is read.
+// Writes and reads tables of events for scripts: table_files write|read KIND FILE RAW. RAW contains
+// AbsoluteEvents in memory layout. Prints the corruption of a file that is read.
 #include <cstdio>
 #include <cstring>
 #include <fstream>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// AEDAT4, through the reader that tells AEDAT's versions apart, and its table of packets.
+// AEDAT4, through the reader for all AEDAT versions, and its packet table.
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_reader.hpp"
@@ -9,7 +9,7 @@ namespace {
 
 using namespace fuzz;
 
-/// All of one kind that was read, as a number.
+/// Hash of all items of one kind.
 class Sum {
  public:
   void add(std::uint64_t number) { sum_ = (sum_ ^ number) * 0x9E3779B97F4A7C15U + (sum_ >> 29); }
@@ -44,10 +44,10 @@ class Sum {
   std::uint64_t sum_ = 0;
 };
 
-/// Of AEDAT's older versions events and triggers come by turns that how bytes are cut may change.
+/// In older AEDAT versions, the interleaving of events and triggers may depend on the split.
 struct Sums {
   Sum events, pictures, triggers, rest;
-  std::vector<Microseconds> latest;  ///< of each stream
+  std::vector<Microseconds> latest;  ///< by stream
   std::uint64_t unsorted = 0;
 
   void add(const EventItem& item) {
@@ -75,7 +75,7 @@ void take(AedatReader& reader, Sums& sums) {
   }
 }
 
-/// Goes to where the table says that the last events are, or back to the beginning.
+/// Seeks to the last events according to the table, or back to the start.
 void seek(AedatReader& reader, std::span<const std::uint8_t> bytes) {
   const auto& decoder = *reader.aedat4();
   auto position = decoder.packets_at();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Sound files of AEDAT's versions.
+// Valid files of all AEDAT versions.
 #pragma once
 
 #include <algorithm>

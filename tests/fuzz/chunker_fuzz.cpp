@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Events at any times, cut into intervals. Four bytes are an event, or a word to the chunker.
+// Cuts events at arbitrary times into intervals. Four bytes are an event or a command.
 #include "src/formats/chunker.hpp"
 
 #include <optional>
@@ -11,7 +11,7 @@ namespace {
 
 using namespace fuzz;
 
-/// Numbered in the order in which they are pushed.
+/// Event numbered in push order.
 AbsoluteEvent numbered(std::uint64_t number, std::uint64_t t) {
   return {static_cast<Microseconds>(t), static_cast<std::uint16_t>(number),
           static_cast<std::uint16_t>(number >> 16)};
@@ -21,7 +21,7 @@ std::uint32_t number_of(const Event& event) {
   return static_cast<std::uint32_t>(event.y_p) << 16 | event.x;
 }
 
-/// Takes what is ready, and returns how many events that were.
+/// Takes all complete intervals and returns their number of events.
 std::uint64_t take(Chunker& chunker, std::optional<Microseconds>& end) {
   std::uint64_t count = 0;
   while (const auto interval = chunker.next()) {

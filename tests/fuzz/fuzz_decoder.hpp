@@ -13,7 +13,7 @@
 
 #include "src/formats/decoder.hpp"
 
-/// What holds for every decoder and any bytes.
+/// Invariants of every decoder for arbitrary bytes.
 namespace fuzz {
 
 using namespace eventcamera;
@@ -24,14 +24,14 @@ inline void require(bool holds, const char* what) {
   std::abort();
 }
 
-/// How bytes are cut: how many a piece has at most, and what chance makes of that.
+/// Split of bytes: maximum piece size, and seed of random sizes.
 struct Pieces {
-  std::size_t longest = 0;  ///< 0: all bytes are one piece
+  std::size_t longest = 0;  ///< 0: a single piece
   std::uint64_t chance = 0;
 };
 
-/// Hands out `bytes` piece by piece. A byte behind a piece cannot be read unseen, nor one of a
-/// piece once it is taken.
+/// Returns `bytes` piece by piece. Sanitizers detect reads past the end of a piece, and of a piece
+/// after its use.
 template <class Take>
 void in_pieces(std::span<const std::uint8_t> bytes, Pieces pieces, const Take& take) {
   const auto longest = pieces.longest == 0 ? bytes.size() : std::min(pieces.longest, bytes.size());
@@ -47,7 +47,7 @@ void in_pieces(std::span<const std::uint8_t> bytes, Pieces pieces, const Take& t
   }
 }
 
-/// `outcome_of(pieces)` has to be the same for all bytes at once as for pieces, small or large.
+/// Checks that `outcome_of(pieces)` is the same for a single piece as for small and large pieces.
 template <class OutcomeOf>
 void require_same_however_cut(std::span<const std::uint8_t> bytes, const OutcomeOf& outcome_of) {
   std::uint64_t chance = bytes.size();
@@ -58,7 +58,7 @@ void require_same_however_cut(std::span<const std::uint8_t> bytes, const Outcome
   require(outcome_of(pieces) == outcome_of(Pieces{}), "pieces make the same");
 }
 
-/// How many events are earlier than one before them.
+/// Number of events earlier than a previous one.
 inline std::uint64_t unsorted(std::span<const AbsoluteEvent> events) {
   std::uint64_t count = 0;
   auto latest = std::numeric_limits<Microseconds>::min();
@@ -75,7 +75,7 @@ inline void require_within(SensorSize size, std::span<const AbsoluteEvent> event
             "events are within the sensor");
 }
 
-/// From the seek point before all events, the same events are read once more.
+/// Checks that the same events are read again from the seek point before all events.
 inline void require_restarts(Decoder& decoder, std::span<const std::uint8_t> bytes,
                              const Decoded& before) {
   const auto seek_point = decoder.seek_point_before(std::numeric_limits<Microseconds>::min());
@@ -88,7 +88,7 @@ inline void require_restarts(Decoder& decoder, std::span<const std::uint8_t> byt
           "what is read anew is the same");
 }
 
-/// All that a decoder makes of bytes. `events_per_byte`: how many the format can hold at most.
+/// Complete output of a decoder. `events_per_byte`: maximum of the format.
 template <class Make>
 auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces pieces,
              std::size_t events_per_byte) {

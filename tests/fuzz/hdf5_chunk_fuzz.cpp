@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Any bytes as the chunks of a sound HDF5 file. Five bytes come first: the layout, the filters, the
-// rows of a chunk, the rows of the file, and the type of a number.
+// Arbitrary bytes as the chunks of a valid HDF5 file. The first five bytes are the layout, the
+// filters, the rows of a chunk, the rows of the file, and the number type.
 #include "src/formats/hdf5/hdf5_handle.hpp"
 #include "tests/fuzz/read_hdf5.hpp"
 #include "tests/fuzz/small_hdf5.hpp"
@@ -17,7 +17,7 @@ hid_t number_type(unsigned choice) {
 
 }  // namespace
 
-/// The library's own memory is kept from file to file: half a megabyte for each that is opened.
+/// The library keeps half a megabyte of memory per opened file.
 extern "C" int LLVMFuzzerInitialize(int*, char***) {
   constexpr int bytes = 16 << 20;
   H5set_free_list_limits(bytes, bytes, bytes, bytes, bytes, bytes);

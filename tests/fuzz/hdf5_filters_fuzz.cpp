@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Any bytes as a chunk of an HDF5 file. Five bytes come first: three filters, those that are left
-// out, and the bytes of a number.
+// Arbitrary bytes as a chunk of an HDF5 file. The first five bytes are three filters, those that
+// are not applied, and the size of a number.
 #include <hdf5.h>
 
 #include "src/formats/hdf5/hdf5_filters.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Writes the files that fuzzing starts from: make_corpus DIRECTORY
+// Writes the seed corpora for fuzzing: make_corpus DIRECTORY
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -16,7 +16,7 @@ namespace {
 
 using namespace fuzz;
 
-/// A format's files: without an event, with few and with more.
+/// Files of a format: without events, with few and with more events.
 std::vector<Seed> seeds_of(const formats::Format& format) {
   constexpr SensorSize size{640, 480};
   recordings::Random random(1);
@@ -30,7 +30,7 @@ std::vector<Seed> seeds_of(const formats::Format& format) {
   return seeds;
 }
 
-/// For chunker_fuzz: events at an even pace, and between them a word to hand some out.
+/// For chunker_fuzz: evenly spaced events, interleaved with commands to return some.
 std::vector<Seed> chunker_seeds() {
   std::vector<Seed> seeds;
   for (const std::uint8_t shift : {0, 4, 10}) {
@@ -79,7 +79,7 @@ int main(int argc, char** argv) {
   write(corpus / "hdf5_filters", hdf5_filters_seeds());
   write(corpus / "chunker", chunker_seeds());
 
-  // A typefinder may be asked about any of them.
+  // Typefinders may see any of them.
   std::vector<Seed> all;
   for (auto& [target, seeds] : files) {
     write(corpus / target, seeds);

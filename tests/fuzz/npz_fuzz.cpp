@@ -8,7 +8,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     MemoryBytes bytes({data, data + size});
     const auto reader = make_npz_reader();
     reader->open(bytes);
-    // A few bytes that are packed can be many events.
+    // A few compressed bytes can be many events.
     constexpr std::size_t most = 1'000'000;
     std::size_t count = 0;
     while (count < most) {

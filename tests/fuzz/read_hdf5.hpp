@@ -7,12 +7,12 @@
 
 namespace fuzz {
 
-/// Reads some of a file, seeks, and reads again.
+/// Reads part of a file, seeks, and reads again.
 inline void read_hdf5(std::span<const std::uint8_t> bytes) {
   try {
     Hdf5Reader reader(
         std::make_unique<MemoryBytes>(std::vector<std::uint8_t>(bytes.begin(), bytes.end())));
-    // A few bytes of gzip can be many events.
+    // A few compressed bytes can be many events.
     constexpr std::size_t most = 100'000;
     std::vector<AbsoluteEvent> events;
     std::vector<Trigger> triggers;
@@ -27,7 +27,7 @@ inline void read_hdf5(std::span<const std::uint8_t> bytes) {
       require(width == 0 || (event.x < width && event.y() < height),
               "events are within the sensor");
   } catch (const std::runtime_error&) {
-    // It is said what is wrong with the file.
+    // Invalid files must be reported.
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What the typefinders tell of any bytes.
+// Typefinders on arbitrary bytes.
 #include "src/formats/recognition.hpp"
 
 #include "src/formats/text/csv_decoder.hpp"
@@ -11,7 +11,7 @@ using namespace fuzz;
 
 std::optional<Recognised> recognise_exactly(std::span<const std::uint8_t> bytes) {
   std::optional<Recognised> found;
-  // In memory of their own, so that a byte behind them cannot be read unseen.
+  // In memory of their own, so that sanitizers detect reads past their end.
   in_pieces(bytes, {}, [&](auto all) { found = recognise(all); });
   return found;
 }

@@ -11,13 +11,13 @@ namespace fuzz {
 
 using namespace eventcamera;
 
-/// A file that a fuzzer starts from.
+/// Seed file for a fuzzer.
 struct Seed {
   std::string name;
   std::vector<std::uint8_t> bytes;
 };
 
-/// No more than `count`, so that a file is small.
+/// At most `count`, to keep files small.
 inline std::vector<AbsoluteEvent> few_events(unsigned seed, SensorSize size, std::size_t count) {
   constexpr Microseconds max_pause = 3'600'000'000;
   recordings::Random random(seed);

@@ -13,7 +13,7 @@ namespace fuzz {
 
 using namespace eventcamera;
 
-/// An HDF5 file in memory that is being made.
+/// Builder of an HDF5 file in memory.
 class SmallHdf5 {
  public:
   explicit SmallHdf5(const std::string& name) {
@@ -33,14 +33,14 @@ class SmallHdf5 {
     H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows);
   }
 
-  /// In chunks of so many rows, which the library packs.
+  /// In chunks of `chunk` rows, filtered by the library.
   void packed_dataset(const char* name, hid_t type, const std::vector<hsize_t>& extent,
                       const void* rows, hsize_t chunk, int filter) {
     const auto dataset = make(name, type, extent, chunk, {filter});
     H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows);
   }
 
-  /// In chunks of so many rows, each of which is stored as these bytes.
+  /// In chunks of `chunk` rows, each stored as these bytes.
   void stored_dataset(const char* name, hid_t type, const std::vector<hsize_t>& extent,
                       hsize_t chunk, const std::vector<int>& filters,
                       const std::vector<std::span<const std::uint8_t>>& chunks) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Sound files of tables of events: text, NumPy's and HDF5's.
+// Valid tables of events: text, NumPy and HDF5.
 #pragma once
 
 #include <zlib.h>
@@ -131,7 +131,7 @@ inline Bytes deflated(const Bytes& bytes) {
   return packed;
 }
 
-/// For hdf5_chunk_fuzz: which layout and filters, and the bytes of a chunk.
+/// For hdf5_chunk_fuzz: layout, filters, and the bytes of a chunk.
 inline std::vector<Seed> hdf5_chunk_seeds() {
   auto seeds = ecf_seeds();
   for (auto& seed : seeds) seed.bytes.insert(seed.bytes.begin(), {2, 0, 200, 250, 0});
@@ -147,7 +147,7 @@ inline std::vector<Seed> hdf5_chunk_seeds() {
   return seeds;
 }
 
-/// For hdf5_filters_fuzz: filters, those that are left out, and 16 numbers of 4 bytes.
+/// For hdf5_filters_fuzz: filters, those that are not applied, and 16 numbers of 4 bytes.
 inline std::vector<Seed> hdf5_filters_seeds() {
   const Bytes numbers(64, 1);
   Bytes shuffled = {1, 1, 1, 6, 3};

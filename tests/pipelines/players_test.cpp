@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Files of events in players, which plug our readers and the renderer by themselves: played, sought
-// in while they play, and played to their end.
+// Event files in players, which autoplug the readers and the renderer: playing, seeking while
+// playing, and playing to the end.
 #include <gst/gst.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr SensorSize sensor{346, 260};
 constexpr Microseconds length = 5'000'000;
-/// So that a time of the file is none of the player's.
+/// File times differ from the player's times.
 constexpr Microseconds beginning = 30'000'000;
 
 /// A dot that runs through the rows.
@@ -62,7 +62,7 @@ bool run(const std::string& launch) {
   return ended;
 }
 
-/// The same events in every format, for as long as the tests run.
+/// Files with the same events in every format, for the duration of the tests.
 class Files {
  public:
   static const Files& get() {
@@ -127,7 +127,7 @@ std::string test_name(std::string text) {
   return text;
 }
 
-/// playbin or playbin3, with a sink in which pictures take their time.
+/// playbin or playbin3, with a slow sink.
 class Player {
  public:
   Player(const std::string& player, const std::string& path) {
@@ -179,13 +179,13 @@ class Player {
                          GST_STATE_CHANGE_SUCCESS;
   }
 
-  /// The stream time of the picture that was shown last, once there is any.
+  /// Stream time of the last picture shown, if any.
   GstClockTime last_picture() const {
     for (int i = 0; i < 2000 && last_ == GST_CLOCK_TIME_NONE; ++i) g_usleep(5000);
     return last_;
   }
 
-  /// To the end; false for an error, or where nothing happens any more.
+  /// Plays to the end. False after an error or a timeout.
   bool ends_well() {
     GstMessage* message = gst_bus_timed_pop_filtered(
         bus_, 20 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));

@@ -14,8 +14,8 @@
 /// Recorded video, read with GStreamer.
 namespace video_frames {
 
-/// Runs a pipeline and shows the first `count` samples of its appsink, called sink. Throws what
-/// the pipeline had to complain of.
+/// Runs a pipeline and visits the first `count` samples of its appsink, named sink. Throws the
+/// error of the pipeline, if any.
 template <class Visit>
 void for_each_sample(const std::string& launch, int count, const Visit& visit) {
   gst_init(nullptr, nullptr);
@@ -55,7 +55,7 @@ void for_each_sample(const std::string& launch, int count, const Visit& visit) {
   complain(error);
 }
 
-/// Shows the first `count` frames of a file, in grey, scaled to a width (a multiple of 4) and
+/// Visits the first `count` frames of a file, in grey, scaled to a width (a multiple of 4) and
 /// height.
 template <class Visit>
 void for_each_frame(const std::string& path, int count, int width, int height, const Visit& visit) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Real pictures: every event of every element on two videos, and whether interpolation moves
-// things the right way. Skips what is not there.
+// Real video: checks every event of every element on two videos, and that interpolation moves
+// objects in the right direction. Skips missing videos.
 #include <gst/app/gstappsink.h>
 #include <gst/gst.h>
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ std::string video(const std::string& name) {
 const std::string driving = "driving-1280x720-25fps.mp4";
 const std::string cars = "cars-768x432-12fps.mp4";
 
-/// The grey pictures of the hand-held sequence in Debian's package visp-images-data.
+/// Grey frames of the hand-held sequence in the Debian package visp-images-data.
 std::vector<Image<std::uint8_t>> castel_frames(int count) {
   std::vector<Image<std::uint8_t>> frames;
   for (int i = 0; i < count; ++i) {
@@ -79,7 +79,7 @@ double psnr(const Image<std::uint8_t>& a, const Image<std::uint8_t>& b) {
 constexpr FlowMethod flows[] = {FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback};
 constexpr Interpolation interpolations[] = {Interpolation::forward, Interpolation::blend};
 
-/// The warp of I(i-1) with all of its flow.
+/// I(i-1) warped by the full flow.
 Image<std::uint8_t> warped(const Image<std::uint8_t>& last, const ImageView<Flow>& flow) {
   Image<std::uint8_t> result(last.width(), last.height());
   for (int y = 0; y < last.height(); ++y)
@@ -113,7 +113,7 @@ TEST(Dense, WarpsTheRightWayRound) {
   }
 }
 
-/// The 8-bit difference frame of one polarity (1 or -1).
+/// 8-bit difference frame of one polarity (1 or -1).
 Image<std::uint8_t> part(const Image<std::uint8_t>& last, const Image<std::uint8_t>& now, int sign,
                          int threshold) {
   Image<std::uint8_t> result(now.width(), now.height());
@@ -124,8 +124,8 @@ Image<std::uint8_t> part(const Image<std::uint8_t>& last, const Image<std::uint8
   return result;
 }
 
-/// The slope about each pixel (15x15, root of the mean square, grey levels a pixel) in the
-/// direction in which it is least.
+/// Minimum gradient over all directions around each pixel (15x15, root mean square, grey levels per
+/// pixel).
 cv::Mat min_slopes(const Image<std::uint8_t>& picture) {
   cv::Mat x;
   cv::Mat y;
@@ -162,7 +162,8 @@ std::vector<Track> opencv_tracks(const Image<std::uint8_t>& from, const Image<st
   return tracks;
 }
 
-/// How far our tracks end from OpenCV's, where there is texture: 3 grey levels a pixel.
+/// Distances between the ends of PointTracker's and OpenCV's tracks at textured pixels: 3 grey
+/// levels per pixel.
 struct TrackErrors {
   double sum = 0;
   int tracks = 0;
@@ -212,7 +213,7 @@ TEST(Tracks, AreThoseOfOpenCv) {
   check("diff", diff);
 }
 
-/// OpenCV's function of the same method, with the same parameters.
+/// OpenCV's implementation of the same method, with the same parameters.
 Image<Flow> opencv_farneback(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to) {
   Image<Flow> flow(from.width(), from.height());
   cv::Mat mat(from.height(), from.width(), CV_32FC2, flow.row(0),
@@ -222,8 +223,7 @@ Image<Flow> opencv_farneback(const Image<std::uint8_t>& from, const Image<std::u
   return flow;
 }
 
-/// The mean distance between two flows where the picture has texture: a gradient of 4 grey levels
-/// a pixel.
+/// Mean distance between two flows at textured pixels: a gradient of 4 grey levels per pixel.
 double distance(const Image<std::uint8_t>& picture, const ImageView<Flow>& a,
                 const ImageView<Flow>& b) {
   double sum = 0;
@@ -259,8 +259,7 @@ TEST(Farneback, IsWhatOpenCvFinds) {
   }
 }
 
-/// The share of events that have a partner among others: of the same polarity, within a pixel and a
-/// step.
+/// Fraction of events with a match in another set: same polarity, within one pixel and one step.
 class Partners {
  public:
   Partners(const std::vector<Event>& events, int width, int height, const StepTimes& steps)
@@ -303,7 +302,7 @@ class Partners {
 
 constexpr Nanoseconds interval = 40'000'000;
 
-/// The events that a simulator makes of the last of a few frames.
+/// Events of a simulator for the last of a few frames.
 std::vector<Event> events_of(Simulator& simulator,
                              const std::vector<const Image<std::uint8_t>*>& frames,
                              double threshold, int interpolated_frames) {
@@ -322,7 +321,7 @@ std::vector<Event> events_of(Simulator& simulator,
   return events;
 }
 
-/// Where ours replaces OpenCV's: nearly all events have a partner, both ways.
+/// Implementations that replace OpenCV's: nearly all events have a match, in both directions.
 void expect_partners(const char* name, const std::vector<Event>& ours,
                      const std::vector<Event>& theirs, int width, int height,
                      const StepTimes& steps) {
@@ -371,8 +370,8 @@ TEST(Events, AreThoseOfOpenCvsFlows) {
   }
 }
 
-/// Bottles pass under a still camera: where flow is sought only around them, it shows as much and
-/// as true as that of the whole picture.
+/// Bottles pass under a static camera: flow computed only around them is as complete and accurate
+/// as that of the whole frame.
 TEST(Events, AreThoseOfTheFlowOfTheWhole) {
   const auto bottles = video("bottles-640x360-30fps.mp4");
   if (!std::filesystem::exists(bottles)) GTEST_SKIP() << "no " << bottles;
@@ -419,7 +418,7 @@ TEST(Events, AreThoseOfTheFlowOfTheWhole) {
 }
 
 struct Agreement {
-  double pixels = 0;  ///< that differ by more than 10 grey levels
+  double pixels = 0;  ///< pixels that change by more than 10 grey levels
   double fired = 0;   ///< of these, those whose polarities do not add up to 0
   double right = 0;   ///< of these, those whose sum has the sign of the difference
 
@@ -448,7 +447,7 @@ void add_agreement(const Image<std::uint8_t>& last, const Image<std::uint8_t>& n
   }
 }
 
-/// How often the polarities of a pixel's events add up to the sign of its change, at the default
+/// How often the sum of polarities of a pixel's events has the sign of its change, with default
 /// settings.
 Agreement agreement_of(const std::vector<Image<std::uint8_t>>& frames, FlowMethod method,
                        Interpolation interpolation) {
@@ -471,7 +470,7 @@ Agreement agreement_of(const std::vector<Image<std::uint8_t>>& frames, FlowMetho
   return agreement;
 }
 
-/// The least shares of pixels and of events that fire the right way.
+/// Minimum fractions of pixels and events with the right polarity.
 struct AgreementBounds {
   double pixels;
   double events;
@@ -501,8 +500,8 @@ TEST(Dense, FiresThePolarityOfTheChange) {
   expect_agreement("castel", frames, {0.95, 0.95});
 }
 
-/// Here things move 20 pixels and more a frame: a pixel sees several of them pass within one
-/// interval, and its polarities, which do not weigh the changes, need not add up to their sum.
+/// Objects move by 20 pixels and more per frame here: several pass a pixel within one interval, and
+/// its polarities, which do not weight the changes, need not add up to their sum.
 TEST(Dense, FiresThePolarityOfTheChangeWhereMuchPassesBy) {
   if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
   expect_agreement("driving", frames_of(video(driving), 5, 1280, 720), {0.83, 0.6});
@@ -532,7 +531,7 @@ std::vector<Case> cases() {
 
 INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(cases()));
 
-/// Order, bounds, interval and polarity of every event.
+/// Checks order, bounds, interval and polarity of every event.
 TEST_P(EveryElement, MakesSoundEventsOfRealVideo) {
   const auto path = video(GetParam().name);
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
