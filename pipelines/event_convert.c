@@ -145,8 +145,8 @@ static const Reader* reader_of(const char* media_type) {
   return NULL;
 }
 
-/* The reader of a file, by its content, or by its extension where the content tells nothing. Prints
- * an error and returns NULL where there is none. */
+/* The reader of a file, by its content, or by its extension if the content is ambiguous. Prints
+ * an error and returns NULL if there is none. */
 static const Reader* find_reader(const char* path) {
   static guint8 start[1 << 14];
   const Format* format = format_of(path);

@@ -32,7 +32,7 @@ struct RecordingFormat {
   const char* description;
   const char* caps;  ///< input caps
   bool has_many_streams = false;
-  bool is_table = false;  ///< rows of numbers; properties tell what these do not
+  bool is_table = false;  ///< rows of numbers, whose properties may be set by the application
 
   /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown. May throw.
   std::unique_ptr<eventcamera::Reader> (*make_reader)(const GstCaps* caps,

@@ -166,7 +166,7 @@ static GstClockTime latency_of(GstEventSimulator* self) {
   return static_cast<GstClockTime>(priv_of(self).latency.lock()->value());
 }
 
-/// Posts a message where this changes the latency.
+/// Posts a message if this changes the latency.
 template <class Change>
 static void change_latency(GstEventSimulator* self, const Change& change) {
   const GstClockTime before = latency_of(self);

@@ -133,8 +133,8 @@ inline Bytes moved(const Bytes& body, std::size_t by) {
   return bytes;
 }
 
-/// `xml` as the header's text; an empty one is left out. Numbers of eight bytes lie at multiples of
-/// eight, counted from the body's size, where they are not `off_by` bytes.
+/// `xml` is the text of the header, unless empty. 8-byte numbers are aligned to 8 bytes relative to
+/// the body's size prefix, plus `off_by` bytes.
 inline Bytes aedat4_header(std::string_view xml, int compression = 0, std::int64_t table = -1,
                            std::size_t off_by = 0) {
   Bytes body;
@@ -198,7 +198,7 @@ struct TriggerSource {
   int source;  ///< value in AEDAT 4
 };
 
-/// Tables with a time in 64 bits and, where it is not left out, a byte.
+/// Tables with a 64-bit time and, unless omitted, a byte.
 inline Bytes triggers_content(std::span<const TriggerSource> triggers, std::size_t off_by = 0) {
   const auto count = static_cast<std::int64_t>(triggers.size());
   const auto first = (4 * count + 8 + 7) / 8 * 8;  // of the tables, from the vector's data
