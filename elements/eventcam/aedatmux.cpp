@@ -110,7 +110,7 @@ GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mu
   ", format = (string) XYTP, width = (int) [ 1, 32767 ], " \
   "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"
 
-/// The first: links that name no pad take it.
+/// First template, so that it is used by links without a pad name.
 static GstStaticPadTemplate any_template =
     GST_STATIC_PAD_TEMPLATE("sink_%u", GST_PAD_SINK, GST_PAD_REQUEST,
                             GST_STATIC_CAPS(EVENTS_CAPS "; " RECORDED_VIDEO_CAPS));
@@ -159,7 +159,7 @@ static Kind kind_of(const GstCaps* caps) {
   return has_events ? Kind::events : Kind::video;
 }
 
-/// What comes to a pad, as far as its caps tell by now.
+/// Kind of the stream of a pad, according to its current or template caps.
 static Kind kind_of(GstAggregatorPad* pad) {
   OwnedCaps caps(gst_pad_get_current_caps(GST_PAD(pad)));
   if (!caps) caps.reset(gst_pad_get_pad_template_caps(GST_PAD(pad)));

@@ -30,7 +30,7 @@ std::unique_ptr<Reader> decoded_by(const GstCaps* /*caps*/, const TableSettings&
   return std::make_unique<DecoderReader>(make_decoder());
 }
 
-/// The reader of a table.
+/// Creates a reader for a table.
 template <class TableDecoder>
 std::unique_ptr<Reader> table_read_by(const GstCaps* /*caps*/, const TableSettings& table) {
   return std::make_unique<DecoderReader>(std::make_unique<TableDecoder>(table));

@@ -1111,7 +1111,7 @@ bool EventReader::seek(GstEvent* event) {
   std::shared_ptr<RecordingReader> recording;
   {
     const auto shared = shared_.lock();
-    // A bin sends the same seek to each of its sinks, and so it comes through each of our pads.
+    // A bin sends a seek to each of its sinks, so the same seek may arrive on every source pad.
     if (shared->last_seek == request.seqnum()) return true;
     is_pulling = shared->is_pulling;
     recording = shared->recording;

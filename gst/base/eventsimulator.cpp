@@ -39,7 +39,7 @@ namespace {
 constexpr guint max_interpolated_frames = 255;
 constexpr guint default_interpolated_frames = 10;
 
-/// Limit of the latency from intervals.
+/// Limit of the latency learnt from intervals.
 constexpr Nanoseconds max_latency = GST_SECOND;
 
 /// User-settable values, copied once per buffer.
@@ -446,7 +446,8 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
 
 /* events, queries, states */
 
-/// Sources of bytes have no times: theirs becomes the segment of the times that frames get.
+/// Replaces a segment in another format than TIME, as from byte sources, by the TIME segment of the
+/// timestamps that frames are given. Takes ownership of `event`.
 static GstEvent* segment_of_times(GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
@@ -459,7 +460,7 @@ static GstEvent* segment_of_times(GstEvent* event) {
   return replacement;
 }
 
-/// Time begins anew, and nothing follows on what was before.
+/// Starts a new timeline, discontinuous with the previous one.
 static void start_timeline(GstEventSimulator* self) {
   start_over(self);
   priv_of(self).stream.clock.start_over();

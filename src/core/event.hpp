@@ -53,7 +53,7 @@ inline std::span<const Event> events_until(std::span<const Event> events, Micros
   return events.first(static_cast<std::size_t>(first_after - events.begin()));
 }
 
-/// The order of simulated events: by time, and within a time in raster order.
+/// Order of simulated events: by time, then in raster order.
 inline bool is_before(const Event& a, const Event& b) {
   const auto place = [](const Event& event) {
     return static_cast<std::uint32_t>(event.y()) << 16 | event.x;

@@ -19,7 +19,7 @@ bool has_at(std::size_t at, std::string_view magic, Bytes bytes) {
                             [](std::uint8_t byte) { return static_cast<char>(byte); });
 }
 
-/// A ZIP archive whose first file is a NumPy array.
+/// True for a ZIP archive whose first file is a NumPy array.
 bool is_npz(Bytes bytes) {
   constexpr std::size_t name_begin = 30;
   constexpr std::string_view ending = ".npy";
@@ -62,8 +62,8 @@ std::optional<Recognised> by_text_header(Bytes bytes) {
   return std::nullopt;
 }
 
-/// True if CsvDecoder decodes every line as an event. The unit of time does not matter here: who
-/// reads the file reports one that cannot be found.
+/// True if CsvDecoder decodes every line as an event. An ambiguous time unit does not matter here;
+/// it is reported when the file is read.
 bool is_csv(Bytes bytes) {
   constexpr std::size_t max_bytes = 4096;
   constexpr std::size_t min_events = 3;
