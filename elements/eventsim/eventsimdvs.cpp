@@ -11,9 +11,10 @@
  * microsecond.
  *
  * A preset sets all of these; properties that are set explicitly, before or after the preset,
- * override it. Thresholds are in units of the response: with log and lin-log a threshold of 0.2 is
- * a change of light by 22 %; linear has as many units from black to white as lin-log, ln(255) =
- * 5.54, so that 0.2 is 9.2 grey levels of 8-bit video.
+ * override it. Times are nanoseconds. Properties that gst-inspect-1.0 marks as controllable are
+ * read at the time of each frame. Thresholds are in units of the response: with log and lin-log a
+ * threshold of 0.2 is a change of light by 22 %; linear has as many units from black to white as
+ * lin-log, ln(255) = 5.54, so that 0.2 is 9.2 grey levels of 8-bit video.
  *
  * If the sensor noise of a webcam makes a static or dark scene fire, denoise removes the noise and
  * keeps the edges.
@@ -41,6 +42,7 @@
 using eventcamera::DvsPreset;
 using eventcamera::DvsSettings;
 using eventcamera::DvsSimulator;
+using eventcamera::Nanoseconds;
 using eventcamera::RefractoryReset;
 using eventcamera::Response;
 using eventcamera::Upsampling;
@@ -95,96 +97,106 @@ static GType preset_type() {
 
 namespace {
 
+/// Flags of a property that a GstController can change over time, and of a trait of the sensor.
+constexpr auto controllable = static_cast<GParamFlags>(GST_PARAM_CONTROLLABLE);
+constexpr GParamFlags fixed = {};
+
+constexpr double max_time = GST_SECOND;
+
 /// A property stored in a member of DvsSettings.
 struct Setting {
   const char* name;
   const char* nick;
   const char* blurb;
   std::variant<double DvsSettings::*, int DvsSettings::*, bool DvsSettings::*,
-               std::uint64_t DvsSettings::*, Response DvsSettings::*, Upsampling DvsSettings::*,
-               RefractoryReset DvsSettings::*>
+               std::uint64_t DvsSettings::*, Nanoseconds DvsSettings::*, Response DvsSettings::*,
+               Upsampling DvsSettings::*, RefractoryReset DvsSettings::*>
       member;
   double min = 0;
   double max = 0;
+  GParamFlags over_time = fixed;
   GType (*type)() = nullptr;  ///< for enums
 };
 
 const Setting table[] = {
     {"denoise", "Denoise",
-     "Smooth frames first, sparing differences between neighbours above this, since sensor noise "
-     "is not light (grey levels, white is 255; 0 = off)",
-     &DvsSettings::denoise, 0, 255},
+     "Remove camera noise from each frame first: differences between neighbouring pixels of up to "
+     "this size are smoothed, larger ones such as edges stay (grey levels, white is 255; 0 = off, "
+     "8 suits noisy webcams)",
+     &DvsSettings::denoise, 0, 255, controllable},
     {"linear-light", "Linear light",
      "Undo the sRGB transfer function (IEC 61966-2-1) first, to recover the light that the camera "
      "saw; otherwise luma is used as light",
      &DvsSettings::linear_light},
     {"response", "Response", "Response of the photoreceptor to light", &DvsSettings::response, 0, 0,
-     response_type},
+     fixed, response_type},
     {"log-eps", "Offset of the logarithm",
      "Light that response=log adds before the logarithm, which limits how dark pixels get (white "
      "is 1)",
      &DvsSettings::log_eps, 1e-6, 1},
     {"upsampling", "Upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0,
-     0, upsampling_type},
+     0, fixed, upsampling_type},
     {"max-steps", "Maximum steps",
      "Maximum number of steps between two frames with upsampling=motion; there are as many as the "
      "pixels that the fastest point moves",
      &DvsSettings::max_steps, 1, 255},
     {"cutoff-hz", "Cutoff",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
-     &DvsSettings::cutoff_hz, 0, 1e6},
+     &DvsSettings::cutoff_hz, 0, 1e6, controllable},
     {"dark-light", "Dark light",
-     "Background light (white is 1): the bandwidth is proportional to (light + "
-     "dark-light) / (1 + dark-light), and light reduces shot noise to as little as a quarter",
-     &DvsSettings::dark_light, 1e-6, 1},
+     "Background light that limits how slow and how noisy dark pixels get (fraction of white): the "
+     "bandwidth of a pixel is cutoff-hz times its brightness, (light + dark-light) / (1 + "
+     "dark-light), and its shot noise falls from all of shot-noise-rate-hz at brightness 0 to a "
+     "quarter at 1",
+     &DvsSettings::dark_light, 1e-6, 1, controllable},
     {"positive-threshold", "Positive threshold",
      "Rise above the reference level that fires an ON event (units of the response)",
-     &DvsSettings::positive_threshold, 1e-3, 10},
+     &DvsSettings::positive_threshold, 1e-3, 10, controllable},
     {"negative-threshold", "Negative threshold",
      "Fall below the reference level that fires an OFF event (units of the response, a magnitude)",
-     &DvsSettings::negative_threshold, 1e-3, 10},
+     &DvsSettings::negative_threshold, 1e-3, 10, controllable},
     {"threshold-sigma", "Threshold mismatch",
      "Standard deviation of the thresholds between pixels (units of the response)",
      &DvsSettings::threshold_sigma, 0, 10},
     {"threshold-jitter", "Threshold jitter",
      "Standard deviation of the thresholds between events (units of the response)",
-     &DvsSettings::threshold_jitter, 0, 10},
+     &DvsSettings::threshold_jitter, 0, 10, controllable},
     {"leak-rate-hz", "Leak rate",
      "Mean rate of ON events of a pixel without change, from the leak of its reference level (Hz)",
-     &DvsSettings::leak_rate_hz, 0, 1e4},
+     &DvsSettings::leak_rate_hz, 0, 1e4, controllable},
     {"leak-spread", "Leak spread", "Standard deviation of the leak rate between pixels (decades)",
      &DvsSettings::leak_spread, 0, 1},
     {"shot-noise-rate-hz", "Shot-noise rate",
      "Rate of random events of a pixel in the dark, ON and OFF together (Hz)",
-     &DvsSettings::shot_noise_rate_hz, 0, 1e4},
+     &DvsSettings::shot_noise_rate_hz, 0, 1e4, controllable},
     {"hot-pixels", "Hot pixels",
      "Fraction of pixels that leak 10 to 1000 ON events per second, regardless of light",
      &DvsSettings::hot_pixels, 0, 1},
     {"dead-pixels", "Dead pixels", "Fraction of pixels that never fire", &DvsSettings::dead_pixels,
      0, 1},
     {"refractory-period", "Refractory period",
-     "Time after an event in which a pixel does not fire again (us)",
-     &DvsSettings::refractory_period, 0, 1e6},
+     "Time after an event in which a pixel does not fire again (ns)",
+     &DvsSettings::refractory_period, 0, max_time, controllable},
     {"refractory-reset", "Refractory reset", "Reference level of a pixel after an event",
-     &DvsSettings::refractory_reset, 0, 0, refractory_reset_type},
+     &DvsSettings::refractory_reset, 0, 0, fixed, refractory_reset_type},
     {"exposure-pulse", "Exposure pulse",
      "Rise of all signals for a millisecond when an exposure begins, in cameras that also capture "
      "frames (units of the response)",
-     &DvsSettings::exposure_pulse, 0, 10},
+     &DvsSettings::exposure_pulse, 0, 10, controllable},
     {"exposure-lead", "Exposure lead",
-     "Time from the start of a frame's exposure to the frame's timestamp, at most the time between "
-     "frames (us)",
-     &DvsSettings::exposure_lead, 0, 1e6},
+     "How long before a frame's timestamp its exposure begins, and with it exposure-pulse (ns); "
+     "longer than the time between frames, there is no pulse",
+     &DvsSettings::exposure_lead, 0, max_time, controllable},
     {"latency", "Latency",
      "Time from the crossing of a threshold to the event, with which the refractory period begins "
-     "(us). Events past the last frame are not sent",
-     &DvsSettings::latency, 0, 1e6},
-    {"latency-jitter", "Latency jitter", "Standard deviation of the latency (us)",
-     &DvsSettings::latency_jitter, 0, 1e6},
+     "(ns). Events past the last frame are not sent",
+     &DvsSettings::latency, 0, max_time, controllable},
+    {"latency-jitter", "Latency jitter", "Standard deviation of the latency (ns)",
+     &DvsSettings::latency_jitter, 0, max_time, controllable},
     {"max-event-rate", "Maximum event rate",
      "Capacity of the readout: further events wait, row by row, and a waiting pixel fires no other "
      "event (events/s; 0 = no limit)",
-     &DvsSettings::max_event_rate, 0, 1e12},
+     &DvsSettings::max_event_rate, 0, 1e12, controllable},
     {"seed", "Seed", "Seed of all random numbers: the same seed gives the same events",
      &DvsSettings::seed},
 };
@@ -215,18 +227,21 @@ static constexpr auto property_flags = static_cast<GParamFlags>(
 
 template <class Value>
 static GParamSpec* spec_of(const Setting& s, Value value) {
+  const auto flags = static_cast<GParamFlags>(property_flags | s.over_time);
   if constexpr (std::is_same_v<Value, double>)
-    return g_param_spec_double(s.name, s.nick, s.blurb, s.min, s.max, value, property_flags);
+    return g_param_spec_double(s.name, s.nick, s.blurb, s.min, s.max, value, flags);
   else if constexpr (std::is_same_v<Value, int>)
     return g_param_spec_uint(s.name, s.nick, s.blurb, static_cast<guint>(s.min),
-                             static_cast<guint>(s.max), static_cast<guint>(value), property_flags);
+                             static_cast<guint>(s.max), static_cast<guint>(value), flags);
   else if constexpr (std::is_same_v<Value, bool>)
-    return g_param_spec_boolean(s.name, s.nick, s.blurb, value, property_flags);
+    return g_param_spec_boolean(s.name, s.nick, s.blurb, value, flags);
   else if constexpr (std::is_same_v<Value, std::uint64_t>)
-    return g_param_spec_uint64(s.name, s.nick, s.blurb, 0, G_MAXUINT64, value, property_flags);
+    return g_param_spec_uint64(s.name, s.nick, s.blurb, 0, G_MAXUINT64, value, flags);
+  else if constexpr (std::is_same_v<Value, Nanoseconds>)
+    return g_param_spec_uint64(s.name, s.nick, s.blurb, 0, static_cast<guint64>(s.max),
+                               static_cast<guint64>(value), flags);
   else
-    return g_param_spec_enum(s.name, s.nick, s.blurb, s.type(), static_cast<int>(value),
-                             property_flags);
+    return g_param_spec_enum(s.name, s.nick, s.blurb, s.type(), static_cast<int>(value), flags);
 }
 
 static void install_properties(GObjectClass* klass) {
@@ -236,8 +251,8 @@ static void install_properties(GObjectClass* klass) {
       [](Choice& choice, const GValue* value) { choice.take_preset(value); },
       [](Choice& choice, GValue* value) { write_value(choice.preset, value); },
       g_param_spec_enum("preset", "Preset",
-                        "Values of all properties that are not set explicitly, before "
-                        "or after",
+                        "Camera model: gives values to all properties of the pixel, except those "
+                        "that are set explicitly, before or after",
                         preset_type(), static_cast<int>(defaults.preset), property_flags));
   for (std::size_t i = 0; i < std::size(table); ++i) {
     const auto add = [&](auto member) {

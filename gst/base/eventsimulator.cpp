@@ -122,6 +122,9 @@ static GuardedSettings<Settings>& settings_of(GObject* object) {
 static constexpr auto property_flags = static_cast<GParamFlags>(
     G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 
+static constexpr auto controllable_flags =
+    static_cast<GParamFlags>(property_flags | GST_PARAM_CONTROLLABLE);
+
 static void install_thresholds(GObjectClass* klass, double grey_levels) {
   Properties<settings_of> properties(klass);
   properties.add(
@@ -129,13 +132,13 @@ static void install_thresholds(GObjectClass* klass, double grey_levels) {
       g_param_spec_double("positive-threshold", "Positive threshold",
                           "Minimum rise in brightness for an ON event, exclusive "
                           "(8-bit grey levels, whatever the depth of the video)",
-                          0, 255, grey_levels, property_flags));
+                          0, 255, grey_levels, controllable_flags));
   properties.add(
       [](Settings& settings) -> double& { return settings.simulation.negative_threshold; },
       g_param_spec_double("negative-threshold", "Negative threshold",
                           "Minimum fall in brightness for an OFF event, exclusive "
                           "(8-bit grey levels, a magnitude, whatever the depth of the video)",
-                          0, 255, grey_levels, property_flags));
+                          0, 255, grey_levels, controllable_flags));
 }
 
 static void install_interpolated_frames(GObjectClass* klass) {
@@ -345,6 +348,14 @@ static bool is_ready(GstEventSimulator* self) {
 
 /* frames in, intervals out */
 
+/// Gives controlled properties the values that they have at a time of the segment.
+static void sync_controlled_properties(GstEventSimulator* self, GstClockTime time) {
+  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
+  if (segment.format != GST_FORMAT_TIME) return;  // as from appsrc
+  const auto stream_time = gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, time);
+  if (GST_CLOCK_TIME_IS_VALID(stream_time)) gst_object_sync_values(GST_OBJECT(self), stream_time);
+}
+
 /// Returns the events between the last frame and this one, or nullptr for a first frame. May throw.
 static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& frame,
                                     Nanoseconds time, const Settings& settings) {
@@ -381,6 +392,7 @@ static void set_times(GstBuffer* out, Nanoseconds start, Nanoseconds end, State&
 static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffer** out) {
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
+  sync_controlled_properties(self, GST_BUFFER_PTS(in));
   const Settings settings = priv_of(self).settings.copy();
 
   check_interlacing(self, in);
@@ -491,6 +503,7 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
   const Nanoseconds start = *state.simulator->last_time();
+  sync_controlled_properties(self, static_cast<GstClockTime>(end));
   configure(self);
   const EventBuckets* events =
       state.simulator->hold_until(end, priv_of(self).settings.copy().simulation);

@@ -3,7 +3,14 @@
 
 #include <cstdint>
 
+#include "src/core/event.hpp"
+
 namespace eventcamera {
+
+/// Time in the unit of pixels, microseconds.
+constexpr double in_microseconds(Nanoseconds time) {
+  return static_cast<double>(time) / 1000;
+}
 
 /// Response of the photoreceptor to light, before its bandwidth limit.
 enum class Response {
@@ -49,16 +56,15 @@ struct DvsSettings {
   double hot_pixels = 0;          ///< fraction of all pixels
   double dead_pixels = 0;         ///< fraction of all pixels
 
-  double refractory_period = 0;  ///< microseconds
+  Nanoseconds refractory_period = 0;
   RefractoryReset refractory_reset = RefractoryReset::level;
 
-  double exposure_pulse =
-      0;                     ///< rise of all signals when an exposure begins, units of the response
-  double exposure_lead = 0;  ///< microseconds from the start of the exposure to the frame's time
+  double exposure_pulse = 0;      ///< rise of all signals at the start of an exposure, same units
+  Nanoseconds exposure_lead = 0;  ///< from the start of the exposure to the frame's time
 
-  double latency = 0;         ///< microseconds from the crossing to the event
-  double latency_jitter = 0;  ///< std-dev of the latency, microseconds
-  double max_event_rate = 0;  ///< limit of the readout, events per second; 0 = no limit
+  Nanoseconds latency = 0;         ///< from the crossing to the event
+  Nanoseconds latency_jitter = 0;  ///< std-dev of the latency
+  double max_event_rate = 0;       ///< limit of the readout, events per second; 0 = no limit
 
   std::uint64_t seed = 0;
 

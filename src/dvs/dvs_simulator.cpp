@@ -87,7 +87,7 @@ class PixelSimulator final : public DvsSimulator {
   /// Returns the duration of the interval in microseconds.
   double begin(const StepTimes& interval) {
     if (settings_ != current_) change_to(settings_);
-    const double duration = static_cast<double>(interval.duration()) / 1000;
+    const double duration = in_microseconds(interval.duration());
     sorter_.begin(duration, band_count(format().height));
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
     return duration;

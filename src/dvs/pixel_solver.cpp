@@ -31,9 +31,11 @@ struct PixelLight {
 /// One pixel in one sub-interval. Times are microseconds after its start.
 class Pixel {
  public:
-  Pixel(const DvsSettings& settings, const Random& random, const SubInterval& sub_interval,
-        const PixelRow& pixels, int x, const PixelLight& light, const BandEvents& events)
+  Pixel(const DvsSettings& settings, const Delays& delays, const Random& random,
+        const SubInterval& sub_interval, const PixelRow& pixels, int x, const PixelLight& light,
+        const BandEvents& events)
       : settings_(settings),
+        delays_(delays),
         random_(random),
         sub_interval_(sub_interval),
         pixels_(pixels),
@@ -97,7 +99,7 @@ class Pixel {
       const double t = std::clamp((level - above_leak_.offset) / above_leak_.slope, 0.0, end_.t);
       if (t < ready_) continue;
       events_.add(sub_interval_.begin + t, x_, pixels_.y, rises ? Polarity::on : Polarity::off);
-      ready_ = t + std::max(settings_.refractory_period, min_gap);
+      ready_ = t + std::max(delays_.refractory_period, min_gap);
     }
     if (happened == max_events) reference_ = end_.value;
     store();
@@ -117,7 +119,7 @@ class Pixel {
       reference_ += crossing->polarity == Polarity::on ? positive_ : -negative_;
       if (now.t < ready_) continue;
       events_.add(sub_interval_.begin + now.t, x_, pixels_.y, crossing->polarity);
-      ready_ = now.t + std::max(settings_.refractory_period, min_gap);
+      ready_ = now.t + std::max(delays_.refractory_period, min_gap);
     }
     if (happened == max_events) reference_ = end_.value;
     store();
@@ -179,13 +181,13 @@ class Pixel {
 
   /// Emits an event and starts the refractory period.
   void fire(double crossed, Polarity polarity) {
-    double t = crossed + settings_.latency;
-    if (settings_.latency_jitter > 0) {
+    double t = crossed + delays_.latency;
+    if (delays_.latency_jitter > 0) {
       const double jitter = random_.normal(number_, Random::Purpose::event, draw_++);
-      t = std::max(crossed, t + settings_.latency_jitter * jitter);
+      t = std::max(crossed, t + delays_.latency_jitter * jitter);
     }
     if (!std::isinf(positive_)) events_.add(sub_interval_.begin + t, x_, pixels_.y, polarity);
-    released_ = t + settings_.refractory_period;
+    released_ = t + delays_.refractory_period;
     ready_ = std::max(released_, t + min_gap);
     held_ = settings_.refractory_reset == RefractoryReset::signal;
     if (settings_.threshold_jitter > 0 && !std::isinf(positive_)) {
@@ -215,6 +217,7 @@ class Pixel {
   }
 
   const DvsSettings& settings_;
+  const Delays& delays_;
   const Random& random_;
   const SubInterval& sub_interval_;
   const PixelRow& pixels_;
@@ -244,6 +247,8 @@ PixelSolver::PixelSolver(const DvsSettings& settings, const Random& random,
     : settings_(settings),
       random_(random),
       sub_interval_(sub_interval),
+      delays_{in_microseconds(settings.refractory_period), in_microseconds(settings.latency),
+              in_microseconds(settings.latency_jitter)},
       only_crossings_(settings.latency == 0 && settings.latency_jitter == 0 &&
                       settings.threshold_jitter == 0 &&
                       settings.refractory_reset == RefractoryReset::level) {}
@@ -259,7 +264,7 @@ void PixelSolver::solve(const PixelRow& pixels, const Candidates& candidates,
             ? Trajectory::low_pass(candidate.last_signal, candidate.last_target, target,
                                    sub_interval_.duration, tables.bandwidth[shade])
             : Trajectory::line(candidate.last_target, target, sub_interval_.duration);
-    return Pixel(settings_, random_, sub_interval_, pixels, x,
+    return Pixel(settings_, delays_, random_, sub_interval_, pixels, x,
                  {signal, pixels.signal[x], tables.expected_noise[shade]}, events);
   };
   if (!only_crossings_) {

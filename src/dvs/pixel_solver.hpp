@@ -51,6 +51,13 @@ struct RowFilter {
 void filter_row(const RowFilter& row_filter, const void* luma, const PixelRow& pixels, int width,
                 Candidates& candidates);
 
+/// Times of DvsSettings, microseconds.
+struct Delays {
+  double refractory_period;
+  double latency;
+  double latency_jitter;
+};
+
 /// Advances single pixels through a sub-interval, exactly: threshold crossings, leak, shot noise,
 /// refractory period, latency.
 class PixelSolver {
@@ -66,6 +73,7 @@ class PixelSolver {
   const DvsSettings& settings_;
   const Random& random_;
   const SubInterval& sub_interval_;
+  Delays delays_;
   bool only_crossings_;  ///< events other than noise are crossings without side effects
 };
 

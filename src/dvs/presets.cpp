@@ -13,9 +13,9 @@ struct Row {
   double cutoff_hz;
   double positive_threshold, negative_threshold, threshold_sigma, threshold_jitter;
   double leak_rate_hz, leak_spread, shot_noise_rate_hz, hot_pixels;
-  double refractory_period;
+  Nanoseconds refractory_period;
   RefractoryReset refractory_reset;
-  double latency, latency_jitter;
+  Nanoseconds latency, latency_jitter;
   double max_event_rate;
 };
 
@@ -36,17 +36,17 @@ constexpr double dark = 20.0 / 255;  // v2e's
 //   period 10 to 1000 us, leak and shot noise up to 1 Hz, cutoff up to 900 Hz. These are their
 //   middles, on a suitable scale. Finateu et al., ISSCC 2020: 1.066 Gev/s of readout, latency below
 //   220 us at 5 lux and about 100 us in office light.
-// The shares of hot pixels are guesses.
+// The shares of hot pixels are guesses. Times are nanoseconds.
 // clang-format off
 constexpr Row table[] = {
-    //                     response  eps   dark     cutoff ON    OFF   sigma  jitter leak  spread shot   hot  period  reset  latency jitter max rate
-    {DvsPreset::ideal,     lin_log,  1e-3, dark,      0,    0.2,  0.2,  0,     0,    0,    0,     0,     0,       0,  level,    0,   0,   0},
-    {DvsPreset::esim,      log,      1e-3, dark,      0,    0.2,  0.2,  0,     0,    0,    0,     0,     0,       0,  level,    0,   0,   0},
-    {DvsPreset::v2e_clean, lin_log,  1e-3, dark,      0,    0.2,  0.2,  0.02,  0,    0,    0,     0,     0,       0,  level,    0,   0,   0},
-    {DvsPreset::v2e_noisy, lin_log,  1e-3, dark,     30,    0.2,  0.2,  0.05,  0,    0.1,  0.1,   5,     0,       0,  level,    0,   0,   0},
-    {DvsPreset::icns,      log,      1e-4, 1e-4, 39'789,    0.4,  0.4,  0.01,  0.01, 0,    0,     0.11,  0,     100,  signal, 100,  10,   0},
-    {DvsPreset::davis346,  lin_log,  1e-3, dark,    300,    0.2,  0.2,  0.03,  0,    0.1,  0.1,   0.001, 1e-4,  500,  level,    0,   0,  12e6},
-    {DvsPreset::gen4,      lin_log,  1e-3, dark,    450,    0.15, 0.1,  0.005, 0,    0.1,  0.1,   0.1,   1e-5,  100,  signal, 100,  20,   1.066e9},
+    //                     response  eps   dark     cutoff ON    OFF   sigma  jitter leak  spread shot   hot   period   reset   latency  jitter  max rate
+    {DvsPreset::ideal,     lin_log,  1e-3, dark,      0,    0.2,  0.2,  0,     0,    0,    0,     0,     0,        0, level,        0,       0,        0},
+    {DvsPreset::esim,      log,      1e-3, dark,      0,    0.2,  0.2,  0,     0,    0,    0,     0,     0,        0, level,        0,       0,        0},
+    {DvsPreset::v2e_clean, lin_log,  1e-3, dark,      0,    0.2,  0.2,  0.02,  0,    0,    0,     0,     0,        0, level,        0,       0,        0},
+    {DvsPreset::v2e_noisy, lin_log,  1e-3, dark,     30,    0.2,  0.2,  0.05,  0,    0.1,  0.1,   5,     0,        0, level,        0,       0,        0},
+    {DvsPreset::icns,      log,      1e-4, 1e-4, 39'789,    0.4,  0.4,  0.01,  0.01, 0,    0,     0.11,  0,  100'000, signal, 100'000,  10'000,        0},
+    {DvsPreset::davis346,  lin_log,  1e-3, dark,    300,    0.2,  0.2,  0.03,  0,    0.1,  0.1,   0.001, 1e-4,  500'000, level,        0,       0,     12e6},
+    {DvsPreset::gen4,      lin_log,  1e-3, dark,    450,    0.15, 0.1,  0.005, 0,    0.1,  0.1,   0.1,   1e-5,  100'000, signal, 100'000,  20'000,  1.066e9},
 };
 // clang-format on
 

@@ -34,7 +34,7 @@ const std::vector<PulseEdge>& ExposurePulse::next(const DvsSettings& settings, d
     free_from = falls_in_ + edge;
     height_ = 0;
   }
-  const double begin = duration - std::max(settings.exposure_lead, edge);
+  const double begin = duration - std::max(in_microseconds(settings.exposure_lead), edge);
   if (!is_exposed || settings.exposure_pulse <= 0 || begin < free_from) return edges_;
 
   edges_.push_back({begin, settings.exposure_pulse});

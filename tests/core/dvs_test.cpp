@@ -22,7 +22,7 @@ namespace eventcamera {
 inline void PrintTo(const DvsSettings& settings, std::ostream* out) {
   *out << "response " << static_cast<int>(settings.response) << ", cutoff " << settings.cutoff_hz
        << " Hz, leak " << settings.leak_rate_hz << " Hz, refractory period "
-       << settings.refractory_period << " us, reset "
+       << settings.refractory_period << " ns, reset "
        << static_cast<int>(settings.refractory_reset);
 }
 
@@ -170,13 +170,13 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(DvsSettings{}, DvsSettings{.response = Response::log, .cutoff_hz = 40},
                     DvsSettings{.linear_light = true, .cutoff_hz = 200, .negative_threshold = 0.31},
                     DvsSettings{.response = Response::linear, .cutoff_hz = 15, .leak_rate_hz = 7},
-                    DvsSettings{.leak_rate_hz = 30, .refractory_period = 900},
-                    DvsSettings{.cutoff_hz = 100, .refractory_period = 1500},
+                    DvsSettings{.leak_rate_hz = 30, .refractory_period = 900'000},
+                    DvsSettings{.cutoff_hz = 100, .refractory_period = 1'500'000},
                     DvsSettings{.cutoff_hz = 100,
                                 .leak_rate_hz = 9,
-                                .refractory_period = 1500,
+                                .refractory_period = 1'500'000,
                                 .refractory_reset = RefractoryReset::signal},
-                    DvsSettings{.refractory_period = 15'000,
+                    DvsSettings{.refractory_period = 15'000'000,
                                 .refractory_reset = RefractoryReset::signal}));
 
 TEST_P(Reference, IsEqualled) {
@@ -299,10 +299,10 @@ TEST(Dvs, RestsForTheRefractoryPeriod) {
                          .threshold_jitter = 0.02,
                          .leak_rate_hz = 50,
                          .shot_noise_rate_hz = 200,
-                         .refractory_period = 3000,
+                         .refractory_period = 3'000'000,
                          .refractory_reset = reset,
-                         .latency = 700,
-                         .latency_jitter = 300};
+                         .latency = 700'000,
+                         .latency_jitter = 300'000};
     Playback playback({40, 30, 8}, settings);
     for (int i = 0; i < 60; ++i)
       playback.push(scene::noise<std::uint8_t>(40, 30, 8, static_cast<unsigned>(i)), 8,
@@ -360,12 +360,12 @@ DvsSettings everything() {
           .shot_noise_rate_hz = 8,
           .hot_pixels = 0.01,
           .dead_pixels = 0.02,
-          .refractory_period = 400,
+          .refractory_period = 400'000,
           .refractory_reset = RefractoryReset::signal,
           .exposure_pulse = 0.05,
-          .exposure_lead = 9000,
-          .latency = 300,
-          .latency_jitter = 100,
+          .exposure_lead = 9'000'000,
+          .latency = 300'000,
+          .latency_jitter = 100'000,
           .max_event_rate = 2e7,
           .seed = 11};
 }
@@ -530,7 +530,7 @@ TEST(Dvs, HasItsSharesOfHotAndDeadPixels) {
 TEST(Dvs, FiresAllOverAsExposuresBegin) {
   // The first pulse in a static scene, up and down by 0.45: ON when it passes 0.2 and 0.4, OFF when
   // it passes 0.1 again.
-  const auto first_pulse_is_at = [&](double begin, double lead) {
+  const auto first_pulse_is_at = [&](double begin, Nanoseconds lead) {
     Playback playback({9, 3, 8},
                       {.negative_threshold = 0.3, .exposure_pulse = 0.45, .exposure_lead = lead});
     stand(playback, flat(9, 3, 90), 3, 40'000'000);
@@ -545,12 +545,12 @@ TEST(Dvs, FiresAllOverAsExposuresBegin) {
       EXPECT_EQ(events[2].polarity, Polarity::off);
     }
   };
-  first_pulse_is_at(33'000, 7000);
-  first_pulse_is_at(39'400, 600);  // ends after the frame
-  first_pulse_is_at(39'900, 0);    // an edge must be within the interval
-  first_pulse_is_at(0, 40'000);
+  first_pulse_is_at(33'000, 7'000'000);
+  first_pulse_is_at(39'400, 600'000);  // ends after the frame
+  first_pulse_is_at(39'900, 0);        // an edge must be within the interval
+  first_pulse_is_at(0, 40'000'000);
 
-  Playback later({9, 3, 8}, {.exposure_pulse = 0.45, .exposure_lead = 40'001});
+  Playback later({9, 3, 8}, {.exposure_pulse = 0.45, .exposure_lead = 40'001'000});
   stand(later, flat(9, 3, 90), 3, 40'000'000);
   EXPECT_TRUE(later.events.empty());
 }
@@ -560,7 +560,7 @@ TEST(Dvs, SeesTheSameLightWhereAPulseCutsIt) {
     const auto events_with = [&](double pulse) {
       Playback playback(
           {90, 40, 8},
-          {.upsampling = upsampling, .exposure_pulse = pulse, .exposure_lead = 21'234});
+          {.upsampling = upsampling, .exposure_pulse = pulse, .exposure_lead = 21'234'000});
       for (int i = 0; i < 5; ++i)
         playback.push(scene::texture<std::uint8_t>(90, 40, 8, 3.0 * i, i), 8, i * 40'000'000LL);
       return playback.events;
@@ -591,7 +591,7 @@ TEST(Dvs, SeesTheSameLightWhereAPulseCutsIt) {
 TEST(Dvs, SendsEventsAsLateAsItsLatency) {
   const auto dark = flat(6, 5, 40);
   const auto bright = flat(6, 5, 200);
-  const auto play = [&](double latency) {
+  const auto play = [&](Nanoseconds latency) {
     Playback playback({6, 5, 8}, DvsSettings{.positive_threshold = 0.5, .latency = latency});
     playback.push(dark, 8, 0);
     playback.push(bright, 8, 40'000'000);
@@ -600,12 +600,12 @@ TEST(Dvs, SendsEventsAsLateAsItsLatency) {
     return playback.events;
   };
   const auto prompt = play(0);
-  const auto late = play(25);
+  const auto late = play(25'000);
   ASSERT_EQ(prompt.size(), 6U * 5U * 3U);
   ASSERT_EQ(late.size(), prompt.size());
   for (std::size_t i = 0; i < prompt.size(); ++i) EXPECT_NEAR(late[i].t, prompt[i].t + 25, 1);
   // No event is lost at the end of the interval, but a pixel has one pending event at a time.
-  const auto later = play(45'000);
+  const auto later = play(45'000'000);
   EXPECT_EQ(later.size(), 6U * 5U);
   EXPECT_GT(later.front().t, 45'000);
 }

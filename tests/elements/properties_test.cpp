@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Defaults are those of the paper's table of settings, and the metadata shown by gst-inspect-1.0 is
 // complete.
+#include <gst/controller/gstdirectcontrolbinding.h>
+#include <gst/controller/gstinterpolationcontrolsource.h>
+
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -122,8 +125,8 @@ TEST(Dvs, TakesWhatIsNotSetFromItsPreset) {
     set("preset", "icns");
     EXPECT_EQ(number(element, "threshold-sigma"), 0.07);
     EXPECT_EQ(number(element, "positive-threshold"), 0.4);
-    EXPECT_EQ(number(element, "refractory-period"), 100);
-    EXPECT_EQ(number(element, "latency"), 100);
+    EXPECT_EQ(number(element, "refractory-period"), 100'000);
+    EXPECT_EQ(number(element, "latency"), 100'000);
     gint reset = 0;
     guint64 seed = 0;
     g_object_get(element, "refractory-reset", &reset, "seed", &seed, nullptr);
@@ -157,6 +160,81 @@ TEST(Dvs, NamesItsPresetsAndTheirsAreInRange) {
     }
     g_free(specs);
   }
+}
+
+TEST(Dvs, CountsTimeInNanoseconds) {
+  gst_init(nullptr, nullptr);
+  Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
+  for (const char* name : {"refractory-period", "exposure-lead", "latency", "latency-jitter"}) {
+    GParamSpec* spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), name);
+    ASSERT_TRUE(G_IS_PARAM_SPEC_UINT64(spec)) << name;
+    EXPECT_EQ(G_PARAM_SPEC_UINT64(spec)->maximum, GST_SECOND) << name;
+    EXPECT_NE(std::string(g_param_spec_get_blurb(spec)).find("(ns)"), std::string::npos) << name;
+  }
+  Harness h("eventsim-dvs latency=7000000");
+  h.caps("video/x-raw, format=GRAY8, width=8, height=8, framerate=25/1");
+  h.push(h.flat(0, 20));
+  h.push(h.flat(40 * GST_MSECOND, 200));
+  const auto buffer = h.pull();
+  ASSERT_TRUE(buffer);
+  const auto first = events_of(buffer.get()).front().t;
+  EXPECT_GE(first, 7000U);
+  EXPECT_LT(first, 12'000U);
+}
+
+/// Sets `property` to the values at these times of the stream.
+void control(GstElement* element, const char* property,
+             std::initializer_list<std::pair<GstClockTime, double>> values) {
+  GstControlSource* source = gst_interpolation_control_source_new();
+  g_object_set(source, "mode", GST_INTERPOLATION_MODE_LINEAR, nullptr);
+  for (const auto& [time, value] : values)
+    gst_timed_value_control_source_set(GST_TIMED_VALUE_CONTROL_SOURCE(source), time, value);
+  EXPECT_TRUE(gst_object_add_control_binding(
+      GST_OBJECT(element),
+      gst_direct_control_binding_new_absolute(GST_OBJECT(element), property, source)));
+  gst_object_unref(source);
+}
+
+TEST_P(EveryElement, HasThresholdsThatChangeOverTime) {
+  const double unit = GetParam().unit;
+  Harness h(GetParam().element);
+  for (const char* property : {"positive-threshold", "negative-threshold"})
+    control(h.element(), property, {{0, 20 * unit}, {5 * GST_SECOND, 100 * unit}});
+  h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1");
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = GST_SECOND;  // which is 0 in the time of the stream
+  gst_harness_push_event(h.get(), gst_event_new_segment(&segment));
+  for (int i = 0; i < 3; ++i) {
+    h.push(h.flat(GST_SECOND + static_cast<GstClockTime>(i) * 2500 * GST_MSECOND, 90));
+    EXPECT_NEAR(number(h.element(), "positive-threshold"), (20 + 40 * i) * unit, 1e-9);
+    EXPECT_NEAR(number(h.element(), "negative-threshold"), (20 + 40 * i) * unit, 1e-9);
+  }
+}
+
+TEST(Dvs, ChangesOverTimeButItsSensorStaysTheSame) {
+  Harness h("eventsim-dvs");
+  control(h.element(), "positive-threshold", {{0, 0.2}, {200 * GST_MSECOND, 10}});
+  control(h.element(), "refractory-period", {{0, 0}, {200 * GST_MSECOND, 2'000'000}});
+  h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1");
+  std::vector<bool> fired;
+  for (int i = 0; i < 6; ++i) {
+    h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, 20 + 40 * i));
+    if (i > 0) fired.push_back(h.pull() != nullptr);
+  }
+  EXPECT_EQ(number(h.element(), "refractory-period"), 2'000'000);
+  EXPECT_EQ(fired, std::vector<bool>({false, false, false, false, false}));
+  for (const char* trait : {"seed", "hot-pixels", "dead-pixels", "threshold-sigma", "leak-spread"})
+    EXPECT_FALSE(g_object_class_find_property(G_OBJECT_GET_CLASS(h.element()), trait)->flags &
+                 GST_PARAM_CONTROLLABLE)
+        << trait;
+  for (const char* property :
+       {"denoise", "cutoff-hz", "dark-light", "negative-threshold", "threshold-jitter",
+        "leak-rate-hz", "shot-noise-rate-hz", "exposure-pulse", "exposure-lead", "latency",
+        "latency-jitter", "max-event-rate"})
+    EXPECT_TRUE(g_object_class_find_property(G_OBJECT_GET_CLASS(h.element()), property)->flags &
+                GST_PARAM_CONTROLLABLE)
+        << property;
 }
 
 }  // namespace

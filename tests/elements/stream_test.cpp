@@ -148,7 +148,8 @@ TEST_P(EveryElement, TakesPropertiesWhilePlaying) {
                    unit * (i % 40 + 0.5), "n-threads", i % 3, "palette", i % 4, nullptr);
       if (is_physical(GetParam()))
         g_object_set(h.element(), "preset", i % 7, "cutoff-hz", i % 3 * 50.0, "response", i % 3,
-                     "upsampling", i % 2, "latency", i % 4 * 30'000.0, "max-event-rate",
+                     "upsampling", i % 2, "latency",
+                     guint64{30} * static_cast<guint64>(i % 4) * GST_MSECOND, "max-event-rate",
                      i % 2 * 1e5, nullptr);
       else if (std::string(GetParam()) != "eventsim-frame")
         g_object_set(h.element(), "interpolated-frames", i % 20, nullptr);

@@ -33,11 +33,11 @@ recovers 8.5 12.5 0.12 eventsim-diff
 recovers 0.2 0.3 0.05 eventsim-dvs response=log log-eps=0.02
 
 # Exposure pulses are found by their bursts of events.
-"$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000 ! evtenc ! filesink location=recorded.raw
+"$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000000 ! evtenc ! filesink location=recorded.raw
 calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02" --to 0.3 | tee found
 read -r lead pulse < <(sed -n 's/.* exposure-lead=\([0-9]*\) exposure-pulse=\([0-9.]*\) .*/\1 \2/p' found)
-awk -v lead="${lead:-0}" -v pulse="${pulse:-0}" 'BEGIN { exit !(lead > 8800 && lead < 9200 && pulse > 0.02 && pulse < 0.045) }' ||
-  fail "a pulse of ${pulse:-0}, ${lead:-0} us before the frames"
+awk -v lead="${lead:-0}" -v pulse="${pulse:-0}" 'BEGIN { exit !(lead > 8.8e6 && lead < 9.2e6 && pulse > 0.02 && pulse < 0.045) }' ||
+  fail "a pulse of ${pulse:-0}, ${lead:-0} ns before the frames"
 
 # A video as a list of pictures, with a known lag.
 "$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=GRAY8,width=160,height=90,framerate=25/1 ! pngenc ! multifilesink location=%02d.png

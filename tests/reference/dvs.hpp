@@ -130,7 +130,7 @@ class DvsPixel {
       reference_ += is_on ? settings_.positive_threshold : -settings_.negative_threshold;
       if (is_refractory) continue;
       events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off});
-      ready_ = now_ + 1 + settings_.refractory_period;
+      ready_ = now_ + 1 + in_microseconds(settings_.refractory_period);
       if (settings_.refractory_reset == RefractoryReset::signal) reference_ = signal_;
     }
     input_ = next;
