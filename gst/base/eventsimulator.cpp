@@ -12,6 +12,7 @@
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/frame_clock.hpp"
+#include "gst/base/frame_luma.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/learnt_latency.hpp"
@@ -29,8 +30,6 @@ GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 
 using eventcamera::Accumulator;
 using eventcamera::EventBuckets;
-using eventcamera::Image;
-using eventcamera::LumaView;
 using eventcamera::Nanoseconds;
 using eventcamera::Simulator;
 
@@ -51,9 +50,9 @@ struct Settings {
 /// State from caps to stop.
 struct State {
   GstVideoInfo video;              ///< input format
+  FrameLuma luma;                  ///< luma of the input
   std::optional<Drawing> drawing;  ///< video output; none if the output is events
   std::unique_ptr<Simulator> simulator;
-  Image<guint8> gathered;      ///< luma copied from a packed format
   bool discontinuous = false;  ///< the next buffer is discontinuous
 };
 
@@ -301,7 +300,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     GST_ERROR_OBJECT(self, "cannot make %" GST_PTR_FORMAT " of %" GST_PTR_FORMAT, out, in);
     return FALSE;
   }
-  const auto luma = luma_format_of(video);
+  const auto luma = FrameLuma::format_of(video);
   const auto failure = [&](const std::exception&) -> Report {
     state.reset();
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for frames of " +
@@ -309,21 +308,21 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
                                                   std::to_string(luma.height) + " pixels."};
   };
   const bool made = guarded(self, failure, [&] {
-    if (!state || luma_format_of(state->video) != luma) {
+    if (!state || FrameLuma::format_of(state->video) != luma) {
       const bool follows = state && (state->discontinuous || state->simulator->last_time());
       state.reset();  // before allocating the next: frames can be large
       state.emplace(State{.video = video,
+                          .luma = FrameLuma(video),
                           .drawing = std::nullopt,
                           .simulator = method_of(self).create(luma),
-                          .gathered = {},
                           .discontinuous = follows});
+    } else {
+      state->video = video;
+      state->luma = FrameLuma(video);
     }
-    state->video = video;
     state->drawing.reset();
     if (event_simulator_draws(out))
       state->drawing = Drawing{drawn, Accumulator(luma.width, luma.height)};
-    state->gathered =
-        has_packed_luma(video) ? Image<guint8>(luma.width, luma.height) : Image<guint8>();
   });
   if (!made) return FALSE;
   if (const GstClockTime duration = frame_duration(video); duration > 0)
@@ -360,13 +359,8 @@ static void sync_controlled_properties(GstEventSimulator* self, GstClockTime tim
 static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& frame,
                                     Nanoseconds time, const Settings& settings) {
   auto& state = *priv_of(self).state;
-  LumaView luma{luma_format_of(state.video), frame.first_component(), frame.stride()};
-  if (has_packed_luma(state.video)) {
-    eventcamera::unpack_luma(static_cast<const guint8*>(luma.data), luma.stride, state.gathered);
-    luma.data = state.gathered.row(0);
-    luma.stride = state.gathered.stride();
-  }
   configure(self);
+  const auto luma = state.luma.of(frame, state.simulator->threads());
   return state.simulator->push(luma, time, settings.simulation);
 }
 

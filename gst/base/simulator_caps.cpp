@@ -27,17 +27,6 @@ void set_formats(GstStructure* structure, const char* formats) {
 
 }  // namespace
 
-eventcamera::LumaFormat luma_format_of(const GstVideoInfo& info) {
-  // P010 and similar formats use the upper bits of the word, so white is the same as in 16 bits.
-  const auto bits =
-      GST_VIDEO_INFO_COMP_DEPTH(&info, 0) + GST_VIDEO_FORMAT_INFO_SHIFT(info.finfo, 0);
-  return {GST_VIDEO_INFO_WIDTH(&info), GST_VIDEO_INFO_HEIGHT(&info), static_cast<int>(bits)};
-}
-
-bool has_packed_luma(const GstVideoInfo& info) {
-  return GST_VIDEO_INFO_COMP_DEPTH(&info, 0) == 8 && GST_VIDEO_INFO_COMP_PSTRIDE(&info, 0) == 2;
-}
-
 GstCaps* event_simulator_output_caps(const GstCaps* video) {
   GstCaps* output = gst_caps_new_empty();
   for (guint i = 0; i < gst_caps_get_size(video); ++i) {

@@ -14,8 +14,7 @@ inline GstClockTime frame_duration(const GstVideoInfo& video) {
                                    GST_VIDEO_INFO_FPS_N(&video));
 }
 
-/// Maps a buffer as video and gives access to its first plane, with the stride of its GstVideoMeta,
-/// if any.
+/// Maps a buffer as video, with the strides of its GstVideoMeta, if any.
 class VideoFrame {
  public:
   VideoFrame(const GstVideoInfo& info, GstBuffer* buffer, GstMapFlags flags) {
@@ -44,6 +43,7 @@ class VideoFrame {
   const std::string& fault() const { return fault_; }
 
   const GstVideoFrame* get() const { return &frame_; }
+  /// The first plane.
   std::byte* data() const {
     return static_cast<std::byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0));
   }
@@ -51,7 +51,7 @@ class VideoFrame {
   std::byte* first_component() const {
     return reinterpret_cast<std::byte*>(GST_VIDEO_FRAME_COMP_DATA(&frame_, 0));
   }
-  /// Bytes from one row to the next.
+  /// Bytes from one row of the first plane to the next.
   std::ptrdiff_t stride() const { return GST_VIDEO_FRAME_PLANE_STRIDE(&frame_, 0); }
 
  private:
@@ -73,16 +73,27 @@ class VideoFrame {
            meta.n_planes >= GST_VIDEO_INFO_N_PLANES(&info);
   }
 
-  /// GStreamer does not check the strides and offsets of a GstVideoMeta.
+  /// Checks the planes that are read or drawn in: the first, or all of RGB.
   bool rows_fit(const GstVideoInfo& info) const {
+    const guint planes = GST_VIDEO_INFO_IS_RGB(&info) ? GST_VIDEO_INFO_N_PLANES(&info) : 1;
+    for (guint plane = 0; plane < planes; ++plane)
+      if (!rows_fit(info, plane)) return false;
+    return true;
+  }
+
+  /// GStreamer does not check the strides and offsets of a GstVideoMeta.
+  bool rows_fit(const GstVideoInfo& info, guint plane) const {
     const std::ptrdiff_t row =
         std::ptrdiff_t{GST_VIDEO_INFO_WIDTH(&info)} * GST_VIDEO_INFO_COMP_PSTRIDE(&info, 0);
-    const std::ptrdiff_t sample = GST_VIDEO_INFO_COMP_DEPTH(&info, 0) > 8 ? 2 : 1;
-    const GstMapInfo& map = frame_.map[0];
-    const auto offset = data() - reinterpret_cast<std::byte*>(map.data);
-    const std::ptrdiff_t end = offset + stride() * (GST_VIDEO_INFO_HEIGHT(&info) - 1) + row;
-    return stride() >= row && offset >= 0 && end <= static_cast<std::ptrdiff_t>(map.size) &&
-           stride() % sample == 0 && reinterpret_cast<std::uintptr_t>(data()) % sample == 0;
+    const std::ptrdiff_t sample = GST_VIDEO_INFO_COMP_DEPTH(&info, 0) == 8 ? 1 : 2;
+    const std::ptrdiff_t stride = GST_VIDEO_FRAME_PLANE_STRIDE(&frame_, plane);
+    const auto* first = static_cast<std::byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, plane));
+    // Without a GstVideoMeta, all planes are in one mapping.
+    const GstMapInfo& map = frame_.map[frame_.meta != nullptr ? plane : 0];
+    const auto offset = first - reinterpret_cast<std::byte*>(map.data);
+    const std::ptrdiff_t end = offset + stride * (GST_VIDEO_INFO_HEIGHT(&info) - 1) + row;
+    return stride >= row && offset >= 0 && end <= static_cast<std::ptrdiff_t>(map.size) &&
+           stride % sample == 0 && reinterpret_cast<std::uintptr_t>(first) % sample == 0;
   }
 
   GstVideoFrame frame_{};

@@ -30,9 +30,12 @@ struct LumaView {
   }
 };
 
-/// Copies the luma of a packed 4:2:2 frame (YUY2, UYVY, ...), every second byte starting at `data`:
-/// the only layout whose luma is not a plane.
-void unpack_luma(const std::uint8_t* data, std::ptrdiff_t stride, Image<std::uint8_t>& out);
+/// Copies luma that is interleaved with chroma: every `step`-th byte (2 to 4), starting at `data`.
+void gather_luma(const std::uint8_t* data, std::ptrdiff_t stride, int step,
+                 Image<std::uint8_t>& out);
+
+/// Copies big-endian 16-bit luma in native byte order.
+void swap_luma(const void* data, std::ptrdiff_t stride, Image<std::uint16_t>& out);
 
 /// Converts frames to the 8 bits that optical flow works on: 8-bit frames are passed through,
 /// deeper ones are reduced to their upper 8 bits.

@@ -6,7 +6,6 @@
 #include <random>
 #include <vector>
 
-#include "src/core/luma.hpp"
 #include "src/render/accumulator.hpp"
 #include "tests/core/targets.hpp"
 
@@ -173,13 +172,6 @@ TEST(Palette, TellsFourKindsOfPixelApartInGreyToo) {
     std::ranges::sort(kinds);
     for (int i = 1; i < 4; ++i) EXPECT_GE(kinds[i] - kinds[i - 1], 20);
   }
-}
-
-TEST(Luma, IsGatheredFromPackedPictures) {
-  const std::uint8_t packed[] = {1, 90, 2, 91, 3, 92, 0, 0, 4, 93, 5, 94, 6, 95, 0, 0};
-  Image<std::uint8_t> luma(3, 2);
-  unpack_luma(packed, 8, luma);
-  for (int i = 0; i < 6; ++i) EXPECT_EQ(luma.at(i % 3, i / 3), i + 1);
 }
 
 }  // namespace

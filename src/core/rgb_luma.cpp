@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/core/rgb_luma.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/core/rgb_luma.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants to come after that.
+#include <hwy/highway.h>
+
+#include <algorithm>
+
+#include "src/core/simd-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// 32-bit sums; not so many lanes that a vector is longer than the padding of an Image's row.
+using Sums = hn::CappedTag<std::int32_t, 16>;
+using SumVector = hn::Vec<Sums>;
+
+/// The weighted sum of one vector of pixels, rounded.
+SumVector luma_of(const LumaWeights& weights, SumVector red, SumVector green, SumVector blue) {
+  const Sums sums;
+  const auto reds = hn::Mul(red, hn::Set(sums, weights.red));
+  const auto greens = hn::Mul(green, hn::Set(sums, weights.green));
+  const auto blues = hn::Mul(blue, hn::Set(sums, weights.blue));
+  const auto half = hn::Set(sums, LumaWeights::one / 2);
+  return hn::ShiftRight<LumaWeights::bits>(hn::Add(hn::Add(reds, greens), hn::Add(blues, half)));
+}
+
+/// Luma of `count` pixels whose colours lie apart. Writes up to a vector past them.
+template <class Pixel>
+void weigh(const LumaWeights& weights, const Pixel* red, const Pixel* green, const Pixel* blue,
+           int count, Pixel* out) {
+  const Sums sums;
+  const hn::Rebind<Pixel, Sums> pixels;
+  const int lanes = static_cast<int>(hn::Lanes(sums));
+  const auto step = [&](int x, const auto& load) {
+    const auto luma =
+        luma_of(weights, hn::PromoteTo(sums, load(red + x)), hn::PromoteTo(sums, load(green + x)),
+                hn::PromoteTo(sums, load(blue + x)));
+    hn::StoreU(hn::DemoteTo(pixels, luma), pixels, out + x);
+  };
+  int x = 0;
+  for (; x + lanes <= count; x += lanes)
+    step(x, [&](const Pixel* from) { return hn::LoadU(pixels, from); });
+  if (x < count) step(x, [&](const Pixel* from) { return load_first(pixels, from, count - x); });
+}
+
+template <class Pixel>
+const Pixel* row_of(const ColourView& colour, int y) {
+  return reinterpret_cast<const Pixel*>(static_cast<const std::byte*>(colour.data) +
+                                        y * colour.stride);
+}
+
+/// A row whose colours are interleaved: sorted apart block by block.
+template <class Pixel>
+void weigh_interleaved(const LumaWeights& weights, const RgbView& picture, int y, int width,
+                       Pixel* out) {
+  const hn::CappedTag<Pixel, 32> block;
+  constexpr int max = static_cast<int>(hn::MaxLanes(block));
+  const int lanes = static_cast<int>(hn::Lanes(block));
+  HWY_ALIGN Pixel apart[4][max];
+  HWY_ALIGN Pixel last[4 * max] = {};
+  const Pixel* row = row_of<Pixel>(picture.red, y);
+  for (int x = 0; x < width; x += lanes) {
+    const int count = std::min(lanes, width - x);
+    const Pixel* from = row + std::ptrdiff_t{x} * picture.samples;
+    if (count < lanes) {
+      std::copy_n(from, count * picture.samples, last);
+      from = last;
+    }
+    auto first = hn::Zero(block);
+    auto second = first;
+    auto third = first;
+    auto fourth = first;
+    if (picture.samples == 3)
+      hn::LoadInterleaved3(block, from, first, second, third);
+    else
+      hn::LoadInterleaved4(block, from, first, second, third, fourth);
+    hn::Store(first, block, apart[0]);
+    hn::Store(second, block, apart[1]);
+    hn::Store(third, block, apart[2]);
+    hn::Store(fourth, block, apart[3]);
+    weigh(weights, apart[picture.red.place], apart[picture.green.place], apart[picture.blue.place],
+          count, out + x);
+  }
+}
+
+template <class Pixel>
+void luma_of_samples(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+                     Image<Pixel>& out) {
+  for_each_row(threads, out.height(), [&](int y) {
+    if (picture.samples == 1)
+      weigh(weights, row_of<Pixel>(picture.red, y), row_of<Pixel>(picture.green, y),
+            row_of<Pixel>(picture.blue, y), out.width(), out.row(y));
+    else
+      weigh_interleaved(weights, picture, y, out.width(), out.row(y));
+  });
+}
+
+void luma_of_bytes(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+                   Image<std::uint8_t>& out) {
+  luma_of_samples(picture, weights, threads, out);
+}
+
+void luma_of_16_bits(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+                     Image<std::uint16_t>& out) {
+  luma_of_samples(picture, weights, threads, out);
+}
+
+void luma_of_words(const RgbWordsView& picture, const LumaWeights& weights, ThreadPool& threads,
+                   Image<std::uint8_t>& out) {
+  const Sums sums;
+  const hn::Rebind<std::uint16_t, Sums> words;
+  const hn::Rebind<std::uint8_t, Sums> pixels;
+  const int lanes = static_cast<int>(hn::Lanes(sums));
+  const LumaWeights in_order =
+      picture.is_blue_first ? LumaWeights{weights.blue, weights.green, weights.red} : weights;
+  // The colour of so many bits from `shift` on, in 8 bits.
+  const auto colour = [&](SumVector word, int shift, int bits) {
+    const auto value =
+        hn::And(hn::ShiftRightSame(word, shift), hn::Set(sums, (std::int32_t{1} << bits) - 1));
+    return hn::Or(hn::ShiftLeftSame(value, 8 - bits), hn::ShiftRightSame(value, 2 * bits - 8));
+  };
+  const auto step = [&](const auto loaded, std::uint8_t* to) {
+    const auto word = hn::PromoteTo(sums, loaded);
+    const auto luma = luma_of(in_order, colour(word, 5 + picture.green_bits, 5),
+                              colour(word, 5, picture.green_bits), colour(word, 0, 5));
+    hn::StoreU(hn::DemoteTo(pixels, luma), pixels, to);
+  };
+  for_each_row(threads, out.height(), [&](int y) {
+    const auto* row = row_of<std::uint16_t>({picture.data, picture.stride}, y);
+    int x = 0;
+    for (; x + lanes <= out.width(); x += lanes) step(hn::LoadU(words, row + x), out.row(y) + x);
+    if (x < out.width()) step(load_first(words, row + x, out.width() - x), out.row(y) + x);
+  });
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(luma_of_bytes);
+HWY_EXPORT(luma_of_16_bits);
+HWY_EXPORT(luma_of_words);
+
+void luma_of_rgb(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+                 Image<std::uint8_t>& out) {
+  HWY_DYNAMIC_DISPATCH(luma_of_bytes)(picture, weights, threads, out);
+}
+
+void luma_of_rgb(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
+                 Image<std::uint16_t>& out) {
+  HWY_DYNAMIC_DISPATCH(luma_of_16_bits)(picture, weights, threads, out);
+}
+
+void luma_of_rgb(const RgbWordsView& picture, const LumaWeights& weights, ThreadPool& threads,
+                 Image<std::uint8_t>& out) {
+  HWY_DYNAMIC_DISPATCH(luma_of_words)(picture, weights, threads, out);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE
