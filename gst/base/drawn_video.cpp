@@ -3,6 +3,10 @@
 
 #include <gst/video/gstvideopool.h>
 
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+
 using eventcamera::PaletteName;
 
 eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info) {
@@ -24,6 +28,27 @@ PaletteName palette_name_of(GstEventCameraPalette palette) {
   static_assert(static_cast<int>(PaletteName::viridis) == GST_EVENT_CAMERA_PALETTE_VIRIDIS);
   static_assert(static_cast<int>(PaletteName::magma) == GST_EVENT_CAMERA_PALETTE_MAGMA);
   return static_cast<PaletteName>(palette);
+}
+
+/// Whether a meta of these tags does not depend on the colours of the pixels, or on where they lie.
+static bool stays_true(GType api) {
+  constexpr std::string_view kept[] = {GST_META_TAG_VIDEO_STR, GST_META_TAG_VIDEO_SIZE_STR,
+                                       GST_META_TAG_VIDEO_ORIENTATION_STR};
+  for (auto tags = gst_meta_api_type_get_tags(api); tags != nullptr && *tags != nullptr; ++tags)
+    if (std::ranges::find(kept, std::string_view(*tags)) == std::end(kept)) return false;
+  return true;
+}
+
+void keep_metas(GstBuffer* frame, GstBuffer* picture) {
+  const auto keep = [](GstBuffer* from, GstMeta** meta, gpointer to) -> gboolean {
+    const GstMetaInfo* info = (*meta)->info;
+    GstMetaTransformCopy whole = {.region = FALSE, .offset = 0, .size = static_cast<gsize>(-1)};
+    if (info->transform_func != nullptr && stays_true(info->api))
+      info->transform_func(static_cast<GstBuffer*>(to), *meta, from, _gst_meta_transform_copy,
+                           &whole);
+    return TRUE;
+  };
+  gst_buffer_foreach_meta(frame, keep, picture);
 }
 
 bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps) {

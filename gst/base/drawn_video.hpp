@@ -15,6 +15,11 @@ eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info);
 /// Converts the public palette enum to the core's.
 eventcamera::PaletteName palette_name_of(GstEventCameraPalette palette);
 
+/// Copies to a picture of events the metas of its frame that stay true where only the colours
+/// differ: those that depend on nothing but size, orientation and time, such as crop and regions of
+/// interest.
+void keep_metas(GstBuffer* frame, GstBuffer* picture);
+
 /// For decide_allocation(): uses downstream's buffer pool if it offers one, else a new video pool.
 /// False if `caps` are not video.
 bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps);

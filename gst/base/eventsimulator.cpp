@@ -325,7 +325,9 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
       state->drawing = Drawing{drawn, Accumulator(luma.width, luma.height)};
   });
   if (!made) return FALSE;
-  if (const GstClockTime duration = frame_duration(video); duration > 0)
+  // A picture has the time of its frame, an interval that of the frame before.
+  const GstClockTime duration = state->drawing ? 0 : frame_duration(video);
+  if (duration > 0 || state->drawing)
     change_latency(self, [duration](LearntLatency& latency) {
       latency.expect(static_cast<Nanoseconds>(duration));
     });
@@ -374,12 +376,27 @@ static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanose
   return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
 }
 
-/// Sets the timestamps and flags of an interval's buffer.
-static void set_times(GstBuffer* out, Nanoseconds start, Nanoseconds end, State& state) {
-  GST_BUFFER_PTS(out) = static_cast<GstClockTime>(start);
+/// Sets the timestamps and flags of an output buffer.
+static void set_times(GstBuffer* out, GstClockTime pts, GstClockTime duration, State& state) {
+  GST_BUFFER_PTS(out) = pts;
   GST_BUFFER_DTS(out) = GST_CLOCK_TIME_NONE;
-  GST_BUFFER_DURATION(out) = static_cast<GstClockTime>(end - start);
+  GST_BUFFER_DURATION(out) = duration;
   if (std::exchange(state.discontinuous, false)) GST_BUFFER_FLAG_SET(out, GST_BUFFER_FLAG_DISCONT);
+}
+
+/// Draws the events since the last frame, none for a first frame. The picture takes the place of
+/// the frame, with its `time`.
+static GstFlowReturn draw_frame(GstEventSimulator* self, const EventBuckets* events,
+                                GstEventCameraPalette palette, Nanoseconds time, GstBuffer* in,
+                                GstBuffer** out) {
+  auto& state = *priv_of(self).state;
+  const EventBuckets none;
+  const GstFlowReturn result = event_simulator_draw_events(
+      GST_BASE_TRANSFORM(self), events != nullptr ? *events : none, *state.drawing,
+      eventcamera::palette(palette_name_of(palette)), state.simulator->threads(), in, out);
+  if (result != GST_FLOW_OK) return result;
+  set_times(*out, static_cast<GstClockTime>(time), GST_BUFFER_DURATION(in), state);
+  return GST_FLOW_OK;
 }
 
 /// Processes a frame and outputs the interval that it ends, if any. May throw.
@@ -402,6 +419,10 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
     return GST_FLOW_ERROR;
   }
   const EventBuckets* events = simulate(self, frame, end, settings);
+  if (state.drawing) {
+    priv_of(self).stream.handed_out_until = end;
+    return draw_frame(self, events, settings.palette, end, in, out);
+  }
   if (events == nullptr) return GST_FLOW_OK;
   learn_latency(self, *start, end);
   GST_LOG_OBJECT(self,
@@ -411,19 +432,13 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
                  GST_TIME_ARGS(static_cast<GstClockTime>(end)));
 
   priv_of(self).stream.handed_out_until = end;
-  GstFlowReturn result = GST_FLOW_OK;
-  if (state.drawing) {
-    result = event_simulator_draw_events(transform, *events, *state.drawing,
-                                         eventcamera::palette(palette_name_of(settings.palette)),
-                                         state.simulator->threads(), in, out);
-  } else if (events->size() > 0) {
-    result = event_simulator_write_events(transform, *events, state.simulator->threads(), in, out);
-  } else {
-    return push_gap(self, *start, end, GST_SEQNUM_INVALID);
-  }
-  if (result != GST_FLOW_OK) return result;
-  set_times(*out, *start, end, state);
-  return GST_FLOW_OK;
+  if (events->size() == 0) return push_gap(self, *start, end, GST_SEQNUM_INVALID);
+  const GstFlowReturn result =
+      event_simulator_write_events(transform, *events, state.simulator->threads(), in, out);
+  if (result == GST_FLOW_OK)
+    set_times(*out, static_cast<GstClockTime>(*start), static_cast<GstClockTime>(end - *start),
+              state);
+  return result;
 }
 
 /// Runs `work`; reports any exception and drops the state, because the simulator is then unusable.
@@ -491,8 +506,8 @@ static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   return true;
 }
 
-/// Holds the last frame until `end` and pushes the events of that time. Pushes a GAP if there are
-/// none or the output is video. May throw.
+/// Holds the last frame until `end` and pushes the events of that time, or a GAP if there are none.
+/// May throw.
 static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum) {
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
@@ -503,12 +518,12 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
       state.simulator->hold_until(end, priv_of(self).settings.copy().simulation);
   priv_of(self).stream.handed_out_until = end;
   GstBuffer* out = nullptr;
-  if (events != nullptr && events->size() > 0 && !state.drawing) {
+  if (events != nullptr && events->size() > 0) {
     const OwnedBuffer in(gst_buffer_new());
     if (event_simulator_write_events(transform, *events, state.simulator->threads(), in.get(),
                                      &out) != GST_FLOW_OK)
       return;
-    set_times(out, start, end, state);
+    set_times(out, static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start), state);
     gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out);
   } else {
     push_gap(self, start, end, seqnum);
@@ -516,14 +531,15 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
 }
 
 /// Handles a GAP from upstream: holds the last frame until one frame duration before the end of the
-/// gap, where the next interval begins. Returns true if the event must be forwarded.
+/// gap, where the next interval begins; drawn video just has the gap. Returns true if the event
+/// must be forwarded.
 static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   GstClockTime pts = GST_CLOCK_TIME_NONE;
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   gst_event_parse_gap(event, &pts, &duration);
   auto& state = priv_of(self).state;
   const auto start = state ? state->simulator->last_time() : std::nullopt;
-  if (!start) return true;
+  if (!start || state->drawing) return true;
   const GstClockTime frame = latency_of(self);
   const GstClockTime rest =
       GST_CLOCK_TIME_IS_VALID(duration) && duration > frame ? duration - frame : 0;

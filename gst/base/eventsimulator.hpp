@@ -15,6 +15,8 @@
 /// as reference for the next one. An interval has the PTS of its first frame and is pushed when its
 /// last frame arrives, so the latency is one frame. In the event stream an interval without events
 /// is a GAP.
+/// Drawn, an interval is a picture in place of its last frame: with the times of that frame and the
+/// metas that stay true of it. A first frame gives an empty picture.
 struct EventSimulatorMethod {
   const char* type_name;
   const char* long_name;

@@ -195,6 +195,7 @@ GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform, const Eve
     drawing.accumulator.draw(palette, pixel_layout_of(drawing.video), picture.data(),
                              picture.stride());
   }
+  keep_metas(in, prepared);
   *out = buffer.release();
   return GST_FLOW_OK;
 }

@@ -23,7 +23,8 @@ TEST_P(EveryOutput, ComesFromAPool) {
   for (int i = 0; i < 40; ++i) {
     h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 == 0 ? 50 : 200));
     const auto buffer = h.pull();
-    ASSERT_EQ(buffer != nullptr, i > 0);
+    const bool drawn = std::string(out).starts_with("video");
+    ASSERT_EQ(buffer != nullptr, drawn || i > 0);
     if (!buffer) continue;
     EXPECT_NE(buffer->pool, nullptr);
     buffers.insert(buffer.get());

@@ -5,6 +5,7 @@
 #include <gst/video/video.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstring>
 #include <functional>
 #include <initializer_list>
@@ -110,24 +111,18 @@ class Harness {
                                      static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info_)),
                                      static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info_)),
                                      GST_VIDEO_INFO_N_PLANES(&info_), offsets, strides);
-    GstVideoFrame video;
-    EXPECT_TRUE(gst_video_frame_map(&video, &info_, buffer, GST_MAP_WRITE));
-    const int step = GST_VIDEO_FRAME_COMP_PSTRIDE(&video, 0);
-    const guint shift = GST_VIDEO_FORMAT_INFO_SHIFT(info_.finfo, 0);
-    const guint depth = GST_VIDEO_INFO_COMP_DEPTH(&info_, 0);
-    for (int y = 0; y < GST_VIDEO_INFO_HEIGHT(&info_); ++y) {
-      auto* row = static_cast<guint8*>(GST_VIDEO_FRAME_COMP_DATA(&video, 0)) +
-                  y * GST_VIDEO_FRAME_COMP_STRIDE(&video, 0);
-      for (int x = 0; x < GST_VIDEO_INFO_WIDTH(&info_); ++x) {
-        if (depth == 8) {
-          row[x * step] = static_cast<guint8>(grey(x, y));
-        } else {
-          const guint value = static_cast<guint>(grey(x, y)) * ((1U << depth) - 1) / 255 << shift;
-          GST_WRITE_UINT16_LE(row + x * step, static_cast<guint16>(value));
-        }
-      }
-    }
-    gst_video_frame_unmap(&video);
+    const int components = GST_VIDEO_INFO_IS_RGB(&info_) ? 3 : 1;
+    for (int component = 0; component < components; ++component) draw(buffer, component, grey);
+    GST_BUFFER_PTS(buffer) = pts;
+    return buffer;
+  }
+
+  /// A frame in RGB, all of it of one colour.
+  GstBuffer* colours(GstClockTime pts, const std::array<int, 3>& rgb) const {
+    GstBuffer* buffer = gst_buffer_new_allocate(nullptr, GST_VIDEO_INFO_SIZE(&info_), nullptr);
+    gst_buffer_memset(buffer, 0, 0, GST_VIDEO_INFO_SIZE(&info_));
+    for (int component = 0; component < 3; ++component)
+      draw(buffer, component, [&](int, int) { return rgb[static_cast<std::size_t>(component)]; });
     GST_BUFFER_PTS(buffer) = pts;
     return buffer;
   }
@@ -164,6 +159,39 @@ class Harness {
   }
 
  private:
+  /// Draws one component; others in the same words stay.
+  void draw(GstBuffer* buffer, int component, const std::function<int(int x, int y)>& value) const {
+    GstVideoFrame video;
+    EXPECT_TRUE(gst_video_frame_map(&video, &info_, buffer, GST_MAP_READWRITE));
+    const int step = GST_VIDEO_FRAME_COMP_PSTRIDE(&video, component);
+    const guint depth = GST_VIDEO_INFO_COMP_DEPTH(&info_, component);
+    const bool is_little_endian = depth == 8 || GST_VIDEO_FORMAT_INFO_IS_LE(info_.finfo);
+    guint shift = GST_VIDEO_FORMAT_INFO_SHIFT(info_.finfo, component);
+    const auto format = GST_VIDEO_INFO_FORMAT(&info_);
+    if (format == GST_VIDEO_FORMAT_BGR16 || format == GST_VIDEO_FORMAT_BGR15)
+      shift = component == 1   ? shift  // GStreamer gives the shifts of RGB16 and RGB15
+              : component == 2 ? GST_VIDEO_FORMAT_INFO_SHIFT(info_.finfo, 0)
+                               : 0;
+    for (int y = 0; y < GST_VIDEO_INFO_HEIGHT(&info_); ++y) {
+      auto* row = static_cast<guint8*>(GST_VIDEO_FRAME_COMP_DATA(&video, component)) +
+                  y * GST_VIDEO_FRAME_COMP_STRIDE(&video, component);
+      for (int x = 0; x < GST_VIDEO_INFO_WIDTH(&info_); ++x) {
+        auto* sample = row + x * step;
+        const guint white = (1U << depth) - 1;
+        const guint bits = static_cast<guint>(value(x, y)) * white / 255 << shift;
+        if (depth == 8) {
+          *sample = static_cast<guint8>(bits);
+        } else if (is_little_endian) {
+          const guint others = depth < 8 ? GST_READ_UINT16_LE(sample) & ~(white << shift) : 0;
+          GST_WRITE_UINT16_LE(sample, static_cast<guint16>(others | bits));
+        } else {
+          GST_WRITE_UINT16_BE(sample, static_cast<guint16>(bits));
+        }
+      }
+    }
+    gst_video_frame_unmap(&video);
+  }
+
   Owned<GstHarness> h_;
   Owned<GstBus> bus_;
   Owned<GstElement> element_;

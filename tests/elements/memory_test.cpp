@@ -54,7 +54,7 @@ TEST_P(Memory, DoesNotGrowOverTenThousandFrames) {
   for (int i = 0; i < 10'000; ++i) {
     ASSERT_EQ(h.push(flight.frame(i)), GST_FLOW_OK);
     const auto buffer = h.pull();
-    ASSERT_EQ(buffer != nullptr, i > 0);
+    ASSERT_EQ(buffer != nullptr, out == pictures || i > 0);
     if (i == 1'000) after_a_thousand = bytes_in_use();
   }
   // Less than a pointer per frame.

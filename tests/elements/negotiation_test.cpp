@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Accepted input, output formats, and the memory of output buffers.
+#include <array>
+
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -39,8 +41,8 @@ TEST_P(EveryElement, MakesVideoWhereDownstreamTakesOnlyThat) {
 TEST(Negotiation, RefusesWhatItCannotRead) {
   Harness h("eventsim-frame");
   gst_harness_set_sink_caps_str(h.get(), "ANY");
-  gst_harness_set_src_caps_str(h.get(), ("video/x-raw, format=RGB" + size).c_str());
-  EXPECT_EQ(h.push(gst_buffer_new_allocate(nullptr, 32 * 24 * 3, nullptr)),
+  gst_harness_set_src_caps_str(h.get(), ("video/x-raw, format=v210" + size).c_str());
+  EXPECT_EQ(h.push(gst_buffer_new_allocate(nullptr, 32 * 24 * 4, nullptr)),
             GST_FLOW_NOT_NEGOTIATED);
 }
 
@@ -100,6 +102,51 @@ TEST_P(EveryInputFormat, HasItsLumaReadWhereItLies) {
   }
 }
 
+/// The colours of a frame rise, each by so much, from 60. Returns how many pixels fire.
+std::size_t fired_by(const std::string& format, const std::string& colorimetry, double threshold,
+                     const std::array<int, 3>& rise) {
+  Harness h("eventsim-frame positive-threshold=" + std::to_string(threshold));
+  h.caps("video/x-raw, framerate=25/1, width=7, height=5, format=" + format +
+         (colorimetry.empty() ? "" : ", colorimetry=" + colorimetry));
+  h.push(h.flat(0, 60));
+  h.push(h.colours(40 * GST_MSECOND, {60 + rise[0], 60 + rise[1], 60 + rise[2]}));
+  const auto buffer = h.pull();
+  return buffer ? events_of(buffer.get()).size() : 0;
+}
+
+class EveryRgbFormat : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(, EveryRgbFormat, testing::ValuesIn([] {
+                           std::vector<std::string> rgb;
+                           for (const auto& name : formats("sink"))
+                             if (GST_VIDEO_FORMAT_INFO_IS_RGB(gst_video_format_get_info(
+                                     gst_video_format_from_string(name.c_str()))))
+                               rgb.push_back(name);
+                           return rgb;
+                         }()),
+                         [](const auto& test) { return test.param; });
+
+/// Luma changes by 0.2126, 0.7152 and 0.0722 of what red, green and blue do.
+TEST_P(EveryRgbFormat, HasEachColourWeighed) {
+  const std::array<int, 3> colours[] = {{160, 0, 0}, {0, 160, 0}, {0, 0, 160}};
+  const double shares[] = {0.2126, 0.7152, 0.0722};
+  for (int colour = 0; colour < 3; ++colour) {
+    const double rise = 160 * shares[colour];
+    EXPECT_EQ(fired_by(GetParam(), "", rise - 3, colours[colour]), 35U) << colour;
+    EXPECT_EQ(fired_by(GetParam(), "", rise + 3, colours[colour]), 0U) << colour;
+  }
+}
+
+TEST(Negotiation, TakesTheWeightsOfColoursFromTheColorimetry) {
+  // range 0-255, RGB, sRGB; the last number is that of the primaries
+  const std::pair<const char*, double> red_by_primaries[] = {
+      {"1:1:7:1", 0.2126}, {"1:1:7:4", 0.299}, {"1:1:7:3", 0.299},
+      {"1:1:7:2", 0.30},   {"1:1:7:5", 0.212}, {"1:1:7:7", 0.2627}};
+  for (const auto& [colorimetry, share] : red_by_primaries) {
+    EXPECT_EQ(fired_by("RGB", colorimetry, 190 * share - 1, {190, 0, 0}), 35U) << colorimetry;
+    EXPECT_EQ(fired_by("RGB", colorimetry, 190 * share + 1, {190, 0, 0}), 0U) << colorimetry;
+  }
+}
+
 class EveryOutputFormat : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(, EveryOutputFormat, testing::ValuesIn(formats("src")),
                          [](const auto& test) { return test.param; });
@@ -110,6 +157,7 @@ TEST_P(EveryOutputFormat, IsDrawn) {
   h.caps("video/x-raw, format=GRAY8, width=5, height=3, framerate=25/1",
          "video/x-raw, format=" + GetParam());
   h.push(h.flat(0, 100));
+  h.pull();  // empty
   h.push(h.frame(40 * GST_MSECOND, [](int x, int) { return x == 0 ? 200 : x == 4 ? 0 : 100; }));
   const auto buffer = h.pull();
   ASSERT_TRUE(buffer);

@@ -116,7 +116,7 @@ TEST_P(EveryElement, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
   h.push(h.flat(80 * GST_MSECOND, 50));
   const auto picture = h.pull();
   ASSERT_TRUE(picture);
-  EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 40 * GST_MSECOND);
+  EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 80 * GST_MSECOND);  // that of its frame
   EXPECT_EQ(gst_buffer_get_size(picture.get()), 32U * 24U);
 }
 
@@ -235,9 +235,48 @@ TEST(Stream, RefusesFramesSmallerThanTheirCaps) {
     }
 }
 
-TEST(Stream, GivesPicturesNothingOfTheFrameThatEndsThem) {
+/// A meta of these tags, as elements that this project does not know make them.
+void add_custom_meta(GstBuffer* frame, const char* name, std::vector<const gchar*> tags) {
+  tags.push_back(nullptr);
+  if (gst_meta_get_info(name) == nullptr)
+    gst_meta_register_custom(name, tags.data(), nullptr, nullptr, nullptr);
+  gst_buffer_add_custom_meta(frame, name);
+}
+
+TEST(Stream, GivesPicturesWhatStaysTrueOfTheirFrame) {
   Harness h("eventsim-frame");
-  h.caps(video(32, 24), "video/x-raw, format=GRAY8");
+  h.caps(video(32, 24), "video/x-raw, format=BGRx");
+  GstBuffer* frame = h.frame(
+      0, [](int, int) { return 90; }, 8);  // padded rows, by a GstVideoMeta
+  GstVideoCropMeta* crop = gst_buffer_add_video_crop_meta(frame);
+  crop->x = 3;
+  crop->height = 10;
+  gst_buffer_add_video_region_of_interest_meta(frame, "face", 1, 2, 5, 6);
+  add_custom_meta(frame, "EventSimTestPlace", {GST_META_TAG_VIDEO_STR});
+  add_custom_meta(frame, "EventSimTestUntagged", {});
+  add_custom_meta(frame, "EventSimTestColours",
+                  {GST_META_TAG_VIDEO_STR, GST_META_TAG_VIDEO_COLORSPACE_STR});
+  add_custom_meta(frame, "EventSimTestMemory", {GST_META_TAG_MEMORY_STR});
+  h.push(frame);
+  const auto picture = h.pull();
+  ASSERT_TRUE(picture);
+  const auto* kept = gst_buffer_get_video_crop_meta(picture.get());
+  ASSERT_NE(kept, nullptr);
+  EXPECT_EQ(kept->x, 3U);
+  EXPECT_EQ(kept->height, 10U);
+  EXPECT_NE(gst_buffer_get_video_region_of_interest_meta_id(picture.get(), 0), nullptr);
+  EXPECT_NE(gst_buffer_get_custom_meta(picture.get(), "EventSimTestPlace"), nullptr);
+  EXPECT_NE(gst_buffer_get_custom_meta(picture.get(), "EventSimTestUntagged"), nullptr);
+  EXPECT_EQ(gst_buffer_get_custom_meta(picture.get(), "EventSimTestColours"), nullptr);
+  EXPECT_EQ(gst_buffer_get_custom_meta(picture.get(), "EventSimTestMemory"), nullptr);
+  if (const auto* layout = gst_buffer_get_video_meta(picture.get())) {
+    EXPECT_EQ(layout->format, GST_VIDEO_FORMAT_BGRx);  // its own
+  }
+}
+
+TEST(Stream, GivesEventsNothingOfTheFrameThatEndsThem) {
+  Harness h("eventsim-frame");
+  h.caps(video(32, 24));
   h.push(h.flat(0, 50));
   GstBuffer* frame = h.flat(40 * GST_MSECOND, 200);
   GST_BUFFER_OFFSET(frame) = 77;

@@ -61,17 +61,53 @@ TEST_P(EveryElement, SendsAGapForAnIntervalWithoutEvents) {
   EXPECT_EQ(duration, 40 * GST_MSECOND);
 }
 
-TEST_P(EveryElement, DrawsAPictureOfAnIntervalWithoutEvents) {
+TEST_P(EveryElement, DrawsAPictureForEveryFrameAtItsTime) {
   h.caps(video, "video/x-raw, format=GRAY8");
-  h.push(h.flat(0, 90));
-  GstBuffer* repeated = h.flat(40 * GST_MSECOND, 90);
-  GST_BUFFER_FLAG_SET(repeated, GST_BUFFER_FLAG_GAP);  // as set by videorate on its copies
-  h.push(repeated);
-  const auto buffer = h.pull();
-  ASSERT_TRUE(buffer);
-  EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 0U);
-  EXPECT_FALSE(GST_BUFFER_FLAG_IS_SET(buffer.get(), GST_BUFFER_FLAG_GAP));
+  std::vector<std::string> pictures;
+  for (int i = 0; i < 6; ++i) {
+    GstBuffer* frame = h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i < 3 ? 60 : 200);
+    GST_BUFFER_DURATION(frame) = 39 * GST_MSECOND;
+    GST_BUFFER_FLAG_SET(frame, GST_BUFFER_FLAG_GAP);  // as set by videorate on its copies
+    if (i == 5) GST_BUFFER_FLAG_SET(frame, GST_BUFFER_FLAG_DISCONT);
+    h.push(frame);
+    const auto picture = h.pull();
+    ASSERT_TRUE(picture) << i;
+    EXPECT_EQ(GST_BUFFER_PTS(picture.get()), i * 40 * GST_MSECOND);
+    EXPECT_EQ(GST_BUFFER_DURATION(picture.get()), 39 * GST_MSECOND);
+    EXPECT_FALSE(GST_BUFFER_FLAG_IS_SET(picture.get(), GST_BUFFER_FLAG_GAP));
+    EXPECT_EQ(GST_BUFFER_IS_DISCONT(picture.get()), i == 5);
+    pictures.push_back(bytes_of(picture.get()));
+  }
+  const std::string& empty = pictures[0];
+  EXPECT_EQ(empty, std::string(empty.size(), empty.front()));
+  EXPECT_EQ(pictures[2], empty);
+  EXPECT_NE(pictures[3], empty);  // at the time of the frame that changed
+  EXPECT_EQ(pictures[5], empty);
   EXPECT_FALSE(h.pull_event(GST_EVENT_GAP));
+}
+
+TEST_P(EveryElement, DrawsWithoutLatency) {
+  h.caps(video, "video/x-raw, format=GRAY8");
+  gst_harness_set_upstream_latency(h.get(), 5 * GST_MSECOND);
+  flash(0);
+  flash(120 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 5 * GST_MSECOND);
+}
+
+TEST_P(EveryElement, DrawsNothingInAGapOfTheVideo) {
+  h.caps(video, "video/x-raw, format=GRAY8");
+  flash(0);
+  EXPECT_TRUE(h.pull());
+  gst_harness_push_event(h.get(), gst_event_new_gap(40 * GST_MSECOND, 100 * GST_MSECOND));
+  const auto gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap_of(gap.get()).start, 40 * GST_MSECOND);
+  EXPECT_EQ(gap_of(gap.get()).duration, 100 * GST_MSECOND);
+  flash(140 * GST_MSECOND);
+  const auto picture = h.pull();
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 140 * GST_MSECOND);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
 }
 
 TEST_P(EveryElement, BeginsAnewAfterADiscontinuity) {
