@@ -8,10 +8,9 @@
 #include "src/formats/evt/raw.hpp"
 
 /// Caps of words without a header.
-#define EVT_WORDS_CAPS                                                             \
-  "application/x-event-camera, format = (string) { EVT2, EVT21, EVT3, EVT4 }, "    \
-  "width = (int) [ 1, 2048 ], height = (int) [ 1, 2048 ], framerate = (fraction) " \
-  "[ 0, max ]"
+#define EVT_WORDS_CAPS                                                          \
+  "application/x-event-camera, format = (string) { EVT2, EVT21, EVT3, EVT4 }, " \
+  "width = (int) [ 1, 2048 ], height = (int) [ 1, 2048 ]"
 
 /// Format with this name in caps, if any.
 inline std::optional<eventcamera::EvtFormat> evt_format_named(const char* name) {

@@ -68,7 +68,10 @@ static GstCaps* fixate_evt(const GstEventCameraInfo& info, int variant, GstCaps*
     gst_structure_fixate_field_string(structure, "format", evt_name(variant));
     gst_structure_fixate_field_nearest_int(structure, "width", info.width);
     gst_structure_fixate_field_nearest_int(structure, "height", info.height);
-    gst_structure_fixate_field_nearest_fraction(structure, "framerate", info.fps_n, info.fps_d);
+    if (gst_structure_has_field(structure, "framerate"))
+      gst_structure_fixate_field_nearest_fraction(structure, "framerate", info.fps_n, info.fps_d);
+    else
+      gst_structure_set(structure, "framerate", GST_TYPE_FRACTION, info.fps_n, info.fps_d, nullptr);
   }
   return gst_caps_fixate(caps);
 }
@@ -81,6 +84,7 @@ static const EventFileFormat evt = {
     .max_width = 2048,
     .max_height = 2048,
     .variants = &evt_variants,
+    .has_words = true,
     .create = make_evt,
     .fixate = fixate_evt,
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/eventwriter.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <optional>
 #include <span>
@@ -10,22 +11,32 @@
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/stream_header.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/writable_events.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_writer_debug);
 #define GST_CAT_DEFAULT event_writer_debug
 
+using eventcamera::AbsoluteEvent;
 using eventcamera::Encoder;
+using eventcamera::Microseconds;
 
 namespace {
 
-constexpr guint prop_variant = 1;
+enum Property : guint { prop_variant = 1, prop_max_size };
+
+/// Bytes that words never straddle.
+constexpr std::size_t word_bytes = 8;
+
+/// Limit of the bytes that an event takes, with words of time.
+constexpr std::size_t max_event_bytes = 32;
 
 /// State of the file being written, from caps to stop.
 struct State {
   GstEventCameraInfo info;
-  OwnedCaps caps;  ///< output caps
+  OwnedCaps caps;      ///< output caps
+  OwnedBuffer header;  ///< until it is pushed; null if the format has none
   std::unique_ptr<Encoder> encoder;
   bool written = false;
 };
@@ -36,6 +47,7 @@ struct GstEventWriterPrivate {
   explicit GstEventWriterPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
 
   std::atomic<int> variant = 0;
+  std::atomic<guint> max_size = G_MAXUINT;
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
@@ -85,7 +97,17 @@ static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, Own
   priv.bytes.clear();
   priv.writable.begin_file({info.width, info.height});
   auto encoder = format_of(self).create({info.width, info.height}, priv.variant, caps.get());
-  priv.state.emplace(State{.info = info, .caps = std::move(caps), .encoder = std::move(encoder)});
+  encoder->encode({}, priv.bytes);
+  OwnedBuffer header;
+  if (!priv.bytes.empty()) {
+    header.reset(copied_buffer(std::as_bytes(std::span(priv.bytes))));
+    caps = with_stream_header(std::move(caps), header.get());
+    priv.bytes.clear();
+  }
+  priv.state.emplace(State{.info = info,
+                           .caps = std::move(caps),
+                           .header = std::move(header),
+                           .encoder = std::move(encoder)});
 }
 
 static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& info) {
@@ -123,16 +145,70 @@ static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
 
 /* data */
 
-/// Pushes the encoded bytes. May throw.
+/// Limit of the bytes in a buffer.
+static std::size_t capacity(GstEventWriter* self) {
+  return priv_of(self).max_size / word_bytes * word_bytes;
+}
+
+static GstFlowReturn push_header(GstEventWriter* self, GstClockTime pts) {
+  auto& state = *priv_of(self).state;
+  const OwnedBuffer header = std::move(state.header);
+  if (!header) return GST_FLOW_OK;
+  GstBuffer* const buffer = gst_buffer_copy(header.get());  // the caps have the other
+  GST_BUFFER_PTS(buffer) = pts;
+  state.written = true;
+  return gst_pad_push(priv_of(self).src, buffer);
+}
+
+/// Pushes the encoded bytes: one buffer, or several if a silence takes more words than fit. Only
+/// the last has a duration, because before it there is more of the interval to come. May throw.
 static GstFlowReturn push_bytes(GstEventWriter* self, GstClockTime pts, GstClockTime duration) {
   auto& priv = priv_of(self);
-  if (priv.bytes.empty()) return GST_FLOW_OK;
-  GstBuffer* buffer = copied_buffer(std::as_bytes(std::span(priv.bytes)));
+  std::span<const guint8> bytes = priv.bytes;
+  GstFlowReturn result = GST_FLOW_OK;
+  while (!bytes.empty() && result == GST_FLOW_OK) {
+    const auto piece = bytes.first(std::min(bytes.size(), capacity(self)));
+    bytes = bytes.subspan(piece.size());
+    GstBuffer* const buffer = copied_buffer(std::as_bytes(piece));
+    GST_BUFFER_PTS(buffer) = pts;
+    if (bytes.empty()) GST_BUFFER_DURATION(buffer) = duration;
+    priv.state->written = true;
+    result = gst_pad_push(priv.src, buffer);
+  }
   priv.bytes.clear();
-  GST_BUFFER_PTS(buffer) = pts;
-  GST_BUFFER_DURATION(buffer) = duration;
-  priv.state->written = true;
-  return gst_pad_push(priv.src, buffer);
+  return result;
+}
+
+/// Returns how many of the first events fit into `room` bytes. They are close enough in time that
+/// no words of time but those of an event come between them.
+static std::size_t count_that_fits(std::span<const AbsoluteEvent> events, std::size_t room) {
+  constexpr Microseconds close = 1000;
+  events = events.first(std::min(events.size(), room / max_event_bytes));
+  const auto end = std::ranges::find_if(
+      events, [&](const auto& event) { return event.t - events.front().t > close; });
+  return static_cast<std::size_t>(end - events.begin());
+}
+
+/// Encodes events, and pushes a buffer whenever one is full. `start` is where the next one begins.
+/// May throw.
+static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent> events,
+                            GstClockTime& start) {
+  auto& priv = priv_of(self);
+  const auto room = capacity(self);
+  while (!events.empty()) {
+    const auto count = priv.max_size == G_MAXUINT
+                           ? events.size()
+                           : count_that_fits(events, room - std::min(room, priv.bytes.size()));
+    if (count == 0) {
+      const auto end = std::max(start, static_cast<GstClockTime>(events.front().t) * GST_USECOND);
+      const GstFlowReturn result = push_bytes(self, start, end - start);
+      if (result != GST_FLOW_OK) return result;
+      start = end;
+    }
+    priv.state->encoder->encode(events.first(count), priv.bytes);
+    events = events.subspan(count);
+  }
+  return GST_FLOW_OK;
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
@@ -140,11 +216,19 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto& priv = priv_of(self);
   const OwnedBuffer buffer(taken);
   if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  GstClockTime start = GST_BUFFER_PTS(taken);
   return reported(self, [&] {
-    const bool encoded = priv.writable.take(
-        taken, [&](const auto& events) { priv.state->encoder->encode(events, priv.bytes); });
-    return encoded ? push_bytes(self, GST_BUFFER_PTS(taken), GST_BUFFER_DURATION(taken))
-                   : GST_FLOW_ERROR;
+    GstFlowReturn result = GST_FLOW_OK;
+    const bool encoded = priv.writable.take(taken, [&](const auto& events) {
+      if (result == GST_FLOW_OK) result = push_header(self, start);
+      if (result == GST_FLOW_OK) result = encode(self, events, start);
+    });
+    if (!encoded) return GST_FLOW_ERROR;
+    if (result != GST_FLOW_OK) return result;
+    GstClockTime duration = GST_BUFFER_DURATION(taken);
+    if (GST_CLOCK_TIME_IS_VALID(duration))
+      duration -= std::min(duration, start - GST_BUFFER_PTS(taken));
+    return push_bytes(self, start, duration);
   });
 }
 
@@ -171,8 +255,10 @@ static void end_file(GstEventWriter* self) {
   if (!priv.state) return;
   priv.writable.end_file();
   reported(self, [&] {
+    GstFlowReturn result = push_header(self, GST_CLOCK_TIME_NONE);
+    if (result != GST_FLOW_OK) return result;
     priv.state->encoder->finish(priv.bytes);
-    const GstFlowReturn result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
+    result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
     auto patch = priv.state->encoder->patch();
     return result == GST_FLOW_OK && patch ? push_patch(self, *std::move(patch)) : result;
   });
@@ -224,12 +310,20 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static void set_property(GObject* object, guint, const GValue* value, GParamSpec*) {
-  priv_of(GST_EVENT_WRITER(object)).variant = g_value_get_enum(value);
+static void set_property(GObject* object, guint id, const GValue* value, GParamSpec*) {
+  auto& priv = priv_of(GST_EVENT_WRITER(object));
+  if (id == prop_max_size)
+    priv.max_size = g_value_get_uint(value);
+  else
+    priv.variant = g_value_get_enum(value);
 }
 
-static void get_property(GObject* object, guint, GValue* value, GParamSpec*) {
-  g_value_set_enum(value, priv_of(GST_EVENT_WRITER(object)).variant);
+static void get_property(GObject* object, guint id, GValue* value, GParamSpec*) {
+  const auto& priv = priv_of(GST_EVENT_WRITER(object));
+  if (id == prop_max_size)
+    g_value_set_uint(value, priv.max_size);
+  else
+    g_value_set_enum(value, priv.variant);
 }
 
 /// Creates the pads here, because the format is not yet known in init.
@@ -276,17 +370,24 @@ static void add_pad_template(GstElementClass* klass, const char* name, GstPadDir
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const EventFileFormat*>(data);
   GST_EVENT_WRITER_CLASS(klass)->format = &format;
-  if (const auto* variants = format.variants) {
-    GObjectClass* object_class = G_OBJECT_CLASS(klass);
-    object_class->set_property = set_property;
-    object_class->get_property = get_property;
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->set_property = set_property;
+  object_class->get_property = get_property;
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
+  if (const auto* variants = format.variants)
     g_object_class_install_property(
         object_class, prop_variant,
         g_param_spec_enum(variants->property, variants->nick, variants->blurb, variants->type(),
                           variants->default_value,
-                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                   GST_PARAM_MUTABLE_READY)));
-  }
+                          static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_READY)));
+  if (format.has_words)
+    g_object_class_install_property(
+        object_class, prop_max_size,
+        g_param_spec_uint("max-size", "Maximum size",
+                          "Maximum size of a buffer of words in bytes, such as the payload of a "
+                          "network packet; words are never split",
+                          64, G_MAXUINT, G_MAXUINT,
+                          static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_PLAYING)));
   auto* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_template(
       element_class, "sink", GST_PAD_SINK,

@@ -671,6 +671,46 @@ TEST_P(EveryFormat, RefusesBuffersThatAreNoEvents) {
   EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
 }
 
+/// A client that joins late, as of tcpserversink, gets it from there.
+TEST_P(EveryFormat, HasItsHeaderInTheCaps) {
+  const auto events = some_events();
+  Harness writer(format().writer);
+  gst_harness_set_sink_caps_str(writer.get(), format().caps);
+  gst_harness_set_src_caps_str(writer.get(), events_caps.c_str());
+  const auto half = std::span(events).first(10'000);
+  writer.push(buffer_of(half, 0));
+  const auto begun = writer.pull();
+  ASSERT_TRUE(begun);
+  EXPECT_TRUE(GST_BUFFER_FLAG_IS_SET(begun.get(), GST_BUFFER_FLAG_HEADER));
+  while (const auto buffer = writer.pull())
+    EXPECT_FALSE(GST_BUFFER_FLAG_IS_SET(buffer.get(), GST_BUFFER_FLAG_HEADER));
+
+  GstPad* const pad = gst_element_get_static_pad(writer.element(), "src");
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(pad));
+  gst_object_unref(pad);
+  const GValue* const headers =
+      gst_structure_get_value(gst_caps_get_structure(caps.get(), 0), "streamheader");
+  ASSERT_TRUE(headers != nullptr && GST_VALUE_HOLDS_ARRAY(headers));
+  ASSERT_EQ(gst_value_array_get_size(headers), 1U);
+  auto* const header = gst_value_get_buffer(gst_value_array_get_value(headers, 0));
+  EXPECT_EQ(bytes_of(header), bytes_of(begun.get()));
+
+  auto reader = Harness::with_late_pad(format().reader);
+  begin_file(reader, format());
+  reader.push(gst_buffer_copy_deep(header));
+  writer.push(buffer_of(std::span(events).subspan(10'000), 6'000'000));
+  while (const auto buffer = writer.pull()) reader.push(gst_buffer_ref(buffer.get()));
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  const auto read = pull_events(reader);
+  // EVT3 has to wait for the next row.
+  const auto missed = 10'000 - read.size();
+  ASSERT_LE(missed, format().name == std::string("evt3") ? 320U : 0U);
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    const auto& event = events[10'000 + missed + i];
+    ASSERT_TRUE(read[i].x == event.x && read[i].y_p == event.y_p) << i;
+  }
+}
+
 /* EVT words without a header */
 
 class EveryWord : public testing::TestWithParam<const char*> {};
@@ -738,6 +778,68 @@ TEST_P(EveryWord, FollowsGapsAndFlushes) {
   gst_harness_push_event(reader.get(), gst_event_new_eos());
   const auto moved = AbsoluteEvent::at(3, 4, 5'000, Polarity::on);
   EXPECT_EQ(pull_events(reader), std::vector{moved});
+}
+
+TEST_P(EveryWord, FillBuffersOfALimitedSize) {
+  constexpr gsize max_size = 100;
+  Harness writer("evtenc max-size=100");
+  gst_harness_set_sink_caps_str(writer.get(), words_caps(GetParam()).c_str());
+  gst_harness_set_src_caps_str(writer.get(), events_caps.c_str());
+  auto reader = Harness::with_late_pad("evtdec");
+  gst_harness_set_src_caps_str(reader.get(), words_caps(GetParam()).c_str());
+  // Dense rows, isolated events, and a silence that may take words of its own.
+  std::vector<AbsoluteEvent> expected;
+  GstClockTime end = 7 * 3600 * GST_SECOND;
+  for (int i = 0; i < 30; ++i) {
+    const auto start = static_cast<Microseconds>(end / GST_USECOND);
+    const Microseconds length = i == 15 ? 500'000 : 10'000;
+    std::vector<AbsoluteEvent> events;
+    for (int x = 0; x < 320; ++x)
+      events.push_back(
+          AbsoluteEvent::at(x, i, start + 17 + (i % 2 == 0 ? x / 40 : 20 * x), Polarity::on));
+    events.push_back(AbsoluteEvent::at(i, 9, start + length - 1, Polarity::off));
+    expected.insert(expected.end(), events.begin(), events.end());
+    GstBuffer* const buffer = buffer_of(events, start);
+    GST_BUFFER_DURATION(buffer) = static_cast<GstClockTime>(length) * GST_USECOND;
+    writer.push(buffer);
+    while (const auto words = writer.pull()) {
+      EXPECT_LE(gst_buffer_get_size(words.get()), max_size);
+      EXPECT_EQ(gst_buffer_get_size(words.get()) % 2, 0U);
+      EXPECT_GE(GST_BUFFER_PTS(words.get()), end);
+      if (GST_BUFFER_DURATION_IS_VALID(words.get()))
+        end = GST_BUFFER_PTS(words.get()) + GST_BUFFER_DURATION(words.get());
+      reader.push(gst_buffer_ref(words.get()));
+    }
+    EXPECT_EQ(end, static_cast<GstClockTime>(start + length) * GST_USECOND);
+  }
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  EXPECT_EQ(pull_events(reader), expected);
+}
+
+TEST(EvtEnc, PutsManyEventsIntoABufferOfALimitedSize) {
+  std::vector<AbsoluteEvent> events;
+  for (int i = 0; i < 10'000; ++i)
+    events.push_back(AbsoluteEvent::at(i % 320, i / 320, i / 100, Polarity::on));
+  for (const char* const limit : {"1400", "4294967295"}) {
+    Harness writer(std::string("evtenc max-size=") + limit);
+    gst_harness_set_sink_caps_str(writer.get(), words_caps("EVT2").c_str());
+    gst_harness_set_src_caps_str(writer.get(), events_caps.c_str());
+    writer.push(buffer_of(events, 0));
+    const auto count = gst_harness_buffers_in_queue(writer.get());
+    if (std::string_view(limit) == "1400")
+      EXPECT_LE(count, 31U);  // 29 of them would be full
+    else
+      EXPECT_EQ(count, 1U);
+  }
+}
+
+TEST(EvtDec, NeedsNoFramerateInCaps) {
+  const auto file = file_of(formats[2], some_events());
+  const TemporaryFile words(file.substr(file.find("% end\n") + 6));
+  Player player(words.path(),
+                "application/x-event-camera,format=EVT3,width=320,height=240 ! evtdec");
+  EXPECT_TRUE(player.ends_well());
+  EXPECT_EQ(player.events.size(), 20'000U);
 }
 
 TEST(EvtEnc, TakesTheFormatThatDownstreamLeaves) {

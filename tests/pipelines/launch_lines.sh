@@ -83,6 +83,24 @@ launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null i
 interrupt interrupted.mp4 10000 -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4
 launch filesrc location=interrupted.mp4 ! decodebin ! fakesink
 
+# A client that joins a server late gets the header first.
+port=$((20000 + $$ % 20000))
+for writer in "evtenc format=EVT3" "evtenc format=EVT4" eventdatenc eventesenc; do
+  echo "tcpserversink of $writer"
+  timeout 60 "$GST_LAUNCH" -q videotestsrc is-live=true pattern=ball ! eventsim-frame ! $writer ! tcpserversink host=127.0.0.1 port=$port &
+  serving=$!
+  joined=false
+  for _ in $(seq 20); do
+    sleep 1
+    timeout 20 "$GST_LAUNCH" -q tcpclientsrc host=127.0.0.1 port=$port num-buffers=30 ! decodebin caps=application/x-event-camera,format=XYTP ! filesink location=joined.xytp || continue
+    joined=true
+    break
+  done
+  kill $serving
+  wait $serving || true
+  $joined && [ "$(stat -c %s joined.xytp)" -gt 8000 ] || fail "a client of $writer got no events"
+done
+
 # Events and their frames in one file, and read back.
 launch videotestsrc pattern=ball num-buffers=50 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux compression=zstd ! filesink location=ball.aedat4
 launch filesrc location=ball.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! filesink location=ball.xytp  d.video_0 ! queue ! filesink location=ball.grey
