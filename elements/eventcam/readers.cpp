@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// The elements that read event files: a table of formats for GstEventReader.
+#include "elements/eventcam/es_origin.hpp"
 #include "elements/eventcam/evtformat.hpp"
 #include "gst/base/eventreader.hpp"
 #include "src/formats/dat/dat.hpp"
@@ -20,34 +21,32 @@
 using eventcamera::Decoder;
 using eventcamera::DecoderReader;
 using eventcamera::Reader;
-using eventcamera::TableSettings;
 
 namespace {
 
 /// Creates a reader for a format with a decoder.
-template <std::unique_ptr<Decoder> (*make_decoder)()>
-std::unique_ptr<Reader> decoded_by(const GstCaps* /*caps*/, const TableSettings& /*table*/) {
-  return std::make_unique<DecoderReader>(make_decoder());
+std::unique_ptr<Reader> decoded_by(std::unique_ptr<Decoder> decoder) {
+  return std::make_unique<DecoderReader>(std::move(decoder));
 }
 
 /// Creates a reader for a table.
 template <class TableDecoder>
-std::unique_ptr<Reader> table_read_by(const GstCaps* /*caps*/, const TableSettings& table) {
-  return std::make_unique<DecoderReader>(std::make_unique<TableDecoder>(table));
+std::unique_ptr<Reader> table_read_by(const GstCaps* /*caps*/, const FormatSettings& settings) {
+  return decoded_by(std::make_unique<TableDecoder>(settings.table()));
 }
 
 /// Words without a header have their format and size in the caps; files have a header.
-std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const TableSettings& /*table*/) {
+std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const FormatSettings& /*settings*/) {
   if (caps != nullptr) {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
     if (const auto words = evt_format_named(gst_structure_get_string(structure, "format"))) {
       eventcamera::SensorSize size;
       gst_structure_get_int(structure, "width", &size.width);
       gst_structure_get_int(structure, "height", &size.height);
-      return std::make_unique<DecoderReader>(eventcamera::make_evt_decoder(*words, size));
+      return decoded_by(eventcamera::make_evt_decoder(*words, size));
     }
   }
-  return std::make_unique<DecoderReader>(eventcamera::make_prophesee_raw_decoder());
+  return decoded_by(eventcamera::make_prophesee_raw_decoder());
 }
 
 }  // namespace
@@ -72,6 +71,7 @@ static const RecordingFormat evt = {
     .long_name = "Prophesee RAW reader",
     .description = "Reads Prophesee RAW files of events",
     .caps = "application/x-prophesee-raw; " EVT_WORDS_CAPS,
+    .add_properties = add_sensor_size,
     .make_reader = make_evt_reader,
 };
 GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_type(evt))
@@ -95,7 +95,10 @@ static const RecordingFormat dat = {
     .long_name = "Prophesee DAT reader",
     .description = "Reads Prophesee DAT files of events",
     .caps = "application/x-prophesee-dat",
-    .make_reader = decoded_by<eventcamera::make_dat_decoder>,
+    .add_properties = add_sensor_size,
+    .make_reader = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<Reader> {
+      return decoded_by(eventcamera::make_dat_decoder());
+    },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_reader_type(dat))
 
@@ -106,6 +109,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  *
  * Reads Event Stream 2.0 files with DVS or ATIS events (of the latter, only the change events).
  * Events are output in buffers of #GstEventReader:buffer-time.
+ *
+ * Tools disagree about where row 0 is. If the picture is upside down, as with files of faery, set
+ * #GstEventEsDec:origin to `top-left`.
  *
  * ## Example launch line
  * |[
@@ -118,7 +124,18 @@ static const RecordingFormat es = {
     .long_name = "Event Stream reader",
     .description = "Reads Event Stream files of events",
     .caps = "application/x-es",
-    .make_reader = decoded_by<eventcamera::make_event_stream_decoder>,
+    .add_properties =
+        [](FormatProperties& properties) {
+          properties.add(&FormatSettings::variant,
+                         g_param_spec_enum(
+                             "origin", ES_ORIGIN_NICK, ES_ORIGIN_BLURB, es_origin_type(), 0,
+                             static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                      GST_PARAM_MUTABLE_READY)));
+        },
+    .make_reader = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Reader> {
+      return decoded_by(eventcamera::make_event_stream_decoder(
+          static_cast<eventcamera::EsOrigin>(settings.variant)));
+    },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_reader_type(es))
 
@@ -130,8 +147,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  * Reads text with one event per line. Columns, separators and time unit are detected from the first
  * lines, unless #GstEventCsvDec:column-order and #GstEventCsvDec:time-unit are set. A file that may
  * be in microseconds or in nanoseconds is refused until the unit is set. If the lines do not state
- * the sensor size, it is taken from downstream's caps, or else is that of the smallest known sensor
- * that the first events fit into.
+ * the sensor size, it is that of #GstEventCsvDec:width and #GstEventCsvDec:height, or else that of
+ * downstream's caps, or else that of the smallest known sensor that the events fit into; if later
+ * events do not, the caps change. Writers cannot change the size within a file: set it for them.
  *
  * ## Example launch line
  * |[
@@ -144,7 +162,7 @@ static const RecordingFormat csv = {
     .long_name = "CSV reader",
     .description = "Reads CSV files of events",
     .caps = "application/x-event-csv",
-    .is_table = true,
+    .add_properties = add_table_properties,
     .make_reader = table_read_by<eventcamera::CsvDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_reader_type(csv))
@@ -157,8 +175,10 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * Reads structured NumPy arrays with the fields t, x, y and p, and arrays of the shape (N, 4),
  * whose columns are detected from the first rows, unless #GstEventNpyDec:column-order is set.
  * Integer times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit or a
- * name such as t_ns says otherwise. Arrays do not contain the sensor size: it is taken from
- * downstream's caps, or else is that of the smallest known sensor that the first events fit into.
+ * name such as t_ns says otherwise. Arrays do not contain the sensor size: it is that of
+ * #GstEventNpyDec:width and #GstEventNpyDec:height, or else that of downstream's caps, or else that
+ * of the smallest known sensor that the events fit into; if later events do not, the caps change.
+ * Writers cannot change the size within a file: set it for them.
  *
  * ## Example launch line
  * |[
@@ -171,7 +191,7 @@ static const RecordingFormat npy = {
     .long_name = "NumPy reader",
     .description = "Reads NumPy files of events",
     .caps = "application/x-npy",
-    .is_table = true,
+    .add_properties = add_table_properties,
     .make_reader = table_read_by<eventcamera::NpyDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_reader_type(npy))
@@ -197,9 +217,11 @@ static const RecordingFormat npz = {
     .long_name = "NumPy archive reader",
     .description = "Reads NumPy archives of events",
     .caps = "application/x-npz",
-    .is_table = true,
-    .make_reader = [](const GstCaps*,
-                      const TableSettings& table) { return eventcamera::make_npz_reader(table); },
+    .add_properties = add_table_properties,
+    .make_reader =
+        [](const GstCaps*, const FormatSettings& settings) {
+          return eventcamera::make_npz_reader(settings.table());
+        },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_reader_type(npz))
 #endif
@@ -230,8 +252,9 @@ static const RecordingFormat hdf5 = {
     .long_name = "HDF5 reader",
     .description = "Reads HDF5 files of events: DSEC, Metavision, v2e",
     .caps = "application/x-hdf5",
+    .add_properties = add_sensor_size,
     .make_reader = [](const GstCaps*,
-                      const TableSettings&) { return eventcamera::make_hdf5_reader(); },
+                      const FormatSettings&) { return eventcamera::make_hdf5_reader(); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, event_reader_type(hdf5))
 #endif
@@ -270,7 +293,7 @@ static const RecordingFormat aedat = {
     .description = "Reads events and frames from AEDAT files",
     .caps = "application/x-aedat, version = (int) { 2, 3, 4 }",
     .has_many_streams = true,
-    .make_reader = [](const GstCaps*, const TableSettings&) -> std::unique_ptr<Reader> {
+    .make_reader = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<Reader> {
       return std::make_unique<eventcamera::AedatReader>();
     },
 };

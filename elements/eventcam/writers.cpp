@@ -2,6 +2,7 @@
 /// The elements that write event files: a table of formats for GstEventWriter.
 #include <vector>
 
+#include "elements/eventcam/es_origin.hpp"
 #include "elements/eventcam/evtformat.hpp"
 #include "gst/base/eventwriter.hpp"
 #include "gst/base/types.hpp"
@@ -95,8 +96,10 @@ GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_typ
  * @title: eventdatenc
  * @short_description: writes DAT files
  *
- * Writes events as a DAT file, version 2. Timestamps have 32 bits: readers may mistake a pause of
- * more than 35 minutes for one that is 71 minutes shorter.
+ * Writes events as a DAT file, version 2. Timestamps have 32 bits. A file whose first event is
+ * later than 71 minutes, as times since 1970 are, starts at 0. A pause is left out, with a warning,
+ * if readers would mistake it: one of more than 71 minutes, or of more than 35 in which the
+ * timestamps wrap.
  *
  * ## Example launch line
  * |[
@@ -122,7 +125,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  * @short_description: writes Event Stream files
  *
  * Writes events as an Event Stream 2.0 file of DVS events. Pauses take one byte per 127
- * microseconds.
+ * microseconds. Tools disagree about where row 0 is: set #GstEventEsEnc:origin for the one that
+ * will read the file.
  *
  * ## Example launch line
  * |[
@@ -130,13 +134,25 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  * location=test.es
  * ]|
  */
+static const EventFileFormat::Variants es_variants = {
+    .property = "origin",
+    .nick = ES_ORIGIN_NICK,
+    .blurb = ES_ORIGIN_BLURB ". Read when the stream begins",
+    .type = es_origin_type,
+    .default_value = static_cast<int>(eventcamera::EsOrigin::bottom_left),
+};
+
 static const EventFileFormat event_stream = {
     .type_name = "GstEventEsEnc",
     .long_name = "Event Stream writer",
     .description = "Writes events as Event Stream",
     .caps = "application/x-es",
-    .create = [](SensorSize size, int,
-                 const GstCaps*) { return eventcamera::make_event_stream_encoder(size); },
+    .variants = &es_variants,
+    .create =
+        [](SensorSize size, int variant, const GstCaps*) {
+          return eventcamera::make_event_stream_encoder(
+              size, static_cast<eventcamera::EsOrigin>(variant));
+        },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
                             event_writer_type(event_stream))

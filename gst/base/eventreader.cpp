@@ -38,7 +38,7 @@ using eventcamera::UnsupportedFormat;
 
 namespace {
 
-enum Property : guint { prop_buffer_time = 1, prop_stats, prop_time_unit, prop_column_order };
+enum Property : guint { prop_buffer_time = 1, prop_stats };
 
 constexpr GstClockTime default_buffer_time = 10 * GST_MSECOND;
 
@@ -47,37 +47,6 @@ constexpr GstFlowReturn nothing_ready = GST_FLOW_CUSTOM_SUCCESS;
 
 GstClockTime nanoseconds(Microseconds t) {
   return static_cast<GstClockTime>(std::max<Microseconds>(t, 0)) * GST_USECOND;
-}
-
-/// Properties of a table that the application has set.
-struct TableProperties {
-  gint time_unit = 0;  ///< 0: detect, else TimeUnit + 1
-  std::string column_order;
-
-  /// Throws UnsupportedFormat.
-  eventcamera::TableSettings settings() const {
-    eventcamera::TableSettings settings;
-    if (time_unit > 0) settings.unit = static_cast<eventcamera::TimeUnit>(time_unit - 1);
-    if (column_order.empty()) return settings;
-    auto columns = eventcamera::columns_of(column_order);
-    if (!columns)
-      throw UnsupportedFormat("column-order \"" + column_order +
-                              "\" must have each of t, x, y and p once, and '-' for others");
-    settings.columns = *std::move(columns);
-    return settings;
-  }
-};
-
-GType time_unit_type() {
-  static const GEnumValue units[] = {
-      {0, "Told by the file, or found by its first rows", "auto"},
-      {1, "Seconds", "seconds"},
-      {2, "Milliseconds", "milliseconds"},
-      {3, "Microseconds", "microseconds"},
-      {4, "Nanoseconds", "nanoseconds"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventTimeUnit", units);
 }
 
 /// Bounds of a segment in whole microseconds, rounded outwards.
@@ -108,11 +77,7 @@ class EventReader {
 
   void set_buffer_time(GstClockTime time) { shared_.lock()->buffer_time = time; }
   GstClockTime buffer_time() { return shared_.lock()->buffer_time; }
-  void set_time_unit(gint unit) { shared_.lock()->table.time_unit = unit; }
-  void set_column_order(std::string order) {
-    shared_.lock()->table.column_order = std::move(order);
-  }
-  TableProperties table() { return shared_.lock()->table; }
+  GuardedSettings<FormatSettings>& format_settings() { return format_settings_; }
   GstStructure* stats();
 
   /// Forgets the file.
@@ -130,7 +95,6 @@ class EventReader {
     Shared() { gst_segment_init(&segment, GST_FORMAT_TIME); }
 
     GstClockTime buffer_time = default_buffer_time;
-    TableProperties table;
     GstSegment segment = {};  ///< relative to the origin; its position is that of the output
     GstClockTime duration = GST_CLOCK_TIME_NONE;
     RecordingReader::Counts counts;
@@ -173,8 +137,9 @@ class EventReader {
   ReaderPad& pad_of(std::size_t stream);
   GstFlowReturn begin_output();
   void start_streams();
-  void guess_size(std::size_t stream);
+  void find_size(std::size_t stream);
   bool send_caps(std::size_t stream);
+  GstFlowReturn refused_size(std::size_t stream);
   void send_segment(ReaderPad& pad);
   void interrupt_output();
   void end_output(bool failed);
@@ -196,6 +161,7 @@ class EventReader {
   const RecordingFormat& format_;
 
   Guarded<Shared> shared_;
+  GuardedSettings<FormatSettings> format_settings_;
 
   // Accessed under the sink pad's stream lock only, or while there is no streaming thread.
   OwnedCaps caps_;                 ///< input caps
@@ -244,42 +210,19 @@ static EventReader& reader_of(gpointer object) {
 }
 
 static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  auto& reader = reader_of(object);
-  std::string text;
-  switch (id) {
-    case prop_buffer_time:
-      reader.set_buffer_time(g_value_get_uint64(value));
-      break;
-    case prop_time_unit:
-      reader.set_time_unit(g_value_get_enum(value));
-      break;
-    case prop_column_order:
-      read_value(value, text);
-      reader.set_column_order(std::move(text));
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-  }
+  if (id == prop_buffer_time)
+    reader_of(object).set_buffer_time(g_value_get_uint64(value));
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
 static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  auto& reader = reader_of(object);
-  switch (id) {
-    case prop_buffer_time:
-      g_value_set_uint64(value, reader.buffer_time());
-      break;
-    case prop_stats:
-      g_value_take_boxed(value, reader.stats());
-      break;
-    case prop_time_unit:
-      g_value_set_enum(value, reader.table().time_unit);
-      break;
-    case prop_column_order:
-      write_value(reader.table().column_order, value);
-      break;
-    default:
-      G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-  }
+  if (id == prop_buffer_time)
+    g_value_set_uint64(value, reader_of(object).buffer_time());
+  else if (id == prop_stats)
+    g_value_take_boxed(value, reader_of(object).stats());
+  else
+    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
@@ -334,30 +277,9 @@ static void add_template(GstElementClass* klass, const char* name, GstPadDirecti
                                      gst_pad_template_new(name, direction, presence, owned.get()));
 }
 
-static void add_table_properties(GObjectClass* klass) {
-  klass->set_property = set_property;
-  klass->get_property = get_property;
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                  GST_PARAM_MUTABLE_READY);
-  g_object_class_install_property(
-      klass, prop_time_unit,
-      g_param_spec_enum(
-          "time-unit", "Time unit",
-          "Unit of the times in the file; needed if the file is refused because its time unit is "
-          "ambiguous",
-          time_unit_type(), 0, flags));
-  g_object_class_install_property(
-      klass, prop_column_order,
-      g_param_spec_string("column-order", "Column order",
-                          "What the columns are: a letter t, x, y or p each, - for others, as in "
-                          "xytp; empty = told by the file, or found by its first rows",
-                          "", flags));
-}
-
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const RecordingFormat*>(data);
   static_cast<GstEventReaderClass*>(klass)->format = &format;
-  if (format.is_table) add_table_properties(G_OBJECT_CLASS(klass));
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   const char* const name = format.has_many_streams ? "events_%u" : "src";
   add_template(element_class, "sink", GST_PAD_SINK, GST_PAD_ALWAYS, format.caps);
@@ -366,6 +288,14 @@ static void format_class_init(gpointer klass, gpointer data) {
     add_template(element_class, "video_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, RECORDED_VIDEO_CAPS);
   gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Demuxer",
                                         format.description, "gst-eventsim");
+  if (format.add_properties != nullptr) {
+    FormatProperties properties(G_OBJECT_CLASS(klass));
+    format.add_properties(properties);
+  }
+}
+
+GuardedSettings<FormatSettings>& format_settings_of(GObject* reader) {
+  return reader_of(reader).format_settings();
 }
 
 GType event_reader_type(const RecordingFormat& format) {
@@ -441,11 +371,9 @@ void EventReader::reset() {
   seqnum_ = GST_SEQNUM_INVALID;
   const auto shared = shared_.lock();
   const auto buffer_time = shared->buffer_time;
-  const auto table = shared->table;
   const bool is_pulling = shared->is_pulling;
   *shared = {};
   shared->buffer_time = buffer_time;
-  shared->table = table;
   shared->is_pulling = is_pulling;
 }
 
@@ -456,7 +384,7 @@ static void unref_caps(GstCaps* caps) {
 /// Creates the recording, to read a file from its start or a stream of words. May throw.
 void EventReader::open_recording() {
   const std::shared_ptr<GstCaps> caps(caps_ ? gst_caps_copy(caps_.get()) : nullptr, unref_caps);
-  auto make = [make_reader = format_.make_reader, caps, settings = table().settings()] {
+  auto make = [make_reader = format_.make_reader, caps, settings = format_settings_.copy()] {
     return make_reader(caps.get(), settings);
   };
   close_recording();
@@ -780,6 +708,7 @@ GstFlowReturn EventReader::push(const RecordingReader::Chunk& chunk) {
   if (output_due_)
     if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
   auto& pad = *pad_of_stream_.at(chunk.stream);
+  if (!send_caps(chunk.stream)) return refused_size(chunk.stream);
   const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(chunk.start);
   const GstClockTime duration = nanoseconds(chunk.duration);
   if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
@@ -833,7 +762,7 @@ GstFlowReturn EventReader::begin_output() {
   const auto& streams = recording_->streams();
   for (std::size_t i = 0; i < streams.size(); ++i) {
     if (!streams[i].shown) continue;
-    if (!format_.has_many_streams) guess_size(i);
+    if (!format_.has_many_streams) find_size(i);
     if (!send_caps(i)) {
       output_due_ = true;
       return pad_of(i).refusal();
@@ -891,11 +820,15 @@ void EventReader::start_streams() {
   if (!std::exchange(has_no_more_pads_, true)) gst_element_no_more_pads(element_);
 }
 
-/// If the file does not state the sensor size, uses the size in downstream's caps, else one that
-/// all events fit into.
-void EventReader::guess_size(std::size_t index) {
+/// If the file does not state the sensor size, uses that of the properties, else the size in
+/// downstream's caps, else one that all events fit into.
+void EventReader::find_size(std::size_t index) {
   const auto& stream = recording_->streams()[index];
-  if (!stream.size_guessed) return;
+  if (stream.size_from != RecordingReader::SizeFrom::assumption) return;
+  if (const auto size = format_settings_.copy().sensor; size.width > 0 && size.height > 0) {
+    recording_->set_size(index, size);
+    return;
+  }
   GstPad* const pad = pad_of(index).get();
   const OwnedCaps templ(gst_pad_get_pad_template_caps(pad));
   const OwnedCaps peer(gst_pad_peer_query_caps(pad, templ.get()));
@@ -903,8 +836,10 @@ void EventReader::guess_size(std::size_t index) {
   if (!gst_caps_is_empty(peer.get())) {
     const auto* const structure = gst_caps_get_structure(peer.get(), 0);
     if (gst_structure_get_int(structure, "width", &size.width) &&
-        gst_structure_get_int(structure, "height", &size.height))
+        gst_structure_get_int(structure, "height", &size.height)) {
       recording_->set_size(index, size);
+      return;
+    }
   }
   GST_INFO_OBJECT(element_, "the file does not state the sensor size; assuming %dx%d",
                   stream.info.size.width, stream.info.size.height);
@@ -916,6 +851,21 @@ bool EventReader::send_caps(std::size_t index) {
   if (stream.info.kind == StreamKind::events) return pad.send_caps(stream.info.size);
   GstVideoInfo info;
   return pad.has_video() || !frame_video_info(*stream.first_frame, &info) || pad.send_caps(info);
+}
+
+/// An assumed size has grown, and downstream does not take another.
+GstFlowReturn EventReader::refused_size(std::size_t index) {
+  const GstFlowReturn refusal = pad_of(index).refusal();
+  if (refusal == GST_FLOW_FLUSHING) return refusal;
+  const auto size = recording_->streams()[index].info.size;
+  const auto text = std::to_string(size.width) + "x" + std::to_string(size.height);
+  post_message(element_, GST_MESSAGE_ERROR,
+               {GST_STREAM_ERROR_FORMAT,
+                "Events lie outside the assumed sensor, whose size the file does not state. Set "
+                "width and height; the events so far need " +
+                    text + " pixels."},
+               "downstream refuses to change the size to " + text);
+  return GST_FLOW_ERROR;
 }
 
 void EventReader::send_segment(ReaderPad& pad) {

@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "src/formats/event_table.hpp"
+#include "gst/base/format_settings.hpp"
 #include "src/formats/reader.hpp"
 
 /// A recording format, and the element that reads it: bytes in, streams of events and video out.
@@ -32,11 +32,11 @@ struct RecordingFormat {
   const char* description;
   const char* caps;  ///< input caps
   bool has_many_streams = false;
-  bool is_table = false;  ///< rows of numbers, whose properties may be set by the application
+  void (*add_properties)(FormatProperties& properties) = nullptr;
 
   /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown. May throw.
   std::unique_ptr<eventcamera::Reader> (*make_reader)(const GstCaps* caps,
-                                                      const eventcamera::TableSettings& table);
+                                                      const FormatSettings& settings);
 };
 
 /// Returns the element type that reads `format`, which must have static storage duration.

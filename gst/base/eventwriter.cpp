@@ -54,6 +54,7 @@ struct GstEventWriterPrivate {
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
   WritableEvents writable;
+  WarnOnce warn_of_pause;
   std::vector<guint8> bytes;  ///< encoded but not yet pushed
 };
 
@@ -95,6 +96,7 @@ static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
 static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
   auto& priv = priv_of(self);
   priv.bytes.clear();
+  priv.warn_of_pause.reset();
   priv.writable.begin_file({info.width, info.height});
   auto encoder = format_of(self).create({info.width, info.height}, priv.variant, caps.get());
   encoder->encode({}, priv.bytes);
@@ -211,6 +213,19 @@ static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent>
   return GST_FLOW_OK;
 }
 
+static void warn_of_pause(GstEventWriter* self) {
+  auto& priv = priv_of(self);
+  const auto left_out = priv.state->encoder->left_out();
+  if (left_out == 0) return;
+  const auto seconds = std::to_string(left_out / 1'000'000);
+  priv.warn_of_pause(self,
+                     {GST_STREAM_ERROR_ENCODE,
+                      "Left out a pause of " + seconds +
+                          " s, which is too long for this format: all later events are earlier by "
+                          "as much. Write AEDAT4, HDF5, NumPy or text to keep their times."},
+                     "the clock of the format cannot tell " + std::to_string(left_out) + " us");
+}
+
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto* self = GST_EVENT_WRITER(parent);
   auto& priv = priv_of(self);
@@ -224,6 +239,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
       if (result == GST_FLOW_OK) result = encode(self, events, start);
     });
     if (!encoded) return GST_FLOW_ERROR;
+    warn_of_pause(self);
     if (result != GST_FLOW_OK) return result;
     GstClockTime duration = GST_BUFFER_DURATION(taken);
     if (GST_CLOCK_TIME_IS_VALID(duration))

@@ -30,11 +30,12 @@ void WritableEvents::begin_file(SensorSize sensor) {
 
 bool WritableEvents::accepts(SensorSize sensor) const {
   if (sensor == sensor_) return true;
-  post_message(
-      element_, GST_MESSAGE_ERROR,
-      {GST_STREAM_ERROR_FORMAT, "The sensor size changes from " + text_of(sensor_) + " to " +
-                                    text_of(sensor) + " within a file. Start a new file for it."},
-      "new caps after events were written");
+  post_message(element_, GST_MESSAGE_ERROR,
+               {GST_STREAM_ERROR_FORMAT,
+                "The sensor size changes from " + text_of(sensor_) + " to " + text_of(sensor) +
+                    " within a file. Start a new file for it, or set width and "
+                    "height where the events are read."},
+               "new caps after events were written");
   return false;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "src/core/event.hpp"
+#include "src/formats/byte_source.hpp"
 
 namespace eventcamera {
 
@@ -93,6 +94,9 @@ class SeekPoints {
   std::uint64_t next_ = 0;
 };
 
+/// How much of a file's end is read to find its last event: more than events are out of order.
+constexpr std::size_t tail_size = std::size_t{1} << 16;
+
 /// Decodes one event format. Bytes are passed in pieces of any size; the split does not affect the
 /// result. Memory is bounded by the size of the pieces and the format's largest unit, never by a
 /// length stated in the bytes.
@@ -120,6 +124,10 @@ class Decoder {
   /// Continues at a seek point: the next bytes are those at its position. Corruption that is read
   /// again counts again.
   virtual void restart(const SeekPoint& /*seek_point*/) {}
+
+  /// Appends the last events of the file, if they can be read without all before them. Must be
+  /// called after the header is read.
+  virtual void decode_tail(ByteSource& /*source*/, Decoded& /*out*/) const {}
 
   /// Sensor size, once the header is read or if known from elsewhere; 0x0 before.
   SensorSize size() const { return size_; }

@@ -38,6 +38,9 @@ class Encoder {
     append_end(out);
   }
 
+  /// Microseconds of pauses between events that were left out because the format cannot hold them.
+  virtual std::uint64_t left_out() const { return 0; }
+
   /// Patch for the header, to be written after finish() if the output is seekable. This project's
   /// readers do not need it.
   virtual std::optional<FilePatch> patch() const { return std::nullopt; }

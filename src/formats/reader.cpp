@@ -2,6 +2,9 @@
 #include "src/formats/reader.hpp"
 
 #include <algorithm>
+#include <utility>
+
+#include "src/formats/chunker.hpp"
 
 namespace eventcamera {
 
@@ -34,6 +37,18 @@ void DecoderReader::restart(const SeekPoint& seek_point) {
   rest_ = {};
   finish_due_ = events_due_ = triggers_due_ = false;
   decoder_->restart(seek_point);
+}
+
+std::optional<Microseconds> DecoderReader::last_time() {
+  if (auto* const source = std::exchange(source_, nullptr); source != nullptr) {
+    Decoded tail;
+    decoder_->decode_tail(*source, tail);
+    Chunker chunker(1);  // it tells which times are to be believed
+    chunker.push(tail.events);
+    chunker.finish();
+    if (chunker.first()) last_time_ = chunker.latest();
+  }
+  return last_time_;
 }
 
 }  // namespace eventcamera

@@ -141,6 +141,10 @@ class DecoderReader final : public Reader {
 
   void push(std::span<const std::uint8_t> piece) override { rest_ = piece; }
   void finish() override { finish_due_ = true; }
+  bool open(ByteSource& source) override {
+    source_ = &source;
+    return false;
+  }
   std::optional<Item> next() override;
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const Corruption& corruption() const override { return decoder_->corruption(); }
@@ -148,9 +152,12 @@ class DecoderReader final : public Reader {
     return decoder_->seek_point_before(t);
   }
   void restart(const SeekPoint& seek_point) override;
+  std::optional<Microseconds> last_time() override;
 
  private:
   std::unique_ptr<Decoder> decoder_;
+  ByteSource* source_ = nullptr;           ///< none: pushed, or the last time is known
+  std::optional<Microseconds> last_time_;  ///< where the decoder can tell
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   std::span<const std::uint8_t> rest_;
   bool finish_due_ = false;

@@ -119,7 +119,7 @@ void RecordingReader::learn_streams() {
     if (known[i].kind != streams_[i].info.kind)
       throw std::runtime_error("the file changed while it was read: its streams are different now");
     // Some formats state the size only after their first bytes.
-    if (!streams_[i].size_guessed && known[i].size != SensorSize{})
+    if (streams_[i].size_from == SizeFrom::file && known[i].size != SensorSize{})
       streams_[i].info.size = known[i].size;
   }
   for (auto i = streams_.size(); i < known.size(); ++i) {
@@ -326,7 +326,7 @@ void RecordingReader::show(Stream& stream) {
   if (stream.info.kind != StreamKind::events) return;
   if (stream.info.size.width <= 0 || stream.info.size.height <= 0) {
     stream.info.size = stream.used.sensor();
-    stream.size_guessed = true;
+    stream.size_from = SizeFrom::assumption;
   }
   start_chunker(stream);
 }
@@ -385,10 +385,16 @@ void RecordingReader::take(const EventItem& item) {
     show(stream);
   }
   auto events = item.events;
-  if (stream.size_guessed && std::ranges::any_of(events, is_outside(stream.info.size))) {
-    within_.assign(events.begin(), events.end());
-    stream.outside += std::erase_if(within_, is_outside(stream.info.size));
-    events = within_;
+  if (stream.size_from != SizeFrom::file &&
+      std::ranges::any_of(events, is_outside(stream.info.size))) {
+    if (stream.size_from == SizeFrom::assumption) {
+      stream.used.include(events);
+      stream.info.size = stream.used.sensor();
+    } else {
+      within_.assign(events.begin(), events.end());
+      stream.outside += std::erase_if(within_, is_outside(stream.info.size));
+      events = within_;
+    }
   }
   if (clock_ == Clock::stream && !shift_ && interval_) set_shift(item.events.front().t);
   stream.chunker.push(events);
@@ -436,10 +442,12 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
       auto& stream = streams_[next_stream_];
       if (!stream.shown) continue;
       while (const auto interval = stream.chunker.next()) {
-        const auto start = interval->start - origin_ + shift_.value_or(0);
-        if (!advance(stream, start, start + interval->duration)) continue;
-        counts_.events += interval->events.size();
-        return Chunk{next_stream_, start, interval->duration, interval->events};
+        Chunk chunk{next_stream_, interval->start - origin_ + shift_.value_or(0),
+                    interval->duration, interval->events};
+        cut_at_stop(chunk);
+        if (!advance(stream, chunk.start, chunk.start + chunk.duration)) continue;
+        counts_.events += chunk.events.size();
+        return chunk;
       }
       const auto silent_until = newest_ - max_lag;
       if (stream.info.kind == StreamKind::frames && silent_until - stream.position >= max_lag) {
@@ -451,6 +459,15 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
     if (newest_ == caught_up_) return std::nullopt;
     catch_up();
   }
+}
+
+/// Cuts off what is past the end of the segment.
+void RecordingReader::cut_at_stop(Chunk& chunk) const {
+  if (!stop_ || chunk.start + chunk.duration <= *stop_) return;
+  chunk.duration = std::max<Microseconds>(*stop_ - chunk.start, 0);
+  const auto end = std::ranges::partition_point(
+      chunk.events, [&](const Event& event) { return event.t < chunk.duration; });
+  chunk.events = {chunk.events.begin(), end};
 }
 
 /// Treats event streams that lag far behind the newest item as silent.

@@ -38,14 +38,18 @@ class RecordingReader {
 
   RecordingReader(MakeReader make_reader, Microseconds chunk_length, Clock clock = Clock::file);
 
+  /// Where a sensor size comes from. An assumed one grows with the events: info.size covers a chunk
+  /// before it is returned.
+  enum class SizeFrom : std::uint8_t { file, user, assumption };
+
   /// A stream of the file.
   struct Stream {
     StreamInfo info;
+    SizeFrom size_from = SizeFrom::file;
     unsigned number = 0;                 ///< index among streams of its kind
     bool shown = false;                  ///< it has items, or may have some
-    bool size_guessed = false;           ///< info.size is not stated in the file
     Microseconds position = 0;           ///< earliest start of its next item
-    std::uint64_t outside = 0;           ///< events outside a guessed size
+    std::uint64_t outside = 0;           ///< events outside the user's size
     std::optional<Microseconds> first;   ///< earliest time in the surveyed part of the file
     std::optional<Microseconds> latest;  ///< latest time in it
     std::optional<Frame> first_frame;    ///< format only: its pixels are no longer valid
@@ -124,8 +128,11 @@ class RecordingReader {
 
   const std::vector<Stream>& streams() const { return streams_; }
 
-  /// Replaces a guessed size.
-  void set_size(std::size_t stream, SensorSize size) { streams_[stream].info.size = size; }
+  /// Replaces an assumed size. Events outside it are dropped.
+  void set_size(std::size_t stream, SensorSize size) {
+    streams_[stream].info.size = size;
+    streams_[stream].size_from = SizeFrom::user;
+  }
 
   std::string format_name() const { return reader_->format_name(); }
 
@@ -185,6 +192,7 @@ class RecordingReader {
   void take(const TriggerItem& item);
   std::optional<Output> next_output();
   std::optional<Chunk> next_chunk();
+  void cut_at_stop(Chunk& chunk) const;
   void catch_up();
   bool advance(Stream& stream, Microseconds start, Microseconds end);
   void set_shift(Microseconds first);
@@ -219,7 +227,7 @@ class RecordingReader {
 
   std::optional<Interval> interval_;   ///< interval of the words being read
   std::optional<Microseconds> shift_;  ///< offset from the clock of words to that of the stream
-  std::vector<AbsoluteEvent> within_;  ///< events within a guessed size
+  std::vector<AbsoluteEvent> within_;  ///< events within the user's size
   std::optional<Output> output_due_;   ///< a frame or triggers
   std::size_t next_stream_ = 0;        ///< next stream to ask for a chunk
   Microseconds newest_ = 0;            ///< maximum position of all streams

@@ -29,6 +29,7 @@ void UnitDecoder::read_headers(bool ended) {
   }
   rest_.erase(rest_.begin(), rest_.begin() + static_cast<std::ptrdiff_t>(taken));
   position_ += taken;
+  units_begin_ = position_;
 }
 
 void UnitDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {

@@ -31,6 +31,9 @@ class UnitDecoder : public Decoder {
 
   void begin(std::unique_ptr<UnitReader> reader, SensorSize size);
 
+  /// The position of the first unit; only after begin().
+  std::uint64_t units_begin() const { return units_begin_; }
+
  private:
   void read_headers(bool ended);
   std::size_t read_units(std::span<const std::uint8_t> bytes, Decoded& out);
@@ -39,6 +42,7 @@ class UnitDecoder : public Decoder {
   std::unique_ptr<UnitReader> reader_;  // null until the header is read
   std::vector<std::uint8_t> rest_;      // incomplete header or unit
   std::uint64_t position_ = 0;          // offset of the next byte to read
+  std::uint64_t units_begin_ = 0;
   Microseconds latest_ = std::numeric_limits<Microseconds>::min();
   Batch batch_{corruption_};
 };

@@ -63,16 +63,24 @@ class GapLimiter {
   /// Must be called at least for every event after a long pause.
   void reach(Microseconds t) {
     const auto gap = static_cast<std::uint64_t>(t) - static_cast<std::uint64_t>(last_);
-    if (t > last_ && gap > static_cast<std::uint64_t>(max_gap)) left_out_ += gap;
+    if (t > last_ && gap > static_cast<std::uint64_t>(max_gap)) {
+      shift_ += gap;
+      if (begun_) left_out_ += gap;
+    }
+    begun_ = true;
     last_ = t;
   }
 
   /// Returns the time to write; unsigned, because overflow must be well-defined.
-  std::uint64_t written(Microseconds t) const { return static_cast<std::uint64_t>(t) - left_out_; }
+  std::uint64_t written(Microseconds t) const { return static_cast<std::uint64_t>(t) - shift_; }
+
+  std::uint64_t left_out() const { return left_out_; }
 
  private:
   Microseconds last_ = 0;
-  std::uint64_t left_out_ = 0;
+  std::uint64_t shift_ = 0;
+  std::uint64_t left_out_ = 0;  ///< after the first event
+  bool begun_ = false;
 };
 
 }  // namespace eventcamera

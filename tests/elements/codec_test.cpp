@@ -404,7 +404,7 @@ TEST_P(EveryFormat, IsPulledAndSoughtIn) {
     EXPECT_EQ(player.duration() == GST_CLOCK_TIME_NONE, false);
 
     const Microseconds from = 3'700'000;
-    const Microseconds to = 3'800'000;
+    const Microseconds to = 3'804'321;
     ASSERT_TRUE(player.pause());
     ASSERT_TRUE(player.seek(static_cast<GstClockTime>(from) * GST_USECOND));
     EXPECT_EQ(player.position(), static_cast<GstClockTime>(from) * GST_USECOND);
@@ -661,6 +661,32 @@ TEST_P(EveryFormat, IsOfOneSize) {
   EXPECT_TRUE(h.message(GST_MESSAGE_ERROR));
 }
 
+TEST_P(EveryFormat, HoldsALongPauseOrTellsThatItIsLeftOut) {
+  // Longer than 32 bits of microseconds.
+  const std::vector events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
+                              AbsoluteEvent::at(6, 6, 4'320'000'000, Polarity::off),
+                              AbsoluteEvent::at(7, 7, 4'320'000'001, Polarity::off)};
+  const auto h = writer_of(format());
+  for (const auto& event : events)
+    EXPECT_EQ(h->push(buffer_of(std::span(&event, 1), event.t / 10'000 * 10'000)), GST_FLOW_OK);
+  gst_harness_push_event(h->get(), gst_event_new_eos());
+  auto reader = Harness::with_late_pad(format().reader);
+  begin_file(reader, format());
+  push_file(reader, pull_bytes(*h), 1 << 20);
+  if (format().name != std::string("dat")) {
+    EXPECT_EQ(pull_events(reader), events);
+    while (const auto warning = h->message(GST_MESSAGE_WARNING))
+      EXPECT_FALSE(text_of(warning.get()).starts_with("Left out"));
+    return;
+  }
+  const auto warning = h->message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_TRUE(text_of(warning.get()).starts_with("Left out a pause of 4319 s"));
+  const auto read = pull_events(reader);
+  ASSERT_EQ(read.size(), 3U);
+  EXPECT_EQ(read[2].t, 1001);
+}
+
 TEST_P(EveryFormat, RefusesBuffersThatAreNoEvents) {
   Harness h(format().writer);
   gst_harness_set_sink_caps_str(h.get(), format().caps);
@@ -870,6 +896,67 @@ TEST(EvtDec, AssumesASensorWhereTheFileTellsNone) {
     EXPECT_TRUE(told.ends_well());
     EXPECT_EQ(told.events.size(), 20'000U);
   }
+}
+
+TEST(EventEs, CountsRowsFromWhereItIsTold) {
+  const auto events = some_events();
+  auto flipped = events;
+  for (auto& event : flipped)
+    event = AbsoluteEvent::at(event.x, height - 1 - event.y(), event.t, event.polarity());
+  const Format top_left = {"es", "eventesenc origin=top-left", "eventesdec origin=top-left",
+                           "application/x-es"};
+  const Format bottom_left = {"es", "eventesenc", "eventesdec", "application/x-es"};
+  const auto file = file_of(top_left, events);
+  EXPECT_EQ(events_in(top_left, file), events);
+  EXPECT_EQ(events_in(bottom_left, file), flipped);
+}
+
+/* sensors whose size the file does not tell */
+
+const Format& npy = *std::ranges::find(formats, std::string("npy"), &Format::name);
+
+/// Moves out of what its beginning fits into.
+std::vector<AbsoluteEvent> growing_events() {
+  std::vector<AbsoluteEvent> events;
+  for (int i = 0; i < 3000; ++i)
+    events.push_back(AbsoluteEvent::at(i / 10, i / 15, Microseconds{1000} * i, Polarity::on));
+  return events;
+}
+
+TEST(EventNpyDec, ChangesCapsWhereEventsLieOutsideTheAssumedSensor) {
+  const auto events = growing_events();
+  auto h = Harness::with_late_pad("eventnpydec");
+  begin_file(h, npy);
+  push_file(h, file_of(npy, events), 500);
+  EXPECT_EQ(pull_events(h), events);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+  std::vector<int> widths;
+  while (const auto event = h.pull_event(GST_EVENT_CAPS)) {
+    GstCaps* caps = nullptr;
+    gst_event_parse_caps(event.get(), &caps);
+    widths.emplace_back();
+    gst_structure_get_int(gst_caps_get_structure(caps, 0), "width", &widths.back());
+  }
+  EXPECT_EQ(widths, (std::vector{128, 240, 304}));
+}
+
+TEST(EventNpyDec, TakesTheSizeOfItsProperties) {
+  const auto events = growing_events();
+  const TemporaryFile file(file_of(npy, events));
+  for (const std::string way : {"", "queue ! "}) {
+    // They come before what downstream allows, and a file has one size.
+    Player written(file.path(), way + "eventnpydec width=320 height=240 ! evtenc ! evtdec");
+    EXPECT_TRUE(written.ends_well());
+    EXPECT_EQ(written.events, events);
+    Player cut(file.path(), way + "eventnpydec width=100 height=100");
+    EXPECT_TRUE(cut.ends_well());
+    EXPECT_EQ(cut.events.size(), 1000U);
+  }
+  Player grown(file.path(), "queue ! eventnpydec ! evtenc ! evtdec");
+  const auto message = grown.play();
+  ASSERT_TRUE(message);
+  ASSERT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_ERROR);
+  EXPECT_NE(text_of(message.get()).find("width and height"), std::string::npos);
 }
 
 TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {

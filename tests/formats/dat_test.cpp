@@ -88,12 +88,40 @@ TEST(Dat, IsAnErrorThatSaysWhy) {
 
 TEST(Dat, IsWrittenAsTheToolsOfTheVendorDo) {
   const auto encoder = make_dat_encoder({1280, 720});
-  const std::vector events{AbsoluteEvent::at(1279, 719, 0x1'0000'0005, Polarity::on)};
+  const std::vector events{AbsoluteEvent::at(1279, 719, 5, Polarity::on)};
   EXPECT_EQ(recordings::encode(*encoder, events),
             file("% Data file containing CD events.\n% Version 2\n% Height 720\n% Width 1280\n"
                  "% end\n",
                  0x0c, {{5, 1279 | 719U << 14 | 1U << 28}}));
   EXPECT_THROW(make_dat_encoder({16385, 1}), std::invalid_argument);
+}
+
+/// The times that are read of those that are written.
+std::vector<Microseconds> read_again(std::initializer_list<Microseconds> times,
+                                     std::uint64_t left_out) {
+  std::vector<AbsoluteEvent> events;
+  for (const auto t : times) events.push_back(AbsoluteEvent::at(1, 2, t, Polarity::on));
+  const auto encoder = make_dat_encoder({320, 240});
+  const auto bytes = recordings::encode(*encoder, events);
+  EXPECT_EQ(encoder->left_out(), left_out);
+  std::vector<Microseconds> read;
+  for (const auto& event : decode(*make_dat_decoder(), bytes).events) read.push_back(event.t);
+  return read;
+}
+
+TEST(Dat, IsWrittenWithTimesThatItsReadersCanTell) {
+  using Times = std::vector<Microseconds>;
+  constexpr Microseconds minute = 60'000'000;
+  constexpr Microseconds lap = Microseconds{1} << 32;
+  EXPECT_EQ(read_again({lap - 1, lap + 5}, 0), (Times{lap - 1, lap + 5}));
+  // Times since 1970 begin at 0.
+  EXPECT_EQ(read_again({1'790'000'000'000'000, 1'790'000'000'000'007}, 0), (Times{0, 7}));
+  EXPECT_EQ(read_again({lap, lap + 7}, 0), (Times{0, 7}));
+  // Pauses: with a wrap or without, and longer than one.
+  EXPECT_EQ(read_again({0, 70 * minute, 104 * minute}, 0), (Times{0, 70 * minute, 104 * minute}));
+  EXPECT_EQ(read_again({60 * minute, 100 * minute, 101 * minute}, 40 * minute),
+            (Times{60 * minute, 60 * minute, 61 * minute}));
+  EXPECT_EQ(read_again({5, 80 * minute, 80 * minute + 1}, 80 * minute - 5), (Times{5, 5, 6}));
 }
 
 }  // namespace

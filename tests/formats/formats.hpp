@@ -52,7 +52,7 @@ inline std::vector<Format> all() {
                      make_dat_encoder});
   formats.push_back({"es", 32768, 3 * minutes,
                      [](SensorSize) { return make_event_stream_decoder(); },
-                     make_event_stream_encoder});
+                     [](SensorSize size) { return make_event_stream_encoder(size); }});
   return formats;
 }
 

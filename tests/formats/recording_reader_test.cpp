@@ -11,6 +11,7 @@
 
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "src/formats/aedat/aedat_reader.hpp"
+#include "src/formats/dat/dat.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
@@ -202,7 +203,9 @@ TEST_P(Recording, IsSeekedIn) {
     outcome.starts = 1;
     outcome.take_all(reader);
     const auto end = origin() + stop.value_or(10'000'000);
-    EXPECT_EQ(from(outcome.events(origin()), 0, end), from(some_events(), origin() + start, end));
+    EXPECT_EQ(outcome.events(origin()), from(some_events(), origin() + start, end));
+    for (const auto& [stream, chunk_start, duration, of_chunk] : outcome.chunks)
+      EXPECT_LE(origin() + chunk_start + duration, end);
     EXPECT_EQ(reader.at_end(), !stop);
     EXPECT_EQ(reader.is_past_stop(), stop.has_value());
     for (const auto& [stream, time, number] : outcome.pictures) {
@@ -217,8 +220,10 @@ TEST_P(Recording, IsSeekedIn) {
     reader.seek(start, std::nullopt);
     expect_from(start, std::nullopt);
   }
-  reader.seek(300'000, 400'000);
-  expect_from(300'000, 400'000);
+  for (const Microseconds stop : {400'000, 404'321, 300'001}) {
+    reader.seek(300'000, stop);
+    expect_from(300'000, stop);
+  }
 }
 
 TEST_P(Recording, IsRestartedWhereItIsPushed) {
@@ -249,9 +254,51 @@ TEST(RecordingReader, GuessesTheSizeOfASensor) {
       if (reader.next()) break;
     }
     ASSERT_EQ(reader.streams().size(), 1U);
-    EXPECT_TRUE(reader.streams().front().size_guessed);
+    EXPECT_EQ(reader.streams().front().size_from, RecordingReader::SizeFrom::assumption);
     EXPECT_EQ(reader.streams().front().info.size, (SensorSize{320, 320})) << size;
   }
+}
+
+/// A file that tells no size, whose events move out of what their first second fits into.
+File growing_file() {
+  Events events;
+  for (int i = 0; i < 3000; ++i)
+    events.push_back(AbsoluteEvent::at(i / 3, i / 5, Microseconds{1000} * i,
+                                       i % 2 == 0 ? Polarity::off : Polarity::on));
+  NpyEncoder encoder;
+  return {"growing", recordings::encode(encoder, events),
+          [] { return std::make_unique<DecoderReader>(std::make_unique<NpyDecoder>()); }};
+}
+
+TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
+  const auto file = growing_file();
+  RecordingReader reader(file.make_reader, chunk_length);
+  std::vector<SensorSize> sizes;
+  std::size_t events = 0;
+  const auto take_all = [&] {
+    while (const auto output = reader.next()) {
+      const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output);
+      if (chunk == nullptr) continue;
+      const auto size = reader.streams().front().info.size;
+      if (sizes.empty() || sizes.back() != size) sizes.push_back(size);
+      for (const auto& event : chunk->events) {
+        EXPECT_LT(event.x, size.width);
+        EXPECT_LT(event.y(), size.height);
+      }
+      events += chunk->events.size();
+    }
+  };
+  for (const auto piece : pieces::of(file.bytes, 500)) {
+    reader.push(piece);
+    take_all();
+  }
+  reader.finish();
+  take_all();
+  EXPECT_EQ(events, 3000U);
+  EXPECT_EQ(reader.counts().outside, 0U);
+  ASSERT_GE(sizes.size(), 3U);
+  EXPECT_EQ(sizes.front(), (SensorSize{128, 128}));
+  EXPECT_EQ(sizes.back(), (SensorSize{1280, 720}));
 }
 
 TEST(RecordingReader, LeavesOutWhatLiesOutsideASizeThatIsSet) {
@@ -268,6 +315,40 @@ TEST(RecordingReader, LeavesOutWhatLiesOutsideASizeThatIsSet) {
       std::ranges::count_if(some_events(), [](auto event) { return event.x < 160; });
   EXPECT_EQ(outcome.events(0).size(), static_cast<std::size_t>(within));
   EXPECT_EQ(reader.counts().outside, some_events().size() - static_cast<std::size_t>(within));
+}
+
+/// Longer than the surveyed part and slower at its end, so that no estimate is right.
+Events many_events(Microseconds first, Microseconds step) {
+  Events events;
+  auto t = first;
+  for (int i = 0; i < 2'500'000; ++i, t += i < 2'000'000 ? step : 5 * step)
+    events.push_back(AbsoluteEvent::at(i % 100, i % 77, t, Polarity::on));
+  events.back().t = events[events.size() - 2].t - 1;  // slightly out of order
+  return events;
+}
+
+TEST(RecordingReader, ReadsTheDurationOfFixedRecordsAtTheEnd) {
+  constexpr Microseconds hour = 3'600'000'000;
+  NpyEncoder npy;
+  const auto dat = make_dat_encoder(sensor);
+  // Ten hours of DAT are eight wraps of its time.
+  const struct {
+    Encoder& encoder;
+    Events events;
+    RecordingReader::MakeReader make_reader;
+  } files[] = {
+      {npy, many_events(7, 100), npy_file().make_reader},
+      {*dat, many_events(hour, 8'000),
+       [] { return std::make_unique<DecoderReader>(make_dat_decoder()); }},
+  };
+  for (const auto& [encoder, events, make_reader] : files) {
+    MemoryBytes bytes(recordings::encode(encoder, events));
+    RecordingReader reader(make_reader, chunk_length);
+    reader.open(bytes);
+    ASSERT_TRUE(reader.next());
+    const auto last = std::ranges::max_element(events, {}, &AbsoluteEvent::t)->t;
+    EXPECT_EQ(reader.duration(), last + 1 - events.front().t);
+  }
 }
 
 /// Words of a stream have stream time, starting with their first event.

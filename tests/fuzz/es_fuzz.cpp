@@ -4,5 +4,5 @@
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  return fuzz::decoder(eventcamera::make_event_stream_decoder, data, size, 1);
+  return fuzz::decoder([] { return eventcamera::make_event_stream_decoder(); }, data, size, 1);
 }

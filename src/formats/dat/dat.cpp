@@ -2,6 +2,7 @@
 #include "src/formats/dat/dat.hpp"
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
 #include <string>
 
@@ -20,20 +21,20 @@ enum Type : std::uint8_t { event_2d = 0x00, event_cd = 0x0c, event_trigger = 0x0
 
 constexpr std::uint8_t record_size = 8;
 
+using DatTime = TimeBase<32, 0>;
+
 class DatReader : public UnitReader {
  public:
   State state() const final { return {static_cast<Microseconds>(time_.time()), 0}; }
   void restore(const State& state) final { time_.restore(state.clock, true); }
 
  protected:
-  using Time = TimeBase<32, 0>;
-
-  static Microseconds next(Time& time, const std::uint8_t* record) {
+  static Microseconds next(DatTime& time, const std::uint8_t* record) {
     time.follow(little_endian<std::uint32_t>(record));
     return static_cast<Microseconds>(time.time());
   }
 
-  Time time_;
+  DatTime time_;
 };
 
 template <int version>
@@ -72,6 +73,9 @@ class DatEventReader final : public DatReader {
 };
 
 class DatTriggerReader final : public DatReader {
+ public:
+  explicit DatTriggerReader(SensorSize /*size*/) {}
+
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
     for (; to - from >= record_size; from += record_size) {
@@ -85,7 +89,46 @@ class DatTriggerReader final : public DatReader {
 
 /// Ignores "T0", which some writers add: the time of the first event since some epoch.
 class DatDecoder final : public UnitDecoder {
+ public:
+  void decode_tail(ByteSource& source, Decoded& out) const override {
+    if (make_reader_ == nullptr || source.size() < units_begin()) return;
+    const auto count = (source.size() - units_begin()) / record_size;
+    const auto last = std::min<std::uint64_t>(count, tail_size / record_size);
+    const auto reader = make_reader_(size());
+    reader->restore({time_before(source, count - last), 0});
+    std::vector<std::uint8_t> bytes(last * record_size);
+    const auto begin = units_begin() + (count - last) * record_size;
+    if (source.read(begin, bytes) != bytes.size()) return;
+    Corruption ignored;
+    Batch batch(ignored);
+    batch.triggers = &out.triggers;
+    const auto* from = bytes.data();
+    while (from != bytes.data() + bytes.size()) {
+      batch.end = batch.begin();
+      from = reader->read(from, bytes.data() + bytes.size(), batch);
+      out.events.insert(out.events.end(), batch.begin(), batch.end);
+    }
+  }
+
  private:
+  using MakeReader = std::unique_ptr<UnitReader> (*)(SensorSize size);
+
+  /// The time of the record before this one. Wraps are followed by a few records, between which no
+  /// more than half an hour should lie.
+  Microseconds time_before(ByteSource& source, std::uint64_t record) const {
+    constexpr std::uint64_t max_samples = 256;
+    const auto samples = std::min(record, max_samples);
+    DatTime time;
+    for (std::uint64_t i = 1; i <= samples; ++i) {
+      const auto sample = record - 1 - (samples - i) * (record / samples);
+      const auto at = units_begin() + sample * record_size;
+      std::array<std::uint8_t, 4> bytes{};
+      if (source.read(at, bytes) != bytes.size()) break;
+      time.follow(little_endian<std::uint32_t>(bytes.data()));
+    }
+    return static_cast<Microseconds>(time.time());
+  }
+
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended) override {
     if (!header_.ended()) {
       const auto taken = header_.take(bytes, ended);
@@ -109,20 +152,59 @@ class DatDecoder final : public UnitDecoder {
     SensorSize size{PropheseeHeader::number(header_.value("Width"), max_side),
                     PropheseeHeader::number(header_.value("Height"), max_side)};
     if (size.width == 0 || size.height == 0) size = version == "2" ? SensorSize{} : first_camera;
-    if (type == event_trigger)
-      begin(std::make_unique<DatTriggerReader>(), size);
-    else if (type != event_2d && type != event_cd)
+    if (type != event_trigger && type != event_2d && type != event_cd)
       throw UnsupportedFormat("unsupported DAT event type " + std::to_string(type));
-    else if (version == "2")
-      begin(std::make_unique<DatEventReader<2>>(size), size);
-    else
-      begin(std::make_unique<DatEventReader<1>>(size), size);
+    make_reader_ = type == event_trigger ? make<DatTriggerReader>
+                   : version == "2"      ? make<DatEventReader<2>>
+                                         : make<DatEventReader<1>>;
+    begin(make_reader_(size), size);
+  }
+
+  template <class Reader>
+  static std::unique_ptr<UnitReader> make(SensorSize size) {
+    return std::make_unique<Reader>(size);
   }
 
   /// Sensor of the first camera, whose files do not state the size.
   static constexpr SensorSize first_camera{304, 240};
 
   PropheseeHeader header_;
+  MakeReader make_reader_ = nullptr;  ///< of the records; once the header is read
+};
+
+/// Times as they are written: their lower 32 bits, of which readers know that they wrap where they
+/// fall by more than half. What these cannot tell is left out: a pause, or a first time past them.
+class DatClock {
+ public:
+  std::uint32_t written(Microseconds t) {
+    const auto gap = static_cast<std::uint64_t>(t) - static_cast<std::uint64_t>(last_);
+    if (t > last_ && gap > half) [[unlikely]]
+      leave_out(t, gap);
+    begun_ = true;
+    last_ = t;
+    return at(t);
+  }
+
+  std::uint64_t left_out() const { return left_out_; }
+
+ private:
+  static constexpr std::uint64_t half = 0x7fff'ffff;
+  static constexpr std::uint64_t max = 0xffff'ffff;
+
+  std::uint32_t at(Microseconds t) const {
+    return static_cast<std::uint32_t>(static_cast<std::uint64_t>(t) - shift_);
+  }
+
+  void leave_out(Microseconds t, std::uint64_t gap) {
+    if (gap <= max && at(t) > at(last_)) return;  // no wrap
+    shift_ += gap;
+    if (begun_) left_out_ += gap;
+  }
+
+  Microseconds last_ = 0;
+  std::uint64_t shift_ = 0;
+  std::uint64_t left_out_ = 0;  ///< after the first event
+  bool begun_ = false;
 };
 
 class DatEncoder final : public Encoder {
@@ -132,18 +214,24 @@ class DatEncoder final : public Encoder {
                 std::to_string(size.height) + "\n% Width " + std::to_string(size.width) +
                 "\n% end\n" + static_cast<char>(event_cd) + static_cast<char>(record_size)) {}
 
+  std::uint64_t left_out() const override { return clock_.left_out(); }
+
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
-    const auto write = [](std::span<const AbsoluteEvent> few, WordWriter<std::uint64_t>& words) {
+    auto clock = clock_;
+    const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint64_t>& words) {
       for (const auto& event : few) {
         const auto place = (std::uint32_t{event.x} & 0x3fff) |
                            (static_cast<std::uint32_t>(event.y_p) & 0x3fff) << 14 |
                            static_cast<std::uint32_t>(event.y_p >> 15) << 28;
-        words.put(std::uint64_t{place} << 32 | static_cast<std::uint32_t>(event.t));
+        words.put(std::uint64_t{place} << 32 | clock.written(event.t));
       }
     };
     write_events<std::uint64_t>(events, events_at_once, out, write);
+    clock_ = clock;
   }
+
+  DatClock clock_;
 };
 
 }  // namespace

@@ -21,12 +21,27 @@ constexpr int max_rows = 32768;
 
 enum Type : std::uint8_t { generic = 0, dvs = 1, atis = 2, amd = 3, colour = 4 };
 
+/// Converts between rows from the top and rows of the file.
+class Rows {
+ public:
+  Rows(int height, EsOrigin origin)
+      : first_(origin == EsOrigin::bottom_left ? height - 1 : 0),
+        step_(origin == EsOrigin::bottom_left ? -1 : 1) {}
+
+  int operator()(int row) const { return first_ + step_ * row; }
+
+ private:
+  int first_;
+  int step_;
+};
+
 /// An event is a byte with the microseconds since the last event and `flag_bits` flags, followed by
 /// x and y with 16 bits each. If all bits of the microseconds are set, it is that byte alone.
 template <int flag_bits>
 class EsReader final : public UnitReader {
  public:
-  explicit EsReader(SensorSize size) : bounds_(size, max_rows), height_(size.height) {}
+  EsReader(SensorSize size, EsOrigin origin)
+      : bounds_(size, max_rows), rows_(size.height, origin) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
@@ -37,6 +52,7 @@ class EsReader final : public UnitReader {
     constexpr std::uint32_t on = flag_bits == 2 ? 2 : 1;
     auto* event = batch.begin();
     const auto* const full = batch.full();
+    const auto rows = rows_;
     auto t = t_;
     std::uint64_t outside = 0;
     while (from < to && event < full) {
@@ -51,8 +67,7 @@ class EsReader final : public UnitReader {
       if (to - from < 5) break;
       t += step;
       const auto x = little_endian<std::uint16_t>(from + 1);
-      const auto y = height_ - 1 - little_endian<std::uint16_t>(from + 3);
-      const auto row = static_cast<std::uint32_t>(y);
+      const auto row = static_cast<std::uint32_t>(rows(little_endian<std::uint16_t>(from + 3)));
       from += 5;
       const auto inside = static_cast<int>(bounds_.contain(x, row));
       const auto is_change = static_cast<int>((byte & exposure) == 0);
@@ -72,11 +87,14 @@ class EsReader final : public UnitReader {
 
  private:
   Bounds bounds_;
-  int height_;
+  Rows rows_;
   std::uint64_t t_ = 0;
 };
 
 class EsDecoder final : public UnitDecoder {
+ public:
+  explicit EsDecoder(EsOrigin origin) : origin_(origin) {}
+
  private:
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool) override {
     const auto known = std::min(bytes.size(), magic.size());
@@ -113,8 +131,10 @@ class EsDecoder final : public UnitDecoder {
     if (size.width == 0 || size.height == 0 || size.height > max_rows)
       throw UnsupportedFormat("Event Stream with an impossible sensor size of " +
                               std::to_string(size.width) + "x" + std::to_string(size.height));
-    begin(std::make_unique<EsReader<flag_bits>>(size), size);
+    begin(std::make_unique<EsReader<flag_bits>>(size, origin_), size);
   }
+
+  EsOrigin origin_;
 };
 
 /// Low and high byte of a number in the header.
@@ -127,11 +147,13 @@ constexpr char high(int number) {
 
 class EsEncoder final : public Encoder {
  public:
-  explicit EsEncoder(SensorSize size)
+  EsEncoder(SensorSize size, EsOrigin origin)
       : Encoder(std::string(magic) + std::string{version, 0, 0, dvs, low(size.width),
                                                  high(size.width), low(size.height),
                                                  high(size.height)}),
-        height_(size.height) {}
+        rows_(size.height, origin) {}
+
+  std::uint64_t left_out() const override { return gaps_.left_out(); }
 
  private:
   static constexpr std::size_t bytes_at_once = 5 * events_at_once;
@@ -142,7 +164,7 @@ class EsEncoder final : public Encoder {
       for (const auto& event : few) {
         const auto step = reach(event.t, bytes);
         const auto x = std::uint32_t{event.x};
-        const auto y = static_cast<std::uint32_t>(height_ - 1 - event.y());
+        const auto y = static_cast<std::uint32_t>(rows_(event.y()));
         const auto on = static_cast<std::uint32_t>(event.y_p >> 15);
         for (const auto byte : {step << 1 | on, x & 255, x >> 8, y & 255, y >> 8})
           bytes.put(static_cast<std::uint8_t>(byte));
@@ -166,7 +188,7 @@ class EsEncoder final : public Encoder {
     return static_cast<std::uint32_t>(step);
   }
 
-  int height_;
+  Rows rows_;
   GapLimiter gaps_;
   Microseconds last_ = 0;
   std::uint64_t written_ = 0;  // time of the last byte
@@ -174,14 +196,14 @@ class EsEncoder final : public Encoder {
 
 }  // namespace
 
-std::unique_ptr<Decoder> make_event_stream_decoder() {
-  return std::make_unique<EsDecoder>();
+std::unique_ptr<Decoder> make_event_stream_decoder(EsOrigin origin) {
+  return std::make_unique<EsDecoder>(origin);
 }
 
-std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size) {
+std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size, EsOrigin origin) {
   if (size.width < 1 || size.height < 1 || size.width > 65535 || size.height > max_rows)
     throw std::invalid_argument("Event Streams support sensors of 1x1 to 65535x32768 pixels");
-  return std::make_unique<EsEncoder>(size);
+  return std::make_unique<EsEncoder>(size, origin);
 }
 
 }  // namespace eventcamera

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "src/formats/decoder.hpp"
@@ -8,13 +9,17 @@
 
 namespace eventcamera {
 
+/// Position of row 0 of a file: tools disagree, and files do not state it. The format's authors
+/// count from the bottom.
+enum class EsOrigin : std::uint8_t { bottom_left, top_left };
+
 /// Decodes Event Stream 2.0 as written by its authors' library sepia: streams of DVS events, and of
-/// ATIS events, of which exposures are skipped. Rows are counted from the bottom in these files, as
-/// in the authors' tools, and from the top here.
-std::unique_ptr<Decoder> make_event_stream_decoder();
+/// ATIS events, of which exposures are skipped.
+std::unique_ptr<Decoder> make_event_stream_decoder(EsOrigin origin = EsOrigin::bottom_left);
 
 /// Encodes DVS events. The format fills pauses with a byte per 127 microseconds. Throws
 /// std::invalid_argument for sensors of more than 65535x32768 pixels.
-std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size);
+std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size,
+                                                   EsOrigin origin = EsOrigin::bottom_left);
 
 }  // namespace eventcamera

@@ -121,6 +121,8 @@ class CdEncoder final : public Encoder {
   CdEncoder(SensorSize size, std::string header)
       : Encoder(std::move(header)), width_(static_cast<std::uint32_t>(size.width)) {}
 
+  std::uint64_t left_out() const override { return gaps_.left_out(); }
+
  private:
   using Words = WordWriter<typename Format::Word>;
 

@@ -190,6 +190,8 @@ class Evt3Encoder final : public Encoder {
   Evt3Encoder(SensorSize size, std::string header)
       : Encoder(std::move(header)), width_(static_cast<std::uint32_t>(size.width)) {}
 
+  std::uint64_t left_out() const override { return gaps_.left_out(); }
+
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint16_t>& words) {

@@ -211,6 +211,23 @@ void NpyDecoder::finish(Decoded& out) {
   }
 }
 
+void NpyDecoder::decode_tail(ByteSource& source, Decoded& out) const {
+  if (!layout_known_) return;
+  const std::uint64_t size = header_->element_bytes;
+  const std::uint64_t begin = preamble_.size();
+  if (source.size() < begin + size) return;
+  const auto count = std::min(header_->count, (source.size() - begin) / size);
+  const auto last = std::min(count, std::max<std::uint64_t>(tail_size / size, 1));
+  std::vector<std::uint8_t> bytes(last * size);
+  if (source.read(begin + (count - last) * size, bytes) != bytes.size()) return;
+  NpyDecoder tail(*header_, settings_);
+  tail.layout_known_ = true;
+  tail.power_ = power_;
+  tail.plain_ = plain_;
+  tail.left_ = last;
+  tail.decode(bytes, out);
+}
+
 void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, Decoded& out) {
   const auto size = header_->element_bytes;
   const auto* const end = bytes + count * size;

@@ -23,6 +23,7 @@ class NpyDecoder final : public Decoder {
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
+  void decode_tail(ByteSource& source, Decoded& out) const override;
 
  private:
   void begin(NpyHeader header);
