@@ -97,7 +97,7 @@ static GType preset_type() {
 
 namespace {
 
-/// Flags of a property that a GstController can change over time, and of a trait of the sensor.
+/// Flags of properties that a GstController can change over time, and of traits of the sensor.
 constexpr auto controllable = static_cast<GParamFlags>(GST_PARAM_CONTROLLABLE);
 constexpr GParamFlags fixed = {};
 

@@ -30,7 +30,8 @@ PaletteName palette_name_of(GstEventCameraPalette palette) {
   return static_cast<PaletteName>(palette);
 }
 
-/// Whether a meta of these tags does not depend on the colours of the pixels, or on where they lie.
+/// True if a meta with the tags of `api` depends neither on the colours of the pixels nor on their
+/// memory layout.
 static bool stays_true(GType api) {
   constexpr std::string_view kept[] = {GST_META_TAG_VIDEO_STR, GST_META_TAG_VIDEO_SIZE_STR,
                                        GST_META_TAG_VIDEO_ORIENTATION_STR};

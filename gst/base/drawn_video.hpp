@@ -15,9 +15,9 @@ eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info);
 /// Converts the public palette enum to the core's.
 eventcamera::PaletteName palette_name_of(GstEventCameraPalette palette);
 
-/// Copies to a picture of events the metas of its frame that stay true where only the colours
-/// differ: those that depend on nothing but size, orientation and time, such as crop and regions of
-/// interest.
+/// Copies the metas of a frame to the picture of its events, if they remain valid although the
+/// colours differ: those that depend only on size, orientation and time, such as crop and regions
+/// of interest.
 void keep_metas(GstBuffer* frame, GstBuffer* picture);
 
 /// For decide_allocation(): uses downstream's buffer pool if it offers one, else a new video pool.

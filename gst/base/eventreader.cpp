@@ -853,7 +853,7 @@ bool EventReader::send_caps(std::size_t index) {
   return pad.has_video() || !frame_video_info(*stream.first_frame, &info) || pad.send_caps(info);
 }
 
-/// An assumed size has grown, and downstream does not take another.
+/// Handles downstream's refusal of a sensor size that has grown.
 GstFlowReturn EventReader::refused_size(std::size_t index) {
   const GstFlowReturn refusal = pad_of(index).refusal();
   if (refusal == GST_FLOW_FLUSHING) return refusal;

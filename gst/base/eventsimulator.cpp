@@ -325,7 +325,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
       state->drawing = Drawing{drawn, Accumulator(luma.width, luma.height)};
   });
   if (!made) return FALSE;
-  // A picture has the time of its frame, an interval that of the frame before.
+  // Pictures have the time of their frame, intervals that of the previous frame.
   const GstClockTime duration = state->drawing ? 0 : frame_duration(video);
   if (duration > 0 || state->drawing)
     change_latency(self, [duration](LearntLatency& latency) {
@@ -349,10 +349,10 @@ static bool is_ready(GstEventSimulator* self) {
 
 /* frames in, intervals out */
 
-/// Gives controlled properties the values that they have at a time of the segment.
+/// Updates controlled properties to their values at `time`, a timestamp of the segment.
 static void sync_controlled_properties(GstEventSimulator* self, GstClockTime time) {
   const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
-  if (segment.format != GST_FORMAT_TIME) return;  // as from appsrc
+  if (segment.format != GST_FORMAT_TIME) return;  // e.g. from appsrc
   const auto stream_time = gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, time);
   if (GST_CLOCK_TIME_IS_VALID(stream_time)) gst_object_sync_values(GST_OBJECT(self), stream_time);
 }
@@ -384,8 +384,8 @@ static void set_times(GstBuffer* out, GstClockTime pts, GstClockTime duration, S
   if (std::exchange(state.discontinuous, false)) GST_BUFFER_FLAG_SET(out, GST_BUFFER_FLAG_DISCONT);
 }
 
-/// Draws the events since the last frame, none for a first frame. The picture takes the place of
-/// the frame, with its `time`.
+/// Draws the events since the last frame (none for a first frame). The picture replaces the frame,
+/// at its `time`.
 static GstFlowReturn draw_frame(GstEventSimulator* self, const EventBuckets* events,
                                 GstEventCameraPalette palette, Nanoseconds time, GstBuffer* in,
                                 GstBuffer** out) {
@@ -531,8 +531,8 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
 }
 
 /// Handles a GAP from upstream: holds the last frame until one frame duration before the end of the
-/// gap, where the next interval begins; drawn video just has the gap. Returns true if the event
-/// must be forwarded.
+/// gap, where the next interval begins; for drawn video, only forwards the gap. Returns true if the
+/// event must be forwarded.
 static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   GstClockTime pts = GST_CLOCK_TIME_NONE;
   GstClockTime duration = GST_CLOCK_TIME_NONE;

@@ -26,17 +26,17 @@ namespace {
 
 enum Property : guint { prop_variant = 1, prop_max_size };
 
-/// Bytes that words never straddle.
+/// Alignment of words, which never straddle multiples of it, bytes.
 constexpr std::size_t word_bytes = 8;
 
-/// Limit of the bytes that an event takes, with words of time.
+/// Maximum bytes per event, including time words.
 constexpr std::size_t max_event_bytes = 32;
 
 /// State of the file being written, from caps to stop.
 struct State {
   GstEventCameraInfo info;
   OwnedCaps caps;      ///< output caps
-  OwnedBuffer header;  ///< until it is pushed; null if the format has none
+  OwnedBuffer header;  ///< pending header; null once pushed, or if the format has none
   std::unique_ptr<Encoder> encoder;
   bool written = false;
 };
@@ -147,7 +147,7 @@ static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
 
 /* data */
 
-/// Limit of the bytes in a buffer.
+/// Maximum bytes per buffer.
 static std::size_t capacity(GstEventWriter* self) {
   return priv_of(self).max_size / word_bytes * word_bytes;
 }
@@ -156,14 +156,14 @@ static GstFlowReturn push_header(GstEventWriter* self, GstClockTime pts) {
   auto& state = *priv_of(self).state;
   const OwnedBuffer header = std::move(state.header);
   if (!header) return GST_FLOW_OK;
-  GstBuffer* const buffer = gst_buffer_copy(header.get());  // the caps have the other
+  GstBuffer* const buffer = gst_buffer_copy(header.get());  // the original belongs to the caps
   GST_BUFFER_PTS(buffer) = pts;
   state.written = true;
   return gst_pad_push(priv_of(self).src, buffer);
 }
 
-/// Pushes the encoded bytes: one buffer, or several if a silence takes more words than fit. Only
-/// the last has a duration, because before it there is more of the interval to come. May throw.
+/// Pushes the encoded bytes in one buffer, or in several if the words of a silence exceed one. Only
+/// the last has a duration, because the interval continues after the others. May throw.
 static GstFlowReturn push_bytes(GstEventWriter* self, GstClockTime pts, GstClockTime duration) {
   auto& priv = priv_of(self);
   std::span<const guint8> bytes = priv.bytes;
@@ -181,8 +181,8 @@ static GstFlowReturn push_bytes(GstEventWriter* self, GstClockTime pts, GstClock
   return result;
 }
 
-/// Returns how many of the first events fit into `room` bytes. They are close enough in time that
-/// no words of time but those of an event come between them.
+/// Returns the number of leading events that fit into `room` bytes. Limited to events so close in
+/// time that no words for pauses are written between them.
 static std::size_t count_that_fits(std::span<const AbsoluteEvent> events, std::size_t room) {
   constexpr Microseconds close = 1000;
   events = events.first(std::min(events.size(), room / max_event_bytes));
@@ -191,8 +191,8 @@ static std::size_t count_that_fits(std::span<const AbsoluteEvent> events, std::s
   return static_cast<std::size_t>(end - events.begin());
 }
 
-/// Encodes events, and pushes a buffer whenever one is full. `start` is where the next one begins.
-/// May throw.
+/// Encodes events, and pushes each full buffer. `start` is the start time of the next buffer. May
+/// throw.
 static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent> events,
                             GstClockTime& start) {
   auto& priv = priv_of(self);

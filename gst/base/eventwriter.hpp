@@ -11,8 +11,8 @@
 
 /// An event file format, and the element that writes it: an event stream in, bytes out.
 ///
-/// The header is a buffer of its own, and in the caps, so that who joins a stream late can decode
-/// it. Written times are those of the PTS. A flush starts the file over, as in filesink. Header
+/// The header is a separate buffer, and is part of the caps, so that late joiners can decode the
+/// stream. Written times are those of the PTS. A flush starts the file over, as in filesink. Header
 /// fields that are only known at the end are written if downstream can seek.
 struct EventFileFormat {
   /// Enum property that selects a variant of the format.
@@ -31,7 +31,7 @@ struct EventFileFormat {
   int max_width = GST_EVENT_CAMERA_MAX_WIDTH;
   int max_height = GST_EVENT_CAMERA_MAX_HEIGHT;
   const Variants* variants = nullptr;
-  bool has_words = false;  ///< property max-size limits the words in a buffer
+  bool has_words = false;  ///< has property max-size, which limits the words per buffer
 
   /// Creates the encoder for a stream with these output caps. May throw.
   std::unique_ptr<eventcamera::Encoder> (*create)(eventcamera::SensorSize size, int variant,

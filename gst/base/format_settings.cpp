@@ -39,7 +39,7 @@ void add_sensor_size(FormatProperties& properties) {
 
 static GType time_unit_type() {
   static const GEnumValue units[] = {
-      {0, "Told by the file, or found by its first rows", "auto"},
+      {0, "As stated in the file, or detected from its first rows", "auto"},
       {1, "Seconds", "seconds"},
       {2, "Milliseconds", "milliseconds"},
       {3, "Microseconds", "microseconds"},
@@ -56,10 +56,11 @@ void add_table_properties(FormatProperties& properties) {
                                    "Unit of the times in the file; needed if the file is "
                                    "refused because its time unit is ambiguous",
                                    time_unit_type(), 0, flags));
-  properties.add(&FormatSettings::column_order,
-                 g_param_spec_string("column-order", "Column order",
-                                     "What the columns are: a letter t, x, y or p each, - for "
-                                     "others, as in xytp; empty = told by the file, or found by "
-                                     "its first rows",
-                                     "", flags));
+  properties.add(
+      &FormatSettings::column_order,
+      g_param_spec_string("column-order", "Column order",
+                          "Meaning of the columns: one letter t, x, y or p each, - for "
+                          "others, as in xytp; empty = as stated in the file, or detected from "
+                          "its first rows",
+                          "", flags));
 }

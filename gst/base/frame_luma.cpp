@@ -12,8 +12,8 @@ using eventcamera::ThreadPool;
 
 namespace {
 
-/// The weights of the colours in luma. The colorimetry of RGB names no YUV matrix, so it is the one
-/// that belongs to its primaries.
+/// Luma weights of the colours. The colorimetry of RGB has no YUV matrix, so the matrix is derived
+/// from the primaries.
 LumaWeights weights_of(const GstVideoInfo& video) {
   const auto matrix = [&] {
     switch (video.colorimetry.primaries) {
@@ -36,7 +36,7 @@ LumaWeights weights_of(const GstVideoInfo& video) {
   return LumaWeights::of(kr, kb);
 }
 
-/// RGB16 and its kin: a pixel is a word.
+/// True for RGB16 and similar formats with one word per pixel.
 bool has_rgb_words(const GstVideoInfo& video) {
   return GST_VIDEO_INFO_IS_RGB(&video) && GST_VIDEO_INFO_COMP_DEPTH(&video, 0) < 8;
 }
@@ -49,7 +49,7 @@ LumaView view_of(const Image<Pixel>& luma, const LumaFormat& format) {
 }  // namespace
 
 LumaFormat FrameLuma::format_of(const GstVideoInfo& video) {
-  // P010 and its kin have their bits at the top of the word, so white is as in 16 bits.
+  // P010 and similar formats use the upper bits of the word, so white is the same as in 16 bits.
   const auto bits = has_rgb_words(video) ? 8
                                          : GST_VIDEO_INFO_COMP_DEPTH(&video, 0) +
                                                GST_VIDEO_FORMAT_INFO_SHIFT(video.finfo, 0);

@@ -8,16 +8,16 @@
 #include "src/core/rgb_luma.hpp"
 #include "src/core/thread_pool.hpp"
 
-/// The luma of a video of EVENT_SIMULATOR_INPUT_FORMATS: read in place where it is a plane, copied
-/// where it is interleaved with chroma or has its bytes swapped, and computed from RGB.
+/// Luma of video of EVENT_SIMULATOR_INPUT_FORMATS: read in place if it is a plane, copied if it is
+/// interleaved with chroma or byte-swapped, or computed from RGB.
 class FrameLuma {
  public:
-  /// Allocates what it copies to. May throw.
+  /// Allocates the buffer for copied luma, if any. May throw.
   explicit FrameLuma(const GstVideoInfo& video);
 
   static eventcamera::LumaFormat format_of(const GstVideoInfo& video);
 
-  /// Valid while the frame is mapped, and until the next call.
+  /// Returns the luma of a frame, valid while it is mapped and until the next call.
   eventcamera::LumaView of(const VideoFrame& frame, eventcamera::ThreadPool& threads);
 
  private:

@@ -24,7 +24,7 @@ GstFlowReturn event_simulator_write_events(GstBaseTransform* transform,
                                            eventcamera::ThreadPool& threads, GstBuffer* in,
                                            GstBuffer** out);
 
-/// Draws the events of an interval into a new buffer, which keeps the metas of `in` that stay true.
+/// Draws the events of an interval into a new buffer, with the metas of `in` that remain valid.
 GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform,
                                           const eventcamera::EventBuckets& events, Drawing& drawing,
                                           const eventcamera::Palette& palette,

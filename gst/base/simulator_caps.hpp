@@ -3,8 +3,8 @@
 
 #include <gst/video/video.h>
 
-/// Formats that FrameLuma takes, those that it reads in place first: grey, planar and semi-planar
-/// YUV; then packed YUV, big-endian words, and RGB.
+/// Formats supported by FrameLuma. First those that it reads in place (grey, planar and semi-planar
+/// YUV), then packed YUV, big-endian words, and RGB.
 #define EVENT_SIMULATOR_INPUT_FORMATS                                                            \
   "{ GRAY8, I420, YV12, NV12, NV21, Y42B, NV16, NV61, Y444, NV24, Y41B, YUV9, YVU9, A420, "      \
   "YUY2, UYVY, YVYU, VYUY, GRAY16_LE, I420_10LE, I422_10LE, Y444_10LE, A420_10LE, A422_10LE, "   \

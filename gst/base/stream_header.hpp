@@ -3,6 +3,6 @@
 
 #include "gst/base/owned.hpp"
 
-/// Adds `header` to the caps of a stream that it begins: who joins late, as a client of
-/// tcpserversink, gets it first. Flags the buffer as a header.
+/// Adds `header` to caps as streamheader, which late joiners, such as clients of tcpserversink,
+/// receive first. Flags the buffer as a header.
 OwnedCaps with_stream_header(OwnedCaps caps, GstBuffer* header);

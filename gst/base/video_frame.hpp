@@ -43,7 +43,7 @@ class VideoFrame {
   const std::string& fault() const { return fault_; }
 
   const GstVideoFrame* get() const { return &frame_; }
-  /// The first plane.
+  /// Start of the first plane.
   std::byte* data() const {
     return static_cast<std::byte*>(GST_VIDEO_FRAME_PLANE_DATA(&frame_, 0));
   }
@@ -73,7 +73,7 @@ class VideoFrame {
            meta.n_planes >= GST_VIDEO_INFO_N_PLANES(&info);
   }
 
-  /// Checks the planes that are read or drawn in: the first, or all of RGB.
+  /// Checks the planes that are accessed: the first, or all planes of RGB.
   bool rows_fit(const GstVideoInfo& info) const {
     const guint planes = GST_VIDEO_INFO_IS_RGB(&info) ? GST_VIDEO_INFO_N_PLANES(&info) : 1;
     for (guint plane = 0; plane < planes; ++plane)

@@ -4,7 +4,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/core/rgb_luma.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants to come after that.
+// Must come after HWY_TARGET_INCLUDE.
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -17,11 +17,11 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// 32-bit sums; not so many lanes that a vector is longer than the padding of an Image's row.
+// 32-bit sums; capped so that no vector exceeds the row padding of an Image.
 using Sums = hn::CappedTag<std::int32_t, 16>;
 using SumVector = hn::Vec<Sums>;
 
-/// The weighted sum of one vector of pixels, rounded.
+/// Rounded weighted sums of a vector of pixels.
 SumVector luma_of(const LumaWeights& weights, SumVector red, SumVector green, SumVector blue) {
   const Sums sums;
   const auto reds = hn::Mul(red, hn::Set(sums, weights.red));
@@ -31,7 +31,7 @@ SumVector luma_of(const LumaWeights& weights, SumVector red, SumVector green, Su
   return hn::ShiftRight<LumaWeights::bits>(hn::Add(hn::Add(reds, greens), hn::Add(blues, half)));
 }
 
-/// Luma of `count` pixels whose colours lie apart. Writes up to a vector past them.
+/// Computes the luma of `count` pixels with separate colours. Writes up to a vector past the end.
 template <class Pixel>
 void weigh(const LumaWeights& weights, const Pixel* red, const Pixel* green, const Pixel* blue,
            int count, Pixel* out) {
@@ -56,7 +56,7 @@ const Pixel* row_of(const ColourView& colour, int y) {
                                         y * colour.stride);
 }
 
-/// A row whose colours are interleaved: sorted apart block by block.
+/// Computes a row with interleaved colours, which are separated block by block.
 template <class Pixel>
 void weigh_interleaved(const LumaWeights& weights, const RgbView& picture, int y, int width,
                        Pixel* out) {
@@ -120,7 +120,7 @@ void luma_of_words(const RgbWordsView& picture, const LumaWeights& weights, Thre
   const int lanes = static_cast<int>(hn::Lanes(sums));
   const LumaWeights in_order =
       picture.is_blue_first ? LumaWeights{weights.blue, weights.green, weights.red} : weights;
-  // The colour of so many bits from `shift` on, in 8 bits.
+  // Expands the colour of `bits` bits at `shift` to 8 bits.
   const auto colour = [&](SumVector word, int shift, int bits) {
     const auto value =
         hn::And(hn::ShiftRightSame(word, shift), hn::Set(sums, (std::int32_t{1} << bits) - 1));

@@ -10,7 +10,7 @@
 
 namespace eventcamera {
 
-/// What the colours contribute to luma, in units of 1/one.
+/// Contributions of the colours to luma, in units of 1/one.
 struct LumaWeights {
   static constexpr int bits = 15;
   static constexpr std::int32_t one = 1 << bits;
@@ -19,7 +19,7 @@ struct LumaWeights {
   std::int32_t green;
   std::int32_t blue;
 
-  /// Of a colour matrix's Kr and Kb. They add up to one, so grey keeps its value.
+  /// Weights from Kr and Kb of a colour matrix. Their sum is `one`, so that grey keeps its value.
   static LumaWeights of(double kr, double kb) {
     const auto red = static_cast<std::int32_t>(std::lround(kr * one));
     const auto blue = static_cast<std::int32_t>(std::lround(kb * one));
@@ -27,32 +27,32 @@ struct LumaWeights {
   }
 };
 
-/// One colour of a picture: a plane, or a place among interleaved samples.
+/// One colour of a frame: a plane, or an offset in interleaved samples.
 struct ColourView {
-  const void* data = nullptr;  ///< the first pixel of the plane
+  const void* data = nullptr;  ///< first pixel of the plane
   std::ptrdiff_t stride = 0;   ///< bytes from one row to the next
-  int place = 0;               ///< of the sample in its pixel
+  int place = 0;               ///< index of the sample in its pixel
 };
 
-/// A picture whose colours are samples of 8 or 16 bits, read in place.
+/// Non-owning view of a frame with colour samples of 8 or 16 bits.
 struct RgbView {
-  int samples = 1;  ///< per pixel in memory: 3 or 4 interleaved, 1 where each colour has a plane
+  int samples = 1;  ///< per pixel: 3 or 4 if interleaved, 1 if each colour has its own plane
   ColourView red;
   ColourView green;
   ColourView blue;
 };
 
-/// A picture of which a pixel is a 16-bit word, read in place: 5 bits of red and blue, and 5 or 6
-/// of green in between.
+/// Non-owning view of a frame with one 16-bit word per pixel: 5 bits each of red and blue, and 5 or
+/// 6 bits of green in between.
 struct RgbWordsView {
   const void* data = nullptr;
   std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
   int green_bits = 6;
-  bool is_blue_first = false;  ///< blue has the upper bits
+  bool is_blue_first = false;  ///< blue is in the upper bits
 };
 
-/// Luma of a picture of the size of `out`: (weights * colours + one / 2) / one, rounded down. Words
-/// are taken as 8-bit colours whose missing bits repeat the upper ones.
+/// Computes the luma of a frame of the size of `out`: (weights * colours + one / 2) / one, rounded
+/// down. Colours of words are expanded to 8 bits by repeating their upper bits.
 void luma_of_rgb(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,
                  Image<std::uint8_t>& out);
 void luma_of_rgb(const RgbView& picture, const LumaWeights& weights, ThreadPool& threads,

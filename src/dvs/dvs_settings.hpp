@@ -7,7 +7,7 @@
 
 namespace eventcamera {
 
-/// Time in the unit of pixels, microseconds.
+/// Converts time to microseconds, the unit of the pixel model.
 constexpr double in_microseconds(Nanoseconds time) {
   return static_cast<double>(time) / 1000;
 }

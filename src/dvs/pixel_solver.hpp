@@ -51,7 +51,7 @@ struct RowFilter {
 void filter_row(const RowFilter& row_filter, const void* luma, const PixelRow& pixels, int width,
                 Candidates& candidates);
 
-/// Times of DvsSettings, microseconds.
+/// Times of DvsSettings in microseconds.
 struct Delays {
   double refractory_period;
   double latency;

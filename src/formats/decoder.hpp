@@ -94,7 +94,7 @@ class SeekPoints {
   std::uint64_t next_ = 0;
 };
 
-/// How much of a file's end is read to find its last event: more than events are out of order.
+/// Bytes at the end of a file that are read to find its last event; covers the disorder of events.
 constexpr std::size_t tail_size = std::size_t{1} << 16;
 
 /// Decodes one event format. Bytes are passed in pieces of any size; the split does not affect the
@@ -125,8 +125,8 @@ class Decoder {
   /// again counts again.
   virtual void restart(const SeekPoint& /*seek_point*/) {}
 
-  /// Appends the last events of the file, if they can be read without all before them. Must be
-  /// called after the header is read.
+  /// Appends the last events of the file, if they can be decoded without reading all events before.
+  /// Must be called after the header was read.
   virtual void decode_tail(ByteSource& /*source*/, Decoded& /*out*/) const {}
 
   /// Sensor size, once the header is read or if known from elsewhere; 0x0 before.

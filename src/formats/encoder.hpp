@@ -38,7 +38,8 @@ class Encoder {
     append_end(out);
   }
 
-  /// Microseconds of pauses between events that were left out because the format cannot hold them.
+  /// Total pauses between events, in microseconds, that were removed because the format does not
+  /// support them.
   virtual std::uint64_t left_out() const { return 0; }
 
   /// Patch for the header, to be written after finish() if the output is seekable. This project's

@@ -43,7 +43,7 @@ std::optional<Microseconds> DecoderReader::last_time() {
   if (auto* const source = std::exchange(source_, nullptr); source != nullptr) {
     Decoded tail;
     decoder_->decode_tail(*source, tail);
-    Chunker chunker(1);  // it tells which times are to be believed
+    Chunker chunker(1);  // rejects erroneous times
     chunker.push(tail.events);
     chunker.finish();
     if (chunker.first()) last_time_ = chunker.latest();

@@ -156,8 +156,8 @@ class DecoderReader final : public Reader {
 
  private:
   std::unique_ptr<Decoder> decoder_;
-  ByteSource* source_ = nullptr;           ///< none: pushed, or the last time is known
-  std::optional<Microseconds> last_time_;  ///< where the decoder can tell
+  ByteSource* source_ = nullptr;           ///< null in push mode, and once the last time is known
+  std::optional<Microseconds> last_time_;  ///< if the decoder can find it
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   std::span<const std::uint8_t> rest_;
   bool finish_due_ = false;

@@ -461,7 +461,7 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
   }
 }
 
-/// Cuts off what is past the end of the segment.
+/// Clips a chunk at the end of the segment.
 void RecordingReader::cut_at_stop(Chunk& chunk) const {
   if (!stop_ || chunk.start + chunk.duration <= *stop_) return;
   chunk.duration = std::max<Microseconds>(*stop_ - chunk.start, 0);

@@ -38,7 +38,7 @@ class RecordingReader {
 
   RecordingReader(MakeReader make_reader, Microseconds chunk_length, Clock clock = Clock::file);
 
-  /// Where a sensor size comes from. An assumed one grows with the events: info.size covers a chunk
+  /// Origin of a sensor size. An assumed size grows with the events: info.size covers each chunk
   /// before it is returned.
   enum class SizeFrom : std::uint8_t { file, user, assumption };
 
@@ -49,7 +49,7 @@ class RecordingReader {
     unsigned number = 0;                 ///< index among streams of its kind
     bool shown = false;                  ///< it has items, or may have some
     Microseconds position = 0;           ///< earliest start of its next item
-    std::uint64_t outside = 0;           ///< events outside the user's size
+    std::uint64_t outside = 0;           ///< events outside a size set by the user
     std::optional<Microseconds> first;   ///< earliest time in the surveyed part of the file
     std::optional<Microseconds> latest;  ///< latest time in it
     std::optional<Frame> first_frame;    ///< format only: its pixels are no longer valid
@@ -227,7 +227,7 @@ class RecordingReader {
 
   std::optional<Interval> interval_;   ///< interval of the words being read
   std::optional<Microseconds> shift_;  ///< offset from the clock of words to that of the stream
-  std::vector<AbsoluteEvent> within_;  ///< events within the user's size
+  std::vector<AbsoluteEvent> within_;  ///< events within a size set by the user
   std::optional<Output> output_due_;   ///< a frame or triggers
   std::size_t next_stream_ = 0;        ///< next stream to ask for a chunk
   Microseconds newest_ = 0;            ///< maximum position of all streams

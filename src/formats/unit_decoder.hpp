@@ -31,7 +31,7 @@ class UnitDecoder : public Decoder {
 
   void begin(std::unique_ptr<UnitReader> reader, SensorSize size);
 
-  /// The position of the first unit; only after begin().
+  /// Position of the first unit; valid only after begin().
   std::uint64_t units_begin() const { return units_begin_; }
 
  private:

@@ -79,7 +79,7 @@ class GapLimiter {
  private:
   Microseconds last_ = 0;
   std::uint64_t shift_ = 0;
-  std::uint64_t left_out_ = 0;  ///< after the first event
+  std::uint64_t left_out_ = 0;  ///< removed after the first event
   bool begun_ = false;
 };
 

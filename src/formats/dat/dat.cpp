@@ -113,8 +113,8 @@ class DatDecoder final : public UnitDecoder {
  private:
   using MakeReader = std::unique_ptr<UnitReader> (*)(SensorSize size);
 
-  /// The time of the record before this one. Wraps are followed by a few records, between which no
-  /// more than half an hour should lie.
+  /// Time of the record before this one. Wraps are counted by sampling a few earlier records, which
+  /// must be less than about half an hour apart.
   Microseconds time_before(ByteSource& source, std::uint64_t record) const {
     constexpr std::uint64_t max_samples = 256;
     const auto samples = std::min(record, max_samples);
@@ -169,11 +169,12 @@ class DatDecoder final : public UnitDecoder {
   static constexpr SensorSize first_camera{304, 240};
 
   PropheseeHeader header_;
-  MakeReader make_reader_ = nullptr;  ///< of the records; once the header is read
+  MakeReader make_reader_ = nullptr;  ///< for the records; set once the header is read
 };
 
-/// Times as they are written: their lower 32 bits, of which readers know that they wrap where they
-/// fall by more than half. What these cannot tell is left out: a pause, or a first time past them.
+/// Converts times to the lower 32 bits that are written. Readers detect a wrap by a fall of more
+/// than half the range. Removes what cannot be represented so: long pauses, or a first time beyond
+/// 32 bits.
 class DatClock {
  public:
   std::uint32_t written(Microseconds t) {
@@ -203,7 +204,7 @@ class DatClock {
 
   Microseconds last_ = 0;
   std::uint64_t shift_ = 0;
-  std::uint64_t left_out_ = 0;  ///< after the first event
+  std::uint64_t left_out_ = 0;  ///< removed after the first event
   bool begun_ = false;
 };
 

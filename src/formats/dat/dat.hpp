@@ -12,9 +12,9 @@ namespace eventcamera {
 /// times have 32 bits and wrap every 71 minutes: a fall by more than half of that is a wrap.
 std::unique_ptr<Decoder> make_dat_decoder();
 
-/// Encodes version 2. A first time of 71 minutes or more becomes 0. A pause that readers would
-/// mistake is left out: one of 71 minutes or more, or of more than 35 in which the time wraps.
-/// Throws std::invalid_argument for sensors of more than 16384x16384 pixels.
+/// Encodes version 2. A first time of 71 minutes or more becomes 0. Pauses that readers would
+/// misinterpret are removed: those of 71 minutes or more, and those of more than 35 minutes with a
+/// wrap. Throws std::invalid_argument for sensors of more than 16384x16384 pixels.
 std::unique_ptr<Encoder> make_dat_encoder(SensorSize size);
 
 }  // namespace eventcamera

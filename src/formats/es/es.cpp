@@ -21,7 +21,7 @@ constexpr int max_rows = 32768;
 
 enum Type : std::uint8_t { generic = 0, dvs = 1, atis = 2, amd = 3, colour = 4 };
 
-/// Converts between rows from the top and rows of the file.
+/// Converts between rows counted from the top and rows of the file.
 class Rows {
  public:
   Rows(int height, EsOrigin origin)

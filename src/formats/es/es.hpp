@@ -9,7 +9,7 @@
 
 namespace eventcamera {
 
-/// Position of row 0 of a file: tools disagree, and files do not state it. The format's authors
+/// Position of row 0 in a file. Tools disagree, and files do not state it; the format's authors
 /// count from the bottom.
 enum class EsOrigin : std::uint8_t { bottom_left, top_left };
 
