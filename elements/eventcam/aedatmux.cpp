@@ -35,6 +35,7 @@
 #include <utility>
 #include <vector>
 
+#include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/frame_buffer.hpp"
@@ -542,7 +543,7 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
                                                        GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata(element_class, "AEDAT 4 muxer", "Codec/Muxer",
                                         "Writes events and frames into AEDAT 4 files",
-                                        "gst-eventsim");
+                                        EVENTSIM_AUTHORS);
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->aggregate = aggregate;

@@ -34,6 +34,7 @@
 #include <optional>
 
 #include "elements/eventcam/report.hpp"
+#include "gst/base/authors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/eventaggregator.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -261,5 +262,5 @@ static void gst_event_compare_class_init(GstEventCompareClass* klass) {
       GST_EVENT_AGGREGATOR_CLASS(klass), {&reference_template, &candidate_template, &src_template});
   gst_element_class_set_static_metadata(
       GST_ELEMENT_CLASS(klass), "Event comparison", "Filter/Analyzer",
-      "Measures the similarity of two event streams", "gst-eventsim");
+      "Measures the similarity of two event streams", EVENTSIM_AUTHORS);
 }

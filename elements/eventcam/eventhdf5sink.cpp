@@ -23,6 +23,7 @@
 #include <string>
 #include <utility>
 
+#include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
@@ -238,14 +239,15 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   properties.add(
       &Settings::compression,
       g_param_spec_enum("compression", "Compression",
-                        "Compression of the DSEC layout; Metavision's is always ECF",
+                        "Compression of layout=dsec: gzip for small files, none for speed. "
+                        "layout=metavision ignores it, since it always uses ECF",
                         compression_type(), static_cast<int>(defaults.compression), flags));
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_static_pad_template(element_class, &sink_template);
   gst_element_class_set_static_metadata(element_class, "HDF5 file sink", "Sink/File",
                                         "Writes events as HDF5: DSEC or Metavision",
-                                        "gst-eventsim");
+                                        EVENTSIM_AUTHORS);
 
   GstBaseSinkClass* sink_class = GST_BASE_SINK_CLASS(klass);
   sink_class->start = start;

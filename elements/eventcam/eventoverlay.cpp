@@ -24,6 +24,7 @@
 #include <limits>
 #include <optional>
 
+#include "gst/base/authors.hpp"
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/eventaggregator.hpp"
@@ -282,5 +283,5 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
                                            {&sink_template, &events_template, &src_template});
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event overlay",
                                         "Filter/Editor/Video", "Draws events over video",
-                                        "gst-eventsim");
+                                        EVENTSIM_AUTHORS);
 }

@@ -33,6 +33,7 @@
 #include <optional>
 #include <utility>
 
+#include "gst/base/authors.hpp"
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/eventaggregator.hpp"
@@ -557,7 +558,7 @@ static void gst_event_render_class_init(GstEventRenderClass* klass) {
                                            {&sink_template, &src_template});
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event renderer",
                                         "Codec/Decoder/Video", "Draws events as video",
-                                        "gst-eventsim");
+                                        EVENTSIM_AUTHORS);
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->src_event = src_event;

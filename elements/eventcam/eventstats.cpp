@@ -32,6 +32,7 @@
 #include <string>
 
 #include "elements/eventcam/report.hpp"
+#include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -297,7 +298,7 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
   gst_element_class_add_static_pad_template(element_class, &sink_template);
   gst_element_class_add_static_pad_template(element_class, &src_template);
   gst_element_class_set_static_metadata(element_class, "Event statistics", "Filter/Analyzer",
-                                        "Measures an event stream", "gst-eventsim");
+                                        "Measures an event stream", EVENTSIM_AUTHORS);
 
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->start = start;

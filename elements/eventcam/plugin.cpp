@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <gst/gst.h>
 
+#include "gst/base/authors.hpp"
+
 #ifdef HAVE_AEDAT
 #define AEDAT_ELEMENTS(X) X(aedatdemux) X(aedatmux)
 #else
@@ -48,4 +50,4 @@ static gboolean plugin_init(GstPlugin* plugin) {
 #define PACKAGE "gst-eventsim"
 GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, eventcam,
                   "Event streams: render, read, write, measure", plugin_init, PACKAGE_VERSION,
-                  "LGPL", "gst-eventsim", "Unknown package origin")
+                  "LGPL", "gst-eventsim", EVENTSIM_AUTHORS)

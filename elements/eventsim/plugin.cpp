@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <gst/gst.h>
 
+#include "gst/base/authors.hpp"
+
 #define ELEMENTS(X) \
   X(eventsim_frame) X(eventsim_dense) X(eventsim_sparse) X(eventsim_diff) X(eventsim_dvs)
 
@@ -19,4 +21,4 @@ static gboolean plugin_init(GstPlugin* plugin) {
 #define PACKAGE "gst-eventsim"
 GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, eventsim,
                   "Simulators of event cameras: video to events", plugin_init, PACKAGE_VERSION,
-                  "LGPL", "gst-eventsim", "Unknown package origin")
+                  "LGPL", "gst-eventsim", EVENTSIM_AUTHORS)

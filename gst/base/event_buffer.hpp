@@ -14,6 +14,9 @@
   GST_EVENT_CAMERA_MEDIA_TYPE \
   ", format = (string) XYTP, width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ]"
 
+/// What to set on decodebin for events, which it draws as video otherwise.
+#define ASK_FOR_EVENTS "caps=\"application/x-event-camera,format=XYTP\""
+
 /// Maps the events of a buffer for reading.
 class MappedEvents {
  public:

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/frame_buffer.hpp"
 #include "gst/base/guarded.hpp"
@@ -29,6 +30,7 @@ GST_DEBUG_CATEGORY_STATIC(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
 
 #include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
 
 using eventcamera::Microseconds;
 using eventcamera::RecordingReader;
@@ -264,7 +266,10 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
   g_object_class_install_property(
       object_class, prop_stats,
       g_param_spec_boxed("stats", "Statistics",
-                         "Numbers of items read and dropped since the start or the last seek",
+                         "Counts since the start or the last seek: events, triggers, frames and "
+                         "imu-samples read; corrupt-places where bytes were skipped; events "
+                         "dropped as outside the sensor; items dropped as late, after their "
+                         "buffer was sent, or stray, at an impossible time (untimely is both)",
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_READER, static_cast<GstPluginAPIFlags>(0));
@@ -287,7 +292,7 @@ static void format_class_init(gpointer klass, gpointer data) {
   if (format.has_many_streams)
     add_template(element_class, "video_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, RECORDED_VIDEO_CAPS);
   gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Demuxer",
-                                        format.description, "gst-eventsim");
+                                        format.description, EVENTSIM_AUTHORS);
   if (format.add_properties != nullptr) {
     FormatProperties properties(G_OBJECT_CLASS(klass));
     format.add_properties(properties);
@@ -439,6 +444,13 @@ gboolean EventReader::activate(GstPadMode mode, bool active) {
   return active ? gst_pad_start_task(sink_, loop, this, nullptr) : gst_pad_stop_task(sink_);
 }
 
+/// Within decodebin, eventrender took the events, and the application wanted something else.
+static Report not_linked() {
+  return {GST_STREAM_ERROR_FAILED,
+          "No element takes what is read. decodebin draws events as video; for the events "
+          "themselves, set decodebin " ASK_FOR_EVENTS "."};
+}
+
 void EventReader::loop(gpointer data) {
   auto& self = *static_cast<EventReader*>(data);
   const GstFlowReturn result = self.guard([&] { return self.pull(); });
@@ -447,7 +459,10 @@ void EventReader::loop(gpointer data) {
   gst_pad_pause_task(self.sink_);
   if (result == GST_FLOW_FLUSHING) return;
   auto* const element = self.element_;
-  if (result != GST_FLOW_EOS && result != GST_FLOW_ERROR) GST_ELEMENT_FLOW_ERROR(element, result);
+  if (result == GST_FLOW_NOT_LINKED)
+    post_message(element, GST_MESSAGE_ERROR, not_linked(), "streaming stopped, reason not-linked");
+  else if (result != GST_FLOW_EOS && result != GST_FLOW_ERROR)
+    GST_ELEMENT_FLOW_ERROR(element, result);
   self.end_output(result != GST_FLOW_EOS);
 }
 
@@ -482,7 +497,10 @@ GstFlowReturn EventReader::chain(GstBuffer* buffer) {
     for (auto& pad : pads_) pad->interrupt();
     for (auto& pad : pads_) pad->need_segment(false);
   }
-  if (flow_ == GST_FLOW_OK) flow_ = guard([&] { return take_buffer(buffer); });
+  if (flow_ != GST_FLOW_OK) return flow_;
+  flow_ = guard([&] { return take_buffer(buffer); });
+  if (flow_ == GST_FLOW_NOT_LINKED)  // upstream may have others to feed
+    post_message(element_, GST_MESSAGE_WARNING, not_linked(), "all source pads are not linked");
   return flow_;
 }
 

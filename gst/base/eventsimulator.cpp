@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "gst/base/authors.hpp"
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/frame_clock.hpp"
@@ -64,6 +65,7 @@ struct Stream {
   WarnOnce warn_of_times;
   WarnOnce warn_of_no_pts;
   WarnOnce warn_of_interlacing;
+  WarnOnce warn_of_drawn_input;
 };
 
 }  // namespace
@@ -290,6 +292,33 @@ static void check_interlacing(GstEventSimulator* self, GstBuffer* frame) {
       std::string("interlace-mode=") + gst_video_interlace_mode_to_string(mode));
 }
 
+/// Name of a query that a simulator upstream answers where it draws its events.
+static constexpr const char* draws_query = "event-simulator-draws";
+
+/// Warns where the video is drawn events, such as those of one simulator right before another.
+static void check_input(GstEventSimulator* self) {
+  GstQuery* query = gst_query_new_custom(GST_QUERY_CUSTOM, gst_structure_new_empty(draws_query));
+  if (gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(self), query))
+    priv_of(self).stream.warn_of_drawn_input(
+        self,
+        {GST_STREAM_ERROR_FORMAT,
+         "The video already shows events, which a simulator upstream drew. To simulate one video "
+         "twice, put a tee in front of both simulators."},
+        std::string("answered upstream: ") + draws_query);
+  gst_query_unref(query);
+}
+
+/// Whether this is that query, and the events are drawn here.
+static bool draws_for(GstBaseTransform* transform, GstQuery* query) {
+  if (GST_QUERY_TYPE(query) != GST_QUERY_CUSTOM) return false;
+  const GstStructure* asked = gst_query_get_structure(query);
+  if (asked == nullptr || !gst_structure_has_name(asked, draws_query)) return false;
+  GstCaps* caps = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform));
+  const bool draws = caps != nullptr && event_simulator_draws(caps);
+  gst_clear_caps(&caps);
+  return draws;
+}
+
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   auto& state = priv_of(self).state;
@@ -325,6 +354,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
       state->drawing = Drawing{drawn, Accumulator(luma.width, luma.height)};
   });
   if (!made) return FALSE;
+  check_input(self);
   // Pictures have the time of their frame, intervals that of the previous frame.
   const GstClockTime duration = state->drawing ? 0 : frame_duration(video);
   if (duration > 0 || state->drawing)
@@ -601,6 +631,7 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
 }
 
 static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
+  if (direction == GST_PAD_SRC && draws_for(transform, query)) return TRUE;
   if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 
@@ -683,7 +714,7 @@ static void method_class_init(gpointer klass, gpointer row) {
   if (method.install_properties != nullptr) method.install_properties(object_class);
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), method.long_name,
                                         "Filter/Effect/Converter/Video", method.description,
-                                        "gst-eventsim");
+                                        EVENTSIM_AUTHORS);
 }
 
 GType event_simulator_type(const EventSimulatorMethod& method) {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
@@ -127,6 +128,34 @@ static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& i
   return gst_pad_push_event(priv.src, gst_event_new_caps(priv.state->caps.get()))
              ? GST_FLOW_OK
              : GST_FLOW_NOT_NEGOTIATED;
+}
+
+/// Caps that the sink pad takes: the sensors that the format holds, and then all others, which the
+/// encoder refuses with a reason. Upstream that can choose takes the first.
+static OwnedCaps sink_caps(GstPad* pad) {
+  GstCaps* caps = gst_caps_make_writable(gst_pad_get_pad_template_caps(pad));
+  gst_caps_append(caps, gst_caps_from_string(GST_EVENT_CAMERA_MEDIA_TYPE ", format=XYTP"));
+  return OwnedCaps(caps);
+}
+
+static gboolean sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  GstCaps* asked = nullptr;
+  switch (GST_QUERY_TYPE(query)) {
+    case GST_QUERY_CAPS: {
+      gst_query_parse_caps(query, &asked);
+      OwnedCaps caps = sink_caps(pad);
+      if (asked != nullptr)
+        caps.reset(gst_caps_intersect_full(asked, caps.get(), GST_CAPS_INTERSECT_FIRST));
+      gst_query_set_caps_result(query, caps.get());
+      return TRUE;
+    }
+    case GST_QUERY_ACCEPT_CAPS:
+      gst_query_parse_accept_caps(query, &asked);
+      gst_query_set_accept_caps_result(query, gst_caps_is_subset(asked, sink_caps(pad).get()));
+      return TRUE;
+    default:
+      return gst_pad_query_default(pad, parent, query);
+  }
 }
 
 static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
@@ -353,6 +382,7 @@ static void constructed(GObject* object) {
       gst_pad_new_from_template(gst_element_class_get_pad_template(element_class, "sink"), "sink");
   gst_pad_set_chain_function(priv.sink, chain);
   gst_pad_set_event_function(priv.sink, sink_event);
+  gst_pad_set_query_function(priv.sink, sink_query);
   gst_element_add_pad(element, priv.sink);
   priv.src =
       gst_pad_new_from_template(gst_element_class_get_pad_template(element_class, "src"), "src");
@@ -412,7 +442,7 @@ static void format_class_init(gpointer klass, gpointer data) {
                                     GST_TYPE_INT_RANGE, 1, format.max_height, nullptr)));
   add_pad_template(element_class, "src", GST_PAD_SRC, OwnedCaps(gst_caps_from_string(format.caps)));
   gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Encoder",
-                                        format.description, "gst-eventsim");
+                                        format.description, EVENTSIM_AUTHORS);
 }
 
 GType event_writer_type(const EventFileFormat& format) {

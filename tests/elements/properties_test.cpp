@@ -83,6 +83,25 @@ TEST_P(EveryElement, DescribesItself) {
   g_free(specs);
 }
 
+TEST(Plugins, SayWhereTheyComeFrom) {
+  gst_init(nullptr, nullptr);
+  for (const char* name : {"eventsim", "eventcam"}) {
+    GstPlugin* plugin = gst_registry_find_plugin(gst_registry_get(), name);
+    ASSERT_NE(plugin, nullptr) << name;
+    EXPECT_STREQ(gst_plugin_get_package(plugin), "gst-eventsim");
+    EXPECT_STREQ(gst_plugin_get_origin(plugin), "The gst-eventsim authors");
+    GList* features = gst_registry_get_feature_list_by_plugin(gst_registry_get(), name);
+    for (const GList* feature = features; feature != nullptr; feature = feature->next) {
+      if (!GST_IS_ELEMENT_FACTORY(feature->data)) continue;
+      EXPECT_STREQ(gst_element_factory_get_metadata(GST_ELEMENT_FACTORY(feature->data),
+                                                    GST_ELEMENT_METADATA_AUTHOR),
+                   "The gst-eventsim authors");
+    }
+    gst_plugin_feature_list_free(features);
+    gst_object_unref(plugin);
+  }
+}
+
 TEST(Dense, NamesItsFlowsAndInterpolations) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make("eventsim-dense", nullptr));

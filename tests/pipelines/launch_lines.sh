@@ -129,6 +129,12 @@ discover ball.aedat4 "video/x-raw, format=(string)GRAY8, width=(int)320, height=
 echo "gst-play-1.0 ball.aedat4"
 timeout 60 gst-play-1.0 -q --no-interactive --videosink=fakesink --start-position=1 ball.aedat4 >played 2>&1 || fail "gst-play-1.0: $(cat played)"
 
+# EVT2.1 is EVT21.
+for format in EVT21 EVT2.1; do
+  launch videotestsrc pattern=ball num-buffers=5 ! eventsim-diff ! evtenc format=$format ! filesink location=$format.raw
+done
+cmp EVT21.raw EVT2.1.raw
+
 # Conversions of event files.
 launch videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
 launch filesrc location=out.raw ! decodebin caps="application/x-event-camera,format=XYTP" ! aedatmux compression=zstd ! filesink location=out.aedat4
@@ -146,7 +152,33 @@ interrupt interrupted.h5 300000 videotestsrc is-live=true pattern=snow ! eventsi
 launch filesrc location=interrupted.h5 ! eventhdf5dec ! filesink location=interrupted.xytp
 [ "$(stat -c %s interrupted.xytp)" -gt 300000 ] || fail "events from before the interruption are lost"
 
+refused() { # WORDS ARGUMENT...: fails, and says these words
+  local words=$1
+  shift
+  echo "gst-launch-1.0 $*, refused"
+  timeout 20 "$GST_LAUNCH" "$@" >refusal 2>&1 && fail "it was not refused"
+  grep -qF "$words" refusal || fail "\"$words\" is not in: $(cat refusal)"
+}
+
 # Refused, with a reason.
+refused "Cannot draw bytes" filesrc location=out.raw ! eventrender ! fakesink
+for element in evtenc eventstats eventrender; do
+  refused 'caps="application/x-event-camera,format=XYTP"' filesrc location=out.raw ! decodebin ! $element ! fakesink
+  refused 'caps="application/x-event-camera,format=XYTP"' filesrc location=out.raw ! queue ! decodebin ! $element ! fakesink
+done
+refused "EVT words support sensors of 1x1 to 2048x2048 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! eventsim-frame ! evtenc ! fakesink
+launch videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! videoscale ! eventsim-frame ! evtenc ! fakesink
+
+# Warned of.
+warnings() { # ARGUMENT...
+  timeout 60 "$GST_LAUNCH" "$@" 2>&1 | grep "^WARNING" || true
+}
+warnings videotestsrc num-buffers=3 ! eventsim-diff ! queue ! videoconvert ! eventsim-dense ! fakesink | grep -q "put a tee in front of both simulators" ||
+  fail "no warning of events of drawn events"
+[ -z "$(warnings videotestsrc num-buffers=3 ! tee name=t  t. ! queue ! eventsim-diff ! videoconvert ! fakesink  t. ! queue ! eventsim-dense ! fakesink)" ] ||
+  fail "a warning of two simulators side by side"
+
+# Other refusals.
 timeout 5 "$GST_LAUNCH" -q filesrc location=ball-frame.xytp ! aedatdemux ! fakesink 2>refusal && fail "a file that is not AEDAT was read"
 grep -q "this is not AEDAT" refusal || fail "the refusal does not name the format"
 if "$GST_LAUNCH" -q videotestsrc num-buffers=2 ! video/x-raw,format=v210 ! eventsim-frame ! fakesink 2>refusal; then
