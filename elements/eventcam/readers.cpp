@@ -279,6 +279,10 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * Corrupt input is skipped; the first place is reported as a warning, and `stats` counts all
  * places.
  *
+ * An AEDAT 2.0 file may not name its camera. Its first addresses then tell how they are made; the
+ * sensor size is #GstAedatDemux:width and #GstAedatDemux:height, or else that of downstream caps,
+ * or else the smallest DAVIS that events fit into, with a warning.
+ *
  * A stream without a frame or event in the first second may get its pad only at its first one.
  *
  * ## Example launch line
@@ -293,8 +297,9 @@ static const RecordingFormat aedat = {
     .description = "Reads events and frames from AEDAT files",
     .caps = "application/x-aedat, version = (int) { 2, 3, 4 }",
     .has_many_streams = true,
-    .make_reader = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<Reader> {
-      return std::make_unique<eventcamera::AedatReader>();
+    .add_properties = add_sensor_size,
+    .make_reader = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Reader> {
+      return std::make_unique<eventcamera::AedatReader>(settings.sensor);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_reader_type(aedat))

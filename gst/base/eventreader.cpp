@@ -173,6 +173,7 @@ class EventReader {
   GstFlowReturn flow_ = GST_FLOW_OK;  ///< anything else refuses pushed bytes
   guint64 corrupt_places_ = 0;        ///< already signalled by DISCONT and a warning
   WarnOnce warn_of_corruption_;
+  WarnOnce warn_of_assumption_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;
   std::map<std::size_t, ReaderPad*> pad_of_stream_;
@@ -361,6 +362,7 @@ void EventReader::reset() {
   caps_.reset();
   flow_ = GST_FLOW_OK;
   warn_of_corruption_.reset();
+  warn_of_assumption_.reset();
   for (auto& pad : pads_) {
     pad->reset();
     if (!format_.has_many_streams) continue;
@@ -780,7 +782,7 @@ GstFlowReturn EventReader::begin_output() {
   const auto& streams = recording_->streams();
   for (std::size_t i = 0; i < streams.size(); ++i) {
     if (!streams[i].shown) continue;
-    if (!format_.has_many_streams) find_size(i);
+    find_size(i);
     if (!send_caps(i)) {
       output_due_ = true;
       return pad_of(i).refusal();
@@ -791,8 +793,8 @@ GstFlowReturn EventReader::begin_output() {
   return GST_FLOW_OK;
 }
 
-/// Starts streams and adds their pads. With many streams, pads have caps before they are added; a
-/// single pad is added first, because the linked element may determine the sensor size.
+/// Starts streams and adds their pads. With many streams, pads have caps before they are added,
+/// except where the linked element may determine the sensor size, as with a single pad.
 void EventReader::start_streams() {
   const auto& streams = recording_->streams();
   const bool is_upstreams = is_timed() && stream_start_ != nullptr;
@@ -814,8 +816,10 @@ void EventReader::start_streams() {
       pad.start_stream(element_, group_);
     if (is_timed()) pad.need_segment(false);
     if (!format_.has_many_streams) continue;
-    send_caps(i);
-    send_segment(pad);
+    if (streams[i].size_from == RecordingReader::SizeFrom::file) {
+      send_caps(i);
+      send_segment(pad);
+    }
     pad.send_tags(recording_->format_name(), streams[i].info.source);
   }
   if (!is_any_new) return;
@@ -859,8 +863,15 @@ void EventReader::find_size(std::size_t index) {
       return;
     }
   }
-  GST_INFO_OBJECT(element_, "the file does not state the sensor size; assuming %dx%d",
-                  stream.info.size.width, stream.info.size.height);
+  const auto text =
+      std::to_string(stream.info.size.width) + "x" + std::to_string(stream.info.size.height);
+  GST_INFO_OBJECT(element_, "the file does not state the sensor size; assuming %s", text.c_str());
+  if (stream.info.mirrored)
+    warn_of_assumption_(element_,
+                        {GST_STREAM_ERROR_FORMAT,
+                         "The file does not state its sensor size; assuming " + text +
+                             " pixels. If events are in the wrong place, set width and height."},
+                        "columns and rows of the file count from the far corner");
 }
 
 bool EventReader::send_caps(std::size_t index) {

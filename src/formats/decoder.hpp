@@ -132,12 +132,17 @@ class Decoder {
   /// Sensor size, once the header is read or if known from elsewhere; 0x0 before.
   SensorSize size() const { return size_; }
 
+  /// Whether columns count from the right and rows from the bottom, for whoever knows the size to
+  /// turn them round.
+  bool is_mirrored() const { return is_mirrored_; }
+
   const Corruption& corruption() const { return corruption_; }
 
  protected:
   Decoder() = default;
 
   SensorSize size_;
+  bool is_mirrored_ = false;
   Corruption corruption_;
   SeekPoints seek_points_;
 };

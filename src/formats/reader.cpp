@@ -29,6 +29,7 @@ std::optional<Item> DecoderReader::next() {
       return std::nullopt;
     }
     streams_.front().size = decoder_->size();
+    streams_.front().mirrored = decoder_->is_mirrored();
     events_due_ = triggers_due_ = true;
   }
 }

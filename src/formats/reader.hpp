@@ -25,6 +25,8 @@ struct StreamInfo {
   StreamKind kind = StreamKind::other;
   SensorSize size;     ///< 0x0 if not stated in the file
   std::string source;  ///< name of the camera
+  /// Columns count from the right and rows from the bottom, as the size that turns them is unknown.
+  bool mirrored = false;
 };
 
 /// Pixel format of a frame; the values are those of AEDAT4.

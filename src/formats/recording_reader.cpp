@@ -119,6 +119,7 @@ void RecordingReader::learn_streams() {
     if (known[i].kind != streams_[i].info.kind)
       throw std::runtime_error("the file changed while it was read: its streams are different now");
     // Some formats state the size only after their first bytes.
+    streams_[i].info.mirrored = known[i].mirrored;
     if (streams_[i].size_from == SizeFrom::file && known[i].size != SensorSize{})
       streams_[i].info.size = known[i].size;
   }
@@ -325,7 +326,7 @@ void RecordingReader::show(Stream& stream) {
   start_due_ = true;
   if (stream.info.kind != StreamKind::events) return;
   if (stream.info.size.width <= 0 || stream.info.size.height <= 0) {
-    stream.info.size = stream.used.sensor();
+    stream.info.size = stream.used.sensor(stream.info.mirrored);
     stream.size_from = SizeFrom::assumption;
   }
   start_chunker(stream);
@@ -389,12 +390,20 @@ void RecordingReader::take(const EventItem& item) {
       std::ranges::any_of(events, is_outside(stream.info.size))) {
     if (stream.size_from == SizeFrom::assumption) {
       stream.used.include(events);
-      stream.info.size = stream.used.sensor();
+      stream.info.size = stream.used.sensor(stream.info.mirrored);
     } else {
       within_.assign(events.begin(), events.end());
       stream.outside += std::erase_if(within_, is_outside(stream.info.size));
       events = within_;
     }
+  }
+  if (stream.info.mirrored) {
+    const auto size = stream.info.size;
+    if (events.data() != within_.data()) within_.assign(events.begin(), events.end());
+    for (auto& event : within_)
+      event = AbsoluteEvent::at(size.width - 1 - event.x, size.height - 1 - event.y(), event.t,
+                                event.polarity());
+    events = within_;
   }
   if (clock_ == Clock::stream && !shift_ && interval_) set_shift(item.events.front().t);
   stream.chunker.push(events);

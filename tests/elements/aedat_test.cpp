@@ -256,14 +256,10 @@ class Player {
       const std::lock_guard lock(self->mutex_);
       self->after_.insert(self->after_.end(), {queue, sink});
       auto& track = self->tracks_[GST_PAD_NAME(pad)] = {};
-      GstCaps* const caps = gst_pad_get_current_caps(pad);
-      gchar* const text = gst_caps_to_string(caps);
-      track.caps = text;
-      g_free(text);
-      gst_caps_unref(caps);
-      GstEvent* const event = gst_pad_get_sticky_event(pad, GST_EVENT_SEGMENT, 0);
-      gst_event_copy_segment(event, &track.segment);
-      gst_event_unref(event);
+      // A pad whose caps may depend on what is linked has none yet.
+      for (const auto type : {GST_EVENT_CAPS, GST_EVENT_SEGMENT})
+        if (const Owned<GstEvent> event{gst_pad_get_sticky_event(pad, type, 0)})
+          see(track, event.get());
     }
     gst_pad_add_probe(pad,
                       static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
@@ -309,6 +305,14 @@ class Player {
 
   static void see(Track& track, GstEvent* event) {
     switch (GST_EVENT_TYPE(event)) {
+      case GST_EVENT_CAPS: {
+        GstCaps* caps = nullptr;
+        gst_event_parse_caps(event, &caps);
+        gchar* const text = gst_caps_to_string(caps);
+        track.caps = text;
+        g_free(text);
+        break;
+      }
       case GST_EVENT_SEGMENT: {
         const auto caps = track.caps;
         track = {};
@@ -381,6 +385,75 @@ TEST(AedatDemux, HandsOutTheEventsOfEveryVersion) {
       EXPECT_EQ(player.stat("events"), expected.size());
     }
   }
+}
+
+/// Runs a line to its end; what fakesink "out" got, and the warnings.
+struct Played {
+  explicit Played(const std::string& launch) {
+    gst_init(nullptr, nullptr);
+    GError* error = nullptr;
+    const Owned<GstElement> pipeline(gst_parse_launch(launch.c_str(), &error));
+    EXPECT_EQ(error, nullptr) << error->message;
+    const Owned<GstElement> out(gst_bin_get_by_name(GST_BIN(pipeline.get()), "out"));
+    g_object_set(out.get(), "signal-handoffs", TRUE, nullptr);
+    g_signal_connect(out.get(), "handoff",
+                     G_CALLBACK(+[](GstElement*, GstBuffer* buffer, GstPad*, Events* seen) {
+                       const auto start = static_cast<Microseconds>(GST_BUFFER_PTS(buffer) / 1000);
+                       for (const auto& e : events_of(buffer))
+                         seen->push_back({start + e.t, e.x, e.y_p});
+                     }),
+                     &events);
+    const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+    gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+    bool ended = false;
+    while (!ended) {
+      const Owned<GstMessage> message(gst_bus_timed_pop_filtered(
+          bus.get(), 20 * GST_SECOND,
+          static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING)));
+      ended = !message || GST_MESSAGE_TYPE(message.get()) != GST_MESSAGE_WARNING;
+      if (!message) error_text = "nothing happens";
+      if (message && GST_MESSAGE_TYPE(message.get()) != GST_MESSAGE_EOS)
+        (ended ? error_text : warnings) += text_of(message.get());
+    }
+    gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  }
+
+  Events events;
+  std::string warnings;
+  std::string error_text;
+};
+
+TEST(AedatDemux, Aedat2WithoutACameraHasTheSizeThatIsAskedFor) {
+  namespace files = eventcamera::aedat_files;
+  recordings::Random random(3);
+  constexpr SensorSize davis240{240, 180};
+  const auto events = recordings::random_events(random, davis240, 20'000, 200'000);
+  const File file(files::aedat2_v2e(events, davis240));
+  const std::string demux = "filesrc location=" + in_quotes(file.path()) + " ! ";
+  for (const std::string between : {"", "identity ! "}) {
+    SCOPED_TRACE(between);
+    const Played assumed(demux + between + "aedatdemux ! fakesink name=out");
+    EXPECT_TRUE(assumed.events == events) << assumed.error_text;
+    EXPECT_NE(assumed.warnings.find("assuming 240x180 pixels"), std::string::npos);
+
+    auto moved = events;  // by what a DAVIS346 has more of
+    for (auto& e : moved) e = AbsoluteEvent::at(e.x + 106, e.y() + 80, e.t, e.polarity());
+    for (const char* way :
+         {"aedatdemux width=346 height=260 ! fakesink name=out",
+          "aedatdemux ! application/x-event-camera,width=346,height=260 ! fakesink name=out"}) {
+      const Played asked(demux + between + way);
+      EXPECT_TRUE(asked.events == moved) << way << ": " << asked.error_text;
+      EXPECT_EQ(asked.warnings, "");
+    }
+  }
+
+  const auto few = recordings::random_events(random, {128, 128}, 20'000, 200'000);
+  const File of_matlab(files::aedat2_of_matlab(few));
+  const Played dvs128("filesrc location=" + in_quotes(of_matlab.path()) +
+                      " ! aedatdemux ! application/x-event-camera,width=128,height=128 ! fakesink "
+                      "name=out");
+  EXPECT_TRUE(dvs128.events == few) << dvs128.error_text;
+  EXPECT_EQ(dvs128.warnings, "");
 }
 
 TEST(AedatDemux, PiecesOfAnySizeChangeNothing) {

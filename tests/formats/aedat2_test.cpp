@@ -81,17 +81,46 @@ TEST(Aedat2, DisorderIsCountedEvenAcrossAWrap) {
   EXPECT_EQ(decoder.corruption().unsorted, 2U);
 }
 
-TEST(Aedat2, ACameraThatIsNotNamedIsAssumed) {
-  const auto size_of = [](std::string_view line, SensorSize assumed) {
-    auto bytes = aedat_files::aedat2_header("");
-    aedat_files::add(bytes, std::string(line));
-    Aedat2Decoder decoder(assumed);
-    decoded(decoder, bytes);
-    return decoder.size();
-  };
-  EXPECT_EQ(size_of("", {}), dvs128);
-  EXPECT_EQ(size_of("# created by v2e\r\n", {}), davis346);
-  EXPECT_EQ(size_of("# created by v2e\r\n", {240, 180}), (SensorSize{240, 180}));
+TEST(Aedat2, WhereNoCameraIsNamedTheAddressesTell) {
+  const SensorSize v2e640{640, 480};
+  const auto of_v2e = random_events::make(v2e640, 3000, 7, 0, {hour});
+  pieces::expect_events<Aedat2Decoder>(aedat_files::aedat2_v2e(of_v2e, v2e640), of_v2e, v2e640);
+  const auto few = random_events::make(dvs128, 3000, 8, 0, {hour});
+  pieces::expect_events<Aedat2Decoder>(aedat_files::aedat2_of_matlab(few), few, dvs128);
+}
+
+TEST(Aedat2, TheHeaderOrTheUserTellsTheSizeOfADavis) {
+  for (const SensorSize size : {SensorSize{240, 180}, davis346}) {
+    const auto events = random_events::make(size, 3000, 9, 0, {hour});
+    const auto text = std::to_string(size.width) + "x" + std::to_string(size.height);
+    for (const std::string& line : {"# sensor size " + text + "\r\n", std::string()}) {
+      const auto bytes = aedat_files::aedat2_v2e(events, size, line);
+      Aedat2Decoder decoder(line.empty() ? size : SensorSize{});
+      EXPECT_TRUE(decoded(decoder, bytes).events == events) << line;
+      EXPECT_EQ(decoder.size(), size);
+      EXPECT_FALSE(decoder.is_mirrored());
+    }
+  }
+  auto bytes = aedat_files::aedat2_header("DAVI346");
+  aedat_files::add_record(bytes, 7U << 22 | 3U << 12 | 1U << 11, 1000);
+  Aedat2Decoder decoder(davis346);
+  EXPECT_EQ(decoded(decoder, bytes).events,
+            std::vector{AbsoluteEvent::at(342, 252, 1000, Polarity::on)});
+}
+
+TEST(Aedat2, WithoutASizeEventsStayMirrored) {
+  const SensorSize size{240, 180};
+  const auto events = random_events::make(size, 3000, 10, 0, {hour});
+  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}}) {
+    Aedat2Decoder decoder;
+    auto turned = decoded(decoder, aedat_files::aedat2_v2e(events, size), piece).events;
+    EXPECT_EQ(decoder.size(), SensorSize{});
+    EXPECT_TRUE(decoder.is_mirrored());
+    for (auto& event : turned)
+      event = AbsoluteEvent::at(239 - event.x, 179 - event.y(), event.t, event.polarity());
+    EXPECT_TRUE(turned == events);
+    EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
+  }
 }
 
 TEST(Aedat2, WhatIsNotAedat2IsRefused) {

@@ -53,6 +53,12 @@ inline std::uint32_t dvs128_address(const AbsoluteEvent& event) {
                                     (event.polarity() == Polarity::on ? 0 : 1));
 }
 
+/// As v2e makes those of 640x480 pixels.
+inline std::uint32_t dvs640_address(const AbsoluteEvent& event) {
+  return static_cast<std::uint32_t>((479 - event.y()) << 11 | (639 - event.x) << 1 |
+                                    (event.polarity() == Polarity::on ? 1 : 0));
+}
+
 inline void add_record(Bytes& bytes, std::uint32_t address, Microseconds t) {
   add_big(bytes, address);
   add_big(bytes, static_cast<std::uint32_t>(t));
@@ -63,6 +69,32 @@ inline Bytes aedat2_davis(std::span<const AbsoluteEvent> events, SensorSize size
   auto bytes = aedat2_header(chip);
   add(bytes, "#End Of ASCII Header\r\n");
   for (const auto& event : events) add_record(bytes, davis_address(event, size), event.t);
+  return bytes;
+}
+
+/// What v2e writes, which names no camera; `size_line` is a line more.
+inline Bytes aedat2_v2e(std::span<const AbsoluteEvent> events, SensorSize size,
+                        std::string_view size_line = "") {
+  Bytes bytes;
+  add(bytes,
+      "#!AER-DAT2.0\r\n# This is a raw AE data file created by AEDat2Output in v2e (see "
+      "https://github.com/SensorsINI/v2e)\r\n# Data format is int32 address, int32 timestamp (8 "
+      "bytes total), repeated for each event\r\n# Timestamps tick is 1 us\r\n");
+  add(bytes, size_line);
+  for (const auto& event : events)
+    add_record(bytes, size.width == 640 ? dvs640_address(event) : davis_address(event, size),
+               event.t);
+  return bytes;
+}
+
+/// What MATLAB's saveaerdat.m writes of a DVS128.
+inline Bytes aedat2_of_matlab(std::span<const AbsoluteEvent> events) {
+  Bytes bytes;
+  add(bytes,
+      "#!AER-DAT2.0\r\n# This is a raw AE data file created by saveaerdat.m\r\n# Data format is "
+      "int32 address, int32 timestamp (8 bytes total), repeated for each event\r\n# Timestamps "
+      "tick is 1 us\r\n");
+  for (const auto& event : events) add_record(bytes, dvs128_address(event), event.t);
   return bytes;
 }
 

@@ -11,16 +11,8 @@ namespace {
 
 constexpr std::size_t record_size = 8;
 
-// Address bits of DAVIS cameras.
-constexpr std::uint32_t davis_sample = 0x80000000;  // frame or IMU sample
-constexpr std::uint32_t davis_external = 1U << 10;
-constexpr std::uint32_t davis_on = 1U << 11;
-constexpr std::uint32_t davis_falling = 2;
-constexpr std::uint32_t edge_mask = 7;
-// Address bits of the DVS128.
-constexpr std::uint32_t dvs128_external = 0x8000;
-constexpr std::uint32_t dvs128_largest = 0xffff;
-constexpr std::uint32_t dvs128_off = 1;
+/// Number of records that determine the layout of addresses.
+constexpr std::size_t layout_records = 1024;
 
 /// Times have 32 bits. A larger step backwards than max_disorder is a wrap.
 constexpr std::int64_t wrap = std::int64_t{1} << 32;
@@ -45,19 +37,26 @@ std::uint32_t big_endian(const std::uint8_t* bytes) {
          std::uint32_t{bytes[2]} << 8 | std::uint32_t{bytes[3]};
 }
 
-/// Sensor size of a chip named in the header.
-SensorSize size_of(const std::string& chip) {
-  struct Chip {
-    std::string_view name;
-    SensorSize size;
+/// A size such as 640x480 in a line of a header.
+std::optional<SensorSize> size_in(std::string_view line) {
+  const auto side = [](std::string_view digits) {
+    int number = 0;
+    for (const char c : digits) number = std::min(10 * number + (c - '0'), 1 << 20);
+    return number;
   };
-  constexpr Chip chips[] = {{"dvs128", {128, 128}},   {"davis128", {128, 128}},
-                            {"davis208", {208, 192}}, {"davis240", {240, 180}},
-                            {"sbret", {240, 180}},    {"davis346", {346, 260}},
-                            {"davis640", {640, 480}}, {"davisrgbw640", {640, 480}}};
-  for (const auto& known : chips)
-    if (chip.find(known.name) != std::string::npos) return known.size;
-  throw UnsupportedFormat("unsupported camera in the AEDAT 2.0 header: " + chip);
+  constexpr std::string_view decimal = "0123456789";
+  constexpr int min_side = 16;
+  constexpr int max_width = 1024;
+  constexpr int max_height = 512;
+  for (auto x = line.find('x'); x != std::string_view::npos; x = line.find('x', x + 1)) {
+    const auto from = line.substr(0, x).find_last_not_of(decimal) + 1;
+    const auto to = std::min(line.find_first_not_of(decimal, x + 1), line.size());
+    const SensorSize size{side(line.substr(from, x - from)), side(line.substr(x + 1, to - x - 1))};
+    if (size.width >= min_side && size.width <= max_width && size.height >= min_side &&
+        size.height <= max_height)
+      return size;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -93,8 +92,18 @@ void Aedat2Decoder::take_line(const std::string& line) {
   constexpr std::string_view chip = "# AEChip:";
   if (line.starts_with(chip)) {
     const auto name = lowercase(std::string_view(line).substr(chip.size()));
-    size_ = size_of(name);
-    davis_ = name.find("dvs128") == std::string::npos;
+    const auto* const camera = std::ranges::find_if(aedat2_cameras, [&](const Aedat2Camera& known) {
+      return name.find(known.name) != name.npos;
+    });
+    if (camera != std::end(aedat2_cameras)) {
+      size_ = camera->size;
+      layout_ = camera->layout;
+    } else if (assumed_ == SensorSize{}) {
+      throw UnsupportedFormat("unsupported camera in the AEDAT 2.0 header: " + name +
+                              "; set width and height");
+    }
+  } else if (size_ == SensorSize{}) {
+    size_ = size_in(line).value_or(SensorSize{});
   }
   if (line.find("v2e") != std::string::npos) of_v2e_ = true;
 }
@@ -102,14 +111,41 @@ void Aedat2Decoder::take_line(const std::string& line) {
 void Aedat2Decoder::end_header() {
   header_read_ = true;
   data_at_ = queue_.position();
-  if (size_ != SensorSize{}) return;
-  constexpr SensorSize dvs128{128, 128};
-  constexpr SensorSize davis346{346, 260};
-  size_ = assumed_ != SensorSize{} ? assumed_ : of_v2e_ ? davis346 : dvs128;
-  davis_ = size_ != dvs128;
+}
+
+/// False where that takes more bytes.
+bool Aedat2Decoder::find_camera() {
+  if (limit_ == SensorSize{}) {
+    if (!layout_ && !find_layout()) return false;
+    find_size();
+  }
+  return true;
+}
+
+/// Tells the layout by the first addresses. False where that takes more bytes.
+bool Aedat2Decoder::find_layout() {
+  const auto wanted = record_size * layout_records;
+  if (queue_.size() < wanted && !finished_) return false;
+  const auto bytes = queue_.peek(std::min(queue_.size(), wanted));
+  std::vector<std::uint32_t> addresses;
+  for (std::size_t i = 0; i + record_size <= std::min(bytes.size(), wanted); i += record_size)
+    addresses.push_back(record_at(bytes.data() + i).address);
+  layout_ = aedat2_layout_of(addresses, of_v2e_);
+  return true;
+}
+
+/// Takes the size that is told, or that all cameras of the layout have.
+void Aedat2Decoder::find_size() {
+  constexpr SensorSize largest_davis{640, 480};
+  if (size_ == SensorSize{}) size_ = assumed_;
+  if (size_ == SensorSize{} && layout_ == dvs128_layout) size_ = {128, 128};
+  if (size_ == SensorSize{} && layout_ == dvs640_layout) size_ = {640, 480};
+  is_mirrored_ = size_ == SensorSize{};
+  limit_ = is_mirrored_ ? largest_davis : size_;
 }
 
 void Aedat2Decoder::read_records(Decoded& out) {
+  if (!find_camera()) return;
   while (!scanning_ || scan()) {
     const auto bytes = queue_.peek(record_size);
     const auto count = bytes.size() / record_size;
@@ -173,10 +209,9 @@ bool Aedat2Decoder::scan() {
 }
 
 bool Aedat2Decoder::within_sensor(std::uint32_t address) const {
-  if (!davis_) return address <= dvs128_largest;
-  if ((address & davis_sample) != 0) return true;
-  return static_cast<int>(address >> 22 & 0x1ff) < size_.height &&
-         static_cast<int>(address >> 12 & 0x3ff) < size_.width;
+  if (address > layout_->largest) return false;
+  return layout_->is_sample(address) || layout_->is_external(address) ||
+         (layout_->x(address) < limit_.width && layout_->y(address) < limit_.height);
 }
 
 /// True if `t` is a large step from the last time, possibly over a wrap.
@@ -202,25 +237,19 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
     last_ = record.t;
   }
   const auto address = record.address;
-  if (davis_) {
-    if ((address & davis_sample) != 0) return;
-    // v2e marks noise events with the bit of external events, but keeps their pixel address.
-    if ((address & ~(davis_external | edge_mask)) == 0 && (address & davis_external) != 0) {
-      out.triggers.push_back({t, 0, (address & edge_mask) != davis_falling});
-      return;
-    }
-  } else if ((address & dvs128_external) != 0) {
-    out.triggers.push_back({t, 0, true});
+  if (layout_->is_sample(address)) return;
+  if (layout_->is_external(address)) {
+    out.triggers.push_back({t, 0, layout_->is_rising(address)});
     return;
   }
-  // Rows are counted from the bottom and columns from the right.
-  const auto x = static_cast<int>(davis_ ? address >> 12 & 0x3ff : address >> 1 & 0x7f);
-  const auto y = static_cast<int>(davis_ ? address >> 22 & 0x1ff : address >> 8 & 0x7f);
-  const bool on = davis_ ? (address & davis_on) != 0 : (address & dvs128_off) == 0;
+  const auto x = layout_->x(address);
+  const auto y = layout_->y(address);
+  const auto polarity = layout_->is_on(address) ? Polarity::on : Polarity::off;
   if (t < newest_) ++corruption_.unsorted;
   newest_ = std::max(newest_, t);
-  out.events.push_back(AbsoluteEvent::at(size_.width - 1 - x, size_.height - 1 - y, t,
-                                         on ? Polarity::on : Polarity::off));
+  out.events.push_back(
+      is_mirrored_ ? AbsoluteEvent::at(x, y, t, polarity)
+                   : AbsoluteEvent::at(size_.width - 1 - x, size_.height - 1 - y, t, polarity));
 }
 
 Aedat2Decoder::Record Aedat2Decoder::record_at(const std::uint8_t* bytes) {

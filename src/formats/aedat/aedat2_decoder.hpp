@@ -6,18 +6,20 @@
 #include <optional>
 #include <string>
 
+#include "src/formats/aedat/aedat2_layout.hpp"
 #include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera {
 
-/// Decodes AEDAT 2.0 of DAVIS cameras and the DVS128. Skips frames and IMU samples.
+/// Decodes AEDAT 2.0 of DAVIS cameras, the DVS128 and v2e. Skips frames and IMU samples.
+///
+/// If the header names no camera, the first addresses determine their layout. A sensor size that
+/// neither the header nor the user states stays 0x0, and then events are mirrored.
 class Aedat2Decoder final : public Decoder {
  public:
-  /// `assumed` is the sensor size to use if the header names no camera: 128x128 means a DVS128, any
-  /// other size a DAVIS. If it is 0x0, files of v2e are read as DAVIS346, which v2e writes, and
-  /// others as DVS128, whose oldest files do not name the camera.
+  /// `assumed` is the sensor size to use if the header states neither that nor the camera.
   explicit Aedat2Decoder(SensorSize assumed = {}) : assumed_(assumed) {}
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
@@ -35,6 +37,9 @@ class Aedat2Decoder final : public Decoder {
   bool read_header();
   void take_line(const std::string& line);
   void end_header();
+  bool find_camera();
+  bool find_layout();
+  void find_size();
   void read_records(Decoded& out);
   bool read_odd_record(Decoded& out);
   bool scan();
@@ -44,7 +49,7 @@ class Aedat2Decoder final : public Decoder {
   void append(const Record& record, Decoded& out);
   static Record record_at(const std::uint8_t* bytes);
 
-  SensorSize assumed_;
+  const SensorSize assumed_;
   ByteQueue queue_;
   bool finished_ = false;
 
@@ -52,7 +57,8 @@ class Aedat2Decoder final : public Decoder {
   bool of_v2e_ = false;
   bool header_read_ = false;
   std::uint64_t data_at_ = 0;
-  bool davis_ = false;
+  std::optional<Aedat2Layout> layout_;
+  SensorSize limit_;  ///< of rows and columns
 
   bool scanning_ = false;             ///< searching for the next valid records
   std::int64_t wraps_ = 0;            ///< sum of the wraps so far

@@ -55,7 +55,7 @@ bool AedatReader::find_version() {
   else if (version == "3.1")
     reader_ = std::make_unique<DecoderReader>(std::make_unique<Aedat3Decoder>());
   else if (version == "2.0")
-    reader_ = std::make_unique<DecoderReader>(std::make_unique<Aedat2Decoder>());
+    reader_ = std::make_unique<DecoderReader>(std::make_unique<Aedat2Decoder>(assumed_));
   else
     throw UnsupportedFormat("this is AEDAT " + std::string(version) +
                             "; only versions 4.0, 3.1 and 2.0 are supported");

@@ -13,6 +13,9 @@ class Aedat4Decoder;
 /// as a single stream of events (and triggers).
 class AedatReader final : public Reader {
  public:
+  /// `assumed` is the sensor size to use if an AEDAT 2.0 file does not state it.
+  explicit AedatReader(SensorSize assumed = {}) : assumed_(assumed) {}
+
   void push(std::span<const std::uint8_t> piece) override;
   void finish() override;
   bool open(ByteSource& source) override;
@@ -32,6 +35,7 @@ class AedatReader final : public Reader {
  private:
   bool find_version();
 
+  const SensorSize assumed_;
   std::vector<std::uint8_t> start_;  ///< start of the file, collected until its version is known
   bool finished_ = false;
   ByteSource* source_ = nullptr;
