@@ -25,15 +25,14 @@ typedef struct {
 } Reader;
 
 static const Reader readers[] = {
-    {"application/x-prophesee-raw", "evtdec", FALSE},
-    {"application/x-prophesee-dat", "eventdatdec", FALSE},
-    {"application/x-es", "eventesdec", FALSE},
+    {"application/x-prophesee-raw", "evtdec name=reader", FALSE},
+    {"application/x-prophesee-dat", "eventdatdec name=reader", FALSE},
+    {"application/x-es", "eventesdec name=reader", FALSE},
     {"application/x-event-csv", "eventcsvdec name=reader", TRUE},
     {"application/x-npy", "eventnpydec name=reader", TRUE},
     {"application/x-npz", "eventnpzdec name=reader", TRUE},
-    /* Frames in the same file are dropped. */
-    {"application/x-aedat", "aedatdemux name=demuxer demuxer.events_0", FALSE},
-    {"application/x-hdf5", "eventhdf5dec", FALSE},
+    {"application/x-aedat", "aedatdemux name=reader reader.events_0", FALSE},
+    {"application/x-hdf5", "eventhdf5dec name=reader", FALSE},
 };
 
 typedef struct {
@@ -57,7 +56,7 @@ static const Format formats[] = {
     {".npy", "NumPy array", "application/x-npy", "eventnpyenc name=writer ! filesink name=out",
      NULL},
     {".npz", "NumPy archive, read only", "application/x-npz", NULL, NULL},
-    {".aedat4", "AEDAT 4, without its frames", "application/x-aedat",
+    {".aedat4", "AEDAT 4; from AEDAT 4 with its frames", "application/x-aedat",
      "aedatmux name=writer ! filesink name=out", "compression"},
     {".aedat", "AEDAT 2.0 and 3.1, read only", "application/x-aedat", NULL, NULL},
     {".h5", "HDF5, written in the layout of DSEC", "application/x-hdf5",
@@ -258,6 +257,66 @@ static void set_location(GstElement* pipeline, const char* name, const char* pat
   gst_object_unref(element);
 }
 
+/* Links the first video stream of an AEDAT 4 file to a writer that takes it. Runs in the streaming
+ * thread, before data flows. */
+static void link_frames(GstElement* reader, GstPad* pad, gpointer writer) {
+  GstObject* pipeline = gst_element_get_parent(reader);
+  GstElement* queue;
+  GstPad* sink;
+  gchar* name = gst_pad_get_name(pad);
+  if (strcmp(name, "video_0") == 0) {
+    queue = gst_element_factory_make("queue", NULL);
+    gst_bin_add(GST_BIN(pipeline), queue);
+    gst_element_link_pads(queue, "src", GST_ELEMENT(writer), "video");
+    sink = gst_element_get_static_pad(queue, "sink");
+    gst_pad_link(pad, sink);
+    gst_object_unref(sink);
+    gst_element_sync_state_with_parent(queue);
+  }
+  g_free(name);
+  gst_object_unref(pipeline);
+}
+
+/* Lets frames come with the events. The muxer waits for the later of both, so that the queue of
+ * events is limited by time alone: a video stream without frames is half a second behind at most.
+ */
+static void convert_frames(GstElement* pipeline, GstElement* queue) {
+  GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
+  GstElement* writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
+  g_object_set(queue, "max-size-buffers", 0, "max-size-bytes", 0, "max-size-time", 2 * GST_SECOND,
+               NULL);
+  g_signal_connect(reader, "pad-added", G_CALLBACK(link_frames), writer);
+  gst_object_unref(writer);
+  gst_object_unref(reader);
+}
+
+/* Says what of IN is not in OUT. */
+static void print_left_out(GstElement* pipeline) {
+  static const struct {
+    const char* field;
+    const char* name;
+  } kinds[] = {{"frames", "frames"}, {"triggers", "triggers"}, {"imu-samples", "IMU samples"}};
+  GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
+  GstElement* writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
+  GstPad* video = gst_element_get_static_pad(writer, "video");
+  GString* text = g_string_new(NULL);
+  GstStructure* stats = NULL;
+  if (g_object_class_find_property(G_OBJECT_GET_CLASS(reader), "stats") != NULL)
+    g_object_get(reader, "stats", &stats, NULL);
+  for (gsize i = video != NULL ? 1 : 0; stats != NULL && i < G_N_ELEMENTS(kinds); ++i) {
+    guint64 count = 0;
+    if (gst_structure_get_uint64(stats, kinds[i].field, &count) && count > 0)
+      g_string_append_printf(text, "%s%" G_GUINT64_FORMAT " %s", text->len > 0 ? ", " : "", count,
+                             kinds[i].name);
+  }
+  if (text->len > 0) PRINT_ERROR("%sleft out: %s\n", isatty(STDERR_FILENO) ? "\n" : "", text->str);
+  if (stats != NULL) gst_structure_free(stats);
+  g_string_free(text, TRUE);
+  if (video != NULL) gst_object_unref(video);
+  gst_object_unref(writer);
+  gst_object_unref(reader);
+}
+
 /* Runs in the streaming thread, while the main thread prints. */
 static GstPadProbeReturn count_events(GstPad* pad, GstPadProbeInfo* info, gpointer events) {
   (void)pad;
@@ -327,6 +386,7 @@ static gboolean run(GstElement* pipeline, const guint64* events) {
     if (GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS) print_message(message);
     gst_message_unref(message);
   }
+  if (ok) print_left_out(pipeline);
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(bus);
   return ok;
@@ -403,6 +463,9 @@ int main(int argc, char** argv) {
   pad = gst_element_get_static_pad(queue, "src");
   gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_BUFFER, count_events, &events, NULL);
   gst_object_unref(pad);
+  if (strcmp(from->media_type, "application/x-aedat") == 0 &&
+      strcmp(to->media_type, from->media_type) == 0)
+    convert_frames(pipeline, queue);
   gst_object_unref(queue);
 
   signal(SIGINT, interrupt);

@@ -10,6 +10,8 @@
  * A pad takes either, and learns which from its caps: `queue ! mux.` links both. The pads `events`
  * and `video` take one kind, for applications that request pads by name.
  *
+ * Frames of #aedatdemux keep their exposure times and their position on the sensor.
+ *
  * A flushing seek truncates the file and starts over. Events that are earlier than those already
  * written, or outside the sensor, are dropped; a warning says how many.
  *
@@ -313,8 +315,7 @@ static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, By
   if (!state.video) return reject("no caps");
   const VideoFrame video(*state.video, buffer, GST_MAP_READ);
   if (!video) return reject(video.fault().c_str());
-  auto frame = recorded_frame(video.get());
-  frame.t = frame.begin = frame.end = frame.exposure_begin = frame.exposure_end = t;
+  const auto frame = recorded_frame(video.get(), t);
   try {
     state.encoder->encode(frame, out);
   } catch (const std::invalid_argument& error) {

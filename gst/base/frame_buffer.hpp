@@ -14,7 +14,12 @@
 bool frame_video_info(const eventcamera::Frame& frame, GstVideoInfo* info);
 
 /// Returns a new buffer with the pixels of a frame, without timestamps. Throws std::bad_alloc.
+///
+/// What else a recording says of the frame is in a GstCustomMeta named GstEventCameraFrame: begin,
+/// end, exposure-begin and exposure-end (gint64, microseconds after the PTS), and the position of
+/// its upper left corner on the sensor, x and y (gint).
 GstBuffer* frame_buffer(const eventcamera::Frame& frame, const GstVideoInfo* info);
 
-/// View of a mapped video frame of RECORDED_VIDEO_CAPS as a recording's frame, without a time.
-eventcamera::Frame recorded_frame(const GstVideoFrame* video);
+/// View of a mapped video frame of RECORDED_VIDEO_CAPS as a recording's frame at `t`, with what its
+/// GstEventCameraFrame says, if it has one.
+eventcamera::Frame recorded_frame(const GstVideoFrame* video, eventcamera::Microseconds t);

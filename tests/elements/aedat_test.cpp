@@ -893,6 +893,41 @@ TEST(AedatMux, KeepsTheTimesOfAFile) {
   EXPECT_TRUE(after.pictures == before.pictures);
 }
 
+TEST(AedatMux, KeepsTheExposureTimesOfFrames) {
+  const auto events = steady_events(100'000, 70, of_1970);
+  const Bytes pixels(5 * 3, 7);
+  const auto t = of_1970 + 50'123;
+  Aedat4Encoder encoder({sensor, "", Aedat4Compression::none, true, true});
+  Bytes bytes;
+  encoder.encode(events, bytes);
+  encoder.encode(Frame{t, t - 900, t + 40, t - 800, t - 300, PixelFormat::grey8, 5, 3, 17, 11,
+                       pixels.data(), 5},
+                 bytes);
+  const File in(finished(encoder, bytes));
+  const File out{Bytes{}};
+  ASSERT_TRUE(run("filesrc location=" + in_quotes(in.path()) +
+                  " ! aedatdemux name=d  d.events_0 ! queue ! m.  d.video_0 ! queue ! m.  aedatmux "
+                  "name=m ! filesink location=" +
+                  in_quotes(out.path())));
+  const auto copy = out.bytes();
+  Aedat4Decoder decoder;
+  decoder.push(copy);
+  int frames = 0;
+  while (const auto item = decoder.next()) {
+    const auto* const some = std::get_if<FrameItem>(&*item);
+    if (some == nullptr) continue;
+    ++frames;
+    EXPECT_EQ(some->frame.t, t);
+    EXPECT_EQ(some->frame.begin, t - 900);
+    EXPECT_EQ(some->frame.end, t + 40);
+    EXPECT_EQ(some->frame.exposure_begin, t - 800);
+    EXPECT_EQ(some->frame.exposure_end, t - 300);
+    EXPECT_EQ(some->frame.x, 17);
+    EXPECT_EQ(some->frame.y, 11);
+  }
+  EXPECT_EQ(frames, 1);
+}
+
 TEST(AedatMux, LearnsFromItsCapsWhatComesToAPad) {
   const auto events = steady_events(300'000, 70, of_1970 + 123'457);
   const File in(aedat4_with_frames(events, PixelFormat::grey8, 5));

@@ -160,6 +160,19 @@ for file in picture.png video.mp4 sound.wav words.txt numbers.txt comments.m "$S
   fi
 done
 
+# Frames come along where they can; what is left out is said.
+timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=framed.aedat4
+convert framed.aedat4 framed.csv 2>left-out
+grep -qx "left out: 40 frames" left-out || fail "frames are left out: $(cat left-out)"
+convert framed.aedat4 again.aedat4 2>left-out
+if grep "left out" left-out; then fail "frames are left out of an AEDAT 4 file"; fi
+for file in framed.aedat4 again.aedat4; do
+  timeout 60 "$GST_LAUNCH" -q filesrc location=$file ! aedatdemux name=d  d.video_0 ! queue ! filesink location=$file.frames
+done
+cmp framed.aedat4.frames again.aedat4.frames || fail "again.aedat4 has other frames"
+convert again.aedat4 again.csv
+cmp framed.csv again.csv || fail "again.aedat4 has other events"
+
 # Errors say what is wrong.
 refused() { # WORDS ARGUMENT...
   local words=$1
@@ -249,5 +262,6 @@ for ending in aedat4 h5 hdf5; do
   counted 343474 recorded.raw
   cmp as-recorded.csv counted.csv || fail "as $ending the recording has other times"
 done
-counted 117667 "$recordings/davis346-frames-events-imu.aedat4"
+counted 117667 "$recordings/davis346-frames-events-imu.aedat4" 2>left-out
+grep -qx "left out: 3 frames, 15 triggers, 130 IMU samples" left-out || fail "the user is told: $(cat left-out)"
 echo "all files were read and written"
