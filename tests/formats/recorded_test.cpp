@@ -107,6 +107,8 @@ TEST(Recorded, WrittenAgainInEveryFormatIsTheSame) {
       const auto bytes = recordings::encode(*encoder, events);
       if (format == EvtFormat::evt3) {
         EXPECT_EQ(evt_validator::evt3(bytes, decoder->size()), "");
+      } else if (format == EvtFormat::evt4) {
+        EXPECT_EQ(evt_validator::evt4(bytes, decoder->size()), "");
       }
       EXPECT_EQ(recordings::decode(*make_evt_decoder(format, decoder->size()), bytes).events,
                 events);

@@ -109,7 +109,14 @@ auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces piece
   require(decoded.events.size() + decoded.triggers.size() <= bytes.size() * events_per_byte,
           "memory is bounded");
   require_within(decoder->size(), decoded.events);
-  if (error.empty() && pieces.longest == 0) require_restarts(*decoder, bytes, decoded);
+  if (error.empty() && pieces.longest == 0) {
+    MemoryBytes file({bytes.begin(), bytes.end()});
+    Decoded tail;
+    decoder->decode_tail(file, tail);
+    require(tail.events.size() <= decoded.events.size(), "the tail is a part of the file");
+    require_within(decoder->size(), tail.events);
+    require_restarts(*decoder, bytes, decoded);
+  }
   return std::tuple(decoded.events, decoded.triggers, error, decoder->size(), corruption.places,
                     corruption.first_at, corruption.first, corruption.unsorted, corruption.outside);
 }
