@@ -185,7 +185,7 @@ refused "Cannot read" words.txt words.raw
 cp words.txt words.raw
 refused "Cannot read" words.raw out.dat
 refused "unknown extension" ball.raw ball.mp3
-refused "choose one of EVT2 EVT21 EVT3 EVT4" ball.raw other.raw --format=EVT5
+refused "choose one of EVT2 EVT21 EVT2.1 EVT3 EVT4" ball.raw other.raw --format=EVT5
 refused "does not apply to .dat" ball.raw ball.dat --dialect=rpg
 refused "can only be read" ball.raw ball.aedat
 refused "can only be read" ball.raw ball.npz
