@@ -32,6 +32,9 @@ class WordWriter {
     used_ += sizeof word;
   }
 
+  /// Size of the byte vector with all words so far.
+  std::size_t size() const { return used_; }
+
  private:
   std::vector<std::uint8_t>& out_;
   std::size_t used_;

@@ -11,6 +11,7 @@
 #include "tests/formats/recordings.hpp"
 #include "tests/fuzz/aedat_seeds.hpp"
 #include "tests/fuzz/table_seeds.hpp"
+#include "tests/wire/rtp_packets.hpp"
 
 namespace {
 
@@ -38,6 +39,29 @@ std::vector<Seed> chunker_seeds() {
     for (std::uint8_t i = 0; i < 24; ++i)
       seed.bytes.insert(seed.bytes.end(),
                         {shift, 9, 0, static_cast<std::uint8_t>(i % 6 < 4 ? 3 : i % 6 - 4)});
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
+/// For rtp_fuzz: streams of both formats.
+std::vector<Seed> rtp_seeds() {
+  constexpr SensorSize size{640, 480};
+  std::vector<Seed> seeds;
+  for (unsigned i = 0; i < 20; ++i) {
+    const auto format = i % 2 == 0 ? RtpEventFormat::evt3 : RtpEventFormat::xytp;
+    Seed seed{"stream-" + std::to_string(i), {static_cast<std::uint8_t>(i % 2)}};
+    RtpPacker packer(size, format);
+    auto intervals = rtp_packets::random_intervals(size, 3, i);
+    for (auto& interval : intervals)
+      interval.events.resize(std::min<std::size_t>(interval.events.size(), 5 * i));
+    for (const auto& packet : rtp_packets::packets_of(intervals, packer, 100, 1)) {
+      const auto length = static_cast<std::uint8_t>(packet.payload.size());
+      seed.bytes.insert(seed.bytes.end(),
+                        {static_cast<std::uint8_t>(packet.marker ? 1 : 0),
+                         static_cast<std::uint8_t>(packet.sequence_number), 0, length});
+      seed.bytes.insert(seed.bytes.end(), packet.payload.begin(), packet.payload.end());
+    }
     seeds.push_back(seed);
   }
   return seeds;
@@ -78,6 +102,7 @@ int main(int argc, char** argv) {
   write(corpus / "hdf5_chunk", hdf5_chunk_seeds());
   write(corpus / "hdf5_filters", hdf5_filters_seeds());
   write(corpus / "chunker", chunker_seeds());
+  write(corpus / "rtp", rtp_seeds());
 
   // Typefinders may see any of them.
   std::vector<Seed> all;

@@ -3,27 +3,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "src/formats/evt/evt3_words.hpp"
 #include "src/formats/evt/words.hpp"
 #include "src/formats/time_base.hpp"
-#include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
 namespace {
 
-enum Type : std::uint32_t {
-  addr_y = 0x0,
-  em_addr_y = 0x1,
-  addr_x = 0x2,
-  vect_base_x = 0x3,
-  vect_12 = 0x4,
-  vect_8 = 0x5,
-  time_low = 0x6,
-  continued_4 = 0x7,
-  time_high = 0x8,
-  ext_trigger = 0xa,
-  others = 0xe,
-  continued_12 = 0xf,
-};
+using namespace evt3;
 
 constexpr std::uint32_t polarity_bit = 0x800;
 
@@ -182,106 +169,38 @@ class Evt3Reader final : public UnitReader {
   std::uint32_t polarity_ = 0;  // polarity of vectors
 };
 
-/// Restricted to what all known readers interpret equally: vectors are complete (VECT_BASE_X,
-/// VECT_12, VECT_12, VECT_8) and within the sensor, every TIME_HIGH is followed by a TIME_LOW, and
-/// there is a TIME_HIGH every 4096 microseconds, including pauses.
 class Evt3Encoder final : public Encoder {
  public:
   Evt3Encoder(SensorSize size, std::string header)
-      : Encoder(std::move(header)), width_(static_cast<std::uint32_t>(size.width)) {}
+      : Encoder(std::move(header)), state_(size.width) {}
 
   std::uint64_t left_out() const override { return gaps_.left_out(); }
 
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
     const auto write = [&](std::span<const AbsoluteEvent> few, WordWriter<std::uint16_t>& words) {
-      for (std::size_t i = 0; i < few.size();) {
-        const auto& event = few[i];
-        reach(event.t, words);
-        const auto polarity = static_cast<std::uint32_t>(event.y_p & 0x8000) >> 4;
-        if (const auto y = static_cast<std::uint32_t>(event.y()) & 0x7ff; y != y_) {
-          words.put(word(addr_y, y));
-          y_ = y;
-        }
-        if (const auto vector = vector_at(few, i); vector.events != 0) {
-          words.put(word(vect_base_x, vector.base | polarity));
-          words.put(word(vect_12, vector.mask & 0xfff));
-          words.put(word(vect_12, vector.mask >> 12 & 0xfff));
-          words.put(word(vect_8, vector.mask >> 24));
-          i += vector.events;
-        } else {
-          words.put(word(addr_x, (event.x & 0x7ff) | polarity));
-          ++i;
-        }
+      while (!few.empty()) {
+        const auto time = written(few.front().t, words);
+        few = few.subspan(state_.write(few, time, words));
       }
     };
     write_events<std::uint16_t>(events, words_at_once, out, write);
   }
 
   static constexpr std::size_t words_at_once = 4 * events_at_once;
-  static constexpr std::uint32_t none = ~std::uint32_t{0};
-  static constexpr std::uint64_t max_steps = (GapLimiter::max_gap >> 12) + 2;
 
-  struct Vector {
-    std::size_t events = 0;  ///< 0: a vector does not pay off
-    std::uint32_t base = 0;
-    std::uint32_t mask = 0;
-  };
-
-  static constexpr std::uint16_t word(std::uint32_t type, std::uint32_t payload) {
-    return static_cast<std::uint16_t>(type << 12 | payload);
+  /// Returns the time to write, after reserving space for the words of a pause.
+  std::uint64_t written(Microseconds t, WordWriter<std::uint16_t>& words) {
+    const auto time = gaps_.written(t);
+    if (state_.steps_to(time) == 0) return time;
+    gaps_.reach(t);
+    const auto steps = state_.steps_to(gaps_.written(t));
+    if (steps > 1 && steps <= Evt3Words::max_steps) words.reserve(steps + words_at_once);
+    return gaps_.written(t);
   }
 
-  void reach(Microseconds t, WordWriter<std::uint16_t>& words) {
-    auto time = gaps_.written(t);
-    if (time >> 12 != high_) {
-      gaps_.reach(t);
-      time = gaps_.written(t);
-      // Write every TIME_HIGH from 0 on, because readers count wraps by them.
-      const auto steps = (time >> 12) - high_;
-      if (steps > 1 && steps <= max_steps) {
-        words.reserve(steps + words_at_once);
-        while (++high_ != time >> 12) words.put(high_word(high_));
-      }
-      high_ = time >> 12;
-      words.put(high_word(high_));
-      low_ = none;
-    }
-    if (const auto low = static_cast<std::uint32_t>(time) & 0xfff; low != low_) {
-      words.put(word(time_low, low));
-      low_ = low;
-    }
-  }
-
-  static constexpr std::uint16_t high_word(std::uint64_t high) {
-    return word(time_high, static_cast<std::uint32_t>(high) & 0xfff);
-  }
-
-  /// Returns the events from `first` on that fit into one vector.
-  Vector vector_at(std::span<const AbsoluteEvent> events, std::size_t first) const {
-    // A vector takes four words, like four events.
-    constexpr std::size_t least = 5;
-    if (width_ < 32 || first + least > events.size()) return {};
-    const auto& event = events[first];
-    const auto base = std::min<std::uint32_t>(event.x, width_ - 32);
-    const auto fits = [&](const AbsoluteEvent& next) {
-      return next.t == event.t && next.y_p == event.y_p && next.x - base < 32;
-    };
-    if (event.x - base >= 32 || !fits(events[first + least - 1])) return {};
-    Vector vector{1, base, std::uint32_t{1} << (event.x - base)};
-    for (auto i = first + 1; i < events.size() && fits(events[i]); ++i) {
-      if (events[i].x <= events[i - 1].x) break;
-      vector.mask |= std::uint32_t{1} << (events[i].x - base);
-      ++vector.events;
-    }
-    return vector.events >= least ? vector : Vector{};
-  }
-
-  std::uint32_t width_;
+  Evt3Words state_;
   GapLimiter gaps_;
-  std::uint64_t high_ = ~std::uint64_t{0};  // one before 0
-  std::uint32_t low_ = none;
-  std::uint32_t y_ = none;
 };
 
 }  // namespace

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "src/formats/decoder.hpp"
+#include "src/formats/unit_reader.hpp"
+#include "src/wire/rtp_payload.hpp"
+
+namespace eventcamera {
+
+/// What the unpacker needs of an RTP packet.
+struct RtpPacket {
+  std::uint32_t ssrc;
+  std::uint16_t sequence_number;
+  bool marker;  ///< last packet of its interval
+  std::span<const std::uint8_t> payload;
+};
+
+/// An interval and those of its events that arrived.
+struct RtpInterval {
+  Nanoseconds start;
+  Nanoseconds duration;
+  std::span<const Event> events;  ///< relative to `start`, rounded down to microseconds
+  bool is_discontinuous;          ///< packets were lost before or in it, or the stream starts over
+};
+
+/// Counters of a receiver. Events sent - events = lost_events, once a later packet has arrived.
+struct RtpStatistics {
+  std::uint64_t packets = 0;           ///< valid and in order
+  std::uint64_t bytes = 0;             ///< their payloads
+  std::uint64_t events = 0;            ///< received
+  std::uint64_t lost_packets = 0;      ///< by sequence number
+  std::uint64_t lost_events = 0;       ///< by event number
+  std::uint64_t late_packets = 0;      ///< duplicate, or after a later one; dropped
+  std::uint64_t rejected_packets = 0;  ///< not of this format or sensor, or corrupt; dropped
+};
+
+/// Decodes the payloads of RTP packets, and joins the packets of each interval. Drops packets that
+/// are late, so that every interval and event is in the sender's order, and packets that are not
+/// valid in every detail.
+class RtpUnpacker {
+ public:
+  RtpUnpacker(SensorSize sensor, RtpEventFormat format);
+
+  /// Calls take(RtpInterval) for each interval that ends with this packet or ended before it. The
+  /// events are valid during the call only.
+  template <class Take>
+  void push(const RtpPacket& packet, const Take& take) {
+    const auto header = accept(packet);
+    if (!header) return;
+    if (!is_of_interval(packet, *header)) flush(take);
+    append(packet, *header);
+    if (packet.marker) flush(take);
+  }
+
+  /// Ends the current interval, if any.
+  template <class Take>
+  void flush(const Take& take) {
+    if (!interval_) return;
+    take(RtpInterval{interval_->start, interval_->duration, events_, is_discontinuous_});
+    close_interval();
+  }
+
+  /// Forgets the stream; the next packet starts a new one. The statistics go on.
+  void reset();
+
+  /// True if a packet may be one of this format: a quick check of its header.
+  bool is_plausible(std::span<const std::uint8_t> payload) const;
+
+  const RtpStatistics& statistics() const { return statistics_; }
+  void count_rejected() { ++statistics_.rejected_packets; }
+
+ private:
+  /// Position in the stream of a sender.
+  struct Position {
+    std::uint32_t ssrc;
+    std::uint16_t next_sequence_number;
+    std::uint32_t next_event;
+  };
+
+  /// Decodes the events of a packet, and returns its header; none if the packet is late or corrupt.
+  std::optional<RtpPayloadHeader> accept(const RtpPacket& packet);
+  bool is_late(const RtpPacket& packet);
+  bool is_of_interval(const RtpPacket& packet, const RtpPayloadHeader& header) const;
+  bool decode(const RtpPayloadHeader& header, std::span<const std::uint8_t> body);
+  bool decode_evt3(const RtpPayloadHeader& header, std::span<const std::uint8_t> words);
+  bool decode_xytp(const RtpPayloadHeader& header, std::span<const std::uint8_t> body);
+  bool decode(const RtpPayloadHeader& header, std::uint64_t t, std::uint16_t x, std::uint16_t y_p);
+  /// Adds the decoded events to the interval.
+  void append(const RtpPacket& packet, const RtpPayloadHeader& header);
+  /// Counts what was lost before a packet.
+  void follow(const RtpPacket& packet, const RtpPayloadHeader& header);
+  void close_interval();
+
+  SensorSize sensor_;
+  RtpEventFormat format_;
+  std::unique_ptr<UnitReader> reader_;  ///< of EVT3 words
+  std::unique_ptr<Batch> batch_;
+  Corruption corruption_;          ///< of the current packet
+  std::vector<Trigger> triggers_;  ///< of the current packet
+  std::vector<Event> decoded_;     ///< of the current packet
+
+  std::optional<Position> position_;
+  std::uint16_t next_late_ = 0;  ///< sequence number that continues the last late packet
+  int late_in_a_row_ = 0;
+  std::optional<RtpPayloadHeader> interval_;  ///< header of the current interval's first packet
+  std::vector<Event> events_;                 ///< of the current interval
+  Nanoseconds end_ = 0;                       ///< of the last interval
+  bool is_discontinuous_ = true;
+  RtpStatistics statistics_;
+};
+
+}  // namespace eventcamera

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "src/wire/pending_interval.hpp"
+#include "tests/wire/rtp_packets.hpp"
+
+namespace eventcamera {
+namespace {
+
+using namespace rtp_packets;
+
+constexpr SensorSize davis{346, 260};
+
+/// Payload sizes of MTUs of 576, 1500 and 9000 bytes, and the minimum.
+constexpr std::size_t max_sizes[] = {RtpPacker::min_size, 576 - 40, 1500 - 40, 9000 - 40};
+
+/// A receiver, and the intervals that it got.
+struct Receiver {
+  explicit Receiver(SensorSize size, RtpEventFormat format) : unpacker(size, format) {}
+
+  void push(const RtpPacket& packet) {
+    unpacker.push(packet, [this](const RtpInterval& interval) { take(interval); });
+  }
+  void push(const Packet& packet) { push(packet.view()); }
+  void push(const std::vector<Packet>& packets) {
+    for (const auto& packet : packets) push(packet);
+  }
+  void finish() {
+    unpacker.flush([this](const RtpInterval& interval) { take(interval); });
+  }
+
+  void take(const RtpInterval& interval) {
+    intervals.push_back(
+        {interval.start, interval.duration, {interval.events.begin(), interval.events.end()}});
+    discontinuities += interval.is_discontinuous ? 1 : 0;
+  }
+
+  RtpUnpacker unpacker;
+  std::vector<Interval> intervals;
+  int discontinuities = 0;
+};
+
+std::vector<AbsoluteEvent> events_of(const std::vector<Interval>& intervals) {
+  std::vector<AbsoluteEvent> events;
+  for (const auto& [start, duration, some] : intervals)
+    for (const auto& event : some) events.push_back({start / 1000 + event.t, event.x, event.y_p});
+  return events;
+}
+
+/// True if all of `some` are in `all`, in the same order.
+bool is_part(const std::vector<AbsoluteEvent>& some, const std::vector<AbsoluteEvent>& all) {
+  auto next = all.begin();
+  for (const auto& event : some) {
+    next = std::find(next, all.end(), event);
+    if (next == all.end()) return false;
+    ++next;
+  }
+  return true;
+}
+
+class EveryFormat : public testing::TestWithParam<RtpEventFormat> {};
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::Values(RtpEventFormat::evt3, RtpEventFormat::xytp),
+                         [](const auto& param) {
+                           return param.param == RtpEventFormat::evt3 ? "Evt3" : "Xytp";
+                         });
+
+TEST_P(EveryFormat, GivesBackEveryIntervalOfAnySensorInPacketsOfAnySize) {
+  unsigned seed = 0;
+  for (const SensorSize size :
+       {SensorSize{1, 1}, {7, 3}, {31, 2}, {33, 1}, davis, {1280, 720}, {2048, 2048}}) {
+    for (const auto max_size : max_sizes) {
+      const auto intervals = random_intervals(size, 20, ++seed);
+      RtpPacker packer(size, GetParam());
+      const auto packets = packets_of(intervals, packer, max_size, 65500);
+      for (const auto& packet : packets) ASSERT_LE(packet.payload.size(), max_size);
+      Receiver receiver(size, GetParam());
+      receiver.push(packets);
+      ASSERT_EQ(receiver.intervals, intervals) << size.width << "x" << size.height;
+      EXPECT_EQ(receiver.discontinuities, 1);  // the first
+      const auto& statistics = receiver.unpacker.statistics();
+      EXPECT_EQ(statistics.packets, packets.size());
+      EXPECT_EQ(statistics.events, packer.next_event());
+      EXPECT_EQ(statistics.lost_events + statistics.lost_packets + statistics.rejected_packets, 0U);
+    }
+  }
+}
+
+TEST_P(EveryFormat, FillsPackets) {
+  std::vector<Event> events;
+  for (std::uint32_t i = 0; i < 100'000; ++i)
+    events.push_back(Event::at(static_cast<int>(i * 7919 % 346), static_cast<int>(i * 104729 % 260),
+                               i / 4, i % 2 == 0 ? Polarity::on : Polarity::off));
+  RtpPacker packer(davis, GetParam());
+  std::size_t packets = 0;
+  std::size_t bytes = 0;
+  packer.pack(0, 40'000'000, events, 1460, [&](std::span<const std::uint8_t> payload, bool) {
+    ++packets;
+    bytes += payload.size();
+  });
+  EXPECT_GT(bytes, 1440 * (packets - 1));
+  EXPECT_LT(bytes, events.size() * (GetParam() == RtpEventFormat::evt3 ? 6 : 9));
+}
+
+TEST_P(EveryFormat, EveryPacketIsDecodedByItself) {
+  const auto intervals = random_intervals(davis, 20, 1);
+  const auto sent = events_of(intervals);
+  RtpPacker packer(davis, GetParam());
+  for (const auto& packet : packets_of(intervals, packer, 536, 0)) {
+    Receiver receiver(davis, GetParam());
+    receiver.push(packet);
+    receiver.finish();
+    ASSERT_EQ(receiver.intervals.size(), 1U);
+    const auto header = RtpPayloadHeader::read(packet.payload);
+    const auto events = events_of(receiver.intervals);
+    ASSERT_TRUE(std::equal(events.begin(), events.end(), sent.begin() + header->first_event));
+    ASSERT_EQ(events.size(), header->event_count);
+  }
+}
+
+TEST_P(EveryFormat, CountsWhatIsLostReorderedOrDuplicated) {
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    std::mt19937 random(seed);
+    const auto happens = [&](int percent) { return static_cast<int>(random() % 100) < percent; };
+    const auto intervals = random_intervals(davis, 30, seed);
+    RtpPacker packer(davis, GetParam());
+    const auto sent = packets_of(intervals, packer, 536, 65000);
+    const int loss = std::array{0, 1, 5, 20}[seed % 4];
+    std::vector<Packet> arriving;
+    std::set<std::uint16_t> arrived;
+    for (std::size_t i = 0; i + 1 < sent.size(); ++i) {
+      if (i > 0 && happens(loss)) continue;
+      arriving.push_back(sent[i]);
+      if (happens(5)) arriving.push_back(sent[i]);
+      if (i > 0 && arriving.size() > 9 && happens(5))
+        std::swap(arriving.back(), arriving[arriving.size() - 2 - random() % 6]);
+    }
+    arriving.push_back(sent.back());
+    Receiver receiver(davis, GetParam());
+    receiver.push(arriving);
+    const auto& statistics = receiver.unpacker.statistics();
+    const auto events = events_of(receiver.intervals);
+    ASSERT_TRUE(is_part(events, events_of(intervals)));
+    EXPECT_EQ(statistics.events, events.size());
+    const auto first = RtpPayloadHeader::read(arriving.front().payload)->first_event;
+    EXPECT_EQ(packer.next_event() - first - events.size(), statistics.lost_events);
+    EXPECT_EQ(statistics.packets + statistics.late_packets, arriving.size());
+    EXPECT_EQ(statistics.rejected_packets, 0U);
+    EXPECT_EQ(receiver.discontinuities > 1, statistics.lost_packets > 0);
+  }
+}
+
+TEST_P(EveryFormat, AReceiverThatJoinsLateHasLostNothing) {
+  const auto intervals = random_intervals(davis, 20, 5);
+  RtpPacker packer(davis, GetParam());
+  auto packets = packets_of(intervals, packer, 536, 7);
+  packets.erase(packets.begin(), packets.begin() + 10);
+  Receiver receiver(davis, GetParam());
+  receiver.push(packets);
+  EXPECT_EQ(receiver.unpacker.statistics().lost_events, 0U);
+  EXPECT_EQ(receiver.unpacker.statistics().lost_packets, 0U);
+}
+
+TEST_P(EveryFormat, FollowsASenderThatRestarts) {
+  const auto intervals = random_intervals(davis, 60, 6);
+  for (const std::uint32_t ssrc : {1U, 2U}) {
+    RtpPacker first(davis, GetParam());
+    RtpPacker second(davis, GetParam());
+    Receiver receiver(davis, GetParam());
+    receiver.push(packets_of(intervals, first, 536, 30000));
+    const auto before = receiver.unpacker.statistics();
+    const auto again = packets_of(intervals, second, 536, 10000);
+    ASSERT_GT(again.size(), 30U);
+    for (const auto& packet : again) receiver.push(packet.view(ssrc));
+    // With a new SSRC at once, else after a few packets that look late.
+    const auto& after = receiver.unpacker.statistics();
+    EXPECT_EQ(after.late_packets, ssrc == 1 ? 15U : 0U);
+    EXPECT_EQ(after.packets - before.packets, again.size() - after.late_packets);
+    EXPECT_EQ(after.lost_events, 0U);
+    EXPECT_EQ(receiver.discontinuities, 2);
+  }
+}
+
+TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
+  const auto intervals = random_intervals(davis, 20, 8);
+  RtpPacker packer(davis, GetParam());
+  Receiver receiver(davis, GetParam());
+  std::mt19937 random(1);
+  std::uint64_t flood = 0;
+  for (const auto& packet : packets_of(intervals, packer, 536, 7)) {
+    for (int i = 0; i < 100; ++i, ++flood) {
+      Packet noise{static_cast<std::uint16_t>(random()), random() % 2 == 0, {}};
+      noise.payload.resize(random() % 600);
+      for (auto& byte : noise.payload) byte = static_cast<std::uint8_t>(random());
+      // Half of it has a valid header.
+      if (i % 2 == 0 && noise.payload.size() >= RtpPayloadHeader::size)
+        std::copy_n(packet.payload.begin(), RtpPayloadHeader::size, noise.payload.begin());
+      receiver.push(noise.view(i % 4 == 0 ? 1 : random()));
+    }
+    receiver.push(packet);
+  }
+  const auto& statistics = receiver.unpacker.statistics();
+  EXPECT_EQ(receiver.intervals, intervals);
+  EXPECT_EQ(statistics.rejected_packets + statistics.late_packets, flood);
+  EXPECT_EQ(statistics.lost_events, 0U);
+}
+
+TEST_P(EveryFormat, RejectsTruncatedPacketsUnlessTheyAreWhole) {
+  const auto intervals = random_intervals(davis, 4, 9);
+  RtpPacker packer(davis, GetParam());
+  for (const auto& packet : packets_of(intervals, packer, 536, 7)) {
+    Receiver whole(davis, GetParam());
+    whole.push(packet);
+    whole.finish();
+    for (std::size_t size = 0; size < packet.payload.size(); ++size) {
+      Receiver receiver(davis, GetParam());
+      auto view = packet.view();
+      view.payload = view.payload.first(size);
+      receiver.push(view);
+      receiver.finish();
+      // The last word of a vector may have no events.
+      if (receiver.intervals != whole.intervals) {
+        ASSERT_TRUE(receiver.intervals.empty());
+        ASSERT_EQ(receiver.unpacker.statistics().rejected_packets, 1U) << size;
+      }
+    }
+  }
+}
+
+TEST_P(EveryFormat, RejectsEventsOutsideItsSensorOrInterval) {
+  const std::vector<Event> events = {Event::at(5, 6, 10, Polarity::on)};
+  const auto rejected = [&](SensorSize receiver, std::size_t byte, std::uint8_t value) {
+    RtpPacker packer(davis, GetParam());
+    std::vector<std::uint8_t> payload;
+    packer.pack(0, 20'000, events, 536,
+                [&](auto bytes, bool) { payload.assign(bytes.begin(), bytes.end()); });
+    if (byte > 0) payload[byte] = value;
+    RtpUnpacker unpacker(receiver, GetParam());
+    unpacker.push({1, 2, true, payload}, [](const RtpInterval&) {});
+    return unpacker.statistics().rejected_packets;
+  };
+  EXPECT_EQ(rejected(davis, 0, 0), 0U);
+  EXPECT_EQ(rejected({6, 7}, 0, 0), 0U);
+  EXPECT_EQ(rejected({5, 7}, 0, 0), 1U);
+  EXPECT_EQ(rejected({6, 6}, 0, 0), 1U);
+  EXPECT_EQ(rejected(davis, 1, 1), 1U);      // reserved
+  EXPECT_EQ(rejected(davis, 3, 2), 1U);      // number of events
+  EXPECT_EQ(rejected(davis, 8, 0x80), 1U);   // start
+  EXPECT_EQ(rejected(davis, 16, 0x01), 1U);  // duration
+  EXPECT_EQ(rejected(davis, 26, 0x01), 1U);  // base
+}
+
+TEST(RtpPacker, RefusesWhatItCannotSend) {
+  EXPECT_THROW(RtpPacker({2049, 1}, RtpEventFormat::evt3), std::invalid_argument);
+  RtpPacker packer({16384, 16384}, RtpEventFormat::xytp);
+  EXPECT_THROW(packer.pack(0, 1, {}, RtpPacker::min_size - 1, [](auto, bool) {}),
+               std::invalid_argument);
+}
+
+TEST(PendingInterval, JoinsIntervals) {
+  PendingInterval pending(davis);
+  const auto none = [] { FAIL(); };
+  pending.add(1'500, 3'400, std::vector{Event::at(1, 2, 1, Polarity::on)}, none);
+  pending.add(3'400, 5'000, std::vector{Event::at(3, 4, 1, Polarity::off)}, none);
+  EXPECT_EQ(pending.start(), 1'500);
+  EXPECT_EQ(pending.end(), 5'000);
+  const std::vector expected = {Event::at(1, 2, 1, Polarity::on),
+                                Event::at(3, 4, 3, Polarity::off)};
+  EXPECT_TRUE(std::ranges::equal(pending.events(), expected));
+  pending.clear();
+  EXPECT_TRUE(pending.empty());
+}
+
+TEST(PendingInterval, LeavesOutWhatIsOutsideOrUnsorted) {
+  PendingInterval pending(davis);
+  const std::vector events = {
+      Event::at(0, 0, 5, Polarity::on),   Event::at(346, 0, 5, Polarity::on),
+      Event::at(0, 260, 5, Polarity::on), Event::at(0, 0, 4, Polarity::on),
+      Event::at(1, 0, 10, Polarity::on),  Event::at(1, 0, 11, Polarity::on)};
+  const auto left_out = pending.add(0, 10'000, events, [] { FAIL(); });
+  EXPECT_EQ(left_out.outside, 2U);
+  EXPECT_EQ(left_out.unsorted, 2U);
+  const std::vector expected = {events[0], events[4]};
+  EXPECT_TRUE(std::ranges::equal(pending.events(), expected));
+}
+
+TEST(PendingInterval, SplitsLongIntervals) {
+  constexpr std::size_t count = 2 * max_rtp_interval_events + 5;
+  std::vector<Event> events;
+  for (std::size_t i = 0; i < count; ++i)
+    events.push_back(
+        Event::at(static_cast<int>(i % 346), 1, static_cast<std::uint32_t>(i / 100), Polarity::on));
+  PendingInterval pending(davis);
+  std::vector<Interval> intervals;
+  const auto flush = [&] {
+    intervals.push_back({pending.start(),
+                         pending.end() - pending.start(),
+                         {pending.events().begin(), pending.events().end()}});
+    pending.clear();
+  };
+  const Interval whole{700, 40'000'000, events};
+  pending.add(whole.start, whole.start + whole.duration, events, flush);
+  flush();
+  EXPECT_EQ(intervals.size(), 3U);
+  EXPECT_EQ(events_of(intervals), events_of({whole}));
+  Nanoseconds end = whole.start;
+  for (const auto& interval : intervals) {
+    EXPECT_EQ(interval.start, end);
+    EXPECT_LE(interval.events.size(), max_rtp_interval_events);
+    end += interval.duration;
+  }
+  EXPECT_EQ(end, whole.start + whole.duration);
+}
+
+}  // namespace
+}  // namespace eventcamera
