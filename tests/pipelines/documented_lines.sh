@@ -7,6 +7,7 @@ source "$SOURCE/tests/pipelines/scratch_folder.sh"
 export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
 cp "$SOURCE/pipelines/events_to_numpy.py" pipelines/
+ln -s "$SOURCE/pipelines/web_events.py" pipelines/web-events
 
 # The files that the lines read.
 ball="videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=I420,framerate=25/1"
@@ -23,7 +24,9 @@ while IFS= read -r line; do
   line=${line//num-buffers=300/num-buffers=40}
   line=${line//pattern=ball foreground/pattern=ball num-buffers=40 foreground}
   line=${line//autovideosink/fakesink}
+  line=${line// --device \/dev\/video0/ --port 0}
   case $line in
+    ./pipelines/web-events*) line="timeout --preserve-status --signal INT 20 $line" ;; # serves until Ctrl-C
     gst-play*) line="$line --no-interactive --videosink=fakesink" ;;
     event-calibrate*) # one and a half seconds are enough
       line=${line/--to 2 --measure-from 2 --measure-to 10/--to 0.3 --measure-from 0.3 --measure-to 1}
@@ -33,7 +36,7 @@ while IFS= read -r line; do
   echo "$line"
   eval "timeout 120 $line" >output 2>&1 </dev/null || fail "$(cat output)"
   count=$((count + 1))
-done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|event-|\.\/pipelines\/events_)/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
+done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|event-|\.\/pipelines\/(events_|web-events))/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
 [ $count -ge 18 ] || fail "found only $count lines"
 for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy; do
   [ -s $file ] || fail "$file is missing or empty"

@@ -1,0 +1,270 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Serves a page that shows the events of a camera live, with the event rate beside them; any number
+of browsers can watch. Ctrl-C ends it.
+
+    web-events --device /dev/video0
+
+Without --device it shows a test scene. Only browsers on this machine are served, unless --address
+is given: 0.0.0.0 serves whoever reaches this machine, without a password."""
+import argparse
+import ipaddress
+import json
+import os
+import socket
+import sys
+from urllib.parse import urlsplit
+
+try:
+    import gi
+
+    gi.require_version("Gst", "1.0")
+    gi.require_version("GstSdp", "1.0")
+    gi.require_version("GstVideo", "1.0")
+    gi.require_version("GstWebRTC", "1.0")
+    gi.require_version("Soup", "3.0")
+    from gi.repository import Gio, GLib, Gst, GstSdp, GstVideo, GstWebRTC, Soup
+except (ImportError, ValueError) as missing:
+    sys.exit(f"error: {missing}\nOn Debian, run: ./install-packages run web")
+
+from capture import Capture  # noqa: E402
+
+PAGE = os.path.join(os.path.dirname(os.path.realpath(__file__)), "web_events.html")
+ELEMENTS = ["eventstats", "eventrender", "vp8enc", "rtpvp8pay", "webrtcbin", "nicesink", "dtlssrtpenc"]
+
+DRAW_AND_ENCODE = (
+    "{simulator} ! application/x-event-camera ! eventstats interval=500000000 ! eventrender"
+    " ! video/x-raw,framerate=30/1 ! videoconvert ! queue leaky=downstream max-size-buffers=2"
+    " ! vp8enc name=encoder deadline=1 cpu-used=8 threads=2 target-bitrate=4000000"
+    " keyframe-max-dist=3600 ! appsink name=encoded emit-signals=true sync=false")
+# A browser that is too slow loses frames, and asks for a key frame.
+SEND = ("appsrc name=encoded is-live=true format=time leaky-type=downstream"
+        " max-buffers=8 max-bytes=0 max-time=0 ! rtpvp8pay picture-id-mode=15-bit ! webrtcbin"
+        " name=webrtc bundle-policy=max-bundle")
+RTP = "application/x-rtp,media=video,encoding-name=VP8,clock-rate=90000,payload=96"
+
+
+def forward(_, info, need_key_frame):
+    """Passes a browser's request for a key frame on."""
+    if info.get_event().has_name("GstForceKeyUnit"):
+        need_key_frame()
+    return Gst.PadProbeReturn.OK
+
+
+class Viewer:
+    """A browser: its WebSocket, and the WebRTC connection negotiated through it. `need_key_frame` is
+    called, from any thread, when it cannot decode without one; `end` when it has left."""
+
+    def __init__(self, websocket, capture, need_key_frame, end):
+        self._websocket = websocket
+        self._need_key_frame = need_key_frame
+        self._end = end
+        self._pipeline = Gst.parse_launch(SEND)
+        self._webrtc = self._pipeline.get_by_name("webrtc")
+        self._encoded = self._pipeline.get_by_name("encoded")
+        transceiver = self._webrtc.emit("get-transceiver", 0)
+        transceiver.set_property("direction", GstWebRTC.WebRTCRTPTransceiverDirection.SENDONLY)
+        transceiver.set_property("do-nack", True)
+        transceiver.set_property("codec-preferences", Gst.Caps.from_string(RTP))
+        self._encoded.get_static_pad("src").add_probe(Gst.PadProbeType.EVENT_UPSTREAM, forward, need_key_frame)
+        self._bus = self._pipeline.get_bus()
+        self._bus.add_signal_watch()
+        # Viewers share the camera's clock: frames keep their times.
+        self._pipeline.use_clock(capture.get_clock())
+        self._pipeline.set_start_time(Gst.CLOCK_TIME_NONE)
+        self._pipeline.set_base_time(capture.get_base_time())
+        self._handlers = [(instance, instance.connect(name, handle)) for instance, name, handle in (
+            (self._webrtc, "on-negotiation-needed", self._create_offer),
+            (self._webrtc, "on-ice-candidate", self._send_candidate),
+            (self._webrtc, "notify::connection-state", self._connection_changed),
+            (self._bus, "message::error", self._fail),
+            (websocket, "message", self._receive),
+            (websocket, "closed", self._closed))]
+        self._pipeline.set_state(Gst.State.PLAYING)
+
+    # from any thread
+
+    def push(self, sample):
+        self._encoded.emit("push-sample", sample)
+
+    def send(self, **message):
+        GLib.idle_add(self._send, json.dumps(message))
+
+    # from threads of the pipeline
+
+    def _create_offer(self, webrtc):
+        def created(promise):
+            reply = promise.get_reply()  # owns the offer
+            if reply and reply.has_field("offer"):
+                offer = reply.get_value("offer")
+                webrtc.emit("set-local-description", offer, None)
+                self.send(offer=offer.sdp.as_text())
+
+        webrtc.emit("create-offer", None, Gst.Promise.new_with_change_func(created))
+
+    def _send_candidate(self, _, line, candidate):
+        self.send(candidate={"sdpMLineIndex": line, "candidate": candidate})
+
+    def _connection_changed(self, webrtc, _):
+        state = webrtc.get_property("connection-state")
+        if state == GstWebRTC.WebRTCPeerConnectionState.CONNECTED:
+            self._need_key_frame()
+        elif state == GstWebRTC.WebRTCPeerConnectionState.FAILED:
+            GLib.idle_add(self.close)
+
+    # from the main thread
+
+    def stop(self):
+        for instance, handler in self._handlers:
+            instance.disconnect(handler)
+        self._bus.remove_signal_watch()
+        self._pipeline.set_state(Gst.State.NULL)
+
+    def close(self):
+        if self._websocket.get_state() == Soup.WebsocketState.OPEN:
+            self._websocket.close(Soup.WebsocketCloseCode.GOING_AWAY, None)
+
+    def _send(self, text):
+        if self._websocket.get_state() == Soup.WebsocketState.OPEN:
+            self._websocket.send_text(text)
+
+    def _receive(self, _, __, data):
+        try:
+            for name, value in json.loads(data.get_data()).items():
+                if name == "answer":
+                    self._set_answer(value)
+                elif name == "candidate":
+                    self._webrtc.emit("add-ice-candidate", value["sdpMLineIndex"], value["candidate"])
+        except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as cause:
+            self._refuse(f"unexpected message: {cause}")
+
+    def _set_answer(self, text):
+        def done(promise):
+            reply = promise.get_reply()
+            if reply and reply.has_field("error"):
+                GLib.idle_add(self._refuse, "unsuitable answer")
+
+        if not text:
+            raise ValueError("empty answer")
+        _, sdp = GstSdp.SDPMessage.new_from_text(text)
+        answer = GstWebRTC.WebRTCSessionDescription.new(GstWebRTC.WebRTCSDPType.ANSWER, sdp)
+        self._webrtc.emit("set-remote-description", answer, Gst.Promise.new_with_change_func(done))
+
+    def _refuse(self, reason):
+        if self._websocket.get_state() == Soup.WebsocketState.OPEN:
+            self._websocket.close(Soup.WebsocketCloseCode.BAD_DATA, reason[:100])
+
+    def _fail(self, _, message):
+        print(f"A viewer is disconnected: {message.parse_error()[0].message}", file=sys.stderr)
+        self.close()
+
+    def _closed(self, _):
+        self.stop()
+        self._end(self)
+
+
+class Server:
+    """The page, and the viewers that it brings."""
+
+    def __init__(self, device, simulator):
+        self._capture = Capture(device, DRAW_AND_ENCODE.format(simulator=simulator), self._tell_rate)
+        self._encoder = self._capture.pipeline.get_by_name("encoder").get_static_pad("src")
+        self._capture.pipeline.get_by_name("encoded").connect("new-sample", self._push)
+        self._viewers = ()  # replaced, never changed: read by the thread that encodes
+        self._http = Soup.Server()
+        self._http.add_handler("/", self._serve_page)
+        self._http.add_early_handler("/viewer", self._refuse_strangers)
+        self._http.add_websocket_handler("/viewer", None, None, self._add_viewer)
+
+    def run(self, address, port):
+        try:
+            self._http.listen(Gio.InetSocketAddress.new_from_string(str(address), port), 0)
+        except GLib.Error as cause:
+            raise RuntimeError(f"cannot listen on {address}, port {port}: {cause.message}; "
+                               "choose another with --port") from cause
+        self._capture.start()
+        if address.is_unspecified:
+            host = socket.gethostname()
+        else:
+            host = f"[{address}]" if address.version == 6 else address
+        port = self._http.get_uris()[0].get_port()
+        print(f"Events are shown at http://{host}:{port}/ until Ctrl-C", flush=True)
+        try:
+            self._capture.run()
+        finally:
+            for viewer in self._viewers:
+                viewer.stop()
+            self._http.disconnect()
+
+    def _serve_page(self, _, message, path, query):
+        if path != "/":
+            message.set_status(Soup.Status.NOT_FOUND, None)
+        elif message.get_method() not in ("GET", "HEAD"):
+            message.set_status(Soup.Status.METHOD_NOT_ALLOWED, None)
+        else:
+            with open(PAGE, "rb") as page:
+                message.set_status(Soup.Status.OK, None)
+                message.set_response("text/html; charset=utf-8", Soup.MemoryUse.COPY, page.read())
+
+    def _refuse_strangers(self, _, message, path, query):
+        """Pages of other sites, in a browser that can reach this server."""
+        headers = message.get_request_headers()
+        origin = headers.get_one("Origin")
+        if origin and urlsplit(origin).netloc != headers.get_one("Host"):
+            message.set_status(Soup.Status.FORBIDDEN, None)
+
+    def _add_viewer(self, _, message, path, websocket):
+        websocket.set_keepalive_interval(20)
+        viewer = Viewer(websocket, self._capture.pipeline, self._encode_key_frame, self._remove_viewer)
+        self._viewers += (viewer,)
+
+    def _remove_viewer(self, viewer):
+        self._viewers = tuple(other for other in self._viewers if other is not viewer)
+
+    def _push(self, appsink):
+        sample = appsink.emit("pull-sample")
+        for viewer in self._viewers:
+            viewer.push(sample)
+        return Gst.FlowReturn.OK
+
+    def _encode_key_frame(self):
+        self._encoder.send_event(
+            GstVideo.video_event_new_upstream_force_key_unit(Gst.CLOCK_TIME_NONE, True, 0))
+
+    def _tell_rate(self, message):
+        figures = message.get_structure()
+        if figures.get_name() == "eventstats" and not figures.get_value("cumulative"):
+            for viewer in self._viewers:
+                viewer.send(rate=round(figures.get_value("rate")))
+
+
+def options():
+    parser = argparse.ArgumentParser(
+        prog="web-events", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--device", help="camera, such as /dev/video0 (default: a test scene)")
+    parser.add_argument("--simulator", default="eventsim-diff",
+                        help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
+                        " (default: %(default)s)")
+    parser.add_argument("--address", type=ipaddress.ip_address, default="127.0.0.1",
+                        help="IP address to listen on (default: %(default)s)")
+    parser.add_argument("--port", type=int, default=8080, help="0 = any that is free (default: %(default)s)")
+    chosen = parser.parse_args()
+    if not 0 <= chosen.port < 65536:
+        parser.error(f"argument --port: {chosen.port} is not a port number")
+    return chosen
+
+
+def main():
+    chosen = options()
+    Gst.init(None)
+    missing = [name for name in ELEMENTS if not Gst.ElementFactory.find(name)]
+    if missing:
+        raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, run: ./install-packages run web")
+    Server(chosen.device, chosen.simulator).run(chosen.address, chosen.port)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (RuntimeError, GLib.Error) as failure:
+        sys.exit(f"error: {failure}")

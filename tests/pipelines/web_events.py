@@ -1,0 +1,151 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""web-events as its viewers see it, in headless Chromium."""
+import contextlib
+import http.client
+import os
+import re
+import signal
+import subprocess
+import tempfile
+import time
+from urllib.parse import urlsplit
+
+from browser import Browser
+
+PROGRAM = os.path.join(os.environ["SOURCE"], "pipelines", "web_events.py")
+SECONDS = 60  # for anything that should happen at once
+
+# The number of pixels in the colours of ON, OFF and no event, and the picture itself.
+PICTURE = """(() => {
+  const video = document.querySelector("video");
+  if (!video?.videoWidth) return null;
+  const canvas = document.createElement("canvas");
+  canvas.width = video.videoWidth;
+  canvas.height = video.videoHeight;
+  const context = canvas.getContext("2d");
+  context.drawImage(video, 0, 0);
+  const pixels = context.getImageData(0, 0, canvas.width, canvas.height).data;
+  const picture = { size: canvas.width * canvas.height, on: 0, off: 0, none: 0, sum: 0 };
+  for (let i = 0; i < pixels.length; i += 4) {
+    const [red, , blue] = pixels.subarray(i, i + 3);
+    if (red > 180) picture.on++;
+    else if (blue - red > 90) picture.off++;
+    else if (red < 60) picture.none++;
+    picture.sum = (picture.sum * 31 + red + blue) % 1000003;
+  }
+  return picture;
+})()"""
+
+
+def wait_for(what, condition):
+    deadline = time.monotonic() + SECONDS
+    while not (value := condition()):
+        assert time.monotonic() < deadline, f"not within {SECONDS} s: {what}"
+        time.sleep(0.2)
+    return value
+
+
+def start(*arguments):
+    server = subprocess.Popen([PROGRAM, "--port", "0", *arguments], stdout=subprocess.PIPE, text=True)
+    line = server.stdout.readline()
+    return server, re.search(r"http://\S+/", line)[0]
+
+
+def refused(words, *arguments):
+    result = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=SECONDS, check=False)
+    assert result.returncode in (1, 2), f"{arguments}: exit status {result.returncode}"
+    assert words in result.stderr and "Traceback" not in result.stderr, result.stderr
+
+
+def descriptors(server):
+    return len(os.listdir(f"/proc/{server.pid}/fd"))
+
+
+def see_events(page):
+    """Waits for three different pictures that show events of both polarities."""
+    sums = set()
+
+    def three():
+        picture = page.evaluate(PICTURE)
+        if picture and picture["on"] > 50 and picture["off"] > 50 and picture["none"] > picture["size"] / 2:
+            sums.add(picture["sum"])
+        return len(sums) >= 3
+
+    wait_for("three pictures of events", three)
+
+
+def see_rate(page):
+    wait_for("an event rate", lambda: re.fullmatch(
+        r"[1-9][\d.]*[KM]? events/s", page.evaluate("document.querySelector('output').textContent")))
+
+
+def closing_code(page, url, message):
+    """With what code the server closes a WebSocket that sends it `message`."""
+    return page.evaluate(f"""new Promise(resolve => {{
+      const socket = new WebSocket({url.replace('http', 'ws') + 'viewer'!r});
+      socket.onopen = () => socket.send({message!r});
+      socket.onclose = ({{ code }}) => resolve(code);
+      setTimeout(() => resolve("nothing"), {SECONDS * 1000});
+    }})""")
+
+
+def handshake(url, origin):
+    """The HTTP status that a WebSocket opened by a page of `origin` is answered with."""
+    connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=SECONDS)
+    connection.request("GET", "/viewer", headers={
+        "Origin": origin, "Connection": "Upgrade", "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="})
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, contextlib.ExitStack() as at_end:
+    server, url = start()
+    at_end.callback(server.kill)
+    browser = Browser(profile)
+    at_end.callback(browser.close)
+
+    first = browser.open(url)
+    see_events(first)
+    see_rate(first)
+    print("one viewer sees events and their rate")
+
+    alone = descriptors(server)
+    for name in ("second", "third"):
+        other = browser.open(url)
+        see_events(other)
+        see_rate(other)
+        see_events(first)
+        other.close()
+        wait_for(f"all that the {name} viewer needed is closed", lambda: descriptors(server) <= alone)
+        see_events(first)
+    browser.open(url).close()
+    wait_for("all that a hasty viewer needed is closed", lambda: descriptors(server) <= alone)
+    see_events(first)
+    print("viewers come and leave, and the first sees events still")
+
+    for message in ("nonsense", "[]", '{"answer": ""}', '{"answer": 5}',
+                    '{"answer": "nonsense"}', '{"candidate": {}}', '{"candidate": null}',
+                    '{"candidate": {"sdpMLineIndex": -1, "candidate": ""}}'):
+        code = closing_code(first, url, message)
+        assert code == 1007, f"{message}: it was answered with {code}"
+    for origin, status in (("http://elsewhere", 403), ("null", 403), (url[:-1], 101)):
+        answer = handshake(url, origin)
+        assert answer == status, f"a page of {origin} is answered with {answer}"
+    see_events(first)
+    print("strange messages and other sites' pages are refused")
+
+    port = re.search(r":(\d+)/", url)[1]
+    refused("Address already in use; choose another with --port", "--port", port)
+    refused("nowhere", "--address", "nowhere")
+    refused("/nowhere", "--device", "/nowhere", "--port", "0")
+    refused("eventsim-nothing", "--simulator", "eventsim-nothing", "--port", "0")
+    print("errors are told")
+
+    server.send_signal(signal.SIGINT)
+    assert server.wait(SECONDS) == 0, f"exit status {server.returncode}"
+    wait_for("the viewer learns that the server has ended", lambda: "disconnected" in first.evaluate(
+        "document.querySelector('output').textContent"))
+    print("Ctrl-C ends it")
