@@ -57,7 +57,7 @@ class Aedat2Decoder final : public Decoder {
   bool of_v2e_ = false;
   bool header_read_ = false;
   std::uint64_t data_at_ = 0;
-  std::optional<Aedat2Layout> layout_;
+  std::optional<AddressLayout> layout_;
   SensorSize limit_;  ///< of rows and columns
 
   bool scanning_ = false;             ///< searching for the next valid records

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+
+namespace eventcamera {
+
+/// How the 32-bit addresses of AEDAT 2.0 and of jAER's datagrams hold a pixel, which depends on the
+/// camera. Columns count from the right and rows from the bottom.
+struct AddressLayout {
+  int x_shift;
+  std::uint32_t x_mask;
+  int y_shift;
+  std::uint32_t y_mask;
+  std::uint32_t polarity;  ///< bit of the polarity
+  bool set_is_on;          ///< where it is set
+  std::uint32_t sample;    ///< bit of samples of frames and of the IMU, if any
+  std::uint32_t external;  ///< bit of external events, if any
+  std::uint32_t pixel;     ///< bits of which an external event has none
+  std::uint32_t largest;   ///< address
+
+  constexpr int width() const { return static_cast<int>(x_mask) + 1; }   ///< largest
+  constexpr int height() const { return static_cast<int>(y_mask) + 1; }  ///< largest
+
+  std::uint32_t address(int x, int y, bool on) const {
+    return static_cast<std::uint32_t>(x) << x_shift | static_cast<std::uint32_t>(y) << y_shift |
+           (on == set_is_on ? polarity : 0);
+  }
+  int x(std::uint32_t address) const { return static_cast<int>(address >> x_shift & x_mask); }
+  int y(std::uint32_t address) const { return static_cast<int>(address >> y_shift & y_mask); }
+  bool is_on(std::uint32_t address) const { return ((address & polarity) != 0) == set_is_on; }
+  bool is_sample(std::uint32_t address) const { return (address & sample) != 0; }
+  /// v2e marks noise with the bit of external events, and leaves them their pixel.
+  bool is_external(std::uint32_t address) const {
+    return (address & external) != 0 && (address & pixel) == 0;
+  }
+
+  /// Of an external event; only a DAVIS tells edges apart.
+  bool is_rising(std::uint32_t address) const {
+    constexpr std::uint32_t edge = 7;
+    constexpr std::uint32_t falling = 2;
+    return pixel == 0 || (address & edge) != falling;
+  }
+
+  friend constexpr bool operator==(const AddressLayout&, const AddressLayout&) = default;
+};
+
+inline constexpr AddressLayout davis_layout{12,   0x3ff,       22,       0x1ff,       1U << 11,
+                                            true, 0x8000'0000, 1U << 10, 0xffff'fbf8, 0xffff'ffff};
+inline constexpr AddressLayout dvs128_layout{1, 0x7f, 8, 0x7f, 1, false, 0, 0x8000, 0, 0xffff};
+/// As v2e has it.
+inline constexpr AddressLayout dvs640_layout{1, 0x3ff, 11, 0x3ff, 1, true, 0, 0, 0, 0xf'ffff};
+
+}  // namespace eventcamera
