@@ -10,6 +10,7 @@
 #include "tests/formats/formats.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/fuzz/aedat_seeds.hpp"
+#include "tests/fuzz/datagram_seeds.hpp"
 #include "tests/fuzz/table_seeds.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
@@ -102,6 +103,7 @@ int main(int argc, char** argv) {
   write(corpus / "hdf5_chunk", hdf5_chunk_seeds());
   write(corpus / "hdf5_filters", hdf5_filters_seeds());
   write(corpus / "chunker", chunker_seeds());
+  write(corpus / "datagram", datagram_seeds());
   write(corpus / "rtp", rtp_seeds());
 
   // Typefinders may see any of them.

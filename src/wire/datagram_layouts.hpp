@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "src/core/address_layout.hpp"
+#include "src/core/event.hpp"
+#include "src/wire/byte_order.hpp"
+#include "src/wire/datagram_settings.hpp"
+#include "src/wire/wrapped_time.hpp"
+
+/// How each format lays out its datagrams. A layout has
+///
+/// - min_event_size and max_size, in bytes: the least that an event takes, and the size of a full
+///   datagram that is sent; received ones may have any size;
+/// - begin(first, out): writes what precedes the events;
+/// - size_of(event): bytes that write() would write;
+/// - write(event, out): writes an event;
+/// - read(bytes, in): reads a received datagram, and returns why it is invalid, or null.
+namespace eventcamera::datagram_layouts {
+
+/// Largest time that fits into 64-bit nanoseconds.
+inline constexpr Microseconds max_time = std::numeric_limits<Nanoseconds>::max() / 1000;
+
+/// A datagram being written.
+class Writer {
+ public:
+  std::size_t size() const { return size_; }
+  std::span<const std::uint8_t> bytes() const { return std::span(bytes_).first(size_); }
+  void clear() { size_ = 0; }
+
+  template <std::unsigned_integral Number>
+  void put(Number number, std::endian order = std::endian::little) {
+    store(number, bytes_.data() + size_, order);
+    size_ += sizeof number;
+  }
+
+ private:
+  std::array<std::uint8_t, 1400> bytes_;  // fits into a frame of Ethernet
+  std::size_t size_ = 0;
+};
+
+using Fault = const char*;
+inline constexpr Fault partial_event = "it ends in a partial event";
+inline constexpr Fault outside = "an event lies outside the sensor";
+inline constexpr Fault no_header = "it is shorter than its header";
+inline constexpr Fault no_time = "an event has no time";
+inline constexpr Fault time_range = "a time is out of range";
+inline constexpr Fault not_boolean = "a polarity is neither 0 nor 1";
+
+/// What is read of a datagram.
+struct Reading {
+  std::vector<AbsoluteEvent>& events;
+  int width;   ///< of the sensor
+  int height;  ///< of the sensor
+  std::optional<Microseconds> arrival;
+  WrappedTime clock;
+  std::optional<std::uint32_t> sequence_number{};
+
+  /// Returns the fault of an event outside the sensor.
+  Fault add(Microseconds t, int x, int y, bool on) {
+    if (x < 0 || x >= width || y < 0 || y >= height) return outside;
+    events.push_back(AbsoluteEvent::at(x, y, t, on ? Polarity::on : Polarity::off));
+    return nullptr;
+  }
+};
+
+inline bool is_on(const AbsoluteEvent& event) {
+  return event.polarity() == Polarity::on;
+}
+
+/// 32-bit words of bit 31: no time follows, 30-16: x, 15: ON, 14-0: y; then, perhaps, a word with
+/// the low bits of the time.
+template <bool has_timestamps>
+class Spif {
+ public:
+  static constexpr std::size_t min_event_size = has_timestamps ? 8 : 4;
+  static constexpr std::size_t max_size = 512;  // AEStream reads no more
+
+  explicit Spif(const DatagramSettings& settings) : order_(settings.byte_order) {}
+
+  void begin(Microseconds /*first*/, Writer& /*out*/) {}
+  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return min_event_size; }
+
+  void write(const AbsoluteEvent& event, Writer& out) {
+    out.put((has_timestamps ? 0U : untimed) | std::uint32_t{event.x} << 16 | event.y_p, order_);
+    if constexpr (has_timestamps) out.put(static_cast<std::uint32_t>(event.t), order_);
+  }
+
+  Fault read(std::span<const std::uint8_t> bytes, Reading& in) const {
+    for (std::size_t at = 0; at < bytes.size();) {
+      if (bytes.size() - at < 4) return partial_event;
+      const auto word = load<std::uint32_t>(&bytes[at], order_);
+      at += 4;
+      std::optional<Microseconds> t;
+      if ((word & untimed) == 0) {
+        if (bytes.size() - at < 4) return partial_event;
+        t = in.clock.at(load<std::uint32_t>(&bytes[at], order_));
+        at += 4;
+      }
+      if constexpr (!has_timestamps) t = in.arrival;
+      if (!t) return no_time;
+      const auto x = static_cast<int>(word >> 16 & 0x7fff);
+      const auto y = static_cast<int>(word & 0x7fff);
+      if (const auto* fault = in.add(*t, x, y, (word & on) != 0)) return fault;
+    }
+    return nullptr;
+  }
+
+ private:
+  static constexpr std::uint32_t untimed = 1U << 31;
+  static constexpr std::uint32_t on = 1U << 15;
+
+  std::endian order_;
+};
+
+/// Events of 13 bytes: 64-bit t, x, y, and a byte for ON.
+class T64X16Y16On8 {
+ public:
+  static constexpr std::size_t min_event_size = 13;
+  static constexpr std::size_t max_size = 100 * min_event_size;
+
+  void begin(Microseconds /*first*/, Writer& /*out*/) {}
+  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return min_event_size; }
+
+  void write(const AbsoluteEvent& event, Writer& out) {
+    out.put(static_cast<std::uint64_t>(event.t));
+    out.put(event.x);
+    out.put(static_cast<std::uint16_t>(event.y()));
+    out.put(static_cast<std::uint8_t>(is_on(event)));
+  }
+
+  Fault read(std::span<const std::uint8_t> bytes, Reading& in) const {
+    if (bytes.size() % min_event_size != 0) return partial_event;
+    for (; !bytes.empty(); bytes = bytes.subspan(min_event_size)) {
+      const auto t = load<std::uint64_t>(bytes.data(), std::endian::little);
+      const auto x = load<std::uint16_t>(&bytes[8], std::endian::little);
+      const auto y = load<std::uint16_t>(&bytes[10], std::endian::little);
+      if (t > max_time) return time_range;
+      if (bytes[12] > 1) return not_boolean;
+      if (const auto* fault = in.add(static_cast<Microseconds>(t), x, y, bytes[12] == 1))
+        return fault;
+    }
+    return nullptr;
+  }
+};
+
+/// Events of 8 bytes: the low 32 bits of t, x, and y << 1 | ON.
+class T32X16Y15On1 {
+ public:
+  static constexpr std::size_t min_event_size = 8;
+  static constexpr std::size_t max_size = 100 * min_event_size;
+
+  void begin(Microseconds /*first*/, Writer& /*out*/) {}
+  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return min_event_size; }
+
+  void write(const AbsoluteEvent& event, Writer& out) {
+    out.put(static_cast<std::uint32_t>(event.t));
+    out.put(event.x);
+    out.put(static_cast<std::uint16_t>(event.y() << 1 | (is_on(event) ? 1 : 0)));
+  }
+
+  Fault read(std::span<const std::uint8_t> bytes, Reading& in) const {
+    if (bytes.size() % min_event_size != 0) return partial_event;
+    for (; !bytes.empty(); bytes = bytes.subspan(min_event_size)) {
+      const auto t = in.clock.at(load<std::uint32_t>(bytes.data(), std::endian::little));
+      const auto x = load<std::uint16_t>(&bytes[4], std::endian::little);
+      const auto y_on = load<std::uint16_t>(&bytes[6], std::endian::little);
+      if (const auto* fault = in.add(t, x, y_on >> 1, (y_on & 1) != 0)) return fault;
+    }
+    return nullptr;
+  }
+};
+
+/// A 64-bit t, then the body of an Event Stream of DVS events. Rows count from the bottom, as in
+/// the tools of its authors.
+class EventStream {
+ public:
+  static constexpr std::size_t min_event_size = 5;
+  static constexpr std::size_t max_size = 1400;
+
+  explicit EventStream(const DatagramSettings& settings) : height_(settings.height) {}
+
+  void begin(Microseconds first, Writer& out) {
+    written_ = first;
+    out.put(static_cast<std::uint64_t>(first));
+  }
+
+  std::size_t size_of(const AbsoluteEvent& event) const {
+    return static_cast<std::size_t>((event.t - written_) / max_step) + min_event_size;
+  }
+
+  void write(const AbsoluteEvent& event, Writer& out) {
+    for (; event.t - written_ >= max_step; written_ += max_step) out.put(pause);
+    const auto step = static_cast<std::uint32_t>(event.t - written_);
+    written_ = event.t;
+    out.put(static_cast<std::uint8_t>(step << 1 | (is_on(event) ? 1U : 0U)));
+    out.put(event.x);
+    out.put(static_cast<std::uint16_t>(height_ - 1 - event.y()));
+  }
+
+  Fault read(std::span<const std::uint8_t> bytes, Reading& in) const {
+    constexpr std::size_t header_size = 8;
+    if (bytes.size() < header_size) return no_header;
+    auto t = load<std::uint64_t>(bytes.data(), std::endian::little);
+    if (t > max_time) return time_range;
+    for (std::size_t at = header_size; at < bytes.size();) {
+      const auto byte = bytes[at];
+      if (byte == pause || byte == ignored) {
+        t += byte == pause ? std::uint64_t{max_step} : 0;
+        ++at;
+        continue;
+      }
+      if (bytes.size() - at < min_event_size) return partial_event;
+      t += byte >> 1;
+      const auto x = load<std::uint16_t>(&bytes[at + 1], std::endian::little);
+      const auto row = load<std::uint16_t>(&bytes[at + 3], std::endian::little);
+      if (const auto* fault =
+              in.add(static_cast<Microseconds>(t), x, height_ - 1 - row, (byte & 1) != 0))
+        return fault;
+      at += min_event_size;
+    }
+    return nullptr;
+  }
+
+ private:
+  static constexpr int max_step = 127;
+  static constexpr std::uint8_t pause = 0xff;
+  static constexpr std::uint8_t ignored = 0xfe;
+
+  int height_;
+  Microseconds written_ = 0;  ///< time that the bytes so far amount to
+};
+
+/// Perhaps a sequence number, then pairs of a camera's address and the low 32 bits of t;
+/// big-endian.
+class Jaer {
+ public:
+  static constexpr std::size_t min_event_size = 8;
+  static constexpr std::size_t max_size = 1400;
+
+  explicit Jaer(const DatagramSettings& settings)
+      : addresses_(settings.width == 128 && settings.height == 128 ? dvs128_layout : davis_layout),
+        has_sequence_number_(settings.has_sequence_number),
+        width_(settings.width),
+        height_(settings.height) {
+    if (settings.width > addresses_.width() || settings.height > addresses_.height())
+      throw std::invalid_argument("addresses of jAER support sensors of up to 1024x512 pixels");
+  }
+
+  void begin(Microseconds /*first*/, Writer& out) {
+    sent_ = (sent_ + 1) & 0x7fff'ffff;
+    if (has_sequence_number_) out.put(sent_, std::endian::big);
+  }
+
+  std::size_t size_of(const AbsoluteEvent& /*event*/) const { return min_event_size; }
+
+  void write(const AbsoluteEvent& event, Writer& out) {
+    out.put(addresses_.address(width_ - 1 - event.x, height_ - 1 - event.y(), is_on(event)),
+            std::endian::big);
+    out.put(static_cast<std::uint32_t>(event.t), std::endian::big);
+  }
+
+  Fault read(std::span<const std::uint8_t> bytes, Reading& in) const {
+    if (has_sequence_number_) {
+      if (bytes.size() < 4) return no_header;
+      in.sequence_number = load<std::uint32_t>(bytes.data(), std::endian::big);
+      bytes = bytes.subspan(4);
+    }
+    if (bytes.size() % min_event_size != 0) return partial_event;
+    for (; !bytes.empty(); bytes = bytes.subspan(min_event_size)) {
+      const auto address = load<std::uint32_t>(bytes.data(), std::endian::big);
+      if (addresses_.is_sample(address) || addresses_.is_external(address)) continue;
+      const auto t = in.clock.at(load<std::uint32_t>(&bytes[4], std::endian::big));
+      const int x = width_ - 1 - addresses_.x(address);
+      const int y = height_ - 1 - addresses_.y(address);
+      if (address > addresses_.largest) return outside;
+      if (const auto* fault = in.add(t, x, y, addresses_.is_on(address))) return fault;
+    }
+    return nullptr;
+  }
+
+ private:
+  AddressLayout addresses_;
+  bool has_sequence_number_;
+  int width_;
+  int height_;
+  std::uint32_t sent_ = 0;
+};
+
+/// Calls `use` with the layout of a format.
+template <class Use>
+auto with_layout(const DatagramSettings& settings, const Use& use) {
+  switch (settings.format) {
+    case DatagramFormat::spif:
+      return use(Spif<false>(settings));
+    case DatagramFormat::spif_timestamps:
+      return use(Spif<true>(settings));
+    case DatagramFormat::t64_x16_y16_on8:
+      return use(T64X16Y16On8());
+    case DatagramFormat::t32_x16_y15_on1:
+      return use(T32X16Y15On1());
+    case DatagramFormat::es:
+      return use(EventStream(settings));
+    case DatagramFormat::jaer:
+      return use(Jaer(settings));
+  }
+  throw std::invalid_argument("no format of datagrams");
+}
+
+}  // namespace eventcamera::datagram_layouts

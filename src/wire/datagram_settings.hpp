@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+namespace eventcamera {
+
+/// Formats of UDP datagrams of other tools.
+enum class DatagramFormat : std::uint8_t {
+  spif,             ///< SpiNNaker, AEStream, EventCV; events have no time
+  spif_timestamps,  ///< the same, with times
+  t64_x16_y16_on8,  ///< faery
+  t32_x16_y15_on1,  ///< faery
+  es,               ///< Event Stream
+  jaer,             ///< jAER's AER-UDP
+};
+
+/// What sender and receiver must agree on; datagrams state none of it.
+struct DatagramSettings {
+  DatagramFormat format = DatagramFormat::spif;
+  int width = 0;                                 ///< of the sensor, in pixels
+  int height = 0;                                ///< of the sensor, in pixels
+  std::endian byte_order = std::endian::little;  ///< of SPIF; the other formats define theirs
+  bool has_sequence_number = true;               ///< in datagrams of jAER
+};
+
+}  // namespace eventcamera

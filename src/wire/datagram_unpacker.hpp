@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "src/core/event.hpp"
+#include "src/wire/datagram_settings.hpp"
+
+namespace eventcamera {
+
+/// What became of a received datagram.
+struct Reception {
+  const char* fault = nullptr;  ///< why it was rejected, for users; null if it was not
+  bool late = false;            ///< dropped, because later events were received before it
+  bool restarted = false;       ///< its times or sequence numbers start over: a new stream
+  std::uint64_t lost = 0;       ///< datagrams that were lost before this one
+};
+
+/// Unpacks datagrams of a format. Each stands alone; only the wraps of 32-bit times and sequence
+/// numbers are followed from one to the next. A datagram that is malformed, or that has an event
+/// outside the sensor, is rejected as a whole and changes nothing.
+class DatagramUnpacker {
+ public:
+  virtual ~DatagramUnpacker() = default;
+  DatagramUnpacker(const DatagramUnpacker&) = delete;
+  DatagramUnpacker& operator=(const DatagramUnpacker&) = delete;
+
+  /// Replaces `events` by those of the datagram, sorted by time and not earlier than any before, or
+  /// by none. `arrival` is the receiver's time, if known; it becomes the time of events without
+  /// one, and finds wraps during silences of hours.
+  virtual Reception unpack(std::span<const std::uint8_t> bytes, std::optional<Microseconds> arrival,
+                           std::vector<AbsoluteEvent>& events) = 0;
+
+ protected:
+  DatagramUnpacker() = default;
+};
+
+/// Throws std::invalid_argument if the format does not support the sensor.
+std::unique_ptr<DatagramUnpacker> make_datagram_unpacker(const DatagramSettings& settings);
+
+}  // namespace eventcamera
