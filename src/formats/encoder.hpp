@@ -32,6 +32,13 @@ class Encoder {
     append(events, out);
   }
 
+  /// Appends an encoded trigger, which is not earlier than anything before it. False if the format
+  /// has no triggers.
+  bool encode_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) {
+    put_header(out);
+    return append_trigger(trigger, out);
+  }
+
   /// Appends the end of the file, preceded by the header if nothing was encoded.
   void finish(std::vector<std::uint8_t>& out) {
     put_header(out);
@@ -50,6 +57,9 @@ class Encoder {
   explicit Encoder(std::string header = {}) : header_(std::move(header)) {}
 
   virtual void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) = 0;
+  virtual bool append_trigger(const Trigger& /*trigger*/, std::vector<std::uint8_t>& /*out*/) {
+    return false;
+  }
   virtual void append_end(std::vector<std::uint8_t>& /*out*/) {}
 
  private:

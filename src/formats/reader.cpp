@@ -13,10 +13,10 @@ constexpr std::size_t block_size = std::size_t{1} << 16;
 
 std::optional<Item> DecoderReader::next() {
   while (true) {
-    if (std::exchange(events_due_, false) && !decoded_.events.empty())
-      return EventItem{0, decoded_.events};
     if (std::exchange(triggers_due_, false) && !decoded_.triggers.empty())
       return TriggerItem{0, decoded_.triggers};
+    if (std::exchange(events_due_, false) && !decoded_.events.empty())
+      return EventItem{0, decoded_.events};
     decoded_.events.clear();
     decoded_.triggers.clear();
     if (!rest_.empty()) {

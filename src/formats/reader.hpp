@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -62,6 +63,17 @@ struct Frame {
   std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
 };
 
+/// Sample of a camera's inertial measurement unit.
+struct ImuSample {
+  Microseconds t = 0;
+  float temperature = 0;                     ///< degrees Celsius
+  std::array<float, 3> acceleration = {};    ///< along x, y and z, in g
+  std::array<float, 3> rotation = {};        ///< around x, y and z, in degrees per second
+  std::array<float, 3> magnetic_field = {};  ///< along x, y and z, in microtesla
+
+  friend bool operator==(const ImuSample&, const ImuSample&) = default;
+};
+
 /// Events of a stream. `stream` is an index into the reader's streams().
 struct EventItem {
   std::size_t stream;
@@ -80,7 +92,13 @@ struct TriggerItem {
   std::span<const Trigger> triggers;
 };
 
-using Item = std::variant<EventItem, FrameItem, TriggerItem>;
+/// IMU samples of a stream.
+struct ImuItem {
+  std::size_t stream;
+  std::span<const ImuSample> samples;
+};
+
+using Item = std::variant<EventItem, FrameItem, TriggerItem, ImuItem>;
 
 /// Reads the items of a recording of any format, in file order.
 ///
@@ -126,9 +144,6 @@ class Reader {
 
   /// Name of the format for users; empty if it adds nothing to the media type.
   virtual std::string format_name() const { return {}; }
-
-  /// Number of skipped IMU samples.
-  virtual std::uint64_t imu_samples() const { return 0; }
 
  protected:
   Reader() = default;

@@ -71,6 +71,8 @@ void RecordingReader::interrupt() {
   for (auto& stream : streams_) start_chunker(stream);
   next_stream_ = 0;
   newest_ = caught_up_ = 0;
+  triggers_.clear();
+  imu_samples_.clear();
 }
 
 bool RecordingReader::reach(Microseconds t) {
@@ -85,6 +87,8 @@ std::optional<Item> RecordingReader::next_item() {
   if (begun_ && held_next_ < held_.size()) {
     const auto& held = held_[held_next_++];
     if (held.frame) return FrameItem{held.stream, *held.frame};
+    if (!held.triggers.empty()) return TriggerItem{held.stream, held.triggers};
+    if (!held.imu_samples.empty()) return ImuItem{held.stream, held.imu_samples};
     return EventItem{held.stream, held.events};
   }
   if (begun_) held_.clear();
@@ -196,10 +200,6 @@ void RecordingReader::note(const FrameItem& item) {
   if (!stream.first_frame) stream.first_frame = item.frame;
 }
 
-void RecordingReader::note(const TriggerItem& item) {
-  counts_.triggers += item.triggers.size();
-}
-
 void RecordingReader::hold(const Item& item) {
   if (const auto* const events = std::get_if<EventItem>(&item)) {
     held_.push_back({events->stream, {events->events.begin(), events->events.end()}, {}, {}});
@@ -210,6 +210,14 @@ void RecordingReader::hold(const Item& item) {
         some->stream, {}, frame, {frame.pixels, frame.pixels + frame.height * frame.stride}});
     held.frame->pixels = held.pixels.data();
     held_size_ += sizeof(HeldItem) + held.pixels.size();
+  } else if (const auto* const triggers = std::get_if<TriggerItem>(&item)) {
+    const auto all = triggers->triggers;
+    held_.push_back({triggers->stream, {}, {}, {}, {all.begin(), all.end()}});
+    held_size_ += sizeof(HeldItem) + all.size_bytes();
+  } else if (const auto* const imu = std::get_if<ImuItem>(&item)) {
+    const auto all = imu->samples;
+    held_.push_back({imu->stream, {}, {}, {}, {}, {all.begin(), all.end()}});
+    held_size_ += sizeof(HeldItem) + all.size_bytes();
   }
 }
 
@@ -296,12 +304,10 @@ void RecordingReader::restart(const std::optional<SeekPoint>& seek_point, Micros
     if (seek_point) {
       reader_->restart(*seek_point);
       before_ = reader_->corruption();
-      imu_samples_before_ = reader_->imu_samples();
     } else {
       reader_ = make_reader_();
       if (source_ != nullptr) reads_itself_ = reader_->open(*source_);
       before_ = {};
-      imu_samples_before_ = 0;
     }
   }
   position_ = seek_point ? seek_point->position : 0;
@@ -311,6 +317,8 @@ void RecordingReader::restart(const std::optional<SeekPoint>& seek_point, Micros
   held_.clear();
   held_next_ = held_size_ = next_stream_ = 0;
   output_due_.reset();
+  triggers_.clear();
+  imu_samples_.clear();
   counts_ = {};
   for (auto& stream : streams_) {
     stream.position = start;
@@ -361,6 +369,8 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
       begin();
     } else if (!std::exchange(finishing_, true)) {
       finish_chunkers();
+    } else if (const auto output = next_accompanying(Chunker::max_time)) {
+      return output;
     } else {
       drained_ = true;
       if (source_ != nullptr && newest_ > start_ && !std::exchange(duration_is_exact_, true))
@@ -372,10 +382,34 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
 /// Next output that needs no further items.
 std::optional<RecordingReader::Output> RecordingReader::next_output() {
   if (std::exchange(start_due_, false)) return Start{};
-  if (output_due_) return std::exchange(output_due_, std::nullopt);
   if (!begun_) return std::nullopt;
-  if (const auto chunk = next_chunk()) return *chunk;
+  if (!output_due_)
+    if (const auto chunk = next_chunk()) output_due_ = *chunk;
+  if (const auto* const chunk = output_due_ ? std::get_if<Chunk>(&*output_due_) : nullptr)
+    if (const auto before = next_accompanying(chunk->start + chunk->duration)) return before;
+  return std::exchange(output_due_, std::nullopt);
+}
+
+/// Triggers or IMU samples before `end`, in time since the origin.
+std::optional<RecordingReader::Output> RecordingReader::next_accompanying(Microseconds end) {
+  if (const auto triggers = taken_before(end, triggers_); !triggers.empty())
+    return TriggerItem{0, triggers};
+  if (const auto samples = taken_before(end, imu_samples_); !samples.empty())
+    return ImuItem{0, samples};
   return std::nullopt;
+}
+
+/// Items before `end` and within the segment, with times since the origin.
+template <class Sample>
+std::span<const Sample> RecordingReader::taken_before(Microseconds end,
+                                                      WaitingItems<Sample>& waiting) {
+  const auto shift = shift_.value_or(0) - origin_;
+  const auto items = waiting.take_before(end - shift);
+  for (auto& item : items) item.t += shift;
+  const auto first =
+      start_ > 0 ? std::ranges::lower_bound(items, start_, {}, &Sample::t) : items.begin();
+  const auto last = stop_ ? std::ranges::lower_bound(items, *stop_, {}, &Sample::t) : items.end();
+  return first < last ? std::span<const Sample>(first, last) : std::span<const Sample>();
 }
 
 void RecordingReader::take(const EventItem& item) {
@@ -433,7 +467,12 @@ void RecordingReader::take(const FrameItem& item) {
 
 void RecordingReader::take(const TriggerItem& item) {
   counts_.triggers += item.triggers.size();
-  output_due_ = item;
+  triggers_.push(item.triggers);
+}
+
+void RecordingReader::take(const ImuItem& item) {
+  counts_.imu_samples += item.samples.size();
+  imu_samples_.push(item.samples);
 }
 
 /// Shifts the clock of words to that of their interval. If the two differ only by wraps of the
@@ -518,7 +557,6 @@ RecordingReader::Counts RecordingReader::counts() const {
   const auto& corruption = reader_->corruption();
   counts.corrupt_places = corruption.places - before_.places;
   counts.outside = corruption.outside - before_.outside;
-  counts.imu_samples = reader_->imu_samples() - imu_samples_before_;
   for (const auto& stream : streams_) {
     counts.outside += stream.outside;
     if (!begun_) continue;

@@ -14,12 +14,13 @@
 #include "src/formats/chunker.hpp"
 #include "src/formats/reader.hpp"
 #include "src/formats/sensor_sizes.hpp"
+#include "src/formats/waiting_items.hpp"
 
 namespace eventcamera {
 
-/// Plays a recording: turns the items of its Reader into chunks of events, frames and triggers,
-/// timed from a common origin, the time of the first event or frame. Knows streams, duration and
-/// seek points, and counts items read and dropped.
+/// Plays a recording: turns the items of its Reader into chunks of events, frames, triggers and IMU
+/// samples, timed from a common origin, the time of the first event or frame. Knows streams,
+/// duration and seek points, and counts items read and dropped.
 ///
 /// In push mode the first items are held until the time origin is known. In pull mode the start of
 /// the file, up to 16 MiB, is surveyed first: this gives an exact or estimated duration, and the
@@ -76,7 +77,9 @@ class RecordingReader {
     Frame frame;
   };
 
-  using Output = std::variant<Start, Chunk, TimedFrame, TriggerItem>;
+  /// Triggers and IMU samples precede the chunk of their interval. Their times, too, are
+  /// microseconds since the origin; the first may be before it.
+  using Output = std::variant<Start, Chunk, TimedFrame, TriggerItem, ImuItem>;
 
   /// Stream time of a buffer of encoded words.
   struct Interval {
@@ -168,6 +171,8 @@ class RecordingReader {
     std::vector<AbsoluteEvent> events;
     std::optional<Frame> frame;
     std::vector<std::uint8_t> pixels;
+    std::vector<Trigger> triggers = {};
+    std::vector<ImuSample> imu_samples = {};
   };
 
   std::unique_lock<std::mutex> reading() const { return std::unique_lock(mutex_); }
@@ -178,7 +183,8 @@ class RecordingReader {
   bool survey();
   void note(const EventItem& item);
   void note(const FrameItem& item);
-  void note(const TriggerItem& item);
+  void note(const TriggerItem& /*item*/) {}
+  void note(const ImuItem& /*item*/) {}
   void hold(const Item& item);
   bool is_origin_known() const;
   bool is_surveyed(std::uint64_t events) const;
@@ -190,7 +196,11 @@ class RecordingReader {
   void take(const EventItem& item);
   void take(const FrameItem& item);
   void take(const TriggerItem& item);
+  void take(const ImuItem& item);
   std::optional<Output> next_output();
+  std::optional<Output> next_accompanying(Microseconds end);
+  template <class Sample>
+  std::span<const Sample> taken_before(Microseconds end, WaitingItems<Sample>& waiting);
   std::optional<Chunk> next_chunk();
   void cut_at_stop(Chunk& chunk) const;
   void catch_up();
@@ -228,13 +238,14 @@ class RecordingReader {
   std::optional<Interval> interval_;   ///< interval of the words being read
   std::optional<Microseconds> shift_;  ///< offset from the clock of words to that of the stream
   std::vector<AbsoluteEvent> within_;  ///< events within a size set by the user
-  std::optional<Output> output_due_;   ///< a frame or triggers
-  std::size_t next_stream_ = 0;        ///< next stream to ask for a chunk
-  Microseconds newest_ = 0;            ///< maximum position of all streams
-  Microseconds caught_up_ = 0;         ///< newest_ at the last catch_up()
-  Corruption before_;                  ///< the reader's corruption at its last restart
-  std::uint64_t imu_samples_before_ = 0;
-  Counts counts_;  ///< without those that reader and chunkers count
+  std::optional<Output> output_due_;   ///< a frame or a chunk
+  WaitingItems<Trigger> triggers_;     ///< with times of the file
+  WaitingItems<ImuSample> imu_samples_;
+  std::size_t next_stream_ = 0;  ///< next stream to ask for a chunk
+  Microseconds newest_ = 0;      ///< maximum position of all streams
+  Microseconds caught_up_ = 0;   ///< newest_ at the last catch_up()
+  Corruption before_;            ///< the reader's corruption at its last restart
+  Counts counts_;                ///< without those that reader and chunkers count
 };
 
 }  // namespace eventcamera

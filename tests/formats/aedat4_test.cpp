@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -41,6 +42,7 @@ struct Contents {
   std::vector<std::vector<AbsoluteEvent>> events;  ///< by stream
   std::vector<Picture> frames;
   std::vector<Trigger> triggers;
+  std::vector<ImuSample> imu_samples;
   std::size_t items = 0;
 };
 
@@ -54,9 +56,12 @@ void take(Aedat4Decoder& decoder, Contents& out) {
     } else if (const auto* picture = std::get_if<FrameItem>(&*item)) {
       const auto& frame = picture->frame;
       out.frames.push_back({frame, {frame.pixels, frame.pixels + frame.stride * frame.height}});
-    } else {
-      const auto triggers = std::get<TriggerItem>(*item).triggers;
+    } else if (const auto* of_triggers = std::get_if<TriggerItem>(&*item)) {
+      const auto triggers = of_triggers->triggers;
       out.triggers.insert(out.triggers.end(), triggers.begin(), triggers.end());
+    } else {
+      const auto samples = std::get<ImuItem>(*item).samples;
+      out.imu_samples.insert(out.imu_samples.end(), samples.begin(), samples.end());
     }
   }
 }
@@ -242,11 +247,45 @@ TEST(Aedat4, EveryTriggerSource) {
   Aedat4Decoder decoder;
   const auto contents = decoded(decoder, bytes);
   const std::vector<Trigger> expected{
-      {1000, 4, true},  {1001, 0, true}, {1002, 0, false}, {1003, 0, true}, {1004, 1, true},
+      {1000, 4, true},  {1001, 0, true}, {1002, 0, false}, {1003, 5, true}, {1004, 1, true},
       {1005, 1, false}, {1006, 2, true}, {1007, 2, false}, {1008, 3, true}, {1009, 3, false}};
   EXPECT_EQ(contents.triggers, expected);
   EXPECT_EQ(decoder.streams()[0].kind, StreamKind::triggers);
   EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+}
+
+TEST(Aedat4, KeepsTriggersAndImuSamples) {
+  const std::vector<Trigger> triggers{
+      {1000, 4, true},  {1001, 0, true}, {1002, 0, false}, {1003, 5, true}, {1004, 1, true},
+      {1005, 1, false}, {1006, 2, true}, {1007, 2, false}, {1008, 3, true}, {1009, 3, false}};
+  auto with_unknown = triggers;
+  with_unknown.push_back({1010, 7, true});
+  const std::vector<ImuSample> samples{
+      {.t = 1500, .temperature = 39.5F, .acceleration = {0.1F, -0.9F, 0.25F}},
+      {.t = 2500, .rotation = {1, -2, 3.5F}, .magnetic_field = {-40, 20.25F, 0}}};
+  for (const auto compression : {Aedat4Compression::none, Aedat4Compression::zstd}) {
+    Aedat4Encoder encoder({.size = {346, 260},
+                           .source = "a camera",
+                           .compression = compression,
+                           .triggers = true,
+                           .imu_samples = true});
+    Bytes bytes;
+    EXPECT_EQ(encoder.encode(std::span<const Trigger>(with_unknown), bytes), triggers.size());
+    EXPECT_EQ(encoder.encode(std::span<const ImuSample>(samples), bytes), samples.size());
+    encoder.finish(bytes);
+    Aedat4Decoder decoder;
+    const auto contents = decoded(decoder, bytes);
+    EXPECT_EQ(contents.triggers, triggers);
+    EXPECT_EQ(contents.imu_samples, samples);
+    ASSERT_EQ(decoder.streams().size(), 3U);
+    EXPECT_EQ(decoder.streams()[1].kind, StreamKind::triggers);
+    EXPECT_EQ(decoder.streams()[2].kind, StreamKind::imu);
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+  }
+  Aedat4Encoder without({{346, 260}, ""});
+  Bytes bytes;
+  EXPECT_EQ(without.encode(std::span<const Trigger>(triggers), bytes), 0U);
+  EXPECT_EQ(without.encode(std::span<const ImuSample>(samples), bytes), 0U);
 }
 
 TEST(Aedat4, AlignmentMayCountFromAnywhere) {
@@ -641,7 +680,12 @@ TEST(Aedat4, ARecordingOfADavis346) {
     EXPECT_EQ(contents.frames[1].frame.t - contents.frames[0].frame.t, 40'000);
     EXPECT_EQ(contents.frames[2].frame.t - contents.frames[1].frame.t, 40'000);
     EXPECT_EQ(contents.triggers.size(), 15U);
-    EXPECT_EQ(decoder.skipped().imu_samples, 130U);
+    ASSERT_EQ(contents.imu_samples.size(), 130U);
+    for (const auto& sample : contents.imu_samples) {
+      const auto [x, y, z] = sample.acceleration;
+      EXPECT_NEAR(std::hypot(x, y, z), 1, 0.2) << "gravity";
+      EXPECT_NEAR(sample.temperature, 40, 20);
+    }
     EXPECT_EQ(decoder.skipped().packets, 0U);
     EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
     EXPECT_EQ(decoder.corruption().unsorted + decoder.corruption().outside, 0U);

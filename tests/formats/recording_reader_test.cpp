@@ -96,6 +96,7 @@ struct Outcome {
   std::size_t starts = 0;
   std::vector<Chunk> chunks;
   std::vector<Picture> pictures;
+  std::vector<Trigger> triggers;
 
   void take(const RecordingReader::Start& /*start*/) { ++starts; }
   void take(const RecordingReader::Chunk& chunk) {
@@ -106,7 +107,10 @@ struct Outcome {
   void take(const RecordingReader::TimedFrame& item) {
     pictures.emplace_back(item.stream, item.time, item.frame.pixels[0]);
   }
-  void take(const TriggerItem& /*item*/) {}
+  void take(const TriggerItem& item) {
+    triggers.insert(triggers.end(), item.triggers.begin(), item.triggers.end());
+  }
+  void take(const ImuItem& /*item*/) {}
 
   void take_all(RecordingReader& reader) {
     while (const auto output = reader.next())
@@ -242,6 +246,68 @@ TEST_P(Recording, IsRestartedWhereItIsPushed) {
     reader.finish();
     outcome.take_all(reader);
     EXPECT_EQ(outcome.events(origin()), from(some_events(), origin() + start, 10'000'000));
+  }
+}
+
+TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
+  const auto events = some_events();
+  std::vector<Trigger> triggers{{1'900'000, 3, true}};  // before the origin
+  const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
+  Bytes bytes;
+  encoder->encode_trigger(triggers.front(), bytes);
+  for (std::size_t i = 0; i < events.size(); i += 1000) {
+    encoder->encode(std::span(events).subspan(i, 1000), bytes);
+    triggers.push_back({events[i + 999].t, static_cast<std::uint16_t>(i / 1000 % 8), i % 2 == 0});
+    encoder->encode_trigger(triggers.back(), bytes);
+  }
+  encoder->finish(bytes);
+  const auto make_reader = [] {
+    return std::make_unique<DecoderReader>(make_prophesee_raw_decoder());
+  };
+  for (const std::size_t size : {1UL, 0UL, 1UL << 24}) {
+    RecordingReader reader(make_reader, chunk_length);
+    std::vector<Trigger> found;
+    std::vector<Microseconds> waiting;
+    Microseconds end = 0;
+    const auto take = [&] {
+      while (const auto output = reader.next()) {
+        if (const auto* const item = std::get_if<TriggerItem>(&*output)) {
+          for (auto trigger : item->triggers) {
+            if (trigger.t >= 0) waiting.push_back(trigger.t);
+            trigger.t += reader.origin();
+            found.push_back(trigger);
+          }
+        } else if (const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output)) {
+          EXPECT_EQ(chunk->start, end);
+          end = chunk->start + chunk->duration;
+          for (const auto t : std::exchange(waiting, {})) {
+            EXPECT_GE(t, chunk->start);
+            EXPECT_LT(t, end);
+          }
+        }
+      }
+    };
+    for (const auto piece : pieces::of(bytes, size)) {
+      reader.push(piece);
+      take();
+    }
+    reader.finish();
+    take();
+    EXPECT_EQ(found, triggers);
+    EXPECT_EQ(reader.counts().triggers, triggers.size());
+  }
+
+  MemoryBytes source(bytes);
+  RecordingReader reader(make_reader, chunk_length);
+  reader.open(source);
+  reader.seek(3'700'000, 3'900'000);
+  Outcome sought;
+  sought.starts = 1;
+  sought.take_all(reader);
+  ASSERT_EQ(sought.triggers.size(), 4U);
+  for (const auto& trigger : sought.triggers) {
+    EXPECT_GE(trigger.t, 3'700'000);
+    EXPECT_LT(trigger.t, 3'900'000);
   }
 }
 

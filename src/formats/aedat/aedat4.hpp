@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -22,6 +23,24 @@ enum class Aedat4Compression : std::uint8_t {
 
 /// First line of the file.
 constexpr std::string_view aedat4_magic = "#!AER-DAT4.0\r\n";
+
+/// What a trigger's source, a number in the file, says of its edge.
+struct Aedat4Edge {
+  std::uint16_t id;
+  bool rising;
+
+  friend constexpr bool operator==(const Aedat4Edge&, const Aedat4Edge&) = default;
+};
+inline constexpr std::array<Aedat4Edge, 10> aedat4_edges{{{4, true},
+                                                          {0, true},
+                                                          {0, false},
+                                                          {5, true},
+                                                          {1, true},
+                                                          {1, false},
+                                                          {2, true},
+                                                          {2, false},
+                                                          {3, true},
+                                                          {3, false}}};
 
 /// Size of the packet header: stream ID and payload size.
 constexpr std::size_t aedat4_packet_header = 8;

@@ -63,15 +63,18 @@ SensorSize limit_of(SensorSize size) {
 }
 
 Trigger trigger_of(const aedat4::Trigger& trigger) {
-  struct Edge {
-    std::uint16_t id;
-    bool rising;
-  };
-  constexpr Edge edges[] = {{4, true},  {0, true}, {0, false}, {0, true}, {1, true},
-                            {1, false}, {2, true}, {2, false}, {3, true}, {3, false}};
   const auto source = static_cast<std::size_t>(static_cast<std::uint8_t>(trigger.source()));
-  const auto edge = source < std::size(edges) ? edges[source] : Edge{5, true};
+  const auto edge =
+      source < aedat4_edges.size() ? aedat4_edges[source] : Aedat4Edge{.id = 6, .rising = true};
   return {trigger.t(), edge.id, edge.rising};
+}
+
+ImuSample imu_sample_of(const aedat4::Imu& imu) {
+  return {imu.t(),
+          imu.temperature(),
+          {imu.acceleration_x(), imu.acceleration_y(), imu.acceleration_z()},
+          {imu.rotation_x(), imu.rotation_y(), imu.rotation_z()},
+          {imu.magnetic_field_x(), imu.magnetic_field_y(), imu.magnetic_field_z()}};
 }
 
 }  // namespace
@@ -87,8 +90,7 @@ void Aedat4Decoder::push(std::span<const std::uint8_t> piece) {
 
 std::optional<Item> Aedat4Decoder::next() {
   while (true) {
-    if (elements_.count > 0)
-      return elements_.kind == StreamKind::events ? next_events() : next_triggers();
+    if (elements_.count > 0) return next_elements();
     queue_.consume(std::exchange(packet_, 0));
     const bool ready = header_read() || read_header();
     if (!ready || (scanning_ && !scan()) || !read_packet()) {
@@ -379,7 +381,6 @@ const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, i
   if (!elements) return broken_packet;
   elements_ = {kind, elements->data, elements->count, stream ? *stream : add_stream(id, kind)};
   if (frame_) frame_->stream = elements_.stream;
-  if (kind == StreamKind::imu) skipped_.imu_samples += std::exchange(elements_.count, 0);
   return nullptr;
 }
 
@@ -438,6 +439,16 @@ bool Aedat4Decoder::has_sound_events(std::span<const std::uint8_t> content, int 
   return true;
 }
 
+Item Aedat4Decoder::next_elements() {
+  if (elements_.kind == StreamKind::events) return next_events();
+  if (elements_.kind == StreamKind::triggers) {
+    read_tables(trigger_of, "a trigger at an impossible time", triggers_);
+    return TriggerItem{elements_.stream, triggers_};
+  }
+  read_tables(imu_sample_of, "an IMU sample at an impossible time", imu_samples_);
+  return ImuItem{elements_.stream, imu_samples_};
+}
+
 Item Aedat4Decoder::next_events() {
   const auto count = std::min(elements_.count, block);
   const EventItem item{elements_.stream, checked_events(count)};
@@ -484,21 +495,22 @@ std::span<const AbsoluteEvent> Aedat4Decoder::checked_events(std::size_t count) 
   return {events_.data(), kept};
 }
 
-Item Aedat4Decoder::next_triggers() {
+/// Reads the next block of elements that are tables.
+template <class Table, class Element>
+void Aedat4Decoder::read_tables(Element (*element_of)(const Table&), const char* corruption,
+                                std::vector<Element>& out) {
   const auto count = std::min(elements_.count, block);
-  triggers_.clear();
+  const aedat4::Elements tables{elements_.data, count};
+  out.clear();
   for (std::size_t i = 0; i < count; ++i) {
-    const auto* const offset = elements_.data + i * sizeof(flatbuffers::uoffset_t);
-    const auto* const trigger = reinterpret_cast<const aedat4::Trigger*>(
-        offset + flatbuffers::ReadScalar<flatbuffers::uoffset_t>(offset));
-    if (is_time(trigger->t()))
-      triggers_.push_back(trigger_of(*trigger));
+    const auto* const table = tables.table<Table>(i);
+    if (is_time(table->t()))
+      out.push_back(element_of(*table));
     else
-      corruption_.note(queue_.position(), "a trigger at an impossible time");
+      corruption_.note(queue_.position(), corruption);
   }
   elements_.data += count * sizeof(flatbuffers::uoffset_t);
   elements_.count -= count;
-  return TriggerItem{elements_.stream, triggers_};
 }
 
 std::optional<std::size_t> Aedat4Decoder::stream_of(int id) const {

@@ -15,11 +15,12 @@
 
 namespace eventcamera {
 
-/// Decodes AEDAT4: streams of events, frames and triggers. Bytes are passed in pieces of any size;
-/// the split does not affect the result. A packet is the smallest unit that is read or skipped.
+/// Decodes AEDAT4: streams of events, frames, triggers and IMU samples. Bytes are passed in pieces
+/// of any size; the split does not affect the result. A packet is the smallest unit that is read or
+/// skipped.
 ///
 /// The ID of a trigger is the source of the edge: 0 the camera's input, 1 its generator, 2 a frame,
-/// 3 an exposure, 4 a reset of its clock.
+/// 3 an exposure, 4 a reset of its clock, 5 a pulse at its input, 6 any other.
 class Aedat4Decoder final : public Reader {
  public:
   Aedat4Decoder();
@@ -41,7 +42,6 @@ class Aedat4Decoder final : public Reader {
   std::optional<Microseconds> last_time() override;
   bool is_empty(std::size_t stream) const override;
   std::string format_name() const override { return "AEDAT 4.0"; }
-  std::uint64_t imu_samples() const override { return skipped_.imu_samples; }
 
   /// Continues at `position`, the start of a packet. The header must have been read.
   void resume(std::uint64_t position);
@@ -64,7 +64,6 @@ class Aedat4Decoder final : public Reader {
 
   /// Numbers of valid items that are not returned.
   struct Skipped {
-    std::uint64_t imu_samples = 0;
     std::uint64_t frames = 0;   ///< with an unknown pixel format
     std::uint64_t packets = 0;  ///< of unknown kinds
   };
@@ -94,9 +93,12 @@ class Aedat4Decoder final : public Reader {
   void read_table();
   void note_missing_table();
   void skip_corrupt(std::size_t packet, std::size_t sound, std::size_t work, bool sound_after);
+  Item next_elements();
   Item next_events();
   std::span<const AbsoluteEvent> checked_events(std::size_t count);
-  Item next_triggers();
+  template <class Table, class Element>
+  void read_tables(Element (*element_of)(const Table&), const char* corruption,
+                   std::vector<Element>& out);
 
   ByteQueue queue_;
   bool finished_ = false;
@@ -120,6 +122,7 @@ class Aedat4Decoder final : public Reader {
   std::optional<FrameItem> frame_;
   std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
+  std::vector<ImuSample> imu_samples_;
 
   std::size_t credit_;  ///< remaining work for searching corrupt packets
   Corruption corruption_;

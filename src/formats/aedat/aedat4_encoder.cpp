@@ -76,6 +76,42 @@ void Aedat4Encoder::encode(const Frame& frame, std::vector<std::uint8_t>& out) {
   write_packet(frame_stream, 1, frame.t, frame.t, out);
 }
 
+std::size_t Aedat4Encoder::encode(std::span<const Trigger> triggers,
+                                  std::vector<std::uint8_t>& out) {
+  if (!settings_.triggers) return 0;
+  write_header(out);
+  builder_->Clear();
+  std::vector<flatbuffers::Offset<aedat4::Trigger>> elements;
+  for (const auto& [t, id, rising] : triggers) {
+    const auto edge = std::ranges::find(aedat4_edges, Aedat4Edge{id, rising});
+    if (edge != aedat4_edges.end())
+      elements.push_back(aedat4::CreateTrigger(
+          *builder_, t, static_cast<std::int8_t>(edge - aedat4_edges.begin())));
+  }
+  if (elements.empty()) return 0;
+  const auto vector = builder_->CreateVector(elements);
+  builder_->FinishSizePrefixed(aedat4::CreateTriggerPacket(*builder_, vector), "TRIG");
+  write_packet(trigger_stream, static_cast<std::int64_t>(elements.size()), triggers.front().t,
+               triggers.back().t, out);
+  return elements.size();
+}
+
+std::size_t Aedat4Encoder::encode(std::span<const ImuSample> samples,
+                                  std::vector<std::uint8_t>& out) {
+  if (!settings_.imu_samples || samples.empty()) return 0;
+  write_header(out);
+  builder_->Clear();
+  std::vector<flatbuffers::Offset<aedat4::Imu>> elements;
+  for (const auto& [t, temperature, a, r, m] : samples)
+    elements.push_back(aedat4::CreateImu(*builder_, t, temperature, a[0], a[1], a[2], r[0], r[1],
+                                         r[2], m[0], m[1], m[2]));
+  const auto vector = builder_->CreateVector(elements);
+  builder_->FinishSizePrefixed(aedat4::CreateImuPacket(*builder_, vector), "IMUS");
+  write_packet(imu_stream, static_cast<std::int64_t>(elements.size()), samples.front().t,
+               samples.back().t, out);
+  return elements.size();
+}
+
 void Aedat4Encoder::flush(std::vector<std::uint8_t>& out) {
   write_header(out);
   if (held_.empty()) return;
@@ -97,8 +133,12 @@ void Aedat4Encoder::write_header(std::vector<std::uint8_t>& out) {
   if (position_ != 0) return;
   std::vector<StreamInfo> streams{
       {event_stream, StreamKind::events, settings_.size, settings_.source}};
-  if (settings_.frames)
-    streams.push_back({frame_stream, StreamKind::frames, settings_.size, settings_.source});
+  const auto add = [&](bool is_written, int id, StreamKind kind) {
+    if (is_written) streams.push_back({id, kind, settings_.size, settings_.source});
+  };
+  add(settings_.frames, frame_stream, StreamKind::frames);
+  add(settings_.triggers, trigger_stream, StreamKind::triggers);
+  add(settings_.imu_samples, imu_stream, StreamKind::imu);
   flatbuffers::FlatBufferBuilder builder;
   // Reserve space for the table's position, which is not known yet.
   builder.ForceDefaults(true);

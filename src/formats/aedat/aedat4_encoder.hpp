@@ -25,16 +25,20 @@ struct Aedat4Settings {
   SensorSize size;
   std::string source;  ///< name of the camera
   Aedat4Compression compression = Aedat4Compression::lz4;
-  bool frames = false;  ///< with a stream of frames
-  bool table = false;   ///< with a packet table at the end; see Aedat4Encoder::patch()
+  bool frames = false;       ///< with a stream of frames
+  bool table = false;        ///< with a packet table at the end; see Aedat4Encoder::patch()
+  bool triggers = false;     ///< with a stream of triggers
+  bool imu_samples = false;  ///< with a stream of IMU samples
 };
 
-/// Encodes AEDAT4: stream 0 has events, stream 1 frames. Output is sequential, except that the
-/// position of the packet table, if any, is patched into the header.
+/// Encodes AEDAT4: stream 0 has events, 1 frames, 2 triggers, 3 IMU samples. Output is sequential,
+/// except that the position of the packet table, if any, is patched into the header.
 class Aedat4Encoder final : public Encoder {
  public:
   static constexpr int event_stream = 0;
   static constexpr int frame_stream = 1;
+  static constexpr int trigger_stream = 2;
+  static constexpr int imu_stream = 3;
 
   /// Throws std::invalid_argument if AEDAT4 does not support the size.
   explicit Aedat4Encoder(Aedat4Settings settings);
@@ -45,6 +49,11 @@ class Aedat4Encoder final : public Encoder {
   /// Appends all pending events, then the frame. Throws std::invalid_argument if AEDAT4 does not
   /// support the frame.
   void encode(const Frame& frame, std::vector<std::uint8_t>& out);
+
+  /// Appends those that AEDAT4 supports, sorted by time, and returns their number. Nothing without
+  /// a stream for them.
+  std::size_t encode(std::span<const Trigger> triggers, std::vector<std::uint8_t>& out);
+  std::size_t encode(std::span<const ImuSample> samples, std::vector<std::uint8_t>& out);
 
   /// Appends the header and all pending events.
   void flush(std::vector<std::uint8_t>& out);

@@ -97,10 +97,6 @@ std::string AedatReader::format_name() const {
   return "AEDAT " + version_;
 }
 
-std::uint64_t AedatReader::imu_samples() const {
-  return reader_ ? reader_->imu_samples() : 0;
-}
-
 const Aedat4Decoder* AedatReader::aedat4() const {
   return dynamic_cast<const Aedat4Decoder*>(reader_.get());
 }

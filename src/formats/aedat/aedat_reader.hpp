@@ -27,7 +27,6 @@ class AedatReader final : public Reader {
   std::optional<Microseconds> last_time() override;
   bool is_empty(std::size_t stream) const override;
   std::string format_name() const override;
-  std::uint64_t imu_samples() const override;
 
   /// The AEDAT 4 decoder; null if the file is not AEDAT 4, or not yet known to be.
   const Aedat4Decoder* aedat4() const;

@@ -40,6 +40,11 @@ struct CdWord {
             static_cast<std::uint16_t>(y() | (type() & 1) << 15)};
   }
 
+  static constexpr CdWord of_trigger(std::uint32_t type, std::uint64_t time,
+                                     const Trigger& trigger) {
+    return {at(type, time, 0, 0).bits | (trigger.id & 31U) << 8 | (trigger.rising ? 1U : 0U)};
+  }
+
   constexpr Trigger trigger(std::uint64_t time) const {
     return {static_cast<Microseconds>(time + time_low()),
             static_cast<std::uint16_t>(bits >> 8 & 31), (bits & 1) != 0};
@@ -141,6 +146,15 @@ class CdEncoder final : public Encoder {
       }
     };
     write_events<typename Format::Word>(events, words_at_once, out, write);
+  }
+
+  bool append_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) override {
+    Words words(out);
+    words.reserve(words_at_once);
+    if (gaps_.written(trigger.t) >> 6 != time_high_) put_time_high(trigger.t, words);
+    words.put(
+        Format::word(CdWord::of_trigger(Format::types.trigger, gaps_.written(trigger.t), trigger)));
+    return true;
   }
 
   static typename Format::Word time_high(std::uint64_t count) {

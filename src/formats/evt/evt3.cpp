@@ -187,6 +187,14 @@ class Evt3Encoder final : public Encoder {
     write_events<std::uint16_t>(events, words_at_once, out, write);
   }
 
+  bool append_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) override {
+    WordWriter<std::uint16_t> words(out);
+    words.reserve(words_at_once);
+    const auto time = written(trigger.t, words);
+    state_.write_trigger(trigger, time, words);
+    return true;
+  }
+
   static constexpr std::size_t words_at_once = 4 * events_at_once;
 
   /// Returns the time to write, after reserving space for the words of a pause.

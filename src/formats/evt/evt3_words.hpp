@@ -73,6 +73,12 @@ class Evt3Words {
     return vector.events;
   }
 
+  /// Writes the edge of a trigger at `time`.
+  void write_trigger(const Trigger& trigger, std::uint64_t time, WordWriter<std::uint16_t>& words) {
+    reach(time, words);
+    words.put(word(evt3::ext_trigger, (trigger.id & 15U) << 8 | (trigger.rising ? 1U : 0U)));
+  }
+
  private:
   static constexpr std::uint32_t none = ~std::uint32_t{0};
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <utility>
 
 #include "src/formats/hdf5/hdf5_file.hpp"
 #include "src/formats/hdf5/hdf5_table.hpp"
@@ -184,19 +186,22 @@ class Hdf5Items final : public Reader {
     return true;
   }
 
+  /// Returns events after the triggers up to their time.
   std::optional<Item> next() override {
     if (!file_) return std::nullopt;
-    while (true) {
-      const bool after_events = std::exchange(triggers_due_, false);
-      if (!after_events) {
-        events_.clear();
-        triggers_due_ = file_->read(read_at_once, events_) > 0;
-        if (triggers_due_) return EventItem{0, events_};
-      }
-      triggers_.clear();
-      if (file_->read_triggers(read_at_once, triggers_) > 0) return TriggerItem{0, triggers_};
-      if (!after_events) return std::nullopt;
+    if (!events_due_) {
+      events_.clear();
+      events_due_ = file_->read(read_at_once, events_) > 0;
     }
+    if (!events_due_ || triggers_until_ <= events_.back().t) {
+      triggers_.clear();
+      if (file_->read_triggers(read_at_once, triggers_) > 0) {
+        triggers_until_ = triggers_.back().t;
+        return TriggerItem{0, triggers_};
+      }
+    }
+    if (!std::exchange(events_due_, false)) return std::nullopt;
+    return EventItem{0, events_};
   }
 
   const std::vector<StreamInfo>& streams() const override { return streams_; }
@@ -213,7 +218,8 @@ class Hdf5Items final : public Reader {
   }
 
   void restart(const SeekPoint& seek_point) override {
-    triggers_due_ = false;
+    events_due_ = false;
+    triggers_until_ = std::numeric_limits<Microseconds>::min();
     file_->seek(seek_point.t);
   }
 
@@ -233,7 +239,8 @@ class Hdf5Items final : public Reader {
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
-  bool triggers_due_ = false;
+  bool events_due_ = false;  ///< events_ are to be returned
+  Microseconds triggers_until_ = std::numeric_limits<Microseconds>::min();  ///< time of the last
   bool opened_ = false;  ///< opened, not collected
 };
 

@@ -27,7 +27,7 @@ class Hdf5Writer::Layout {
  public:
   virtual ~Layout() = default;
   virtual void append(std::span<const AbsoluteEvent> events) = 0;
-  virtual void append(std::span<const Trigger> triggers) = 0;
+  virtual bool append(std::span<const Trigger> triggers) = 0;
   virtual void close() = 0;
 };
 
@@ -187,7 +187,7 @@ class DsecLayout final : public Hdf5Writer::Layout {
     }
   }
 
-  void append(std::span<const Trigger> /*triggers*/) override {}
+  bool append(std::span<const Trigger> /*triggers*/) override { return false; }
 
   void close() override {
     flush();
@@ -324,7 +324,7 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
     }
   }
 
-  void append(std::span<const Trigger> triggers) override {
+  bool append(std::span<const Trigger> triggers) override {
     for (const auto& trigger : triggers) {
       trigger_index_.add(triggers_.count(), trigger.t);
       TriggerRow row;
@@ -333,6 +333,7 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
       row.id = static_cast<std::int16_t>(trigger.id);
       triggers_.put(row);
     }
+    return true;
   }
 
   void close() override {
@@ -440,11 +441,12 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   file_->output.check();
 }
 
-void Hdf5Writer::append(std::span<const Trigger> triggers) {
+bool Hdf5Writer::append(std::span<const Trigger> triggers) {
   const Hdf5Session session;
   file_->output.check();
-  layout_->append(triggers);
+  const bool written = layout_->append(triggers);
   file_->output.check();
+  return written;
 }
 
 void Hdf5Writer::close() {

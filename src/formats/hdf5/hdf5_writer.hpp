@@ -35,8 +35,8 @@ class Hdf5Writer {
   /// Events must be sorted by time and within the sensor.
   void append(std::span<const AbsoluteEvent> events);
 
-  /// Ignored by the DSEC layout, which has no triggers.
-  void append(std::span<const Trigger> triggers);
+  /// False for the DSEC layout, which has no triggers.
+  bool append(std::span<const Trigger> triggers);
 
   void close();
 

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <iterator>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "src/core/event.hpp"
+#include "src/formats/chunker.hpp"
+
+namespace eventcamera {
+
+/// Items with a time `t`, such as triggers, that wait for the interval of events they belong to.
+template <class Item>
+class WaitingItems {
+ public:
+  /// Drops items at an erroneous time.
+  void push(std::span<const Item> items) {
+    std::ranges::copy_if(items, std::back_inserter(waiting_), [](const Item& item) {
+      return item.t >= -Chunker::max_time && item.t <= Chunker::max_time;
+    });
+  }
+
+  /// Removes and returns the items before `end`, sorted by time; all items if too many wait. Valid
+  /// until the next call.
+  std::span<Item> take_before(Microseconds end) {
+    taken_.clear();
+    if (waiting_.empty()) return taken_;
+    std::ranges::stable_sort(waiting_, {}, &Item::t);
+    const auto last = waiting_.size() > max_count
+                          ? waiting_.end()
+                          : std::ranges::lower_bound(waiting_, end, {}, &Item::t);
+    taken_.assign(waiting_.begin(), last);
+    waiting_.erase(waiting_.begin(), last);
+    return taken_;
+  }
+
+  /// Time of the first item that waits.
+  std::optional<Microseconds> first() const {
+    const auto first = std::ranges::min_element(waiting_, {}, &Item::t);
+    return first == waiting_.end() ? std::nullopt : std::optional(first->t);
+  }
+
+  void clear() { waiting_.clear(); }
+
+ private:
+  static constexpr std::size_t max_count = std::size_t{1} << 16;
+
+  std::vector<Item> waiting_;
+  std::vector<Item> taken_;
+};
+
+}  // namespace eventcamera
