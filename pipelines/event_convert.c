@@ -56,8 +56,8 @@ static const Format formats[] = {
     {".npy", "NumPy array", "application/x-npy", "eventnpyenc name=writer ! filesink name=out",
      NULL},
     {".npz", "NumPy archive, read only", "application/x-npz", NULL, NULL},
-    {".aedat4", "AEDAT 4; from AEDAT 4 with its frames", "application/x-aedat",
-     "aedatmux name=writer ! filesink name=out", "compression"},
+    {".aedat4", "AEDAT 4; from AEDAT 4 with its frames, triggers and IMU samples",
+     "application/x-aedat", "aedatmux name=writer ! filesink name=out", "compression"},
     {".aedat", "AEDAT 2.0 and 3.1, read only", "application/x-aedat", NULL, NULL},
     {".h5", "HDF5, written in the layout of DSEC", "application/x-hdf5",
      "eventhdf5sink name=writer", "compression"},
@@ -290,31 +290,36 @@ static void convert_frames(GstElement* pipeline, GstElement* queue) {
   gst_object_unref(reader);
 }
 
+static GstStructure* stats_of(GstElement* pipeline, const char* name) {
+  GstElement* element = gst_bin_get_by_name(GST_BIN(pipeline), name);
+  GstStructure* stats = NULL;
+  g_object_get(element, "stats", &stats, NULL);
+  gst_object_unref(element);
+  return stats;
+}
+
 /* Says what of IN is not in OUT. */
 static void print_left_out(GstElement* pipeline) {
   static const struct {
     const char* field;
     const char* name;
   } kinds[] = {{"frames", "frames"}, {"triggers", "triggers"}, {"imu-samples", "IMU samples"}};
-  GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
-  GstElement* writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
-  GstPad* video = gst_element_get_static_pad(writer, "video");
+  GstStructure* read = stats_of(pipeline, "reader");
+  GstStructure* written = stats_of(pipeline, "writer");
   GString* text = g_string_new(NULL);
-  GstStructure* stats = NULL;
-  if (g_object_class_find_property(G_OBJECT_GET_CLASS(reader), "stats") != NULL)
-    g_object_get(reader, "stats", &stats, NULL);
-  for (gsize i = video != NULL ? 1 : 0; stats != NULL && i < G_N_ELEMENTS(kinds); ++i) {
-    guint64 count = 0;
-    if (gst_structure_get_uint64(stats, kinds[i].field, &count) && count > 0)
-      g_string_append_printf(text, "%s%" G_GUINT64_FORMAT " %s", text->len > 0 ? ", " : "", count,
-                             kinds[i].name);
+  for (gsize i = 0; i < G_N_ELEMENTS(kinds); ++i) {
+    guint64 of_in = 0;
+    guint64 of_out = 0;
+    gst_structure_get_uint64(read, kinds[i].field, &of_in);
+    gst_structure_get_uint64(written, kinds[i].field, &of_out);
+    if (of_in > of_out)
+      g_string_append_printf(text, "%s%" G_GUINT64_FORMAT " %s", text->len > 0 ? ", " : "",
+                             of_in - of_out, kinds[i].name);
   }
   if (text->len > 0) PRINT_ERROR("%sleft out: %s\n", isatty(STDERR_FILENO) ? "\n" : "", text->str);
-  if (stats != NULL) gst_structure_free(stats);
   g_string_free(text, TRUE);
-  if (video != NULL) gst_object_unref(video);
-  gst_object_unref(writer);
-  gst_object_unref(reader);
+  gst_structure_free(written);
+  gst_structure_free(read);
 }
 
 /* Runs in the streaming thread, while the main thread prints. */

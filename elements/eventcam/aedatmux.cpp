@@ -10,7 +10,8 @@
  * A pad takes either, and learns which from its caps: `queue ! mux.` links both. The pads `events`
  * and `video` take one kind, for applications that request pads by name.
  *
- * Frames of #aedatdemux keep their exposure times and their position on the sensor.
+ * Frames of #aedatdemux keep their exposure times and their position on the sensor. Its triggers
+ * and IMU samples come with the events. The property `stats` counts what was written.
  *
  * A flushing seek truncates the file and starts over. Events that are earlier than those already
  * written, or outside the sensor, are dropped; a warning says how many.
@@ -32,6 +33,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -43,6 +45,8 @@
 #include "gst/base/frame_buffer.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/properties.hpp"
+#include "gst/base/sensor_events.hpp"
+#include "gst/base/stream_header.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/base/writable_events.hpp"
@@ -54,8 +58,10 @@ GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
 
 using eventcamera::Aedat4Compression;
 using eventcamera::Aedat4Encoder;
+using eventcamera::ImuSample;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
+using eventcamera::Trigger;
 
 namespace {
 
@@ -81,6 +87,9 @@ struct State {
   std::unique_ptr<Aedat4Encoder> encoder;  ///< null until the header is written
   gint64 shift = 0;                        ///< offset from running time to file time, nanoseconds
   Microseconds flushed = 0;                ///< file time of the last flushed packet
+  /// Announced, so that the header has a stream for them; then those that wait for the next buffer.
+  std::optional<std::vector<Trigger>> triggers;
+  std::optional<std::vector<ImuSample>> imu_samples;
   WarnOnce warn;
 };
 
@@ -218,17 +227,10 @@ static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = fa
 
 /// Sends the caps, with the header as streamheader for late joiners.
 static void send_caps(GstAedatMux* self, const Bytes& header) {
-  const OwnedCaps caps(
-      gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr));
-  GValue headers = G_VALUE_INIT;
-  GValue value = G_VALUE_INIT;
-  g_value_init(&headers, GST_TYPE_ARRAY);
-  g_value_init(&value, GST_TYPE_BUFFER);
-  GstBuffer* const buffer = gst_buffer_new_memdup(header.data(), header.size());
-  GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_HEADER);
-  gst_value_take_buffer(&value, buffer);
-  gst_value_array_append_and_take_value(&headers, &value);
-  gst_structure_take_value(gst_caps_get_structure(caps.get(), 0), "streamheader", &headers);
+  const OwnedBuffer buffer(gst_buffer_new_memdup(header.data(), header.size()));
+  const OwnedCaps caps = with_stream_header(
+      OwnedCaps(gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr)),
+      buffer.get());
   gst_aggregator_set_src_caps(GST_AGGREGATOR(self), caps.get());
 }
 
@@ -266,6 +268,8 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
       pads_of(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
   settings.table = can_seek_bytes(GST_AGGREGATOR_SRC_PAD(self));
   settings.compression = self->priv->settings.copy().compression;
+  settings.triggers = state.triggers.has_value();
+  settings.imu_samples = state.imu_samples.has_value();
   self->priv->writable.begin_file(state.size);
   state.shift = shift_of(self);
   state.encoder = std::make_unique<Aedat4Encoder>(settings);
@@ -276,11 +280,27 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   return push_bytes(self, std::move(header), true);
 }
 
+/// Encodes the triggers and IMU samples that wait. May throw.
+static Bytes waiting_items(GstAedatMux* self) {
+  State& state = self->priv->state;
+  Bytes out;
+  const auto encode = [&]<class Sample>(std::optional<std::vector<Sample>>& waiting) {
+    const auto samples = waiting ? std::exchange(*waiting, {}) : std::vector<Sample>();
+    return state.encoder->encode(std::span<const Sample>(samples), out);
+  };
+  const auto triggers = encode(state.triggers);
+  const auto imu_samples = encode(state.imu_samples);
+  const auto written = self->priv->writable.written().lock();
+  written->triggers += triggers;
+  written->imu_samples += imu_samples;
+  return out;
+}
+
 /// Writes the end of the file, and patches the header. May throw.
 static GstFlowReturn end_file(GstAedatMux* self) {
   State& state = self->priv->state;
   self->priv->writable.end_file();
-  Bytes bytes;
+  Bytes bytes = waiting_items(self);
   state.encoder->finish(bytes);
   const GstFlowReturn result = push_bytes(self, std::move(bytes));
   auto patch = state.encoder->patch();
@@ -318,6 +338,7 @@ static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, By
   const auto frame = recorded_frame(video.get(), t);
   try {
     state.encoder->encode(frame, out);
+    ++self->priv->writable.written().lock()->frames;
   } catch (const std::invalid_argument& error) {
     reject(error.what());
   }
@@ -337,7 +358,7 @@ static GstFlowReturn write_next(GstAedatMux* self) {
          "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
     return GST_FLOW_OK;
   }
-  Bytes out;
+  Bytes out = waiting_items(self);
   const Microseconds t = file_time(state, running);
   const bool silent = gst_buffer_get_size(buffer.get()) == 0;
   if (!silent && kind_of(pad.get()) == Kind::events)
@@ -355,10 +376,15 @@ static bool is_at_end(const Pad& pad) {
   return gst_aggregator_pad_is_eos(pad.get());
 }
 
-/// True if enough is known to write the header.
+/// True if enough is known to write the header: the caps, and what the events before the first
+/// buffer announce.
 static bool is_known(GstAedatMux* self) {
   const State& state = self->priv->state;
-  if (state.size != SensorSize{}) return true;
+  if (state.size != SensorSize{})
+    return std::ranges::all_of(pads_of(self), [](const Pad& pad) {
+      return kind_of(pad.get()) != Kind::events || is_at_end(pad) ||
+             OwnedBuffer(gst_aggregator_pad_peek_buffer(pad.get()));
+    });
   return state.video && std::ranges::all_of(pads_of(self), [](const Pad& pad) {
            return kind_of(pad.get()) == Kind::video || is_at_end(pad);
          });
@@ -430,8 +456,23 @@ static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* c
   return true;
 }
 
+/// Adds triggers or IMU samples to those that wait. False if the event had others.
+template <class Sample>
+static bool take_waiting(GstAedatMux* self, std::optional<std::vector<Sample>>&& samples,
+                         std::optional<std::vector<Sample>>& waiting) {
+  if (!samples) return false;
+  // Their times are those of the stream, which may have been moved since the file began.
+  const State& state = self->priv->state;
+  const gint64 moved = state.encoder ? (state.shift - shift_of(self)) / 1000 : 0;
+  for (auto& sample : *samples) sample.t += moved;
+  if (!waiting) waiting.emplace();
+  waiting->insert(waiting->end(), samples->begin(), samples->end());
+  return true;
+}
+
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
   auto* self = GST_AEDAT_MUX(aggregator);
+  State& state = self->priv->state;
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);
@@ -439,12 +480,15 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
       gst_event_unref(event);
       return FALSE;
     }
+  } else if (take_waiting(self, triggers_of(event), state.triggers) ||
+             take_waiting(self, imu_samples_of(event), state.imu_samples)) {
+    gst_event_unref(event);
+    return TRUE;
   } else if (GST_EVENT_TYPE(event) == GST_EVENT_TAG) {
     GstTagList* tags = nullptr;
     gchar* source = nullptr;
     gst_event_parse_tag(event, &tags);
-    if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source))
-      self->priv->state.source = source;
+    if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source)) state.source = source;
     g_free(source);
   }
   return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
@@ -503,6 +547,8 @@ static gboolean stop(GstAggregator* aggregator) {
 static GstFlowReturn flush(GstAggregator* aggregator) {
   State& state = GST_AEDAT_MUX(aggregator)->priv->state;
   state.encoder.reset();
+  state.triggers.reset();
+  state.imu_samples.reset();
   state.flushed = 0;
   state.warn.reset();
   return GST_FLOW_OK;
@@ -526,12 +572,18 @@ static void gst_aedat_mux_init(GstAedatMux* self) {
 static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  Properties<settings_of>(object_class)
-      .add(&Settings::compression,
-           g_param_spec_enum("compression", "Compression", "Compression of the file",
-                             compression_type(), static_cast<int>(Settings().compression),
-                             static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                      GST_PARAM_MUTABLE_READY)));
+  Properties<settings_of> properties(object_class);
+  properties.add(
+      &Settings::compression,
+      g_param_spec_enum("compression", "Compression", "Compression of the file", compression_type(),
+                        static_cast<int>(Settings().compression),
+                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                 GST_PARAM_MUTABLE_READY)));
+  properties.add_read_only(
+      +[](GObject* object, GValue* value) {
+        g_value_take_boxed(value, GST_AEDAT_MUX(object)->priv->writable.stats());
+      },
+      WritableEvents::stats_spec());
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_static_pad_template_with_gtype(element_class, &any_template,

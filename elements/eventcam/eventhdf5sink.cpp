@@ -5,7 +5,8 @@
  * @short_description: writes HDF5 files of events
  *
  * Writes events as an HDF5 file in the layout of DSEC or Metavision, whose arrays can be read
- * directly with h5py. Written times are those of the PTS.
+ * directly with h5py. Written times are those of the PTS. `layout=metavision` keeps triggers; the
+ * property `stats` counts them.
  *
  * The file is complete at the end of the stream, or when the pipeline is stopped. A flushing seek
  * truncates the file and starts over. Events that are earlier than those already written, or
@@ -20,12 +21,14 @@
 #include <gst/base/gstbasesink.h>
 
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/properties.hpp"
+#include "gst/base/sensor_events.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/writable_events.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -36,6 +39,7 @@ GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
 
 using eventcamera::Hdf5Layout;
 using eventcamera::Hdf5Writer;
+using eventcamera::Trigger;
 
 namespace {
 
@@ -192,6 +196,16 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   return written ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
+/// Writes triggers, which the layout may not have.
+static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> triggers) {
+  const State& state = self->priv->state;
+  if (!state.writer) return true;
+  return reported(self, [&] {
+    if (state.writer->append(triggers))
+      self->priv->writable.written().lock()->triggers += triggers.size();
+  });
+}
+
 /// Completes the file before EOS is posted to the application, and starts over after a flush.
 static gboolean event(GstBaseSink* sink, GstEvent* event) {
   auto* self = GST_EVENT_HDF5_SINK(sink);
@@ -200,6 +214,7 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
   if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.info.width > 0)
     done = begin_file(self, GstEventCameraInfo(state.info));
+  if (const auto triggers = triggers_of(event)) done = write_triggers(self, *triggers);
   if (!done) {
     gst_event_unref(event);
     return FALSE;
@@ -242,6 +257,11 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
                         "Compression of layout=dsec: gzip for small files, none for speed. "
                         "layout=metavision ignores it, since it always uses ECF",
                         compression_type(), static_cast<int>(defaults.compression), flags));
+  properties.add_read_only(
+      +[](GObject* object, GValue* value) {
+        g_value_take_boxed(value, GST_EVENT_HDF5_SINK(object)->priv->writable.stats());
+      },
+      WritableEvents::stats_spec());
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   gst_element_class_add_static_pad_template(element_class, &sink_template);

@@ -8,6 +8,7 @@
 #include <map>
 #include <new>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,7 @@
 #include "gst/base/properties.hpp"
 #include "gst/base/reader_pad.hpp"
 #include "gst/base/seek_request.hpp"
+#include "gst/base/sensor_events.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/formats/recording_reader.hpp"
@@ -133,7 +135,10 @@ class EventReader {
   GstFlowReturn push(const RecordingReader::Start& start);
   GstFlowReturn push(const RecordingReader::Chunk& chunk);
   GstFlowReturn push(const RecordingReader::TimedFrame& item);
-  GstFlowReturn push(const eventcamera::TriggerItem& /*item*/) { return GST_FLOW_OK; }
+  GstFlowReturn push(const eventcamera::TriggerItem& item) { return push_to_first(item.triggers); }
+  GstFlowReturn push(const eventcamera::ImuItem& item) { return push_to_first(item.samples); }
+  template <class Sample>
+  GstFlowReturn push_to_first(std::span<const Sample> samples);
   GstFlowReturn combined(ReaderPad& pad, GstFlowReturn result);
 
   ReaderPad& pad_of(std::size_t stream);
@@ -748,6 +753,23 @@ GstFlowReturn EventReader::push(const RecordingReader::TimedFrame& item) {
   return combined(pad, pad.push(frame_buffer(item.frame, &info), pts));
 }
 
+/// Sends triggers or IMU samples with the first stream of events, if there is one.
+template <class Sample>
+GstFlowReturn EventReader::push_to_first(std::span<const Sample> samples) {
+  if (output_due_)
+    if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
+  std::vector<Sample> of_stream(samples.begin(), samples.end());
+  for (auto& sample : of_stream) sample.t += std::max<Microseconds>(recording_->origin(), 0);
+  const auto& streams = recording_->streams();
+  const auto first = std::ranges::find_if(streams, [](const RecordingReader::Stream& stream) {
+    return stream.shown && stream.info.kind == StreamKind::events;
+  });
+  if (first == streams.end()) return GST_FLOW_OK;
+  auto& pad = pad_of(static_cast<std::size_t>(first - streams.begin()));
+  gst_pad_push_event(pad.get(), new_sensor_event(std::span<const Sample>(of_stream)));
+  return GST_FLOW_OK;
+}
+
 GstFlowReturn EventReader::combined(ReaderPad& pad, GstFlowReturn result) {
   return gst_flow_combiner_update_pad_flow(combiner_, pad.get(), result);
 }
@@ -790,6 +812,11 @@ GstFlowReturn EventReader::begin_output() {
     send_segment(pad_of(i));
   }
   for (GstEvent* event : std::exchange(held_, {})) push_to_pads(event);
+  // Writers must know these streams before the first buffer.
+  for (const auto& stream : streams) {
+    if (stream.info.kind == StreamKind::triggers) push(eventcamera::TriggerItem{});
+    if (stream.info.kind == StreamKind::imu) push(eventcamera::ImuItem{});
+  }
   return GST_FLOW_OK;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -12,9 +13,11 @@
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/sensor_events.hpp"
 #include "gst/base/stream_header.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/writable_events.hpp"
+#include "src/formats/waiting_items.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_writer_debug);
 #define GST_CAT_DEFAULT event_writer_debug
@@ -22,10 +25,12 @@ GST_DEBUG_CATEGORY_STATIC(event_writer_debug);
 using eventcamera::AbsoluteEvent;
 using eventcamera::Encoder;
 using eventcamera::Microseconds;
+using eventcamera::Trigger;
+using eventcamera::WaitingItems;
 
 namespace {
 
-enum Property : guint { prop_variant = 1, prop_max_size };
+enum Property : guint { prop_variant = 1, prop_max_size, prop_stats };
 
 /// Alignment of words, which never straddle multiples of it, bytes.
 constexpr std::size_t word_bytes = 8;
@@ -40,6 +45,8 @@ struct State {
   OwnedBuffer header;  ///< pending header; null once pushed, or if the format has none
   std::unique_ptr<Encoder> encoder;
   bool written = false;
+  WaitingItems<Trigger> triggers = {};
+  Microseconds last = std::numeric_limits<Microseconds>::min();  ///< time of the last encoded item
 };
 
 }  // namespace
@@ -237,9 +244,37 @@ static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent>
       start = end;
     }
     priv.state->encoder->encode(events.first(count), priv.bytes);
+    if (count > 0) priv.state->last = events[count - 1].t;
     events = events.subspan(count);
   }
   return GST_FLOW_OK;
+}
+
+/// Encodes the triggers before `t`, without those that come too late. May throw.
+static void encode_triggers(GstEventWriter* self, Microseconds t) {
+  auto& priv = priv_of(self);
+  auto& state = *priv.state;
+  for (const auto& trigger : state.triggers.take_before(t)) {
+    if (trigger.t < state.last || !state.encoder->encode_trigger(trigger, priv.bytes)) continue;
+    state.last = trigger.t;
+    ++priv.writable.written().lock()->triggers;
+  }
+}
+
+/// Encodes events, and the triggers among them. May throw.
+static GstFlowReturn encode_all(GstEventWriter* self, std::span<const AbsoluteEvent> events,
+                                GstClockTime& start) {
+  const auto& triggers = priv_of(self).state->triggers;
+  GstFlowReturn result = GST_FLOW_OK;
+  while (!events.empty() && result == GST_FLOW_OK) {
+    encode_triggers(self, events.front().t);
+    const auto next = triggers.first().value_or(events.back().t);
+    const auto end = std::ranges::upper_bound(events, next, {}, &AbsoluteEvent::t);
+    const auto count = static_cast<std::size_t>(end - events.begin());
+    result = encode(self, events.first(count), start);
+    events = events.subspan(count);
+  }
+  return result;
 }
 
 static void warn_of_pause(GstEventWriter* self) {
@@ -265,7 +300,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
     GstFlowReturn result = GST_FLOW_OK;
     const bool encoded = priv.writable.take(taken, [&](const auto& events) {
       if (result == GST_FLOW_OK) result = push_header(self, start);
-      if (result == GST_FLOW_OK) result = encode(self, events, start);
+      if (result == GST_FLOW_OK) result = encode_all(self, events, start);
     });
     if (!encoded) return GST_FLOW_ERROR;
     warn_of_pause(self);
@@ -302,6 +337,7 @@ static void end_file(GstEventWriter* self) {
   reported(self, [&] {
     GstFlowReturn result = push_header(self, GST_CLOCK_TIME_NONE);
     if (result != GST_FLOW_OK) return result;
+    encode_triggers(self, eventcamera::Chunker::max_time);
     priv.state->encoder->finish(priv.bytes);
     result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
     auto patch = priv.state->encoder->patch();
@@ -332,6 +368,13 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       break;
     case GST_EVENT_FLUSH_STOP:
       start_over(self);
+      break;
+    case GST_EVENT_CUSTOM_DOWNSTREAM:
+      if (const auto triggers = triggers_of(event)) {
+        if (priv_of(self).state) priv_of(self).state->triggers.push(*triggers);
+        gst_event_unref(event);
+        return TRUE;
+      }
       break;
     default:
       break;
@@ -364,8 +407,10 @@ static void set_property(GObject* object, guint id, const GValue* value, GParamS
 }
 
 static void get_property(GObject* object, guint id, GValue* value, GParamSpec*) {
-  const auto& priv = priv_of(GST_EVENT_WRITER(object));
-  if (id == prop_max_size)
+  auto& priv = priv_of(GST_EVENT_WRITER(object));
+  if (id == prop_stats)
+    g_value_take_boxed(value, priv.writable.stats());
+  else if (id == prop_max_size)
     g_value_set_uint(value, priv.max_size);
   else
     g_value_set_enum(value, priv.variant);
@@ -434,6 +479,7 @@ static void format_class_init(gpointer klass, gpointer data) {
                           "network packet; words are never split",
                           64, G_MAXUINT, G_MAXUINT,
                           static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_PLAYING)));
+  g_object_class_install_property(object_class, prop_stats, WritableEvents::stats_spec());
   auto* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_template(
       element_class, "sink", GST_PAD_SINK,

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 /// Settings that the application may change at any time; the element works with a copy.
 template <class Settings>
@@ -119,13 +120,23 @@ class Properties {
   /// Adds a property with a custom setter and getter.
   template <class Set, class Get>
   void add(Set set, Get get, GParamSpec* spec) {
-    auto access = std::make_unique<PropertyAccess>();
-    access->set = [set](GObject* object, const GValue* value) {
-      settings_of(object).access([&](Settings& settings) { set(settings, value); });
-    };
-    access->get = [get](GObject* object, GValue* value) {
-      settings_of(object).access([&](Settings& settings) { get(settings, value); });
-    };
+    install({[set](GObject* object, const GValue* value) {
+               settings_of(object).access([&](Settings& settings) { set(settings, value); });
+             },
+             [get](GObject* object, GValue* value) {
+               settings_of(object).access([&](Settings& settings) { get(settings, value); });
+             }},
+            spec);
+  }
+
+  /// Adds a read-only property that is not in the settings.
+  void add_read_only(void (*get)(GObject*, GValue*), GParamSpec* spec) {
+    install({nullptr, get}, spec);
+  }
+
+ private:
+  void install(PropertyAccess functions, GParamSpec* spec) {
+    auto access = std::make_unique<PropertyAccess>(std::move(functions));
     g_param_spec_set_qdata_full(spec, PropertyAccess::quark(), access.release(), [](gpointer last) {
       const std::unique_ptr<PropertyAccess> owned(static_cast<PropertyAccess*>(last));
     });
@@ -133,6 +144,5 @@ class Properties {
     g_object_class_install_property(klass_, number, spec);
   }
 
- private:
   GObjectClass* klass_;
 };

@@ -26,6 +26,7 @@ void WritableEvents::begin_file(SensorSize sensor) {
   sensor_ = sensor;
   latest_ = 0;
   earlier_ = outside_ = {};
+  *written_.lock() = {};
 }
 
 bool WritableEvents::accepts(SensorSize sensor) const {
@@ -69,6 +70,7 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
     if (earlier_.reported == 0) warn_of_earlier();
     if (outside_.reported == 0) warn_of_outside();
   }
+  written_.lock()->events += picked_.size();
   return picked_;
 }
 
@@ -98,6 +100,22 @@ void WritableEvents::warn(LeftOut& left_out, const std::string& what, const std:
                            (left_out.reported == 0 ? " " : " in total ") + what},
                cause);
   left_out.reported = left_out.count;
+}
+
+GstStructure* WritableEvents::stats() {
+  const Written written = *written_.lock();
+  return gst_structure_new("application/x-event-writer-stats", "events", G_TYPE_UINT64,
+                           written.events, "triggers", G_TYPE_UINT64, written.triggers, "frames",
+                           G_TYPE_UINT64, written.frames, "imu-samples", G_TYPE_UINT64,
+                           written.imu_samples, nullptr);
+}
+
+GParamSpec* WritableEvents::stats_spec() {
+  return g_param_spec_boxed("stats", "Statistics",
+                            "Counts of what was written to the file: events, triggers, frames and "
+                            "imu-samples",
+                            GST_TYPE_STRUCTURE,
+                            static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS));
 }
 
 Report WritableEvents::failure(const std::exception& error, const Report& otherwise) {

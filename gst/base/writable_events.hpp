@@ -10,10 +10,19 @@
 
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/guarded.hpp"
 #include "src/formats/decoder.hpp"
 
 /// True if downstream of a source pad can seek in bytes.
 bool can_seek_bytes(GstPad* src);
+
+/// Numbers of items in a file that is being written.
+struct Written {
+  guint64 events = 0;
+  guint64 triggers = 0;
+  guint64 frames = 0;
+  guint64 imu_samples = 0;
+};
 
 /// Filter for elements that write event files. Passes events that a file can hold, sorted by time
 /// and within the sensor, and counts the others. Posts a warning about these once valid events
@@ -55,6 +64,14 @@ class WritableEvents {
 
   void end_file();
 
+  /// What was written since begin_file(); the filter counts only the events. Any thread may read
+  /// it.
+  Guarded<Written>& written() { return written_; }
+
+  /// The property stats of the element: what was written.
+  GstStructure* stats();
+  static GParamSpec* stats_spec();
+
   /// Report for an exception from writing: `otherwise`, unless memory is short or the format cannot
   /// hold the stream.
   static Report failure(const std::exception& error, const Report& otherwise);
@@ -78,4 +95,5 @@ class WritableEvents {
   std::vector<eventcamera::AbsoluteEvent> picked_;
   LeftOut earlier_;
   LeftOut outside_;
+  Guarded<Written> written_;
 };

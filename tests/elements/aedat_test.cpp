@@ -928,6 +928,59 @@ TEST(AedatMux, KeepsTheExposureTimesOfFrames) {
   EXPECT_EQ(frames, 1);
 }
 
+TEST(AedatMux, KeepsTriggersAndImuSamples) {
+  using eventcamera::ImuSample;
+  using eventcamera::Trigger;
+  const auto events = steady_events(300'000, 70, of_1970);
+  std::vector<Trigger> triggers{{of_1970 - 5'000, 0, true}};  // before the first event
+  std::vector<ImuSample> samples;
+  Aedat4Encoder encoder({.size = sensor,
+                         .source = "a camera",
+                         .compression = Aedat4Compression::lz4,
+                         .table = true,
+                         .triggers = true,
+                         .imu_samples = true});
+  Bytes bytes;
+  encoder.encode(std::span<const Trigger>(triggers), bytes);
+  for (std::size_t i = 0; i < events.size(); i += 100) {
+    const std::vector<Trigger> few{{events[i].t, 1, true}, {events[i].t + 33, 1, false}};
+    const std::vector<ImuSample> sample{
+        {.t = events[i].t + 50, .temperature = 40, .acceleration = {0, -1, static_cast<float>(i)}}};
+    triggers.insert(triggers.end(), few.begin(), few.end());
+    samples.push_back(sample.front());
+    encoder.encode(std::span<const Trigger>(few), bytes);
+    encoder.encode(std::span<const ImuSample>(sample), bytes);
+    encoder.encode(std::span(events).subspan(i, std::min<std::size_t>(100, events.size() - i)),
+                   bytes);
+  }
+  const File in(finished(encoder, bytes));
+  for (const char* between : {"", "identity ! "}) {
+    const File out{Bytes{}};
+    ASSERT_TRUE(run("filesrc location=" + in_quotes(in.path()) + " ! " + between +
+                    "aedatdemux ! queue ! aedatmux ! filesink location=" + in_quotes(out.path())));
+    const auto copy = out.bytes();
+    Aedat4Decoder decoder;
+    decoder.push(copy);
+    decoder.finish();
+    std::vector<Trigger> triggers_found;
+    std::vector<ImuSample> samples_found;
+    Events events_found;
+    while (const auto item = decoder.next()) {
+      if (const auto* const of_triggers = std::get_if<eventcamera::TriggerItem>(&*item))
+        triggers_found.insert(triggers_found.end(), of_triggers->triggers.begin(),
+                              of_triggers->triggers.end());
+      else if (const auto* const imu = std::get_if<eventcamera::ImuItem>(&*item))
+        samples_found.insert(samples_found.end(), imu->samples.begin(), imu->samples.end());
+      else if (const auto* const some = std::get_if<EventItem>(&*item))
+        events_found.insert(events_found.end(), some->events.begin(), some->events.end());
+    }
+    EXPECT_EQ(triggers_found, triggers);
+    EXPECT_EQ(samples_found, samples);
+    EXPECT_EQ(events_found, events);
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+  }
+}
+
 TEST(AedatMux, LearnsFromItsCapsWhatComesToAPad) {
   const auto events = steady_events(300'000, 70, of_1970 + 123'457);
   const File in(aedat4_with_frames(events, PixelFormat::grey8, 5));

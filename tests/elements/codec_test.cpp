@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "src/formats/chunker.hpp"
+#include "src/formats/evt/raw.hpp"
 #include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
 
@@ -866,6 +867,54 @@ TEST(EvtDec, NeedsNoFramerateInCaps) {
                 "application/x-event-camera,format=EVT3,width=320,height=240 ! evtdec");
   EXPECT_TRUE(player.ends_well());
   EXPECT_EQ(player.events.size(), 20'000U);
+}
+
+TEST(EvtEnc, KeepsTriggers) {
+  using eventcamera::Trigger;
+  gst_init(nullptr, nullptr);
+  const auto events = some_events();
+  const std::span<const AbsoluteEvent> all(events);
+  const std::vector<Trigger> triggers{{events[5000].t, 2, true},
+                                      {events[5000].t + 20, 2, false},
+                                      {events[9'999].t + 1'500'000, 7, true},
+                                      {events.back().t + 40'000, 7, false}};
+  const auto encoder =
+      eventcamera::make_prophesee_raw_encoder(eventcamera::EvtFormat::evt3, {width, height});
+  std::vector<std::uint8_t> bytes;
+  encoder->encode(all.first(5001), bytes);
+  for (const auto& trigger : {triggers[0], triggers[1]})
+    EXPECT_TRUE(encoder->encode_trigger(trigger, bytes));
+  encoder->encode(all.subspan(5001, 4999), bytes);
+  EXPECT_TRUE(encoder->encode_trigger(triggers[2], bytes));
+  encoder->encode(all.subspan(10'000), bytes);
+  EXPECT_TRUE(encoder->encode_trigger(triggers[3], bytes));
+  const TemporaryFile in(std::string(bytes.begin(), bytes.end()));
+  for (const char* between : {"", "identity ! "})
+    for (const char* words : {"EVT2", "EVT21", "EVT3", "EVT4"}) {
+      SCOPED_TRACE(std::string(words) + between);
+      const TemporaryFile out("");
+      const auto launch = "filesrc location=" + in_quotes(in.path()) + " ! " + between +
+                          "evtdec ! queue ! evtenc format=" + words +
+                          " ! filesink location=" + in_quotes(out.path());
+      const Owned<GstElement> pipeline(gst_parse_launch(launch.c_str(), nullptr));
+      const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+      gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+      const Owned<GstMessage> message(gst_bus_timed_pop_filtered(
+          bus.get(), 20 * GST_SECOND,
+          static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
+      gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+      ASSERT_TRUE(message && GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_EOS);
+      std::ifstream file(out.path(), std::ios::binary);
+      const std::vector<std::uint8_t> written{std::istreambuf_iterator<char>(file),
+                                              std::istreambuf_iterator<char>()};
+      const auto decoder = eventcamera::make_prophesee_raw_decoder();
+      eventcamera::Decoded decoded;
+      decoder->decode(written, decoded);
+      decoder->finish(decoded);
+      EXPECT_EQ(decoded.triggers, triggers);
+      EXPECT_EQ(decoded.events, events);
+      EXPECT_EQ(decoder->corruption().places, 0U);
+    }
 }
 
 TEST(EvtEnc, TakesTheFormatThatDownstreamLeaves) {

@@ -166,6 +166,16 @@ class Player {
                GST_STATE_CHANGE_SUCCESS;
   }
 
+  guint64 count(const char* element, const char* field) const {
+    const Owned<GstElement> of(gst_bin_get_by_name(GST_BIN(pipeline_.get()), element));
+    GstStructure* stats = nullptr;
+    guint64 count = 0;
+    g_object_get(of.get(), "stats", &stats, nullptr);
+    EXPECT_TRUE(gst_structure_get_uint64(stats, field, &count));
+    gst_structure_free(stats);
+    return count;
+  }
+
   gint64 duration() const {
     gint64 duration = -1;
     gst_element_query_duration(pipeline_.get(), GST_FORMAT_TIME, &duration);
@@ -295,6 +305,41 @@ TEST_P(Hdf5, IsWritten) {
   ASSERT_TRUE(player.ends_well());
   ASSERT_TRUE(player.reaches(GST_STATE_NULL));
   EXPECT_TRUE(read(path) == events);
+}
+
+/// Through EVT words and back.
+TEST(Hdf5Elements, KeepTriggers) {
+  using eventcamera::Trigger;
+  const auto events = some_events();
+  std::vector<Trigger> triggers{{events.front().t - 1'500, 1, true}};
+  for (std::size_t i = 0; i < events.size(); i += 777)
+    triggers.push_back({events[i].t, static_cast<std::uint16_t>(i % 8), i % 2 == 0});
+  triggers.push_back({events.back().t + 7'000, 0, false});
+  const Folder folder;
+  const auto in = folder / "in.hdf5";
+  {
+    Hdf5Writer writer(in, {Hdf5Layout::metavision, Hdf5Writer::Compression::none, {width, height}});
+    writer.append(events);
+    EXPECT_TRUE(writer.append(std::span<const Trigger>(triggers)));
+    writer.close();
+  }
+  for (const std::string layout : {"metavision", "dsec"}) {
+    SCOPED_TRACE(layout);
+    const auto out = folder / (layout + ".hdf5");
+    Player player("filesrc location=" + in_quotes(in) +
+                  " ! eventhdf5dec ! evtenc ! evtdec ! tee name=t  t. ! queue ! eventhdf5sink "
+                  "name=out layout=" +
+                  layout + " location=" + in_quotes(out) + "  t. ! queue");
+    ASSERT_TRUE(player.ends_well());
+    EXPECT_TRUE(read(out) == events);
+    std::vector<Trigger> found;
+    Hdf5Reader reader(out);
+    while (reader.read_triggers(1000, found) > 0) continue;
+    const bool has_triggers = layout == "metavision";
+    EXPECT_EQ(found, has_triggers ? triggers : std::vector<Trigger>());
+    EXPECT_EQ(player.count("out", "triggers"), has_triggers ? triggers.size() : 0);
+    EXPECT_EQ(player.count("out", "events"), events.size());
+  }
 }
 
 /// Sink fed by the test.

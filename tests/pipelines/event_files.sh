@@ -262,6 +262,30 @@ for ending in aedat4 h5 hdf5; do
   counted 343474 recorded.raw
   cmp as-recorded.csv counted.csv || fail "as $ending the recording has other times"
 done
-counted 117667 "$recordings/davis346-frames-events-imu.aedat4" 2>left-out
+davis=$recordings/davis346-frames-events-imu.aedat4
+counted 117667 "$davis" 2>left-out
 grep -qx "left out: 3 frames, 15 triggers, 130 IMU samples" left-out || fail "the user is told: $(cat left-out)"
+
+# Triggers, frames and IMU samples come along where both formats have them.
+complete() { # IN OUT
+  convert "$1" "$2" 2>left-out
+  if grep "left out" left-out; then fail "something of $1 is left out of $2"; fi
+}
+complete "$recordings/evt3-640x480-triggers.raw" triggers.hdf5
+complete triggers.hdf5 triggers.raw
+complete triggers.raw triggers-again.hdf5
+complete "$davis" davis.aedat4
+complete davis.aedat4 davis-again.aedat4
+cmp davis.aedat4 davis-again.aedat4 || fail "the copy of a copy is another file"
+convert "$recordings/evt3-640x480-triggers.raw" triggers.h5 2>left-out
+grep -qx "left out: [0-9]* triggers" left-out || fail "the user is told: $(cat left-out)"
+/usr/bin/python3 - triggers.hdf5 triggers-again.hdf5 "$(grep -o "[0-9]*" left-out)" <<'PYTHON'
+import sys
+
+import h5py
+
+first, again = (h5py.File(path)["EXT_TRIGGER/events"][:] for path in sys.argv[1:3])
+assert len(first) == int(sys.argv[3]), "triggers are lost on the way from EVT3"
+assert (first == again).all(), "triggers are others on the way back"
+PYTHON
 echo "all files were read and written"

@@ -85,7 +85,7 @@ launch filesrc location=interrupted.mp4 ! decodebin ! fakesink
 
 # A client that joins a server late gets the header first.
 port=$((20000 + $$ % 20000))
-for writer in "evtenc format=EVT3" "evtenc format=EVT4" eventdatenc eventesenc; do
+for writer in "evtenc format=EVT3" "evtenc format=EVT4" eventdatenc eventesenc "application/x-event-camera ! aedatmux"; do
   echo "tcpserversink of $writer"
   timeout 60 "$GST_LAUNCH" -q videotestsrc is-live=true pattern=ball ! eventsim-frame ! $writer ! tcpserversink host=127.0.0.1 port=$port &
   serving=$!
