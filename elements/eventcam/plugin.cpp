@@ -26,7 +26,7 @@
   AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X)                                       \
   X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats)                             \
   X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
-  X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc)
+  X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)
 // clang-format on
 #define TYPE_FINDERS(X) \
   X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(npz) X(propheseedat) X(propheseeraw)
@@ -49,5 +49,5 @@ static gboolean plugin_init(GstPlugin* plugin) {
 
 #define PACKAGE "gst-eventsim"
 GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, eventcam,
-                  "Event streams: render, read, write, measure", plugin_init, PACKAGE_VERSION,
+                  "Event streams: render, read, write, send, measure", plugin_init, PACKAGE_VERSION,
                   "LGPL", "gst-eventsim", EVENTSIM_AUTHORS)

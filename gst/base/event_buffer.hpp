@@ -61,7 +61,7 @@ inline constexpr GstClockTime event_resolution = GST_USECOND;
 std::optional<EventInterval> interval_of(GstBuffer* buffer);
 
 /// Reason for skipping events of a buffer.
-enum class EventFault { no_pts, partial_event, beyond_sensor };
+enum class EventFault { no_pts, partial_event, beyond_sensor, unsorted };
 
 /// Posts warnings about events that an element skips, once per fault and stream.
 class EventFaults {
@@ -76,5 +76,5 @@ class EventFaults {
 
  private:
   const char* verb_;
-  std::array<WarnOnce, 3> warnings_{};
+  std::array<WarnOnce, 4> warnings_{};
 };

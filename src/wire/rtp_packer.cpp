@@ -22,8 +22,8 @@ constexpr std::uint64_t max_time = 0xffffff;
 
 }  // namespace
 
-RtpPacker::RtpPacker(SensorSize sensor, RtpEventFormat format)
-    : width_(sensor.width), format_(format) {
+RtpPacker::RtpPacker(SensorSize sensor, RtpEventFormat format, std::uint32_t first_event)
+    : width_(sensor.width), format_(format), next_event_(first_event) {
   if (format == RtpEventFormat::evt3 && std::max(sensor.width, sensor.height) > max_evt_side)
     throw std::invalid_argument("EVT3 words support sensors of 1x1 to 2048x2048 pixels");
 }

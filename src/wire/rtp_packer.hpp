@@ -17,8 +17,9 @@ class RtpPacker {
   /// Minimum of max_size.
   static constexpr std::size_t min_size = RtpPayloadHeader::size + 16;
 
-  /// Throws std::invalid_argument if the format does not support the sensor.
-  RtpPacker(SensorSize sensor, RtpEventFormat format);
+  /// `first_event` is the number of the first event. Throws std::invalid_argument if the format
+  /// does not support the sensor.
+  RtpPacker(SensorSize sensor, RtpEventFormat format, std::uint32_t first_event = 0);
 
   /// Calls take(payload, is_last) for each packet of an interval, at least one. Events must be
   /// sorted and within the sensor, at most max_rtp_interval_events, and their times relative to
@@ -33,7 +34,7 @@ class RtpPacker {
     } while (!events.empty());
   }
 
-  /// Number of events packed so far, modulo 2^32.
+  /// Number of the next event, modulo 2^32.
   std::uint32_t next_event() const { return next_event_; }
 
  private:
@@ -45,7 +46,7 @@ class RtpPacker {
 
   int width_;
   RtpEventFormat format_;
-  std::uint32_t next_event_ = 0;
+  std::uint32_t next_event_;
   std::vector<std::uint8_t> payload_;
 };
 

@@ -77,6 +77,7 @@ void RtpUnpacker::append(const RtpPacket& packet, const RtpPayloadHeader& header
   if (!interval_) {
     is_discontinuous_ |= header.start < end_;
     interval_ = header;
+    arrival_ = packet.arrival;
   }
   events_.insert(events_.end(), decoded_.begin(), decoded_.end());
   ++statistics_.packets;

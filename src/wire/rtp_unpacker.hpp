@@ -20,6 +20,7 @@ struct RtpPacket {
   std::uint16_t sequence_number;
   bool marker;  ///< last packet of its interval
   std::span<const std::uint8_t> payload;
+  std::uint64_t arrival = 0;  ///< passed on, on any clock
 };
 
 /// An interval and those of its events that arrived.
@@ -27,6 +28,7 @@ struct RtpInterval {
   Nanoseconds start;
   Nanoseconds duration;
   std::span<const Event> events;  ///< relative to `start`, rounded down to microseconds
+  std::uint64_t arrival;          ///< of its first packet
   bool is_discontinuous;          ///< packets were lost before or in it, or the stream starts over
 };
 
@@ -63,7 +65,7 @@ class RtpUnpacker {
   template <class Take>
   void flush(const Take& take) {
     if (!interval_) return;
-    take(RtpInterval{interval_->start, interval_->duration, events_, is_discontinuous_});
+    take(RtpInterval{interval_->start, interval_->duration, events_, arrival_, is_discontinuous_});
     close_interval();
   }
 
@@ -73,8 +75,10 @@ class RtpUnpacker {
   /// True if a packet may be one of this format: a quick check of its header.
   bool is_plausible(std::span<const std::uint8_t> payload) const;
 
-  const RtpStatistics& statistics() const { return statistics_; }
+  /// Counts a packet that was dropped because it is not plausible.
   void count_rejected() { ++statistics_.rejected_packets; }
+
+  const RtpStatistics& statistics() const { return statistics_; }
 
  private:
   /// Position in the stream of a sender.
@@ -111,6 +115,7 @@ class RtpUnpacker {
   int late_in_a_row_ = 0;
   std::optional<RtpPayloadHeader> interval_;  ///< header of the current interval's first packet
   std::vector<Event> events_;                 ///< of the current interval
+  std::uint64_t arrival_ = 0;                 ///< of the current interval
   Nanoseconds end_ = 0;                       ///< of the last interval
   bool is_discontinuous_ = true;
   RtpStatistics statistics_;

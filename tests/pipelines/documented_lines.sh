@@ -18,6 +18,7 @@ eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc dialect=e
 for name in recording real simulated; do cp drive.raw $name.raw; done
 
 count=0
+receiver=
 while IFS= read -r line; do
   line=${line//v4l2src/$ball}
   line=${line//rtspsrc location=rtsp:\/\/camera\/stream ! decodebin/$ball}
@@ -25,6 +26,7 @@ while IFS= read -r line; do
   line=${line//pattern=ball foreground/pattern=ball num-buffers=40 foreground}
   line=${line//autovideosink/fakesink}
   line=${line// --device \/dev\/video0/ --port 0}
+  line=${line//host=receiver/host=127.0.0.1}
   case $line in
     ./pipelines/web-events*) line="timeout --preserve-status --signal INT 20 $line" ;; # serves until Ctrl-C
     gst-play*) line="$line --no-interactive --videosink=fakesink" ;;
@@ -34,10 +36,20 @@ while IFS= read -r line; do
       ;;
   esac
   echo "$line"
-  eval "timeout 120 $line" >output 2>&1 </dev/null || fail "$(cat output)"
   count=$((count + 1))
+  if [[ $line == *udpsrc* ]]; then # a receiver of what the next line sends
+    eval "timeout 120 ${line/udpsrc/udpsrc num-buffers=5}" >received 2>&1 </dev/null &
+    receiver=$!
+    sleep 2
+    continue
+  fi
+  eval "timeout 120 $line" >output 2>&1 </dev/null || fail "$(cat output)"
+  if [ -n "$receiver" ]; then
+    wait $receiver || fail "$(cat received)"
+    receiver=
+  fi
 done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|event-|\.\/pipelines\/(events_|web-events))/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
-[ $count -ge 18 ] || fail "found only $count lines"
+[ $count -ge 20 ] || fail "found only $count lines"
 for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy; do
   [ -s $file ] || fail "$file is missing or empty"
 done

@@ -57,7 +57,11 @@ for mode in accumulate decay time-surface count; do
   check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender mode=$mode ! videoconvert ! fakesink
 done
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.events
+check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay ! rtpeventdepay ! fakesink
+check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay max-latency=1000000000 ! rtpeventdepay ! fakesink num-buffers=1
 # Errors in mid-stream.
+check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay ! rtpeventdepay ! identity error-after=2 ! fakesink
+check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay mtu=30 ! fakesink
 check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! fakesink
 check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! aedatmux ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender ! identity error-after=2 ! fakesink

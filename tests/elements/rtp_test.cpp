@@ -1,0 +1,455 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// rtpeventpay and rtpeventdepay: what arrives, when, and what is counted.
+#include <gst/rtp/gstrtpbuffer.h>
+#include <gst/sdp/gstsdpmessage.h>
+
+#include <algorithm>
+#include <optional>
+#include <random>
+
+#include "src/wire/rtp_payload.hpp"
+#include "tests/elements/event_buffer.hpp"
+#include "tests/elements/harness.hpp"
+#include "tests/wire/rtp_packets.hpp"
+
+namespace {
+
+using namespace harness;
+using namespace eventcamera;
+using rtp_packets::Interval;
+
+constexpr GstClockTime ms = GST_MSECOND;
+constexpr SensorSize davis{346, 260};
+const std::string davis_caps = "application/x-event-camera, format=XYTP, width=346, height=260";
+const std::string rtp_caps =
+    "application/x-rtp, media=application, clock-rate=1000000, encoding-name=X-EVENT-CAMERA, "
+    "width=346, height=260, format=";
+
+void push(Harness& h, const Interval& interval) {
+  const auto start = static_cast<GstClockTime>(interval.start);
+  const auto duration = static_cast<GstClockTime>(interval.duration);
+  if (interval.events.empty())
+    gst_harness_push_event(h.get(), gst_event_new_gap(start, duration));
+  else
+    ASSERT_EQ(h.push(buffer_of(start, interval.events, duration)), GST_FLOW_OK);
+}
+
+void end(Harness& h) {
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+}
+
+/// Output of a depayloader: its buffers and GAP events, in the order of time.
+struct Output {
+  std::vector<Interval> intervals;
+  std::vector<GstSegment> segments;
+  int discontinuities = 0;
+
+  explicit Output(Harness& h) {
+    while (const auto buffer = h.pull()) {
+      Interval interval{static_cast<Nanoseconds>(GST_BUFFER_PTS(buffer.get())),
+                        static_cast<Nanoseconds>(GST_BUFFER_DURATION(buffer.get())),
+                        {}};
+      for (const auto& event : events_of(buffer.get()))
+        interval.events.push_back({event.t, event.x, event.y_p});
+      intervals.push_back(interval);
+      discontinuities += GST_BUFFER_IS_DISCONT(buffer.get()) ? 1 : 0;
+    }
+    while (const Owned<GstEvent> event{gst_harness_try_pull_event(h.get())}) {
+      if (GST_EVENT_TYPE(event.get()) == GST_EVENT_GAP) {
+        const auto gap = gap_of(event.get());
+        intervals.push_back(
+            {static_cast<Nanoseconds>(gap.start), static_cast<Nanoseconds>(gap.duration), {}});
+      } else if (GST_EVENT_TYPE(event.get()) == GST_EVENT_SEGMENT) {
+        gst_event_copy_segment(event.get(), &segments.emplace_back());
+      }
+    }
+    std::ranges::stable_sort(intervals, {}, &Interval::start);
+  }
+};
+
+std::vector<AbsoluteEvent> absolute(const std::vector<Interval>& intervals) {
+  std::vector<AbsoluteEvent> events;
+  for (const auto& [start, duration, some] : intervals)
+    for (const auto& event : some) events.push_back({start / 1000 + event.t, event.x, event.y_p});
+  return events;
+}
+
+guint64 stat(const Harness& h, const char* field) {
+  GstStructure* stats = nullptr;
+  g_object_get(h.element(), "stats", &stats, nullptr);
+  guint64 value = G_MAXUINT64;
+  EXPECT_TRUE(gst_structure_get_uint64(stats, field, &value)) << field;
+  gst_structure_free(stats);
+  return value;
+}
+
+/// Fields of an RTP packet.
+struct Fields {
+  guint16 sequence_number;
+  guint32 timestamp;
+  bool marker;
+  std::optional<RtpPayloadHeader> header;
+
+  explicit Fields(GstBuffer* packet) {
+    GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+    EXPECT_TRUE(gst_rtp_buffer_map(packet, GST_MAP_READ, &rtp));
+    sequence_number = gst_rtp_buffer_get_seq(&rtp);
+    timestamp = gst_rtp_buffer_get_timestamp(&rtp);
+    marker = gst_rtp_buffer_get_marker(&rtp) != FALSE;
+    header =
+        RtpPayloadHeader::read({static_cast<const std::uint8_t*>(gst_rtp_buffer_get_payload(&rtp)),
+                                gst_rtp_buffer_get_payload_len(&rtp)});
+    gst_rtp_buffer_unmap(&rtp);
+  }
+};
+
+/// Packets of a stream, one per buffer.
+std::vector<Buffer> packets_of(const std::vector<Interval>& intervals,
+                               const std::string& properties = "") {
+  Harness pay("rtpeventpay max-latency=0 mtu=576 " + properties);
+  pay.caps(davis_caps, "application/x-rtp");
+  for (const auto& interval : intervals) push(pay, interval);
+  std::vector<Buffer> packets;
+  while (auto packet = pay.pull()) packets.push_back(std::move(packet));
+  EXPECT_EQ(stat(pay, "packets"), packets.size());
+  EXPECT_EQ(stat(pay, "events"), absolute(intervals).size());
+  return packets;
+}
+
+struct Depayloader : Harness {
+  explicit Depayloader(const std::string& format = "EVT3") : Harness("rtpeventdepay") {
+    caps(rtp_caps + format);
+  }
+
+  void take(GstBuffer* packet) { EXPECT_EQ(push(gst_buffer_ref(packet)), GST_FLOW_OK); }
+  void take(GstBuffer* packet, GstClockTime arrival) {
+    GstBuffer* copy = gst_buffer_copy(packet);
+    GST_BUFFER_PTS(copy) = arrival;
+    EXPECT_EQ(push(copy), GST_FLOW_OK);
+  }
+};
+
+class EveryFormat : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::Values("EVT3", "XYTP"));
+
+TEST_P(EveryFormat, GivesBackEveryBufferAndGap) {
+  unsigned seed = 0;
+  for (const auto mtu : {576, 1500, 9000}) {
+    Harness h("rtpeventpay max-latency=0 format=" + std::string(GetParam()) +
+              " mtu=" + std::to_string(mtu) + " ! rtpeventdepay");
+    h.caps(davis_caps);
+    const auto intervals = rtp_packets::random_intervals(davis, 40, ++seed);
+    for (const auto& interval : intervals) push(h, interval);
+    end(h);
+    const Output output(h);
+    EXPECT_EQ(output.intervals, intervals);
+    EXPECT_EQ(output.discontinuities, 1);
+    EXPECT_EQ(output.segments.size(), 1U);
+    EXPECT_NE(h.out_caps().find("width=(int)346, height=(int)260"), std::string::npos);
+  }
+}
+
+TEST_P(EveryFormat, SendsPacketsUpToTheMtu) {
+  const auto intervals = rtp_packets::random_intervals(davis, 40, 5);
+  for (const unsigned mtu : {64U, 576U, 1500U, 9000U}) {
+    Harness h("rtpeventpay max-latency=0 timestamp-offset=7 format=" + std::string(GetParam()) +
+              " mtu=" + std::to_string(mtu));
+    h.caps(davis_caps, "application/x-rtp");
+    gsize largest = 0;
+    for (const auto& interval : intervals) {
+      push(h, interval);
+      std::size_t events = 0;
+      bool ended = false;
+      while (const auto packet = h.pull()) {
+        const Fields fields(packet.get());
+        largest = std::max(largest, gst_buffer_get_size(packet.get()));
+        ASSERT_FALSE(ended);
+        ended = fields.marker;
+        ASSERT_TRUE(fields.header);
+        EXPECT_EQ(fields.timestamp, static_cast<guint32>(interval.start / 1000 + 7));
+        EXPECT_EQ(fields.header->start, interval.start);
+        EXPECT_EQ(fields.header->duration, interval.duration);
+        events += fields.header->event_count;
+      }
+      EXPECT_TRUE(ended);
+      EXPECT_EQ(events, interval.events.size());
+    }
+    EXPECT_LE(largest, mtu);
+    if (mtu < 9000) {
+      EXPECT_GT(largest, mtu - 20);
+    }
+  }
+}
+
+TEST_P(EveryFormat, CountsLossDuplicationAndReordering) {
+  for (const unsigned loss : {0U, 1U, 5U, 20U}) {
+    std::mt19937 random(loss);
+    const auto intervals = rtp_packets::random_intervals(davis, 60, loss);
+    const auto sent = packets_of(intervals, std::string("format=") + GetParam());
+    std::vector<GstBuffer*> arriving;
+    for (const auto& packet : sent) {
+      const bool is_lost = random() % 100 < loss && packet != sent.front() && packet != sent.back();
+      if (is_lost) continue;
+      arriving.push_back(packet.get());
+      if (random() % 20 == 0) arriving.push_back(packet.get());
+      if (random() % 20 == 0 && arriving.size() > 9 && packet != sent.back())
+        std::swap(arriving.back(), arriving[arriving.size() - 2 - random() % 6]);
+    }
+    Depayloader h(GetParam());
+    for (auto* packet : arriving) h.take(packet);
+    end(h);
+    const Output output(h);
+    const auto received = absolute(output.intervals);
+    const auto all = absolute(intervals);
+    auto next = all.begin();
+    for (const auto& event : received) {
+      next = std::find(next, all.end(), event);
+      ASSERT_NE(next, all.end()) << "an event that was not sent";
+      ++next;
+    }
+    EXPECT_EQ(stat(h, "events"), received.size());
+    EXPECT_EQ(stat(h, "lost-events"), all.size() - received.size());
+    EXPECT_EQ(stat(h, "lost-packets"), sent.size() - stat(h, "packets"));
+    EXPECT_EQ(stat(h, "rejected-packets"), 0U);
+    EXPECT_GT(output.discontinuities, loss > 1 ? 2 : 0);
+  }
+}
+
+TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
+  const auto intervals = rtp_packets::random_intervals(davis, 30, 3);
+  std::mt19937 random(1);
+  Depayloader h(GetParam());
+  guint64 flood = 0;
+  for (const auto& packet : packets_of(intervals, std::string("format=") + GetParam())) {
+    for (int i = 0; i < 50; ++i, ++flood) {
+      std::vector<guint8> bytes(1 + random() % 600);
+      for (auto& byte : bytes) byte = static_cast<guint8>(random());
+      if (i % 2 == 0 && bytes.size() > 12) gst_buffer_extract(packet.get(), 0, bytes.data(), 2);
+      h.push(gst_buffer_new_memdup(bytes.data(), bytes.size()));
+    }
+    h.take(packet.get());
+  }
+  end(h);
+  const Output output(h);
+  EXPECT_EQ(output.intervals, intervals);
+  EXPECT_EQ(output.discontinuities, 1);
+  EXPECT_EQ(stat(h, "rejected-packets"), flood);
+  EXPECT_EQ(stat(h, "lost-packets"), 0U);
+}
+
+TEST(RtpEventPay, JoinsShortBuffersUpToItsLatency) {
+  Harness h("rtpeventpay max-latency=5000000 ! rtpeventdepay");
+  h.caps(davis_caps);
+  std::vector<Interval> intervals;
+  for (int i = 0; i < 20; ++i)
+    intervals.push_back({i * 1'000'000, 1'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  for (const auto& interval : intervals) push(h, interval);
+  const Output output(h);
+  EXPECT_EQ(absolute(output.intervals), absolute(intervals));
+  ASSERT_LE(output.intervals.size(), 10U);
+  for (const auto& interval : output.intervals) EXPECT_LE(interval.duration, 5'000'000);
+}
+
+TEST(RtpEventPay, SendsWaitingEventsWithoutFurtherInput) {
+  Harness h("rtpeventpay max-latency=5000000");
+  h.caps(davis_caps, "application/x-rtp");
+  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  const gint64 begin = g_get_monotonic_time();
+  const Buffer packet(gst_harness_pull(h.get()));  // waits
+  ASSERT_TRUE(packet);
+  EXPECT_EQ(Fields(packet.get()).header->event_count, 1);
+  EXPECT_LT(g_get_monotonic_time() - begin, G_USEC_PER_SEC);
+}
+
+TEST(RtpEventPay, SendsWaitingEventsAtTheEndAndBeforeAGap) {
+  Harness h("rtpeventpay max-latency=1000000000");
+  h.caps(davis_caps, "application/x-rtp");
+  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  EXPECT_FALSE(h.pull());
+  push(h, {5'000'000, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});  // not the next interval
+  EXPECT_TRUE(h.pull());
+  end(h);
+  EXPECT_TRUE(h.pull());
+}
+
+TEST(RtpEventPay, DropsWaitingEventsWhenFlushed) {
+  Harness h("rtpeventpay max-latency=1000000000");
+  h.caps(davis_caps, "application/x-rtp");
+  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  flush({h.get()});
+  push_segment(h.get());
+  end(h);
+  EXPECT_FALSE(h.pull());
+}
+
+TEST(RtpEventPay, AddsItsLatency) {
+  Harness h("rtpeventpay max-latency=7000000");
+  h.caps(davis_caps, "application/x-rtp");
+  gst_harness_set_upstream_latency(h.get(), 20 * ms);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 27 * ms);
+}
+
+TEST(RtpEventPay, TellsOfSilence) {
+  Harness h("rtpeventpay");
+  h.caps(davis_caps, "application/x-rtp");
+  push(h, {0, 40'000'000, {}});
+  const auto packet = h.pull();
+  ASSERT_TRUE(packet);
+  const Fields fields(packet.get());
+  EXPECT_TRUE(fields.marker);
+  EXPECT_EQ(fields.header->event_count, 0);
+  EXPECT_EQ(fields.header->duration, 40'000'000);
+}
+
+TEST(RtpEventPay, WarnsOfEventsThatItCannotSend) {
+  Harness h("rtpeventpay");
+  h.caps(davis_caps, "application/x-rtp");
+  push(h, {0, 10'000'000, {Event::at(346, 2, 3, Polarity::on), Event::at(1, 2, 3, Polarity::on)}});
+  const auto outside = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(outside);
+  EXPECT_NE(text_of(outside.get()).find("beyond the sensor"), std::string::npos);
+  push(h, {10'000'000,
+           10'000'000,
+           {Event::at(1, 2, 3, Polarity::on), Event::at(1, 2, 2, Polarity::on)}});
+  const auto unsorted = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(unsorted);
+  EXPECT_NE(text_of(unsorted.get()).find("earlier than those before them"), std::string::npos);
+  EXPECT_EQ(stat(h, "left-out-events"), 2U);
+  EXPECT_EQ(stat(h, "events"), 2U);
+  GstBuffer* partial = gst_buffer_new_memdup("12345", 5);
+  GST_BUFFER_PTS(partial) = 20 * ms;
+  EXPECT_EQ(h.push(partial), GST_FLOW_OK);
+  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST(RtpEventPay, RefusesWhatItCannotSend) {
+  Harness small("rtpeventpay mtu=40");
+  small.caps(davis_caps, "application/x-rtp");
+  EXPECT_EQ(small.push(buffer_of(0, {Event::at(1, 2, 3, Polarity::on)}, 10 * ms)), GST_FLOW_ERROR);
+  const auto error = small.message(GST_MESSAGE_ERROR);
+  ASSERT_TRUE(error);
+  EXPECT_NE(text_of(error.get()).find("set mtu to at least 56"), std::string::npos);
+
+  const std::string large = "application/x-event-camera, format=XYTP, width=2049, height=1";
+  Harness evt3("rtpeventpay");
+  evt3.caps(large, "application/x-rtp");
+  EXPECT_EQ(evt3.push(buffer_of(0, {Event::at(1, 0, 3, Polarity::on)}, 10 * ms)),
+            GST_FLOW_NOT_NEGOTIATED);
+  const auto refusal = evt3.message(GST_MESSAGE_ERROR);
+  ASSERT_TRUE(refusal);
+  EXPECT_NE(text_of(refusal.get()).find("format=XYTP"), std::string::npos);
+  Harness xytp("rtpeventpay format=XYTP");
+  xytp.caps(large, "application/x-rtp");
+  push(xytp, {0, 10'000'000, {Event::at(2048, 0, 3, Polarity::on)}});
+  EXPECT_TRUE(xytp.pull());
+}
+
+TEST(RtpEventPay, GoesOnWithAnotherSensor) {
+  Harness h("rtpeventpay max-latency=1000000000");
+  h.caps(davis_caps, "application/x-rtp");
+  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  gst_harness_set_src_caps_str(h.get(),
+                               "application/x-event-camera, format=XYTP, width=640, height=480");
+  EXPECT_TRUE(h.pull());  // what waited
+  push(h, {1'000'000, 1'000'000, {Event::at(639, 2, 3, Polarity::on)}});
+  end(h);
+  const auto packet = h.pull();
+  ASSERT_TRUE(packet);
+  EXPECT_EQ(Fields(packet.get()).header->first_event, 1U);
+  EXPECT_NE(h.out_caps().find("width=(string)640"), std::string::npos);
+}
+
+TEST(RtpEventDepay, MapsTheSendersTimesToTheTimeOfArrival) {
+  std::vector<Interval> intervals;
+  for (int i = 0; i < 30; ++i)
+    intervals.push_back(
+        {7'000'000'000 + i * 10'000'000, 10'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  const auto packets = packets_of(intervals);
+  Depayloader h;
+  for (int i = 0; i < 30; ++i) {
+    // Jitter of 3 ms, and a delay of 20 ms more after a while.
+    const int jitter = i % 3 + (i < 15 ? 0 : 20);
+    h.take(packets[static_cast<std::size_t>(i)].get(),
+           static_cast<GstClockTime>(i * 10 + jitter) * ms);
+  }
+  const Output output(h);
+  EXPECT_EQ(output.intervals, intervals);
+  ASSERT_EQ(output.segments.size(), 2U);
+  const auto running = [&](std::size_t segment, std::size_t interval) {
+    return gst_segment_to_running_time(&output.segments[segment], GST_FORMAT_TIME,
+                                       static_cast<GstClockTime>(intervals[interval].start));
+  };
+  EXPECT_EQ(running(0, 0), 0U);
+  EXPECT_EQ(running(0, 14), 140 * ms);
+  EXPECT_EQ(running(1, 15), 170 * ms);
+  EXPECT_EQ(output.segments[1].time, 170 * ms);
+}
+
+TEST(RtpEventDepay, StartsOverWithItsSender) {
+  const std::vector<Interval> intervals = {
+      {5'000'000'000, 10'000'000, {Event::at(1, 2, 500, Polarity::on)}},
+      {5'010'000'000, 10'000'000, {Event::at(2, 2, 500, Polarity::on)}}};
+  const std::vector<Interval> again = {{0, 10'000'000, {Event::at(3, 2, 500, Polarity::on)}}};
+  Depayloader h;
+  for (const auto& packet : packets_of(intervals)) h.take(packet.get(), 10 * ms);
+  for (const auto& packet : packets_of(again)) h.take(packet.get(), 500 * ms);
+  const Output output(h);
+  ASSERT_EQ(output.intervals.size(), 3U);
+  EXPECT_EQ(output.intervals.front(), again.front());
+  EXPECT_EQ(output.segments.back().start, 0U);
+  EXPECT_EQ(output.segments.back().base, 500 * ms);
+  EXPECT_EQ(output.discontinuities, 2);
+  EXPECT_EQ(stat(h, "lost-events"), 0U);
+}
+
+TEST(RtpEventDepay, NeedsTheSizeOfTheSensor) {
+  const std::string base =
+      "application/x-rtp, media=application, clock-rate=1000000, encoding-name=X-EVENT-CAMERA";
+  for (const auto* caps :
+       {"", ", width=346", ", width=0, height=260", ", width=(string)9x, height=1",
+        ", width=16385, height=1", ", width=346, height=260, format=EVT9"}) {
+    Harness h("rtpeventdepay");
+    h.caps(base + caps);
+    const auto error = h.message(GST_MESSAGE_ERROR);
+    ASSERT_TRUE(error) << caps;
+    EXPECT_NE(text_of(error.get()).find("set width, height and format"), std::string::npos);
+  }
+}
+
+TEST(RtpEventDepay, IsDescribedBySdp) {
+  Harness pay("rtpeventpay pt=99");
+  pay.caps(davis_caps, "application/x-rtp");
+  push(pay, {0, 40'000'000, {Event::at(345, 259, 500, Polarity::on)}});
+  GstCaps* caps = gst_pad_get_current_caps(pay->sinkpad);
+  GstSDPMedia* media = nullptr;
+  gst_sdp_media_new(&media);
+  ASSERT_EQ(gst_sdp_media_set_media_from_caps(caps, media), GST_SDP_OK);
+  EXPECT_STREQ(gst_sdp_media_get_media(media), "application");
+  EXPECT_STREQ(gst_sdp_media_get_attribute_val(media, "rtpmap"), "99 X-EVENT-CAMERA/1000000");
+  EXPECT_STREQ(gst_sdp_media_get_attribute_val(media, "fmtp"),
+               "99 width=346;height=260;format=EVT3");
+  gst_caps_unref(caps);
+  GstCaps* from_sdp = gst_sdp_media_get_caps_from_media(media, 99);
+  gst_structure_set_name(gst_caps_get_structure(from_sdp, 0), "application/x-rtp");
+  gchar* text = gst_caps_to_string(from_sdp);
+  Harness depay("rtpeventdepay");
+  depay.caps(text);
+  while (auto packet = pay.pull()) depay.push(packet.release());
+  EXPECT_EQ(Output(depay).intervals.size(), 1U);
+  g_free(text);
+  gst_caps_unref(from_sdp);
+  gst_sdp_media_free(media);
+}
+
+TEST(RtpEventDepay, KeepsTheStatisticsOfItsBaseClass) {
+  for (const auto* name : {"rtpeventpay", "rtpeventdepay"}) {
+    Harness h(name);
+    GstStructure* stats = nullptr;
+    g_object_get(h.element(), "stats", &stats, nullptr);
+    EXPECT_TRUE(gst_structure_has_field(stats, "seqnum"));
+    EXPECT_TRUE(gst_structure_has_field(stats, "events"));
+    gst_structure_free(stats);
+  }
+}
+
+}  // namespace
