@@ -26,6 +26,7 @@
   AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X)                                       \
   X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats)                             \
   X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
+  X(eventdatagramdepay) X(eventdatagrampay)                                                \
   X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)
 // clang-format on
 #define TYPE_FINDERS(X) \

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/gst.h>
+
+#include <bit>
+
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
+#include "src/wire/datagram_settings.hpp"
+
+/// Caps of datagrams of other tools.
+#define DATAGRAM_CAPS                                                         \
+  "application/x-event-datagram, format = (string) { spif, spif-timestamps, " \
+  "t64-x16-y16-on8, t32-x16-y15-on1, es, jaer }"
+
+inline GType datagram_format_type() {
+  using eventcamera::DatagramFormat;
+  static const GEnumValue values[] = {
+      {static_cast<int>(DatagramFormat::spif), "SPIF without times: SpiNNaker, AEStream, EventCV",
+       "spif"},
+      {static_cast<int>(DatagramFormat::spif_timestamps), "SPIF with times: EventCV",
+       "spif-timestamps"},
+      {static_cast<int>(DatagramFormat::t64_x16_y16_on8), "faery, 13 bytes per event",
+       "t64-x16-y16-on8"},
+      {static_cast<int>(DatagramFormat::t32_x16_y15_on1), "faery, 8 bytes per event",
+       "t32-x16-y15-on1"},
+      {static_cast<int>(DatagramFormat::es), "Event Stream", "es"},
+      {static_cast<int>(DatagramFormat::jaer), "jAER's AER-UDP", "jaer"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventDatagramFormat", values);
+}
+
+inline GType datagram_byte_order_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(std::endian::little), "Little-endian, as AEStream on a PC",
+       "little-endian"},
+      {static_cast<int>(std::endian::big), "Big-endian, network byte order", "big-endian"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventDatagramByteOrder", values);
+}
+
+/// Adds the properties that sender and receiver must agree on. Settings are derived from
+/// DatagramSettings.
+template <auto settings_of>
+void add_datagram_properties(Properties<settings_of>& properties) {
+  using eventcamera::DatagramSettings;
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                  GST_PARAM_MUTABLE_READY);
+  constexpr DatagramSettings defaults;
+  properties.add(
+      &DatagramSettings::format,
+      g_param_spec_enum("format", "Format", "Format of the datagrams", datagram_format_type(),
+                        static_cast<int>(defaults.format), flags));
+  properties.add(
+      &DatagramSettings::byte_order,
+      g_param_spec_enum("byte-order", "Byte order",
+                        "Byte order of SPIF; the other formats define their own",
+                        datagram_byte_order_type(), static_cast<int>(defaults.byte_order), flags));
+  properties.add(
+      &DatagramSettings::has_sequence_number,
+      g_param_spec_boolean("sequence-number", "Sequence number",
+                           "Datagrams of jAER start with a sequence number, which reveals losses",
+                           defaults.has_sequence_number, flags));
+}
+
+/// Counts of datagrams. Losses are known only if datagrams have a sequence number.
+struct DatagramCounts {
+  guint64 packets = 0;
+  guint64 events = 0;
+  guint64 bytes = 0;
+  guint64 lost = 0;
+  guint64 late = 0;
+  guint64 rejected = 0;
+};
+
+/// Adds the property `stats`, a structure of these counts.
+template <auto counts_of>
+void add_datagram_stats(GObjectClass* klass, const char* blurb,
+                        GstStructure* (*structure_of)(const DatagramCounts&)) {
+  Properties<counts_of> properties(klass);
+  properties.add(
+      [](DatagramCounts&, const GValue*) {},
+      [structure_of](const DatagramCounts& counts, GValue* value) {
+        g_value_take_boxed(value, structure_of(counts));
+      },
+      g_param_spec_boxed("stats", "Statistics", blurb, GST_TYPE_STRUCTURE,
+                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+}

@@ -1,0 +1,526 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Events in datagrams of other tools: packed, unpacked, through sockets, and beside hostile ones.
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <random>
+
+#include "tests/elements/event_buffer.hpp"
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::AbsoluteEvent;
+using eventcamera::Event;
+using eventcamera::Microseconds;
+using eventcamera::Polarity;
+
+constexpr int width = 640;
+constexpr int height = 480;
+constexpr auto events_caps =
+    "application/x-event-camera, format=XYTP, width=640, height=480, framerate=0/1";
+constexpr auto depay_size = " width=640 height=480";
+
+/// Sorted events, 10 us apart, from 1 s on.
+std::vector<AbsoluteEvent> stream(int count) {
+  std::vector<AbsoluteEvent> events;
+  for (int i = 0; i < count; ++i)
+    events.push_back(AbsoluteEvent::at(i % width, i / width % height, 1'000'000 + 10 * i,
+                                       i % 3 == 0 ? Polarity::off : Polarity::on));
+  return events;
+}
+
+/// Pushes events in buffers of 10 ms.
+void push(Harness& h, std::span<const AbsoluteEvent> events) {
+  while (!events.empty()) {
+    const auto start = events.front().t / 10'000 * 10'000;
+    const auto end =
+        std::ranges::find_if(events, [&](const auto& event) { return event.t >= start + 10'000; });
+    const auto count = static_cast<std::size_t>(end - events.begin());
+    ASSERT_EQ(h.push(buffer_of(events.first(count), start)), GST_FLOW_OK);
+    events = events.subspan(count);
+  }
+}
+
+void append_events(GstBuffer* buffer, std::vector<AbsoluteEvent>& out) {
+  GstEventCameraMap map;
+  ASSERT_TRUE(gst_event_camera_map(&map, buffer));
+  for (std::size_t i = 0; i < map.n_events; ++i)
+    out.push_back({static_cast<Microseconds>(map.start + map.events[i].t), map.events[i].x,
+                   map.events[i].y_p});
+  gst_event_camera_unmap(&map);
+}
+
+std::vector<AbsoluteEvent> pull_events(Harness& h) {
+  std::vector<AbsoluteEvent> events;
+  while (const auto buffer = h.pull()) append_events(buffer.get(), events);
+  return events;
+}
+
+guint64 stat_of(GstElement* element, const char* name) {
+  GstStructure* stats = nullptr;
+  g_object_get(element, "stats", &stats, nullptr);
+  guint64 value = 0;
+  EXPECT_TRUE(gst_structure_get_uint64(stats, name, &value)) << name;
+  gst_structure_free(stats);
+  return value;
+}
+
+/// An element that unpacks, as after udpsrc.
+struct Depay : Harness {
+  explicit Depay(const std::string& properties)
+      : Harness("eventdatagramdepay width=640 height=480 " + properties) {
+    gst_harness_set_src_caps_str(get(), "application/x-event-datagram");
+  }
+};
+
+/// A received datagram.
+GstBuffer* datagram(const std::vector<guint8>& bytes, GstClockTime arrival) {
+  GstBuffer* buffer = gst_buffer_new_memdup(bytes.data(), bytes.size());
+  GST_BUFFER_PTS(buffer) = arrival;
+  return buffer;
+}
+
+/// One of faery, with an event of pixel (1, y).
+GstBuffer* t32(guint32 t, guint8 y, GstClockTime arrival) {
+  std::vector<guint8> bytes(8);
+  GST_WRITE_UINT32_LE(bytes.data(), t);
+  bytes[4] = 1;
+  bytes[6] = static_cast<guint8>(y << 1);
+  return datagram(bytes, arrival);
+}
+
+/// One of jAER, with an event.
+GstBuffer* jaer(guint32 number, guint32 t, GstClockTime arrival) {
+  std::vector<guint8> bytes(12);
+  GST_WRITE_UINT32_BE(bytes.data(), number);
+  GST_WRITE_UINT32_BE(bytes.data() + 8, t);
+  return datagram(bytes, arrival);
+}
+
+struct Format {
+  const char* name;
+  const char* properties;
+  bool has_times = true;
+};
+
+void PrintTo(const Format& format, std::ostream* out) {
+  *out << format.name;
+}
+
+const Format formats[] = {
+    {"spif", "format=spif", false},
+    {"spif_big_endian", "format=spif byte-order=big-endian", false},
+    {"spif_timestamps", "format=spif-timestamps"},
+    {"spif_timestamps_big_endian", "format=spif-timestamps byte-order=big-endian"},
+    {"t64", "format=t64-x16-y16-on8"},
+    {"t32", "format=t32-x16-y15-on1"},
+    {"es", "format=es"},
+    {"jaer", "format=jaer"},
+    {"jaer_without_number", "format=jaer sequence-number=false"},
+};
+
+class EveryFormat : public testing::TestWithParam<Format> {};
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+TEST_P(EveryFormat, BringsEveryEvent) {
+  const std::string properties = GetParam().properties;
+  Harness h("eventdatagrampay " + properties + " ! eventdatagramdepay " + properties + depay_size);
+  h.caps(events_caps);
+  const auto sent = stream(50'000);
+  push(h, sent);
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto received = pull_events(h);
+  ASSERT_EQ(received.size(), sent.size());
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    ASSERT_EQ(received[i].x, sent[i].x);
+    ASSERT_EQ(received[i].y_p, sent[i].y_p);
+    // Without times, it is that of the datagram.
+    const auto earliest = GetParam().has_times ? sent[i].t : sent[i].t - 5000;
+    ASSERT_LE(received[i].t, sent[i].t);
+    ASSERT_GE(received[i].t, earliest);
+  }
+  EXPECT_EQ(h.out_caps(),
+            "application/x-event-camera, format=(string)XYTP, width=(int)640, height=(int)480, "
+            "framerate=(fraction)0/1");
+  EXPECT_EQ(stat_of(h.element(), "events"), sent.size());
+}
+
+TEST_P(EveryFormat, HasIntervalsThatFollowOneAnother) {
+  const std::string properties = GetParam().properties;
+  Harness h("eventdatagrampay " + properties + " ! eventdatagramdepay " + properties + depay_size);
+  h.caps(events_caps);
+  push(h, stream(5000));
+  GstClockTime end = 0;
+  int count = 0;
+  while (const auto buffer = h.pull()) {
+    EXPECT_GE(GST_BUFFER_PTS(buffer.get()), end);
+    end = GST_BUFFER_PTS(buffer.get()) + GST_BUFFER_DURATION(buffer.get());
+    const auto events = events_of(buffer.get());
+    EXPECT_EQ(events.back().t, GST_BUFFER_DURATION(buffer.get()) / GST_USECOND);
+    EXPECT_EQ(GST_BUFFER_IS_DISCONT(buffer.get()), count == 0);
+    ++count;
+  }
+  EXPECT_GT(count, 15);
+}
+
+/// Receives from a socket on this machine.
+class UdpReceiver {
+ public:
+  explicit UdpReceiver(const std::string& properties) {
+    gst_init(nullptr, nullptr);
+    const auto launch =
+        "udpsrc name=source address=127.0.0.1 port=0 buffer-size=4000000 ! eventdatagramdepay "
+        "name=depay " +
+        properties + depay_size + " ! fakesink name=sink signal-handoffs=true sync=false async=false";
+    pipeline_.reset(gst_parse_launch(launch.c_str(), nullptr));
+    Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "sink"));
+    g_signal_connect(sink.get(), "handoff",
+                     G_CALLBACK(+[](GstElement*, GstBuffer* buffer, GstPad*, UdpReceiver* self) {
+                       self->take(buffer);
+                     }),
+                     this);
+    gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING);
+    EXPECT_NE(gst_element_get_state(pipeline_.get(), nullptr, nullptr, 10 * GST_SECOND),
+              GST_STATE_CHANGE_FAILURE);
+  }
+  ~UdpReceiver() { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
+  UdpReceiver(const UdpReceiver&) = delete;
+  UdpReceiver& operator=(const UdpReceiver&) = delete;
+
+  int port() const {
+    Owned<GstElement> source(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "source"));
+    int port = 0;
+    g_object_get(source.get(), "port", &port, nullptr);
+    return port;
+  }
+
+  /// Waits until so many have come.
+  std::vector<AbsoluteEvent> events(std::size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::seconds(20), [&] { return events_.size() >= count; });
+    return events_;
+  }
+
+  guint64 stat(const char* name) const {
+    Owned<GstElement> depay(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "depay"));
+    return stat_of(depay.get(), name);
+  }
+
+ private:
+  void take(GstBuffer* buffer) {
+    const std::lock_guard lock(mutex_);
+    append_events(buffer, events_);
+    changed_.notify_all();
+  }
+
+  Owned<GstElement> pipeline_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<AbsoluteEvent> events_;
+};
+
+TEST_P(EveryFormat, GoesThroughSockets) {
+  const std::string properties = GetParam().properties;
+  UdpReceiver receiver(properties);
+  Harness h(
+      "eventdatagrampay " + properties +
+      " ! udpsink sync=false async=false host=127.0.0.1 port=" + std::to_string(receiver.port()));
+  gst_harness_set_src_caps_str(h.get(), events_caps);
+  const auto sent = stream(20'000);
+  push(h, sent);
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto received = receiver.events(sent.size());
+  ASSERT_EQ(received.size(), sent.size());
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    ASSERT_EQ(received[i].x, sent[i].x);
+    ASSERT_EQ(received[i].y_p, sent[i].y_p);
+    ASSERT_TRUE(!GetParam().has_times || received[i].t == sent[i].t);
+  }
+  for (const auto* name : {"lost", "late", "rejected"}) EXPECT_EQ(receiver.stat(name), 0) << name;
+  EXPECT_EQ(receiver.stat("packets"), stat_of(h.element(), "packets"));
+  EXPECT_EQ(receiver.stat("bytes"), stat_of(h.element(), "bytes"));
+}
+
+TEST_P(EveryFormat, RejectsRandomDatagrams) {
+  const std::string properties = GetParam().properties;
+  Harness pay("eventdatagrampay " + properties);
+  pay.caps(events_caps, "application/x-event-datagram");
+  const auto sent = stream(5000);
+  push(pay, sent);
+  gst_harness_push_event(pay.get(), gst_event_new_eos());
+  Depay h(properties);
+  std::mt19937 random(1);
+  guint64 bad = 0;
+  while (auto good = pay.pull()) {
+    const auto arrival = GST_BUFFER_PTS(good.get());
+    for (int i = 0; i < 3; ++i, ++bad) {
+      std::vector<guint8> bytes(200 + random() % 1300);
+      for (auto& byte : bytes) byte = static_cast<guint8>(random());
+      ASSERT_EQ(h.push(datagram(bytes, arrival)), GST_FLOW_OK);
+    }
+    ASSERT_EQ(h.push(good.release()), GST_FLOW_OK);
+  }
+  EXPECT_EQ(pull_events(h).size(), sent.size());
+  EXPECT_EQ(stat_of(h.element(), "rejected"), bad);
+  const auto warning = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(text_of(warning.get()).find("Set format, width and height"), std::string::npos);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+}
+
+/* payloader */
+
+/// A buffer of a millisecond with 10 events.
+GstBuffer* millisecond(int number) {
+  std::vector<Event> events;
+  for (int i = 0; i < 10; ++i)
+    events.push_back(Event::at(i, 2, static_cast<std::uint32_t>(100 * i), Polarity::on));
+  return buffer_of(static_cast<GstClockTime>(number) * GST_MSECOND, events, GST_MSECOND);
+}
+
+TEST(Payloader, LetsNoEventWait) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000");
+  h.caps(events_caps, "application/x-event-datagram");
+  for (int i = 0; i < 40; ++i) {
+    h.push(millisecond(i));
+    // Whatever is older than 4 ms would be older than 5 ms with the next buffer.
+    EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), (static_cast<guint>(i) + 1) / 5);
+  }
+  while (const auto buffer = h.pull()) EXPECT_EQ(gst_buffer_get_size(buffer.get()), 50 * 8);
+}
+
+TEST(Payloader, FillsDatagramsIfItMay) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=1000000000");
+  h.caps(events_caps, "application/x-event-datagram");
+  for (int i = 0; i < 39; ++i) h.push(millisecond(i));
+  EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 3);
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 4);
+  const auto first = h.pull();
+  EXPECT_EQ(GST_BUFFER_PTS(first.get()), 0);
+  EXPECT_EQ(GST_BUFFER_DURATION(first.get()), 9900 * GST_USECOND);
+  EXPECT_EQ(GST_BUFFER_PTS(h.pull().get()), 10 * GST_MSECOND);
+  EXPECT_EQ(stat_of(h.element(), "packets"), 4);
+  EXPECT_EQ(stat_of(h.element(), "events"), 390);
+  EXPECT_EQ(stat_of(h.element(), "bytes"), 390 * 8);
+}
+
+TEST(Payloader, SendsAtOnceIfBuffersAreLong) {
+  Harness h("eventdatagrampay format=es");
+  h.caps(events_caps, "application/x-event-datagram");
+  h.push(buffer_of(0,
+                   {Event::at(1, 2, 100, Polarity::on), Event::at(1, 2, 5000, Polarity::on),
+                    Event::at(1, 2, 5200, Polarity::on)},
+                   40 * GST_MSECOND));
+  ASSERT_EQ(gst_harness_buffers_in_queue(h.get()), 2);
+  EXPECT_EQ(GST_BUFFER_DURATION(h.pull().get()), 4900 * GST_USECOND);
+  EXPECT_EQ(GST_BUFFER_DURATION(h.pull().get()), 0);
+}
+
+TEST(Payloader, SendsDuringAGap) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1");
+  h.caps(events_caps, "application/x-event-datagram");
+  h.push(millisecond(0));
+  gst_harness_push_event(h.get(), gst_event_new_gap(GST_MSECOND, GST_MSECOND));
+  EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 0);
+  gst_harness_push_event(h.get(), gst_event_new_gap(2 * GST_MSECOND, 10 * GST_MSECOND));
+  EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
+}
+
+TEST(Payloader, ForgetsEventsThatAreFlushed) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1");
+  h.caps(events_caps, "application/x-event-datagram");
+  h.push(millisecond(5));
+  flush({h.get()});
+  push_segment(h.get());
+  h.push(millisecond(0));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto buffer = h.pull();
+  ASSERT_TRUE(buffer);
+  EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 0);
+  EXPECT_EQ(gst_buffer_get_size(buffer.get()), 80);
+  EXPECT_FALSE(h.pull());
+}
+
+TEST(Payloader, SkipsEventsOutsideTheSensor) {
+  Harness h("eventdatagrampay format=spif");
+  h.caps(events_caps, "application/x-event-datagram");
+  h.push(buffer_of(0,
+                   {Event::at(640, 2, 1, Polarity::on), Event::at(639, 2, 2, Polarity::on),
+                    Event::at(1, 480, 3, Polarity::on)},
+                   40 * GST_MSECOND));
+  EXPECT_EQ(gst_buffer_get_size(h.pull().get()), 4);
+  const auto warning = h.message(GST_MESSAGE_WARNING);
+  ASSERT_TRUE(warning);
+  EXPECT_EQ(text_of(warning.get()),
+            "Cannot send all events: some lie beyond the sensor; skipping these.");
+}
+
+TEST(Payloader, SkipsInvalidBuffers) {
+  Harness h("eventdatagrampay");
+  h.caps(events_caps, "application/x-event-datagram");
+  EXPECT_EQ(h.push(buffer_of(GST_CLOCK_TIME_NONE, {Event::at(1, 2, 3, Polarity::on)}, 0)),
+            GST_FLOW_OK);
+  EXPECT_EQ(h.push(datagram({1, 2, 3}, 0)), GST_FLOW_OK);
+  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
+  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
+  EXPECT_FALSE(h.pull());
+}
+
+TEST(Payloader, RefusesSensorsThatTheFormatDoesNotSupport) {
+  Harness h("eventdatagrampay format=jaer");
+  h.caps("application/x-event-camera, format=XYTP, width=1280, height=720",
+         "application/x-event-datagram");
+  const auto error = h.message(GST_MESSAGE_ERROR);
+  ASSERT_TRUE(error);
+  EXPECT_NE(text_of(error.get()).find("up to 1024x512 pixels"), std::string::npos);
+}
+
+TEST(Payloader, ReportsItsLatency) {
+  Harness h("eventdatagrampay max-latency=7000000");
+  h.caps(events_caps, "application/x-event-datagram");
+  gst_harness_set_upstream_latency(h.get(), 40 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 47 * GST_MSECOND);
+}
+
+/* depayloader */
+
+TEST(Depayloader, NeedsTheSensorSize) {
+  gst_init(nullptr, nullptr);
+  for (const auto* launch :
+       {"eventdatagramdepay", "eventdatagramdepay width=640", "eventdatagramdepay height=480",
+        "eventdatagramdepay format=jaer width=1280 height=720"}) {
+    Owned<GstElement> element(gst_parse_launch(launch, nullptr));
+    Owned<GstBus> bus(gst_bus_new());
+    gst_element_set_bus(element.get(), bus.get());
+    EXPECT_EQ(gst_element_set_state(element.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
+    Owned<GstMessage> error(gst_bus_pop_filtered(bus.get(), GST_MESSAGE_ERROR));
+    ASSERT_TRUE(error);
+    EXPECT_NE(text_of(error.get()).find("width and height"), std::string::npos);
+    gst_element_set_state(element.get(), GST_STATE_NULL);
+    gst_element_set_bus(element.get(), nullptr);
+  }
+}
+
+TEST(Depayloader, MapsTheSendersTimeToTheArrival) {
+  Depay h("format=t32-x16-y15-on1");
+  h.push(t32(5'000'000, 0, 2 * GST_SECOND));
+  h.push(t32(5'000'500, 1, 2 * GST_SECOND + 700 * GST_USECOND));
+  const auto first = h.pull();
+  const auto second = h.pull();
+  EXPECT_EQ(GST_BUFFER_PTS(first.get()), 5 * GST_SECOND);
+  EXPECT_EQ(GST_BUFFER_PTS(second.get()), 5 * GST_SECOND);
+  EXPECT_EQ(GST_BUFFER_DURATION(second.get()), 500 * GST_USECOND);
+  const auto event = h.pull_event(GST_EVENT_SEGMENT);
+  ASSERT_TRUE(event);
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event.get(), &segment);
+  EXPECT_EQ(gst_segment_to_running_time(segment, GST_FORMAT_TIME, 5 * GST_SECOND), 2 * GST_SECOND);
+  EXPECT_EQ(gst_segment_to_stream_time(segment, GST_FORMAT_TIME, 5 * GST_SECOND), 5 * GST_SECOND);
+  EXPECT_FALSE(h.pull_event(GST_EVENT_SEGMENT));
+}
+
+TEST(Depayloader, FollowsASenderWhoseClockDrifts) {
+  Depay h("format=t32-x16-y15-on1");
+  // It stood still for two seconds.
+  h.push(t32(5'000'000, 0, 2 * GST_SECOND));
+  h.push(t32(5'000'500, 1, 4 * GST_SECOND));
+  ASSERT_TRUE(h.pull());
+  const auto second = h.pull();
+  EXPECT_EQ(GST_BUFFER_PTS(second.get()), 5 * GST_SECOND + 500 * GST_USECOND);
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(second.get()));
+  ASSERT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
+  const auto event = h.pull_event(GST_EVENT_SEGMENT);
+  ASSERT_TRUE(event);
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event.get(), &segment);
+  EXPECT_EQ(gst_segment_to_running_time(segment, GST_FORMAT_TIME, GST_BUFFER_PTS(second.get())),
+            4 * GST_SECOND);
+}
+
+TEST(Depayloader, FollowsASenderThatStartsOver) {
+  Depay h("format=t32-x16-y15-on1");
+  h.push(t32(50'000'000, 0, 2 * GST_SECOND));
+  h.push(t32(100, 1, 3 * GST_SECOND));
+  EXPECT_EQ(GST_BUFFER_PTS(h.pull().get()), 50 * GST_SECOND);
+  const auto second = h.pull();
+  EXPECT_EQ(GST_BUFFER_PTS(second.get()), 100 * GST_USECOND);
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(second.get()));
+}
+
+TEST(Depayloader, FillsSilenceWithGaps) {
+  Depay h("format=t32-x16-y15-on1");
+  h.push(t32(5'000'000, 0, 2 * GST_SECOND));
+  h.push(t32(5'300'000, 1, 2 * GST_SECOND + 300 * GST_MSECOND));
+  ASSERT_TRUE(h.pull());
+  const auto buffer = h.pull();
+  const auto gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap_of(gap.get()).start, 5 * GST_SECOND);
+  EXPECT_EQ(gap_of(gap.get()).duration, 299'999 * GST_USECOND);
+  EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), 5 * GST_SECOND + 299'999 * GST_USECOND);
+  EXPECT_FALSE(GST_BUFFER_IS_DISCONT(buffer.get()));
+  EXPECT_EQ(events_of(buffer.get()).at(0).t, 1);
+}
+
+TEST(Depayloader, TellsOfLosses) {
+  Depay h("format=jaer");
+  for (const guint32 number : {1, 2, 5, 4, 6})
+    h.push(jaer(number, 1000 * number, number * GST_MSECOND));
+  for (const bool discont : {true, false, true, false}) {
+    const auto buffer = h.pull();
+    ASSERT_TRUE(buffer);
+    EXPECT_EQ(GST_BUFFER_IS_DISCONT(buffer.get()), discont);
+  }
+  EXPECT_FALSE(h.pull());
+  const auto gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  GstGapFlags flags{};
+  gst_event_parse_gap_flags(gap.get(), &flags);
+  EXPECT_EQ(flags, GST_GAP_FLAG_MISSING_DATA);
+  EXPECT_EQ(stat_of(h.element(), "lost"), 2);
+  EXPECT_EQ(stat_of(h.element(), "late"), 1);
+  EXPECT_EQ(stat_of(h.element(), "packets"), 4);
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST(Depayloader, GivesEventsWithoutTimesThatOfTheirArrival) {
+  Depay h("format=spif");
+  h.push(datagram({1, 0, 2, 0x80, 1, 0, 3, 0x80}, 7 * GST_MSECOND));
+  h.push(datagram({1, 0, 4, 0x80}, 9 * GST_MSECOND));
+  EXPECT_EQ(pull_events(h), (std::vector{AbsoluteEvent::at(2, 1, 7000, Polarity::off),
+                                         AbsoluteEvent::at(3, 1, 7000, Polarity::off),
+                                         AbsoluteEvent::at(4, 1, 9000, Polarity::off)}));
+}
+
+TEST(Depayloader, NeedsArrivalTimesForEventsWithoutTimes) {
+  Depay h("format=spif");
+  EXPECT_EQ(h.push(datagram({1, 0, 2, 0x80}, GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
+  const auto error = h.message(GST_MESSAGE_ERROR);
+  ASSERT_TRUE(error);
+  EXPECT_NE(text_of(error.get()).find("do-timestamp=true"), std::string::npos);
+}
+
+TEST(Depayloader, DoesWithoutArrivalTimes) {
+  Depay h("format=t32-x16-y15-on1");
+  EXPECT_EQ(h.push(t32(5'000'000, 0, GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
+  EXPECT_EQ(h.push(t32(95'000'000, 1, GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
+  EXPECT_EQ(pull_events(h).size(), 2);
+}
+
+TEST(Depayloader, StartsOverAfterAFlush) {
+  Depay h("format=jaer");
+  h.push(jaer(70, 9'000'000, GST_SECOND));
+  flush({h.get()});
+  push_segment(h.get());
+  h.push(jaer(2, 8'999'999, 2 * GST_SECOND));
+  ASSERT_TRUE(h.pull());
+  EXPECT_TRUE(h.pull());
+  EXPECT_EQ(stat_of(h.element(), "rejected"), 0);
+}
+
+}  // namespace
