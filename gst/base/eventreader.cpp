@@ -428,6 +428,13 @@ Report EventReader::report_of(const std::exception& error) const {
           "format."};
 }
 
+/// decodebin drops errors of an element that it is still adding, which it shows by a locked state,
+/// and then waits for the element's pads for ever. An application may lock the state for longer.
+static void wait_until_added(GstElement* element) {
+  constexpr int max_milliseconds = 1000;
+  for (int i = 0; i < max_milliseconds && gst_element_is_locked_state(element); ++i) g_usleep(1000);
+}
+
 /// Runs `work`; reports any exception. If the cause is a failed pull, returns its flow instead.
 template <class Work>
 GstFlowReturn EventReader::guard(const Work& work) {
@@ -437,6 +444,7 @@ GstFlowReturn EventReader::guard(const Work& work) {
         try {
           return work();
         } catch (const std::exception&) {
+          wait_until_added(element_);
           if (!bytes_ || !bytes_->failed()) throw;
           return bytes_->flow();
         }
@@ -466,6 +474,7 @@ void EventReader::loop(gpointer data) {
   gst_pad_pause_task(self.sink_);
   if (result == GST_FLOW_FLUSHING) return;
   auto* const element = self.element_;
+  if (result != GST_FLOW_EOS) wait_until_added(element);
   if (result == GST_FLOW_NOT_LINKED)
     post_message(element, GST_MESSAGE_ERROR, not_linked(), "streaming stopped, reason not-linked");
   else if (result != GST_FLOW_EOS && result != GST_FLOW_ERROR)

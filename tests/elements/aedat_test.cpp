@@ -728,6 +728,61 @@ TEST(AedatDemux, SaysWhereSomethingIsNotAedat) {
   }
 }
 
+/// Result of playing a file with decodebin: the type of the last message, or GST_MESSAGE_UNKNOWN.
+GstMessageType decoded(const std::string& path, const std::string& between = "") {
+  gst_init(nullptr, nullptr);
+  const Owned<GstElement> pipeline(
+      gst_parse_launch(("filesrc location=" + in_quotes(path) + " ! " + between +
+                        "decodebin caps=application/x-event-camera,format=XYTP ! fakesink")
+                           .c_str(),
+                       nullptr));
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+  const Owned<GstMessage> message(gst_bus_timed_pop_filtered(
+      bus.get(), 5 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  return message ? GST_MESSAGE_TYPE(message.get()) : GST_MESSAGE_UNKNOWN;
+}
+
+/// decodebin drops errors while it is adding an element, whose state it locks.
+TEST(AedatDemux, TellsDecodebinOfErrors) {
+  auto bytes = aedat4(steady_events(100'000, 70));
+  bytes[17] = 0x7f;  // the size of the header
+  const File file(bytes);
+  for (int i = 0; i < 30; ++i) {
+    ASSERT_EQ(decoded(file.path()), GST_MESSAGE_ERROR) << i;
+    ASSERT_EQ(decoded(file.path(), "queue ! "), GST_MESSAGE_ERROR) << i;
+  }
+
+  const Owned<GstElement> pipeline(gst_parse_launch(
+      ("filesrc location=" + in_quotes(file.path()) + " ! aedatdemux name=d").c_str(), nullptr));
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  const Owned<GstElement> demux(gst_bin_get_by_name(GST_BIN(pipeline.get()), "d"));
+  gst_element_set_locked_state(demux.get(), TRUE);
+  gst_element_set_state(pipeline.get(), GST_STATE_PAUSED);
+  gst_element_set_state(demux.get(), GST_STATE_PAUSED);
+  EXPECT_FALSE(Owned<GstMessage>(
+      gst_bus_timed_pop_filtered(bus.get(), 50 * GST_MSECOND, GST_MESSAGE_ERROR)));
+  gst_element_set_locked_state(demux.get(), FALSE);
+  EXPECT_TRUE(
+      Owned<GstMessage>(gst_bus_timed_pop_filtered(bus.get(), 20 * GST_SECOND, GST_MESSAGE_ERROR)));
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
+/// Any byte of the header may be wrong: decodebin ends with EOS or an error.
+TEST(AedatDemux, EndsWhereTheHeaderIsDamaged) {
+  const auto ends = [](Bytes bytes, std::size_t at) {
+    bytes[at] = 0x7f;
+    const File file(bytes);
+    EXPECT_NE(decoded(file.path()), GST_MESSAGE_UNKNOWN) << at;
+  };
+  const auto made = aedat4_with_frames(steady_events(100'000, 70), PixelFormat::grey8, 3);
+  for (std::size_t at = 0; at < 200; at += 3) ends(made, at);
+  const auto recorded = eventcamera::shared_data::events_file(davis);
+  for (const std::size_t at : {11, 17, 33, 110, 111, 112, 3123})
+    if (!recorded.empty()) ends(recorded, at);
+}
+
 TEST(AedatDemux, SaysWhereAFileHasNoEvents) {
   const File empty(eventcamera::aedat_files::aedat4_header(""));
   Player player(empty.path());
