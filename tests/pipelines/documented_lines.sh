@@ -40,7 +40,8 @@ while IFS= read -r line; do
   if [[ $line == *udpsrc* ]]; then # a receiver of what the next line sends
     eval "timeout 120 ${line/udpsrc/udpsrc num-buffers=5}" >received 2>&1 </dev/null &
     receiver=$!
-    sleep 2
+    port=$(sed 's/.*udpsrc port=\([0-9]*\).*/\1/' <<<"$line")
+    while kill -0 $receiver && ! grep -q "$(printf ':%04X ' "$port")" /proc/net/udp; do sleep 0.1; done
     continue
   fi
   eval "timeout 120 $line" >output 2>&1 </dev/null || fail "$(cat output)"
@@ -49,7 +50,7 @@ while IFS= read -r line; do
     receiver=
   fi
 done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|event-|\.\/pipelines\/(events_|web-events))/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
-[ $count -ge 20 ] || fail "found only $count lines"
-for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy; do
+[ $count -ge 25 ] || fail "found only $count lines"
+for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy received.raw; do
   [ -s $file ] || fail "$file is missing or empty"
 done

@@ -101,6 +101,11 @@ for writer in "evtenc format=EVT3" "evtenc format=EVT4" eventdatenc eventesenc "
   $joined && [ "$(stat -c %s joined.xytp)" -gt 8000 ] || fail "a client of $writer got no events"
 done
 
+# Datagrams of other tools, without a network.
+for format in spif spif-timestamps t64-x16-y16-on8 t32-x16-y15-on1 es jaer; do
+  launch videotestsrc pattern=ball num-buffers=20 ! eventsim-diff ! eventdatagrampay format=$format ! eventdatagramdepay format=$format width=320 height=240 ! eventrender ! videoconvert ! fakesink
+done
+
 # Events and their frames in one file, and read back.
 launch videotestsrc pattern=ball num-buffers=50 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux compression=zstd ! filesink location=ball.aedat4
 launch filesrc location=ball.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! filesink location=ball.xytp  d.video_0 ! queue ! filesink location=ball.grey
@@ -168,6 +173,9 @@ for element in evtenc eventstats eventrender; do
 done
 refused "EVT words support sensors of 1x1 to 2048x2048 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! eventsim-frame ! evtenc ! fakesink
 launch videotestsrc num-buffers=3 ! video/x-raw,width=2049,height=16 ! videoscale ! eventsim-frame ! evtenc ! fakesink
+
+refused "Set width and height to those of the sender" udpsrc port=0 ! eventdatagramdepay ! fakesink
+refused "up to 1024x512 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=1280,height=720 ! eventsim-frame ! eventdatagrampay format=jaer ! fakesink
 
 # Warned of.
 warnings() { # ARGUMENT...

@@ -59,6 +59,15 @@ done
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.events
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay ! rtpeventdepay ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay max-latency=1000000000 ! rtpeventdepay ! fakesink num-buffers=1
+for format in spif jaer; do
+  pay="eventdatagrampay format=$format"
+  depay="eventdatagramdepay format=$format width=320 height=240"
+  # shellcheck disable=SC2086
+  check videotestsrc num-buffers=8 ! eventsim-frame ! $pay ! $depay ! fakesink
+  # shellcheck disable=SC2086
+  check videotestsrc num-buffers=8 ! eventsim-frame ! $pay ! identity error-after=2 ! $depay ! fakesink
+done
+check videotestsrc num-buffers=8 ! eventsim-frame ! eventdatagrampay ! eventdatagramdepay format=es width=20 height=20 ! fakesink
 # Errors in mid-stream.
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay ! rtpeventdepay ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay mtu=30 ! fakesink
