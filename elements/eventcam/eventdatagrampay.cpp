@@ -8,9 +8,8 @@
  * Stream, and jAER receive, as #GstEventDatagramPay:format says. Each buffer is a datagram: send it
  * with udpsink. Its PTS is the time of its first event.
  *
- * A datagram is sent when it is full, and early enough that none of its events waits longer than
- * #GstEventDatagramPay:max-latency, if the next buffer comes in time; the durations of buffers tell
- * when that is.
+ * A datagram is sent when it is full, or when its first event cannot wait for another buffer as
+ * long as the last one. If no buffer comes, it is sent after #GstEventDatagramPay:max-latency.
  *
  * jAER's addresses are those of a DVS128 if the sensor has 128x128 pixels, else those of a DAVIS,
  * with up to 1024x512 pixels: select that camera in jAER.
@@ -26,6 +25,7 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +34,7 @@
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/flush_timer.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "src/wire/datagram_packer.hpp"
@@ -59,12 +60,15 @@ struct Private {
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
-  // Accessed by the streaming thread only, or while there is none.
+  // Accessed under the stream lock of the sink pad, or while nothing streams.
   GstEventCameraInfo info{};
   std::unique_ptr<DatagramPacker> packer;
   std::vector<AbsoluteEvent> events;   ///< of the current buffer
   std::vector<OwnedBuffer> datagrams;  ///< complete but not yet pushed
   EventFaults faults{"send"};
+  std::optional<Microseconds> timed;  ///< first event of the datagram that the timer is set for
+
+  std::optional<FlushTimer> timer;  ///< while streaming
 };
 
 }  // namespace
@@ -124,6 +128,18 @@ static GstFlowReturn push(Private& priv) {
   return gst_pad_push_list(priv.src, list);
 }
 
+/// Limits the time that a new incomplete datagram waits.
+static void set_timer(Private& priv) {
+  const auto since = priv.packer ? priv.packer->waiting_since() : std::nullopt;
+  if (!priv.timer || since == priv.timed) return;
+  priv.timed = since;
+  if (since)
+    priv.timer->set(FlushTimer::Clock::now() +
+                    std::chrono::nanoseconds(priv.settings.copy().max_latency));
+  else
+    priv.timer->cancel();
+}
+
 /// Runs `work`, which packs events, and pushes the datagrams that they complete.
 template <class Work>
 static GstFlowReturn pack(GstEventDatagramPay* self, const Work& work) {
@@ -131,11 +147,20 @@ static GstFlowReturn pack(GstEventDatagramPay* self, const Work& work) {
   const bool packed = guarded(self, report_of, [&] {
     if (priv.packer) work(*priv.packer, [&](const Datagram& datagram) { keep(priv, datagram); });
   });
+  set_timer(priv);
   return packed ? push(priv) : GST_FLOW_ERROR;
 }
 
 static GstFlowReturn flush(GstEventDatagramPay* self) {
   return pack(self, [](DatagramPacker& packer, const auto& send) { packer.flush(send); });
+}
+
+/// Sends events that have waited long enough, in the timer's thread.
+static void flush_late(GstEventDatagramPay* self) {
+  GstPad* const sink = self->priv->sink;
+  GST_PAD_STREAM_LOCK(sink);
+  flush(self);
+  GST_PAD_STREAM_UNLOCK(sink);
 }
 
 /// True if events would wait for too long in the incomplete datagram. `interval` is that of the
@@ -233,6 +258,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       break;
     case GST_EVENT_FLUSH_STOP:
       if (self->priv->packer) self->priv->packer->flush([](const Datagram&) {});
+      set_timer(*self->priv);
       break;
     default:
       break;
@@ -250,12 +276,17 @@ static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
 /* states */
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto& priv = *GST_EVENT_DATAGRAM_PAY(element)->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+  auto* self = GST_EVENT_DATAGRAM_PAY(element);
+  auto& priv = *self->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
     priv.counts.access([](DatagramCounts& counts) { counts = {}; });
+    priv.timer.emplace([self] { flush_late(self); });
+  }
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv.timer.reset();
+    priv.timed.reset();
     priv.packer.reset();
     priv.datagrams.clear();
     priv.faults.reset();

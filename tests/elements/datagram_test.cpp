@@ -174,7 +174,8 @@ class UdpReceiver {
     const auto launch =
         "udpsrc name=source address=127.0.0.1 port=0 buffer-size=4000000 ! eventdatagramdepay "
         "name=depay " +
-        properties + depay_size + " ! fakesink name=sink signal-handoffs=true sync=false async=false";
+        properties + depay_size +
+        " ! fakesink name=sink signal-handoffs=true sync=false async=false";
     pipeline_.reset(gst_parse_launch(launch.c_str(), nullptr));
     Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "sink"));
     g_signal_connect(sink.get(), "handoff",
@@ -274,36 +275,50 @@ TEST_P(EveryFormat, RejectsRandomDatagrams) {
 
 /* payloader */
 
-/// A buffer of a millisecond with 10 events.
-GstBuffer* millisecond(int number) {
+/// A buffer of a second with 10 events. That long, no timer interferes.
+GstBuffer* second(int number) {
   std::vector<Event> events;
   for (int i = 0; i < 10; ++i)
-    events.push_back(Event::at(i, 2, static_cast<std::uint32_t>(100 * i), Polarity::on));
-  return buffer_of(static_cast<GstClockTime>(number) * GST_MSECOND, events, GST_MSECOND);
+    events.push_back(Event::at(i, 2, static_cast<std::uint32_t>(100'000 * i), Polarity::on));
+  return buffer_of(static_cast<GstClockTime>(number) * GST_SECOND, events, GST_SECOND);
 }
 
-TEST(Payloader, LetsNoEventWait) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000");
+TEST(Payloader, LetsNoEventWaitForTheNextBuffer) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
   h.caps(events_caps, "application/x-event-datagram");
   for (int i = 0; i < 40; ++i) {
-    h.push(millisecond(i));
-    // Whatever is older than 4 ms would be older than 5 ms with the next buffer.
+    h.push(second(i));
+    // Whatever is older than 4 s would be older than 5 s with the next buffer.
     EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), (static_cast<guint>(i) + 1) / 5);
   }
   while (const auto buffer = h.pull()) EXPECT_EQ(gst_buffer_get_size(buffer.get()), 50 * 8);
 }
 
-TEST(Payloader, FillsDatagramsIfItMay) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=1000000000");
+TEST(Payloader, LetsNoEventWaitIfNoBufferComes) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=30000000");
   h.caps(events_caps, "application/x-event-datagram");
-  for (int i = 0; i < 39; ++i) h.push(millisecond(i));
+  for (int i = 0; i < 2; ++i) {
+    const auto start = g_get_monotonic_time();
+    h.push(buffer_of(static_cast<GstClockTime>(i) * GST_SECOND, {Event::at(1, 2, 3, Polarity::on)},
+                     GST_MSECOND));
+    const Buffer buffer(gst_harness_pull(h.get()));
+    ASSERT_TRUE(buffer);
+    EXPECT_EQ(gst_buffer_get_size(buffer.get()), 8);
+    EXPECT_GE(g_get_monotonic_time() - start, 30'000);
+  }
+}
+
+TEST(Payloader, FillsDatagramsIfItMay) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=1000000000000");
+  h.caps(events_caps, "application/x-event-datagram");
+  for (int i = 0; i < 39; ++i) h.push(second(i));
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 3);
   gst_harness_push_event(h.get(), gst_event_new_eos());
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 4);
   const auto first = h.pull();
   EXPECT_EQ(GST_BUFFER_PTS(first.get()), 0);
-  EXPECT_EQ(GST_BUFFER_DURATION(first.get()), 9900 * GST_USECOND);
-  EXPECT_EQ(GST_BUFFER_PTS(h.pull().get()), 10 * GST_MSECOND);
+  EXPECT_EQ(GST_BUFFER_DURATION(first.get()), 9900 * GST_MSECOND);
+  EXPECT_EQ(GST_BUFFER_PTS(h.pull().get()), 10 * GST_SECOND);
   EXPECT_EQ(stat_of(h.element(), "packets"), 4);
   EXPECT_EQ(stat_of(h.element(), "events"), 390);
   EXPECT_EQ(stat_of(h.element(), "bytes"), 390 * 8);
@@ -322,22 +337,22 @@ TEST(Payloader, SendsAtOnceIfBuffersAreLong) {
 }
 
 TEST(Payloader, SendsDuringAGap) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1");
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
   h.caps(events_caps, "application/x-event-datagram");
-  h.push(millisecond(0));
-  gst_harness_push_event(h.get(), gst_event_new_gap(GST_MSECOND, GST_MSECOND));
+  h.push(second(0));
+  gst_harness_push_event(h.get(), gst_event_new_gap(GST_SECOND, GST_SECOND));
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 0);
-  gst_harness_push_event(h.get(), gst_event_new_gap(2 * GST_MSECOND, 10 * GST_MSECOND));
+  gst_harness_push_event(h.get(), gst_event_new_gap(2 * GST_SECOND, 10 * GST_SECOND));
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
 }
 
 TEST(Payloader, ForgetsEventsThatAreFlushed) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1");
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
   h.caps(events_caps, "application/x-event-datagram");
-  h.push(millisecond(5));
+  h.push(second(5));
   flush({h.get()});
   push_segment(h.get());
-  h.push(millisecond(0));
+  h.push(second(0));
   gst_harness_push_event(h.get(), gst_event_new_eos());
   const auto buffer = h.pull();
   ASSERT_TRUE(buffer);
