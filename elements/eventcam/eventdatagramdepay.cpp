@@ -14,6 +14,9 @@
  * second, or if the sender starts over. Events of SPIF without times get the time at which their
  * datagram arrived: the PTS of its buffer, which udpsrc sets.
  *
+ * Live sinks wait for #GstEventDatagramDepay:latency, so that events that the sender packed or the
+ * network delayed for up to that long are in time.
+ *
  * A datagram that is malformed, or has an event outside the sensor, is rejected as a whole. One
  * that is older than others before it is dropped, so events are sorted. After a loss, which only
  * the sequence number of jAER reveals, the next buffer is flagged DISCONT.
@@ -43,6 +46,7 @@
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "src/wire/datagram_unpacker.hpp"
 
@@ -76,9 +80,15 @@ struct State {
   bool has_caps = false;
 };
 
+/// User-settable values.
+struct Settings : DatagramSettings {
+  GstClockTime latency = 10 * GST_MSECOND;
+};
+
 struct Private {
-  GuardedSettings<DatagramSettings> settings;
+  GuardedSettings<Settings> settings;
   GuardedSettings<DatagramCounts> counts;
+  GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
   // Accessed by the streaming thread only, or while there is none.
@@ -102,7 +112,7 @@ G_DEFINE_TYPE_WITH_CODE(GstEventDatagramDepay, gst_event_datagram_depay, GST_TYP
 GST_ELEMENT_REGISTER_DEFINE(eventdatagramdepay, "eventdatagramdepay", GST_RANK_NONE,
                             gst_event_datagram_depay_get_type())
 
-static GuardedSettings<DatagramSettings>& settings_of(GObject* object) {
+static GuardedSettings<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_DEPAY(object)->priv->settings;
 }
 
@@ -279,6 +289,13 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   return gst_pad_event_default(pad, parent, event);
 }
 
+static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  auto& priv = *GST_EVENT_DATAGRAM_DEPAY(parent)->priv;
+  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(priv.sink, query, priv.settings.copy().latency);
+  return gst_pad_query_default(pad, parent, query);
+}
+
 /* states */
 
 static bool start(GstEventDatagramDepay* self) {
@@ -317,12 +334,12 @@ static void gst_event_datagram_depay_init(GstEventDatagramDepay* self) {
   auto& priv = *self->priv;
   auto* element = GST_ELEMENT(self);
   auto* klass = GST_ELEMENT_GET_CLASS(self);
-  GstPad* const sink =
-      gst_pad_new_from_template(gst_element_class_get_pad_template(klass, "sink"), "sink");
-  gst_pad_set_chain_function(sink, chain);
-  gst_pad_set_event_function(sink, sink_event);
-  gst_element_add_pad(element, sink);
+  priv.sink = gst_pad_new_from_template(gst_element_class_get_pad_template(klass, "sink"), "sink");
+  gst_pad_set_chain_function(priv.sink, chain);
+  gst_pad_set_event_function(priv.sink, sink_event);
+  gst_element_add_pad(element, priv.sink);
   priv.src = gst_pad_new_from_template(gst_element_class_get_pad_template(klass, "src"), "src");
+  gst_pad_set_query_function(priv.src, src_query);
   gst_pad_use_fixed_caps(priv.src);
   gst_element_add_pad(element, priv.src);
 }
@@ -344,6 +361,12 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
       &DatagramSettings::height,
       g_param_spec_uint("height", "Height", "Height of the sender's sensor (pixels); required", 0,
                         max_size, 0, flags));
+  properties.add(
+      &Settings::latency,
+      g_param_spec_uint64("latency", "Latency",
+                          "Time by which events may arrive later than the first did, relative to "
+                          "their own times; live sinks wait for as long (ns)",
+                          0, 10 * GST_SECOND, Settings().latency, flags));
   add_datagram_stats<counts_of>(
       object_class,
       "Counts since the start: packets, events and bytes received; packets lost, where they have a "

@@ -527,6 +527,12 @@ TEST(Depayloader, DoesWithoutArrivalTimes) {
   EXPECT_EQ(pull_events(h).size(), 2);
 }
 
+TEST(Depayloader, ReportsItsLatency) {
+  Depay h("latency=30000000");
+  gst_harness_set_upstream_latency(h.get(), 40 * GST_MSECOND);
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 70 * GST_MSECOND);
+}
+
 TEST(Depayloader, StartsOverAfterAFlush) {
   Depay h("format=jaer");
   h.push(jaer(70, 9'000'000, GST_SECOND));
