@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -46,7 +45,7 @@ struct State {
   std::unique_ptr<Encoder> encoder;
   bool written = false;
   WaitingItems<Trigger> triggers = {};
-  Microseconds last = std::numeric_limits<Microseconds>::min();  ///< time of the last encoded item
+  Microseconds last = 0;  ///< time of the last encoded item
 };
 
 }  // namespace

@@ -5,6 +5,9 @@
 #include <cstring>
 #include <iterator>
 
+#include "src/formats/chunker.hpp"
+
+using eventcamera::Chunker;
 using eventcamera::ImuSample;
 using eventcamera::Trigger;
 
@@ -28,7 +31,7 @@ static GstEvent* new_event(const char* name, std::span<const Record> records) {
   return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, structure);
 }
 
-/// A partial record at the end is ignored.
+/// A partial record at the end is ignored, and records at an impossible time are.
 template <class Record>
 static std::optional<std::vector<Record>> records_of(GstEvent* event, const char* name) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_CUSTOM_DOWNSTREAM || !gst_event_has_name(event, name))
@@ -41,6 +44,9 @@ static std::optional<std::vector<Record>> records_of(GstEvent* event, const char
       g_bytes_get_data(static_cast<GBytes*>(g_value_get_boxed(value)), &size);
   records.resize(size / sizeof(Record));
   if (!records.empty()) std::memcpy(records.data(), data, records.size() * sizeof(Record));
+  std::erase_if(records, [](const Record& record) {
+    return record.t < -Chunker::max_time || record.t > Chunker::max_time;
+  });
   return records;
 }
 

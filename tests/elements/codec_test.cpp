@@ -917,6 +917,40 @@ TEST(EvtEnc, KeepsTriggers) {
     }
 }
 
+/// A custom event may come from anywhere, with any content.
+TEST_P(EveryFormat, SurvivesTriggersOfAnyKind) {
+  const auto push = [](Harness& h, GstStructure* structure) {
+    EXPECT_TRUE(gst_harness_push_event(
+        h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, structure)));
+  };
+  const auto push_records = [&](Harness& h, const char* name, const std::vector<gint64>& numbers,
+                                gsize size) {
+    GBytes* const records = g_bytes_new(numbers.data(), size);
+    push(h, gst_structure_new(name, "records", G_TYPE_BYTES, records, nullptr));
+    g_bytes_unref(records);
+  };
+  const auto& format = GetParam();
+  const auto events = some_events();
+  Harness h(format.writer);
+  gst_harness_set_sink_caps_str(h.get(), format.caps);
+  gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
+  for (const char* name : {"GstEventCameraTriggers", "GstEventCameraImu"}) {
+    push(h, gst_structure_new_empty(name));
+    push(h, gst_structure_new(name, "records", G_TYPE_STRING, "none", nullptr));
+    push_records(h, name, {}, 0);
+    push_records(h, name, {G_MININT64, -1, G_MAXINT64, -1, -1, -1, 0, 0, 7'000'000, 1}, 75);
+  }
+  EXPECT_EQ(h.push(buffer_of(std::span(events).first(100), 2'000'000)), GST_FLOW_OK);
+  push_records(h, "GstEventCameraTriggers", {2'000'000, 1, 2'004'950, -1},
+               32);  // the first is late
+  EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_eos()));
+  auto reader = Harness::with_late_pad(format.reader);
+  begin_file(reader, format);
+  push_file(reader, pull_bytes(h), 1 << 20);
+  EXPECT_EQ(pull_events(reader), std::vector(events.begin(), events.begin() + 100));
+  EXPECT_FALSE(reader.message(GST_MESSAGE_WARNING));
+}
+
 TEST(EvtEnc, TakesTheFormatThatDownstreamLeaves) {
   Harness h("evtenc format=EVT4");
   gst_harness_set_sink_caps_str(h.get(),
