@@ -21,18 +21,17 @@
 typedef struct {
   const char* media_type;
   const char* element;
-  gboolean is_table; /* the options --time-unit and --column-order apply */
 } Reader;
 
 static const Reader readers[] = {
-    {"application/x-prophesee-raw", "evtdec name=reader", FALSE},
-    {"application/x-prophesee-dat", "eventdatdec name=reader", FALSE},
-    {"application/x-es", "eventesdec name=reader", FALSE},
-    {"application/x-event-csv", "eventcsvdec name=reader", TRUE},
-    {"application/x-npy", "eventnpydec name=reader", TRUE},
-    {"application/x-npz", "eventnpzdec name=reader", TRUE},
-    {"application/x-aedat", "aedatdemux name=reader reader.events_0", FALSE},
-    {"application/x-hdf5", "eventhdf5dec name=reader", FALSE},
+    {"application/x-prophesee-raw", "evtdec name=reader"},
+    {"application/x-prophesee-dat", "eventdatdec name=reader"},
+    {"application/x-es", "eventesdec name=reader"},
+    {"application/x-event-csv", "eventcsvdec name=reader"},
+    {"application/x-npy", "eventnpydec name=reader"},
+    {"application/x-npz", "eventnpzdec name=reader"},
+    {"application/x-aedat", "aedatdemux name=reader reader.events_0"},
+    {"application/x-hdf5", "eventhdf5dec name=reader"},
 };
 
 typedef struct {
@@ -66,14 +65,19 @@ static const Format formats[] = {
 };
 
 typedef struct {
-  const char* name; /* same as that of the property */
-  gboolean is_of_reader;
-  gchar* value; /* NULL if not given */
+  const char* name;   /* same as that of the property */
+  const char* inputs; /* files whose reader has the property; NULL if it is the writer's */
+  gchar* value;       /* NULL if not given */
 } Option;
 
 static Option properties[] = {
-    {"format", FALSE, NULL},   {"dialect", FALSE, NULL},     {"compression", FALSE, NULL},
-    {"time-unit", TRUE, NULL}, {"column-order", TRUE, NULL},
+    {"format", NULL, NULL},
+    {"dialect", NULL, NULL},
+    {"compression", NULL, NULL},
+    {"time-unit", "text or NumPy files", NULL},
+    {"column-order", "text or NumPy files", NULL},
+    {"width", "files that may lack a sensor size", NULL},
+    {"height", "files that may lack a sensor size", NULL},
 };
 
 static const GOptionEntry options[] = {
@@ -86,6 +90,10 @@ static const GOptionEntry options[] = {
      "Unit of the times in text or NumPy files that are read", "NAME"},
     {"column-order", 'o', 0, G_OPTION_ARG_STRING, &properties[4].value,
      "Columns of text or NumPy files that are read, such as txyp", "LETTERS"},
+    {"width", 0, 0, G_OPTION_ARG_STRING, &properties[5].value,
+     "Width of the sensor, if IN does not state it", "PIXELS"},
+    {"height", 0, 0, G_OPTION_ARG_STRING, &properties[6].value,
+     "Height of the sensor, if IN does not state it", "PIXELS"},
     G_OPTION_ENTRY_NULL,
 };
 
@@ -192,18 +200,48 @@ static gboolean can_write(const char* path, const Format* format) {
   return TRUE;
 }
 
-/* True if all given options apply to the files. */
-static gboolean options_apply(const Reader* reader, const Format* format) {
+/* True if all given options of the writer apply to the format. */
+static gboolean options_apply(const Format* format) {
   for (gsize i = 0; i < G_N_ELEMENTS(properties); ++i) {
     const Option* option = &properties[i];
-    if (option->value == NULL) continue;
-    if (option->is_of_reader ? reader->is_table : g_strcmp0(format->option, option->name) == 0)
-      continue;
-    if (option->is_of_reader)
-      PRINT_ERROR("--%s applies only where text or NumPy files are read\n", option->name);
-    else
-      PRINT_ERROR("--%s does not apply to %s files\n", option->name, format->extension);
+    if (option->value == NULL || option->inputs != NULL) continue;
+    if (g_strcmp0(format->option, option->name) == 0) continue;
+    PRINT_ERROR("--%s does not apply to %s files\n", option->name, format->extension);
     return FALSE;
+  }
+  return TRUE;
+}
+
+/* Sets a property to the value of an option. */
+static gboolean set_option(GstElement* element, const Option* option) {
+  GParamSpec* spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element), option->name);
+  if (spec == NULL) {
+    PRINT_ERROR("--%s applies only where %s are read\n", option->name, option->inputs);
+    return FALSE;
+  }
+  if (G_IS_PARAM_SPEC_ENUM(spec)) {
+    const GEnumValue* value =
+        g_enum_get_value_by_nick(G_PARAM_SPEC_ENUM(spec)->enum_class, option->value);
+    if (value == NULL) {
+      gchar* names = names_of(G_OBJECT(element), option->name);
+      PRINT_ERROR("--%s: no \"%s\"; choose one of%s\n", option->name, option->value, names);
+      g_free(names);
+      return FALSE;
+    }
+    g_object_set(element, option->name, value->value, NULL);
+  } else if (G_IS_PARAM_SPEC_UINT(spec)) {
+    const GParamSpecUInt* range = G_PARAM_SPEC_UINT(spec);
+    guint64 number = 0;
+    GError* error = NULL;
+    if (!g_ascii_string_to_unsigned(option->value, 10, range->minimum, range->maximum, &number,
+                                    &error)) {
+      PRINT_ERROR("--%s: %s\n", option->name, error->message);
+      g_clear_error(&error);
+      return FALSE;
+    }
+    g_object_set(element, option->name, (guint)number, NULL);
+  } else {
+    g_object_set(element, option->name, option->value, NULL);
   }
   return TRUE;
 }
@@ -214,24 +252,9 @@ static gboolean set_options(GstElement* pipeline) {
   for (gsize i = 0; i < G_N_ELEMENTS(properties) && ok; ++i) {
     const Option* option = &properties[i];
     GstElement* element;
-    GParamSpec* spec;
     if (option->value == NULL) continue;
-    element = gst_bin_get_by_name(GST_BIN(pipeline), option->is_of_reader ? "reader" : "writer");
-    spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element), option->name);
-    if (G_IS_PARAM_SPEC_ENUM(spec)) {
-      const GEnumValue* value =
-          g_enum_get_value_by_nick(G_PARAM_SPEC_ENUM(spec)->enum_class, option->value);
-      ok = value != NULL;
-      if (ok) {
-        g_object_set(element, option->name, value->value, NULL);
-      } else {
-        gchar* names = names_of(G_OBJECT(element), option->name);
-        PRINT_ERROR("--%s: no \"%s\"; choose one of%s\n", option->name, option->value, names);
-        g_free(names);
-      }
-    } else {
-      g_object_set(element, option->name, option->value, NULL);
-    }
+    element = gst_bin_get_by_name(GST_BIN(pipeline), option->inputs != NULL ? "reader" : "writer");
+    ok = set_option(element, option);
     gst_object_unref(element);
   }
   return ok;
@@ -443,7 +466,7 @@ int main(int argc, char** argv) {
   if (!can_write(argv[2], to)) return 2;
   from = find_reader(argv[1]);
   if (from == NULL) return 1;
-  if (!options_apply(from, to)) return 2;
+  if (!options_apply(to)) return 2;
   if (same_file(argv[1], argv[2])) {
     PRINT_ERROR("%s and %s are the same file\n", argv[1], argv[2]);
     return 2;

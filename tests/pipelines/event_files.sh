@@ -51,6 +51,10 @@ cmp ball.csv named.csv || fail "the name was not found"
 if LC_ALL=C convert "kein Bällchen.dat" none.csv 2>named; then fail "no file was converted"; fi
 grep -q "kein Bällchen.dat: No such file" named || fail "the error says $(cat named)"
 
+# A sensor size that the file does not state.
+convert --width=500 --height=400 ball.npy sized.raw
+grep -aq "geometry 500x400" sized.raw || fail "the size is not the one that was set: $(grep -a geometry sized.raw)"
+
 # Text and NumPy of other tools.
 convert --dialect=esim ball.raw esim.csv
 convert --time-unit=nanoseconds esim.csv esim-back.csv
@@ -192,6 +196,8 @@ refused "can only be read" ball.raw ball.npz
 refused "choose one of auto seconds" --time-unit=hours ball.csv other.raw
 refused "must have each of t, x, y and p once" --column-order=xy ball.csv other.raw
 refused "only where text or NumPy" --time-unit=seconds ball.raw other.raw
+refused "only where files that may lack a sensor size" --width=320 ball.es other.raw
+refused "--height: " --height=tall ball.csv other.raw
 printf '1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n' >unclear.txt
 refused "set time-unit" unclear.txt out.dat
 refused "neither its content nor its extension" /dev/null out.dat
