@@ -20,6 +20,17 @@ inline std::string in_quotes(const std::string& path) {
   return '"' + path + '"';
 }
 
+/// Number of repetitions of a test that finds more the longer it runs: `soak` in ./tests/run soak,
+/// else `usual`, or a quarter of it under a sanitizer.
+inline int repetitions(int usual, int soak) {
+  if (g_getenv("SOAK") != nullptr) return soak;
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  return (usual + 3) / 4;
+#else
+  return usual;
+#endif
+}
+
 /// A simulator element between a source and a sink simulated by the test.
 namespace harness {
 
@@ -221,6 +232,16 @@ inline std::string text_of(GstMessage* message) {
   std::string text = error->message;
   g_error_free(error);
   return text;
+}
+
+/// Links a pad that appears on `element` to `sink`, at every start: a launch line does so only
+/// once.
+inline void link_late_pads(GstElement* element, GstElement* sink) {
+  g_signal_connect_object(element, "pad-added",
+                          G_CALLBACK(+[](GstElement* source, GstPad*, GstElement* to) {
+                            gst_element_link(source, to);
+                          }),
+                          sink, static_cast<GConnectFlags>(0));
 }
 
 /// Drives an element with two sink pads, the first of which is passed to the source pad.

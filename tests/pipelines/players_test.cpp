@@ -1,131 +1,14 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Event files in players, which autoplug the readers and the renderer: playing, seeking while
 // playing, and playing to the end.
-#include <gst/gst.h>
-#include <gtest/gtest.h>
-
 #include <atomic>
-#include <filesystem>
-#include <fstream>
-#include <random>
-#include <span>
-#include <string>
 #include <tuple>
-#include <vector>
 
-#include "src/formats/evt/raw.hpp"
-#include "tests/formats/aedat_files.hpp"
+#include "tests/elements/recording_files.hpp"
 
 namespace {
 
-using eventcamera::AbsoluteEvent;
-using eventcamera::EvtFormat;
-using eventcamera::Microseconds;
-using eventcamera::Polarity;
-using eventcamera::SensorSize;
-using Bytes = std::vector<std::uint8_t>;
-
-constexpr SensorSize sensor{346, 260};
-constexpr Microseconds length = 5'000'000;
-/// File times differ from the player's times.
-constexpr Microseconds beginning = 30'000'000;
-
-/// A dot that runs through the rows.
-std::vector<AbsoluteEvent> some_events() {
-  std::vector<AbsoluteEvent> events;
-  constexpr Microseconds step = 100;
-  for (Microseconds t = 0; t < length; t += step) {
-    const auto i = static_cast<int>(t / step);
-    events.push_back(AbsoluteEvent::at(i % sensor.width, i / 7 % sensor.height, beginning + t,
-                                       i % 3 == 0 ? Polarity::on : Polarity::off));
-  }
-  return events;
-}
-
-bool run(const std::string& launch) {
-  GError* error = nullptr;
-  GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
-  if (error != nullptr) {
-    ADD_FAILURE() << launch << ": " << error->message;
-    g_clear_error(&error);
-    return false;
-  }
-  GstBus* bus = gst_element_get_bus(pipeline);
-  gst_element_set_state(pipeline, GST_STATE_PLAYING);
-  GstMessage* message = gst_bus_timed_pop_filtered(
-      bus, 20 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-  const bool ended = message != nullptr && GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS;
-  if (message != nullptr) gst_message_unref(message);
-  gst_element_set_state(pipeline, GST_STATE_NULL);
-  gst_object_unref(bus);
-  gst_object_unref(pipeline);
-  return ended;
-}
-
-/// Files with the same events in every format, for the duration of the tests.
-class Files {
- public:
-  static const Files& get() {
-    static const Files files;
-    return files;
-  }
-
-  std::string path(const std::string& name) const { return folder_ / name; }
-
-  Files(const Files&) = delete;
-  Files& operator=(const Files&) = delete;
-  ~Files() { std::filesystem::remove_all(folder_); }
-
- private:
-  Files()
-      : folder_(std::filesystem::temp_directory_path() /
-                ("players-test-" + std::to_string(std::random_device()()))) {
-    gst_init(nullptr, nullptr);
-    std::filesystem::create_directories(folder_);
-    const auto events = some_events();
-    for (const auto& [name, format] : {std::pair{"evt2.raw", EvtFormat::evt2},
-                                       {"evt21.raw", EvtFormat::evt21},
-                                       {"evt3.raw", EvtFormat::evt3},
-                                       {"evt4.raw", EvtFormat::evt4}}) {
-      Bytes bytes;
-      const auto encoder = eventcamera::make_prophesee_raw_encoder(format, sensor);
-      encoder->encode(events, bytes);
-      encoder->finish(bytes);
-      save(name, bytes);
-    }
-    save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
-    save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
-    for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
-                                       {"a.es", "eventesenc ! filesink"},
-                                       {"a.csv", "eventcsvenc ! filesink"},
-                                       {"a.txt", "eventcsvenc dialect=rpg ! filesink"},
-                                       {"a.npy", "eventnpyenc ! filesink"},
-                                       {"a.aedat4", "aedatmux ! filesink"},
-                                       {"dsec.h5", "eventhdf5sink"},
-                                       {"metavision.hdf5", "eventhdf5sink layout=metavision"}})
-      EXPECT_TRUE(run("filesrc location=\"" + path("evt3.raw") + "\" ! evtdec ! " + writer +
-                      " location=\"" + path(name) + "\""));
-  }
-
-  void save(const std::string& name, const Bytes& bytes) const {
-    std::ofstream(folder_ / name, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-  }
-
-  std::filesystem::path folder_;
-};
-
-const char* const files[] = {"evt2.raw",        "evt21.raw",    "evt3.raw", "evt4.raw",
-                             "a.dat",           "a.es",         "a.csv",    "a.txt",
-                             "a.npy",           "aedat2.aedat", "a.aedat4", "aedat3.aedat",
-                             "metavision.hdf5", "dsec.h5"};
-
-std::string test_name(std::string text) {
-  for (auto& c : text)
-    if (g_ascii_isalnum(c) == FALSE) c = '_';
-  return text;
-}
+using namespace recording_files;
 
 /// playbin or playbin3, with a slow sink.
 class Player {
@@ -208,18 +91,18 @@ class Player {
   std::atomic<GstClockTime> last_ = GST_CLOCK_TIME_NONE;
 };
 
-class EveryPlayer : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
+class EveryPlayer : public testing::TestWithParam<std::tuple<const char*, File>> {};
 INSTANTIATE_TEST_SUITE_P(, EveryPlayer,
                          testing::Combine(testing::Values("playbin", "playbin3"),
                                           testing::ValuesIn(files)),
                          [](const auto& test) {
                            return test_name(std::get<0>(test.param) + std::string("_") +
-                                            std::get<1>(test.param));
+                                            std::get<1>(test.param).name);
                          });
 
 TEST_P(EveryPlayer, PlaysAndSeeksWhilePlaying) {
   const auto& [name, file] = GetParam();
-  Player player(name, Files::get().path(file));
+  Player player(name, file.path());
   ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
   EXPECT_EQ(player.duration(), (length - 100 + 1) * GST_USECOND);
   EXPECT_TRUE(player.is_seekable());
@@ -234,20 +117,20 @@ TEST_P(EveryPlayer, PlaysAndSeeksWhilePlaying) {
   EXPECT_TRUE(player.ends_well());
 }
 
-class EveryDecodebin : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
+class EveryDecodebin : public testing::TestWithParam<std::tuple<const char*, File>> {};
 INSTANTIATE_TEST_SUITE_P(
     , EveryDecodebin,
     testing::Combine(testing::Values("decodebin", "decodebin3", "queue ! decodebin"),
                      testing::ValuesIn(files)),
     [](const auto& test) {
-      return test_name(std::get<0>(test.param) + std::string("_") + std::get<1>(test.param));
+      return test_name(std::get<0>(test.param) + std::string("_") + std::get<1>(test.param).name);
     });
 
 TEST_P(EveryDecodebin, DrawsTheWholeFile) {
   const auto& [bin, file] = GetParam();
   gst_init(nullptr, nullptr);
   GError* error = nullptr;
-  const auto launch = "filesrc location=\"" + Files::get().path(file) + "\" ! " + bin +
+  const auto launch = "filesrc location=" + in_quotes(file.path()) + " ! " + bin +
                       " ! video/x-raw ! fakesink name=sink signal-handoffs=true";
   GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
   ASSERT_EQ(error, nullptr) << error->message;

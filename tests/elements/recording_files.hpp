@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "src/formats/evt/raw.hpp"
+#include "tests/elements/harness.hpp"
+#include "tests/formats/aedat_files.hpp"
+#include "tests/formats/npz_file.hpp"
+
+/// A recording of five seconds, in files of every format.
+namespace recording_files {
+
+using eventcamera::AbsoluteEvent;
+using eventcamera::EvtFormat;
+using eventcamera::Microseconds;
+using eventcamera::Polarity;
+using eventcamera::SensorSize;
+using harness::Owned;
+using Bytes = std::vector<std::uint8_t>;
+
+inline constexpr SensorSize sensor{346, 260};
+inline constexpr Microseconds length = 5'000'000;
+/// File times differ from the player's times.
+inline constexpr Microseconds beginning = 30'000'000;
+
+/// A dot that runs through the rows.
+inline std::vector<AbsoluteEvent> some_events() {
+  std::vector<AbsoluteEvent> events;
+  constexpr Microseconds step = 100;
+  for (Microseconds t = 0; t < length; t += step) {
+    const auto i = static_cast<int>(t / step);
+    events.push_back(AbsoluteEvent::at(i % sensor.width, i / 7 % sensor.height, beginning + t,
+                                       i % 3 == 0 ? Polarity::on : Polarity::off));
+  }
+  return events;
+}
+
+/// A NumPy archive, which no element writes.
+inline Bytes npz(const std::vector<AbsoluteEvent>& events) {
+  std::vector<std::int64_t> t;
+  std::vector<std::uint16_t> x;
+  std::vector<std::uint16_t> y;
+  std::vector<std::uint8_t> p;
+  for (const auto& event : events) {
+    t.push_back(event.t);
+    x.push_back(event.x);
+    y.push_back(static_cast<std::uint16_t>(event.y()));
+    p.push_back(event.polarity() == Polarity::on);
+  }
+  using npz_file::column;
+  return npz_file::archive({{"t.npy", column("<i8", t)},
+                            {"x.npy", column("<u2", x)},
+                            {"y.npy", column("<u2", y)},
+                            {"p.npy", column("|u1", p)}},
+                           true);
+}
+
+/// Runs a launch line to its end. False after an error or a timeout.
+inline bool run(const std::string& launch) {
+  const Owned<GstElement> pipeline(gst_parse_launch(launch.c_str(), nullptr));
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+  const Owned<GstMessage> end(
+      gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND,
+                                 static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  return end && GST_MESSAGE_TYPE(end.get()) == GST_MESSAGE_EOS;
+}
+
+/// The files, in a folder that lasts as long as the tests.
+class Folder {
+ public:
+  static std::string path(const std::string& name) {
+    static const Folder folder;
+    return folder.path_ / name;
+  }
+
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  ~Folder() { std::filesystem::remove_all(path_); }
+
+ private:
+  Folder() {
+    gst_init(nullptr, nullptr);
+    std::filesystem::create_directories(path_);
+    const auto events = some_events();
+    for (const auto& [name, format] : {std::pair{"evt2.raw", EvtFormat::evt2},
+                                       {"evt21.raw", EvtFormat::evt21},
+                                       {"evt3.raw", EvtFormat::evt3},
+                                       {"evt4.raw", EvtFormat::evt4}}) {
+      Bytes bytes;
+      const auto encoder = eventcamera::make_prophesee_raw_encoder(format, sensor);
+      encoder->encode(events, bytes);
+      encoder->finish(bytes);
+      save(name, bytes);
+    }
+    save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
+    save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
+    save("a.npz", npz(events));
+    for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
+                                       {"a.es", "eventesenc ! filesink"},
+                                       {"a.csv", "eventcsvenc ! filesink"},
+                                       {"a.txt", "eventcsvenc dialect=rpg ! filesink"},
+                                       {"a.npy", "eventnpyenc ! filesink"},
+                                       {"a.aedat4", "aedatmux ! filesink"},
+                                       {"dsec.h5", "eventhdf5sink"},
+                                       {"metavision.hdf5", "eventhdf5sink layout=metavision"}})
+      EXPECT_TRUE(run("filesrc location=" + in_quotes(path_ / "evt3.raw") + " ! evtdec ! " +
+                      writer + " location=" + in_quotes(path_ / name)));
+  }
+
+  void save(const std::string& name, const Bytes& bytes) const {
+    std::ofstream(path_ / name, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+  }
+
+  std::filesystem::path path_ = std::filesystem::temp_directory_path() /
+                                ("recording-files-" + std::to_string(std::random_device()()));
+};
+
+struct File {
+  const char* name;
+  const char* reader;
+
+  std::string path() const { return Folder::path(name); }
+};
+
+inline constexpr File files[] = {
+    {"evt2.raw", "evtdec"},         {"evt21.raw", "evtdec"},
+    {"evt3.raw", "evtdec"},         {"evt4.raw", "evtdec"},
+    {"a.dat", "eventdatdec"},       {"a.es", "eventesdec"},
+    {"a.csv", "eventcsvdec"},       {"a.txt", "eventcsvdec"},
+    {"a.npy", "eventnpydec"},       {"a.npz", "eventnpzdec"},
+    {"aedat2.aedat", "aedatdemux"}, {"a.aedat4", "aedatdemux"},
+    {"aedat3.aedat", "aedatdemux"}, {"metavision.hdf5", "eventhdf5dec"},
+    {"dsec.h5", "eventhdf5dec"},
+};
+
+/// Part of a test's name.
+inline std::string test_name(std::string text) {
+  for (auto& c : text)
+    if (g_ascii_isalnum(c) == FALSE) c = '_';
+  return text;
+}
+
+}  // namespace recording_files
