@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What the servers show: a camera, or without one a test scene, until Ctrl-C."""
+"""What servers of events share: their options, and the capture of a camera, or without one of a test
+scene, until Ctrl-C."""
+import argparse
+import ipaddress
 import signal
+import socket
 
 from gi.repository import GLib, Gst
 
@@ -10,17 +14,57 @@ CAMERA = ("v4l2src name=camera ! video/x-raw,width=[1,640],height=[1,480];"
           "image/jpeg,width=[1,640],height=[1,480] ! decodebin")
 
 
+def option_parser(program, description, address, port):
+    parser = argparse.ArgumentParser(
+        prog=program, description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--device", help="camera, such as /dev/video0 (default: a test scene)")
+    parser.add_argument("--simulator", default="eventsim-diff",
+                        help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
+                        " (default: %(default)s)")
+    parser.add_argument("--address", type=ipaddress.ip_address, default=address,
+                        help="IP address to listen on (default: %(default)s)")
+    parser.add_argument("--port", type=port_number, default=port,
+                        help="0 = any that is free (default: %(default)s)")
+    return parser
+
+
+def port_number(text):
+    if not 0 <= int(text) < 65536:
+        raise argparse.ArgumentTypeError(f"{text} is not a port number")
+    return int(text)
+
+
+def host_of(address):
+    """The host of URLs."""
+    if address.is_unspecified:
+        return socket.gethostname()
+    return f"[{address}]" if address.version == 6 else str(address)
+
+
 class Capture:
-    """A pipeline of a camera, or of the test scene, and `launch`. on_element_message(message) is
-    called for the messages of its elements."""
+    """A pipeline of a camera, or of the test scene, and `launch`. What it makes is pushed to the
+    appsrcs that are attached. on_element_message(message) is called for messages of its elements."""
 
     def __init__(self, device, launch, on_element_message=None):
         # Frames that come too fast are dropped, so that latency does not grow.
-        self.pipeline = Gst.parse_launch(f"{CAMERA if device else SCENE}"
-                                         f" ! queue leaky=downstream max-size-buffers=2 ! {launch}")
+        self.pipeline = Gst.parse_launch(
+            f"{CAMERA if device else SCENE} ! queue leaky=downstream max-size-buffers=2 ! {launch}"
+            " ! appsink name=captured emit-signals=true sync=false")
         if device:
             self.pipeline.get_by_name("camera").set_property("device", device)
-        self.on_element_message = on_element_message
+        self.pipeline.get_by_name("captured").connect("new-sample", self._push)
+        self._appsrcs = ()  # replaced, never changed: read by the thread that captures
+        self._on_element_message = on_element_message
+
+    def attach(self, appsrc, pipeline):
+        """`pipeline`, in which `appsrc` is, gets the clock of the capture: buffers keep their times."""
+        pipeline.use_clock(self.pipeline.get_clock())
+        pipeline.set_start_time(Gst.CLOCK_TIME_NONE)
+        pipeline.set_base_time(self.pipeline.get_base_time())
+        self._appsrcs += (appsrc,)
+
+    def detach(self, appsrc):
+        self._appsrcs = tuple(other for other in self._appsrcs if other is not appsrc)
 
     def start(self):
         if self.pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
@@ -34,8 +78,8 @@ class Capture:
         failures = []
 
         def receive(_, message):
-            if message.type == Gst.MessageType.ELEMENT and self.on_element_message:
-                self.on_element_message(message)
+            if message.type == Gst.MessageType.ELEMENT and self._on_element_message:
+                self._on_element_message(message)
             elif message.type in (Gst.MessageType.ERROR, Gst.MessageType.EOS):
                 failures.append(described(message))
                 loop.quit()
@@ -50,6 +94,12 @@ class Capture:
         self.pipeline.set_state(Gst.State.NULL)
         if failures:
             raise RuntimeError(failures[0])
+
+    def _push(self, appsink):
+        sample = appsink.emit("pull-sample")
+        for appsrc in self._appsrcs:
+            appsrc.emit("push-sample", sample)
+        return Gst.FlowReturn.OK
 
 
 def described(message):

@@ -7,11 +7,8 @@ of browsers can watch. Ctrl-C ends it.
 
 Without --device it shows a test scene. Only browsers on this machine are served, unless --address
 is given: 0.0.0.0 serves whoever reaches this machine, without a password."""
-import argparse
-import ipaddress
 import json
 import os
-import socket
 import sys
 from urllib.parse import urlsplit
 
@@ -27,7 +24,7 @@ try:
 except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nOn Debian, run: ./install-packages run web")
 
-from capture import Capture  # noqa: E402
+from capture import Capture, host_of, option_parser  # noqa: E402
 
 PAGE = os.path.join(os.path.dirname(os.path.realpath(__file__)), "web_events.html")
 ELEMENTS = ["eventstats", "eventrender", "vp8enc", "rtpvp8pay", "webrtcbin", "nicesink", "dtlssrtpenc"]
@@ -36,7 +33,7 @@ DRAW_AND_ENCODE = (
     "{simulator} ! application/x-event-camera ! eventstats interval=500000000 ! eventrender"
     " ! video/x-raw,framerate=30/1 ! videoconvert ! queue leaky=downstream max-size-buffers=2"
     " ! vp8enc name=encoder deadline=1 cpu-used=8 threads=2 target-bitrate=4000000"
-    " keyframe-max-dist=3600 ! appsink name=encoded emit-signals=true sync=false")
+    " keyframe-max-dist=3600")
 # A browser that is too slow loses frames, and asks for a key frame.
 SEND = ("appsrc name=encoded is-live=true format=time leaky-type=downstream"
         " max-buffers=8 max-bytes=0 max-time=0 ! rtpvp8pay picture-id-mode=15-bit ! webrtcbin"
@@ -57,6 +54,7 @@ class Viewer:
 
     def __init__(self, websocket, capture, need_key_frame, end):
         self._websocket = websocket
+        self._capture = capture
         self._need_key_frame = need_key_frame
         self._end = end
         self._pipeline = Gst.parse_launch(SEND)
@@ -69,10 +67,7 @@ class Viewer:
         self._encoded.get_static_pad("src").add_probe(Gst.PadProbeType.EVENT_UPSTREAM, forward, need_key_frame)
         self._bus = self._pipeline.get_bus()
         self._bus.add_signal_watch()
-        # Viewers share the camera's clock: frames keep their times.
-        self._pipeline.use_clock(capture.get_clock())
-        self._pipeline.set_start_time(Gst.CLOCK_TIME_NONE)
-        self._pipeline.set_base_time(capture.get_base_time())
+        capture.attach(self._encoded, self._pipeline)
         self._handlers = [(instance, instance.connect(name, handle)) for instance, name, handle in (
             (self._webrtc, "on-negotiation-needed", self._create_offer),
             (self._webrtc, "on-ice-candidate", self._send_candidate),
@@ -83,9 +78,6 @@ class Viewer:
         self._pipeline.set_state(Gst.State.PLAYING)
 
     # from any thread
-
-    def push(self, sample):
-        self._encoded.emit("push-sample", sample)
 
     def send(self, **message):
         GLib.idle_add(self._send, json.dumps(message))
@@ -118,6 +110,7 @@ class Viewer:
         for instance, handler in self._handlers:
             instance.disconnect(handler)
         self._bus.remove_signal_watch()
+        self._capture.detach(self._encoded)
         self._pipeline.set_state(Gst.State.NULL)
 
     def close(self):
@@ -169,8 +162,7 @@ class Server:
     def __init__(self, device, simulator):
         self._capture = Capture(device, DRAW_AND_ENCODE.format(simulator=simulator), self._tell_rate)
         self._encoder = self._capture.pipeline.get_by_name("encoder").get_static_pad("src")
-        self._capture.pipeline.get_by_name("encoded").connect("new-sample", self._push)
-        self._viewers = ()  # replaced, never changed: read by the thread that encodes
+        self._viewers = []
         self._http = Soup.Server()
         self._http.add_handler("/", self._serve_page)
         self._http.add_early_handler("/viewer", self._refuse_strangers)
@@ -183,12 +175,8 @@ class Server:
             raise RuntimeError(f"cannot listen on {address}, port {port}: {cause.message}; "
                                "choose another with --port") from cause
         self._capture.start()
-        if address.is_unspecified:
-            host = socket.gethostname()
-        else:
-            host = f"[{address}]" if address.version == 6 else address
         port = self._http.get_uris()[0].get_port()
-        print(f"Events are shown at http://{host}:{port}/ until Ctrl-C", flush=True)
+        print(f"Events are shown at http://{host_of(address)}:{port}/ until Ctrl-C", flush=True)
         try:
             self._capture.run()
         finally:
@@ -215,17 +203,7 @@ class Server:
 
     def _add_viewer(self, _, message, path, websocket):
         websocket.set_keepalive_interval(20)
-        viewer = Viewer(websocket, self._capture.pipeline, self._encode_key_frame, self._remove_viewer)
-        self._viewers += (viewer,)
-
-    def _remove_viewer(self, viewer):
-        self._viewers = tuple(other for other in self._viewers if other is not viewer)
-
-    def _push(self, appsink):
-        sample = appsink.emit("pull-sample")
-        for viewer in self._viewers:
-            viewer.push(sample)
-        return Gst.FlowReturn.OK
+        self._viewers.append(Viewer(websocket, self._capture, self._encode_key_frame, self._viewers.remove))
 
     def _encode_key_frame(self):
         self._encoder.send_event(
@@ -238,24 +216,8 @@ class Server:
                 viewer.send(rate=round(figures.get_value("rate")))
 
 
-def options():
-    parser = argparse.ArgumentParser(
-        prog="web-events", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--device", help="camera, such as /dev/video0 (default: a test scene)")
-    parser.add_argument("--simulator", default="eventsim-diff",
-                        help='simulator and its properties, such as "eventsim-sparse positive-threshold=5"'
-                        " (default: %(default)s)")
-    parser.add_argument("--address", type=ipaddress.ip_address, default="127.0.0.1",
-                        help="IP address to listen on (default: %(default)s)")
-    parser.add_argument("--port", type=int, default=8080, help="0 = any that is free (default: %(default)s)")
-    chosen = parser.parse_args()
-    if not 0 <= chosen.port < 65536:
-        parser.error(f"argument --port: {chosen.port} is not a port number")
-    return chosen
-
-
 def main():
-    chosen = options()
+    chosen = option_parser("web-events", __doc__, "127.0.0.1", 8080).parse_args()
     Gst.init(None)
     missing = [name for name in ELEMENTS if not Gst.ElementFactory.find(name)]
     if missing:
