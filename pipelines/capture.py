@@ -5,6 +5,7 @@ import argparse
 import ipaddress
 import signal
 import socket
+import threading
 
 from gi.repository import GLib, Gst
 
@@ -53,7 +54,8 @@ class Capture:
         if device:
             self.pipeline.get_by_name("camera").set_property("device", device)
         self.pipeline.get_by_name("captured").connect("new-sample", self._push)
-        self._appsrcs = ()  # replaced, never changed: read by the thread that captures
+        self._appsrcs = ()  # replaced, never changed: the thread that captures reads it
+        self._attaching = threading.Lock()
         self._on_element_message = on_element_message
 
     def attach(self, appsrc, pipeline):
@@ -61,10 +63,12 @@ class Capture:
         pipeline.use_clock(self.pipeline.get_clock())
         pipeline.set_start_time(Gst.CLOCK_TIME_NONE)
         pipeline.set_base_time(self.pipeline.get_base_time())
-        self._appsrcs += (appsrc,)
+        with self._attaching:
+            self._appsrcs += (appsrc,)
 
     def detach(self, appsrc):
-        self._appsrcs = tuple(other for other in self._appsrcs if other is not appsrc)
+        with self._attaching:
+            self._appsrcs = tuple(other for other in self._appsrcs if other is not appsrc)
 
     def start(self):
         if self.pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:

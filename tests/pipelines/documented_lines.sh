@@ -8,6 +8,7 @@ export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
 cp "$SOURCE/pipelines/events_to_numpy.py" pipelines/
 ln -s "$SOURCE/pipelines/web_events.py" pipelines/web-events
+ln -s "$SOURCE/pipelines/rtsp_events.py" pipelines/rtsp-events
 
 # The files that the lines read.
 ball="videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=I420,framerate=25/1"
@@ -17,6 +18,8 @@ eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,form
 eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc dialect=esim ! filesink location=events.txt"
 for name in recording real simulated; do cp drive.raw $name.raw; done
 
+servers=()
+trap 'kill "${servers[@]}" 2>/dev/null || true; rm -rf "$work"' EXIT
 count=0
 receiver=
 while IFS= read -r line; do
@@ -27,8 +30,9 @@ while IFS= read -r line; do
   line=${line//autovideosink/fakesink}
   line=${line// --device \/dev\/video0/ --port 0}
   line=${line//host=receiver/host=127.0.0.1}
+  line=${line//server:8554/127.0.0.1:${served:-}}
   case $line in
-    ./pipelines/web-events*) line="timeout --preserve-status --signal INT 20 $line" ;; # serves until Ctrl-C
+    *rtspsrc*) line=${line/fakesink/fakesink num-buffers=10} ;;
     gst-play*) line="$line --no-interactive --videosink=fakesink" ;;
     event-calibrate*) # one and a half seconds are enough
       line=${line/--to 2 --measure-from 2 --measure-to 10/--to 0.3 --measure-from 0.3 --measure-to 1}
@@ -37,6 +41,18 @@ while IFS= read -r line; do
   esac
   echo "$line"
   count=$((count + 1))
+  if [[ $line == ./pipelines/*-events\ * ]]; then # serves the lines that follow
+    eval "exec $line" >serving 2>&1 </dev/null &
+    servers+=($!)
+    served=
+    for _ in $(seq 300); do
+      served=$(sed -n 's#.*://[^/]*:\([0-9]*\)/.*#\1#p' serving)
+      [ -n "$served" ] && break
+      sleep 0.2
+    done
+    [ -n "$served" ] || fail "$(cat serving)"
+    continue
+  fi
   if [[ $line == *udpsrc* ]]; then # a receiver of what the next line sends
     eval "timeout 120 ${line/udpsrc/udpsrc num-buffers=5}" >received 2>&1 </dev/null &
     receiver=$!
@@ -49,8 +65,12 @@ while IFS= read -r line; do
     wait $receiver || fail "$(cat received)"
     receiver=
   fi
-done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|event-|\.\/pipelines\/(events_|web-events))/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
-[ $count -ge 25 ] || fail "found only $count lines"
+done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|event-|\.\/pipelines\/(events_|web-events|rtsp-events))/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
+[ $count -ge 29 ] || fail "found only $count lines"
 for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy received.raw; do
   [ -s $file ] || fail "$file is missing or empty"
+done
+for server in "${servers[@]}"; do
+  kill "$server"
+  wait "$server" || fail "a server ended with status $?"
 done

@@ -1,0 +1,123 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Serves over RTSP the events of a camera, and what it sees, to any number of clients, until Ctrl-C:
+
+    rtsp-events --device /dev/video0
+
+    rtsp://HOST:8554/events   the events
+    rtsp://HOST:8554/video    the video of the camera
+    rtsp://HOST:8554/both     both in one session, synchronized by RTCP
+
+Without --device it serves a test scene. With --certificate, it serves rtsps:// only."""
+import sys
+
+try:
+    import gi
+
+    gi.require_version("Gst", "1.0")
+    gi.require_version("GstRtsp", "1.0")
+    gi.require_version("GstRtspServer", "1.0")
+    from gi.repository import Gio, GLib, Gst, GstRtsp, GstRtspServer
+except (ImportError, ValueError) as missing:
+    sys.exit(f"error: {missing}\nOn Debian, run: ./install-packages run rtsp")
+
+from capture import Capture, host_of, option_parser  # noqa: E402
+
+ELEMENTS = ["rtpeventpay", "vp8enc", "rtpvp8pay"]
+
+# Media that are too slow leave frames out.
+FRAMES = "appsrc name=frames is-live=true format=time"
+QUEUE = "queue leaky=downstream max-size-buffers=2"
+EVENTS = f"{QUEUE} ! {{simulator}} ! application/x-event-camera ! rtpeventpay"
+# Clients of RTSP cannot ask for a key frame: there is one every second.
+VIDEO = (f"{QUEUE} ! videoconvert ! vp8enc deadline=1 cpu-used=8 threads=2 target-bitrate=4000000"
+         " keyframe-max-dist=30 ! rtpvp8pay picture-id-mode=15-bit")
+MEDIA = {
+    "/events": f"{FRAMES} ! {EVENTS} name=pay0",
+    "/video": f"{FRAMES} ! {VIDEO} name=pay0",
+    "/both": f"{FRAMES} ! tee name=t  t. ! {EVENTS} name=pay0  t. ! {VIDEO} name=pay1",
+}
+VIEWER = "viewer"
+SECONDS_BETWEEN_CLEANUPS = 5
+
+
+class Server:
+    """The media of a capture: clients of a path share one, and all share the camera."""
+
+    def __init__(self, device, simulator):
+        self._capture = Capture(device, "identity")
+        self._server = GstRtspServer.RTSPServer()
+        permissions = GstRtspServer.RTSPPermissions.new()
+        for permission in ("media.factory.access", "media.factory.construct"):
+            permissions.add_permission_for_role(VIEWER, permission, True)
+        for path, launch in MEDIA.items():
+            factory = GstRtspServer.RTSPMediaFactory()
+            factory.set_launch(f"( {launch.format(simulator=simulator)} )")
+            factory.set_shared(True)
+            factory.set_permissions(permissions)
+            factory.connect("media-configure", self._feed)
+            self._server.get_mount_points().add_factory(path, factory)
+
+    def protect(self, user, password, certificate):
+        auth = GstRtspServer.RTSPAuth.new()
+        token = GstRtspServer.RTSPToken.new()
+        token.set_string("media.factory.role", VIEWER)
+        if user:
+            auth.set_supported_methods(GstRtsp.RTSPAuthMethod.DIGEST)
+            auth.add_digest(user, password, token)
+        else:
+            auth.set_default_token(token)
+        if certificate:
+            auth.set_tls_certificate(Gio.TlsCertificate.new_from_file(certificate))
+        self._server.set_auth(auth)
+
+    def run(self, address, port, scheme):
+        self._server.set_address(str(address))
+        self._server.set_service(str(port))
+        if self._server.attach(None) == 0:
+            raise RuntimeError(f"cannot listen on {address}, port {port}, which may be in use; "
+                               "choose another with --port")
+        self._capture.start()
+        base = f"{scheme}://{host_of(address)}:{self._server.get_bound_port()}"
+        print(f"Serving {', '.join(base + path for path in MEDIA)} until Ctrl-C", flush=True)
+        sessions = self._server.get_session_pool()
+        GLib.timeout_add_seconds(SECONDS_BETWEEN_CLEANUPS, lambda: sessions.cleanup() >= 0)
+        try:
+            self._capture.run()
+        finally:
+            self._server.client_filter(lambda *_: GstRtspServer.RTSPFilterResult.REMOVE)
+            sessions.filter(lambda *_: GstRtspServer.RTSPFilterResult.REMOVE)
+            # Waits for the threads that call _feed's handler.
+            GstRtspServer.RTSPThreadPool.cleanup()
+
+    def _feed(self, _, media):
+        element = media.get_element()
+        frames = element.get_by_name("frames")
+        self._capture.attach(frames, element.get_parent())
+        media.connect("unprepared", lambda _: self._capture.detach(frames))
+
+
+def main():
+    parser = option_parser("rtsp-events", __doc__, "0.0.0.0", 8554)
+    parser.add_argument("--user", help="user that clients must name")
+    parser.add_argument("--password", help="password of the user")
+    parser.add_argument("--certificate", metavar="PEM",
+                        help="TLS certificate and its private key, in one file")
+    chosen = parser.parse_args()
+    if (chosen.user is None) != (chosen.password is None):
+        parser.error("--user and --password need each other")
+    Gst.init(None)
+    missing = [name for name in ELEMENTS if not Gst.ElementFactory.find(name)]
+    if missing:
+        raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, run: ./install-packages run rtsp")
+    server = Server(chosen.device, chosen.simulator)
+    if chosen.user or chosen.certificate:
+        server.protect(chosen.user, chosen.password, chosen.certificate)
+    server.run(chosen.address, chosen.port, "rtsps" if chosen.certificate else "rtsp")
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (RuntimeError, GLib.Error) as failure:
+        sys.exit(f"error: {failure}")

@@ -1,0 +1,237 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""rtsp-events as its clients see it."""
+import os
+import signal
+import subprocess
+import tempfile
+import time
+
+import gi
+import numpy as np
+
+gi.require_version("Gst", "1.0")
+gi.require_version("GstApp", "1.0")
+from gi.repository import Gio, GLib, Gst, GstApp  # noqa: E402, F401
+
+PROGRAM = os.path.join(os.environ["SOURCE"], "pipelines", "rtsp_events.py")
+SECONDS = 60  # for anything that should happen at once
+XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
+
+
+class Server:
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen(
+            [PROGRAM, "--address", "127.0.0.1", "--port", "0", *arguments], stdout=subprocess.PIPE, text=True)
+        self.base = self.process.stdout.readline().split()[1].removesuffix("/events,")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGINT)
+        try:
+            assert self.process.wait(SECONDS) == 0, f"exit status {self.process.returncode}"
+        finally:
+            self.process.kill()
+
+    def descriptors(self):
+        return len(os.listdir(f"/proc/{self.process.pid}/fd"))
+
+
+class Client:
+    """Plays a URL into appsinks."""
+
+    def __init__(self, url, rest, **properties):
+        self._pipeline = Gst.parse_launch(f"rtspsrc name=source latency=200 {rest}")
+        source = self._pipeline.get_by_name("source")
+        for name, value in {"location": url, **properties}.items():
+            source.set_property(name.replace("_", "-"), value)
+
+    def __enter__(self):
+        self._pipeline.set_state(Gst.State.PLAYING)
+        return self
+
+    def __exit__(self, *_):
+        self._pipeline.set_state(Gst.State.NULL)
+
+    def samples(self, count, sink="out"):
+        appsink = self._pipeline.get_by_name(sink)
+        samples = []
+        deadline = time.monotonic() + SECONDS
+        while len(samples) < count:
+            if sample := appsink.try_pull_sample(Gst.SECOND // 10):
+                samples.append(sample)
+            elif message := self._pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR):
+                error, cause = message.parse_error()
+                raise RuntimeError(f"{error.message} {cause}")
+            assert time.monotonic() < deadline, f"{len(samples)} of {count} buffers within {SECONDS} s"
+        return samples
+
+
+def events_of(url, **properties):
+    return Client(url + "/events", "! rtpeventdepay ! appsink name=out sync=false", **properties)
+
+
+def video_of(url, **properties):
+    return Client(url + "/video", "! rtpvp8depay ! vp8dec ! videoconvert ! video/x-raw,format=GRAY8"
+                  " ! appsink name=out sync=false", **properties)
+
+
+def check_events(samples):
+    caps = samples[0].get_caps().get_structure(0)
+    assert caps.get_value("width") == 320 and caps.get_value("height") == 240, caps.to_string()
+    events = sum(sample.get_buffer().get_size() // 8 for sample in samples)
+    assert events > 100 * len(samples), f"only {events} events in {len(samples)} buffers"
+
+
+def check_video(samples):
+    pictures = {sample.get_buffer().extract_dup(0, 320 * 240) for sample in samples}
+    assert len(pictures) > len(samples) / 2, f"only {len(pictures)} different frames of {len(samples)}"
+    assert all(min(picture) < 50 and max(picture) > 200 for picture in pictures), "no white ball on black"
+
+
+def refused(words, client):
+    try:
+        with client:
+            client.samples(1)
+    except RuntimeError as cause:
+        assert words in str(cause), f"refused with: {cause}"
+    else:
+        raise AssertionError("not refused")
+
+
+def fails(words, *arguments):
+    result = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=SECONDS, check=False)
+    assert result.returncode in (1, 2), f"{arguments}: exit status {result.returncode}"
+    assert words in result.stderr and "Traceback" not in result.stderr, result.stderr
+
+
+def bytes_by_time(samples):
+    return {sample.get_buffer().pts: sample.get_buffer().extract_dup(0, sample.get_buffer().get_size())
+            for sample in samples}
+
+
+def clients_come_and_leave():
+    with Server() as server:
+        with events_of(server.base) as first, video_of(server.base) as watching:
+            check_events(first.samples(5))
+            check_video(watching.samples(5))
+        time.sleep(5)
+        idle = server.descriptors()  # with those that the first clients left open for the next
+        with events_of(server.base) as first:
+            check_events(first.samples(20))
+            with events_of(server.base, protocols=4) as second, video_of(server.base) as watching:
+                check_video(watching.samples(20))
+                ours, theirs = bytes_by_time(first.samples(60)), bytes_by_time(second.samples(60))
+                both = ours.keys() & theirs.keys()
+                assert len(both) > 20, f"only {len(both)} intervals in common"
+                assert all(ours[pts] == theirs[pts] for pts in both), "two clients get different events"
+            check_events(first.samples(20))
+        with video_of(server.base) as again:
+            check_video(again.samples(20))
+        deadline = time.monotonic() + SECONDS
+        while server.descriptors() > idle:
+            assert time.monotonic() < deadline, f"{server.descriptors()} descriptors, {idle} before the clients"
+            time.sleep(0.5)
+        fails("choose another with --port", "--address", "127.0.0.1", "--port", server.base.split(":")[-1])
+
+
+def passwords():
+    with Server("--user", "ada", "--password", "secret") as server:
+        refused("Unauthorized", events_of(server.base))
+        refused("Unauthorized", video_of(server.base, user_id="ada", user_pw="wrong"))
+        with events_of(server.base, user_id="ada", user_pw="secret") as client:
+            check_events(client.samples(5))
+
+
+def encryption():
+    with tempfile.TemporaryDirectory() as folder:
+        certificate, pair = os.path.join(folder, "certificate.pem"), os.path.join(folder, "pair.pem")
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=127.0.0.1",
+                        "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", pair, "-out", certificate],
+                       check=True, capture_output=True)
+        with open(certificate, "rb") as public, open(pair, "ab") as both:
+            both.write(public.read())
+        trusted = Gio.TlsFileDatabase.new(certificate)
+        with Server("--certificate", pair, "--user", "ada", "--password", "secret") as server:
+            assert server.base.startswith("rtsps://"), server.base
+            refused("Failed to connect", events_of(server.base, user_id="ada", user_pw="secret"))
+            refused("Unauthorized", events_of(server.base, tls_database=trusted))
+            with events_of(server.base, tls_database=trusted, user_id="ada", user_pw="secret") as client:
+                check_events(client.samples(5))
+        with Server("--certificate", pair) as server:
+            refused("Could not receive message", events_of(server.base.replace("rtsps", "rtsp")))
+            with video_of(server.base, tls_database=trusted) as client:
+                check_video(client.samples(5))
+
+
+def running_time(sample):
+    """In seconds."""
+    return sample.get_segment().to_running_time(Gst.Format.TIME, sample.get_buffer().pts) / 1e9
+
+
+def ball_in_video(sample):
+    """(time, x, y)"""
+    pixels = np.frombuffer(sample.get_buffer().extract_dup(0, 320 * 240), np.uint8).reshape(240, 320)
+    y, x = np.nonzero(pixels > 128)
+    return running_time(sample), x.mean(), y.mean()
+
+
+def ball_in_events(sample):
+    buffer = sample.get_buffer()
+    events = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), XYTP)
+    assert len(events) > 50, f"only {len(events)} events in {buffer.duration} ns"
+    return running_time(sample) + events["t"].mean() / 1e6, events["x"].mean(), (events["y_p"] & 0x7FFF).mean()
+
+
+def offset_between(video, events):
+    """How much later than the video the events show the ball, and how far the two positions then are
+    apart, in pixels (RMS)."""
+    # Only between frames that follow one another.
+    after = np.searchsorted(video[:, 0], events[:, 0])
+    inside = (after > 5) & (after < len(video) - 5)
+    inside[inside] &= video[after[inside], 0] - video[after[inside] - 1, 0] < 0.1
+    events = events[inside]
+    if len(events) < 30:
+        return 0, np.inf
+
+    def distance(lag):
+        return np.sqrt(np.mean(sum((np.interp(events[:, 0] - lag, video[:, 0], video[:, axis]) - events[:, axis])**2
+                                   for axis in (1, 2))))
+
+    lag = min(np.arange(-0.15, 0.15, 0.001), key=distance)
+    return lag, distance(lag)
+
+
+def in_sync():
+    """The events of eventsim-dvs are where the ball is in the video at the same time."""
+    with (Server("--simulator", "eventsim-dvs") as server, Client(
+            server.base + "/both",
+            "source. ! application/x-rtp,media=video ! rtpvp8depay ! vp8dec ! videoconvert"
+            " ! video/x-raw,format=GRAY8 ! appsink name=video sync=false"
+            "  source. ! application/x-rtp,media=application ! rtpeventdepay ! appsink name=events sync=false",
+            buffer_mode=4) as client):  # synced: server and client have one clock
+        video, events = [], []
+        lag, distance = 0, np.inf
+        deadline = time.monotonic() + SECONDS
+        while abs(lag) > 0.01 or distance > 1:  # until RTCP has synchronized them
+            assert time.monotonic() < deadline, f"events are {1000 * lag:.0f} ms late, {distance:.1f} pixels apart"
+            video += map(ball_in_video, client.samples(30, "video"))
+            while not events or events[-1][0] < video[-1][0]:
+                events += map(ball_in_events, client.samples(1, "events"))
+            lag, distance = offset_between(np.array(video[-90:]), np.array(events[-90:]))
+        print(f"events are {1000 * lag:.0f} ms later than the video, {distance:.2f} pixels apart")
+
+
+def errors():
+    fails("/nowhere", "--device", "/nowhere", "--port", "0")
+    fails("nowhere.pem", "--certificate", "nowhere.pem", "--port", "0")
+    fails("--password", "--user", "ada")
+
+
+Gst.init(None)
+for test in (clients_come_and_leave, in_sync, passwords, encryption, errors):
+    start = time.monotonic()
+    test()
+    print(f"{test.__name__}: {time.monotonic() - start:.1f} s", flush=True)
