@@ -1,0 +1,560 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Events over RTP, through the elements that people send and protect RTP with: nothing is lost
+// that need not be, and what is lost is counted.
+#include <gst/app/gstappsink.h>
+#include <gst/app/gstappsrc.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gst/eventcamera/eventcamera.h"
+#include "tests/elements/event_buffer.hpp"
+
+namespace {
+
+using eventcamera::AbsoluteEvent;
+using eventcamera::Event;
+using eventcamera::Polarity;
+using namespace std::chrono_literals;
+
+const std::string event_caps = "application/x-event-camera,format=XYTP,width=346,height=260";
+const std::string rtp_fields =
+    "media=application,clock-rate=1000000,encoding-name=X-EVENT-CAMERA,payload=96,width=346,"
+    "height=260,format=EVT3";
+const std::string from_caps = "caps=\"application/x-rtp," + rtp_fields + "\"";
+/// One second of events in buffers of 10 ms.
+constexpr int buffers = 100;
+constexpr int events_per_buffer = 400;
+const std::string source =
+    "appsrc name=in format=time is-live=true caps=" + event_caps + " ! identity sync=true";
+const std::string sink = "rtpeventdepay name=depay ! appsink name=out sync=false";
+
+/// The sender's times are neither 0 at its start nor whole microseconds.
+constexpr GstClockTime origin = 123'456'789;
+
+std::vector<Event> events_of_buffer(int number) {
+  std::vector<Event> events;
+  for (int i = 0; i < events_per_buffer; ++i)
+    events.push_back(Event::at((number * 31 + i * 17) % 346, (number * 7 + i * 5) % 260,
+                               static_cast<std::uint32_t>(i * 25),
+                               i % 3 == 0 ? Polarity::on : Polarity::off));
+  return events;
+}
+
+/// A pipeline of a test.
+class Pipeline {
+ public:
+  explicit Pipeline(const std::string& launch) {
+    gst_init(nullptr, nullptr);
+    GError* error = nullptr;
+    pipeline_ = gst_parse_launch(launch.c_str(), &error);
+    EXPECT_EQ(error, nullptr) << launch << ": " << error->message;
+    g_clear_error(&error);
+    bus_ = gst_element_get_bus(pipeline_);
+  }
+  ~Pipeline() {
+    gst_element_set_state(pipeline_, GST_STATE_NULL);
+    gst_object_unref(bus_);
+    gst_object_unref(pipeline_);
+  }
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  void play() { gst_element_set_state(pipeline_, GST_STATE_PLAYING); }
+
+  /// Waits for the end; false after an error or half a minute.
+  bool wait() {
+    GstMessage* message = gst_bus_timed_pop_filtered(
+        bus_, 30 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+    const bool ended = message != nullptr && GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS;
+    if (message != nullptr && !ended) {
+      GError* error = nullptr;
+      gchar* cause = nullptr;
+      gst_message_parse_error(message, &error, &cause);
+      ADD_FAILURE() << error->message << " (" << cause << ")";
+      g_error_free(error);
+      g_free(cause);
+    }
+    if (message != nullptr) gst_message_unref(message);
+    return ended;
+  }
+
+  /// An element, valid as long as the pipeline.
+  GstElement* operator[](const char* name) const {
+    GstElement* element = gst_bin_get_by_name(GST_BIN(pipeline_), name);
+    EXPECT_NE(element, nullptr) << name;
+    gst_object_unref(element);
+    return element;
+  }
+
+  guint64 stat(const char* element, const char* field) const {
+    GstStructure* stats = nullptr;
+    g_object_get((*this)[element], "stats", &stats, nullptr);
+    guint64 value = 0;
+    EXPECT_TRUE(gst_structure_get_uint64(stats, field, &value)) << field;
+    gst_structure_free(stats);
+    return value;
+  }
+
+ private:
+  GstElement* pipeline_;
+  GstBus* bus_;
+};
+
+/// Sends the test's events into the appsrc `in` of a pipeline.
+class Sender {
+ public:
+  explicit Sender(const Pipeline& pipeline) : in_(GST_APP_SRC(pipeline["in"])) {}
+
+  void send(int first, int end) {
+    for (int i = first; i < end; ++i)
+      gst_app_src_push_buffer(in_, buffer_of(origin + static_cast<GstClockTime>(i) * duration,
+                                             events_of_buffer(i), duration));
+  }
+  void send_all() {
+    send(0, buffers);
+    end();
+  }
+  void end() { gst_app_src_end_of_stream(in_); }
+
+ private:
+  static constexpr GstClockTime duration = 10 * GST_MSECOND;
+  GstAppSrc* in_;
+};
+
+std::vector<AbsoluteEvent> sent_events() {
+  std::vector<AbsoluteEvent> events;
+  for (int i = 0; i < buffers; ++i)
+    for (const auto& event : events_of_buffer(i))
+      events.push_back(
+          {static_cast<eventcamera::Microseconds>(origin / 1000) + i * 10'000 + event.t, event.x,
+           event.y_p});
+  return events;
+}
+
+/// Gets the events from the appsink `out` of a pipeline.
+class Receiver {
+ public:
+  explicit Receiver(const Pipeline& pipeline) {
+    GstAppSinkCallbacks callbacks = {};
+    callbacks.new_sample = [](GstAppSink* out, gpointer self) {
+      static_cast<Receiver*>(self)->take(gst_app_sink_pull_sample(out));
+      return GST_FLOW_OK;
+    };
+    gst_app_sink_set_callbacks(GST_APP_SINK(pipeline["out"]), &callbacks, this, nullptr);
+  }
+
+  std::vector<AbsoluteEvent> events() {
+    const std::lock_guard lock(mutex_);
+    return events_;
+  }
+
+  /// Waits until nothing has come for a while.
+  void wait_for_silence() {
+    for (auto before = ~std::size_t{0}; before != events().size();) {
+      before = events().size();
+      std::this_thread::sleep_for(300ms);
+    }
+  }
+
+  /// Waits for this many events, at most 20 s.
+  void wait_for(std::size_t count) {
+    for (int i = 0; i < 400 && events().size() < count; ++i) std::this_thread::sleep_for(50ms);
+  }
+
+ private:
+  void take(GstSample* sample) {
+    GstEventCameraMap map;
+    ASSERT_TRUE(gst_event_camera_map(&map, gst_sample_get_buffer(sample)));
+    {
+      const std::lock_guard lock(mutex_);
+      for (gsize i = 0; i < map.n_events; ++i)
+        events_.push_back({static_cast<eventcamera::Microseconds>(map.start) + map.events[i].t,
+                           map.events[i].x, map.events[i].y_p});
+    }
+    gst_event_camera_unmap(&map);
+    gst_sample_unref(sample);
+  }
+
+  std::mutex mutex_;
+  std::vector<AbsoluteEvent> events_;
+};
+
+/// Waits until the payloader `pay` has sent the first buffers.
+void wait_until_sent(const Pipeline& pipeline, int count) {
+  const auto events = static_cast<guint64>(count) * events_per_buffer;
+  while (pipeline.stat("pay", "events") < events) std::this_thread::sleep_for(10ms);
+}
+
+bool is_part(const std::vector<AbsoluteEvent>& some, const std::vector<AbsoluteEvent>& all) {
+  auto next = all.begin();
+  for (const auto& event : some) {
+    next = std::find(next, all.end(), event);
+    if (next == all.end()) return false;
+    ++next;
+  }
+  return true;
+}
+
+/// Even port number that this process uses for no other test.
+int next_port() {
+  static int port = 20000 + static_cast<int>(g_get_monotonic_time() / 1000 % 20000) / 2 * 2;
+  return port += 10;
+}
+
+/// Drops every 50th packet that leaves the element `loss`, but not the first few and the last.
+void drop_every_50th(const Pipeline& pipeline, std::atomic<int>& dropped) {
+  GstPad* pad = gst_element_get_static_pad(pipeline["loss"], "src");
+  struct Loss {
+    std::atomic<int>& dropped;
+    int count = 0;
+  };
+  gst_pad_add_probe(
+      pad, GST_PAD_PROBE_TYPE_BUFFER,
+      [](GstPad*, GstPadProbeInfo*, gpointer data) {
+        auto& loss = *static_cast<Loss*>(data);
+        if (++loss.count % 50 != 0 || loss.count > buffers) return GST_PAD_PROBE_OK;
+        ++loss.dropped;
+        return GST_PAD_PROBE_DROP;
+      },
+      new Loss{dropped}, [](gpointer data) { delete static_cast<Loss*>(data); });
+  gst_object_unref(pad);
+}
+
+/// Everything arrives through a pipeline that starts with rtpeventpay's packets.
+void expect_everything(
+    const std::string& way,
+    const std::function<void(const Pipeline&)>& prepare = [](const Pipeline&) {}) {
+  Pipeline pipeline(source + " ! rtpeventpay name=pay ! " + way + " ! " + sink);
+  prepare(pipeline);
+  Receiver receiver(pipeline);
+  pipeline.play();
+  Sender(pipeline).send_all();
+  EXPECT_TRUE(pipeline.wait()) << way;
+  EXPECT_EQ(receiver.events(), sent_events()) << way;
+  EXPECT_EQ(pipeline.stat("depay", "lost-events"), 0U) << way;
+}
+
+/// The same between two pipelines. The receiver starts first.
+void expect_everything(const std::string& to, const std::string& from) {
+  Pipeline receiving(from + " ! " + sink);
+  Receiver receiver(receiving);
+  receiving.play();
+  Pipeline sending(source + " ! rtpeventpay ! " + to);
+  sending.play();
+  std::this_thread::sleep_for(500ms);
+  Sender(sending).send_all();
+  receiver.wait_for(sent_events().size());
+  EXPECT_EQ(receiver.events(), sent_events()) << to;
+  EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U) << from;
+}
+
+TEST(Rtp, JitterBuffer) {
+  expect_everything("rtpjitterbuffer latency=50");
+}
+
+TEST(Rtp, StreamFraming) {
+  expect_everything("rtpstreampay ! rtpstreamdepay");
+}
+
+TEST(Rtp, Udp) {
+  const auto port = std::to_string(next_port());
+  expect_everything("udpsink host=127.0.0.1 port=" + port,
+                    "udpsrc port=" + port + " " + from_caps + " ! rtpjitterbuffer latency=50");
+}
+
+TEST(Rtp, RtpBin) {
+  const int port = next_port();
+  const auto rtp = std::to_string(port);
+  const auto rtcp = std::to_string(port + 1);
+  expect_everything(
+      "s.send_rtp_sink_0  rtpbin name=s  s.send_rtp_src_0 ! udpsink host=127.0.0.1 port=" + rtp +
+          "  s.send_rtcp_src_0 ! udpsink host=127.0.0.1 sync=false async=false port=" + rtcp,
+      "udpsrc port=" + rtp + " " + from_caps + " ! r.recv_rtp_sink_0  udpsrc port=" + rtcp +
+          " ! r.recv_rtcp_sink_0  rtpbin name=r latency=50  r.");
+}
+
+const std::string key(60, 'a');
+
+std::string srtp_receiver(const std::string& port, const std::string& with) {
+  return "udpsrc port=" + port + " caps=\"application/x-srtp," + rtp_fields +
+         ",ssrc=(uint)1234,srtp-key=(buffer)" + with +
+         ",srtp-cipher=aes-128-icm,srtp-auth=hmac-sha1-80,srtcp-cipher=aes-128-icm,"
+         "srtcp-auth=hmac-sha1-80\" ! srtpdec";
+}
+
+TEST(Rtp, Srtp) {
+  const auto port = std::to_string(next_port());
+  expect_everything("application/x-rtp,ssrc=(uint)1234 ! srtpenc key=" + key +
+                        " ! udpsink host=127.0.0.1 port=" + port,
+                    srtp_receiver(port, key));
+}
+
+TEST(Rtp, AWrongSrtpKeyYieldsNoEvent) {
+  const auto port = std::to_string(next_port());
+  Pipeline receiving(srtp_receiver(port, std::string(60, 'b')) + " ! " + sink);
+  Receiver receiver(receiving);
+  receiving.play();
+  Pipeline sending(source + " ! rtpeventpay ssrc=1234 ! srtpenc key=" + key +
+                   " ! udpsink host=127.0.0.1 port=" + port);
+  sending.play();
+  Sender(sending).send_all();
+  EXPECT_TRUE(sending.wait());
+  receiver.wait_for_silence();
+  EXPECT_TRUE(receiver.events().empty());
+}
+
+TEST(Rtp, EncryptedPacketsAreRejected) {
+  const auto port = std::to_string(next_port());
+  Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
+  Receiver receiver(receiving);
+  receiving.play();
+  Pipeline sending(source + " ! rtpeventpay ! srtpenc key=" + key +
+                   " ! udpsink host=127.0.0.1 port=" + port);
+  sending.play();
+  Sender(sending).send_all();
+  EXPECT_TRUE(sending.wait());
+  receiver.wait_for_silence();
+  EXPECT_TRUE(receiver.events().empty());
+  EXPECT_GT(receiving.stat("depay", "rejected-packets"), 50U);
+}
+
+/// Answers `signal` of an rtpbin with an element for session 0.
+void add_retransmission(const Pipeline& pipeline, const char* rtpbin, const char* signal,
+                        const char* element) {
+  g_signal_connect(
+      pipeline[rtpbin], signal, G_CALLBACK(+[](GstElement*, guint, gpointer name) {
+        GstElement* bin = gst_bin_new(nullptr);
+        GstElement* rtx = gst_element_factory_make(static_cast<const char*>(name), nullptr);
+        GstStructure* map =
+            gst_structure_new("application/x-rtp-pt-map", "96", G_TYPE_UINT, 97U, nullptr);
+        g_object_set(rtx, "payload-type-map", map, nullptr);
+        if (g_strcmp0(static_cast<const char*>(name), "rtprtxsend") == 0)
+          g_object_set(rtx, "max-size-packets", 1000U, nullptr);
+        gst_structure_free(map);
+        gst_bin_add(GST_BIN(bin), rtx);
+        for (const auto* pad_name : {"sink", "src"}) {
+          GstPad* pad = gst_element_get_static_pad(rtx, pad_name);
+          gst_element_add_pad(bin, gst_ghost_pad_new((std::string(pad_name) + "_0").c_str(), pad));
+          gst_object_unref(pad);
+        }
+        return bin;
+      }),
+      const_cast<char*>(element));
+}
+
+TEST(Rtp, RetransmissionLosesNothing) {
+  const int port = next_port();
+  const auto [rtp, rtcp, feedback] =
+      std::array{std::to_string(port), std::to_string(port + 1), std::to_string(port + 2)};
+  const std::string bin = "rtpbin rtp-profile=avpf do-retransmission=true latency=2000 name=";
+  Pipeline receiving(bin + "r  udpsrc name=rtp port=" + rtp + " " + from_caps +
+                     "  udpsrc port=" + rtcp +
+                     " ! r.recv_rtcp_sink_0  r.send_rtcp_src_0 ! udpsink host=127.0.0.1 "
+                     "sync=false async=false port=" +
+                     feedback + "  r. ! " + sink);
+  g_signal_connect(
+      receiving["r"], "request-pt-map", G_CALLBACK(+[](GstElement*, guint, guint type, gpointer) {
+        const auto caps = type == 96 ? "application/x-rtp," + rtp_fields
+                                     : std::string(
+                                           "application/x-rtp,media=application,payload=97,"
+                                           "clock-rate=1000000,encoding-name=RTX,apt=96");
+        return gst_caps_from_string(caps.c_str());
+      }),
+      nullptr);
+  // rtpbin asks for these when its pads are requested.
+  add_retransmission(receiving, "r", "request-aux-receiver", "rtprtxreceive");
+  gst_element_link_pads(receiving["rtp"], "src", receiving["r"], "recv_rtp_sink_0");
+  Receiver receiver(receiving);
+  Pipeline sending(
+      bin + "s  " + source +
+      " ! rtpeventpay name=pay  identity name=loss ! udpsink host=127.0.0.1 port=" + rtp +
+      "  s.send_rtcp_src_0 ! udpsink host=127.0.0.1 sync=false async=false port=" + rtcp +
+      "  udpsrc port=" + feedback + " ! s.recv_rtcp_sink_0");
+  add_retransmission(sending, "s", "request-aux-sender", "rtprtxsend");
+  gst_element_link_pads(sending["pay"], "src", sending["s"], "send_rtp_sink_0");
+  gst_element_link_pads(sending["s"], "send_rtp_src_0", sending["loss"], "sink");
+  std::atomic<int> dropped = 0;
+  drop_every_50th(sending, dropped);
+  receiving.play();
+  sending.play();
+  std::this_thread::sleep_for(500ms);
+  Sender(sending).send_all();
+  receiver.wait_for(sent_events().size());
+  EXPECT_EQ(dropped, 2);
+  EXPECT_EQ(receiver.events(), sent_events());
+  EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U);
+}
+
+TEST(Rtp, ForwardErrorCorrectionLosesNothing) {
+  std::atomic<int> dropped = 0;
+  expect_everything(
+      "rtpulpfecenc pt=122 percentage=100 multipacket=true ! identity name=loss ! "
+      "rtpstorage name=storage size-time=1000000000 ! rtpjitterbuffer do-lost=true latency=200 ! "
+      "rtpulpfecdec name=fec pt=122",
+      [&](const Pipeline& pipeline) {
+        drop_every_50th(pipeline, dropped);
+        GObject* storage = nullptr;
+        g_object_get(pipeline["storage"], "internal-storage", &storage, nullptr);
+        g_object_set(pipeline["fec"], "storage", storage, nullptr);
+        g_object_unref(storage);
+      });
+  EXPECT_EQ(dropped, 2);
+}
+
+TEST(Rtp, Srt) {
+  const auto port = std::to_string(next_port());
+  expect_everything("rtpstreampay ! srtsink uri=\"srt://127.0.0.1:" + port + "?mode=caller\"",
+                    "srtsrc uri=\"srt://127.0.0.1:" + port +
+                        "?mode=listener\" ! application/x-rtp-stream," + rtp_fields +
+                        " ! rtpstreamdepay");
+}
+
+TEST(Rtp, Rist) {
+  const int port = next_port();
+  // ristsrc knows static payload types only.
+  expect_everything("ristsink address=127.0.0.1 port=" + std::to_string(port),
+                    "udpsrc port=" + std::to_string(port) + " " + from_caps +
+                        " ! r.recv_rtp_sink_0  udpsrc port=" + std::to_string(port + 1) +
+                        " ! r.recv_rtcp_sink_0  rtpbin name=r latency=50  r.");
+}
+
+struct Network {
+  const char* name;
+  const char* properties;
+  bool loses;
+};
+
+class EveryNetwork : public testing::TestWithParam<Network> {};
+INSTANTIATE_TEST_SUITE_P(
+    , EveryNetwork,
+    testing::Values(Network{"Loss1", "drop-probability=0.01", true},
+                    Network{"Loss5", "drop-probability=0.05", true},
+                    Network{"Loss20", "drop-probability=0.2", true},
+                    Network{"Duplication", "duplicate-probability=0.3", false},
+                    Network{"Reordering", "delay-probability=0.2 min-delay=1 max-delay=30", true},
+                    Network{"Everything",
+                            "drop-probability=0.05 duplicate-probability=0.1 "
+                            "delay-probability=0.1 min-delay=1 max-delay=50",
+                            true}),
+    [](const auto& param) { return param.param.name; });
+
+TEST_P(EveryNetwork, WhatIsLostIsCounted) {
+  Pipeline pipeline(source + " ! rtpeventpay mtu=576 name=pay ! netsim name=net " +
+                    GetParam().properties + " ! " + sink);
+  Receiver receiver(pipeline);
+  pipeline.play();
+  Sender sender(pipeline);
+  sender.send(0, buffers - 1);
+  wait_until_sent(pipeline, buffers - 1);
+  receiver.wait_for_silence();
+  // The last packets arrive.
+  g_object_set(pipeline["net"], "drop-probability", 0.0, "duplicate-probability", 0.0,
+               "delay-probability", 0.0, nullptr);
+  sender.send(buffers - 1, buffers);
+  sender.end();
+  EXPECT_TRUE(pipeline.wait());
+  const auto sent = sent_events();
+  const auto received = receiver.events();
+  ASSERT_FALSE(received.empty());
+  EXPECT_TRUE(is_part(received, sent));
+  const auto first = std::find(sent.begin(), sent.end(), received.front());
+  EXPECT_EQ(pipeline.stat("pay", "events"), sent.size());
+  EXPECT_EQ(pipeline.stat("depay", "events"), received.size());
+  // A receiver knows of no packets before its first.
+  EXPECT_EQ(pipeline.stat("depay", "lost-events"),
+            static_cast<std::size_t>(sent.end() - first) - received.size());
+  EXPECT_EQ(pipeline.stat("depay", "lost-events") > 0, GetParam().loses);
+}
+
+TEST(Rtp, AReorderedStreamIsWholeAfterAJitterBuffer) {
+  Pipeline pipeline(source +
+                    " ! rtpeventpay name=pay mtu=576 ! netsim name=net min-delay=1 max-delay=50 ! "
+                    "rtpjitterbuffer latency=200 ! " +
+                    sink);
+  Receiver receiver(pipeline);
+  pipeline.play();
+  Sender sender(pipeline);
+  // A jitter buffer starts with the first packet that it gets.
+  sender.send(0, 1);
+  wait_until_sent(pipeline, 1);
+  g_object_set(pipeline["net"], "delay-probability", 0.2, nullptr);
+  sender.send(1, buffers);
+  receiver.wait_for(sent_events().size());
+  EXPECT_EQ(receiver.events(), sent_events());
+  EXPECT_EQ(pipeline.stat("depay", "lost-events"), 0U);
+}
+
+TEST(Rtp, AReceiverJoinsLateLeavesAndReturns) {
+  const auto port = std::to_string(next_port());
+  Pipeline sending(source + " ! rtpeventpay ! udpsink host=127.0.0.1 port=" + port);
+  sending.play();
+  Sender(sending).send_all();
+  for (int i = 0; i < 2; ++i) {
+    std::this_thread::sleep_for(150ms);
+    Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
+    Receiver receiver(receiving);
+    receiving.play();
+    std::this_thread::sleep_for(250ms);
+    const auto received = receiver.events();
+    EXPECT_FALSE(received.empty());
+    EXPECT_TRUE(is_part(received, sent_events()));
+    EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U);
+  }
+  EXPECT_TRUE(sending.wait());
+}
+
+TEST(Rtp, ASenderRestarts) {
+  const auto port = std::to_string(next_port());
+  Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
+  Receiver receiver(receiving);
+  receiving.play();
+  for (int i = 0; i < 2; ++i) {
+    Pipeline sending(source + " ! rtpeventpay ! udpsink host=127.0.0.1 port=" + port);
+    sending.play();
+    Sender(sending).send_all();
+    EXPECT_TRUE(sending.wait());
+  }
+  receiver.wait_for(2 * sent_events().size());
+  auto twice = sent_events();
+  const auto once = twice;
+  twice.insert(twice.end(), once.begin(), once.end());
+  EXPECT_EQ(receiver.events(), twice);
+  EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U);
+}
+
+TEST(Rtp, ASlowReceiverLosesPacketsAndCountsThem) {
+  const auto port = std::to_string(next_port());
+  Pipeline receiving("udpsrc buffer-size=4096 port=" + port + " " + from_caps +
+                     " ! rtpeventdepay name=depay ! identity sleep-time=30000 ! "
+                     "appsink name=out sync=false");
+  Receiver receiver(receiving);
+  receiving.play();
+  Pipeline sending(source + " ! rtpeventpay name=pay ! udpsink host=127.0.0.1 port=" + port);
+  sending.play();
+  Sender sender(sending);
+  const auto begin = std::chrono::steady_clock::now();
+  sender.send(0, buffers - 1);
+  wait_until_sent(sending, buffers - 1);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 3s);  // the sender does not wait
+  receiver.wait_for_silence();
+  sender.send(buffers - 1, buffers);
+  sender.end();
+  EXPECT_TRUE(sending.wait());
+  receiver.wait_for_silence();
+  const auto received = receiver.events();
+  EXPECT_TRUE(is_part(received, sent_events()));
+  EXPECT_GT(receiving.stat("depay", "lost-events"), 0U);
+  EXPECT_EQ(receiving.stat("depay", "lost-events"), sent_events().size() - received.size());
+}
+
+}  // namespace
