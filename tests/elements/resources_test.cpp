@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Memory, threads and file descriptors do not grow: while elements run, and over starts and stops.
+#include <malloc.h>
+#include <unistd.h>
+
+#include <iostream>
+#include <tuple>
+
+#include "tests/elements/element_lines.hpp"
+
+namespace {
+
+using namespace harness;
+using namespace element_lines;
+
+constexpr const char* video = "video/x-raw, format=GRAY8, width=64, height=48, framerate=25/1";
+constexpr const char* pictures = "video/x-raw, format=BGRx";
+
+/// A small square that flies over a texture repeatedly; all buffers of a frame share its memory.
+class Flight {
+ public:
+  explicit Flight(const Harness& h) {
+    for (int i = 0; i < 8; ++i)
+      frames_.emplace_back(h.frame(0, [i](int x, int y) {
+        const bool within = x >= 6 * i && x < 6 * i + 5 && y >= 20 && y < 25;
+        return within ? 220 : 40 + (x * 7 + y) % 9;
+      }));
+  }
+  /// A buffer with frame i of the stream.
+  GstBuffer* frame(int i) const {
+    GstBuffer* buffer = gst_buffer_copy(frames_[static_cast<std::size_t>(i) % 8].get());
+    GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * 40 * GST_MSECOND;
+    return buffer;
+  }
+
+ private:
+  std::vector<Buffer> frames_;
+};
+
+/// What the process uses.
+struct Resources {
+  std::size_t heap = 0;      ///< bytes
+  std::size_t resident = 0;  ///< bytes
+  std::ptrdiff_t threads = 0;
+  std::ptrdiff_t files = 0;
+
+  static Resources now() {
+    const auto entries_of = [](const char* folder) {
+      return std::distance(std::filesystem::directory_iterator(folder), {});
+    };
+    const auto info = mallinfo2();
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm").ignore(32, ' ') >> pages;
+    return {info.uordblks + info.hblkhd, pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)),
+            entries_of("/proc/self/task"), entries_of("/proc/self/fd")};
+  }
+};
+
+std::ostream& operator<<(std::ostream& out, const Resources& resources) {
+  return out << resources.heap / 1024 << " KiB of heap, " << resources.resident / 1024
+             << " KiB resident, " << resources.threads << " threads, " << resources.files
+             << " file descriptors";
+}
+
+class Memory : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
+INSTANTIATE_TEST_SUITE_P(, Memory,
+                         testing::Combine(testing::ValuesIn(elements),
+                                          testing::Values(GST_EVENT_CAMERA_MEDIA_TYPE, pictures)));
+
+TEST_P(Memory, DoesNotGrowOverTenThousandFrames) {
+  const auto& [element, out] = GetParam();
+  Harness h(element);
+  h.caps(video, out);
+  const Flight flight(h);
+  Resources after_a_thousand;
+  for (int i = 0; i < 10'000; ++i) {
+    ASSERT_EQ(h.push(flight.frame(i)), GST_FLOW_OK);
+    const auto buffer = h.pull();
+    ASSERT_EQ(buffer != nullptr, out == pictures || i > 0);
+    if (i == 1'000) after_a_thousand = Resources::now();
+  }
+  // Less than a pointer per frame.
+  EXPECT_LE(Resources::now().heap, after_a_thousand.heap + 64 * 1024);
+}
+
+class EveryElement : public testing::TestWithParam<std::string> {
+ protected:
+  static void SetUpTestSuite() {
+    mallopt(M_ARENA_MAX, 1);  // mallinfo2() counts only the main arena
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(element_names()),
+                         element_lines::test_name);
+
+TEST_P(EveryElement, ReleasesEverythingOnStop) {
+  const int starts = repetitions(60, 500);
+  const std::string line = Kind(GetParam()).launch_with_sources(1'000'000);
+  Resources after_some;
+  for (int i = 0; i < starts; ++i) {
+    if (i == starts / 5) after_some = Resources::now();
+    const auto pipeline = launched(line);
+    gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+    ASSERT_EQ(gst_element_get_state(pipeline.get(), nullptr, nullptr, 60 * GST_SECOND),
+              GST_STATE_CHANGE_SUCCESS);
+    gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  }
+  const auto at_the_end = Resources::now();
+  std::cout << after_some << "\n" << at_the_end << "\n";
+  EXPECT_LE(at_the_end.threads, after_some.threads + 8);  // GLib keeps a few idle
+  EXPECT_LE(at_the_end.files, after_some.files);
+  // Threads of GLib's pool have their share; GStreamer itself loses about 100 bytes per start.
+  EXPECT_LE(at_the_end.heap, after_some.heap + 256 * 1024 + 512 * static_cast<unsigned>(starts));
+}
+
+guint64 rendered_buffers(GstElement* pipeline) {
+  const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline), "sink"));
+  GstStructure* stats = nullptr;
+  guint64 buffers = 0;
+  g_object_get(sink.get(), "stats", &stats, nullptr);
+  gst_structure_get_uint64(stats, "rendered", &buffers);
+  gst_structure_free(stats);
+  return buffers;
+}
+
+/// Nearly every pixel fires in every frame.
+TEST(Noise, NeedsNoMoreMemoryOverTime) {
+  const auto pipeline = launched(
+      "videotestsrc pattern=snow ! video/x-raw,format=GRAY8,width=1280,height=720,framerate=30/1 ! "
+      "eventsim-dvs preset=v2e-noisy ! application/x-event-camera ! fakesink name=sink");
+  const auto wait_for_buffers = [&pipeline](guint64 count) {
+    while (rendered_buffers(pipeline.get()) < count) g_usleep(10'000);
+  };
+  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+  wait_for_buffers(5);
+  const auto after_some = Resources::now();
+  g_usleep(static_cast<gulong>(repetitions(0, 600)) * G_USEC_PER_SEC);
+  wait_for_buffers(15);
+  const auto at_the_end = Resources::now();
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  std::cout << after_some << "\n" << at_the_end << "\n";
+  EXPECT_LE(at_the_end.resident, after_some.resident + (16U << 20U));
+}
+
+}  // namespace
