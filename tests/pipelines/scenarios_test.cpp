@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The scenarios of gst-validate-1.0, which Debian does not package, on every reader and player:
+// scrub, seek, pause, fast forward, stop at a position, and change states intensively. Streams keep
+// the order of events that GStreamer requires.
+#include <atomic>
+#include <optional>
+#include <tuple>
+
+#include "tests/elements/recording_files.hpp"
+
+namespace {
+
+using namespace recording_files;
+
+constexpr GstClockTime ms = GST_MSECOND;
+constexpr GstClockTime end_of_file = length * GST_USECOND;
+/// A picture lasts 33 ms, a buffer of events 10 ms.
+constexpr GstClockTime tolerance = 40 * ms;
+constexpr auto accurate = static_cast<GstSeekFlags>(GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE);
+
+/// Launch line that plays a file, with a fakesink named "sink". Its source of late pads is "it".
+struct Line {
+  const char* name;
+  std::string (*launch)(const File& file);
+};
+
+const Line lines[] = {
+    {"reader",
+     [](const File& file) {
+       return "filesrc location=" + in_quotes(file.path()) + " ! " + file.reader +
+              " name=it  fakesink name=sink sync=true";
+     }},
+    {"pushed_reader",
+     [](const File& file) {
+       return "filesrc location=" + in_quotes(file.path()) + " ! queue ! " + file.reader +
+              " name=it  fakesink name=sink sync=true";
+     }},
+    {"decodebin",
+     [](const File& file) {
+       return "filesrc location=" + in_quotes(file.path()) +
+              " ! decodebin name=it  fakesink name=sink sync=true";
+     }},
+    {"playbin3",
+     [](const File& file) {
+       gchar* const uri = gst_filename_to_uri(file.path().c_str(), nullptr);
+       const std::string line =
+           "playbin3 uri=" + in_quotes(uri) + " video-sink=\"fakesink name=sink sync=true\"";
+       g_free(uri);
+       return line;
+     }},
+};
+
+/// Checks what arrives at a sink: stream start, caps and segment in this order, then buffers within
+/// the segment.
+class StreamCheck {
+ public:
+  explicit StreamCheck(GstElement* sink) : pad_(gst_element_get_static_pad(sink, "sink")) {
+    gst_pad_add_probe(
+        pad_,
+        static_cast<GstPadProbeType>(GST_PAD_PROBE_TYPE_BUFFER |
+                                     GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
+                                     GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+        [](GstPad*, GstPadProbeInfo* info, gpointer self) {
+          auto* const check = static_cast<StreamCheck*>(self);
+          if (GST_PAD_PROBE_INFO_TYPE(info) & GST_PAD_PROBE_TYPE_BUFFER)
+            check->take(GST_PAD_PROBE_INFO_BUFFER(info));
+          else
+            check->take(GST_PAD_PROBE_INFO_EVENT(info));
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+  }
+  ~StreamCheck() { gst_object_unref(pad_); }
+  StreamCheck(const StreamCheck&) = delete;
+  StreamCheck& operator=(const StreamCheck&) = delete;
+
+  /// Since the start or the last flush.
+  int buffers() const { return buffers_; }
+
+ private:
+  void take(GstEvent* event) {
+    switch (GST_EVENT_TYPE(event)) {
+      case GST_EVENT_STREAM_START:
+        has_started_ = true;
+        has_caps_ = false;
+        segment_.reset();
+        break;
+      case GST_EVENT_CAPS:
+        EXPECT_TRUE(has_started_) << "caps before stream start";
+        has_caps_ = true;
+        break;
+      case GST_EVENT_SEGMENT: {
+        const GstSegment* segment = nullptr;
+        gst_event_parse_segment(event, &segment);
+        EXPECT_TRUE(has_caps_) << "segment before caps";
+        EXPECT_EQ(segment->format, GST_FORMAT_TIME);
+        segment_ = *segment;
+        break;
+      }
+      case GST_EVENT_FLUSH_STOP:
+        segment_.reset();
+        buffers_ = 0;
+        break;
+      default:
+        break;
+    }
+  }
+
+  void take(GstBuffer* buffer) {
+    ++buffers_;
+    ASSERT_TRUE(segment_) << "buffer before segment";
+    ASSERT_TRUE(GST_BUFFER_PTS_IS_VALID(buffer) && GST_BUFFER_DURATION_IS_VALID(buffer));
+    const GstClockTime pts = GST_BUFFER_PTS(buffer);
+    EXPECT_TRUE(gst_segment_clip(&*segment_, GST_FORMAT_TIME, pts,
+                                 pts + GST_BUFFER_DURATION(buffer), nullptr, nullptr))
+        << "buffer at " << pts / ms << " ms is outside its segment";
+  }
+
+  GstPad* pad_;
+  std::atomic<int> buffers_ = 0;
+  // Accessed by the streaming thread only.
+  bool has_started_ = false;
+  bool has_caps_ = false;
+  std::optional<GstSegment> segment_;
+};
+
+/// A file being played; errors and warnings fail the test.
+class Playback {
+ public:
+  explicit Playback(const std::string& line)
+      : pipeline_(GST_ELEMENT(gst_object_ref_sink(gst_parse_launch(line.c_str(), nullptr)))),
+        bus_(gst_element_get_bus(pipeline_.get())),
+        sink_(find_sink()),
+        stream_(sink_.get()) {
+    const Owned<GstElement> source(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "it"));
+    is_player_ = source == nullptr;
+    if (!is_player_) harness::link_late_pads(source.get(), sink_.get());
+  }
+  ~Playback() {
+    check_messages();
+    gst_element_set_state(pipeline_.get(), GST_STATE_NULL);
+  }
+  Playback(const Playback&) = delete;
+  Playback& operator=(const Playback&) = delete;
+
+  /// Does not wait, except for playbin3, which may deadlock when it is stopped while it finds the
+  /// type of a file (GStreamer 1.22).
+  void set(GstState state) {
+    old_buffers_ = stream_.buffers();
+    EXPECT_NE(gst_element_set_state(pipeline_.get(), state), GST_STATE_CHANGE_FAILURE);
+    if (is_player_) gst_element_get_state(pipeline_.get(), nullptr, nullptr, 60 * GST_SECOND);
+  }
+
+  void reach(GstState state) {
+    set(state);
+    wait_for_state();
+  }
+
+  void seek(GstClockTime to, GstSeekFlags flags = accurate, gdouble rate = 1,
+            GstClockTime stop = GST_CLOCK_TIME_NONE) {
+    old_buffers_ = 0;  // the flush resets their number
+    last_seek_ = g_get_monotonic_time();
+    EXPECT_TRUE(gst_element_seek(pipeline_.get(), rate, GST_FORMAT_TIME, flags, GST_SEEK_TYPE_SET,
+                                 static_cast<gint64>(to), GST_SEEK_TYPE_SET,
+                                 static_cast<gint64>(stop)))
+        << "to " << to / ms << " ms";
+    wait_for_state();
+  }
+
+  GstClockTime position() {
+    gint64 position = -1;
+    EXPECT_TRUE(gst_element_query_position(pipeline_.get(), GST_FORMAT_TIME, &position));
+    return static_cast<GstClockTime>(position);
+  }
+
+  void expect_position(GstClockTime from, GstClockTime to) {
+    const auto at = position();
+    EXPECT_TRUE(at + tolerance >= from && at <= to + tolerance)
+        << at / ms << " ms, not " << from / ms << " to " << to / ms << " ms";
+  }
+
+  /// Waits for buffers, and checks that the position is no later than the time since the last seek
+  /// allows.
+  void expect_progress(GstClockTime from, gdouble rate = 1) {
+    for (int i = 0; i < 6000 && stream_.buffers() < old_buffers_ + 3; ++i) g_usleep(10'000);
+    EXPECT_GE(stream_.buffers(), old_buffers_ + 3) << "nothing is shown";
+    const auto elapsed = static_cast<gdouble>(g_get_monotonic_time() - last_seek_) * GST_USECOND;
+    expect_position(from, from + static_cast<GstClockTime>(rate * elapsed));
+  }
+
+  void play_to_end() {
+    set(GST_STATE_PLAYING);
+    const Owned<GstMessage> message(gst_bus_timed_pop_filtered(
+        bus_.get(), 60 * GST_SECOND,
+        static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING)));
+    ASSERT_TRUE(message) << "neither EOS nor error";
+    EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS);
+  }
+
+ private:
+  /// In a player it is a property until the pipeline starts.
+  Owned<GstElement> find_sink() const {
+    if (auto* const found = gst_bin_get_by_name(GST_BIN(pipeline_.get()), "sink"))
+      return Owned<GstElement>(found);
+    GstElement* video_sink = nullptr;
+    g_object_get(pipeline_.get(), "video-sink", &video_sink, nullptr);
+    return Owned<GstElement>(video_sink);
+  }
+
+  void wait_for_state() {
+    EXPECT_EQ(gst_element_get_state(pipeline_.get(), nullptr, nullptr, 60 * GST_SECOND),
+              GST_STATE_CHANGE_SUCCESS);
+    check_messages();
+  }
+
+  /// Drops all messages.
+  void check_messages() {
+    while (const Owned<GstMessage> message{gst_bus_pop_filtered(
+        bus_.get(), static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_WARNING))})
+      ADD_FAILURE() << harness::text_of(message.get());
+  }
+
+  Owned<GstElement> pipeline_;
+  Owned<GstBus> bus_;
+  Owned<GstElement> sink_;
+  StreamCheck stream_;
+  bool is_player_ = false;
+  int old_buffers_ = 0;   ///< buffers before the last state change
+  gint64 last_seek_ = 0;  ///< monotonic time, microseconds
+};
+
+/* scenarios */
+
+void scrub(Playback& playback) {
+  playback.reach(GST_STATE_PAUSED);
+  const int steps = repetitions(4, 100);
+  const auto seek_to_step = [&](int i) {
+    const auto to = end_of_file / static_cast<GstClockTime>(steps) * static_cast<GstClockTime>(i);
+    playback.seek(to);
+    playback.expect_position(to, to);
+  };
+  for (int i = 0; i < steps; ++i) seek_to_step(i);
+  for (int i = steps - 1; i >= 0; --i) seek_to_step(i);
+}
+
+void seek(Playback& playback) {
+  playback.reach(GST_STATE_PLAYING);
+  for (int times = repetitions(1, 10); times > 0; --times)
+    for (const GstClockTime to : {1000 * ms, 4000 * ms, 500 * ms, 0 * ms, 3000 * ms}) {
+      playback.seek(to, to == 500 * ms ? GST_SEEK_FLAG_FLUSH : accurate);
+      playback.expect_progress(to);
+    }
+}
+
+void pause(Playback& playback) {
+  playback.reach(GST_STATE_PLAYING);
+  for (int times = repetitions(1, 10); times > 0; --times) {
+    playback.seek(1000 * ms);
+    playback.expect_progress(1000 * ms);
+    playback.reach(GST_STATE_PAUSED);
+    const auto at = playback.position();
+    g_usleep(50'000);
+    EXPECT_EQ(playback.position(), at) << "does not pause";
+    playback.reach(GST_STATE_PLAYING);
+    playback.expect_progress(at);
+  }
+}
+
+void fast_forward(Playback& playback) {
+  playback.reach(GST_STATE_PLAYING);
+  for (const double rate : {2., 4., 8., 16., 0.5, 1.}) {
+    playback.seek(1000 * ms, accurate, rate);
+    playback.expect_progress(1000 * ms, rate);
+  }
+  playback.reach(GST_STATE_PAUSED);
+  playback.seek(0, static_cast<GstSeekFlags>(GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_TRICKMODE), 32);
+  playback.play_to_end();
+}
+
+void stop_at_a_position(Playback& playback) {
+  playback.reach(GST_STATE_PAUSED);
+  playback.seek(1000 * ms, accurate, 1, 1100 * ms);
+  playback.play_to_end();
+  playback.expect_position(1100 * ms, 1100 * ms);
+  playback.reach(GST_STATE_PAUSED);
+  playback.seek(4900 * ms);
+  playback.play_to_end();
+}
+
+void change_state_intensive(Playback& playback) {
+  for (int times = repetitions(4, 50); times > 0; --times) {
+    for (const auto state : {GST_STATE_PLAYING, GST_STATE_NULL, GST_STATE_PAUSED, GST_STATE_PLAYING,
+                             GST_STATE_PAUSED, GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_NULL})
+      playback.set(state);
+    playback.reach(GST_STATE_PAUSED);
+    playback.seek(4000 * ms);
+    playback.reach(GST_STATE_PLAYING);
+    playback.set(GST_STATE_NULL);
+  }
+}
+
+struct Scenario {
+  const char* name;
+  void (*play)(Playback& playback);
+};
+
+const Scenario scenarios[] = {
+    {"scrub", scrub},
+    {"seek", seek},
+    {"pause", pause},
+    {"fast_forward", fast_forward},
+    {"stop_at_a_position", stop_at_a_position},
+    {"change_state_intensive", change_state_intensive},
+};
+
+struct Play {
+  Line line;
+  File file;
+  Scenario scenario;
+};
+
+/// All combinations in the soak, else two scenarios of each file on each line.
+std::vector<Play> plays() {
+  constexpr int count = std::size(scenarios);
+  std::vector<Play> plays;
+  for (std::size_t line = 0; line < std::size(lines); ++line)
+    for (std::size_t file = 0; file < std::size(files); ++file)
+      for (int i = repetitions(2, count); i > 0; --i)
+        plays.push_back({lines[line], files[file],
+                         scenarios[(line + file + static_cast<std::size_t>(i)) % count]});
+  return plays;
+}
+
+class EveryLine : public testing::TestWithParam<Play> {};
+INSTANTIATE_TEST_SUITE_P(, EveryLine, testing::ValuesIn(plays()), [](const auto& test) {
+  const Play& play = test.param;
+  return test_name(std::string(play.line.name) + "_" + play.file.name + "_" + play.scenario.name);
+});
+
+TEST_P(EveryLine, PlaysTheScenario) {
+  Playback playback(GetParam().line.launch(GetParam().file));
+  GetParam().scenario.play(playback);
+}
+
+}  // namespace
