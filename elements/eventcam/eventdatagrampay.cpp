@@ -285,6 +285,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv.timer->stop();
     priv.timer.reset();
     priv.timed.reset();
     priv.packer.reset();

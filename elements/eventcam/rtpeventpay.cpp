@@ -322,6 +322,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv.timer->stop();
     priv.timer.reset();
     priv.state.reset();
     priv.faults.reset();

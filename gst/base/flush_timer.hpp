@@ -16,15 +16,7 @@ class FlushTimer {
   using Clock = std::chrono::steady_clock;
 
   explicit FlushTimer(std::function<void()> flush) : flush_(std::move(flush)) {}
-  /// Waits for a running call.
-  ~FlushTimer() {
-    {
-      const std::lock_guard lock(mutex_);
-      is_stopped_ = true;
-    }
-    changed_.notify_one();
-    if (thread_.joinable()) thread_.join();
-  }
+  ~FlushTimer() { stop(); }
   FlushTimer(const FlushTimer&) = delete;
   FlushTimer& operator=(const FlushTimer&) = delete;
 
@@ -36,6 +28,16 @@ class FlushTimer {
     }
     changed_.notify_one();
     if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
+  }
+
+  /// Ends the thread, after a running call, which may still use this object.
+  void stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_stopped_ = true;
+    }
+    changed_.notify_one();
+    if (thread_.joinable()) thread_.join();
   }
 
   /// Removes the deadline; a running call may still go on.
