@@ -57,8 +57,8 @@ std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const FormatSetting
  * @short_description: reads RAW files and EVT words
  *
  * Reads Prophesee RAW files, and words without a header whose format is in the caps: EVT2, EVT2.1,
- * EVT3 and EVT4. Events are output in buffers of #GstEventReader:buffer-time; triggers are counted
- * and dropped.
+ * EVT3 and EVT4. Events are output in buffers of #GstEventReader:buffer-time; triggers come with
+ * them, for writers that keep them.
  *
  * ## Example launch line
  * |[
@@ -71,6 +71,7 @@ static const RecordingFormat evt = {
     .long_name = "Prophesee RAW reader",
     .description = "Reads Prophesee RAW files of events",
     .caps = "application/x-prophesee-raw; " EVT_WORDS_CAPS,
+    .has_triggers = true,
     .add_properties = add_sensor_size,
     .make_reader = make_evt_reader,
 };
@@ -82,7 +83,7 @@ GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_typ
  * @short_description: reads DAT files
  *
  * Reads Prophesee DAT files, versions 1 and 2. Events are output in buffers of
- * #GstEventReader:buffer-time; triggers are counted and dropped.
+ * #GstEventReader:buffer-time; triggers come with them, for writers that keep them.
  *
  * ## Example launch line
  * |[
@@ -95,6 +96,7 @@ static const RecordingFormat dat = {
     .long_name = "Prophesee DAT reader",
     .description = "Reads Prophesee DAT files of events",
     .caps = "application/x-prophesee-dat",
+    .has_triggers = true,
     .add_properties = add_sensor_size,
     .make_reader = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<Reader> {
       return decoded_by(eventcamera::make_dat_decoder());
@@ -233,7 +235,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * @short_description: reads HDF5 files of events
  *
  * Reads the events of HDF5 files from DSEC, Metavision (compressed with ECF) and v2e. They are
- * output in buffers of #GstEventReader:buffer-time; triggers are counted and dropped.
+ * output in buffers of #GstEventReader:buffer-time; triggers come with them, for writers that keep
+ * them.
  *
  * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
  * mode the file is collected in memory, up to 256 MiB, and read at its end.
@@ -252,6 +255,7 @@ static const RecordingFormat hdf5 = {
     .long_name = "HDF5 reader",
     .description = "Reads HDF5 files of events: DSEC, Metavision, v2e",
     .caps = "application/x-hdf5",
+    .has_triggers = true,
     .add_properties = add_sensor_size,
     .make_reader = [](const GstCaps*,
                       const FormatSettings&) { return eventcamera::make_hdf5_reader(); },
@@ -266,7 +270,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * @short_description: reads AEDAT, the files of DAVIS and DVS cameras
  *
  * Splits an AEDAT 4 file into its event streams and video streams. AEDAT 2.0 and 3.1 are read as
- * one event stream. Triggers and IMU samples are counted and dropped.
+ * one event stream. Triggers and IMU samples come with the events of `events_0`, for writers that
+ * keep them.
  *
  * PTS are the times of the file, so that they survive when written again. The segments of all
  * streams start at the first event or frame of any of them, so that playback starts at once and
@@ -297,6 +302,7 @@ static const RecordingFormat aedat = {
     .description = "Reads events and frames from AEDAT files",
     .caps = "application/x-aedat, version = (int) { 2, 3, 4 }",
     .has_many_streams = true,
+    .has_triggers = true,
     .add_properties = add_sensor_size,
     .make_reader = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Reader> {
       return std::make_unique<eventcamera::AedatReader>(settings.sensor);

@@ -22,7 +22,7 @@ using eventcamera::SensorSize;
  *
  * Writes events as a Prophesee RAW file with words of #GstEvtEnc:format. If downstream requests
  * `application/x-event-camera` with the format EVT2, EVT21, EVT3 or EVT4, writes these words
- * without a header.
+ * without a header. Triggers that come with the events are written among them.
  *
  * ## Example launch line
  * |[

@@ -822,10 +822,10 @@ GstFlowReturn EventReader::begin_output() {
   }
   for (GstEvent* event : std::exchange(held_, {})) push_to_pads(event);
   // Writers must know these streams before the first buffer.
-  for (const auto& stream : streams) {
-    if (stream.info.kind == StreamKind::triggers) push(eventcamera::TriggerItem{});
-    if (stream.info.kind == StreamKind::imu) push(eventcamera::ImuItem{});
-  }
+  if (format_.has_triggers) push(eventcamera::TriggerItem{});
+  if (std::ranges::any_of(streams,
+                          [](const auto& stream) { return stream.info.kind == StreamKind::imu; }))
+    push(eventcamera::ImuItem{});
   return GST_FLOW_OK;
 }
 

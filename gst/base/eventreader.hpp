@@ -23,6 +23,8 @@
 /// Source pads appear once their streams are known. An element with a single stream has a pad
 /// "src", which it keeps after a stop; others have pads "events_%u" and "video_%u".
 ///
+/// Triggers and IMU samples precede the events of their interval; see sensor_events.hpp.
+///
 /// Words without a header may arrive in a TIME segment, as from an encoder or a network. Times are
 /// then upstream's: the clock of the words is shifted so that the first event of a buffer lies
 /// within that buffer's interval.
@@ -32,6 +34,7 @@ struct RecordingFormat {
   const char* description;
   const char* caps;  ///< input caps
   bool has_many_streams = false;
+  bool has_triggers = false;  ///< announced to writers, although a file may have none
   void (*add_properties)(FormatProperties& properties) = nullptr;
 
   /// Creates a reader for a file or a stream with these caps; `caps` is null if unknown. May throw.

@@ -11,6 +11,7 @@
 
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/evt/raw.hpp"
 #include "tests/elements/harness.hpp"
 #include "tests/formats/aedat_files.hpp"
 #include "tests/formats/recordings.hpp"
@@ -1034,6 +1035,37 @@ TEST(AedatMux, KeepsTriggersAndImuSamples) {
     EXPECT_EQ(events_found, events);
     EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
   }
+}
+
+TEST(AedatMux, KeepsTriggersOfOtherFormats) {
+  using eventcamera::Trigger;
+  const auto events = steady_events(300'000, 70);
+  const std::vector<Trigger> triggers{{200'000, 0, true}, {200'070, 1, true}, {250'000, 0, false}};
+  const auto encoder =
+      eventcamera::make_prophesee_raw_encoder(eventcamera::EvtFormat::evt3, sensor);
+  Bytes bytes;
+  auto rest = std::span(events);
+  for (const auto& trigger : triggers) {
+    const auto end = std::ranges::upper_bound(rest, trigger.t, {}, &AbsoluteEvent::t);
+    encoder->encode(rest.first(static_cast<std::size_t>(end - rest.begin())), bytes);
+    encoder->encode_trigger(trigger, bytes);
+    rest = rest.subspan(static_cast<std::size_t>(end - rest.begin()));
+  }
+  encoder->encode_trigger({rest.front().t, 9, true}, bytes);  // AEDAT 4 has no such input
+  encoder->encode(rest, bytes);
+  const File in(bytes);
+  const File out{Bytes{}};
+  ASSERT_TRUE(run("filesrc location=" + in_quotes(in.path()) +
+                  " ! evtdec ! aedatmux ! filesink location=" + in_quotes(out.path())));
+  const auto copy = out.bytes();
+  Aedat4Decoder decoder;
+  decoder.push(copy);
+  std::vector<Trigger> found;
+  while (const auto item = decoder.next())
+    if (const auto* const some = std::get_if<eventcamera::TriggerItem>(&*item))
+      found.insert(found.end(), some->triggers.begin(), some->triggers.end());
+  EXPECT_EQ(found, triggers);
+  EXPECT_TRUE(content_of(copy).events == events);
 }
 
 TEST(AedatMux, LearnsFromItsCapsWhatComesToAPad) {

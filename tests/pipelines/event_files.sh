@@ -283,6 +283,9 @@ complete triggers.raw triggers-again.hdf5
 complete "$davis" davis.aedat4
 complete davis.aedat4 davis-again.aedat4
 cmp davis.aedat4 davis-again.aedat4 || fail "the copy of a copy is another file"
+convert "$davis" davis.raw 2>left-out
+grep -qx "left out: 3 frames, 130 IMU samples" left-out || fail "the user is told: $(cat left-out)"
+complete davis.raw davis-events.aedat4
 convert "$recordings/evt3-640x480-triggers.raw" triggers.h5 2>left-out
 grep -qx "left out: [0-9]* triggers" left-out || fail "the user is told: $(cat left-out)"
 /usr/bin/python3 - triggers.hdf5 triggers-again.hdf5 "$(grep -o "[0-9]*" left-out)" <<'PYTHON'
