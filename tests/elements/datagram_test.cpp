@@ -440,21 +440,23 @@ TEST(Depayloader, MapsTheSendersTimeToTheArrival) {
 }
 
 TEST(Depayloader, FollowsASenderWhoseClockDrifts) {
-  Depay h("format=t32-x16-y15-on1");
-  // It stood still for two seconds.
-  h.push(t32(5'000'000, 0, 2 * GST_SECOND));
-  h.push(t32(5'000'500, 1, 4 * GST_SECOND));
-  ASSERT_TRUE(h.pull());
-  const auto second = h.pull();
-  EXPECT_EQ(GST_BUFFER_PTS(second.get()), 5 * GST_SECOND + 500 * GST_USECOND);
-  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(second.get()));
-  ASSERT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
-  const auto event = h.pull_event(GST_EVENT_SEGMENT);
-  ASSERT_TRUE(event);
-  const GstSegment* segment = nullptr;
-  gst_event_parse_segment(event.get(), &segment);
-  EXPECT_EQ(gst_segment_to_running_time(segment, GST_FORMAT_TIME, GST_BUFFER_PTS(second.get())),
-            4 * GST_SECOND);
+  // It stands still for two seconds, or sends a file at once.
+  for (const auto& [t, arrival] : {std::pair<guint32, GstClockTime>{5'000'500, 4 * GST_SECOND},
+                                   {9'000'000, 2 * GST_SECOND + GST_MSECOND}}) {
+    Depay h("format=t32-x16-y15-on1");
+    h.push(t32(5'000'000, 0, 2 * GST_SECOND));
+    h.push(t32(t, 1, arrival));
+    ASSERT_TRUE(h.pull());
+    const auto second = h.pull();
+    EXPECT_EQ(GST_BUFFER_PTS(second.get()), t * GST_USECOND);
+    EXPECT_TRUE(GST_BUFFER_IS_DISCONT(second.get()));
+    ASSERT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
+    const auto event = h.pull_event(GST_EVENT_SEGMENT);
+    ASSERT_TRUE(event);
+    const GstSegment* segment = nullptr;
+    gst_event_parse_segment(event.get(), &segment);
+    EXPECT_EQ(gst_segment_to_running_time(segment, GST_FORMAT_TIME, t * GST_USECOND), arrival);
+  }
 }
 
 TEST(Depayloader, FollowsASenderThatStartsOver) {
