@@ -3,8 +3,8 @@
 
     aedat4_check.py FILE...
 
-Prints a line a file: events, ON, sums of t, x and y; frames, and the sum of their pixels; entries of
-the table. Exits with 77 where a library is missing.
+Prints a line a file: events, ON, sums of t, x and y; frames, and the sum of their pixels; triggers,
+and the sum of their sources; IMU samples, and the sum of their numbers; entries of the table. Exits with 77 where a library is missing.
 """
 import struct
 import sys
@@ -64,6 +64,7 @@ def check(path):
         assert int(stream.find("node[@name='info']/attr[@key='sizeX']").text) > 0
 
     events = on = sum_t = sum_x = sum_y = frames = pixels = entries = 0
+    triggers = sources = samples = numbers = 0
     at = 18 + size
     end = table_at if table_at > 0 else len(data)
     while at < end:
@@ -79,6 +80,18 @@ def check(path):
                 sum_t += t
                 sum_x += x
                 sum_y += y
+        elif kind in ("TRIG", "IMUS"):
+            vector = field(packet, 0)
+            for i in range(packet.VectorLen(vector)):
+                at_element = packet.Indirect(packet.Vector(vector) + 4 * i)
+                element = flatbuffers.table.Table(content, at_element)
+                sum_t += scalar(element, 0, FLAGS.Int64Flags)
+                if kind == "TRIG":
+                    triggers += 1
+                    sources += scalar(element, 1, FLAGS.Int8Flags)
+                else:
+                    samples += 1
+                    numbers += sum(int(scalar(element, k, FLAGS.Float32Flags)) for k in range(1, 11))
         else:
             assert kind == "FRME"
             frames += 1
@@ -89,7 +102,7 @@ def check(path):
     if table_at > 0:
         table = root(decompressed(compression, data[end:]), b"FTAB")
         entries = table.VectorLen(field(table, 0))
-    print(events, on, sum_t, sum_x, sum_y, frames, pixels, entries)
+    print(events, on, sum_t, sum_x, sum_y, frames, pixels, triggers, sources, samples, numbers, entries)
 
 
 for name in sys.argv[1:]:

@@ -715,14 +715,21 @@ TEST(Aedat4, PythonsLibrariesReadWhatWeWrite) {
     sum_y += event.y();
     on += event.polarity() == Polarity::on ? 1 : 0;
   }
+  const std::vector<Trigger> triggers{{1001, 0, true}, {1002, 0, false}, {1003, 3, true}};
+  const std::vector<ImuSample> samples{{1004, 40, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}},
+                                       {1005, 39, {-1, -2, -3}, {-4, -5, -6}, {-7, -8, -9}}};
+  for (const auto& trigger : triggers) sum_t += trigger.t;
+  for (const auto& sample : samples) sum_t += sample.t;
   auto folder = (std::filesystem::temp_directory_path() / "aedat4-test-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
   std::string command = "/usr/bin/python3 '" + std::string(AEDAT4_CHECK) + "'";
   std::string expected;
   for (const auto compression : compressions)
     for (const bool table : {false, true}) {
-      Aedat4Encoder encoder({{346, 260}, "a <b> & c", compression, true, table});
+      Aedat4Encoder encoder({{346, 260}, "a <b> & c", compression, true, table, true, true});
       Bytes bytes;
+      encoder.encode(std::span<const Trigger>(triggers), bytes);
+      encoder.encode(std::span<const ImuSample>(samples), bytes);
       encoder.encode(events, bytes);
       const Bytes pixels(346 * 260, 3);
       encoder.encode(
@@ -735,10 +742,12 @@ TEST(Aedat4, PythonsLibrariesReadWhatWeWrite) {
           .write(reinterpret_cast<const char*>(bytes.data()),
                  static_cast<std::streamsize>(bytes.size()));
       command += " '" + path + "'";
-      for (const auto number : {std::int64_t{9000}, on, sum_t, sum_x, sum_y, std::int64_t{1},
-                                std::int64_t{3 * 346 * 260}})
+      for (const auto number :
+           {std::int64_t{9000}, on, sum_t, sum_x, sum_y, std::int64_t{1},
+            std::int64_t{3 * 346 * 260}, std::int64_t{3}, std::int64_t{1 + 2 + 8}, std::int64_t{2},
+            std::int64_t{40 + 45 + 39 - 45}})
         expected += std::to_string(number) + " ";
-      expected += table ? "4\n" : "0\n";
+      expected += table ? "6\n" : "0\n";
     }
   command += " 2>&1";
   FILE* const pipe = popen(command.c_str(), "r");

@@ -43,11 +43,16 @@ inline std::vector<Seed> aedat4_seeds() {
   constexpr SensorSize size{346, 260};
   const auto events = few_events(1, size, 16);
   const std::array<std::uint8_t, 48> pixels{1, 2, 3};
+  const std::array<Trigger, 2> edges{{{1000, 0, true}, {1001, 3, false}}};
+  const std::array<ImuSample, 2> samples{
+      {{1000, 40, {0, -1, 0}, {1, 2, 3}, {}}, {2000, 40, {0, -1, 0}, {3, 2, 1}, {}}}};
   std::vector<Seed> seeds;
   for (const auto compression :
        {Aedat4Compression::none, Aedat4Compression::lz4, Aedat4Compression::zstd}) {
-    Aedat4Encoder encoder({size, "seed", compression, true, true});
+    Aedat4Encoder encoder({size, "seed", compression, true, true, true, true});
     std::vector<std::uint8_t> bytes;
+    encoder.encode(std::span<const Trigger>(edges), bytes);
+    encoder.encode(std::span<const ImuSample>(samples), bytes);
     encoder.encode(std::span(events).first(10), bytes);
     encoder.encode({1500, 0, 0, 0, 0, PixelFormat::bgr, 4, 4, 0, 0, pixels.data(), 12}, bytes);
     encoder.encode(std::span(events).subspan(10), bytes);
