@@ -1023,23 +1023,28 @@ TEST(EventNpyDec, ChangesCapsWhereEventsLieOutsideTheAssumedSensor) {
   EXPECT_EQ(widths, (std::vector{128, 240, 304}));
 }
 
-TEST(EventNpyDec, TakesTheSizeOfItsProperties) {
+TEST(TableReaders, TakeTheSizeOfTheirProperties) {
+  const Format csv{"csv", "eventcsvenc dialect=names", "eventcsvdec", "application/x-event-csv"};
   const auto events = growing_events();
-  const TemporaryFile file(file_of(npy, events));
-  for (const std::string way : {"", "queue ! "}) {
-    // They come before what downstream allows, and a file has one size.
-    Player written(file.path(), way + "eventnpydec width=320 height=240 ! evtenc ! evtdec");
-    EXPECT_TRUE(written.ends_well());
-    EXPECT_EQ(written.events, events);
-    Player cut(file.path(), way + "eventnpydec width=100 height=100");
-    EXPECT_TRUE(cut.ends_well());
-    EXPECT_EQ(cut.events.size(), 1000U);
+  for (const auto& format : {npy, csv}) {
+    SCOPED_TRACE(format.name);
+    const TemporaryFile file(file_of(format, events));
+    const std::string reader = format.reader;
+    for (const std::string way : {"", "queue ! "}) {
+      // They come before what downstream allows, and a file has one size.
+      Player written(file.path(), way + reader + " width=320 height=240 ! evtenc ! evtdec");
+      EXPECT_TRUE(written.ends_well());
+      EXPECT_EQ(written.events, events);
+      Player cut(file.path(), way + reader + " width=100 height=100");
+      EXPECT_TRUE(cut.ends_well());
+      EXPECT_EQ(cut.events.size(), 1000U);
+    }
+    Player grown(file.path(), "queue ! " + reader + " ! evtenc ! evtdec");
+    const auto message = grown.play();
+    ASSERT_TRUE(message);
+    ASSERT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_ERROR);
+    EXPECT_NE(text_of(message.get()).find("width and height"), std::string::npos);
   }
-  Player grown(file.path(), "queue ! eventnpydec ! evtenc ! evtdec");
-  const auto message = grown.play();
-  ASSERT_TRUE(message);
-  ASSERT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_ERROR);
-  EXPECT_NE(text_of(message.get()).find("width and height"), std::string::npos);
 }
 
 TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
