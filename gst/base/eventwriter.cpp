@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -45,7 +47,8 @@ struct State {
   std::unique_ptr<Encoder> encoder;
   bool written = false;
   WaitingItems<Trigger> triggers = {};
-  Microseconds last = 0;  ///< time of the last encoded item
+  Microseconds last = 0;              ///< time of the last encoded item
+  std::uint64_t pauses_reported = 0;  ///< microseconds left out that were warned of
 };
 
 }  // namespace
@@ -61,7 +64,6 @@ struct GstEventWriterPrivate {
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
   WritableEvents writable;
-  WarnOnce warn_of_pause;
   std::vector<guint8> bytes;  ///< encoded but not yet pushed
 };
 
@@ -103,7 +105,6 @@ static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
 static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
   auto& priv = priv_of(self);
   priv.bytes.clear();
-  priv.warn_of_pause.reset();
   priv.writable.begin_file({info.width, info.height});
   auto encoder = format_of(self).create({info.width, info.height}, priv.variant, caps.get());
   encoder->encode({}, priv.bytes);
@@ -276,17 +277,21 @@ static GstFlowReturn encode_all(GstEventWriter* self, std::span<const AbsoluteEv
   return result;
 }
 
-static void warn_of_pause(GstEventWriter* self) {
-  auto& priv = priv_of(self);
-  const auto left_out = priv.state->encoder->left_out();
-  if (left_out == 0) return;
-  const auto seconds = std::to_string(left_out / 1'000'000);
-  priv.warn_of_pause(self,
-                     {GST_STREAM_ERROR_ENCODE,
-                      "Left out a pause of " + seconds +
-                          " s, which is too long for this format: all later events are earlier by "
-                          "as much. Write AEDAT4, HDF5, NumPy or text to keep their times."},
-                     "the clock of the format cannot tell " + std::to_string(left_out) + " us");
+/// Warns of the first pause that is left out, and at the end of the file of all, if there are more.
+static void warn_of_pauses(GstEventWriter* self, bool at_end) {
+  auto& state = *priv_of(self).state;
+  const auto left_out = state.encoder->left_out();
+  const auto reported = state.pauses_reported;
+  if (left_out == reported || (reported > 0 && !at_end)) return;
+  state.pauses_reported = left_out;
+  const auto seconds = std::to_string(left_out / 1'000'000) + " s";
+  post_message(self, GST_MESSAGE_WARNING,
+               {GST_STREAM_ERROR_ENCODE,
+                (reported == 0 ? "Left out a pause of " + seconds + ", which is"
+                               : "Left out pauses of " + seconds + " in total, which are") +
+                    " too long for this format: all later events are earlier by as much. Write "
+                    "AEDAT4, HDF5, NumPy or text to keep their times."},
+               "the clock of the format cannot tell " + std::to_string(left_out) + " us");
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
@@ -302,7 +307,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
       if (result == GST_FLOW_OK) result = encode_all(self, events, start);
     });
     if (!encoded) return GST_FLOW_ERROR;
-    warn_of_pause(self);
+    warn_of_pauses(self, false);
     if (result != GST_FLOW_OK) return result;
     GstClockTime duration = GST_BUFFER_DURATION(taken);
     if (GST_CLOCK_TIME_IS_VALID(duration))
@@ -338,6 +343,7 @@ static void end_file(GstEventWriter* self) {
     if (result != GST_FLOW_OK) return result;
     encode_triggers(self, eventcamera::Chunker::max_time);
     priv.state->encoder->finish(priv.bytes);
+    warn_of_pauses(self, true);
     result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
     auto patch = priv.state->encoder->patch();
     return result == GST_FLOW_OK && patch ? push_patch(self, *std::move(patch)) : result;

@@ -688,6 +688,24 @@ TEST_P(EveryFormat, HoldsALongPauseOrTellsThatItIsLeftOut) {
   EXPECT_EQ(read[2].t, 1001);
 }
 
+TEST(EventDatEnc, TellsOfAllPausesThatAreLeftOut) {
+  Harness h("eventdatenc");
+  gst_harness_set_sink_caps_str(h.get(), "application/x-prophesee-dat");
+  gst_harness_set_src_caps_str(h.get(), events_caps.c_str());
+  for (const Microseconds hour : {0, 2, 7}) {
+    const auto t = hour * 3'600'000'000 + 1000;
+    const auto event = AbsoluteEvent::at(5, 5, t, Polarity::on);
+    EXPECT_EQ(h.push(buffer_of(std::span(&event, 1), t)), GST_FLOW_OK);
+  }
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  for (const char* text : {"Left out a pause of 7200 s", "Left out pauses of 25200 s in total"}) {
+    const auto warning = h.message(GST_MESSAGE_WARNING);
+    ASSERT_TRUE(warning);
+    EXPECT_TRUE(text_of(warning.get()).starts_with(text)) << text_of(warning.get());
+  }
+  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+}
+
 TEST_P(EveryFormat, RefusesBuffersThatAreNoEvents) {
   Harness h(format().writer);
   gst_harness_set_sink_caps_str(h.get(), format().caps);
