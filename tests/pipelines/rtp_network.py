@@ -1,0 +1,275 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Events over RTP between hosts, on good and bad networks: what arrives was sent, what is lost is counted."""
+import os
+import time
+
+import gi
+import numpy as np
+
+import hosts
+from hosts import Conditions, Host, Network
+
+gi.require_version("Gst", "1.0")
+gi.require_version("GstApp", "1.0")
+from gi.repository import Gst, GstApp  # noqa: E402, F401
+
+EVENT = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
+# Two seconds of events in buffers of 10 ms.
+BUFFERS, EVENTS_PER_BUFFER, DURATION = 200, 200, 10_000_000
+ORIGIN = 123_456_789  # ns: neither 0 nor whole microseconds
+RTP = ("media=application,clock-rate=1000000,encoding-name=X-EVENT-CAMERA,payload=96,width=346,height=260,"
+       "format=EVT3")
+FROM_NETWORK = f'udpsrc name=udp port=5000 buffer-size=2000000 caps="application/x-rtp,{RTP}"'
+SECONDS = 30  # for anything that should happen at once
+IP_AND_UDP = 28  # bytes of headers
+
+
+def events_of_buffer(number):
+    i = np.arange(EVENTS_PER_BUFFER)
+    events = np.zeros(EVENTS_PER_BUFFER, EVENT)
+    events["t"] = i * 50
+    events["x"] = (number * 31 + i * 17) % 346
+    events["y_p"] = (number * 7 + i * 5) % 260 | np.where(i % 3 == 0, 0x8000, 0)
+    return events
+
+
+def absolute(start, events):
+    """Event times in microseconds, x, and y with polarity, one row per event."""
+    return np.stack([start // 1000 + events["t"].astype(np.int64), events["x"], events["y_p"]], axis=1)
+
+
+def sent(first=0, end=BUFFERS):
+    return np.concatenate([absolute(ORIGIN + i * DURATION, events_of_buffer(i)) for i in range(first, end)])
+
+
+def wait_until(happened, what):
+    deadline = time.monotonic() + SECONDS
+    while not happened():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.02)
+
+
+class Player:
+    def __init__(self, launch):
+        Gst.init(None)
+        self._launch = launch
+        self._pipeline = None
+        self.start()
+
+    def start(self):
+        self._pipeline = Gst.parse_launch(self._launch)
+        if storage := self._pipeline.get_by_name("storage"):
+            self._pipeline.get_by_name("fec").set_property("storage", storage.get_property("internal-storage"))
+        self._pipeline.set_state(Gst.State.PLAYING)
+
+    def stop(self):
+        self._pipeline.set_state(Gst.State.NULL)
+
+    def stat(self, field):
+        return self._pipeline.get_by_name("rtp").get_property("stats").get_uint64(field)[1]
+
+    def resident_size(self):
+        """In bytes."""
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+class Sender(Player):
+    def __init__(self, to, options=""):
+        super().__init__(
+            "appsrc name=in format=time is-live=true caps=application/x-event-camera,format=XYTP,width=346,height=260"
+            f" ! identity sync=true ! rtpeventpay name=rtp {options} ! {to}")
+
+    def send(self, first, end):
+        """Returns when all is sent."""
+        appsrc = self._pipeline.get_by_name("in")
+        for i in range(first, end):
+            buffer = Gst.Buffer.new_wrapped(events_of_buffer(i).tobytes())
+            buffer.pts, buffer.duration = ORIGIN + i * DURATION, DURATION
+            appsrc.push_buffer(buffer)
+        wait_until(lambda: self.stat("events") >= end * EVENTS_PER_BUFFER, f"sender has sent {self.stat('events')}")
+
+    def stop(self):
+        """Returns when the last packet is sent."""
+        self._pipeline.get_by_name("in").end_of_stream()
+        self._pipeline.get_bus().timed_pop_filtered(SECONDS * Gst.SECOND, Gst.MessageType.EOS)
+        super().stop()
+
+
+class Receiver(Player):
+    def __init__(self, launch=f"{FROM_NETWORK} ! rtpeventdepay name=rtp", last=""):
+        self._received = [np.zeros((0, 3), np.int64)]
+        super().__init__(f"{launch} {last} ! appsink name=out sync=false async=false")
+
+    def events(self):
+        appsink = self._pipeline.get_by_name("out")
+        while sample := appsink.try_pull_sample(0):
+            buffer = sample.get_buffer()
+            events = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), EVENT)
+            self._received.append(absolute(buffer.pts, events))
+        return np.concatenate(self._received)
+
+    def wait_for(self, events):
+        """Waits until this many events have arrived or are counted as lost."""
+        wait_until(lambda: self.stat("events") + self.stat("lost-events") >= events,
+                   f"{self.stat('events')} events, {self.stat('lost-events')} lost, of {events}")
+        wait_until(lambda: len(self.events()) >= self.stat("events"), "events stay in the depayloader")
+
+
+def is_part(some, everything):
+    """True if the rows stand in `everything` in the same order. All rows are different there."""
+    place = {tuple(row): i for i, row in enumerate(everything.tolist())}
+    places = [place.get(tuple(row), -1) for row in some.tolist()]
+    return all(a < b for a, b in zip([-1] + places, places))
+
+
+TO_RECEIVER = f"udpsink host={Host.address(2)} port=5000 sync=false async=false"
+SMALL = f"mtu={576 - IP_AND_UDP}"  # many packets
+WITH_SSRC = "application/x-rtp,ssrc=(uint)1234"
+FROM_SSRC = FROM_NETWORK.replace("application/x-rtp", WITH_SSRC)
+JITTER_BUFFER = f"{FROM_NETWORK} ! rtpjitterbuffer latency=1000 ! rtpeventdepay name=rtp"
+
+
+def exchange(conditions, loses, *, to=TO_RECEIVER, launch=None, options="", mtu=1500):
+    """Sends everything; the first and the last packets arrive."""
+    receiver = (Receiver, launch) if launch else (Receiver,)
+    with Network((Sender, to, options), receiver, mtu=mtu) as network:
+        source, target = network.hosts
+        source.send(0, 1)
+        wait_until(lambda: network.switch.packets > 0, "no packet")
+        network.switch.conditions = conditions
+        source.send(1, BUFFERS - 1)
+        time.sleep(2 * conditions.delay + 0.3)
+        network.switch.conditions = Conditions()
+        source.send(BUFFERS - 1, BUFFERS)
+        target.wait_for(BUFFERS * EVENTS_PER_BUFFER)
+        received, lost = target.events(), target.stat("lost-events")
+        assert source.stat("events") == len(sent())
+        assert target.stat("events") == len(received)
+        assert target.stat("rejected-packets") == 0
+        assert len(sent()) - len(received) == lost, f"{len(received)} of {len(sent())} events, {lost} lost"
+        assert is_part(received, sent()), "events that were not sent, or in another order"
+        assert (lost > 0) == loses, f"{lost} events are lost, of {network.switch.lost} packets"
+        assert conditions.loss == 0 or network.switch.lost > 0
+        assert conditions.duplication == 0 or network.switch.duplicated > 0
+        assert conditions.delayed == 0 or network.switch.delayed > 0
+        sizes = [len(frame) - 14 for _, frame in network.switch.frames if frame[12:14] == b"\x08\x00"]
+        assert 0.8 * mtu < max(sizes) <= mtu, max(sizes)
+
+
+def no_loss():
+    exchange(Conditions(), False)
+
+
+def loss_1():
+    exchange(Conditions(loss=0.01), True, options=SMALL, mtu=576)
+
+
+def loss_5():
+    exchange(Conditions(loss=0.05), True, options=SMALL, mtu=576)
+
+
+def loss_20():
+    exchange(Conditions(loss=0.2), True, options=SMALL, mtu=576)
+
+
+def duplication():
+    exchange(Conditions(duplication=0.3), False)
+
+
+def reordering():
+    exchange(Conditions(delayed=0.1, delay=0.03), True)
+
+
+def everything():
+    exchange(Conditions(loss=0.05, duplication=0.1, delayed=0.1, delay=0.05), True, options=SMALL, mtu=576)
+
+
+def jitter():
+    exchange(Conditions(delayed=1, delay=0.05), False, launch=JITTER_BUFFER)
+
+
+def mtu_576():
+    exchange(Conditions(), False, options=SMALL, mtu=576)
+
+
+def mtu_576_fragments():
+    """The payloader does not know of the path's MTU: a lost fragment costs its packet."""
+    exchange(Conditions(loss=0.05), True, mtu=576)
+
+
+def mtu_9000():
+    exchange(Conditions(), False, options=f"mtu={9000 - IP_AND_UDP} max-latency=200000000", mtu=9000)
+
+
+def fec():
+    exchange(Conditions(loss=0.01), False, options=SMALL, mtu=576,
+             to=f"{WITH_SSRC} ! rtpulpfecenc pt=122 percentage=100 multipacket=true ! {TO_RECEIVER}",
+             launch=f"{FROM_SSRC} ! rtpstorage name=storage size-time=2000000000"
+             " ! rtpjitterbuffer do-lost=true latency=1000 ! rtpulpfecdec name=fec pt=122 ! rtpeventdepay name=rtp")
+
+
+def receivers_come_and_go():
+    with Network((Sender, TO_RECEIVER), (Receiver,)) as network:
+        source, target = network.hosts
+        target.stop()
+        source.send(0, 50)
+        for first in 50, 150:
+            target.start()
+            before = len(target.events())
+            source.send(first, first + 50)
+            target.wait_for((50 - 25) * EVENTS_PER_BUFFER)
+            received = target.events()[before:]
+            assert target.stat("lost-events") == 0
+            target.stop()
+            # The network may still hold the buffer before.
+            assert is_part(received, sent(first - 1, first + 50)), f"other events than those sent from {first}"
+            source.send(first + 50, min(first + 100, BUFFERS))
+
+
+def a_sender_restarts():
+    with Network((Sender, TO_RECEIVER), (Receiver,)) as network:
+        source, target = network.hosts
+        for _ in range(2):
+            source.send(0, 100)
+            source.stop()
+            source.start()
+        target.wait_for(2 * 100 * EVENTS_PER_BUFFER)
+        twice = np.concatenate(2 * [sent(0, 100)])
+        assert np.array_equal(target.events(), twice)
+        assert target.stat("lost-events") == 0
+
+
+def multicast_to_a_slow_receiver():
+    """The slow one loses what does not fit into its socket; the other gets everything in time."""
+    group = FROM_NETWORK + " address=239.1.1.1 multicast-iface=eth0"
+    depay = " ! rtpeventdepay name=rtp"
+    slow_group = group.replace("buffer-size=2000000", "buffer-size=4096")
+    with Network((Sender, "udpsink host=239.1.1.1 port=5000 multicast-iface=eth0 sync=false async=false"),
+                 (Receiver, group + depay),
+                 (Receiver, slow_group + depay, "! identity sleep-time=100000")) as network:
+        source, fast, slow = network.hosts
+        source.send(0, 1)
+        fast.wait_for(EVENTS_PER_BUFFER)
+        slow.wait_for(EVENTS_PER_BUFFER)
+        size = slow.resident_size()
+        start = time.monotonic()
+        source.send(1, BUFFERS - 1)
+        assert time.monotonic() - start < 2 * BUFFERS * DURATION / 1e9, "the sender waits for its receivers"
+        time.sleep(3)  # the slow receiver's socket empties
+        source.send(BUFFERS - 1, BUFFERS)
+        fast.wait_for(BUFFERS * EVENTS_PER_BUFFER)
+        slow.wait_for(BUFFERS * EVENTS_PER_BUFFER)
+        assert np.array_equal(fast.events(), sent())
+        assert fast.stat("lost-events") == 0
+        received, lost = slow.events(), slow.stat("lost-events")
+        assert is_part(received, sent())
+        assert 0 < lost == len(sent()) - len(received), f"{len(received)} of {len(sent())} events, {lost} lost"
+        assert slow.resident_size() - size < 8 << 20, f"grew by {slow.resident_size() - size} bytes"
+
+
+if __name__ == "__main__":
+    hosts.run([no_loss, loss_1, loss_5, loss_20, duplication, reordering, everything, jitter, mtu_576,
+               mtu_576_fragments, mtu_9000, fec, receivers_come_and_go, a_sender_restarts,
+               multicast_to_a_slow_receiver])
