@@ -10,8 +10,10 @@
 
 namespace eventcamera {
 
-/// Events of one interval as kernels produce them: a bucket per step and band of rows. Each thread
-/// fills its own buckets; concatenated in order, they are the sorted events of the interval.
+/// Events of one interval as kernels produce them: a bucket per step and band of rows. With more
+/// than one band, a bucket holds the events of its rows only, so that threads can draw bands
+/// concurrently. Each thread fills its own buckets; concatenated in order, they are the sorted
+/// events of the interval.
 class EventBuckets {
  public:
   /// On its own cache line, because threads fill neighbouring buckets concurrently.

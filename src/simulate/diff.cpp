@@ -80,8 +80,9 @@ class FiredPixels {
   }
 
   /// Emits the accumulated pixels in raster order and clears them.
-  void fire(std::uint32_t t, std::vector<Event>& out) {
+  void fire(int step, std::uint32_t t, EventBuckets& events) {
     for (int y = 0; y < strongest_.height(); ++y) {
+      auto& out = events.bucket(step, y / rows_per_band);
       for (int x = 0; x < strongest_.width(); x += 64) {
         for (auto bits = std::exchange(taken_[word({x, y})], 0); bits != 0; bits &= bits - 1) {
           const int at = x + std::countr_zero(bits);
@@ -170,7 +171,7 @@ class DiffSimulator final : public Simulator {
       const int j = i + 1;
       auto& fired_pixels = fired_pixels_[static_cast<std::size_t>(thread)];
       for (const auto& moving : moving_) fired_pixels.add(moving.point.at(j), moving.difference);
-      fired_pixels.fire(steps.microseconds(j), events.bucket(j, 0));
+      fired_pixels.fire(j, steps.microseconds(j), events);
     });
   }
 

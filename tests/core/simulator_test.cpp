@@ -156,6 +156,22 @@ TEST_P(EveryMethod, DoesNotDependOnThreadsOrOnTheFramesBeforeAReset) {
   EXPECT_TRUE(scene::last_interval(*simulator, one, views) == expected);
 }
 
+TEST_P(EveryMethod, PutsEventsIntoTheBucketsOfTheirBand) {
+  const auto simulator = GetParam().make({120, 80, 8});
+  const EventBuckets* events = nullptr;
+  std::vector<Image<std::uint8_t>> frames;
+  for (int i = 0; i < 3; ++i) frames.push_back(scene::texture<std::uint8_t>(120, 80, 8, 2 * i, i));
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    events = simulator->push(scene::luma(frames[i]), static_cast<Nanoseconds>(i) * frame_time,
+                             settings());
+  ASSERT_NE(events, nullptr);
+  ASSERT_GT(events->size(), 0U);
+  if (events->bands() == 1) return;  // of all rows
+  for (std::size_t i = 0; i < events->buckets().size(); ++i)
+    for (const auto& event : events->buckets()[i])
+      ASSERT_EQ(event.y() / rows_per_band, static_cast<int>(i) % events->bands());
+}
+
 TEST_P(EveryMethod, GivesTheSameIn16Bits) {
   const auto widened = [](const Image<std::uint8_t>& narrow) {
     Image<std::uint16_t> wide(narrow.width(), narrow.height());
