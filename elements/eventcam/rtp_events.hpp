@@ -5,7 +5,6 @@
 #include <gst/gst.h>
 
 #include <array>
-#include <optional>
 
 #include "src/wire/rtp_payload.hpp"
 
