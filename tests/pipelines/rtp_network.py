@@ -210,6 +210,21 @@ def fec():
              " ! rtpjitterbuffer do-lost=true latency=1000 ! rtpulpfecdec name=fec pt=122 ! rtpeventdepay name=rtp")
 
 
+def rtx():
+    types = 'payload-type-map="application/x-rtp-pt-map,96=(uint)97"'
+    exchange(
+        Conditions(loss=0.01), False, options=SMALL, mtu=576,
+        to=f"{WITH_SSRC} ! rtprtxsend max-size-packets=1000 {types} ! s.send_rtp_sink"
+        f"  rtpsession name=s rtp-profile=avpf  s.send_rtp_src ! {TO_RECEIVER}"
+        f"  s.send_rtcp_src ! udpsink host={Host.address(2)} port=5001 sync=false async=false"
+        "  udpsrc port=5001 caps=application/x-rtcp ! s.recv_rtcp_sink",
+        launch=f"rtpsession name=r rtp-profile=avpf  {FROM_SSRC} ! r.recv_rtp_sink"
+        "  udpsrc port=5001 caps=application/x-rtcp ! r.recv_rtcp_sink"
+        f"  r.send_rtcp_src ! udpsink host={Host.address(1)} port=5001 sync=false async=false"
+        f"  r.recv_rtp_src ! rtprtxreceive {types} ! rtpssrcdemux name=d  d.src_1234"
+        " ! rtpjitterbuffer do-retransmission=true latency=4000 ! rtpeventdepay name=rtp")
+
+
 def receivers_come_and_go():
     with Network((Sender, TO_RECEIVER), (Receiver,)) as network:
         source, target = network.hosts
@@ -271,5 +286,5 @@ def multicast_to_a_slow_receiver():
 
 if __name__ == "__main__":
     hosts.run([no_loss, loss_1, loss_5, loss_20, duplication, reordering, everything, jitter, mtu_576,
-               mtu_576_fragments, mtu_9000, fec, receivers_come_and_go, a_sender_restarts,
+               mtu_576_fragments, mtu_9000, fec, rtx, receivers_come_and_go, a_sender_restarts,
                multicast_to_a_slow_receiver])
