@@ -1,0 +1,93 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""tshark follows a client of rtsp-events from the session description to the packets, without complaint."""
+import os
+import subprocess
+import tempfile
+import time
+
+import gi
+
+import hosts
+from hosts import Host, Network
+
+gi.require_version("Gst", "1.0")
+gi.require_version("GstApp", "1.0")
+from gi.repository import Gst, GstApp  # noqa: E402, F401
+
+PROGRAM = os.path.join(os.environ["SOURCE"], "pipelines", "rtsp_events.py")
+BUFFERS = 100
+SECONDS = 60  # for anything that should happen at once
+# tshark's severity, and its group of what TCP repeats when it waits too long for a busy machine.
+WARNING, TCP_SEQUENCE = 0x600000, 0x2000000
+
+
+class Server:
+    def __init__(self):
+        # pylint: disable-next=consider-using-with
+        self._process = subprocess.Popen([PROGRAM, "--address", Host.address(1)], stdout=subprocess.PIPE, text=True,
+                                         preexec_fn=hosts.end_with_parent)
+        self._process.stdout.readline()
+
+
+class Client:
+    def __init__(self):
+        Gst.init(None)
+        self._pipeline = Gst.parse_launch(
+            f"rtspsrc location=rtsp://{Host.address(1)}:8554/both protocols=udp nat-method=none name=source"
+            "  source. ! application/x-rtp,media=video ! rtpvp8depay ! fakesink"
+            "  source. ! application/x-rtp,media=application ! rtpeventdepay ! appsink name=out sync=false")
+
+    def play(self, buffers):
+        self._pipeline.set_state(Gst.State.PLAYING)
+        appsink = self._pipeline.get_by_name("out")
+        deadline = time.monotonic() + SECONDS
+        while buffers > 0:
+            assert time.monotonic() < deadline, f"{buffers} buffers are missing"
+            buffers -= appsink.try_pull_sample(Gst.SECOND // 10) is not None
+        self._pipeline.set_state(Gst.State.NULL)
+
+
+def dissected(path, which, *fields):
+    """Lines of fields of the frames that match."""
+    output = subprocess.run(
+        ["tshark", "-r", path, "-Y", which, "-T", "fields", *(part for field in fields for part in ("-e", field))],
+        check=True, capture_output=True, text=True).stdout
+    return [line.split("\t") for line in output.splitlines()]
+
+
+def rtsp_session():
+    with tempfile.TemporaryDirectory() as folder, Network((Server,), (Client,)) as network:
+        network.hosts[1].play(BUFFERS)
+        path = os.path.join(folder, "session.pcap")
+        network.switch.write_pcap(path)
+
+        for number, protocol, severities, groups, messages in dissected(
+                path, "_ws.expert", "frame.number", "_ws.col.Protocol", "_ws.expert.severity", "_ws.expert.group",
+                "_ws.expert.message"):
+            assert not any(int(severity) >= WARNING and int(group) != TCP_SEQUENCE for severity, group in
+                           zip(severities.split(","), groups.split(","))), f"frame {number}, {protocol}: {messages}"
+        descriptions = dissected(path, "sdp", "sdp.mime.type", "sdp.sample_rate", "sdp.fmtp.parameter")
+        assert descriptions, "tshark sees no session description"
+        types, rates, parameters = (set(field.split(",")) for field in descriptions[0])
+        assert types == {"VP8", "X-EVENT-CAMERA"} and rates == {"90000", "1000000"}, descriptions
+        assert parameters >= {"width=320", "height=240", "format=EVT3"}, descriptions
+
+        # Known as RTP from the session only.
+        packets = dissected(path, "rtp && rtp.setup-method == RTSP", "rtp.ssrc", "rtp.p_type", "rtp.seq",
+                            "rtp.timestamp", "rtp.marker")
+        assert len(packets) > BUFFERS and len({ssrc for ssrc, *_ in packets}) == 2, packets[:10]
+        for ssrc in {ssrc for ssrc, *_ in packets}:
+            stream = [packet for packet in packets if packet[0] == ssrc]
+            assert len({packet_type for _, packet_type, *_ in stream}) == 1, stream[0]
+            numbers = [int(number) for _, _, number, *_ in stream]
+            assert all((a + 1) % 65536 == b for a, b in zip(numbers, numbers[1:])), "sequence numbers"
+            # A timestamp has one marker, in its last packet; the capture may begin and end anywhere.
+            wrong = [(a, b) for a, b in zip(stream, stream[1:]) if (a[4] == "1") != (a[3] != b[3])]
+            assert not wrong, f"markers of {wrong}"
+        reports = {packet_type for line in dissected(path, "rtcp", "rtcp.pt") for packet_type in line[0].split(",")}
+        assert {"200", "201", "202"} <= reports, f"RTCP packets of types {reports}"
+        print(f"{len(packets)} packets")
+
+
+hosts.run([rtsp_session])
