@@ -253,6 +253,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_GAP:
       take_gap(self, event);
       break;
+    case GST_EVENT_SEGMENT:  // the times of waiting events are those of the last one
     case GST_EVENT_EOS:
       flush(self);
       break;

@@ -395,6 +395,14 @@ TEST(Payloader, SendsDuringAGap) {
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
 }
 
+TEST(Payloader, SendsBeforeANewSegment) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
+  h.caps(events_caps, "application/x-event-datagram");
+  h.push(second(0));
+  push_segment(h.get());
+  EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
+}
+
 TEST(Payloader, ForgetsEventsThatAreFlushed) {
   Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
   h.caps(events_caps, "application/x-event-datagram");
