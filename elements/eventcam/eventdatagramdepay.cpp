@@ -77,6 +77,7 @@ struct State {
   GstSegment upstream{};                ///< of arrival times
   std::optional<GstSegment> segment{};  ///< of the events, once pushed
   Microseconds end = 0;                 ///< of the last buffer
+  bool is_discontinuous = false;        ///< before the next buffer
   bool has_caps = false;
 };
 
@@ -172,7 +173,7 @@ static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds 
 
 /// Pushes the events of a datagram. May throw.
 static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& reception,
-                          GstClockTime arrival, bool discont) {
+                          GstClockTime arrival) {
   auto& priv = *self->priv;
   auto& state = *priv.state;
   const auto first = state.events.front().t;
@@ -180,7 +181,7 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
     return GST_PAD_IS_FLUSHING(priv.src) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
   if (!state.segment || reception.restarted || has_drifted(*state.segment, first, arrival)) {
     push_segment(priv, first, arrival);
-    discont = true;
+    state.is_discontinuous = true;
   } else if (first - state.end > min_gap) {
     GstEvent* const gap =
         gst_event_new_gap(nanoseconds(state.end), nanoseconds(first - 1 - state.end));
@@ -190,7 +191,8 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
   }
   GstBuffer* const buffer = buffer_of(state.events, state.end, state.events.back().t);
   state.end = state.events.back().t;
-  if (discont || reception.lost > 0) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+  if (std::exchange(state.is_discontinuous, false))
+    GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
   return gst_pad_push(priv.src, buffer);
 }
 
@@ -223,7 +225,9 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, std::span<const std::u
     counts.rejected += reception.fault != nullptr ? 1 : 0;
   });
   if (reception.fault != nullptr) reject(self, reception.fault, bytes.size());
-  return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival, discont);
+  // A datagram without events, such as jAER's samples of frames, may be the one that tells.
+  state.is_discontinuous |= discont || reception.lost > 0;
+  return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
 }
 
 /// Running time at which a datagram arrived, if its buffer has a PTS.

@@ -562,6 +562,17 @@ TEST(Depayloader, TellsOfLosses) {
   EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
 }
 
+TEST(Depayloader, TellsOfLossesBeforeDatagramsWithoutEvents) {
+  Depay h("format=jaer");
+  h.push(jaer(1, 1000, GST_MSECOND));
+  h.push(datagram({0, 0, 0, 3}, 2 * GST_MSECOND));
+  h.push(jaer(4, 1500, 3 * GST_MSECOND));
+  ASSERT_TRUE(h.pull());
+  const auto buffer = h.pull();
+  ASSERT_TRUE(buffer);
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(buffer.get()));
+}
+
 TEST(Depayloader, GivesEventsWithoutTimesThatOfTheirArrival) {
   Depay h("format=spif");
   h.push(datagram({1, 0, 2, 0x80, 1, 0, 3, 0x80}, 7 * GST_MSECOND));
