@@ -311,7 +311,8 @@ static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
   gst_rtp_base_payload_set_options(payload, "application", TRUE, "X-EVENT-CAMERA", rtp_clock_rate);
   return gst_rtp_base_payload_set_outcaps(
       payload, "width", G_TYPE_STRING, width.c_str(), "height", G_TYPE_STRING, height.c_str(),
-      "format", G_TYPE_STRING, rtp_event_formats[static_cast<std::size_t>(format)], nullptr);
+      "format", G_TYPE_STRING, rtp_event_formats[static_cast<std::size_t>(priv.state->format)],
+      nullptr);
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {

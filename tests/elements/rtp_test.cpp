@@ -359,6 +359,18 @@ TEST(RtpEventPay, GoesOnWithAnotherSensor) {
   EXPECT_NE(h.out_caps().find("width=(string)640"), std::string::npos);
 }
 
+TEST(RtpEventPay, KeepsTheFormatOfItsStream) {
+  Harness h("rtpeventpay max-latency=0");
+  h.caps(davis_caps, "application/x-rtp");
+  g_object_set(h.element(), "format", 1, nullptr);
+  gst_harness_set_src_caps_str(h.get(), (davis_caps + ", framerate=30/1").c_str());
+  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  const auto packet = h.pull();
+  ASSERT_TRUE(packet);
+  EXPECT_EQ(Fields(packet.get()).header->format, RtpEventFormat::evt3);
+  EXPECT_NE(h.out_caps().find("format=(string)EVT3"), std::string::npos);
+}
+
 TEST(RtpEventDepay, MapsTheSendersTimesToTheTimeOfArrival) {
   std::vector<Interval> intervals;
   for (int i = 0; i < 30; ++i)
