@@ -69,10 +69,17 @@ constexpr GstClockTimeDiff max_drift = 5 * GST_MSECOND;
 /// Maximum sides of XYTP caps.
 constexpr int max_side = 16384;
 
-/// Stream of one sensor.
+/// Stream of a sender.
 struct State {
   State(SensorSize size, RtpEventFormat events_format)
       : sensor(size), format(events_format), unpacker(size, format) {}
+
+  /// Sequence numbers and counters go on.
+  void change(SensorSize size, RtpEventFormat events_format) {
+    unpacker.change(size, events_format);
+    sensor = size;
+    format = events_format;
+  }
 
   SensorSize sensor;
   RtpEventFormat format;
@@ -315,7 +322,13 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
   if (state && state->sensor == sensor && state->format == *format) return TRUE;
   flush(self);
   const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
-  if (!guarded(self, report, [&] { state.emplace(sensor, *format); })) return FALSE;
+  const auto follow = [&] {
+    if (state)
+      state->change(sensor, *format);
+    else
+      state.emplace(sensor, *format);
+  };
+  if (!guarded(self, report, follow)) return FALSE;
   return send_caps(self, sensor);
 }
 

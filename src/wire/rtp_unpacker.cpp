@@ -18,6 +18,12 @@ RtpUnpacker::RtpUnpacker(SensorSize sensor, RtpEventFormat format)
       reader_(make_evt3_reader(sensor)),
       batch_(std::make_unique<Batch>(corruption_)) {}
 
+void RtpUnpacker::change(SensorSize sensor, RtpEventFormat format) {
+  reader_ = make_evt3_reader(sensor);
+  sensor_ = sensor;
+  format_ = format;
+}
+
 void RtpUnpacker::reset() {
   position_.reset();
   close_interval();

@@ -50,6 +50,9 @@ class RtpUnpacker {
  public:
   RtpUnpacker(SensorSize sensor, RtpEventFormat format);
 
+  /// Goes on with another sensor or format. Flush before.
+  void change(SensorSize sensor, RtpEventFormat format);
+
   /// Calls take(RtpInterval) for each interval that ends with this packet or ended before it. The
   /// events are valid during the call only.
   template <class Take>

@@ -414,6 +414,29 @@ TEST(RtpEventDepay, StartsOverWithItsSender) {
   EXPECT_EQ(stat(h, "lost-events"), 0U);
 }
 
+TEST(RtpEventDepay, CountsOnWithAnotherSensor) {
+  Harness pay("rtpeventpay max-latency=0");
+  pay.caps(davis_caps, "application/x-rtp");
+  const Interval first{0, 10'000'000, {Event::at(1, 2, 3, Polarity::on)}};
+  push(pay, first);
+  Depayloader h;
+  h.take(pay.pull().get());
+  gst_harness_set_src_caps_str(pay.get(),
+                               "application/x-event-camera, format=XYTP, width=640, height=480");
+  h.caps(
+      "application/x-rtp, media=application, clock-rate=1000000, encoding-name=X-EVENT-CAMERA, "
+      "width=640, height=480");
+  push(pay, {10'000'000, 10'000'000, {Event::at(639, 2, 3, Polarity::on)}});
+  EXPECT_TRUE(pay.pull());  // lost
+  const Interval last{20'000'000, 10'000'000, {Event::at(638, 2, 3, Polarity::on)}};
+  push(pay, last);
+  h.take(pay.pull().get());
+  EXPECT_EQ(Output(h).intervals, (std::vector{first, last}));
+  EXPECT_EQ(stat(h, "events"), 2U);
+  EXPECT_EQ(stat(h, "lost-events"), 1U);
+  EXPECT_EQ(stat(pay, "events"), 3U);
+}
+
 TEST(RtpEventDepay, NeedsTheSizeOfTheSensor) {
   const std::string base =
       "application/x-rtp, media=application, clock-rate=1000000, encoding-name=X-EVENT-CAMERA";
