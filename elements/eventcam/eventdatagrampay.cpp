@@ -316,6 +316,7 @@ static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
   gst_pad_set_query_function(priv.src, src_query);
   gst_pad_use_fixed_caps(priv.src);
   gst_element_add_pad(element, priv.src);
+  announce_latency(self, "max-latency");
 }
 
 static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {

@@ -37,6 +37,7 @@
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/flush_timer.hpp"
 #include "gst/base/guarded.hpp"
+#include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
@@ -352,6 +353,7 @@ static void finalize(GObject* object) {
 static void gst_rtp_event_pay_init(GstRtpEventPay* self) {
   self->priv = new Private;
   gst_pad_set_query_function(GST_RTP_BASE_PAYLOAD_SRCPAD(self), src_query);
+  announce_latency(self, "max-latency");
 }
 
 static GType format_type() {

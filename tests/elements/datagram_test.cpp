@@ -457,6 +457,10 @@ TEST(Payloader, ReportsItsLatency) {
   h.caps(events_caps, "application/x-event-datagram");
   gst_harness_set_upstream_latency(h.get(), 40 * GST_MSECOND);
   EXPECT_EQ(gst_harness_query_latency(h.get()), 47 * GST_MSECOND);
+  while (h.message(GST_MESSAGE_LATENCY)) {
+  }
+  g_object_set(h.element(), "max-latency", 9 * GST_MSECOND, nullptr);
+  EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
 }
 
 /* depayloader */

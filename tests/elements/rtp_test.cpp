@@ -287,6 +287,10 @@ TEST(RtpEventPay, AddsItsLatency) {
   h.caps(davis_caps, "application/x-rtp");
   gst_harness_set_upstream_latency(h.get(), 20 * ms);
   EXPECT_EQ(gst_harness_query_latency(h.get()), 27 * ms);
+  while (h.message(GST_MESSAGE_LATENCY)) {
+  }
+  g_object_set(h.element(), "max-latency", 9 * ms, nullptr);
+  EXPECT_TRUE(h.message(GST_MESSAGE_LATENCY));
 }
 
 TEST(RtpEventPay, TellsOfSilence) {
