@@ -146,13 +146,19 @@ static bool has_drifted(const GstSegment& segment, Microseconds t, GstClockTime 
   return std::abs(GST_CLOCK_DIFF(due, arrival)) > max_drift;
 }
 
-/// Starts a segment in which `t` has the running time `arrival`.
+/// Starts a segment in which `t` has the running time `arrival`, if that is known.
 static void push_segment(Private& priv, Microseconds t, GstClockTime arrival) {
   auto& state = *priv.state;
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   segment.start = segment.position = segment.time = nanoseconds(t);
-  if (GST_CLOCK_TIME_IS_VALID(arrival)) segment.base = arrival;
+  if (GST_CLOCK_TIME_IS_VALID(arrival)) {
+    segment.base = arrival;
+  } else if (state.segment) {
+    // A stream that starts over continues where the last one ended.
+    segment.base =
+        gst_segment_to_running_time(&*state.segment, GST_FORMAT_TIME, nanoseconds(state.end));
+  }
   state.segment = segment;
   state.end = t;
   gst_pad_push_event(priv.src, gst_event_new_segment(&segment));

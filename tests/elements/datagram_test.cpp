@@ -601,6 +601,18 @@ TEST(Depayloader, DoesWithoutArrivalTimes) {
   EXPECT_EQ(pull_events(h).size(), 2);
 }
 
+TEST(Depayloader, ContinuesWithoutArrivalTimesWhenTheSenderStartsOver) {
+  Depay h("format=t32-x16-y15-on1");
+  for (const guint32 t : {5'000'000, 8'000'000, 1'000'000})
+    EXPECT_EQ(h.push(t32(t, 0, GST_CLOCK_TIME_NONE)), GST_FLOW_OK);
+  GstSegment segment;
+  gst_event_copy_segment(h.pull_event(GST_EVENT_SEGMENT).get(), &segment);
+  EXPECT_EQ(segment.base, 0);
+  gst_event_copy_segment(h.pull_event(GST_EVENT_SEGMENT).get(), &segment);
+  EXPECT_EQ(segment.start, GST_SECOND);
+  EXPECT_EQ(segment.base, 3 * GST_SECOND);
+}
+
 TEST(Depayloader, ReportsItsLatency) {
   Depay h("latency=30000000");
   gst_harness_set_upstream_latency(h.get(), 40 * GST_MSECOND);
