@@ -151,7 +151,7 @@ static bool measure(GstEventStats* self, int width, int height) {
 /// Adds an interval. Time between intervals counts as time without events; if time goes backwards,
 /// no inter-event interval spans the discontinuity.
 static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) {
-  if (measurement.end && start + static_cast<Nanoseconds>(event_resolution) < *measurement.end) {
+  if (measurement.end && start < *measurement.end - static_cast<Nanoseconds>(event_resolution)) {
     measurement.validator = EventValidator(measurement.width, measurement.height);
     for (auto* part : {&measurement.cumulative, &measurement.recent})
       part->statistics.forget_times();
@@ -160,7 +160,8 @@ static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) 
   const Nanoseconds from = measurement.end.value_or(start);
   for (auto* part : {&measurement.cumulative, &measurement.recent}) {
     if (!part->start) part->start = from;
-    part->covered += std::max(end - from, Nanoseconds{0});
+    const Nanoseconds most = std::numeric_limits<Nanoseconds>::max() - part->covered;
+    part->covered += std::clamp(end - from, Nanoseconds{0}, most);
   }
   measurement.end = std::max(end, from);
 }
