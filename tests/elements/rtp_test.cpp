@@ -244,6 +244,7 @@ TEST(RtpEventPay, JoinsShortBuffersUpToItsLatency) {
   for (int i = 0; i < 20; ++i)
     intervals.push_back({i * 1'000'000, 1'000'000, {Event::at(i, 2, 500, Polarity::on)}});
   for (const auto& interval : intervals) push(h, interval);
+  end(h);
   const Output output(h);
   EXPECT_EQ(absolute(output.intervals), absolute(intervals));
   ASSERT_LE(output.intervals.size(), 10U);
