@@ -276,18 +276,11 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
 }
 
 /// Adds the time for which events wait here.
-static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* asked) {
-  if (!gst_pad_query_default(pad, parent, asked)) return FALSE;
-  if (GST_QUERY_TYPE(asked) == GST_QUERY_LATENCY) {
-    gboolean live = FALSE;
-    GstClockTime min = 0;
-    GstClockTime max = 0;
-    gst_query_parse_latency(asked, &live, &min, &max);
-    const auto own = GST_RTP_EVENT_PAY(parent)->priv->settings.copy().max_latency;
-    if (GST_CLOCK_TIME_IS_VALID(max)) max += own;
-    gst_query_set_latency(asked, live, min + own, max);
-  }
-  return TRUE;
+static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(GST_RTP_BASE_PAYLOAD_SINKPAD(parent), query,
+                          GST_RTP_EVENT_PAY(parent)->priv->settings.copy().max_latency);
+  return gst_pad_query_default(pad, parent, query);
 }
 
 /* negotiation, states */
