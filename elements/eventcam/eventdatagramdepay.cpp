@@ -130,11 +130,7 @@ static GstClockTime nanoseconds(Microseconds t) {
 static bool push_caps(GstEventDatagramDepay* self) {
   auto& state = *self->priv->state;
   if (state.has_caps) return true;
-  GstEventCameraInfo info = {};
-  info.width = state.settings.width;
-  info.height = state.settings.height;
-  info.fps_d = 1;
-  const OwnedCaps caps(gst_event_camera_info_to_caps(&info));
+  const OwnedCaps caps = event_caps(state.settings.width, state.settings.height);
   state.has_caps = gst_pad_push_event(self->priv->src, gst_event_new_caps(caps.get())) != FALSE;
   return state.has_caps;
 }

@@ -49,7 +49,6 @@
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
-#include "gst/eventcamera/eventcamera.h"
 #include "src/wire/rtp_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
@@ -291,11 +290,7 @@ static std::optional<RtpEventFormat> format_of(const GstStructure* caps) {
 }
 
 static bool send_caps(GstRtpEventDepay* self, SensorSize sensor) {
-  GstEventCameraInfo info = {};
-  info.width = sensor.width;
-  info.height = sensor.height;
-  info.fps_d = 1;
-  const OwnedCaps caps(gst_event_camera_info_to_caps(&info));
+  const OwnedCaps caps = event_caps(sensor.width, sensor.height);
   return gst_pad_set_caps(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), caps.get()) != FALSE;
 }
 

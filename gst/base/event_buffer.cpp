@@ -10,6 +10,14 @@ static GstClockTime time_of_last_event(GstBuffer* buffer) {
   return last.t * GST_USECOND;
 }
 
+OwnedCaps event_caps(int width, int height) {
+  GstEventCameraInfo info = {};
+  info.width = width;
+  info.height = height;
+  info.fps_d = 1;
+  return OwnedCaps(gst_event_camera_info_to_caps(&info));
+}
+
 std::optional<EventInterval> interval_of(GstBuffer* buffer) {
   const GstClockTime start = GST_BUFFER_PTS(buffer);
   if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;

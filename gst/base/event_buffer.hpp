@@ -6,6 +6,7 @@
 #include <span>
 
 #include "gst/base/errors.hpp"
+#include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event.hpp"
 
@@ -46,6 +47,9 @@ class MappedEvents {
   GstEventCameraMap map_{};
   bool mapped_;
 };
+
+/// Caps of events in memory format, from a sensor of this size, at a framerate that varies.
+OwnedCaps event_caps(int width, int height);
 
 /// A time interval (start, end].
 struct EventInterval {

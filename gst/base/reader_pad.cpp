@@ -3,8 +3,8 @@
 
 #include <utility>
 
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
-#include "gst/eventcamera/eventcamera.h"
 
 using eventcamera::SensorSize;
 
@@ -70,11 +70,7 @@ void ReaderPad::send_tags(const std::string& format, const std::string& camera) 
 
 bool ReaderPad::send_caps(SensorSize size) {
   if (size == size_) return true;
-  GstEventCameraInfo info = {};
-  info.width = size.width;
-  info.height = size.height;
-  info.fps_d = 1;
-  const OwnedCaps caps(gst_event_camera_info_to_caps(&info));
+  const OwnedCaps caps = event_caps(size.width, size.height);
   const bool taken = push_caps(caps.get());
   if (taken) size_ = size;
   return taken;
