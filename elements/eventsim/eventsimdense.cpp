@@ -74,7 +74,7 @@ static void install_properties(GObjectClass* klass) {
                         interpolation_type(), static_cast<int>(defaults.interpolation), flags));
 }
 
-static void configure(eventcamera::Simulator& simulator, GObject* object) {
+static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
   const Settings settings = settings_of(object).copy();
   auto& dense = static_cast<DenseSimulator&>(simulator);
   dense.set_flow(settings.flow);
@@ -87,9 +87,7 @@ static const EventSimulatorMethod dense = {
     .description = "Turns video into events: interpolates frames with dense optical flow",
     .threshold = 2,
     .interpolates = true,
-    .create = [](const eventcamera::LumaFormat& format) -> std::unique_ptr<eventcamera::Simulator> {
-      return eventcamera::make_dense_simulator(format);
-    },
+    .create = in_system_memory<eventcamera::make_dense_simulator>,
     .make_settings = []() -> std::shared_ptr<void> {
       return std::make_shared<GuardedSettings<Settings>>();
     },

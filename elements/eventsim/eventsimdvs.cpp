@@ -268,7 +268,7 @@ static void install_properties(GObjectClass* klass) {
   }
 }
 
-static void configure(eventcamera::Simulator& simulator, GObject* object) {
+static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
   static_cast<DvsSimulator&>(simulator).set(choice_of(object).copy().settings);
 }
 
@@ -279,9 +279,7 @@ static const EventSimulatorMethod dvs = {
         "Turns video into events: simulates the pixels of an event camera and their "
         "noise",
     .threshold = std::nullopt,
-    .create = [](const eventcamera::LumaFormat& format) -> std::unique_ptr<eventcamera::Simulator> {
-      return eventcamera::make_dvs_simulator(format);
-    },
+    .create = in_system_memory<eventcamera::make_dvs_simulator>,
     .make_settings = []() -> std::shared_ptr<void> {
       return std::make_shared<GuardedSettings<Choice>>();
     },

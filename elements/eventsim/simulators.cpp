@@ -28,7 +28,7 @@ static const EventSimulatorMethod frame = {
     .long_name = "Event camera simulator: difference frame",
     .description = "Turns video into events: thresholds the difference of successive frames",
     .threshold = 20,
-    .create = eventcamera::make_frame_simulator,
+    .create = in_system_memory<eventcamera::make_frame_simulator>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
                             event_simulator_type(frame))
@@ -61,7 +61,7 @@ static const EventSimulatorMethod sparse = {
         "frames",
     .threshold = 10,
     .interpolates = true,
-    .create = eventcamera::make_sparse_simulator,
+    .create = in_system_memory<eventcamera::make_sparse_simulator>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_sparse, "eventsim-sparse", GST_RANK_NONE,
                             event_simulator_type(sparse))
@@ -92,7 +92,7 @@ static const EventSimulatorMethod diff = {
         "next",
     .threshold = 20,
     .interpolates = true,
-    .create = eventcamera::make_diff_simulator,
+    .create = in_system_memory<eventcamera::make_diff_simulator>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_diff, "eventsim-diff", GST_RANK_NONE,
                             event_simulator_type(diff))

@@ -13,7 +13,6 @@
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/frame_clock.hpp"
-#include "gst/base/frame_luma.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/learnt_latency.hpp"
@@ -24,15 +23,14 @@
 #include "gst/base/video_frame.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/render/accumulator.hpp"
-#include "src/simulate/motion.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 #define GST_CAT_DEFAULT event_simulator_debug
 
 using eventcamera::Accumulator;
 using eventcamera::EventBuckets;
+using eventcamera::IntervalSimulator;
 using eventcamera::Nanoseconds;
-using eventcamera::Simulator;
 
 namespace {
 
@@ -51,10 +49,11 @@ struct Settings {
 /// State from caps to stop.
 struct State {
   GstVideoInfo video;              ///< input format
-  FrameLuma luma;                  ///< luma of the input
   std::optional<Drawing> drawing;  ///< video output; none if the output is events
-  std::unique_ptr<Simulator> simulator;
+  std::unique_ptr<VideoSimulator> frames;
   bool discontinuous = false;  ///< the next buffer is discontinuous
+
+  IntervalSimulator& simulator() const { return frames->simulator(); }
 };
 
 /// State from start to stop, independent of caps.
@@ -81,15 +80,6 @@ struct GstEventSimulatorPrivate {
   Stream stream;
 };
 
-#define GST_TYPE_EVENT_SIMULATOR (gst_event_simulator_get_type())
-G_DECLARE_DERIVABLE_TYPE(GstEventSimulator, gst_event_simulator, GST, EVENT_SIMULATOR,
-                         GstBaseTransform)
-
-struct _GstEventSimulatorClass {
-  GstBaseTransformClass parent_class;
-  const EventSimulatorMethod* method;
-};
-
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventSimulator, gst_event_simulator, GST_TYPE_BASE_TRANSFORM,
                                  G_ADD_PRIVATE(GstEventSimulator)
                                      GST_DEBUG_CATEGORY_INIT(event_simulator_debug, "eventsim", 0,
@@ -111,7 +101,7 @@ void* event_simulator_settings(GObject* object) {
 /// Passes the settings of the method to the simulator.
 static void configure(GstEventSimulator* self) {
   if (const auto configure = method_of(self).configure)
-    configure(*priv_of(self).state->simulator, G_OBJECT(self));
+    configure(priv_of(self).state->simulator(), G_OBJECT(self));
 }
 
 /* properties */
@@ -190,8 +180,8 @@ static void learn_latency(GstEventSimulator* self, Nanoseconds start, Nanosecond
 /// Makes the next frame a first frame.
 static void forget_frames(GstEventSimulator* self) {
   auto& state = priv_of(self).state;
-  if (!state || !state->simulator->last_time()) return;
-  state->simulator->reset();
+  if (!state || !state->simulator().last_time()) return;
+  state->simulator().reset();
   state->discontinuous = true;
 }
 
@@ -246,7 +236,7 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
     return false;
   }
   const auto time = static_cast<Nanoseconds>(pts);
-  const auto last = priv_of(self).state->simulator->last_time();
+  const auto last = priv_of(self).state->simulator().last_time();
   if (last && time <= *last) {
     warn_of_times(self, "a frame is not later than the previous one");
     forget_frames(self);
@@ -260,10 +250,10 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
 
 /* negotiation */
 
-static GstCaps* transform_caps(GstBaseTransform*, GstPadDirection direction, GstCaps* caps,
-                               GstCaps* filter) {
-  GstCaps* other = direction == GST_PAD_SINK ? event_simulator_output_caps(caps)
-                                             : event_simulator_input_caps(caps);
+static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection direction,
+                               GstCaps* caps, GstCaps* filter) {
+  const SimulatorVideo& video = method_of(GST_EVENT_SIMULATOR(transform)).video;
+  GstCaps* other = direction == GST_PAD_SINK ? video.output_caps(caps) : video.input_caps(caps);
   if (filter == nullptr) return other;
   GstCaps* filtered = gst_caps_intersect_full(filter, other, GST_CAPS_INTERSECT_FIRST);
   gst_caps_unref(other);
@@ -330,24 +320,25 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     return FALSE;
   }
   const auto luma = FrameLuma::format_of(video);
-  const auto failure = [&](const std::exception&) -> Report {
+  const auto failure = [&](const std::exception& error) -> Report {
     state.reset();
+    if (const auto* known = dynamic_cast<const VideoSimulatorError*>(&error))
+      return known->report();
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for frames of " +
                                                   std::to_string(luma.width) + "x" +
                                                   std::to_string(luma.height) + " pixels."};
   };
   const bool made = guarded(self, failure, [&] {
     if (!state || FrameLuma::format_of(state->video) != luma) {
-      const bool follows = state && (state->discontinuous || state->simulator->last_time());
+      const bool follows = state && (state->discontinuous || state->simulator().last_time());
       state.reset();  // before allocating the next: frames can be large
       state.emplace(State{.video = video,
-                          .luma = FrameLuma(video),
                           .drawing = std::nullopt,
-                          .simulator = method_of(self).create(luma),
+                          .frames = method_of(self).create(G_OBJECT(self), video),
                           .discontinuous = follows});
     } else {
       state->video = video;
-      state->luma = FrameLuma(video);
+      state->frames->set_video(video);
     }
     state->drawing.reset();
     if (event_simulator_draws(out))
@@ -387,15 +378,6 @@ static void sync_controlled_properties(GstEventSimulator* self, GstClockTime tim
   if (GST_CLOCK_TIME_IS_VALID(stream_time)) gst_object_sync_values(GST_OBJECT(self), stream_time);
 }
 
-/// Returns the events between the last frame and this one, or nullptr for a first frame. May throw.
-static const EventBuckets* simulate(GstEventSimulator* self, const VideoFrame& frame,
-                                    Nanoseconds time, const Settings& settings) {
-  auto& state = *priv_of(self).state;
-  configure(self);
-  const auto luma = state.luma.of(frame, state.simulator->threads());
-  return state.simulator->push(luma, time, settings.simulation);
-}
-
 /// Pushes a GAP for an interval without events.
 static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
                               guint32 seqnum) {
@@ -423,7 +405,7 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const EventBuckets* eve
   const EventBuckets none;
   const GstFlowReturn result = event_simulator_draw_events(
       GST_BASE_TRANSFORM(self), events != nullptr ? *events : none, *state.drawing,
-      eventcamera::palette(palette_name_of(palette)), state.simulator->threads(), in, out);
+      eventcamera::palette(palette_name_of(palette)), state.simulator().threads(), in, out);
   if (result != GST_FLOW_OK) return result;
   set_times(*out, static_cast<GstClockTime>(time), GST_BUFFER_DURATION(in), state);
   return GST_FLOW_OK;
@@ -439,16 +421,9 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   check_interlacing(self, in);
   if (!check_time(self, in)) return GST_FLOW_OK;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
-  const auto start = state.simulator->last_time();
-  const VideoFrame frame(state.video, in, GST_MAP_READ);
-  if (!frame) {
-    GST_ELEMENT_ERROR(
-        self, RESOURCE, FAILED,
-        ("Cannot read a video frame: %s. Check the element upstream.", frame.fault().c_str()),
-        ("%" GST_PTR_FORMAT, in));
-    return GST_FLOW_ERROR;
-  }
-  const EventBuckets* events = simulate(self, frame, end, settings);
+  const auto start = state.simulator().last_time();
+  configure(self);
+  const EventBuckets* events = state.frames->push(in, end, settings.simulation);
   if (state.drawing) {
     priv_of(self).stream.handed_out_until = end;
     return draw_frame(self, events, settings.palette, end, in, out);
@@ -464,7 +439,7 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   priv_of(self).stream.handed_out_until = end;
   if (events->size() == 0) return push_gap(self, *start, end, GST_SEQNUM_INVALID);
   const GstFlowReturn result =
-      event_simulator_write_events(transform, *events, state.simulator->threads(), in, out);
+      event_simulator_write_events(transform, *events, state.simulator().threads(), in, out);
   if (result == GST_FLOW_OK)
     set_times(*out, static_cast<GstClockTime>(*start), static_cast<GstClockTime>(end - *start),
               state);
@@ -480,6 +455,8 @@ static GstFlowReturn reported(GstEventSimulator* self, const Work& work) {
       return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
               "Not enough memory for the events of a frame. Raise the thresholds, or lower "
               "interpolated-frames."};
+    if (const auto* known = dynamic_cast<const VideoSimulatorError*>(&error))
+      return known->report();
     return {GST_STREAM_ERROR_FAILED, "The simulation failed."};
   };
   return guarded(self, failure, work);
@@ -541,16 +518,16 @@ static bool take_segment(GstEventSimulator* self, GstEvent* event) {
 static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum) {
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
-  const Nanoseconds start = *state.simulator->last_time();
+  const Nanoseconds start = *state.simulator().last_time();
   sync_controlled_properties(self, static_cast<GstClockTime>(end));
   configure(self);
   const EventBuckets* events =
-      state.simulator->hold_until(end, priv_of(self).settings.copy().simulation);
+      state.simulator().hold_until(end, priv_of(self).settings.copy().simulation);
   priv_of(self).stream.handed_out_until = end;
   GstBuffer* out = nullptr;
   if (events != nullptr && events->size() > 0) {
     const OwnedBuffer in(gst_buffer_new());
-    if (event_simulator_write_events(transform, *events, state.simulator->threads(), in.get(),
+    if (event_simulator_write_events(transform, *events, state.simulator().threads(), in.get(),
                                      &out) != GST_FLOW_OK)
       return;
     set_times(out, static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start), state);
@@ -568,7 +545,7 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   gst_event_parse_gap(event, &pts, &duration);
   auto& state = priv_of(self).state;
-  const auto start = state ? state->simulator->last_time() : std::nullopt;
+  const auto start = state ? state->simulator().last_time() : std::nullopt;
   if (!start || state->drawing) return true;
   const GstClockTime frame = latency_of(self);
   const GstClockTime rest =
@@ -674,23 +651,6 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   object_class->finalize = finalize;
   install_base_properties(object_class);
 
-  static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE(
-      "sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-      GST_STATIC_CAPS("video/x-raw, format = (string) " EVENT_SIMULATOR_INPUT_FORMATS
-                      ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
-                      "framerate = (fraction) [ 0, max ]"));
-  static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
-      "src", GST_PAD_SRC, GST_PAD_ALWAYS,
-      GST_STATIC_CAPS(GST_EVENT_CAMERA_MEDIA_TYPE
-                      ", format = (string) XYTP, width = (int) [ 1, 16384 ], "
-                      "height = (int) [ 1, 16384 ], framerate = (fraction) [ 0, max ]; "
-                      "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS
-                      ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
-                      "framerate = (fraction) [ 0, max ]"));
-  static_assert(eventcamera::max_side == 16384);
-  gst_element_class_add_static_pad_template(GST_ELEMENT_CLASS(klass), &sink_template);
-  gst_element_class_add_static_pad_template(GST_ELEMENT_CLASS(klass), &src_template);
-
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->transform_caps = transform_caps;
   transform_class->fixate_caps = fixate_caps;
@@ -709,6 +669,7 @@ static void method_class_init(gpointer klass, gpointer row) {
   const auto& method = *static_cast<const EventSimulatorMethod*>(row);
   auto* object_class = G_OBJECT_CLASS(klass);
   GST_EVENT_SIMULATOR_CLASS(klass)->method = &method;
+  method.video.install_pads(GST_ELEMENT_CLASS(klass));
   if (method.threshold) install_thresholds(object_class, *method.threshold);
   if (method.interpolates) install_interpolated_frames(object_class);
   if (method.install_properties != nullptr) method.install_properties(object_class);
@@ -717,6 +678,6 @@ static void method_class_init(gpointer klass, gpointer row) {
                                         EVENTSIM_AUTHORS);
 }
 
-GType event_simulator_type(const EventSimulatorMethod& method) {
-  return row_type(GST_TYPE_EVENT_SIMULATOR, method.type_name, method_class_init, &method);
+GType event_simulator_type(const EventSimulatorMethod& method, GType parent) {
+  return row_type(parent, method.type_name, method_class_init, &method);
 }

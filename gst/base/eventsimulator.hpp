@@ -7,6 +7,8 @@
 #include <optional>
 
 #include "gst/base/properties.hpp"
+#include "gst/base/simulator_caps.hpp"
+#include "gst/base/video_simulator.hpp"
 #include "src/simulate/simulator.hpp"
 
 /// A simulation method, and its element: video in, events or accumulated-event video out.
@@ -26,18 +28,33 @@ struct EventSimulatorMethod {
   std::optional<double> threshold;
   bool interpolates = false;  ///< has the property interpolated-frames
 
-  /// Creates the simulator for frames of this format. May throw.
-  std::unique_ptr<eventcamera::Simulator> (*create)(const eventcamera::LumaFormat& format);
+  /// Creates the simulator of an element for frames of this format. May throw.
+  std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);
+
+  /// Video taken and drawn.
+  const SimulatorVideo& video = system_memory_video;
 
   /// For methods with their own properties, else null: create a GuardedSettings, install the
   /// properties, and pass the settings to the simulator before each frame.
   std::shared_ptr<void> (*make_settings)() = nullptr;
   void (*install_properties)(GObjectClass* klass) = nullptr;
-  void (*configure)(eventcamera::Simulator& simulator, GObject* object) = nullptr;
+  void (*configure)(eventcamera::IntervalSimulator& simulator, GObject* object) = nullptr;
 };
 
-/// Returns the element type of `method`, which must have static storage duration.
-GType event_simulator_type(const EventSimulatorMethod& method);
+/// Base class of all simulators.
+#define GST_TYPE_EVENT_SIMULATOR (gst_event_simulator_get_type())
+G_DECLARE_DERIVABLE_TYPE(GstEventSimulator, gst_event_simulator, GST, EVENT_SIMULATOR,
+                         GstBaseTransform)
+
+struct _GstEventSimulatorClass {
+  GstBaseTransformClass parent_class;
+  const EventSimulatorMethod* method;
+};
+
+/// Returns the element type of `method`, which must have static storage duration: a subclass of
+/// `parent`.
+GType event_simulator_type(const EventSimulatorMethod& method,
+                           GType parent = GST_TYPE_EVENT_SIMULATOR);
 
 /// Returns the result of make_settings() for an element.
 void* event_simulator_settings(GObject* object);

@@ -3,7 +3,6 @@
 
 #include <initializer_list>
 
-#include "gst/base/drawn_video.hpp"
 #include "gst/eventcamera/eventcamera.h"
 
 namespace {
@@ -27,37 +26,55 @@ void set_formats(GstStructure* structure, const char* formats) {
 
 }  // namespace
 
-GstCaps* event_simulator_output_caps(const GstCaps* video) {
+/// Video of `formats` with the geometry of `caps`.
+GstCaps* SimulatorVideo::video_of(const GstCaps* caps, const char* of_formats) const {
+  GstCaps* video = gst_caps_new_empty();
+  for (guint i = 0; i < gst_caps_get_size(caps); ++i) {
+    GstStructure* structure =
+        with_fields_of(gst_caps_get_structure(caps, i), "video/x-raw",
+                       {"width", "height", "framerate", "pixel-aspect-ratio"});
+    set_formats(structure, of_formats);
+    video = gst_caps_merge_structure_full(video, structure, gst_caps_features_new(memory, nullptr));
+  }
+  return video;
+}
+
+GstCaps* SimulatorVideo::output_caps(const GstCaps* input) const {
   GstCaps* output = gst_caps_new_empty();
-  for (guint i = 0; i < gst_caps_get_size(video); ++i) {
-    const GstStructure* in = gst_caps_get_structure(video, i);
+  for (guint i = 0; i < gst_caps_get_size(input); ++i) {
     GstStructure* events =
-        with_fields_of(in, GST_EVENT_CAMERA_MEDIA_TYPE, {"width", "height", "framerate"});
+        with_fields_of(gst_caps_get_structure(input, i), GST_EVENT_CAMERA_MEDIA_TYPE,
+                       {"width", "height", "framerate"});
     gst_structure_set(events, "format", G_TYPE_STRING, "XYTP", nullptr);
     output = gst_caps_merge_structure(output, events);
   }
-  for (guint i = 0; i < gst_caps_get_size(video); ++i) {
-    const GstStructure* in = gst_caps_get_structure(video, i);
-    GstStructure* pictures =
-        with_fields_of(in, "video/x-raw", {"width", "height", "framerate", "pixel-aspect-ratio"});
-    if (gst_caps_is_fixed(video) && !gst_structure_has_field(pictures, "pixel-aspect-ratio"))
-      gst_structure_set(pictures, "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, nullptr);
-    set_formats(pictures, DRAWN_VIDEO_FORMATS);
-    output = gst_caps_merge_structure(output, pictures);
+  GstCaps* pictures = video_of(input, drawn_formats);
+  if (gst_caps_is_fixed(input)) {
+    GstStructure* picture = gst_caps_get_structure(pictures, 0);
+    if (!gst_structure_has_field(picture, "pixel-aspect-ratio"))
+      gst_structure_set(picture, "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, nullptr);
   }
-  return output;
+  return gst_caps_merge(output, pictures);
 }
 
-GstCaps* event_simulator_input_caps(const GstCaps* output) {
-  GstCaps* video = gst_caps_new_empty();
-  for (guint i = 0; i < gst_caps_get_size(output); ++i) {
-    const GstStructure* out = gst_caps_get_structure(output, i);
-    GstStructure* in =
-        with_fields_of(out, "video/x-raw", {"width", "height", "framerate", "pixel-aspect-ratio"});
-    set_formats(in, EVENT_SIMULATOR_INPUT_FORMATS);
-    video = gst_caps_merge_structure(video, in);
-  }
-  return video;
+GstCaps* SimulatorVideo::input_caps(const GstCaps* output) const {
+  return video_of(output, formats);
+}
+
+void SimulatorVideo::install_pads(GstElementClass* klass) const {
+  // As wide and high as eventcamera::max_side.
+  GstCaps* any = gst_caps_from_string(GST_EVENT_CAMERA_MEDIA_TYPE
+                                      ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
+                                      "framerate = (fraction) [ 0, max ]");
+  GstCaps* input = input_caps(any);
+  GstCaps* output = output_caps(any);
+  gst_element_class_add_pad_template(
+      klass, gst_pad_template_new("sink", GST_PAD_SINK, GST_PAD_ALWAYS, input));
+  gst_element_class_add_pad_template(
+      klass, gst_pad_template_new("src", GST_PAD_SRC, GST_PAD_ALWAYS, output));
+  gst_caps_unref(input);
+  gst_caps_unref(output);
+  gst_caps_unref(any);
 }
 
 GstCaps* event_simulator_fixate_output(GstCaps* caps) {

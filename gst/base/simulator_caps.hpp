@@ -3,6 +3,8 @@
 
 #include <gst/video/video.h>
 
+#include "gst/base/drawn_video.hpp"
+
 /// Formats supported by FrameLuma. First those that it reads in place (grey, planar and semi-planar
 /// YUV), then packed YUV, big-endian words, and RGB.
 #define EVENT_SIMULATOR_INPUT_FORMATS                                                            \
@@ -13,12 +15,31 @@
   "GBR, GBRA, RGBP, BGRP, RGB16, BGR16, RGB15, BGR15, GBR_10LE, GBRA_10LE, GBR_12LE, "           \
   "GBRA_12LE, ARGB64, ARGB64_LE, RGBA64_LE, BGRA64_LE, ABGR64_LE }"
 
-/// Output caps for this video: events (preferred) or accumulated-event video of the same size and
-/// framerate.
-GstCaps* event_simulator_output_caps(const GstCaps* video);
+/// Video that a simulator takes, and that it draws events in.
+struct SimulatorVideo {
+  const char* memory;   ///< caps feature
+  const char* formats;  ///< taken
+  const char* drawn_formats;
 
-/// Input caps for this output, events or accumulated-event video.
-GstCaps* event_simulator_input_caps(const GstCaps* output);
+  /// Output caps for this input: events (preferred) or accumulated-event video of the same size and
+  /// framerate.
+  GstCaps* output_caps(const GstCaps* input) const;
+
+  /// Input caps for this output, events or accumulated-event video.
+  GstCaps* input_caps(const GstCaps* output) const;
+
+  /// For class_init: adds the pad templates.
+  void install_pads(GstElementClass* klass) const;
+
+ private:
+  GstCaps* video_of(const GstCaps* caps, const char* of_formats) const;
+};
+
+inline constexpr SimulatorVideo system_memory_video = {
+    .memory = GST_CAPS_FEATURE_MEMORY_SYSTEM_MEMORY,
+    .formats = EVENT_SIMULATOR_INPUT_FORMATS,
+    .drawn_formats = DRAWN_VIDEO_FORMATS,
+};
 
 /// Fixates the output to events if `caps` (not empty) include them, else to video. Takes ownership
 /// of `caps`.

@@ -5,23 +5,14 @@
 
 namespace eventcamera {
 
-const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
-                                    const Settings& settings) {
-  assert(frame.format == format_);
+std::optional<StepTimes> IntervalSimulator::steps_to(Nanoseconds time, const Settings& settings) {
   threads_.set_threads(settings.threads);
-  const bool is_first = !last_time_;
-  if (is_first) {
-    start(frame);
-  } else {
-    assert(time > *last_time_ && time - *last_time_ <= max_interval);
-    simulate(frame, StepTimes(time - *last_time_, settings.interpolated_frames + 1), settings,
-             events_);
-  }
-  last_time_ = time;
-  return is_first ? nullptr : &events_;
+  if (!last_time_) return std::nullopt;
+  assert(time > *last_time_ && time - *last_time_ <= max_interval);
+  return StepTimes(time - *last_time_, settings.interpolated_frames + 1);
 }
 
-const EventBuckets* Simulator::hold_until(Nanoseconds time, const Settings& settings) {
+const EventBuckets* IntervalSimulator::hold_until(Nanoseconds time, const Settings& settings) {
   assert(!last_time_ || time >= *last_time_);
   if (!last_time_) return nullptr;
   const Nanoseconds duration = time - *last_time_;
@@ -31,7 +22,7 @@ const EventBuckets* Simulator::hold_until(Nanoseconds time, const Settings& sett
   return hold(StepTimes(duration, 1), settings, events_) ? &events_ : nullptr;
 }
 
-void Simulator::reset() {
+void IntervalSimulator::reset() {
   last_time_.reset();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cstdint>
 #include <optional>
 
@@ -57,20 +58,12 @@ class StepTimes {
   int count_;
 };
 
-/// Turns frames into the events between them. One call per frame does all the work, so that an
-/// implementation may run on any processor. The same frames, times and settings give the same
-/// events for any number of threads.
-class Simulator {
+/// Time and threads of a simulator, whatever kind of frame it takes.
+class IntervalSimulator {
  public:
-  virtual ~Simulator() = default;
-  Simulator(const Simulator&) = delete;
-  Simulator& operator=(const Simulator&) = delete;
-
-  /// Processes the next frame, in the simulator's format. `time` must be later than that of the
-  /// last frame, by at most max_interval. Returns the sorted events of (time of the last frame,
-  /// time], valid until the next call; nullptr for the first frame. Throws std::bad_alloc or
-  /// cv::Exception; after that the simulator may only be destroyed.
-  const EventBuckets* push(const LumaView& frame, Nanoseconds time, const Settings& settings);
+  virtual ~IntervalSimulator() = default;
+  IntervalSimulator(const IntervalSimulator&) = delete;
+  IntervalSimulator& operator=(const IntervalSimulator&) = delete;
 
   /// Time of the last frame, if any.
   std::optional<Nanoseconds> last_time() const { return last_time_; }
@@ -87,23 +80,58 @@ class Simulator {
   ThreadPool& threads() { return threads_; }
 
  protected:
-  explicit Simulator(LumaFormat format) : format_(format) {}
+  explicit IntervalSimulator(LumaFormat format) : format_(format) {}
 
   const LumaFormat& format() const { return format_; }
 
-  /// Stores the first frame.
-  virtual void start(const LumaView& frame) = 0;
-  /// Fills `events` with the events between the last frame and this one, and stores this one.
-  virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
-                        EventBuckets& events) = 0;
+  /// Prepares for a frame at `time`. Returns the steps of the interval that it ends; none for a
+  /// first frame.
+  std::optional<StepTimes> steps_to(Nanoseconds time, const Settings& settings);
+
   /// Fills `events` with those that fire while the frame does not change; false if there are none.
   virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
 
- private:
-  LumaFormat format_;
   std::optional<Nanoseconds> last_time_;
   EventBuckets events_;
+
+ private:
+  LumaFormat format_;
   ThreadPool threads_;
 };
+
+/// Turns frames into the events between them. One call per frame does all the work, so that an
+/// implementation may run on any processor. The same frames, times and settings give the same
+/// events for any number of threads.
+template <class Frame>
+class BasicSimulator : public IntervalSimulator {
+ public:
+  /// Processes the next frame, whose `format` must be the simulator's. `time` must be later than
+  /// that of the last frame, by at most max_interval. Returns the sorted events of (time of the
+  /// last frame, time], valid until the next call; nullptr for the first frame. Throws
+  /// std::bad_alloc or an exception of the implementation (cv::Exception, gl::Error); after that
+  /// the simulator may only be destroyed.
+  const EventBuckets* push(const Frame& frame, Nanoseconds time, const Settings& settings) {
+    assert(frame.format == format());
+    const auto steps = steps_to(time, settings);
+    if (steps)
+      simulate(frame, *steps, settings, events_);
+    else
+      start(frame);
+    last_time_ = time;
+    return steps ? &events_ : nullptr;
+  }
+
+ protected:
+  using IntervalSimulator::IntervalSimulator;
+
+  /// Stores the first frame.
+  virtual void start(const Frame& frame) = 0;
+  /// Fills `events` with the events between the last frame and this one, and stores this one.
+  virtual void simulate(const Frame& frame, const StepTimes& steps, const Settings& settings,
+                        EventBuckets& events) = 0;
+};
+
+/// Simulator on the CPU.
+using Simulator = BasicSimulator<LumaView>;
 
 }  // namespace eventcamera

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/video/video.h>
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "gst/base/errors.hpp"
+#include "gst/base/frame_luma.hpp"
+#include "src/simulate/simulator.hpp"
+
+/// A simulator of the frames in buffers, wherever their pixels are.
+class VideoSimulator {
+ public:
+  virtual ~VideoSimulator() = default;
+
+  /// Takes frames of this format from now on. Size and depth must be the same.
+  virtual void set_video(const GstVideoInfo& video) = 0;
+
+  /// As BasicSimulator::push(), for the frame in a buffer. Throws VideoSimulatorError as well.
+  virtual const eventcamera::EventBuckets* push(GstBuffer* frame, eventcamera::Nanoseconds time,
+                                                const eventcamera::Settings& settings) = 0;
+
+  virtual eventcamera::IntervalSimulator& simulator() = 0;
+};
+
+/// Failure that has a message of its own.
+class VideoSimulatorError : public std::runtime_error {
+ public:
+  VideoSimulatorError(Report report, const std::string& cause)
+      : std::runtime_error(cause), report_(std::move(report)) {}
+
+  const Report& report() const { return report_; }
+
+ private:
+  Report report_;
+};
+
+/// Simulator of frames in system memory.
+class LumaVideoSimulator final : public VideoSimulator {
+ public:
+  LumaVideoSimulator(const GstVideoInfo& video, std::unique_ptr<eventcamera::Simulator> simulator)
+      : video_(video), luma_(video), simulator_(std::move(simulator)) {}
+
+  void set_video(const GstVideoInfo& video) override {
+    video_ = video;
+    luma_ = FrameLuma(video);
+  }
+
+  const eventcamera::EventBuckets* push(GstBuffer* frame, eventcamera::Nanoseconds time,
+                                        const eventcamera::Settings& settings) override {
+    const VideoFrame mapped(video_, frame, GST_MAP_READ);
+    if (!mapped)
+      throw VideoSimulatorError(
+          {GST_RESOURCE_ERROR_FAILED,
+           "Cannot read a video frame: " + mapped.fault() + ". Check the element upstream."},
+          mapped.fault());
+    return simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
+  }
+
+  eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
+
+ private:
+  GstVideoInfo video_;
+  FrameLuma luma_;
+  std::unique_ptr<eventcamera::Simulator> simulator_;
+};
+
+/// For EventSimulatorMethod::create: a simulator made by `make` from the format of the luma.
+template <auto make>
+std::unique_ptr<VideoSimulator> in_system_memory(GObject*, const GstVideoInfo& video) {
+  return std::make_unique<LumaVideoSimulator>(video, make(FrameLuma::format_of(video)));
+}
