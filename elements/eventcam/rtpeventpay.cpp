@@ -32,6 +32,7 @@
 #include <string>
 
 #include "elements/eventcam/rtp_events.hpp"
+#include "elements/eventcam/rtp_header_extensions.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
@@ -89,6 +90,7 @@ struct Private {
   std::optional<State> state;
   EventFaults faults{"send"};
   GstFlowReturn flow = GST_FLOW_OK;  ///< result of the last packets
+  RtpHeaderExtensions extensions;
 
   std::optional<FlushTimer> timer;  ///< while streaming
 };
@@ -115,9 +117,19 @@ static GuardedSettings<Settings>& settings_of(GObject* object) {
 
 /* packets */
 
+/// Maximum size of the RTP header, with the CSRCs and header extensions that the base class writes.
+static gsize max_header_size(GstRtpEventPay* self) {
+  auto* payload = GST_RTP_BASE_PAYLOAD(self);
+  const OwnedBuffer packet(gst_rtp_base_payload_allocate_output_buffer(payload, 0, 0, 0));
+  const OwnedCaps caps(gst_pad_get_current_caps(GST_RTP_BASE_PAYLOAD_SRCPAD(self)));
+  return gst_buffer_get_size(packet.get()) +
+         (caps ? self->priv->extensions.max_size(caps, packet.get()) : 0);
+}
+
 /// Maximum size of a payload.
-static guint max_payload_size(GstRtpEventPay* self) {
-  return gst_rtp_buffer_calc_payload_len(GST_RTP_BASE_PAYLOAD_MTU(self), 0, 0);
+static gsize max_payload_size(GstRtpEventPay* self) {
+  const gsize header = max_header_size(self);
+  return std::max<gsize>(GST_RTP_BASE_PAYLOAD_MTU(self), header) - header;
 }
 
 static GstBuffer* make_packet(GstRtpEventPay* self, std::span<const std::uint8_t> payload,
@@ -173,10 +185,10 @@ static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
   priv.flow = GST_FLOW_OK;
   const auto failure = [&](const std::exception& error) -> Report {
     if (is_a<std::invalid_argument>(error))
-      return {GST_STREAM_ERROR_FORMAT, "An RTP packet of " +
-                                           std::to_string(GST_RTP_BASE_PAYLOAD_MTU(self)) +
-                                           " bytes has no space for events; set mtu to at least " +
-                                           std::to_string(RtpPacker::min_size + 12) + "."};
+      return {GST_STREAM_ERROR_FORMAT,
+              "An RTP packet of " + std::to_string(GST_RTP_BASE_PAYLOAD_MTU(self)) +
+                  " bytes has no space for events; set mtu to at least " +
+                  std::to_string(RtpPacker::min_size + max_header_size(self)) + "."};
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
   };
   if (!guarded(self, failure, work)) return GST_FLOW_ERROR;

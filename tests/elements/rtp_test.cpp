@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // rtpeventpay and rtpeventdepay: what arrives, when, and what is counted.
 #include <gst/rtp/gstrtpbuffer.h>
+#include <gst/rtp/gstrtphdrext.h>
+#include <gst/rtp/gstrtpmeta.h>
 #include <gst/sdp/gstsdpmessage.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <random>
 
@@ -178,6 +181,46 @@ TEST_P(EveryFormat, SendsPacketsUpToTheMtu) {
     if (mtu < 9000) {
       EXPECT_GT(largest, mtu - 20);
     }
+  }
+}
+
+TEST_P(EveryFormat, KeepsToTheMtuWithSourcesAndHeaderExtensions) {
+  const auto intervals = rtp_packets::random_intervals(davis, 20, 5);
+  constexpr guint mtu = 576;
+  // An extension of the receiver, with a header of one byte, and one of the application, of two.
+  for (const std::string receiver : {", extmap-3=(string)http://www.ietf.org/id/"
+                                     "draft-holmer-rmcat-transport-wide-cc-extensions-01",
+                                     ""}) {
+    Harness h("rtpeventpay max-latency=0 source-info=true mtu=576 format=" +
+              std::string(GetParam()));
+    if (receiver.empty()) {
+      GstElement* mid = gst_element_factory_make("rtphdrextmid", nullptr);
+      g_object_set(mid, "mid", "0123456789abcdef", nullptr);
+      gst_rtp_header_extension_set_id(GST_RTP_HEADER_EXTENSION(mid), 200);
+      g_signal_emit_by_name(h.element(), "add-extension", mid);
+      gst_object_unref(mid);
+    }
+    h.caps(davis_caps, "application/x-rtp" + receiver);
+    for (const auto& interval : intervals) {
+      if (interval.events.empty()) continue;
+      GstBuffer* buffer = buffer_of(static_cast<GstClockTime>(interval.start), interval.events,
+                                    static_cast<GstClockTime>(interval.duration));
+      const guint32 ssrc = 7;
+      const std::array<guint32, 9> csrcs = {1, 2, 3, 4, 5, 6, 7, 8, 9};
+      gst_buffer_add_rtp_source_meta(buffer, &ssrc, csrcs.data(), csrcs.size());
+      ASSERT_EQ(h.push(buffer), GST_FLOW_OK);
+    }
+    gsize largest = 0;
+    while (const auto packet = h.pull()) {
+      largest = std::max(largest, gst_buffer_get_size(packet.get()));
+      GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+      ASSERT_TRUE(gst_rtp_buffer_map(packet.get(), GST_MAP_READ, &rtp));
+      EXPECT_EQ(gst_rtp_buffer_get_csrc_count(&rtp), 10);
+      EXPECT_TRUE(gst_rtp_buffer_get_extension(&rtp));
+      gst_rtp_buffer_unmap(&rtp);
+    }
+    EXPECT_LE(largest, mtu);
+    EXPECT_GT(largest, mtu - 20);
   }
 }
 
