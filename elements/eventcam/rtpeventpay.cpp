@@ -41,6 +41,7 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/properties.hpp"
+#include "gst/base/sensor_events.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/wire/pending_interval.hpp"
@@ -281,7 +282,9 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       if (priv.state) priv.state->pending.clear();
       break;
     default:
-      if (GST_EVENT_IS_SERIALIZED(event)) reported(self, [&] { send(self); });
+      // Those of sensors precede each buffer, and may precede the ones that it is joined to.
+      if (GST_EVENT_IS_SERIALIZED(event) && !is_sensor_event(event))
+        reported(self, [&] { send(self); });
       break;
   }
   return PARENT_PAYLOAD_CLASS->sink_event(payload, event);

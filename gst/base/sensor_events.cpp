@@ -31,11 +31,14 @@ static GstEvent* new_event(const char* name, std::span<const Record> records) {
   return gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, structure);
 }
 
+static bool is_named(GstEvent* event, const char* name) {
+  return GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM && gst_event_has_name(event, name);
+}
+
 /// A partial record at the end is ignored, and records at an impossible time are.
 template <class Record>
 static std::optional<std::vector<Record>> records_of(GstEvent* event, const char* name) {
-  if (GST_EVENT_TYPE(event) != GST_EVENT_CUSTOM_DOWNSTREAM || !gst_event_has_name(event, name))
-    return std::nullopt;
+  if (!is_named(event, name)) return std::nullopt;
   std::vector<Record> records;
   const GValue* const value = gst_structure_get_value(gst_event_get_structure(event), field);
   if (value == nullptr || !G_VALUE_HOLDS(value, G_TYPE_BYTES)) return records;
@@ -59,6 +62,10 @@ GstEvent* new_sensor_event(std::span<const Trigger> triggers) {
 
 GstEvent* new_sensor_event(std::span<const ImuSample> samples) {
   return new_event(imu_name, samples);
+}
+
+bool is_sensor_event(GstEvent* event) {
+  return is_named(event, triggers_name) || is_named(event, imu_name);
 }
 
 std::optional<std::vector<Trigger>> triggers_of(GstEvent* event) {

@@ -17,6 +17,9 @@
 GstEvent* new_sensor_event(std::span<const eventcamera::Trigger> triggers);
 GstEvent* new_sensor_event(std::span<const eventcamera::ImuSample> samples);
 
+/// True if an event holds triggers or IMU samples.
+bool is_sensor_event(GstEvent* event);
+
 /// Return the content of an event; nothing if it is another event.
 std::optional<std::vector<eventcamera::Trigger>> triggers_of(GstEvent* event);
 std::optional<std::vector<eventcamera::ImuSample>> imu_samples_of(GstEvent* event);

@@ -294,6 +294,34 @@ TEST(RtpEventPay, JoinsShortBuffersUpToItsLatency) {
   for (const auto& interval : output.intervals) EXPECT_LE(interval.duration, 5'000'000);
 }
 
+void push_custom_event(Harness& h, const char* name) {
+  gst_harness_push_event(
+      h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty(name)));
+}
+
+TEST(RtpEventPay, JoinsBuffersWithTriggersAndImuSamplesBetweenThem) {
+  Harness h("rtpeventpay max-latency=1000000000");
+  h.caps(davis_caps, "application/x-rtp");
+  const std::array names = {"GstEventCameraTriggers", "GstEventCameraImu"};
+  for (int i = 0; i < 10; ++i) {
+    for (const auto* name : names) push_custom_event(h, name);
+    push(h, {i * 1'000'000, 1'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  }
+  EXPECT_FALSE(h.pull());
+  for (int i = 0; i < 10; ++i) {
+    for (const auto* name : names) {
+      const auto event = h.pull_event(GST_EVENT_CUSTOM_DOWNSTREAM);
+      ASSERT_TRUE(event);
+      EXPECT_TRUE(gst_event_has_name(event.get(), name));
+    }
+  }
+  // Other events stay between the buffers around them.
+  push_custom_event(h, "other");
+  const auto packet = h.pull();
+  ASSERT_TRUE(packet);
+  EXPECT_EQ(Fields(packet.get()).header->event_count, 10);
+}
+
 TEST(RtpEventPay, SendsWaitingEventsWithoutFurtherInput) {
   Harness h("rtpeventpay max-latency=5000000");
   h.caps(davis_caps, "application/x-rtp");
