@@ -68,6 +68,7 @@ constexpr GstClockTimeDiff max_drift = GST_SECOND;
 
 /// Shorter silences belong to the interval of the next buffer, longer ones are a GAP event.
 constexpr Microseconds min_gap = 1000;
+static_assert(min_gap + eventcamera::max_datagram_span <= G_MAXUINT32, "wraps times in buffers");
 
 /// State of the stream, from start to stop.
 struct State {
@@ -75,6 +76,7 @@ struct State {
   std::unique_ptr<DatagramUnpacker> unpacker;
   std::vector<AbsoluteEvent> events{};  ///< of the current datagram
   GstSegment upstream{};                ///< of arrival times
+  guint32 segment_seqnum = gst_util_seqnum_next();
   std::optional<GstSegment> segment{};  ///< of the events, once pushed
   Microseconds end = 0;                 ///< of the last buffer
   bool is_discontinuous = false;        ///< before the next buffer
@@ -157,7 +159,9 @@ static void push_segment(Private& priv, Microseconds t, GstClockTime arrival) {
   }
   state.segment = segment;
   state.end = t;
-  gst_pad_push_event(priv.src, gst_event_new_segment(&segment));
+  GstEvent* const event = gst_event_new_segment(&segment);
+  gst_event_set_seqnum(event, state.segment_seqnum);
+  gst_pad_push_event(priv.src, event);
 }
 
 /// Buffer of the events of the interval (start, end]. May throw.
@@ -278,7 +282,10 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto& state = self->priv->state;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
-      if (state) gst_event_copy_segment(event, &state->upstream);
+      if (state) {
+        gst_event_copy_segment(event, &state->upstream);
+        state->segment_seqnum = gst_event_get_seqnum(event);
+      }
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_CAPS:

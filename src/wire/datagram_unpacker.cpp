@@ -69,7 +69,7 @@ class UnpackerOf final : public DatagramUnpacker {
     if (!std::ranges::is_sorted(events, by_time)) std::ranges::stable_sort(events, by_time);
     if (events.empty()) return nullptr;
     if (events.back().t > datagram_layouts::max_time) return datagram_layouts::time_range;
-    if (events.back().t - events.front().t > max_interval / 1000)
+    if (events.back().t - events.front().t > max_datagram_span)
       return "its events are more than 71 minutes apart";
     return nullptr;
   }

@@ -13,6 +13,10 @@
 
 namespace eventcamera {
 
+/// Maximum time between the first and the last event of a datagram: 71 minutes, so that a 32-bit
+/// time tells it even after a short pause.
+inline constexpr Microseconds max_datagram_span = Microseconds{71} * 60 * 1'000'000;
+
 /// What became of a received datagram.
 struct Reception {
   const char* fault = nullptr;  ///< why it was rejected, for users; null if it was not

@@ -437,6 +437,24 @@ TEST(Datagrams, WithImpossibleTimesAreRejected) {
   EXPECT_STREQ(t32.take(leaps).fault, "its events are more than 71 minutes apart");
 }
 
+TEST(Datagrams, MaySpan71Minutes) {
+  const DatagramSettings settings{
+      .format = t64_x16_y16_on8, .width = 640, .height = 480, .byte_order = std::endian::little};
+  for (const Microseconds over : {0, 1}) {
+    const std::vector events{AbsoluteEvent::at(1, 2, 5, on),
+                             AbsoluteEvent::at(1, 2, 5 + 71 * 60'000'000LL + over, on)};
+    const auto packer = make_datagram_packer(settings);
+    Receiver receiver(settings);
+    const auto packets = datagrams::packets_of(*packer, events);
+    ASSERT_EQ(packets.size(), 1);
+    const auto* fault = receiver.take(packets[0].bytes).fault;
+    if (over == 0)
+      EXPECT_EQ(receiver.events, events);
+    else
+      EXPECT_STREQ(fault, "its events are more than 71 minutes apart");
+  }
+}
+
 /// A datagram of jAER with an event at `t`.
 Bytes jaer_packet(std::uint32_t number, std::uint32_t t) {
   Bytes bytes(12);
