@@ -98,11 +98,11 @@ static GuardedSettings<DatagramCounts>& counts_of(GObject* object) {
 /* datagrams */
 
 static Report report_of(const std::exception& error) {
-  if (is_a<std::bad_alloc>(error))
-    return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
-  return {GST_STREAM_ERROR_FORMAT,
-          std::string("Cannot send events of this sensor in this format: ") + error.what() +
-              ". Select another format."};
+  if (is_a<std::invalid_argument>(error))
+    return {GST_STREAM_ERROR_FORMAT,
+            std::string("Cannot send events of this sensor in this format: ") + error.what() +
+                ". Select another format."};
+  return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
 }
 
 /// Keeps a datagram until push(). May throw.
@@ -128,7 +128,7 @@ static GstFlowReturn push(Private& priv) {
   return gst_pad_push_list(priv.src, list);
 }
 
-/// Limits the time that a new incomplete datagram waits.
+/// Limits the time that a new incomplete datagram waits. May throw.
 static void set_timer(Private& priv) {
   const auto since = priv.packer ? priv.packer->waiting_since() : std::nullopt;
   if (!priv.timer || since == priv.timed) return;
@@ -146,8 +146,8 @@ static GstFlowReturn pack(GstEventDatagramPay* self, const Work& work) {
   auto& priv = *self->priv;
   const bool packed = guarded(self, report_of, [&] {
     if (priv.packer) work(*priv.packer, [&](const Datagram& datagram) { keep(priv, datagram); });
+    set_timer(priv);
   });
-  set_timer(priv);
   return packed ? push(priv) : GST_FLOW_ERROR;
 }
 

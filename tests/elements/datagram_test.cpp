@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Events in datagrams of other tools: packed, unpacked, through sockets, and beside hostile ones.
+#include <pthread.h>
+
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -357,6 +359,38 @@ TEST(Payloader, LetsNoEventWaitIfNoBufferComes) {
   }
 }
 
+/// While it exists, threads get a stack of more than the address space, so none can start.
+class NoThreads {
+ public:
+  NoThreads() {
+    EXPECT_EQ(pthread_getattr_default_np(&before_), 0);
+    pthread_attr_t huge;
+    pthread_attr_init(&huge);
+    EXPECT_EQ(pthread_attr_setstacksize(&huge, std::size_t{1} << 60), 0);
+    EXPECT_EQ(pthread_setattr_default_np(&huge), 0);
+    pthread_attr_destroy(&huge);
+  }
+  ~NoThreads() {
+    EXPECT_EQ(pthread_setattr_default_np(&before_), 0);
+    pthread_attr_destroy(&before_);
+  }
+  NoThreads(const NoThreads&) = delete;
+  NoThreads& operator=(const NoThreads&) = delete;
+
+ private:
+  pthread_attr_t before_;
+};
+
+TEST(Payloader, ReportsThatItsTimerCannotStart) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1");
+  h.caps(events_caps, "application/x-event-datagram");
+  const NoThreads none;
+  EXPECT_EQ(h.push(buffer_of(0, {Event::at(1, 2, 3, Polarity::on)}, GST_MSECOND)), GST_FLOW_ERROR);
+  const auto error = h.message(GST_MESSAGE_ERROR);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(text_of(error.get()), "Not enough memory to send the events.");
+}
+
 TEST(Payloader, FillsDatagramsIfItMay) {
   Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=1000000000000");
   h.caps(events_caps, "application/x-event-datagram");
@@ -617,6 +651,50 @@ TEST(Depayloader, ReportsItsLatency) {
   Depay h("latency=30000000");
   gst_harness_set_upstream_latency(h.get(), 40 * GST_MSECOND);
   EXPECT_EQ(gst_harness_query_latency(h.get()), 70 * GST_MSECOND);
+}
+
+/// One of faery with times of 64 bits, with an event at each of `times`.
+GstBuffer* t64(std::initializer_list<guint64> times, GstClockTime arrival) {
+  std::vector<guint8> bytes;
+  for (const auto t : times) {
+    bytes.resize(bytes.size() + 13);
+    GST_WRITE_UINT64_LE(&bytes[bytes.size() - 13], t);
+  }
+  return datagram(bytes, arrival);
+}
+
+TEST(Depayloader, KeepsTimesOfEventsThatAreFarApart) {
+  constexpr guint64 first = 1'000'000;
+  constexpr guint64 next = first + 1000;  // the longest pause without a GAP event
+  constexpr guint64 longest = G_GUINT64_CONSTANT(71) * 60 * 1'000'000;
+  for (const guint64 span : {longest, longest + 1, guint64{G_MAXUINT32}}) {
+    Depay h("format=t64-x16-y16-on8");
+    h.push(t64({first}, 0));
+    h.push(t64({next, next + span}, GST_MSECOND));
+    std::vector<guint64> times;
+    for (const auto& event : pull_events(h)) times.push_back(static_cast<guint64>(event.t));
+    if (span == longest)
+      EXPECT_EQ(times, (std::vector{first, next, next + span}));
+    else
+      EXPECT_EQ(times, std::vector{first}) << span;
+    EXPECT_EQ(stat_of(h.element(), "rejected"), span == longest ? 0 : 1);
+  }
+}
+
+TEST(Depayloader, SegmentsHaveTheSequenceNumberOfUpstream) {
+  Depay h("format=t32-x16-y15-on1");
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  GstEvent* event = gst_event_new_segment(&segment);
+  const guint32 number = gst_event_get_seqnum(event);
+  gst_harness_push_event(h.get(), event);
+  h.push(t32(5'000'000, 0, GST_SECOND));
+  h.push(t32(0, 0, 2 * GST_SECOND));
+  for (int i = 0; i < 2; ++i) {
+    const auto sent = h.pull_event(GST_EVENT_SEGMENT);
+    ASSERT_TRUE(sent);
+    EXPECT_EQ(gst_event_get_seqnum(sent.get()), number);
+  }
 }
 
 TEST(Depayloader, StartsOverAfterAFlush) {
