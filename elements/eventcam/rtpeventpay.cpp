@@ -16,7 +16,8 @@
  *
  * - `packets`, `bytes` (#guint64): packets sent, and the size of their payloads;
  * - `events` (#guint64): events sent; those received plus those that receivers count as lost;
- * - `left-out-events` (#guint64): events not sent.
+ * - `left-out-events` (#guint64): events not sent, for one of these reasons, because their buffer
+ *   has no PTS, one of more than 292 years or a partial event, or because of a flush.
  *
  * ## Example launch line
  * |[
@@ -235,21 +236,24 @@ static PendingInterval::LeftOut take(GstRtpEventPay* self, EventInterval interva
 
 /* streaming */
 
+/// Leaves out a buffer.
+static GstFlowReturn leave_out(GstRtpEventPay* self, EventFault fault, GstBuffer* buffer) {
+  self->priv->faults.warn(self, fault, buffer);
+  self->priv->sent.lock()->left_out += gst_buffer_get_size(buffer) / sizeof(Event);
+  return GST_FLOW_OK;
+}
+
 static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken) {
   auto* self = GST_RTP_EVENT_PAY(payload);
   auto& priv = *self->priv;
   const OwnedBuffer buffer(taken);
   if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  if (!GST_BUFFER_PTS_IS_VALID(taken)) return leave_out(self, EventFault::no_pts, taken);
   const auto interval = interval_of(taken);
-  if (!interval || interval->start > static_cast<GstClockTime>(eventcamera::max_rtp_start)) {
-    priv.faults.warn(self, EventFault::no_pts, taken);
-    return GST_FLOW_OK;
-  }
+  if (!interval || interval->start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
+    return leave_out(self, EventFault::pts_too_large, taken);
   const MappedEvents mapped(taken);
-  if (!mapped) {
-    priv.faults.warn(self, EventFault::partial_event, taken);
-    return GST_FLOW_OK;
-  }
+  if (!mapped) return leave_out(self, EventFault::partial_event, taken);
   return reported(self, [&] {
     const auto [outside, unsorted] = take(self, *interval, mapped.events());
     priv.sent.lock()->left_out += outside + unsorted;
@@ -258,16 +262,19 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   });
 }
 
-/// Sends a GAP event as an interval without events.
+/// Sends a GAP event as an interval without events; at once if its duration is unknown.
 static void take_gap(GstRtpEventPay* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!self->priv->state || !GST_CLOCK_TIME_IS_VALID(duration) ||
-      start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
-    return;
-  const GstClockTime end = start + std::min(duration, GstClockTime{eventcamera::max_interval});
-  reported(self, [&] { take(self, {start, end}, {}); });
+  if (!self->priv->state || start > static_cast<GstClockTime>(eventcamera::max_rtp_start)) return;
+  const bool is_known = GST_CLOCK_TIME_IS_VALID(duration);
+  const GstClockTime end =
+      is_known ? start + std::min(duration, GstClockTime{eventcamera::max_interval}) : start;
+  reported(self, [&] {
+    take(self, {start, end}, {});
+    if (!is_known) send(self);
+  });
 }
 
 static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
@@ -279,7 +286,10 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_FLUSH_STOP:
-      if (priv.state) priv.state->pending.clear();
+      if (priv.state) {
+        priv.sent.lock()->left_out += priv.state->pending.events().size();
+        priv.state->pending.clear();
+      }
       break;
     default:
       // Those of sensors precede each buffer, and may precede the ones that it is joined to.

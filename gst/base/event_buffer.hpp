@@ -65,7 +65,7 @@ inline constexpr GstClockTime event_resolution = GST_USECOND;
 std::optional<EventInterval> interval_of(GstBuffer* buffer);
 
 /// Reason for skipping events of a buffer.
-enum class EventFault { no_pts, partial_event, beyond_sensor, unsorted };
+enum class EventFault { no_pts, pts_too_large, partial_event, beyond_sensor, unsorted };
 
 /// Posts warnings about events that an element skips, once per fault and stream.
 class EventFaults {
@@ -80,5 +80,5 @@ class EventFaults {
 
  private:
   const char* verb_;
-  std::array<WarnOnce, 4> warnings_{};
+  std::array<WarnOnce, 5> warnings_{};
 };
