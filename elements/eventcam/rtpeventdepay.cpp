@@ -23,6 +23,7 @@
  * - `events`: events received;
  * - `lost-packets`, `lost-events`: what the sender sent and did not arrive in time, since the first
  *   packet;
+ * - `late-packets`: duplicates, and packets that came after later ones; dropped;
  * - `rejected-packets`: packets that are not of this format or sensor, or corrupt.
  *
  * ## Example launch line
@@ -90,8 +91,10 @@ struct State {
 struct Private {
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
-  GstPadChainFunction chain = nullptr;           ///< of the base class
-  GstPadChainListFunction chain_list = nullptr;  ///< of the base class
+  guint32 segment_seqnum = gst_util_seqnum_next();  ///< of upstream
+  GstPadChainFunction chain = nullptr;              ///< of the base class
+  GstPadChainListFunction chain_list = nullptr;     ///< of the base class
+  guint processed = 0;                              ///< packets that the base class passed on
 
   Guarded<RtpStatistics> statistics;
 };
@@ -141,7 +144,9 @@ static void update_segment(GstRtpEventDepay* self, GstClockTime start, GstClockT
     next.time = next.base;
   }
   segment = next;
-  gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), gst_event_new_segment(&next));
+  GstEvent* event = gst_event_new_segment(&next);
+  gst_event_set_seqnum(event, self->priv->segment_seqnum);
+  gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), event);
 }
 
 static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
@@ -178,6 +183,7 @@ static std::span<const std::uint8_t> payload_of(GstRTPBuffer* rtp) {
 static GstBuffer* process(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
   auto* self = GST_RTP_EVENT_DEPAY(depayload);
   auto& priv = *self->priv;
+  ++priv.processed;
   if (!priv.state) return nullptr;
   auto& state = *priv.state;
   const eventcamera::RtpPacket packet{
@@ -214,9 +220,24 @@ static bool is_plausible(GstRtpEventDepay* self, GstBuffer* buffer) {
   return plausible;
 }
 
+/// Calls `chain`, which gives packets to the base class. It drops those that are late, which are
+/// counted here.
+template <class Chain>
+static GstFlowReturn counting_late(GstRtpEventDepay* self, guint packets, const Chain& chain) {
+  auto& priv = *self->priv;
+  priv.processed = 0;
+  const GstFlowReturn flow = chain();
+  if (flow == GST_FLOW_OK && priv.state && priv.processed < packets) {
+    priv.state->unpacker.count_late(packets - priv.processed);
+    *priv.statistics.lock() = priv.state->unpacker.statistics();
+  }
+  return flow;
+}
+
 static GstFlowReturn chain(GstPad* pad, GstObject* parent, GstBuffer* buffer) {
   auto* self = GST_RTP_EVENT_DEPAY(parent);
-  if (is_plausible(self, buffer)) return self->priv->chain(pad, parent, buffer);
+  if (is_plausible(self, buffer))
+    return counting_late(self, 1, [&] { return self->priv->chain(pad, parent, buffer); });
   gst_buffer_unref(buffer);
   return GST_FLOW_OK;
 }
@@ -232,7 +253,8 @@ static GstFlowReturn chain_list(GstPad* pad, GstObject* parent, GstBufferList* l
         return TRUE;
       },
       self);
-  return self->priv->chain_list(pad, parent, list);
+  return counting_late(self, gst_buffer_list_length(list),
+                       [&] { return self->priv->chain_list(pad, parent, list); });
 }
 
 static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
@@ -249,8 +271,11 @@ static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
       }
       break;
     case GST_EVENT_EOS:
+      flush(self);
+      break;
     case GST_EVENT_SEGMENT:
       flush(self);
+      self->priv->segment_seqnum = gst_event_get_seqnum(event);
       break;
     default:
       break;
@@ -343,12 +368,12 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 static void get_property(GObject* object, guint, GValue* value, GParamSpec*) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_DEPAYLOAD);
   const auto counted = *GST_RTP_EVENT_DEPAY(object)->priv->statistics.lock();
-  gst_structure_set(stats, "packets", G_TYPE_UINT64, guint64{counted.packets}, "bytes",
-                    G_TYPE_UINT64, guint64{counted.bytes}, "events", G_TYPE_UINT64,
-                    guint64{counted.events}, "lost-packets", G_TYPE_UINT64,
-                    guint64{counted.lost_packets}, "lost-events", G_TYPE_UINT64,
-                    guint64{counted.lost_events}, "rejected-packets", G_TYPE_UINT64,
-                    guint64{counted.rejected_packets}, nullptr);
+  gst_structure_set(
+      stats, "packets", G_TYPE_UINT64, guint64{counted.packets}, "bytes", G_TYPE_UINT64,
+      guint64{counted.bytes}, "events", G_TYPE_UINT64, guint64{counted.events}, "lost-packets",
+      G_TYPE_UINT64, guint64{counted.lost_packets}, "lost-events", G_TYPE_UINT64,
+      guint64{counted.lost_events}, "late-packets", G_TYPE_UINT64, guint64{counted.late_packets},
+      "rejected-packets", G_TYPE_UINT64, guint64{counted.rejected_packets}, nullptr);
   g_value_take_boxed(value, stats);
 }
 

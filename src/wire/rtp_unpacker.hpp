@@ -78,8 +78,9 @@ class RtpUnpacker {
   /// True if a packet may be one of this format: a quick check of its header.
   bool is_plausible(std::span<const std::uint8_t> payload) const;
 
-  /// Counts a packet that was dropped because it is not plausible.
+  /// Count packets that were dropped before they came here: not plausible, or late.
   void count_rejected() { ++statistics_.rejected_packets; }
+  void count_late(std::uint64_t packets) { statistics_.late_packets += packets; }
 
   const RtpStatistics& statistics() const { return statistics_; }
 

@@ -240,6 +240,7 @@ TEST_P(EveryFormat, CountsLossDuplicationAndReordering) {
     }
     Depayloader h(GetParam());
     for (auto* packet : arriving) h.take(packet);
+    EXPECT_EQ(stat(h, "packets") + stat(h, "late-packets"), arriving.size());
     end(h);
     const Output output(h);
     const auto received = absolute(output.intervals);
@@ -377,6 +378,20 @@ TEST(RtpEventPay, TellsOfSilence) {
   EXPECT_EQ(fields.header->duration, 40'000'000);
 }
 
+TEST(RtpEventPay, TellsOfSilenceOfUnknownDuration) {
+  Harness h("rtpeventpay max-latency=1000000000");
+  h.caps(davis_caps, "application/x-rtp");
+  push(h, {0, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  for (const GstClockTime start : {ms, 5 * ms}) {
+    gst_harness_push_event(h.get(), gst_event_new_gap(start, GST_CLOCK_TIME_NONE));
+    const auto packet = h.pull();
+    ASSERT_TRUE(packet);
+    EXPECT_EQ(Fields(packet.get()).header->event_count, start == ms ? 1 : 0);
+    EXPECT_EQ(Fields(packet.get()).header->start, start == ms ? 0 : 5'000'000);
+    EXPECT_FALSE(h.pull());
+  }
+}
+
 TEST(RtpEventPay, WarnsOfEventsThatItCannotSend) {
   Harness h("rtpeventpay");
   h.caps(davis_caps, "application/x-rtp");
@@ -392,10 +407,40 @@ TEST(RtpEventPay, WarnsOfEventsThatItCannotSend) {
   EXPECT_NE(text_of(unsorted.get()).find("earlier than those before them"), std::string::npos);
   EXPECT_EQ(stat(h, "left-out-events"), 2U);
   EXPECT_EQ(stat(h, "events"), 2U);
-  GstBuffer* partial = gst_buffer_new_memdup("12345", 5);
-  GST_BUFFER_PTS(partial) = 20 * ms;
-  EXPECT_EQ(h.push(partial), GST_FLOW_OK);
-  EXPECT_TRUE(h.message(GST_MESSAGE_WARNING));
+}
+
+TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
+  Harness h("rtpeventpay max-latency=1000000000");
+  h.caps(davis_caps, "application/x-rtp");
+  const std::vector events(3, Event::at(1, 2, 3, Polarity::on));
+  guint64 left_out = 0;
+  const auto skips = [&](GstBuffer* buffer, const char* reason) {
+    EXPECT_EQ(h.push(buffer), GST_FLOW_OK);
+    const auto warning = h.message(GST_MESSAGE_WARNING);
+    ASSERT_TRUE(warning) << reason;
+    EXPECT_NE(text_of(warning.get()).find(reason), std::string::npos) << text_of(warning.get());
+    EXPECT_EQ(stat(h, "left-out-events"), left_out += 3) << reason;
+  };
+  skips(buffer_of(GST_CLOCK_TIME_NONE, events, ms), "has no PTS");
+  skips(buffer_of(static_cast<GstClockTime>(max_rtp_start) + 1, events, ms), "292 years");
+  GstBuffer* partial = buffer_of(0, events, ms);
+  gst_buffer_append(partial, gst_buffer_new_memdup("12345", 5));
+  skips(partial, "not a multiple of 8 bytes");
+  // Those that a flush drops.
+  push(h, {0, 1'000'000, events});
+  flush({h.get()});
+  EXPECT_EQ(stat(h, "left-out-events"), left_out + 3);
+  EXPECT_EQ(stat(h, "events"), 0U);
+}
+
+TEST(RtpEventPay, SendsUpToTheLatestStart) {
+  Harness h("rtpeventpay max-latency=0");
+  h.caps(davis_caps, "application/x-rtp");
+  push(h, {max_rtp_start, 1'000'000, {Event::at(1, 2, 3, Polarity::on)}});
+  const auto packet = h.pull();
+  ASSERT_TRUE(packet);
+  EXPECT_EQ(Fields(packet.get()).header->start, max_rtp_start);
+  EXPECT_EQ(stat(h, "left-out-events"), 0U);
 }
 
 TEST(RtpEventPay, RefusesWhatItCannotSend) {
@@ -471,6 +516,26 @@ TEST(RtpEventDepay, MapsTheSendersTimesToTheTimeOfArrival) {
   EXPECT_EQ(running(0, 14), 140 * ms);
   EXPECT_EQ(running(1, 15), 170 * ms);
   EXPECT_EQ(output.segments[1].time, 170 * ms);
+}
+
+TEST(RtpEventDepay, SegmentsHaveTheSequenceNumberOfUpstream) {
+  const std::vector<Interval> intervals = {
+      {0, 10'000'000, {Event::at(1, 2, 500, Polarity::on)}},
+      {10'000'000, 10'000'000, {Event::at(2, 2, 500, Polarity::on)}}};
+  const auto packets = packets_of(intervals);
+  Depayloader h;
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  GstEvent* event = gst_event_new_segment(&segment);
+  const guint32 number = gst_event_get_seqnum(event);
+  gst_harness_push_event(h.get(), event);
+  h.take(packets[0].get(), 0);
+  h.take(packets[1].get(), 80 * ms);
+  for (int i = 0; i < 2; ++i) {
+    const auto sent = h.pull_event(GST_EVENT_SEGMENT);
+    ASSERT_TRUE(sent);
+    EXPECT_EQ(gst_event_get_seqnum(sent.get()), number);
+  }
 }
 
 TEST(RtpEventDepay, StartsOverWithItsSender) {
