@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Events over RTP between hosts, on good and bad networks: what arrives was sent, what is lost is counted."""
+"""Events between hosts, by RTP and in datagrams of other tools, on good and bad networks: what arrives was sent, what is
+lost is counted."""
 import os
 import time
 
@@ -67,7 +68,7 @@ class Player:
         self._pipeline.set_state(Gst.State.NULL)
 
     def stat(self, field):
-        return self._pipeline.get_by_name("rtp").get_property("stats").get_uint64(field)[1]
+        return self._pipeline.get_by_name("counting").get_property("stats").get_uint64(field)[1]
 
     def resident_size(self):
         """In bytes."""
@@ -76,10 +77,10 @@ class Player:
 
 
 class Sender(Player):
-    def __init__(self, to, options=""):
+    def __init__(self, to, options="", payloader="rtpeventpay"):
         super().__init__(
             "appsrc name=in format=time is-live=true caps=application/x-event-camera,format=XYTP,width=346,height=260"
-            f" ! identity sync=true ! rtpeventpay name=rtp {options} ! {to}")
+            f" ! identity sync=true ! {payloader} name=counting {options} ! {to}")
 
     def send(self, first, end):
         """Returns when all is sent."""
@@ -98,7 +99,7 @@ class Sender(Player):
 
 
 class Receiver(Player):
-    def __init__(self, launch=f"{FROM_NETWORK} ! rtpeventdepay name=rtp", last=""):
+    def __init__(self, launch=f"{FROM_NETWORK} ! rtpeventdepay name=counting", last=""):
         self._received = [np.zeros((0, 3), np.int64)]
         super().__init__(f"{launch} {last} ! appsink name=out sync=false async=false")
 
@@ -118,17 +119,16 @@ class Receiver(Player):
 
 
 def is_part(some, everything):
-    """True if the rows stand in `everything` in the same order. All rows are different there."""
-    place = {tuple(row): i for i, row in enumerate(everything.tolist())}
-    places = [place.get(tuple(row), -1) for row in some.tolist()]
-    return all(a < b for a, b in zip([-1] + places, places))
+    """True if the rows stand in `everything` in the same order."""
+    rest = iter(everything.tolist())
+    return all(row in rest for row in some.tolist())
 
 
 TO_RECEIVER = f"udpsink host={Host.address(2)} port=5000 sync=false async=false"
 SMALL = f"mtu={576 - IP_AND_UDP}"  # many packets
 WITH_SSRC = "application/x-rtp,ssrc=(uint)1234"
 FROM_SSRC = FROM_NETWORK.replace("application/x-rtp", WITH_SSRC)
-JITTER_BUFFER = f"{FROM_NETWORK} ! rtpjitterbuffer latency=1000 ! rtpeventdepay name=rtp"
+JITTER_BUFFER = f"{FROM_NETWORK} ! rtpjitterbuffer latency=1000 ! rtpeventdepay name=counting"
 
 
 def exchange(conditions, loses, *, to=TO_RECEIVER, launch=None, options="", mtu=1500):
@@ -207,7 +207,7 @@ def fec():
     exchange(Conditions(loss=0.01), False, options=SMALL, mtu=576,
              to=f"{WITH_SSRC} ! rtpulpfecenc pt=122 percentage=100 multipacket=true ! {TO_RECEIVER}",
              launch=f"{FROM_SSRC} ! rtpstorage name=storage size-time=2000000000"
-             " ! rtpjitterbuffer do-lost=true latency=1000 ! rtpulpfecdec name=fec pt=122 ! rtpeventdepay name=rtp")
+             " ! rtpjitterbuffer do-lost=true latency=1000 ! rtpulpfecdec name=fec pt=122 ! rtpeventdepay name=counting")
 
 
 def rtx():
@@ -222,7 +222,7 @@ def rtx():
         "  udpsrc port=5001 caps=application/x-rtcp ! r.recv_rtcp_sink"
         f"  r.send_rtcp_src ! udpsink host={Host.address(1)} port=5001 sync=false async=false"
         f"  r.recv_rtp_src ! rtprtxreceive {types} ! rtpssrcdemux name=d  d.src_1234"
-        " ! rtpjitterbuffer do-retransmission=true latency=4000 ! rtpeventdepay name=rtp")
+        " ! rtpjitterbuffer do-retransmission=true latency=4000 ! rtpeventdepay name=counting")
 
 
 def receivers_come_and_go():
@@ -259,7 +259,7 @@ def a_sender_restarts():
 def multicast_to_a_slow_receiver():
     """The slow one loses what does not fit into its socket; the other gets everything in time."""
     group = FROM_NETWORK + " address=239.1.1.1 multicast-iface=eth0"
-    depay = " ! rtpeventdepay name=rtp"
+    depay = " ! rtpeventdepay name=counting"
     slow_group = group.replace("buffer-size=2000000", "buffer-size=4096")
     with Network((Sender, "udpsink host=239.1.1.1 port=5000 multicast-iface=eth0 sync=false async=false"),
                  (Receiver, group + depay),
@@ -284,7 +284,63 @@ def multicast_to_a_slow_receiver():
         assert slow.resident_size() - size < 8 << 20, f"grew by {slow.resident_size() - size} bytes"
 
 
+def exchange_datagrams(options, *, loss=0.0, has_times=True, is_numbered=False):
+    """Sends everything in datagrams of other tools; the first and the last ones arrive."""
+    depayloader = f"eventdatagramdepay name=counting width=346 height=260 {options}"
+    with Network((Sender, TO_RECEIVER, options, "eventdatagrampay"),
+                 (Receiver, f"udpsrc port=5000 buffer-size=2000000 ! {depayloader}")) as network:
+        source, target = network.hosts
+
+        def arrive():
+            wait_until(lambda: target.stat("packets") == source.stat("packets") - network.switch.lost, "packets miss")
+        source.send(0, 1)
+        arrive()
+        network.switch.conditions = Conditions(loss=loss)
+        source.send(1, BUFFERS - 1)
+        arrive()
+        network.switch.conditions = Conditions()
+        source.send(BUFFERS - 1, BUFFERS)
+        arrive()
+        wait_until(lambda: len(target.events()) >= target.stat("events"), "events stay in the depayloader")
+        first = 0 if has_times else 1
+        received, everything_sent = target.events()[:, first:], sent()[:, first:]
+        assert source.stat("events") == len(everything_sent)
+        assert target.stat("events") == len(received)
+        assert target.stat("rejected") == target.stat("late") == 0
+        assert (network.switch.lost > 0) == (loss > 0)
+        assert target.stat("lost") == (network.switch.lost if is_numbered else 0)
+        if loss:
+            assert 0.5 * len(everything_sent) < len(received) < len(everything_sent)
+            assert is_part(received, everything_sent), "events that were not sent, or in another order"
+        else:
+            assert np.array_equal(received, everything_sent)
+
+
+def t32():
+    exchange_datagrams("format=t32-x16-y15-on1")
+
+
+def t32_loss():
+    exchange_datagrams("format=t32-x16-y15-on1", loss=0.05)
+
+
+def spif():
+    exchange_datagrams("format=spif", has_times=False)
+
+
+def spif_loss():
+    exchange_datagrams("format=spif", loss=0.05, has_times=False)
+
+
+def jaer():
+    exchange_datagrams("format=jaer", is_numbered=True)
+
+
+def jaer_loss():
+    exchange_datagrams("format=jaer", loss=0.05, is_numbered=True)
+
+
 if __name__ == "__main__":
     hosts.run([no_loss, loss_1, loss_5, loss_20, duplication, reordering, everything, jitter, mtu_576,
                mtu_576_fragments, mtu_9000, fec, rtx, receivers_come_and_go, a_sender_restarts,
-               multicast_to_a_slow_receiver])
+               multicast_to_a_slow_receiver, t32, t32_loss, spif, spif_loss, jaer, jaer_loss])
