@@ -19,6 +19,7 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/simulator_buffers.hpp"
 #include "gst/base/simulator_caps.hpp"
+#include "gst/base/simulator_qos.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -37,8 +38,12 @@ namespace {
 constexpr guint max_interpolated_frames = 255;
 constexpr guint default_interpolated_frames = 10;
 
-/// Limit of the latency learnt from intervals.
+/// Limits of the interval and of the processing time in the latency.
 constexpr Nanoseconds max_latency = GST_SECOND;
+
+/// Processing time that sinks allow for (the default of their property processing-deadline).
+/// Multiples of it are reported as latency.
+constexpr Nanoseconds processing_deadline = 20 * GST_MSECOND;
 
 /// User-settable values, copied once per buffer.
 struct Settings {
@@ -54,6 +59,18 @@ struct State {
   bool discontinuous = false;  ///< the next buffer is discontinuous
 
   IntervalSimulator& simulator() const { return frames->simulator(); }
+};
+
+/// Delay from the start of an interval to its output.
+struct Latency {
+  LearntLatency interval;
+  LearntLatency processing;
+  Nanoseconds downstream = 0;  ///< of elements downstream that do not report it
+
+  Latency() { processing.expect(0); }
+  GstClockTime total() const {
+    return static_cast<GstClockTime>(interval.value() + processing.value() + downstream);
+  }
 };
 
 /// State from start to stop, independent of caps.
@@ -73,7 +90,8 @@ struct GstEventSimulatorPrivate {
   GuardedSettings<Settings> settings;
   std::shared_ptr<void> method_settings;
 
-  Guarded<LearntLatency> latency;  // make no calls while holding its lock
+  GuardedSettings<SimulatorQos> qos;
+  Guarded<Latency> latency;  // make no calls while holding its lock
 
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
@@ -154,27 +172,89 @@ static void install_base_properties(GObjectClass* klass) {
                                    property_flags));
 }
 
-/* time */
-
-static GstClockTime latency_of(GstEventSimulator* self) {
-  return static_cast<GstClockTime>(priv_of(self).latency.lock()->value());
+static GuardedSettings<SimulatorQos>& qos_of(GObject* object) {
+  return priv_of(GST_EVENT_SIMULATOR(object)).qos;
 }
+
+/// Overrides the property `qos` of GstBaseTransform, whose default is off.
+static void install_qos_properties(GObjectClass* klass) {
+  Properties<qos_of> properties(klass);
+  properties.add(
+      [](SimulatorQos& qos, const GValue* value) { qos.enable(g_value_get_boolean(value)); },
+      [](SimulatorQos& qos, GValue* value) { g_value_set_boolean(value, qos.is_enabled()); },
+      g_param_spec_boolean("qos", "QoS",
+                           "Skip whole frames, without processing them, if downstream is late; the "
+                           "next interval is longer. By default on for events drawn as video, off "
+                           "for events",
+                           TRUE,
+                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                    GST_PARAM_MUTABLE_PLAYING)));
+  properties.add(
+      [](SimulatorQos&, const GValue*) {},
+      [](SimulatorQos& qos, GValue* value) { g_value_take_boxed(value, qos.stats()); },
+      g_param_spec_boxed("stats", "Statistics",
+                         "Counts since start: frames (processed), skipped (frames, because of "
+                         "qos), processing-time (of all processed frames, ns)",
+                         GST_TYPE_STRUCTURE,
+                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+}
+
+/* time */
 
 /// Posts a message if this changes the latency.
 template <class Change>
 static void change_latency(GstEventSimulator* self, const Change& change) {
-  const GstClockTime before = latency_of(self);
-  change(*priv_of(self).latency.lock());
-  const GstClockTime latency = latency_of(self);
-  if (latency == before) return;
-  GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(latency));
+  GstClockTime before = 0;
+  GstClockTime after = 0;
+  {
+    const auto latency = priv_of(self).latency.lock();
+    before = latency->total();
+    change(*latency);
+    after = latency->total();
+  }
+  if (after == before) return;
+  GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(after));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
 }
 
-/// Raises the latency to the observed interval: the framerate in the caps may be missing or wrong.
+/// Adapts the latency to an interval: the framerate in the caps may be missing or wrong.
 static void learn_latency(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
-  change_latency(
-      self, [&](LearntLatency& latency) { latency.add(end, std::min(end - start, max_latency)); });
+  change_latency(self, [&](Latency& latency) {
+    latency.interval.add(end, std::min(end - start, max_latency));
+  });
+}
+
+/// Starts processing a frame. Returns false if the frame is skipped instead.
+static bool begin_work(GstEventSimulator* self, GstBuffer* frame) {
+  const bool ends_interval = priv_of(self).state->simulator().last_time().has_value();
+  GstMessage* skipped = nullptr;
+  priv_of(self).qos.access([&](SimulatorQos& qos) {
+    skipped = qos.begin(GST_BASE_TRANSFORM(self), frame, ends_interval);
+  });
+  if (skipped == nullptr) return true;
+  GST_DEBUG_OBJECT(self, "skipped %" GST_PTR_FORMAT, frame);
+  gst_element_post_message(GST_ELEMENT(self), skipped);
+  return false;
+}
+
+/// Ends the processing of the frame of this time, and adapts the latency to its duration.
+static void end_work(GstEventSimulator* self, Nanoseconds time) {
+  Nanoseconds work = 0;
+  Nanoseconds downstream = 0;
+  priv_of(self).qos.access([&](SimulatorQos& qos) {
+    work = qos.end_work(GST_BASE_TRANSFORM(self));
+    downstream = qos.downstream_latency();
+  });
+  change_latency(self, [&](Latency& latency) {
+    latency.processing.add(time,
+                           std::min(work, max_latency) / processing_deadline * processing_deadline);
+    latency.downstream = downstream;
+  });
+}
+
+/// Ends the processing of a frame, after its output has been pushed.
+static void end_frame(GstEventSimulator* self) {
+  priv_of(self).qos.access([self](SimulatorQos& qos) { qos.end(GST_BASE_TRANSFORM(self)); });
 }
 
 /// Makes the next frame a first frame.
@@ -349,9 +429,10 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   // Pictures have the time of their frame, intervals that of the previous frame.
   const GstClockTime duration = state->drawing ? 0 : frame_duration(video);
   if (duration > 0 || state->drawing)
-    change_latency(self, [duration](LearntLatency& latency) {
-      latency.expect(static_cast<Nanoseconds>(duration));
+    change_latency(self, [duration](Latency& latency) {
+      latency.interval.expect(static_cast<Nanoseconds>(duration));
     });
+  priv_of(self).qos.access([&](SimulatorQos& qos) { qos.take_output(state->drawing.has_value()); });
   return TRUE;
 }
 
@@ -419,17 +500,26 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   const Settings settings = priv_of(self).settings.copy();
 
   check_interlacing(self, in);
-  if (!check_time(self, in)) return GST_FLOW_OK;
+  if (!check_time(self, in) || !begin_work(self, in)) return GST_FLOW_OK;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
   const auto start = state.simulator().last_time();
   configure(self);
   const EventBuckets* events = state.frames->push(in, end, settings.simulation);
   if (state.drawing) {
     priv_of(self).stream.handed_out_until = end;
-    return draw_frame(self, events, settings.palette, end, in, out);
+    const GstFlowReturn result = draw_frame(self, events, settings.palette, end, in, out);
+    end_work(self, end);
+    if (result == GST_FLOW_OK)
+      priv_of(self).qos.access([&](const SimulatorQos& qos) {
+        qos.extend(transform, *out, frame_duration(state.video));
+      });
+    return result;
   }
-  if (events == nullptr) return GST_FLOW_OK;
-  learn_latency(self, *start, end);
+  if (events == nullptr) {
+    end_work(self, end);
+    end_frame(self);
+    return GST_FLOW_OK;
+  }
   GST_LOG_OBJECT(self,
                  "%" G_GSIZE_FORMAT " events in the interval from %" GST_TIME_FORMAT
                  " to %" GST_TIME_FORMAT,
@@ -437,9 +527,16 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
                  GST_TIME_ARGS(static_cast<GstClockTime>(end)));
 
   priv_of(self).stream.handed_out_until = end;
-  if (events->size() == 0) return push_gap(self, *start, end, GST_SEQNUM_INVALID);
-  const GstFlowReturn result =
-      event_simulator_write_events(transform, *events, state.simulator().threads(), in, out);
+  GstFlowReturn result = GST_FLOW_OK;
+  if (events->size() > 0)
+    result = event_simulator_write_events(transform, *events, state.simulator().threads(), in, out);
+  end_work(self, end);
+  learn_latency(self, *start, end);
+  if (events->size() == 0) {
+    result = push_gap(self, *start, end, GST_SEQNUM_INVALID);
+    end_frame(self);
+    return result;
+  }
   if (result == GST_FLOW_OK)
     set_times(*out, static_cast<GstClockTime>(*start), static_cast<GstClockTime>(end - *start),
               state);
@@ -466,7 +563,10 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   auto* self = GST_EVENT_SIMULATOR(transform);
   *out = nullptr;
   OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
-  if (!in) return GST_FLOW_OK;
+  if (!in) {  // the base class asks for more after it has pushed a buffer
+    end_frame(self);
+    return GST_FLOW_OK;
+  }
   if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
   if (!give_pts(self, in)) return GST_FLOW_OK;
   return reported(self, [&] { return take_frame(self, in.get(), out); });
@@ -492,6 +592,7 @@ static GstEvent* segment_of_times(GstEvent* event) {
 static void start_timeline(GstEventSimulator* self) {
   start_over(self);
   priv_of(self).stream.clock.start_over();
+  priv_of(self).qos.access([](SimulatorQos& qos) { qos.start_over(); });
 }
 
 static bool take_segment(GstEventSimulator* self, GstEvent* event) {
@@ -547,7 +648,7 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   auto& state = priv_of(self).state;
   const auto start = state ? state->simulator().last_time() : std::nullopt;
   if (!start || state->drawing) return true;
-  const GstClockTime frame = latency_of(self);
+  const auto frame = static_cast<GstClockTime>(priv_of(self).latency.lock()->interval.value());
   const GstClockTime rest =
       GST_CLOCK_TIME_IS_VALID(duration) && duration > frame ? duration - frame : 0;
   if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
@@ -588,7 +689,10 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
-    // If upstream dropped frames, events would depend on the machine's load.
+    // Not forwarded: frames are skipped here, where that is wanted, and nowhere else.
+    priv_of(GST_EVENT_SIMULATOR(transform)).qos.access([&](SimulatorQos& qos) {
+      qos.take_event(transform, event);
+    });
     gst_event_unref(event);
     return TRUE;
   }
@@ -612,8 +716,16 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 
-  return answer_latency(GST_BASE_TRANSFORM_SINK_PAD(transform), query,
-                        latency_of(GST_EVENT_SIMULATOR(transform)));
+  const GstClockTime latency = priv_of(GST_EVENT_SIMULATOR(transform)).latency.lock()->total();
+  return answer_latency(GST_BASE_TRANSFORM_SINK_PAD(transform), query, latency);
+}
+
+static gboolean start(GstBaseTransform* transform) {
+  priv_of(GST_EVENT_SIMULATOR(transform)).qos.access([](SimulatorQos& qos) {
+    qos.start_over();
+    qos.reset_stats();
+  });
+  return TRUE;
 }
 
 static gboolean stop(GstBaseTransform* transform) {
@@ -641,7 +753,7 @@ static void finalize(GObject* object) {
 
 static void gst_event_simulator_init(GstEventSimulator* self) {
   std::construct_at(&priv_of(self));
-  // Never drop late frames: that would change the events.
+  // SimulatorQos decides which frames are skipped.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }
 
@@ -650,6 +762,7 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   object_class->constructed = constructed;
   object_class->finalize = finalize;
   install_base_properties(object_class);
+  install_qos_properties(object_class);
 
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->transform_caps = transform_caps;
@@ -660,6 +773,7 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->sink_event = sink_event;
   transform_class->src_event = src_event;
   transform_class->query = query;
+  transform_class->start = start;
   transform_class->stop = stop;
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_SIMULATOR, static_cast<GstPluginAPIFlags>(0));
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));

@@ -15,10 +15,11 @@
 ///
 /// N frames give N - 1 intervals; the first frame after start, flush or a discontinuity only serves
 /// as reference for the next one. An interval has the PTS of its first frame and is pushed when its
-/// last frame arrives, so the latency is one frame. In the event stream an interval without events
-/// is a GAP. In drawn video, an interval is a picture that replaces its last frame, with that
-/// frame's timestamps and those of its metas that remain valid. A first frame gives an empty
-/// picture.
+/// last frame arrives, so the latency is one frame plus the processing time. In the event stream an
+/// interval without events is a GAP. In drawn video, an interval is a picture that replaces its
+/// last frame, with that frame's timestamps and those of its metas that remain valid, so the
+/// latency is the processing time. Where frames are skipped, its duration lasts until the expected
+/// next picture. A first frame gives an empty picture.
 struct EventSimulatorMethod {
   const char* type_name;
   const char* long_name;

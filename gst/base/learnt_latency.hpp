@@ -9,7 +9,7 @@
 
 /// Latency learnt from measured delays. It rises to the second largest of the recent delays, so
 /// that a single one, such as a pause of the source, does not delay everything after it. It falls
-/// once all recent delays are clearly smaller.
+/// once all recent delays are clearly smaller. Jitter does not change it.
 class LearntLatency {
  public:
   using Nanoseconds = eventcamera::Nanoseconds;
@@ -53,7 +53,7 @@ class LearntLatency {
       largest = std::max(largest, delay.length);
     }
     if (!expected_ && recent_.size() == 1) second = largest;
-    if (second > value_)
+    if (second > value_ + value_ / 8)
       value_ = second;
     else if (largest < value_ / 4 * 3)
       value_ = std::max(largest, expected_.value_or(0));

@@ -1,0 +1,414 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// What simulators do where there is no time for all frames.
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "gst/base/frame_pacer.hpp"
+#include "gst/base/learnt_latency.hpp"
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+
+constexpr GstClockTime ms = GST_MSECOND;
+const std::string video = "video/x-raw, format=GRAY8, width=32, height=24, framerate=5/1";
+const std::string pictures = "video/x-raw, format=GRAY8";
+
+/// A live source, a simulator and a video sink, in virtual time.
+class Overload {
+ public:
+  using Time = FramePacer::Nanoseconds;
+
+  static constexpr Time frame_duration = GST_SECOND / 30;
+
+  /// Times for a picture, in ms: in the simulator, downstream, and for a frame upstream.
+  struct Work {
+    int simulator;
+    int downstream;
+    int upstream = 0;
+    bool varies = false;  ///< in the simulator: from half to many times as much
+  };
+
+  Overload(Work work, bool has_queue)
+      : work_(work.simulator * one_ms),
+        downstream_(work.downstream * one_ms),
+        upstream_(work.upstream * one_ms),
+        varies_(work.varies),
+        has_queue_(has_queue) {
+    processing_.expect(0);
+  }
+
+  /// Times at which pictures are shown.
+  std::vector<Time> play(Time duration) {
+    for (Time frame = 0; frame < duration; frame += frame_duration) {
+      now_ = std::max(now_, frame) + upstream_;
+      report();
+      if (pacer_.skip(frame, now_)) continue;
+      pacer_.begin(frame);
+      const Time work = work_now();
+      now_ += work;
+      processing_.add(frame, work / deadline * deadline);
+      push(frame, std::max(frame_duration, pacer_.period(now_)));
+      report();
+      pacer_.end(now_);
+    }
+    return shown_;
+  }
+
+  /// Shortest time from one picture to the next.
+  Time period() const {
+    const auto share = 1 - static_cast<double>(upstream_) / frame_duration;
+    const auto first = static_cast<double>(has_queue_ ? work_ : work_ + downstream_) / share;
+    return std::max({frame_duration, static_cast<Time>(first), downstream_});
+  }
+
+ private:
+  static constexpr Time one_ms = GST_MSECOND;
+  static constexpr Time deadline = 20 * one_ms;
+
+  struct Report {
+    Time at;
+    Time start;
+    Time lateness;
+  };
+
+  void report() {
+    for (; !reports_.empty() && reports_.front().at <= now_; reports_.pop_front())
+      pacer_.take_lateness(reports_.front().start, reports_.front().lateness, reports_.front().at);
+  }
+
+  /// Time in the simulator, of which the mean is `work_`.
+  Time work_now() {
+    if (!varies_) return work_;
+    std::uniform_real_distribution<> uniform(0.001, 1);
+    return static_cast<Time>(static_cast<double>(work_) * (0.5 - 0.5 * std::log(uniform(random_))));
+  }
+
+  /// As GstVideoSink, which drops a picture that comes 5 ms after its end.
+  void push(Time start, Time duration) {
+    const Time due =
+        start + upstream_ + processing_.value() + pacer_.downstream_latency() + deadline;
+    const Time arrival = std::max(now_, sink_until_) + downstream_;
+    const Time shown = std::max(arrival, due);
+    if (shown <= due + duration + 5 * one_ms) shown_.push_back(shown);
+    sink_until_ = shown;
+    reports_.push_back({shown, start, arrival - due});
+    if (!has_queue_) now_ = shown;
+  }
+
+  FramePacer pacer_;
+  LearntLatency processing_;
+  Time work_;
+  Time downstream_;
+  Time upstream_;
+  bool varies_;
+  std::mt19937 random_{1};
+  bool has_queue_;
+  Time now_ = 0;
+  Time sink_until_ = 0;
+  std::deque<Report> reports_;
+  std::vector<Time> shown_;
+};
+
+/// Plays a minute, of which the first second is for learning. Expects 80 % of the pictures that
+/// there is time for, at even distances: 95 % of them within `periods`, and a frame.
+void expect_shown(Overload::Work work, double periods = 1.5) {
+  for (const bool has_queue : {false, true}) {
+    SCOPED_TRACE(testing::Message()
+                 << work.upstream << " ms, " << work.simulator << " ms, " << work.downstream
+                 << (has_queue ? " ms in two threads" : " ms in one thread"));
+    const auto second = static_cast<Overload::Time>(GST_SECOND);
+    Overload overload(work, has_queue);
+    const auto period = overload.period();
+    auto shown = overload.play(60 * second);
+    EXPECT_GE(static_cast<double>(shown.size()), 0.8 * static_cast<double>(59 * second / period));
+    ASSERT_GT(shown.size(), 20U);
+    for (std::size_t i = shown.size() - 1; i > 0; --i) shown[i] -= shown[i - 1];
+    std::sort(shown.begin() + 1, shown.end());
+    EXPECT_LE(static_cast<double>(shown[shown.size() * 95 / 100] - Overload::frame_duration),
+              periods * static_cast<double>(period));
+  }
+}
+
+TEST(FramePacer, ShowsMostOfWhatCanBeComputedEvenly) {
+  for (const int work : {5, 20, 30, 35, 50, 70, 100, 250, 400})
+    for (const int downstream : {0, 2, 15, 40, 100}) expect_shown({work, downstream});
+}
+
+TEST(FramePacer, ShowsMostIfUpstreamTakesTimeForSkippedFrames) {
+  for (const int work : {50, 70, 100, 250, 400})
+    for (const int upstream : {2, 5, 8}) expect_shown({work, 2, upstream});
+}
+
+TEST(FramePacer, ShowsMostIfSomePicturesTakeLonger) {
+  for (const int work : {20, 50, 70, 100, 250, 400})
+    for (const int downstream : {0, 2, 15}) expect_shown({work, downstream, 0, true}, 2);
+}
+
+TEST(FramePacer, SkipsNothingWithoutReports) {
+  FramePacer pacer;
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_FALSE(
+        pacer.skip(i * Overload::frame_duration, i * static_cast<Overload::Time>(GST_SECOND)));
+    pacer.begin(i * Overload::frame_duration);
+    pacer.end((i + 1) * static_cast<Overload::Time>(GST_SECOND));
+  }
+}
+
+TEST(FramePacer, GoesOnWhereReportsCease) {
+  FramePacer pacer;
+  pacer.skip(0, 0);
+  pacer.begin(0);
+  pacer.end(0);
+  pacer.take_lateness(0, 0, 0);
+  int processed = 0;
+  for (int i = 1; i <= 300; ++i) {
+    const auto now = i * Overload::frame_duration;
+    if (pacer.skip(now, now)) continue;
+    pacer.begin(now);
+    pacer.end(now);
+    ++processed;
+  }
+  EXPECT_GT(processed, 260);  // all but those of a second
+}
+
+class EveryElement : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
+
+constexpr GstClockTime frame_time(int i) {
+  return static_cast<GstClockTime>(i) * 200 * ms;
+}
+
+GstBuffer* frame_at(const Harness& h, int i) {
+  return h.frame(frame_time(i), [i](int x, int y) { return (x * 9 + y * 5 + i * 40) % 256; });
+}
+
+/// The sink reports how late the picture that starts at `start` was.
+void report(Harness& h, GstClockTime start, GstClockTimeDiff lateness,
+            GstQOSType type = GST_QOS_TYPE_UNDERFLOW) {
+  gst_harness_push_upstream_event(h.get(), gst_event_new_qos(type, 2, lateness, start));
+}
+
+guint64 stat(const Harness& h, const char* name) {
+  GstStructure* stats = nullptr;
+  g_object_get(h.element(), "stats", &stats, nullptr);
+  guint64 value = 0;
+  EXPECT_TRUE(gst_structure_get_uint64(stats, name, &value));
+  gst_structure_free(stats);
+  return value;
+}
+
+/// Elements downstream take frame 1 until frame 4 has arrived.
+constexpr GstClockTime slow_until = frame_time(4) + 120 * ms;
+
+/// Makes downstream take until `until` for the next buffer.
+void be_slow(Harness& h, GstClockTime until) {
+  const auto wait = [](GstPad*, GstPadProbeInfo*, gpointer data) {
+    auto& [harness, time] = *static_cast<std::pair<GstHarness*, GstClockTime>*>(data);
+    gst_harness_set_time(harness, time);
+    return GST_PAD_PROBE_REMOVE;
+  };
+  gst_pad_add_probe(
+      h->sinkpad, GST_PAD_PROBE_TYPE_BUFFER, wait, new std::pair(h.get(), until),
+      [](gpointer data) { delete static_cast<std::pair<GstHarness*, GstClockTime>*>(data); });
+}
+
+/// The output of frames 0 to 8, where downstream is slow once; or where upstream does not send the
+/// frames that are then skipped, and the frame after them lasts longer.
+std::vector<std::string> output(Harness& h, bool is_slow) {
+  std::vector<std::string> intervals;
+  for (int i = 0; i <= 8; ++i) {
+    if (!is_slow && i >= 2 && i < 4) continue;
+    const bool is_late = is_slow && i < 5 && i >= 2;
+    gst_harness_set_time(h.get(), is_late ? slow_until : frame_time(i));
+    if (is_slow && i == 1) be_slow(h, slow_until);
+    GstBuffer* frame = frame_at(h, i);
+    if (!is_slow && i == 4) GST_BUFFER_DURATION(frame) = frame_time(3);
+    EXPECT_EQ(h.push(frame), GST_FLOW_OK);
+    if (is_slow && (i < 2 || i >= 4)) report(h, frame_time(i), (i == 1 ? 520 : 0) * ms);
+    while (const auto buffer = h.pull())
+      intervals.push_back(std::to_string(GST_BUFFER_PTS(buffer.get()) / ms) + "+" +
+                          std::to_string(GST_BUFFER_DURATION(buffer.get()) / ms) + " " +
+                          bytes_of(buffer.get()));
+  }
+  return intervals;
+}
+
+TEST_P(EveryElement, SkipsWholeFramesWhereDownstreamIsLate) {
+  for (const bool draws : {true, false}) {
+    Harness h(std::string(GetParam()) + (draws ? "" : " qos=true"));
+    h.caps(video, draws ? pictures : GST_EVENT_CAMERA_MEDIA_TYPE);
+    Harness expected(GetParam());
+    expected.caps(video, draws ? pictures : GST_EVENT_CAMERA_MEDIA_TYPE);
+    EXPECT_TRUE(output(h, true) == output(expected, false));
+    EXPECT_EQ(stat(h, "skipped"), 2U);
+    EXPECT_EQ(stat(h, "frames"), 7U);
+    EXPECT_EQ(stat(expected, "skipped"), 0U);
+    guint64 skipped = 0;
+    while (const auto message = h.message(GST_MESSAGE_QOS)) {
+      GstFormat format = GST_FORMAT_UNDEFINED;
+      guint64 done = 0;
+      guint64 dropped = 0;
+      gint64 jitter = 0;
+      guint64 time = 0;
+      gst_message_parse_qos_stats(message.get(), &format, &done, &dropped);
+      gst_message_parse_qos_values(message.get(), &jitter, nullptr, nullptr);
+      gst_message_parse_qos(message.get(), nullptr, &time, nullptr, nullptr, nullptr);
+      EXPECT_EQ(format, GST_FORMAT_BUFFERS);
+      EXPECT_EQ(done, 2U);
+      EXPECT_EQ(dropped, ++skipped);
+      EXPECT_EQ(jitter, 520 * static_cast<gint64>(ms));
+      EXPECT_EQ(time, frame_time(static_cast<int>(skipped) + 1));
+    }
+    EXPECT_EQ(skipped, 2U);
+  }
+}
+
+TEST_P(EveryElement, SkipsFramesOfPicturesUnlessToldOtherwise) {
+  const auto skipped = [](const std::string& launch, const std::string& out) {
+    Harness h(launch);
+    h.caps(video, out);
+    output(h, true);
+    gboolean enabled = FALSE;
+    g_object_get(h.element(), "qos", &enabled, nullptr);
+    EXPECT_EQ(enabled != FALSE, stat(h, "skipped") > 0);
+    return stat(h, "skipped");
+  };
+  const std::string element = GetParam();
+  EXPECT_EQ(skipped(element, pictures), 2U);
+  EXPECT_EQ(skipped(element + " qos=false", pictures), 0U);
+  EXPECT_EQ(skipped(element, GST_EVENT_CAMERA_MEDIA_TYPE), 0U);
+  EXPECT_EQ(skipped(element + " qos=true", GST_EVENT_CAMERA_MEDIA_TYPE), 2U);
+}
+
+TEST_P(EveryElement, SkipsNothingAfterAFlush) {
+  Harness h(GetParam());
+  h.caps(video, pictures);
+  h.push(frame_at(h, 0));
+  report(h, 0, 0);
+  be_slow(h, slow_until);
+  h.push(frame_at(h, 1));
+  report(h, frame_time(1), 520 * ms);
+  flush({h.get()});
+  push_segment(h.get());
+  for (int i = 2; i < 5; ++i) h.push(frame_at(h, i));
+  EXPECT_EQ(stat(h, "skipped"), 0U);
+}
+
+TEST(Qos, SkipsFramesThatDownstreamDoesNotWant) {
+  Harness h("eventsim-frame");
+  h.caps(video, pictures);
+  for (int i = 0; i < 14; ++i) {
+    gst_harness_set_time(h.get(), frame_time(i));
+    h.push(frame_at(h, i));
+    if (i == 1) report(h, frame_time(1), 600 * ms, GST_QOS_TYPE_THROTTLE);
+  }
+  EXPECT_EQ(stat(h, "skipped"), 8U);  // one picture at once, then one in 600 ms
+}
+
+/// A frame that takes `work` to process.
+GstBuffer* slow_frame(const Harness& h, int i, GstClockTime work) {
+  static GstHarness* harness;
+  static GstClockTime duration;
+  harness = h.get();
+  duration = work;
+  GstBuffer* frame = frame_at(h, i);
+  auto* meta =
+      gst_buffer_add_video_meta(frame, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8, 32, 24);
+  meta->map = [](GstVideoMeta* of, guint plane, GstMapInfo* info, gpointer* data, gint* stride,
+                 GstMapFlags flags) -> gboolean {
+    gst_harness_set_time(harness,
+                         gst_clock_get_time(GST_ELEMENT_CLOCK(harness->element)) + duration);
+    if (!gst_buffer_map(of->buffer, info, flags)) return FALSE;
+    *data = info->data + of->offset[plane];
+    *stride = of->stride[plane];
+    return TRUE;
+  };
+  meta->unmap = [](GstVideoMeta* of, guint, GstMapInfo* info) -> gboolean {
+    gst_buffer_unmap(of->buffer, info);
+    return TRUE;
+  };
+  return frame;
+}
+
+TEST_P(EveryElement, ReportsTheLatencyOfProcessing) {
+  Harness h(GetParam());
+  h.caps(video);
+  auto latency = [&, i = 0](GstClockTime work) mutable {
+    for (const int end = i + 5; i < end; ++i) {
+      gst_harness_set_time(h.get(), frame_time(i));
+      h.push(slow_frame(h, i, work));
+    }
+    return gst_harness_query_latency(h.get());
+  };
+  EXPECT_EQ(latency(15 * ms), 200 * ms);  // sinks allow for so much
+  EXPECT_EQ(latency(50 * ms), 240 * ms);
+  EXPECT_EQ(latency(130 * ms), 320 * ms);
+  EXPECT_EQ(latency(15 * ms), 200 * ms);
+  EXPECT_EQ(stat(h, "processing-time"), 5 * (15 + 50 + 130 + 15) * ms);
+}
+
+TEST(Qos, CountsFromTheStart) {
+  Harness h("eventsim-frame");
+  h.caps(video, pictures);
+  output(h, true);
+  h.push(slow_frame(h, 9, 15 * ms));
+  EXPECT_EQ(stat(h, "processing-time"), 15 * ms);
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  EXPECT_EQ(stat(h, "frames"), 8U);
+  gst_element_set_state(h.element(), GST_STATE_PAUSED);
+  for (const char* count : {"frames", "skipped", "processing-time"}) EXPECT_EQ(stat(h, count), 0U);
+}
+
+/// Plays into a sink that takes 100 ms for a picture; returns when pictures were shown.
+std::vector<GstClockTime> show(const std::string& element, int frames) {
+  gst_init(nullptr, nullptr);
+  const std::string launch =
+      "videotestsrc is-live=true pattern=ball num-buffers=" + std::to_string(frames) +
+      " ! "
+      "video/x-raw,format=GRAY8,width=64,height=48,framerate=30/1 ! " +
+      element +
+      " ! video/x-raw,format=BGRx ! identity sleep-time=100000 ! fakesink name=sink sync=true "
+      "qos=true max-lateness=5000000 processing-deadline=100000000 signal-handoffs=true";
+  const Owned<GstElement> pipeline(gst_parse_launch(launch.c_str(), nullptr));
+  const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
+  std::vector<GstClockTime> shown;
+  g_signal_connect(
+      sink.get(), "handoff",
+      G_CALLBACK(+[](GstElement* from, GstBuffer*, GstPad*, std::vector<GstClockTime>* times) {
+        times->push_back(gst_element_get_current_running_time(from));
+      }),
+      &shown);
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+  for (bool done = false; !done;) {
+    const Owned<GstMessage> message(gst_bus_timed_pop(bus.get(), 60 * GST_SECOND));
+    EXPECT_TRUE(message);
+    if (message && GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_LATENCY)
+      gst_bin_recalculate_latency(GST_BIN(pipeline.get()));
+    done = !message || GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_EOS ||
+           GST_MESSAGE_TYPE(message.get()) == GST_MESSAGE_ERROR;
+  }
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  return shown;
+}
+
+TEST(Qos, ShowsMostOfWhatASlowSinkCanTakeEvenly) {
+  auto shown = show("eventsim-frame", 240);
+  EXPECT_GE(shown.size(), 64U);  // of 80 in 8 s
+  ASSERT_GT(shown.size(), 20U);
+  for (std::size_t i = shown.size() - 1; i > 0; --i) shown[i] -= shown[i - 1];
+  std::sort(shown.begin() + 1, shown.end());
+  EXPECT_LT(shown[shown.size() * 9 / 10], 200 * ms);
+}
+
+TEST(Qos, NearlyFreezesWithoutIt) {
+  EXPECT_LT(show("eventsim-frame qos=false", 60).size(), 10U);
+}
+
+}  // namespace
