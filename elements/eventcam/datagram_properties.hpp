@@ -19,7 +19,7 @@ inline GType datagram_format_type() {
   static const GEnumValue values[] = {
       {static_cast<int>(DatagramFormat::spif), "SPIF without times: SpiNNaker, AEStream, EventCV",
        "spif"},
-      {static_cast<int>(DatagramFormat::spif_timestamps), "SPIF with times: EventCV",
+      {static_cast<int>(DatagramFormat::spif_timestamps), "SPIF with times: SpiNNaker, EventCV",
        "spif-timestamps"},
       {static_cast<int>(DatagramFormat::t64_x16_y16_on8), "faery, 13 bytes per event",
        "t64-x16-y16-on8"},

@@ -82,7 +82,8 @@ template <bool has_timestamps>
 class Spif {
  public:
   static constexpr std::size_t min_event_size = has_timestamps ? 8 : 4;
-  static constexpr std::size_t max_size = 512;  // AEStream reads no more
+  // 128 events. AEStream reads no more than 512 bytes, without times; spiffer no more than 1024.
+  static constexpr std::size_t max_size = 128 * min_event_size;
 
   explicit Spif(const DatagramSettings& settings) : order_(settings.byte_order) {}
 
