@@ -251,6 +251,52 @@ TEST_P(EveryFormat, RejectsEventsOutsideItsSensorOrInterval) {
   EXPECT_EQ(rejected(davis, 26, 0x01), 1U);  // base
 }
 
+/// Payloads written from docs/rtp-payload-format.md alone, with 4 events of an interval.
+struct Capture {
+  RtpEventFormat format;
+  std::vector<std::uint8_t> payload;
+};
+
+const Capture captures[] = {
+    {RtpEventFormat::evt3,
+     {0x10, 0x00, 0x00, 0x04,                          // version 1, EVT3; 4 events
+      0x00, 0x00, 0x00, 0x07,                          // from number 7 on
+      0x00, 0x00, 0x00, 0x00, 0x3b, 0x9a, 0xca, 0x01,  // start 1'000'000'001
+      0x00, 0x00, 0x00, 0x00, 0x00, 0x98, 0x96, 0x80,  // duration 10'000'000
+      0x00, 0x00, 0x03, 0xe8,                          // base 1000
+      0x00, 0x80, 0x00, 0x60, 0x05, 0x00,              // TIME_HIGH 0, TIME_LOW 0, ADDR_Y 5
+      0x23, 0x29,                                      // ADDR_X 0x123, ON
+      0x01, 0x80, 0x64, 0x60, 0x06, 0x00,              // TIME_HIGH 1, TIME_LOW 100, ADDR_Y 6
+      0x20, 0x30,                                      // VECT_BASE_X 32, OFF
+      0x01, 0x48, 0x00, 0x40, 0x80, 0x50}},            // bits 0, 11; none; 7
+    {RtpEventFormat::xytp,
+     {0x11, 0x00, 0x00, 0x04,                          //
+      0x00, 0x00, 0x00, 0x07,                          //
+      0x00, 0x00, 0x00, 0x00, 0x3b, 0x9a, 0xca, 0x01,  //
+      0x00, 0x00, 0x00, 0x00, 0x00, 0x98, 0x96, 0x80,  //
+      0x00, 0x00, 0x00, 0x00,                          // base 0
+      0xe8, 0x03, 0x00, 0x00, 0x23, 0x01, 0x05, 0x80,  // t 1000, x 0x123, y 5, ON
+      0x4c, 0x14, 0x00, 0x00, 0x20, 0x00, 0x06, 0x00,  // t 5196, x 32, y 6, OFF
+      0x4c, 0x14, 0x00, 0x00, 0x2b, 0x00, 0x06, 0x00,  // x 43
+      0x4c, 0x14, 0x00, 0x00, 0x3f, 0x00, 0x06, 0x00}}};
+
+TEST(RtpUnpacker, ReadsPacketsWrittenFromTheSpecification) {
+  const std::vector events{
+      Event::at(0x123, 5, 1000, Polarity::on), Event::at(32, 6, 5196, Polarity::off),
+      Event::at(43, 6, 5196, Polarity::off), Event::at(63, 6, 5196, Polarity::off)};
+  for (const auto& [format, payload] : captures) {
+    RtpUnpacker unpacker({346, 260}, format);
+    int intervals = 0;
+    unpacker.push({1, 0, true, payload}, [&](const RtpInterval& interval) {
+      ++intervals;
+      EXPECT_EQ(interval.start, 1'000'000'001);
+      EXPECT_EQ(interval.duration, 10'000'000);
+      EXPECT_TRUE(std::ranges::equal(interval.events, events));
+    });
+    EXPECT_EQ(intervals, 1);
+  }
+}
+
 TEST(RtpPacker, RefusesWhatItCannotSend) {
   EXPECT_THROW(RtpPacker({2049, 1}, RtpEventFormat::evt3), std::invalid_argument);
   RtpPacker packer({16384, 16384}, RtpEventFormat::xytp);
