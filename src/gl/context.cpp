@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/gl/context.hpp"
+
+#include <cstdio>
+#include <string_view>
+
+namespace eventcamera::gl {
+namespace {
+
+std::string hexadecimal(GLenum code) {
+  char text[16];
+  std::snprintf(text, sizeof text, "0x%04x", code);
+  return text;
+}
+
+}  // namespace
+
+Context::Context(const Load& load) {
+  const auto get_string = reinterpret_cast<PFNGLGETSTRINGPROC>(load("glGetString"));
+  const auto* text =
+      get_string != nullptr ? reinterpret_cast<const char*>(get_string(GL_VERSION)) : nullptr;
+  if (text == nullptr) throw Error("no OpenGL context is current");
+  std::string_view version = text;
+  constexpr std::string_view es = "OpenGL ES ";
+  is_es_ = version.starts_with(es);
+  if (is_es_) version.remove_prefix(es.size());
+  int major = 0;
+  int minor = 0;
+  std::sscanf(version.data(), "%d.%d", &major, &minor);
+  const int needed = is_es_ ? 301 : 403;
+  const auto too_old = [&](const std::string& reason) {
+    return Error("compute shaders need OpenGL ES 3.1 or OpenGL 4.3, and " + reason);
+  };
+  if (100 * major + minor < needed)
+    throw too_old(std::string("this is ") + (is_es_ ? "" : "OpenGL ") + text);
+#define LOAD(type, name)                           \
+  name = reinterpret_cast<type>(load("gl" #name)); \
+  if (name == nullptr) throw too_old("gl" #name " is missing");
+  EVENTCAMERA_GL_FUNCTIONS(LOAD)
+#undef LOAD
+  GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_buffer_size_);
+}
+
+void Context::check() const {
+  const GLenum code = GetError();
+  if (code == GL_NO_ERROR) return;
+  constexpr GLenum context_lost = 0x0507;
+  if (code == context_lost) throw Error("the OpenGL context was lost");
+  if (code == GL_OUT_OF_MEMORY) throw Error("OpenGL is out of memory");
+  throw Error("OpenGL error " + hexadecimal(code));
+}
+
+}  // namespace eventcamera::gl

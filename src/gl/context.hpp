@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <GLES3/gl31.h>
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+
+namespace eventcamera::gl {
+
+/// OpenGL is missing, too old, lost, or refused something. The text is for the user.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+#define EVENTCAMERA_GL_FUNCTIONS(X)                \
+  X(PFNGLACTIVETEXTUREPROC, ActiveTexture)         \
+  X(PFNGLATTACHSHADERPROC, AttachShader)           \
+  X(PFNGLBINDBUFFERPROC, BindBuffer)               \
+  X(PFNGLBINDBUFFERBASEPROC, BindBufferBase)       \
+  X(PFNGLBINDTEXTUREPROC, BindTexture)             \
+  X(PFNGLBUFFERDATAPROC, BufferData)               \
+  X(PFNGLBUFFERSUBDATAPROC, BufferSubData)         \
+  X(PFNGLCLIENTWAITSYNCPROC, ClientWaitSync)       \
+  X(PFNGLCOMPILESHADERPROC, CompileShader)         \
+  X(PFNGLCREATEPROGRAMPROC, CreateProgram)         \
+  X(PFNGLCREATESHADERPROC, CreateShader)           \
+  X(PFNGLDELETEBUFFERSPROC, DeleteBuffers)         \
+  X(PFNGLDELETEPROGRAMPROC, DeleteProgram)         \
+  X(PFNGLDELETESHADERPROC, DeleteShader)           \
+  X(PFNGLDELETESYNCPROC, DeleteSync)               \
+  X(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)     \
+  X(PFNGLFENCESYNCPROC, FenceSync)                 \
+  X(PFNGLGENBUFFERSPROC, GenBuffers)               \
+  X(PFNGLGETERRORPROC, GetError)                   \
+  X(PFNGLGETINTEGER64VPROC, GetInteger64v)         \
+  X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog) \
+  X(PFNGLGETPROGRAMIVPROC, GetProgramiv)           \
+  X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)   \
+  X(PFNGLGETSHADERIVPROC, GetShaderiv)             \
+  X(PFNGLLINKPROGRAMPROC, LinkProgram)             \
+  X(PFNGLMAPBUFFERRANGEPROC, MapBufferRange)       \
+  X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)         \
+  X(PFNGLSHADERSOURCEPROC, ShaderSource)           \
+  X(PFNGLUNIFORM1IPROC, Uniform1i)                 \
+  X(PFNGLUNMAPBUFFERPROC, UnmapBuffer)             \
+  X(PFNGLUSEPROGRAMPROC, UseProgram)
+
+/// Functions and limits of the current OpenGL context. This object and all that is made with it may
+/// only be used, and destroyed, while that context, or one that shares its objects, is current.
+class Context {
+ public:
+  /// Returns the address of an OpenGL function, nullptr if there is none of this name.
+  using Load = std::function<void*(const char* name)>;
+
+  /// Throws Error if the context has no compute shaders: they need OpenGL ES 3.1 or OpenGL 4.3.
+  explicit Context(const Load& load);
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+
+#define DECLARE(type, name) type name;
+  EVENTCAMERA_GL_FUNCTIONS(DECLARE)
+#undef DECLARE
+
+  /// First lines of every shader.
+  const char* shader_version() const {
+    return is_es_ ? "#version 310 es\nprecision highp float;\nprecision highp int;\n"
+                  : "#version 430\n";
+  }
+
+  /// Largest buffer that a shader can reach, in bytes.
+  GLint64 max_buffer_size() const {
+    return max_buffer_size_;
+  }
+
+  /// Throws Error if an OpenGL call failed since the last check.
+  void check() const;
+
+ private:
+  bool is_es_ = false;
+  GLint64 max_buffer_size_ = 0;
+};
+
+}  // namespace eventcamera::gl

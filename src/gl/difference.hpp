@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include "src/gl/event_list.hpp"
+#include "src/gl/grey_frame.hpp"
+
+namespace eventcamera::gl {
+
+/// Marks the pixels that fire between two frames, as fire_differences() does.
+class DifferenceKernel {
+ public:
+  DifferenceKernel(const Context& gl, const LumaFormat& format);
+
+  /// Marks those of `step`, 1 or later.
+  void run(const GreyFrame& before, const GreyFrame& now, const Thresholds& thresholds, int step,
+           const EventList& out) const;
+
+ private:
+  LumaFormat format_;
+  Kernel kernel_;
+};
+
+}  // namespace eventcamera::gl

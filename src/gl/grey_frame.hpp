@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include "src/core/luma.hpp"
+#include "src/core/rgb_luma.hpp"
+#include "src/gl/kernel.hpp"
+
+namespace eventcamera::gl {
+
+/// A frame in a 2D texture of bytes, as a simulator takes it.
+struct TextureFrame {
+  LumaFormat format;
+  GLuint texture;
+  /// Contributions of the four channels to luma, in units of 1/LumaWeights::one. Their sum is
+  /// LumaWeights::one.
+  int weights[4];
+};
+
+/// The luma of a frame: bytes, four to a word; rows start at whole words.
+class GreyFrame {
+ public:
+  GreyFrame(const Context& gl, const LumaFormat& format) : buffer_(gl) {
+    buffer_.reserve(static_cast<std::size_t>(words_across(format.width)) *
+                    static_cast<std::size_t>(format.height) * 4);
+  }
+
+  static int words_across(int width) { return groups_of(4, width); }
+  const Buffer& buffer() const { return buffer_; }
+
+ private:
+  Buffer buffer_;
+};
+
+/// Computes the luma of textures, exactly as luma_of_rgb() does.
+class LumaKernel {
+ public:
+  explicit LumaKernel(const Context& gl);
+  void run(const TextureFrame& frame, const GreyFrame& out) const;
+
+ private:
+  const Context& gl_;
+  Kernel kernel_;
+};
+
+}  // namespace eventcamera::gl

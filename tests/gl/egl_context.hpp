@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "src/gl/context.hpp"
+#include "src/gl/grey_frame.hpp"
+
+namespace gl_test {
+
+inline void* load(const char* name) {
+  return reinterpret_cast<void*>(eglGetProcAddress(name));
+}
+
+/// An OpenGL context without a window, current in this thread.
+class EglContext {
+ public:
+  /// OpenGL ES 3.1, or OpenGL 4.3.
+  explicit EglContext(bool is_es) {
+    const auto query_devices =
+        reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(load("eglQueryDevicesEXT"));
+    const auto get_display =
+        reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(load("eglGetPlatformDisplayEXT"));
+    EGLDeviceEXT device = nullptr;
+    EGLint devices = 0;
+    query_devices(1, &device, &devices);
+    display_ = get_display(EGL_PLATFORM_DEVICE_EXT, device, nullptr);
+    EXPECT_TRUE(eglInitialize(display_, nullptr, nullptr));
+    eglBindAPI(is_es ? EGL_OPENGL_ES_API : EGL_OPENGL_API);
+    const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, is_es ? 3 : 4,
+                                 EGL_CONTEXT_MINOR_VERSION, is_es ? 1 : 3, EGL_NONE};
+    const EGLint of_config[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE,
+                                is_es ? EGL_OPENGL_ES3_BIT : EGL_OPENGL_BIT, EGL_NONE};
+    EGLConfig config = nullptr;
+    EGLint configs = 0;
+    EXPECT_TRUE(eglChooseConfig(display_, of_config, &config, 1, &configs));
+    context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, attributes);
+    EXPECT_TRUE(eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_));
+  }
+  ~EglContext() {
+    eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    eglDestroyContext(display_, context_);
+  }
+  EglContext(const EglContext&) = delete;
+  EglContext& operator=(const EglContext&) = delete;
+
+ private:
+  EGLDisplay display_ = nullptr;
+  EGLContext context_ = nullptr;
+};
+
+/// A texture of one or four bytes a pixel.
+class Texture {
+ public:
+  Texture(int width, int height, int channels) : format_{width, height, 8}, channels_(channels) {
+    gen_textures(1, &name_);
+  }
+  ~Texture() { delete_textures(1, &name_); }
+  Texture(const Texture&) = delete;
+  Texture& operator=(const Texture&) = delete;
+
+  void upload(const std::vector<std::uint8_t>& bytes) {
+    bind_texture(GL_TEXTURE_2D, name_);
+    pixel_store(GL_UNPACK_ALIGNMENT, 1);
+    tex_image(GL_TEXTURE_2D, 0, channels_ == 1 ? GL_R8 : GL_RGBA8, format_.width, format_.height, 0,
+              channels_ == 1 ? GL_RED : GL_RGBA, GL_UNSIGNED_BYTE, bytes.data());
+    tex_parameter(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  }
+
+  eventcamera::gl::TextureFrame frame(const int (&weights)[4]) const {
+    return {format_, name_, {weights[0], weights[1], weights[2], weights[3]}};
+  }
+
+ private:
+#define LOAD(type, name, gl_name) type name = reinterpret_cast<type>(load(gl_name));
+  LOAD(PFNGLGENTEXTURESPROC, gen_textures, "glGenTextures")
+  LOAD(PFNGLDELETETEXTURESPROC, delete_textures, "glDeleteTextures")
+  LOAD(PFNGLBINDTEXTUREPROC, bind_texture, "glBindTexture")
+  LOAD(PFNGLPIXELSTOREIPROC, pixel_store, "glPixelStorei")
+  LOAD(PFNGLTEXIMAGE2DPROC, tex_image, "glTexImage2D")
+  LOAD(PFNGLTEXPARAMETERIPROC, tex_parameter, "glTexParameteri")
+#undef LOAD
+  eventcamera::LumaFormat format_;
+  int channels_;
+  GLuint name_ = 0;
+};
+
+}  // namespace gl_test
