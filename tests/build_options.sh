@@ -28,10 +28,16 @@ without -Deventsim
 if grep -q opencv "$build/compile_commands.json" "$build/build.ninja"; then
   fail "OpenCV is in the commands of a build without simulators"
 fi
-[ "$(plugins)" = "./eventcam/libgsteventcam.so " ] || fail "built $(plugins)"
+[ "$(plugins)" = "./eventcam/libgsteventcam.so ./eventsimgl/libgsteventsimgl.so " ] || fail "built $(plugins)"
 
 without -Deventsim -Daedat
 without -Deventsim -Dhdf5
 without -Deventsim -Dnpz
 without -Deventcam # finds OpenCV, although it is not in the prefix
+[ "$(plugins)" = "./eventsim/libgsteventsim.so ./eventsimgl/libgsteventsimgl.so " ] || fail "built $(plugins)"
+
+without -Deventcam -Deventsimgl
+if grep -q gstreamer-gl "$build/compile_commands.json"; then
+  fail "OpenGL is in the commands of a build without simulators on the GPU"
+fi
 [ "$(plugins)" = "./eventsim/libgsteventsim.so " ] || fail "built $(plugins)"

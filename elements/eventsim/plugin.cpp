@@ -2,6 +2,10 @@
 #include <gst/gst.h>
 
 #include "gst/base/authors.hpp"
+#include "gst/base/eventsimulator.hpp"
+
+const EventSimulatorTypeNames event_simulator_type_names = {.simulator = "GstEventSimulator",
+                                                            .pool = "GstEventPool"};
 
 #define ELEMENTS(X) \
   X(eventsim_frame) X(eventsim_dense) X(eventsim_sparse) X(eventsim_diff) X(eventsim_dvs)

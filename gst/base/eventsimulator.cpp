@@ -98,14 +98,12 @@ struct GstEventSimulatorPrivate {
   Stream stream;
 };
 
-G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventSimulator, gst_event_simulator, GST_TYPE_BASE_TRANSFORM,
-                                 G_ADD_PRIVATE(GstEventSimulator)
-                                     GST_DEBUG_CATEGORY_INIT(event_simulator_debug, "eventsim", 0,
-                                                             "event simulators"))
-#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_simulator_parent_class)
+static gpointer parent_class;
+static gint private_offset;
+#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(parent_class)
 
 static GstEventSimulatorPrivate& priv_of(GstEventSimulator* self) {
-  return *static_cast<GstEventSimulatorPrivate*>(gst_event_simulator_get_instance_private(self));
+  return *static_cast<GstEventSimulatorPrivate*>(G_STRUCT_MEMBER_P(self, private_offset));
 }
 
 static const EventSimulatorMethod& method_of(GstEventSimulator* self) {
@@ -743,12 +741,12 @@ static void constructed(GObject* object) {
   auto* self = GST_EVENT_SIMULATOR(object);
   if (const auto make_settings = method_of(self).make_settings)
     priv_of(self).method_settings = make_settings();
-  G_OBJECT_CLASS(gst_event_simulator_parent_class)->constructed(object);
+  G_OBJECT_CLASS(parent_class)->constructed(object);
 }
 
 static void finalize(GObject* object) {
   std::destroy_at(&priv_of(GST_EVENT_SIMULATOR(object)));
-  G_OBJECT_CLASS(gst_event_simulator_parent_class)->finalize(object);
+  G_OBJECT_CLASS(parent_class)->finalize(object);
 }
 
 static void gst_event_simulator_init(GstEventSimulator* self) {
@@ -758,6 +756,8 @@ static void gst_event_simulator_init(GstEventSimulator* self) {
 }
 
 static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
+  parent_class = g_type_class_peek_parent(klass);
+  g_type_class_adjust_private_offset(klass, &private_offset);
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->constructed = constructed;
   object_class->finalize = finalize;
@@ -777,6 +777,18 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->stop = stop;
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_SIMULATOR, static_cast<GstPluginAPIFlags>(0));
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
+}
+
+GType gst_event_simulator_get_type() {
+  static const GType type = [] {
+    GST_DEBUG_CATEGORY_INIT(event_simulator_debug, "eventsim", 0, "event simulators");
+    const GType registered = register_type(
+        GST_TYPE_BASE_TRANSFORM, event_simulator_type_names.simulator,
+        gst_event_simulator_class_init, gst_event_simulator_init, G_TYPE_FLAG_ABSTRACT);
+    private_offset = g_type_add_instance_private(registered, sizeof(GstEventSimulatorPrivate));
+    return registered;
+  }();
+  return type;
 }
 
 static void method_class_init(gpointer klass, gpointer row) {

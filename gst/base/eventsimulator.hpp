@@ -42,6 +42,13 @@ struct EventSimulatorMethod {
   void (*configure)(eventcamera::IntervalSimulator& simulator, GObject* object) = nullptr;
 };
 
+/// Names of the types in the plugin that this library is linked to. Each plugin defines its own.
+struct EventSimulatorTypeNames {
+  const char* simulator;
+  const char* pool;
+};
+extern const EventSimulatorTypeNames event_simulator_type_names;
+
 /// Base class of all simulators.
 #define GST_TYPE_EVENT_SIMULATOR (gst_event_simulator_get_type())
 G_DECLARE_DERIVABLE_TYPE(GstEventSimulator, gst_event_simulator, GST, EVENT_SIMULATOR,

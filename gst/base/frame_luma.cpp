@@ -10,11 +10,7 @@ using eventcamera::RgbView;
 using eventcamera::RgbWordsView;
 using eventcamera::ThreadPool;
 
-namespace {
-
-/// Luma weights of the colours. The colorimetry of RGB has no YUV matrix, so the matrix is derived
-/// from the primaries.
-LumaWeights weights_of(const GstVideoInfo& video) {
+LumaWeights luma_weights_of(const GstVideoInfo& video) {
   const auto matrix = [&] {
     switch (video.colorimetry.primaries) {
       case GST_VIDEO_COLOR_PRIMARIES_SMPTE170M:
@@ -35,6 +31,8 @@ LumaWeights weights_of(const GstVideoInfo& video) {
   gst_video_color_matrix_get_Kr_Kb(matrix, &kr, &kb);
   return LumaWeights::of(kr, kb);
 }
+
+namespace {
 
 /// True for RGB16 and similar formats with one word per pixel.
 bool has_rgb_words(const GstVideoInfo& video) {
@@ -69,7 +67,7 @@ FrameLuma::FrameLuma(const GstVideoInfo& video)
     : video_(video),
       layout_(layout_of(video)),
       format_(format_of(video)),
-      weights_(weights_of(video)) {
+      weights_(luma_weights_of(video)) {
   if (layout_ == Layout::plane) return;
   if (format_.bits == 8)
     bytes_ = Image<guint8>(format_.width, format_.height);

@@ -8,6 +8,10 @@
 #include "src/core/rgb_luma.hpp"
 #include "src/core/thread_pool.hpp"
 
+/// Luma weights of the colours of RGB video. Its colorimetry has no YUV matrix, so the matrix is
+/// derived from the primaries.
+eventcamera::LumaWeights luma_weights_of(const GstVideoInfo& video);
+
 /// Luma of video of EVENT_SIMULATOR_INPUT_FORMATS: read in place if it is a plane, copied if it is
 /// interleaved with chroma or byte-swapped, or computed from RGB.
 class FrameLuma {

@@ -7,8 +7,10 @@
 #include <new>
 
 #include "gst/base/drawn_video.hpp"
+#include "gst/base/eventsimulator.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/simulator_caps.hpp"
+#include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 
 using eventcamera::EventBuckets;
@@ -27,8 +29,8 @@ struct _GstEventPool {
   gsize needed;             ///< bytes that a recent interval needed: a maximum that decays
 };
 
-G_DEFINE_TYPE(GstEventPool, gst_event_pool, GST_TYPE_BUFFER_POOL)
-#define PARENT_POOL_CLASS GST_BUFFER_POOL_CLASS(gst_event_pool_parent_class)
+static gpointer parent_pool_class;
+#define PARENT_POOL_CLASS GST_BUFFER_POOL_CLASS(parent_pool_class)
 
 /// Limit of idle memory in a pool. Returned buffers beyond it are freed, unless the pool is empty.
 static constexpr gsize max_idle = gsize{64} << 20;
@@ -68,10 +70,18 @@ static gboolean stop_pool(GstBufferPool* pool) {
 static void gst_event_pool_init(GstEventPool*) {}
 
 static void gst_event_pool_class_init(GstEventPoolClass* klass) {
+  parent_pool_class = g_type_class_peek_parent(klass);
   GstBufferPoolClass* pool_class = GST_BUFFER_POOL_CLASS(klass);
   pool_class->acquire_buffer = acquire_buffer;
   pool_class->release_buffer = release_buffer;
   pool_class->stop = stop_pool;
+}
+
+GType gst_event_pool_get_type() {
+  static const GType type =
+      register_type(GST_TYPE_BUFFER_POOL, event_simulator_type_names.pool,
+                    gst_event_pool_class_init, gst_event_pool_init, static_cast<GTypeFlags>(0));
+  return type;
 }
 
 /// Gives an empty buffer of the pool `size` > 0 bytes to write. False if memory is short. Not

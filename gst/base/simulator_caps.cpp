@@ -34,6 +34,8 @@ GstCaps* SimulatorVideo::video_of(const GstCaps* caps, const char* of_formats) c
         with_fields_of(gst_caps_get_structure(caps, i), "video/x-raw",
                        {"width", "height", "framerate", "pixel-aspect-ratio"});
     set_formats(structure, of_formats);
+    if (texture_target != nullptr)
+      gst_structure_set(structure, "texture-target", G_TYPE_STRING, texture_target, nullptr);
     video = gst_caps_merge_structure_full(video, structure, gst_caps_features_new(memory, nullptr));
   }
   return video;
@@ -48,6 +50,7 @@ GstCaps* SimulatorVideo::output_caps(const GstCaps* input) const {
     gst_structure_set(events, "format", G_TYPE_STRING, "XYTP", nullptr);
     output = gst_caps_merge_structure(output, events);
   }
+  if (drawn_formats == nullptr) return output;
   GstCaps* pictures = video_of(input, drawn_formats);
   if (gst_caps_is_fixed(input)) {
     GstStructure* picture = gst_caps_get_structure(pictures, 0);

@@ -17,9 +17,10 @@
 
 /// Video that a simulator takes, and that it draws events in.
 struct SimulatorVideo {
-  const char* memory;   ///< caps feature
-  const char* formats;  ///< taken
-  const char* drawn_formats;
+  const char* memory;                    ///< caps feature
+  const char* formats;                   ///< taken
+  const char* drawn_formats;             ///< nullptr if it draws none
+  const char* texture_target = nullptr;  ///< of OpenGL
 
   /// Output caps for this input: events (preferred) or accumulated-event video of the same size and
   /// framerate.

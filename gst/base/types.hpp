@@ -15,6 +15,17 @@ inline GType enum_type(const char* name, const GEnumValue* values) {
   return type;
 }
 
+/// Registers a type. For classes that several plugins contain: names of types are unique in a
+/// process, so G_DEFINE_TYPE would fail in the second plugin.
+template <class Instance, class Class>
+GType register_type(GType parent, const char* name, void (*class_init)(Class*),
+                    void (*init)(Instance*), GTypeFlags flags) {
+  const auto any = [](auto function) { return reinterpret_cast<void (*)()>(function); };
+  return g_type_register_static_simple(
+      parent, name, sizeof(Class), reinterpret_cast<GClassInitFunc>(any(class_init)),
+      sizeof(Instance), reinterpret_cast<GInstanceInitFunc>(any(init)), flags);
+}
+
 /// Returns the element type that a row of a table describes: a subclass of `parent` whose
 /// class_init receives the row as class data.
 inline GType row_type(GType parent, const char* name, GClassInitFunc class_init,

@@ -11,7 +11,7 @@ using namespace harness;
 
 class EveryOutput : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
 INSTANTIATE_TEST_SUITE_P(, EveryOutput,
-                         testing::Combine(testing::ValuesIn(elements),
+                         testing::Combine(testing::ValuesIn(cpu_elements),
                                           testing::Values(GST_EVENT_CAMERA_MEDIA_TYPE,
                                                           "video/x-raw, format=BGRx")));
 

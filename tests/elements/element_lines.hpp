@@ -25,7 +25,7 @@ inline constexpr const char* event_caps =
 inline std::vector<std::string> element_names() {
   gst_init(nullptr, nullptr);
   std::vector<std::string> names;
-  for (const char* plugin : {"eventcam", "eventsim"}) {
+  for (const char* plugin : {"eventcam", "eventsim", "eventsimgl"}) {
     GList* const features = gst_registry_get_feature_list_by_plugin(gst_registry_get(), plugin);
     if (features == nullptr) g_error("no plugin %s in GST_PLUGIN_PATH", plugin);
     for (const GList* item = features; item != nullptr; item = item->next)
@@ -52,6 +52,9 @@ class Kind {
       return gst_caps_can_intersect(caps.get(), others.get()) != FALSE;
     }
     bool takes_frames() const { return takes(frame_caps); }
+    bool takes_textures() const {
+      return takes("video/x-raw(memory:GLMemory), format=(string)GRAY8");
+    }
     bool takes_events() const { return takes(event_caps); }
   };
 
@@ -124,6 +127,7 @@ class Kind {
     const auto events = video + " ! eventsim-frame ! " + event_caps;
     if (name_.ends_with("depay")) return events + " ! " + name_.substr(0, name_.size() - 5) + "pay";
     if (pad.takes_frames()) return video;
+    if (pad.takes_textures()) return video + " ! glupload";
     if (pad.takes_events()) return events;
     const auto* const file =
         std::ranges::find(recording_files::files, name_, &recording_files::File::reader);

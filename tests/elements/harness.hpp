@@ -10,6 +10,7 @@
 #include <functional>
 #include <initializer_list>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -49,13 +50,22 @@ using Owned = std::unique_ptr<Type, Unref>;
 using Buffer = Owned<GstBuffer>;
 
 inline const char* const elements[] = {"eventsim-frame", "eventsim-dense", "eventsim-sparse",
-                                       "eventsim-diff", "eventsim-dvs"};
+                                       "eventsim-diff",  "eventsim-dvs",   "gleventsim-frame"};
+
+/// Those that take frames in system memory, and draw.
+inline const auto cpu_elements = std::span(elements).first<5>();
+
+/// A simulator, taking frames in system memory.
+inline std::string with_upload(const std::string& launch) {
+  return (launch.starts_with("gl") ? "glupload ! " : "") + launch;
+}
 
 class Harness {
  public:
   /// For example "eventsim-dense flow=dis-hq".
   explicit Harness(const std::string& launch)
-      : Harness((gst_init(nullptr, nullptr), gst_harness_new_parse(launch.c_str())), launch) {}
+      : Harness((gst_init(nullptr, nullptr), gst_harness_new_parse(with_upload(launch).c_str())),
+                launch) {}
 
   /// For elements whose source pad appears with its first output.
   static Harness with_late_pad(const std::string& launch) {

@@ -13,6 +13,9 @@ const std::string size = ", width=32, height=24, framerate=25/1";
 class EveryElement : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
 
+class EveryElementThatDraws : public EveryElement {};
+INSTANTIATE_TEST_SUITE_P(, EveryElementThatDraws, testing::ValuesIn(cpu_elements));
+
 TEST_P(EveryElement, MakesEventsWhereDownstreamTakesAnything) {
   Harness h(GetParam());
   h.caps("video/x-raw, format=GRAY8" + size, "ANY");
@@ -27,7 +30,7 @@ TEST_P(EveryElement, MakesEventsWhereDownstreamPrefersVideoButTakesBoth) {
   EXPECT_EQ(h.out_caps().rfind("application/x-event-camera", 0), 0U) << h.out_caps();
 }
 
-TEST_P(EveryElement, MakesVideoWhereDownstreamTakesOnlyThat) {
+TEST_P(EveryElementThatDraws, MakesVideoWhereDownstreamTakesOnlyThat) {
   Harness h(GetParam());
   h.caps("video/x-raw, format=I420, pixel-aspect-ratio=4/3, interlace-mode=progressive" + size,
          "video/x-raw");

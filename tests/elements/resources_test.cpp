@@ -64,7 +64,7 @@ std::ostream& operator<<(std::ostream& out, const Resources& resources) {
 
 class Memory : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
 INSTANTIATE_TEST_SUITE_P(, Memory,
-                         testing::Combine(testing::ValuesIn(elements),
+                         testing::Combine(testing::ValuesIn(cpu_elements),
                                           testing::Values(GST_EVENT_CAMERA_MEDIA_TYPE, pictures)));
 
 TEST_P(Memory, DoesNotGrowOverTenThousandFrames) {

@@ -29,7 +29,7 @@ TEST_P(EveryElement, PlaysAgainAfterAStop) {
   gst_init(nullptr, nullptr);
   const std::string launch =
       "videotestsrc name=source pattern=ball num-buffers=6 ! video/x-raw,width=80,height=60 ! " +
-      std::string(GetParam()) + " ! fakesink name=sink signal-handoffs=true";
+      with_upload(GetParam()) + " ! fakesink name=sink signal-handoffs=true";
   Owned<GstElement> pipeline(gst_parse_launch(launch.c_str(), nullptr));
   ASSERT_TRUE(pipeline);
   int buffers = 0;

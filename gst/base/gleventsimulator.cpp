@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/base/gleventsimulator.hpp"
+
+#include <gst/gl/gstglfuncs.h>
+
+#include <exception>
+#include <mutex>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "gst/base/frame_luma.hpp"
+#include "gst/base/gl_display.hpp"
+
+using eventcamera::EventBuckets;
+using eventcamera::LumaWeights;
+using eventcamera::Nanoseconds;
+
+/// Locked while they change: contexts are set and queried from any thread.
+struct GstGLEventSimulatorPrivate {
+  std::recursive_mutex mutex;
+  GstGLDisplay* display = nullptr;
+  GstGLContext* other = nullptr;  ///< of the application, to share objects with
+  GstGLContext* context = nullptr;
+};
+
+G_DEFINE_ABSTRACT_TYPE_WITH_PRIVATE(GstGLEventSimulator, gst_gl_event_simulator,
+                                    GST_TYPE_EVENT_SIMULATOR)
+#define PARENT_ELEMENT_CLASS GST_ELEMENT_CLASS(gst_gl_event_simulator_parent_class)
+#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_gl_event_simulator_parent_class)
+
+static GstGLEventSimulatorPrivate& priv_of(gpointer self) {
+  return *static_cast<GstGLEventSimulatorPrivate*>(
+      gst_gl_event_simulator_get_instance_private(GST_GL_EVENT_SIMULATOR(self)));
+}
+
+/// What to do without OpenGL: the element on the CPU has the same name without "gl".
+static std::string advice_of(gpointer self) {
+  const auto* factory = gst_element_get_factory(GST_ELEMENT(self));
+  return std::string(" Use ") + (GST_OBJECT_NAME(factory) + 2) + ", which runs on the CPU.";
+}
+
+/* display and context */
+
+/// Asks the neighbours and the application for a display, which set_context() then stores.
+static void ask_for_display(GstElement* self) {
+  auto& priv = priv_of(self);
+  GstQuery* query = gst_query_new_context(GST_GL_DISPLAY_CONTEXT_TYPE);
+  for (GstPad* pad : {GST_BASE_TRANSFORM_SRC_PAD(self), GST_BASE_TRANSFORM_SINK_PAD(self)}) {
+    GstContext* context = nullptr;
+    if (priv.display == nullptr && gst_pad_peer_query(pad, query)) {
+      gst_query_parse_context(query, &context);
+      if (context != nullptr) gst_element_set_context(self, context);
+    }
+  }
+  gst_query_unref(query);
+  if (priv.display == nullptr)
+    gst_element_post_message(
+        self, gst_message_new_need_context(GST_OBJECT(self), GST_GL_DISPLAY_CONTEXT_TYPE));
+}
+
+/// Makes a display, and shares it with the pipeline.
+static void provide_display(GstElement* self) {
+  GstGLDisplay* display = make_gl_display();
+  if (display == nullptr) return;
+  GstContext* context = gst_context_new(GST_GL_DISPLAY_CONTEXT_TYPE, TRUE);
+  gst_context_set_gl_display(context, display);
+  gst_object_unref(display);
+  gst_element_set_context(self, context);
+  gst_element_post_message(self, gst_message_new_have_context(GST_OBJECT(self), context));
+}
+
+static bool open_display(GstElement* self) {
+  auto& priv = priv_of(self);
+  const std::lock_guard lock(priv.mutex);
+  if (priv.display == nullptr) ask_for_display(self);
+  if (priv.display == nullptr) provide_display(self);
+  if (priv.display != nullptr && gst_gl_ensure_element_data(self, &priv.display, &priv.other))
+    return true;
+  post_message(self, GST_MESSAGE_ERROR,
+               {GST_RESOURCE_ERROR_NOT_FOUND,
+                "OpenGL does not work here: neither a screen nor a GPU, nor a software renderer "
+                "(in Debian's libgl1-mesa-dri)." +
+                    advice_of(self)},
+               "no GstGLDisplay has a context");
+  return false;
+}
+
+static void close_display(gpointer self) {
+  auto& priv = priv_of(self);
+  const std::lock_guard lock(priv.mutex);
+  gst_clear_object(&priv.context);
+  gst_clear_object(&priv.other);
+  gst_clear_object(&priv.display);
+}
+
+/// Returns the context shared with the neighbours, or else that of the display; null with an error
+/// if there is none.
+static GstGLContext* find_context(GstElement* self, GError** error) {
+  auto& priv = priv_of(self);
+  const std::lock_guard lock(priv.mutex);
+  if (priv.context == nullptr) gst_gl_query_local_gl_context(self, GST_PAD_SRC, &priv.context);
+  if (priv.context == nullptr) gst_gl_query_local_gl_context(self, GST_PAD_SINK, &priv.context);
+  if (priv.context == nullptr) priv.context = gl_context_of(priv.display, priv.other, error);
+  return priv.context;
+}
+
+static void set_context(GstElement* self, GstContext* context) {
+  auto& priv = priv_of(self);
+  {
+    const std::lock_guard lock(priv.mutex);
+    gst_gl_handle_set_context(self, context, &priv.display, &priv.other);
+  }
+  PARENT_ELEMENT_CLASS->set_context(self, context);
+}
+
+static GstStateChangeReturn change_state(GstElement* self, GstStateChange change) {
+  if (change == GST_STATE_CHANGE_NULL_TO_READY && !open_display(self))
+    return GST_STATE_CHANGE_FAILURE;
+  const auto result = PARENT_ELEMENT_CLASS->change_state(self, change);
+  if (change == GST_STATE_CHANGE_READY_TO_NULL) close_display(self);
+  return result;
+}
+
+static gboolean query(GstBaseTransform* self, GstPadDirection direction, GstQuery* query) {
+  if (GST_QUERY_TYPE(query) == GST_QUERY_CONTEXT) {
+    auto& priv = priv_of(self);
+    const std::lock_guard lock(priv.mutex);
+    if (gst_gl_handle_context_query(GST_ELEMENT(self), query, priv.display, priv.context,
+                                    priv.other))
+      return TRUE;
+  }
+  return PARENT_TRANSFORM_CLASS->query(self, direction, query);
+}
+
+/* frames */
+
+namespace {
+
+/// Runs `work` in the thread of a context; passes on its exceptions.
+template <class Work>
+void run_in(GstGLContext* context, const Work& work) {
+  struct Call {
+    const Work& work;
+    std::exception_ptr failure;
+  } call{work, nullptr};
+  const auto run = [](GstGLContext*, gpointer data) {
+    auto& this_call = *static_cast<Call*>(data);
+    try {
+      this_call.work();
+    } catch (...) {
+      this_call.failure = std::current_exception();
+    }
+  };
+  gst_gl_context_thread_add(context, run, &call);
+  if (call.failure) std::rethrow_exception(call.failure);
+}
+
+/// Contributions of the channels of the first texture to luma.
+void find_weights(const GstVideoInfo& video, int (&weights)[4]) {
+  const auto channel = [&](guint component) -> int& {
+    return weights[GST_VIDEO_INFO_COMP_POFFSET(&video, component)];
+  };
+  std::fill(std::begin(weights), std::end(weights), 0);
+  if (GST_VIDEO_INFO_IS_RGB(&video)) {
+    const auto luma = luma_weights_of(video);
+    channel(GST_VIDEO_COMP_R) = luma.red;
+    channel(GST_VIDEO_COMP_G) = luma.green;
+    channel(GST_VIDEO_COMP_B) = luma.blue;
+  } else {
+    channel(GST_VIDEO_COMP_Y) = LumaWeights::one;
+  }
+}
+
+/// Maps the first texture of a frame.
+class MappedTexture {
+ public:
+  MappedTexture(const GstVideoInfo& video, GstBuffer* buffer, GstGLContext* context) {
+    GstMemory* memory =
+        gst_buffer_n_memory(buffer) > 0 ? gst_buffer_peek_memory(buffer, 0) : nullptr;
+    if (memory == nullptr || !gst_is_gl_memory(memory)) {
+      fault_ = "its memory is not an OpenGL texture";
+      return;
+    }
+    auto* texture = GST_GL_MEMORY_CAST(memory);
+    if (!gst_gl_context_can_share(texture->mem.context, context)) {
+      fault_ = "its texture is in an OpenGL context that shares nothing with that of this element";
+      return;
+    }
+    if (gst_gl_memory_get_texture_target(texture) != GST_GL_TEXTURE_TARGET_2D ||
+        gst_gl_memory_get_texture_width(texture) < GST_VIDEO_INFO_WIDTH(&video) ||
+        gst_gl_memory_get_texture_height(texture) < GST_VIDEO_INFO_HEIGHT(&video)) {
+      fault_ = "its texture is not 2D, or smaller than the caps say";
+      return;
+    }
+    if (auto* sync = gst_buffer_get_gl_sync_meta(buffer)) gst_gl_sync_meta_wait(sync, context);
+    memory_ = memory;
+    if (!gst_memory_map(memory, &map_, static_cast<GstMapFlags>(GST_MAP_READ | GST_MAP_GL))) {
+      memory_ = nullptr;
+      fault_ = "its texture cannot be mapped";
+    }
+  }
+  ~MappedTexture() {
+    if (memory_ != nullptr) gst_memory_unmap(memory_, &map_);
+  }
+  MappedTexture(const MappedTexture&) = delete;
+  MappedTexture& operator=(const MappedTexture&) = delete;
+
+  /// Description of the fault, for a message; empty if the texture was mapped.
+  const std::string& fault() const { return fault_; }
+  guint name() const { return *reinterpret_cast<const guint*>(map_.data); }
+
+ private:
+  GstMemory* memory_ = nullptr;
+  GstMapInfo map_{};
+  std::string fault_;
+};
+
+class TextureVideoSimulator final : public VideoSimulator {
+ public:
+  TextureVideoSimulator(GstElement* element, GstGLContext* context, const GstVideoInfo& video,
+                        MakeGlSimulator make)
+      : element_(element),
+        context_(static_cast<GstGLContext*>(gst_object_ref(context))),
+        frame_{FrameLuma::format_of(video), 0, {}} {
+    set_video(video);
+    try {
+      run([&] {
+        gl_.emplace(
+            [context](const char* name) { return gst_gl_context_get_proc_address(context, name); });
+        simulator_ = make(*gl_, frame_.format);
+      });
+    } catch (...) {
+      close();
+      throw;
+    }
+  }
+  ~TextureVideoSimulator() override { close(); }
+  TextureVideoSimulator(const TextureVideoSimulator&) = delete;
+  TextureVideoSimulator& operator=(const TextureVideoSimulator&) = delete;
+
+  void set_video(const GstVideoInfo& video) override {
+    video_ = video;
+    find_weights(video, frame_.weights);
+  }
+
+  const EventBuckets* push(GstBuffer* buffer, Nanoseconds time,
+                           const eventcamera::Settings& settings) override {
+    const MappedTexture texture(video_, buffer, context_);
+    if (!texture.fault().empty())
+      throw VideoSimulatorError(
+          {GST_RESOURCE_ERROR_FAILED,
+           "Cannot read a video frame: " + texture.fault() + ". Check the element upstream."},
+          texture.fault());
+    const EventBuckets* events = nullptr;
+    frame_.texture = texture.name();
+    run([&] { events = simulator_->push(frame_, time, settings); });
+    return events;
+  }
+
+  eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
+
+ private:
+  /// Runs `work` in the context; turns errors of OpenGL into messages.
+  template <class Work>
+  void run(const Work& work) {
+    try {
+      run_in(context_, work);
+    } catch (const eventcamera::gl::Error& error) {
+      gint major = 0;
+      gint minor = 0;
+      gst_gl_context_get_gl_version(context_, &major, &minor);
+      gchar* api = gst_gl_api_to_string(gst_gl_context_get_gl_api(context_));
+      const std::string version =
+          std::string(api) + " " + std::to_string(major) + "." + std::to_string(minor);
+      g_free(api);
+      throw VideoSimulatorError(
+          {GST_RESOURCE_ERROR_FAILED,
+           std::string("OpenGL cannot simulate: ") + error.what() + "." + advice_of(element_)},
+          version);
+    }
+  }
+
+  void close() {
+    run_in(context_, [this] {
+      simulator_.reset();
+      gl_.reset();
+    });
+    gst_object_unref(context_);
+  }
+
+  GstElement* element_;
+  GstGLContext* context_;
+  GstVideoInfo video_;
+  eventcamera::gl::TextureFrame frame_;
+  std::optional<eventcamera::gl::Context> gl_;
+  std::unique_ptr<eventcamera::gl::Simulator> simulator_;
+};
+
+}  // namespace
+
+std::unique_ptr<VideoSimulator> make_texture_simulator(GObject* element, const GstVideoInfo& video,
+                                                       MakeGlSimulator make) {
+  auto* self = GST_ELEMENT(element);
+  GError* error = nullptr;
+  GstGLContext* context = find_context(self, &error);
+  if (context == nullptr) {
+    const std::string cause = error != nullptr ? error->message : "unknown";
+    g_clear_error(&error);
+    throw VideoSimulatorError(
+        {GST_RESOURCE_ERROR_NOT_FOUND, "Cannot create an OpenGL context." + advice_of(self)},
+        cause);
+  }
+  return std::make_unique<TextureVideoSimulator>(self, context, video, make);
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  close_display(object);
+  std::destroy_at(&priv_of(object));
+  G_OBJECT_CLASS(gst_gl_event_simulator_parent_class)->finalize(object);
+}
+
+static void gst_gl_event_simulator_init(GstGLEventSimulator* self) {
+  std::construct_at(&priv_of(self));
+}
+
+static void gst_gl_event_simulator_class_init(GstGLEventSimulatorClass* klass) {
+  G_OBJECT_CLASS(klass)->finalize = finalize;
+  GST_ELEMENT_CLASS(klass)->set_context = set_context;
+  GST_ELEMENT_CLASS(klass)->change_state = change_state;
+  GST_BASE_TRANSFORM_CLASS(klass)->query = query;
+  gst_type_mark_as_plugin_api(GST_TYPE_GL_EVENT_SIMULATOR, static_cast<GstPluginAPIFlags>(0));
+}

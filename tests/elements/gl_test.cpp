@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The simulators on the GPU: against those on the CPU, and how they find OpenGL.
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+
+std::vector<std::string> formats() {
+  gst_init(nullptr, nullptr);
+  const Owned<GstElement> element(gst_element_factory_make("gleventsim-frame", nullptr));
+  GstPad* pad = gst_element_get_static_pad(element.get(), "sink");
+  const Owned<GstCaps> caps(gst_pad_get_pad_template_caps(pad));
+  gst_object_unref(pad);
+  const GValue* list = gst_structure_get_value(gst_caps_get_structure(caps.get(), 0), "format");
+  std::vector<std::string> names;
+  for (guint i = 0; i < gst_value_list_get_size(list); ++i)
+    names.emplace_back(g_value_get_string(gst_value_list_get_value(list, i)));
+  return names;
+}
+
+class EveryFormat : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats()),
+                         [](const auto& format) { return format.param; });
+
+/// Bytes of the events of five noisy frames.
+std::string events_of_noise(const std::string& element, const std::string& format) {
+  Harness h(element);
+  h.caps("video/x-raw, width=46, height=34, framerate=25/1, format=" + format);
+  GRand* random = g_rand_new_with_seed(7);
+  std::string bytes;
+  for (GstClockTime i = 0; i < 5; ++i) {
+    GstBuffer* frame = h.flat(i * 40 * GST_MSECOND, 0);
+    GstMapInfo map;
+    gst_buffer_map(frame, &map, GST_MAP_WRITE);
+    for (gsize byte = 0; byte < map.size; ++byte)
+      map.data[byte] = static_cast<guint8>(g_rand_int(random));
+    gst_buffer_unmap(frame, &map);
+    EXPECT_EQ(h.push(frame), GST_FLOW_OK);
+    if (const auto events = h.pull()) bytes += bytes_of(events.get());
+  }
+  g_rand_free(random);
+  return bytes;
+}
+
+TEST_P(EveryFormat, GivesTheEventsOfTheCpuBitForBit) {
+  const auto expected = events_of_noise("eventsim-frame", GetParam());
+  EXPECT_GT(expected.size(), 8U * 1000);
+  EXPECT_EQ(events_of_noise("gleventsim-frame", GetParam()), expected);
+}
+
+TEST(OpenGl, IsSharedWithThePipeline) {
+  gst_init(nullptr, nullptr);
+  const Owned<GstElement> pipeline(
+      gst_parse_launch("videotestsrc num-buffers=3 ! glupload ! gleventsim-frame name=it ! "
+                       "fakesink",
+                       nullptr));
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  EXPECT_EQ(gst_element_set_state(pipeline.get(), GST_STATE_READY), GST_STATE_CHANGE_SUCCESS);
+  const Owned<GstElement> element(gst_bin_get_by_name(GST_BIN(pipeline.get()), "it"));
+  for (GstElement* holder : {pipeline.get(), element.get()}) {
+    GstContext* context = gst_element_get_context(holder, "gst.gl.GLDisplay");
+    ASSERT_NE(context, nullptr) << GST_OBJECT_NAME(holder);
+    gst_context_unref(context);
+  }
+  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
+  const Owned<GstMessage> end(
+      gst_bus_timed_pop_filtered(bus.get(), 20 * GST_SECOND,
+                                 static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
+  ASSERT_TRUE(end);
+  EXPECT_EQ(GST_MESSAGE_TYPE(end.get()), GST_MESSAGE_EOS);
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+}
+
+TEST(OpenGl, IsNamedInAnErrorWhereItIsMissing) {
+  // Neither a screen nor a device, in a process of its own.
+  const auto run = [] {
+    g_setenv("GST_GL_PLATFORM", "egl", TRUE);
+    g_setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere", TRUE);
+    gst_init(nullptr, nullptr);
+    const Owned<GstElement> element(gst_element_factory_make("gleventsim-frame", nullptr));
+    const Owned<GstBus> bus(gst_bus_new());
+    gst_element_set_bus(element.get(), bus.get());
+    const bool refused =
+        gst_element_set_state(element.get(), GST_STATE_READY) == GST_STATE_CHANGE_FAILURE;
+    const Owned<GstMessage> error(gst_bus_pop_filtered(bus.get(), GST_MESSAGE_ERROR));
+    g_printerr("refused=%d: %s\n", refused, error ? text_of(error.get()).c_str() : "no error");
+    gst_element_set_bus(element.get(), nullptr);
+    std::_Exit(0);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(run(), testing::ExitedWithCode(0),
+              "refused=1: OpenGL does not work here: .* Use eventsim-frame, which runs on the "
+              "CPU\\.");
+}
+
+TEST(OpenGl, IsRefusedWhereItIsTooOld) {
+  const auto run = [] {
+    g_setenv("MESA_GLES_VERSION_OVERRIDE", "3.0", TRUE);
+    g_setenv("GST_GL_API", "gles2", TRUE);
+    Harness h("gleventsim-frame");
+    h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1");
+    h.push(h.flat(0, 100));
+    const auto error = h.message(GST_MESSAGE_ERROR);
+    g_printerr("%s\n", error ? text_of(error.get()).c_str() : "no error");
+    std::_Exit(0);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(run(), testing::ExitedWithCode(0),
+              "OpenGL cannot simulate: compute shaders need OpenGL ES 3.1 or OpenGL 4.3, and this "
+              "is OpenGL ES 3.0 .* Use eventsim-frame, which runs on the CPU\\.");
+}
+
+}  // namespace
