@@ -28,6 +28,9 @@ class VideoFrame {
     if (!mapped_ || !rows_fit(info))
       fault_ = text_of(info) + " does not fit into its " +
                std::to_string(gst_buffer_get_size(buffer)) + " bytes";
+    // GStreamer sets the size of the GstVideoMeta, which may be larger.
+    GST_VIDEO_INFO_WIDTH(&frame_.info) = GST_VIDEO_INFO_WIDTH(&info);
+    GST_VIDEO_INFO_HEIGHT(&frame_.info) = GST_VIDEO_INFO_HEIGHT(&info);
   }
   ~VideoFrame() {
     if (mapped_) gst_video_frame_unmap(&frame_);

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <map>
 #include <mutex>
+#include <numeric>
 #include <optional>
 #include <random>
 #include <set>
@@ -346,9 +347,6 @@ class Player {
   std::map<std::string, Track> tracks_;
   std::vector<GstElement*> after_;  ///< the pipeline's
 };
-
-/// In pull mode, and in push mode with pieces of any size.
-const char* const ways[] = {"", "identity", "identity ! identity name=i"};
 
 TEST(AedatDemux, HandsOutTheEventsOfEveryVersion) {
   recordings::Random random(7);
@@ -1185,6 +1183,38 @@ TEST(AedatMux, LeavesOutWhatDoesNotFit) {
   EXPECT_TRUE(warnings[0].starts_with("Left out a buffer without a timestamp"));
   EXPECT_TRUE(warnings[1].starts_with("Left out 2 events earlier than"));
   EXPECT_TRUE(warnings[2].starts_with("Left out 2 events outside"));
+}
+
+TEST(AedatMux, WritesFramesInTheSizeOfTheirCaps) {
+  const Owned<GstHarness> h(gst_harness_new_with_padnames("aedatmux", "video", "src"));
+  gst_harness_set_src_caps_str(h.get(),
+                               "video/x-raw, format=GRAY8, width=4, height=3, framerate=0/1");
+  // Rows of 16 bytes; the meta's frame is larger than the memory.
+  Bytes pixels(3 * 16);
+  std::iota(pixels.begin(), pixels.end(), std::uint8_t{0});
+  GstBuffer* const buffer = gst_buffer_new_memdup(pixels.data(), pixels.size());
+  gsize offsets[GST_VIDEO_MAX_PLANES] = {0};
+  gint strides[GST_VIDEO_MAX_PLANES] = {16};
+  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8, 16, 999,
+                                 1, offsets, strides);
+  GST_BUFFER_PTS(buffer) = GST_SECOND;
+  EXPECT_EQ(gst_harness_push(h.get(), buffer), GST_FLOW_OK);
+  EXPECT_TRUE(gst_harness_push_event(h.get(), gst_event_new_eos()));
+  const auto bytes = rest_of_file(h.get());
+  Aedat4Decoder decoder;
+  decoder.push(bytes);
+  int frames = 0;
+  while (const auto item = decoder.next()) {
+    const auto* const some = std::get_if<FrameItem>(&*item);
+    if (some == nullptr) continue;
+    ++frames;
+    ASSERT_EQ(some->frame.width, 4);
+    ASSERT_EQ(some->frame.height, 3);
+    for (int y = 0; y < 3; ++y)
+      for (int x = 0; x < 4; ++x)
+        EXPECT_EQ(some->frame.pixels[y * some->frame.stride + x], 16 * y + x);
+  }
+  EXPECT_EQ(frames, 1);
 }
 
 TEST(AedatMux, WritesAnewAfterAFlush) {
