@@ -411,8 +411,9 @@ class Points {
     active = hn::And(active, inside);
     const Ints ints;
     const auto stride = hn::Set(ints, static_cast<std::int32_t>(to_.stride()));
-    hn::Store(hn::Add(hn::Mul(hn::ConvertTo(ints, y), stride), hn::ConvertTo(ints, x)), ints,
-              at_ + i);
+    const auto row = hn::ConvertTo(ints, hn::IfThenElseZero(inside, y));
+    const auto column = hn::ConvertTo(ints, hn::IfThenElseZero(inside, x));
+    hn::Store(hn::Add(hn::Mul(row, stride), column), ints, at_ + i);
     const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
                                               hn::Ne(cell_y, hn::Load(floats, cell_y_ + i))));
     hn::Store(cell_x, floats, cell_x_ + i);
