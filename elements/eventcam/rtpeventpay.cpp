@@ -293,7 +293,8 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       break;
     default:
       // Those of sensors precede each buffer, and may precede the ones that it is joined to.
-      if (GST_EVENT_IS_SERIALIZED(event) && !is_sensor_event(event))
+      if ((gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) &&
+          !is_sensor_event(event))
         reported(self, [&] { send(self); });
       break;
   }

@@ -594,7 +594,7 @@ gboolean EventReader::sink_event(GstEvent* event) {
       interrupt_output();
       return gst_pad_event_default(sink_, GST_OBJECT(element_), event);
     default:
-      return GST_EVENT_IS_SERIALIZED(event)
+      return (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED)
                  ? forward(event)
                  : gst_pad_event_default(sink_, GST_OBJECT(element_), event);
   }

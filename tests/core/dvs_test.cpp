@@ -396,21 +396,25 @@ std::vector<std::vector<Event>> film(int width, int height, int bits, const DvsS
 }
 
 TEST(Dvs, IsTheSameForAllThreadsStridesAndTargets) {
-  const std::pair<int, int> sizes[] = {{1, 1}, {3, 17}, {31, 33}, {97, 61}, {130, 40}};
-  for (const auto& [width, height] : sizes) {
+  struct Size {
+    int width, height;
+  };
+  for (const auto& size : {Size{1, 1}, Size{3, 17}, Size{31, 33}, Size{97, 61}, Size{130, 40}}) {
     for (const auto upsampling : {Upsampling::linear, Upsampling::motion}) {
       auto settings = everything();
       settings.upsampling = upsampling;
       settings.max_steps = 5;
       for (const int bits : {8, 10, 12, 16}) {
-        const auto play = [&, w = width, h = height](int threads, int padding) {
-          return bits == 8 ? film<std::uint8_t>(w, h, bits, settings, threads, padding)
-                           : film<std::uint16_t>(w, h, bits, settings, threads, padding);
+        const auto play = [&](int threads, int padding) {
+          return bits == 8
+                     ? film<std::uint8_t>(size.width, size.height, bits, settings, threads, padding)
+                     : film<std::uint16_t>(size.width, size.height, bits, settings, threads,
+                                           padding);
         };
         const auto expected = play(1, 0);
         EXPECT_TRUE(play(2, 14) == expected);
         targets::for_each([&](const char* target) {
-          EXPECT_TRUE(play(2, 0) == expected) << target << " " << width << "x" << height;
+          EXPECT_TRUE(play(2, 0) == expected) << target << " " << size.width << "x" << size.height;
         });
       }
     }
