@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Configures and builds the plugins and programs with each feature disabled. Without the simulators
-# nothing may need OpenCV.
+# Builds the plugins and programs with each feature disabled, in one directory, so that only what a
+# feature changes is built again. Without the simulators nothing may need OpenCV.
 set -eu
 cd "$(dirname "$0")/.."
-builds=$(mktemp -d)
-trap 'rm -rf "$builds"' EXIT
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+build=$scratch/build
 
 fail() {
   echo "FAILED: $*" >&2
@@ -13,30 +14,36 @@ fail() {
 }
 
 without() { # FEATURE...
-  echo "Without ${*#-D}"
-  build=$builds/without$(printf -- '-%s' "${@#-D}")
+  echo "Without $*"
+  local feature options=()
+  for feature in eventsim eventsimgl eventcam aedat hdf5 npz; do
+    case " $* " in
+      *" $feature "*) options+=("-D$feature=disabled") ;;
+      *) options+=("-D$feature=auto") ;;
+    esac
+  done
+  if [ -d "$build" ]; then meson configure "$build" "${options[@]}"; fi
   ./compile "$build" -Dtests=false -Dintrospection=disabled -Dbuildtype=plain -Dwerror=true \
-    --prefix="$builds/installed" \
-    "${@/%/=disabled}"
+    --prefix="$scratch/installed" "${options[@]}"
 }
 
 plugins() {
   (cd "$build/elements" && find . -name '*.so' | sort | tr '\n' ' ')
 }
 
-without -Deventsim
+without eventsim
 if grep -q opencv "$build/compile_commands.json" "$build/build.ninja"; then
   fail "OpenCV is in the commands of a build without simulators"
 fi
 [ "$(plugins)" = "./eventcam/libgsteventcam.so ./eventsimgl/libgsteventsimgl.so " ] || fail "built $(plugins)"
 
-without -Deventsim -Daedat
-without -Deventsim -Dhdf5
-without -Deventsim -Dnpz
-without -Deventcam # finds OpenCV, although it is not in the prefix
+without eventsim aedat
+without eventsim hdf5
+without eventsim npz
+without eventcam # finds OpenCV, although it is not in the prefix
 [ "$(plugins)" = "./eventsim/libgsteventsim.so ./eventsimgl/libgsteventsimgl.so " ] || fail "built $(plugins)"
 
-without -Deventcam -Deventsimgl
+without eventcam eventsimgl
 if grep -q gstreamer-gl "$build/compile_commands.json"; then
   fail "OpenGL is in the commands of a build without simulators on the GPU"
 fi

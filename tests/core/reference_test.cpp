@@ -217,7 +217,7 @@ INSTANTIATE_TEST_SUITE_P(Textures, Equality,
                                          Case{131, 50, 16, 10, Picture::texture, 2},
                                          Case{90, 70, 12, 3, Picture::texture, 1},
                                          Case{75, 49, 8, 255, Picture::texture, 2},
-                                         Case{320, 240, 8, 10, Picture::texture, 2}));
+                                         Case{160, 120, 8, 10, Picture::texture, 2}));
 INSTANTIATE_TEST_SUITE_P(StillGrounds, Equality,
                          testing::Values(Case{200, 150, 8, 10, Picture::patch, 2},
                                          Case{333, 101, 8, 20, Picture::patch, 1},
