@@ -4,6 +4,7 @@
 //   loopback/FORMAT                 10 million events per second through sockets of this machine:
 //                                   million events per second that were sent, percent that did not
 //                                   arrive, and processors in use
+//   growth/rate/FORMAT/RATE         the same at 1 to 40 million events per second
 //   meson devenv -C build-bench bench/datagrams_bench
 #include <benchmark/benchmark.h>
 
@@ -72,15 +73,11 @@ int main(int argc, char** argv) {
   const std::vector scenes{noise(), recorded("1280x720", "evt3-1280x720-triggers.raw"),
                            recorded("640x480", "evt3-640x480-triggers.raw")};
   for (const auto& scene : scenes) register_codecs(scene);
-  for (const auto& format : formats_for({640, 480}))
-    benchmark::RegisterBenchmark(
-        ("loopback/" + format.name).c_str(),
-        [name = format.name](auto& state) {
-          bench::loopback(state, 10'000,
-                          "! eventdatagramdepay name=depay width=640 height=480 format=" + name,
-                          "eventdatagrampay format=" + name);
-        })
-        ->Iterations(1)
-        ->UseRealTime();
+  for (const auto& [name, settings] : formats_for({640, 480})) {
+    const auto from = "! eventdatagramdepay name=depay width=640 height=480 format=" + name;
+    const auto payloader = "eventdatagrampay format=" + name;
+    register_loopback("loopback/" + name, 10'000, from, payloader);
+    register_growth(name, from, payloader);
+  }
   benchmark::RunSpecifiedBenchmarks();
 }

@@ -140,6 +140,7 @@ inline void loopback(benchmark::State& state, std::size_t events_per_ms, const s
     const auto cpu = std::clock();
     const double seconds = send(GST_APP_SRC(sender.named("source")), events_per_ms, [](int) {});
     const auto sent = static_cast<double>(1000 * events_per_ms);
+    state.counters["offered"] = static_cast<double>(events_per_ms) / 1e3;
     state.counters["Mevents/s"] = sent / seconds / 1e6;
     guint64 received = 0;
     for (guint64 before = 1; received != before && received < 1000 * events_per_ms;) {
@@ -151,6 +152,23 @@ inline void loopback(benchmark::State& state, std::size_t events_per_ms, const s
     state.counters["processors"] =
         static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC / seconds;
   }
+}
+
+/// Registers a run of loopback().
+inline void register_loopback(const std::string& name, std::size_t events_per_ms,
+                              const std::string& from, const std::string& payloader) {
+  benchmark::RegisterBenchmark(
+      name.c_str(), [=](auto& state) { loopback(state, events_per_ms, from, payloader); })
+      ->Iterations(1)
+      ->UseRealTime();
+}
+
+/// Registers growth/rate/NAME/RATE for growing rates, in million events per second.
+inline void register_growth(const std::string& name, const std::string& from,
+                            const std::string& payloader) {
+  for (const int rate : {1, 2, 5, 10, 20, 40})
+    register_loopback("growth/rate/" + name + "/" + std::to_string(rate),
+                      static_cast<std::size_t>(rate) * 1000, from, payloader);
 }
 
 }  // namespace bench

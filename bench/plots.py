@@ -222,4 +222,5 @@ def main():
     draw_growth(runs, os.path.join(sys.argv[2], "growth.png"))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -4,6 +4,8 @@
 //   loopback/FORMAT                 20 million events per second through sockets of this machine:
 //                                   million events per second that were sent, percent that did not
 //                                   arrive, and processors in use
+//   growth/rate/FORMAT/RATE         the same at 1 to 40 million events per second
+//   growth/mtu/FORMAT/MTU           the same at 20 million, for other sizes of packets
 //   latency                         one million events per second, likewise: milliseconds from a
 //                                   buffer's arrival at the payloader until its events leave the
 //                                   depayloader, median and 99th percentile
@@ -155,11 +157,12 @@ int main(int argc, char** argv) {
     const std::string name = formats[i];
     for (const auto& scene : scenes)
       if (!scene.events.empty()) register_codec(scene, static_cast<RtpEventFormat>(i), name);
-    benchmark::RegisterBenchmark(
-        ("loopback/" + name).c_str(),
-        [name](auto& state) { loopback(state, 20'000, from(name), "rtpeventpay format=" + name); })
-        ->Iterations(1)
-        ->UseRealTime();
+    const auto payloader = "rtpeventpay format=" + name;
+    register_loopback("loopback/" + name, 20'000, from(name), payloader);
+    register_growth("RTP " + name, from(name), payloader);
+    for (const auto* mtu : {"576", "1400", "8972", "65507"})
+      register_loopback("growth/mtu/RTP " + name + "/" + mtu, 20'000,
+                        std::string("mtu=") + mtu + " " + from(name), payloader + " mtu=" + mtu);
   }
   benchmark::RegisterBenchmark("latency", latency)->Iterations(1)->UseRealTime();
   benchmark::RunSpecifiedBenchmarks();
