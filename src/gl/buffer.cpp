@@ -2,6 +2,7 @@
 #include "src/gl/buffer.hpp"
 
 #include <cstring>
+#include <vector>
 
 namespace eventcamera::gl {
 
@@ -25,6 +26,10 @@ void Buffer::assign(std::span<const std::byte> bytes) {
   gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, name_);
   gl_.BufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(bytes.size()),
                     bytes.data());
+}
+
+void Buffer::assign_zeros(std::size_t size) {
+  assign(std::vector<std::byte>(size));
 }
 
 void Buffer::read(std::span<std::byte> out) const {

@@ -26,6 +26,9 @@ class Buffer {
   /// Replaces the contents.
   void assign(std::span<const std::byte> bytes);
 
+  /// Replaces the contents by `size` zeros.
+  void assign_zeros(std::size_t size);
+
   /// Copies the first bytes to `out`, once the GPU has written them. Throws Error if the context is
   /// lost.
   void read(std::span<std::byte> out) const;

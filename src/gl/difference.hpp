@@ -3,6 +3,7 @@
 
 #include "src/gl/event_list.hpp"
 #include "src/gl/grey_frame.hpp"
+#include "src/simulate/simulator.hpp"
 
 namespace eventcamera::gl {
 

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/gl/event_list.hpp"
 
-#include <algorithm>
 #include <bit>
-#include <vector>
 
 #include "src/gl/shaders.hpp"
 
@@ -46,14 +44,13 @@ void EventList::write(int steps) const {
              {marks_a_step(), marks_across_, static_cast<int>(events_.size() / sizeof(Event))});
 }
 
-void EventList::read(const StepTimes& steps, EventBuckets& events) {
-  std::vector<std::uint32_t> times;
-  for (int j = 1; j <= steps.count(); ++j) times.push_back(steps.microseconds(j));
-  times_.assign(std::as_bytes(std::span(times)));
-  const Groups blocks{groups_of(block, marks_a_step()), steps.count()};
+void EventList::read(std::span<const std::uint32_t> times, EventBuckets& events) {
+  const int steps = static_cast<int>(times.size());
+  times_.assign(std::as_bytes(times));
+  const Groups blocks{groups_of(block, marks_a_step()), steps};
   count_.run(blocks, {&marks_, &starts_}, {marks_a_step()});
   scan_.run({}, {&starts_, &total_}, {blocks.x * blocks.y});
-  write(steps.count());
+  write(steps);
 
   const GLsync fence = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
   const GLenum state = gl_.ClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, patience);
@@ -64,7 +61,7 @@ void EventList::read(const StepTimes& steps, EventBuckets& events) {
   total_.read(std::as_writable_bytes(std::span(&total, 1)));
   if (total > events_.size() / sizeof(Event)) {
     events_.reserve(std::bit_ceil(std::size_t{total}) * sizeof(Event));
-    write(steps.count());
+    write(steps);
   }
   events.reset(1, 1);
   auto& list = events.bucket(1, 0);

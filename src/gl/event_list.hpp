@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <cstdint>
+#include <span>
+
 #include "src/core/event_buckets.hpp"
 #include "src/core/luma.hpp"
 #include "src/gl/kernel.hpp"
-#include "src/simulate/simulator.hpp"
 
 namespace eventcamera::gl {
 
@@ -24,8 +26,9 @@ class EventList {
   int marks_across() const { return marks_across_; }
   int marks_a_step() const { return marks_across_ * height_; }
 
-  /// Waits for the GPU, and replaces the contents of `events`. Throws Error.
-  void read(const StepTimes& steps, EventBuckets& events);
+  /// Waits for the GPU, and replaces the contents of `events`. `times` are those of the steps,
+  /// microseconds. Throws Error.
+  void read(std::span<const std::uint32_t> times, EventBuckets& events);
 
  private:
   void write(int steps) const;

@@ -23,13 +23,13 @@ class FrameSimulator final : public Simulator {
 
   void simulate(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
                 EventBuckets& events) override {
-    const StepTimes step(steps.duration(), 1);
     const auto& before = frames_[last_];
     last_ = 1 - last_;
     luma_.run(frame, frames_[last_]);
     list_.begin(1);
     difference_.run(before, frames_[last_], Thresholds::of(settings, format().bits), 1, list_);
-    list_.read(step, events);
+    const std::uint32_t t = steps.microseconds(steps.count());
+    list_.read({&t, 1}, events);
   }
 
   LumaKernel luma_;

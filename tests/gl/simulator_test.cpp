@@ -2,11 +2,24 @@
 // The simulators on the GPU against those on the CPU.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <random>
+#include <span>
+#include <utility>
+#include <vector>
 
+#include "src/flow/lucas_kanade/point_tracker.hpp"
+#include "src/gl/diff.hpp"
 #include "src/gl/frame.hpp"
+#include "src/gl/point_tracker.hpp"
+#include "src/gl/sparse.hpp"
+#include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
+#include "src/simulate/sparse.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/gl/egl_context.hpp"
 
@@ -103,6 +116,117 @@ TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
     if (i == 0) continue;
     ASSERT_EQ(scene::copy(*made), scene::copy(*expected));
   }
+}
+
+/// Share of events of `a` for which `b` has one of the same polarity within a pixel and a step.
+double matched(const std::vector<Event>& a, const std::vector<Event>& b, std::uint32_t step) {
+  std::size_t matches = 0;
+  for (const auto& event : a) {
+    const auto first =
+        std::ranges::lower_bound(b, event.t - std::min(event.t, step), {}, &Event::t);
+    const auto last = std::ranges::upper_bound(b, event.t + step, {}, &Event::t);
+    matches += std::any_of(first, last, [&](const Event& other) {
+      return event.polarity() == other.polarity() && std::abs(event.x - other.x) <= 1 &&
+             std::abs(event.y() - other.y()) <= 1;
+    });
+  }
+  return static_cast<double>(matches) / static_cast<double>(a.size());
+}
+
+/// Pushes frames of a moving texture to both, and compares the events, which may differ where the
+/// last bits of tracks do.
+void expect_similar_events(gl::Simulator& ours, Simulator& reference) {
+  constexpr int width = 67;
+  constexpr int height = 45;
+  Texture texture(width, height, 1);
+  Settings settings;
+  settings.positive_threshold = 12;
+  settings.negative_threshold = 9;
+  std::size_t interpolated = 0;
+  for (int i = 0; i < 5; ++i) {
+    const auto frame = scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i);
+    texture.upload(bytes_of(frame));
+    settings.interpolated_frames = i == 3 ? 0 : 10;
+    const auto* made = ours.push(texture.frame({one, 0, 0, 0}), i * scene::frame_time, settings);
+    const auto* expected = reference.push(scene::luma(frame), i * scene::frame_time, settings);
+    if (i == 0) continue;
+    const auto events = scene::copy(*made);
+    const auto wanted = scene::copy(*expected);
+    EXPECT_TRUE(scene::sorted(events));
+    if (i == 3) {  // no tracks
+      ASSERT_EQ(events, wanted);
+      continue;
+    }
+    if (wanted.front().t != wanted.back().t) interpolated += wanted.size();
+    const auto step = static_cast<std::uint32_t>(scene::frame_time / 11 / 1000 + 1);
+    EXPECT_GE(matched(events, wanted, step), 0.995);
+    EXPECT_GE(matched(wanted, events, step), 0.995);
+    EXPECT_NEAR(static_cast<double>(events.size()), static_cast<double>(wanted.size()),
+                0.005 * static_cast<double>(wanted.size()));
+  }
+  EXPECT_GT(interpolated, 5'000U);
+}
+
+TEST_P(EveryApi, FollowsDifferencesAsTheCpuDoes) {
+  const LumaFormat format{67, 45, 8};
+  expect_similar_events(*gl::make_diff_simulator(context, format), *make_diff_simulator(format));
+}
+
+TEST_P(EveryApi, FollowsChangedPixelsAsTheCpuDoes) {
+  const LumaFormat format{67, 45, 8};
+  expect_similar_events(*gl::make_sparse_simulator(context, format),
+                        *make_sparse_simulator(format));
+}
+
+TEST_P(EveryApi, TracksPointsAsTheCpuDoes) {
+  constexpr int width = 83;
+  constexpr int height = 70;
+  const LumaFormat format{width, height, 8};
+  const auto from = scene::texture<std::uint8_t>(width, height, 8, 0, 0);
+  const auto to = scene::texture<std::uint8_t>(width, height, 8, 2.3, -1.6);
+  const gl::PointTracker tracker(context, format);
+  const gl::LumaKernel luma(context);
+  const gl::Pyramid pyramids[] = {{context, format}, {context, format}};
+  Texture texture(width, height, 1);
+  for (const auto& [pyramid, picture] : {std::pair{&pyramids[0], &from}, {&pyramids[1], &to}}) {
+    texture.upload(bytes_of(*picture));
+    luma.run(texture.frame({one, 0, 0, 0}), pyramid->picture());
+    tracker.build(*pyramid);
+  }
+  struct {
+    float x;
+    float y;
+  } tracks[width * height];
+  gl::Buffer points(context, GL_DYNAMIC_READ);
+  points.reserve(sizeof tracks);
+  tracker.find_points(pyramids[0], points);
+  tracker.track(pyramids[0], pyramids[1], points);
+  points.read(std::as_writable_bytes(std::span(tracks)));
+
+  PointTracker reference;
+  ThreadPool threads;
+  reference.push(from.view(), threads);
+  reference.push(to.view(), threads);
+  std::vector<Point> places;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      if (from.at(x, y) != 0) places.push_back({x, y});
+  const auto expected = reference.track(places, threads);
+  double sum = 0;
+  int differences = 0;
+  int found = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto& track = tracks[places[i].y * width + places[i].x];
+    const bool is_found = std::bit_cast<std::uint32_t>(track.x) != 0x7fffffff;
+    differences += is_found != expected[i].found;
+    if (!is_found || !expected[i].found) continue;
+    ++found;
+    sum += std::hypot(track.x - expected[i].flow.x, track.y - expected[i].flow.y);
+  }
+  EXPECT_GT(found, 5'000);
+  EXPECT_LE(differences, static_cast<int>(places.size()) / 200);
+  EXPECT_LE(sum / found, 0.02);
+  RecordProperty("mean_difference", std::to_string(sum / found));
 }
 
 TEST(Context, NamesWhatIsMissing) {

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/gl/diff.hpp"
+
+#include <span>
+#include <vector>
+
+#include "src/gl/difference.hpp"
+#include "src/gl/event_list.hpp"
+#include "src/gl/point_tracker.hpp"
+#include "src/gl/shaders.hpp"
+
+namespace eventcamera::gl {
+namespace {
+
+/// One polarity of the last two difference frames.
+struct Part {
+  Part(const Context& gl, const LumaFormat& format)
+      : pictures{{gl, format}, {gl, format}}, motions(gl) {
+    motions.reserve(static_cast<std::size_t>(format.width) *
+                    static_cast<std::size_t>(format.height) * 8);
+  }
+
+  Pyramid pictures[2];  ///< 0 for pixels that did not fire
+  Buffer motions;       ///< of the pixels of the earlier one
+};
+
+class DiffSimulator final : public Simulator {
+ public:
+  DiffSimulator(const Context& gl, const LumaFormat& format)
+      : Simulator(format),
+        luma_(gl),
+        difference_(gl, format),
+        split_(gl, "split", shaders::split),
+        land_(gl, "land", shaders::land),
+        mark_(gl, "mark", shaders::mark),
+        tracker_(gl, format),
+        list_(gl, format),
+        strongest_(gl),
+        frames_{{gl, format}, {gl, format}},
+        on_(gl, format),
+        off_(gl, format) {
+    strongest_.assign_zeros(static_cast<std::size_t>(format.width) *
+                            static_cast<std::size_t>(format.height) * 4);
+  }
+
+ private:
+  void start(const TextureFrame& frame) override {
+    luma_.run(frame, frames_[last_]);
+    has_difference_ = false;
+  }
+
+  void simulate(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
+                EventBuckets& events) override {
+    const auto thresholds = Thresholds::of(settings, format().bits);
+    const int before = last_;
+    last_ = 1 - last_;
+    luma_.run(frame, frames_[last_]);
+    const int words = GreyFrame::words_across(format().width);
+    split_.run({groups_of(64, words), format().height},
+               {&frames_[before].buffer(), &frames_[last_].buffer(),
+                &on_.pictures[last_].picture().buffer(), &off_.pictures[last_].picture().buffer()},
+               {words, thresholds.positive, thresholds.negative});
+    for (const auto* part : {&on_, &off_}) tracker_.build(part->pictures[last_]);
+
+    const bool interpolates = has_difference_ && steps.count() > 1;
+    const int first = interpolates ? 1 : steps.count();
+    list_.begin(steps.count() - first + 1);
+    if (interpolates) fire_between(steps.count());
+    difference_.run(frames_[before], frames_[last_], thresholds, steps.count() - first + 1, list_);
+    std::vector<std::uint32_t> times;
+    for (int j = first; j <= steps.count(); ++j) times.push_back(steps.microseconds(j));
+    list_.read(times, events);
+    has_difference_ = true;
+  }
+
+  void fire_between(int steps) const {
+    const auto [width, height, bits] = format();
+    const Groups groups{groups_of(64, width), height};
+    const int before = 1 - last_;
+    for (const auto* part : {&on_, &off_}) {
+      tracker_.find_points(part->pictures[before], part->motions);
+      tracker_.track(part->pictures[before], part->pictures[last_], part->motions);
+      tracker_.to_motion(part->motions, steps, part->pictures[last_].picture(), true);
+    }
+    for (int j = 1; j < steps; ++j) {
+      for (const auto* part : {&on_, &off_})
+        land_.run(groups, {&part->pictures[before].picture().buffer(), &part->motions, &strongest_},
+                  {width, j, part == &on_ ? 1 : 0});
+      mark_.run({groups_of(64, list_.marks_across()), height}, {&strongest_, &list_.marks()},
+                {width, list_.marks_across(), (j - 1) * list_.marks_a_step()});
+    }
+  }
+
+  LumaKernel luma_;
+  DifferenceKernel difference_;
+  Kernel split_;
+  Kernel land_;
+  Kernel mark_;
+  PointTracker tracker_;
+  EventList list_;
+  Buffer strongest_;  ///< difference on each pixel of an interpolated frame
+  GreyFrame frames_[2];
+  Part on_;
+  Part off_;
+  int last_ = 0;  ///< of the two frames, and of the pictures of the parts
+  bool has_difference_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Simulator> make_diff_simulator(const Context& gl, const LumaFormat& format) {
+  return std::make_unique<DiffSimulator>(gl, format);
+}
+
+}  // namespace eventcamera::gl

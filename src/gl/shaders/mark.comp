@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Marks the pixels that a difference landed on, and forgets them. 32 pixels an invocation.
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) buffer Strongest { uint strongest[]; };
+layout(std430, binding = 1) writeonly buffer Fired { uvec2 fired[]; };
+layout(location = 0) uniform int width;
+layout(location = 1) uniform int marks_across;
+layout(location = 2) uniform int first_mark;
+
+void main() {
+  int mark = int(gl_GlobalInvocationID.x);
+  int y = int(gl_WorkGroupID.y);
+  if (mark >= marks_across) return;
+  uvec2 bits = uvec2(0);
+  for (int x = 32 * mark; x < min(32 * mark + 32, width); ++x) {
+    uint here = strongest[y * width + x];
+    if (here == 0u) continue;
+    bits |= uvec2(1u, here & 1u) << uint(x % 32);
+    strongest[y * width + x] = 0u;
+  }
+  fired[first_mark + y * marks_across + mark] = bits;
+}

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Lucas-Kanade on one level of a pyramid, a point an invocation: search_tile() of
+// src/flow/lucas_kanade/search, pixel by pixel.
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) readonly buffer From { uint from[]; };
+layout(std430, binding = 1) readonly buffer Slopes { int slopes[]; };
+layout(std430, binding = 2) readonly buffer To { uint to[]; };
+layout(std430, binding = 3) buffer Tracks { uvec2 tracks[]; };
+layout(location = 0) uniform int width;  // of the frame
+layout(location = 1) uniform int level;
+layout(location = 2) uniform int level_width;
+layout(location = 3) uniform int level_height;
+
+const uint none = 0x7fffffffu;
+const float scale = 1.0 / 1048576.0;
+
+int mirrored(int p, int size) {
+  if (size == 1) return 0;
+  while (p < 0 || p >= size) p = p < 0 ? -p : 2 * (size - 1) - p;
+  return p;
+}
+
+int place(int x, int y) {
+  return mirrored(y, level_height) * ((level_width + 3) / 4) * 4 + mirrored(x, level_width);
+}
+
+int grey_from(int x, int y) {
+  int p = place(x, y);
+  return int(from[p / 4] >> (8 * (p % 4)) & 255u);
+}
+
+int grey_to(int x, int y) {
+  int p = place(x, y);
+  return int(to[p / 4] >> (8 * (p % 4)) & 255u);
+}
+
+ivec2 slope(int x, int y) {
+  if (x < 0 || x >= level_width || y < 0 || y >= level_height) return ivec2(0);
+  int both = slopes[y * level_width + x];
+  return ivec2(both << 16 >> 16, both >> 16);
+}
+
+ivec3 pixel(int x, int y) {
+  return ivec3(4 * grey_from(x, y), slope(x, y));
+}
+
+ivec3 between(ivec3 a, ivec3 b, int eighths) {
+  return a + ((b - a) * eighths + 4 >> 3);
+}
+
+// The exact sum of products is high * 256 + low.
+float rounded(int high, int low) {
+  return (float(high) * 256.0 + float(low)) * scale;
+}
+
+void main() {
+  int x = int(gl_GlobalInvocationID.x);
+  int y = int(gl_WorkGroupID.y);
+  if (x >= width) return;
+  uvec2 track = tracks[y * width + x];
+  if (track.x == none) return;
+  vec2 flow = 2.0 * uintBitsToFloat(track);
+  ivec2 offset = ivec2(x << 3 >> level, y << 3 >> level) & 7;
+  ivec2 first = ivec2(x >> level, y >> level) - 7;
+  vec2 part = vec2(offset) / 8.0;
+
+  ivec3 window[225];  // grey levels, in 1/4, and slopes
+  ivec3 high = ivec3(0);
+  ivec3 low = ivec3(0);
+  for (int v = 0; v < 15; ++v) {
+    ivec3 upper_left = pixel(first.x, first.y + v);
+    ivec3 lower_left = pixel(first.x, first.y + v + 1);
+    for (int u = 0; u < 15; ++u) {
+      ivec3 upper = pixel(first.x + u + 1, first.y + v);
+      ivec3 lower = pixel(first.x + u + 1, first.y + v + 1);
+      ivec3 here = between(between(upper_left, upper, offset.x),
+                           between(lower_left, lower, offset.x), offset.y);
+      upper_left = upper;
+      lower_left = lower;
+      window[15 * v + u] = here;
+      ivec3 products = ivec3(here.y * here.y, here.y * here.z, here.z * here.z);
+      high += products >> 8;
+      low += products & 255;
+    }
+  }
+  float xx = rounded(high.x, low.x);
+  float xy = rounded(high.y, low.y);
+  float yy = rounded(high.z, low.z);
+  float least = (xx + yy - sqrt((xx - yy) * (xx - yy) + 4.0 * (xy * xy))) / 450.0;
+  float determinant = xx * yy - xy * xy;
+  bool found = least >= 1e-4 && determinant >= 1.1920929e-7;
+  vec2 before = vec2(0.0);
+  for (int i = 0; i < 10 && found; ++i) {
+    vec2 cell = floor(flow + part);
+    vec2 corner = vec2(first) + cell;
+    if (any(lessThan(corner, vec2(-15.0))) || corner.x >= float(level_width) ||
+        corner.y >= float(level_height)) {
+      found = false;
+      break;
+    }
+    ivec2 sums[4] = ivec2[4](ivec2(0), ivec2(0), ivec2(0), ivec2(0));
+    ivec2 start = first + ivec2(cell);
+    for (int v = 0; v < 15; ++v) {
+      int upper_left = 4 * grey_to(start.x, start.y + v);
+      int lower_left = 4 * grey_to(start.x, start.y + v + 1);
+      for (int u = 0; u < 15; ++u) {
+        int upper = 4 * grey_to(start.x + u + 1, start.y + v);
+        int lower = 4 * grey_to(start.x + u + 1, start.y + v + 1);
+        ivec3 here = window[15 * v + u];
+        sums[0] += (upper_left - here.x) * here.yz;
+        sums[1] += (upper - here.x) * here.yz;
+        sums[2] += (lower_left - here.x) * here.yz;
+        sums[3] += (lower - here.x) * here.yz;
+        upper_left = upper;
+        lower_left = lower;
+      }
+    }
+    vec2 within = flow + part - cell;
+    vec2 above = vec2(sums[0]) + (vec2(sums[1]) - vec2(sums[0])) * within.x;
+    vec2 below = vec2(sums[2]) + (vec2(sums[3]) - vec2(sums[2])) * within.x;
+    vec2 mismatch = (above + (below - above) * within.y) * (8.0 * scale);
+    vec2 move = vec2(xy * mismatch.y - yy * mismatch.x, xy * mismatch.x - xx * mismatch.y) *
+                (1.0 / determinant);
+    flow += move;
+    if (dot(move, move) <= 0.03 * 0.03) break;
+    if (i > 0 && all(lessThan(abs(move + before), vec2(0.01)))) {
+      flow -= move / 2.0;
+      break;
+    }
+    before = move;
+  }
+  vec2 corner = vec2(first) + floor(flow + part);
+  if (any(lessThan(corner, vec2(-15.0))) || corner.x >= float(level_width) ||
+      corner.y >= float(level_height))
+    found = false;
+  tracks[y * width + x] = level == 0 && !found ? uvec2(none) : floatBitsToUint(flow);
+}
