@@ -7,7 +7,7 @@
 const EventSimulatorTypeNames event_simulator_type_names = {.simulator = "GstGLEventSimulatorBase",
                                                             .pool = "GstGLEventPool"};
 
-#define ELEMENTS(X) X(gleventsim_frame)
+#define ELEMENTS(X) X(gleventsim_frame) X(gleventsim_sparse) X(gleventsim_diff)
 
 #define DECLARE(name) GST_ELEMENT_REGISTER_DECLARE(name)
 G_BEGIN_DECLS
