@@ -41,8 +41,8 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_frame, "gleventsim-frame", GST_RANK_NONE,
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=100 ! glupload ! gleventsim-sparse ! eventstats !
- * fakesink
+ * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! glupload ! gleventsim-sparse !
+ * eventstats ! fakesink
  * ]|
  */
 static const EventSimulatorMethod sparse = {
@@ -68,7 +68,8 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_sparse, "gleventsim-sparse", GST_RANK_NON
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=100 ! glupload ! gleventsim-diff ! eventstats ! fakesink
+ * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! glupload ! gleventsim-diff !
+ * eventstats ! fakesink
  * ]|
  */
 static const EventSimulatorMethod diff = {
