@@ -33,9 +33,9 @@ Context::Context(const Load& load) {
   };
   if (100 * major + minor < needed)
     throw too_old(std::string("this is ") + (is_es_ ? "" : "OpenGL ") + text);
-#define LOAD(type, name)                           \
-  name = reinterpret_cast<type>(load("gl" #name)); \
-  if (name == nullptr) throw too_old("gl" #name " is missing");
+#define LOAD(type, name)                             \
+  (name) = reinterpret_cast<type>(load("gl" #name)); \
+  if ((name) == nullptr) throw too_old("gl" #name " is missing");
   EVENTCAMERA_GL_FUNCTIONS(LOAD)
 #undef LOAD
   GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_buffer_size_);
