@@ -44,7 +44,7 @@ without eventcam # finds OpenCV, although it is not in the prefix
 [ "$(plugins)" = "./eventsim/libgsteventsim.so ./eventsimgl/libgsteventsimgl.so " ] || fail "built $(plugins)"
 
 without eventcam eventsimgl
-if grep -q gstreamer-gl "$build/compile_commands.json"; then
+if grep -q libgstgl "$build/build.ninja"; then
   fail "OpenGL is in the commands of a build without simulators on the GPU"
 fi
 [ "$(plugins)" = "./eventsim/libgsteventsim.so " ] || fail "built $(plugins)"
