@@ -28,7 +28,7 @@ static GstGLDisplay* display_of_screen() {
 }
 
 /// GstGL does not try devices without a screen by itself.
-static GstGLDisplay* display_of_device() {
+static GstGLDisplay* find_device() {
   for (guint device = 0;; ++device) {
     auto* found = gst_gl_display_egl_device_new(device);
     if (found == nullptr) return nullptr;
@@ -36,7 +36,18 @@ static GstGLDisplay* display_of_device() {
   }
 }
 
-GstGLDisplay* make_gl_display() {
+/// Of all elements without a screen: EGL has one display of a device in a process, which GstGL
+/// terminates with the first object that stands for it, whoever else draws with it.
+static GstGLDisplay* display_of_device() {
+  static GstGLDisplay* const display = [] {
+    GstGLDisplay* const found = find_device();
+    if (found != nullptr) GST_OBJECT_FLAG_SET(found, GST_OBJECT_FLAG_MAY_BE_LEAKED);
+    return found;
+  }();
+  return display == nullptr ? nullptr : GST_GL_DISPLAY(gst_object_ref(display));
+}
+
+GstGLDisplay* gl_display() {
   // What users set to choose a screen.
   const bool has_screen = g_getenv("DISPLAY") != nullptr ||
                           g_getenv("WAYLAND_DISPLAY") != nullptr ||

@@ -3,9 +3,10 @@
 
 #include <gst/gl/gl.h>
 
-/// Returns a new display that OpenGL contexts can be created in, with one in it: that of the
-/// screen, or, without one, that of a GPU or a software renderer. nullptr if there is none.
-GstGLDisplay* make_gl_display();
+/// Returns a new reference to a display that OpenGL contexts can be created in, with one in it:
+/// that of the screen, or, without one, that of a GPU or a software renderer. nullptr if there is
+/// none.
+GstGLDisplay* gl_display();
 
 /// Returns a new reference to the context of a display, made if it has none; nullptr if that fails.
 /// `other`, if any, is a context to share objects with.

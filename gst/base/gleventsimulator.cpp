@@ -61,7 +61,7 @@ static void ask_for_display(GstElement* self) {
 
 /// Makes a display, and shares it with the pipeline.
 static void provide_display(GstElement* self) {
-  GstGLDisplay* display = make_gl_display();
+  GstGLDisplay* display = gl_display();
   if (display == nullptr) return;
   GstContext* context = gst_context_new(GST_GL_DISPLAY_CONTEXT_TYPE, TRUE);
   gst_context_set_gl_display(context, display);
