@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstring>
 #include <functional>
 #include <mutex>
 #include <random>
@@ -658,7 +659,8 @@ GstBuffer* t64(std::initializer_list<guint64> times, GstClockTime arrival) {
   std::vector<guint8> bytes;
   for (const auto t : times) {
     bytes.resize(bytes.size() + 13);
-    GST_WRITE_UINT64_LE(&bytes[bytes.size() - 13], t);
+    const guint64 little = GUINT64_TO_LE(t);
+    std::memcpy(&bytes[bytes.size() - 13], &little, 8);
   }
   return datagram(bytes, arrival);
 }
