@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/gl_display.hpp"
 
+#include <gst/gl/egl/gstgldisplay_egl.h>
 #include <gst/gl/egl/gstgldisplay_egl_device.h>
 
 GstGLContext* gl_context_of(GstGLDisplay* display, GstGLContext* other, GError** error) {
@@ -41,7 +42,11 @@ static GstGLDisplay* find_device() {
 static GstGLDisplay* display_of_device() {
   static GstGLDisplay* const display = [] {
     GstGLDisplay* const found = find_device();
-    if (found != nullptr) GST_OBJECT_FLAG_SET(found, GST_OBJECT_FLAG_MAY_BE_LEAKED);
+    if (found == nullptr) return found;
+    GstGLDisplayEGL* const egl = gst_gl_display_egl_from_gl_display(found);
+    GST_OBJECT_FLAG_SET(found, GST_OBJECT_FLAG_MAY_BE_LEAKED);
+    GST_OBJECT_FLAG_SET(egl, GST_OBJECT_FLAG_MAY_BE_LEAKED);  // which `found` holds
+    gst_object_unref(egl);
     return found;
   }();
   return display == nullptr ? nullptr : GST_GL_DISPLAY(gst_object_ref(display));
