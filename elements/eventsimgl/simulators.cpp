@@ -42,7 +42,7 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_frame, "gleventsim-frame", GST_RANK_NONE,
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! glupload ! gleventsim-sparse !
- * eventstats ! fakesink
+ * glimagesink
  * ]|
  */
 static const EventSimulatorMethod sparse = {

@@ -23,12 +23,10 @@
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/eventcamera/eventcamera.h"
-#include "src/render/accumulator.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 #define GST_CAT_DEFAULT event_simulator_debug
 
-using eventcamera::Accumulator;
 using eventcamera::EventBuckets;
 using eventcamera::IntervalSimulator;
 using eventcamera::Nanoseconds;
@@ -53,9 +51,9 @@ struct Settings {
 
 /// State from caps to stop.
 struct State {
-  GstVideoInfo video;              ///< input format
-  std::optional<Drawing> drawing;  ///< video output; none if the output is events
+  GstVideoInfo video;  ///< input format
   std::unique_ptr<VideoSimulator> frames;
+  bool draws = false;          ///< the output is video, not events
   bool discontinuous = false;  ///< the next buffer is discontinuous
 
   IntervalSimulator& simulator() const { return frames->simulator(); }
@@ -411,26 +409,24 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
       const bool follows = state && (state->discontinuous || state->simulator().last_time());
       state.reset();  // before allocating the next: frames can be large
       state.emplace(State{.video = video,
-                          .drawing = std::nullopt,
                           .frames = method_of(self).create(G_OBJECT(self), video),
                           .discontinuous = follows});
     } else {
       state->video = video;
       state->frames->set_video(video);
     }
-    state->drawing.reset();
-    if (event_simulator_draws(out))
-      state->drawing = Drawing{drawn, Accumulator(luma.width, luma.height)};
+    state->draws = event_simulator_draws(out);
+    if (state->draws) state->frames->set_drawn_video(drawn);
   });
   if (!made) return FALSE;
   check_input(self);
   // Pictures have the time of their frame, intervals that of the previous frame.
-  const GstClockTime duration = state->drawing ? 0 : frame_duration(video);
-  if (duration > 0 || state->drawing)
+  const GstClockTime duration = state->draws ? 0 : frame_duration(video);
+  if (duration > 0 || state->draws)
     change_latency(self, [duration](Latency& latency) {
       latency.interval.expect(static_cast<Nanoseconds>(duration));
     });
-  priv_of(self).qos.access([&](SimulatorQos& qos) { qos.take_output(state->drawing.has_value()); });
+  priv_of(self).qos.access([&](SimulatorQos& qos) { qos.take_output(state->draws); });
   return TRUE;
 }
 
@@ -476,17 +472,17 @@ static void set_times(GstBuffer* out, GstClockTime pts, GstClockTime duration, S
 }
 
 /// Draws the events since the last frame (none for a first frame). The picture replaces the frame,
-/// at its `time`.
-static GstFlowReturn draw_frame(GstEventSimulator* self, const EventBuckets* events,
-                                GstEventCameraPalette palette, Nanoseconds time, GstBuffer* in,
-                                GstBuffer** out) {
+/// at its `time`. May throw.
+static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& settings, Nanoseconds time,
+                                GstBuffer* in, GstBuffer** out) {
   auto& state = *priv_of(self).state;
-  const EventBuckets none;
-  const GstFlowReturn result = event_simulator_draw_events(
-      GST_BASE_TRANSFORM(self), events != nullptr ? *events : none, *state.drawing,
-      eventcamera::palette(palette_name_of(palette)), state.simulator().threads(), in, out);
+  OwnedBuffer picture;
+  const GstFlowReturn result = event_simulator_make_picture(GST_BASE_TRANSFORM(self), in, picture);
   if (result != GST_FLOW_OK) return result;
-  set_times(*out, static_cast<GstClockTime>(time), GST_BUFFER_DURATION(in), state);
+  state.frames->draw(in, time, settings.simulation,
+                     eventcamera::palette(palette_name_of(settings.palette)), picture.get());
+  set_times(picture.get(), static_cast<GstClockTime>(time), GST_BUFFER_DURATION(in), state);
+  *out = picture.release();
   return GST_FLOW_OK;
 }
 
@@ -502,10 +498,9 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
   const auto start = state.simulator().last_time();
   configure(self);
-  const EventBuckets* events = state.frames->push(in, end, settings.simulation);
-  if (state.drawing) {
+  if (state.draws) {
     priv_of(self).stream.handed_out_until = end;
-    const GstFlowReturn result = draw_frame(self, events, settings.palette, end, in, out);
+    const GstFlowReturn result = draw_frame(self, settings, end, in, out);
     end_work(self, end);
     if (result == GST_FLOW_OK)
       priv_of(self).qos.access([&](const SimulatorQos& qos) {
@@ -513,6 +508,7 @@ static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffe
       });
     return result;
   }
+  const EventBuckets* events = state.frames->push(in, end, settings.simulation);
   if (events == nullptr) {
     end_work(self, end);
     end_frame(self);
@@ -645,7 +641,7 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   gst_event_parse_gap(event, &pts, &duration);
   auto& state = priv_of(self).state;
   const auto start = state ? state->simulator().last_time() : std::nullopt;
-  if (!start || state->drawing) return true;
+  if (!start || state->draws) return true;
   const auto frame = static_cast<GstClockTime>(priv_of(self).latency.lock()->interval.value());
   const GstClockTime rest =
       GST_CLOCK_TIME_IS_VALID(duration) && duration > frame ? duration - frame : 0;

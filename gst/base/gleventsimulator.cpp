@@ -172,10 +172,11 @@ void find_weights(const GstVideoInfo& video, int (&weights)[4]) {
   }
 }
 
-/// Maps the first texture of a frame.
+/// Maps the first texture of a frame or a picture.
 class MappedTexture {
  public:
-  MappedTexture(const GstVideoInfo& video, GstBuffer* buffer, GstGLContext* context) {
+  MappedTexture(const GstVideoInfo& video, GstBuffer* buffer, GstGLContext* context,
+                GstMapFlags access) {
     GstMemory* memory =
         gst_buffer_n_memory(buffer) > 0 ? gst_buffer_peek_memory(buffer, 0) : nullptr;
     if (memory == nullptr || !gst_is_gl_memory(memory)) {
@@ -195,7 +196,7 @@ class MappedTexture {
     }
     if (auto* sync = gst_buffer_get_gl_sync_meta(buffer)) gst_gl_sync_meta_wait(sync, context);
     memory_ = memory;
-    if (!gst_memory_map(memory, &map_, static_cast<GstMapFlags>(GST_MAP_READ | GST_MAP_GL))) {
+    if (!gst_memory_map(memory, &map_, static_cast<GstMapFlags>(access | GST_MAP_GL))) {
       memory_ = nullptr;
       fault_ = "its texture cannot be mapped";
     }
@@ -244,18 +245,34 @@ class TextureVideoSimulator final : public VideoSimulator {
     find_weights(video, frame_.weights);
   }
 
+  void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
+
   const EventBuckets* push(GstBuffer* buffer, Nanoseconds time,
                            const eventcamera::Settings& settings) override {
-    const MappedTexture texture(video_, buffer, context_);
-    if (!texture.fault().empty())
-      throw VideoSimulatorError(
-          {GST_RESOURCE_ERROR_FAILED,
-           "Cannot read a video frame: " + texture.fault() + ". Check the element upstream."},
-          texture.fault());
+    const MappedTexture texture(video_, buffer, context_, GST_MAP_READ);
+    if (!texture.fault().empty()) throw cannot_read(texture.fault());
     const EventBuckets* events = nullptr;
     frame_.texture = texture.name();
     run([&] { events = simulator_->push(frame_, time, settings); });
     return events;
+  }
+
+  void draw(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings,
+            const eventcamera::Palette& palette, GstBuffer* picture) override {
+    {
+      const MappedTexture texture(video_, buffer, context_, GST_MAP_READ);
+      if (!texture.fault().empty()) throw cannot_read(texture.fault());
+      const MappedTexture drawn(drawn_, picture, context_, GST_MAP_WRITE);
+      if (!drawn.fault().empty()) throw cannot_draw(drawn.fault());
+      frame_.texture = texture.name();
+      const eventcamera::gl::Picture out{
+          drawn.name(), eventcamera::pixels_by_kind(palette, pixel_layout_of(drawn_))};
+      run([&] { simulator_->draw(frame_, time, settings, out); });
+    }
+    // What reads the picture in another context waits until it is drawn.
+    auto* sync = gst_buffer_get_gl_sync_meta(picture);
+    if (sync == nullptr) sync = gst_buffer_add_gl_sync_meta(context_, picture);
+    gst_gl_sync_meta_set_sync_point(sync, context_);
   }
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
@@ -292,6 +309,7 @@ class TextureVideoSimulator final : public VideoSimulator {
   GstElement* element_;
   GstGLContext* context_;
   GstVideoInfo video_;
+  GstVideoInfo drawn_{};
   eventcamera::gl::TextureFrame frame_;
   std::optional<eventcamera::gl::Context> gl_;
   std::unique_ptr<eventcamera::gl::Simulator> simulator_;
@@ -314,6 +332,45 @@ std::unique_ptr<VideoSimulator> make_texture_simulator(GObject* element, const G
   return std::make_unique<TextureVideoSimulator>(self, context, video, make);
 }
 
+/* allocation */
+
+/// Upstream's textures may be of another context.
+static gboolean propose_allocation(GstBaseTransform* self, GstQuery* decide, GstQuery* query) {
+  gst_query_add_allocation_meta(query, GST_GL_SYNC_META_API_TYPE, nullptr);
+  return PARENT_TRANSFORM_CLASS->propose_allocation(self, decide, query);
+}
+
+/// Puts a pool of textures first: downstream's, if it has one that the context can draw in.
+static void choose_texture_pool(GstQuery* query, GstCaps* caps, GstGLContext* context) {
+  GstBufferPool* pool = nullptr;
+  guint size = 0;
+  guint min = 0;
+  guint max = 0;
+  const bool offered = gst_query_get_n_allocation_pools(query) > 0;
+  if (offered) gst_query_parse_nth_allocation_pool(query, 0, &pool, &size, &min, &max);
+  if (pool == nullptr || !GST_IS_GL_BUFFER_POOL(pool) ||
+      !gst_gl_context_can_share(GST_GL_BUFFER_POOL(pool)->context, context)) {
+    gst_clear_object(&pool);
+    pool = gst_gl_buffer_pool_new(context);
+  }
+  GstStructure* config = gst_buffer_pool_get_config(pool);
+  gst_buffer_pool_config_set_params(config, caps, size, min, max);
+  gst_buffer_pool_config_add_option(config, GST_BUFFER_POOL_OPTION_GL_SYNC_META);
+  gst_buffer_pool_set_config(pool, config);
+  if (offered)
+    gst_query_set_nth_allocation_pool(query, 0, pool, size, min, max);
+  else
+    gst_query_add_allocation_pool(query, pool, size, min, max);
+  gst_object_unref(pool);
+}
+
+static gboolean decide_allocation(GstBaseTransform* self, GstQuery* query) {
+  GstCaps* caps = nullptr;
+  gst_query_parse_allocation(query, &caps, nullptr);
+  if (event_simulator_draws(caps)) choose_texture_pool(query, caps, priv_of(self).context);
+  return PARENT_TRANSFORM_CLASS->decide_allocation(self, query);
+}
+
 /* type */
 
 static void finalize(GObject* object) {
@@ -330,6 +387,9 @@ static void gst_gl_event_simulator_class_init(GstGLEventSimulatorClass* klass) {
   G_OBJECT_CLASS(klass)->finalize = finalize;
   GST_ELEMENT_CLASS(klass)->set_context = set_context;
   GST_ELEMENT_CLASS(klass)->change_state = change_state;
-  GST_BASE_TRANSFORM_CLASS(klass)->query = query;
+  auto* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
+  transform_class->query = query;
+  transform_class->propose_allocation = propose_allocation;
+  transform_class->decide_allocation = decide_allocation;
   gst_type_mark_as_plugin_api(GST_TYPE_GL_EVENT_SIMULATOR, static_cast<GstPluginAPIFlags>(0));
 }

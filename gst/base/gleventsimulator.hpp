@@ -23,7 +23,7 @@ inline constexpr SimulatorVideo gl_memory_video = {
     .formats =
         "{ GRAY8, I420, YV12, NV12, NV21, Y42B, Y444, Y41B, YUY2, UYVY, AYUV, VUYA, RGBA, "
         "BGRA, RGBx, BGRx, ARGB, ABGR, xRGB, xBGR, RGB, BGR }",
-    .drawn_formats = nullptr,
+    .drawn_formats = "{ RGBA }",
     .texture_target = GST_GL_TEXTURE_TARGET_2D_STR,
 };
 

@@ -8,10 +8,8 @@
 
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/eventsimulator.hpp"
-#include "gst/base/owned.hpp"
 #include "gst/base/simulator_caps.hpp"
 #include "gst/base/types.hpp"
-#include "gst/base/video_frame.hpp"
 
 using eventcamera::EventBuckets;
 using eventcamera::ThreadPool;
@@ -185,27 +183,12 @@ GstFlowReturn event_simulator_write_events(GstBaseTransform* transform, const Ev
   return GST_FLOW_OK;
 }
 
-GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform, const EventBuckets& events,
-                                          Drawing& drawing, const eventcamera::Palette& palette,
-                                          ThreadPool& threads, GstBuffer* in, GstBuffer** out) {
+GstFlowReturn event_simulator_make_picture(GstBaseTransform* transform, GstBuffer* in,
+                                           OwnedBuffer& picture) {
   GstBuffer* prepared = nullptr;
   const GstFlowReturn result = base_class()->prepare_output_buffer(transform, in, &prepared);
   if (result != GST_FLOW_OK) return result;
-  OwnedBuffer buffer(prepared);
-  {
-    const VideoFrame picture(drawing.video, prepared, GST_MAP_WRITE);
-    if (!picture) {
-      GST_ELEMENT_ERROR(transform, RESOURCE, FAILED,
-                        ("Cannot draw into an output buffer: %s. Check the element downstream.",
-                         picture.fault().c_str()),
-                        ("%" GST_PTR_FORMAT, prepared));
-      return GST_FLOW_ERROR;
-    }
-    drawing.accumulator.add(events, threads);
-    drawing.accumulator.draw(palette, pixel_layout_of(drawing.video), picture.data(),
-                             picture.stride());
-  }
+  picture.reset(prepared);
   keep_metas(in, prepared);
-  *out = buffer.release();
   return GST_FLOW_OK;
 }

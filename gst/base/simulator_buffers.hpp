@@ -2,20 +2,13 @@
 #pragma once
 
 #include <gst/base/gstbasetransform.h>
-#include <gst/video/video.h>
 
+#include "gst/base/owned.hpp"
 #include "src/core/event_buckets.hpp"
 #include "src/core/thread_pool.hpp"
-#include "src/render/accumulator.hpp"
 
 /// For class_init: installs the virtual functions for input and output buffers.
 void event_simulator_class_install_buffers(GstBaseTransformClass* klass);
-
-/// State of accumulated-event video output.
-struct Drawing {
-  GstVideoInfo video;
-  eventcamera::Accumulator accumulator;
-};
 
 /// Writes the events of an interval, at least one, to a new buffer. `in` is the frame that ends the
 /// interval. Throws std::bad_alloc.
@@ -24,9 +17,6 @@ GstFlowReturn event_simulator_write_events(GstBaseTransform* transform,
                                            eventcamera::ThreadPool& threads, GstBuffer* in,
                                            GstBuffer** out);
 
-/// Draws the events of an interval into a new buffer, with the metas of `in` that remain valid.
-GstFlowReturn event_simulator_draw_events(GstBaseTransform* transform,
-                                          const eventcamera::EventBuckets& events, Drawing& drawing,
-                                          const eventcamera::Palette& palette,
-                                          eventcamera::ThreadPool& threads, GstBuffer* in,
-                                          GstBuffer** out);
+/// Makes a buffer to draw the events of an interval in, with the metas of `in` that remain valid.
+GstFlowReturn event_simulator_make_picture(GstBaseTransform* transform, GstBuffer* in,
+                                           OwnedBuffer& picture);

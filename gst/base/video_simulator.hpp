@@ -4,12 +4,15 @@
 #include <gst/video/video.h>
 
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "gst/base/drawn_video.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/frame_luma.hpp"
+#include "src/render/accumulator.hpp"
 #include "src/simulate/simulator.hpp"
 
 /// A simulator of the frames in buffers, wherever their pixels are.
@@ -20,9 +23,17 @@ class VideoSimulator {
   /// Takes frames of this format from now on. Size and depth must be the same.
   virtual void set_video(const GstVideoInfo& video) = 0;
 
+  /// Draws pictures of this format from now on.
+  virtual void set_drawn_video(const GstVideoInfo& drawn) = 0;
+
   /// As BasicSimulator::push(), for the frame in a buffer. Throws VideoSimulatorError as well.
   virtual const eventcamera::EventBuckets* push(GstBuffer* frame, eventcamera::Nanoseconds time,
                                                 const eventcamera::Settings& settings) = 0;
+
+  /// As push(), but draws the events in the buffer `picture`: none for a first frame.
+  virtual void draw(GstBuffer* frame, eventcamera::Nanoseconds time,
+                    const eventcamera::Settings& settings, const eventcamera::Palette& palette,
+                    GstBuffer* picture) = 0;
 
   virtual eventcamera::IntervalSimulator& simulator() = 0;
 };
@@ -39,6 +50,20 @@ class VideoSimulatorError : public std::runtime_error {
   Report report_;
 };
 
+/// A frame that is not what its caps say.
+inline VideoSimulatorError cannot_read(const std::string& fault) {
+  return {{GST_RESOURCE_ERROR_FAILED,
+           "Cannot read a video frame: " + fault + ". Check the element upstream."},
+          fault};
+}
+
+/// An output buffer that is not what its caps say.
+inline VideoSimulatorError cannot_draw(const std::string& fault) {
+  return {{GST_RESOURCE_ERROR_FAILED,
+           "Cannot draw into an output buffer: " + fault + ". Check the element downstream."},
+          fault};
+}
+
 /// Simulator of frames in system memory.
 class LumaVideoSimulator final : public VideoSimulator {
  public:
@@ -50,22 +75,38 @@ class LumaVideoSimulator final : public VideoSimulator {
     luma_ = FrameLuma(video);
   }
 
+  void set_drawn_video(const GstVideoInfo& drawn) override {
+    drawing_ = Drawing{drawn, {GST_VIDEO_INFO_WIDTH(&drawn), GST_VIDEO_INFO_HEIGHT(&drawn)}};
+  }
+
   const eventcamera::EventBuckets* push(GstBuffer* frame, eventcamera::Nanoseconds time,
                                         const eventcamera::Settings& settings) override {
     const VideoFrame mapped(video_, frame, GST_MAP_READ);
-    if (!mapped)
-      throw VideoSimulatorError(
-          {GST_RESOURCE_ERROR_FAILED,
-           "Cannot read a video frame: " + mapped.fault() + ". Check the element upstream."},
-          mapped.fault());
+    if (!mapped) throw cannot_read(mapped.fault());
     return simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
+  }
+
+  void draw(GstBuffer* frame, eventcamera::Nanoseconds time, const eventcamera::Settings& settings,
+            const eventcamera::Palette& palette, GstBuffer* picture) override {
+    const auto* events = push(frame, time, settings);
+    const VideoFrame mapped(drawing_->video, picture, GST_MAP_WRITE);
+    if (!mapped) throw cannot_draw(mapped.fault());
+    if (events != nullptr) drawing_->accumulator.add(*events, simulator_->threads());
+    drawing_->accumulator.draw(palette, pixel_layout_of(drawing_->video), mapped.data(),
+                               mapped.stride());
   }
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 
  private:
+  struct Drawing {
+    GstVideoInfo video;
+    eventcamera::Accumulator accumulator;
+  };
+
   GstVideoInfo video_;
   FrameLuma luma_;
+  std::optional<Drawing> drawing_;
   std::unique_ptr<eventcamera::Simulator> simulator_;
 };
 

@@ -44,6 +44,7 @@ class Error : public std::runtime_error {
   X(PFNGLMAPBUFFERRANGEPROC, MapBufferRange)       \
   X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)         \
   X(PFNGLSHADERSOURCEPROC, ShaderSource)           \
+  X(PFNGLTEXSUBIMAGE2DPROC, TexSubImage2D)         \
   X(PFNGLUNIFORM1IPROC, Uniform1i)                 \
   X(PFNGLUNMAPBUFFERPROC, UnmapBuffer)             \
   X(PFNGLUSEPROGRAMPROC, UseProgram)

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/gl/diff.hpp"
 
-#include <span>
-#include <vector>
-
 #include "src/gl/difference.hpp"
-#include "src/gl/event_list.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 
@@ -27,14 +23,13 @@ struct Part {
 class DiffSimulator final : public Simulator {
  public:
   DiffSimulator(const Context& gl, const LumaFormat& format)
-      : Simulator(format),
+      : Simulator(gl, format),
         luma_(gl),
         difference_(gl, format),
         split_(gl, "split", shaders::split),
         land_(gl, "land", shaders::land),
         mark_(gl, "mark", shaders::mark),
         tracker_(gl, format),
-        list_(gl, format),
         strongest_(gl),
         frames_{{gl, format}, {gl, format}},
         on_(gl, format),
@@ -49,8 +44,8 @@ class DiffSimulator final : public Simulator {
     has_difference_ = false;
   }
 
-  void simulate(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+  void mark(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
+            EventList& list) override {
     const auto thresholds = Thresholds::of(settings, format().bits);
     const int before = last_;
     last_ = 1 - last_;
@@ -64,16 +59,13 @@ class DiffSimulator final : public Simulator {
 
     const bool interpolates = has_difference_ && steps.count() > 1;
     const int first = interpolates ? 1 : steps.count();
-    list_.begin(steps.count() - first + 1);
-    if (interpolates) fire_between(steps.count());
-    difference_.run(frames_[before], frames_[last_], thresholds, steps.count() - first + 1, list_);
-    std::vector<std::uint32_t> times;
-    for (int j = first; j <= steps.count(); ++j) times.push_back(steps.microseconds(j));
-    list_.read(times, events);
+    list.begin(steps, first);
+    if (interpolates) fire_between(steps.count(), list);
+    difference_.run(frames_[before], frames_[last_], thresholds, list.steps(), list);
     has_difference_ = true;
   }
 
-  void fire_between(int steps) const {
+  void fire_between(int steps, const EventList& list) const {
     const auto [width, height, bits] = format();
     const Groups groups{groups_of(64, width), height};
     const int before = 1 - last_;
@@ -86,8 +78,8 @@ class DiffSimulator final : public Simulator {
       for (const auto* part : {&on_, &off_})
         land_.run(groups, {&part->pictures[before].picture().buffer(), &part->motions, &strongest_},
                   {width, j, part == &on_ ? 1 : 0});
-      mark_.run({groups_of(64, list_.marks_across()), height}, {&strongest_, &list_.marks()},
-                {width, list_.marks_across(), (j - 1) * list_.marks_a_step()});
+      mark_.run({groups_of(64, list.marks_across()), height}, {&strongest_, &list.marks()},
+                {width, list.marks_across(), (j - 1) * list.marks_a_step()});
     }
   }
 
@@ -97,7 +89,6 @@ class DiffSimulator final : public Simulator {
   Kernel land_;
   Kernel mark_;
   PointTracker tracker_;
-  EventList list_;
   Buffer strongest_;  ///< difference on each pixel of an interpolated frame
   GreyFrame frames_[2];
   Part on_;

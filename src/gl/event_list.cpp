@@ -2,6 +2,7 @@
 #include "src/gl/event_list.hpp"
 
 #include <bit>
+#include <span>
 
 #include "src/gl/shaders.hpp"
 
@@ -26,31 +27,33 @@ EventList::EventList(const Context& gl, const LumaFormat& format)
       write_(gl, "write", shaders::write),
       marks_(gl),
       starts_(gl),
-      times_(gl),
+      step_times_(gl),
       total_(gl, GL_DYNAMIC_READ),
       events_(gl, GL_DYNAMIC_READ) {
+  marks_.reserve(static_cast<std::size_t>(marks_a_step()) * 8);
   total_.reserve(sizeof(std::uint32_t));
   events_.reserve(first_capacity * sizeof(Event));
 }
 
-void EventList::begin(int steps) {
-  const auto count = static_cast<std::size_t>(steps);
-  marks_.reserve(count * static_cast<std::size_t>(marks_a_step()) * 8);
-  starts_.reserve(count * static_cast<std::size_t>(groups_of(block, marks_a_step())) * 4);
+void EventList::begin(const StepTimes& steps, int first) {
+  times_.clear();
+  for (int j = first; j <= steps.count(); ++j) times_.push_back(steps.microseconds(j));
+  marks_.reserve(times_.size() * static_cast<std::size_t>(marks_a_step()) * 8);
 }
 
-void EventList::write(int steps) const {
-  write_.run({groups_of(block, marks_a_step()), steps}, {&marks_, &starts_, &times_, &events_},
+void EventList::write() const {
+  write_.run({groups_of(block, marks_a_step()), steps()},
+             {&marks_, &starts_, &step_times_, &events_},
              {marks_a_step(), marks_across_, static_cast<int>(events_.size() / sizeof(Event))});
 }
 
-void EventList::read(std::span<const std::uint32_t> times, EventBuckets& events) {
-  const int steps = static_cast<int>(times.size());
-  times_.assign(std::as_bytes(times));
-  const Groups blocks{groups_of(block, marks_a_step()), steps};
+void EventList::read(EventBuckets& events) {
+  step_times_.assign(std::as_bytes(std::span(times_)));
+  const Groups blocks{groups_of(block, marks_a_step()), steps()};
+  starts_.reserve(static_cast<std::size_t>(blocks.x) * times_.size() * 4);
   count_.run(blocks, {&marks_, &starts_}, {marks_a_step()});
   scan_.run({}, {&starts_, &total_}, {blocks.x * blocks.y});
-  write(steps);
+  write();
 
   const GLsync fence = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
   const GLenum state = gl_.ClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, patience);
@@ -61,7 +64,7 @@ void EventList::read(std::span<const std::uint32_t> times, EventBuckets& events)
   total_.read(std::as_writable_bytes(std::span(&total, 1)));
   if (total > events_.size() / sizeof(Event)) {
     events_.reserve(std::bit_ceil(std::size_t{total}) * sizeof(Event));
-    write(steps);
+    write();
   }
   events.reset(1, 1);
   auto& list = events.bucket(1, 0);

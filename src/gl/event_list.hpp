@@ -2,15 +2,16 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
+#include <vector>
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/luma.hpp"
 #include "src/gl/kernel.hpp"
+#include "src/simulate/simulator.hpp"
 
 namespace eventcamera::gl {
 
-/// Collects the pixels that fire in each step of an interval, and reads them back as a sorted list
+/// Collects the pixels that fire in the steps of an interval, and reads them back as a sorted list
 /// of events.
 ///
 /// Kernels mark pixels in marks(): two words for 32 pixels of a row, whose bits are set for pixels
@@ -19,19 +20,22 @@ class EventList {
  public:
   EventList(const Context& gl, const LumaFormat& format);
 
-  /// Begins an interval of this many steps: all of their marks must be written.
-  void begin(int steps);
+  /// Begins an interval without steps.
+  void clear() { times_.clear(); }
 
+  /// Begins an interval: all marks of its steps, from step `first` on, must be written.
+  void begin(const StepTimes& steps, int first = 1);
+
+  int steps() const { return static_cast<int>(times_.size()); }
   const Buffer& marks() const { return marks_; }
   int marks_across() const { return marks_across_; }
   int marks_a_step() const { return marks_across_ * height_; }
 
-  /// Waits for the GPU, and replaces the contents of `events`. `times` are those of the steps,
-  /// microseconds. Throws Error.
-  void read(std::span<const std::uint32_t> times, EventBuckets& events);
+  /// Waits for the GPU, and replaces the contents of `events`. Throws Error.
+  void read(EventBuckets& events);
 
  private:
-  void write(int steps) const;
+  void write() const;
 
   const Context& gl_;
   int marks_across_;
@@ -39,9 +43,10 @@ class EventList {
   Kernel count_;
   Kernel scan_;
   Kernel write_;
+  std::vector<std::uint32_t> times_;  ///< of the steps, microseconds
   Buffer marks_;
-  Buffer starts_;  ///< index of the first event of each block of marks
-  Buffer times_;
+  Buffer starts_;      ///< index of the first event of each block of marks
+  Buffer step_times_;  ///< times_
   Buffer total_;
   Buffer events_;
 };

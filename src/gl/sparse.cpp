@@ -2,10 +2,8 @@
 #include "src/gl/sparse.hpp"
 
 #include <algorithm>
-#include <vector>
 
 #include "src/gl/difference.hpp"
-#include "src/gl/event_list.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/shaders.hpp"
 
@@ -15,14 +13,13 @@ namespace {
 class SparseSimulator final : public Simulator {
  public:
   SparseSimulator(const Context& gl, const LumaFormat& format)
-      : Simulator(format),
+      : Simulator(gl, format),
         luma_(gl),
         difference_(gl, format),
         changed_(gl, "changed", shaders::changed),
         reach_(gl, "reach", shaders::reach),
         paint_(gl, "paint", shaders::paint),
         tracker_(gl, format),
-        list_(gl, format),
         points_(gl),
         winners_(gl),
         frames_{{gl, format}, {gl, format}},
@@ -36,8 +33,8 @@ class SparseSimulator final : public Simulator {
  private:
   void start(const TextureFrame& frame) override { take(frame); }
 
-  void simulate(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) override {
+  void mark(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
+            EventList& list) override {
     const auto thresholds = Thresholds::of(settings, format().bits);
     const auto& last = frames_[now_];
     take(frame);
@@ -49,18 +46,15 @@ class SparseSimulator final : public Simulator {
     tracker_.track(last, now, points_);
     tracker_.to_motion(points_, steps.count(), now.picture(), false);
 
-    list_.begin(steps.count());
+    list.begin(steps);
     const GreyFrame* before = &last.picture();
-    std::vector<std::uint32_t> times;
     for (int j = 1; j <= steps.count(); ++j) {
       const bool ends = j == steps.count();
       if (!ends) paint(last.picture(), now.picture(), j);
       const GreyFrame& drawn = ends ? now.picture() : between_[j % 2];
-      difference_.run(*before, drawn, thresholds, j, list_);
+      difference_.run(*before, drawn, thresholds, j, list);
       before = &drawn;
-      times.push_back(steps.microseconds(j));
     }
-    list_.read(times, events);
   }
 
   void take(const TextureFrame& frame) {
@@ -85,7 +79,6 @@ class SparseSimulator final : public Simulator {
   Kernel reach_;
   Kernel paint_;
   PointTracker tracker_;
-  EventList list_;
   Buffer points_;
   Buffer winners_;  ///< points that reach the pixels of an interpolated frame
   Pyramid frames_[2];

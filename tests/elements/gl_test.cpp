@@ -23,10 +23,11 @@ class EveryFormat : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats()),
                          [](const auto& format) { return format.param; });
 
-/// Bytes of the events of five noisy frames.
-std::string events_of_noise(const std::string& element, const std::string& format) {
+/// Bytes of the output for five noisy frames.
+std::string output_of_noise(const std::string& element, const std::string& format,
+                            const std::string& out = GST_EVENT_CAMERA_MEDIA_TYPE) {
   Harness h(element);
-  h.caps("video/x-raw, width=46, height=34, framerate=25/1, format=" + format);
+  h.caps("video/x-raw, width=46, height=34, framerate=25/1, format=" + format, out);
   GRand* random = g_rand_new_with_seed(7);
   std::string bytes;
   for (GstClockTime i = 0; i < 5; ++i) {
@@ -37,16 +38,37 @@ std::string events_of_noise(const std::string& element, const std::string& forma
       map.data[byte] = static_cast<guint8>(g_rand_int(random));
     gst_buffer_unmap(frame, &map);
     EXPECT_EQ(h.push(frame), GST_FLOW_OK);
-    if (const auto events = h.pull()) bytes += bytes_of(events.get());
+    if (const auto output = h.pull()) bytes += bytes_of(output.get());
   }
   g_rand_free(random);
   return bytes;
 }
 
 TEST_P(EveryFormat, GivesTheEventsOfTheCpuBitForBit) {
-  const auto expected = events_of_noise("eventsim-frame", GetParam());
+  const auto expected = output_of_noise("eventsim-frame", GetParam());
   EXPECT_GT(expected.size(), 8U * 1000);
-  EXPECT_EQ(events_of_noise("gleventsim-frame", GetParam()), expected);
+  EXPECT_EQ(output_of_noise("gleventsim-frame", GetParam()), expected);
+}
+
+TEST(Pictures, AreThoseOfTheCpuBitForBit) {
+  for (const char* palette : {"dark", "light", "viridis"}) {
+    const std::string options =
+        std::string("eventsim-frame positive-threshold=60 palette=") + palette;
+    const auto expected = output_of_noise(options, "GRAY8", pictures_of("eventsim-frame"));
+    EXPECT_EQ(expected.size(), 5U * 46 * 34 * 4);
+    EXPECT_EQ(output_of_noise("gl" + options, "GRAY8", pictures_of("gleventsim-frame")), expected)
+        << palette;
+  }
+}
+
+TEST(Pictures, TellTheirReadersWhenTheyAreDrawn) {
+  Harness h("gleventsim-frame");
+  h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1",
+         pictures_of("gleventsim-frame"));
+  h.push(h.flat(0, 100));
+  const auto picture = h.pull();
+  ASSERT_TRUE(picture);
+  EXPECT_NE(gst_buffer_get_meta(picture.get(), g_type_from_name("GstGLSyncMetaAPI")), nullptr);
 }
 
 TEST(OpenGl, IsSharedWithThePipeline) {

@@ -53,12 +53,22 @@ inline const char* const elements[] = {"eventsim-frame",    "eventsim-dense", "e
                                        "eventsim-diff",     "eventsim-dvs",   "gleventsim-frame",
                                        "gleventsim-sparse", "gleventsim-diff"};
 
-/// Those that take frames in system memory, and draw.
+/// Those that take frames in system memory.
 inline const auto cpu_elements = std::span(elements).first<5>();
+
+inline bool is_on_gpu(const std::string& element) {
+  return element.starts_with("gl");
+}
+
+/// Caps of the pictures that a simulator draws. The tests read those in textures like others.
+inline std::string pictures_of(const std::string& element) {
+  return is_on_gpu(element) ? "video/x-raw(memory:GLMemory), format=RGBA"
+                            : "video/x-raw, format=RGBA";
+}
 
 /// A simulator, taking frames in system memory.
 inline std::string with_upload(const std::string& launch) {
-  return (launch.starts_with("gl") ? "glupload ! " : "") + launch;
+  return (is_on_gpu(launch) ? "glupload ! " : "") + launch;
 }
 
 class Harness {

@@ -39,17 +39,15 @@ bool is_physical(const std::string& element) {
 class EveryElement : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
 
-class EveryElementOnTheCpu : public EveryElement {};
-INSTANTIATE_TEST_SUITE_P(, EveryElementOnTheCpu, testing::ValuesIn(cpu_elements));
-
-TEST_P(EveryElementOnTheCpu, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
+TEST_P(EveryElement, GivesTheSameBytesForAnyStrideAndNumberOfThreads) {
   Harness h(GetParam());
   h.caps(video(61, 43));
   const auto expected = intervals(h, 4);
   ASSERT_EQ(expected.size(), 3U);
   Harness padded(std::string(GetParam()) + " n-threads=1");
   padded.caps(video(61, 43));
-  EXPECT_EQ(intervals(padded, 4, 19), expected);
+  // GStreamer 1.22 uploads rows of whole words only.
+  EXPECT_EQ(intervals(padded, 4, is_on_gpu(GetParam()) ? 20 : 19), expected);
 }
 
 TEST_P(EveryElement, GivesEventsWithinThePictureSorted) {
@@ -104,7 +102,7 @@ TEST_P(EveryElement, LosesNoIntervalWhenOnlyTheFormatOrTheFramerateChanges) {
   EXPECT_TRUE(h.pull());
 }
 
-TEST_P(EveryElementOnTheCpu, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
+TEST_P(EveryElement, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
   Harness h(GetParam());
   h.caps(video(32, 24));
   h.push(h.flat(0, 50));
@@ -114,13 +112,13 @@ TEST_P(EveryElementOnTheCpu, SwitchesFromEventsToVideoWithoutLosingAnInterval) {
     EXPECT_GT(last.t, 30'000U);
   else
     EXPECT_EQ(last.t, 40'000U);
-  gst_harness_set_sink_caps_str(h.get(), "video/x-raw, format=GRAY8");
+  gst_harness_set_sink_caps_str(h.get(), pictures_of(GetParam()).c_str());
   gst_harness_push_upstream_event(h.get(), gst_event_new_reconfigure());
   h.push(h.flat(80 * GST_MSECOND, 50));
   const auto picture = h.pull();
   ASSERT_TRUE(picture);
   EXPECT_EQ(GST_BUFFER_PTS(picture.get()), 80 * GST_MSECOND);  // that of its frame
-  EXPECT_EQ(gst_buffer_get_size(picture.get()), 32U * 24U);
+  EXPECT_EQ(gst_buffer_get_size(picture.get()), 32U * 24U * 4U);
 }
 
 TEST_P(EveryElement, StandsBesideItsLikes) {

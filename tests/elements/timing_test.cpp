@@ -35,9 +35,6 @@ class EveryElement : public testing::TestWithParam<const char*> {
 };
 INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(elements));
 
-class EveryElementThatDraws : public EveryElement {};
-INSTANTIATE_TEST_SUITE_P(, EveryElementThatDraws, testing::ValuesIn(cpu_elements));
-
 TEST_P(EveryElement, MakesOneIntervalLessThanThereAreFrames) {
   h.caps(video);
   for (int i = 0; i < 5; ++i) ASSERT_EQ(flash(i * 40 * GST_MSECOND), GST_FLOW_OK);
@@ -64,8 +61,8 @@ TEST_P(EveryElement, SendsAGapForAnIntervalWithoutEvents) {
   EXPECT_EQ(duration, 40 * GST_MSECOND);
 }
 
-TEST_P(EveryElementThatDraws, DrawsAPictureForEveryFrameAtItsTime) {
-  h.caps(video, "video/x-raw, format=GRAY8");
+TEST_P(EveryElement, DrawsAPictureForEveryFrameAtItsTime) {
+  h.caps(video, pictures_of(GetParam()));
   std::vector<std::string> pictures;
   for (int i = 0; i < 6; ++i) {
     GstBuffer* frame = h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i < 3 ? 60 : 200);
@@ -82,23 +79,23 @@ TEST_P(EveryElementThatDraws, DrawsAPictureForEveryFrameAtItsTime) {
     pictures.push_back(bytes_of(picture.get()));
   }
   const std::string& empty = pictures[0];
-  EXPECT_EQ(empty, std::string(empty.size(), empty.front()));
+  EXPECT_EQ(empty.substr(4), empty.substr(0, empty.size() - 4));  // of one colour
   EXPECT_EQ(pictures[2], empty);
   EXPECT_NE(pictures[3], empty);  // at the time of the frame that changed
   EXPECT_EQ(pictures[5], empty);
   EXPECT_FALSE(h.pull_event(GST_EVENT_GAP));
 }
 
-TEST_P(EveryElementThatDraws, DrawsWithoutLatency) {
-  h.caps(video, "video/x-raw, format=GRAY8");
+TEST_P(EveryElement, DrawsWithoutLatency) {
+  h.caps(video, pictures_of(GetParam()));
   gst_harness_set_upstream_latency(h.get(), 5 * GST_MSECOND);
   flash(0);
   flash(120 * GST_MSECOND);
   EXPECT_EQ(gst_harness_query_latency(h.get()), 5 * GST_MSECOND);
 }
 
-TEST_P(EveryElementThatDraws, DrawsNothingInAGapOfTheVideo) {
-  h.caps(video, "video/x-raw, format=GRAY8");
+TEST_P(EveryElement, DrawsNothingInAGapOfTheVideo) {
+  h.caps(video, pictures_of(GetParam()));
   flash(0);
   EXPECT_TRUE(h.pull());
   gst_harness_push_event(h.get(), gst_event_new_gap(40 * GST_MSECOND, 100 * GST_MSECOND));

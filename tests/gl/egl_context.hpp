@@ -72,6 +72,22 @@ class Texture {
     tex_parameter(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   }
 
+  GLuint name() const { return name_; }
+
+  /// RGBA bytes.
+  std::vector<std::uint8_t> download() const {
+    std::vector<std::uint8_t> bytes(static_cast<std::size_t>(format_.width) *
+                                    static_cast<std::size_t>(format_.height) * 4);
+    GLuint framebuffer = 0;
+    gen_framebuffers(1, &framebuffer);
+    bind_framebuffer(GL_FRAMEBUFFER, framebuffer);
+    framebuffer_texture(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, name_, 0);
+    read_pixels(0, 0, format_.width, format_.height, GL_RGBA, GL_UNSIGNED_BYTE, bytes.data());
+    bind_framebuffer(GL_FRAMEBUFFER, 0);
+    delete_framebuffers(1, &framebuffer);
+    return bytes;
+  }
+
   eventcamera::gl::TextureFrame frame(const int (&weights)[4]) const {
     return {format_, name_, {weights[0], weights[1], weights[2], weights[3]}};
   }
@@ -84,6 +100,11 @@ class Texture {
   LOAD(PFNGLPIXELSTOREIPROC, pixel_store, "glPixelStorei")
   LOAD(PFNGLTEXIMAGE2DPROC, tex_image, "glTexImage2D")
   LOAD(PFNGLTEXPARAMETERIPROC, tex_parameter, "glTexParameteri")
+  LOAD(PFNGLGENFRAMEBUFFERSPROC, gen_framebuffers, "glGenFramebuffers")
+  LOAD(PFNGLDELETEFRAMEBUFFERSPROC, delete_framebuffers, "glDeleteFramebuffers")
+  LOAD(PFNGLBINDFRAMEBUFFERPROC, bind_framebuffer, "glBindFramebuffer")
+  LOAD(PFNGLFRAMEBUFFERTEXTURE2DPROC, framebuffer_texture, "glFramebufferTexture2D")
+  LOAD(PFNGLREADPIXELSPROC, read_pixels, "glReadPixels")
 #undef LOAD
   eventcamera::LumaFormat format_;
   int channels_;

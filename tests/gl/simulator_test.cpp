@@ -17,6 +17,7 @@
 #include "src/gl/frame.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/sparse.hpp"
+#include "src/render/accumulator.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"
@@ -176,6 +177,49 @@ TEST_P(EveryApi, FollowsChangedPixelsAsTheCpuDoes) {
   const LumaFormat format{67, 45, 8};
   expect_similar_events(*gl::make_sparse_simulator(context, format),
                         *make_sparse_simulator(format));
+}
+
+/// The picture that the CPU draws of these events.
+std::vector<std::uint8_t> drawn(const EventBuckets* events, const Palette& palette,
+                                const LumaFormat& format) {
+  Accumulator accumulator(format.width, format.height);
+  if (events != nullptr) accumulator.add(*events);
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(format.width) *
+                                   static_cast<std::size_t>(format.height) * 4);
+  accumulator.draw(palette, {.bytes = 4}, reinterpret_cast<std::byte*>(pixels.data()),
+                   std::ptrdiff_t{format.width} * 4);
+  return pixels;
+}
+
+TEST_P(EveryApi, DrawsItsEventsAsTheCpuDoes) {
+  for (const auto make :
+       {gl::make_frame_simulator, gl::make_sparse_simulator, gl::make_diff_simulator}) {
+    for (const auto& [width, height] : {std::pair{1, 1}, {33, 21}, {67, 45}, {2100, 3}}) {
+      const LumaFormat format{width, height, 8};
+      const auto drawing = make(context, format);
+      const auto listing = make(context, format);
+      Texture texture(width, height, 1);
+      Texture picture(width, height, 4);
+      picture.upload(std::vector<std::uint8_t>(drawn(nullptr, {}, format).size(), 77));
+      const auto& colours = palette(PaletteName::dark);
+      Settings settings;
+      settings.positive_threshold = 3;
+      settings.negative_threshold = 4;
+      for (int i = 0; i < 4; ++i) {
+        texture.upload(bytes_of(scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i)));
+        const auto frame = texture.frame({one, 0, 0, 0});
+        const Nanoseconds time = i * scene::frame_time;
+        drawing->draw(frame, time, settings,
+                      {picture.name(), pixels_by_kind(colours, {.bytes = 4})});
+        const auto* events = listing->push(frame, time, settings);
+        ASSERT_EQ(picture.download(), drawn(events, colours, format)) << width << " " << i;
+        if (i == 2) {  // a first frame again
+          drawing->reset();
+          listing->reset();
+        }
+      }
+    }
+  }
 }
 
 TEST_P(EveryApi, TracksPointsAsTheCpuDoes) {

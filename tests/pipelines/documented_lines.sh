@@ -28,6 +28,7 @@ while IFS= read -r line; do
   line=${line//num-buffers=300/num-buffers=40}
   line=${line//pattern=ball foreground/pattern=ball num-buffers=40 foreground}
   line=${line//autovideosink/fakesink}
+  line=${line//glimagesink/"'video/x-raw(memory:GLMemory)' ! fakesink"}
   line=${line// --device \/dev\/video0/ --port 0}
   line=${line//host=receiver/host=127.0.0.1}
   line=${line//server:8554/127.0.0.1:${served:-}}
