@@ -80,6 +80,8 @@ static Option properties[] = {
     {"height", "files that may lack a sensor size", NULL},
 };
 
+static gboolean print_version;
+
 static const GOptionEntry options[] = {
     {"format", 'f', 0, G_OPTION_ARG_STRING, &properties[0].value, "Words of a .raw file", "NAME"},
     {"dialect", 'd', 0, G_OPTION_ARG_STRING, &properties[1].value, "Dialect of a .csv or .txt file",
@@ -94,6 +96,7 @@ static const GOptionEntry options[] = {
      "Width of the sensor, if IN does not state it", "PIXELS"},
     {"height", 0, 0, G_OPTION_ARG_STRING, &properties[6].value,
      "Height of the sensor, if IN does not state it", "PIXELS"},
+    {"version", 0, 0, G_OPTION_ARG_NONE, &print_version, "Print the version", NULL},
     G_OPTION_ENTRY_NULL,
 };
 
@@ -353,16 +356,25 @@ static GstPadProbeReturn count_events(GstPad* pad, GstPadProbeInfo* info, gpoint
   return GST_PAD_PROBE_OK;
 }
 
-/* Prints a line that is overwritten on a terminal, or one line per second elsewhere. */
+/* Prints a bar that is overwritten on a terminal, or one line per second elsewhere. */
 static void print_progress(GstElement* pipeline, guint64 events) {
+  static const char full[] = "########################################";
   gint64 position = 0;
   gint64 duration = 0;
+  gdouble share;
   if (!gst_element_query_position(pipeline, GST_FORMAT_TIME, &position) ||
       !gst_element_query_duration(pipeline, GST_FORMAT_TIME, &duration) || duration <= 0)
     return;
-  PRINT_ERROR("%s%3.0f %%, %" G_GUINT64_FORMAT " events%s", isatty(STDERR_FILENO) ? "\r" : "",
-              CLAMP(100.0 * (gdouble)position / (gdouble)duration, 0.0, 100.0), events,
-              isatty(STDERR_FILENO) ? "" : "\n");
+  share = CLAMP((gdouble)position / (gdouble)duration, 0.0, 1.0);
+  if (isatty(STDERR_FILENO))
+    PRINT_ERROR("\r[%-40.*s] %3.0f %%, %" G_GUINT64_FORMAT " events", (int)(40 * share), full,
+                100 * share, events);
+  else
+    PRINT_ERROR("%3.0f %%, %" G_GUINT64_FORMAT " events\n", 100 * share, events);
+}
+
+static void clear_progress(void) {
+  if (isatty(STDERR_FILENO)) PRINT_ERROR("\r\033[K");
 }
 
 /* Prints an error or a warning with its cause: the debug text, after the code location. */
@@ -375,8 +387,8 @@ static void print_message(GstMessage* message) {
     gst_message_parse_error(message, &error, &debug);
   else
     gst_message_parse_warning(message, &error, &debug);
-  PRINT_ERROR("%s%s: %s\n", isatty(STDERR_FILENO) ? "\n" : "", fatal ? "error" : "warning",
-              error->message);
+  clear_progress();
+  PRINT_ERROR("%s: %s\n", fatal ? "error" : "warning", error->message);
   cause = debug != NULL ? strchr(debug, '\n') : NULL;
   if (cause != NULL && cause[1] != '\0') PRINT_ERROR("  %s\n", cause + 1);
   g_free(debug);
@@ -414,6 +426,7 @@ static gboolean run(GstElement* pipeline, const guint64* events) {
     if (GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS) print_message(message);
     gst_message_unref(message);
   }
+  clear_progress();
   if (ok) print_left_out(pipeline);
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(bus);
@@ -457,6 +470,10 @@ int main(int argc, char** argv) {
   g_option_context_add_main_entries(context, options, NULL);
   ok = g_option_context_parse(context, &argc, &argv, &error);
   g_option_context_free(context);
+  if (ok && print_version) {
+    printf("event-convert %s\n", PACKAGE_VERSION);
+    return 0;
+  }
   if (!ok || argc != 3) {
     PRINT_ERROR("%s; see %s --help\n", ok ? "needs IN and OUT" : error->message, g_get_prgname());
     g_clear_error(&error);
@@ -502,7 +519,6 @@ int main(int argc, char** argv) {
   ok = finish(part, argv[2], ok);
   g_free(part);
   if (ok)
-    printf("%s%" G_GUINT64_FORMAT " events from %s to %s\n", isatty(STDERR_FILENO) ? "\r" : "",
-           events, argv[1], argv[2]);
+    printf("%" G_GUINT64_FORMAT " events from %s to %s\n", events, argv[1], argv[2]);
   return ok ? 0 : 1;
 }
