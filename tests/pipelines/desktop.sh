@@ -1,0 +1,99 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# What is installed for desktops: recordings have a type, a thumbnail, and programs that open them.
+set -eu
+if [ ! -w "$BUILD" ]; then
+  echo "$BUILD is read-only: meson cannot install from it"
+  exit 77
+fi
+source "$SOURCE/tests/pipelines/scratch_folder.sh"
+
+export XDG_DATA_HOME=$work/home XDG_CONFIG_HOME=$work/config XDG_CURRENT_DESKTOP=GNOME
+meson install -C "$BUILD" --no-rebuild --destdir "$work" --tags desktop --quiet
+data=$work/usr/share
+cp /usr/share/mime/packages/freedesktop.org.xml "$data/mime/packages/"
+export XDG_DATA_DIRS=$data
+desktop-file-validate "$data"/applications/*.desktop
+appstreamcli validate --no-net "$data"/metainfo/*.xml
+update-mime-database "$data/mime"
+update-desktop-database -q "$data/applications"
+
+# Types of recordings, and of other files with their extensions.
+"$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! evtenc ! filesink location=ball.raw
+for ending in dat es npy aedat4 h5 hdf5; do "$BUILD/pipelines/event-convert" ball.raw ball.$ending; done
+cp ball.dat "without an extension"
+/usr/bin/python3 - <<'PYTHON'
+import h5py
+import numpy as np
+
+np.save("numbers.npy", np.zeros((5, 4)))
+np.savez("numbers.npz", x=np.zeros(5))
+with h5py.File("numbers.h5", "w") as file:
+    file.create_dataset("weights", data=np.zeros(5))
+PYTHON
+echo 'export const a = 1;' >script.es
+printf 'IIU\0\010\0\0\0 a photo' >photo.raw
+printf '\1\2\3\4 other words' >words.raw
+echo "a text" >notes.dat
+while read -r type file; do
+  found=$(gio info -a standard::content-type "$file" | sed -n 's/.*content-type: //p')
+  [ "$found" = "$type" ] || fail "$file: $found instead of $type"
+  found=$(xdg-mime query filetype "$file")
+  [ "$found" = "$type" ] || fail "$file: xdg-mime tells $found instead of $type"
+done <<'FILES'
+application/x-prophesee-raw ball.raw
+application/x-prophesee-dat ball.dat
+application/x-prophesee-dat without an extension
+application/x-es ball.es
+application/x-event-npy ball.npy
+application/x-aedat ball.aedat4
+application/x-event-hdf5 ball.h5
+application/x-event-hdf5 ball.hdf5
+application/x-npy numbers.npy
+application/x-npz numbers.npz
+application/x-hdf numbers.h5
+application/ecmascript script.es
+image/x-panasonic-rw photo.raw
+image/x-panasonic-rw words.raw
+text/plain notes.dat
+FILES
+
+# Players that are installed open them; the one with a window of its own first.
+mkdir programs
+ln -s "$(command -v gst-play-1.0)" "$(command -v gio)" programs/
+default_of() { # TYPE
+  PATH=$work/programs gio mime "$1" | sed -n '1s/.*: //p'
+}
+for ending in raw dat es npy aedat4 h5; do
+  type=$(gio info -a standard::content-type ball.$ending | sed -n 's/.*content-type: //p')
+  [ "$(default_of "$type")" = events-in-terminal.desktop ] || fail "$type is opened by $(default_of "$type")"
+done
+ln -s /bin/true programs/totem
+[ "$(default_of application/x-es)" = events-in-gnome-videos.desktop ] || fail "$(default_of application/x-es) instead of Totem"
+
+# Thumbnails show events.
+thumbnailer=$data/thumbnailers/event-recordings.thumbnailer
+for ending in raw dat es npy aedat4 h5; do
+  type=$(gio info -a standard::content-type ball.$ending | sed -n 's/.*content-type: //p')
+  grep -q "^MimeType=.*$type;" "$thumbnailer" || fail "no thumbnail of $type"
+  line=$(sed -n 's/^Exec=//p' "$thumbnailer")
+  line=${line//%s/128}
+  line=${line//%u/$(gio info ball.$ending | sed -n 's/^uri: //p')}
+  line=${line//%o/thumbnail.png}
+  echo "$line"
+  eval "env -u DISPLAY timeout 60 $line"
+  "$GST_LAUNCH" -q filesrc location=thumbnail.png ! pngdec ! videoconvert ! video/x-raw,format=GRAY8,width=128 ! filesink location=grey
+  [ "$(od -An -v -tu1 -w1 grey | sort -u | wc -l)" -gt 20 ] || fail "the thumbnail of ball.$ending is empty"
+  rm thumbnail.png
+done
+
+# Effects run as webcam applications run them.
+for effect in "$data"/gnome-video-effects/*.effect; do
+  for key in Name Comment PipelineDescription; do
+    grep -q "^$key=." "$effect" || fail "${effect##*/} has no $key"
+  done
+  line=$(sed -n 's/^PipelineDescription=//p' "$effect")
+  echo "$line"
+  eval "timeout 60 $GST_LAUNCH -q videotestsrc num-buffers=5 ! videoconvert ! $line ! videoconvert ! video/x-raw,format=I420,width=320,height=240 ! filesink location=pictures"
+  [ "$(stat -c %s pictures)" -eq $((5 * 320 * 240 * 3 / 2)) ] || fail "${effect##*/}: $(stat -c %s pictures) bytes"
+done
