@@ -66,8 +66,8 @@ while IFS= read -r line; do
     wait $receiver || fail "$(cat received)"
     receiver=
   fi
-done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|event-|\.\/pipelines\/(events_|web-events|rtsp-events))/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
-[ $count -ge 29 ] || fail "found only $count lines"
+done < <(awk '/^```/ { inside = !inside } inside && /^(gst-|ges-|event-|\.\/pipelines\/(events_|web-events|rtsp-events))/' "$SOURCE/README.md" "$SOURCE"/docs/*.md)
+[ $count -ge 30 ] || fail "found only $count lines"
 for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy received.raw; do
   [ -s $file ] || fail "$file is missing or empty"
 done
