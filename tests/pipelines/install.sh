@@ -12,10 +12,31 @@ trap 'rm -rf "$root"' EXIT
 meson install -C "$BUILD" --no-rebuild --destdir "$root" --quiet
 (cd "$root" && find . -type f -o -type l | sort)
 
+# Each file is in exactly one Debian package.
+while IFS= read -r file; do
+  packages=()
+  for list in "$SOURCE"/debian/*.install; do
+    while IFS= read -r pattern; do
+      # shellcheck disable=SC2053
+      if [[ $file == $pattern || $file == $pattern/* ]]; then packages+=("${list##*/}"); fi
+    done <"$list"
+  done
+  [ ${#packages[@]} -eq 1 ] || {
+    echo "FAILED: $file is in these packages: ${packages[*]}"
+    exit 1
+  }
+done < <(cd "$root" && find * -type f -o -type l)
+
 library=$(dirname "$(find "$root" -name libgsteventcamera-1.0.so)")
 plugins=$library/gstreamer-1.0
 # Debian's GStreamer searches for plugins here.
 [ "${plugins#"$root"}" = "$(pkg-config --variable=pluginsdir gstreamer-1.0)" ]
+
+# The interface of the library is the one that packages rely on.
+mkdir -p "$root/debian/package/DEBIAN"
+cp "$SOURCE/debian/control" "$SOURCE/debian/changelog" "$root/debian/"
+(cd "$root" && dpkg-gensymbols -c4 -plibgsteventcamera-1.0-0 -Pdebian/package -Odebian/symbols \
+  -I"$SOURCE/debian/libgsteventcamera-1.0-0.symbols" -e"$library"/libgsteventcamera-1.0.so.0)
 
 # As if the root were /. pkg-config expects and prints escaped blanks.
 sed -i "s#^prefix=.*#prefix=${root// /\\\\ }/usr#" "$library/pkgconfig/gsteventcamera-1.0.pc"
@@ -25,8 +46,29 @@ eval "flags=($(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0))
 cc -Wall -Werror -o "$root/count_events" "$SOURCE/pipelines/count_events.c" "${flags[@]}"
 
 export LD_LIBRARY_PATH=$library GST_PLUGIN_PATH=$plugins GST_REGISTRY=$root/registry.bin
+export PATH=$root/usr/bin:$PATH
+completed() { # PROGRAM WORD...
+  (
+    source "$root/usr/share/bash-completion/completions/$1"
+    COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
+    "_${1//-/_}" "$1"
+    printf '%s\n' "${COMPREPLY[@]}"
+  )
+}
 for program in event-convert event-calibrate; do
   "$root/usr/bin/$program" --help >"$root/help"
   grep -qi "^usage" "$root/help"
+  [[ $("$root/usr/bin/$program" --version) =~ ^$program\ [0-9]+\.[0-9]+\.[0-9]+$ ]]
+  # Its manual describes each option, and bash completes each.
+  sed 's/\\-/-/g' "$root/usr/share/man/man1/$program.1" >"$root/manual"
+  options=$(grep -o -e ' --[a-z-]*' "$root/help" | sort -u)
+  for option in $options; do
+    grep -q -e "$option" "$root/manual"
+    completed "$program" "$option" | grep -qx -e "$option"
+  done
 done
+completed event-convert --format EVT21 | grep -qx EVT21
+completed event-convert --compression = zstd-h | grep -qx zstd-high
+completed event-convert -d v | grep -qx v2e
+completed event-calibrate --element eventsim-de | grep -qx eventsim-dense
 "$root/count_events" "videotestsrc num-buffers=5 pattern=ball ! eventsim-frame ! appsink name=events"
