@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include <gst/gst.h>
-
-#include "gst/base/authors.hpp"
+#include "gst/base/plugin.hpp"
 #include "gst/base/eventsimulator.hpp"
 
 const EventSimulatorTypeNames event_simulator_type_names = {.simulator = "GstEventSimulator",
@@ -10,19 +8,5 @@ const EventSimulatorTypeNames event_simulator_type_names = {.simulator = "GstEve
 #define ELEMENTS(X) \
   X(eventsim_frame) X(eventsim_dense) X(eventsim_sparse) X(eventsim_diff) X(eventsim_dvs)
 
-#define DECLARE(name) GST_ELEMENT_REGISTER_DECLARE(name)
-G_BEGIN_DECLS
-ELEMENTS(DECLARE)
-G_END_DECLS
-
-static gboolean plugin_init(GstPlugin* plugin) {
-  gboolean registered = FALSE;
-#define REGISTER(name) registered |= GST_ELEMENT_REGISTER(name, plugin);
-  ELEMENTS(REGISTER)
-  return registered;
-}
-
-#define PACKAGE "gst-eventsim"
-GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, eventsim,
-                  "Simulators of event cameras: video to events", plugin_init, PACKAGE_VERSION,
-                  "LGPL", "gst-eventsim", EVENTSIM_AUTHORS)
+EVENTSIM_PLUGIN(eventsim, "Simulators of event cameras: video to events", ELEMENTS,
+                EVENTSIM_NO_TYPE_FINDERS)
