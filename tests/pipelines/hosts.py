@@ -21,6 +21,7 @@ import traceback
 from dataclasses import dataclass
 
 SKIPPED = 77  # exit status that Meson knows
+MAX_HOSTS = 3
 libc = ctypes.CDLL(None, use_errno=True)
 fork = multiprocessing.get_context("fork")
 
@@ -52,6 +53,10 @@ def unshare_network():
 
 def ip(arguments):
     subprocess.run(["ip", *arguments.split()], check=True)
+
+
+def mac_address(host):
+    return f"02:00:00:00:00:{host:02x}"
 
 
 def compute_checksums(interface):
@@ -105,6 +110,12 @@ class Host:
         ip(f"link set eth0 mtu {mtu} up")
         ip(f"address add {cls.address(number)}/24 dev eth0")
         ip("route add 224.0.0.0/4 dev eth0")
+        # Packets do not wait for ARP, whose queue is short, or for the interface.
+        for other in range(1, MAX_HOSTS + 1):
+            ip(f"neighbour add {cls.address(other)} lladdr {mac_address(other)} dev eth0 nud permanent")
+        while " state UP " not in subprocess.run(["ip", "link", "show", "eth0"], check=True, capture_output=True,
+                                                 text=True).stdout:
+            time.sleep(0.01)
         compute_checksums("eth0")
         worker = work(*arguments)
         connection.send(None)
@@ -127,10 +138,20 @@ class Conditions:
     delay: float = 0  # maximum, seconds
 
 
+def is_udp(frame):
+    return frame[12:14] == b"\x08\x00" and frame[23] == socket.IPPROTO_UDP
+
+
+def is_last_fragment(frame):
+    more_fragments = 0x20
+    return not frame[20] & more_fragments
+
+
 class Switch:
     def __init__(self, seed):
         self.conditions = Conditions()
         self.packets = self.lost = self.duplicated = self.delayed = 0  # of UDP
+        self.datagrams = 0  # whose packets were all forwarded, lost or delayed
         self.frames = []  # (time, bytes), as sent
         self._random = random.Random(seed)
         self._ports = {}  # by MAC address
@@ -139,7 +160,7 @@ class Switch:
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def connect(self, number, pid, mtu):
-        mac = f"02:00:00:00:00:{number:02x}"
+        mac = mac_address(number)
         ip(f"link add port{number} mtu {mtu} type veth peer name eth0 address {mac} netns {pid}")
         ip(f"link set port{number} up")
         port = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(0x0003))
@@ -165,18 +186,25 @@ class Switch:
                 if kind != socket.PACKET_OUTGOING:
                     self._take(frame, port)
             while self._waiting and self._waiting[0][0] <= time.monotonic():
-                _, _, frame, port = heapq.heappop(self._waiting)
+                _, _, frame, port = self._waiting[0]
                 self._forward(frame, port)
+                heapq.heappop(self._waiting)
 
     def _take(self, frame, source):
         self.frames.append((time.time(), frame))
         is_group = frame[0] & 1
         for mac, port in self._ports.items():
             if port is not source and (is_group or mac == frame[:6]):
-                if frame[12:14] == b"\x08\x00" and frame[23] == socket.IPPROTO_UDP:
+                if is_udp(frame):
                     self._take_udp(frame, port)
                 else:
                     self._forward(frame, port)
+        if is_udp(frame) and is_last_fragment(frame):
+            self.datagrams += 1
+
+    def has_forwarded(self, datagrams):
+        """True if it holds none of the first so many UDP datagrams that hosts have sent."""
+        return self.datagrams >= datagrams and not self._waiting
 
     def _take_udp(self, frame, port):
         self.packets += 1
