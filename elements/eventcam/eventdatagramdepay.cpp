@@ -33,7 +33,6 @@
  */
 #include <gst/gst.h>
 
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <span>
@@ -42,12 +41,14 @@
 #include <vector>
 
 #include "elements/eventcam/datagram_properties.hpp"
+#include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 #include "src/wire/datagram_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);
@@ -77,9 +78,9 @@ struct State {
   std::vector<AbsoluteEvent> events{};  ///< of the current datagram
   GstSegment upstream{};                ///< of arrival times
   guint32 segment_seqnum = gst_util_seqnum_next();
-  std::optional<GstSegment> segment{};  ///< of the events, once pushed
-  Microseconds end = 0;                 ///< of the last buffer
-  bool is_discontinuous = false;        ///< before the next buffer
+  ArrivalSegment segment{max_drift};
+  Microseconds end = 0;           ///< of the last buffer
+  bool is_discontinuous = false;  ///< before the next buffer
   bool has_caps = false;
 };
 
@@ -137,33 +138,6 @@ static bool push_caps(GstEventDatagramDepay* self) {
   return state.has_caps;
 }
 
-/// True if `t` is due at another running time than `arrival`, by too much.
-static bool has_drifted(const GstSegment& segment, Microseconds t, GstClockTime arrival) {
-  if (!GST_CLOCK_TIME_IS_VALID(arrival)) return false;
-  const GstClockTime due = gst_segment_to_running_time(&segment, GST_FORMAT_TIME, nanoseconds(t));
-  return std::abs(GST_CLOCK_DIFF(due, arrival)) > max_drift;
-}
-
-/// Starts a segment in which `t` has the running time `arrival`, if that is known.
-static void push_segment(Private& priv, Microseconds t, GstClockTime arrival) {
-  auto& state = *priv.state;
-  GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
-  segment.start = segment.position = segment.time = nanoseconds(t);
-  if (GST_CLOCK_TIME_IS_VALID(arrival)) {
-    segment.base = arrival;
-  } else if (state.segment) {
-    // A stream that starts over continues where the last one ended.
-    segment.base =
-        gst_segment_to_running_time(&*state.segment, GST_FORMAT_TIME, nanoseconds(state.end));
-  }
-  state.segment = segment;
-  state.end = t;
-  GstEvent* const event = gst_event_new_segment(&segment);
-  gst_event_set_seqnum(event, state.segment_seqnum);
-  gst_pad_push_event(priv.src, event);
-}
-
 /// Buffer of the events of the interval (start, end]. May throw.
 static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds start,
                             Microseconds end) {
@@ -185,8 +159,10 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
   const auto first = state.events.front().t;
   if (!push_caps(self))
     return GST_PAD_IS_FLUSHING(priv.src) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
-  if (!state.segment || reception.restarted || has_drifted(*state.segment, first, arrival)) {
-    push_segment(priv, first, arrival);
+  if (reception.restarted || !state.segment.continues(nanoseconds(first), arrival)) {
+    state.segment.begin(priv.src, state.segment_seqnum, nanoseconds(first), arrival,
+                        nanoseconds(first));
+    state.end = first;
     state.is_discontinuous = true;
   } else if (first - state.end > min_gap) {
     GstEvent* const gap =
@@ -197,6 +173,7 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
   }
   GstBuffer* const buffer = buffer_of(state.events, state.end, state.events.back().t);
   state.end = state.events.back().t;
+  state.segment.reach(nanoseconds(state.end));
   if (std::exchange(state.is_discontinuous, false))
     GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
   return gst_pad_push(priv.src, buffer);
@@ -345,16 +322,12 @@ static void finalize(GObject* object) {
 static void gst_event_datagram_depay_init(GstEventDatagramDepay* self) {
   self->priv = new Private;
   auto& priv = *self->priv;
-  auto* element = GST_ELEMENT(self);
-  auto* klass = GST_ELEMENT_GET_CLASS(self);
-  priv.sink = gst_pad_new_from_template(gst_element_class_get_pad_template(klass, "sink"), "sink");
+  priv.sink = add_pad(GST_ELEMENT(self), "sink");
   gst_pad_set_chain_function(priv.sink, chain);
   gst_pad_set_event_function(priv.sink, sink_event);
-  gst_element_add_pad(element, priv.sink);
-  priv.src = gst_pad_new_from_template(gst_element_class_get_pad_template(klass, "src"), "src");
+  priv.src = add_pad(GST_ELEMENT(self), "src");
   gst_pad_set_query_function(priv.src, src_query);
   gst_pad_use_fixed_caps(priv.src);
-  gst_element_add_pad(element, priv.src);
 }
 
 static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klass) {
@@ -393,14 +366,9 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
                                  counts.rejected, nullptr);
       });
 
-  static GstStaticPadTemplate sink_template =
-      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS_ANY);
-  static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;
-  gst_element_class_add_static_pad_template(element_class, &sink_template);
-  gst_element_class_add_static_pad_template(element_class, &src_template);
+  add_pad_templates(element_class, "ANY", EVENT_CAPS);
   gst_element_class_set_static_metadata(
       element_class, "Event datagram depayloader", "Codec/Depayloader/Network",
       "Unpacks events from datagrams of other tools", EVENTSIM_AUTHORS);

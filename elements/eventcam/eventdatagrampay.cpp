@@ -37,6 +37,7 @@
 #include "gst/base/flush_timer.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 #include "src/wire/datagram_packer.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);
@@ -68,7 +69,7 @@ struct Private {
   EventFaults faults{"send"};
   std::optional<Microseconds> timed;  ///< first event of the datagram that the timer is set for
 
-  std::optional<FlushTimer> timer;  ///< while streaming
+  FlushTimer timer;
 };
 
 }  // namespace
@@ -128,16 +129,17 @@ static GstFlowReturn push(Private& priv) {
   return gst_pad_push_list(priv.src, list);
 }
 
+static void flush_late(GstObject* element);
+
 /// Limits the time that a new incomplete datagram waits. May throw.
 static void set_timer(Private& priv) {
   const auto since = priv.packer ? priv.packer->waiting_since() : std::nullopt;
-  if (!priv.timer || since == priv.timed) return;
+  if (since == priv.timed) return;
   priv.timed = since;
   if (since)
-    priv.timer->set(FlushTimer::Clock::now() +
-                    std::chrono::nanoseconds(priv.settings.copy().max_latency));
+    priv.timer.set(priv.settings.copy().max_latency, priv.sink, flush_late);
   else
-    priv.timer->cancel();
+    priv.timer.cancel();
 }
 
 /// Runs `work`, which packs events, and pushes the datagrams that they complete.
@@ -155,12 +157,9 @@ static GstFlowReturn flush(GstEventDatagramPay* self) {
   return pack(self, [](DatagramPacker& packer, const auto& send) { packer.flush(send); });
 }
 
-/// Sends events that have waited long enough, in the timer's thread.
-static void flush_late(GstEventDatagramPay* self) {
-  GstPad* const sink = self->priv->sink;
-  GST_PAD_STREAM_LOCK(sink);
-  flush(self);
-  GST_PAD_STREAM_UNLOCK(sink);
+/// Sends events that have waited long enough.
+static void flush_late(GstObject* element) {
+  flush(GST_EVENT_DATAGRAM_PAY(element));
 }
 
 /// True if events would wait for too long in the incomplete datagram. `interval` is that of the
@@ -277,17 +276,13 @@ static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
 /* states */
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto* self = GST_EVENT_DATAGRAM_PAY(element);
-  auto& priv = *self->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
+  auto& priv = *GST_EVENT_DATAGRAM_PAY(element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
     priv.counts.access([](DatagramCounts& counts) { counts = {}; });
-    priv.timer.emplace([self] { flush_late(self); });
-  }
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.timer->stop();
-    priv.timer.reset();
+    priv.timer.stop();
     priv.timed.reset();
     priv.packer.reset();
     priv.datagrams.clear();
@@ -306,16 +301,12 @@ static void finalize(GObject* object) {
 static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
   self->priv = new Private;
   auto& priv = *self->priv;
-  auto* element = GST_ELEMENT(self);
-  auto* klass = GST_ELEMENT_GET_CLASS(self);
-  priv.sink = gst_pad_new_from_template(gst_element_class_get_pad_template(klass, "sink"), "sink");
+  priv.sink = add_pad(GST_ELEMENT(self), "sink");
   gst_pad_set_chain_function(priv.sink, chain);
   gst_pad_set_event_function(priv.sink, sink_event);
-  gst_element_add_pad(element, priv.sink);
-  priv.src = gst_pad_new_from_template(gst_element_class_get_pad_template(klass, "src"), "src");
+  priv.src = add_pad(GST_ELEMENT(self), "src");
   gst_pad_set_query_function(priv.src, src_query);
   gst_pad_use_fixed_caps(priv.src);
-  gst_element_add_pad(element, priv.src);
   announce_latency(self, "max-latency");
 }
 
@@ -341,14 +332,9 @@ static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
                                  G_TYPE_UINT64, counts.bytes, nullptr);
       });
 
-  static GstStaticPadTemplate sink_template =
-      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(DATAGRAM_CAPS));
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;
-  gst_element_class_add_static_pad_template(element_class, &sink_template);
-  gst_element_class_add_static_pad_template(element_class, &src_template);
+  add_pad_templates(element_class, EVENT_CAPS, DATAGRAM_CAPS);
   gst_element_class_set_static_metadata(
       element_class, "Event datagram payloader", "Codec/Payloader/Network",
       "Packs events into datagrams of other tools", EVENTSIM_AUTHORS);

@@ -35,6 +35,7 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event_validator.hpp"
 #include "src/measure/event_statistics.hpp"
@@ -291,13 +292,8 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
                                                    GST_PARAM_MUTABLE_PLAYING)));
   add_report_properties(properties, "PNG file of the events per pixel, written at EOS or on stop");
 
-  static GstStaticPadTemplate sink_template =
-      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
-  gst_element_class_add_static_pad_template(element_class, &sink_template);
-  gst_element_class_add_static_pad_template(element_class, &src_template);
+  add_pad_templates(element_class, EVENT_CAPS, EVENT_CAPS);
   gst_element_class_set_static_metadata(element_class, "Event statistics", "Filter/Analyzer",
                                         "Measures an event stream", EVENTSIM_AUTHORS);
 

@@ -36,7 +36,6 @@
 #include <gst/rtp/gstrtpbasedepayload.h>
 #include <gst/rtp/gstrtpbuffer.h>
 
-#include <algorithm>
 #include <charconv>
 #include <optional>
 #include <span>
@@ -45,11 +44,13 @@
 #include <utility>
 
 #include "elements/eventcam/rtp_events.hpp"
+#include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
@@ -84,8 +85,8 @@ struct State {
   SensorSize sensor;
   RtpEventFormat format;
   RtpUnpacker unpacker;
-  std::optional<GstSegment> segment{};  ///< sent downstream
-  bool is_discontinuous = false;        ///< before the next buffer
+  ArrivalSegment segment{max_drift};
+  bool is_discontinuous = false;  ///< before the next buffer
 };
 
 struct Private {
@@ -122,31 +123,12 @@ GST_ELEMENT_REGISTER_DEFINE(rtpeventdepay, "rtpeventdepay", GST_RANK_SECONDARY,
 /// segment does so already.
 static void update_segment(GstRtpEventDepay* self, GstClockTime start, GstClockTime arrival) {
   const GstSegment& in = GST_RTP_BASE_DEPAYLOAD(self)->segment;
-  const bool is_timed = in.format == GST_FORMAT_TIME;
-  const guint64 running =
-      is_timed ? gst_segment_to_running_time(&in, GST_FORMAT_TIME, arrival) : GST_CLOCK_TIME_NONE;
+  if (in.format != GST_FORMAT_TIME) arrival = GST_CLOCK_TIME_NONE;
+  const guint64 running = gst_segment_to_running_time(&in, in.format, arrival);
   auto& segment = self->priv->state->segment;
-  if (segment && start >= segment->start) {
-    const guint64 mapped = gst_segment_to_running_time(&*segment, GST_FORMAT_TIME, start);
-    if (!GST_CLOCK_TIME_IS_VALID(running) || ABS(GST_CLOCK_DIFF(mapped, running)) <= max_drift)
-      return;
-  }
-  GstSegment next;
-  gst_segment_init(&next, GST_FORMAT_TIME);
-  next.start = next.position = start;
-  if (GST_CLOCK_TIME_IS_VALID(running)) {
-    next.base = running;
-    next.time = gst_segment_to_stream_time(&in, GST_FORMAT_TIME, arrival);
-  } else {
-    // Without timestamps, a stream that starts over continues where the last one ended.
-    if (segment)
-      next.base = gst_segment_to_running_time(&*segment, GST_FORMAT_TIME, segment->position);
-    next.time = next.base;
-  }
-  segment = next;
-  GstEvent* event = gst_event_new_segment(&next);
-  gst_event_set_seqnum(event, self->priv->segment_seqnum);
-  gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), event);
+  if (!segment.continues(start, running))
+    segment.begin(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), self->priv->segment_seqnum, start, running,
+                  gst_segment_to_stream_time(&in, in.format, arrival));
 }
 
 static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
@@ -154,7 +136,7 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
   const auto duration = static_cast<GstClockTime>(interval.duration);
   update_segment(self, start, interval.arrival);
   auto& state = *self->priv->state;
-  state.segment->position = std::max(state.segment->position, start + duration);
+  state.segment.reach(start + duration);
   state.is_discontinuous |= interval.is_discontinuous;
   if (interval.events.empty()) {
     gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), gst_event_new_gap(start, duration));
@@ -402,13 +384,8 @@ static void gst_rtp_event_depay_class_init(GstRtpEventDepayClass* klass) {
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
-  static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE(
-      "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(RTP_EVENT_CAPS));
-  static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
-  gst_element_class_add_static_pad_template(element_class, &sink_template);
-  gst_element_class_add_static_pad_template(element_class, &src_template);
+  add_pad_templates(element_class, RTP_EVENT_CAPS, EVENT_CAPS);
   gst_element_class_set_static_metadata(element_class, "RTP event depayloader",
                                         "Codec/Depayloader/Network/RTP",
                                         "Gets events out of RTP packets", EVENTSIM_AUTHORS);

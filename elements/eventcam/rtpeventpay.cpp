@@ -28,7 +28,6 @@
 #include <gst/rtp/gstrtpbuffer.h>
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
 #include <string>
 
@@ -41,6 +40,7 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/sensor_events.hpp"
 #include "gst/base/types.hpp"
@@ -94,7 +94,7 @@ struct Private {
   GstFlowReturn flow = GST_FLOW_OK;  ///< result of the last packets
   RtpHeaderExtensions extensions;
 
-  std::optional<FlushTimer> timer;  ///< while streaming
+  FlushTimer timer;
 };
 
 }  // namespace
@@ -169,7 +169,7 @@ static void send(GstRtpEventPay* self) {
   }
   sent.events = pending.events().size();
   pending.clear();
-  if (priv.timer) priv.timer->cancel();
+  priv.timer.cancel();
   {
     const auto total = priv.sent.lock();
     total->packets += sent.packets;
@@ -197,12 +197,10 @@ static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
   return priv.flow;
 }
 
-/// Sends events that have waited long enough, in the timer's thread.
-static void send_late(GstRtpEventPay* self) {
-  GstPad* sink = GST_RTP_BASE_PAYLOAD_SINKPAD(self);
-  GST_PAD_STREAM_LOCK(sink);
+/// Sends events that have waited long enough.
+static void send_late(GstObject* element) {
+  auto* self = GST_RTP_EVENT_PAY(element);
   reported(self, [&] { send(self); });
-  GST_PAD_STREAM_UNLOCK(sink);
 }
 
 /// True if the pending events fill a packet, or cannot wait for another interval as long as the
@@ -227,9 +225,8 @@ static PendingInterval::LeftOut take(GstRtpEventPay* self, EventInterval interva
   const auto left_out = pending.add(start, end, events, [&] { send(self); });
   if (is_due(self, end - start)) {
     send(self);
-  } else if (is_first && priv.timer) {
-    priv.timer->set(FlushTimer::Clock::now() +
-                    std::chrono::nanoseconds(priv.settings.copy().max_latency));
+  } else if (is_first) {
+    priv.timer.set(priv.settings.copy().max_latency, GST_RTP_BASE_PAYLOAD_SINKPAD(self), send_late);
   }
   return left_out;
 }
@@ -336,15 +333,11 @@ static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
-  auto* self = GST_RTP_EVENT_PAY(element);
-  auto& priv = *self->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
-    priv.timer.emplace([self] { send_late(self); });
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_rtp_event_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
-    priv.timer->stop();
-    priv.timer.reset();
+    auto& priv = *GST_RTP_EVENT_PAY(element)->priv;
+    priv.timer.stop();
     priv.state.reset();
     priv.faults.reset();
     *priv.sent.lock() = {};
@@ -354,8 +347,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static void get_property(GObject* object, guint, GValue* value, GParamSpec* spec) {
-  if (g_strcmp0(spec->name, "stats") != 0) return PropertyAccess::of(spec).get(object, value);
+static void get_stats(GObject* object, GValue* value) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_PAYLOAD);
   const auto sent = *GST_RTP_EVENT_PAY(object)->priv->sent.lock();
   gst_structure_set(stats, "packets", G_TYPE_UINT64, guint64{sent.packets}, "bytes", G_TYPE_UINT64,
@@ -403,22 +395,14 @@ static void gst_rtp_event_pay_class_init(GstRtpEventPayClass* klass) {
                      "0 = send each buffer at once)",
                      0, GST_SECOND, Settings().max_latency,
                      static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_PLAYING)));
-  object_class->get_property = get_property;
-  constexpr guint other_number = 2;
-  g_object_class_install_property(
-      object_class, other_number,
+  properties.add_read_only(
+      get_stats,
       g_param_spec_boxed("stats", "Statistics", "Counters of packets and events sent",
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
-  static GstStaticPadTemplate sink_template =
-      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-                              GST_STATIC_CAPS(RTP_EVENT_CAPS ", payload = (int) [ 96, 127 ]"));
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
-  gst_element_class_add_static_pad_template(element_class, &sink_template);
-  gst_element_class_add_static_pad_template(element_class, &src_template);
+  add_pad_templates(element_class, EVENT_CAPS, RTP_EVENT_CAPS ", payload = (int) [ 96, 127 ]");
   gst_element_class_set_static_metadata(element_class, "RTP event payloader",
                                         "Codec/Payloader/Network/RTP",
                                         "Packs events in RTP packets", EVENTSIM_AUTHORS);

@@ -20,6 +20,7 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pad_bytes.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/reader_pad.hpp"
 #include "gst/base/seek_request.hpp"
@@ -334,9 +335,7 @@ static gboolean choose_mode(GstPad* sink, GstObject* /*parent*/) {
 }
 
 EventReader::EventReader(GstElement* element, const RecordingFormat& format)
-    : element_(element), format_(format) {
-  auto* const klass = GST_ELEMENT_GET_CLASS(element);
-  sink_ = gst_pad_new_from_template(gst_element_class_get_pad_template(klass, "sink"), "sink");
+    : element_(element), sink_(add_pad(element, "sink")), format_(format) {
   gst_pad_set_activate_function(sink_, choose_mode);
   gst_pad_set_activatemode_function(
       sink_, +[](GstPad*, GstObject* parent, GstPadMode mode, gboolean active) {
@@ -350,7 +349,6 @@ EventReader::EventReader(GstElement* element, const RecordingFormat& format)
       sink_, +[](GstPad*, GstObject* parent, GstEvent* event) {
         return reader_of(parent).sink_event(event);
       });
-  gst_element_add_pad(element, sink_);
 }
 
 EventReader::~EventReader() {

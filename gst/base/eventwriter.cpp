@@ -14,6 +14,7 @@
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/sensor_events.hpp"
 #include "gst/base/stream_header.hpp"
 #include "gst/base/types.hpp"
@@ -424,19 +425,14 @@ static void get_property(GObject* object, guint id, GValue* value, GParamSpec*) 
 /// Creates the pads here, because the format is not yet known in init.
 static void constructed(GObject* object) {
   auto* element = GST_ELEMENT(object);
-  auto* element_class = GST_ELEMENT_GET_CLASS(element);
   auto& priv = priv_of(GST_EVENT_WRITER(object));
   if (const auto* variants = format_of(GST_EVENT_WRITER(object)).variants)
     priv.variant = variants->default_value;
-  priv.sink =
-      gst_pad_new_from_template(gst_element_class_get_pad_template(element_class, "sink"), "sink");
+  priv.sink = add_pad(element, "sink");
   gst_pad_set_chain_function(priv.sink, chain);
   gst_pad_set_event_function(priv.sink, sink_event);
   gst_pad_set_query_function(priv.sink, sink_query);
-  gst_element_add_pad(element, priv.sink);
-  priv.src =
-      gst_pad_new_from_template(gst_element_class_get_pad_template(element_class, "src"), "src");
-  gst_element_add_pad(element, priv.src);
+  priv.src = add_pad(element, "src");
   G_OBJECT_CLASS(gst_event_writer_parent_class)->constructed(object);
 }
 

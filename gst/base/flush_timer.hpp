@@ -1,43 +1,36 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <gst/gst.h>
+
 #include <chrono>
 #include <condition_variable>
-#include <functional>
 #include <mutex>
 #include <optional>
 #include <thread>
-#include <utility>
 
 /// Calls a function, in a thread of its own, when a deadline passes. The thread starts with the
 /// first deadline.
 class FlushTimer {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Flush = void (*)(GstObject* element);
 
-  explicit FlushTimer(std::function<void()> flush) : flush_(std::move(flush)) {}
+  FlushTimer() = default;
   ~FlushTimer() { stop(); }
   FlushTimer(const FlushTimer&) = delete;
   FlushTimer& operator=(const FlushTimer&) = delete;
 
-  /// Replaces the deadline.
-  void set(Clock::time_point deadline) {
+  /// Replaces the deadline: `delay` from now, `flush` is called with the element of `pad`, under
+  /// the pad's stream lock.
+  void set(GstClockTime delay, GstPad* pad, Flush flush) {
     {
       const std::lock_guard lock(mutex_);
-      deadline_ = deadline;
+      deadline_ = Clock::now() + std::chrono::nanoseconds(delay);
+      pad_ = pad;
+      flush_ = flush;
     }
     changed_.notify_one();
     if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
-  }
-
-  /// Ends the thread, after a running call, which may still use this object.
-  void stop() {
-    {
-      const std::lock_guard lock(mutex_);
-      is_stopped_ = true;
-    }
-    changed_.notify_one();
-    if (thread_.joinable()) thread_.join();
   }
 
   /// Removes the deadline; a running call may still go on.
@@ -46,7 +39,21 @@ class FlushTimer {
     deadline_.reset();
   }
 
+  /// Removes the deadline and ends the thread, after a running call.
+  void stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_stopped_ = true;
+    }
+    changed_.notify_one();
+    if (thread_.joinable()) thread_.join();
+    is_stopped_ = false;
+    deadline_.reset();
+  }
+
  private:
+  using Clock = std::chrono::steady_clock;
+
   void run() {
     std::unique_lock lock(mutex_);
     while (!is_stopped_) {
@@ -56,17 +63,22 @@ class FlushTimer {
         changed_.wait_until(lock, Clock::time_point(*deadline_));
       } else {
         deadline_.reset();
+        GstPad* const pad = pad_;
+        const Flush flush = flush_;
         lock.unlock();
-        flush_();
+        GST_PAD_STREAM_LOCK(pad);
+        flush(GST_OBJECT_PARENT(pad));
+        GST_PAD_STREAM_UNLOCK(pad);
         lock.lock();
       }
     }
   }
 
-  std::function<void()> flush_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::optional<Clock::time_point> deadline_;  ///< guarded by mutex_
+  GstPad* pad_ = nullptr;                      ///< guarded by mutex_
+  Flush flush_ = nullptr;                      ///< guarded by mutex_
   bool is_stopped_ = false;                    ///< guarded by mutex_
   std::thread thread_;
 };

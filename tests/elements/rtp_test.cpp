@@ -555,6 +555,22 @@ TEST(RtpEventDepay, StartsOverWithItsSender) {
   EXPECT_EQ(stat(h, "lost-events"), 0U);
 }
 
+TEST(RtpEventDepay, ContinuesWithoutArrivalTimesWhenItsSenderStartsOver) {
+  const std::vector<Interval> first = {
+      {5'000'000'000, 10'000'000, {Event::at(1, 2, 500, Polarity::on)}},
+      {7'000'000'000, 10'000'000, {Event::at(2, 2, 500, Polarity::on)}}};
+  const std::vector<Interval> again = {
+      {6'000'000'000, 10'000'000, {Event::at(3, 2, 500, Polarity::on)}}};
+  Depayloader h;
+  for (const auto& intervals : {first, again})
+    for (const auto& packet : packets_of(intervals)) h.take(packet.get(), GST_CLOCK_TIME_NONE);
+  const Output output(h);
+  ASSERT_EQ(output.segments.size(), 2U);
+  EXPECT_EQ(output.segments[0].base, 0U);
+  EXPECT_EQ(output.segments[1].start, 6 * GST_SECOND);
+  EXPECT_EQ(output.segments[1].base, 2010 * ms);
+}
+
 TEST(RtpEventDepay, CountsOnWithAnotherSensor) {
   Harness pay("rtpeventpay max-latency=0");
   pay.caps(davis_caps, "application/x-rtp");

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/gst.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <optional>
+
+/// Segment that maps a sender's times to the running times at which they arrive.
+class ArrivalSegment {
+ public:
+  /// Follows changes of the mapping by more than `max_drift`.
+  explicit ArrivalSegment(GstClockTimeDiff max_drift) : max_drift_(max_drift) {}
+
+  /// True if it goes on at `start`, which arrived at this running time, if that is known.
+  bool continues(GstClockTime start, GstClockTime arrival) const {
+    if (!segment_ || start < segment_->start ||
+        GST_CLOCK_DIFF(start, segment_->position) > max_drift_)
+      return false;
+    const auto mapped = gst_segment_to_running_time(&*segment_, GST_FORMAT_TIME, start);
+    return !GST_CLOCK_TIME_IS_VALID(arrival) ||
+           std::abs(GST_CLOCK_DIFF(mapped, arrival)) <= max_drift_;
+  }
+
+  /// Pushes a segment from `start`, which arrived at this running time; if that is not known, it
+  /// begins where the last one ended. Without stream time, that is the running time.
+  void begin(GstPad* src, guint32 seqnum, GstClockTime start, GstClockTime arrival,
+             GstClockTime stream_time) {
+    GstSegment next;
+    gst_segment_init(&next, GST_FORMAT_TIME);
+    next.start = next.position = start;
+    if (GST_CLOCK_TIME_IS_VALID(arrival))
+      next.base = arrival;
+    else if (segment_)
+      next.base = gst_segment_to_running_time(&*segment_, GST_FORMAT_TIME, segment_->position);
+    next.time = GST_CLOCK_TIME_IS_VALID(stream_time) ? stream_time : next.base;
+    segment_ = next;
+    GstEvent* const event = gst_event_new_segment(&next);
+    gst_event_set_seqnum(event, seqnum);
+    gst_pad_push_event(src, event);
+  }
+
+  /// What was received ends at `end`.
+  void reach(GstClockTime end) { segment_->position = std::max(segment_->position, end); }
+
+  /// The next time starts a new one.
+  void reset() { segment_.reset(); }
+
+ private:
+  GstClockTimeDiff max_drift_;
+  std::optional<GstSegment> segment_;
+};

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/gst.h>
+
+#include "gst/base/owned.hpp"
+
+/// For class_init: adds the templates of pads that are always there, "sink" and "src".
+inline void add_pad_templates(GstElementClass* klass, const char* sink_caps, const char* src_caps) {
+  const auto add = [klass](const char* name, GstPadDirection direction, const char* text) {
+    const OwnedCaps caps(gst_caps_from_string(text));
+    gst_element_class_add_pad_template(
+        klass, gst_pad_template_new(name, direction, GST_PAD_ALWAYS, caps.get()));
+  };
+  add("sink", GST_PAD_SINK, sink_caps);
+  add("src", GST_PAD_SRC, src_caps);
+}
+
+/// For init: adds the pad of the template `name`.
+inline GstPad* add_pad(GstElement* element, const char* name) {
+  auto* pad_template = gst_element_class_get_pad_template(GST_ELEMENT_GET_CLASS(element), name);
+  GstPad* const pad = gst_pad_new_from_template(pad_template, name);
+  gst_element_add_pad(element, pad);
+  return pad;
+}
