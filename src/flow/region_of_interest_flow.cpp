@@ -7,20 +7,14 @@
 namespace eventcamera {
 namespace {
 
-/// Distance up to which a change affects the flow, in pixels: the reach of a window on a coarse
-/// scale.
-constexpr int surroundings = 48;
-
-/// Region sides are rounded up to multiples of this, so that regions of similar size share a
-/// DenseFlow.
-constexpr int side_step = 64;
-
 /// Extent of a region along one axis: at least [from, to) and its surroundings.
 struct Range {
   int first;
   int last;
 
   Range(int from, int to, int size) {
+    constexpr int surroundings = RegionOfInterestFlow::surroundings;
+    constexpr int side_step = RegionOfInterestFlow::side_step;
     const int wanted = to - from + 2 * surroundings;
     const int length = std::min((wanted + side_step - 1) / side_step * side_step, size);
     first = std::clamp(from - (length - (to - from)) / 2, 0, size - length);

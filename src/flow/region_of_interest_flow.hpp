@@ -12,6 +12,14 @@ namespace eventcamera {
 /// most of the work if the camera does not move.
 class RegionOfInterestFlow {
  public:
+  /// Distance up to which a change affects the flow, in pixels: the reach of a window on a coarse
+  /// scale.
+  static constexpr int surroundings = 48;
+
+  /// Region sides are rounded up to multiples of this, so that regions of similar size share a
+  /// DenseFlow.
+  static constexpr int side_step = 64;
+
   /// For frames of this size.
   RegionOfInterestFlow(FlowMethod method, int width, int height);
 

@@ -10,8 +10,7 @@
 namespace eventcamera {
 namespace {
 
-constexpr int halvings = 3;
-constexpr int iterations = 3;
+constexpr int max_levels = 4;
 constexpr int min_side = 32;  ///< of a pyramid level
 
 /// Neighbouring bands of polynomials share image rows, which are computed twice, so bands must not
@@ -39,12 +38,17 @@ FarnebackFlow::Level::Level(int width, int height, int level)
       update(pyramid.width(), pyramid.height()),
       flow(pyramid.width(), pyramid.height()) {}
 
+int FarnebackFlow::level_count(int width, int height) {
+  int count = 1;
+  while (count < max_levels && std::min(width, height) >= min_side << count) ++count;
+  return count;
+}
+
 void FarnebackFlow::start(int width, int height) {
   width_ = width;
   height_ = height;
   levels_.clear();
-  for (int level = 0; level <= halvings; ++level) {
-    if (level > 0 && std::min(width, height) < min_side << level) break;
+  for (int level = 0; level < level_count(width, height); ++level) {
     levels_.emplace_back(width, height, level);
     if (level == 0) continue;
     Level& finer = levels_[levels_.size() - 2];

@@ -14,6 +14,11 @@ namespace eventcamera {
 /// Farneback's method (SCIA 2003), coarse to fine; the flow between equal images is 0.
 class FarnebackFlow final : public DenseFlow {
  public:
+  static constexpr int iterations = 3;  ///< on each level
+
+  /// Number of pyramid levels of images of this size, each half as large as the one before.
+  static int level_count(int width, int height);
+
   void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) override;
   ImageView<Flow> flow(ThreadPool& threads) override;
 

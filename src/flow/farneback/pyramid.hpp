@@ -50,6 +50,8 @@ class PyramidLevel {
 
   int width() const { return columns_.size(); }
   int height() const { return rows_.size(); }
+  /// Weights of the blur along each axis, an odd number.
+  const std::vector<float>& kernel() const { return kernel_; }
   /// Writes row y to `out`, which must have row_padding elements past its end.
   void row(const ImageView<std::uint8_t>& picture, int y, Scratch& scratch, float* out) const;
 
