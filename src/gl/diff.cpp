@@ -12,8 +12,7 @@ namespace {
 struct Part {
   Part(const Context& gl, const LumaFormat& format)
       : pictures{{gl, format}, {gl, format}}, motions(gl) {
-    motions.reserve(static_cast<std::size_t>(format.width) *
-                    static_cast<std::size_t>(format.height) * 8);
+    motions.reserve(pixel_count(format) * 8);
   }
 
   Pyramid pictures[2];  ///< 0 for pixels that did not fire
@@ -34,8 +33,7 @@ class DiffSimulator final : public Simulator {
         frames_{{gl, format}, {gl, format}},
         on_(gl, format),
         off_(gl, format) {
-    strongest_.assign_zeros(static_cast<std::size_t>(format.width) *
-                            static_cast<std::size_t>(format.height) * 4);
+    strongest_.assign_zeros(pixel_count(format) * 4);
   }
 
  private:

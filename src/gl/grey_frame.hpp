@@ -16,6 +16,10 @@ struct TextureFrame {
   int weights[4];
 };
 
+inline std::size_t pixel_count(const LumaFormat& format) {
+  return static_cast<std::size_t>(format.width) * static_cast<std::size_t>(format.height);
+}
+
 /// The luma of a frame: bytes, four to a word; rows start at whole words.
 class GreyFrame {
  public:

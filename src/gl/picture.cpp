@@ -3,6 +3,7 @@
 
 #include <bit>
 
+#include "src/gl/grey_frame.hpp"
 #include "src/gl/shaders.hpp"
 
 namespace eventcamera::gl {
@@ -13,7 +14,7 @@ DrawKernel::DrawKernel(const Context& gl, const LumaFormat& format)
 void DrawKernel::run(const EventList& events, const Picture& out) {
   const auto [width, height, bits] = format_;
   const auto colour = [&out](std::size_t kind) { return std::bit_cast<int>(out.colours[kind]); };
-  pixels_.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4);
+  pixels_.reserve(pixel_count(format_) * 4);
   kernel_.run(
       {groups_of(64, events.marks_across()), height}, {&events.marks(), &pixels_},
       {width, events.marks_across(), events.steps(), colour(0), colour(1), colour(2), colour(3)});

@@ -39,8 +39,7 @@ PointTracker::PointTracker(const Context& gl, const LumaFormat& format)
       search_(gl, "search", shaders::search),
       motion_(gl, "motion", shaders::motion),
       slopes_(gl) {
-  slopes_.reserve(static_cast<std::size_t>(format.width) * static_cast<std::size_t>(format.height) *
-                  4);
+  slopes_.reserve(pixel_count(format) * 4);
 }
 
 void PointTracker::build(const Pyramid& pyramid) const {

@@ -24,10 +24,8 @@ class SparseSimulator final : public Simulator {
         winners_(gl),
         frames_{{gl, format}, {gl, format}},
         between_{{gl, format}, {gl, format}} {
-    const auto pixels =
-        static_cast<std::size_t>(format.width) * static_cast<std::size_t>(format.height);
-    points_.reserve(pixels * 8);
-    winners_.assign_zeros(pixels * 4);
+    points_.reserve(pixel_count(format) * 8);
+    winners_.assign_zeros(pixel_count(format) * 4);
   }
 
  private:
