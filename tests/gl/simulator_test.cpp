@@ -22,31 +22,19 @@
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"
 #include "tests/core/scene.hpp"
-#include "tests/gl/egl_context.hpp"
+#include "tests/gl/every_api.hpp"
 
 namespace {
 
 using namespace eventcamera;
+using gl_test::bytes_of;
 using gl_test::EglContext;
+using gl_test::EveryApi;
+using gl_test::matched;
+using gl_test::one;
 using gl_test::Texture;
 
-constexpr int one = LumaWeights::one;
-
-std::vector<std::uint8_t> bytes_of(const Image<std::uint8_t>& picture) {
-  std::vector<std::uint8_t> bytes;
-  for (int y = 0; y < picture.height(); ++y)
-    bytes.insert(bytes.end(), picture.row(y), picture.row(y) + picture.width());
-  return bytes;
-}
-
-/// With OpenGL ES and OpenGL.
-class EveryApi : public testing::TestWithParam<bool> {
- protected:
-  EglContext current{GetParam()};
-  gl::Context context{gl_test::load};
-};
-INSTANTIATE_TEST_SUITE_P(, EveryApi, testing::Bool(),
-                         [](const auto& api) { return api.param ? "OpenGLES" : "OpenGL"; });
+INSTANTIATE_TEST_SUITE_P(, EveryApi, testing::Bool(), gl_test::name_of_api);
 
 /// Pushes grey frames to both simulators and compares the events of each interval.
 void expect_same_events(gl::Simulator& ours, Simulator& reference, const Settings& settings,
@@ -117,21 +105,6 @@ TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
     if (i == 0) continue;
     ASSERT_EQ(scene::copy(*made), scene::copy(*expected));
   }
-}
-
-/// Share of events of `a` for which `b` has one of the same polarity within a pixel and a step.
-double matched(const std::vector<Event>& a, const std::vector<Event>& b, std::uint32_t step) {
-  std::size_t matches = 0;
-  for (const auto& event : a) {
-    const auto first =
-        std::ranges::lower_bound(b, event.t - std::min(event.t, step), {}, &Event::t);
-    const auto last = std::ranges::upper_bound(b, event.t + step, {}, &Event::t);
-    matches += std::any_of(first, last, [&](const Event& other) {
-      return event.polarity() == other.polarity() && std::abs(event.x - other.x) <= 1 &&
-             std::abs(event.y() - other.y()) <= 1;
-    });
-  }
-  return static_cast<double>(matches) / static_cast<double>(a.size());
 }
 
 /// Pushes frames of a moving texture to both, and compares the events, which may differ where the
@@ -229,12 +202,9 @@ TEST_P(EveryApi, TracksPointsAsTheCpuDoes) {
   const auto from = scene::texture<std::uint8_t>(width, height, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(width, height, 8, 2.3, -1.6);
   const gl::PointTracker tracker(context, format);
-  const gl::LumaKernel luma(context);
   const gl::Pyramid pyramids[] = {{context, format}, {context, format}};
-  Texture texture(width, height, 1);
   for (const auto& [pyramid, picture] : {std::pair{&pyramids[0], &from}, {&pyramids[1], &to}}) {
-    texture.upload(bytes_of(*picture));
-    luma.run(texture.frame({one, 0, 0, 0}), pyramid->picture());
+    upload(*picture, pyramid->picture());
     tracker.build(*pyramid);
   }
   struct {
