@@ -17,8 +17,8 @@
  * ! x264enc ! mp4mux ! filesink location=events.mp4
  * ]|
  */
+#include "gst/base/dense_properties.hpp"
 #include "gst/base/eventsimulator.hpp"
-#include "gst/base/types.hpp"
 #include "src/simulate/dense.hpp"
 
 using eventcamera::DenseSimulator;
@@ -43,35 +43,17 @@ static GType flow_type() {
       {static_cast<int>(FlowMethod::dis_lq),
        "DIS, low quality: fast, misses small objects that move far", "dis-lq"},
       {static_cast<int>(FlowMethod::dis_hq), "DIS, high quality", "dis-hq"},
-      {static_cast<int>(FlowMethod::farneback), "Farneback", "farneback"},
+      farneback_flow,
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventSimFlowMethod", values);
 }
 
-static GType interpolation_type() {
-  static const GEnumValue values[] = {
-      {static_cast<int>(Interpolation::forward), "The earlier frame, moved along the flow",
-       "forward"},
-      {static_cast<int>(Interpolation::blend),
-       "The earlier frame moved forward and the later frame moved back, blended", "blend"},
-      {0, nullptr, nullptr},
-  };
-  return enum_type("GstEventSimInterpolation", values);
-}
-
 static void install_properties(GObjectClass* klass) {
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                  GST_PARAM_MUTABLE_PLAYING);
   const Settings defaults;
   Properties<settings_of> properties(klass);
-  properties.add(&Settings::flow,
-                 g_param_spec_enum("flow", "Flow", "Method of finding the motion between frames",
-                                   flow_type(), static_cast<int>(defaults.flow), flags));
-  properties.add(
-      &Settings::interpolation,
-      g_param_spec_enum("interpolation", "Interpolation", "Method of interpolating frames",
-                        interpolation_type(), static_cast<int>(defaults.interpolation), flags));
+  properties.add(&Settings::flow, flow_property(flow_type(), defaults.flow));
+  properties.add(&Settings::interpolation, interpolation_property(defaults.interpolation));
 }
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {

@@ -5,7 +5,7 @@
 const EventSimulatorTypeNames event_simulator_type_names = {.simulator = "GstGLEventSimulatorBase",
                                                             .pool = "GstGLEventPool"};
 
-#define ELEMENTS(X) X(gleventsim_frame) X(gleventsim_sparse) X(gleventsim_diff)
+#define ELEMENTS(X) X(gleventsim_frame) X(gleventsim_dense) X(gleventsim_sparse) X(gleventsim_diff)
 
 EVENTSIM_PLUGIN(eventsimgl, "Simulators of event cameras on the GPU: video to events", ELEMENTS,
                 EVENTSIM_NO_TYPE_FINDERS)

@@ -37,5 +37,8 @@ std::unique_ptr<VideoSimulator> make_texture_simulator(GObject* element, const G
 /// For EventSimulatorMethod::create.
 template <auto make>
 std::unique_ptr<VideoSimulator> in_gl_memory(GObject* element, const GstVideoInfo& video) {
-  return make_texture_simulator(element, video, make);
+  return make_texture_simulator(
+      element, video,
+      [](const eventcamera::gl::Context& gl, const eventcamera::LumaFormat& format)
+          -> std::unique_ptr<eventcamera::gl::Simulator> { return make(gl, format); });
 }

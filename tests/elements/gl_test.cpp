@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The simulators on the GPU: against those on the CPU, and how they find OpenGL.
+#include <cmath>
+
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -69,6 +71,34 @@ TEST(Pictures, TellTheirReadersWhenTheyAreDrawn) {
   const auto picture = h.pull();
   ASSERT_TRUE(picture);
   EXPECT_NE(gst_buffer_get_meta(picture.get(), g_type_from_name("GstGLSyncMetaAPI")), nullptr);
+}
+
+/// Bytes of the events of a pattern that moves.
+std::string events_of_motion(const std::string& element) {
+  Harness h(element);
+  h.caps("video/x-raw, width=62, height=46, framerate=25/1, format=GRAY8");
+  std::string bytes;
+  for (int i = 0; i < 4; ++i) {
+    h.push(h.frame(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, [i](int x, int y) {
+      return static_cast<int>(128 + 60 * std::sin(0.4 * (x - 2 * i)) + 60 * std::cos(0.3 * y));
+    }));
+    if (const auto events = h.pull()) bytes += bytes_of(events.get());
+  }
+  return bytes;
+}
+
+TEST(Dense, InterpolatesAsSet) {
+  const auto forward = events_of_motion("gleventsim-dense");
+  const auto blend = events_of_motion("gleventsim-dense interpolation=blend");
+  EXPECT_NE(forward, blend);
+  for (const auto& [ours, setting] : {std::pair{&forward, "forward"}, {&blend, "blend"}}) {
+    const auto expected =
+        events_of_motion(std::string("eventsim-dense flow=farneback interpolation=") + setting);
+    EXPECT_GT(expected.size(), 8U * 10'000);
+    EXPECT_NEAR(static_cast<double>(ours->size()), static_cast<double>(expected.size()),
+                0.001 * static_cast<double>(expected.size()))
+        << setting;
+  }
 }
 
 TEST(OpenGl, IsSharedWithThePipeline) {

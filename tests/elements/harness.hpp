@@ -49,9 +49,9 @@ using Owned = std::unique_ptr<Type, Unref>;
 
 using Buffer = Owned<GstBuffer>;
 
-inline const char* const elements[] = {"eventsim-frame",    "eventsim-dense", "eventsim-sparse",
-                                       "eventsim-diff",     "eventsim-dvs",   "gleventsim-frame",
-                                       "gleventsim-sparse", "gleventsim-diff"};
+inline const char* const elements[] = {"eventsim-frame",   "eventsim-dense",    "eventsim-sparse",
+                                       "eventsim-diff",    "eventsim-dvs",      "gleventsim-frame",
+                                       "gleventsim-dense", "gleventsim-sparse", "gleventsim-diff"};
 
 /// Those that take frames in system memory.
 inline const auto cpu_elements = std::span(elements).first<5>();

@@ -29,12 +29,14 @@ struct Defaults {
 };
 
 class EveryElement : public testing::TestWithParam<Defaults> {};
-INSTANTIATE_TEST_SUITE_P(, EveryElement,
-                         testing::Values(Defaults{"eventsim-frame", 20, false},
-                                         Defaults{"eventsim-dense", 2, true},
-                                         Defaults{"eventsim-sparse", 10, true},
-                                         Defaults{"eventsim-diff", 20, true},
-                                         Defaults{"eventsim-dvs", 0.2, false, 0.1}));
+INSTANTIATE_TEST_SUITE_P(
+    , EveryElement,
+    testing::Values(Defaults{"eventsim-frame", 20, false}, Defaults{"eventsim-dense", 2, true},
+                    Defaults{"eventsim-sparse", 10, true}, Defaults{"eventsim-diff", 20, true},
+                    Defaults{"eventsim-dvs", 0.2, false, 0.1},
+                    Defaults{"gleventsim-frame", 20, false}, Defaults{"gleventsim-dense", 2, true},
+                    Defaults{"gleventsim-sparse", 10, true},
+                    Defaults{"gleventsim-diff", 20, true}));
 
 TEST_P(EveryElement, HasTheDefaultsOfTheTable) {
   gst_init(nullptr, nullptr);
@@ -77,7 +79,8 @@ TEST_P(EveryElement, DescribesItself) {
     if (g_type_is_a(specs[i]->owner_type, GST_TYPE_ELEMENT)) {
       EXPECT_NE(g_param_spec_get_blurb(specs[i]), nullptr) << specs[i]->name;
     }
-    const bool ours = std::string(g_type_name(specs[i]->owner_type)).rfind("GstEventSim", 0) == 0;
+    const std::string owner = g_type_name(specs[i]->owner_type);
+    const bool ours = owner.starts_with("GstEventSim") || owner.starts_with("GstGLEventSim");
     if (ours && (specs[i]->flags & G_PARAM_WRITABLE)) {
       EXPECT_TRUE(specs[i]->flags & GST_PARAM_MUTABLE_PLAYING) << specs[i]->name;
     }
@@ -87,7 +90,7 @@ TEST_P(EveryElement, DescribesItself) {
 
 TEST(Plugins, SayWhereTheyComeFrom) {
   gst_init(nullptr, nullptr);
-  for (const char* name : {"eventsim", "eventcam"}) {
+  for (const char* name : {"eventsim", "eventsimgl", "eventcam"}) {
     GstPlugin* plugin = gst_registry_find_plugin(gst_registry_get(), name);
     ASSERT_NE(plugin, nullptr) << name;
     EXPECT_STREQ(gst_plugin_get_package(plugin), "gst-eventsim");
@@ -104,26 +107,44 @@ TEST(Plugins, SayWhereTheyComeFrom) {
   }
 }
 
-TEST(Dense, NamesItsFlowsAndInterpolations) {
+struct Flows {
+  const char* element;
+  std::vector<const char*> flows;  ///< the first one is the default
+};
+
+class EveryDense : public testing::TestWithParam<Flows> {};
+INSTANTIATE_TEST_SUITE_P(, EveryDense,
+                         testing::Values(Flows{"eventsim-dense", {"dis-lq", "dis-hq", "farneback"}},
+                                         Flows{"gleventsim-dense", {"farneback"}}));
+
+TEST_P(EveryDense, NamesItsFlowsAndInterpolations) {
   gst_init(nullptr, nullptr);
-  Owned<GstElement> element(gst_element_factory_make("eventsim-dense", nullptr));
-  for (const char* flow : {"dis-lq", "dis-hq", "farneback"}) {
-    gst_util_set_object_arg(G_OBJECT(element.get()), "flow", flow);
-    gchar* back = nullptr;
+  Owned<GstElement> element(gst_element_factory_make(GetParam().element, nullptr));
+  const auto value_of = [&](const char* property) {
     GValue value = G_VALUE_INIT;
     g_value_init(
         &value,
-        g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), "flow")->value_type);
-    g_object_get_property(G_OBJECT(element.get()), "flow", &value);
-    back = gst_value_serialize(&value);
-    EXPECT_STREQ(back, flow);
-    g_free(back);
+        g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), property)->value_type);
+    g_object_get_property(G_OBJECT(element.get()), property, &value);
+    gchar* text = gst_value_serialize(&value);
+    std::string result = text;
+    g_free(text);
     g_value_unset(&value);
+    return result;
+  };
+  const auto type =
+      G_PARAM_SPEC_ENUM(g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), "flow"));
+  EXPECT_EQ(type->enum_class->n_values, GetParam().flows.size());
+  EXPECT_EQ(value_of("flow"), GetParam().flows.front());
+  for (const char* flow : GetParam().flows) {
+    gst_util_set_object_arg(G_OBJECT(element.get()), "flow", flow);
+    EXPECT_EQ(value_of("flow"), flow);
   }
-  gst_util_set_object_arg(G_OBJECT(element.get()), "interpolation", "blend");
-  gint interpolation = 0;
-  g_object_get(element.get(), "interpolation", &interpolation, nullptr);
-  EXPECT_EQ(interpolation, 1);
+  for (const char* interpolation : {"forward", "blend"}) {
+    if (std::string(interpolation) == "blend")
+      gst_util_set_object_arg(G_OBJECT(element.get()), "interpolation", interpolation);
+    EXPECT_EQ(value_of("interpolation"), interpolation);
+  }
 }
 
 TEST(Dvs, TakesWhatIsNotSetFromItsPreset) {

@@ -57,7 +57,7 @@ for mode in accumulate decay time-surface count; do
   check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender mode=$mode ! videoconvert ! fakesink
 done
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.events
-for element in frame sparse diff; do
+for element in frame dense sparse diff; do
   check videotestsrc num-buffers=8 ! video/x-raw,width=64,height=48 ! glupload ! gleventsim-$element ! fakesink
 done
 check videotestsrc num-buffers=8 ! glupload ! gleventsim-frame ! 'video/x-raw(memory:GLMemory)' ! fakesink

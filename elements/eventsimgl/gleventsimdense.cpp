@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-gleventsim-dense
+ * @title: gleventsim-dense
+ * @short_description: events from frames interpolated with dense optical flow, on the GPU
+ *
+ * #GstEventSimDense for video in OpenGL textures, with compute shaders. The events are the same
+ * given the same flow; flow differs at most in the last bits of floating-point numbers, and near
+ * the border of a region of interest. Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! glupload ! gleventsim-dense !
+ * eventstats ! fakesink
+ * ]|
+ */
+#include "gst/base/dense_properties.hpp"
+#include "gst/base/gleventsimulator.hpp"
+#include "src/gl/dense.hpp"
+
+using eventcamera::FlowMethod;
+using eventcamera::Interpolation;
+using eventcamera::gl::DenseSimulator;
+
+namespace {
+
+struct Settings {
+  FlowMethod flow = FlowMethod::farneback;
+  Interpolation interpolation = Interpolation::forward;
+};
+
+}  // namespace
+
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return event_simulator_settings<Settings>(object);
+}
+
+static GType flow_type() {
+  static const GEnumValue values[] = {farneback_flow, {0, nullptr, nullptr}};
+  return enum_type("GstGLEventSimFlowMethod", values);
+}
+
+static void install_properties(GObjectClass* klass) {
+  const Settings defaults;
+  Properties<settings_of> properties(klass);
+  properties.add(&Settings::flow, flow_property(flow_type(), defaults.flow));
+  properties.add(&Settings::interpolation, interpolation_property(defaults.interpolation));
+}
+
+static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
+  static_cast<DenseSimulator&>(simulator).set_interpolation(
+      settings_of(object).copy().interpolation);
+}
+
+static const EventSimulatorMethod dense = {
+    .type_name = "GstGLEventSimDense",
+    .long_name = "Event camera simulator: dense interpolation, on the GPU",
+    .description = "Turns video into events: interpolates frames with dense optical flow",
+    .threshold = 2,
+    .interpolates = true,
+    .create = in_gl_memory<eventcamera::gl::make_dense_simulator>,
+    .video = gl_memory_video,
+    .make_settings = []() -> std::shared_ptr<void> {
+      return std::make_shared<GuardedSettings<Settings>>();
+    },
+    .install_properties = install_properties,
+    .configure = configure,
+};
+GST_ELEMENT_REGISTER_DEFINE(gleventsim_dense, "gleventsim-dense", GST_RANK_NONE,
+                            event_simulator_type(dense, GST_TYPE_GL_EVENT_SIMULATOR))
