@@ -518,7 +518,6 @@ int main(int argc, char** argv) {
   gst_object_unref(pipeline);
   ok = finish(part, argv[2], ok);
   g_free(part);
-  if (ok)
-    printf("%" G_GUINT64_FORMAT " events from %s to %s\n", events, argv[1], argv[2]);
+  if (ok) printf("%" G_GUINT64_FORMAT " events from %s to %s\n", events, argv[1], argv[2]);
   return ok ? 0 : 1;
 }

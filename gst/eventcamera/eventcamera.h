@@ -32,6 +32,8 @@ G_BEGIN_DECLS
  * GST_EVENT_CAMERA_MEDIA_TYPE:
  *
  * The media type of event streams.
+ *
+ * Since: 0.1
  */
 #define GST_EVENT_CAMERA_MEDIA_TYPE "application/x-event-camera"
 
@@ -39,6 +41,8 @@ G_BEGIN_DECLS
  * GST_EVENT_CAMERA_MAX_WIDTH:
  *
  * The maximum sensor width: x must fit into an event.
+ *
+ * Since: 0.1
  */
 #define GST_EVENT_CAMERA_MAX_WIDTH 65535
 
@@ -46,6 +50,8 @@ G_BEGIN_DECLS
  * GST_EVENT_CAMERA_MAX_HEIGHT:
  *
  * The maximum sensor height: y must fit into an event.
+ *
+ * Since: 0.1
  */
 #define GST_EVENT_CAMERA_MAX_HEIGHT 32768
 
@@ -60,6 +66,8 @@ typedef struct _GstEventCameraMap GstEventCameraMap;
  * @y_p: row from the top in bits 0 to 14; bit 15 is the polarity: 1 = ON (brighter), 0 = OFF
  *
  * One event of a buffer of format XYTP: 8 bytes, little-endian.
+ *
+ * Since: 0.1
  */
 struct _GstEventCameraEvent {
   guint32 t;
@@ -72,6 +80,8 @@ struct _GstEventCameraEvent {
  * @event: an event
  *
  * Returns: the row, from the top
+ *
+ * Since: 0.1
  */
 static inline guint gst_event_camera_event_get_y(const GstEventCameraEvent* event) {
   return event->y_p & 0x7fffu;
@@ -82,6 +92,8 @@ static inline guint gst_event_camera_event_get_y(const GstEventCameraEvent* even
  * @event: an event
  *
  * Returns: %TRUE for ON (brighter), %FALSE for OFF (darker)
+ *
+ * Since: 0.1
  */
 static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent* event) {
   return (event->y_p & 0x8000u) != 0;
@@ -99,6 +111,8 @@ static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent* e
  * The colours of drawn events. In accumulated-event video, they distinguish pixels with no events,
  * ON events, OFF events and both. In modes with shades, the first four palettes shade ON and OFF
  * separately, and the uniform ones show the magnitude, regardless of polarity.
+ *
+ * Since: 0.1
  */
 typedef enum {
   GST_EVENT_CAMERA_PALETTE_LIGHT,
@@ -125,6 +139,8 @@ GType gst_event_camera_info_get_type(void);
  * @fps_d: denominator of the buffers per second
  *
  * Parsed caps of an event stream of format XYTP.
+ *
+ * Since: 0.1
  */
 struct _GstEventCameraInfo {
   gint width;
@@ -144,6 +160,8 @@ struct _GstEventCameraInfo {
  * Parses the caps of an event stream of format XYTP. A missing framerate counts as 0/1.
  *
  * Returns: %FALSE if @caps are anything else; @info is then unchanged
+ *
+ * Since: 0.1
  */
 GST_EVENT_CAMERA_API
 gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps* caps);
@@ -153,6 +171,8 @@ gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps
  * @info: the content of the caps
  *
  * Returns: (transfer full): the caps of an event stream of format XYTP
+ *
+ * Since: 0.1
  */
 GST_EVENT_CAMERA_API
 GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info);
@@ -164,6 +184,8 @@ GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info);
  * @start: the time that each event's t is relative to, in microseconds: floor(PTS / 1000)
  *
  * The events of a mapped buffer.
+ *
+ * Since: 0.1
  */
 struct _GstEventCameraMap {
   const GstEventCameraEvent* events;
@@ -187,6 +209,8 @@ struct _GstEventCameraMap {
  *
  * Returns: %FALSE if @buffer cannot be mapped, has no PTS, or ends in a partial event;
  *     @map must then not be unmapped
+ *
+ * Since: 0.1
  */
 GST_EVENT_CAMERA_API
 gboolean gst_event_camera_map(GstEventCameraMap* map, GstBuffer* buffer);
@@ -196,6 +220,8 @@ gboolean gst_event_camera_map(GstEventCameraMap* map, GstBuffer* buffer);
  * @map: a map filled in by gst_event_camera_map()
  *
  * Releases the buffer. The events must not be accessed afterwards.
+ *
+ * Since: 0.1
  */
 GST_EVENT_CAMERA_API
 void gst_event_camera_unmap(GstEventCameraMap* map);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Runs the examples of pipelines/; both count the same events.
+# Runs the examples of pipelines/; those for the same pipeline count the same events.
 set -eu
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -29,3 +29,11 @@ assert (np.diff(events["t"]) >= 0).all(), "not sorted"
 assert events["x"].max() < 320 and events["y"].max() < 240, "beyond the sensor"
 assert 0.3 < events["p"].mean() < 0.7, "polarities are unequal"
 PYTHON
+
+# The same example in three languages.
+"$BUILD/pipelines/on_and_off" | tee "$work/expected"
+grep -qx "Events of a 320x240 sensor" "$work/expected"
+grep -qx "[1-9][0-9]* ON, [1-9][0-9]* OFF" "$work/expected"
+for language in py js; do
+  "$SOURCE/pipelines/examples/on_and_off.$language" | diff "$work/expected" -
+done

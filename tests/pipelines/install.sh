@@ -38,6 +38,18 @@ cp "$SOURCE/debian/control" "$SOURCE/debian/changelog" "$root/debian/"
 (cd "$root" && dpkg-gensymbols -c4 -plibgsteventcamera-1.0-0 -Pdebian/package -Odebian/symbols \
   -I"$SOURCE/debian/libgsteventcamera-1.0-0.symbols" -e"$library"/libgsteventcamera-1.0.so.0)
 
+# Its documentation tells which version introduced what.
+gir=$(find "$root" -name 'GstEventCamera-1.0.gir')
+/usr/bin/python3 - "$gir" <<'PYTHON'
+import sys
+from xml.etree import ElementTree
+
+core = "{http://www.gtk.org/introspection/core/1.0}"
+public = {core + tag for tag in ("constant", "enumeration", "function", "function-inline", "method", "method-inline", "record")}
+new = [e.get("name") for e in ElementTree.parse(sys.argv[1]).iter() if e.tag in public and "version" not in e.attrib]
+assert not new, f"no Since: in the documentation of {new}"
+PYTHON
+
 # As if the root were /. pkg-config expects and prints escaped blanks.
 sed -i "s#^prefix=.*#prefix=${root// /\\\\ }/usr#" "$library/pkgconfig/gsteventcamera-1.0.pc"
 export PKG_CONFIG_PATH=$library/pkgconfig
