@@ -25,7 +25,10 @@ static GstGLDisplay* that_works(GstGLDisplay* display) {
 }
 
 static GstGLDisplay* display_of_screen() {
-  return that_works(gst_gl_display_new());
+  GstGLDisplay* display = gst_gl_display_new();
+  // Without a screen, GStreamer makes a display of no kind, and crashes where it opens a window.
+  if (G_OBJECT_TYPE(display) == GST_TYPE_GL_DISPLAY) gst_clear_object(&display);
+  return that_works(display);
 }
 
 /// GstGL does not try devices without a screen by itself.

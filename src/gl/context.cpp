@@ -38,14 +38,20 @@ Context::Context(const Load& load) {
   if ((name) == nullptr) throw too_old("gl" #name " is missing");
   EVENTCAMERA_GL_FUNCTIONS(LOAD)
 #undef LOAD
+  for (const char* name : {"glGetGraphicsResetStatus", "glGetGraphicsResetStatusKHR",
+                           "glGetGraphicsResetStatusEXT", "glGetGraphicsResetStatusARB"})
+    if (get_reset_status_ == nullptr)
+      get_reset_status_ = reinterpret_cast<decltype(get_reset_status_)>(load(name));
   GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_buffer_size_);
 }
 
 void Context::check() const {
-  const GLenum code = GetError();
-  if (code == GL_NO_ERROR) return;
   constexpr GLenum context_lost = 0x0507;
-  if (code == context_lost) throw Error("the OpenGL context was lost");
+  const bool is_reset = get_reset_status_ != nullptr && get_reset_status_() != GL_NO_ERROR;
+  const GLenum code = is_reset ? context_lost : GetError();
+  if (code == GL_NO_ERROR) return;
+  if (code == context_lost)
+    throw Error("the OpenGL context was lost, because the GPU was reset or removed");
   if (code == GL_OUT_OF_MEMORY) throw Error("OpenGL is out of memory");
   throw Error("OpenGL error " + hexadecimal(code));
 }

@@ -76,10 +76,11 @@ class Context {
     return max_buffer_size_;
   }
 
-  /// Throws Error if an OpenGL call failed since the last check.
+  /// Throws Error if the context is lost, or an OpenGL call failed since the last check.
   void check() const;
 
  private:
+  GLenum(GL_APIENTRY* get_reset_status_)() = nullptr;  ///< of a robust context, else null
   bool is_es_ = false;
   GLint64 max_buffer_size_ = 0;
 };

@@ -60,8 +60,11 @@ void EventList::read(EventBuckets& events) {
   gl_.DeleteSync(fence);
   gl_.check();
   if (state == GL_TIMEOUT_EXPIRED) throw Error("OpenGL has not answered for a minute");
+  if (state == GL_WAIT_FAILED) throw Error("OpenGL cannot wait for the GPU");
   std::uint32_t total = 0;
   total_.read(std::as_writable_bytes(std::span(&total, 1)));
+  if (total > times_.size() * static_cast<std::size_t>(marks_a_step()) * 32)
+    throw Error("OpenGL returned more events than there are pixels");
   if (total > events_.size() / sizeof(Event)) {
     events_.reserve(std::bit_ceil(std::size_t{total}) * sizeof(Event));
     write();

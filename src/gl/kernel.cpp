@@ -40,6 +40,7 @@ Kernel::Kernel(const Context& gl, std::string_view name, std::string_view source
   gl.DeleteShader(shader);
   if (linked != GL_FALSE) return;
   gl.DeleteProgram(program_);
+  gl.check();
   throw Error("the driver does not compile the compute shader '" + std::string(name) + "': " + log);
 }
 

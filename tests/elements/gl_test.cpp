@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The simulators on the GPU: against those on the CPU, and how they find OpenGL.
+#include <GLES3/gl31.h>
+#include <gst/gl/gl.h>
+
+#include <atomic>
 #include <cmath>
+#include <string_view>
 
 #include "tests/elements/harness.hpp"
 
 namespace {
 
 using namespace harness;
+
+constexpr const char* video = "video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1";
 
 std::vector<std::string> formats() {
   gst_init(nullptr, nullptr);
@@ -65,12 +72,11 @@ TEST(Pictures, AreThoseOfTheCpuBitForBit) {
 
 TEST(Pictures, TellTheirReadersWhenTheyAreDrawn) {
   Harness h("gleventsim-frame");
-  h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1",
-         pictures_of("gleventsim-frame"));
+  h.caps(video, pictures_of("gleventsim-frame"));
   h.push(h.flat(0, 100));
   const auto picture = h.pull();
   ASSERT_TRUE(picture);
-  EXPECT_NE(gst_buffer_get_meta(picture.get(), g_type_from_name("GstGLSyncMetaAPI")), nullptr);
+  EXPECT_NE(gst_buffer_get_gl_sync_meta(picture.get()), nullptr);
 }
 
 /// Bytes of the events of a pattern that moves.
@@ -146,12 +152,62 @@ TEST(OpenGl, IsNamedInAnErrorWhereItIsMissing) {
               "CPU\\.");
 }
 
+std::atomic<bool> is_lost = false;
+
+/// Makes all contexts of the process, from now on, report that they are lost where `is_lost`.
+void make_contexts_losable() {
+  static gpointer (*get_proc_address)(GstGLAPI, const gchar*);
+  static GLenum (*get_error)();
+  auto* contexts =
+      static_cast<GstGLContextClass*>(g_type_class_ref(g_type_from_name("GstGLContextEGL")));
+  get_proc_address = contexts->get_proc_address;
+  contexts->get_proc_address = [](GstGLAPI api, const gchar* name) -> gpointer {
+    const gpointer function = get_proc_address(api, name);
+    if (std::string_view(name) != "glGetError") return function;
+    get_error = reinterpret_cast<GLenum (*)()>(function);
+    return reinterpret_cast<gpointer>(+[]() -> GLenum {
+      constexpr GLenum context_lost = 0x0507;
+      return is_lost ? context_lost : get_error();
+    });
+  };
+}
+
+TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
+  { Harness("gleventsim-frame").caps(video); }  // GStreamer registers the type of contexts
+  make_contexts_losable();
+  for (const std::string element :
+       {"gleventsim-frame", "gleventsim-dense", "gleventsim-sparse", "gleventsim-diff"}) {
+    for (const std::string& out :
+         {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of(element)}) {
+      Harness h(element);
+      h.caps(video, out);
+      int i = 0;
+      const auto push = [&h, &i] {
+        ++i;
+        return h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 * 100));
+      };
+      EXPECT_EQ(push(), GST_FLOW_OK);
+      EXPECT_EQ(push(), GST_FLOW_OK);
+      is_lost = true;
+      EXPECT_EQ(push(), GST_FLOW_ERROR);
+      is_lost = false;
+      const auto error = h.message(GST_MESSAGE_ERROR);
+      ASSERT_TRUE(error);
+      EXPECT_EQ(text_of(error.get()),
+                "OpenGL cannot simulate: the OpenGL context was lost, because the GPU was reset or "
+                "removed. Use " +
+                    element.substr(2) + ", which runs on the CPU.");
+      EXPECT_EQ(push(), GST_FLOW_OK);  // begins anew, if the application goes on
+    }
+  }
+}
+
 TEST(OpenGl, IsRefusedWhereItIsTooOld) {
   const auto run = [] {
     g_setenv("MESA_GLES_VERSION_OVERRIDE", "3.0", TRUE);
     g_setenv("GST_GL_API", "gles2", TRUE);
     Harness h("gleventsim-frame");
-    h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1");
+    h.caps(video);
     h.push(h.flat(0, 100));
     const auto error = h.message(GST_MESSAGE_ERROR);
     g_printerr("%s\n", error ? text_of(error.get()).c_str() : "no error");

@@ -267,6 +267,96 @@ TEST(Context, NamesWhatIsMissing) {
             "compute shaders need OpenGL ES 3.1 or OpenGL 4.3, and this is OpenGL ES 3.0 Old");
 }
 
+/// What a lost context does, as drivers differ.
+enum class Loss { none, error, reset, no_mapping, no_wait, garbage };
+Loss loss = Loss::none;
+
+template <class Function>
+Function driver(const char* name) {
+  return reinterpret_cast<Function>(gl_test::load(name));
+}
+
+/// The functions of a context that can be lost.
+void* load_losable(const char* name) {
+  const std::string_view function = name;
+  if (function == "glGetError")
+    return reinterpret_cast<void*>(+[]() -> GLenum {
+      constexpr GLenum context_lost = 0x0507;
+      return loss == Loss::error ? context_lost : driver<PFNGLGETERRORPROC>("glGetError")();
+    });
+  if (function == "glGetGraphicsResetStatus")
+    return reinterpret_cast<void*>(+[]() -> GLenum {
+      constexpr GLenum unknown_reset = 0x8255;
+      return loss == Loss::reset ? unknown_reset : GL_NO_ERROR;
+    });
+  if (function == "glClientWaitSync")
+    return reinterpret_cast<void*>(+[](GLsync sync, GLbitfield flags, GLuint64 timeout) -> GLenum {
+      return loss == Loss::no_wait
+                 ? GL_WAIT_FAILED
+                 : driver<PFNGLCLIENTWAITSYNCPROC>("glClientWaitSync")(sync, flags, timeout);
+    });
+  if (function == "glMapBufferRange")
+    return reinterpret_cast<void*>(+[](GLenum target, GLintptr offset, GLsizeiptr length,
+                                       GLbitfield access) -> void* {
+      static constinit std::uint64_t garbage[] = {~0ULL, ~0ULL};
+      if (loss == Loss::no_mapping) return nullptr;
+      if (loss == Loss::garbage) return garbage;
+      return driver<PFNGLMAPBUFFERRANGEPROC>("glMapBufferRange")(target, offset, length, access);
+    });
+  return gl_test::load(name);
+}
+
+TEST(Context, IsReportedAsLostByWhateverTellsOfIt) {
+  const EglContext current(true);
+  const gl::Context context(load_losable);
+  const LumaFormat format{33, 21, 8};
+  constexpr const char* lost = "the OpenGL context was lost, because the GPU was reset or removed";
+  const std::pair<Loss, const char*> losses[] = {
+      {Loss::error, lost},
+      {Loss::reset, lost},
+      {Loss::no_mapping, "cannot read a buffer of OpenGL"},
+      {Loss::no_wait, "OpenGL cannot wait for the GPU"},
+      {Loss::garbage, "OpenGL returned more events than there are pixels"}};
+  Texture texture(33, 21, 1);
+  Texture picture(33, 21, 4);
+  picture.upload(std::vector<std::uint8_t>(33 * 21 * 4));
+  const auto message = [](const auto& work) -> std::string {
+    try {
+      work();
+    } catch (const gl::Error& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  for (const auto make :
+       {gl::make_frame_simulator, gl::make_sparse_simulator, gl::make_diff_simulator}) {
+    for (const auto& [what, expected] : losses) {
+      for (const bool draws : {false, true}) {
+        if (draws && expected != lost) continue;  // reads nothing
+        const auto simulator = make(context, format);
+        int i = 0;
+        const auto push = [&] {
+          texture.upload(bytes_of(scene::noise<std::uint8_t>(33, 21, 8, ++i)));
+          const auto frame = texture.frame({one, 0, 0, 0});
+          if (draws)
+            simulator->draw(frame, i * scene::frame_time, {}, {picture.name(), {}});
+          else
+            simulator->push(frame, i * scene::frame_time, {});
+        };
+        push();
+        push();
+        loss = what;
+        EXPECT_EQ(message(push), expected);
+        loss = Loss::none;
+        while (context.GetError() != GL_NO_ERROR) continue;  // a buffer was not mapped
+      }
+    }
+  }
+  loss = Loss::reset;
+  EXPECT_EQ(message([&] { const gl::Kernel kernel(context, "wrong", "wrong"); }), lost);
+  loss = Loss::none;
+}
+
 TEST(Kernel, ReportsWhatTheCompilerSays) {
   const EglContext current(true);
   const gl::Context context(gl_test::load);
