@@ -67,7 +67,7 @@ used() {
   for file in ball.raw=application/x-prophesee-raw ball.h5=application/x-event-hdf5; do
     [ "$(gio info -a standard::content-type "${file%=*}" | sed -n 's/.*content-type: //p')" = "${file#*=}" ]
   done
-  gio mime application/x-prophesee-raw | grep -q events-in-gnome-videos.desktop
+  gio mime application/x-es | grep -q events-in-gnome-videos.desktop
   try totem-video-thumbnailer -s 128 file:///tmp/ball.h5 thumbnail.png
 }
 apt-get update -q

@@ -70,6 +70,7 @@ for ending in raw dat es npy aedat4 h5; do
 done
 ln -s /bin/true programs/totem
 [ "$(default_of application/x-es)" = events-in-gnome-videos.desktop ] || fail "$(default_of application/x-es) instead of Totem"
+[ "$(default_of application/x-prophesee-raw)" = events-in-terminal.desktop ] || fail "Totem, which ignores .raw files"
 
 # Thumbnails show events.
 thumbnailer=$data/thumbnailers/event-recordings.thumbnailer
