@@ -49,6 +49,9 @@ public = {core + tag for tag in ("constant", "enumeration", "function", "functio
 new = [e.get("name") for e in ElementTree.parse(sys.argv[1]).iter() if e.tag in public and "version" not in e.attrib]
 assert not new, f"no Since: in the documentation of {new}"
 PYTHON
+gi-docgen generate --quiet --fatal-warnings --no-namespace-dir --config="$SOURCE/gst/eventcamera/documentation.toml" \
+  --output-dir="$root/documentation" "$gir"
+grep -q "One event of a buffer" "$root/documentation/struct.Event.html"
 
 # As if the root were /. pkg-config expects and prints escaped blanks.
 sed -i "s#^prefix=.*#prefix=${root// /\\\\ }/usr#" "$library/pkgconfig/gsteventcamera-1.0.pc"
