@@ -4,8 +4,8 @@
 
   network.py PAGE.md PLOT.png RUN.json...
 
-Writes the table of loopback speed between the markers of the page, and draws how speed and load
-grow with the event rate and the size of packets."""
+Writes the tables of loopback speed and of bytes per event between the markers of the page, and
+draws how speed and load grow with the event rate and the size of packets."""
 import json
 import sys
 
@@ -23,6 +23,10 @@ COLOURS = {
     "es": "#6a6f7a",
     "jaer": "#8a5ab5",
 }
+
+
+# Recordings of real cameras, and random pixels.
+SCENES = {"640x480": "640x480 camera", "1280x720": "1280x720 camera", "noise": "random pixels"}
 
 
 def runs_of(paths):
@@ -44,6 +48,10 @@ def table_of(runs, context):
             lines.append(f"| {name} | {run['Mevents/s']:.1f} | {run['lost%']:.1f} % | {run['processors']:.1f} |")
     if run := runs.get(("latency",)):
         lines.append(f"\nLatency of RTP at 1 Mev/s: median {run['p50-ms']:.1f} ms, 99th percentile {run['p99-ms']:.1f} ms.")
+    lines += ["", f"| bytes per event | {' | '.join(SCENES.values())} |", "|---" * (len(SCENES) + 1) + "|"]
+    for name in COLOURS:
+        packed = [runs.get((scene, name.removeprefix("RTP "), "pack")) for scene in SCENES]
+        lines.append(" | ".join([f"| {name}", *(f"{run['bytes/event']:.1f}" if run else "–" for run in packed)]) + " |")
     return "\n".join(lines) + "\n"
 
 
