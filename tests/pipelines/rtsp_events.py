@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """rtsp-events as its clients see it."""
 import os
-import signal
 import subprocess
 import tempfile
 import time
@@ -10,33 +9,26 @@ import time
 import gi
 import numpy as np
 
+from servers import SECONDS, ServerProcess
+
 gi.require_version("Gst", "1.0")
 gi.require_version("GstApp", "1.0")
 from gi.repository import Gio, GLib, Gst, GstApp  # noqa: E402, F401
 
 PROGRAM = os.path.join(os.environ["SOURCE"], "pipelines", "rtsp_events.py")
-SECONDS = 60  # for anything that should happen at once
 XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
 
 
-class Server:
+class Server(ServerProcess):
     def __init__(self, *arguments):
-        self.process = subprocess.Popen(
-            [PROGRAM, "--address", "127.0.0.1", "--port", "0", *arguments], stdout=subprocess.PIPE, text=True)
-        self.base = self.process.stdout.readline().split()[1].removesuffix("/events,")
+        super().__init__(PROGRAM, "--address", "127.0.0.1", "--port", "0", *arguments)
+        self.base = self.address.split()[1].removesuffix("/events,")
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        self.process.send_signal(signal.SIGINT)
-        try:
-            assert self.process.wait(SECONDS) == 0, f"exit status {self.process.returncode}"
-        finally:
-            self.process.kill()
-
-    def descriptors(self):
-        return len(os.listdir(f"/proc/{self.process.pid}/fd"))
+        self.interrupt()
 
 
 class Client:
@@ -185,14 +177,21 @@ def ball_in_events(sample):
     return running_time(sample) + events["t"].mean() / 1e6, events["x"].mean(), (events["y_p"] & 0x7FFF).mean()
 
 
+def since_times_went_back(samples):
+    """As they do when RTCP synchronizes them."""
+    samples = np.array(samples)
+    back = np.flatnonzero(np.diff(samples[:, 0]) < 0)
+    return samples[back[-1] + 1:] if len(back) else samples
+
+
 def offset_between(video, events):
-    """How much later than the video the events show the ball, and how far the two positions then are
-    apart, in pixels (RMS)."""
+    """How much later than the video the last events show the ball, and how far the two positions then
+    are apart, in pixels (RMS)."""
     # Only between frames that follow one another.
     after = np.searchsorted(video[:, 0], events[:, 0])
     inside = (after > 5) & (after < len(video) - 5)
     inside[inside] &= video[after[inside], 0] - video[after[inside] - 1, 0] < 0.1
-    events = events[inside]
+    events = events[inside][-60:]
     if len(events) < 30:
         return 0, np.inf
 
@@ -220,7 +219,7 @@ def in_sync():
             video += map(ball_in_video, client.samples(30, "video"))
             while not events or events[-1][0] < video[-1][0]:
                 events += map(ball_in_events, client.samples(1, "events"))
-            lag, distance = offset_between(np.array(video[-90:]), np.array(events[-90:]))
+            lag, distance = offset_between(since_times_went_back(video), since_times_went_back(events))
         print(f"events are {1000 * lag:.0f} ms later than the video, {distance:.2f} pixels apart")
 
 

@@ -5,16 +5,15 @@ import contextlib
 import http.client
 import os
 import re
-import signal
 import subprocess
 import tempfile
 import time
 from urllib.parse import urlsplit
 
 from browser import Browser
+from servers import SECONDS, ServerProcess
 
 PROGRAM = os.path.join(os.environ["SOURCE"], "pipelines", "web_events.py")
-SECONDS = 60  # for anything that should happen at once
 
 # The number of pixels in the colours of ON, OFF and no event, and the picture itself.
 PICTURE = """(() => {
@@ -41,25 +40,15 @@ PICTURE = """(() => {
 def wait_for(what, condition):
     deadline = time.monotonic() + SECONDS
     while not (value := condition()):
-        assert time.monotonic() < deadline, f"not within {SECONDS} s: {what}"
+        assert time.monotonic() < deadline, f"not within {SECONDS} s: {what}; {server.descriptors()} descriptors"
         time.sleep(0.2)
     return value
-
-
-def start(*arguments):
-    server = subprocess.Popen([PROGRAM, "--port", "0", *arguments], stdout=subprocess.PIPE, text=True)
-    line = server.stdout.readline()
-    return server, re.search(r"http://\S+/", line)[0]
 
 
 def refused(words, *arguments):
     result = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=SECONDS, check=False)
     assert result.returncode in (1, 2), f"{arguments}: exit status {result.returncode}"
     assert words in result.stderr and "Traceback" not in result.stderr, result.stderr
-
-
-def descriptors(server):
-    return len(os.listdir(f"/proc/{server.pid}/fd"))
 
 
 def see_events(page):
@@ -102,8 +91,9 @@ def handshake(url, origin):
 
 
 with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, contextlib.ExitStack() as at_end:
-    server, url = start()
-    at_end.callback(server.kill)
+    server = ServerProcess(PROGRAM, "--port", "0")
+    at_end.callback(server.process.kill)
+    url = re.search(r"http://\S+/", server.address)[0]
     browser = Browser(profile)
     at_end.callback(browser.close)
 
@@ -112,17 +102,17 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     see_rate(first)
     print("one viewer sees events and their rate")
 
-    alone = descriptors(server) + 3  # browsers keep connections for later; a viewer needs about 20
+    alone = server.descriptors() + 3  # browsers keep connections for later; a viewer needs about 20
     for name in ("second", "third"):
         other = browser.open(url)
         see_events(other)
         see_rate(other)
         see_events(first)
         other.close()
-        wait_for(f"all that the {name} viewer needed is closed", lambda: descriptors(server) <= alone)
+        wait_for(f"all that the {name} viewer needed is closed", lambda: server.descriptors() <= alone)
         see_events(first)
     browser.open(url).close()
-    wait_for("all that a hasty viewer needed is closed", lambda: descriptors(server) <= alone)
+    wait_for("all that a hasty viewer needed is closed", lambda: server.descriptors() <= alone)
     see_events(first)
     print("viewers come and leave, and the first sees events still")
 
@@ -144,8 +134,7 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     refused("eventsim-nothing", "--simulator", "eventsim-nothing", "--port", "0")
     print("errors are told")
 
-    server.send_signal(signal.SIGINT)
-    assert server.wait(SECONDS) == 0, f"exit status {server.returncode}"
+    server.interrupt()
     wait_for("the viewer learns that the server has ended", lambda: "disconnected" in first.evaluate(
         "document.querySelector('output').textContent"))
     print("Ctrl-C ends it")
