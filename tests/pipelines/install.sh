@@ -32,10 +32,10 @@ plugins=$library/gstreamer-1.0
 # Debian's GStreamer searches for plugins here.
 [ "${plugins#"$root"}" = "$(pkg-config --variable=pluginsdir gstreamer-1.0)" ]
 
-# The interface of the library is the one that packages rely on.
+# The interface of the library is the one that packages rely on. Only a later version misses symbols.
 mkdir -p "$root/debian/package/DEBIAN"
 cp "$SOURCE/debian/control" "$SOURCE/debian/changelog" "$root/debian/"
-(cd "$root" && dpkg-gensymbols -c4 -plibgsteventcamera-1.0-0 -Pdebian/package -Odebian/symbols \
+(cd "$root" && dpkg-gensymbols -c4 -v999 -plibgsteventcamera-1.0-0 -Pdebian/package -Odebian/symbols \
   -I"$SOURCE/debian/libgsteventcamera-1.0-0.symbols" -e"$library"/libgsteventcamera-1.0.so.0)
 
 # Its documentation tells which version introduced what.
