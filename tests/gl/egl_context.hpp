@@ -3,9 +3,9 @@
 
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
-#include <gtest/gtest.h>
 
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "src/gl/context.hpp"
@@ -30,7 +30,7 @@ class EglContext {
     EGLint devices = 0;
     query_devices(1, &device, &devices);
     display_ = get_display(EGL_PLATFORM_DEVICE_EXT, device, nullptr);
-    EXPECT_TRUE(eglInitialize(display_, nullptr, nullptr));
+    require(eglInitialize(display_, nullptr, nullptr));
     eglBindAPI(is_es ? EGL_OPENGL_ES_API : EGL_OPENGL_API);
     const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, is_es ? 3 : 4,
                                  EGL_CONTEXT_MINOR_VERSION, is_es ? 1 : 3, EGL_NONE};
@@ -38,9 +38,9 @@ class EglContext {
                                 is_es ? EGL_OPENGL_ES3_BIT : EGL_OPENGL_BIT, EGL_NONE};
     EGLConfig config = nullptr;
     EGLint configs = 0;
-    EXPECT_TRUE(eglChooseConfig(display_, of_config, &config, 1, &configs));
+    require(eglChooseConfig(display_, of_config, &config, 1, &configs));
     context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, attributes);
-    EXPECT_TRUE(eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_));
+    require(eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_));
   }
   ~EglContext() {
     eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
@@ -50,6 +50,10 @@ class EglContext {
   EglContext& operator=(const EglContext&) = delete;
 
  private:
+  static void require(EGLBoolean succeeded) {
+    if (succeeded == EGL_FALSE) throw std::runtime_error("no OpenGL context without a screen");
+  }
+
   EGLDisplay display_ = nullptr;
   EGLContext context_ = nullptr;
 };

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Time per frame of the simulators on the GPU, in its parts, beside those on the CPU: the three
+// scenes, scaled to each size. Prints a table.
+//   meson devenv -C build-bench bench/gl_bench [WIDTHxHEIGHT...]
+#include <gst/app/gstappsrc.h>
+#include <gst/gst.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "bench/methods.hpp"
+#include "bench/scenes.hpp"
+#include "src/gl/dense.hpp"
+#include "src/gl/diff.hpp"
+#include "src/gl/frame.hpp"
+#include "src/gl/sparse.hpp"
+#include "tests/core/scene.hpp"
+#include "tests/gl/egl_context.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using bench::Clip;
+using bench::Picture;
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// Calls `work` and returns its duration, milliseconds.
+template <class Work>
+double time_of(const Work& work) {
+  const auto start = Clock::now();
+  work();
+  return milliseconds_since(start);
+}
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+
+/// The picture at another size, by bilinear interpolation.
+Picture scaled(const Picture& from, int width, int height) {
+  Picture to(width, height);
+  for (int y = 0; y < height; ++y) {
+    const double v = (from.height() - 1.0) * y / std::max(height - 1, 1);
+    const int top = std::min(static_cast<int>(v), from.height() - 2);
+    for (int x = 0; x < width; ++x) {
+      const double u = (from.width() - 1.0) * x / std::max(width - 1, 1);
+      const int left = std::min(static_cast<int>(u), from.width() - 2);
+      const double right = u - left;
+      const auto row = [&](int at) {
+        return from.at(left, at) * (1 - right) + from.at(left + 1, at) * right;
+      };
+      to.at(x, y) =
+          static_cast<std::uint8_t>(row(top) * (1 - (v - top)) + row(top + 1) * (v - top) + 0.5);
+    }
+  }
+  return to;
+}
+
+struct Method {
+  const bench::Method& cpu;
+  std::unique_ptr<gl::Simulator> (*make)(const gl::Context&, const LumaFormat&);
+  const char* element;
+};
+
+std::unique_ptr<gl::Simulator> make_dense(const gl::Context& gl, const LumaFormat& format) {
+  return gl::make_dense_simulator(gl, format);
+}
+
+const Method methods[] = {
+    {bench::frame_method, gl::make_frame_simulator, "gleventsim-frame"},
+    {bench::farneback_method, make_dense, "gleventsim-dense"},
+    {bench::sparse_method, gl::make_sparse_simulator, "gleventsim-sparse"},
+    {bench::diff_method, gl::make_diff_simulator, "gleventsim-diff"},
+};
+
+/// Time that the GPU works, by timer queries.
+class GpuTimer {
+ public:
+  GpuTimer() { gen_queries_(1, &query_); }
+
+  /// Milliseconds for which the GPU works on what `work` queues.
+  template <class Work>
+  double time_of(const Work& work) const {
+    constexpr GLenum time_elapsed = 0x88BF;
+    begin_query_(time_elapsed, query_);
+    work();
+    end_query_(time_elapsed);
+    GLuint nanoseconds = 0;
+    get_result_(query_, GL_QUERY_RESULT, &nanoseconds);
+    return nanoseconds / 1e6;
+  }
+
+ private:
+  PFNGLGENQUERIESPROC gen_queries_ =
+      reinterpret_cast<PFNGLGENQUERIESPROC>(gl_test::load("glGenQueries"));
+  PFNGLBEGINQUERYPROC begin_query_ =
+      reinterpret_cast<PFNGLBEGINQUERYPROC>(gl_test::load("glBeginQuery"));
+  PFNGLENDQUERYPROC end_query_ = reinterpret_cast<PFNGLENDQUERYPROC>(gl_test::load("glEndQuery"));
+  PFNGLGETQUERYOBJECTUIVPROC get_result_ =
+      reinterpret_cast<PFNGLGETQUERYOBJECTUIVPROC>(gl_test::load("glGetQueryObjectuiv"));
+  GLuint query_ = 0;
+};
+
+/// Milliseconds of a frame, and its events.
+struct Costs {
+  double upload;
+  double kernels;  ///< work of the GPU; llvmpipe, which works in the call, counts none
+  double rest;     ///< of the call: queueing, waiting, and reading the events back
+  double events;
+};
+
+Costs costs_of(const gl::Context& context, const Method& method, const Clip& clip,
+               const Settings& settings) {
+  const auto finish = reinterpret_cast<PFNGLFINISHPROC>(gl_test::load("glFinish"));
+  const int width = clip[0].width();
+  const int height = clip[0].height();
+  const auto simulator = method.make(context, {width, height, 8});
+  gl_test::Texture texture(width, height, 1);
+  const GpuTimer gpu;
+  std::vector<double> upload;
+  std::vector<double> kernels;
+  std::vector<double> rest;
+  std::vector<double> events;
+  for (std::size_t i = 0; i < clip.size(); ++i) {
+    std::vector<std::uint8_t> bytes;
+    for (int y = 0; y < height; ++y)
+      bytes.insert(bytes.end(), clip[i].row(y), clip[i].row(y) + width);
+    const double uploading = time_of([&] {
+      texture.upload(bytes);
+      finish();
+    });
+    const EventBuckets* made = nullptr;
+    double call = 0;
+    const double working = gpu.time_of([&] {
+      call = time_of([&] {
+        made = simulator->push(texture.frame({LumaWeights::one, 0, 0, 0}),
+                               static_cast<Nanoseconds>(i) * bench::frame_time, settings);
+      });
+    });
+    if (i < 2) continue;  // drivers compile late; diff has no difference yet
+    upload.push_back(uploading);
+    kernels.push_back(working);
+    rest.push_back(std::max(call - working, 0.0));
+    events.push_back(static_cast<double>(made->size()));
+  }
+  return {median(upload), median(kernels), median(rest), median(events)};
+}
+
+/// Milliseconds of a frame on the CPU.
+double cpu_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
+  const auto simulator = method.cpu.ours({clip[0].width(), clip[0].height(), 8});
+  std::vector<double> times;
+  for (std::size_t i = 0; i < clip.size(); ++i) {
+    const double time = time_of([&] {
+      simulator->push(scene::luma(clip[i]), static_cast<Nanoseconds>(i) * bench::frame_time,
+                      settings);
+    });
+    if (i >= 2) times.push_back(time);
+  }
+  return median(times);
+}
+
+/// Milliseconds for which a pipeline plays these frames, from memory to events.
+double pipeline_time(const Method& method, const Clip& clip, std::size_t frames,
+                     const Settings& settings) {
+  std::string launch = "appsrc name=source format=time block=true max-buffers=1 ! glupload ! ";
+  launch += std::string(method.element) +
+            " positive-threshold=" + std::to_string(settings.positive_threshold) +
+            " negative-threshold=" + std::to_string(settings.negative_threshold);
+  if (method.cpu.name != "frame")
+    launch += " interpolated-frames=" + std::to_string(settings.interpolated_frames);
+  launch += " ! application/x-event-camera ! fakesink sync=false";
+  GError* error = nullptr;
+  GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
+  if (error != nullptr) throw std::runtime_error(error->message);
+  auto* source = GST_APP_SRC(gst_bin_get_by_name(GST_BIN(pipeline), "source"));
+  GstCaps* caps = gst_caps_new_simple(
+      "video/x-raw", "format", G_TYPE_STRING, "GRAY8", "width", G_TYPE_INT, clip[0].width(),
+      "height", G_TYPE_INT, clip[0].height(), "framerate", GST_TYPE_FRACTION, 25, 1, nullptr);
+  gst_app_src_set_caps(source, caps);
+  gst_caps_unref(caps);
+  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  const auto start = Clock::now();
+  for (std::size_t i = 0; i < frames; ++i) {
+    const auto& frame = clip[i];
+    const auto width = static_cast<gsize>(frame.width());
+    GstBuffer* buffer =
+        gst_buffer_new_allocate(nullptr, width * static_cast<gsize>(frame.height()), nullptr);
+    for (int y = 0; y < frame.height(); ++y)
+      gst_buffer_fill(buffer, static_cast<gsize>(y) * width, frame.row(y), width);
+    GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(i) * bench::frame_time;
+    gst_app_src_push_buffer(source, buffer);
+  }
+  gst_app_src_end_of_stream(source);
+  GstBus* bus = gst_element_get_bus(pipeline);
+  GstMessage* end = gst_bus_timed_pop_filtered(
+      bus, GST_CLOCK_TIME_NONE, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
+  const double time = milliseconds_since(start);
+  const bool failed = GST_MESSAGE_TYPE(end) == GST_MESSAGE_ERROR;
+  gst_message_unref(end);
+  gst_object_unref(bus);
+  gst_object_unref(source);
+  gst_element_set_state(pipeline, GST_STATE_NULL);
+  gst_object_unref(pipeline);
+  if (failed) throw std::runtime_error("the pipeline failed: " + launch);
+  return time;
+}
+
+/// Milliseconds of a frame in a pipeline: what all but the first two add.
+double element_cost_of(const Method& method, const Clip& clip, const Settings& settings) {
+  const double first = pipeline_time(method, clip, 2, settings);
+  const double all = pipeline_time(method, clip, clip.size(), settings);
+  return std::max(all - first, 0.0) / static_cast<double>(clip.size() - 2);
+}
+
+void print_row(const gl::Context& context, const bench::Scene& scene, const Method& method,
+               int width, int height) {
+  Clip clip;
+  for (const auto& picture : scene.clips[0]) clip.push_back(scaled(picture, width, height));
+  const Settings settings{method.cpu.threshold, method.cpu.threshold, scene.interpolated_frames, 0};
+  const auto gpu = costs_of(context, method, clip, settings);
+  char kernels[32] = "not counted";
+  if (gpu.kernels > 0.001) std::snprintf(kernels, sizeof kernels, "%.3g", gpu.kernels);
+  std::printf("| %s, %dx%d | %s | %.0f | %.3g | %s | %.3g | %.3g | %.3g |\n", scene.name.c_str(),
+              width, height, method.cpu.name.c_str(), gpu.events, gpu.upload, kernels, gpu.rest,
+              element_cost_of(method, clip, settings), cpu_cost_of(method, clip, settings));
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  gst_init(&argc, &argv);
+  std::vector<std::string> sizes(argv + 1, argv + argc);
+  if (sizes.empty()) sizes = {"640x480", "1280x720", "1920x1080", "3840x2160"};
+  const gl_test::EglContext current(false);
+  const gl::Context context(gl_test::load);
+  const auto get_string = reinterpret_cast<PFNGLGETSTRINGPROC>(gl_test::load("glGetString"));
+  std::printf("Renderer: %s. Milliseconds per frame, medians.\n\n",
+              reinterpret_cast<const char*>(get_string(GL_RENDERER)));
+  std::printf(
+      "| scene | method | events | upload | kernels | calls and read-back | element | CPU |\n"
+      "|---|---|---|---|---|---|---|---|\n");
+  const auto scenes = bench::scenes(false);
+  for (const auto& size : sizes) {
+    int width = 0;
+    int height = 0;
+    if (std::sscanf(size.c_str(), "%dx%d", &width, &height) != 2 || width < 1 || height < 1) {
+      std::fprintf(stderr, "gl_bench: '%s' is no size; give WIDTHxHEIGHT\n", size.c_str());
+      return 2;
+    }
+    for (const auto& scene : scenes)
+      for (const auto& method : methods) print_row(context, scene, method, width, height);
+  }
+}
