@@ -31,7 +31,7 @@ class OpenCvFlow {
  public:
   OpenCvFlow(FlowMethod method, int width, int height) : method_(method) {
     if (method == FlowMethod::farneback) return;
-    const bool high = method == FlowMethod::dis_hq;
+    const bool high = method != FlowMethod::dis_lq;
     const int patch = high ? 8 : 4;
     dis_->setPatchSize(patch);
     dis_->setPatchStride(high ? 4 : 3);

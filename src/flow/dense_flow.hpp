@@ -16,9 +16,10 @@ struct Flow {
 
 /// Dense-flow algorithms.
 enum class FlowMethod {
-  dis_lq,     ///< DIS, low quality and fast: patches of 4, overlap 0.05, 8 iterations, 3 scales
-  dis_hq,     ///< DIS, high quality: patches of 8, overlap 0.4, 32 iterations
-  farneback,  ///< Farneback: 3 levels, window 15, 3 iterations, polynomials of 5 pixels
+  dis_lq,      ///< DIS, low quality and fast: patches of 4, overlap 0.05, 8 iterations, 3 scales
+  dis_hq,      ///< DIS, high quality: patches of 8, overlap 0.4, 32 iterations
+  farneback,   ///< Farneback: 3 levels, window 15, 3 iterations, polynomials of 5 pixels
+  opencv_dis,  ///< OpenCV's DIS with the parameters of dis_hq
 };
 
 /// Dense optical flow between 8-bit images of any size. Each image serves twice, first as the

@@ -26,7 +26,7 @@ class EveryFlow : public testing::TestWithParam<FlowMethod> {
 
 INSTANTIATE_TEST_SUITE_P(, EveryFlow,
                          testing::Values(FlowMethod::dis_lq, FlowMethod::dis_hq,
-                                         FlowMethod::farneback));
+                                         FlowMethod::farneback, FlowMethod::opencv_dis));
 
 TEST_P(EveryFlow, PointsFromTheEarlierFrameToTheLater) {
   const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);

@@ -114,7 +114,8 @@ struct Flows {
 
 class EveryDense : public testing::TestWithParam<Flows> {};
 INSTANTIATE_TEST_SUITE_P(, EveryDense,
-                         testing::Values(Flows{"eventsim-dense", {"dis-lq", "dis-hq", "farneback"}},
+                         testing::Values(Flows{"eventsim-dense",
+                                               {"dis-lq", "dis-hq", "farneback", "opencv-dis"}},
                                          Flows{"gleventsim-dense", {"farneback"}}));
 
 TEST_P(EveryDense, NamesItsFlowsAndInterpolations) {

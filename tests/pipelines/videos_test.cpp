@@ -15,12 +15,14 @@
 
 #include "gst/eventcamera/eventcamera.h"
 #include "src/flow/dense_flow.hpp"
+#include "src/flow/dis/dis.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/opencv.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/sparse.hpp"
+#include "tests/core/opencv_dis.hpp"
 #include "tests/pipelines/video_frames.hpp"
 #include "tests/reference/dense.hpp"
 #include "tests/reference/diff.hpp"
@@ -259,6 +261,27 @@ TEST(Farneback, IsWhatOpenCvFinds) {
   }
 }
 
+TEST(Dis, IsWhatOpenCvFinds) {
+  if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
+  const auto frames = frames_of(video(driving), 8, 640, 480);
+  ASSERT_EQ(frames.size(), 8U);
+  ThreadPool threads;
+  threads.set_threads(0);
+  for (const auto& quality : {DisFlow::low, DisFlow::high}) {
+    DisFlow finder(quality);
+    finder.push(frames[0].view(), threads);
+    for (std::size_t i = 1; i < frames.size(); ++i) {
+      finder.push(frames[i].view(), threads);
+      const auto ours = finder.flow(threads);
+      const auto theirs = opencv_dis(frames[i - 1], frames[i], quality);
+      EXPECT_LT(distance(frames[i - 1], ours, theirs.view()), 0.05) << "pair " << i;
+      EXPECT_GT(psnr(warped(frames[i - 1], ours), frames[i]),
+                psnr(warped(frames[i - 1], theirs.view()), frames[i]) - 0.01)
+          << "pair " << i;
+    }
+  }
+}
+
 /// Fraction of events with a match in another set: same polarity, within one pixel and one step.
 class Partners {
  public:
@@ -324,13 +347,13 @@ std::vector<Event> events_of(Simulator& simulator,
 /// Implementations that replace OpenCV's: nearly all events have a match, in both directions.
 void expect_partners(const char* name, const std::vector<Event>& ours,
                      const std::vector<Event>& theirs, int width, int height,
-                     const StepTimes& steps) {
+                     const StepTimes& steps, double share = 0.95) {
   const double of_ours = Partners(theirs, width, height, steps).share(ours);
   const double of_theirs = Partners(ours, width, height, steps).share(theirs);
   std::printf("%s: %zu events, %.2f %% of them among OpenCV's %zu, of which %.2f %% are ours\n",
               name, ours.size(), 100 * of_ours, theirs.size(), 100 * of_theirs);
-  EXPECT_GE(of_ours, 0.95) << name;
-  EXPECT_GE(of_theirs, 0.95) << name;
+  EXPECT_GE(of_ours, share) << name;
+  EXPECT_GE(of_theirs, share) << name;
 }
 
 TEST(Events, AreThoseOfOpenCvsFlows) {
@@ -367,6 +390,17 @@ TEST(Events, AreThoseOfOpenCvsFlows) {
                     reference::dense(last, now, opencv_farneback(last, now).view(),
                                      Interpolation::forward, steps, {3, 3}),
                     640, 480, steps);
+    const auto hold_dis = [&](const char* name, FlowMethod method,
+                              const DisFlow::Quality& quality) {
+      const auto simulator = make_dense_simulator(format);
+      simulator->set_flow(method);
+      expect_partners(name, events_of(*simulator, {&last, &now}, 3, n),
+                      reference::dense(last, now, opencv_dis(last, now, quality).view(),
+                                       Interpolation::forward, steps, {3, 3}),
+                      640, 480, steps, 0.99);
+    };
+    hold_dis("dis-lq", FlowMethod::dis_lq, DisFlow::low);
+    hold_dis("dis-hq", FlowMethod::dis_hq, DisFlow::high);
   }
 }
 

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/flow/dis/dis.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <utility>
+
+#include "src/flow/dis/upsampling.hpp"
+#include "src/flow/farneback/scratch.hpp"
+
+namespace eventcamera {
+namespace {
+
+constexpr int rows_per_round = 16;  ///< of pixels
+
+int rounds(int rows) {
+  return (rows + rows_per_round - 1) / rows_per_round;
+}
+
+/// Number of times the image is halved for the coarsest level: on it, the largest displacement that
+/// is searched for, a quarter of the longer side, is one patch.
+int coarsest_scale(int width, int height, int patch) {
+  const auto [shorter, longer] = std::minmax({width, height});
+  return std::min(static_cast<int>(std::lround(std::log2(longer / (4.0 * patch)))),
+                  static_cast<int>(std::log2(shorter / patch)));
+}
+
+/// The flow of a coarser level at a pixel of a finer one.
+Flow flow_at(const VariationalRefinement& coarser, float x, float y) {
+  const auto place = [](float position, int size) {
+    return std::clamp(position, 0.0F, static_cast<float>(size - 1));
+  };
+  const float from_x = place(x, coarser.width());
+  const float from_y = place(y, coarser.height());
+  const int left = static_cast<int>(from_x);
+  const int top = static_cast<int>(from_y);
+  const int right = std::min(left + 1, coarser.width() - 1);
+  const int bottom = std::min(top + 1, coarser.height() - 1);
+  const auto between = [](const Flow& a, const Flow& b, float weight) -> Flow {
+    return {a.x + weight * (b.x - a.x), a.y + weight * (b.y - a.y)};
+  };
+  const float along = from_x - static_cast<float>(left);
+  return between(between(coarser.at(left, top), coarser.at(right, top), along),
+                 between(coarser.at(left, bottom), coarser.at(right, bottom), along),
+                 from_y - static_cast<float>(top));
+}
+
+}  // namespace
+
+DisFlow::Level::Level(const AreaShrink& shrink_, const Quality& quality)
+    : shrink(shrink_),
+      last(shrink.width(), shrink.height()),
+      next(shrink.width(), shrink.height()),
+      gradients(shrink.width(), shrink.height()),
+      grid(shrink.width(), shrink.height(), quality.patch, quality.stride),
+      flows(grid.columns, grid.rows),
+      refinement(shrink.width(), shrink.height()) {}
+
+void DisFlow::start(int width, int height) {
+  width_ = width;
+  height_ = height;
+  flow_ = Image<Flow>(width, height);
+  width = std::max(width, min_side);
+  height = std::max(height, min_side);
+  if (width != width_ || height != height_) padded_ = Image<std::uint8_t>(width, height);
+  const int coarsest = coarsest_scale(width, height, quality_.patch);
+  finest_scale_ = quality_.scales == 0 ? 1 : std::max(0, coarsest - quality_.scales + 1);
+  levels_.clear();
+  columns_ = Resampling(width >> finest_scale_, width);
+  rows_ = Resampling(height >> finest_scale_, height);
+  for (int scale = finest_scale_; scale <= coarsest; ++scale) {
+    const AreaShrink shrink(width, height, levels_.empty() ? width >> finest_scale_ : width / 2,
+                            levels_.empty() ? height >> finest_scale_ : height / 2);
+    levels_.emplace_back(shrink, quality_);
+    width = shrink.width();
+    height = shrink.height();
+  }
+}
+
+ImageView<std::uint8_t> DisFlow::padded(const ImageView<std::uint8_t>& picture) {
+  if (std::min(picture.width, picture.height) >= min_side) return picture;
+  for (int y = 0; y < padded_.height(); ++y) {
+    const std::uint8_t* row = picture.row(std::min(y, picture.height - 1));
+    std::fill(std::copy_n(row, picture.width, padded_.row(y)), padded_.row(y) + padded_.width(),
+              row[picture.width - 1]);
+  }
+  return padded_.view();
+}
+
+void DisFlow::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
+  if (picture.width != width_ || picture.height != height_) start(picture.width, picture.height);
+  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  auto from = padded(picture);
+  for (auto& level : levels_) {
+    std::swap(level.last, level.next);
+    const int height = level.shrink.height();
+    threads.for_each(rounds(height), [&](int round, int thread) {
+      const int first = round * rows_per_round;
+      for (int y = first; y < std::min(first + rows_per_round, height); ++y)
+        level.next.shrink_row(level.shrink, from, y, scratch_[thread].sums);
+    });
+    level.next.replicate_rows();
+    from = level.next.grey().view();
+  }
+}
+
+ImageView<Flow> DisFlow::flow(ThreadPool& threads) {
+  assert(!levels_.empty());
+  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  const Level* coarser = nullptr;
+  for (std::size_t i = levels_.size(); i-- > 0;) {
+    Level& level = levels_[i];
+    const auto& last = level.last.grey();
+    const auto& next = level.next.grey();
+    const int height = last.height();
+    const auto for_each_band = [&](const auto& body) {
+      threads.for_each(rounds(height), [&](int round, int thread) {
+        const int first = round * rows_per_round;
+        body(first, std::min(first + rows_per_round, height), scratch_[thread]);
+      });
+    };
+    for_each_band([&](int first, int end, Scratch& scratch) {
+      for (int y = first; y < end; ++y) level.gradients.row(last, y, scratch.slopes);
+    });
+    threads.for_each(level.grid.rows, [&](int row, int) { search(coarser, level, row); });
+    for_each_band([&](int first, int end, Scratch& scratch) {
+      auto& field = level.refinement.start();
+      spread_patches(level.grid, last, next, level.flows, first, end, scratch.sums, field.x,
+                     field.y);
+    });
+    level.refinement.run(last, next, threads);
+    coarser = &level;
+  }
+  constexpr int wide_rows = 64;  // that share rows of the finest level
+  threads.for_each((height_ + wide_rows - 1) / wide_rows, [&](int round, int thread) {
+    const int first = round * wide_rows;
+    widen(first, std::min(first + wide_rows, height_), scratch_[thread]);
+  });
+  return flow_.view();
+}
+
+void DisFlow::search(const Level* coarser, Level& level, int row) const {
+  const PatchGrid& grid = level.grid;
+  Flow* flows = level.flows.row(row);
+  std::fill_n(flows, grid.columns, Flow{});
+  if (coarser != nullptr) {
+    const auto ratio = [](int from, int to) {
+      return static_cast<float>(from) / static_cast<float>(to);
+    };
+    const float ratio_x = ratio(coarser->refinement.width(), level.refinement.width());
+    const float ratio_y = ratio(coarser->refinement.height(), level.refinement.height());
+    const auto centre = [&](int i) {
+      return static_cast<float>(i * grid.stride + grid.side / 2) + 0.5F;
+    };
+    for (int i = 0; i < grid.columns; ++i) {
+      const Flow coarse =
+          flow_at(coarser->refinement, centre(i) * ratio_x - 0.5F, centre(row) * ratio_y - 0.5F);
+      flows[i] = {2 * coarse.x, 2 * coarse.y};
+    }
+  }
+  search_row(grid, level.last.grey(), level.gradients, level.next.grey(), row, quality_.iterations,
+             flows);
+}
+
+/// Computes rows [first, last) of the flow from the finest level.
+void DisFlow::widen(int first, int last, Scratch& scratch) {
+  const auto& finest = levels_.front().refinement;
+  std::array<int, 2> known = {-1, -1};
+  const auto wide_row = [&](int y) {
+    const auto slot = static_cast<std::size_t>(y) % 2;
+    const auto padded_width = static_cast<std::size_t>(columns_.size()) + row_padding;
+    Flow* wide = scratch_of(scratch.wide_rows[slot], padded_width);
+    if (std::exchange(known[slot], y) == y) return wide;
+    Flow* row = scratch_of(scratch.row, static_cast<std::size_t>(finest.width()) + 2 * row_padding);
+    finest.row(y, row);
+    row[finest.width()] = row[finest.width() - 1];
+    widen_flow(row, columns_, static_cast<float>(1 << finest_scale_), wide);
+    return wide;
+  };
+  for (int y = first; y < last; ++y) {
+    const int upper = rows_.first()[y];
+    const int lower = std::min(upper + 1, finest.height() - 1);
+    blend_flows(wide_row(upper), wide_row(lower), rows_.weight()[y], width_, flow_.row(y));
+  }
+}
+
+}  // namespace eventcamera

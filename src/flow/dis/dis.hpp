@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "src/flow/dense_flow.hpp"
+#include "src/flow/dis/patches.hpp"
+#include "src/flow/dis/pyramid.hpp"
+#include "src/flow/dis/variational_refinement.hpp"
+#include "src/flow/farneback/pyramid.hpp"
+
+namespace eventcamera {
+
+/// Dense inverse search (Kroeger et al., ECCV 2016), coarse to fine: patches are searched, spread
+/// over the pixels that they cover, and refined with a variational method.
+class DisFlow final : public DenseFlow {
+ public:
+  struct Quality {
+    int patch;   ///< side, 4 or 8 pixels
+    int stride;  ///< patch * (1 - overlap)
+    int iterations;
+    int scales;  ///< number of pyramid levels; 0 = from the coarsest to half the size
+  };
+  static constexpr Quality low = {4, 3, 8, 3};
+  static constexpr Quality high = {8, 4, 32, 0};
+
+  /// Smaller images are padded, by replicating their border, to this width and height.
+  static constexpr int min_side = 64;
+
+  explicit DisFlow(const Quality& quality) : quality_(quality) {}
+
+  void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) override;
+  ImageView<Flow> flow(ThreadPool& threads) override;
+
+ private:
+  struct Level {
+    Level(const AreaShrink& shrink_, const Quality& quality);
+
+    AreaShrink shrink;  ///< from the next finer level, or from the whole image
+    PyramidPicture last;
+    PyramidPicture next;
+    Gradients gradients;  ///< of `last`
+    PatchGrid grid;
+    Image<Flow> flows;  ///< of patches
+    VariationalRefinement refinement;
+  };
+
+  /// Scratch memory of one thread.
+  struct Scratch {
+    std::vector<float> sums;
+    std::vector<std::int16_t> slopes;
+    std::vector<Flow> row;
+    std::array<std::vector<Flow>, 2> wide_rows;
+  };
+
+  void start(int width, int height);
+  ImageView<std::uint8_t> padded(const ImageView<std::uint8_t>& picture);
+  void search(const Level* coarser, Level& level, int row) const;
+  void widen(int first, int last, Scratch& scratch);
+
+  Quality quality_;
+  int width_ = 0;
+  int height_ = 0;
+  int finest_scale_ = 0;  ///< the finest level has 1 / 2^finest_scale_ of the size
+  Image<std::uint8_t> padded_;
+  std::vector<Level> levels_;  ///< finest first
+  Resampling columns_;         ///< from the finest level to the whole image
+  Resampling rows_;
+  Image<Flow> flow_;
+  std::vector<Scratch> scratch_;
+};
+
+}  // namespace eventcamera

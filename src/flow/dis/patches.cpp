@@ -1,0 +1,520 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/flow/dis/patches.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "src/flow/farneback/scratch.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/dis/patches.cpp"
+#include <hwy/foreach_target.h>
+// Compiled once per SIMD target.
+#include "src/core/simd-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+/// Eight pixels of a patch: a row of one of 8x8, two rows of one of 4x4.
+using Words = hn::CappedTag<std::int16_t, 8>;
+using Sums = hn::Repartition<std::int32_t, Words>;
+using Word = hn::Vec<Words>;
+constexpr int group_size = 8;
+
+/// One lane per patch.
+using Floats = hn::CappedTag<float, 16>;
+using Vector = hn::Vec<Floats>;
+
+/// Determinants of gradient matrices below this count as this.
+constexpr double min_determinant = 1e-3;
+
+/// Lane-wise sum of products, exact in 32 bits.
+class ProductSum {
+ public:
+  // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
+  ProductSum() : low_(hn::Zero(Sums())), high_(hn::Zero(Sums())) {}
+  void add(Word a, Word b) { low_ = hn::ReorderWidenMulAccumulate(Sums(), a, b, low_, high_); }
+  hn::Vec<Sums> lanes() const { return hn::Add(low_, high_); }
+
+ private:
+  hn::Vec<Sums> low_;
+  hn::Vec<Sums> high_;
+};
+
+/// Stores the totals of four sums.
+HWY_INLINE void store_totals(const ProductSum& sum0, const ProductSum& sum1, const ProductSum& sum2,
+                             const ProductSum& sum3, std::int32_t* out) {
+#if HWY_TARGET == HWY_SCALAR
+  for (const auto* sum : {&sum0, &sum1, &sum2, &sum3}) *out++ = hn::GetLane(sum->lanes());
+#else
+  const Sums lanes;
+  const hn::Repartition<std::int64_t, Sums> pairs;
+  const auto add_pairs = [&](auto a, auto b) {
+    return hn::BitCast(pairs,
+                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
+  };
+  const auto low = add_pairs(sum0.lanes(), sum1.lanes());
+  const auto high = add_pairs(sum2.lanes(), sum3.lanes());
+  hn::StoreU(hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
+                     hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high))),
+             lanes, out);
+#endif
+}
+
+/// Searches for up to `capacity` patches of a row, one lane per patch.
+///
+/// Where a patch lies between four pixels of the other image, its differences from there are the
+/// bilinear mean of the differences at these four, and their sums are polynomials of the four
+/// weights. So pixels are read only when a patch enters another cell of four pixels.
+template <int side>
+class Search {
+ public:
+  static constexpr int capacity = 64;
+
+  Search(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
+         const Image<std::uint8_t>& to, int row, int first, int count, const Flow* flows)
+      : from_(from),
+        gradients_(gradients),
+        to_(to),
+        top_(row * grid.stride),
+        left_(first * grid.stride),
+        stride_(grid.stride),
+        count_(count) {
+    for (int i = 0; i < count; ++i) {
+      left_of_[i] = static_cast<float>(left_ + i * stride_);
+      start_x_[i] = flow_x_[i] = flows[i].x;
+      start_y_[i] = flow_y_[i] = flows[i].y;
+      previous_[i] = std::numeric_limits<float>::infinity();
+      cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
+      active_[i] = 1;
+      read_gradients(i);
+    }
+    const int lanes = static_cast<int>(hn::Lanes(Floats()));
+    for (int i = count; i < (count + lanes - 1) / lanes * lanes; ++i) {
+      active_[i] = left_of_[i] = flow_x_[i] = flow_y_[i] = cell_x_[i] = cell_y_[i] = 0;
+    }
+  }
+
+  void run(int iterations) {
+    const Floats floats;
+    const int lanes = static_cast<int>(hn::Lanes(floats));
+    for (int i = 0; i < count_; i += lanes)
+      locate(i, hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats)),
+             hn::Load(floats, flow_x_ + i), hn::Load(floats, flow_y_ + i));
+    for (int iteration = 0; iteration < iterations; ++iteration) {
+      for (int k = 0; k < moved_count_; ++k) read_cell(moved_[k]);
+      moved_count_ = 0;
+      bool any = false;
+      for (int i = 0; i < count_; i += lanes) {
+        const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
+        if (hn::AllFalse(floats, active)) continue;
+        any = true;
+        descend(i, active);
+      }
+      if (!any) break;
+    }
+  }
+
+  void store(Flow* flows) const {
+    for (int i = 0; i < count_; ++i) {
+      const float x = flow_x_[i] - start_x_[i];
+      const float y = flow_y_[i] - start_y_[i];
+      if (x * x + y * y <= float{side * side}) flows[i] = {flow_x_[i], flow_y_[i]};
+    }
+  }
+
+ private:
+  static constexpr float pixels = side * side;
+
+  /// The address of eight values of a patch.
+  template <class T>
+  static HWY_INLINE const T* group_of(const Image<T>& plane, int x, int y, int group, T* buffer) {
+    if constexpr (side == group_size) return plane.row(y + group) + x;
+    std::memcpy(buffer, plane.row(y + 2 * group) + x, side * sizeof(T));
+    std::memcpy(buffer + side, plane.row(y + 2 * group + 1) + x, side * sizeof(T));
+    return buffer;
+  }
+
+  static HWY_INLINE Word load_bytes(const Image<std::uint8_t>& plane, int x, int y, int group,
+                                    int lane) {
+    std::uint8_t buffer[group_size];
+    const hn::Rebind<std::uint8_t, Words> bytes;
+    return hn::PromoteTo(Words(), hn::LoadU(bytes, group_of(plane, x, y, group, buffer) + lane));
+  }
+  static HWY_INLINE Word load_words(const Image<std::int16_t>& plane, int x, int y, int group,
+                                    int lane) {
+    std::int16_t buffer[group_size];
+    return hn::LoadU(Words(), group_of(plane, x, y, group, buffer) + lane);
+  }
+
+  /// Vectors of a patch.
+  static int vectors() { return side * side / static_cast<int>(hn::Lanes(Words())); }
+  static int group_at(int vector) {
+    return vector * static_cast<int>(hn::Lanes(Words())) / group_size;
+  }
+  static int lane_at(int vector) {
+    return vector * static_cast<int>(hn::Lanes(Words())) % group_size;
+  }
+
+  /// Computes what stays constant during the search for a patch.
+  void read_gradients(int i) {
+    const int x = left_ + i * stride_;
+    ProductSum xx;
+    ProductSum xy;
+    ProductSum yy;
+    ProductSum total_x;
+    ProductSum total_y;
+    const auto one = hn::Set(Words(), 1);
+    for (int vector = 0; vector < vectors(); ++vector) {
+      const int group = group_at(vector);
+      const int lane = lane_at(vector);
+      const auto slope_x = load_words(gradients_.x(), x, top_, group, lane);
+      const auto slope_y = load_words(gradients_.y(), x, top_, group, lane);
+      xx.add(slope_x, slope_x);
+      xy.add(slope_x, slope_y);
+      yy.add(slope_y, slope_y);
+      total_x.add(slope_x, one);
+      total_y.add(slope_y, one);
+    }
+    std::int32_t totals[8];
+    store_totals(xx, xy, yy, yy, totals);
+    store_totals(total_x, total_y, total_x, total_y, totals + 4);
+    const double determinant =
+        std::max(min_determinant, static_cast<double>(std::int64_t{totals[0]} * totals[2] -
+                                                      std::int64_t{totals[1]} * totals[1]));
+    inverse_xx_[i] = static_cast<float>(totals[2] / determinant);
+    inverse_xy_[i] = static_cast<float>(-totals[1] / determinant);
+    inverse_yy_[i] = static_cast<float>(totals[0] / determinant);
+    mean_x_[i] = static_cast<float>(totals[4]) / pixels;
+    mean_y_[i] = static_cast<float>(totals[5]) / pixels;
+  }
+
+  /// Differences of eight pixels of a patch from the four pixels of a cell.
+  HWY_INLINE void subtract(int x, int to_x, int to_y, int group, int lane, Word* d) const {
+    const auto here = load_bytes(from_, x, top_, group, lane);
+    d[0] = hn::Sub(load_bytes(to_, to_x, to_y, group, lane), here);
+    d[1] = hn::Sub(load_bytes(to_, to_x + 1, to_y, group, lane), here);
+    d[2] = hn::Sub(load_bytes(to_, to_x, to_y + 1, group, lane), here);
+    d[3] = hn::Sub(load_bytes(to_, to_x + 1, to_y + 1, group, lane), here);
+  }
+
+  /// Computes the sums at the four pixels of a patch's cell, of the differences d0 ... d3 and their
+  /// products.
+  void read_cell(int i) {
+    const int x = left_ + i * stride_;
+    const int to_x = static_cast<int>(cell_x_[i]);
+    const int to_y = static_cast<int>(cell_y_[i]);
+    std::int32_t totals[max_sums];
+    {
+      ProductSum squares[4];
+      ProductSum products[6];
+      for (int vector = 0; vector < vectors(); ++vector) {
+        const int group = group_at(vector);
+        const int lane = lane_at(vector);
+        Word d[4];
+        subtract(x, to_x, to_y, group, lane, d);
+        for (int k = 0; k < 4; ++k) squares[k].add(d[k], d[k]);
+        products[0].add(d[0], d[1]);
+        products[1].add(d[0], d[2]);
+        products[2].add(d[0], d[3]);
+        products[3].add(d[1], d[2]);
+        products[4].add(d[1], d[3]);
+        products[5].add(d[2], d[3]);
+      }
+      store_totals(squares[0], squares[1], squares[2], squares[3], totals);
+      store_totals(products[0], products[1], products[2], products[3], totals + 4);
+      store_totals(products[4], products[5], products[4], products[5], totals + 8);
+    }
+    ProductSum plain[4];
+    ProductSum along_x[4];
+    ProductSum along_y[4];
+    const auto one = hn::Set(Words(), 1);
+    for (int vector = 0; vector < vectors(); ++vector) {
+      const int group = group_at(vector);
+      const int lane = lane_at(vector);
+      Word d[4];
+      subtract(x, to_x, to_y, group, lane, d);
+      const auto slope_x = load_words(gradients_.x(), x, top_, group, lane);
+      const auto slope_y = load_words(gradients_.y(), x, top_, group, lane);
+      for (int k = 0; k < 4; ++k) {
+        plain[k].add(d[k], one);
+        along_x[k].add(d[k], slope_x);
+        along_y[k].add(d[k], slope_y);
+      }
+    }
+    store_totals(plain[0], plain[1], plain[2], plain[3], totals + sum);
+    store_totals(along_x[0], along_x[1], along_x[2], along_x[3], totals + sum_x);
+    store_totals(along_y[0], along_y[1], along_y[2], along_y[3], totals + sum_y);
+    for (int k = 0; k < max_sums; ++k) sums_[k][i] = static_cast<float>(totals[k]);
+  }
+
+  /// Stores where patches are, and queues those that entered another cell.
+  template <class Mask>
+  void locate(int i, Mask active, Vector flow_x, Vector flow_y) {
+    const Floats floats;
+    const auto clamped = [&](Vector place, int size) {
+      return hn::Min(hn::Max(place, hn::Set(floats, float{1 - side})),
+                     hn::Set(floats, static_cast<float>(size - 1)));
+    };
+    const auto x = clamped(hn::Add(hn::Load(floats, left_of_ + i), flow_x), to_.width());
+    const auto y =
+        clamped(hn::Add(hn::Set(floats, static_cast<float>(top_)), flow_y), to_.height());
+    const auto cell_x = hn::Floor(x);
+    const auto cell_y = hn::Floor(y);
+    const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
+                                              hn::Ne(cell_y, hn::Load(floats, cell_y_ + i))));
+    hn::Store(cell_x, floats, cell_x_ + i);
+    hn::Store(cell_y, floats, cell_y_ + i);
+    hn::Store(hn::Sub(x, cell_x), floats, right_ + i);
+    hn::Store(hn::Sub(y, cell_y), floats, down_ + i);
+    hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(floats, moved, bytes);
+    for (unsigned bits = bytes[0] | bytes[1] << 8U; bits != 0; bits &= bits - 1)
+      moved_[moved_count_++] = static_cast<std::int16_t>(i + std::countr_zero(bits));
+  }
+
+  /// Moves a vector of patches by a step, and stops those whose error has not decreased.
+  template <class Mask>
+  void descend(int i, Mask active) {
+    const Floats floats;
+    const auto load = [&](const float* values) { return hn::Load(floats, values + i); };
+    const auto total = [&](int k) { return load(sums_[k]); };
+    const auto right = load(right_);
+    const auto down = load(down_);
+    const auto one = hn::Set(floats, 1.0F);
+    const auto two = hn::Set(floats, 2.0F);
+    const auto left = hn::Sub(one, right);
+    const auto up = hn::Sub(one, down);
+    const auto w0 = hn::Mul(up, left);
+    const auto w1 = hn::Mul(up, right);
+    const auto w2 = hn::Mul(down, left);
+    const auto w3 = hn::Mul(down, right);
+    const auto weighted = [&](int k) {
+      return hn::Add(hn::Add(hn::Mul(w0, total(k)), hn::Mul(w1, total(k + 1))),
+                     hn::Add(hn::Mul(w2, total(k + 2)), hn::Mul(w3, total(k + 3))));
+    };
+    const auto all = weighted(sum);
+    const auto along_x = hn::Sub(weighted(sum_x), hn::Mul(all, load(mean_x_)));
+    const auto along_y = hn::Sub(weighted(sum_y), hn::Mul(all, load(mean_y_)));
+    const auto cross0 =
+        hn::Add(hn::Add(hn::Mul(w1, total(4)), hn::Mul(w2, total(5))), hn::Mul(w3, total(6)));
+    const auto cross1 = hn::Add(hn::Mul(w2, total(7)), hn::Mul(w3, total(8)));
+    const auto cross2 = hn::Mul(w3, total(9));
+    const auto part = [&](Vector weight, int square, Vector cross) {
+      return hn::Mul(weight, hn::Add(hn::Mul(weight, total(square)), hn::Mul(two, cross)));
+    };
+    auto error = hn::Add(hn::Add(part(w0, 0, cross0), part(w1, 1, cross1)),
+                         hn::Add(part(w2, 2, cross2), hn::Mul(w3, hn::Mul(w3, total(3)))));
+    error = hn::Sub(error, hn::Mul(all, hn::Mul(all, hn::Set(floats, 1 / pixels))));
+
+    const auto xx = load(inverse_xx_);
+    const auto xy = load(inverse_xy_);
+    const auto yy = load(inverse_yy_);
+    const auto step_x = hn::Add(hn::Mul(xx, along_x), hn::Mul(xy, along_y));
+    const auto step_y = hn::Add(hn::Mul(xy, along_x), hn::Mul(yy, along_y));
+    const auto old_x = load(flow_x_);
+    const auto old_y = load(flow_y_);
+    const auto flow_x = hn::IfThenElse(active, hn::Sub(old_x, step_x), old_x);
+    const auto flow_y = hn::IfThenElse(active, hn::Sub(old_y, step_y), old_y);
+    hn::Store(flow_x, floats, flow_x_ + i);
+    hn::Store(flow_y, floats, flow_y_ + i);
+    const auto goes_on = hn::And(active, hn::Lt(error, load(previous_)));
+    hn::Store(error, floats, previous_ + i);
+    locate(i, goes_on, flow_x, flow_y);
+  }
+
+  // Indices of sums: the squares of d0 ... d3; d0 with d1, d2, d3, d1 with d2, d3, d2 with d3; and
+  // d0 ... d3, alone and times each gradient.
+  static constexpr int sum = 12;
+  static constexpr int sum_x = 16;
+  static constexpr int sum_y = 20;
+  static constexpr int max_sums = 24;
+
+  const Image<std::uint8_t>& from_;
+  const Gradients& gradients_;
+  const Image<std::uint8_t>& to_;
+  int top_;
+  int left_;
+  int stride_;
+  int count_;
+  int moved_count_ = 0;
+  std::int16_t moved_[capacity];
+  HWY_ALIGN float left_of_[capacity];
+  HWY_ALIGN float start_x_[capacity];
+  HWY_ALIGN float start_y_[capacity];
+  HWY_ALIGN float flow_x_[capacity];
+  HWY_ALIGN float flow_y_[capacity];
+  HWY_ALIGN float cell_x_[capacity];
+  HWY_ALIGN float cell_y_[capacity];
+  HWY_ALIGN float right_[capacity];
+  HWY_ALIGN float down_[capacity];
+  HWY_ALIGN float active_[capacity];
+  HWY_ALIGN float previous_[capacity];
+  HWY_ALIGN float inverse_xx_[capacity];
+  HWY_ALIGN float inverse_xy_[capacity];
+  HWY_ALIGN float inverse_yy_[capacity];
+  HWY_ALIGN float mean_x_[capacity];
+  HWY_ALIGN float mean_y_[capacity];
+  HWY_ALIGN float sums_[max_sums][capacity];
+};
+
+template <int side>
+void search(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
+            const Image<std::uint8_t>& to, int row, int iterations, Flow* flows) {
+  for (int first = 0; first < grid.columns; first += Search<side>::capacity) {
+    const int count = std::min(grid.columns - first, Search<side>::capacity);
+    Search<side> patches(grid, from, gradients, to, row, first, count, flows + first);
+    patches.run(iterations);
+    patches.store(flows + first);
+  }
+}
+
+void search_one_row(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                    const Gradients& gradients, const Image<std::uint8_t>& to, int row,
+                    int iterations, Flow* flows) {
+  if (grid.side == 4)
+    search<4>(grid, from, gradients, to, row, iterations, flows);
+  else
+    search<8>(grid, from, gradients, to, row, iterations, flows);
+}
+
+/// Weighted sums over the patches that cover the pixels of a row.
+struct SumRow {
+  float* x;
+  float* y;
+  float* weight;
+};
+
+/// Adds pixels [x, x + width) of row y of a patch with this flow.
+template <int side>
+HWY_INLINE void add_patch_row(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int x,
+                              int y, int width, const Flow& flow, const SumRow& sums) {
+  const hn::CappedTag<float, side> floats;
+  const hn::RebindToSigned<decltype(floats)> ints;
+  const hn::Rebind<std::uint8_t, decltype(floats)> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  // Past these limits, all pixels would be replicated ones.
+  const float to_x = std::clamp(static_cast<float>(x) + flow.x, static_cast<float>(-width),
+                                static_cast<float>(to.width()));
+  const float to_y =
+      std::clamp(static_cast<float>(y) + flow.y, -1.0F, static_cast<float>(to.height()));
+  const int left = static_cast<int>(std::floor(to_x));
+  const int top = static_cast<int>(std::floor(to_y));
+  const auto right = hn::Set(floats, to_x - static_cast<float>(left));
+  const auto down = hn::Set(floats, to_y - static_cast<float>(top));
+  const auto flow_x = hn::Set(floats, flow.x);
+  const auto flow_y = hn::Set(floats, flow.y);
+  const auto one = hn::Set(floats, 1.0F);
+  const auto between = [](auto a, auto b, auto weight) {
+    return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
+  };
+  for (int k = 0; k < width; k += lanes) {
+    const auto load = [&](const std::uint8_t* pixels) {
+      return hn::ConvertTo(floats, hn::PromoteTo(ints, hn::LoadU(bytes, pixels + k)));
+    };
+    const auto along = [&](int row) {
+      const std::uint8_t* pixels = to.row(row) + left;
+      return between(load(pixels), load(pixels + 1), right);
+    };
+    const auto there = between(along(top), along(top + 1), down);
+    const auto difference = hn::Abs(hn::Sub(there, load(from.row(y) + x)));
+    const auto weight = hn::Div(one, hn::Max(one, difference));
+    const auto add = [&](float* sum, auto value) {
+      hn::StoreU(hn::Add(hn::LoadU(floats, sum + x + k), value), floats, sum + x + k);
+    };
+    add(sums.x, hn::Mul(weight, flow_x));
+    add(sums.y, hn::Mul(weight, flow_y));
+    add(sums.weight, weight);
+  }
+}
+
+/// Divides sums by weights.
+void divide_row(const SumRow& sums, int y, SplitPlane& flow_x, SplitPlane& flow_y) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  for (int k = 0; k < flow_x.count(0); k += lanes) {
+    const auto load = [&](const float* row, Vector* values) {
+      hn::LoadInterleaved2(floats, row + std::ptrdiff_t{2} * k, values[0], values[1]);
+    };
+    Vector x[2];
+    Vector y_[2];
+    Vector weight[2];
+    load(sums.x, x);
+    load(sums.y, y_);
+    load(sums.weight, weight);
+    for (int parity = 0; parity < 2; ++parity) {
+      hn::StoreU(hn::Div(x[parity], weight[parity]), floats, flow_x.row(parity, y) + k);
+      hn::StoreU(hn::Div(y_[parity], weight[parity]), floats, flow_y.row(parity, y) + k);
+    }
+  }
+}
+
+template <int side>
+void spread(const PatchGrid& grid, const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
+            const Image<Flow>& flows, int first, int last, float* sums, int padded_width,
+            SplitPlane& x, SplitPlane& y) {
+  const auto sums_of = [&](int row) -> SumRow {
+    float* values = sums + std::ptrdiff_t{row - first} * 3 * padded_width;
+    return {values, values + padded_width, values + std::ptrdiff_t{2} * padded_width};
+  };
+  const int width = from.width();
+  for (int row = first; row < last; ++row) {
+    const SumRow sum = sums_of(row);
+    std::fill_n(sum.x, 2 * padded_width + width, 0.0F);
+    std::fill(sum.weight + width, sum.weight + padded_width, 1.0F);
+  }
+  const int first_patches = std::clamp((first - side) / grid.stride, 0, grid.rows - 1);
+  for (int j = first_patches; j < grid.rows && j * grid.stride < last; ++j) {
+    const int top = std::max(first, j * grid.stride);
+    const int bottom = std::min(last, j == grid.rows - 1 ? last : j * grid.stride + side);
+    for (int i = 0; i < grid.columns; ++i) {
+      const int left = i * grid.stride;
+      const int covered = i == grid.columns - 1 ? width - left : side;
+      for (int row = top; row < bottom; ++row)
+        add_patch_row<side>(from, to, left, row, covered, flows.at(i, j), sums_of(row));
+    }
+  }
+  for (int row = first; row < last; ++row) divide_row(sums_of(row), row, x, y);
+}
+
+void spread_rows(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                 const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
+                 float* sums, int padded_width, SplitPlane& x, SplitPlane& y) {
+  if (grid.side == 4)
+    spread<4>(grid, from, to, flows, first, last, sums, padded_width, x, y);
+  else
+    spread<8>(grid, from, to, flows, first, last, sums, padded_width, x, y);
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(search_one_row);
+HWY_EXPORT(spread_rows);
+
+void search_row(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
+                const Image<std::uint8_t>& to, int row, int iterations, Flow* flows) {
+  HWY_DYNAMIC_DISPATCH(search_one_row)(grid, from, gradients, to, row, iterations, flows);
+}
+
+void spread_patches(const PatchGrid& grid, const Image<std::uint8_t>& from,
+                    const Image<std::uint8_t>& to, const Image<Flow>& flows, int first, int last,
+                    std::vector<float>& sums, SplitPlane& x, SplitPlane& y) {
+  const int padded_width = from.width() + 3 * row_padding;
+  float* rows = scratch_of(sums, std::size_t{3} * static_cast<std::size_t>(padded_width) *
+                                     static_cast<std::size_t>(last - first));
+  HWY_DYNAMIC_DISPATCH(spread_rows)
+  (grid, from, to, flows, first, last, rows, padded_width, x, y);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace eventcamera {
+
+/// Plane of floats that keeps the even and the odd columns of a row apart. The neighbours of every
+/// other pixel of a row are then contiguous, as red-black relaxation needs them.
+class SplitPlane {
+ public:
+  /// All 0.
+  SplitPlane(int width, int height)
+      : width_(width),
+        height_(height),
+        odd_((count(0) + 2 * padding) / padding * padding),
+        values_(static_cast<std::size_t>(2 * odd_ * height + padding)) {}
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  /// Number of columns of a parity.
+  int count(int parity) const { return (width_ + 1 - parity) / 2; }
+  /// Columns of a parity: column x at x / 2. One before the first and a vector past the last exist.
+  float* row(int parity, int y) { return values_.data() + start_of(parity, y); }
+  const float* row(int parity, int y) const { return values_.data() + start_of(parity, y); }
+  float at(int x, int y) const { return row(x & 1, y)[x / 2]; }
+
+  /// Makes the pixels beside row y equal to its first and last ones.
+  void replicate_ends(int y) {
+    row(1, y)[-1] = row(0, y)[0];
+    row(width_ & 1, y)[width_ / 2] = at(width_ - 1, y);
+  }
+  void clear_row(int y) { std::fill_n(row(0, y) - 1, 2 * odd_, 0.0F); }
+
+ private:
+  static constexpr int padding = 16;  ///< the longest vector
+
+  std::ptrdiff_t start_of(int parity, int y) const { return padding + (2 * y + parity) * odd_; }
+
+  int width_;
+  int height_;
+  std::ptrdiff_t odd_;  ///< from the even columns of a row to the odd ones
+  std::vector<float> values_;
+};
+
+/// Several values per pixel, split as in SplitPlane. They are interleaved in blocks, so that
+/// reading them all is reading one stream.
+template <int values>
+class SplitPlanes {
+ public:
+  static constexpr int block = 16;  ///< the longest vector
+
+  SplitPlanes(int width, int height)
+      : odd_(((width + 1) / 2 + block - 1) / block * block * values),
+        values_(static_cast<std::size_t>(2 * odd_ * height)) {}
+
+  float* row(int parity, int y) { return values_.data() + (2 * y + parity) * odd_; }
+  const float* row(int parity, int y) const { return values_.data() + (2 * y + parity) * odd_; }
+  /// Where the first of the values at k in a row is; the others follow `block` floats apart.
+  static std::ptrdiff_t at(int k) { return std::ptrdiff_t{k / block} * block * values + k % block; }
+
+ private:
+  std::ptrdiff_t odd_;
+  std::vector<float> values_;
+};
+
+}  // namespace eventcamera

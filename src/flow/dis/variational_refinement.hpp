@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "src/core/image.hpp"
+#include "src/core/thread_pool.hpp"
+#include "src/flow/dense_flow.hpp"
+#include "src/flow/dis/split_plane.hpp"
+
+namespace eventcamera {
+
+/// Refines a flow by minimising an energy (Brox et al., ECCV 2004): brightness and gradients stay
+/// constant along the flow, and the flow is smooth, all with robust penalties. The images are
+/// linearised once, at the given flow. Five times, the penalties are evaluated at the refined flow,
+/// and five rounds of red-black successive over-relaxation solve the resulting linear equations.
+///
+/// Threads compute bands of rows, and for each evaluation as many rows around them as affect them.
+class VariationalRefinement {
+ public:
+  /// Components of a flow field.
+  struct Field {
+    Field(int width, int height) : x(width, height), y(width, height) {}
+    SplitPlane x;
+    SplitPlane y;
+  };
+
+  /// Brightness constancy and that of both gradients, linearised: a x + b y + c = 0 for a step
+  /// (x, y), each scaled by the gradient it depends on. a, b and c of each.
+  using Constraints = SplitPlanes<3 * 3>;
+
+  /// Equations of a pixel: its step in x is inverse_x (constant_x - cross y + what the neighbours
+  /// add), and likewise in y.
+  enum { cross, inverse_x, inverse_y, constant_x, constant_y, max_coefficients };
+
+  /// Rows that a thread is working on; row y is at y % rows.
+  struct Scratch {
+    static constexpr int rows = 16;
+
+    explicit Scratch(int width)
+        : step(width, rows),
+          total(width, rows),
+          right(width, rows),
+          down(width, rows),
+          equations(width, rows),
+          mean(width, rows),
+          change(width, rows),
+          slope(width, rows) {}
+
+    Field step;
+    Field total;       ///< the flow plus the step
+    SplitPlane right;  ///< how much a pixel and the one to the right pull at each other
+    SplitPlane down;
+    SplitPlanes<max_coefficients> equations;
+
+    // Of the images.
+    SplitPlane mean;
+    SplitPlane change;
+    Field slope;
+  };
+
+  VariationalRefinement(int width, int height);
+
+  int width() const { return flow_.x.width(); }
+  int height() const { return flow_.x.height(); }
+  /// The flow to refine.
+  Field& start() { return flow_; }
+  void run(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, ThreadPool& threads);
+  /// The refined flow at a pixel.
+  Flow at(int x, int y) const {
+    return {flow_.x.at(x, y) + steps_[0].x.at(x, y), flow_.y.at(x, y) + steps_[0].y.at(x, y)};
+  }
+  /// The refined flow of a row. Up to 32 elements past the end of `out` are written.
+  void row(int y, Flow* out) const;
+
+ private:
+  Field flow_;
+  std::array<Field, 2> steps_;  ///< from flow_ to the refined flow: the current one, the next one
+  Constraints constraints_;
+  std::vector<Scratch> scratch_;
+};
+
+}  // namespace eventcamera
