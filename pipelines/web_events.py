@@ -57,6 +57,8 @@ class Viewer:
         self._capture = capture
         self._need_key_frame = need_key_frame
         self._end = end
+        self._has_offered = False
+        self._has_left = False
         self._pipeline = Gst.parse_launch(SEND)
         self._webrtc = self._pipeline.get_by_name("webrtc")
         self._encoded = self._pipeline.get_by_name("encoded")
@@ -88,9 +90,17 @@ class Viewer:
         def created(promise):
             reply = promise.get_reply()  # owns the offer
             if reply and reply.has_field("offer"):
+                # By default libnice asks the router to forward ports.
+                for sink in webrtc.iterate_all_by_element_factory_name("nicesink"):
+                    sink.get_property("agent").set_property("upnp", False)
                 offer = reply.get_value("offer")
-                webrtc.emit("set-local-description", offer, None)
+                webrtc.emit("set-local-description", offer, Gst.Promise.new_with_change_func(offered))
                 self.send(offer=offer.sdp.as_text())
+            else:
+                GLib.idle_add(self._offered)
+
+        def offered(_):
+            GLib.idle_add(self._offered)
 
         webrtc.emit("create-offer", None, Gst.Promise.new_with_change_func(created))
 
@@ -149,9 +159,21 @@ class Viewer:
 
     def _fail(self, _, message):
         print(f"A viewer is disconnected: {message.parse_error()[0].message}", file=sys.stderr)
+        self._offered()
         self.close()
 
+    def _offered(self):
+        if self._has_left and not self._has_offered:
+            self._leave()
+        self._has_offered = True
+
     def _closed(self, _):
+        self._has_left = True
+        # webrtcbin 1.22 that is stopped while it sets its offer does not close its sockets.
+        if self._has_offered:
+            self._leave()
+
+    def _leave(self):
         self.stop()
         self._end(self)
 

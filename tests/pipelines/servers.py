@@ -21,6 +21,10 @@ class ServerProcess:
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self._errors, text=True,
                                         env={**os.environ, "G_DEBUG": "fatal-criticals"})
         self.address = self.process.stdout.readline()
+        if not self.address:
+            self.process.kill()
+            self._errors.seek(0)
+            raise RuntimeError(f"{command} does not start: {self._errors.read()}")
 
     def descriptors(self):
         return len(os.listdir(f"/proc/{self.process.pid}/fd"))
