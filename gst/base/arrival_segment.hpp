@@ -13,14 +13,14 @@ class ArrivalSegment {
   /// Follows changes of the mapping by more than `max_drift`.
   explicit ArrivalSegment(GstClockTimeDiff max_drift) : max_drift_(max_drift) {}
 
-  /// True if it goes on at `start`, which arrived at this running time, if that is known.
+  /// True if it goes on at `start`, which arrived at this running time; if that is not known,
+  /// `start` must not be earlier than what was received before.
   bool continues(GstClockTime start, GstClockTime arrival) const {
-    if (!segment_ || start < segment_->start ||
-        GST_CLOCK_DIFF(start, segment_->position) > max_drift_)
-      return false;
+    if (!segment_ || start < segment_->start) return false;
+    if (!GST_CLOCK_TIME_IS_VALID(arrival))
+      return GST_CLOCK_DIFF(start, segment_->position) <= max_drift_;
     const auto mapped = gst_segment_to_running_time(&*segment_, GST_FORMAT_TIME, start);
-    return !GST_CLOCK_TIME_IS_VALID(arrival) ||
-           std::abs(GST_CLOCK_DIFF(mapped, arrival)) <= max_drift_;
+    return std::abs(GST_CLOCK_DIFF(mapped, arrival)) <= max_drift_;
   }
 
   /// Pushes a segment from `start`, which arrived at this running time; if that is not known, it

@@ -571,6 +571,17 @@ TEST(RtpEventDepay, ContinuesWithoutArrivalTimesWhenItsSenderStartsOver) {
   EXPECT_EQ(output.segments[1].base, 2010 * ms);
 }
 
+TEST(RtpEventDepay, ContinuesWhereIntervalsOverlap) {
+  std::vector<Interval> intervals;
+  for (Nanoseconds start = 0; start < 100'000'000; start += 10'000'000)
+    intervals.push_back({start, 20'000'000, {Event::at(1, 2, 500, Polarity::on)}});
+  const auto packets = packets_of(intervals);
+  ASSERT_EQ(packets.size(), intervals.size());
+  Depayloader h;
+  for (std::size_t i = 0; i < packets.size(); ++i) h.take(packets[i].get(), i * 10 * ms);
+  EXPECT_EQ(Output(h).segments.size(), 1U);
+}
+
 TEST(RtpEventDepay, CountsOnWithAnotherSensor) {
   Harness pay("rtpeventpay max-latency=0");
   pay.caps(davis_caps, "application/x-rtp");
