@@ -37,6 +37,7 @@ static GstGLEventSimulatorPrivate& priv_of(gpointer self) {
 /// What to do without OpenGL: the element on the CPU has the same name without "gl".
 static std::string advice_of(gpointer self) {
   const auto* factory = gst_element_get_factory(GST_ELEMENT(self));
+  if (factory == nullptr) return " Use the element that runs on the CPU.";
   return std::string(" Use ") + (GST_OBJECT_NAME(factory) + 2) + ", which runs on the CPU.";
 }
 
@@ -278,11 +279,15 @@ class TextureVideoSimulator final : public VideoSimulator {
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 
  private:
-  /// Runs `work` in the context; turns errors of OpenGL into messages.
+  /// Runs `work` in the context, which others use, too; turns errors of OpenGL into messages.
   template <class Work>
   void run(const Work& work) {
     try {
-      run_in(context_, work);
+      run_in(context_, [&] {
+        if (gl_) gl_->forget_errors();
+        work();
+        gst_gl_context_clear_shader(context_);
+      });
     } catch (const eventcamera::gl::Error& error) {
       gint major = 0;
       gint minor = 0;

@@ -45,6 +45,12 @@ Context::Context(const Load& load) {
   GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_buffer_size_);
 }
 
+void Context::forget_errors() const {
+  constexpr int most = 8;  // a lost context has no end of them
+  for (int i = 0; i < most && GetError() != GL_NO_ERROR; ++i) {
+  }
+}
+
 void Context::check() const {
   constexpr GLenum context_lost = 0x0507;
   const bool is_reset = get_reset_status_ != nullptr && get_reset_status_() != GL_NO_ERROR;

@@ -76,6 +76,9 @@ class Context {
     return max_buffer_size_;
   }
 
+  /// Forgets that OpenGL calls failed.
+  void forget_errors() const;
+
   /// Throws Error if the context is lost, or an OpenGL call failed since the last check.
   void check() const;
 
