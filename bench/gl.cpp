@@ -82,12 +82,13 @@ const Method methods[] = {
     {bench::diff_method, gl::make_diff_simulator, "gleventsim-diff"},
 };
 
-/// Time that the GPU works, by timer queries.
+/// Time on the GPU, by timer queries.
 class GpuTimer {
  public:
   GpuTimer() { gen_queries_(1, &query_); }
 
-  /// Milliseconds for which the GPU works on what `work` queues.
+  /// Milliseconds from the first to the last command of `work` on the GPU, including waits between
+  /// them.
   template <class Work>
   double time_of(const Work& work) const {
     constexpr GLenum time_elapsed = 0x88BF;

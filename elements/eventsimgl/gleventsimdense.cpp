@@ -5,8 +5,9 @@
  * @short_description: events from frames interpolated with dense optical flow, on the GPU
  *
  * #GstEventSimDense for video in OpenGL textures, with compute shaders. The events are the same
- * given the same flow; flow differs at most in the last bits of floating-point numbers, and near
- * the border of a region of interest. Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen.
+ * given the same flow. Flow differs in the last bits of floating-point numbers, and more where the
+ * CPU computes it only around the pixels that changed, with another pyramid and other borders.
+ * Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen.
  *
  * ## Example launch line
  * |[

@@ -9,7 +9,8 @@
 namespace eventcamera::gl {
 
 /// As eventcamera::DenseSimulator, with Farneback's flow. Given the same flow, the events are the
-/// same; flow may differ in the last bits of floating-point numbers.
+/// same. Flow is computed for the whole frame, so where the CPU computes it only around the pixels
+/// that changed, pyramid and borders differ; elsewhere the last bits of floating-point numbers.
 class DenseSimulator : public Simulator {
  public:
   void set_interpolation(Interpolation interpolation) { interpolation_ = interpolation; }
