@@ -16,9 +16,9 @@ struct Flow {
 
 /// Dense-flow algorithms.
 enum class FlowMethod {
-  dis_lq,      ///< DIS, low quality and fast: patches of 4, overlap 0.05, 8 iterations, 3 scales
-  dis_hq,      ///< DIS, high quality: patches of 8, overlap 0.4, 32 iterations
-  farneback,   ///< Farneback: 3 levels, window 15, 3 iterations, polynomials of 5 pixels
+  dis_lq,      ///< DIS, low quality and fast: patches of 4 at strides of 3, 8 iterations, 3 scales
+  dis_hq,      ///< DIS, high quality: patches of 8 at strides of 4, 32 iterations
+  farneback,   ///< Farneback: up to 4 levels, window 15, 3 iterations, polynomials of 5 pixels
   opencv_dis,  ///< OpenCV's DIS with the parameters of dis_hq
 };
 

@@ -19,7 +19,8 @@ int rounds(int rows) {
 }
 
 /// Number of times the image is halved for the coarsest level: on it, the largest displacement that
-/// is searched for, a quarter of the longer side, is one patch.
+/// is searched for, a quarter of the longer side, is about one patch; at most until the shorter
+/// side is one patch.
 int coarsest_scale(int width, int height, int patch) {
   const auto [shorter, longer] = std::minmax({width, height});
   return std::min(static_cast<int>(std::lround(std::log2(longer / (4.0 * patch)))),

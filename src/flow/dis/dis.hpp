@@ -18,7 +18,7 @@ class DisFlow final : public DenseFlow {
  public:
   struct Quality {
     int patch;   ///< side, 4 or 8 pixels
-    int stride;  ///< patch * (1 - overlap)
+    int stride;  ///< patch * (1 - overlap), rounded down
     int iterations;
     int scales;  ///< number of pyramid levels; 0 = from the coarsest to half the size
   };

@@ -10,8 +10,8 @@
 
 namespace eventcamera {
 
-/// Overlapping square patches of an image, in rows and columns. The last ones of each end at or
-/// before the border.
+/// Overlapping square patches of an image, in rows and columns. The last row and
+/// column end at or before the border.
 struct PatchGrid {
   PatchGrid(int width, int height, int side_, int stride_)
       : side(side_),

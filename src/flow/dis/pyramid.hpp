@@ -15,7 +15,7 @@ class AreaShrink {
 
   int width() const { return columns_.size(); }
   int height() const { return rows_.size(); }
-  /// Writes row y to `out`, which must have a vector of padding past its end. `sums` is scratch.
+  /// Writes row y to `out`. `sums` is scratch.
   void row(const ImageView<std::uint8_t>& picture, int y, std::vector<float>& sums,
            std::uint8_t* out) const;
 
@@ -55,8 +55,8 @@ class PyramidPicture {
   Image<std::uint8_t> grey_;
 };
 
-/// Gradients of an image, as by the Sobel operator: eight times the slope in grey levels per pixel,
-/// 0 across the border.
+/// Gradients of an image, as by the Sobel operator: eight times the slope in grey levels per pixel;
+/// the slope across a border is 0.
 class Gradients {
  public:
   Gradients(int width, int height) : x_(width, height), y_(width, height) {}

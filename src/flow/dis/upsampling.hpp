@@ -10,7 +10,8 @@ namespace eventcamera {
 /// `row`, with weight 0; writes up to a vector past the end of `out`.
 void widen_flow(const Flow* row, const Resampling& columns, float factor, Flow* out);
 
-/// Interpolates between two rows; `weight` is that of the lower one.
+/// Interpolates between two rows; `weight` is that of the lower one. Reads and writes up to a
+/// vector past the ends.
 void blend_flows(const Flow* upper, const Flow* lower, float weight, int width, Flow* out);
 
 }  // namespace eventcamera
