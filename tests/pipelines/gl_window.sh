@@ -33,11 +33,11 @@ for element in frame sparse diff; do
   # The last picture stays in the window.
   mkfifo video
   # shellcheck disable=SC2086
-  "$GST_LAUNCH" -q filesrc location=video blocksize=$((width * height * 3 / 2)) ! $of_frames ! glupload ! gleventsim-$element qos=false ! \
+  timeout 120 "$GST_LAUNCH" -q filesrc location=video blocksize=$((width * height * 3 / 2)) ! $of_frames ! glupload ! gleventsim-$element qos=false ! \
     glimagesink sync=false >output 2>&1 &
   player=$!
-  exec 4>video
-  cat frames >&4
+  exec 4<>video # also opens if the player has failed
+  timeout 60 cat frames >&4 || fail "$(cat output)"
   shown=false
   for _ in $(seq 40); do
     sleep 0.25

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Another application reads the virtual camera through PipeWire.
 set -eu
-if [ -z "${SESSION:-}" ]; then exec env SESSION=1 dbus-run-session -- "$0"; fi
+if [ -z "${EVENTSIM_TEST_SESSION:-}" ]; then exec env EVENTSIM_TEST_SESSION=1 dbus-run-session -- "$0"; fi
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
 export XDG_RUNTIME_DIR=$work/run HOME=$work XDG_CONFIG_HOME=$work/config XDG_STATE_HOME=$work/state
@@ -10,7 +10,7 @@ mkdir -m 700 run
 started=()
 trap 'kill "${started[@]}" 2>/dev/null || true; wait; rm -rf "$work"' EXIT
 wait_for() { # COMMAND...
-  for _ in $(seq 100); do
+  for _ in $(seq 600); do
     if "$@" >/dev/null 2>&1; then return; fi
     sleep 0.1
   done
@@ -21,6 +21,8 @@ start() { # PROGRAM ARGUMENT...
   "$@" >"$(basename "$1").log" 2>&1 &
   started+=($!)
 }
+unset G_DEBUG # warnings of daemons about the machine do not matter
+export MESON_DEVENV=1
 start pipewire
 wait_for test -S run/pipewire-0
 start wireplumber
