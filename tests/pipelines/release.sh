@@ -7,6 +7,8 @@ if ! git -C "$SOURCE" rev-parse -q --verify HEAD >/dev/null 2>&1; then
   exit 77
 fi
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
+export GIT_CONFIG_GLOBAL=$work/git.config GIT_CONFIG_SYSTEM=/dev/null
+git config --global safe.directory "*"
 export GIT_AUTHOR_NAME=Test GIT_AUTHOR_EMAIL=test@localhost GIT_COMMITTER_NAME=Test GIT_COMMITTER_EMAIL=test@localhost
 git clone -q "$SOURCE" clone
 cp "$SOURCE/release" clone/
