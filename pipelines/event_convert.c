@@ -342,7 +342,7 @@ static void print_left_out(GstElement* pipeline) {
       g_string_append_printf(text, "%s%" G_GUINT64_FORMAT " %s", text->len > 0 ? ", " : "",
                              of_in - of_out, kinds[i].name);
   }
-  if (text->len > 0) PRINT_ERROR("%sleft out: %s\n", isatty(STDERR_FILENO) ? "\n" : "", text->str);
+  if (text->len > 0) PRINT_ERROR("left out: %s\n", text->str);
   g_string_free(text, TRUE);
   gst_structure_free(written);
   gst_structure_free(read);

@@ -18,6 +18,7 @@ fail() {
 if ! compgen -G "$packages/*.changes" >/dev/null; then
   echo "Building the packages"
   tree=$packages/gst-eventsim
+  rm -rf "$tree"
   mkdir "$tree"
   git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents -t "$tree"
   (cd "$tree" && dpkg-buildpackage --no-sign) >"$packages/build.log" 2>&1 || {
@@ -29,11 +30,12 @@ fi
 lintian --fail-on error --no-tag-display-limit "$packages"/*.changes
 
 # The same packages with a higher version.
+version=$(dpkg-parsechangelog -S Version)
 mkdir "$scratch/new"
 for package in "$packages"/*.deb; do
   if [[ $package == *-dbgsym_* ]]; then continue; fi
   dpkg-deb -R "$package" "$scratch/unpacked"
-  sed -i -E '/^(Version|Depends|Recommends):/s/\b0\.[0-9]+\.[0-9]+\b/&+new/g' "$scratch/unpacked/DEBIAN/control"
+  sed -i -E "/^(Version|Depends|Recommends):/s/(Version: |= )$version\\b/&+new/g" "$scratch/unpacked/DEBIAN/control"
   dpkg-deb --root-owner-group -b "$scratch/unpacked" "$scratch/new" >/dev/null
   rm -rf "$scratch/unpacked"
 done

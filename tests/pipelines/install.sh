@@ -25,14 +25,15 @@ while IFS= read -r file; do
     echo "FAILED: $file is in these packages: ${packages[*]}"
     exit 1
   }
-done < <(cd "$root" && find * -type f -o -type l)
+done < <(cd "$root" && find * -path usr/share/doc -prune -o \( -type f -o -type l \) -print)
 
 library=$(dirname "$(find "$root" -name libgsteventcamera-1.0.so)")
 plugins=$library/gstreamer-1.0
 # Debian's GStreamer searches for plugins here.
 [ "${plugins#"$root"}" = "$(pkg-config --variable=pluginsdir gstreamer-1.0)" ]
 
-# The interface of the library is the one that packages rely on. Only a later version misses symbols.
+# The interface of the library is the one that packages rely on. dpkg-gensymbols
+# reports lost symbols only for a version later than theirs.
 mkdir -p "$root/debian/package/DEBIAN"
 cp "$SOURCE/debian/control" "$SOURCE/debian/changelog" "$root/debian/"
 (cd "$root" && dpkg-gensymbols -c4 -v999 -plibgsteventcamera-1.0-0 -Pdebian/package -Odebian/symbols \
