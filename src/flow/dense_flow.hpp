@@ -45,6 +45,6 @@ class DenseFlow {
   }
 };
 
-std::unique_ptr<DenseFlow> make_dense_flow(FlowMethod method, int width, int height);
+std::unique_ptr<DenseFlow> make_dense_flow(FlowMethod method);
 
 }  // namespace eventcamera

@@ -50,7 +50,7 @@ class OpenCvDisFlow final : public DenseFlow {
 
 }  // namespace
 
-std::unique_ptr<DenseFlow> make_dense_flow(FlowMethod method, int /*width*/, int /*height*/) {
+std::unique_ptr<DenseFlow> make_dense_flow(FlowMethod method) {
   switch (method) {
     case FlowMethod::dis_lq:
       return std::make_unique<DisFlow>(DisFlow::low);

@@ -55,7 +55,7 @@ ImageView<Flow> RegionOfInterestFlow::find(const ImageView<std::uint8_t>& from,
 ImageView<Flow> RegionOfInterestFlow::find_in_whole(const ImageView<std::uint8_t>& from,
                                                     const ImageView<std::uint8_t>& to,
                                                     ThreadPool& threads) {
-  if (!whole_) whole_ = make_dense_flow(method_, width_, height_);
+  if (!whole_) whole_ = make_dense_flow(method_);
   if (!whole_knows_last_) whole_->push(from, threads);
   whole_->push(to, threads);
   whole_knows_last_ = true;
@@ -65,11 +65,7 @@ ImageView<Flow> RegionOfInterestFlow::find_in_whole(const ImageView<std::uint8_t
 void RegionOfInterestFlow::find_in_part(const ImageView<std::uint8_t>& from,
                                         const ImageView<std::uint8_t>& to, const Box& part,
                                         ThreadPool& threads) {
-  if (!part_ || part_width_ != part.width() || part_height_ != part.height()) {
-    part_ = make_dense_flow(method_, part.width(), part.height());
-    part_width_ = part.width();
-    part_height_ = part.height();
-  }
+  if (!part_) part_ = make_dense_flow(method_);
   const auto found = part_->find(cut_out(from, part), cut_out(to, part), threads);
   clear();
   for (int y = 0; y < part.height(); ++y)

@@ -16,8 +16,8 @@ class RegionOfInterestFlow {
   /// scale.
   static constexpr int surroundings = 48;
 
-  /// Region sides are rounded up to multiples of this, so that regions of similar size share a
-  /// DenseFlow.
+  /// Region sides are rounded up to multiples of this, so that regions of similar size share the
+  /// memory of a DenseFlow.
   static constexpr int side_step = 64;
 
   /// For frames of this size.
@@ -44,8 +44,6 @@ class RegionOfInterestFlow {
   std::unique_ptr<DenseFlow> whole_;
   bool whole_knows_last_ = false;
   std::unique_ptr<DenseFlow> part_;
-  int part_width_ = 0;
-  int part_height_ = 0;
   Image<Flow> flow_;  ///< 0 outside filled_
   Box filled_;
 };

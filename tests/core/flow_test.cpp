@@ -31,7 +31,7 @@ INSTANTIATE_TEST_SUITE_P(, EveryFlow,
 TEST_P(EveryFlow, PointsFromTheEarlierFrameToTheLater) {
   const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(320, 240, 8, -3, 2);  // moves right and up
-  const auto finder = make_dense_flow(GetParam(), 320, 240);
+  const auto finder = make_dense_flow(GetParam());
   const auto flow = finder->find(from.view(), to.view(), threads);
   double x = 0;
   double y = 0;
@@ -50,7 +50,7 @@ TEST_P(EveryFlow, TakesPicturesOfAnySize) {
   for (const auto& [width, height] : {std::pair(1, 1), {1, 40}, {40, 1}, {13, 7}, {63, 65}}) {
     const auto from = scene::noise<std::uint8_t>(width, height, 8, 1);
     const auto to = scene::noise<std::uint8_t>(width, height, 8, 2);
-    const auto finder = make_dense_flow(GetParam(), width, height);
+    const auto finder = make_dense_flow(GetParam());
     const auto flow = finder->find(from.view(), to.view(), threads);
     EXPECT_EQ(flow.width, width);
     EXPECT_EQ(flow.height, height);
@@ -60,8 +60,8 @@ TEST_P(EveryFlow, TakesPicturesOfAnySize) {
 TEST_P(EveryFlow, DoesNotDependOnThreads) {
   const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(320, 240, 8, 2.3, 1.9);
-  const auto one = make_dense_flow(GetParam(), 320, 240);
-  const auto many = make_dense_flow(GetParam(), 320, 240);
+  const auto one = make_dense_flow(GetParam());
+  const auto many = make_dense_flow(GetParam());
   const auto a = one->find(from.view(), to.view(), threads);
   for (int count = 2; count <= cv::getNumberOfCPUs(); ++count) {
     threads.set_threads(count);
@@ -75,8 +75,8 @@ TEST_P(EveryFlow, KnowsThePicturesThatWerePushedBefore) {
   const auto first = scene::texture<std::uint8_t>(200, 150, 8, 0, 0);
   const auto second = scene::texture<std::uint8_t>(200, 150, 8, 1.4, 0.8);
   const auto third = scene::texture<std::uint8_t>(200, 150, 8, 2.5, -0.6);
-  const auto kept = make_dense_flow(GetParam(), 200, 150);
-  const auto fresh = make_dense_flow(GetParam(), 200, 150);
+  const auto kept = make_dense_flow(GetParam());
+  const auto fresh = make_dense_flow(GetParam());
   kept->find(first.view(), second.view(), threads);
   kept->push(third.view(), threads);
   const auto a = kept->flow(threads);
@@ -141,7 +141,7 @@ TEST_P(EveryFlow, OfChangesIsThatOfTheWholeWhereAllChanges) {
     const auto& to = *sequence[i];
     const auto flow = finder.find(from.view(), to.view(), i == 2 ? Box{} : all, threads);
     if (i == 2) continue;
-    const auto whole = make_dense_flow(GetParam(), 320, 240);
+    const auto whole = make_dense_flow(GetParam());
     const auto expected = whole->find(from.view(), to.view(), threads);
     for (int y = 0; y < 240; ++y)
       ASSERT_EQ(std::memcmp(flow.row(y), expected.row(y), 320 * sizeof(Flow)), 0) << i;

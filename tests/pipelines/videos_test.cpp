@@ -98,7 +98,7 @@ TEST(Dense, WarpsTheRightWayRound) {
   ThreadPool threads;
   threads.set_threads(0);
   for (const auto method : flows) {
-    const auto finder = make_dense_flow(method, 1280, 720);
+    const auto finder = make_dense_flow(method);
     double with_warp = 0;
     double without = 0;
     int pairs = 0;
@@ -246,7 +246,7 @@ TEST(Farneback, IsWhatOpenCvFinds) {
   if (!std::filesystem::exists(video(driving))) GTEST_SKIP() << "no " << video(driving);
   const auto frames = frames_of(video(driving), 8, 640, 480);
   ASSERT_EQ(frames.size(), 8U);
-  const auto finder = make_dense_flow(FlowMethod::farneback, 640, 480);
+  const auto finder = make_dense_flow(FlowMethod::farneback);
   ThreadPool threads;
   threads.set_threads(0);
   finder->push(frames[0].view(), threads);
@@ -426,7 +426,7 @@ TEST(Events, AreThoseOfTheFlowOfTheWhole) {
       RegionOfInterestFlow finder(method, 640, 360);
       const auto changed = reference::changed_box(last, now, 3);
       const auto part = finder.find(last.view(), now.view(), changed, threads);
-      const auto whole_finder = make_dense_flow(method, 640, 360);
+      const auto whole_finder = make_dense_flow(method);
       const auto whole = whole_finder->find(last.view(), now.view(), threads);
       part_error += square_error(warped(last, part), now);
       whole_error += square_error(warped(last, whole), now);
