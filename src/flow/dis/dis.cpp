@@ -6,8 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "src/flow/dis/upsampling.hpp"
-#include "src/flow/farneback/scratch.hpp"
+#include "src/flow/scratch.hpp"
 
 namespace eventcamera {
 namespace {
@@ -176,13 +175,13 @@ void DisFlow::widen(int first, int last, Scratch& scratch) {
     Flow* row = scratch_of(scratch.row, static_cast<std::size_t>(finest.width()) + 2 * row_padding);
     finest.row(y, row);
     row[finest.width()] = row[finest.width() - 1];
-    widen_flow(row, columns_, static_cast<float>(1 << finest_scale_), wide);
+    resample_row(row, columns_, static_cast<float>(1 << finest_scale_), wide);
     return wide;
   };
   for (int y = first; y < last; ++y) {
     const int upper = rows_.first()[y];
     const int lower = std::min(upper + 1, finest.height() - 1);
-    blend_flows(wide_row(upper), wide_row(lower), rows_.weight()[y], width_, flow_.row(y));
+    blend_rows(wide_row(upper), wide_row(lower), rows_.weight()[y], width_, flow_.row(y));
   }
 }
 

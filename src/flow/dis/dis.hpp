@@ -8,7 +8,7 @@
 #include "src/flow/dis/patches.hpp"
 #include "src/flow/dis/pyramid.hpp"
 #include "src/flow/dis/variational_refinement.hpp"
-#include "src/flow/farneback/pyramid.hpp"
+#include "src/flow/resampling.hpp"
 
 namespace eventcamera {
 

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <limits>
 
-#include "src/flow/farneback/scratch.hpp"
+#include "src/flow/scratch.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/dis/patches.cpp"
@@ -26,7 +26,7 @@ using Word = hn::Vec<Words>;
 constexpr int group_size = 8;
 
 /// One lane per patch.
-using Floats = hn::CappedTag<float, 16>;
+using Floats = hn::CappedTag<float, row_padding>;
 using Vector = hn::Vec<Floats>;
 
 /// Determinants of gradient matrices below this count as this.

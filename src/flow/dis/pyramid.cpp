@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "src/flow/farneback/scratch.hpp"
+#include "src/flow/scratch.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/dis/pyramid.cpp"
@@ -18,7 +18,7 @@ namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
 using Floats = hn::CappedTag<float, row_padding>;
-using Slopes = hn::CappedTag<std::int16_t, 16>;
+using Slopes = hn::CappedTag<std::int16_t, row_padding>;
 template <class Lanes>
 using BytesFor = hn::Rebind<std::uint8_t, Lanes>;
 
@@ -47,7 +47,7 @@ void add_row(const std::uint8_t* row, float weight, int width, float* out) {
 /// Means of 2x2 pixels, rounded up from a half.
 void halve_rows(const std::uint8_t* upper, const std::uint8_t* lower, int width,
                 std::uint8_t* out) {
-  const hn::CappedTag<std::uint16_t, 16> words;
+  const hn::CappedTag<std::uint16_t, row_padding> words;
   const hn::RebindToSigned<decltype(words)> signed_words;
   const BytesFor<decltype(words)> bytes;
   const int lanes = static_cast<int>(hn::Lanes(bytes));

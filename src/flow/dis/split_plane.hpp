@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "src/flow/scratch.hpp"
+
 namespace eventcamera {
 
 /// Plane of floats that keeps the even and the odd columns of a row apart. The neighbours of every
@@ -15,8 +17,8 @@ class SplitPlane {
   SplitPlane(int width, int height)
       : width_(width),
         height_(height),
-        odd_((count(0) + 2 * padding) / padding * padding),
-        values_(static_cast<std::size_t>(2 * odd_ * height + padding)) {}
+        odd_((count(0) + 2 * row_padding) / row_padding * row_padding),
+        values_(static_cast<std::size_t>(2 * odd_ * height + row_padding)) {}
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -35,9 +37,7 @@ class SplitPlane {
   void clear_row(int y) { std::fill_n(row(0, y) - 1, 2 * odd_, 0.0F); }
 
  private:
-  static constexpr int padding = 16;  ///< the longest vector
-
-  std::ptrdiff_t start_of(int parity, int y) const { return padding + (2 * y + parity) * odd_; }
+  std::ptrdiff_t start_of(int parity, int y) const { return row_padding + (2 * y + parity) * odd_; }
 
   int width_;
   int height_;
@@ -50,7 +50,7 @@ class SplitPlane {
 template <int values>
 class SplitPlanes {
  public:
-  static constexpr int block = 16;  ///< the longest vector
+  static constexpr int block = row_padding;
 
   SplitPlanes(int width, int height)
       : odd_(((width + 1) / 2 + block - 1) / block * block * values),

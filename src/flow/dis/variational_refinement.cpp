@@ -15,7 +15,7 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-using Floats = hn::CappedTag<float, 16>;
+using Floats = hn::CappedTag<float, row_padding>;
 using Vector = hn::Vec<Floats>;
 using Field = VariationalRefinement::Field;
 using Constraints = VariationalRefinement::Constraints;

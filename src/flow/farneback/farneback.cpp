@@ -5,7 +5,7 @@
 #include <cassert>
 #include <utility>
 
-#include "src/flow/farneback/scratch.hpp"
+#include "src/flow/scratch.hpp"
 
 namespace eventcamera {
 namespace {
@@ -143,14 +143,15 @@ void FarnebackFlow::start_rows(const Level* coarser, const Level& level, int las
     std::fill_n(out.row(out.first), (last - out.first) * out.stride, Flow{0, 0});
     return;
   }
-  const auto padded_width = 2 * static_cast<std::size_t>(coarser->flow.width() + row_padding);
-  float* between = scratch_of(scratch.coarser_row, padded_width);
+  const int width = coarser->flow.width();
+  Flow* row = scratch_of(scratch.coarser_row, static_cast<std::size_t>(width + row_padding));
   for (int y = out.first; y < last; ++y) {
     const int upper = level.rows.first()[y];
     const int lower = std::min(upper + 1, coarser->flow.height() - 1);
-    resample_pairs(&coarser->flow.row(upper)->x, &coarser->flow.row(lower)->x,
-                   level.rows.weight()[y], coarser->pyramid.width(), level.columns, 2, between,
-                   &out.row(y)->x);
+    blend_rows(coarser->flow.row(upper), coarser->flow.row(lower), level.rows.weight()[y], width,
+               row);
+    row[width] = row[width - 1];
+    resample_row(row, level.columns, 2, out.row(y));
   }
 }
 

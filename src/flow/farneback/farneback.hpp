@@ -8,6 +8,7 @@
 #include "src/flow/farneback/flow_update.hpp"
 #include "src/flow/farneback/polynomial_expansion.hpp"
 #include "src/flow/farneback/pyramid.hpp"
+#include "src/flow/resampling.hpp"
 
 namespace eventcamera {
 
@@ -40,7 +41,7 @@ class FarnebackFlow final : public DenseFlow {
     PyramidLevel::Scratch pyramid;
     std::array<std::vector<float>, 2 * PolynomialExpansion::reach + 1> rows;
     PolynomialExpansion::Scratch expansion;
-    std::vector<float> coarser_row;
+    std::vector<Flow> coarser_row;
     std::array<std::vector<Flow>, 2> flows;
     FlowUpdate::Scratch update;
   };

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "src/flow/farneback/scratch.hpp"
+#include "src/flow/scratch.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/flow_update.cpp"

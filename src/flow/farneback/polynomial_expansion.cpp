@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/flow/farneback/scratch.hpp"
+#include "src/flow/scratch.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/farneback/polynomial_expansion.cpp"

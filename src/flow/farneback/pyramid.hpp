@@ -5,35 +5,9 @@
 #include <vector>
 
 #include "src/core/image.hpp"
+#include "src/flow/resampling.hpp"
 
 namespace eventcamera {
-
-/// Maps the pixels of a row to positions on a row of another length and the same extent: between
-/// two of its pixels, or on its first or last one.
-class Resampling {
- public:
-  Resampling() = default;
-  Resampling(int from, int to);
-
-  int size() const { return size_; }
-  /// First of the two pixels.
-  const std::int32_t* first() const { return first_.data(); }
-  /// Weight of the second one, [0, 1); 0 if there is none.
-  const float* weight() const { return weight_.data(); }
-
- private:
-  int size_ = 0;
-  std::vector<std::int32_t> first_;
-  std::vector<float> weight_;
-};
-
-/// Resamples a row. Reads one element past its end, with weight 0.
-void resample_row(const float* row, const Resampling& resampling, float* out);
-
-/// Interpolates between two rows of pairs (`weight` is that of the lower one), resamples the result
-/// and multiplies it by `factor`. `between` is scratch for one such row with its padding.
-void resample_pairs(const float* upper, const float* lower, float weight, int width,
-                    const Resampling& resampling, float factor, float* between, float* out);
 
 /// Blurs an image with a Gaussian and shrinks it to 1 / 2^level of its size, row by row. A blur of
 /// about half a pixel of the shrunk image prevents aliasing; level 0 is blurred slightly, against

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/flow/resampling.hpp"
+
+#include <cmath>
+
+#include "src/flow/scratch.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/flow/resampling.cpp"
+#include <hwy/foreach_target.h>
+// Compiled once per SIMD target.
+#include "src/core/simd-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+using Floats = hn::CappedTag<float, row_padding>;
+using Words = hn::Rebind<std::int32_t, Floats>;
+using Vector = hn::Vec<Floats>;
+
+Vector between(Vector a, Vector b, Vector weight) {
+  return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
+}
+
+void resample_floats(const float* row, const Resampling& resampling, float* out) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  for (int x = 0; x < resampling.size(); x += lanes) {
+    const auto first = hn::LoadU(Words(), resampling.first() + x);
+    const auto a = hn::GatherIndex(floats, row, first);
+    const auto b = hn::GatherIndex(floats, row + 1, first);
+    hn::StoreU(between(a, b, hn::LoadU(floats, resampling.weight() + x)), floats, out + x);
+  }
+}
+
+void resample_flows(const Flow* row, const Resampling& resampling, float factor, Flow* out) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  const auto times = hn::Set(floats, factor);
+  const float* values = &row->x;
+  for (int x = 0; x < resampling.size(); x += lanes) {
+    const auto first = hn::ShiftLeft<1>(hn::LoadU(Words(), resampling.first() + x));
+    const auto right = hn::LoadU(floats, resampling.weight() + x);
+    const auto at = [&](int i) { return hn::GatherIndex(floats, values + i, first); };
+    hn::StoreInterleaved2(hn::Mul(between(at(0), at(2), right), times),
+                          hn::Mul(between(at(1), at(3), right), times), floats, &out[x].x);
+  }
+}
+
+void blend_flows(const Flow* upper, const Flow* lower, float weight, int width, Flow* out) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  const auto down = hn::Set(floats, weight);
+  for (int i = 0; i < 2 * width; i += lanes)
+    hn::StoreU(between(hn::LoadU(floats, &upper->x + i), hn::LoadU(floats, &lower->x + i), down),
+               floats, &out->x + i);
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(resample_floats);
+HWY_EXPORT(resample_flows);
+HWY_EXPORT(blend_flows);
+
+Resampling::Resampling(int from, int to)
+    : size_(to), first_(to + row_padding, 0), weight_(to + row_padding, 0.0F) {
+  const double ratio = static_cast<double>(from) / to;
+  for (int i = 0; i < to; ++i) {
+    const double place = (i + 0.5) * ratio - 0.5;
+    const int before = static_cast<int>(std::floor(place));
+    if (before < 0) continue;
+    first_[i] = before < from - 1 ? before : from - 1;
+    weight_[i] = before < from - 1 ? static_cast<float>(place - before) : 0.0F;
+  }
+}
+
+void resample_row(const float* row, const Resampling& resampling, float* out) {
+  HWY_DYNAMIC_DISPATCH(resample_floats)(row, resampling, out);
+}
+
+void resample_row(const Flow* row, const Resampling& resampling, float factor, Flow* out) {
+  HWY_DYNAMIC_DISPATCH(resample_flows)(row, resampling, factor, out);
+}
+
+void blend_rows(const Flow* upper, const Flow* lower, float weight, int width, Flow* out) {
+  HWY_DYNAMIC_DISPATCH(blend_flows)(upper, lower, weight, width, out);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE
