@@ -11,12 +11,6 @@
 namespace eventcamera {
 namespace {
 
-constexpr int rows_per_round = 16;  ///< of pixels
-
-int rounds(int rows) {
-  return (rows + rows_per_round - 1) / rows_per_round;
-}
-
 /// Number of times the image is halved for the coarsest level: on it, the largest displacement that
 /// is searched for, a quarter of the longer side, is about one patch; at most until the shorter
 /// side is one patch.
@@ -88,17 +82,22 @@ ImageView<std::uint8_t> DisFlow::padded(const ImageView<std::uint8_t>& picture) 
   return padded_.view();
 }
 
+/// Runs body(rows, scratch) for the bands of an image of this height.
+template <class Body>
+void DisFlow::for_each_band(int height, ThreadPool& threads, const Body& body) {
+  scratch_.resize(static_cast<std::size_t>(threads.threads()));
+  threads.for_each(band_count(height),
+                   [&](int band, int thread) { body(BandRows(band, height), scratch_[thread]); });
+}
+
 void DisFlow::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   if (picture.width != width_ || picture.height != height_) start(picture.width, picture.height);
-  scratch_.resize(static_cast<std::size_t>(threads.threads()));
   auto from = padded(picture);
   for (auto& level : levels_) {
     std::swap(level.last, level.next);
-    const int height = level.shrink.height();
-    threads.for_each(rounds(height), [&](int round, int thread) {
-      const int first = round * rows_per_round;
-      for (int y = first; y < std::min(first + rows_per_round, height); ++y)
-        level.next.shrink_row(level.shrink, from, y, scratch_[thread].sums);
+    for_each_band(level.shrink.height(), threads, [&](const BandRows& rows, Scratch& scratch) {
+      for (int y = rows.first; y < rows.last; ++y)
+        level.next.shrink_row(level.shrink, from, y, scratch.sums);
     });
     level.next.replicate_rows();
     from = level.next.grey().view();
@@ -107,27 +106,19 @@ void DisFlow::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) 
 
 ImageView<Flow> DisFlow::flow(ThreadPool& threads) {
   assert(!levels_.empty());
-  scratch_.resize(static_cast<std::size_t>(threads.threads()));
   const Level* coarser = nullptr;
   for (std::size_t i = levels_.size(); i-- > 0;) {
     Level& level = levels_[i];
     const auto& last = level.last.grey();
     const auto& next = level.next.grey();
-    const int height = last.height();
-    const auto for_each_band = [&](const auto& body) {
-      threads.for_each(rounds(height), [&](int round, int thread) {
-        const int first = round * rows_per_round;
-        body(first, std::min(first + rows_per_round, height), scratch_[thread]);
-      });
-    };
-    for_each_band([&](int first, int end, Scratch& scratch) {
-      for (int y = first; y < end; ++y) level.gradients.row(last, y, scratch.slopes);
+    for_each_band(last.height(), threads, [&](const BandRows& rows, Scratch& scratch) {
+      for (int y = rows.first; y < rows.last; ++y) level.gradients.row(last, y, scratch.slopes);
     });
     threads.for_each(level.grid.rows, [&](int row, int) { search(coarser, level, row); });
-    for_each_band([&](int first, int end, Scratch& scratch) {
+    for_each_band(last.height(), threads, [&](const BandRows& rows, Scratch& scratch) {
       auto& field = level.refinement.start();
-      spread_patches(level.grid, last, next, level.flows, first, end, scratch.sums, field.x,
-                     field.y);
+      spread_patches(level.grid, last, next, level.flows, rows.first, rows.last, scratch.sums,
+                     field.x, field.y);
     });
     level.refinement.run(last, next, threads);
     coarser = &level;

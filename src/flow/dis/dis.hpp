@@ -55,6 +55,8 @@ class DisFlow final : public DenseFlow {
   };
 
   void start(int width, int height);
+  template <class Body>
+  void for_each_band(int height, ThreadPool& threads, const Body& body);
   ImageView<std::uint8_t> padded(const ImageView<std::uint8_t>& picture);
   void search(const Level* coarser, Level& level, int row) const;
   void widen(int first, int last, Scratch& scratch);
