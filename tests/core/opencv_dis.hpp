@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <opencv2/video/tracking.hpp>
 
 #include "src/flow/dis/dis.hpp"
@@ -12,15 +10,11 @@
 inline eventcamera::Image<eventcamera::Flow> opencv_dis(
     const eventcamera::Image<std::uint8_t>& from, const eventcamera::Image<std::uint8_t>& to,
     const eventcamera::DisFlow::Quality& quality) {
-  const auto [shorter, longer] = std::minmax({from.width(), from.height()});
-  const int coarsest =
-      std::min(static_cast<int>(std::lround(std::log2(longer / (4.0 * quality.patch)))),
-               static_cast<int>(std::log2(shorter / quality.patch)));
   const auto dis = cv::DISOpticalFlow::create();
   dis->setPatchSize(quality.patch);
   dis->setPatchStride(quality.stride);
   dis->setGradientDescentIterations(quality.iterations);
-  dis->setFinestScale(quality.scales == 0 ? 1 : std::max(0, coarsest - quality.scales + 1));
+  dis->setFinestScale(quality.finest_scale(from.width(), from.height()));
   dis->setUseSpatialPropagation(false);
   cv::Mat flow;
   // Contiguous rows, as it requires.

@@ -11,15 +11,6 @@
 namespace eventcamera {
 namespace {
 
-/// Number of times the image is halved for the coarsest level: on it, the largest displacement that
-/// is searched for, a quarter of the longer side, is about one patch; at most until the shorter
-/// side is one patch.
-int coarsest_scale(int width, int height, int patch) {
-  const auto [shorter, longer] = std::minmax({width, height});
-  return std::min(static_cast<int>(std::lround(std::log2(longer / (4.0 * patch)))),
-                  static_cast<int>(std::log2(shorter / patch)));
-}
-
 /// The flow of a coarser level at a pixel of a finer one.
 Flow flow_at(const VariationalRefinement& coarser, float x, float y) {
   const auto place = [](float position, int size) {
@@ -42,6 +33,16 @@ Flow flow_at(const VariationalRefinement& coarser, float x, float y) {
 
 }  // namespace
 
+int DisFlow::Quality::coarsest_scale(int width, int height) const {
+  const auto [shorter, longer] = std::minmax({width, height});
+  return std::min(static_cast<int>(std::lround(std::log2(longer / (4.0 * patch)))),
+                  static_cast<int>(std::log2(shorter / patch)));
+}
+
+int DisFlow::Quality::finest_scale(int width, int height) const {
+  return scales == 0 ? 1 : std::max(0, coarsest_scale(width, height) - scales + 1);
+}
+
 DisFlow::Level::Level(const AreaShrink& shrink_, const Quality& quality)
     : shrink(shrink_),
       last(shrink.width(), shrink.height()),
@@ -58,8 +59,8 @@ void DisFlow::start(int width, int height) {
   width = std::max(width, min_side);
   height = std::max(height, min_side);
   if (width != width_ || height != height_) padded_ = Image<std::uint8_t>(width, height);
-  const int coarsest = coarsest_scale(width, height, quality_.patch);
-  finest_scale_ = quality_.scales == 0 ? 1 : std::max(0, coarsest - quality_.scales + 1);
+  const int coarsest = quality_.coarsest_scale(width, height);
+  finest_scale_ = quality_.finest_scale(width, height);
   levels_.clear();
   columns_ = Resampling(width >> finest_scale_, width);
   rows_ = Resampling(height >> finest_scale_, height);

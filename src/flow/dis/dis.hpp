@@ -21,6 +21,12 @@ class DisFlow final : public DenseFlow {
     int stride;  ///< patch * (1 - overlap), rounded down
     int iterations;
     int scales;  ///< number of pyramid levels; 0 = from the coarsest to half the size
+
+    /// Number of times an image is halved for the coarsest level: on it, the largest displacement
+    /// that is searched for, a quarter of the longer side, is about one patch; at most until the
+    /// shorter side is one patch.
+    int coarsest_scale(int width, int height) const;
+    int finest_scale(int width, int height) const;
   };
   static constexpr Quality low = {4, 3, 8, 3};
   static constexpr Quality high = {8, 4, 32, 0};
