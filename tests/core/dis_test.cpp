@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <thread>
@@ -66,8 +67,10 @@ INSTANTIATE_TEST_SUITE_P(
     , Dis,
     testing::Values(Case{DisFlow::low, 64, 64, true}, Case{DisFlow::low, 67, 83, false},
                     Case{DisFlow::low, 150, 111, false}, Case{DisFlow::low, 161, 130, true},
+                    Case{DisFlow::low, 64, 600, false}, Case{DisFlow::low, 64, 600, true},
                     Case{DisFlow::high, 64, 64, true}, Case{DisFlow::high, 67, 83, false},
-                    Case{DisFlow::high, 150, 111, false}, Case{DisFlow::high, 161, 130, true}));
+                    Case{DisFlow::high, 150, 111, false}, Case{DisFlow::high, 161, 130, true},
+                    Case{DisFlow::high, 64, 600, false}, Case{DisFlow::high, 64, 600, true}));
 
 struct Distance {
   double mean = 0;
@@ -103,21 +106,6 @@ TEST_P(Dis, IsWhatOpenCvFinds) {
   const Distance distance(flow_of(GetParam(), from, to, threads),
                           opencv_dis(from, to, GetParam().quality));
   EXPECT_LT(distance.mean, 0.02);
-}
-
-TEST_P(Dis, PadsSmallPictures) {
-  const auto from = scene::texture<std::uint8_t>(40, 70, 8, 0, 0);
-  const auto to = scene::texture<std::uint8_t>(40, 70, 8, 1, 0);
-  const auto padded = [](const Picture& picture) {
-    Picture result(64, 70);
-    for (int y = 0; y < 70; ++y)
-      for (int x = 0; x < 64; ++x) result.at(x, y) = picture.at(std::min(x, 39), y);
-    return result;
-  };
-  const auto small = flow_of(GetParam(), from, to, threads);
-  const auto large = flow_of(GetParam(), padded(from), padded(to), threads);
-  for (int y = 0; y < 70; ++y)
-    ASSERT_EQ(std::memcmp(small.row(y), large.row(y), 40 * sizeof(Flow)), 0) << "row " << y;
 }
 
 TEST_P(Dis, IsNothingBetweenEqualPictures) {
@@ -171,6 +159,26 @@ TEST_P(Dis, TakesAPartOfAPictureWhereItLies) {
   const auto found = flow.find({from_bytes.data(), stride, width, height},
                                {to_bytes.data(), stride, width, height}, threads);
   EXPECT_TRUE(equal(copy(found), flow_of(GetParam(), from, to, threads)));
+}
+
+TEST(SmallPictures, ArePadded) {
+  ThreadPool threads;
+  const auto padded = [](const Picture& picture) {
+    Picture result(64, 70);
+    for (int y = 0; y < 70; ++y)
+      for (int x = 0; x < 64; ++x) result.at(x, y) = picture.at(std::min(x, 39), y);
+    return result;
+  };
+  for (const auto& quality : {DisFlow::low, DisFlow::high}) {
+    const Case c{quality, 40, 70, false};
+    const auto from = picture_of(c, 0);
+    const auto to = picture_of(c, 1);
+    const auto small = flow_of(c, from, to, threads);
+    const auto large = flow_of(c, padded(from), padded(to), threads);
+    for (int y = 0; y < 70; ++y)
+      ASSERT_EQ(std::memcmp(small.row(y), large.row(y), 40 * sizeof(Flow)), 0)
+          << testing::PrintToString(c) << ", row " << y;
+  }
 }
 
 }  // namespace
