@@ -143,7 +143,8 @@ void DisFlow::search(const Level* coarser, Level& level, int row) const {
     const float ratio_x = ratio(coarser->refinement.width(), level.refinement.width());
     const float ratio_y = ratio(coarser->refinement.height(), level.refinement.height());
     const auto centre = [&](int i) {
-      return static_cast<float>(i * grid.stride + grid.side / 2) + 0.5F;
+      const int half = grid.side / 2;
+      return static_cast<float>(i * grid.stride + half) + 0.5F;
     };
     for (int i = 0; i < grid.columns; ++i) {
       const Flow coarse =
@@ -164,7 +165,8 @@ void DisFlow::widen(int first, int last, Scratch& scratch) {
     const auto padded_width = static_cast<std::size_t>(columns_.size()) + row_padding;
     Flow* wide = scratch_of(scratch.wide_rows[slot], padded_width);
     if (std::exchange(known[slot], y) == y) return wide;
-    Flow* row = scratch_of(scratch.row, static_cast<std::size_t>(finest.width()) + 2 * row_padding);
+    Flow* row = scratch_of(scratch.row,
+                           static_cast<std::size_t>(finest.width()) + std::size_t{2} * row_padding);
     finest.row(y, row);
     row[finest.width()] = row[finest.width() - 1];
     resample_row(row, columns_, static_cast<float>(1 << finest_scale_), wide);

@@ -63,9 +63,11 @@ void halve_rows(const std::uint8_t* upper, const std::uint8_t* lower, int width,
     const auto mean = hn::BitCast(signed_words, hn::ShiftRight<2>(sum));
     hn::StoreU(hn::DemoteTo(bytes, mean), bytes, out + x);
   }
-  for (; x < width; ++x)
-    out[x] = static_cast<std::uint8_t>(
-        (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1] + 2) / 4);
+  for (; x < width; ++x) {
+    const auto left = std::ptrdiff_t{2} * x;
+    const int sum = upper[left] + upper[left + 1] + lower[left] + lower[left + 1];
+    out[x] = static_cast<std::uint8_t>((sum + 2) / 4);
+  }
 }
 
 /// sums = above + 2 * middle + below, differences = below - above
@@ -135,7 +137,8 @@ void AreaShrink::row(const ImageView<std::uint8_t>& picture, int y, std::vector<
     HWY_DYNAMIC_DISPATCH(halve_rows)(picture.row(2 * y), picture.row(2 * y + 1), width(), out);
     return;
   }
-  const auto padded_width = static_cast<std::size_t>(columns_.from + columns_.taps + row_padding);
+  const int reached = columns_.from + columns_.taps + row_padding;
+  const auto padded_width = static_cast<std::size_t>(reached);
   float* sum = scratch_of(sums, padded_width);
   std::fill_n(sum, padded_width, 0.0F);
   for (int t = 0; t < rows_.taps; ++t) {
@@ -164,7 +167,7 @@ void PyramidPicture::shrink_row(const AreaShrink& shrink, const ImageView<std::u
 void PyramidPicture::replicate_rows() {
   const auto copy = [&](int from, int to) {
     std::memcpy(grey_.row(to) - margin, grey_.row(from) - margin,
-                static_cast<std::size_t>(grey_.width() + 2 * margin));
+                static_cast<std::size_t>(grey_.width()) + std::size_t{2} * margin);
   };
   for (int i = 1; i <= margin; ++i) {
     copy(0, -i);
@@ -175,7 +178,7 @@ void PyramidPicture::replicate_rows() {
 void Gradients::row(const Image<std::uint8_t>& picture, int y, std::vector<std::int16_t>& scratch) {
   const int width = picture.width();
   const int end = picture.height() - 1;
-  const auto padded_width = static_cast<std::size_t>(width) + 2 * row_padding;
+  const auto padded_width = static_cast<std::size_t>(width) + std::size_t{2} * row_padding;
   std::int16_t* sums = scratch_of(scratch, 2 * padded_width) + 1;
   std::int16_t* differences = sums + padded_width;
   const auto mirrored = [&](int i) {

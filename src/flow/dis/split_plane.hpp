@@ -17,7 +17,7 @@ class SplitPlane {
   SplitPlane(int width, int height)
       : width_(width),
         height_(height),
-        odd_((count(0) + 2 * row_padding) / row_padding * row_padding),
+        odd_(std::ptrdiff_t{(count(0) + 2 * row_padding) / row_padding} * row_padding),
         values_(static_cast<std::size_t>(2 * odd_ * height + row_padding)) {}
 
   int width() const { return width_; }
@@ -50,7 +50,7 @@ class SplitPlane {
 template <int values>
 class SplitPlanes {
  public:
-  static constexpr int block = row_padding;
+  static constexpr std::ptrdiff_t block = row_padding;
 
   SplitPlanes(int width, int height)
       : odd_(((width + 1) / 2 + block - 1) / block * block * values),
@@ -59,7 +59,7 @@ class SplitPlanes {
   float* row(int parity, int y) { return values_.data() + (2 * y + parity) * odd_; }
   const float* row(int parity, int y) const { return values_.data() + (2 * y + parity) * odd_; }
   /// Where the first of the values at k in a row is; the others follow `block` floats apart.
-  static std::ptrdiff_t at(int k) { return std::ptrdiff_t{k / block} * block * values + k % block; }
+  static std::ptrdiff_t at(int k) { return k / block * block * values + k % block; }
 
  private:
   std::ptrdiff_t odd_;

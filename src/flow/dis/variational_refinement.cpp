@@ -154,7 +154,7 @@ class Linearisation {
         upper_right[lane] = upper[1];
         lower_left[lane] = lower[0];
         lower_right[lane] = lower[1];
-        earlier[lane] = here[2 * (k + lane)];
+        earlier[lane] = here[std::ptrdiff_t{2} * (k + lane)];
       }
       const auto right = hn::Sub(to_x, cell_x);
       const auto there =
@@ -517,7 +517,7 @@ void merge_row(const Field& flow, const Field& step, int y, Flow* out) {
     const auto even_y = sum(flow.y, step.y, 0, k);
     const auto odd_x = sum(flow.x, step.x, 1, k);
     const auto odd_y = sum(flow.y, step.y, 1, k);
-    hn::StoreInterleaved4(even_x, even_y, odd_x, odd_y, floats, &out[2 * k].x);
+    hn::StoreInterleaved4(even_x, even_y, odd_x, odd_y, floats, &out[std::ptrdiff_t{2} * k].x);
   }
 }
 

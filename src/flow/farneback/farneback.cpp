@@ -144,7 +144,7 @@ void FarnebackFlow::start_rows(const Level* coarser, const Level& level, int las
     return;
   }
   const int width = coarser->flow.width();
-  Flow* row = scratch_of(scratch.coarser_row, static_cast<std::size_t>(width + row_padding));
+  Flow* row = scratch_of(scratch.coarser_row, static_cast<std::size_t>(width) + row_padding);
   for (int y = out.first; y < last; ++y) {
     const int upper = level.rows.first()[y];
     const int lower = std::min(upper + 1, coarser->flow.height() - 1);
