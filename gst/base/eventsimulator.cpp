@@ -12,6 +12,7 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/drawn_video.hpp"
 #include "gst/base/errors.hpp"
+#include "gst/base/flush_timer.hpp"
 #include "gst/base/frame_clock.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
@@ -43,16 +44,28 @@ constexpr Nanoseconds max_latency = GST_SECOND;
 /// Multiples of it are reported as latency.
 constexpr Nanoseconds processing_deadline = 20 * GST_MSECOND;
 
+/// Time after which to look whether the events of an interval are ready.
+constexpr GstClockTime poll_interval = GST_MSECOND;
+
 /// User-settable values, copied once per buffer.
 struct Settings {
   eventcamera::Settings simulation;
   GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
 };
 
+/// An interval whose events are awaited.
+struct Interval {
+  OwnedBuffer frame;  ///< that ends it
+  Nanoseconds start;
+  Nanoseconds end;
+  std::optional<Nanoseconds> work_began;
+};
+
 /// State from caps to stop.
 struct State {
   GstVideoInfo video;  ///< input format
   std::unique_ptr<VideoSimulator> frames;
+  std::optional<Interval> awaited{};
   bool draws = false;          ///< the output is video, not events
   bool discontinuous = false;  ///< the next buffer is discontinuous
 
@@ -75,6 +88,7 @@ struct Latency {
 struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
   bool backwards = false;                       ///< the segment was refused
+  GstFlowReturn flow = GST_FLOW_OK;             ///< result of the last push
   FrameClock clock;                             ///< for frames without a PTS
   WarnOnce warn_of_times;
   WarnOnce warn_of_no_pts;
@@ -91,9 +105,11 @@ struct GstEventSimulatorPrivate {
   GuardedSettings<SimulatorQos> qos;
   Guarded<Latency> latency;  // make no calls while holding its lock
 
-  // Accessed by the streaming thread only, or while there is none.
+  // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
   std::optional<State> state;
   Stream stream;
+
+  FlushTimer timer;  ///< for the awaited interval
 };
 
 static gpointer parent_class;
@@ -233,12 +249,13 @@ static bool begin_work(GstEventSimulator* self, GstBuffer* frame) {
   return false;
 }
 
-/// Ends the processing of the frame of this time, and adapts the latency to its duration.
-static void end_work(GstEventSimulator* self, Nanoseconds time) {
+/// Ends the work on the frame of this time, and adapts the latency to its duration.
+static void end_work(GstEventSimulator* self, Nanoseconds time,
+                     std::optional<Nanoseconds> work_began) {
   Nanoseconds work = 0;
   Nanoseconds downstream = 0;
   priv_of(self).qos.access([&](SimulatorQos& qos) {
-    work = qos.end_work(GST_BASE_TRANSFORM(self));
+    work = qos.end_work(GST_BASE_TRANSFORM(self), work_began);
     downstream = qos.downstream_latency();
   });
   change_latency(self, [&](Latency& latency) {
@@ -248,20 +265,85 @@ static void end_work(GstEventSimulator* self, Nanoseconds time) {
   });
 }
 
+static std::optional<Nanoseconds> work_began(GstEventSimulator* self) {
+  std::optional<Nanoseconds> began;
+  priv_of(self).qos.access([&](const SimulatorQos& qos) { began = qos.began(); });
+  return began;
+}
+
 /// Ends the processing of a frame, after its output has been pushed.
 static void end_frame(GstEventSimulator* self) {
   priv_of(self).qos.access([self](SimulatorQos& qos) { qos.end(GST_BASE_TRANSFORM(self)); });
 }
 
-/// Makes the next frame a first frame.
+/* intervals out */
+
+/// Pushes a GAP for an interval without events.
+static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
+                              guint32 seqnum) {
+  GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(self);
+  GstEvent* gap =
+      gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start));
+  if (seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(gap, seqnum);
+  return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
+}
+
+/// Sets the timestamps and flags of an output buffer, and pushes it.
+static GstFlowReturn push_buffer(GstEventSimulator* self, OwnedBuffer out, GstClockTime pts,
+                                 GstClockTime duration) {
+  auto* transform = GST_BASE_TRANSFORM(self);
+  GST_BUFFER_PTS(out.get()) = pts;
+  GST_BUFFER_DTS(out.get()) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION(out.get()) = duration;
+  if (std::exchange(priv_of(self).state->discontinuous, false))
+    GST_BUFFER_FLAG_SET(out.get(), GST_BUFFER_FLAG_DISCONT);
+  if (transform->segment.format == GST_FORMAT_TIME)
+    transform->segment.position = GST_CLOCK_TIME_IS_VALID(duration) ? pts + duration : pts;
+  return gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out.release());
+}
+
+/// Waits for the events of the awaited interval, if any, and pushes them, or a GAP if there are
+/// none. May throw.
+static void push_awaited(GstEventSimulator* self) {
+  auto& state = priv_of(self).state;
+  if (!state || !state->awaited) return;
+  priv_of(self).timer.cancel();
+  auto [frame, start, end, began] = *std::exchange(state->awaited, std::nullopt);
+  const EventBuckets& events = state->frames->read();
+  GST_LOG_OBJECT(self,
+                 "%" G_GSIZE_FORMAT " events in the interval from %" GST_TIME_FORMAT
+                 " to %" GST_TIME_FORMAT,
+                 events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(start)),
+                 GST_TIME_ARGS(static_cast<GstClockTime>(end)));
+
+  auto& flow = priv_of(self).stream.flow;
+  OwnedBuffer out;
+  if (events.size() > 0)
+    flow = event_simulator_write_events(GST_BASE_TRANSFORM(self), events,
+                                        state->simulator().threads(), frame.get(), out);
+  frame.reset();  // upstream may need it while downstream blocks
+  end_work(self, end, began);
+  learn_latency(self, start, end);
+  if (events.size() == 0)
+    flow = push_gap(self, start, end, GST_SEQNUM_INVALID);
+  else if (flow == GST_FLOW_OK)
+    flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
+                       static_cast<GstClockTime>(end - start));
+  end_frame(self);
+}
+
+/* discontinuities */
+
+/// Makes the next frame a first frame. May throw.
 static void forget_frames(GstEventSimulator* self) {
+  push_awaited(self);
   auto& state = priv_of(self).state;
   if (!state || !state->simulator().last_time()) return;
   state->simulator().reset();
   state->discontinuous = true;
 }
 
-/// Restarts at a first frame, for a new timeline.
+/// Restarts at a first frame, for a new timeline. May throw.
 static void start_over(GstEventSimulator* self) {
   forget_frames(self);
   priv_of(self).stream.handed_out_until.reset();
@@ -302,10 +384,13 @@ static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
 }
 
 /// Validates the time of a frame and prepares the simulator for it. False if the frame must be
-/// skipped.
+/// skipped. May throw.
 static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
-  if (GST_BUFFER_IS_DISCONT(buffer)) start_over(self);
+  if (GST_BUFFER_IS_DISCONT(buffer)) {
+    start_over(self);
+    priv_of(self).state->discontinuous = true;
+  }
   if (pts > G_MAXINT64) {
     warn_of_times(self, "the PTS of a frame is out of range");
     forget_frames(self);
@@ -322,6 +407,27 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   }
   // An interval starting with this frame would overlap the last one.
   return !(priv_of(self).stream.handed_out_until && time < *priv_of(self).stream.handed_out_until);
+}
+
+/// Runs `work`; reports any exception and drops the state, because the simulator is then unusable.
+template <class Work>
+static void reported(GstEventSimulator* self, const Work& work) {
+  const auto failure = [&](const std::exception& error) -> Report {
+    priv_of(self).state.reset();
+    if (is_a<std::bad_alloc>(error))
+      return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+              "Not enough memory for the events of a frame. Raise the thresholds, or lower "
+              "interpolated-frames."};
+    if (const auto* known = dynamic_cast<const VideoSimulatorError*>(&error))
+      return known->report();
+    return {GST_STREAM_ERROR_FAILED, "The simulation failed."};
+  };
+  if (!guarded(self, failure, work)) priv_of(self).stream.flow = GST_FLOW_ERROR;
+}
+
+/// Ends the wait for the awaited interval.
+static void finish_interval(GstEventSimulator* self) {
+  reported(self, [self] { push_awaited(self); });
 }
 
 /* negotiation */
@@ -388,6 +494,7 @@ static bool draws_for(GstBaseTransform* transform, GstQuery* query) {
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   auto& state = priv_of(self).state;
+  finish_interval(self);
   GstVideoInfo video;
   GstVideoInfo drawn;
   if (!gst_video_info_from_caps(&video, in) ||
@@ -443,7 +550,7 @@ static bool is_ready(GstEventSimulator* self) {
   return ready;
 }
 
-/* frames in, intervals out */
+/* frames in */
 
 /// Updates controlled properties to their values at `time`, a timestamp of the segment.
 static void sync_controlled_properties(GstEventSimulator* self, GstClockTime time) {
@@ -453,117 +560,87 @@ static void sync_controlled_properties(GstEventSimulator* self, GstClockTime tim
   if (GST_CLOCK_TIME_IS_VALID(stream_time)) gst_object_sync_values(GST_OBJECT(self), stream_time);
 }
 
-/// Pushes a GAP for an interval without events.
-static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
-                              guint32 seqnum) {
-  GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(self);
-  GstEvent* gap =
-      gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start));
-  if (seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(gap, seqnum);
-  return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
-}
-
-/// Sets the timestamps and flags of an output buffer.
-static void set_times(GstBuffer* out, GstClockTime pts, GstClockTime duration, State& state) {
-  GST_BUFFER_PTS(out) = pts;
-  GST_BUFFER_DTS(out) = GST_CLOCK_TIME_NONE;
-  GST_BUFFER_DURATION(out) = duration;
-  if (std::exchange(state.discontinuous, false)) GST_BUFFER_FLAG_SET(out, GST_BUFFER_FLAG_DISCONT);
-}
-
 /// Draws the events since the last frame (none for a first frame). The picture replaces the frame,
 /// at its `time`. May throw.
 static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& settings, Nanoseconds time,
-                                GstBuffer* in, GstBuffer** out) {
-  auto& state = *priv_of(self).state;
-  OwnedBuffer picture;
-  const GstFlowReturn result = event_simulator_make_picture(GST_BASE_TRANSFORM(self), in, picture);
-  if (result != GST_FLOW_OK) return result;
-  state.frames->draw(in, time, settings.simulation,
-                     eventcamera::palette(palette_name_of(settings.palette)), picture.get());
-  set_times(picture.get(), static_cast<GstClockTime>(time), GST_BUFFER_DURATION(in), state);
-  *out = picture.release();
-  return GST_FLOW_OK;
-}
-
-/// Processes a frame and outputs the interval that it ends, if any. May throw.
-static GstFlowReturn take_frame(GstEventSimulator* self, GstBuffer* in, GstBuffer** out) {
+                                OwnedBuffer in) {
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
-  sync_controlled_properties(self, GST_BUFFER_PTS(in));
-  const Settings settings = priv_of(self).settings.copy();
-
-  check_interlacing(self, in);
-  if (!check_time(self, in) || !begin_work(self, in)) return GST_FLOW_OK;
-  const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in));
-  const auto start = state.simulator().last_time();
-  configure(self);
-  if (state.draws) {
-    priv_of(self).stream.handed_out_until = end;
-    const GstFlowReturn result = draw_frame(self, settings, end, in, out);
-    end_work(self, end);
-    if (result == GST_FLOW_OK)
-      priv_of(self).qos.access([&](const SimulatorQos& qos) {
-        qos.extend(transform, *out, frame_duration(state.video));
-      });
-    return result;
-  }
-  const EventBuckets* events = state.frames->push(in, end, settings.simulation);
-  if (events == nullptr) {
-    end_work(self, end);
-    end_frame(self);
-    return GST_FLOW_OK;
-  }
-  GST_LOG_OBJECT(self,
-                 "%" G_GSIZE_FORMAT " events in the interval from %" GST_TIME_FORMAT
-                 " to %" GST_TIME_FORMAT,
-                 events->size(), GST_TIME_ARGS(static_cast<GstClockTime>(*start)),
-                 GST_TIME_ARGS(static_cast<GstClockTime>(end)));
-
-  priv_of(self).stream.handed_out_until = end;
-  GstFlowReturn result = GST_FLOW_OK;
-  if (events->size() > 0)
-    result = event_simulator_write_events(transform, *events, state.simulator().threads(), in, out);
-  end_work(self, end);
-  learn_latency(self, *start, end);
-  if (events->size() == 0) {
-    result = push_gap(self, *start, end, GST_SEQNUM_INVALID);
-    end_frame(self);
-    return result;
-  }
+  OwnedBuffer picture;
+  GstFlowReturn result = event_simulator_make_picture(transform, in.get(), picture);
   if (result == GST_FLOW_OK)
-    set_times(*out, static_cast<GstClockTime>(*start), static_cast<GstClockTime>(end - *start),
-              state);
+    state.frames->draw(in.get(), time, settings.simulation,
+                       eventcamera::palette(palette_name_of(settings.palette)), picture.get());
+  end_work(self, time, work_began(self));
+  if (result != GST_FLOW_OK) return result;
+  GST_BUFFER_DURATION(picture.get()) = GST_BUFFER_DURATION(in.get());
+  in.reset();  // upstream may need it while downstream blocks
+  priv_of(self).qos.access([&](const SimulatorQos& qos) {
+    qos.extend(transform, picture.get(), frame_duration(state.video));
+  });
+  const GstClockTime duration = GST_BUFFER_DURATION(picture.get());
+  result = push_buffer(self, std::move(picture), static_cast<GstClockTime>(time), duration);
+  end_frame(self);
   return result;
 }
 
-/// Runs `work`; reports any exception and drops the state, because the simulator is then unusable.
-template <class Work>
-static GstFlowReturn reported(GstEventSimulator* self, const Work& work) {
-  const auto failure = [&](const std::exception& error) -> Report {
-    priv_of(self).state.reset();
-    if (is_a<std::bad_alloc>(error))
-      return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
-              "Not enough memory for the events of a frame. Raise the thresholds, or lower "
-              "interpolated-frames."};
-    if (const auto* known = dynamic_cast<const VideoSimulatorError*>(&error))
-      return known->report();
-    return {GST_STREAM_ERROR_FAILED, "The simulation failed."};
-  };
-  return guarded(self, failure, work);
+static void look_for_events(GstObject* element);
+
+/// Pushes the awaited interval if its events are ready, else looks again later. May throw.
+static void push_if_ready(GstEventSimulator* self) {
+  auto& priv = priv_of(self);
+  if (priv.state->frames->is_ready())
+    push_awaited(self);
+  else
+    priv.timer.set(poll_interval, GST_BASE_TRANSFORM_SINK_PAD(self), look_for_events);
+}
+
+/// Processes a frame and outputs the interval that it ends, if any: at once if its events are
+/// ready, else as soon as they are. May throw.
+static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
+  auto& stream = priv_of(self).stream;
+  auto& state = *priv_of(self).state;
+  sync_controlled_properties(self, GST_BUFFER_PTS(in.get()));
+  const Settings settings = priv_of(self).settings.copy();
+
+  check_interlacing(self, in.get());
+  if (!check_time(self, in.get()) || !begin_work(self, in.get())) return;
+  const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in.get()));
+  const auto start = state.simulator().last_time();
+  configure(self);
+  if (state.draws) {
+    stream.handed_out_until = end;
+    stream.flow = draw_frame(self, settings, end, std::move(in));
+    return;
+  }
+  const bool ends_interval = state.frames->queue(in.get(), end, settings.simulation);
+  push_awaited(self);  // whose events are read while the GPU works on this frame
+  if (!ends_interval) {
+    end_work(self, end, work_began(self));
+    end_frame(self);
+    return;
+  }
+  stream.handed_out_until = end;
+  state.awaited.emplace(Interval{std::move(in), *start, end, work_began(self)});
+  if (stream.flow == GST_FLOW_OK) push_if_ready(self);
+}
+
+static void look_for_events(GstObject* element) {
+  auto* self = GST_EVENT_SIMULATOR(element);
+  const auto& state = priv_of(self).state;
+  if (state && state->awaited) reported(self, [self] { push_if_ready(self); });
 }
 
 static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
-  *out = nullptr;
+  auto& flow = priv_of(self).stream.flow;
+  *out = nullptr;  // output is pushed here, because that of the last frame may follow later
   OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
-  if (!in) {  // the base class asks for more after it has pushed a buffer
-    end_frame(self);
-    return GST_FLOW_OK;
+  if (flow == GST_FLOW_OK) {
+    if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
+    if (give_pts(self, in)) reported(self, [&] { take_frame(self, std::move(in)); });
   }
-  if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
-  if (!give_pts(self, in)) return GST_FLOW_OK;
-  return reported(self, [&] { return take_frame(self, in.get(), out); });
+  return std::exchange(flow, GST_FLOW_OK);
 }
 
 /* events, queries, states */
@@ -584,6 +661,9 @@ static GstEvent* segment_of_times(GstEvent* event) {
 
 /// Starts a new timeline, discontinuous with the previous one.
 static void start_timeline(GstEventSimulator* self) {
+  auto& state = priv_of(self).state;
+  if (state && std::exchange(state->awaited, std::nullopt)) state->frames->drop();
+  priv_of(self).stream.flow = GST_FLOW_OK;
   start_over(self);
   priv_of(self).stream.clock.start_over();
   priv_of(self).qos.access([](SimulatorQos& qos) { qos.start_over(); });
@@ -619,17 +699,18 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   const EventBuckets* events =
       state.simulator().hold_until(end, priv_of(self).settings.copy().simulation);
   priv_of(self).stream.handed_out_until = end;
-  GstBuffer* out = nullptr;
-  if (events != nullptr && events->size() > 0) {
-    const OwnedBuffer in(gst_buffer_new());
-    if (event_simulator_write_events(transform, *events, state.simulator().threads(), in.get(),
-                                     &out) != GST_FLOW_OK)
-      return;
-    set_times(out, static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start), state);
-    gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out);
-  } else {
-    push_gap(self, start, end, seqnum);
+  auto& flow = priv_of(self).stream.flow;
+  if (events == nullptr || events->size() == 0) {
+    flow = push_gap(self, start, end, seqnum);
+    return;
   }
+  const OwnedBuffer in(gst_buffer_new());
+  OwnedBuffer out;
+  flow =
+      event_simulator_write_events(transform, *events, state.simulator().threads(), in.get(), out);
+  if (flow == GST_FLOW_OK)
+    flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
+                       static_cast<GstClockTime>(end - start));
 }
 
 /// Handles a GAP from upstream: holds the last frame until one frame duration before the end of the
@@ -648,15 +729,15 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
   const auto end = static_cast<Nanoseconds>(pts + rest);
   if (end <= *start) return false;
-  reported(self, [&] {
-    hold_until(self, end, gst_event_get_seqnum(event));
-    return GST_FLOW_OK;
-  });
+  reported(self, [&] { hold_until(self, end, gst_event_get_seqnum(event)); });
   return false;
 }
 
 static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto* self = GST_EVENT_SIMULATOR(transform);
+  const bool is_serialized =
+      (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) != 0;
+  if (is_serialized && GST_EVENT_TYPE(event) != GST_EVENT_FLUSH_STOP) finish_interval(self);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
       event = segment_of_times(event);
@@ -707,6 +788,8 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
 
 static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
   if (direction == GST_PAD_SRC && draws_for(transform, query)) return TRUE;
+  if (direction == GST_PAD_SINK && GST_QUERY_IS_SERIALIZED(query))
+    finish_interval(GST_EVENT_SIMULATOR(transform));
   if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 
@@ -724,6 +807,7 @@ static gboolean start(GstBaseTransform* transform) {
 
 static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_SIMULATOR(transform);
+  priv_of(self).timer.stop();
   priv_of(self).state.reset();
   priv_of(self).stream = {};
   *priv_of(self).latency.lock() = {};

@@ -248,15 +248,28 @@ class TextureVideoSimulator final : public VideoSimulator {
 
   void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
 
-  const EventBuckets* push(GstBuffer* buffer, Nanoseconds time,
-                           const eventcamera::Settings& settings) override {
+  bool queue(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings) override {
     const MappedTexture texture(video_, buffer, context_, GST_MAP_READ);
     if (!texture.fault().empty()) throw cannot_read(texture.fault());
-    const EventBuckets* events = nullptr;
+    bool ends_interval = false;
     frame_.texture = texture.name();
-    run([&] { events = simulator_->push(frame_, time, settings); });
-    return events;
+    run([&] { ends_interval = simulator_->queue(frame_, time, settings); });
+    return ends_interval;
   }
+
+  bool is_ready() override {
+    bool ready = false;
+    run([&] { ready = simulator_->is_ready(); });
+    return ready;
+  }
+
+  const EventBuckets& read() override {
+    const EventBuckets* events = nullptr;
+    run([&] { events = &simulator_->read(); });
+    return *events;
+  }
+
+  void drop() override { simulator_->drop(); }
 
   void draw(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings,
             const eventcamera::Palette& palette, GstBuffer* picture) override {

@@ -168,18 +168,17 @@ void event_simulator_class_install_buffers(GstBaseTransformClass* klass) {
 /* intervals */
 
 GstFlowReturn event_simulator_write_events(GstBaseTransform* transform, const EventBuckets& events,
-                                           ThreadPool& threads, GstBuffer* in, GstBuffer** out) {
+                                           ThreadPool& threads, GstBuffer* in, OwnedBuffer& out) {
   GstBuffer* prepared = nullptr;
   const GstFlowReturn result = base_class()->prepare_output_buffer(transform, in, &prepared);
   if (result != GST_FLOW_OK) return result;
-  OwnedBuffer buffer(prepared);
+  out.reset(prepared);
   GstMapInfo map;
   if (!reserve(prepared, events.size() * sizeof(eventcamera::Event)) ||
       !gst_buffer_map(prepared, &map, GST_MAP_WRITE))
     throw std::bad_alloc();
   events.copy_to(reinterpret_cast<eventcamera::Event*>(map.data), threads);
   gst_buffer_unmap(prepared, &map);
-  *out = buffer.release();
   return GST_FLOW_OK;
 }
 

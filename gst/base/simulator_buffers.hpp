@@ -15,7 +15,7 @@ void event_simulator_class_install_buffers(GstBaseTransformClass* klass);
 GstFlowReturn event_simulator_write_events(GstBaseTransform* transform,
                                            const eventcamera::EventBuckets& events,
                                            eventcamera::ThreadPool& threads, GstBuffer* in,
-                                           GstBuffer** out);
+                                           OwnedBuffer& out);
 
 /// Makes a buffer to draw the events of an interval in, with the metas of `in` that remain valid.
 GstFlowReturn event_simulator_make_picture(GstBaseTransform* transform, GstBuffer* in,

@@ -56,9 +56,10 @@ GstMessage* SimulatorQos::begin(GstBaseTransform* element, GstBuffer* frame, boo
   return nullptr;
 }
 
-SimulatorQos::Nanoseconds SimulatorQos::end_work(GstBaseTransform* element) {
+SimulatorQos::Nanoseconds SimulatorQos::end_work(GstBaseTransform* element,
+                                                 std::optional<Nanoseconds> began) {
   const auto time = now(element);
-  const Nanoseconds work = time && began_ ? std::max(*time - *began_, Nanoseconds{0}) : 0;
+  const Nanoseconds work = time && began ? std::max(*time - *began, Nanoseconds{0}) : 0;
   ++frames_;
   processing_time_ += static_cast<guint64>(work);
   return work;
@@ -75,7 +76,10 @@ void SimulatorQos::extend(GstBaseTransform* element, GstBuffer* picture,
 }
 
 void SimulatorQos::end(GstBaseTransform* element) {
-  if (const auto time = now(element)) pacer_.end(*time);
+  const auto time = now(element);
+  if (!time) return;
+  pacer_.end(*time);
+  began_ = time;
 }
 
 void SimulatorQos::reset_stats() {

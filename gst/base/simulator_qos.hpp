@@ -25,12 +25,15 @@ class SimulatorQos {
   /// Starts processing a frame. If the frame is skipped instead, returns the message that reports
   /// it; only frames that end an interval are `skippable`.
   GstMessage* begin(GstBaseTransform* element, GstBuffer* frame, bool skippable);
-  /// Ends the work on it. Returns its duration; 0 without a clock.
-  Nanoseconds end_work(GstBaseTransform* element);
+  /// When the work on the last frame began, or, if that is later, when the output of another one
+  /// had been pushed; none without a clock.
+  std::optional<Nanoseconds> began() const { return began_; }
+  /// Ends the work on a frame, which began then. Returns its duration; 0 without a clock.
+  Nanoseconds end_work(GstBaseTransform* element, std::optional<Nanoseconds> began);
   /// Extends the duration of its picture over the frames that will probably be skipped after it,
   /// because sinks drop a picture that comes after its end.
   void extend(GstBaseTransform* element, GstBuffer* picture, GstClockTime frame_duration) const;
-  /// Ends the processing, after the output has been pushed.
+  /// Ends the processing of a frame, after the output has been pushed.
   void end(GstBaseTransform* element);
 
   /// Latency of elements downstream that they do not report.

@@ -26,11 +26,24 @@ class VideoSimulator {
   /// Draws pictures of this format from now on.
   virtual void set_drawn_video(const GstVideoInfo& drawn) = 0;
 
-  /// As BasicSimulator::push(), for the frame in a buffer. Throws VideoSimulatorError as well.
-  virtual const eventcamera::EventBuckets* push(GstBuffer* frame, eventcamera::Nanoseconds time,
-                                                const eventcamera::Settings& settings) = 0;
+  /// Takes the frame in a buffer, as BasicSimulator::push(), but may return before it has the
+  /// events. Returns whether the frame ends an interval, whose events are to be read(); the buffer
+  /// must be kept until then. Up to two intervals may wait. Throws VideoSimulatorError as well.
+  virtual bool queue(GstBuffer* frame, eventcamera::Nanoseconds time,
+                     const eventcamera::Settings& settings) = 0;
 
-  /// As push(), but draws the events in the buffer `picture`: none for a first frame.
+  /// Whether read() would return at once.
+  virtual bool is_ready() = 0;
+
+  /// Returns the events of the first interval that waits, valid until the next call. Throws
+  /// VideoSimulatorError as well.
+  virtual const eventcamera::EventBuckets& read() = 0;
+
+  /// Forgets the intervals that wait.
+  virtual void drop() = 0;
+
+  /// As BasicSimulator::push(), but draws the events in the buffer `picture`: none for a first
+  /// frame. Throws VideoSimulatorError as well.
   virtual void draw(GstBuffer* frame, eventcamera::Nanoseconds time,
                     const eventcamera::Settings& settings, const eventcamera::Palette& palette,
                     GstBuffer* picture) = 0;
@@ -79,19 +92,24 @@ class LumaVideoSimulator final : public VideoSimulator {
     drawing_ = Drawing{drawn, {GST_VIDEO_INFO_WIDTH(&drawn), GST_VIDEO_INFO_HEIGHT(&drawn)}};
   }
 
-  const eventcamera::EventBuckets* push(GstBuffer* frame, eventcamera::Nanoseconds time,
-                                        const eventcamera::Settings& settings) override {
+  bool queue(GstBuffer* frame, eventcamera::Nanoseconds time,
+             const eventcamera::Settings& settings) override {
     const VideoFrame mapped(video_, frame, GST_MAP_READ);
     if (!mapped) throw cannot_read(mapped.fault());
-    return simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
+    events_ = simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
+    return events_ != nullptr;
   }
+
+  bool is_ready() override { return true; }
+  const eventcamera::EventBuckets& read() override { return *events_; }
+  void drop() override {}
 
   void draw(GstBuffer* frame, eventcamera::Nanoseconds time, const eventcamera::Settings& settings,
             const eventcamera::Palette& palette, GstBuffer* picture) override {
-    const auto* events = push(frame, time, settings);
+    const bool ends_interval = queue(frame, time, settings);
     const VideoFrame mapped(drawing_->video, picture, GST_MAP_WRITE);
     if (!mapped) throw cannot_draw(mapped.fault());
-    if (events != nullptr) drawing_->accumulator.add(*events, simulator_->threads());
+    if (ends_interval) drawing_->accumulator.add(*events_, simulator_->threads());
     drawing_->accumulator.draw(palette, pixel_layout_of(drawing_->video), mapped.data(),
                                mapped.stride());
   }
@@ -108,6 +126,7 @@ class LumaVideoSimulator final : public VideoSimulator {
   FrameLuma luma_;
   std::optional<Drawing> drawing_;
   std::unique_ptr<eventcamera::Simulator> simulator_;
+  const eventcamera::EventBuckets* events_ = nullptr;
 };
 
 /// For EventSimulatorMethod::create: a simulator made by `make` from the format of the luma.

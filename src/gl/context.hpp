@@ -33,6 +33,7 @@ class Error : public std::runtime_error {
   X(PFNGLDELETESYNCPROC, DeleteSync)               \
   X(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)     \
   X(PFNGLFENCESYNCPROC, FenceSync)                 \
+  X(PFNGLFLUSHPROC, Flush)                         \
   X(PFNGLGENBUFFERSPROC, GenBuffers)               \
   X(PFNGLGETERRORPROC, GetError)                   \
   X(PFNGLGETINTEGER64VPROC, GetInteger64v)         \

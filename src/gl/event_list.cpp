@@ -18,13 +18,16 @@ constexpr GLuint64 patience = 60'000'000'000;
 
 }  // namespace
 
-EventList::EventList(const Context& gl, const LumaFormat& format)
+EventListKernels::EventListKernels(const Context& gl)
+    : count(gl, "count", shaders::count),
+      scan(gl, "scan", shaders::scan),
+      write(gl, "write", shaders::write) {}
+
+EventList::EventList(const Context& gl, const LumaFormat& format, const EventListKernels& kernels)
     : gl_(gl),
+      kernels_(kernels),
       marks_across_(groups_of(32, format.width)),
       height_(format.height),
-      count_(gl, "count", shaders::count),
-      scan_(gl, "scan", shaders::scan),
-      write_(gl, "write", shaders::write),
       marks_(gl),
       starts_(gl),
       step_times_(gl),
@@ -42,22 +45,29 @@ void EventList::begin(const StepTimes& steps, int first) {
 }
 
 void EventList::write() const {
-  write_.run({groups_of(block, marks_a_step()), steps()},
-             {&marks_, &starts_, &step_times_, &events_},
-             {marks_a_step(), marks_across_, static_cast<int>(events_.size() / sizeof(Event))});
+  kernels_.write.run(
+      {groups_of(block, marks_a_step()), steps()}, {&marks_, &starts_, &step_times_, &events_},
+      {marks_a_step(), marks_across_, static_cast<int>(events_.size() / sizeof(Event))});
 }
 
-void EventList::read(EventBuckets& events) {
+void EventList::sort() {
   step_times_.assign(std::as_bytes(std::span(times_)));
   const Groups blocks{groups_of(block, marks_a_step()), steps()};
   starts_.reserve(static_cast<std::size_t>(blocks.x) * times_.size() * 4);
-  count_.run(blocks, {&marks_, &starts_}, {marks_a_step()});
-  scan_.run({}, {&starts_, &total_}, {blocks.x * blocks.y});
+  kernels_.count.run(blocks, {&marks_, &starts_}, {marks_a_step()});
+  kernels_.scan.run({}, {&starts_, &total_}, {blocks.x * blocks.y});
   write();
+  gl_.DeleteSync(done_);
+  done_ = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  gl_.Flush();
+}
 
-  const GLsync fence = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
-  const GLenum state = gl_.ClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, patience);
-  gl_.DeleteSync(fence);
+bool EventList::is_sorted() const {
+  return gl_.ClientWaitSync(done_, 0, 0) != GL_TIMEOUT_EXPIRED;
+}
+
+void EventList::read(EventBuckets& events) {
+  const GLenum state = gl_.ClientWaitSync(done_, 0, patience);
   gl_.check();
   if (state == GL_TIMEOUT_EXPIRED) throw Error("OpenGL has not answered for a minute");
   if (state == GL_WAIT_FAILED) throw Error("OpenGL cannot wait for the GPU");

@@ -11,14 +11,26 @@
 
 namespace eventcamera::gl {
 
+/// Kernels that make a sorted list of marks.
+struct EventListKernels {
+  explicit EventListKernels(const Context& gl);
+
+  Kernel count;
+  Kernel scan;
+  Kernel write;
+};
+
 /// Collects the pixels that fire in the steps of an interval, and reads them back as a sorted list
-/// of events.
+/// of events: while the GPU works on the next interval, which has a list of its own.
 ///
 /// Kernels mark pixels in marks(): two words for 32 pixels of a row, whose bits are set for pixels
 /// that fire and for those of them that become brighter; by step, then in raster order.
 class EventList {
  public:
-  EventList(const Context& gl, const LumaFormat& format);
+  EventList(const Context& gl, const LumaFormat& format, const EventListKernels& kernels);
+  ~EventList() { gl_.DeleteSync(done_); }
+  EventList(const EventList&) = delete;
+  EventList& operator=(const EventList&) = delete;
 
   /// Begins an interval without steps.
   void clear() { times_.clear(); }
@@ -31,18 +43,23 @@ class EventList {
   int marks_across() const { return marks_across_; }
   int marks_a_step() const { return marks_across_ * height_; }
 
-  /// Waits for the GPU, and replaces the contents of `events`. Throws Error.
+  /// Queues the sorting of the marks. Does not wait.
+  void sort();
+
+  /// Whether the GPU is done with that.
+  bool is_sorted() const;
+
+  /// Waits until the GPU is done with that, and replaces the contents of `events`. Throws Error.
   void read(EventBuckets& events);
 
  private:
   void write() const;
 
   const Context& gl_;
+  const EventListKernels& kernels_;
   int marks_across_;
   int height_;
-  Kernel count_;
-  Kernel scan_;
-  Kernel write_;
+  GLsync done_ = nullptr;             ///< when the marks are sorted
   std::vector<std::uint32_t> times_;  ///< of the steps, microseconds
   Buffer marks_;
   Buffer starts_;      ///< index of the first event of each block of marks

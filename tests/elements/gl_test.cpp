@@ -153,30 +153,158 @@ TEST(OpenGl, IsNamedInAnErrorWhereItIsMissing) {
 }
 
 std::atomic<bool> is_lost = false;
+std::atomic<bool> is_busy = false;
+std::atomic<int> waits = 0;
 
-/// Makes all contexts of the process, from now on, report that they are lost where `is_lost`.
-void make_contexts_losable() {
-  static gpointer (*get_proc_address)(GstGLAPI, const gchar*);
+/// Makes all contexts of the process report that they are lost where `is_lost`, and that the GPU is
+/// not done where `is_busy`, unless they wait for it.
+void take_over_contexts() {
+  { Harness("gleventsim-frame").caps(video); }  // GStreamer registers the type of contexts
+  static gpointer (*get_proc_address)(GstGLAPI, const gchar*) = nullptr;
   static GLenum (*get_error)();
+  static PFNGLCLIENTWAITSYNCPROC wait_for;
   auto* contexts =
       static_cast<GstGLContextClass*>(g_type_class_ref(g_type_from_name("GstGLContextEGL")));
+  if (get_proc_address != nullptr) return;
   get_proc_address = contexts->get_proc_address;
   contexts->get_proc_address = [](GstGLAPI api, const gchar* name) -> gpointer {
     const gpointer function = get_proc_address(api, name);
-    if (std::string_view(name) != "glGetError") return function;
-    get_error = reinterpret_cast<GLenum (*)()>(function);
-    return reinterpret_cast<gpointer>(+[]() -> GLenum {
-      constexpr GLenum context_lost = 0x0507;
-      return is_lost ? context_lost : get_error();
-    });
+    if (std::string_view(name) == "glGetError") {
+      get_error = reinterpret_cast<GLenum (*)()>(function);
+      return reinterpret_cast<gpointer>(+[]() -> GLenum {
+        constexpr GLenum context_lost = 0x0507;
+        return is_lost ? context_lost : get_error();
+      });
+    }
+    if (std::string_view(name) == "glClientWaitSync") {
+      wait_for = reinterpret_cast<PFNGLCLIENTWAITSYNCPROC>(function);
+      return reinterpret_cast<gpointer>(
+          +[](GLsync sync, GLbitfield flags, GLuint64 timeout) -> GLenum {
+            waits += timeout > 0;
+            return is_busy && timeout == 0 ? GL_TIMEOUT_EXPIRED : wait_for(sync, flags, timeout);
+          });
+    }
+    return function;
   };
 }
 
+/// Frames, the GPU being busy, whose intervals are known from when it is not.
+class Busy : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    take_over_contexts();
+    is_busy = false;
+    Harness idle(GetParam());
+    idle.caps(video);
+    for (int i = 0; i < 6; ++i) {
+      idle.push(frame(idle, i));
+      if (const auto events = idle.pull()) intervals.push_back(bytes_of(events.get()));
+    }
+    ASSERT_EQ(intervals.size(), 5U);
+    is_busy = true;
+    h.caps(video);
+    push(0);
+    push(1);
+    EXPECT_FALSE(h.pull());
+    EXPECT_EQ(waits, 0);
+  }
+  void TearDown() override { is_busy = false; }
+
+  static GstBuffer* frame(const Harness& of, int i) {
+    GstBuffer* made =
+        of.frame(time_of(i), [i](int x, int y) { return (x * 9 + y * 5 + i * 40) % 256; });
+    if (i == 0) GST_BUFFER_FLAG_SET(made, GST_BUFFER_FLAG_DISCONT);
+    return made;
+  }
+  static GstClockTime time_of(int i) { return static_cast<GstClockTime>(i) * 40 * GST_MSECOND; }
+
+  void push(int i) {
+    waits = 0;
+    EXPECT_EQ(h.push(frame(h, i)), GST_FLOW_OK);
+  }
+
+  /// Expects interval i to be the next output.
+  void expect_interval(std::size_t i, const Buffer& output) const {
+    ASSERT_TRUE(output);
+    EXPECT_EQ(GST_BUFFER_PTS(output.get()), time_of(static_cast<int>(i)));
+    EXPECT_TRUE(bytes_of(output.get()) == intervals[i]);
+  }
+
+  std::vector<std::string> intervals;
+  Harness h{GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(, Busy, testing::Values("gleventsim-frame", "gleventsim-dense"));
+
+TEST_P(Busy, IntervalsAreReadWhenTheNextFrameHasBeenQueued) {
+  for (int i = 2; i < 6; ++i) {
+    push(i);
+    EXPECT_EQ(waits, 1);  // for the interval before
+    const auto output = h.pull();
+    expect_interval(static_cast<std::size_t>(i - 2), output);
+    EXPECT_EQ(GST_BUFFER_FLAG_IS_SET(output.get(), GST_BUFFER_FLAG_DISCONT), i == 2);
+    EXPECT_FALSE(h.pull());
+  }
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  expect_interval(4, h.pull());
+  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+}
+
+TEST_P(Busy, IntervalsNeedNoFurtherFrame) {
+  is_busy = false;
+  expect_interval(0, Buffer(gst_harness_pull(h.get())));
+  EXPECT_EQ(gst_harness_query_latency(h.get()), 40 * GST_MSECOND);
+}
+
+TEST_P(Busy, IntervalsComeBeforeWhatFollowsThem) {
+  gst_harness_push_event(h.get(), gst_event_new_gap(time_of(1), 80 * GST_MSECOND));
+  expect_interval(0, h.pull());
+  EXPECT_EQ(gap_of(h.pull_event(GST_EVENT_GAP).get()).start, time_of(1));
+  GstBuffer* discontinuous = frame(h, 4);
+  GST_BUFFER_FLAG_SET(discontinuous, GST_BUFFER_FLAG_DISCONT);
+  h.push(discontinuous);
+  push(5);
+  EXPECT_FALSE(h.pull());
+  gst_harness_set_src_caps_str(h.get(),
+                               "video/x-raw, format=GRAY8, width=16, height=16, framerate=25/1");
+  const auto output = h.pull();
+  expect_interval(4, output);
+  EXPECT_TRUE(GST_BUFFER_FLAG_IS_SET(output.get(), GST_BUFFER_FLAG_DISCONT));
+  EXPECT_NE(h.out_caps().find("width=(int)16"), std::string::npos);
+}
+
+TEST_P(Busy, IntervalsAreDroppedByAFlush) {
+  flush({h.get()});
+  push_segment(h.get());
+  is_busy = false;
+  push(1);
+  push(2);
+  expect_interval(1, h.pull());
+  EXPECT_FALSE(h.pull());
+}
+
+TEST_P(Busy, IntervalsAreDroppedAtStop) {
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  gst_element_set_state(h.element(), GST_STATE_NULL);
+  EXPECT_EQ(waits, 0);
+}
+
+TEST_P(Busy, DownstreamsRefusalIsToldToUpstreamAtTheNextFrame) {
+  gst_pad_add_probe(
+      h->sinkpad, GST_PAD_PROBE_TYPE_BUFFER,
+      [](GstPad*, GstPadProbeInfo* info, gpointer) {
+        GST_PAD_PROBE_INFO_FLOW_RETURN(info) = GST_FLOW_EOS;
+        gst_buffer_unref(GST_PAD_PROBE_INFO_BUFFER(info));
+        return GST_PAD_PROBE_HANDLED;
+      },
+      nullptr, nullptr);
+  gst_harness_push_event(
+      h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty("any")));
+  EXPECT_EQ(h.push(frame(h, 2)), GST_FLOW_EOS);
+}
+
 TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
-  { Harness("gleventsim-frame").caps(video); }  // GStreamer registers the type of contexts
-  make_contexts_losable();
-  for (const std::string element :
-       {"gleventsim-frame", "gleventsim-dense", "gleventsim-sparse", "gleventsim-diff"}) {
+  take_over_contexts();
+  for (const std::string element : gpu_elements) {
     for (const std::string& out :
          {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of(element)}) {
       Harness h(element);

@@ -53,8 +53,9 @@ inline const char* const elements[] = {"eventsim-frame",   "eventsim-dense",    
                                        "eventsim-diff",    "eventsim-dvs",      "gleventsim-frame",
                                        "gleventsim-dense", "gleventsim-sparse", "gleventsim-diff"};
 
-/// Those that take frames in system memory.
+/// Those that take frames in system memory, and in textures.
 inline const auto cpu_elements = std::span(elements).first<5>();
+inline const auto gpu_elements = std::span(elements).last<4>();
 
 inline bool is_on_gpu(const std::string& element) {
   return element.starts_with("gl");

@@ -62,10 +62,11 @@ TEST_P(EveryApi, InterpolatesAlongAFlowBitForBit) {
   constexpr Thresholds thresholds{6, 9};
   ThreadPool threads;
   std::size_t events = 0;
+  const gl::EventListKernels list_kernels(context);
   for (const auto& [width, height] : {std::pair{1, 1}, {7, 3}, {67, 45}, {130, 21}}) {
     const LumaFormat format{width, height, 8};
     const gl::InterpolationKernel kernel(context, format);
-    gl::EventList list(context, format);
+    gl::EventList list(context, format, list_kernels);
     const gl::GreyFrame frames[] = {{context, format}, {context, format}};
     gl::Buffer flows(context);
     for (const bool noise : {false, true}) {
@@ -84,6 +85,7 @@ TEST_P(EveryApi, InterpolatesAlongAFlowBitForBit) {
           list.begin(steps);
           kernel.run(frames[0], frames[1], flows, interpolation, thresholds, list);
           EventBuckets made;
+          list.sort();
           list.read(made);
           EventBuckets expected;
           InterpolationKernel reference;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "src/flow/lucas_kanade/point_tracker.hpp"
+#include "src/gl/dense.hpp"
 #include "src/gl/diff.hpp"
 #include "src/gl/frame.hpp"
 #include "src/gl/point_tracker.hpp"
@@ -267,14 +268,90 @@ TEST(Context, NamesWhatIsMissing) {
             "compute shaders need OpenGL ES 3.1 or OpenGL 4.3, and this is OpenGL ES 3.0 Old");
 }
 
-/// What a lost context does, as drivers differ.
-enum class Loss { none, error, reset, no_mapping, no_wait, garbage };
-Loss loss = Loss::none;
-
 template <class Function>
 Function driver(const char* name) {
   return reinterpret_cast<Function>(gl_test::load(name));
 }
+
+/// Calls that wait for the GPU, or would copy what it has not yet written.
+int waits = 0;
+bool is_gpu_busy = false;
+
+void* load_counting_waits(const char* name) {
+  const std::string_view function = name;
+  if (function == "glClientWaitSync")
+    return reinterpret_cast<void*>(+[](GLsync sync, GLbitfield flags, GLuint64 timeout) -> GLenum {
+      waits += timeout > 0;
+      if (timeout == 0 && is_gpu_busy) return GL_TIMEOUT_EXPIRED;
+      return driver<PFNGLCLIENTWAITSYNCPROC>("glClientWaitSync")(sync, flags, timeout);
+    });
+  if (function == "glMapBufferRange")
+    return reinterpret_cast<void*>(+[](GLenum target, GLintptr offset, GLsizeiptr length,
+                                       GLbitfield access) -> void* {
+      ++waits;
+      return driver<PFNGLMAPBUFFERRANGEPROC>("glMapBufferRange")(target, offset, length, access);
+    });
+  return gl_test::load(name);
+}
+
+TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
+  const EglContext current(false);
+  const gl::Context context(load_counting_waits);
+  const LumaFormat format{130, 61, 8};
+  Texture texture(format.width, format.height, 1);
+  const auto frame_of = [&](unsigned i) {
+    texture.upload(bytes_of(scene::noise<std::uint8_t>(format.width, format.height, 8, i)));
+    return texture.frame({one, 0, 0, 0});
+  };
+  using Make = std::unique_ptr<gl::Simulator> (*)(const gl::Context&, const LumaFormat&);
+  const Make make_dense = [](const gl::Context& gl, const LumaFormat& of) {
+    return std::unique_ptr<gl::Simulator>(gl::make_dense_simulator(gl, of));
+  };
+  std::size_t most = 0;
+  for (const auto& [make, threshold] : {std::pair<Make, double>{gl::make_frame_simulator, 20},
+                                        {make_dense, 20},
+                                        {gl::make_sparse_simulator, 200},
+                                        {gl::make_diff_simulator, 200}}) {
+    const Settings settings{threshold, threshold};
+    const auto waiting = make(context, format);
+    std::vector<std::vector<Event>> expected;
+    for (int i = 0; i < 4; ++i)
+      if (const auto* events = waiting->push(frame_of(i), i * scene::frame_time, settings))
+        expected.push_back(scene::copy(*events));
+
+    const auto simulator = make(context, format);
+    std::vector<std::vector<Event>> made;
+    for (int i = 0; i < 4; ++i) {
+      waits = 0;
+      is_gpu_busy = true;
+      EXPECT_EQ(simulator->queue(frame_of(i), i * scene::frame_time, settings), i > 0);
+      EXPECT_EQ(i > 0 && simulator->is_ready(), false);
+      EXPECT_EQ(waits, 0);
+      is_gpu_busy = false;
+      if (i > 1) made.push_back(scene::copy(simulator->read()));
+    }
+    waits = 0;
+    EXPECT_TRUE(simulator->is_ready());
+    EXPECT_EQ(waits, 0);
+    made.push_back(scene::copy(simulator->read()));
+    EXPECT_GT(waits, 0);
+    EXPECT_EQ(made, expected);
+    most = std::max(most, made.back().size());
+
+    simulator->queue(frame_of(2), 7 * scene::frame_time, settings);
+    simulator->queue(frame_of(3), 8 * scene::frame_time, settings);
+    simulator->drop();
+    simulator->reset();
+    EXPECT_FALSE(simulator->queue(frame_of(0), 9 * scene::frame_time, settings));
+    EXPECT_TRUE(simulator->queue(frame_of(1), 10 * scene::frame_time, settings));
+    EXPECT_EQ(scene::copy(simulator->read()), expected.front());
+  }
+  EXPECT_GT(most, 4096U);  // so that lists grow
+}
+
+/// What a lost context does, as drivers differ.
+enum class Loss { none, error, reset, no_mapping, no_wait, garbage };
+Loss loss = Loss::none;
 
 /// The functions of a context that can be lost.
 void* load_losable(const char* name) {
