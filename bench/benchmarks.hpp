@@ -12,6 +12,10 @@ void register_simulators(const Scene& scene);
 /// SCENE/STEP/FORMULATION/threads:1.
 void register_events(const Scene& scene);
 
+/// All optimized methods on growing pictures of the driving scene, two threads, until one takes
+/// longer than a thirtieth of a second: sizes/METHOD/SIZE.
+void register_sizes(bool few_frames);
+
 /// Scaling of the methods: growth/AXIS/METHOD/FORMULATION/VALUE.
 void register_growth(bool few_frames);
 

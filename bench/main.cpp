@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
     bench::register_simulators(scene);
     bench::register_events(scene);
   }
+  bench::register_sizes(few_frames);
   bench::register_growth(few_frames);
   benchmark::RunSpecifiedBenchmarks();
   return 0;

@@ -4,6 +4,8 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "bench/plain/dense.hpp"
 #include "bench/plain/diff.hpp"
@@ -58,16 +60,30 @@ inline const Method frame_method{"frame", 20, make_plain<plain::FrameSimulator>(
                                  make_frame_simulator};
 inline const Method dis_lq_method = dense_method("dense-dis-lq", FlowMethod::dis_lq);
 inline const Method dis_hq_method = dense_method("dense-dis-hq", FlowMethod::dis_hq);
+inline const Method opencv_dis_method = dense_method("dense-opencv-dis", FlowMethod::opencv_dis);
 inline const Method farneback_method = dense_method("dense-farneback", FlowMethod::farneback);
 inline const Method sparse_method{"sparse", 6, make_plain<plain::SparseSimulator>(),
                                   make_sparse_simulator};
 inline const Method diff_method{"diff", 19, make_plain<plain::DiffSimulator>(),
                                 make_diff_simulator};
-inline const Method dvs_ideal_method = dvs_method("dvs-ideal", settings_of(DvsPreset::ideal));
-inline const Method dvs_denoised_method = dvs_method("dvs-denoised", {.denoise = 8});
-inline const Method dvs_noisy_method =
-    dvs_method("dvs-v2e-noisy", settings_of(DvsPreset::v2e_noisy));
-inline const Method dvs_motion_method =
-    dvs_method("dvs-motion", {.upsampling = Upsampling::motion});
+
+/// All methods, with multiples of their usual thresholds.
+inline std::vector<Method> all_methods(double threshold_factor = 1) {
+  std::vector<Method> methods{frame_method,     dis_lq_method, dis_hq_method,
+                              farneback_method, sparse_method, diff_method};
+  for (auto& method : methods) method.threshold *= threshold_factor;
+  const std::pair<const char*, DvsSettings> arrays[] = {
+      {"dvs-ideal", settings_of(DvsPreset::ideal)},
+      {"dvs-denoised", {.denoise = 8}},
+      {"dvs-v2e-noisy", settings_of(DvsPreset::v2e_noisy)},
+      {"dvs-motion", {.upsampling = Upsampling::motion}},
+  };
+  for (auto [name, settings] : arrays) {
+    settings.positive_threshold *= threshold_factor;
+    settings.negative_threshold *= threshold_factor;
+    methods.push_back(dvs_method(name, settings));
+  }
+  return methods;
+}
 
 }  // namespace bench

@@ -6,7 +6,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "tests/core/scene.hpp"
 #include "tests/pipelines/video_frames.hpp"
@@ -29,7 +31,25 @@ struct Video {
   int interpolated_frames;
 };
 
-Scene read(const Video& video, const std::string& path) {
+Video driving_video(int width, int height) {
+  return {"driving-" + std::to_string(width) + "x" + std::to_string(height),
+          "driving-1280x720-25fps.mp4",
+          {{0, 4}, {34, 4}},
+          width,
+          height,
+          20};
+}
+
+/// The video's clips; nothing, and a note, if $SHARED_DATA does not have it. With `few_frames` one
+/// clip of three frames.
+std::optional<Scene> read(Video video, bool few_frames) {
+  const char* shared = std::getenv("SHARED_DATA");
+  const auto path = std::string(shared != nullptr ? shared : "") + "/video/" + video.file;
+  if (!std::filesystem::exists(path)) {
+    std::fprintf(stderr, "no %s: %s is left out\n", path.c_str(), video.name.c_str());
+    return {};
+  }
+  if (few_frames) video.spans = {{video.spans.front().first, 3}};
   Scene scene{video.name, std::vector<Clip>(video.spans.size()), video.interpolated_frames};
   const int end = video.spans.back().first + video.spans.back().count;
   int i = 0;
@@ -61,24 +81,23 @@ Clip ball(int count) {
 }
 
 std::vector<Scene> scenes(bool few_frames) {
-  // Spans of the cars video with moving cars.
+  const std::string cars = "cars-768x432-12fps.mp4";
   const Video videos[] = {
-      {"driving-640x480", "driving-1280x720-25fps.mp4", {{0, 4}, {17, 4}, {34, 4}}, 640, 480, 20},
-      {"cars-1280x720", "cars-768x432-12fps.mp4", {{66, 4}, {205, 4}, {325, 4}}, 1280, 720, 10},
+      driving_video(640, 480),
+      {"cars-1280x720", cars, {{66, 4}, {325, 4}}, 1280, 720, 10},
+      // About as much changes in them as on average in frames 200 to 225, the busiest.
+      {"busy-cars-1280x720", cars, {{200, 4}, {214, 4}}, 1280, 720, 10},
+      {"bottles-640x360", "bottles-640x360-30fps.mp4", {{0, 4}, {81, 4}}, 640, 360, 10},
   };
   std::vector<Scene> scenes;
-  const char* shared = std::getenv("SHARED_DATA");
-  for (auto video : videos) {
-    const auto path = std::string(shared != nullptr ? shared : "") + "/video/" + video.file;
-    if (!std::filesystem::exists(path)) {
-      std::fprintf(stderr, "no %s: %s is left out\n", path.c_str(), video.name.c_str());
-      continue;
-    }
-    if (few_frames) video.spans = {{video.spans.front().first, 3}};
-    scenes.push_back(read(video, path));
-  }
+  for (const auto& video : videos)
+    if (auto scene = read(video, few_frames)) scenes.push_back(std::move(*scene));
   scenes.push_back({"ball-1280x720", {ball(few_frames ? 3 : 7)}, 10});
   return scenes;
+}
+
+std::optional<Scene> driving(int width, int height, bool few_frames) {
+  return read(driving_video(width, height), few_frames);
 }
 
 Clip moving_patch(int width, int height, double share, int count) {

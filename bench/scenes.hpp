@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,9 +24,13 @@ struct Scene {
   int interpolated_frames;
 };
 
-/// Two recorded videos, if $SHARED_DATA has them, and the ball. With `few_frames` the clips are as
+/// Recorded videos, if $SHARED_DATA has them, and the ball. With `few_frames` the clips are as
 /// short as possible.
 std::vector<Scene> scenes(bool few_frames);
+
+/// The recorded video from a moving car, at a size whose width is a multiple of 4; nothing if
+/// $SHARED_DATA does not have it.
+std::optional<Scene> driving(int width, int height, bool few_frames);
 
 /// A ball of 40 pixels that flies over a static, textured image of 1280x720.
 Clip ball(int count);

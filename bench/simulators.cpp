@@ -107,18 +107,9 @@ void register_simulators(const Scene& scene) {
       });
     };
 
-    add_method(frame_method);
+    for (const auto& method : all_methods()) add_method(method);
     add_after_flow("plain", time_plain_after_flow);
     add_after_flow("ours", time_our_after_flow);
-    add_method(dis_lq_method);
-    add_method(dis_hq_method);
-    add_method(farneback_method);
-    add_method(sparse_method);
-    add_method(diff_method);
-    add_method(dvs_ideal_method);
-    add_method(dvs_denoised_method);
-    add_method(dvs_noisy_method);
-    add_method(dvs_motion_method);
   }
 }
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Prints the tables of a benchmark run, a row per method and a column per scene: speed relative to
-the naive implementation, and milliseconds per frame.
+the naive implementation, and milliseconds per frame; and the sizes that each method holds in real
+time.
 
   table.py BENCHMARKS.json [PAGE.md]
 
@@ -15,6 +16,8 @@ from page import replace_tables, run_on
 SCENES = {
     "driving-640x480": "driving, 640x480, n = 20",
     "cars-1280x720": "cars, 1280x720, n = 10",
+    "busy-cars-1280x720": "busy cars, 1280x720, n = 10",
+    "bottles-640x360": "bottles, 640x360, n = 10",
     "ball-1280x720": "ball, 1280x720, n = 10",
 }
 METHODS = {
@@ -22,6 +25,7 @@ METHODS = {
     "dense-after-flow": "dense, after the flow",
     "dense-dis-lq": "dense, `dis-lq`, with flow",
     "dense-dis-hq": "dense, `dis-hq`, with flow",
+    "dense-opencv-dis": "dense, `opencv-dis`, with flow",
     "dense-farneback": "dense, `farneback`, with flow",
     "sparse": "sparse, with tracking",
     "diff": "diff, with tracking",
@@ -30,6 +34,7 @@ METHODS = {
     "dvs-v2e-noisy": "dvs, `v2e-noisy`",
     "dvs-motion": "dvs, `ideal`, `upsampling=motion`, with flow",
 }
+RATES = [30, 60]  # frames per second
 COPIES = {
     "events-to-buffer": "events → buffer",
     "buffer-to-grey-picture": "buffer → grey picture",
@@ -47,6 +52,16 @@ def times_of(run):
             key = (scene, method, formulation, threads.split(":")[1])
             times.setdefault(key, []).append(benchmark["real_time"])
     return {key: statistics.median(values) for key, values in times.items()}
+
+
+def sizes_of(run):
+    """Milliseconds of each method at growing sizes of the picture."""
+    sizes = {}
+    for benchmark in run["benchmarks"]:
+        parts = benchmark["name"].split("/")
+        if parts[0] == "sizes" and not benchmark.get("error_occurred"):
+            sizes.setdefault(parts[1], {})[parts[2]] = benchmark["real_time"]
+    return sizes
 
 
 def milliseconds(time):
@@ -83,6 +98,22 @@ beside_memcpy = beside("memcpy", lambda ours, memcpy: (
     f"**{ours / memcpy:.1f}×** memcpy ({milliseconds(ours)} ms)"))
 
 
+def table_of_sizes(sizes):
+    """The largest size that each method holds at a rate, and its times."""
+    columns = list(dict.fromkeys(size for times in sizes.values() for size in times))
+    if not columns:
+        return ""
+    heads = ["two threads", *(f"{rate} frames/s" for rate in RATES), *(f"{size}, ms" for size in columns)]
+    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+    for method, label in METHODS.items():
+        if times := sizes.get(method):
+            held = [[size for size in times if times[size] <= 1000 / rate] for rate in RATES]
+            cells = [label, *(f"**{each[-1]}**" if each else "none" for each in held)]
+            cells += [milliseconds(times[size]) if size in times else "" for size in columns]
+            lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
 def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         run = json.load(file)
@@ -90,6 +121,7 @@ def main():
     tables = [
         table(times, METHODS, "2", "two threads", beside_plain),
         table(times, METHODS, "1", "one thread", beside_plain),
+        table_of_sizes(sizes_of(run)),
         table(times, COPIES, "1", "one thread", beside_memcpy),
     ]
     text = "\n".join([run_on(run["context"])] + [each for each in tables if each])
