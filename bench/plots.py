@@ -8,6 +8,7 @@ DIRECTORY/runtimes.png: the runtimes of the paper, beside the naive implementati
 DIRECTORY/growth.png: how the methods' cost grows."""
 import json
 import os
+import re
 import statistics
 import sys
 
@@ -21,13 +22,26 @@ INK = "#262b36"
 PAPER = "#b9bec9"
 PLAIN = "#e0a458"
 OURS = "#2f6fb5"
-COLOURS = {
-    "frame": "#6a6f7a",
-    "dense-dis-lq": "#2f6fb5",
-    "sparse": "#3a9a68",
-    "diff": "#d0573e",
-}
-LABELS = {"frame": "frame", "dense-dis-lq": "dense, dis-lq", "sparse": "sparse", "diff": "diff"}
+EVENTCV = "#dfe2e8"
+# Rows of the growth plots: label and colour of each method.
+GROWTH = [
+    {
+        "frame": ("frame", "#6a6f7a"),
+        "sparse": ("sparse", "#3a9a68"),
+        "diff": ("diff", "#d0573e"),
+    },
+    {
+        "dense-dis-lq": ("dense, dis-lq", "#7fb2e5"),
+        "dense-dis-hq": ("dense, dis-hq", "#2f6fb5"),
+        "dense-farneback": ("dense, farneback", "#8a5ab5"),
+    },
+    {
+        "dvs-ideal": ("dvs, ideal", "#3a9a68"),
+        "dvs-denoised": ("dvs, ideal, denoise=8", "#2f6fb5"),
+        "dvs-v2e-noisy": ("dvs, v2e-noisy", "#d0573e"),
+        "dvs-motion": ("dvs, ideal, upsampling=motion", "#c99a2e"),
+    },
+]
 
 # The coordinates of the paper's two runtime figures, in milliseconds (Ziegler et al., ICRA 2023):
 # on a car's camera at 640x480, and on a table-tennis ball at 1280x720.
@@ -42,9 +56,12 @@ PAPER_RUNTIMES = [
     ("dense, Farneback (GPU)", None, 20.22, 49.30),
     ("sparse, LK (GPU)", None, 22.45, 4.66),
     ("difference, LK (GPU)", None, 10.07, 2.87),
-    ("v2e (GPU)", None, 71741.58, 49934.16),
-    ("vid2e (GPU)", None, 1420506.78, 43040.42),
+    ("v2e (GPU)\nand eventsim-dvs, v2e-noisy", "dvs-v2e-noisy", 71741.58, 49934.16),
+    ("vid2e (GPU)\nand eventsim-dvs, upsampling=motion", "dvs-motion", 1420506.78, 43040.42),
 ]
+# The documentation of EventCV's simulator: a moving edge at 640x480 and at 1280x720, on 12 cores.
+EVENTCV_RUNTIMES = ("EventCV", None, 56, 185)
+ROWS = [*PAPER_RUNTIMES, EVENTCV_RUNTIMES, ("eventsim-dvs, ideal", "dvs-ideal", None, None)]
 REAL_TIME = 30  # milliseconds, the paper's line
 ON_WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 
@@ -80,7 +97,8 @@ def runs_of(benchmarks):
     runs = {}
     for benchmark in benchmarks:
         if benchmark["run_type"] == "iteration":
-            runs.setdefault(benchmark["name"].replace("/real_time", ""), []).append(benchmark)
+            name = re.sub("/(min_time:[^/]*|real_time)", "", benchmark["name"])
+            runs.setdefault(name, []).append(benchmark)
     return {
         name: {**same[0], "real_time": statistics.median(run["real_time"] for run in same)}
         for name, same in runs.items()
@@ -92,12 +110,12 @@ def draw_runtimes(runs, path):
         ("Many events: from a moving car, 640x480", "driving-640x480", 2),
         ("Few events: a ball, 1280x720", "ball-1280x720", 3),
     ]
-    figure, all_axes = plt.subplots(1, 2, figsize=(13, 8), sharey=True)
+    figure, all_axes = plt.subplots(1, 2, figsize=(13, 10), sharey=True)
     for axes, (title, scene, column) in zip(all_axes, panels):
         top = 0.0
         ticks = []
-        for row in PAPER_RUNTIMES:
-            bars = [(row[column], PAPER)]
+        for row in ROWS:
+            bars = [(row[column], EVENTCV if row is EVENTCV_RUNTIMES else PAPER)] if row[column] else []
             for formulation, colour in (("plain", PLAIN), ("ours", OURS)):
                 run = runs.get(f"{scene}/{row[1]}/{formulation}/threads:2")
                 if run:
@@ -123,7 +141,7 @@ def draw_runtimes(runs, path):
         axes.set_xlim(0.01, 2e7)
         axes.set_ylim(top - 0.3, -1.3)
         axes.set_yticks(ticks)
-        axes.set_yticklabels([row[0] for row in PAPER_RUNTIMES])
+        axes.set_yticklabels([row[0] for row in ROWS])
         axes.tick_params(axis="y", length=0)
         axes.xaxis.set_major_locator(LogLocator(10, numticks=20))
         axes.xaxis.set_minor_formatter(NullFormatter())
@@ -131,88 +149,97 @@ def draw_runtimes(runs, path):
         axes.set_axisbelow(True)
         axes.set_xlabel("milliseconds a frame")
         axes.set_title(title, pad=14)
-    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, PLAIN, OURS)]
+    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (PAPER, PLAIN, EVENTCV, OURS)]
     figure.legend(
         handles,
         [
             "the paper's figures: its footage, measured on its machine (i7-9700, RTX 2080 Ti)",
             "naive implementation: our footage, our machine, two threads",
+            "EventCV's figures: a moving edge, on its machine (12 cores)",
             "ours: the same footage, machine and threads",
         ],
         loc="lower center",
-        ncol=3,
+        ncol=2,
         frameon=False,
         fontsize=9,
         handlelength=1.2,
     )
-    figure.tight_layout(rect=(0, 0.045, 1, 1), w_pad=2)
+    figure.tight_layout(rect=(0, 0.055, 1, 1), w_pad=2)
     figure.savefig(path, dpi=110)
+
+
+def points_of(runs, axis, counter, method, formulation):
+    prefix = f"growth/{axis}/{method}/{formulation}/"
+    return sorted((run[counter], run["real_time"]) for name, run in runs.items() if name.startswith(prefix))
+
+
+def scale_growth(axes, runs, axis):
+    axes.set_yscale("log")
+    if axis == "changed":
+        axes.set_xscale("symlog", linthresh=0.01, linscale=0.5)
+        axes.set_xlim(0, 1.1)
+        axes.set_xticks([0, 0.01, 0.1, 0.3, 1])
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{100 * x:g} %"))
+    elif axis == "n":
+        axes.set_xlim(left=0)
+    elif axis == "pixels":
+        sizes = {run["pixels"]: name.rsplit("/", 1)[1] for name, run in runs.items() if name.startswith("growth/pixels/")}
+        axes.set_xscale("log")
+        axes.set_xticks(list(sizes), list(sizes.values()), fontsize=7.5)
+        axes.xaxis.set_minor_locator(NullLocator())
+    else:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: short(x)))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
+    axes.grid(color="#e8eaee", linewidth=0.8)
 
 
 def draw_growth(runs, path):
-    panels = [
-        ("pixels", "pixels", "size of the picture (by its pixels)", "A tenth of the picture moves, n = 10"),
+    columns = [
+        ("pixels", "pixels", "size of the picture (by its pixels)", "A tenth moves, n = 10"),
         ("n", "n", "n, interpolated frames", "A tenth of 640x480 moves"),
         ("changed", "changed", "share of changed pixels", "640x480, n = 10"),
-        ("events", "events", "events a frame", "Thresholds; a third of 640x480 moves, n = 10"),
+        ("events", "events", "events a frame, by the thresholds", "A third of 640x480 moves, n = 10"),
     ]
-    figure, all_axes = plt.subplots(2, 2, figsize=(12, 9))
-    for axes, (axis, counter, label, title) in zip(all_axes.flat, panels):
-        for method, colour in COLOURS.items():
-            for formulation, style in (("plain", ":"), ("ours", "-")):
-                prefix = f"growth/{axis}/{method}/{formulation}/"
-                points = sorted(
-                    (run[counter], run["real_time"])
-                    for name, run in runs.items()
-                    if name.startswith(prefix)
-                )
-                if not points:
-                    continue
+    figure, all_axes = plt.subplots(len(GROWTH), len(columns), figsize=(17, 11), sharey="row")
+    for row, (methods, row_axes) in enumerate(zip(GROWTH, all_axes)):
+        for axes, (axis, counter, label, title) in zip(row_axes, columns):
+            lines = [
+                (points, method, formulation)
+                for method in methods
+                for formulation in ("plain", "ours")
+                if (points := points_of(runs, axis, counter, method, formulation))
+            ]
+            if not lines:
+                axes.text(0.5, 0.5, "eventsim-dvs does not have n", transform=axes.transAxes, ha="center")
+                axes.set_axis_off()
+                continue
+            for points, method, formulation in lines:
+                ours = formulation == "ours"
                 axes.plot(
                     *zip(*points),
-                    style,
-                    color=colour,
-                    linewidth=1.9 if formulation == "ours" else 1.4,
-                    marker="o" if formulation == "ours" else None,
+                    "-" if ours else ":",
+                    color=methods[method][1],
+                    linewidth=1.9 if ours else 1.4,
+                    marker="o" if ours else None,
                     markersize=4,
                 )
-        axes.set_yscale("log")
-        if axis == "changed":
-            axes.set_xscale("symlog", linthresh=0.01, linscale=0.5)
-            axes.set_xlim(0, 1.1)
-            axes.set_xticks([0, 0.01, 0.03, 0.1, 0.3, 1])
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{100 * x:g} %"))
-            axes.xaxis.set_minor_formatter(NullFormatter())
-        elif axis == "n":
-            axes.set_xlim(left=0)
-        elif axis == "pixels":
-            sizes = {
-                run["pixels"]: name.rsplit("/", 1)[1]
-                for name, run in runs.items()
-                if name.startswith("growth/pixels/")
-            }
-            axes.set_xscale("log")
-            axes.set_xticks(list(sizes), list(sizes.values()), fontsize=8)
-            axes.xaxis.set_minor_formatter(NullFormatter())
-            axes.xaxis.set_minor_locator(NullLocator())
-        else:
-            axes.set_xscale("log")
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: short(x)))
-            axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
-        axes.grid(color="#e8eaee", linewidth=0.8)
-        axes.set_xlabel(label)
-        axes.set_ylabel("milliseconds a frame")
-        axes.set_title(title, pad=8)
-    lines = [plt.Line2D([], [], color=colour, linewidth=2) for colour in COLOURS.values()]
-    lines += [
+            scale_growth(axes, runs, axis)
+            axes.tick_params(labelleft=True)
+            axes.set_xlabel(label)
+            if row == 0:
+                axes.set_title(title, pad=8)
+        row_axes[0].set_ylabel("milliseconds a frame")
+        lines = [plt.Line2D([], [], color=colour, linewidth=2) for _, colour in methods.values()]
+        row_axes[0].legend(lines, [label for label, _ in methods.values()], frameon=False, fontsize=9)
+    lines = [
         plt.Line2D([], [], color=INK, linewidth=1.9, marker="o", markersize=4),
         plt.Line2D([], [], color=INK, linewidth=1.4, linestyle=":"),
     ]
-    names = [LABELS[method] for method in COLOURS] + ["ours", "naive implementation"]
-    figure.legend(lines, names, loc="lower center", ncol=6, frameon=False)
-    figure.tight_layout(rect=(0, 0.04, 1, 1), h_pad=2.5, w_pad=2.5)
-    figure.savefig(path, dpi=110)
+    figure.legend(lines, ["ours", "naive implementation"], loc="lower center", ncol=2, frameon=False)
+    figure.tight_layout(rect=(0, 0.03, 1, 1), h_pad=2, w_pad=1.5)
+    figure.savefig(path, dpi=100)
 
 
 def main():
