@@ -30,6 +30,23 @@ np.save("numbers.npy", np.zeros((5, 4)))
 np.savez("numbers.npz", x=np.zeros(5))
 with h5py.File("numbers.h5", "w") as file:
     file.create_dataset("weights", data=np.zeros(5))
+with h5py.File("particles.h5", "w") as file:  # events of another kind
+    group = file.create_group("events")
+    for name in ("pt", "eta", "phi"):
+        group.create_dataset(name, data=np.zeros(5))
+with h5py.File("rows.hdf5", "w") as file:
+    file.create_dataset("events", data=np.zeros((5, 4)))
+with h5py.File("dsec.h5", "w") as file:
+    file.create_dataset("ms_to_idx", data=np.zeros(5, int))
+    group = file.create_group("events")
+    for name in ("p", "t", "x", "y"):
+        group.create_dataset(name, data=np.zeros(5, int), compression="gzip")
+with h5py.File("columns.h5", "w") as file:
+    group = file.create_group("events")
+    for name in ("t", "x", "y", "p"):
+        group.create_dataset(name, data=np.zeros(5, int))
+with h5py.File("v2e.h5", "w") as file:
+    file.create_dataset("events", shape=(0, 4), maxshape=(None, 4), dtype="uint32", compression="gzip")
 PYTHON
 echo 'export const a = 1;' >script.es
 printf 'IIU\0\010\0\0\0 a photo' >photo.raw
@@ -49,9 +66,14 @@ application/x-event-npy ball.npy
 application/x-aedat ball.aedat4
 application/x-event-hdf5 ball.h5
 application/x-event-hdf5 ball.hdf5
+application/x-event-hdf5 dsec.h5
+application/x-event-hdf5 columns.h5
+application/x-event-hdf5 v2e.h5
 application/x-npy numbers.npy
 application/x-npz numbers.npz
 application/x-hdf numbers.h5
+application/x-hdf particles.h5
+application/x-hdf rows.hdf5
 application/ecmascript script.es
 image/x-panasonic-rw photo.raw
 image/x-panasonic-rw words.raw
