@@ -423,9 +423,8 @@ TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
   };
   skips(buffer_of(GST_CLOCK_TIME_NONE, events, ms), "has no PTS");
   skips(buffer_of(static_cast<GstClockTime>(max_rtp_start) + 1, events, ms), "292 years");
-  GstBuffer* partial = buffer_of(0, events, ms);
-  gst_buffer_append(partial, gst_buffer_new_memdup("12345", 5));
-  skips(partial, "not a multiple of 8 bytes");
+  skips(gst_buffer_append(buffer_of(0, events, ms), gst_buffer_new_memdup("12345", 5)),
+        "not a multiple of 8 bytes");
   // Those that a flush drops.
   push(h, {0, 1'000'000, events});
   flush({h.get()});

@@ -24,10 +24,13 @@ bool is_side(int pixels) {
 
 }  // namespace
 
+/// FlatBufferBuilder is a class or an alias, depending on the version of FlatBuffers.
+class Aedat4Builder : public flatbuffers::FlatBufferBuilder {};
+
 Aedat4Encoder::Aedat4Encoder(Aedat4Settings settings)
     : settings_(std::move(settings)),
       compressor_(std::make_unique<Aedat4Compressor>(settings_.compression)),
-      builder_(std::make_unique<flatbuffers::FlatBufferBuilder>()) {
+      builder_(std::make_unique<Aedat4Builder>()) {
   if (!is_side(settings_.size.width) || !is_side(settings_.size.height))
     throw std::invalid_argument("AEDAT4 supports sensors of 1x1 to 32767x32767 pixels");
 }
@@ -62,8 +65,8 @@ void Aedat4Encoder::encode(const Frame& frame, std::vector<std::uint8_t>& out) {
   flush(out);
   builder_->Clear();
   std::uint8_t* pixels = nullptr;
-  const auto vector = builder_->CreateUninitializedVector(
-      row * static_cast<std::size_t>(frame.height), sizeof *pixels, &pixels);
+  const auto vector =
+      builder_->CreateUninitializedVector(row * static_cast<std::size_t>(frame.height), &pixels);
   for (int y = 0; y < frame.height; ++y)
     std::memcpy(pixels + static_cast<std::size_t>(y) * row, frame.pixels + y * frame.stride, row);
   builder_->FinishSizePrefixed(

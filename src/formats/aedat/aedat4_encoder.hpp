@@ -12,12 +12,9 @@
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/encoder.hpp"
 
-namespace flatbuffers {
-class FlatBufferBuilder;
-}
-
 namespace eventcamera {
 
+class Aedat4Builder;
 class Aedat4Compressor;
 
 /// Settings of an AEDAT4 file.
@@ -72,7 +69,7 @@ class Aedat4Encoder final : public Encoder {
 
   Aedat4Settings settings_;
   std::unique_ptr<Aedat4Compressor> compressor_;
-  std::unique_ptr<flatbuffers::FlatBufferBuilder> builder_;
+  std::unique_ptr<Aedat4Builder> builder_;
   std::vector<AbsoluteEvent> held_;
   std::uint64_t position_ = 0;        ///< of the next bytes in the file
   std::uint64_t table_field_at_ = 0;  ///< of the table position in the file
