@@ -25,10 +25,12 @@
  * jAER's addresses are read as those of a DVS128 if the sensor has 128x128 pixels, else as those of
  * a DAVIS. Samples of frames and of the IMU are skipped.
  *
- * ## Example launch line
+ * ## Example launch lines
  * |[
  * gst-launch-1.0 udpsrc port=3333 ! eventdatagramdepay format=spif width=640 height=480 !
  * eventrender ! videoconvert ! autovideosink
+ * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
+ * eventdatagrampay format=spif ! udpsink host=receiver port=3333
  * ]|
  */
 #include <gst/gst.h>

@@ -155,7 +155,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 filesrc location=events.txt ! eventcsvdec ! evtenc ! filesink
+ * gst-launch-1.0 filesrc location=recording.csv ! eventcsvdec ! evtenc ! filesink
  * location=events.raw
  * ]|
  */
@@ -246,7 +246,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 filesrc location=events.h5 ! eventhdf5dec ! eventrender ! videoconvert !
+ * gst-launch-1.0 filesrc location=recording.h5 ! eventhdf5dec ! eventrender ! videoconvert !
  * autovideosink
  * ]|
  */

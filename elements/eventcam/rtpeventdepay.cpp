@@ -26,11 +26,13 @@
  * - `late-packets`: duplicates, and packets that came after later ones; dropped;
  * - `rejected-packets`: packets that are not of this format or sensor, or corrupt.
  *
- * ## Example launch line
+ * ## Example launch lines
  * |[
  * gst-launch-1.0 udpsrc port=5000
  * caps="application/x-rtp,media=application,clock-rate=1000000,encoding-name=X-EVENT-CAMERA,width=640,height=480"
  * ! rtpjitterbuffer ! rtpeventdepay ! eventrender ! videoconvert ! autovideosink
+ * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
+ * rtpeventpay ! udpsink host=receiver port=5000
  * ]|
  */
 #include <gst/rtp/gstrtpbasedepayload.h>
