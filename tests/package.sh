@@ -58,10 +58,11 @@ used() {
     try gst-inspect-1.0 $element
   done
   try gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc ! filesink location=ball.raw
-  try gst-play-1.0 --no-interactive --videosink=fakesink ball.raw
-  try event-convert ball.raw ball.h5
+  for ending in dat es npy csv aedat4 hdf5 h5; do try event-convert ball.raw ball.$ending; done
+  for ending in raw dat es npy csv aedat4 hdf5 h5; do try gst-play-1.0 --no-interactive --videosink=fakesink ball.$ending; done
   try event-calibrate --version
   try man --whatis event-convert
+  try test -s /usr/share/doc/gsteventcamera-1.0/struct.Info.html
   try pkg-config --exists --print-errors gsteventcamera-1.0
   try cc count_events.c -o count_events $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
   try ./count_events "videotestsrc pattern=ball num-buffers=10 ! eventsim-diff ! appsink name=events"
