@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Overhead of GStreamer per frame: a whole pipeline compared to the core alone, and events written
-// and drawn compared to a memcpy of the same bytes. Both sides of a comparison alternate in one
-// run. Counters are medians: microseconds per frame, and ratios of wall-clock and CPU time.
+// Overhead of GStreamer per frame: an element compared to its core, which writes the events to
+// memory or draws them as the element does; and events written and drawn compared to a memcpy of
+// the same bytes. Both sides of a comparison alternate in one run. Counters are medians:
+// microseconds per frame, and ratios of wall-clock and CPU time.
 //   meson devenv -C build-bench bench/element_bench
 #include <benchmark/benchmark.h>
-#include <gst/app/gstappsrc.h>
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <functional>
@@ -52,57 +52,81 @@ struct Method {
 
 constexpr int interpolated_frames = 10;
 
-/// `appsrc ! ELEMENT ! fakesink`, fed from memory.
-class Pipeline {
+/// An element between two bare pads, fed from memory by the calling thread, so that nothing but the
+/// element is timed.
+class FedElement {
  public:
-  Pipeline(const Scene& scene, const Method& method, const std::string& out, int threads)
-      : scene_(scene) {
-    const std::string launch = "appsrc name=source format=time ! " + method.element +
-                               " n-threads=" + std::to_string(threads) +
+  FedElement(const Scene& scene, const Method& method, const std::string& out, int threads) {
+    const std::string launch = method.element + " n-threads=" + std::to_string(threads) +
                                " positive-threshold=" + std::to_string(method.threshold) +
-                               " negative-threshold=" + std::to_string(method.threshold) + " ! " +
-                               out + " ! fakesink sync=false";
+                               " negative-threshold=" + std::to_string(method.threshold);
     GError* error = nullptr;
-    pipeline_ = gst_parse_launch(launch.c_str(), &error);
+    element_ = gst_parse_launch(launch.c_str(), &error);
     if (error != nullptr) {
       std::fprintf(stderr, "%s: %s\n", launch.c_str(), error->message);
       std::exit(1);
     }
-    source_ = GST_APP_SRC(gst_bin_get_by_name(GST_BIN(pipeline_), "source"));
+    gst_object_ref_sink(element_);
+    source_ = pad_of(GST_PAD_SRC, "ANY", "sink");
+    sink_ = pad_of(GST_PAD_SINK, out.c_str(), "src");
+    gst_pad_set_chain_function(sink_, [](GstPad*, GstObject*, GstBuffer* buffer) {
+      gst_buffer_unref(buffer);
+      return GST_FLOW_OK;
+    });
+    gst_pad_set_active(sink_, TRUE);
+    gst_element_set_state(element_, GST_STATE_PLAYING);
+    gst_pad_set_active(source_, TRUE);
+
     const auto& first = scene.clip.front();
+    gst_pad_push_event(source_, gst_event_new_stream_start("benchmark"));
     GstCaps* caps = gst_caps_new_simple(
         "video/x-raw", "format", G_TYPE_STRING, "GRAY8", "width", G_TYPE_INT, first.width(),
         "height", G_TYPE_INT, first.height(), "framerate", GST_TYPE_FRACTION, 25, 1, nullptr);
-    gst_app_src_set_caps(source_, caps);
+    gst_pad_push_event(source_, gst_event_new_caps(caps));
     gst_caps_unref(caps);
-    GstAppSrcCallbacks callbacks = {};
-    callbacks.need_data = [](GstAppSrc*, guint, gpointer self) {
-      static_cast<Pipeline*>(self)->push_another();
-    };
-    gst_app_src_set_callbacks(source_, &callbacks, this, nullptr);
-
-    gst_element_set_state(pipeline_, GST_STATE_PLAYING);
-    wants_more_.wait(false);
+    GstSegment segment;
+    gst_segment_init(&segment, GST_FORMAT_TIME);
+    gst_pad_push_event(source_, gst_event_new_segment(&segment));
+    for (const auto& frame : scene.clip) frames_.push_back(wrapped(frame));
   }
-  ~Pipeline() {
-    gst_element_set_state(pipeline_, GST_STATE_NULL);
+  ~FedElement() {
+    gst_pad_set_active(source_, FALSE);
+    gst_element_set_state(element_, GST_STATE_NULL);
+    gst_pad_set_active(sink_, FALSE);
+    for (GstBuffer* frame : frames_) gst_buffer_unref(frame);
     gst_object_unref(source_);
-    gst_object_unref(pipeline_);
+    gst_object_unref(sink_);
+    gst_object_unref(element_);
   }
-  Pipeline(const Pipeline&) = delete;
-  Pipeline& operator=(const Pipeline&) = delete;
+  FedElement(const FedElement&) = delete;
+  FedElement& operator=(const FedElement&) = delete;
 
-  /// Pushes `frames` frames and returns when the pipeline wants more.
-  void run(int frames) {
-    wants_more_ = false;
-    left_ = frames - 1;
-    push();
-    wants_more_.wait(false);
+  void push(int frames) {
+    for (int i = 0; i < frames; ++i, ++pushed_) {
+      GstBuffer* frame = bench::back_and_forth(frames_, pushed_);
+      GST_BUFFER_PTS(frame) = static_cast<GstClockTime>(pushed_ * scene::frame_time);
+      if (gst_pad_push(source_, gst_buffer_ref(frame)) != GST_FLOW_OK) std::exit(1);
+    }
   }
 
  private:
-  void push() {
-    const auto& frame = bench::back_and_forth(scene_.clip, pushed_);
+  /// Makes a pad that is linked to one of the element.
+  GstPad* pad_of(GstPadDirection direction, const char* caps, const char* peer_name) {
+    GstCaps* accepted = gst_caps_from_string(caps);
+    GstPadTemplate* pad_template =
+        gst_pad_template_new("bench", direction, GST_PAD_ALWAYS, accepted);
+    gst_caps_unref(accepted);
+    auto* pad = GST_PAD(gst_object_ref_sink(gst_pad_new_from_template(pad_template, nullptr)));
+    gst_object_unref(pad_template);
+    GstPad* peer = gst_element_get_static_pad(element_, peer_name);
+    const auto linked =
+        direction == GST_PAD_SRC ? gst_pad_link(pad, peer) : gst_pad_link(peer, pad);
+    gst_object_unref(peer);
+    if (linked != GST_PAD_LINK_OK) std::exit(1);
+    return pad;
+  }
+
+  static GstBuffer* wrapped(const bench::Picture& frame) {
     gsize offsets[GST_VIDEO_MAX_PLANES] = {};
     gint strides[GST_VIDEO_MAX_PLANES] = {static_cast<gint>(frame.stride())};
     const auto size = static_cast<gsize>(frame.stride()) * static_cast<gsize>(frame.height());
@@ -112,26 +136,65 @@ class Pipeline {
     gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8,
                                    static_cast<guint>(frame.width()),
                                    static_cast<guint>(frame.height()), 1, offsets, strides);
-    GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(pushed_++ * scene::frame_time);
-    gst_app_src_push_buffer(source_, buffer);
+    return buffer;
   }
-  /// Called once the pipeline has processed all frames.
-  void push_another() {
-    if (left_ > 0) {
-      --left_;
-      push();
-    } else {
-      wants_more_ = true;
-      wants_more_.notify_one();
+
+  GstElement* element_;
+  GstPad* source_;
+  GstPad* sink_;
+  std::vector<GstBuffer*> frames_;
+  std::int64_t pushed_ = 0;
+};
+
+/// The core of an element: frames to events in memory, or to a picture.
+class Core {
+ public:
+  Core(const Scene& scene, const Method& method, bool draws, int threads)
+      : scene_(scene),
+        simulator_(method.make({scene.clip[0].width(), scene.clip[0].height(), 8})),
+        settings_{method.threshold, method.threshold, interpolated_frames, threads},
+        accumulator_(scene.clip[0].width(), scene.clip[0].height()),
+        picture_(draws ? static_cast<std::size_t>(stride()) *
+                             static_cast<std::size_t>(scene.clip[0].height())
+                       : 0) {}
+
+  void push(int frames) {
+    for (int i = 0; i < frames; ++i, ++pushed_) {
+      const auto* made = simulator_->push(scene::luma(bench::back_and_forth(scene_.clip, pushed_)),
+                                          pushed_ * scene::frame_time, settings_);
+      if (made == nullptr) continue;
+      events_ += made->size();
+      if (picture_.empty())
+        write(*made);
+      else
+        draw(*made);
     }
   }
 
+  double events_per_frame() const {
+    return static_cast<double>(events_) / static_cast<double>(pushed_);
+  }
+
+ private:
+  void write(const EventBuckets& events) {
+    if (memory_.size() < events.size()) memory_.resize(events.size());
+    events.write_to(memory_.data(), simulator_->threads());
+  }
+  void draw(const EventBuckets& events) {
+    constexpr PixelLayout bgrx{.bytes = 4, .red = 2, .green = 1, .blue = 0};
+    accumulator_.add(events, simulator_->threads());
+    accumulator_.draw(palette(PaletteName::dark), bgrx, picture_.data(), stride());
+  }
+  std::ptrdiff_t stride() const { return std::ptrdiff_t{4} * scene_.clip[0].width(); }
+
   const Scene& scene_;
-  GstElement* pipeline_;
-  GstAppSrc* source_;
+  std::unique_ptr<Simulator> simulator_;
+  Settings settings_;
+  std::vector<Event> memory_;
+  Accumulator accumulator_;
+  std::vector<std::byte> picture_;  ///< empty if the events are written
   std::int64_t pushed_ = 0;
-  std::atomic<int> left_ = 0;
-  std::atomic<bool> wants_more_ = false;
+  std::size_t events_ = 0;
 };
 
 /// Duration of a piece of work, microseconds: wall-clock time, and CPU time of all threads, which
@@ -179,53 +242,42 @@ void by_turns(benchmark::State& state, const char* base_name, int frames,
   state.counters["processor-ratio"] = median(processor_ratios);
 }
 
-void register_pipeline(const Scene& scene, const Method& method, const std::string& out,
-                       int threads) {
+void register_element(const Scene& scene, const Method& method, const std::string& out,
+                      int threads) {
   const auto name = scene.name + "/" + method.element + "/" + out.substr(0, out.find('/')) +
                     "/threads:" + std::to_string(threads);
-  benchmark::RegisterBenchmark(
-      name.c_str(),
-      [&, out, threads](benchmark::State& state) {
-        Pipeline pipeline(scene, method, out, threads);
-        const LumaFormat format{scene.clip[0].width(), scene.clip[0].height(), 8};
-        const auto simulator = method.make(format);
-        const Settings settings{method.threshold, method.threshold, interpolated_frames, threads};
-        std::int64_t pushed = 0;
-        std::size_t events = 0;
-        by_turns(
-            state, "core", method.frames_per_turn, [&] { pipeline.run(method.frames_per_turn); },
-            [&] {
-              for (int i = 0; i < method.frames_per_turn; ++i, ++pushed) {
-                const auto* made =
-                    simulator->push(scene::luma(bench::back_and_forth(scene.clip, pushed)),
-                                    pushed * scene::frame_time, settings);
-                if (made != nullptr) events += made->size();
-              }
-            });
-        state.counters["events"] = static_cast<double>(events) / static_cast<double>(pushed);
-      })
+  benchmark::RegisterBenchmark(name.c_str(),
+                               [&, out, threads](benchmark::State& state) {
+                                 FedElement element(scene, method, out, threads);
+                                 Core core(scene, method, out.starts_with("video"), threads);
+                                 by_turns(
+                                     state, "core", method.frames_per_turn,
+                                     [&] { element.push(method.frames_per_turn); },
+                                     [&] { core.push(method.frames_per_turn); });
+                                 state.counters["events"] = core.events_per_frame();
+                               })
       ->Unit(benchmark::kMillisecond)
       ->UseRealTime();
 }
 
-/// `count` random events of an interval, evenly distributed over pixels and steps.
+/// About `count` random events of an interval, evenly distributed over pixels and steps.
 EventBuckets random_events(int count, int width, int height) {
   std::minstd_rand random;
   constexpr int steps = interpolated_frames + 1;
-  constexpr int rows_a_bucket = 16;
+  std::bernoulli_distribution fires(static_cast<double>(count) / (steps * width * height));
   EventBuckets events;
-  events.reset(steps, (height + rows_a_bucket - 1) / rows_a_bucket);
-  for (int i = 0; i < count; ++i) {
-    const int step = 1 + i % steps;
-    const int y = static_cast<int>(random() >> 4) % height;
-    const int x = static_cast<int>(random() >> 4) % width;
-    const auto polarity = random() % 64 < 32 ? Polarity::on : Polarity::off;
-    events.bucket(step, y / rows_a_bucket)
-        .push_back(Event::at(x, y, static_cast<std::uint32_t>(step), polarity));
-  }
-  for (const auto& bucket : events.buckets()) {
-    auto& sorted = const_cast<EventBuckets::Bucket&>(bucket);
-    std::ranges::sort(sorted, {}, [](const Event& e) { return std::pair(e.y(), e.x); });
+  events.reset(steps, band_count(height));
+  for (int step = 1; step <= steps; ++step) {
+    for (int y = 0; y < height; ++y) {
+      auto& pixels = events.pixels(step, y / rows_per_band);
+      if (y % rows_per_band == 0) pixels.begin(static_cast<std::uint32_t>(step));
+      for (int x = 0; x < width; x += 64) {
+        std::uint64_t fired = 0;
+        for (int i = 0; i < std::min(64, width - x); ++i)
+          if (fires(random)) fired |= std::uint64_t{1} << i;
+        pixels.add(x, y, fired, random());
+      }
+    }
   }
   return events;
 }
@@ -233,13 +285,13 @@ EventBuckets random_events(int count, int width, int height) {
 constexpr int picture_width = 1280;
 constexpr int picture_height = 720;
 
-void copy_events(benchmark::State& state, int count) {
+void write_events(benchmark::State& state, int count) {
   const auto events = random_events(count, picture_width, picture_height);
   std::vector<Event> in(events.size());
   std::vector<Event> out(events.size());
-  events.copy_to(in.data());
+  events.write_to(in.data());
   by_turns(
-      state, "memcpy", 1, [&] { events.copy_to(out.data()); },
+      state, "memcpy", 1, [&] { events.write_to(out.data()); },
       [&] { std::memcpy(out.data(), in.data(), in.size() * sizeof(Event)); });
 }
 
@@ -263,11 +315,11 @@ void register_all(const std::vector<Scene>& scenes, const std::vector<Method>& m
   for (const auto& scene : scenes)
     for (const auto& method : methods)
       for (const char* out : {"application/x-event-camera", "video/x-raw,format=BGRx"})
-        for (const int threads : {1, 2}) register_pipeline(scene, method, out, threads);
+        for (const int threads : {1, 2}) register_element(scene, method, out, threads);
 
   for (const int count : {6'000, 60'000, 1'000'000}) {
     const auto events = "/events:" + std::to_string(count);
-    benchmark::RegisterBenchmark(("copy" + events).c_str(), copy_events, count);
+    benchmark::RegisterBenchmark(("write" + events).c_str(), write_events, count);
     for (const auto& [name, layout] :
          {std::pair("GRAY8", PixelLayout{}), std::pair("RGB", PixelLayout{.bytes = 3}),
           std::pair("BGRx", PixelLayout{.bytes = 4, .red = 2, .green = 1, .blue = 0})})

@@ -32,7 +32,7 @@ Intervals intervals_of(const Scene& scene) {
     auto& [buckets, buffer] = intervals.emplace_back();
     buckets = *push(clip[1], frame_time);
     buffer.resize(buckets.size());
-    buckets.copy_to(buffer.data());
+    buckets.write_to(buffer.data());
   }
   return intervals;
 }
@@ -69,7 +69,7 @@ void time_writing_events(benchmark::State& state, const Intervals& intervals) {
   auto out = buffer_for(intervals);
   benchmark::DoNotOptimize(out.data());
   time_intervals(state, intervals, [&](const Interval& interval) {
-    if (interval.buckets.size() <= out.size()) interval.buckets.copy_to(out.data());
+    if (interval.buckets.size() <= out.size()) interval.buckets.write_to(out.data());
   });
 }
 

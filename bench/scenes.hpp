@@ -39,7 +39,8 @@ Clip ball(int count);
 Clip moving_patch(int width, int height, double share, int count);
 
 /// Frame i of a clip played forwards and backwards forever.
-inline const Picture& back_and_forth(const Clip& clip, std::int64_t i) {
+template <class Frame>
+const Frame& back_and_forth(const std::vector<Frame>& clip, std::int64_t i) {
   const auto period = 2 * (static_cast<std::int64_t>(clip.size()) - 1);
   const auto at = i % period;
   return clip[static_cast<std::size_t>(std::min(at, period - at))];

@@ -177,7 +177,7 @@ GstFlowReturn event_simulator_write_events(GstBaseTransform* transform, const Ev
   if (!reserve(prepared, events.size() * sizeof(eventcamera::Event)) ||
       !gst_buffer_map(prepared, &map, GST_MAP_WRITE))
     throw std::bad_alloc();
-  events.copy_to(reinterpret_cast<eventcamera::Event*>(map.data), threads);
+  events.write_to(reinterpret_cast<eventcamera::Event*>(map.data), threads);
   gst_buffer_unmap(prepared, &map);
   return GST_FLOW_OK;
 }

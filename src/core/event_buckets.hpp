@@ -6,44 +6,66 @@
 #include <vector>
 
 #include "src/core/event.hpp"
+#include "src/core/fired_pixels.hpp"
 #include "src/core/thread_pool.hpp"
 
 namespace eventcamera {
 
 /// Events of one interval as kernels produce them: a bucket per step and band of rows. With more
 /// than one band, a bucket holds the events of its rows only, so that threads can draw bands
-/// concurrently. Each thread fills its own buckets; concatenated in order, they are the sorted
-/// events of the interval.
+/// concurrently. Each thread fills its own buckets; written in order, they are the sorted events of
+/// the interval.
 class EventBuckets {
  public:
-  /// On its own cache line, because threads fill neighbouring buckets concurrently.
-  struct alignas(64) Bucket : std::vector<Event> {};
+  /// Either a list of events, or the pixels that fire in a step, whose events are made when they
+  /// are written. On its own cache line, because threads fill neighbouring buckets concurrently.
+  struct alignas(64) Bucket {
+    std::vector<Event> events;
+    FiredPixels pixels;
+
+    std::size_t size() const { return events.size() + pixels.size(); }
+  };
 
   /// Empties the buckets but keeps their memory.
   void reset(int steps, int bands) {
     bands_ = static_cast<std::size_t>(bands);
     buckets_.resize(static_cast<std::size_t>(steps) * bands_);
-    for (auto& bucket : buckets_) bucket.clear();
+    for (auto& bucket : buckets_) {
+      bucket.events.clear();
+      bucket.pixels.begin(0);
+    }
   }
 
   /// Step 1 ... steps, band 0 ... bands - 1.
-  std::vector<Event>& bucket(int step, int band) {
-    return buckets_[static_cast<std::size_t>(step - 1) * bands_ + static_cast<std::size_t>(band)];
-  }
+  std::vector<Event>& bucket(int step, int band) { return at(step, band).events; }
+  FiredPixels& pixels(int step, int band) { return at(step, band).pixels; }
 
-  std::span<const Bucket> buckets() const { return buckets_; }
   int bands() const { return static_cast<int>(bands_); }
 
   /// Number of events in all buckets.
   std::size_t size() const;
 
   /// Writes size() events, sorted by time, then in raster order.
-  void copy_to(Event* out) const;
-  void copy_to(Event* out, ThreadPool& threads) const;
+  void write_to(Event* out) const;
+  void write_to(Event* out, ThreadPool& threads) const;
+
+  /// Calls visit(events), events a std::span<const Event>, until it has seen all events of a band
+  /// in order.
+  template <class Visit>
+  void visit_band(int band, const Visit& visit) const {
+    for (auto i = static_cast<std::size_t>(band); i < buckets_.size(); i += bands_) {
+      visit(std::span<const Event>(buckets_[i].events));
+      buckets_[i].pixels.visit(visit);
+    }
+  }
 
  private:
-  /// Copies the sorted events [first, last).
-  void copy_part(std::size_t first, std::size_t last, Event* out) const;
+  Bucket& at(int step, int band) {
+    return buckets_[static_cast<std::size_t>(step - 1) * bands_ + static_cast<std::size_t>(band)];
+  }
+  /// Writes the sorted events [first, last) of lists, and those of pixels of which the first is in
+  /// that range.
+  void write_part(std::size_t first, std::size_t last, Event* out) const;
 
   std::vector<Bucket> buckets_;
   std::size_t bands_ = 1;

@@ -103,13 +103,13 @@ void Readout::pass(const EventBuckets& in, double duration, double events_per_se
       idle_from_ += count * time_per_event;
     }
   };
-  for (const auto& bucket : in.buckets()) {
-    for (const auto& event : bucket) {
+  in.visit_band(0, [&](std::span<const Event> events) {
+    for (const auto& event : events) {
       serve_until(event.t);
       if (queue_count_ == 0) idle_from_ = std::max<double>(idle_from_, event.t);
       admit(event);
     }
-  }
+  });
   serve_until(duration);
   idle_from_ = std::max(0.0, idle_from_ - duration);
   sort_within_times(left);

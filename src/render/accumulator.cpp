@@ -133,20 +133,16 @@ void Accumulator::add(std::span<const Event> events) {
 }
 
 void Accumulator::add(const EventBuckets& events) {
-  for (int band = 0; band < events.bands(); ++band)
-    add_band(events, static_cast<std::size_t>(band));
+  for (int band = 0; band < events.bands(); ++band) add_band(events, band);
 }
 
 void Accumulator::add(const EventBuckets& events, ThreadPool& threads) {
-  threads.for_each(events.bands(),
-                   [&](int band, int) { add_band(events, static_cast<std::size_t>(band)); });
+  threads.for_each(events.bands(), [&](int band, int) { add_band(events, band); });
 }
 
 /// Adds one band at a time, so that its rows stay in the cache from step to step.
-void Accumulator::add_band(const EventBuckets& events, std::size_t band) {
-  const auto buckets = events.buckets();
-  for (std::size_t i = band; i < buckets.size(); i += static_cast<std::size_t>(events.bands()))
-    add(buckets[i]);
+void Accumulator::add_band(const EventBuckets& events, int band) {
+  events.visit_band(band, [this](std::span<const Event> part) { add(part); });
 }
 
 void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,

@@ -26,7 +26,7 @@ class Accumulator {
             std::ptrdiff_t stride);
 
  private:
-  void add_band(const EventBuckets& events, std::size_t band);
+  void add_band(const EventBuckets& events, int band);
 
   Image<std::uint8_t> fired_;  // bit 0: OFF, bit 1: ON
 };

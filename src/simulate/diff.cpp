@@ -82,13 +82,16 @@ class FiredPixels {
   /// Emits the accumulated pixels in raster order and clears them.
   void fire(int step, std::uint32_t t, EventBuckets& events) {
     for (int y = 0; y < strongest_.height(); ++y) {
-      auto& out = events.bucket(step, y / rows_per_band);
+      auto& out = events.pixels(step, y / rows_per_band);
+      if (y % rows_per_band == 0) out.begin(t);
       for (int x = 0; x < strongest_.width(); x += 64) {
-        for (auto bits = std::exchange(taken_[word({x, y})], 0); bits != 0; bits &= bits - 1) {
-          const int at = x + std::countr_zero(bits);
-          const int difference = std::exchange(strongest_.at(at, y), 0);
-          out.push_back(Event::at(at, y, t, difference > 0 ? Polarity::on : Polarity::off));
+        const auto fired = std::exchange(taken_[word({x, y})], 0);
+        std::uint64_t on = 0;
+        for (auto bits = fired; bits != 0; bits &= bits - 1) {
+          const int i = std::countr_zero(bits);
+          if (std::exchange(strongest_.at(x + i, y), 0) > 0) on |= std::uint64_t{1} << i;
         }
+        out.add(x, y, fired, on);
       }
     }
   }
@@ -144,13 +147,15 @@ class DiffSimulator final : public Simulator {
     on_.begin_next();
     off_.begin_next();
     const int shift = format().bits - 8;
-    for (int band = 0; band < band_count(now.height); ++band) {
-      for (const auto& event : events.bucket(last_step, band)) {
+    const auto keep = [&](std::span<const Event> fired) {
+      for (const auto& event : fired) {
         const Point place{event.x, event.y()};
         const int difference = now.row(place.y)[place.x] - last_.at(place.x, place.y);
         (event.polarity() == Polarity::on ? on_ : off_).keep(place, difference, shift);
       }
-    }
+    };
+    for (int band = 0; band < band_count(now.height); ++band)
+      events.pixels(last_step, band).visit(keep);
   }
 
   /// Tracks the kept pixels of the last difference frame into this one.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <vector>
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/image.hpp"
@@ -12,12 +11,12 @@
 
 namespace eventcamera {
 
-/// Appends the events of a row of pixels: ON where now - before > C+, OFF where before - now > C-
+/// Adds the pixels of a row that fire: ON where now - before > C+, OFF where before - now > C-
 /// (paper, section III-A).
 void fire_differences(const std::uint8_t* before, const std::uint8_t* now, int width, int y,
-                      std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out);
+                      const Thresholds& thresholds, FiredPixels& out);
 void fire_differences(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
-                      std::uint32_t t, const Thresholds& thresholds, std::vector<Event>& out);
+                      const Thresholds& thresholds, FiredPixels& out);
 
 /// Smallest range [first, last) of a row that holds all pixels that changed by more than a
 /// threshold; empty if none did.
@@ -49,10 +48,11 @@ void fire_differences(const ImageView<Pixel>& before, const ImageView<Pixel>& no
                       std::uint32_t t, const Thresholds& thresholds, ThreadPool& threads,
                       EventBuckets& events) {
   threads.for_each(band_count(now.height), [&](int band, int) {
+    auto& fired = events.pixels(step, band);
+    fired.begin(t);
     const BandRows rows(band, now.height);
     for (int y = rows.first; y < rows.last; ++y)
-      fire_differences(before.row(y), now.row(y), now.width, y, t, thresholds,
-                       events.bucket(step, band));
+      fire_differences(before.row(y), now.row(y), now.width, y, thresholds, fired);
   });
 }
 

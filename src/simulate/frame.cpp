@@ -24,10 +24,11 @@ class FrameSimulator final : public Simulator {
     const int bands = band_count(now.height);
     events.reset(1, bands);
     threads().for_each(bands, [&](int band, int) {
+      auto& fired = events.pixels(1, band);
+      fired.begin(t);
       const BandRows rows(band, now.height);
       for (int y = rows.first; y < rows.last; ++y) {
-        fire_differences(last_.row(y), now.row(y), now.width, y, t, thresholds,
-                         events.bucket(1, band));
+        fire_differences(last_.row(y), now.row(y), now.width, y, thresholds, fired);
         last_.assign_row(y, now.row(y));
       }
     });

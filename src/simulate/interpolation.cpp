@@ -5,6 +5,22 @@
 #include <array>
 #include <cstddef>
 
+#ifndef EVENTCAMERA_BEGIN_STEPS
+#define EVENTCAMERA_BEGIN_STEPS
+namespace eventcamera {
+namespace {
+
+/// Empties the pixels of each step, in a band of rows.
+template <class Pixel>
+void begin_steps(const InterpolatedInterval<Pixel>& interval, int band, EventBuckets& events) {
+  for (int j = 1; j <= interval.steps.count(); ++j)
+    events.pixels(j, band).begin(interval.steps.microseconds(j));
+}
+
+}  // namespace
+}  // namespace eventcamera
+#endif
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/interpolation.cpp"
 #include <hwy/foreach_target.h>
@@ -202,18 +218,12 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
 
   for (int x = 0; x < width; x += lanes) {
     const auto within = hn::FirstN(words, static_cast<std::size_t>(std::min(lanes, width - x)));
-    const auto off = off_events(x, y);
     const auto fire = [&](Vector before, Vector after, int j) {
       const auto difference = hn::Sub(after, before);
       const auto on = hn::Gt(difference, positive);
       const auto fired = hn::And(hn::Or(on, hn::Gt(hn::Neg(difference), negative)), within);
       if (hn::AllFalse(words, fired)) return;
-      const FiredLanes tag;
-      Event here[hn::MaxLanes(tag)];
-      store_fired(off, hn::RebindMask(tag, fired), hn::RebindMask(tag, on),
-                  interval.steps.microseconds(j), here);
-      auto& out = events.bucket(j, band);
-      out.insert(out.end(), here, here + hn::CountTrue(words, fired));
+      events.pixels(j, band).add(x, y, bits_of(words, fired), bits_of(words, on));
     };
 
     auto before = hn::PromoteTo(words, hn::LoadU(Bytes(), last_row + x));
@@ -321,6 +331,7 @@ void fire_band_forward(const InterpolatedInterval<std::uint8_t>& interval,
                        const ImageView<std::uint16_t>& last_pairs,
                        const GradientBound& gradient_bound, int band, EventBuckets& events) {
   const PairSampler last(last_pairs);
+  begin_steps(interval, band, events);
   const BandRows rows(band, interval.flow.height);
   const int width = interval.flow.width;
   FirstSteps first_steps;
@@ -338,6 +349,7 @@ void fire_band_blend(const InterpolatedInterval<std::uint8_t>& interval, int ban
                      EventBuckets& events) {
   const Sampler last(interval.warp.last);
   const BandRows rows(band, interval.flow.height);
+  begin_steps(interval, band, events);
   FirstSteps first_steps;
   first_steps.fill(1);
   for (int y = rows.first; y < rows.last; ++y)
@@ -390,8 +402,7 @@ void fire_row_16(const InterpolatedInterval<std::uint16_t>& interval, int y, int
                                   : interval.warp.now.row(y)[x];
       const int difference = value - before;
       if (difference > interval.thresholds.positive || -difference > interval.thresholds.negative)
-        events.bucket(j, band).push_back(Event::at(x, y, interval.steps.microseconds(j),
-                                                   difference > 0 ? Polarity::on : Polarity::off));
+        events.pixels(j, band).add(x, y, 1, difference > 0 ? 1 : 0);
       before = value;
     }
   }
@@ -400,6 +411,7 @@ void fire_row_16(const InterpolatedInterval<std::uint16_t>& interval, int y, int
 template <Interpolation interpolation>
 void fire_band_16(const InterpolatedInterval<std::uint16_t>& interval, int band,
                   EventBuckets& events) {
+  begin_steps(interval, band, events);
   const BandRows rows(band, interval.flow.height);
   for (int y = rows.first; y < rows.last; ++y)
     fire_row_16<interpolation>(interval, y, band, events);

@@ -43,13 +43,14 @@ class Painter {
       std::swap(before_, between_);
       const bool ends = j == steps.count();
       if (!ends) paint(interval, j);
-      auto& out = events.bucket(j, 0);
+      auto& out = events.pixels(j, 0);
+      out.begin(steps.microseconds(j));
       for (int y = 0; y < interval.now.height; ++y) {
         const bool touched = interval.touched[static_cast<std::size_t>(y)] != 0;
         if (!touched && !ends) continue;
         fire_differences(touched ? before_.row(y) : interval.last.row(y),
                          ends ? interval.now.row(y) : between_.row(y), interval.now.width, y,
-                         steps.microseconds(j), thresholds, out);
+                         thresholds, out);
       }
     }
   }
@@ -118,8 +119,10 @@ class SparseSimulator final : public Simulator {
     changes_.reset(1, band_count(now.height));
     fire_differences(last_.view(), now, 1, 0, {threshold, threshold}, threads(), changes_);
     changed_.clear();
-    for (const auto& bucket : changes_.buckets())
-      for (const auto& change : bucket) changed_.push_back({change.x, change.y()});
+    for (int band = 0; band < changes_.bands(); ++band)
+      changes_.visit_band(band, [this](std::span<const Event> changes) {
+        for (const auto& change : changes) changed_.push_back({change.x, change.y()});
+      });
   }
 
   /// Tracks the changed pixels into this frame.

@@ -204,7 +204,7 @@ TEST(Allocations, AreNotMadeByCopyingOrDrawingEvents) {
   Accumulator accumulator(width, height);
   std::vector<std::byte> picture(std::size_t{width} * height);
   EXPECT_EQ(allocations_in_steady_state([&](int) {
-              events->copy_to(copied.data(), simulator->threads());
+              events->write_to(copied.data(), simulator->threads());
               accumulator.add(*events, simulator->threads());
               accumulator.draw(palette(PaletteName::dark), {}, picture.data(), width);
             }),

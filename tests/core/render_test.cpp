@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "src/render/accumulator.hpp"
+#include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
 
 namespace {
@@ -78,13 +79,13 @@ EventBuckets events_by_chance(int width, int height, double share) {
 std::vector<std::byte> plainly_drawn(const EventBuckets& events, int width, int height, int stride,
                                      const Palette& palette, const PixelLayout& layout) {
   std::vector<std::byte> out(static_cast<std::size_t>(stride * height), std::byte{7});
+  const auto list = scene::copy(events);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       bool on = false;
       bool off = false;
-      for (const auto& bucket : events.buckets())
-        for (const auto& event : bucket)
-          if (event.x == x && event.y() == y) (event.polarity() == Polarity::on ? on : off) = true;
+      for (const auto& event : list)
+        if (event.x == x && event.y() == y) (event.polarity() == Polarity::on ? on : off) = true;
       const auto& colour = on && off ? palette.both
                            : on      ? palette.on
                            : off     ? palette.off

@@ -79,7 +79,7 @@ inline LumaView luma(const Image<std::uint8_t>& picture) {
 
 inline std::vector<Event> copy(const eventcamera::EventBuckets& buckets) {
   std::vector<Event> events(buckets.size());
-  buckets.copy_to(events.data());
+  buckets.write_to(events.data());
   return events;
 }
 

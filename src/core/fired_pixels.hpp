@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "src/core/event.hpp"
+
+namespace eventcamera {
+
+/// Pixels that fire at the same time, in raster order: bits, from which their events are written
+/// straight to where they stay.
+class FiredPixels {
+ public:
+  /// 16 pixels of row y, from x on; at least one fires.
+  struct Group {
+    std::uint16_t x;
+    std::uint16_t y;
+    std::uint16_t fired;  ///< bit i is set if pixel x + i fires
+    std::uint16_t on;     ///< bit i of those pixels: its event is ON
+  };
+
+  /// Drops all pixels but keeps their memory.
+  void begin(std::uint32_t t) {
+    t_ = t;
+    size_ = 0;
+    groups_.clear();
+  }
+
+  /// Adds 64 pixels of row y, from x on: bit i of `fired` is set if pixel x + i fires, bit i of
+  /// `on` if its event is ON. Always inlined, so that SIMD code has it for its own target.
+  [[gnu::always_inline]] void add(int x, int y, std::uint64_t fired, std::uint64_t on) {
+    size_ += static_cast<std::size_t>(std::popcount(fired));
+    for (; fired != 0; fired >>= 16, on >>= 16, x += 16)
+      if ((fired & 0xffff) != 0)
+        groups_.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+                           static_cast<std::uint16_t>(fired), static_cast<std::uint16_t>(on)});
+  }
+
+  /// Number of pixels.
+  std::size_t size() const { return size_; }
+
+  /// Writes size() events.
+  void write_to(Event* out) const;
+
+  /// Calls visit(events), events a std::span<const Event>, for some of the events at a time.
+  template <class Visit>
+  void visit(const Visit& visit) const {
+    constexpr std::size_t groups_at_once = 32;
+    Event events[groups_at_once * 16];
+    for (std::size_t first = 0; first < groups_.size(); first += groups_at_once) {
+      const auto groups =
+          std::span(groups_).subspan(first).first(std::min(groups_at_once, groups_.size() - first));
+      std::size_t count = 0;
+      for (const auto& group : groups)
+        count += static_cast<std::size_t>(std::popcount(group.fired));
+      write(groups, t_, std::span(events).first(count));
+      visit(std::span<const Event>(events, count));
+    }
+  }
+
+ private:
+  static void write(std::span<const Group> groups, std::uint32_t t, std::span<Event> out);
+
+  std::vector<Group> groups_;
+  std::size_t size_ = 0;
+  std::uint32_t t_ = 0;
+};
+
+}  // namespace eventcamera
