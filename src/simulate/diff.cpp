@@ -64,12 +64,13 @@ struct Part {
 };
 
 /// Pixels that fire in one interpolated difference frame.
-class FiredPixels {
+class FiredDifferences {
  public:
-  FiredPixels(int width, int height)
+  FiredDifferences(int width, int height)
       : strongest_(width, height),
         words_((width + 63) / 64),
-        taken_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)) {}
+        taken_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)),
+        top_(height) {}
 
   /// The largest difference on a pixel wins; ON wins over an equal OFF.
   void add(const Point& place, int difference) {
@@ -77,15 +78,19 @@ class FiredPixels {
     if (std::abs(difference) > std::abs(strongest) || difference == -strongest)
       strongest = difference == -strongest ? std::abs(difference) : difference;
     taken_[word(place)] |= std::uint64_t{1} << (place.x % 64);
+    top_ = std::min(top_, place.y);
+    bottom_ = std::max(bottom_, place.y + 1);
   }
 
   /// Emits the accumulated pixels in raster order and clears them.
   void fire(int step, std::uint32_t t, EventBuckets& events) {
-    for (int y = 0; y < strongest_.height(); ++y) {
+    for (int y = top_; y < bottom_; ++y) {
       auto& out = events.pixels(step, y / rows_per_band);
-      if (y % rows_per_band == 0) out.begin(t);
+      if (y == top_ || y % rows_per_band == 0) out.begin(t);
       for (int x = 0; x < strongest_.width(); x += 64) {
-        const auto fired = std::exchange(taken_[word({x, y})], 0);
+        auto& taken = taken_[word({x, y})];
+        if (taken == 0) continue;
+        const auto fired = std::exchange(taken, 0);
         std::uint64_t on = 0;
         for (auto bits = fired; bits != 0; bits &= bits - 1) {
           const int i = std::countr_zero(bits);
@@ -94,6 +99,8 @@ class FiredPixels {
         out.add(x, y, fired, on);
       }
     }
+    top_ = strongest_.height();
+    bottom_ = 0;
   }
 
  private:
@@ -105,6 +112,8 @@ class FiredPixels {
   Image<int> strongest_;
   int words_;                         ///< 64-pixel words per row
   std::vector<std::uint64_t> taken_;  ///< one bit per pixel that fires
+  int top_;                           ///< rows [top_, bottom_) hold all of them
+  int bottom_ = 0;
 };
 
 template <class Pixel>
@@ -170,13 +179,14 @@ class DiffSimulator final : public Simulator {
   }
 
   void fire_between(const StepTimes& steps, EventBuckets& events) {
-    while (static_cast<int>(fired_pixels_.size()) < threads().threads())
-      fired_pixels_.emplace_back(format().width, format().height);
+    while (static_cast<int>(fired_differences_.size()) < threads().threads())
+      fired_differences_.emplace_back(format().width, format().height);
     threads().for_each(steps.count() - 1, [&](int i, int thread) {
       const int j = i + 1;
-      auto& fired_pixels = fired_pixels_[static_cast<std::size_t>(thread)];
-      for (const auto& moving : moving_) fired_pixels.add(moving.point.at(j), moving.difference);
-      fired_pixels.fire(j, steps.microseconds(j), events);
+      auto& fired_differences = fired_differences_[static_cast<std::size_t>(thread)];
+      for (const auto& moving : moving_)
+        fired_differences.add(moving.point.at(j), moving.difference);
+      fired_differences.fire(j, steps.microseconds(j), events);
     });
   }
 
@@ -185,7 +195,7 @@ class DiffSimulator final : public Simulator {
   Part on_;
   Part off_;
   std::vector<MovingDifference> moving_;
-  std::vector<FiredPixels> fired_pixels_;  // one per thread
+  std::vector<FiredDifferences> fired_differences_;  // one per thread
 };
 
 }  // namespace

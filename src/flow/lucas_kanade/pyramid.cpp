@@ -115,6 +115,13 @@ int reflected(int p, int size) {
 void reflect_sides(Image<std::uint8_t>& picture, int y) {
   std::uint8_t* row = picture.row(y);
   const int width = picture.width();
+  if (width > Pyramid::margin) {  // without the divisions of reflected()
+    for (int i = 1; i <= Pyramid::margin; ++i) {
+      row[-i] = row[i];
+      row[width - 1 + i] = row[width - 1 - i];
+    }
+    return;
+  }
   for (int i = 1; i <= Pyramid::margin; ++i) row[-i] = row[reflected(-i, width)];
   for (int i = 0; i < Pyramid::margin; ++i) row[width + i] = row[reflected(width + i, width)];
 }
