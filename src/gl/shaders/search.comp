@@ -15,38 +15,47 @@ layout(location = 3) uniform int level_height;
 const uint none = 0x7fffffffu;
 const float scale = 1.0 / 1048576.0;
 
+ivec2 first;   // pixel of the window's corner
+ivec2 offset;  // of the point in its pixel, in 1/8
+
 int mirrored(int p, int size) {
   if (size == 1) return 0;
   while (p < 0 || p >= size) p = p < 0 ? -p : 2 * (size - 1) - p;
   return p;
 }
 
-int place(int x, int y) {
-  return mirrored(y, level_height) * ((level_width + 3) / 4) * 4 + mirrored(x, level_width);
+// In 1/4 of a grey level.
+int grey_of(uint word, int x) {
+  return int(word >> (8 * (x % 4)) & 255u) * 4;
 }
 
-int grey_from(int x, int y) {
-  int p = place(x, y);
-  return int(from[p / 4] >> (8 * (p % 4)) & 255u);
+int word_of(int x, int y) {
+  return mirrored(y, level_height) * ((level_width + 3) / 4) + x / 4;
 }
 
 int grey_to(int x, int y) {
-  int p = place(x, y);
-  return int(to[p / 4] >> (8 * (p % 4)) & 255u);
+  int u = mirrored(x, level_width);
+  return grey_of(to[word_of(u, y)], u);
 }
 
-ivec2 slope(int x, int y) {
-  if (x < 0 || x >= level_width || y < 0 || y >= level_height) return ivec2(0);
-  int both = slopes[y * level_width + x];
-  return ivec2(both << 16 >> 16, both >> 16);
-}
-
+// Grey level and slopes.
 ivec3 pixel(int x, int y) {
-  return ivec3(4 * grey_from(x, y), slope(x, y));
+  int u = mirrored(x, level_width);
+  int grey = grey_of(from[word_of(u, y)], u);
+  if (x < 0 || x >= level_width || y < 0 || y >= level_height) return ivec3(grey, 0, 0);
+  int slope = slopes[y * level_width + x];
+  return ivec3(grey, slope << 16 >> 16, slope >> 16);
 }
 
 ivec3 between(ivec3 a, ivec3 b, int eighths) {
   return a + ((b - a) * eighths + 4 >> 3);
+}
+
+// Column u of the window, between two pixels of a row.
+ivec3 across(int u, int y) {
+  ivec3 left = pixel(first.x + u, y);
+  if (level == 0) return left;
+  return between(left, pixel(first.x + u + 1, y), offset.x);
 }
 
 // The exact sum of products is high * 256 + low.
@@ -61,24 +70,19 @@ void main() {
   uvec2 track = tracks[y * width + x];
   if (track.x == none) return;
   vec2 flow = 2.0 * uintBitsToFloat(track);
-  ivec2 offset = ivec2(x << 3 >> level, y << 3 >> level) & 7;
-  ivec2 first = ivec2(x >> level, y >> level) - 7;
+  offset = ivec2(x << 3 >> level, y << 3 >> level) & 7;
+  first = ivec2(x >> level, y >> level) - 7;
   vec2 part = vec2(offset) / 8.0;
 
-  ivec3 window[225];  // grey levels, in 1/4, and slopes
+  // The window is computed anew in each move: registers could not hold it.
   ivec3 high = ivec3(0);
   ivec3 low = ivec3(0);
-  for (int v = 0; v < 15; ++v) {
-    ivec3 upper_left = pixel(first.x, first.y + v);
-    ivec3 lower_left = pixel(first.x, first.y + v + 1);
-    for (int u = 0; u < 15; ++u) {
-      ivec3 upper = pixel(first.x + u + 1, first.y + v);
-      ivec3 lower = pixel(first.x + u + 1, first.y + v + 1);
-      ivec3 here = between(between(upper_left, upper, offset.x),
-                           between(lower_left, lower, offset.x), offset.y);
-      upper_left = upper;
-      lower_left = lower;
-      window[15 * v + u] = here;
+  for (int u = 0; u < 15; ++u) {
+    ivec3 upper = across(u, first.y);
+    for (int v = 0; v < 15; ++v) {
+      ivec3 lower = across(u, first.y + v + 1);
+      ivec3 here = between(upper, lower, offset.y);
+      upper = lower;
       ivec3 products = ivec3(here.y * here.y, here.y * here.z, here.z * here.z);
       high += products >> 8;
       low += products & 255;
@@ -101,19 +105,22 @@ void main() {
     }
     ivec2 sums[4] = ivec2[4](ivec2(0), ivec2(0), ivec2(0), ivec2(0));
     ivec2 start = first + ivec2(cell);
-    for (int v = 0; v < 15; ++v) {
-      int upper_left = 4 * grey_to(start.x, start.y + v);
-      int lower_left = 4 * grey_to(start.x, start.y + v + 1);
-      for (int u = 0; u < 15; ++u) {
-        int upper = 4 * grey_to(start.x + u + 1, start.y + v);
-        int lower = 4 * grey_to(start.x + u + 1, start.y + v + 1);
-        ivec3 here = window[15 * v + u];
+    for (int u = 0; u < 15; ++u) {
+      ivec3 upper = across(u, first.y);
+      int upper_left = grey_to(start.x + u, start.y);
+      int upper_right = grey_to(start.x + u + 1, start.y);
+      for (int v = 0; v < 15; ++v) {
+        ivec3 lower = across(u, first.y + v + 1);
+        int lower_left = grey_to(start.x + u, start.y + v + 1);
+        int lower_right = grey_to(start.x + u + 1, start.y + v + 1);
+        ivec3 here = between(upper, lower, offset.y);
         sums[0] += (upper_left - here.x) * here.yz;
-        sums[1] += (upper - here.x) * here.yz;
+        sums[1] += (upper_right - here.x) * here.yz;
         sums[2] += (lower_left - here.x) * here.yz;
-        sums[3] += (lower - here.x) * here.yz;
-        upper_left = upper;
-        lower_left = lower;
+        sums[3] += (lower_right - here.x) * here.yz;
+        upper = lower;
+        upper_left = lower_left;
+        upper_right = lower_right;
       }
     }
     vec2 within = flow + part - cell;
