@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "src/gl/shaders.hpp"
+
 namespace eventcamera::gl {
 namespace {
 
@@ -23,9 +25,11 @@ Kernel::Kernel(const Context& gl, std::string_view name, std::string_view source
     : gl_(gl), program_(gl.CreateProgram()) {
   const GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER);
   const std::string_view version = gl.shader_version();
-  const GLchar* const parts[] = {version.data(), source.data()};
-  const GLint lengths[] = {static_cast<GLint>(version.size()), static_cast<GLint>(source.size())};
-  gl.ShaderSource(shader, 2, parts, lengths);
+  const GLchar* const parts[] = {version.data(), shaders::prelude.data(), source.data()};
+  const GLint lengths[] = {static_cast<GLint>(version.size()),
+                           static_cast<GLint>(shaders::prelude.size()),
+                           static_cast<GLint>(source.size())};
+  gl.ShaderSource(shader, 3, parts, lengths);
   gl.CompileShader(shader);
   GLint compiled = GL_FALSE;
   gl.GetShaderiv(shader, GL_COMPILE_STATUS, &compiled);

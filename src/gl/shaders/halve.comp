@@ -9,12 +9,6 @@ layout(location = 0) uniform int width;
 layout(location = 1) uniform int height;
 layout(location = 2) uniform int half_width;
 
-int mirrored(int p, int size) {
-  if (size == 1) return 0;
-  while (p < 0 || p >= size) p = p < 0 ? -p : 2 * (size - 1) - p;
-  return p;
-}
-
 int grey(int x, int y) {
   int u = mirrored(x, width);
   return int(picture[mirrored(y, height) * ((width + 3) / 4) + u / 4] >> (8 * (u % 4)) & 255u);

@@ -18,12 +18,6 @@ const float scale = 1.0 / 1048576.0;
 ivec2 first;   // pixel of the window's corner
 ivec2 offset;  // of the point in its pixel, in 1/8
 
-int mirrored(int p, int size) {
-  if (size == 1) return 0;
-  while (p < 0 || p >= size) p = p < 0 ? -p : 2 * (size - 1) - p;
-  return p;
-}
-
 // In 1/4 of a grey level.
 int grey_of(uint word, int x) {
   return int(word >> (8 * (x % 4)) & 255u) * 4;

@@ -15,26 +15,9 @@ layout(location = 4) uniform int reach;
 // Of the pixels that 64 pixels, 1/8 as many, depend on.
 shared float sums[576];
 
-int mirrored(int p, int size) {
-  if (size == 1) return 0;
-  while (p < 0 || p >= size) p = p < 0 ? -p : 2 * (size - 1) - p;
-  return p;
-}
-
 float grey(int x, int y) {
   int word = mirrored(y, height) * ((width + 3) / 4) + x / 4;
   return float(picture[word] >> (8 * (x % 4)) & 255u);
-}
-
-// Position of pixel i of `to` on a row of `from` pixels: the first of two of these, and the weight
-// of the second one.
-int place(int i, int from, int to, out float weight) {
-  int numerator = (2 * i + 1) * from - to;
-  int first = max(numerator, 0) / (2 * to);
-  weight = 0.0;
-  if (first >= from - 1) return from - 1;
-  weight = max(float(numerator - first * 2 * to), 0.0) / float(2 * to);
-  return first;
 }
 
 void main() {

@@ -7,12 +7,6 @@ layout(std430, binding = 1) writeonly buffer Slopes { int slopes[]; };
 layout(location = 0) uniform int width;
 layout(location = 1) uniform int height;
 
-int mirrored(int p, int size) {
-  if (size == 1) return 0;
-  while (p < 0 || p >= size) p = p < 0 ? -p : 2 * (size - 1) - p;
-  return p;
-}
-
 int grey(int x, int y) {
   int u = mirrored(x, width);
   return int(picture[mirrored(y, height) * ((width + 3) / 4) + u / 4] >> (8 * (u % 4)) & 255u);

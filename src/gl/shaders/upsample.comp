@@ -9,17 +9,6 @@ layout(location = 1) uniform int coarser_height;
 layout(location = 2) uniform int width;
 layout(location = 3) uniform int height;
 
-// Position of pixel i of `to` on a row of `from` pixels: the first of two of these, and the weight
-// of the second one.
-int place(int i, int from, int to, out float weight) {
-  int numerator = (2 * i + 1) * from - to;
-  int first = max(numerator, 0) / (2 * to);
-  weight = 0.0;
-  if (first >= from - 1) return from - 1;
-  weight = max(float(numerator - first * 2 * to), 0.0) / float(2 * to);
-  return first;
-}
-
 void main() {
   int x = int(gl_GlobalInvocationID.x);
   int y = int(gl_WorkGroupID.y);

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Functions that any shader may call.
+
+// Position p on a row of pixels, mirrored at its ends until it is on it.
+int mirrored(int p, int size) {
+  if (size == 1) return 0;
+  while (p < 0 || p >= size) p = p < 0 ? -p : 2 * (size - 1) - p;
+  return p;
+}
+
+// Position of pixel i of `to` on a row of `from` pixels: the first of two of these, and the weight
+// of the second one.
+int place(int i, int from, int to, out float weight) {
+  int numerator = (2 * i + 1) * from - to;
+  int first = max(numerator, 0) / (2 * to);
+  weight = 0.0;
+  if (first >= from - 1) return from - 1;
+  weight = max(float(numerator - first * 2 * to), 0.0) / float(2 * to);
+  return first;
+}
