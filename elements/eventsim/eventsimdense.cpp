@@ -23,20 +23,8 @@
 
 using eventcamera::DenseSimulator;
 using eventcamera::FlowMethod;
-using eventcamera::Interpolation;
 
-namespace {
-
-struct Settings {
-  FlowMethod flow = FlowMethod::dis_lq;
-  Interpolation interpolation = Interpolation::forward;
-};
-
-}  // namespace
-
-static GuardedSettings<Settings>& settings_of(GObject* object) {
-  return event_simulator_settings<Settings>(object);
-}
+using Settings = DenseSettings<FlowMethod::dis_lq>;
 
 static GType flow_type() {
   static const GEnumValue values[] = {
@@ -52,14 +40,11 @@ static GType flow_type() {
 }
 
 static void install_properties(GObjectClass* klass) {
-  const Settings defaults;
-  Properties<settings_of> properties(klass);
-  properties.add(&Settings::flow, flow_property(flow_type(), defaults.flow));
-  properties.add(&Settings::interpolation, interpolation_property(defaults.interpolation));
+  Settings::install(klass, flow_type());
 }
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
-  const Settings settings = settings_of(object).copy();
+  const Settings settings = Settings::of(object).copy();
   auto& dense = static_cast<DenseSimulator&>(simulator);
   dense.set_flow(settings.flow);
   dense.set_interpolation(settings.interpolation);
@@ -72,9 +57,7 @@ static const EventSimulatorMethod dense = {
     .threshold = 2,
     .interpolates = true,
     .create = in_system_memory<eventcamera::make_dense_simulator>,
-    .make_settings = []() -> std::shared_ptr<void> {
-      return std::make_shared<GuardedSettings<Settings>>();
-    },
+    .make_settings = Settings::make,
     .install_properties = install_properties,
     .configure = configure,
 };

@@ -20,21 +20,9 @@
 #include "src/gl/dense.hpp"
 
 using eventcamera::FlowMethod;
-using eventcamera::Interpolation;
 using eventcamera::gl::DenseSimulator;
 
-namespace {
-
-struct Settings {
-  FlowMethod flow = FlowMethod::farneback;
-  Interpolation interpolation = Interpolation::forward;
-};
-
-}  // namespace
-
-static GuardedSettings<Settings>& settings_of(GObject* object) {
-  return event_simulator_settings<Settings>(object);
-}
+using Settings = DenseSettings<FlowMethod::farneback>;
 
 static GType flow_type() {
   static const GEnumValue values[] = {farneback_flow, {0, nullptr, nullptr}};
@@ -42,15 +30,12 @@ static GType flow_type() {
 }
 
 static void install_properties(GObjectClass* klass) {
-  const Settings defaults;
-  Properties<settings_of> properties(klass);
-  properties.add(&Settings::flow, flow_property(flow_type(), defaults.flow));
-  properties.add(&Settings::interpolation, interpolation_property(defaults.interpolation));
+  Settings::install(klass, flow_type());
 }
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
   static_cast<DenseSimulator&>(simulator).set_interpolation(
-      settings_of(object).copy().interpolation);
+      Settings::of(object).copy().interpolation);
 }
 
 static const EventSimulatorMethod dense = {
@@ -61,9 +46,7 @@ static const EventSimulatorMethod dense = {
     .interpolates = true,
     .create = in_gl_memory<eventcamera::gl::make_dense_simulator>,
     .video = gl_memory_video,
-    .make_settings = []() -> std::shared_ptr<void> {
-      return std::make_shared<GuardedSettings<Settings>>();
-    },
+    .make_settings = Settings::make,
     .install_properties = install_properties,
     .configure = configure,
 };

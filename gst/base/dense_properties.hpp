@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <memory>
+
+#include "gst/base/eventsimulator.hpp"
 #include "gst/base/types.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/warp.hpp"
@@ -12,12 +15,6 @@ inline constexpr auto dense_property_flags = static_cast<GParamFlags>(
 
 inline constexpr GEnumValue farneback_flow = {static_cast<int>(eventcamera::FlowMethod::farneback),
                                               "Farneback", "farneback"};
-
-/// `type` is that of the methods that an element has.
-inline GParamSpec* flow_property(GType type, eventcamera::FlowMethod method) {
-  return g_param_spec_enum("flow", "Flow", "Method of finding the motion between frames", type,
-                           static_cast<int>(method), dense_property_flags);
-}
 
 inline GParamSpec* interpolation_property(eventcamera::Interpolation interpolation) {
   using eventcamera::Interpolation;
@@ -32,3 +29,26 @@ inline GParamSpec* interpolation_property(eventcamera::Interpolation interpolati
                            enum_type("GstEventSimInterpolation", values),
                            static_cast<int>(interpolation), dense_property_flags);
 }
+
+/// Settings of such a simulator. `method` is the default.
+template <eventcamera::FlowMethod method>
+struct DenseSettings {
+  eventcamera::FlowMethod flow = method;
+  eventcamera::Interpolation interpolation = eventcamera::Interpolation::forward;
+
+  static std::shared_ptr<void> make() { return std::make_shared<GuardedSettings<DenseSettings>>(); }
+
+  static GuardedSettings<DenseSettings>& of(GObject* object) {
+    return event_simulator_settings<DenseSettings>(object);
+  }
+
+  /// `flows` is the type of the methods that the element has.
+  static void install(GObjectClass* klass, GType flows) {
+    const DenseSettings defaults;
+    Properties<of> properties(klass);
+    properties.add(&DenseSettings::flow,
+                   g_param_spec_enum("flow", "Flow", "Method of finding the motion between frames",
+                                     flows, static_cast<int>(defaults.flow), dense_property_flags));
+    properties.add(&DenseSettings::interpolation, interpolation_property(defaults.interpolation));
+  }
+};
