@@ -12,11 +12,11 @@
  *
  * #GstEventSimFrame for video in OpenGL textures, with compute shaders: the same events for the
  * same frames. Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen. Worth it where the video
- * is in the memory of the GPU already.
+ * is in the memory of the GPU already; video in system memory is uploaded.
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=100 ! glupload ! gleventsim-frame ! eventstats ! fakesink
+ * gst-launch-1.0 videotestsrc num-buffers=100 ! gleventsim-frame ! eventstats ! fakesink
  * ]|
  */
 static const EventSimulatorMethod frame = {

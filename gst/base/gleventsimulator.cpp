@@ -11,6 +11,8 @@
 
 #include "gst/base/frame_luma.hpp"
 #include "gst/base/gl_display.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/video_frame.hpp"
 
 using eventcamera::EventBuckets;
 using eventcamera::LumaWeights;
@@ -106,6 +108,18 @@ static GstGLContext* find_context(GstElement* self, GError** error) {
   return priv.context;
 }
 
+/// Makes find_context() look for another context than this one, which is lost.
+static void forget_context(GstElement* self, GstGLContext* context) {
+  auto& priv = priv_of(self);
+  const std::lock_guard lock(priv.mutex);
+  if (priv.context != context) return;
+  GST_OBJECT_LOCK(priv.display);
+  gst_gl_display_remove_context(priv.display, context);
+  GST_OBJECT_UNLOCK(priv.display);
+  gst_clear_object(&priv.context);
+  gst_pad_mark_reconfigure(GST_BASE_TRANSFORM_SRC_PAD(self));  // its textures are lost, too
+}
+
 static void set_context(GstElement* self, GstContext* context) {
   auto& priv = priv_of(self);
   {
@@ -138,15 +152,18 @@ static gboolean query(GstBaseTransform* self, GstPadDirection direction, GstQuer
 
 namespace {
 
-/// Runs `work` in the thread of a context; passes on its exceptions.
+/// Runs `work` in the thread of a context; passes on its exceptions. Returns false if the context
+/// has no thread any more.
 template <class Work>
-void run_in(GstGLContext* context, const Work& work) {
+bool run_in(GstGLContext* context, const Work& work) {
   struct Call {
     const Work& work;
+    bool has_run;
     std::exception_ptr failure;
-  } call{work, nullptr};
+  } call{work, false, nullptr};
   const auto run = [](GstGLContext*, gpointer data) {
     auto& this_call = *static_cast<Call*>(data);
+    this_call.has_run = true;
     try {
       this_call.work();
     } catch (...) {
@@ -155,6 +172,7 @@ void run_in(GstGLContext* context, const Work& work) {
   };
   gst_gl_context_thread_add(context, run, &call);
   if (call.failure) std::rethrow_exception(call.failure);
+  return call.has_run;
 }
 
 /// Contributions of the channels of the first texture to luma.
@@ -244,12 +262,14 @@ class TextureVideoSimulator final : public VideoSimulator {
   void set_video(const GstVideoInfo& video) override {
     video_ = video;
     find_weights(video, frame_.weights);
+    gst_clear_object(&upload_);
   }
 
   void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
 
   bool queue(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings) override {
-    const MappedTexture texture(video_, buffer, context_, GST_MAP_READ);
+    const OwnedBuffer uploaded = in_texture(buffer);
+    const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
     if (!texture.fault().empty()) throw cannot_read(texture.fault());
     bool ends_interval = false;
     frame_.texture = texture.name();
@@ -274,7 +294,8 @@ class TextureVideoSimulator final : public VideoSimulator {
   void draw(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings,
             const eventcamera::Palette& palette, GstBuffer* picture) override {
     {
-      const MappedTexture texture(video_, buffer, context_, GST_MAP_READ);
+      const OwnedBuffer uploaded = in_texture(buffer);
+      const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
       if (!texture.fault().empty()) throw cannot_read(texture.fault());
       const MappedTexture drawn(drawn_, picture, context_, GST_MAP_WRITE);
       if (!drawn.fault().empty()) throw cannot_draw(drawn.fault());
@@ -292,16 +313,44 @@ class TextureVideoSimulator final : public VideoSimulator {
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 
  private:
+  /// The frame in a texture: uploaded where it is in system memory.
+  OwnedBuffer in_texture(GstBuffer* buffer) {
+    if (gst_buffer_n_memory(buffer) > 0 && gst_is_gl_memory(gst_buffer_peek_memory(buffer, 0)))
+      return OwnedBuffer(gst_buffer_ref(buffer));
+    if (const VideoFrame mapped(video_, buffer, GST_MAP_READ); !mapped)  // GstGLUpload trusts it
+      throw cannot_read(mapped.fault());
+    if (upload_ == nullptr) {
+      upload_ = gst_gl_upload_new(context_);
+      const OwnedCaps from(gst_video_info_to_caps(&video_));
+      const OwnedCaps to(gst_caps_copy(from.get()));
+      gst_caps_set_features_simple(
+          to.get(), gst_caps_features_new(GST_CAPS_FEATURE_MEMORY_GL_MEMORY, nullptr));
+      gst_caps_set_simple(to.get(), "texture-target", G_TYPE_STRING, GST_GL_TEXTURE_TARGET_2D_STR,
+                          nullptr);
+      gst_gl_upload_set_caps(upload_, from.get(), to.get());
+    }
+    GstBuffer* uploaded = nullptr;
+    auto result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
+    if (result == GST_GL_UPLOAD_RECONFIGURE)  // it has chosen how to upload
+      result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
+    if (result != GST_GL_UPLOAD_DONE)
+      throw cannot_read("it cannot be uploaded to an OpenGL texture");
+    return OwnedBuffer(uploaded);
+  }
+
   /// Runs `work` in the context, which others use, too; turns errors of OpenGL into messages.
   template <class Work>
   void run(const Work& work) {
     try {
-      run_in(context_, [&] {
+      const bool has_run = run_in(context_, [&] {
         if (gl_) gl_->forget_errors();
         work();
         gst_gl_context_clear_shader(context_);
       });
+      if (!has_run) throw eventcamera::gl::ContextLost("the OpenGL context has ended");
     } catch (const eventcamera::gl::Error& error) {
+      if (dynamic_cast<const eventcamera::gl::ContextLost*>(&error) != nullptr)
+        forget_context(element_, context_);
       gint major = 0;
       gint minor = 0;
       gst_gl_context_get_gl_version(context_, &major, &minor);
@@ -317,10 +366,15 @@ class TextureVideoSimulator final : public VideoSimulator {
   }
 
   void close() {
-    run_in(context_, [this] {
+    const auto destroy = [this] {
       simulator_.reset();
       gl_.reset();
-    });
+    };
+    if (!run_in(context_, destroy)) {
+      if (gl_) gl_->abandon();
+      destroy();
+    }
+    gst_clear_object(&upload_);
     gst_object_unref(context_);
   }
 
@@ -328,6 +382,7 @@ class TextureVideoSimulator final : public VideoSimulator {
   GstGLContext* context_;
   GstVideoInfo video_;
   GstVideoInfo drawn_{};
+  GstGLUpload* upload_ = nullptr;  ///< for video in system memory
   eventcamera::gl::TextureFrame frame_;
   std::optional<eventcamera::gl::Context> gl_;
   std::unique_ptr<eventcamera::gl::Simulator> simulator_;
@@ -385,7 +440,11 @@ static void choose_texture_pool(GstQuery* query, GstCaps* caps, GstGLContext* co
 static gboolean decide_allocation(GstBaseTransform* self, GstQuery* query) {
   GstCaps* caps = nullptr;
   gst_query_parse_allocation(query, &caps, nullptr);
-  if (event_simulator_draws(caps)) choose_texture_pool(query, caps, priv_of(self).context);
+  if (event_simulator_draws(caps)) {
+    GstGLContext* const context = find_context(GST_ELEMENT(self), nullptr);
+    if (context == nullptr) return FALSE;
+    choose_texture_pool(query, caps, context);
+  }
   return PARENT_TRANSFORM_CLASS->decide_allocation(self, query);
 }
 

@@ -61,7 +61,10 @@ GstCaps* SimulatorVideo::output_caps(const GstCaps* input) const {
 }
 
 GstCaps* SimulatorVideo::input_caps(const GstCaps* output) const {
-  return video_of(output, formats);
+  GstCaps* input = video_of(output, formats);
+  if (texture_target == nullptr) return input;
+  const SimulatorVideo uploaded{GST_CAPS_FEATURE_MEMORY_SYSTEM_MEMORY, formats, nullptr};
+  return gst_caps_merge(input, uploaded.input_caps(output));
 }
 
 void SimulatorVideo::install_pads(GstElementClass* klass) const {

@@ -20,7 +20,7 @@ struct SimulatorVideo {
   const char* memory;                    ///< caps feature
   const char* formats;                   ///< taken
   const char* drawn_formats;             ///< nullptr if it draws none
-  const char* texture_target = nullptr;  ///< of OpenGL
+  const char* texture_target = nullptr;  ///< of OpenGL; video in system memory is taken, too
 
   /// Output caps for this input: events (preferred) or accumulated-event video of the same size and
   /// framerate.

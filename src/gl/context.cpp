@@ -45,6 +45,12 @@ Context::Context(const Load& load) {
   GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_buffer_size_);
 }
 
+void Context::abandon() {
+  DeleteBuffers = [](GLsizei, const GLuint*) {};
+  DeleteProgram = [](GLuint) {};
+  DeleteSync = [](GLsync) {};
+}
+
 void Context::forget_errors() const {
   constexpr int most = 8;  // a lost context has no end of them
   for (int i = 0; i < most && GetError() != GL_NO_ERROR; ++i) {
@@ -57,7 +63,7 @@ void Context::check() const {
   const GLenum code = is_reset ? context_lost : GetError();
   if (code == GL_NO_ERROR) return;
   if (code == context_lost)
-    throw Error("the OpenGL context was lost, because the GPU was reset or removed");
+    throw ContextLost("the OpenGL context was lost, because the GPU was reset or removed");
   if (code == GL_OUT_OF_MEMORY) throw Error("OpenGL is out of memory");
   throw Error("OpenGL error " + hexadecimal(code));
 }

@@ -15,6 +15,12 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The context, and all that was made with it, is of no more use.
+class ContextLost : public Error {
+ public:
+  using Error::Error;
+};
+
 #define EVENTCAMERA_GL_FUNCTIONS(X)                \
   X(PFNGLACTIVETEXTUREPROC, ActiveTexture)         \
   X(PFNGLATTACHSHADERPROC, AttachShader)           \
@@ -76,6 +82,10 @@ class Context {
   GLint64 max_buffer_size() const {
     return max_buffer_size_;
   }
+
+  /// Calls OpenGL no more to free what was made with this: it ended with the context. Anything else
+  /// may no longer be done.
+  void abandon();
 
   /// Forgets that OpenGL calls failed.
   void forget_errors() const;

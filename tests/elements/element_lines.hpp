@@ -52,9 +52,6 @@ class Kind {
       return gst_caps_can_intersect(caps.get(), others.get()) != FALSE;
     }
     bool takes_frames() const { return takes(frame_caps); }
-    bool takes_textures() const {
-      return takes("video/x-raw(memory:GLMemory), format=(string)GRAY8");
-    }
     bool takes_events() const { return takes(event_caps); }
   };
 
@@ -127,7 +124,6 @@ class Kind {
     const auto events = video + " ! eventsim-frame ! " + event_caps;
     if (name_.ends_with("depay")) return events + " ! " + name_.substr(0, name_.size() - 5) + "pay";
     if (pad.takes_frames()) return video;
-    if (pad.takes_textures()) return video + " ! glupload";
     if (pad.takes_events()) return events;
     const auto* const file =
         std::ranges::find(recording_files::files, name_, &recording_files::File::reader);

@@ -32,10 +32,15 @@ class EveryFormat : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats()),
                          [](const auto& format) { return format.param; });
 
+/// A simulator on the GPU that takes frames in system memory.
+Harness without_upload(const std::string& launch) {
+  gst_init(nullptr, nullptr);
+  return {gst_harness_new_parse(launch.c_str()), launch};
+}
+
 /// Bytes of the output for five noisy frames.
-std::string output_of_noise(const std::string& element, const std::string& format,
+std::string output_of_noise(Harness&& h, const std::string& format,
                             const std::string& out = GST_EVENT_CAMERA_MEDIA_TYPE) {
-  Harness h(element);
   h.caps("video/x-raw, width=46, height=34, framerate=25/1, format=" + format, out);
   GRand* random = g_rand_new_with_seed(7);
   std::string bytes;
@@ -54,19 +59,21 @@ std::string output_of_noise(const std::string& element, const std::string& forma
 }
 
 TEST_P(EveryFormat, GivesTheEventsOfTheCpuBitForBit) {
-  const auto expected = output_of_noise("eventsim-frame", GetParam());
+  const auto expected = output_of_noise(Harness("eventsim-frame"), GetParam());
   EXPECT_GT(expected.size(), 8U * 1000);
-  EXPECT_EQ(output_of_noise("gleventsim-frame", GetParam()), expected);
+  EXPECT_EQ(output_of_noise(Harness("gleventsim-frame"), GetParam()), expected);
+  EXPECT_EQ(output_of_noise(without_upload("gleventsim-frame"), GetParam()), expected);
 }
 
 TEST(Pictures, AreThoseOfTheCpuBitForBit) {
   for (const char* palette : {"dark", "light", "viridis"}) {
     const std::string options =
         std::string("eventsim-frame positive-threshold=60 palette=") + palette;
-    const auto expected = output_of_noise(options, "GRAY8", pictures_of("eventsim-frame"));
+    const auto expected = output_of_noise(Harness(options), "GRAY8", pictures_of("eventsim-frame"));
     EXPECT_EQ(expected.size(), 5U * 46 * 34 * 4);
-    EXPECT_EQ(output_of_noise("gl" + options, "GRAY8", pictures_of("gleventsim-frame")), expected)
-        << palette;
+    const auto pictures = pictures_of("gleventsim-frame");
+    EXPECT_EQ(output_of_noise(Harness("gl" + options), "GRAY8", pictures), expected) << palette;
+    EXPECT_EQ(output_of_noise(without_upload("gl" + options), "GRAY8", pictures), expected);
   }
 }
 
@@ -109,10 +116,8 @@ TEST(Dense, InterpolatesAsSet) {
 
 TEST(OpenGl, IsSharedWithThePipeline) {
   gst_init(nullptr, nullptr);
-  const Owned<GstElement> pipeline(
-      gst_parse_launch("videotestsrc num-buffers=3 ! glupload ! gleventsim-frame name=it ! "
-                       "fakesink",
-                       nullptr));
+  const Owned<GstElement> pipeline(gst_parse_launch(
+      "videotestsrc num-buffers=3 ! gleventsim-frame name=it ! fakesink", nullptr));
   const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
   EXPECT_EQ(gst_element_set_state(pipeline.get(), GST_STATE_READY), GST_STATE_CHANGE_SUCCESS);
   const Owned<GstElement> element(gst_bin_get_by_name(GST_BIN(pipeline.get()), "it"));
@@ -153,6 +158,9 @@ TEST(OpenGl, IsNamedInAnErrorWhereItIsMissing) {
 }
 
 std::atomic<bool> is_lost = false;
+std::atomic<GstGLContext*> lost = nullptr;     ///< or only this one
+std::atomic<GstGLContext*> current = nullptr;  ///< at the last look for errors
+std::atomic<bool> has_ended = false;
 std::atomic<bool> is_busy = false;
 std::atomic<int> waits = 0;
 
@@ -173,7 +181,8 @@ void take_over_contexts() {
       get_error = reinterpret_cast<GLenum (*)()>(function);
       return reinterpret_cast<gpointer>(+[]() -> GLenum {
         constexpr GLenum context_lost = 0x0507;
-        return is_lost ? context_lost : get_error();
+        current = gst_gl_context_get_current();
+        return is_lost || current == lost ? context_lost : get_error();
       });
     }
     if (std::string_view(name) == "glClientWaitSync") {
@@ -328,6 +337,53 @@ TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
       EXPECT_EQ(push(), GST_FLOW_OK);  // begins anew, if the application goes on
     }
   }
+}
+
+TEST(OpenGl, IsFoundAnewAfterALoss) {
+  take_over_contexts();
+  for (const std::string& out :
+       {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of("gleventsim-frame")}) {
+    Harness h = without_upload("gleventsim-frame");
+    h.caps(video, out);
+    int i = 0;
+    const auto push = [&h, &i] {
+      ++i;
+      return h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 * 100));
+    };
+    EXPECT_EQ(push(), GST_FLOW_OK);
+    lost = current.load();
+    EXPECT_EQ(push(), GST_FLOW_ERROR);
+    EXPECT_EQ(push(), GST_FLOW_OK);
+    EXPECT_EQ(push(), GST_FLOW_OK);
+    EXPECT_NE(current, lost);
+    lost = nullptr;
+  }
+}
+
+TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
+  take_over_contexts();
+  Harness h("gleventsim-frame");
+  h.caps(video);
+  is_busy = true;
+  h.push(h.flat(0, 0));
+  h.push(h.flat(40 * GST_MSECOND, 100));
+  static void (*send)(GstGLWindow*, GstGLWindowCB, gpointer);
+  GstGLWindow* window = gst_gl_context_get_window(current);
+  send = std::exchange(GST_GL_WINDOW_GET_CLASS(window)->send_message,
+                       [](GstGLWindow* to, GstGLWindowCB callback, gpointer data) {
+                         if (!has_ended) send(to, callback, data);
+                       });
+  gst_object_unref(window);
+  has_ended = true;
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  has_ended = false;
+  is_busy = false;
+  const auto error = h.message(GST_MESSAGE_ERROR);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(text_of(error.get()),
+            "OpenGL cannot simulate: the OpenGL context has ended. Use eventsim-frame, which runs "
+            "on the CPU.");
+  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
 TEST(OpenGl, IsRefusedWhereItIsTooOld) {

@@ -61,6 +61,7 @@ for element in frame dense sparse diff; do
   check videotestsrc num-buffers=8 ! video/x-raw,width=64,height=48 ! glupload ! gleventsim-$element ! fakesink
 done
 check videotestsrc num-buffers=8 ! glupload ! gleventsim-frame ! 'video/x-raw(memory:GLMemory)' ! fakesink
+check videotestsrc num-buffers=8 ! gleventsim-frame ! fakesink
 check videotestsrc num-buffers=8 ! glupload ! gleventsim-frame ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay ! rtpeventdepay ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay max-latency=1000000000 ! rtpeventdepay ! fakesink num-buffers=1
