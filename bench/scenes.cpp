@@ -87,7 +87,7 @@ std::vector<Scene> scenes(bool few_frames) {
       {"cars-1280x720", cars, {{66, 4}, {325, 4}}, 1280, 720, 10},
       // About as much changes in them as on average in frames 200 to 225, the busiest.
       {"busy-cars-1280x720", cars, {{200, 4}, {214, 4}}, 1280, 720, 10},
-      {"bottles-640x360", "bottles-640x360-30fps.mp4", {{0, 4}, {81, 4}}, 640, 360, 10},
+      {"bottles-640x360", "bottles-640x360-30fps.mp4", {{0, 4}, {82, 4}}, 640, 360, 10},
   };
   std::vector<Scene> scenes;
   for (const auto& video : videos)
