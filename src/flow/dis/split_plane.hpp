@@ -9,6 +9,22 @@
 
 namespace eventcamera {
 
+/// Floats that start on a cache line, a multiple of a line. All 0 at first.
+class AlignedFloats {
+ public:
+  explicit AlignedFloats(std::ptrdiff_t count)
+      : lines_(static_cast<std::size_t>(count / row_padding)) {}
+
+  float* data() { return reinterpret_cast<float*>(lines_.data()); }
+  const float* data() const { return reinterpret_cast<const float*>(lines_.data()); }
+
+ private:
+  struct alignas(row_padding * sizeof(float)) Line {
+    float values[row_padding];
+  };
+  std::vector<Line> lines_;
+};
+
 /// Plane of floats that keeps the even and the odd columns of a row apart. The neighbours of every
 /// other pixel of a row are then contiguous, as red-black relaxation needs them.
 class SplitPlane {
@@ -17,14 +33,15 @@ class SplitPlane {
   SplitPlane(int width, int height)
       : width_(width),
         height_(height),
-        odd_(std::ptrdiff_t{(count(0) + 2 * row_padding) / row_padding} * row_padding),
-        values_(static_cast<std::size_t>(2 * odd_ * height + row_padding)) {}
+        odd_(std::ptrdiff_t{(count(0) + 3 * row_padding) / row_padding} * row_padding),
+        values_(2 * odd_ * height + row_padding) {}
 
   int width() const { return width_; }
   int height() const { return height_; }
   /// Number of columns of a parity.
   int count(int parity) const { return (width_ + 1 - parity) / 2; }
-  /// Columns of a parity: column x at x / 2. One before the first and a vector past the last exist.
+  /// Columns of a parity: column x at x / 2. One before the first and two vectors past the last
+  /// exist.
   float* row(int parity, int y) { return values_.data() + start_of(parity, y); }
   const float* row(int parity, int y) const { return values_.data() + start_of(parity, y); }
   float at(int x, int y) const { return row(x & 1, y)[x / 2]; }
@@ -35,6 +52,10 @@ class SplitPlane {
     row(width_ & 1, y)[width_ / 2] = at(width_ - 1, y);
   }
   void clear_row(int y) { std::fill_n(row(0, y) - 1, 2 * odd_, 0.0F); }
+  /// Makes row y equal to a row of a plane of the same width.
+  void copy_row(int y, const SplitPlane& from, int from_y) {
+    std::copy_n(from.row(0, from_y), odd_ + count(1), row(0, y));
+  }
 
  private:
   std::ptrdiff_t start_of(int parity, int y) const { return row_padding + (2 * y + parity) * odd_; }
@@ -42,7 +63,7 @@ class SplitPlane {
   int width_;
   int height_;
   std::ptrdiff_t odd_;  ///< from the even columns of a row to the odd ones
-  std::vector<float> values_;
+  AlignedFloats values_;
 };
 
 /// Several values per pixel, split as in SplitPlane. They are interleaved in blocks, so that
@@ -53,8 +74,8 @@ class SplitPlanes {
   static constexpr std::ptrdiff_t block = row_padding;
 
   SplitPlanes(int width, int height)
-      : odd_(((width + 1) / 2 + block - 1) / block * block * values),
-        values_(static_cast<std::size_t>(2 * odd_ * height)) {}
+      : odd_(((width + 1) / 2 + 2 * block - 1) / block * block * values),
+        values_(2 * odd_ * height) {}
 
   float* row(int parity, int y) { return values_.data() + (2 * y + parity) * odd_; }
   const float* row(int parity, int y) const { return values_.data() + (2 * y + parity) * odd_; }
@@ -63,7 +84,7 @@ class SplitPlanes {
 
  private:
   std::ptrdiff_t odd_;
-  std::vector<float> values_;
+  AlignedFloats values_;
 };
 
 }  // namespace eventcamera

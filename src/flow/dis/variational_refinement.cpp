@@ -30,7 +30,8 @@ constexpr float gradient = 10.0F / 2;
 constexpr float min_gradient = 0.1F * 0.1F;
 constexpr float min_residual = 0.001F * 0.001F;
 constexpr float over_relaxation = 1.6F;
-constexpr int half_sweeps = 2 * 5;  ///< per evaluation of the penalties
+constexpr int half_sweeps = 2 * 5;      ///< per evaluation of the penalties
+constexpr int reach = half_sweeps - 1;  ///< rows to the farthest that affects a row
 /// Positions in the later image are rounded to a fraction of a pixel.
 constexpr float fractions = 32;
 
@@ -45,6 +46,19 @@ HWY_INLINE Vector set(float value) {
 }
 HWY_INLINE Vector square(Vector value) {
   return hn::Mul(value, value);
+}
+
+/// 1 / sqrt(value) with a relative error below 1e-6: an estimate from the bits of the exponent, and
+/// two steps of Newton's method, the first with the factors that are best for one step. Faster than
+/// a square root and a division.
+HWY_INLINE Vector inverse_sqrt(Vector value) {
+  const hn::RebindToSigned<Floats> ints;
+  const auto bits = hn::ShiftRight<1>(hn::BitCast(ints, value));
+  auto root = hn::BitCast(Floats(), hn::Sub(hn::Set(ints, 0x5F1FFFF9), bits));
+  root = hn::Mul(hn::Mul(root, set(0.703952253F)),
+                 hn::Sub(set(2.38924456F), hn::Mul(hn::Mul(value, root), root)));
+  const auto half = hn::Mul(value, set(0.5F));
+  return hn::Mul(root, hn::Sub(set(1.5F), hn::Mul(hn::Mul(half, root), root)));
 }
 
 /// The columns to the left of those of a parity; those to the right follow each of them.
@@ -184,13 +198,14 @@ class Linearisation {
     scratch_.slope.x.replicate_ends(ring(y));
   }
 
-  /// Stores a constraint.
-  static HWY_INLINE void put(Vector a, Vector b, Vector c, float* out) {
-    const auto size = hn::Add(hn::Add(square(a), square(b)), set(min_gradient));
-    const auto scale = hn::Div(set(1.0F), hn::Sqrt(size));
+  /// Stores a constraint on the flow, from one on the step from the given flow.
+  static HWY_INLINE void put(Vector a, Vector b, Vector c, Vector flow_x, Vector flow_y,
+                             float* out) {
+    const auto scale = inverse_sqrt(hn::Add(hn::Add(square(a), square(b)), set(min_gradient)));
+    const auto at_0 = hn::Sub(c, hn::Add(hn::Mul(a, flow_x), hn::Mul(b, flow_y)));
     store(hn::Mul(a, scale), out);
     store(hn::Mul(b, scale), out + Constraints::block);
-    store(hn::Mul(c, scale), out + 2 * Constraints::block);
+    store(hn::Mul(at_0, scale), out + 2 * Constraints::block);
   }
 
   void linearise(int y) {
@@ -199,13 +214,18 @@ class Linearisation {
       const auto slope_x = neighbours(scratch_.slope.x, parity, y);
       const auto slope_y = neighbours(scratch_.slope.y, parity, y);
       const auto change = neighbours(scratch_.change, parity, y);
+      const float* flow_x_row = flow_.x.row(parity, y);
+      const float* flow_y_row = flow_.y.row(parity, y);
       float* constraints = out_.row(parity, y);
       for (int k = 0; k < flow_.x.count(parity); k += lanes) {
+        const auto flow_x = load(flow_x_row + k);
+        const auto flow_y = load(flow_y_row + k);
         const auto xy = slope_x.along(k);
         float* out = constraints + Constraints::at(k);
-        put(load(slope_x.here + k), load(slope_y.here + k), load(change.here + k), out);
-        put(slope_x.across(k), xy, change.across(k), out + 3 * Constraints::block);
-        put(xy, slope_y.along(k), change.along(k), out + 6 * Constraints::block);
+        put(load(slope_x.here + k), load(slope_y.here + k), load(change.here + k), flow_x, flow_y,
+            out);
+        put(slope_x.across(k), xy, change.across(k), flow_x, flow_y, out + 3 * Constraints::block);
+        put(xy, slope_y.along(k), change.along(k), flow_x, flow_y, out + 6 * Constraints::block);
       }
     }
   }
@@ -223,73 +243,53 @@ void linearise_rows(const Image<std::uint8_t>& from, const Image<std::uint8_t>& 
   Linearisation(from, to, flow, scratch, out).run(first, last);
 }
 
-/// Evaluates the penalties at a step, and improves the step.
+/// Evaluates the penalties at a flow, and improves the flow.
 class Relaxation {
  public:
-  Relaxation(const Field& flow, const Constraints& constraints, const Field& step, Scratch& scratch,
-             Field& out)
-      : flow_(flow),
-        constraints_(constraints),
-        step_(step),
+  Relaxation(const Constraints& constraints, const Field& start, const Field& flow, int first,
+             int last, Scratch& scratch, Field& out)
+      : constraints_(constraints),
+        start_(start),
+        flow_(flow),
+        first_(first),
+        last_(last),
         scratch_(scratch),
         out_(out),
         width_(flow.x.width()),
         height_(flow.x.height()) {}
 
-  /// Rows [first, last). A half sweep of a row follows the previous half sweep of the next row, so
-  /// all of them are done in one pass over rows that stay in the cache.
-  void run(int first, int last) {
-    constexpr int reach = half_sweeps - 1;
-    const int begin = std::max(0, first - reach);
-    const int end = std::min(height_, last + reach);
+  /// A half sweep of a row follows the previous half sweep of the next row, so all of them are done
+  /// in one pass over rows that stay in the cache.
+  void run() {
+    const int begin = std::max(0, first_ - reach);
+    const int end = std::min(height_, last_ + reach);
     load_row(begin - 1);
     load_row(begin);
     couple(begin - 1);
-    for (int y = begin; y < last + reach; ++y) {
+    for (int y = begin; y < last_ + reach; ++y) {
       if (y < end) {
         load_row(y + 1);
         couple(y);
-        assemble(y);
+        for (int parity = 0; parity < 2; ++parity) assemble(y, parity);
       }
-      for (int i = 0; i < half_sweeps; ++i) {
-        const int row = y - i;
-        const int beside = reach - i;
-        if (row >= std::max(0, first - beside) && row < std::min(height_, last + beside))
-          relax(row, (row + i) & 1);
-      }
-      if (y - reach >= first) store_row(y - reach);
+      relax(y);
+      if (y - reach >= first_) store_row(y - reach);
     }
   }
 
  private:
   void load_row(int y) {
     const int to = ring(y);
-    if (y < 0 || y >= height_) {
-      scratch_.step.x.clear_row(to);
-      scratch_.step.y.clear_row(to);
-      return;
-    }
-    load_row(step_.x, flow_.x, y, scratch_.step.x, scratch_.total.x);
-    load_row(step_.y, flow_.y, y, scratch_.step.y, scratch_.total.y);
-  }
-  static void load_row(const SplitPlane& step, const SplitPlane& flow, int y, SplitPlane& row,
-                       SplitPlane& total) {
-    const int to = ring(y);
-    const int lanes = static_cast<int>(hn::Lanes(Floats()));
-    for (int parity = 0; parity < 2; ++parity) {
-      const float* from_step = step.row(parity, y);
-      const float* from_flow = flow.row(parity, y);
-      float* to_row = row.row(parity, to);
-      float* to_total = total.row(parity, to);
-      const int count = flow.count(parity);
-      for (int k = 0; k < count; k += lanes) {
-        const auto values = load(from_step + k);
-        store(values, to_row + k);
-        store(hn::Add(load(from_flow + k), values), to_total + k);
+    const auto load_component = [&](const SplitPlane& from, SplitPlane& row) {
+      if (y < 0 || y >= height_) {
+        row.clear_row(to);
+        return;
       }
-      store(set(0.0F), to_row + count);  // nothing pulls from outside the image
-    }
-    total.replicate_ends(to);
+      row.copy_row(to, from, y);
+      row.replicate_ends(to);
+    };
+    load_component(flow_.x, scratch_.flow.x);
+    load_component(flow_.y, scratch_.flow.y);
   }
 
   /// Computes how much pixels pull at each other: little where the flow changes much.
@@ -302,15 +302,14 @@ class Relaxation {
     const int below = y + 1 < height_ ? ring(y + 1) : here;
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int parity = 0; parity < 2; ++parity) {
-      const Neighbours x(scratch_.total.x, parity, here, here, below);
-      const Neighbours y_(scratch_.total.y, parity, here, here, below);
+      const Neighbours x(scratch_.flow.x, parity, here, here, below);
+      const Neighbours y_(scratch_.flow.y, parity, here, here, below);
       float* right = scratch_.right.row(parity, here);
       float* down = scratch_.down.row(parity, here);
       for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-        const auto size = hn::Add(hn::Add(squares(x, k), squares(y_, k)), set(min_residual));
-        const auto weight = hn::Div(set(smoothness), hn::Sqrt(size));
-        store(weight, right + k);
-        store(weight, down + k);
+        const auto by = weight(smoothness, hn::Add(squares(x, k), squares(y_, k)));
+        store(by, right + k);
+        store(by, down + k);
       }
     }
     scratch_.right.row((width_ - 1) & 1, here)[(width_ - 1) / 2] = 0;
@@ -318,10 +317,10 @@ class Relaxation {
   }
 
   /// Squares of the differences from the neighbours to the right and below.
-  static HWY_INLINE Vector squares(const Neighbours& total, int k) {
-    const auto value = load(total.here + k);
-    return hn::Add(square(hn::Sub(total.right(k), value)),
-                   square(hn::Sub(load(total.below + k), value)));
+  static HWY_INLINE Vector squares(const Neighbours& flow, int k) {
+    const auto value = load(flow.here + k);
+    return hn::Add(square(hn::Sub(flow.right(k), value)),
+                   square(hn::Sub(load(flow.below + k), value)));
   }
 
   /// Constraint of a vector of pixels.
@@ -330,18 +329,33 @@ class Relaxation {
         : a(load(from)),
           b(load(from + Constraints::block)),
           c(load(from + 2 * Constraints::block)) {}
-    HWY_INLINE Vector residual(Vector step_x, Vector step_y) const {
-      return hn::Add(hn::Add(c, hn::Mul(a, step_x)), hn::Mul(b, step_y));
+    HWY_INLINE Vector residual(Vector x, Vector y) const {
+      return hn::Add(hn::Add(c, hn::Mul(a, x)), hn::Mul(b, y));
     }
     Vector a;
     Vector b;
     Vector c;
   };
 
+  struct PixelConstraints {
+    explicit HWY_INLINE PixelConstraints(const float* from)
+        : bright(from),
+          gradient_x(from + 3 * Constraints::block),
+          gradient_y(from + 6 * Constraints::block) {}
+    Term bright;
+    Term gradient_x;
+    Term gradient_y;
+  };
+
   /// Equations of a vector of pixels.
   struct Equations {
     // Not in the declarations: GCC 12 compiles these without the target's instructions.
-    HWY_INLINE Equations() : xx(set(min_gradient)), xy(set(0.0F)), yy(xx), x(xy), y(xy) {}
+    HWY_INLINE Equations(Vector start_x, Vector start_y)
+        : xx(set(min_gradient)),
+          xy(set(0.0F)),
+          yy(xx),
+          x(hn::Mul(xx, start_x)),
+          y(hn::Mul(xx, start_y)) {}
     HWY_INLINE void add(const Term& term, Vector weight) {
       const auto a = hn::Mul(weight, term.a);
       const auto b = hn::Mul(weight, term.b);
@@ -359,166 +373,191 @@ class Relaxation {
   };
 
   static HWY_INLINE Vector weight(float factor, Vector squares) {
-    return hn::Div(set(factor), hn::Sqrt(hn::Add(squares, set(min_residual))));
+    return hn::Mul(set(factor), inverse_sqrt(hn::Add(squares, set(min_residual))));
   }
 
-  /// What the neighbours' flows add to the equations.
-  static HWY_INLINE Vector pull(const Neighbours& flow, int k, Vector left, Vector right,
-                                Vector above, Vector below) {
-    const auto value = load(flow.here + k);
-    return hn::Add(hn::Add(hn::Mul(left, hn::Sub(flow.left(k), value)),
-                           hn::Mul(right, hn::Sub(flow.right(k), value))),
-                   hn::Add(hn::Mul(above, hn::Sub(load(flow.above + k), value)),
-                           hn::Mul(below, hn::Sub(load(flow.below + k), value))));
-  }
-
-  /// Computes the equations of a row.
-  void assemble(int y) {
-    for (int parity = 0; parity < 2; ++parity) assemble(y, parity);
-  }
+  /// Computes the equations of a row. Each depends on a long sequence of operations, so it is split
+  /// in two stages, of which the processor overlaps the vectors of a few columns.
   void assemble(int y, int parity) {
+    constexpr int columns = 2 * row_padding;
+    HWY_ALIGN float bright_weights[columns];
+    HWY_ALIGN float gradient_weights[columns];
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     const int here = ring(y);
-    const int y_above = std::max(y - 1, 0);
-    const int y_below = std::min(y + 1, height_ - 1);
-    const Neighbours flow_x(flow_.x, parity, y, y_above, y_below);
-    const Neighbours flow_y(flow_.y, parity, y, y_above, y_below);
     const float* constraints = constraints_.row(parity, y);
-    const float* step_x_row = scratch_.step.x.row(parity, here);
-    const float* step_y_row = scratch_.step.y.row(parity, here);
-    const float* beside_row = beside(scratch_.right, parity, here);
+    const float* start_x = start_.x.row(parity, y);
+    const float* start_y = start_.y.row(parity, y);
+    const float* x_row = scratch_.flow.x.row(parity, here);
+    const float* y_row = scratch_.flow.y.row(parity, here);
+    const float* left = beside(scratch_.right, parity, here);
     const float* right = scratch_.right.row(parity, here);
     const float* above = scratch_.down.row(parity, ring(y - 1));
     const float* below = scratch_.down.row(parity, here);
     float* out = scratch_.equations.row(parity, here);
-    for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-      const auto step_x = load(step_x_row + k);
-      const auto step_y = load(step_y_row + k);
-      const float* constraint = constraints + Constraints::at(k);
-      Equations equations;
-      const Term bright(constraint);
-      equations.add(bright, weight(brightness, square(bright.residual(step_x, step_y))));
-      const Term gradient_x(constraint + 3 * Constraints::block);
-      const Term gradient_y(constraint + 6 * Constraints::block);
-      const auto gradient_weight =
-          weight(gradient, hn::Add(square(gradient_x.residual(step_x, step_y)),
-                                   square(gradient_y.residual(step_x, step_y))));
-      equations.add(gradient_x, gradient_weight);
-      equations.add(gradient_y, gradient_weight);
-      const auto by_left = load(beside_row + k);
-      const auto by_right = load(right + k);
-      const auto by_above = load(above + k);
-      const auto by_below = load(below + k);
-      const auto all = hn::Add(hn::Add(by_left, by_right), hn::Add(by_above, by_below));
-      const auto pull_x = pull(flow_x, k, by_left, by_right, by_above, by_below);
-      const auto pull_y = pull(flow_y, k, by_left, by_right, by_above, by_below);
-      const auto xx = hn::Add(equations.xx, all);
-      const auto yy = hn::Add(equations.yy, all);
-      const auto inverse = hn::Div(set(1.0F), hn::Mul(xx, yy));
-      float* to = out + EquationRows::at(k);
-      store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
-      store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
-      store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
-      store(hn::Add(equations.x, pull_x),
-            to + VariationalRefinement::constant_x * EquationRows::block);
-      store(hn::Add(equations.y, pull_y),
-            to + VariationalRefinement::constant_y * EquationRows::block);
+    for (int first = 0; first < flow_.x.count(parity); first += columns) {
+      for (int i = 0; i < columns; i += lanes) {
+        const int k = first + i;
+        const auto x = load(x_row + k);
+        const auto y_ = load(y_row + k);
+        const PixelConstraints constraint(constraints + Constraints::at(k));
+        store(weight(brightness, square(constraint.bright.residual(x, y_))), bright_weights + i);
+        store(weight(gradient, hn::Add(square(constraint.gradient_x.residual(x, y_)),
+                                       square(constraint.gradient_y.residual(x, y_)))),
+              gradient_weights + i);
+      }
+      for (int i = 0; i < columns; i += lanes) {
+        const int k = first + i;
+        const PixelConstraints constraint(constraints + Constraints::at(k));
+        Equations equations(load(start_x + k), load(start_y + k));
+        const auto gradient_weight = load(gradient_weights + i);
+        equations.add(constraint.bright, load(bright_weights + i));
+        equations.add(constraint.gradient_x, gradient_weight);
+        equations.add(constraint.gradient_y, gradient_weight);
+        const auto all = hn::Add(hn::Add(load(left + k), load(right + k)),
+                                 hn::Add(load(above + k), load(below + k)));
+        const auto xx = hn::Add(equations.xx, all);
+        const auto yy = hn::Add(equations.yy, all);
+        const auto inverse = hn::Div(set(over_relaxation), hn::Mul(xx, yy));
+        float* to = out + EquationRows::at(k);
+        store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
+        store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
+        store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
+        store(equations.x, to + VariationalRefinement::constant_x * EquationRows::block);
+        store(equations.y, to + VariationalRefinement::constant_y * EquationRows::block);
+      }
     }
   }
 
-  /// Solves an equation, and goes further. `other` is the term of the other component.
-  static HWY_INLINE Vector solve(const Neighbours& steps, int k, Vector old, Vector other,
-                                 Vector constant, Vector inverse, Vector left, Vector right,
-                                 Vector up, Vector down) {
-    auto sum = hn::Add(hn::Mul(left, steps.left(k)), hn::Mul(right, steps.right(k)));
-    sum = hn::Add(sum, hn::Mul(up, load(steps.above + k)));
-    sum = hn::Add(sum, hn::Mul(down, load(steps.below + k)));
-    sum = hn::Sub(hn::Add(sum, constant), other);
-    const auto solution = hn::Mul(sum, inverse);
-    return hn::Add(old, hn::Mul(set(over_relaxation), hn::Sub(solution, old)));
-  }
+  /// Every other pixel of a row.
+  struct Pixels {
+    Pixels() = default;
+    Pixels(Scratch& scratch, int parity, int row)
+        : x(scratch.flow.x.row(parity, row)),
+          y(scratch.flow.y.row(parity, row)),
+          beside_x(beside(scratch.flow.x, parity, row)),
+          beside_y(beside(scratch.flow.y, parity, row)),
+          left(beside(scratch.right, parity, row)),
+          right(scratch.right.row(parity, row)),
+          down(scratch.down.row(parity, row)),
+          equations(scratch.equations.row(parity, row)) {}
 
-  /// Improves the steps of the pixels of a parity in a row.
-  void relax(int y, int parity) {
-    const int here = ring(y);
-    const int up = ring(y - 1);
-    const int down = ring(y + 1);
-    const float* weight_left = beside(scratch_.right, parity, here);
-    const float* weight_right = scratch_.right.row(parity, here);
-    const float* weight_up = scratch_.down.row(parity, up);
-    const float* weight_down = scratch_.down.row(parity, here);
-    const float* equations = scratch_.equations.row(parity, here);
-    float* x = scratch_.step.x.row(parity, here);
-    float* y_ = scratch_.step.y.row(parity, here);
-    const Neighbours steps_x(scratch_.step.x, parity, here, up, down);
-    const Neighbours steps_y(scratch_.step.y, parity, here, up, down);
+    float* x;
+    float* y;
+    const float* beside_x;
+    const float* beside_y;
+    const float* left;
+    const float* right;
+    const float* down;
+    const float* equations;
+  };
+
+  /// Improves a vector of pixels in one row after the other, upwards.
+  class Climb {
+   public:
+    HWY_INLINE Climb(const Pixels& below, const Pixels& row, int k)
+        : below_x_(load(below.x + k)),
+          below_y_(load(below.y + k)),
+          x_(load(row.x + k)),
+          y_(load(row.y + k)),
+          down_(load(row.down + k)) {}
+
+    HWY_INLINE void improve(const Pixels& row, const Pixels& above, int k) {
+      const float* equation = row.equations + EquationRows::at(k);
+      const auto coefficient = [&](int which) HWY_ATTR {
+        return load(equation + which * EquationRows::block);
+      };
+      const auto above_x = load(above.x + k);
+      const auto above_y = load(above.y + k);
+      const auto up = load(above.down + k);
+      const auto left = load(row.left + k);
+      const auto right = load(row.right + k);
+      // What the row below adds comes last: it has just been computed.
+      const auto pull = [&](const float* beside, Vector above_flow, Vector constant,
+                            Vector below_flow) HWY_ATTR {
+        const auto along =
+            hn::Add(hn::Mul(left, load(beside + k)), hn::Mul(right, load(beside + k + 1)));
+        const auto sum = hn::Add(hn::Add(along, constant), hn::Mul(up, above_flow));
+        return hn::Add(sum, hn::Mul(down_, below_flow));
+      };
+      const auto cross = coefficient(VariationalRefinement::cross);
+      const auto keep = set(1 - over_relaxation);
+      const auto pull_x = pull(
+          row.beside_x, above_x,
+          hn::Sub(coefficient(VariationalRefinement::constant_x), hn::Mul(cross, y_)), below_x_);
+      const auto pull_y =
+          pull(row.beside_y, above_y, coefficient(VariationalRefinement::constant_y), below_y_);
+      below_x_ = hn::Add(hn::Mul(keep, x_),
+                         hn::Mul(pull_x, coefficient(VariationalRefinement::inverse_x)));
+      below_y_ = hn::Add(hn::Mul(keep, y_), hn::Mul(hn::Sub(pull_y, hn::Mul(cross, below_x_)),
+                                                    coefficient(VariationalRefinement::inverse_y)));
+      store(below_x_, row.x + k);
+      store(below_y_, row.y + k);
+      x_ = above_x;
+      y_ = above_y;
+      down_ = up;
+    }
+
+   private:
+    Vector below_x_;
+    Vector below_y_;
+    Vector x_;
+    Vector y_;
+    Vector down_;
+  };
+
+  /// Half sweep i of row y - i, for every i: the same columns of all these rows. Most of what a row
+  /// needs has just been loaded for the row below it, if a few columns are improved in all of them
+  /// at a time. Two vectors at a time, because each row waits for the one below it.
+  void relax(int y) {
+    const int begin = std::max(0, y - height_ + 1);
+    const int end = std::min({half_sweeps, y + 1, (y - first_ + reach) / 2 + 1});
+    const int parity = y & 1;
+    Pixels rows[half_sweeps + 1];
+    for (int i = begin; i <= end; ++i) rows[i] = Pixels(scratch_, parity, ring(y - i));
+    const Pixels below(scratch_, parity, ring(y - begin + 1));
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     const int count = flow_.x.count(parity);
-    for (int k = 0; k < count; k += lanes) {
-      const float* equation = equations + EquationRows::at(k);
-      const auto by_left = load(weight_left + k);
-      const auto by_right = load(weight_right + k);
-      const auto by_up = load(weight_up + k);
-      const auto by_down = load(weight_down + k);
-      const auto cross = load(equation + VariationalRefinement::cross * EquationRows::block);
-      const auto inverse_x =
-          load(equation + VariationalRefinement::inverse_x * EquationRows::block);
-      const auto inverse_y =
-          load(equation + VariationalRefinement::inverse_y * EquationRows::block);
-      const auto constant_x =
-          load(equation + VariationalRefinement::constant_x * EquationRows::block);
-      const auto constant_y =
-          load(equation + VariationalRefinement::constant_y * EquationRows::block);
-      const auto old_x = load(x + k);
-      const auto old_y = load(y_ + k);
-      const auto new_x = solve(steps_x, k, old_x, hn::Mul(old_y, cross), constant_x, inverse_x,
-                               by_left, by_right, by_up, by_down);
-      const auto new_y = solve(steps_y, k, old_y, hn::Mul(new_x, cross), constant_y, inverse_y,
-                               by_left, by_right, by_up, by_down);
-      store(new_x, x + k);
-      store(new_y, y_ + k);
+    for (int k = 0; k < count; k += 2 * lanes) {
+      Climb left(below, rows[begin], k);
+      Climb right(below, rows[begin], k + lanes);
+      for (int i = begin; i < end; ++i) {
+        left.improve(rows[i], rows[i + 1], k);
+        right.improve(rows[i], rows[i + 1], k + lanes);
+      }
     }
-    x[count] = 0;
-    y_[count] = 0;
+    for (int i = begin; i < end; ++i) rows[i].x[count] = rows[i].y[count] = 0;  // outside the image
   }
 
   void store_row(int y) {
-    store_row(scratch_.step.x, y, out_.x);
-    store_row(scratch_.step.y, y, out_.y);
-  }
-  static void store_row(const SplitPlane& step, int y, SplitPlane& out) {
-    for (int parity = 0; parity < 2; ++parity)
-      std::copy_n(step.row(parity, ring(y)), step.count(parity), out.row(parity, y));
+    out_.x.copy_row(y, scratch_.flow.x, ring(y));
+    out_.y.copy_row(y, scratch_.flow.y, ring(y));
   }
 
-  const Field& flow_;
   const Constraints& constraints_;
-  const Field& step_;
+  const Field& start_;
+  const Field& flow_;
+  int first_;
+  int last_;
   Scratch& scratch_;
   Field& out_;
   int width_;
   int height_;
 };
 
-void relax_rows(const Field& flow, const Constraints& constraints, const Field& step, int first,
+/// Rows [first, last).
+void relax_rows(const Constraints& constraints, const Field& start, const Field& flow, int first,
                 int last, Scratch& scratch, Field& out) {
-  Relaxation(flow, constraints, step, scratch, out).run(first, last);
+  Relaxation(constraints, start, flow, first, last, scratch, out).run();
 }
 
-/// Interleaves flow plus step.
-void merge_row(const Field& flow, const Field& step, int y, Flow* out) {
+/// Interleaves the components of a row.
+void merge_row(const Field& flow, int y, Flow* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
-  const auto sum = [&](const SplitPlane& a, const SplitPlane& b, int parity, int k) {
-    return hn::Add(load(a.row(parity, y) + k), load(b.row(parity, y) + k));
-  };
-  for (int k = 0; k < flow.x.count(0); k += lanes) {
-    const auto even_x = sum(flow.x, step.x, 0, k);
-    const auto even_y = sum(flow.y, step.y, 0, k);
-    const auto odd_x = sum(flow.x, step.x, 1, k);
-    const auto odd_y = sum(flow.y, step.y, 1, k);
-    hn::StoreInterleaved4(even_x, even_y, odd_x, odd_y, floats, &out[std::ptrdiff_t{2} * k].x);
-  }
+  for (int k = 0; k < flow.x.count(0); k += lanes)
+    hn::StoreInterleaved4(load(flow.x.row(0, y) + k), load(flow.y.row(0, y) + k),
+                          load(flow.x.row(1, y) + k), load(flow.y.row(1, y) + k), floats,
+                          &out[std::ptrdiff_t{2} * k].x);
 }
 
 }  // namespace
@@ -545,8 +584,8 @@ int band_count_for(int height, int threads) {
 }  // namespace
 
 VariationalRefinement::VariationalRefinement(int width, int height)
-    : flow_(width, height),
-      steps_{Field(width, height), Field(width, height)},
+    : start_(width, height),
+      flows_{Field(width, height), Field(width, height)},
       constraints_(width, height) {}
 
 void VariationalRefinement::run(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
@@ -560,23 +599,21 @@ void VariationalRefinement::run(const Image<std::uint8_t>& from, const Image<std
     });
   };
   for_each_band([&](int first, int last, Scratch& scratch) {
-    HWY_DYNAMIC_DISPATCH(linearise_rows)(from, to, flow_, first, last, scratch, constraints_);
-    for (int y = first; y < last; ++y) {
-      steps_[0].x.clear_row(y);
-      steps_[0].y.clear_row(y);
-    }
+    HWY_DYNAMIC_DISPATCH(linearise_rows)
+    (from, to, start_, first, last, scratch, constraints_);
   });
   for (int i = 0; i < evaluations; ++i) {
+    const Field& flow = i == 0 ? start_ : flows_[0];
     for_each_band([&](int first, int last, Scratch& scratch) {
       HWY_DYNAMIC_DISPATCH(relax_rows)
-      (flow_, constraints_, steps_[0], first, last, scratch, steps_[1]);
+      (constraints_, start_, flow, first, last, scratch, flows_[1]);
     });
-    std::swap(steps_[0], steps_[1]);
+    std::swap(flows_[0], flows_[1]);
   }
 }
 
 void VariationalRefinement::row(int y, Flow* out) const {
-  HWY_DYNAMIC_DISPATCH(merge_row)(flow_, steps_[0], y, out);
+  HWY_DYNAMIC_DISPATCH(merge_row)(flows_[0], y, out);
 }
 
 }  // namespace eventcamera

@@ -26,12 +26,12 @@ class VariationalRefinement {
     SplitPlane y;
   };
 
-  /// Brightness constancy and that of both gradients, linearised: a x + b y + c = 0 for a step
+  /// Brightness constancy and that of both gradients, linearised: a x + b y + c = 0 for a flow
   /// (x, y), each scaled by the gradient it depends on. a, b and c of each.
   using Constraints = SplitPlanes<3 * 3>;
 
-  /// Equations of a pixel: its step in x is inverse_x (constant_x - cross y + what the neighbours
-  /// add), and likewise in y.
+  /// Equations of a pixel: relaxation adds inverse_x (constant_x - cross y + what the neighbours
+  /// add) to a multiple of its flow in x, and likewise in y.
   enum { cross, inverse_x, inverse_y, constant_x, constant_y, max_coefficients };
 
   /// Rows that a thread is working on; row y is at y % rows.
@@ -39,8 +39,7 @@ class VariationalRefinement {
     static constexpr int rows = 16;
 
     explicit Scratch(int width)
-        : step(width, rows),
-          total(width, rows),
+        : flow(width, rows),
           right(width, rows),
           down(width, rows),
           equations(width, rows),
@@ -48,8 +47,7 @@ class VariationalRefinement {
           change(width, rows),
           slope(width, rows) {}
 
-    Field step;
-    Field total;       ///< the flow plus the step
+    Field flow;
     SplitPlane right;  ///< how much a pixel and the one to the right pull at each other
     SplitPlane down;
     SplitPlanes<max_coefficients> equations;
@@ -62,21 +60,19 @@ class VariationalRefinement {
 
   VariationalRefinement(int width, int height);
 
-  int width() const { return flow_.x.width(); }
-  int height() const { return flow_.x.height(); }
+  int width() const { return flows_[0].x.width(); }
+  int height() const { return flows_[0].x.height(); }
   /// The flow to refine.
-  Field& start() { return flow_; }
+  Field& start() { return start_; }
   void run(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, ThreadPool& threads);
   /// The refined flow at a pixel.
-  Flow at(int x, int y) const {
-    return {flow_.x.at(x, y) + steps_[0].x.at(x, y), flow_.y.at(x, y) + steps_[0].y.at(x, y)};
-  }
+  Flow at(int x, int y) const { return {flows_[0].x.at(x, y), flows_[0].y.at(x, y)}; }
   /// The refined flow of a row. Up to 32 elements past the end of `out` are written.
   void row(int y, Flow* out) const;
 
  private:
-  Field flow_;
-  std::array<Field, 2> steps_;  ///< from flow_ to the refined flow: the current one, the next one
+  Field start_;
+  std::array<Field, 2> flows_;  ///< the current one, the next one
   Constraints constraints_;
   std::vector<Scratch> scratch_;
 };
