@@ -788,8 +788,9 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
 
 static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
   if (direction == GST_PAD_SRC && draws_for(transform, query)) return TRUE;
-  if (direction == GST_PAD_SINK && GST_QUERY_IS_SERIALIZED(query))
-    finish_interval(GST_EVENT_SIMULATOR(transform));
+  const bool is_serialized =
+      (gst_query_type_get_flags(GST_QUERY_TYPE(query)) & GST_QUERY_TYPE_SERIALIZED) != 0;
+  if (direction == GST_PAD_SINK && is_serialized) finish_interval(GST_EVENT_SIMULATOR(transform));
   if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 
