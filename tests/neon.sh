@@ -1,29 +1,35 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Builds the event core for 64-bit Arm and runs its tests on an emulator: kernels on NEON, compared with
-# the reference. Debian's packages for Arm are unpacked in the build directory, not installed.
-set -eu
+# the reference. Debian's packages for Arm are unpacked in the user's cache, not installed: with a root
+# below a path with spaces, pkg-config's answers are useless.
+set -euo pipefail
 cd "$(dirname "$0")/.."
 build="build-neon"
-root=$PWD/$build/root
+root=${XDG_CACHE_HOME:-$HOME/.cache}/gst-eventsim/arm64-root
 suite=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release)
+packages=(libgstreamer-plugins-base1.0-dev libgtest-dev libhwy-dev libjson-glib-dev libopencv-video-dev
+  libpng-dev zlib1g-dev)
+contents="$suite ${packages[*]}"
 tests=(denoise dis dvs farneback luma lucas_kanade reference render)
 # The equations; the largest pictures take minutes on the emulator.
 export GTEST_FILTER='*Reference*:*Equality*:*Target*:-Pyramids/Farneback.*/4:Pyramids/Farneback.*/5'
 
-if [ ! -e "$root/complete" ]; then
+if [ "$(cat "$root/contents" 2>/dev/null)" != "$contents" ]; then
   echo "Unpacking packages for Arm in $root"
   rm -rf "$root"
   mkdir -p "$root"
-  packages=(libgstreamer-plugins-base1.0-dev libgtest-dev libhwy-dev libjson-glib-dev libopencv-video-dev
-    libpng-dev zlib1g-dev)
-  mmdebstrap --quiet --variant=extract --architectures=arm64 --include="${packages[*]}" "$suite" - |
+  # A mirror may be an old snapshot; whether apt takes one is the host's decision.
+  eval "$(apt-config shell check_date Acquire::Check-Valid-Until)"
+  mmdebstrap --quiet --variant=extract --architectures=arm64 --include="${packages[*]}" \
+    --aptopt="Acquire::Check-Valid-Until \"${check_date:-true}\"" "$suite" - |
     tar --extract --directory="$root" --exclude='./dev/*' --no-same-owner
   # Alternatives, which installing them would choose.
   ln -s blas/libblas.so.3 lapack/liblapack.so.3 "$root/usr/lib/aarch64-linux-gnu"
-  touch "$root/complete"
+  echo "$contents" >"$root/contents"
 fi
 
+mkdir -p $build
 cat >$build/cross.ini <<CROSS
 [constants]
 root = '$root'

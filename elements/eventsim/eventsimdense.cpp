@@ -14,7 +14,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 filesrc location=drive.mp4 ! decodebin ! eventsim-dense flow=dis-hq ! videoconvert
- * ! x264enc ! mp4mux ! filesink location=events.mp4
+ * ! vp8enc deadline=1 ! webmmux ! filesink location=events.webm
  * ]|
  */
 #include "gst/base/dense_properties.hpp"

@@ -50,7 +50,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=300 ! eventsim-sparse !
- * application/x-event-camera ! filesink location=ball.xytp
+ * eventnpyenc ! filesink location=ball.npy
  * ]|
  */
 static const EventSimulatorMethod sparse = {

@@ -11,7 +11,7 @@
  * @short_description: events from the difference frame, on the GPU
  *
  * #GstEventSimFrame for video in OpenGL textures, with compute shaders: the same events for the
- * same frames. Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen. Worth it where the video
+ * same frames. Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen. It pays where the video
  * is in the memory of the GPU already; video in system memory is uploaded.
  *
  * ## Example launch line
