@@ -622,7 +622,7 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
   }
   stream.handed_out_until = end;
   state.awaited.emplace(Interval{std::move(in), *start, end, work_began(self)});
-  if (stream.flow == GST_FLOW_OK) push_if_ready(self);
+  push_if_ready(self);
 }
 
 static void look_for_events(GstObject* element) {
@@ -636,7 +636,9 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   auto& flow = priv_of(self).stream.flow;
   *out = nullptr;  // output is pushed here, because that of the last frame may follow later
   OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
-  if (flow == GST_FLOW_OK) {
+  // Since the timer or an event pushed, downstream may have been linked anew.
+  if (flow != GST_FLOW_EOS && flow != GST_FLOW_ERROR) {
+    flow = GST_FLOW_OK;
     if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
     if (give_pts(self, in)) reported(self, [&] { take_frame(self, std::move(in)); });
   }

@@ -101,10 +101,18 @@ static void close_display(gpointer self) {
 /// if there is none.
 static GstGLContext* find_context(GstElement* self, GError** error) {
   auto& priv = priv_of(self);
+  {
+    const std::lock_guard lock(priv.mutex);
+    if (priv.context != nullptr) return priv.context;
+  }
+  GstGLContext* shared = nullptr;  // neighbours may ask back, so they are asked without the lock
+  gst_gl_query_local_gl_context(self, GST_PAD_SRC, &shared);
+  if (shared == nullptr) gst_gl_query_local_gl_context(self, GST_PAD_SINK, &shared);
+
   const std::lock_guard lock(priv.mutex);
-  if (priv.context == nullptr) gst_gl_query_local_gl_context(self, GST_PAD_SRC, &priv.context);
-  if (priv.context == nullptr) gst_gl_query_local_gl_context(self, GST_PAD_SINK, &priv.context);
+  if (priv.context == nullptr) std::swap(priv.context, shared);
   if (priv.context == nullptr) priv.context = gl_context_of(priv.display, priv.other, error);
+  gst_clear_object(&shared);
   return priv.context;
 }
 

@@ -19,7 +19,7 @@ Context::Context(const Load& load) {
   const auto get_string = reinterpret_cast<PFNGLGETSTRINGPROC>(load("glGetString"));
   const auto* text =
       get_string != nullptr ? reinterpret_cast<const char*>(get_string(GL_VERSION)) : nullptr;
-  if (text == nullptr) throw Error("no OpenGL context is current");
+  if (text == nullptr) throw ContextLost("no OpenGL context is current, or it is lost");
   std::string_view version = text;
   constexpr std::string_view es = "OpenGL ES ";
   is_es_ = version.starts_with(es);

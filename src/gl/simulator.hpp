@@ -18,7 +18,7 @@ class Simulator : public BasicSimulator<TextureFrame> {
   static constexpr int max_queued = 2;  ///< intervals
 
   /// As push(), but only queues the work. Returns whether the frame ends an interval, whose events
-  /// are to be read(). Neither the texture nor the context may be lost until then.
+  /// are to be read(). The contents of the texture may not change until then.
   bool queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings);
 
   /// Whether the GPU is done with the first of the queued intervals.
