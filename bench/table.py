@@ -59,7 +59,7 @@ def sizes_of(run):
     sizes = {}
     for benchmark in run["benchmarks"]:
         parts = benchmark["name"].split("/")
-        if parts[0] == "sizes" and not benchmark.get("error_occurred"):
+        if benchmark["run_type"] == "iteration" and parts[0] == "sizes" and not benchmark.get("error_occurred"):
             sizes.setdefault(parts[1], {})[parts[2]] = benchmark["real_time"]
     return sizes
 

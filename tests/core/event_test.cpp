@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <random>
+#include <span>
+#include <vector>
 
 #include "src/core/event_buckets.hpp"
 #include "src/simulate/simulator.hpp"
@@ -59,6 +62,38 @@ TEST(EventBuckets, AreCopiedAlikeByAnyNumberOfThreads) {
   }
   buckets.reset(1, 1);
   buckets.write_to(nullptr, threads);
+}
+
+TEST(EventBuckets, OfPixelsAreWrittenOnceByAnyNumberOfThreads) {
+  EventBuckets buckets;
+  buckets.reset(3, 4);
+  std::vector<Event> expected;
+  std::mt19937_64 random;
+  for (int step = 1; step <= 3; ++step) {
+    for (int band = 0; band < 4; ++band) {
+      auto& pixels = buckets.pixels(step, band);
+      pixels.begin(static_cast<std::uint32_t>(step));
+      for (int i = 0; i < 300 * ((step + band) % 3); ++i) {
+        const int y = 100 * band + i / 10;
+        const int x = 64 * (i % 10);
+        const std::uint64_t fired = random();
+        const std::uint64_t on = random();
+        pixels.add(x, y, fired, on);
+        for (int bit = 0; bit < 64; ++bit)
+          if ((fired >> bit & 1) != 0)
+            expected.push_back(Event::at(x + bit, y, static_cast<std::uint32_t>(step),
+                                         (on >> bit & 1) != 0 ? Polarity::on : Polarity::off));
+      }
+    }
+  }
+  ASSERT_EQ(buckets.size(), expected.size());
+  ThreadPool threads;
+  for (const int most : {1, 2, 0}) {
+    threads.set_threads(most);
+    std::vector<Event> events(expected.size());
+    buckets.write_to(events.data(), threads);
+    EXPECT_TRUE(events == expected) << most << " threads";
+  }
 }
 
 TEST(StepTimes, ShareOutTheInterval) {
