@@ -351,12 +351,12 @@ TEST(OpenGl, IsFoundAnewAfterALoss) {
       return h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 * 100));
     };
     EXPECT_EQ(push(), GST_FLOW_OK);
-    lost = current.load();
+    lost = GST_GL_CONTEXT(gst_object_ref(current.load()));  // so that no other has its address
     EXPECT_EQ(push(), GST_FLOW_ERROR);
     EXPECT_EQ(push(), GST_FLOW_OK);
     EXPECT_EQ(push(), GST_FLOW_OK);
     EXPECT_NE(current, lost);
-    lost = nullptr;
+    gst_object_unref(lost.exchange(nullptr));
   }
 }
 
