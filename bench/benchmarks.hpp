@@ -8,6 +8,10 @@ namespace bench {
 /// All methods on a scene, plain and optimized: SCENE/METHOD/FORMULATION/threads:N.
 void register_simulators(const Scene& scene);
 
+/// Dense flow alone, of whole frames, and OpenCV's with the same parameters:
+/// SCENE/FLOW/FORMULATION/threads:N.
+void register_flows(const Scene& scene);
+
 /// Events to a buffer, and a buffer to a picture, compared to a memcpy of the output:
 /// SCENE/STEP/FORMULATION/threads:1.
 void register_events(const Scene& scene);

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   const auto scenes = bench::scenes(few_frames);
   for (const auto& scene : scenes) {
     bench::register_simulators(scene);
+    bench::register_flows(scene);
     bench::register_events(scene);
   }
   bench::register_sizes(few_frames);

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Prints the tables of a benchmark run, a row per method and a column per scene: speed relative to
-the naive implementation, and milliseconds per frame; and the sizes that each method holds in real
-time.
+the naive implementation, and milliseconds per frame; the same of dense flow alone relative to
+OpenCV's; and the sizes that each method holds in real time.
 
   table.py BENCHMARKS.json [PAGE.md]
 
@@ -33,6 +33,11 @@ METHODS = {
     "dvs-denoised": "dvs, `ideal`, `denoise=8`",
     "dvs-v2e-noisy": "dvs, `v2e-noisy`",
     "dvs-motion": "dvs, `ideal`, `upsampling=motion`, with flow",
+}
+FLOWS = {
+    "flow-dis-lq": "`dis-lq`",
+    "flow-dis-hq": "`dis-hq`",
+    "flow-farneback": "`farneback`",
 }
 RATES = [30, 60]  # frames per second
 COPIES = {
@@ -94,6 +99,8 @@ def beside(other, text):
 
 beside_plain = beside("plain", lambda ours, plain: (
     f"**{plain / ours:.1f}×** {milliseconds(ours)} ms (naive {milliseconds(plain)})"))
+beside_opencv = beside("opencv", lambda ours, opencv: (
+    f"**{opencv / ours:.2f}×** {milliseconds(ours)} ms (OpenCV {milliseconds(opencv)})"))
 beside_memcpy = beside("memcpy", lambda ours, memcpy: (
     f"**{ours / memcpy:.1f}×** memcpy ({milliseconds(ours)} ms)"))
 
@@ -121,6 +128,8 @@ def main():
     tables = [
         table(times, METHODS, "2", "two threads", beside_plain),
         table(times, METHODS, "1", "one thread", beside_plain),
+        table(times, FLOWS, "2", "flow alone, two threads", beside_opencv),
+        table(times, FLOWS, "1", "flow alone, one thread", beside_opencv),
         table_of_sizes(sizes_of(run)),
         table(times, COPIES, "1", "one thread", beside_memcpy),
     ]
