@@ -25,7 +25,7 @@ inline std::string in_quotes(const std::string& path) {
 /// else `usual`, or a quarter of it under a sanitizer.
 inline int repetitions(int usual, int soak) {
   if (g_getenv("SOAK") != nullptr) return soak;
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef SANITIZED
   return (usual + 3) / 4;
 #else
   return usual;
