@@ -19,10 +19,7 @@ if [ "$(cat "$root/contents" 2>/dev/null)" != "$contents" ]; then
   echo "Unpacking packages for Arm in $root"
   rm -rf "$root"
   mkdir -p "$root"
-  # A mirror may be an old snapshot; whether apt takes one is the host's decision.
-  eval "$(apt-config shell check_date Acquire::Check-Valid-Until)"
-  mmdebstrap --quiet --variant=extract --architectures=arm64 --include="${packages[*]}" \
-    --aptopt="Acquire::Check-Valid-Until \"${check_date:-true}\"" "$suite" - |
+  tests/mmdebstrap.sh host --variant=extract --architectures=arm64 --include="${packages[*]}" |
     tar --extract --directory="$root" --exclude='./dev/*' --no-same-owner
   # Alternatives, which installing them would choose.
   ln -s blas/libblas.so.3 lapack/liblapack.so.3 "$root/usr/lib/aarch64-linux-gnu"

@@ -3,7 +3,7 @@
 # Builds the Debian packages, checks them with lintian, and installs, uses, upgrades and removes them
 # in a fresh chroot, as root:
 #   tests/package.sh [DIRECTORY]     the packages are left in DIRECTORY, or used if they are there
-set -eu
+set -euo pipefail
 cd "$(dirname "$0")/.."
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
@@ -98,7 +98,6 @@ USE
 mkdir "$scratch/old"
 cp "$packages"/*.deb "$scratch/old/"
 rm -f "$scratch"/old/*-dbgsym_*
-suite=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release)
-mmdebstrap --quiet --variant=apt --format=null \
+tests/mmdebstrap.sh host --variant=apt --format=null \
   --customize-hook="copy-in '$scratch/old' '$scratch/new' '$scratch/use' pipelines/count_events.c /tmp" \
-  --customize-hook='chroot "$1" bash /tmp/use' "$suite"
+  --customize-hook='chroot "$1" bash /tmp/use'
