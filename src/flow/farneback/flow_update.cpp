@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/farneback/flow_update.hpp"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 
 #include "src/flow/scratch.hpp"
@@ -18,168 +20,222 @@ namespace {
 using Floats = hn::CappedTag<float, row_padding>;
 using Words = hn::Rebind<std::int32_t, Floats>;
 using Vector = hn::Vec<Floats>;
+using WordVector = hn::Vec<Words>;
 constexpr int coefficients = PolynomialExpansion::coefficients;
+constexpr int reach = FlowUpdate::reach;
+constexpr int side = 2 * reach + 1;  ///< of a window
+constexpr int strip = FlowUpdate::strip;
 /// Coefficients of the normal equations: symmetric 2x2 matrix and right-hand side.
-constexpr int equations = 5;
+constexpr int equations = FlowUpdate::equations;
 
-/// Pixels of a row that are processed together.
-constexpr int chunk = 64;
-
-/// Intermediate values per pixel of a chunk.
-struct Chunk {
-  HWY_ALIGN std::int32_t offset[chunk];  ///< of the later polynomials, at the end of the flow
-  HWY_ALIGN float right[chunk];          ///< sub-pixel offset from that pixel
-  HWY_ALIGN float down[chunk];
-  HWY_ALIGN float weight[chunk];        ///< 1 / number of polynomials that a is a mean of
-  HWY_ALIGN float four[4 * chunk + 4];  ///< earlier b - later b, earlier a + later a
-  HWY_ALIGN float fifth[chunk];
+/// Weights of three neighbouring columns or rows, of which each lane has two at most.
+struct Weights {
+  Vector first;
+  Vector second;
+  Vector third;
 };
 
-/// Follows the flow to the later polynomials. There is none outside the image: a zero one is read,
-/// and the earlier one's a counts twice.
-void follow(const PolynomialExpansion& to, const Flow* flow, int x, int y, int count,
-            Chunk& result) {
+/// Adds polynomials of `columns` x `rows` pixels, weighted: lane i reads `at` i pixels further.
+template <int columns, int rows>
+HWY_INLINE void add_weighted(const float* at, std::ptrdiff_t stride, const Weights& across,
+                             const Weights& down, Vector* sums) {
+  const Floats floats;
+  const auto upper_first = hn::Mul(down.first, across.first);
+  const auto upper_second = hn::Mul(down.first, across.second);
+  const auto upper_third = hn::Mul(down.first, across.third);
+  const auto middle_first = hn::Mul(down.second, across.first);
+  const auto middle_second = hn::Mul(down.second, across.second);
+  const auto middle_third = hn::Mul(down.second, across.third);
+  const auto lower_first = hn::Mul(down.third, across.first);
+  const auto lower_second = hn::Mul(down.third, across.second);
+  const auto lower_third = hn::Mul(down.third, across.third);
+  for (int k = 0; k < coefficients; ++k) {
+    const float* upper = at + k * stride;
+    const float* middle = upper + coefficients * stride;
+    auto sum = hn::Add(sums[k], hn::Mul(upper_first, hn::LoadU(floats, upper)));
+    sum = hn::Add(sum, hn::Mul(upper_second, hn::LoadU(floats, upper + 1)));
+    if (columns == 3) sum = hn::Add(sum, hn::Mul(upper_third, hn::LoadU(floats, upper + 2)));
+    sum = hn::Add(sum, hn::Mul(middle_first, hn::LoadU(floats, middle)));
+    sum = hn::Add(sum, hn::Mul(middle_second, hn::LoadU(floats, middle + 1)));
+    if (columns == 3) sum = hn::Add(sum, hn::Mul(middle_third, hn::LoadU(floats, middle + 2)));
+    if (rows == 3) {
+      const float* lower = middle + coefficients * stride;
+      sum = hn::Add(sum, hn::Mul(lower_first, hn::LoadU(floats, lower)));
+      sum = hn::Add(sum, hn::Mul(lower_second, hn::LoadU(floats, lower + 1)));
+      if (columns == 3) sum = hn::Add(sum, hn::Mul(lower_third, hn::LoadU(floats, lower + 2)));
+    }
+    sums[k] = sum;
+  }
+}
+
+/// Where the flow of a vector of pixels ends.
+struct Ends {
+  hn::Mask<Words> inside;  ///< the image
+  WordVector column;       ///< of the pixel before the end, minus that of the first lane
+  WordVector row;
+  Vector right;  ///< sub-pixel offset from that pixel
+  Vector down;
+
+  HWY_INLINE Ends(const PolynomialExpansion& to, Vector dx, Vector dy, int x, int y) {
+    const Floats floats;
+    const auto zero = hn::Zero(floats);
+    const auto to_x = hn::Add(hn::Iota(floats, static_cast<float>(x)), dx);
+    const auto to_y = hn::Add(hn::Set(floats, static_cast<float>(y)), dy);
+    const auto right_end = hn::Set(floats, static_cast<float>(to.width() - 1));
+    const auto lower_end = hn::Set(floats, static_cast<float>(to.height() - 1));
+    const auto is_inside = hn::And(hn::And(hn::Ge(to_x, zero), hn::Le(to_x, right_end)),
+                                   hn::And(hn::Ge(to_y, zero), hn::Le(to_y, lower_end)));
+    const auto in_x = hn::IfThenElseZero(is_inside, to_x);
+    const auto in_y = hn::IfThenElseZero(is_inside, to_y);
+    const auto x0 = hn::ConvertTo(Words(), in_x);
+    inside = hn::RebindMask(Words(), is_inside);
+    row = hn::ConvertTo(Words(), in_y);
+    column = hn::Sub(x0, hn::Iota(Words(), 0));
+    right = hn::Sub(in_x, hn::ConvertTo(floats, x0));
+    down = hn::Sub(in_y, hn::ConvertTo(floats, row));
+  }
+};
+
+/// Interpolates the later polynomials bilinearly; outside the image they are 0.
+///
+/// Neighbours mostly move alike: relative to its lane, a cell of four pixels is that of the other
+/// lanes or the one beside it. Lanes for which this holds read the same vectors of 3x3 pixels;
+/// those that a lane does not need have weight 0, which leaves its sum as it is. The other lanes
+/// follow, in groups that are chosen in the same way.
+HWY_INLINE void interpolate(const PolynomialExpansion& to, const Ends& ends, Vector* sums) {
+  const Words words;
+  const Floats floats;
+  const auto zero = hn::Zero(floats);
+  const auto left = hn::Sub(hn::Set(floats, 1.0F), ends.right);
+  const auto up = hn::Sub(hn::Set(floats, 1.0F), ends.down);
+  HWY_ALIGN std::int32_t columns[hn::MaxLanes(words)];
+  HWY_ALIGN std::int32_t rows[hn::MaxLanes(words)];
+  hn::Store(ends.column, words, columns);
+  hn::Store(ends.row, words, rows);
+  for (int k = 0; k < coefficients; ++k) sums[k] = zero;
+  auto remaining = ends.inside;
+  for (;;) {
+    const auto lane = hn::FindFirstTrue(words, remaining);
+    if (lane < 0) return;
+    // Of the cell of this lane and the one before it, if any lane has that.
+    const auto first_of = [&](WordVector cells, int cell) {
+      const auto before = hn::Eq(cells, hn::Set(words, cell - 1));
+      return hn::AllFalse(words, hn::And(before, remaining)) ? cell : cell - 1;
+    };
+    const int column = first_of(ends.column, columns[lane]);
+    const int row = first_of(ends.row, rows[lane]);
+    const auto in_first = hn::Eq(ends.column, hn::Set(words, column));
+    const auto in_second = hn::Eq(ends.column, hn::Set(words, column + 1));
+    const auto in_upper = hn::Eq(ends.row, hn::Set(words, row));
+    const auto in_lower = hn::Eq(ends.row, hn::Set(words, row + 1));
+    const auto here =
+        hn::And(hn::And(hn::Or(in_first, in_second), hn::Or(in_upper, in_lower)), remaining);
+    remaining = hn::AndNot(here, remaining);
+    const auto lanes_of = [&](auto mask) { return hn::RebindMask(floats, mask); };
+    const auto first = lanes_of(in_first);
+    const auto upper = lanes_of(hn::And(in_upper, here));
+    const auto lower = lanes_of(hn::And(in_lower, here));
+    const Weights across{hn::IfThenElseZero(first, left), hn::IfThenElse(first, ends.right, left),
+                         hn::IfThenElse(first, zero, ends.right)};
+    const Weights down{hn::IfThenElseZero(upper, up),
+                       hn::IfThenElse(upper, ends.down, hn::IfThenElseZero(lower, up)),
+                       hn::IfThenElseZero(lower, ends.down)};
+    const float* at = to.row(row) + column;
+    for (int k = 0; k < coefficients; ++k)
+      hwy::Prefetch(at + (coefficients + k) * to.stride() + strip);
+    if (hn::AllFalse(words, hn::And(in_second, here))) {
+      if (hn::AllFalse(floats, lower))
+        add_weighted<2, 2>(at, to.stride(), across, down, sums);
+      else
+        add_weighted<2, 3>(at, to.stride(), across, down, sums);
+    } else {
+      if (hn::AllFalse(floats, lower))
+        add_weighted<3, 2>(at, to.stride(), across, down, sums);
+      else
+        add_weighted<3, 3>(at, to.stride(), across, down, sums);
+    }
+  }
+}
+
+using RowSums = FlowUpdate::RowSums;
+
+/// Replaces the equations of each row of a block by the sum of its and all later rows.
+void complete_block(RowSums& sums) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
-  const auto zero = hn::Zero(floats);
-  const auto right_end = hn::Set(floats, static_cast<float>(to.width() - 1));
-  const auto lower_end = hn::Set(floats, static_cast<float>(to.height() - 1));
-  const auto stride = hn::Set(Words(), to.stride());
-  const auto nowhere = hn::Set(Words(), to.stride() * to.height());
-  const auto py = hn::Set(floats, static_cast<float>(y));
-  for (int i = 0; i < count; i += lanes) {
+  for (int equation = 0; equation < equations; ++equation) {
+    for (int x = 0; x < strip; x += lanes) {
+      auto sum = hn::Load(floats, sums.rows[side - 1][equation] + x);
+      for (int row = side - 2; row >= 0; --row) {
+        float* at = sums.rows[row][equation] + x;
+        sum = hn::Add(sum, hn::Load(floats, at));
+        hn::Store(sum, floats, at);
+      }
+    }
+  }
+}
+
+/// Rows of floats, one per equation.
+template <int width>
+using EquationRows = float[equations][width + 2 * row_padding];
+
+/// Sums over fifteen rows: those of a strip, and before it the last ones of the strip to the left.
+struct Window {
+  static constexpr int before = row_padding;
+  HWY_ALIGN EquationRows<before + strip> sums = {};
+};
+
+/// Adds the equations of columns [left, right) of image row y, as row `row` of the present block.
+/// Computes the sums over the last fifteen rows.
+void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
+             int y, int left, int right, float row_weight, const float* column_weights, int row,
+             RowSums& sums, Window& window) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  const auto half = hn::Set(floats, 0.5F);
+  const auto one = hn::Set(floats, 1.0F);
+  for (int x = left; x < right; x += lanes) {
     Vector dx;
     Vector dy;
-    hn::LoadInterleaved2(floats, &flow[x + i].x, dx, dy);
-    const auto to_x = hn::Add(hn::Iota(floats, static_cast<float>(x + i)), dx);
-    const auto to_y = hn::Add(py, dy);
-    const auto inside = hn::And(hn::And(hn::Ge(to_x, zero), hn::Le(to_x, right_end)),
-                                hn::And(hn::Ge(to_y, zero), hn::Le(to_y, lower_end)));
-    const auto in_x = hn::IfThenElseZero(inside, to_x);
-    const auto in_y = hn::IfThenElseZero(inside, to_y);
-    const auto x0 = hn::ConvertTo(Words(), in_x);
-    const auto y0 = hn::ConvertTo(Words(), in_y);
-    const auto x5 = hn::Add(hn::ShiftLeft<2>(x0), x0);
-    const auto offset = hn::Add(hn::Mul(y0, stride), x5);
-    const auto is_inside = hn::RebindMask(Words(), inside);
-    hn::Store(hn::IfThenElse(is_inside, offset, nowhere), Words(), result.offset + i);
-    hn::Store(hn::Sub(in_x, hn::ConvertTo(floats, x0)), floats, result.right + i);
-    hn::Store(hn::Sub(in_y, hn::ConvertTo(floats, y0)), floats, result.down + i);
-    hn::Store(hn::IfThenElse(inside, hn::Set(floats, 0.5F), hn::Set(floats, 1.0F)), floats,
-              result.weight + i);
-  }
-}
-
-/// Combines the later polynomials, interpolated bilinearly, with the earlier ones.
-void combine(const float* from, const PolynomialExpansion& to, int count, Chunk& result) {
-  HWY_ALIGN static constexpr float signs[8] = {-1, -1, 1, 1, 1, 1, 1, 1};
-  const float* upper_row = to.row(0);
-  const float* lower_row = to.row(1);
-  const auto combined = [&](auto tag, int i, int k) {
-    const float* upper = upper_row + result.offset[i] + k;
-    const float* lower = lower_row + result.offset[i] + k;
-    const auto down = hn::Set(tag, result.down[i]);
-    const auto between = [](auto a, auto b, auto weight) {
-      return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
+    hn::LoadInterleaved2(floats, &flow[x].x, dx, dy);
+    const Ends ends(to, dx, dy, x, y);
+    Vector there[coefficients];
+    interpolate(to, ends, there);
+    const auto here = [&](int k) {
+      const float* coefficient = from.row(y, k) + x;
+      hwy::Prefetch(coefficient + strip);
+      return hn::LoadU(floats, coefficient);
     };
-    const auto left = between(hn::LoadU(tag, upper), hn::LoadU(tag, lower), down);
-    const auto right =
-        between(hn::LoadU(tag, upper + coefficients), hn::LoadU(tag, lower + coefficients), down);
-    const auto there = between(left, right, hn::Set(tag, result.right[i]));
-    return hn::Add(hn::LoadU(tag, from + std::ptrdiff_t{coefficients} * i + k),
-                   hn::Mul(hn::LoadU(tag, signs + k), there));
-  };
-  const hn::CappedTag<float, 8> eight;
-  const hn::CappedTag<float, 4> four;
-  const int quarter = static_cast<int>(hn::Lanes(four));
-  for (int i = 0; i < count; ++i) {
-    float* out = result.four + std::ptrdiff_t{4} * i;
-    if (hn::Lanes(eight) == 8) {  // the next pixel overwrites the upper four
-      hn::StoreU(combined(eight, i, 0), eight, out);
-      result.fifth[i] = out[4];
-    } else {
-      for (int k = 0; k < 4; k += quarter) hn::StoreU(combined(four, i, k), four, out + k);
-      result.fifth[i] = hn::GetLane(combined(hn::CappedTag<float, 1>(), i, 4));
-    }
-  }
-}
-
-/// Ring buffers of three rows of equations, and of thirteen rows of their sums over three rows.
-struct Rows {
-  int padded_width;  ///< floats per row of one equation
-  float* tensors;
-  float* threes;
-  float* window;  ///< sums over fifteen rows, each with `reach` pixels before and after
-
-  float* tensor_row(int i) const {
-    return tensors + std::ptrdiff_t{i % 3} * equations * padded_width;
-  }
-  float* three_row(int i) const {
-    return threes + std::ptrdiff_t{i % 13} * equations * padded_width;
-  }
-};
-
-/// Computes the i-th row of equations, those of image row y, and the sums over the last fifteen
-/// rows, which are valid from the fifteenth row on.
-void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
-             int y, float row_weight, const float* column_weights, int i, const Rows& rows,
-             Chunk& pixels) {
-  const Floats floats;
-  const int lanes = static_cast<int>(hn::Lanes(floats));
-  float* tensor = rows.tensor_row(i);
-  const float* tensor_1 = rows.tensor_row(i + 2);
-  const float* tensor_2 = rows.tensor_row(i + 1);
-  float* three = rows.three_row(i);
-  const float* earlier_threes[4];
-  for (int k = 0; k < 4; ++k) earlier_threes[k] = rows.three_row(i + 13 - 3 * (4 - k));
-  float* window = rows.window + FlowUpdate::reach;
-  const std::ptrdiff_t padded_width = rows.padded_width;
-  for (int left = 0; left < from.width(); left += chunk) {
-    const int count = std::min(chunk, from.width() - left);
-    follow(to, flow, left, y, count, pixels);
-    combine(from.row(y) + std::ptrdiff_t{coefficients} * left, to, count, pixels);
-    for (int j = 0; j < count; j += lanes) {
-      const int x = left + j;
-      Vector b_y;
-      Vector b_x;
-      Vector a_yy;
-      Vector a_xx;
-      Vector dx;
-      Vector dy;
-      hn::LoadInterleaved4(floats, pixels.four + std::ptrdiff_t{4} * j, b_y, b_x, a_yy, a_xx);
-      hn::LoadInterleaved2(floats, &flow[x].x, dx, dy);
-      const auto half = hn::Set(floats, 0.5F);
-      const auto weight =
-          hn::Mul(hn::Set(floats, row_weight), hn::LoadU(floats, column_weights + x));
-      const auto a_weight = hn::Load(floats, pixels.weight + j);
-      a_yy = hn::Mul(a_yy, a_weight);
-      a_xx = hn::Mul(a_xx, a_weight);
-      auto a_xy = hn::Mul(hn::Load(floats, pixels.fifth + j), hn::Mul(a_weight, half));
-      b_y = hn::Add(hn::Mul(b_y, half), hn::Add(hn::Mul(a_yy, dy), hn::Mul(a_xy, dx)));
-      b_x = hn::Add(hn::Mul(b_x, half), hn::Add(hn::Mul(a_xy, dy), hn::Mul(a_xx, dx)));
-      a_yy = hn::Mul(a_yy, weight);
-      a_xx = hn::Mul(a_xx, weight);
-      a_xy = hn::Mul(a_xy, weight);
-      b_y = hn::Mul(b_y, weight);
-      b_x = hn::Mul(b_x, weight);
-      const auto xy_squared = hn::Mul(a_xy, a_xy);
-      const auto put = [&](int equation, Vector value) {
-        // The five equations of a vector of pixels are adjacent, so one address serves all.
-        const std::ptrdiff_t at = std::ptrdiff_t{equations} * x + std::ptrdiff_t{equation} * lanes;
-        const auto recent = [&](const float* row) { return hn::LoadU(floats, row + at); };
-        const auto sum = hn::Add(hn::Add(recent(tensor_2), recent(tensor_1)), value);
-        hn::StoreU(value, floats, tensor + at);
-        hn::StoreU(sum, floats, three + at);
-        auto all = hn::Add(recent(earlier_threes[0]), recent(earlier_threes[1]));
-        all = hn::Add(hn::Add(all, recent(earlier_threes[2])), recent(earlier_threes[3]));
-        hn::StoreU(hn::Add(all, sum), floats, window + equation * padded_width + x);
-      };
-      put(0, hn::Add(hn::Mul(a_yy, a_yy), xy_squared));
-      put(1, hn::Mul(hn::Add(a_yy, a_xx), a_xy));
-      put(2, hn::Add(hn::Mul(a_xx, a_xx), xy_squared));
-      put(3, hn::Add(hn::Mul(a_yy, b_y), hn::Mul(a_xy, b_x)));
-      put(4, hn::Add(hn::Mul(a_xy, b_y), hn::Mul(a_xx, b_x)));
-    }
+    const auto weight = hn::Mul(hn::Set(floats, row_weight), hn::LoadU(floats, column_weights + x));
+    // Outside the image, a is that of the earlier polynomial alone.
+    const auto a_weight = hn::IfThenElse(hn::RebindMask(floats, ends.inside), half, one);
+    auto a_yy = hn::Mul(hn::Add(here(2), there[2]), a_weight);
+    auto a_xx = hn::Mul(hn::Add(here(3), there[3]), a_weight);
+    auto a_xy = hn::Mul(hn::Add(here(4), there[4]), hn::Mul(a_weight, half));
+    auto b_y = hn::Add(hn::Mul(hn::Sub(here(0), there[0]), half),
+                       hn::Add(hn::Mul(a_yy, dy), hn::Mul(a_xy, dx)));
+    auto b_x = hn::Add(hn::Mul(hn::Sub(here(1), there[1]), half),
+                       hn::Add(hn::Mul(a_xy, dy), hn::Mul(a_xx, dx)));
+    a_yy = hn::Mul(a_yy, weight);
+    a_xx = hn::Mul(a_xx, weight);
+    a_xy = hn::Mul(a_xy, weight);
+    b_y = hn::Mul(b_y, weight);
+    b_x = hn::Mul(b_x, weight);
+    const auto xy_squared = hn::Mul(a_xy, a_xy);
+    const int at = x - left;
+    const auto put = [&](int equation, Vector value) {
+      float* start = sums.start[equation] + at;
+      const auto sum = hn::Add(hn::Load(floats, start), value);
+      const auto end = hn::Load(floats, sums.rows[row + 1][equation] + at);
+      hn::Store(sum, floats, start);
+      hn::Store(value, floats, sums.rows[row][equation] + at);
+      hn::Store(hn::Add(end, sum), floats, window.sums[equation] + Window::before + at);
+    };
+    put(0, hn::Add(hn::Mul(a_yy, a_yy), xy_squared));
+    put(1, hn::Mul(hn::Add(a_yy, a_xx), a_xy));
+    put(2, hn::Add(hn::Mul(a_xx, a_xx), xy_squared));
+    put(3, hn::Add(hn::Mul(a_yy, b_y), hn::Mul(a_xy, b_x)));
+    put(4, hn::Add(hn::Mul(a_xy, b_y), hn::Mul(a_xx, b_x)));
   }
 }
 
@@ -187,73 +243,106 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
 void add_threes(const float* row, int width, float* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
+  const auto at = [&](int x) { return hn::LoadU(floats, row + x); };
   for (int x = 0; x < width; x += lanes)
-    hn::StoreU(hn::Add(hn::Add(hn::LoadU(floats, row + x), hn::LoadU(floats, row + x + 1)),
-                       hn::LoadU(floats, row + x + 2)),
-               floats, out + x);
+    hn::Store(hn::Add(hn::Add(at(x), at(x + 1)), at(x + 2)), floats, out + x);
 }
 
-/// Solves for the flow of a row. `threes` are the sums of the equations over fifteen rows and three
-/// pixels. At straight edges the products of sums nearly cancel, so they are computed in double.
-void solve_row(const float* threes, int padded_width, int width, Flow* flow) {
+/// Adds up every third of fifteen pixels: out[x] = row[x] + row[x + 3] + ... + row[x + 12]
+void add_fives(const float* row, int width, float* out) {
+  const Floats floats;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  const auto at = [&](int x) { return hn::LoadU(floats, row + x); };
+  for (int x = 0; x < width; x += lanes) {
+    const auto first = hn::Add(at(x), at(x + 3));
+    const auto last = hn::Add(at(x + 9), at(x + 12));
+    hn::Store(hn::Add(hn::Add(first, at(x + 6)), last), floats, out + x);
+  }
+}
+
+/// Solves the equations of a row of windows. At straight edges the products of sums nearly cancel,
+/// so they are computed in double.
+void solve(const EquationRows<strip>& sums, int width, Flow* flow) {
   const hn::CappedTag<double, 8> doubles;
   const hn::Rebind<float, decltype(doubles)> floats;
   using Doubles = hn::Vec<decltype(doubles)>;
   const int lanes = static_cast<int>(hn::Lanes(doubles));
-  constexpr int side = 2 * FlowUpdate::reach + 1;
   // Regularization: the flow is 0 where there is no texture.
   const auto regular = hn::Set(doubles, 1e-3 * side * side * side * side);
   for (int x = 0; x < width; x += lanes) {
-    const auto window = [&](int equation) {
-      const float* row = threes + std::ptrdiff_t{equation} * padded_width + x;
-      auto sum = hn::LoadU(floats, row);
-      for (int k = 3; k < side; k += 3) sum = hn::Add(sum, hn::LoadU(floats, row + k));
-      return hn::PromoteTo(doubles, sum);
+    const auto sum = [&](int equation) {
+      return hn::PromoteTo(doubles, hn::Load(floats, sums[equation] + x));
     };
     const auto difference = [](Doubles a, Doubles b, Doubles c, Doubles d) {
       return hn::Sub(hn::Mul(a, b), hn::Mul(c, d));
     };
-    const auto g_yy = window(0);
-    const auto g_xy = window(1);
-    const auto g_xx = window(2);
-    const auto h_y = window(3);
-    const auto h_x = window(4);
-    const auto inverse =
-        hn::Div(hn::Set(doubles, 1.0), hn::Add(difference(g_yy, g_xx, g_xy, g_xy), regular));
-    hn::StoreInterleaved2(hn::DemoteTo(floats, hn::Mul(difference(g_yy, h_x, g_xy, h_y), inverse)),
-                          hn::DemoteTo(floats, hn::Mul(difference(g_xx, h_y, g_xy, h_x), inverse)),
-                          floats, &flow[x].x);
+    const auto g_yy = sum(0);
+    const auto g_xy = sum(1);
+    const auto g_xx = sum(2);
+    const auto h_y = sum(3);
+    const auto h_x = sum(4);
+    const auto rounded = [&](Doubles value) { return hn::DemoteTo(floats, value); };
+    const auto determinant = rounded(hn::Add(difference(g_yy, g_xx, g_xy, g_xy), regular));
+    const auto inverse = hn::Div(hn::Set(floats, 1.0F), determinant);
+    hn::StoreInterleaved2(hn::Mul(rounded(difference(g_yy, h_x, g_xy, h_y)), inverse),
+                          hn::Mul(rounded(difference(g_xx, h_y, g_xy, h_x)), inverse), floats,
+                          &flow[x].x);
   }
 }
 
-void solve_window(const Rows& rows, int width, float* threes, Flow* flow) {
+/// Solves a row of a strip; the border of the image is replicated. `edge` has the last sums of the
+/// strip to the left, and gets those of this one.
+void solve_strip(Window& window, int left, int right, int width, float* edge, Flow* flow) {
+  constexpr int before = Window::before;
+  // The windows of the other columns reach into the next strip.
+  constexpr int lag = 8;
+  const int first = left == 0 ? 0 : left - lag;
+  const int count = (right == width ? width : right - lag) - first;
+  HWY_ALIGN EquationRows<strip> threes;
+  HWY_ALIGN EquationRows<strip> sums;
   for (int equation = 0; equation < equations; ++equation) {
-    const std::ptrdiff_t at = std::ptrdiff_t{equation} * rows.padded_width;
-    float* window = rows.window + at + FlowUpdate::reach;
-    std::fill_n(window - FlowUpdate::reach, FlowUpdate::reach, window[0]);
-    std::fill_n(window + width, FlowUpdate::reach, window[width - 1]);
-    add_threes(rows.window + at, width + 2 * FlowUpdate::reach - 2, threes + at);
+    float* row = window.sums[equation];
+    float* end = row + before + (right - left);
+    if (left == 0)
+      std::fill_n(row, before, row[before]);
+    else
+      std::copy_n(edge, before, row);
+    if (right == width) std::fill_n(end, reach, end[-1]);
+    std::copy_n(end - before, before, edge);
+    edge += before;
+    add_threes(row + (first - left) + before - reach, count + side - 3, threes[equation]);
   }
-  solve_row(threes, rows.padded_width, width, flow);
+  for (int equation = 0; equation < equations; ++equation)
+    add_fives(threes[equation], count, sums[equation]);
+  solve(sums, count, flow + first);
 }
 
 void update_rows(const PolynomialExpansion& from, const PolynomialExpansion& to,
                  const FlowRows& flow, int first, int last, const float* column_weights,
                  const float* row_weights, FlowUpdate::Scratch& scratch, const FlowRows& out) {
-  const int padded_width = from.width() + 2 * FlowUpdate::reach + row_padding;
-  const auto row_size =
-      static_cast<std::size_t>(equations) * static_cast<std::size_t>(padded_width);
-  const Rows rows{padded_width, scratch_of(scratch.tensors, 3 * row_size),
-                  scratch_of(scratch.threes, 13 * row_size),
-                  scratch_of(scratch.window_rows, row_size)};
-  float* row_threes = scratch_of(scratch.row_threes, row_size);
-  Chunk pixels{};
-  const int before = first - FlowUpdate::reach;
-  for (int i = 0; before + i < last + FlowUpdate::reach; ++i) {
-    const int y = std::clamp(before + i, 0, from.height() - 1);  // the border is replicated
-    add_row(from, to, flow.row(y), y, row_weights[y], column_weights, i, rows, pixels);
-    if (i >= 2 * FlowUpdate::reach)
-      solve_window(rows, from.width(), row_threes, out.row(before + i - FlowUpdate::reach));
+  const int width = from.width();
+  RowSums* strips = scratch_of(scratch.sums, static_cast<std::size_t>((width + strip - 1) / strip));
+  float* edges = scratch_of(scratch.edges, std::size_t{side} * equations * row_padding);
+  Window window;
+  int end = 0;
+  for (int start = first; start < last + 2 * reach; start = end) {
+    end = std::min((start / side + 1) * side, last + 2 * reach);
+    for (int left = 0; left < width; left += strip) {
+      const int right = std::min(left + strip, width);
+      RowSums& sums = strips[left / strip];
+      std::fill_n(sums.start[0], equations * strip, 0.0F);
+      for (int i = start; i < end; ++i) {
+        const int y = std::clamp(i - reach, 0, from.height() - 1);  // the border is replicated
+        const int row = i % side;
+        add_row(from, to, flow.row(y), y, left, right, row_weights[y], column_weights, row, sums,
+                window);
+        if (i < first + 2 * reach) continue;
+        solve_strip(window, left, right, width,
+                    edges + std::ptrdiff_t{i - start} * equations * row_padding,
+                    out.row(i - 2 * reach));
+      }
+      if (end % side == 0) complete_block(sums);
+    }
   }
 }
 

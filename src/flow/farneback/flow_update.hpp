@@ -25,14 +25,24 @@ struct FlowRows {
 /// The result does not depend on how rows are divided between calls.
 class FlowUpdate {
  public:
-  static constexpr int reach = 7;   ///< pixels each way from the centre of a window
-  static constexpr int border = 5;  ///< width of the border where polynomials weigh less
+  static constexpr int reach = 7;      ///< pixels each way from the centre of a window
+  static constexpr int strip = 128;    ///< columns that are processed together
+  static constexpr int equations = 5;  ///< coefficients: symmetric 2x2 matrix and right-hand side
+  static constexpr int border = 5;     ///< width of the border where polynomials weigh less
 
+  /// Sums of the equations of a strip over fifteen rows.
+  ///
+  /// Rows are counted from the first window's first one, in blocks of fifteen. The sum over a
+  /// window is that of the end of a block and that of the start of the next one.
+  struct RowSums {
+    /// Equations of the rows of a block; once it is complete, of each row and all after it. The
+    /// last row is 0.
+    alignas(64) float rows[2 * reach + 2][equations][strip];
+    alignas(64) float start[equations][strip];  ///< sum of the first rows of the present block
+  };
   struct Scratch {
-    std::vector<float> tensors;  ///< equations of the last rows
-    std::vector<float> threes;   ///< their sums over three rows
-    std::vector<float> window_rows;
-    std::vector<float> row_threes;
+    std::vector<RowSums> sums;
+    std::vector<float> edges;  ///< of a strip, which the one to the right needs
   };
 
   FlowUpdate() = default;

@@ -42,9 +42,8 @@ void fit_columns(const PolynomialExpansion::Window& window, int width, const Fit
   }
 }
 
-/// `four` and `fifth` are scratch for the first four coefficients per pixel and the last one.
 void fit_row(const float* smooth, const float* slope, const float* bend, int width,
-             const FitKernels& kernels, float* four, float* fifth, float* out) {
+             const FitKernels& kernels, float* out, std::ptrdiff_t stride) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   for (int x = 0; x < width; x += lanes) {
@@ -67,13 +66,11 @@ void fit_row(const float* smooth, const float* slope, const float* bend, int wid
       a_xx = hn::Add(a_xx, hn::Mul(set(kernels.bend[k]), hn::Add(left, right)));
       a_xy = hn::Add(a_xy, hn::Mul(set(kernels.slope[k]), hn::Sub(right_slope, left_slope)));
     }
-    hn::StoreInterleaved4(b_y, b_x, a_yy, a_xx, floats, four + std::ptrdiff_t{4} * x);
-    hn::StoreU(a_xy, floats, fifth + x);
-  }
-  for (int x = 0; x < width; ++x) {
-    float* polynomial = out + std::ptrdiff_t{PolynomialExpansion::coefficients} * x;
-    std::copy_n(four + std::ptrdiff_t{4} * x, 4, polynomial);
-    polynomial[4] = fifth[x];
+    float* at_x = out + x;
+    for (const auto& coefficient : {b_y, b_x, a_yy, a_xx, a_xy}) {
+      hn::StoreU(coefficient, floats, at_x);
+      at_x += stride;
+    }
   }
 }
 
@@ -111,26 +108,21 @@ FitKernels::FitKernels() {
 }
 
 PolynomialExpansion::PolynomialExpansion(int width, int height)
-    : width_(width),
-      height_(height),
-      data_(static_cast<std::size_t>(stride()) * (static_cast<std::size_t>(height) + 2) +
-            row_padding) {}
+    : width_(width), height_(height), planes_(width, coefficients * height, row_padding) {}
 
 void PolynomialExpansion::fit(int y, const Window& window, Scratch& scratch) {
   static const FitKernels kernels;
   const auto padded_width = static_cast<std::size_t>(width_) + std::size_t{2} * reach + row_padding;
   std::array<float*, 3> rows;
   for (std::size_t i = 0; i < rows.size(); ++i)
-    rows[i] = scratch_of(scratch.column_sums[i], padded_width) + reach;
+    rows[i] = scratch_of(scratch[i], padded_width) + reach;
   HWY_DYNAMIC_DISPATCH(fit_columns)(window, width_, kernels, rows[0], rows[1], rows[2]);
   for (float* row : rows) {
     std::fill_n(row - reach, reach, row[0]);
     std::fill_n(row + width_, reach, row[width_ - 1]);
   }
-  float* four = scratch_of(scratch.coefficients, coefficients * padded_width);
   HWY_DYNAMIC_DISPATCH(fit_row)
-  (rows[0], rows[1], rows[2], width_, kernels, four, four + 4 * padded_width,
-   data_.data() + std::ptrdiff_t{y} * stride());
+  (rows[0], rows[1], rows[2], width_, kernels, planes_.row(coefficients * y), stride());
 }
 
 }  // namespace eventcamera

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <vector>
+
+#include "src/core/image.hpp"
+#include "src/flow/scratch.hpp"
 
 namespace eventcamera {
 
@@ -21,23 +23,23 @@ class PolynomialExpansion {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  /// Floats from one row to the next.
-  int stride() const { return coefficients * (width_ + 1); }
-  /// Polynomials of a row. One more past its end may be read, which is finite, and two rows of
-  /// zeros below the last row.
-  const float* row(int y) const { return data_.data() + std::ptrdiff_t{y} * stride(); }
+  /// Coefficient k of each polynomial of a row; coefficient k + 1 is `stride` floats further on.
+  /// `row_padding` more to the left, twice as many to the right, and two rows below the last one
+  /// may be read, and are finite.
+  const float* row(int y, int k = 0) const { return planes_.row(coefficients * y + k); }
+  /// Floats.
+  std::ptrdiff_t stride() const {
+    return planes_.stride() / static_cast<std::ptrdiff_t>(sizeof(float));
+  }
 
-  struct Scratch {
-    std::array<std::vector<float>, 3> column_sums;
-    std::vector<float> coefficients;
-  };
+  using Scratch = std::array<std::vector<float>, 3>;  ///< sums along the columns
   /// Fits row y.
   void fit(int y, const Window& window, Scratch& scratch);
 
  private:
   int width_ = 0;
   int height_ = 0;
-  std::vector<float> data_;
+  Image<float> planes_;  ///< a row of each coefficient in turn
 };
 
 /// Kernels of the least-squares fit, which is separable: each coefficient is one kernel along the
