@@ -390,10 +390,12 @@ struct SumRow {
   float* weight;
 };
 
-/// Adds pixels [x, x + width) of row y of a patch with this flow.
-template <int side>
-HWY_INLINE void add_patch_row(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int x,
-                              int y, int width, const Flow& flow, const SumRow& sums) {
+/// Adds rows [first, last) of a patch with this flow, whose top left pixel is (x, y); sums_of(row)
+/// are those of a row.
+template <int side, class SumsOf>
+HWY_INLINE void add_patch(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, int x,
+                          int y, int width, int first, int last, const Flow& flow,
+                          const SumsOf& sums_of) {
   const hn::CappedTag<float, side> floats;
   const hn::RebindToSigned<decltype(floats)> ints;
   const hn::Rebind<std::uint8_t, decltype(floats)> bytes;
@@ -401,8 +403,8 @@ HWY_INLINE void add_patch_row(const Image<std::uint8_t>& from, const Image<std::
   // Past these limits, all pixels would be replicated ones.
   const float to_x = std::clamp(static_cast<float>(x) + flow.x, static_cast<float>(-width),
                                 static_cast<float>(to.width()));
-  const float to_y =
-      std::clamp(static_cast<float>(y) + flow.y, -1.0F, static_cast<float>(to.height()));
+  const float to_y = std::clamp(static_cast<float>(y) + flow.y, static_cast<float>(y - last),
+                                static_cast<float>(to.height()));
   const int left = static_cast<int>(std::floor(to_x));
   const int top = static_cast<int>(std::floor(to_y));
   const auto right = hn::Set(floats, to_x - static_cast<float>(left));
@@ -410,26 +412,32 @@ HWY_INLINE void add_patch_row(const Image<std::uint8_t>& from, const Image<std::
   const auto flow_x = hn::Set(floats, flow.x);
   const auto flow_y = hn::Set(floats, flow.y);
   const auto one = hn::Set(floats, 1.0F);
+  const auto load = [&](const std::uint8_t* pixels) {
+    return hn::ConvertTo(floats, hn::PromoteTo(ints, hn::LoadU(bytes, pixels)));
+  };
   const auto between = [](auto a, auto b, auto weight) {
     return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
   };
   for (int k = 0; k < width; k += lanes) {
-    const auto load = [&](const std::uint8_t* pixels) {
-      return hn::ConvertTo(floats, hn::PromoteTo(ints, hn::LoadU(bytes, pixels + k)));
-    };
     const auto along = [&](int row) {
-      const std::uint8_t* pixels = to.row(row) + left;
+      const std::uint8_t* pixels = to.row(row - y + top) + left + k;
       return between(load(pixels), load(pixels + 1), right);
     };
-    const auto there = between(along(top), along(top + 1), down);
-    const auto difference = hn::Abs(hn::Sub(there, load(from.row(y) + x)));
-    const auto weight = hn::Div(one, hn::Max(one, difference));
-    const auto add = [&](float* sum, auto value) {
-      hn::StoreU(hn::Add(hn::LoadU(floats, sum + x + k), value), floats, sum + x + k);
-    };
-    add(sums.x, hn::Mul(weight, flow_x));
-    add(sums.y, hn::Mul(weight, flow_y));
-    add(sums.weight, weight);
+    auto above = along(first);
+    for (int row = first; row < last; ++row) {
+      const auto below = along(row + 1);
+      const auto there = between(above, below, down);
+      above = below;
+      const auto difference = hn::Abs(hn::Sub(there, load(from.row(row) + x + k)));
+      const auto weight = hn::Div(one, hn::Max(one, difference));
+      const SumRow sums = sums_of(row);
+      const auto add = [&](float* sum, auto value) {
+        hn::StoreU(hn::Add(hn::LoadU(floats, sum + x + k), value), floats, sum + x + k);
+      };
+      add(sums.x, hn::Mul(weight, flow_x));
+      add(sums.y, hn::Mul(weight, flow_y));
+      add(sums.weight, weight);
+    }
   }
 }
 
@@ -475,8 +483,8 @@ void spread(const PatchGrid& grid, const Image<std::uint8_t>& from, const Image<
     for (int i = 0; i < grid.columns; ++i) {
       const int left = i * grid.stride;
       const int covered = i == grid.columns - 1 ? width - left : side;
-      for (int row = top; row < bottom; ++row)
-        add_patch_row<side>(from, to, left, row, covered, flows.at(i, j), sums_of(row));
+      add_patch<side>(from, to, left, j * grid.stride, covered, top, bottom, flows.at(i, j),
+                      sums_of);
     }
   }
   for (int row = first; row < last; ++row) divide_row(sums_of(row), row, x, y);

@@ -110,6 +110,8 @@ class Linearisation {
   }
 
  private:
+  using Ints = hn::RebindToSigned<Floats>;
+
   int above(int y) const { return ring(std::max(y - 1, 0)); }
   int below(int y) const { return ring(std::min(y + 1, end_)); }
 
@@ -121,10 +123,11 @@ class Linearisation {
   static HWY_INLINE Vector between(Vector a, Vector b, Vector weight) {
     return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
   }
-  static HWY_INLINE Vector pixels(const std::uint8_t* from) {
-    const hn::RebindToSigned<Floats> ints;
-    const hn::Rebind<std::uint8_t, Floats> bytes;
-    return hn::ConvertTo(Floats(), hn::PromoteTo(ints, hn::Load(bytes, from)));
+  /// The mean of two neighbours, each the low and the high byte of a word.
+  static HWY_INLINE Vector along(const std::uint16_t* words, Vector weight) {
+    const auto both = hn::PromoteTo(Ints(), hn::Load(hn::Rebind<std::uint16_t, Floats>(), words));
+    return between(hn::ConvertTo(Floats(), hn::And(both, hn::Set(Ints(), 0xFF))),
+                   hn::ConvertTo(Floats(), hn::ShiftRight<8>(both)), weight);
   }
 
   /// Computes the mean and the difference of the earlier image and the later one, moved back.
@@ -135,46 +138,41 @@ class Linearisation {
   }
   void warp(int y, int parity) {
     const Floats floats;
-    const hn::RebindToSigned<Floats> ints;
+    const Ints ints;
+    const hn::Rebind<std::uint8_t, Floats> bytes;
     constexpr int max_lanes = hn::MaxLanes(floats);
     const int lanes = static_cast<int>(hn::Lanes(floats));
     const auto iota = hn::Mul(hn::Iota(floats, 0.0F), set(2.0F));
-    const std::uint8_t* here = from_.row(y) + parity;
-    const auto stride = to_.stride();
+    const std::uint8_t* here = from_.row(y);
+    const auto stride = static_cast<std::int32_t>(to_.stride());
     const std::uint8_t* data = to_.row(0);
     const float* flow_x = flow_.x.row(parity, y);
     const float* flow_y = flow_.y.row(parity, y);
     float* mean = scratch_.mean.row(parity, ring(y));
     float* change = scratch_.change.row(parity, ring(y));
-    HWY_ALIGN std::int32_t columns[max_lanes];
-    HWY_ALIGN std::int32_t rows[max_lanes];
-    HWY_ALIGN std::uint8_t upper_left[max_lanes];
-    HWY_ALIGN std::uint8_t upper_right[max_lanes];
-    HWY_ALIGN std::uint8_t lower_left[max_lanes];
-    HWY_ALIGN std::uint8_t lower_right[max_lanes];
-    HWY_ALIGN std::uint8_t earlier[max_lanes];
+    HWY_ALIGN std::int32_t offsets[max_lanes];
+    HWY_ALIGN std::uint16_t upper[max_lanes];
+    HWY_ALIGN std::uint16_t lower[max_lanes];
     for (int k = 0; k < flow_.x.count(parity); k += lanes) {
       const auto start = hn::Add(iota, set(static_cast<float>(2 * k + parity)));
       const auto to_x = place(hn::Add(start, load(flow_x + k)), to_.width());
       const auto to_y = place(hn::Add(set(static_cast<float>(y)), load(flow_y + k)), to_.height());
       const auto cell_x = hn::Floor(to_x);
       const auto cell_y = hn::Floor(to_y);
-      hn::Store(hn::ConvertTo(ints, cell_x), ints, columns);
-      hn::Store(hn::ConvertTo(ints, cell_y), ints, rows);
+      hn::Store(hn::Add(hn::Mul(hn::ConvertTo(ints, cell_y), hn::Set(ints, stride)),
+                        hn::ConvertTo(ints, cell_x)),
+                ints, offsets);
       for (int lane = 0; lane < lanes; ++lane) {
-        const std::uint8_t* upper = data + rows[lane] * stride + columns[lane];
-        const std::uint8_t* lower = upper + stride;
-        upper_left[lane] = upper[0];
-        upper_right[lane] = upper[1];
-        lower_left[lane] = lower[0];
-        lower_right[lane] = lower[1];
-        earlier[lane] = here[std::ptrdiff_t{2} * (k + lane)];
+        const std::uint8_t* pixels = data + offsets[lane];
+        const std::uint8_t* below = pixels + stride;
+        upper[lane] = static_cast<std::uint16_t>(pixels[0] | pixels[1] << 8);
+        lower[lane] = static_cast<std::uint16_t>(below[0] | below[1] << 8);
       }
       const auto right = hn::Sub(to_x, cell_x);
-      const auto there =
-          between(between(pixels(upper_left), pixels(upper_right), right),
-                  between(pixels(lower_left), pixels(lower_right), right), hn::Sub(to_y, cell_y));
-      const auto grey = pixels(earlier);
+      const auto there = between(along(upper, right), along(lower, right), hn::Sub(to_y, cell_y));
+      hn::Vec<decltype(bytes)> columns[2];
+      hn::LoadInterleaved2(bytes, here + std::ptrdiff_t{2} * k, columns[0], columns[1]);
+      const auto grey = hn::ConvertTo(floats, hn::PromoteTo(ints, columns[parity]));
       store(hn::Mul(hn::Add(grey, there), set(0.5F)), mean + k);
       store(hn::Sub(there, grey), change + k);
     }
