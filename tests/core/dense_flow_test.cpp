@@ -6,7 +6,6 @@
 
 #include <cstring>
 #include <memory>
-#include <thread>
 #include <tuple>
 #include <vector>
 
@@ -46,8 +45,8 @@ TEST_P(OurFlow, IsNothingBetweenEqualPictures) {
 
 TEST_P(OurFlow, DoesNotDependOnThreads) {
   const auto one = flow_of(pictures.at(0), pictures.at(1));
-  for (unsigned count = 2; count <= std::thread::hardware_concurrency(); ++count) {
-    threads.set_threads(static_cast<int>(count));
+  for (const int count : {2, 3, 7, 16}) {  // also more than there are processors
+    threads.set_threads(count);
     EXPECT_TRUE(equal(flow_of(pictures.at(0), pictures.at(1)), one)) << count << " threads";
   }
 }
