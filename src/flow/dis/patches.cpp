@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "src/flow/scratch.hpp"
@@ -19,11 +18,13 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// Eight pixels of a patch: a row of one of 8x8, two rows of one of 4x4.
-using Words = hn::CappedTag<std::int16_t, 8>;
+/// Pixels of a patch: up to two rows of one of 8x8, all four of one of 4x4.
+using Words = hn::CappedTag<std::int16_t, 16>;
 using Sums = hn::Repartition<std::int32_t, Words>;
 using Word = hn::Vec<Words>;
-constexpr int group_size = 8;
+
+/// Lanes of a sum once its halves are added.
+using Quarters = hn::CappedTag<std::int32_t, 4>;
 
 /// One lane per patch.
 using Floats = hn::CappedTag<float, row_padding>;
@@ -38,11 +39,38 @@ class ProductSum {
   // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
   ProductSum() : low_(hn::Zero(Sums())), high_(hn::Zero(Sums())) {}
   void add(Word a, Word b) { low_ = hn::ReorderWidenMulAccumulate(Sums(), a, b, low_, high_); }
-  hn::Vec<Sums> lanes() const { return hn::Add(low_, high_); }
+  hn::Vec<Quarters> lanes() const { return quarters(hn::Add(low_, high_)); }
 
  private:
+  template <class Sum>
+  static HWY_INLINE hn::Vec<Quarters> quarters(Sum sum) {
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (hn::MaxLanes(hn::DFromV<Sum>()) > hn::MaxLanes(Quarters()))
+      return hn::Add(hn::LowerHalf(Quarters(), sum), hn::UpperHalf(Quarters(), sum));
+    else
+#endif
+      return sum;
+  }
+
   hn::Vec<Sums> low_;
   hn::Vec<Sums> high_;
+};
+
+/// Sums at one of the four pixels of a patch's cell.
+struct Corner {
+  // Not defaulted, as that of ProductSum.
+  Corner() {}  // NOLINT(modernize-use-equals-default)
+  HWY_INLINE void add(Word d, Word slope_x, Word slope_y) {
+    square.add(d, d);
+    plain.add(d, hn::Set(Words(), 1));
+    along_x.add(d, slope_x);
+    along_y.add(d, slope_y);
+  }
+
+  ProductSum square;
+  ProductSum plain;
+  ProductSum along_x;
+  ProductSum along_y;
 };
 
 /// Stores the totals of four sums.
@@ -51,8 +79,8 @@ HWY_INLINE void store_totals(const ProductSum& sum0, const ProductSum& sum1, con
 #if HWY_TARGET == HWY_SCALAR
   for (const auto* sum : {&sum0, &sum1, &sum2, &sum3}) *out++ = hn::GetLane(sum->lanes());
 #else
-  const Sums lanes;
-  const hn::Repartition<std::int64_t, Sums> pairs;
+  const Quarters lanes;
+  const hn::Repartition<std::int64_t, Quarters> pairs;
   const auto add_pairs = [&](auto a, auto b) {
     return hn::BitCast(pairs,
                        hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
@@ -130,34 +158,28 @@ class Search {
  private:
   static constexpr float pixels = side * side;
 
-  /// The address of eight values of a patch.
-  template <class T>
-  static HWY_INLINE const T* group_of(const Image<T>& plane, int x, int y, int group, T* buffer) {
-    if constexpr (side == group_size) return plane.row(y + group) + x;
-    std::memcpy(buffer, plane.row(y + 2 * group) + x, side * sizeof(T));
-    std::memcpy(buffer + side, plane.row(y + 2 * group + 1) + x, side * sizeof(T));
-    return buffer;
-  }
+  static constexpr int vector_size = hn::MaxLanes(Words());
 
-  static HWY_INLINE Word load_bytes(const Image<std::uint8_t>& plane, int x, int y, int group,
-                                    int lane) {
-    std::uint8_t buffer[group_size];
+  /// Pixels of the patch at (x, y), row by row, from the `first` on.
+  template <class Tag, class T>
+  static HWY_INLINE hn::Vec<Tag> load_pixels(Tag tag, const Image<T>& plane, int x, int y,
+                                             int first) {
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (hn::MaxLanes(tag) > side) {
+      const hn::Half<Tag> half;
+      constexpr int half_size = hn::MaxLanes(half);
+      return hn::Combine(tag, load_pixels(half, plane, x, y, first + half_size),
+                         load_pixels(half, plane, x, y, first));
+    } else
+#endif
+      return hn::LoadU(tag, plane.row(y + first / side) + x + first % side);
+  }
+  static HWY_INLINE Word load_words(const Image<std::uint8_t>& plane, int x, int y, int first) {
     const hn::Rebind<std::uint8_t, Words> bytes;
-    return hn::PromoteTo(Words(), hn::LoadU(bytes, group_of(plane, x, y, group, buffer) + lane));
+    return hn::PromoteTo(Words(), load_pixels(bytes, plane, x, y, first));
   }
-  static HWY_INLINE Word load_words(const Image<std::int16_t>& plane, int x, int y, int group,
-                                    int lane) {
-    std::int16_t buffer[group_size];
-    return hn::LoadU(Words(), group_of(plane, x, y, group, buffer) + lane);
-  }
-
-  /// Vectors of a patch.
-  static int vectors() { return side * side / static_cast<int>(hn::Lanes(Words())); }
-  static int group_at(int vector) {
-    return vector * static_cast<int>(hn::Lanes(Words())) / group_size;
-  }
-  static int lane_at(int vector) {
-    return vector * static_cast<int>(hn::Lanes(Words())) % group_size;
+  static HWY_INLINE Word load_words(const Image<std::int16_t>& plane, int x, int y, int first) {
+    return load_pixels(Words(), plane, x, y, first);
   }
 
   /// Computes what stays constant during the search for a patch.
@@ -169,11 +191,9 @@ class Search {
     ProductSum total_x;
     ProductSum total_y;
     const auto one = hn::Set(Words(), 1);
-    for (int vector = 0; vector < vectors(); ++vector) {
-      const int group = group_at(vector);
-      const int lane = lane_at(vector);
-      const auto slope_x = load_words(gradients_.x(), x, top_, group, lane);
-      const auto slope_y = load_words(gradients_.y(), x, top_, group, lane);
+    for (int first = 0; first < side * side; first += vector_size) {
+      const auto slope_x = load_words(gradients_.x(), x, top_, first);
+      const auto slope_y = load_words(gradients_.y(), x, top_, first);
       xx.add(slope_x, slope_x);
       xy.add(slope_x, slope_y);
       yy.add(slope_y, slope_y);
@@ -193,62 +213,48 @@ class Search {
     mean_y_[i] = static_cast<float>(totals[5]) / pixels;
   }
 
-  /// Differences of eight pixels of a patch from the four pixels of a cell.
-  HWY_INLINE void subtract(int x, int to_x, int to_y, int group, int lane, Word* d) const {
-    const auto here = load_bytes(from_, x, top_, group, lane);
-    d[0] = hn::Sub(load_bytes(to_, to_x, to_y, group, lane), here);
-    d[1] = hn::Sub(load_bytes(to_, to_x + 1, to_y, group, lane), here);
-    d[2] = hn::Sub(load_bytes(to_, to_x, to_y + 1, group, lane), here);
-    d[3] = hn::Sub(load_bytes(to_, to_x + 1, to_y + 1, group, lane), here);
-  }
-
   /// Computes the sums at the four pixels of a patch's cell, of the differences d0 ... d3 and their
   /// products.
   void read_cell(int i) {
     const int x = left_ + i * stride_;
     const int to_x = static_cast<int>(cell_x_[i]);
     const int to_y = static_cast<int>(cell_y_[i]);
+    Corner c0;
+    Corner c1;
+    Corner c2;
+    Corner c3;
+    ProductSum d01;
+    ProductSum d02;
+    ProductSum d03;
+    ProductSum d12;
+    ProductSum d13;
+    ProductSum d23;
+    for (int first = 0; first < side * side; first += vector_size) {
+      const auto here = load_words(from_, x, top_, first);
+      const auto slope_x = load_words(gradients_.x(), x, top_, first);
+      const auto slope_y = load_words(gradients_.y(), x, top_, first);
+      const auto d0 = hn::Sub(load_words(to_, to_x, to_y, first), here);
+      const auto d1 = hn::Sub(load_words(to_, to_x + 1, to_y, first), here);
+      const auto d2 = hn::Sub(load_words(to_, to_x, to_y + 1, first), here);
+      const auto d3 = hn::Sub(load_words(to_, to_x + 1, to_y + 1, first), here);
+      c0.add(d0, slope_x, slope_y);
+      c1.add(d1, slope_x, slope_y);
+      c2.add(d2, slope_x, slope_y);
+      c3.add(d3, slope_x, slope_y);
+      d01.add(d0, d1);
+      d02.add(d0, d2);
+      d03.add(d0, d3);
+      d12.add(d1, d2);
+      d13.add(d1, d3);
+      d23.add(d2, d3);
+    }
     std::int32_t totals[max_sums];
-    {
-      ProductSum squares[4];
-      ProductSum products[6];
-      for (int vector = 0; vector < vectors(); ++vector) {
-        const int group = group_at(vector);
-        const int lane = lane_at(vector);
-        Word d[4];
-        subtract(x, to_x, to_y, group, lane, d);
-        for (int k = 0; k < 4; ++k) squares[k].add(d[k], d[k]);
-        products[0].add(d[0], d[1]);
-        products[1].add(d[0], d[2]);
-        products[2].add(d[0], d[3]);
-        products[3].add(d[1], d[2]);
-        products[4].add(d[1], d[3]);
-        products[5].add(d[2], d[3]);
-      }
-      store_totals(squares[0], squares[1], squares[2], squares[3], totals);
-      store_totals(products[0], products[1], products[2], products[3], totals + 4);
-      store_totals(products[4], products[5], products[4], products[5], totals + 8);
-    }
-    ProductSum plain[4];
-    ProductSum along_x[4];
-    ProductSum along_y[4];
-    const auto one = hn::Set(Words(), 1);
-    for (int vector = 0; vector < vectors(); ++vector) {
-      const int group = group_at(vector);
-      const int lane = lane_at(vector);
-      Word d[4];
-      subtract(x, to_x, to_y, group, lane, d);
-      const auto slope_x = load_words(gradients_.x(), x, top_, group, lane);
-      const auto slope_y = load_words(gradients_.y(), x, top_, group, lane);
-      for (int k = 0; k < 4; ++k) {
-        plain[k].add(d[k], one);
-        along_x[k].add(d[k], slope_x);
-        along_y[k].add(d[k], slope_y);
-      }
-    }
-    store_totals(plain[0], plain[1], plain[2], plain[3], totals + sum);
-    store_totals(along_x[0], along_x[1], along_x[2], along_x[3], totals + sum_x);
-    store_totals(along_y[0], along_y[1], along_y[2], along_y[3], totals + sum_y);
+    store_totals(c0.square, c1.square, c2.square, c3.square, totals);
+    store_totals(d01, d02, d03, d12, totals + 4);
+    store_totals(d13, d23, d13, d23, totals + 8);
+    store_totals(c0.plain, c1.plain, c2.plain, c3.plain, totals + sum);
+    store_totals(c0.along_x, c1.along_x, c2.along_x, c3.along_x, totals + sum_x);
+    store_totals(c0.along_y, c1.along_y, c2.along_y, c3.along_y, totals + sum_y);
     for (int k = 0; k < max_sums; ++k) sums_[k][i] = static_cast<float>(totals[k]);
   }
 
