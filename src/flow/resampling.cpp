@@ -34,12 +34,13 @@ void resample_floats(const float* row, const Resampling& resampling, float* out)
   }
 }
 
-void resample_flows(const Flow* row, const Resampling& resampling, float factor, Flow* out) {
+void resample_flows(const Flow* row, const Resampling& resampling, int begin, int end, float factor,
+                    Flow* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const auto times = hn::Set(floats, factor);
   const float* values = &row->x;
-  for (int x = 0; x < resampling.size(); x += lanes) {
+  for (int x = begin; x < end; x += lanes) {
     const auto first = hn::ShiftLeft<1>(hn::LoadU(Words(), resampling.first() + x));
     const auto right = hn::LoadU(floats, resampling.weight() + x);
     const auto at = [&](int i) { return hn::GatherIndex(floats, values + i, first); };
@@ -85,7 +86,12 @@ void resample_row(const float* row, const Resampling& resampling, float* out) {
 }
 
 void resample_row(const Flow* row, const Resampling& resampling, float factor, Flow* out) {
-  HWY_DYNAMIC_DISPATCH(resample_flows)(row, resampling, factor, out);
+  resample_columns(row, resampling, 0, resampling.size(), factor, out);
+}
+
+void resample_columns(const Flow* row, const Resampling& resampling, int first, int last,
+                      float factor, Flow* out) {
+  HWY_DYNAMIC_DISPATCH(resample_flows)(row, resampling, first, last, factor, out);
 }
 
 void blend_rows(const Flow* upper, const Flow* lower, float weight, int width, Flow* out) {

@@ -34,6 +34,10 @@ void resample_row(const float* row, const Resampling& resampling, float* out);
 /// Resamples a row of a flow, likewise, and multiplies it by `factor`.
 void resample_row(const Flow* row, const Resampling& resampling, float factor, Flow* out);
 
+/// The same for columns [first, last) alone.
+void resample_columns(const Flow* row, const Resampling& resampling, int first, int last,
+                      float factor, Flow* out);
+
 /// Interpolates between two rows of a flow; `weight` is that of the lower one. Reads and writes up
 /// to a vector past the ends.
 void blend_rows(const Flow* upper, const Flow* lower, float weight, int width, Flow* out);

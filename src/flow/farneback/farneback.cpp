@@ -2,6 +2,7 @@
 #include "src/flow/farneback/farneback.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <utility>
 
@@ -21,13 +22,21 @@ int expansion_bands(int height) {
   return (height + rows_per_expansion - 1) / rows_per_expansion;
 }
 
-/// A band of flow goes through all iterations while its polynomials are in the cache, and each
-/// iteration needs more rows around it. So bands are thick, but numerous enough for all threads.
-int flow_bands(int height, int threads) {
-  constexpr int min_rows = 60;
-  constexpr int max_rows = 160;
-  return std::clamp(height / min_rows, 1, std::max(2 * threads, height / max_rows));
-}
+/// A tile of flow, as high as the image, goes through all iterations block by block, while the
+/// polynomials of the last blocks are in the cache. Each iteration needs more columns around it. So
+/// tiles are wide, but numerous enough for all threads. They end at multiples of 16 pixels.
+struct Tiles {
+  Tiles(int level_width, int threads) : width(level_width) {
+    constexpr int min_columns = 80;
+    constexpr int max_columns = 320;
+    count = std::clamp(width / min_columns, 1, std::max(threads, width / max_columns));
+  }
+  int left(int tile) const {
+    return tile == count ? width : width * tile / count / row_padding * row_padding;
+  }
+  int width;
+  int count;
+};
 
 }  // namespace
 
@@ -102,57 +111,63 @@ ImageView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
   const Level* coarser = nullptr;
   for (std::size_t i = levels_.size(); i-- > 0;) {
     Level& level = levels_[i];
-    const int height = level.flow.height();
-    const int bands = flow_bands(height, threads.threads());
-    threads.for_each(bands, [&](int band, int thread) {
-      find_rows(coarser, level, height * band / bands, height * (band + 1) / bands,
-                scratch_[thread]);
+    const Tiles tiles(level.flow.width(), threads.threads());
+    threads.for_each(tiles.count, [&](int tile, int thread) {
+      find_columns(coarser, level, tiles.left(tile), tiles.left(tile + 1), scratch_[thread]);
     });
     coarser = &level;
   }
   return levels_.front().flow.view();
 }
 
-/// Computes rows [first, last) of a level's flow.
-void FarnebackFlow::find_rows(const Level* coarser, Level& level, int first, int last,
-                              Scratch& scratch) {
+/// Computes columns [first, last) of a level's flow.
+void FarnebackFlow::find_columns(const Level* coarser, Level& level, int first, int last,
+                                 Scratch& scratch) {
+  constexpr int reach = FlowUpdate::reach;
+  constexpr int side = FlowUpdate::side;
+  const int width = level.flow.width();
   const int height = level.flow.height();
   const auto stride = static_cast<std::size_t>(level.flow.stride()) / sizeof(Flow);
   const auto first_of = [&](int iteration) {
-    return std::max(0, first - FlowUpdate::reach * (iterations - iteration));
+    return std::max(0, first - FlowUpdate::margin * (iterations - iteration));
   };
   const auto last_of = [&](int iteration) {
-    return std::min(height, last + FlowUpdate::reach * (iterations - iteration));
+    return std::min(width, last + FlowUpdate::margin * (iterations - iteration));
   };
-  const auto rows_of = [&](int iteration) -> FlowRows {
-    if (iteration == iterations) return {level.flow.row(0), static_cast<std::ptrdiff_t>(stride), 0};
-    auto& flow = scratch.flows[static_cast<std::size_t>(iteration) % 2];
-    Flow* rows = scratch_of(flow, stride * static_cast<std::size_t>(last_of(0) - first_of(0)));
-    return {rows, static_cast<std::ptrdiff_t>(stride), first_of(iteration)};
-  };
-  start_rows(coarser, level, last_of(0), scratch, rows_of(0));
-  for (int i = 1; i <= iterations; ++i)
-    level.update.run(level.last, level.next, rows_of(i - 1), first_of(i), last_of(i),
-                     scratch.update, rows_of(i));
+  // Each iteration is a block behind the one before it.
+  constexpr int kept_rows = 2 * side;
+  std::array<FlowRows, iterations + 1> rows;
+  for (int i = 0; i < iterations; ++i)
+    rows[i] = {scratch_of(scratch.flows[i], stride * std::size_t{kept_rows}),
+               static_cast<std::ptrdiff_t>(stride), kept_rows};
+  rows[iterations] = {level.flow.row(0), static_cast<std::ptrdiff_t>(stride), height};
+  int started = 0;
+  for (int block = 0; block < FlowUpdate::blocks(height) + iterations - 1; ++block) {
+    for (; started < std::min(height, block * side + reach + 1); ++started)
+      start_row(coarser, level, started, first_of(0), last_of(0), scratch, rows[0].row(started));
+    for (int i = 1; i <= iterations; ++i)
+      level.update.run(level.last, level.next, rows[i - 1], first_of(i), last_of(i),
+                       block - (i - 1), scratch.updates[i - 1], rows[i]);
+  }
 }
 
-/// Initializes the rows of `out` before `last` from the flow of the coarser level, or with 0.
-void FarnebackFlow::start_rows(const Level* coarser, const Level& level, int last, Scratch& scratch,
-                               const FlowRows& out) {
+/// Initializes columns [first, last) of row y from the flow of the coarser level, or with 0.
+void FarnebackFlow::start_row(const Level* coarser, const Level& level, int y, int first, int last,
+                              Scratch& scratch, Flow* out) {
   if (coarser == nullptr) {
-    std::fill_n(out.row(out.first), (last - out.first) * out.stride, Flow{0, 0});
+    std::fill(out + first, out + last, Flow{0, 0});
     return;
   }
   const int width = coarser->flow.width();
   Flow* row = scratch_of(scratch.coarser_row, static_cast<std::size_t>(width) + row_padding);
-  for (int y = out.first; y < last; ++y) {
-    const int upper = level.rows.first()[y];
-    const int lower = std::min(upper + 1, coarser->flow.height() - 1);
-    blend_rows(coarser->flow.row(upper), coarser->flow.row(lower), level.rows.weight()[y], width,
-               row);
-    row[width] = row[width - 1];
-    resample_row(row, level.columns, 2, out.row(y));
-  }
+  const int upper = level.rows.first()[y];
+  const int lower = std::min(upper + 1, coarser->flow.height() - 1);
+  const int left = level.columns.first()[first];
+  const int right = std::min(level.columns.first()[last - 1] + 2, width);
+  blend_rows(coarser->flow.row(upper) + left, coarser->flow.row(lower) + left,
+             level.rows.weight()[y], right - left, row + left);
+  row[width] = row[width - 1];
+  resample_columns(row, level.columns, first, last, 2, out);
 }
 
 }  // namespace eventcamera

@@ -42,16 +42,17 @@ class FarnebackFlow final : public DenseFlow {
     std::array<std::vector<float>, 2 * PolynomialExpansion::reach + 1> rows;
     PolynomialExpansion::Scratch expansion;
     std::vector<Flow> coarser_row;
-    std::array<std::vector<Flow>, 2> flows;
-    FlowUpdate::Scratch update;
+    std::array<std::vector<Flow>, iterations> flows;  ///< before each iteration
+    std::array<FlowUpdate::Scratch, iterations> updates;
   };
 
   void start(int width, int height);
   static void expand(const ImageView<std::uint8_t>& picture, Level& level, int band,
                      Scratch& scratch);
-  static void start_rows(const Level* coarser, const Level& level, int last, Scratch& scratch,
-                         const FlowRows& out);
-  static void find_rows(const Level* coarser, Level& level, int first, int last, Scratch& scratch);
+  static void start_row(const Level* coarser, const Level& level, int y, int first, int last,
+                        Scratch& scratch, Flow* out);
+  static void find_columns(const Level* coarser, Level& level, int first, int last,
+                           Scratch& scratch);
 
   int width_ = 0;
   int height_ = 0;

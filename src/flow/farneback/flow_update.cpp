@@ -23,7 +23,7 @@ using Vector = hn::Vec<Floats>;
 using WordVector = hn::Vec<Words>;
 constexpr int coefficients = PolynomialExpansion::coefficients;
 constexpr int reach = FlowUpdate::reach;
-constexpr int side = 2 * reach + 1;  ///< of a window
+constexpr int side = FlowUpdate::side;
 constexpr int strip = FlowUpdate::strip;
 /// Coefficients of the normal equations: symmetric 2x2 matrix and right-hand side.
 constexpr int equations = FlowUpdate::equations;
@@ -290,14 +290,13 @@ void solve(const EquationRows<strip>& sums, int width, Flow* flow) {
   }
 }
 
-/// Solves a row of a strip; the border of the image is replicated. `edge` has the last sums of the
-/// strip to the left, and gets those of this one.
-void solve_strip(Window& window, int left, int right, int width, float* edge, Flow* flow) {
+/// Solves columns [first, last) of a row with the sums of columns [left, right), a strip; the
+/// border of the image is replicated. `edge` has the last sums of the strip to the left, and gets
+/// those of this one.
+void solve_strip(Window& window, int left, int right, int first, int last, int width, float* edge,
+                 Flow* flow) {
   constexpr int before = Window::before;
-  // The windows of the other columns reach into the next strip.
-  constexpr int lag = 8;
-  const int first = left == 0 ? 0 : left - lag;
-  const int count = (right == width ? width : right - lag) - first;
+  const int count = last - first;
   HWY_ALIGN EquationRows<strip> threes;
   HWY_ALIGN EquationRows<strip> sums;
   for (int equation = 0; equation < equations; ++equation) {
@@ -317,32 +316,39 @@ void solve_strip(Window& window, int left, int right, int width, float* edge, Fl
   solve(sums, count, flow + first);
 }
 
-void update_rows(const PolynomialExpansion& from, const PolynomialExpansion& to,
-                 const FlowRows& flow, int first, int last, const float* column_weights,
-                 const float* row_weights, FlowUpdate::Scratch& scratch, const FlowRows& out) {
+void update_block(const PolynomialExpansion& from, const PolynomialExpansion& to,
+                  const FlowRows& flow, int first, int last, int block, const float* column_weights,
+                  const float* row_weights, FlowUpdate::Scratch& scratch, const FlowRows& out) {
+  constexpr int margin = FlowUpdate::margin;
   const int width = from.width();
-  RowSums* strips = scratch_of(scratch.sums, static_cast<std::size_t>((width + strip - 1) / strip));
+  const int start = block * side;
+  const int end = std::min(start + side, from.height() + 2 * reach);
+  const int begin = std::max(first - margin, 0);
+  const int stop = std::min(last + margin, width);
+  RowSums* sums =
+      scratch_of(scratch.sums, static_cast<std::size_t>((stop - begin + strip - 1) / strip));
   float* edges = scratch_of(scratch.edges, std::size_t{side} * equations * row_padding);
-  Window window;
-  int end = 0;
-  for (int start = first; start < last + 2 * reach; start = end) {
-    end = std::min((start / side + 1) * side, last + 2 * reach);
-    for (int left = 0; left < width; left += strip) {
-      const int right = std::min(left + strip, width);
-      RowSums& sums = strips[left / strip];
-      std::fill_n(sums.start[0], equations * strip, 0.0F);
-      for (int i = start; i < end; ++i) {
+  Window windows[2];
+  for (int left = begin; left < stop; left += strip) {
+    const int right = std::min(left + strip, stop);
+    // The windows of the other columns reach into the next strip.
+    const int solved_first = left == begin ? first : left - margin;
+    const int solved_last = right == stop ? last : right - margin;
+    std::fill_n(sums->start[0], equations * strip, 0.0F);
+    // A row is solved after the next one's equations, when its sums have arrived in the cache.
+    for (int i = start; i <= end; ++i) {
+      if (i < end) {
         const int y = std::clamp(i - reach, 0, from.height() - 1);  // the border is replicated
-        const int row = i % side;
-        add_row(from, to, flow.row(y), y, left, right, row_weights[y], column_weights, row, sums,
-                window);
-        if (i < first + 2 * reach) continue;
-        solve_strip(window, left, right, width,
-                    edges + std::ptrdiff_t{i - start} * equations * row_padding,
-                    out.row(i - 2 * reach));
+        add_row(from, to, flow.row(y), y, left, right, row_weights[y], column_weights, i - start,
+                *sums, windows[i % 2]);
       }
-      if (end % side == 0) complete_block(sums);
+      const int last_row = i - 1;
+      if (last_row < std::max(start, 2 * reach)) continue;
+      solve_strip(windows[last_row % 2], left, right, solved_first, solved_last, width,
+                  edges + std::ptrdiff_t{last_row - start} * equations * row_padding,
+                  out.row(last_row - 2 * reach));
     }
+    complete_block(*sums++);
   }
 }
 
@@ -353,7 +359,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace eventcamera {
 
-HWY_EXPORT(update_rows);
+HWY_EXPORT(update_block);
 
 namespace {
 
@@ -374,10 +380,11 @@ FlowUpdate::FlowUpdate(int width, int height)
     : column_weights_(border_weights(width)), row_weights_(border_weights(height)) {}
 
 void FlowUpdate::run(const PolynomialExpansion& from, const PolynomialExpansion& to,
-                     const FlowRows& flow, int first, int last, Scratch& scratch,
+                     const FlowRows& flow, int first, int last, int block, Scratch& scratch,
                      const FlowRows& out) const {
-  HWY_DYNAMIC_DISPATCH(update_rows)
-  (from, to, flow, first, last, column_weights_.data(), row_weights_.data(), scratch, out);
+  if (block < 0 || block >= blocks(from.height())) return;
+  HWY_DYNAMIC_DISPATCH(update_block)
+  (from, to, flow, first, last, block, column_weights_.data(), row_weights_.data(), scratch, out);
 }
 
 }  // namespace eventcamera

@@ -9,26 +9,30 @@
 
 namespace eventcamera {
 
-/// Rows of a flow field, starting with row `first`, each padded by row_padding pixels.
+/// The last rows of a flow field, in a ring of `count`. Each is padded by row_padding pixels.
 struct FlowRows {
   Flow* data;
   std::ptrdiff_t stride;  ///< pixels from one row to the next
-  int first;
+  int count;
 
-  Flow* row(int y) const { return data + (y - first) * stride; }
+  Flow* row(int y) const { return data + y % count * stride; }
 };
 
 /// One iteration of Farneback's method, which refines a flow.
 ///
 /// The polynomials at both ends of a pixel's flow differ by a shift, which solves two linear
 /// equations. These are summed over a window (least squares) and solved for the flow of its centre.
-/// The result does not depend on how rows are divided between calls.
+/// The result does not depend on how columns are divided between calls.
 class FlowUpdate {
  public:
-  static constexpr int reach = 7;      ///< pixels each way from the centre of a window
-  static constexpr int strip = 128;    ///< columns that are processed together
+  static constexpr int reach = 7;             ///< pixels each way from the centre of a window
+  static constexpr int side = 2 * reach + 1;  ///< of a window; also rows of a block
+  static constexpr int strip = 128;           ///< columns that are processed together
   static constexpr int equations = 5;  ///< coefficients: symmetric 2x2 matrix and right-hand side
   static constexpr int border = 5;     ///< width of the border where polynomials weigh less
+
+  /// Columns of flow that are read on each side of those that are filled: `reach`, aligned.
+  static constexpr int margin = 8;
 
   /// Sums of the equations of a strip over fifteen rows.
   ///
@@ -37,7 +41,7 @@ class FlowUpdate {
   struct RowSums {
     /// Equations of the rows of a block; once it is complete, of each row and all after it. The
     /// last row is 0.
-    alignas(64) float rows[2 * reach + 2][equations][strip];
+    alignas(64) float rows[side + 1][equations][strip];
     alignas(64) float start[equations][strip];  ///< sum of the first rows of the present block
   };
   struct Scratch {
@@ -48,10 +52,15 @@ class FlowUpdate {
   FlowUpdate() = default;
   FlowUpdate(int width, int height);
 
-  /// Fills rows [first, last) of `out`. Reads these rows of `flow` and `reach` more on each side,
-  /// as far as they exist.
+  /// Number of blocks of an image.
+  static constexpr int blocks(int height) { return (height + 2 * reach + side - 1) / side; }
+
+  /// Fills columns [first, last), multiples of 8 or the border, of the `side` rows that end with
+  /// the first row of a block. Reads `flow` in `margin` more columns on each side, and in the rows
+  /// from `reach` before to `reach` after that first row. To be called for all blocks in turn; does
+  /// nothing for others.
   void run(const PolynomialExpansion& from, const PolynomialExpansion& to, const FlowRows& flow,
-           int first, int last, Scratch& scratch, const FlowRows& out) const;
+           int first, int last, int block, Scratch& scratch, const FlowRows& out) const;
 
  private:
   std::vector<float> column_weights_;
