@@ -66,8 +66,7 @@ struct State {
   GstVideoInfo video;  ///< input format
   std::unique_ptr<VideoSimulator> frames;
   std::optional<Interval> awaited{};
-  bool draws = false;          ///< the output is video, not events
-  bool discontinuous = false;  ///< the next buffer is discontinuous
+  bool draws = false;  ///< the output is video, not events
 
   IntervalSimulator& simulator() const { return frames->simulator(); }
 };
@@ -88,6 +87,7 @@ struct Latency {
 struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
   bool backwards = false;                       ///< the segment was refused
+  bool discontinuous = false;                   ///< the next buffer is discontinuous
   GstFlowReturn flow = GST_FLOW_OK;             ///< result of the last push
   FrameClock clock;                             ///< for frames without a PTS
   WarnOnce warn_of_times;
@@ -295,7 +295,7 @@ static GstFlowReturn push_buffer(GstEventSimulator* self, OwnedBuffer out, GstCl
   GST_BUFFER_PTS(out.get()) = pts;
   GST_BUFFER_DTS(out.get()) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION(out.get()) = duration;
-  if (std::exchange(priv_of(self).state->discontinuous, false))
+  if (std::exchange(priv_of(self).stream.discontinuous, false))
     GST_BUFFER_FLAG_SET(out.get(), GST_BUFFER_FLAG_DISCONT);
   if (transform->segment.format == GST_FORMAT_TIME)
     transform->segment.position = GST_CLOCK_TIME_IS_VALID(duration) ? pts + duration : pts;
@@ -340,7 +340,7 @@ static void forget_frames(GstEventSimulator* self) {
   auto& state = priv_of(self).state;
   if (!state || !state->simulator().last_time()) return;
   state->simulator().reset();
-  state->discontinuous = true;
+  priv_of(self).stream.discontinuous = true;
 }
 
 /// Restarts at a first frame, for a new timeline. May throw.
@@ -389,7 +389,7 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
   if (GST_BUFFER_IS_DISCONT(buffer)) {
     start_over(self);
-    priv_of(self).state->discontinuous = true;
+    priv_of(self).stream.discontinuous = true;
   }
   if (pts > G_MAXINT64) {
     warn_of_times(self, "the PTS of a frame is out of range");
@@ -410,10 +410,12 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
 }
 
 /// Runs `work`; reports any exception and drops the state, because the simulator is then unusable.
+/// What comes after it, if anything, is discontinuous.
 template <class Work>
 static void reported(GstEventSimulator* self, const Work& work) {
   const auto failure = [&](const std::exception& error) -> Report {
     priv_of(self).state.reset();
+    priv_of(self).stream.discontinuous = true;
     if (is_a<std::bad_alloc>(error))
       return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
               "Not enough memory for the events of a frame. Raise the thresholds, or lower "
@@ -513,11 +515,9 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   };
   const bool made = guarded(self, failure, [&] {
     if (!state || FrameLuma::format_of(state->video) != luma) {
-      const bool follows = state && (state->discontinuous || state->simulator().last_time());
+      if (state && state->simulator().last_time()) priv_of(self).stream.discontinuous = true;
       state.reset();  // before allocating the next: frames can be large
-      state.emplace(State{.video = video,
-                          .frames = method_of(self).create(G_OBJECT(self), video),
-                          .discontinuous = follows});
+      state.emplace(State{.video = video, .frames = method_of(self).create(G_OBJECT(self), video)});
     } else {
       state->video = video;
       state->frames->set_video(video);

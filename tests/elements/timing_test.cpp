@@ -127,6 +127,27 @@ TEST_P(EveryElement, BeginsAnewAfterADiscontinuity) {
   EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
 }
 
+TEST_P(EveryElement, BeginsAnewAfterAFrameThatFails) {
+  for (const auto& out : {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of(GetParam())}) {
+    Harness bare(gst_harness_new_parse(GetParam()), GetParam());
+    bare.caps(video, out);
+    std::vector<bool> discontinuous;
+    for (int i = 0; i < 7; ++i) {
+      GstBuffer* frame = bare.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 * 150);
+      if (i == 3) gst_buffer_set_size(frame, 1);
+      EXPECT_EQ(bare.push(frame), i == 3 ? GST_FLOW_ERROR : GST_FLOW_OK);
+      if (i == 2)
+        while (bare.pull()) continue;
+    }
+    EXPECT_TRUE(bare.message(GST_MESSAGE_ERROR));
+    while (const auto output = bare.pull())
+      discontinuous.push_back(GST_BUFFER_IS_DISCONT(output.get()));
+    ASSERT_GE(discontinuous.size(), 2U);
+    EXPECT_TRUE(discontinuous[0]);
+    EXPECT_FALSE(discontinuous[1]);
+  }
+}
+
 TEST_P(EveryElement, BeginsAnewAfterAFlush) {
   h.caps(video);
   flash(0);
