@@ -278,7 +278,7 @@ class TextureVideoSimulator final : public VideoSimulator {
   bool queue(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings) override {
     const OwnedBuffer uploaded = in_texture(buffer);
     const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
-    if (!texture.fault().empty()) throw cannot_read(texture.fault());
+    if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
     bool ends_interval = false;
     frame_.texture = texture.name();
     run([&] { ends_interval = simulator_->queue(frame_, time, settings); });
@@ -304,9 +304,9 @@ class TextureVideoSimulator final : public VideoSimulator {
     {
       const OwnedBuffer uploaded = in_texture(buffer);
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
-      if (!texture.fault().empty()) throw cannot_read(texture.fault());
+      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
       const MappedTexture drawn(drawn_, picture, context_, GST_MAP_WRITE);
-      if (!drawn.fault().empty()) throw cannot_draw(drawn.fault());
+      if (!drawn.fault().empty()) refuse(cannot_draw(drawn.fault()));
       frame_.texture = texture.name();
       const eventcamera::gl::Picture out{
           drawn.name(), eventcamera::pixels_by_kind(palette, pixel_layout_of(drawn_))};
@@ -342,8 +342,14 @@ class TextureVideoSimulator final : public VideoSimulator {
     if (result == GST_GL_UPLOAD_RECONFIGURE)  // it has chosen how to upload
       result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
     if (result != GST_GL_UPLOAD_DONE)
-      throw cannot_read("it cannot be uploaded to an OpenGL texture");
+      refuse(cannot_read("it cannot be uploaded to an OpenGL texture"));
     return OwnedBuffer(uploaded);
+  }
+
+  /// Throws what is wrong with a frame or a picture, unless it is the context.
+  [[noreturn]] void refuse(const VideoSimulatorError& fault) {
+    run([] {});
+    throw fault;
   }
 
   /// Runs `work` in the context, which others use, too; turns errors of OpenGL into messages.

@@ -51,19 +51,24 @@ void Context::abandon() {
   DeleteSync = [](GLsync) {};
 }
 
+GLenum Context::next_error() const {
+  constexpr GLenum context_lost = 0x0507;
+  const bool is_reset = get_reset_status_ != nullptr && get_reset_status_() != GL_NO_ERROR;
+  const GLenum code = is_reset ? context_lost : GetError();
+  if (code == context_lost)
+    throw ContextLost("the OpenGL context was lost, because the GPU was reset or removed");
+  return code;
+}
+
 void Context::forget_errors() const {
-  constexpr int most = 8;  // a lost context has no end of them
-  for (int i = 0; i < most && GetError() != GL_NO_ERROR; ++i) {
+  constexpr int most = 8;  // without a context there is no end of them
+  for (int i = 0; i < most && next_error() != GL_NO_ERROR; ++i) {
   }
 }
 
 void Context::check() const {
-  constexpr GLenum context_lost = 0x0507;
-  const bool is_reset = get_reset_status_ != nullptr && get_reset_status_() != GL_NO_ERROR;
-  const GLenum code = is_reset ? context_lost : GetError();
+  const GLenum code = next_error();
   if (code == GL_NO_ERROR) return;
-  if (code == context_lost)
-    throw ContextLost("the OpenGL context was lost, because the GPU was reset or removed");
   if (code == GL_OUT_OF_MEMORY) throw Error("OpenGL is out of memory");
   throw Error("OpenGL error " + hexadecimal(code));
 }

@@ -87,13 +87,16 @@ class Context {
   /// may no longer be done.
   void abandon();
 
-  /// Forgets that OpenGL calls failed.
+  /// Forgets that OpenGL calls failed. Throws ContextLost if that is why.
   void forget_errors() const;
 
   /// Throws Error if the context is lost, or an OpenGL call failed since the last check.
   void check() const;
 
  private:
+  /// Throws ContextLost.
+  GLenum next_error() const;
+
   GLenum(GL_APIENTRY* get_reset_status_)() = nullptr;  ///< of a robust context, else null
   bool is_es_ = false;
   GLint64 max_buffer_size_ = 0;

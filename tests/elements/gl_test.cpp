@@ -38,6 +38,23 @@ Harness without_upload(const std::string& launch) {
   return {gst_harness_new_parse(launch.c_str()), launch};
 }
 
+/// A video whose frames differ, pushed one by one.
+class Flashes {
+ public:
+  explicit Flashes(Harness& h) : h_(h) {}
+
+  GstFlowReturn push() { return h_.push(frame()); }
+
+  GstBuffer* frame() {
+    ++count_;
+    return h_.flat(static_cast<GstClockTime>(count_) * 40 * GST_MSECOND, count_ % 2 * 100);
+  }
+
+ private:
+  Harness& h_;
+  int count_ = 0;
+};
+
 /// Bytes of the output for five noisy frames.
 std::string output_of_noise(Harness&& h, const std::string& format,
                             const std::string& out = GST_EVENT_CAMERA_MEDIA_TYPE) {
@@ -318,15 +335,11 @@ TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
          {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of(element)}) {
       Harness h(element);
       h.caps(video, out);
-      int i = 0;
-      const auto push = [&h, &i] {
-        ++i;
-        return h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 * 100));
-      };
-      EXPECT_EQ(push(), GST_FLOW_OK);
-      EXPECT_EQ(push(), GST_FLOW_OK);
+      Flashes flashes(h);
+      EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+      EXPECT_EQ(flashes.push(), GST_FLOW_OK);
       is_lost = true;
-      EXPECT_EQ(push(), GST_FLOW_ERROR);
+      EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
       is_lost = false;
       const auto error = h.message(GST_MESSAGE_ERROR);
       ASSERT_TRUE(error);
@@ -334,7 +347,7 @@ TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
                 "OpenGL cannot simulate: the OpenGL context was lost, because the GPU was reset or "
                 "removed. Use " +
                     element.substr(2) + ", which runs on the CPU.");
-      EXPECT_EQ(push(), GST_FLOW_OK);  // begins anew, if the application goes on
+      EXPECT_EQ(flashes.push(), GST_FLOW_OK);  // begins anew, if the application goes on
     }
   }
 }
@@ -345,20 +358,37 @@ TEST(OpenGl, IsFoundAnewAfterALoss) {
        {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of("gleventsim-frame")}) {
     Harness h = without_upload("gleventsim-frame");
     h.caps(video, out);
-    int i = 0;
-    const auto push = [&h, &i] {
-      ++i;
-      return h.push(h.flat(static_cast<GstClockTime>(i) * 40 * GST_MSECOND, i % 2 * 100));
-    };
-    EXPECT_EQ(push(), GST_FLOW_OK);
+    Flashes flashes(h);
+    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
     lost = GST_GL_CONTEXT(gst_object_ref(current.load()));  // so that no other has its address
-    EXPECT_EQ(push(), GST_FLOW_ERROR);
-    EXPECT_EQ(push(), GST_FLOW_OK);
-    EXPECT_EQ(push(), GST_FLOW_OK);
+    EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
+    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
     EXPECT_NE(current, lost);
     gst_object_unref(lost.exchange(nullptr));
   }
 }
+
+/// Ends the threads of all contexts, as it seems, while it exists.
+class EndOfThreads {
+ public:
+  EndOfThreads() {
+    static void (*send)(GstGLWindow*, GstGLWindowCB, gpointer) = nullptr;
+    GstGLWindow* window = gst_gl_context_get_window(current);
+    auto& send_message = GST_GL_WINDOW_GET_CLASS(window)->send_message;
+    if (send == nullptr)
+      send = std::exchange(send_message, [](GstGLWindow* to, GstGLWindowCB run, gpointer data) {
+        if (!has_ended) send(to, run, data);
+      });
+    gst_object_unref(window);
+    has_ended = true;
+  }
+  ~EndOfThreads() { has_ended = false; }
+};
+
+constexpr const char* thread_has_ended =
+    "OpenGL cannot simulate: the OpenGL context has ended. Use eventsim-frame, which runs on the "
+    "CPU.";
 
 TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
   take_over_contexts();
@@ -367,23 +397,34 @@ TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
   is_busy = true;
   h.push(h.flat(0, 0));
   h.push(h.flat(40 * GST_MSECOND, 100));
-  static void (*send)(GstGLWindow*, GstGLWindowCB, gpointer);
-  GstGLWindow* window = gst_gl_context_get_window(current);
-  send = std::exchange(GST_GL_WINDOW_GET_CLASS(window)->send_message,
-                       [](GstGLWindow* to, GstGLWindowCB callback, gpointer data) {
-                         if (!has_ended) send(to, callback, data);
-                       });
-  gst_object_unref(window);
-  has_ended = true;
-  gst_harness_push_event(h.get(), gst_event_new_eos());
-  has_ended = false;
+  {
+    const EndOfThreads end;
+    gst_harness_push_event(h.get(), gst_event_new_eos());
+  }
   is_busy = false;
   const auto error = h.message(GST_MESSAGE_ERROR);
   ASSERT_TRUE(error);
-  EXPECT_EQ(text_of(error.get()),
-            "OpenGL cannot simulate: the OpenGL context has ended. Use eventsim-frame, which runs "
-            "on the CPU.");
+  EXPECT_EQ(text_of(error.get()), thread_has_ended);
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+}
+
+TEST(OpenGl, IsNotMistakenForTheFrameWhereItHasEnded) {
+  take_over_contexts();
+  for (const std::string& out :
+       {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of("gleventsim-frame")}) {
+    Harness h = without_upload("gleventsim-frame");
+    h.caps(video, out);
+    Flashes flashes(h);
+    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+    {
+      const EndOfThreads end;
+      EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
+    }
+    const auto error = h.message(GST_MESSAGE_ERROR);
+    ASSERT_TRUE(error) << out;
+    EXPECT_EQ(text_of(error.get()), thread_has_ended);
+    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+  }
 }
 
 TEST(OpenGl, IsRefusedWhereItIsTooOld) {

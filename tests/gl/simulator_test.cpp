@@ -431,6 +431,8 @@ TEST(Context, IsReportedAsLostByWhateverTellsOfIt) {
   }
   loss = Loss::reset;
   EXPECT_EQ(message([&] { const gl::Kernel kernel(context, "wrong", "wrong"); }), lost);
+  loss = Loss::error;
+  EXPECT_EQ(message([&] { context.forget_errors(); }), lost);
   loss = Loss::none;
 }
 
