@@ -53,19 +53,19 @@ struct Settings {
   GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
 };
 
-/// An interval whose events are awaited.
-struct Interval {
-  OwnedBuffer frame;  ///< that ends it
-  Nanoseconds start;
-  Nanoseconds end;
-  std::optional<Nanoseconds> work_began;
+/// A frame that is worked on, and the interval that it ends, if any.
+struct Awaited {
+  OwnedBuffer frame;
+  Nanoseconds start = 0;
+  Nanoseconds end = 0;
+  std::optional<Nanoseconds> work_began{};
 };
 
 /// State from caps to stop.
 struct State {
   GstVideoInfo video;  ///< input format
   std::unique_ptr<VideoSimulator> frames;
-  std::optional<Interval> awaited{};
+  std::optional<Awaited> awaited{};
   bool draws = false;  ///< the output is video, not events
 
   IntervalSimulator& simulator() const { return frames->simulator(); }
@@ -302,29 +302,30 @@ static GstFlowReturn push_buffer(GstEventSimulator* self, OwnedBuffer out, GstCl
   return gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out.release());
 }
 
-/// Waits for the events of the awaited interval, if any, and pushes them, or a GAP if there are
-/// none. May throw.
+/// Waits until the work on the awaited frame, if any, is done. Pushes the events of the interval
+/// that it ends, or a GAP if there are none. May throw.
 static void push_awaited(GstEventSimulator* self) {
   auto& state = priv_of(self).state;
   if (!state || !state->awaited) return;
   priv_of(self).timer.cancel();
   auto [frame, start, end, began] = *std::exchange(state->awaited, std::nullopt);
-  const EventBuckets& events = state->frames->read();
+  const EventBuckets* const events = state->frames->read();
+  if (events == nullptr) return;  // of a first frame, or drawn
   GST_LOG_OBJECT(self,
                  "%" G_GSIZE_FORMAT " events in the interval from %" GST_TIME_FORMAT
                  " to %" GST_TIME_FORMAT,
-                 events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(start)),
+                 events->size(), GST_TIME_ARGS(static_cast<GstClockTime>(start)),
                  GST_TIME_ARGS(static_cast<GstClockTime>(end)));
 
   auto& flow = priv_of(self).stream.flow;
   OwnedBuffer out;
-  if (events.size() > 0)
-    flow = event_simulator_write_events(GST_BASE_TRANSFORM(self), events,
+  if (events->size() > 0)
+    flow = event_simulator_write_events(GST_BASE_TRANSFORM(self), *events,
                                         state->simulator().threads(), frame.get(), out);
   frame.reset();  // upstream may need it while downstream blocks
   end_work(self, end, began);
   learn_latency(self, start, end);
-  if (events.size() == 0)
+  if (events->size() == 0)
     flow = push_gap(self, start, end, GST_SEQNUM_INVALID);
   else if (flow == GST_FLOW_OK)
     flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
@@ -560,6 +561,18 @@ static void sync_controlled_properties(GstEventSimulator* self, GstClockTime tim
   if (GST_CLOCK_TIME_IS_VALID(stream_time)) gst_object_sync_values(GST_OBJECT(self), stream_time);
 }
 
+static void look_for_events(GstObject* element);
+
+/// Lets the awaited frame go, and pushes its interval, if the work on it is done, else looks again
+/// later. May throw.
+static void push_if_ready(GstEventSimulator* self) {
+  auto& priv = priv_of(self);
+  if (priv.state->frames->is_ready())
+    push_awaited(self);
+  else
+    priv.timer.set(poll_interval, GST_BASE_TRANSFORM_SINK_PAD(self), look_for_events);
+}
+
 /// Draws the events since the last frame (none for a first frame). The picture replaces the frame,
 /// at its `time`. May throw.
 static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& settings, Nanoseconds time,
@@ -568,13 +581,16 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
   auto& state = *priv_of(self).state;
   OwnedBuffer picture;
   GstFlowReturn result = event_simulator_make_picture(transform, in.get(), picture);
-  if (result == GST_FLOW_OK)
+  if (result == GST_FLOW_OK) {
     state.frames->draw(in.get(), time, settings.simulation,
                        eventcamera::palette(palette_name_of(settings.palette)), picture.get());
+    push_awaited(self);
+  }
   end_work(self, time, work_began(self));
   if (result != GST_FLOW_OK) return result;
   GST_BUFFER_DURATION(picture.get()) = GST_BUFFER_DURATION(in.get());
-  in.reset();  // upstream may need it while downstream blocks
+  state.awaited.emplace(Awaited{.frame = std::move(in)});
+  push_if_ready(self);  // upstream may need the frame while downstream blocks
   priv_of(self).qos.access([&](const SimulatorQos& qos) {
     qos.extend(transform, picture.get(), frame_duration(state.video));
   });
@@ -582,17 +598,6 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
   result = push_buffer(self, std::move(picture), static_cast<GstClockTime>(time), duration);
   end_frame(self);
   return result;
-}
-
-static void look_for_events(GstObject* element);
-
-/// Pushes the awaited interval if its events are ready, else looks again later. May throw.
-static void push_if_ready(GstEventSimulator* self) {
-  auto& priv = priv_of(self);
-  if (priv.state->frames->is_ready())
-    push_awaited(self);
-  else
-    priv.timer.set(poll_interval, GST_BASE_TRANSFORM_SINK_PAD(self), look_for_events);
 }
 
 /// Processes a frame and outputs the interval that it ends, if any: at once if its events are
@@ -613,15 +618,15 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
     stream.flow = draw_frame(self, settings, end, std::move(in));
     return;
   }
-  const bool ends_interval = state.frames->queue(in.get(), end, settings.simulation);
+  state.frames->queue(in.get(), end, settings.simulation);
   push_awaited(self);  // whose events are read while the GPU works on this frame
-  if (!ends_interval) {
+  if (start) {
+    stream.handed_out_until = end;
+  } else {
     end_work(self, end, work_began(self));
     end_frame(self);
-    return;
   }
-  stream.handed_out_until = end;
-  state.awaited.emplace(Interval{std::move(in), *start, end, work_began(self)});
+  state.awaited.emplace(Awaited{std::move(in), start.value_or(end), end, work_began(self)});
   push_if_ready(self);
 }
 

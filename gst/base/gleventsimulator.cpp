@@ -275,29 +275,13 @@ class TextureVideoSimulator final : public VideoSimulator {
 
   void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
 
-  bool queue(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings) override {
+  void queue(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings) override {
     const OwnedBuffer uploaded = in_texture(buffer);
     const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
     if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
-    bool ends_interval = false;
     frame_.texture = texture.name();
-    run([&] { ends_interval = simulator_->queue(frame_, time, settings); });
-    return ends_interval;
+    run([&] { simulator_->queue(frame_, time, settings); });
   }
-
-  bool is_ready() override {
-    bool ready = false;
-    run([&] { ready = simulator_->is_ready(); });
-    return ready;
-  }
-
-  const EventBuckets& read() override {
-    const EventBuckets* events = nullptr;
-    run([&] { events = &simulator_->read(); });
-    return *events;
-  }
-
-  void drop() override { simulator_->drop(); }
 
   void draw(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings,
             const eventcamera::Palette& palette, GstBuffer* picture) override {
@@ -317,6 +301,20 @@ class TextureVideoSimulator final : public VideoSimulator {
     if (sync == nullptr) sync = gst_buffer_add_gl_sync_meta(context_, picture);
     gst_gl_sync_meta_set_sync_point(sync, context_);
   }
+
+  bool is_ready() override {
+    bool ready = false;
+    run([&] { ready = simulator_->is_ready(); });
+    return ready;
+  }
+
+  const EventBuckets* read() override {
+    const EventBuckets* events = nullptr;
+    run([&] { events = simulator_->read(); });
+    return events;
+  }
+
+  void drop() override { simulator_->drop(); }
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 

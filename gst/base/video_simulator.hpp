@@ -27,26 +27,26 @@ class VideoSimulator {
   virtual void set_drawn_video(const GstVideoInfo& drawn) = 0;
 
   /// Takes the frame in a buffer, as BasicSimulator::push(), but may return before it has the
-  /// events. Returns whether the frame ends an interval, whose events are to be read(); the buffer
-  /// must be kept until then. Up to two intervals may wait. Throws VideoSimulatorError as well.
-  virtual bool queue(GstBuffer* frame, eventcamera::Nanoseconds time,
+  /// events, which are to be read(); the buffer must be kept until then. Up to two frames may wait.
+  /// Throws VideoSimulatorError as well.
+  virtual void queue(GstBuffer* frame, eventcamera::Nanoseconds time,
                      const eventcamera::Settings& settings) = 0;
+
+  /// As queue(), but draws the events in the buffer `picture` (none for a first frame); read()
+  /// returns none.
+  virtual void draw(GstBuffer* frame, eventcamera::Nanoseconds time,
+                    const eventcamera::Settings& settings, const eventcamera::Palette& palette,
+                    GstBuffer* picture) = 0;
 
   /// Whether read() would return at once.
   virtual bool is_ready() = 0;
 
-  /// Returns the events of the first interval that waits, valid until the next call. Throws
-  /// VideoSimulatorError as well.
-  virtual const eventcamera::EventBuckets& read() = 0;
+  /// Returns the events of the interval that the first frame that waits ends, valid until the next
+  /// call; nullptr if it ends none. Throws VideoSimulatorError as well.
+  virtual const eventcamera::EventBuckets* read() = 0;
 
-  /// Forgets the intervals that wait.
+  /// Forgets the frames that wait.
   virtual void drop() = 0;
-
-  /// As BasicSimulator::push(), but draws the events in the buffer `picture`: none for a first
-  /// frame. Throws VideoSimulatorError as well.
-  virtual void draw(GstBuffer* frame, eventcamera::Nanoseconds time,
-                    const eventcamera::Settings& settings, const eventcamera::Palette& palette,
-                    GstBuffer* picture) = 0;
 
   virtual eventcamera::IntervalSimulator& simulator() = 0;
 };
@@ -92,27 +92,27 @@ class LumaVideoSimulator final : public VideoSimulator {
     drawing_ = Drawing{drawn, {GST_VIDEO_INFO_WIDTH(&drawn), GST_VIDEO_INFO_HEIGHT(&drawn)}};
   }
 
-  bool queue(GstBuffer* frame, eventcamera::Nanoseconds time,
+  void queue(GstBuffer* frame, eventcamera::Nanoseconds time,
              const eventcamera::Settings& settings) override {
     const VideoFrame mapped(video_, frame, GST_MAP_READ);
     if (!mapped) throw cannot_read(mapped.fault());
     events_ = simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
-    return events_ != nullptr;
   }
-
-  bool is_ready() override { return true; }
-  const eventcamera::EventBuckets& read() override { return *events_; }
-  void drop() override {}
 
   void draw(GstBuffer* frame, eventcamera::Nanoseconds time, const eventcamera::Settings& settings,
             const eventcamera::Palette& palette, GstBuffer* picture) override {
-    const bool ends_interval = queue(frame, time, settings);
+    queue(frame, time, settings);
     const VideoFrame mapped(drawing_->video, picture, GST_MAP_WRITE);
     if (!mapped) throw cannot_draw(mapped.fault());
-    if (ends_interval) drawing_->accumulator.add(*events_, simulator_->threads());
+    if (const auto* events = std::exchange(events_, nullptr))
+      drawing_->accumulator.add(*events, simulator_->threads());
     drawing_->accumulator.draw(palette, pixel_layout_of(drawing_->video), mapped.data(),
                                mapped.stride());
   }
+
+  bool is_ready() override { return true; }
+  const eventcamera::EventBuckets* read() override { return events_; }
+  void drop() override {}
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 

@@ -13,9 +13,6 @@ constexpr int block = 512;  ///< marks a group, as in the shaders
 
 constexpr std::size_t first_capacity = 4096;  ///< events
 
-/// Time in which a driver must complete an interval, nanoseconds.
-constexpr GLuint64 patience = 60'000'000'000;
-
 }  // namespace
 
 EventListKernels::EventListKernels(const Context& gl)
@@ -57,20 +54,9 @@ void EventList::sort() {
   kernels_.count.run(blocks, {&marks_, &starts_}, {marks_a_step()});
   kernels_.scan.run({}, {&starts_, &total_}, {blocks.x * blocks.y});
   write();
-  gl_.DeleteSync(done_);
-  done_ = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
-  gl_.Flush();
-}
-
-bool EventList::is_sorted() const {
-  return gl_.ClientWaitSync(done_, 0, 0) != GL_TIMEOUT_EXPIRED;
 }
 
 void EventList::read(EventBuckets& events) {
-  const GLenum state = gl_.ClientWaitSync(done_, 0, patience);
-  gl_.check();
-  if (state == GL_TIMEOUT_EXPIRED) throw Error("OpenGL has not answered for a minute");
-  if (state == GL_WAIT_FAILED) throw Error("OpenGL cannot wait for the GPU");
   std::uint32_t total = 0;
   total_.read(std::as_writable_bytes(std::span(&total, 1)));
   if (total > times_.size() * static_cast<std::size_t>(marks_a_step()) * 32)

@@ -28,9 +28,6 @@ struct EventListKernels {
 class EventList {
  public:
   EventList(const Context& gl, const LumaFormat& format, const EventListKernels& kernels);
-  ~EventList() { gl_.DeleteSync(done_); }
-  EventList(const EventList&) = delete;
-  EventList& operator=(const EventList&) = delete;
 
   /// Begins an interval without steps.
   void clear() { times_.clear(); }
@@ -46,10 +43,7 @@ class EventList {
   /// Queues the sorting of the marks. Does not wait.
   void sort();
 
-  /// Whether the GPU is done with that.
-  bool is_sorted() const;
-
-  /// Waits until the GPU is done with that, and replaces the contents of `events`. Throws Error.
+  /// Replaces the contents of `events`, once the GPU is done with that. Throws Error.
   void read(EventBuckets& events);
 
  private:
@@ -59,7 +53,6 @@ class EventList {
   const EventListKernels& kernels_;
   int marks_across_;
   int height_;
-  GLsync done_ = nullptr;             ///< when the marks are sorted
   std::vector<std::uint32_t> times_;  ///< of the steps, microseconds
   Buffer marks_;
   Buffer starts_;      ///< index of the first event of each block of marks

@@ -17,41 +17,48 @@ bool Simulator::take(const TextureFrame& frame, Nanoseconds time, const Settings
   return steps.has_value();
 }
 
-bool Simulator::queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings) {
-  assert(queued_ < max_queued);
-  auto& list = lists_[(first_ + queued_) % max_queued];
-  const bool ends_interval = take(frame, time, settings, list);
-  if (ends_interval) {
-    list.sort();
-    ++queued_;
-  }
+void Simulator::queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings) {
+  auto& [list, is_sorted, done] = next();
+  is_sorted = take(frame, time, settings, list);
+  if (is_sorted) list.sort();
+  done.set();
   gl_.check();
-  return ends_interval;
-}
-
-const EventBuckets& Simulator::read() {
-  assert(queued_ > 0);
-  auto& list = lists_[first_];
-  first_ = (first_ + 1) % max_queued;
-  --queued_;
-  list.read(events_);
-  return events_;
 }
 
 void Simulator::draw(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
                      const Picture& picture) {
-  auto& list = lists_[first_];
+  auto& [list, is_sorted, done] = next();
+  is_sorted = false;
   list.clear();
   take(frame, time, settings, list);
   draw_.run(list, picture);
+  done.set();
   gl_.check();
+}
+
+Simulator::Queued& Simulator::next() {
+  assert(queued_ < max_queued);
+  return queue_[(first_ + queued_++) % max_queued];
+}
+
+const EventBuckets* Simulator::read() {
+  assert(queued_ > 0);
+  auto& [list, is_sorted, done] = queue_[first_];
+  first_ = (first_ + 1) % max_queued;
+  --queued_;
+  done.wait();
+  if (!is_sorted) return nullptr;
+  list.read(events_);
+  return &events_;
 }
 
 void Simulator::simulate(const TextureFrame& frame, const StepTimes& steps,
                          const Settings& settings, EventBuckets& events) {
-  auto& list = lists_[first_];
+  auto& [list, is_sorted, done] = queue_[first_];
   mark(frame, steps, settings, list);
   list.sort();
+  done.set();
+  done.wait();
   list.read(events);
 }
 

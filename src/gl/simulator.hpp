@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/gl/event_list.hpp"
+#include "src/gl/fence.hpp"
 #include "src/gl/grey_frame.hpp"
 #include "src/gl/picture.hpp"
 #include "src/simulate/simulator.hpp"
@@ -15,33 +16,32 @@ namespace eventcamera::gl {
 /// read() the events of the interval before.
 class Simulator : public BasicSimulator<TextureFrame> {
  public:
-  static constexpr int max_queued = 2;  ///< intervals
+  static constexpr int max_queued = 2;  ///< frames
 
-  /// As push(), but only queues the work. Returns whether the frame ends an interval, whose events
-  /// are to be read(). The contents of the texture may not change until then.
-  bool queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings);
+  /// As push(), but only queues the work, whose result is to be read(). The contents of the texture
+  /// may not change until then.
+  void queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings);
 
-  /// Whether the GPU is done with the first of the queued intervals.
-  bool is_ready() const { return lists_[first_].is_sorted(); }
-
-  /// Waits until the GPU is done with the first of the queued intervals. Returns its events, valid
-  /// until the next call.
-  const EventBuckets& read();
-
-  /// Forgets the queued intervals.
-  void drop() { queued_ = 0; }
-
-  /// As push(), but draws the events in a texture (none for the first frame), and reads nothing
-  /// back. Does not wait for the GPU.
+  /// As queue(), but draws the events in a texture (none for the first frame); read() returns none.
   void draw(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
             const Picture& picture);
+
+  /// Whether the GPU is done with the first of the queued frames.
+  bool is_ready() const { return queue_[first_].done.is_reached(); }
+
+  /// Waits until the GPU is done with the first of the queued frames. Returns what push() does.
+  const EventBuckets* read();
+
+  /// Forgets the queued frames.
+  void drop() { queued_ = 0; }
 
  protected:
   Simulator(const Context& gl, const LumaFormat& format)
       : BasicSimulator(format),
         gl_(gl),
         kernels_(gl),
-        lists_{{gl, format, kernels_}, {gl, format, kernels_}},
+        queue_{{{gl, format, kernels_}, false, Fence(gl)},
+               {{gl, format, kernels_}, false, Fence(gl)}},
         draw_(gl, format) {}
 
   /// Queues the marks of the pixels that fire between the last frame and this one, in `list`, and
@@ -50,16 +50,25 @@ class Simulator : public BasicSimulator<TextureFrame> {
                     EventList& list) = 0;
 
  private:
+  struct Queued {
+    EventList list;
+    bool is_sorted;  ///< to be read
+    Fence done;
+  };
+
   void simulate(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
                 EventBuckets& events) final;
 
   /// Queues all work on a frame but the sorting. Returns whether it ends an interval.
   bool take(const TextureFrame& frame, Nanoseconds time, const Settings& settings, EventList& list);
 
+  /// Adds a frame to those that are queued.
+  Queued& next();
+
   const Context& gl_;
   EventListKernels kernels_;
-  EventList lists_[max_queued];
-  int first_ = 0;   ///< of the lists that are queued
+  Queued queue_[max_queued];
+  int first_ = 0;   ///< of those that are queued
   int queued_ = 0;  ///< their number
   DrawKernel draw_;
 };

@@ -230,9 +230,11 @@ class Busy : public testing::TestWithParam<const char*> {
     is_busy = true;
     h.caps(video);
     push(0);
+    EXPECT_EQ(waits, 0);
     push(1);
     EXPECT_FALSE(h.pull());
-    EXPECT_EQ(waits, 0);
+    EXPECT_EQ(waits, 1);  // for the first frame
+    waits = 0;
   }
   void TearDown() override { is_busy = false; }
 
@@ -424,6 +426,27 @@ TEST(OpenGl, IsNotMistakenForTheFrameWhereItHasEnded) {
     ASSERT_TRUE(error) << out;
     EXPECT_EQ(text_of(error.get()), thread_has_ended);
     EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+  }
+}
+
+TEST(OpenGl, HoldsFramesUntilItHasReadThem) {
+  take_over_contexts();
+  for (const std::string& out :
+       {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of("gleventsim-frame")}) {
+    Harness h = without_upload("gleventsim-frame");
+    h.caps(video, out);
+    Flashes flashes(h);
+    for (int i = 0; i < 3; ++i) {
+      const Buffer frame(flashes.frame());
+      const auto is_held = [&frame] { return GST_MINI_OBJECT_REFCOUNT_VALUE(frame.get()) > 1; };
+      is_busy = true;
+      EXPECT_EQ(h.push(gst_buffer_ref(frame.get())), GST_FLOW_OK);
+      g_usleep(20'000);
+      EXPECT_TRUE(is_held()) << out << i;
+      is_busy = false;
+      for (int wait = 0; wait < 1000 && is_held(); ++wait) g_usleep(10'000);
+      EXPECT_FALSE(is_held()) << out << i;
+    }
   }
 }
 

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include "src/gl/context.hpp"
+
+namespace eventcamera::gl {
+
+/// A point in the work of the GPU.
+class Fence {
+ public:
+  explicit Fence(const Context& gl) : gl_(gl) {}
+  ~Fence() { gl_.DeleteSync(sync_); }
+  Fence(const Fence&) = delete;
+  Fence& operator=(const Fence&) = delete;
+
+  /// Moves it past all that has been queued.
+  void set();
+
+  /// Whether the GPU has come to it.
+  bool is_reached() const;
+
+  /// Waits until the GPU has come to it. Throws Error.
+  void wait() const;
+
+ private:
+  const Context& gl_;
+  GLsync sync_ = nullptr;
+};
+
+}  // namespace eventcamera::gl
