@@ -45,41 +45,47 @@ static std::string advice_of(gpointer self) {
 
 /* display and context */
 
-/// Asks the neighbours and the application for a display, which set_context() then stores.
-static void ask_for_display(GstElement* self) {
-  auto& priv = priv_of(self);
-  GstQuery* query = gst_query_new_context(GST_GL_DISPLAY_CONTEXT_TYPE);
+/// Asks the neighbours and the application for an object, which set_context() then stores. Returns
+/// whether there is one. To be called without the lock: those asked may ask back.
+template <class Object>
+static bool ask_for(GstElement* self, const char* type,
+                    Object* GstGLEventSimulatorPrivate::*object) {
+  const auto is_known = [&priv = priv_of(self), object] {
+    const std::lock_guard lock(priv.mutex);
+    return priv.*object != nullptr;
+  };
+  GstQuery* query = gst_query_new_context(type);
   for (GstPad* pad : {GST_BASE_TRANSFORM_SRC_PAD(self), GST_BASE_TRANSFORM_SINK_PAD(self)}) {
     GstContext* context = nullptr;
-    if (priv.display == nullptr && gst_pad_peer_query(pad, query)) {
+    if (!is_known() && gst_pad_peer_query(pad, query)) {
       gst_query_parse_context(query, &context);
       if (context != nullptr) gst_element_set_context(self, context);
     }
   }
   gst_query_unref(query);
-  if (priv.display == nullptr)
-    gst_element_post_message(
-        self, gst_message_new_need_context(GST_OBJECT(self), GST_GL_DISPLAY_CONTEXT_TYPE));
+  if (!is_known())
+    gst_element_post_message(self, gst_message_new_need_context(GST_OBJECT(self), type));
+  return is_known();
 }
 
-/// Makes a display, and shares it with the pipeline.
-static void provide_display(GstElement* self) {
+/// Makes a display, and shares it with the pipeline. False if there is none.
+static bool provide_display(GstElement* self) {
   GstGLDisplay* display = gl_display();
-  if (display == nullptr) return;
+  if (display == nullptr) return false;
   GstContext* context = gst_context_new(GST_GL_DISPLAY_CONTEXT_TYPE, TRUE);
   gst_context_set_gl_display(context, display);
   gst_object_unref(display);
   gst_element_set_context(self, context);
   gst_element_post_message(self, gst_message_new_have_context(GST_OBJECT(self), context));
+  return true;
 }
 
 static bool open_display(GstElement* self) {
-  auto& priv = priv_of(self);
-  const std::lock_guard lock(priv.mutex);
-  if (priv.display == nullptr) ask_for_display(self);
-  if (priv.display == nullptr) provide_display(self);
-  if (priv.display != nullptr && gst_gl_ensure_element_data(self, &priv.display, &priv.other))
+  using Private = GstGLEventSimulatorPrivate;
+  if (ask_for(self, GST_GL_DISPLAY_CONTEXT_TYPE, &Private::display) || provide_display(self)) {
+    ask_for(self, "gst.gl.app_context", &Private::other);
     return true;
+  }
   post_message(self, GST_MESSAGE_ERROR,
                {GST_RESOURCE_ERROR_NOT_FOUND,
                 "OpenGL does not work here: neither a screen nor a GPU, nor a software renderer "

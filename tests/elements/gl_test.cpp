@@ -152,6 +152,55 @@ TEST(OpenGl, IsSharedWithThePipeline) {
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
 }
 
+TEST(OpenGl, SharesWhatItDrawsWithTheApplication) {
+  gst_init(nullptr, nullptr);
+  const Owned<GstElement> pipeline(
+      gst_parse_launch("videotestsrc num-buffers=2 ! gleventsim-frame name=it ! "
+                       "video/x-raw(memory:GLMemory) ! fakesink name=sink",
+                       nullptr));
+  const Owned<GstElement> element(gst_bin_get_by_name(GST_BIN(pipeline.get()), "it"));
+  gst_element_set_state(element.get(), GST_STATE_READY);
+  GstContext* display = gst_element_get_context(element.get(), GST_GL_DISPLAY_CONTEXT_TYPE);
+  ASSERT_NE(display, nullptr);
+  gst_element_set_state(element.get(), GST_STATE_NULL);
+  GstGLDisplay* of_application = nullptr;
+  gst_context_get_gl_display(display, &of_application);
+  GstGLContext* application = nullptr;
+  ASSERT_TRUE(gst_gl_display_create_context(of_application, nullptr, &application, nullptr));
+
+  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
+  gst_bus_set_sync_handler(
+      bus.get(),
+      [](GstBus*, GstMessage* message, gpointer data) {
+        const gchar* type = nullptr;
+        if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_NEED_CONTEXT &&
+            gst_message_parse_context_type(message, &type) &&
+            std::string_view(type) == "gst.gl.app_context") {
+          GstContext* context = gst_context_new(type, TRUE);
+          gst_structure_set(gst_context_writable_structure(context), "context", GST_TYPE_GL_CONTEXT,
+                            data, nullptr);
+          gst_element_set_context(GST_ELEMENT(GST_MESSAGE_SRC(message)), context);
+          gst_context_unref(context);
+        }
+        return GST_BUS_PASS;
+      },
+      application, nullptr);
+  const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
+  gst_element_set_state(pipeline.get(), GST_STATE_PAUSED);
+  gst_element_get_state(pipeline.get(), nullptr, nullptr, 20 * GST_SECOND);
+  GstSample* sample = nullptr;
+  g_object_get(sink.get(), "last-sample", &sample, nullptr);
+  ASSERT_NE(sample, nullptr);
+  GstMemory* picture = gst_buffer_peek_memory(gst_sample_get_buffer(sample), 0);
+  EXPECT_TRUE(gst_gl_context_can_share(GST_GL_BASE_MEMORY_CAST(picture)->context, application));
+  gst_sample_unref(sample);
+  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  gst_bus_set_sync_handler(bus.get(), nullptr, nullptr, nullptr);
+  gst_object_unref(application);
+  gst_object_unref(of_application);
+  gst_context_unref(display);
+}
+
 TEST(OpenGl, IsNamedInAnErrorWhereItIsMissing) {
   // Neither a screen nor a device, in a process of its own.
   const auto run = [] {
