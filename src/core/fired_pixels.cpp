@@ -1,32 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/core/fired_pixels.hpp"
 
+#include "src/core/set_bits.hpp"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/core/fired_pixels.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
-
-#ifndef EVENTCAMERA_SET_BITS
-#define EVENTCAMERA_SET_BITS
-namespace eventcamera {
-
-/// Positions of the set bits of each byte, in order; zeros follow.
-struct SetBits {
-  constexpr SetBits() {
-    for (std::size_t byte = 0; byte < 256; ++byte) {
-      std::size_t count = 0;
-      for (std::uint8_t bit = 0; bit < 8; ++bit)
-        if ((byte >> bit & 1) != 0) of[byte][count++] = bit;
-    }
-  }
-
-  std::uint8_t of[256][8] = {};
-};
-inline constexpr SetBits set_bits;
-
-}  // namespace eventcamera
-#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
