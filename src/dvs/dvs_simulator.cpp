@@ -36,6 +36,7 @@ constexpr double unlimited = 1e18;
 /// Scratch memory of a thread.
 struct alignas(64) Scratch {
   Candidates candidates;
+  UnsolvedPixels unsolved;
   std::vector<std::uint16_t> luma;  ///< a row, padded for vectors
 };
 
@@ -188,12 +189,20 @@ class PixelSimulator final : public DvsSimulator {
                    const BandEvents& events) {
     const ShadeTables& tables = *tables_for(sub_interval);
     auto& candidates = scratch.candidates;
-    candidates.clear();
+    candidates.count = 0;
     const PixelRow pixels = pixels_.row(y);
     filter_row({sub_interval, tables, responses_, luma_bits(current_), current_.cutoff_hz > 0,
                 current_.shot_noise_rate_hz > 0},
                luma, pixels, format().width, candidates);
-    PixelSolver(current_, random_, sub_interval).solve(pixels, candidates, tables, events);
+    const RowToSolve solved{current_, random_, sub_interval, tables, pixels, candidates, events};
+    switch (solver_for(current_)) {
+      case Solver::pixels:
+        return solve_pixels(solved);
+      case Solver::lines:
+        return solve_lines(solved);
+      case Solver::row:
+        return solve_row(solved, scratch.unsolved);
+    }
   }
 
   /// Bit depth of the luma that is passed to the pixels.
@@ -247,6 +256,7 @@ class PixelSimulator final : public DvsSimulator {
   void for_each_band(const Body& body) {
     threads().for_each(band_count(format().height), [&](int band, int thread) {
       auto& scratch = scratch_[static_cast<std::size_t>(thread)];
+      scratch.candidates.resize(format().width);
       scratch.luma.resize(static_cast<std::size_t>(format().width) + max_lanes);
       body(BandRows(band, format().height), scratch, BandEvents{sorter_, band});
     });

@@ -35,6 +35,10 @@ class Random {
     return mixed(mixed(mixed(key_ + pixel) + static_cast<std::uint64_t>(purpose)) + counter);
   }
 
+  bool coin(std::uint64_t pixel, Purpose purpose, std::uint64_t counter) const {
+    return (bits(pixel, purpose, counter) >> 63) != 0;
+  }
+
   /// In (0, 1).
   double uniform(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
     return to_uniform(bits(pixel, purpose, counter));

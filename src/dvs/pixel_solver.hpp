@@ -7,32 +7,40 @@
 #include "src/dvs/light_response.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/readout.hpp"
+#include "src/dvs/shot_noise.hpp"
 #include "src/dvs/sub_intervals.hpp"
 #include "src/dvs/trajectory.hpp"
 
 namespace eventcamera {
 
-/// A pixel in which something may happen, and its light.
-struct Candidate {
-  int x;
-  int shade;
-  float last_target;  ///< at the start of the sub-interval
-  float last_signal;
-};
-
-/// Candidates of a row by kind, because each kind has its own fast path.
-struct Candidates {
-  std::vector<Candidate> without_noise;  ///< no shot noise in the sub-interval
-  std::vector<Candidate> with_noise;
-
-  void clear() {
-    without_noise.clear();
-    with_noise.clear();
-  }
-};
-
 /// Maximum vector length in floats; rows of luma values are padded by this.
 inline constexpr int max_lanes = 16;
+
+/// Pixels of a row in which something may happen, and their light, by column.
+struct Candidates {
+  std::size_t count = 0;
+  std::vector<std::int32_t> x;
+  std::vector<std::int32_t> shade;
+  std::vector<float> last_target;  ///< at the start of the sub-interval
+  std::vector<float> last_signal;
+
+  void add(int column, int its_shade, float target, float signal) {
+    x[count] = column;
+    shade[count] = its_shade;
+    last_target[count] = target;
+    last_signal[count] = signal;
+    ++count;
+  }
+
+  /// Makes space for a row, padded for vectors.
+  void resize(int width) {
+    const auto size = static_cast<std::size_t>(width) + max_lanes;
+    x.resize(size);
+    shade.resize(size);
+    last_target.resize(size);
+    last_signal.resize(size);
+  }
+};
 
 /// Parameters of filter_row(), shared by all pixels in a sub-interval.
 struct RowFilter {
@@ -45,36 +53,86 @@ struct RowFilter {
 };
 
 /// Advances a row of pixels through a sub-interval: targets and signals of all pixels, references
-/// and noise budgets of those in which nothing can happen, which are most. The others are added to
-/// `candidates`. The decision has a margin for float rounding, and is the same on every processor.
-/// Luma values are std::uint8_t if they have 8 bits, std::uint16_t otherwise.
+/// and noise budgets of those in which nothing can happen, which are most. The others become
+/// the `candidates`. The decision has a margin for float rounding, and is the same on every
+/// processor. Luma values are std::uint8_t if they have 8 bits, std::uint16_t otherwise.
 void filter_row(const RowFilter& row_filter, const void* luma, const PixelRow& pixels, int width,
                 Candidates& candidates);
 
-/// Times of DvsSettings in microseconds.
-struct Delays {
-  double refractory_period;
-  double latency;
-  double latency_jitter;
+/// Limit of events of a pixel in one sub-interval, including those lost in its refractory period;
+/// at the limit its reference is set to its signal. A change from black to white is 35 events at
+/// common thresholds.
+inline constexpr int max_events = 512;
+
+/// Minimum time between two events of a pixel, microseconds: the resolution of event times.
+inline constexpr double min_gap = 1;
+
+/// Candidates of a row to be advanced through a sub-interval.
+struct RowToSolve {
+  const DvsSettings& settings;
+  const Random& random;
+  const SubInterval& sub_interval;
+  const ShadeTables& tables;
+  const PixelRow& pixels;
+  const Candidates& candidates;
+  const BandEvents& events;
 };
 
-/// Advances single pixels through a sub-interval, exactly: threshold crossings, leak, shot noise,
-/// refractory period, latency.
-class PixelSolver {
+/// Pixels that solve_row() has not finished: a column per variable, a row per pixel.
+class UnsolvedPixels {
  public:
-  PixelSolver(const DvsSettings& settings, const Random& random, const SubInterval& sub_interval);
+  /// Times are microseconds after the start of the sub-interval. Values are multiplied by `sign`,
+  /// such that the slope of the trajectory never decreases: it may turn towards the level above
+  /// the reference, which is then the far one.
+  enum Column : std::size_t {
+    index,  ///< in Candidates
+    sign,
+    t,      ///< of the last event
+    value,  ///< of the signal at t
+    end,    ///< value at the end of the sub-interval
+    offset,
+    slope,
+    bandwidth,
+    reference,
+    to_far,   ///< from the reference to the far level
+    to_near,  ///< from the near level to the reference
+    ready,    ///< earliest time of the next event
+    next_noise,
+    columns
+  };
 
-  /// Advances reference, refractory_left and noise_budget of a row's candidates to the end of the
-  /// sub-interval.
-  void solve(const PixelRow& pixels, const Candidates& candidates, const ShadeTables& tables,
-             const BandEvents& events) const;
+  std::vector<ShotNoise> noise;      ///< by index
+  std::vector<std::uint64_t> draws;  ///< by index: the counter of the next random number
+
+  void resize(std::size_t size) {
+    size_ = size;
+    if (noise.size() >= size) return;
+    noise.resize(size);
+    draws.resize(size);
+    memory_.resize(columns * size);
+  }
+  double* column(Column column) { return memory_.data() + column * size_; }
 
  private:
-  const DvsSettings& settings_;
-  const Random& random_;
-  const SubInterval& sub_interval_;
-  Delays delays_;
-  bool only_crossings_;  ///< events other than noise are crossings without side effects
+  std::size_t size_ = 0;
+  std::vector<double> memory_;
 };
+
+/// Advances reference, refractory_left and noise_budget of a row's candidates to the end of the
+/// sub-interval, exactly: threshold crossings, leak, shot noise, refractory period, latency. One
+/// pixel at a time.
+void solve_pixels(const RowToSolve& row);
+
+/// Solvers for the settings with which solve_pixels() is not needed.
+enum class Solver { pixels, lines, row };
+Solver solver_for(const DvsSettings& settings);
+
+/// As solve_pixels(), for signals that are straight lines, and events that are crossings without
+/// side effects but the refractory period.
+void solve_lines(const RowToSolve& row);
+
+/// As solve_pixels(), for events without side effects but the refractory period: many pixels at a
+/// time.
+void solve_row(const RowToSolve& row, UnsolvedPixels& unsolved);
 
 }  // namespace eventcamera

@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+#include <algorithm>
+#include <bit>
+
 #include "src/dvs/pixel_solver.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/row_filter.cpp"
 #include <hwy/foreach_target.h>
-// Must come after HWY_TARGET_INCLUDE.
-#include <hwy/highway.h>
-
-#include <algorithm>
-#include <bit>
+// Compiled once per SIMD target.
+#include "src/core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::CappedTag<float, max_lanes>;
 using Words = hn::Rebind<std::int32_t, Floats>;
@@ -90,12 +88,10 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
                           hn::Le(min, hn::Neg(hn::LoadU(floats, negatives + x))));
     happens = hn::Or(happens, hn::Gt(hn::LoadU(floats, refractory_lefts + x), zero));
     auto noise_budget = hn::Zero(counts);
-    auto is_noisy = hn::Lt(zero, zero);
     if (row_filter.has_noise) {
       const auto noise = hn::GatherIndex(counts, tables.noise.data(), shade);
       const auto before = hn::LoadU(counts, noise_budgets + x);
-      is_noisy = hn::RebindMask(floats, hn::Not(hn::Gt(before, noise)));
-      happens = hn::Or(happens, is_noisy);
+      happens = hn::Or(happens, hn::RebindMask(floats, hn::Not(hn::Gt(before, noise))));
       noise_budget = hn::Sub(before, noise);
     }
     happens = hn::And(happens, hn::FirstN(floats, static_cast<std::size_t>(count)));
@@ -117,16 +113,10 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
     hn::Store(last_target, floats, last_targets);
     hn::Store(last_signal, floats, last_signals);
     hn::Store(shade, words, shades_here);
-    const auto add = [&](const auto& mask, std::vector<Candidate>& to) {
-      std::uint64_t bits[(max_lanes + 63) / 64] = {};
-      hn::StoreMaskBits(floats, mask, reinterpret_cast<std::uint8_t*>(bits));
-      for (; bits[0] != 0; bits[0] &= bits[0] - 1) {
-        const int i = std::countr_zero(bits[0]);
-        to.push_back({x + i, shades_here[i], last_targets[i], last_signals[i]});
-      }
-    };
-    add(hn::AndNot(is_noisy, happens), candidates.without_noise);
-    add(hn::And(is_noisy, happens), candidates.with_noise);
+    for (auto bits = bits_of(floats, happens); bits != 0; bits &= bits - 1) {
+      const int i = std::countr_zero(bits);
+      candidates.add(x + i, shades_here[i], last_targets[i], last_signals[i]);
+    }
   }
 }
 

@@ -4,15 +4,6 @@
 #include <cmath>
 
 namespace eventcamera {
-namespace {
-
-/// Precision of crossing times, microseconds.
-constexpr double precision = 0.001;
-
-/// More than bisection needs for that precision in any interval.
-constexpr int max_iterations = 64;
-
-}  // namespace
 
 /// Turning point after `from`: slope = bandwidth lag.
 TrajectoryPoint Crossings::turn_after(TrajectoryPoint from) const {
@@ -27,6 +18,7 @@ TrajectoryPoint Crossings::turn_after(TrajectoryPoint from) const {
 /// Returns the time at which a level is crossed between `a` and `b`, where it is crossed once, or
 /// missed by rounding. Halley's method with bisection as fallback.
 double Crossings::time_of(double level, TrajectoryPoint a, TrajectoryPoint b) const {
+  constexpr double precision = crossing_precision;
   const double rise = level - a.value;
   const double duration = b.t - a.t;
   const double secant = std::clamp(rise / (b.value - a.value), 0.0, 1.0) * duration;

@@ -73,6 +73,12 @@ struct Crossing {
 /// several events from one grey level to another and back.
 inline constexpr float rounding = 2e-6F;
 
+/// Precision of crossing times, microseconds.
+inline constexpr double crossing_precision = 0.001;
+
+/// More than bisection needs for that precision in any interval.
+inline constexpr int max_iterations = 64;
+
 /// Finds exact times at which a trajectory crosses levels.
 class Crossings {
  public:

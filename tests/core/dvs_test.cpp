@@ -8,10 +8,12 @@
 #include <cstring>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <random>
 
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/pixel_array.hpp"
+#include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/trajectory.hpp"
 #include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
@@ -134,6 +136,106 @@ TEST(Crossings, AreFoundOnEveryTrajectoryOfALowPass) {
     ASSERT_NEAR(trajectory.at(first->point.t), first->point.value, 1e-6) << i;
   }
   EXPECT_GT(found, 200);
+}
+
+/// Result of a solver: events by pixel, and the state of the pixels.
+struct Solved {
+  Pixels events;
+  std::vector<float> state;
+  std::vector<std::uint32_t> noise_budgets;
+};
+
+/// A row of pixels in light that changes at random, advanced through a sub-interval.
+template <class Solve>
+Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
+  const Random random(7);
+  const SubInterval sub_interval{0, 40'000, 1, 1, 0.01, 3};
+  const ShadeTables tables(settings, sub_interval.duration);
+  std::minstd_rand draw(5);
+  std::uniform_real_distribution<float> level(0, 1.5F);
+  PixelArray array(width, 1);
+  const auto pixels = array.row(0);
+  std::generate_n(pixels.target, width, [&] { return level(draw); });
+  array.draw_traits(0, settings, random);
+  array.settle(0, settings, random);
+  Candidates candidates;
+  candidates.resize(width);
+  for (int x = 0; x < width; ++x) {
+    const int shade = static_cast<int>(draw() % shades);
+    const float from = pixels.target[x];
+    const bool is_lagging = settings.cutoff_hz > 0;
+    const float signal = is_lagging ? from + 0.1F * (level(draw) - 0.75F) : from;
+    const float to = x % 5 == 0 ? from : level(draw);
+    candidates.add(x, shade, from, signal);
+    pixels.target[x] = to;
+    const double bandwidth = tables.bandwidth[static_cast<std::size_t>(shade)];
+    pixels.signal[x] =
+        is_lagging ? static_cast<float>(
+                         Trajectory::low_pass(signal, from, to, sub_interval.duration, bandwidth)
+                             .at(sub_interval.duration))
+                   : to;
+    if (x % 7 == 0) pixels.refractory_left[x] = 9000;
+  }
+  EventSorter sorter;
+  sorter.begin(sub_interval.duration, 1);
+  solve(RowToSolve{settings, random, sub_interval, tables, pixels, candidates, {sorter, 0}});
+  EventBuckets sorted;
+  ThreadPool pool;
+  sorter.finish(sorted, pool);
+  Solved result;
+  for (const auto& event : scene::copy(sorted))
+    result.events[{event.x, 0}].push_back(
+        {static_cast<double>(event.t), event.x, 0, event.polarity()});
+  for (const float* row : {pixels.reference, pixels.refractory_left})
+    result.state.insert(result.state.end(), row, row + width);
+  result.noise_budgets.assign(pixels.noise_budget, pixels.noise_budget + width);
+  return result;
+}
+
+/// Expects equal results but for rounding.
+void expect_equal(const Solved& found, const Solved& expected) {
+  ASSERT_EQ(found.events.size(), expected.events.size());
+  for (const auto& [place, events] : expected.events) {
+    const auto& ours = found.events.at(place);
+    ASSERT_EQ(ours.size(), events.size()) << place.first;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      EXPECT_NEAR(ours[i].t, events[i].t, 1) << place.first;
+      EXPECT_EQ(ours[i].polarity, events[i].polarity) << place.first;
+    }
+  }
+  for (std::size_t i = 0; i < expected.state.size(); ++i)
+    EXPECT_NEAR(found.state[i], expected.state[i], 0.01) << i;
+  EXPECT_EQ(found.noise_budgets, expected.noise_budgets);
+}
+
+TEST(Solvers, AreEqualOnAllTargets) {
+  DvsSettings settings{.threshold_sigma = 0.03,
+                       .leak_rate_hz = 5,
+                       .leak_spread = 0.1,
+                       .dead_pixels = 0.05,
+                       .refractory_period = 700'000};
+  for (const int width : {1, 3, 17, 500}) {
+    ASSERT_EQ(solver_for(settings), Solver::lines);
+    expect_equal(solved(settings, width, solve_lines), solved(settings, width, solve_pixels));
+    for (const double noise_hz : {0.0, 30.0}) {
+      for (const double cutoff_hz : {0.0, 3.0, 30.0, 3000.0}) {
+        auto others = settings;
+        others.cutoff_hz = cutoff_hz;
+        others.shot_noise_rate_hz = noise_hz;
+        const auto expected = solved(others, width, solve_pixels);
+        std::optional<Solved> first;
+        targets::for_each([&](const char* target) {
+          UnsolvedPixels unsolved;
+          const auto found =
+              solved(others, width, [&](const RowToSolve& row) { solve_row(row, unsolved); });
+          SCOPED_TRACE(target);
+          expect_equal(found, expected);
+          if (!first) first = found;
+          EXPECT_EQ(found.state, first->state);
+        });
+      }
+    }
+  }
 }
 
 TEST(Dvs, EqualsTheRuleOfEsim) {
@@ -400,10 +502,10 @@ TEST(Dvs, IsTheSameForAllThreadsStridesAndTargets) {
     int width, height;
   };
   for (const auto& size : {Size{1, 1}, Size{3, 17}, Size{31, 33}, Size{97, 61}, Size{130, 40}}) {
-    for (const auto upsampling : {Upsampling::linear, Upsampling::motion}) {
-      auto settings = everything();
-      settings.upsampling = upsampling;
-      settings.max_steps = 5;
+    auto along_motion = everything();
+    along_motion.upsampling = Upsampling::motion;
+    along_motion.max_steps = 5;
+    for (const auto& settings : {everything(), along_motion, settings_of(DvsPreset::v2e_noisy)}) {
       for (const int bits : {8, 10, 12, 16}) {
         const auto play = [&](int threads, int padding) {
           return bits == 8

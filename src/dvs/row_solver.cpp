@@ -1,0 +1,450 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "src/core/set_bits.hpp"
+#include "src/dvs/pixel_solver.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/dvs/row_solver.cpp"
+#include <hwy/foreach_target.h>
+// Compiled once per SIMD target.
+#include "src/core/simd-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+using Doubles = hn::CappedTag<double, max_lanes / 2>;
+using Bits = hn::RebindToUnsigned<Doubles>;
+using Floats = hn::Rebind<float, Doubles>;
+using Words = hn::Rebind<std::int32_t, Doubles>;
+using Values = hn::Vec<Doubles>;
+using Mask = hn::Mask<Doubles>;
+
+Values all(double value) {
+  return hn::Set(Doubles(), value);
+}
+
+/// exp(-x) as the function of trajectory.hpp.
+HWY_INLINE Values decays(Values x) {
+  const Doubles doubles;
+  const Bits bits;
+  const auto to_integers = all(0x1.8p52);
+  x = hn::Min(x, all(700));
+  const auto shifted = hn::Add(hn::Mul(x, all(1.4426950408889634)), to_integers);
+  const auto r = hn::Sub(hn::Mul(hn::Sub(shifted, to_integers), all(0.6931471805599453)), x);
+  const auto r2 = hn::Mul(r, r);
+  const auto r4 = hn::Mul(r2, r2);
+  const auto line = [&](double a, double b) { return hn::Add(all(a), hn::Mul(r, all(b))); };
+  const auto low = hn::Add(hn::Add(all(1), r), hn::Mul(r2, line(1.0 / 2, 1.0 / 6)));
+  const auto middle = hn::Add(line(1.0 / 24, 1.0 / 120), hn::Mul(r2, line(1.0 / 720, 1.0 / 5040)));
+  const auto high = hn::Add(line(1.0 / 40320, 1.0 / 362880), hn::Mul(r2, all(1.0 / 3628800)));
+  const auto mantissa = hn::Add(low, hn::Mul(r4, hn::Add(middle, hn::Mul(r4, high))));
+  const auto exponent = hn::Sub(hn::Set(bits, std::uint64_t{1023} << 52),
+                                hn::ShiftLeft<52>(hn::BitCast(bits, shifted)));
+  return hn::Mul(mantissa, hn::BitCast(doubles, exponent));
+}
+
+/// ln(x) for normal x > 0, with a relative error of 1e-11.
+HWY_INLINE Values logarithms(Values x) {
+  const Doubles doubles;
+  const Bits bits;
+  const auto word = hn::BitCast(bits, x);
+  // 2^52 + e has the exponent e in its lowest bits.
+  const auto exponent = hn::Sub(
+      hn::BitCast(doubles,
+                  hn::Or(hn::ShiftRight<52>(word), hn::Set(bits, std::uint64_t{0x433} << 52))),
+      all(0x1p52 + 1023));
+  const auto mantissa =
+      hn::BitCast(doubles, hn::Or(hn::And(word, hn::Set(bits, (std::uint64_t{1} << 52) - 1)),
+                                  hn::Set(bits, std::uint64_t{1023} << 52)));
+  // ln((1 + s) / (1 - s)) = 2 (s + s^3 / 3 + s^5 / 5 ...), of the mantissa over sqrt(2).
+  const auto root = all(1.4142135623730951);
+  const auto s = hn::Div(hn::Sub(mantissa, root), hn::Add(mantissa, root));
+  const auto s2 = hn::Mul(s, s);
+  auto sum = all(1.0 / 15);
+  for (int i = 13; i > 0; i -= 2) sum = hn::Add(hn::Mul(sum, s2), all(1.0 / i));
+  return hn::Add(hn::Mul(hn::Add(exponent, all(0.5)), all(0.6931471805599453)),
+                 hn::Mul(hn::Add(s, s), sum));
+}
+
+/// Indices that move the lanes of a mask to the front.
+HWY_INLINE auto first_lanes(std::uint64_t mask) {
+  const hn::RebindToSigned<Doubles> integers;
+  const auto lanes = hn::LoadU(hn::Rebind<std::uint8_t, Doubles>(), set_bits.of[mask]);
+  return hn::IndicesFromVec(Doubles(), hn::PromoteTo(integers, hn::PromoteTo(Words(), lanes)));
+}
+
+struct Points {
+  Values t;
+  Values value;
+};
+
+/// Trajectories whose slope never decreases, as in Crossings.
+struct Trajectories {
+  Values offset;
+  Values slope;
+  Values bandwidth;
+
+  HWY_INLINE Values lag_at(const Points& points) const {
+    return hn::Sub(hn::Sub(points.value, offset), hn::Mul(slope, points.t));
+  }
+  HWY_INLINE Values slope_at(const Points& points) const {
+    return hn::Sub(slope, hn::Mul(bandwidth, lag_at(points)));
+  }
+
+  /// Value at a time after that of `points`.
+  HWY_INLINE Values at(Values t, const Points& points) const {
+    return hn::Add(hn::Add(offset, hn::Mul(slope, t)),
+                   hn::Mul(lag_at(points), decays(hn::Mul(bandwidth, hn::Sub(t, points.t)))));
+  }
+
+  /// As Crossings::turn_after().
+  HWY_INLINE Points turn_after(const Points& from, const Points& end) const {
+    const auto final_lag = hn::Div(slope, bandwidth);
+    const auto ratio = hn::Div(lag_at(from), final_lag);
+    const auto t = hn::Add(from.t, hn::Div(logarithms(ratio), bandwidth));
+    const auto value = hn::Add(hn::Add(offset, hn::Mul(slope, t)), final_lag);
+    const auto is_before_end = hn::Lt(t, end.t);
+    const auto turns = hn::Gt(ratio, all(1));
+    return {hn::IfThenElse(turns, hn::IfThenElse(is_before_end, t, end.t), from.t),
+            hn::IfThenElse(turns, hn::IfThenElse(is_before_end, value, end.value), from.value)};
+  }
+
+  /// As Crossings::time_of(), for the lanes of `wanted`.
+  HWY_INLINE Values times_of(Values levels, const Points& a, const Points& b, Mask wanted) const {
+    const auto zero = all(0);
+    const auto two = all(2);
+    const auto precision = all(crossing_precision);
+    const auto rise = hn::Sub(levels, a.value);
+    const auto duration = hn::Sub(b.t, a.t);
+    const auto secant =
+        hn::Mul(hn::Min(hn::Max(hn::Div(rise, hn::Sub(b.value, a.value)), zero), all(1)), duration);
+    const auto lag = lag_at(a);
+    const auto rises = hn::Gt(b.value, a.value);
+    const auto half = hn::Sub(slope, hn::Mul(bandwidth, hn::Add(lag, hn::Mul(rise, all(0.5)))));
+    const auto square =
+        hn::Add(hn::Mul(half, half), hn::Mul(hn::Mul(hn::Mul(two, slope), bandwidth), rise));
+    const auto root = hn::Sqrt(hn::Max(zero, square));
+    auto t = hn::Div(hn::Mul(two, rise), hn::Add(half, hn::IfThenElse(rises, root, hn::Neg(root))));
+    t = hn::IfThenElse(hn::And(hn::Ge(t, zero), hn::Le(t, duration)), t, secant);
+    auto early = zero;
+    auto late = duration;
+    auto left = wanted;
+    for (int i = 0; i < max_iterations && !hn::AllFalse(Doubles(), left); ++i) {
+      const auto lag_left = hn::Mul(lag, decays(hn::Mul(bandwidth, t)));
+      const auto beyond = hn::Sub(hn::Sub(hn::Mul(slope, t), hn::Sub(lag, lag_left)), rise);
+      const auto is_late = hn::Not(hn::Xor(hn::Gt(beyond, zero), rises));
+      late = hn::IfThenElse(is_late, t, late);
+      early = hn::IfThenElse(is_late, early, t);
+      const auto slope_here = hn::Sub(slope, hn::Mul(bandwidth, lag_left));
+      const auto curvature = hn::Mul(hn::Mul(bandwidth, bandwidth), lag_left);
+      const auto step = hn::Div(
+          hn::Mul(hn::Mul(two, beyond), slope_here),
+          hn::Sub(hn::Mul(hn::Mul(two, slope_here), slope_here), hn::Mul(beyond, curvature)));
+      const auto next = hn::Sub(t, step);
+      const auto is_within = hn::And(hn::Ge(next, early), hn::Le(next, late));
+      t = hn::IfThenElse(
+          left, hn::IfThenElse(is_within, next, hn::Mul(hn::Add(early, late), all(0.5))), t);
+      const auto length = hn::Abs(step);
+      const auto slope_there = hn::Sub(slope_here, hn::Mul(curvature, step));
+      const auto min_slope_squared =
+          hn::Min(hn::Mul(slope_here, slope_here), hn::Mul(slope_there, slope_there));
+      const auto error = hn::Mul(
+          hn::Mul(hn::Mul(length, length), length),
+          hn::Add(
+              hn::Mul(hn::Mul(curvature, curvature), all(0.25)),
+              hn::Mul(hn::Abs(hn::Mul(hn::Mul(curvature, bandwidth), slope_here)), all(1.0 / 6))));
+      const auto is_short = hn::Lt(hn::Mul(bandwidth, length), all(0.5));
+      const auto is_precise =
+          hn::Or(hn::Lt(length, precision), hn::Lt(error, hn::Mul(precision, min_slope_squared)));
+      const auto is_done = hn::Or(hn::Lt(hn::Sub(late, early), precision),
+                                  hn::And(hn::And(is_within, is_short), is_precise));
+      left = hn::And(left, hn::Not(is_done));
+    }
+    return hn::Add(a.t, t);
+  }
+};
+
+class RowSolver {
+ public:
+  RowSolver(const RowToSolve& row, UnsolvedPixels& unsolved)
+      : row_(row),
+        unsolved_(unsolved),
+        duration_(row.sub_interval.duration),
+        has_bandwidth_(row.settings.cutoff_hz > 0),
+        gap_(std::max(in_microseconds(row.settings.refractory_period), min_gap)) {}
+
+  void solve() {
+    begin();
+    for (int i = 0; count_ > 0 && i < max_events; ++i) pass();
+    for (std::size_t i = 0; i < count_; ++i) give_up(i);
+  }
+
+ private:
+  using Column = UnsolvedPixels::Column;
+
+  std::size_t lanes() const { return hn::Lanes(Doubles()); }
+
+  void begin() {
+    const auto& candidates = row_.candidates;
+    count_ = candidates.count;
+    unsolved_.resize(count_ + lanes());
+    for (std::size_t i = 0; i < count_; i += lanes()) begin(i);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const auto shade = static_cast<std::size_t>(candidates.shade[i]);
+      const double budget = row_.pixels.noise_budget[candidates.x[i]];
+      auto& noise = unsolved_.noise[i];
+      noise = {row_.tables.expected_noise[shade], budget};
+      unsolved_.column(Column::next_noise)[i] = noise.next(duration_);
+    }
+    std::fill_n(unsolved_.draws.begin(), count_, row_.sub_interval.number * draws_per_sub_interval);
+  }
+
+  void begin(std::size_t i) {
+    const Doubles doubles;
+    const Words words;
+    const auto& candidates = row_.candidates;
+    const auto& pixels = row_.pixels;
+    const auto within = hn::FirstN(words, count_ - i);
+    const auto x = hn::IfThenElseZero(within, hn::LoadU(words, candidates.x.data() + i));
+    const auto shade = hn::IfThenElseZero(within, hn::LoadU(words, candidates.shade.data() + i));
+    const auto gather = [&](const float* row) {
+      return hn::PromoteTo(doubles, hn::GatherIndex(Floats(), row, x));
+    };
+    const auto load = [&](const std::vector<float>& values) {
+      return hn::PromoteTo(doubles, hn::LoadU(Floats(), values.data() + i));
+    };
+    const auto store = [&](Column column, const Values& values) {
+      hn::StoreU(values, doubles, unsolved_.column(column) + i);
+    };
+    const auto duration = all(duration_);
+    const auto from = load(candidates.last_target);
+    const auto fall = hn::Add(gather(pixels.leak), all(row_.sub_interval.rise / duration_));
+    const auto light_slope = hn::Div(hn::Sub(gather(pixels.target), from), duration);
+    auto value = from;
+    auto offset = from;
+    auto bandwidth = all(0);
+    auto sign = all(1);
+    if (has_bandwidth_) {
+      bandwidth = hn::GatherIndex(doubles, row_.tables.bandwidth.data(),
+                                  hn::PromoteTo(hn::RebindToSigned<Doubles>(), shade));
+      value = load(candidates.last_signal);
+      offset = hn::Sub(from, hn::Div(light_slope, bandwidth));
+      sign = hn::CopySign(sign, hn::Sub(value, offset));
+    }
+    const auto end = hn::Add(gather(pixels.signal), hn::Mul(fall, duration));
+    const auto positive = gather(pixels.positive);
+    const auto negative = gather(pixels.negative);
+    const auto is_upright = hn::Gt(sign, all(0));
+    store(Column::index, hn::Add(hn::Iota(doubles, 0), all(static_cast<double>(i))));
+    store(Column::sign, sign);
+    store(Column::t, all(0));
+    store(Column::value, hn::Mul(sign, value));
+    store(Column::end, hn::Mul(sign, end));
+    store(Column::offset, hn::Mul(sign, offset));
+    store(Column::slope, hn::Mul(sign, hn::Add(light_slope, fall)));
+    store(Column::bandwidth, bandwidth);
+    store(Column::reference, hn::Mul(sign, gather(pixels.reference)));
+    store(Column::to_far, hn::IfThenElse(is_upright, positive, negative));
+    store(Column::to_near, hn::IfThenElse(is_upright, negative, positive));
+    store(Column::ready, gather(pixels.refractory_left));
+  }
+
+  /// Finds the next event of each pixel; pixels that have none are stored.
+  void pass() {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count_; i += lanes()) kept += advance(i, kept);
+    count_ = kept;
+  }
+
+  std::size_t advance(std::size_t i, std::size_t kept) {
+    const Doubles doubles;
+    const auto load = [&](Column column) {
+      return hn::LoadU(doubles, unsolved_.column(column) + i);
+    };
+    const auto within = hn::FirstN(doubles, count_ - i);
+    const Trajectories trajectories{load(Column::offset), load(Column::slope),
+                                    load(Column::bandwidth)};
+    const Points now{load(Column::t), load(Column::value)};
+    const Points end{all(duration_), load(Column::end)};
+    const auto reference = load(Column::reference);
+    const auto to_far = load(Column::to_far);
+    const auto to_near = load(Column::to_near);
+    const auto ready = load(Column::ready);
+    const auto noise = load(Column::next_noise);
+    const auto sign = load(Column::sign);
+    const auto far = hn::Add(reference, to_far);
+    const auto near = hn::Sub(reference, to_near);
+    const auto margin = all(rounding);
+
+    // As Crossings::first().
+    const auto is_far = hn::Ge(now.value, far);
+    const auto is_near = hn::Le(now.value, near);
+    const auto is_crossed = hn::Or(is_far, is_near);
+    auto crosses_near = hn::Le(end.value, hn::Add(near, margin));
+    auto until = end;
+    if (has_bandwidth_) {
+      const auto first_slope = trajectories.slope_at(now);
+      const auto last_slope = trajectories.slope_at(end);
+      const auto turns = hn::And(hn::And(within, hn::Gt(end.value, near)),
+                                 hn::And(hn::Lt(first_slope, all(0)), hn::Gt(last_slope, all(0))));
+      crosses_near = hn::And(crosses_near, hn::Not(turns));
+      const auto to_meeting = hn::Div(
+          hn::Sub(hn::Sub(end.value, now.value), hn::Mul(last_slope, hn::Sub(end.t, now.t))),
+          hn::Sub(first_slope, last_slope));
+      const auto lowest = hn::Add(now.value, hn::Mul(first_slope, to_meeting));
+      const auto may_cross = hn::And(turns, hn::Le(lowest, hn::Add(near, margin)));
+      if (!hn::AllFalse(doubles, may_cross)) {
+        const auto turn = trajectories.turn_after(now, end);
+        const auto crosses = hn::And(may_cross, hn::Le(turn.value, hn::Add(near, margin)));
+        until.t = hn::IfThenElse(crosses, turn.t, until.t);
+        until.value = hn::IfThenElse(crosses, turn.value, until.value);
+        crosses_near = hn::Or(crosses_near, crosses);
+      }
+    }
+    crosses_near = hn::And(hn::Or(crosses_near, is_near), hn::Not(is_far));
+    const auto crosses_far = hn::Or(hn::Ge(end.value, hn::Sub(far, margin)), is_far);
+    const auto crosses = hn::And(within, hn::Or(crosses_near, crosses_far));
+    const auto level = hn::IfThenElse(crosses_near, near, far);
+    const auto wanted = hn::And(crosses, hn::Not(is_crossed));
+    auto t = now.t;
+    if (!hn::AllFalse(doubles, wanted)) {
+      const auto times = has_bandwidth_ ? trajectories.times_of(level, now, until, wanted)
+                                        : secants(level, now, until);
+      t = hn::IfThenElse(wanted, times, t);
+    }
+    auto value = hn::IfThenElse(is_crossed, now.value, level);
+    auto next_reference = level;
+
+    const auto is_noise =
+        hn::And(within, hn::Le(noise, hn::IfThenElse(crosses, t, all(duration_))));
+    const auto happens = hn::Or(crosses, is_noise);
+    if (!hn::AllFalse(doubles, is_noise)) {
+      t = hn::IfThenElse(is_noise, noise, t);
+      value = hn::IfThenElse(is_noise, trajectories.at(t, now), value);
+      next_reference = hn::IfThenElse(is_noise, hn::IfThenElse(hn::Ge(t, ready), value, reference),
+                                      next_reference);
+    }
+    const auto fires = hn::And(happens, hn::Ge(t, ready));
+    const auto is_off = hn::Xor(crosses_near, hn::Lt(sign, all(0)));
+
+    const auto noise_bits = bits_of(doubles, is_noise);
+    const auto fire_bits = bits_of(doubles, fires);
+    const auto on_bits = ~bits_of(doubles, is_off);
+    HWY_ALIGN double times[max_lanes];
+    hn::Store(t, doubles, times);
+    for (auto bits = fire_bits | noise_bits; bits != 0; bits &= bits - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
+      const auto is_set = [lane](std::uint64_t mask) { return (mask >> lane & 1) != 0; };
+      if (is_set(noise_bits))
+        make_noise(i + lane, times[lane], is_set(fire_bits));
+      else
+        add_event(x_of(i + lane), times[lane], is_set(on_bits));
+    }
+    for (auto bits = bits_of(doubles, hn::And(within, hn::Not(happens))); bits != 0;
+         bits &= bits - 1)
+      store(i + static_cast<std::size_t>(std::countr_zero(bits)));
+
+    // hn::CompressStore() is slow on some targets.
+    const auto kept_lanes = first_lanes(bits_of(doubles, happens));
+    const auto keep = [&](Column column, const Values& values) {
+      hn::StoreU(hn::TableLookupLanes(values, kept_lanes), doubles,
+                 unsolved_.column(column) + kept);
+    };
+    const auto next_noise = load(Column::next_noise);
+    keep(Column::index, load(Column::index));
+    keep(Column::sign, sign);
+    keep(Column::t, t);
+    keep(Column::value, value);
+    keep(Column::end, end.value);
+    keep(Column::offset, trajectories.offset);
+    keep(Column::slope, trajectories.slope);
+    keep(Column::bandwidth, trajectories.bandwidth);
+    keep(Column::reference, next_reference);
+    keep(Column::to_far, to_far);
+    keep(Column::to_near, to_near);
+    keep(Column::next_noise, next_noise);
+    keep(Column::ready, hn::IfThenElse(fires, hn::Add(t, all(gap_)), ready));
+    return hn::CountTrue(doubles, happens);
+  }
+
+  static HWY_INLINE Values secants(Values level, const Points& a, const Points& b) {
+    const auto share = hn::Div(hn::Sub(level, a.value), hn::Sub(b.value, a.value));
+    return hn::Add(a.t, hn::Mul(hn::Min(hn::Max(share, all(0)), all(1)), hn::Sub(b.t, a.t)));
+  }
+
+  std::size_t index_of(std::size_t i) {
+    return static_cast<std::size_t>(unsolved_.column(Column::index)[i]);
+  }
+  int x_of(std::size_t i) { return row_.candidates.x[index_of(i)]; }
+
+  void add_event(int x, double t, bool is_on) {
+    row_.events.add(row_.sub_interval.begin + t, x, row_.pixels.y,
+                    is_on ? Polarity::on : Polarity::off);
+  }
+
+  void make_noise(std::size_t i, double t, bool fires) {
+    const auto index = index_of(i);
+    const int x = x_of(i);
+    const auto number = row_.pixels.first_number + static_cast<std::uint64_t>(x);
+    auto& noise = unsolved_.noise[index];
+    auto& draw = unsolved_.draws[index];
+    noise.draw(row_.random, number, draw++);
+    unsolved_.column(Column::next_noise)[i] = noise.next(duration_);
+    if (!fires) return;
+    const bool is_on = row_.random.coin(number, Random::Purpose::event, draw++);
+    if (!std::isinf(row_.pixels.positive[x])) add_event(x, t, is_on);
+  }
+
+  void store(std::size_t i) {
+    const auto index = index_of(i);
+    const int x = row_.candidates.x[index];
+    const auto& pixels = row_.pixels;
+    const double fall = pixels.leak[x] + row_.sub_interval.rise / duration_;
+    const double reference =
+        unsolved_.column(Column::sign)[i] * unsolved_.column(Column::reference)[i];
+    pixels.reference[x] = static_cast<float>(reference - fall * duration_);
+    pixels.refractory_left[x] =
+        static_cast<float>(std::max(0.0, unsolved_.column(Column::ready)[i] - duration_));
+    pixels.noise_budget[x] = unsolved_.noise[index].left();
+  }
+
+  /// Stores a pixel in which too much happens.
+  void give_up(std::size_t i) {
+    const auto index = index_of(i);
+    const auto x = static_cast<std::uint64_t>(row_.candidates.x[index]);
+    unsolved_.column(Column::reference)[i] = unsolved_.column(Column::end)[i];
+    unsolved_.noise[index].skip(row_.random, row_.pixels.first_number + x, unsolved_.draws[index]);
+    store(i);
+  }
+
+  const RowToSolve& row_;
+  UnsolvedPixels& unsolved_;
+  double duration_;
+  bool has_bandwidth_;
+  double gap_;             ///< minimum time between two events of a pixel
+  std::size_t count_ = 0;  ///< pixels in the columns
+};
+
+void solve(const RowToSolve& row, UnsolvedPixels& unsolved) {
+  RowSolver(row, unsolved).solve();
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(solve);
+
+void solve_row(const RowToSolve& row, UnsolvedPixels& unsolved) {
+  HWY_DYNAMIC_DISPATCH(solve)(row, unsolved);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE

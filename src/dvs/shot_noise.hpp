@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+#include "src/dvs/pixel_array.hpp"
+
+namespace eventcamera {
+
+inline constexpr double never = std::numeric_limits<double>::infinity();
+
+/// Upper bound of the random numbers that a pixel draws in a sub-interval.
+inline constexpr std::uint64_t draws_per_sub_interval = 1 << 16;
+
+/// Shot noise of a pixel in a sub-interval, in units of 1/noise_unit events.
+struct ShotNoise {
+  double expected;    ///< in the whole sub-interval
+  double budget;      ///< expected noise from the last noise event to the next
+  double passed = 0;  ///< expected noise up to the last noise event
+
+  /// Time of the next noise event in a sub-interval of this duration; `never` if after its end.
+  double next(double duration) const {
+    const double then = passed + budget;
+    if (expected < 1 || then > expected) return never;
+    return duration * (then / expected);
+  }
+
+  /// Passes the next noise event, and draws the one after it.
+  void draw(const Random& random, std::uint64_t pixel, std::uint64_t counter) {
+    passed += budget;
+    budget = draw_noise_budget(random, pixel, Random::Purpose::event, counter);
+  }
+
+  /// Drops noise that is due until the end of the sub-interval, and draws the next. Noise has no
+  /// memory, so its new budget starts there.
+  void skip(const Random& random, std::uint64_t pixel, std::uint64_t counter) {
+    if (expected < 1 || passed + budget > expected) return;
+    draw(random, pixel, counter);
+    passed = expected;
+  }
+
+  /// Noise budget at the end of the sub-interval.
+  std::uint32_t left() const {
+    return static_cast<std::uint32_t>(std::clamp(budget - (expected - passed), 1.0, 4294967294.0));
+  }
+};
+
+}  // namespace eventcamera
