@@ -56,6 +56,17 @@ launch videotestsrc num-buffers=10 ! identity drop-allocation=true ! eventsim-de
 launch videotestsrc num-buffers=10 ! videorate ! video/x-raw,framerate=50/1 ! eventsim-diff ! fakesink
 launch videotestsrc num-buffers=1 ! eventsim-sparse ! fakesink
 
+# Ten at once make the same events.
+for element in eventsim-dense eventsim-dvs gleventsim-frame gleventsim-diff; do
+  ten=()
+  for i in {0..9}; do
+    ten+=(videotestsrc pattern=ball num-buffers=10 ! video/x-raw,width=160,height=120 ! $element ! evtenc ! filesink location=ten-$i.raw)
+  done
+  launch "${ten[@]}"
+  [ -s ten-0.raw ] || fail "$element: no events"
+  for i in {1..9}; do cmp ten-0.raw ten-$i.raw || fail "$element: ten at once differ"; done
+done
+
 # Mixed with the video.
 launch videotestsrc pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! mixer.  t. ! queue ! eventsim-diff ! videoconvert ! mixer.  compositor name=mixer sink_1::alpha=0.5 ! fakesink
 
