@@ -155,7 +155,7 @@ TEST(PointTracker, FollowsATexture) {
   PointTracker tracker;
   tracker.push(from.view(), threads);
   tracker.push(to.view(), threads);
-  const Point points[] = {{60, 50}, {80, 70}, {100, 40}};
+  const Point points[] = {{100, 40}, {60, 50}, {80, 70}};
   for (const auto& track : tracker.track(points, threads)) {
     EXPECT_TRUE(track.found);
     EXPECT_NEAR(track.flow.x, 4, 0.1);

@@ -38,22 +38,40 @@ TEST_P(EverySize, PyramidsEqualTheReference) {
   targets::for_each([&](const char* target) {
     Pyramid pyramid;
     pyramid.build(picture.view(), threads);
-    pyramid.build_slopes(threads);
     auto expected = picture;
     for (const auto& level : pyramid.levels()) {
-      ASSERT_EQ(level.picture.width(), expected.width());
-      ASSERT_EQ(level.picture.height(), expected.height());
+      ASSERT_EQ(level.width(), expected.width());
+      ASSERT_EQ(level.height(), expected.height());
       const reference::Mirrored mirrored{expected};
       for (int y = -16; y < expected.height() + 16; ++y) {
         for (int x = -16; x < expected.width() + 16; ++x) {
-          ASSERT_EQ(level.picture.row(y)[x], mirrored(x, y)) << target << " " << x << "," << y;
-          ASSERT_EQ(level.slope_x.row(y)[x], reference::slope(expected, x, y, true)) << target;
-          ASSERT_EQ(level.slope_y.row(y)[x], reference::slope(expected, x, y, false)) << target;
+          ASSERT_EQ(level.row(y)[x], mirrored(x, y)) << target << " " << x << "," << y;
         }
       }
       expected = reference::halved(expected);
     }
   });
+}
+
+TEST_P(EverySize, GradientsEqualTheReference) {
+  const auto [width, height] = GetParam();
+  const auto picture = scene::noise<std::uint8_t>(width, height, 8, 3);
+  ThreadPool threads;
+  Pyramid pyramid;
+  pyramid.build(picture.view(), threads);
+  for (const Box& box : {Box{-7, -7, width + 8, height + 9},
+                         Box{width / 3, height / 2, width / 3 + 40, height / 2 + 5}}) {
+    targets::for_each([&](const char* target) {
+      ScharrGradients gradients(box.width(), box.height());
+      gradients.compute(pyramid.levels()[0], box);
+      for (int y = box.top; y < box.bottom; ++y) {
+        for (int x = box.left; x < std::min(box.right, width + ScharrGradients::margin); ++x) {
+          ASSERT_EQ(gradients.x(y)[x], reference::slope(picture, x, y, true)) << target;
+          ASSERT_EQ(gradients.y(y)[x], reference::slope(picture, x, y, false)) << target;
+        }
+      }
+    });
+  }
 }
 
 TEST_P(EverySize, SearchesEqualTheReference) {
@@ -67,7 +85,7 @@ TEST_P(EverySize, SearchesEqualTheReference) {
     Pyramid from_levels;
     Pyramid to_levels;
     from_levels.build(from.view(), threads);
-    from_levels.build_slopes(threads);
+    ScharrGradients gradients(width + 32, height + 32);
     to_levels.build(to.view(), threads);
     for (int i = 0; i < 4; ++i) {
       const Tile tile{i % 2 * (width - 1) / Tile::side * Tile::side,
@@ -86,7 +104,8 @@ TEST_P(EverySize, SearchesEqualTheReference) {
       for (auto& search : expected) reference::search(from, to, tile, search);
       targets::for_each([&](const char* target) {
         auto found = searches;
-        search_tile(from_levels.levels()[0], to_levels.levels()[0], tile, found);
+        gradients.compute(from_levels.levels()[0], {-7, -7, width + 9, height + 9});
+        search_tile(from_levels.levels()[0], gradients, to_levels.levels()[0], tile, found);
         for (std::size_t k = 0; k < found.size(); ++k) {
           SCOPED_TRACE(testing::Message() << target << ", tile " << i << ", search " << k);
           const auto bits = [](float value) { return std::bit_cast<std::uint32_t>(value); };

@@ -36,18 +36,18 @@ class Place {
 void PointTracker::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   std::swap(last_, next_);
   next_.build(picture, threads);
-  has_slopes_ = false;
 }
 
 std::span<const Track> PointTracker::track(std::span<const Point> points, ThreadPool& threads) {
   tracks_.resize(points.size());
   if (points.empty()) return tracks_;
-  if (!std::exchange(has_slopes_, true)) last_.build_slopes(threads);
-  const auto& picture = last_.levels()[0].picture;
+  const auto& picture = last_.levels()[0];
   find_rows(points, picture.height());
   constexpr std::size_t most = std::size_t{block_side} * block_side;
+  constexpr int around = Tile::before + Tile::after;
   while (static_cast<int>(blocks_.size()) < threads.threads())
-    blocks_.push_back({std::vector<std::uint32_t>(most), std::vector<std::uint32_t>(most)});
+    blocks_.push_back({std::vector<std::uint32_t>(most), std::vector<std::uint32_t>(most),
+                       ScharrGradients(block_side + around, block_side + around)});
   const int across = (picture.width() + block_side - 1) / block_side;
   const int down = (picture.height() + block_side - 1) / block_side;
   threads.for_each(across * down, [&](int i, int thread) {
@@ -81,8 +81,15 @@ void PointTracker::follow(std::span<const Point> points, int left, int top, Bloc
   }
   if (block.points.empty()) return;
   block.ordered.resize(block.points.size());
-  for (std::size_t level = last_.levels().size(); level-- > 0;)
+  const int first_row = points[block.points.front()].y;
+  const int last_row = points[block.points.back()].y;
+  for (std::size_t level = last_.levels().size(); level-- > 0;) {
+    block.gradients.compute(
+        last_.levels()[level],
+        {(left >> level) - Tile::before, (first_row >> level) - Tile::before,
+         ((left + block_side) >> level) + Tile::after, (last_row >> level) + 1 + Tile::after});
     search(points, level, left, top, block);
+  }
 }
 
 void PointTracker::search(std::span<const Point> points, std::size_t level, int left, int top,
@@ -116,7 +123,7 @@ void PointTracker::search(std::span<const Point> points, std::size_t level, int 
                      {2 * flow.x, 2 * flow.y},
                      false};
     }
-    search_tile(last_.levels()[level], next_.levels()[level], tile,
+    search_tile(last_.levels()[level], block.gradients, next_.levels()[level], tile,
                 std::span(searches).first(in_tile.size()));
     for (std::size_t i = 0; i < in_tile.size(); ++i)
       tracks_[in_tile[i]] = {searches[i].flow, searches[i].found};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "src/flow/lucas_kanade/pyramid.hpp"
+#include "src/flow/lucas_kanade/scharr_gradients.hpp"
 #include "src/flow/lucas_kanade/search.hpp"
 
 namespace eventcamera {
@@ -39,10 +40,10 @@ class PointTracker {
   static constexpr int block_side = Tile::side << (Pyramid::max_levels - 1);
   static constexpr int tiles_a_block = 1 << 2 * (Pyramid::max_levels - 1);
 
-  /// Points of a block, and the same ordered by their tiles on a level.
   struct Block {
     std::vector<std::uint32_t> points;
-    std::vector<std::uint32_t> ordered;
+    std::vector<std::uint32_t> ordered;  ///< the same by their tiles on a level
+    ScharrGradients gradients;           ///< of a level, where the points' windows are
   };
 
   void find_rows(std::span<const Point> points, int height);
@@ -51,7 +52,6 @@ class PointTracker {
 
   Pyramid last_;
   Pyramid next_;
-  bool has_slopes_ = false;
   std::vector<std::size_t> rows_;  ///< index of the first point of each row
   std::vector<Block> blocks_;      ///< one per thread
   std::vector<Track> tracks_;

@@ -14,9 +14,7 @@ namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
 using Words = hn::CappedTag<std::uint16_t, 16>;
-using Slopes = hn::CappedTag<std::int16_t, 16>;
-template <class Lanes>
-using BytesFor = hn::Rebind<std::uint8_t, Lanes>;
+using Bytes = hn::Rebind<std::uint8_t, Words>;
 
 /// Length limit of a blurred row: an image row, two pixels more on each side, and a vector.
 constexpr int max_row = 16384 + 64;
@@ -27,7 +25,7 @@ constexpr int max_row = 16384 + 64;
 /// past the end.
 void halve_row(const Image<std::uint8_t>& picture, int y, std::uint8_t* out, int width) {
   const Words words;
-  const BytesFor<Words> bytes;
+  const Bytes bytes;
   const int lanes = static_cast<int>(hn::Lanes(words));
   HWY_ALIGN std::uint16_t blurred[max_row];
   const auto load = [&](int row, int x) {
@@ -58,39 +56,12 @@ void halve_row(const Image<std::uint8_t>& picture, int y, std::uint8_t* out, int
     const auto inner = hn::ShiftLeft<2>(hn::Add(hn::Add(left1, right1), middle));
     const auto sum = hn::Add(hn::Add(hn::Add(left2, right2), inner), hn::ShiftLeft<1>(middle));
     const auto rounded = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 128)));
-    hn::StoreU(hn::DemoteTo(bytes, hn::BitCast(Slopes(), rounded)), bytes, out + x);
+    hn::StoreU(hn::DemoteTo(bytes, hn::BitCast(hn::RebindToSigned<Words>(), rounded)), bytes,
+               out + x);
   }
 }
 
 // NOLINTEND(clang-analyzer-core.uninitialized.Assign)
-
-/// Computes a row of both gradients, followed by up to a vector of zeros.
-void slope_row(const Image<std::uint8_t>& picture, int y, std::int16_t* out_x,
-               std::int16_t* out_y) {
-  const Slopes slopes;
-  const BytesFor<Slopes> bytes;
-  const int lanes = static_cast<int>(hn::Lanes(slopes));
-  const auto ten = hn::Set(slopes, 10);
-  const auto three = hn::Set(slopes, 3);
-  for (int x = 0; x < picture.width(); x += lanes) {
-    const auto load = [&](int row, int column) {
-      return hn::PromoteTo(slopes, hn::LoadU(bytes, picture.row(row) + column));
-    };
-    const auto weigh = [&](auto outer, auto middle) {
-      return hn::Add(hn::Mul(outer, three), hn::Mul(middle, ten));
-    };
-    const auto difference = [&](int row) { return hn::Sub(load(row, x + 1), load(row, x - 1)); };
-    const auto smooth = [&](int row) {
-      return weigh(hn::Add(load(row, x - 1), load(row, x + 1)), load(row, x));
-    };
-    const auto within =
-        hn::FirstN(slopes, static_cast<std::size_t>(std::min(lanes, picture.width() - x)));
-    const auto dx = weigh(hn::Add(difference(y - 1), difference(y + 1)), difference(y));
-    const auto dy = hn::Sub(smooth(y + 1), smooth(y - 1));
-    hn::StoreU(hn::IfThenElseZero(within, dx), slopes, out_x + x);
-    hn::StoreU(hn::IfThenElseZero(within, dy), slopes, out_y + x);
-  }
-}
 
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
@@ -100,7 +71,6 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(halve_row);
-HWY_EXPORT(slope_row);
 
 namespace {
 
@@ -142,14 +112,10 @@ void reflect_ends(Image<std::uint8_t>& picture) {
 }  // namespace
 
 void Pyramid::shape(int width, int height) {
-  if (!levels_.empty() && levels_[0].picture.width() == width &&
-      levels_[0].picture.height() == height)
-    return;
+  if (!levels_.empty() && levels_[0].width() == width && levels_[0].height() == height) return;
   levels_.clear();
   while (levels_.empty() || (std::min(width, height) > min_side && levels_.size() < max_levels)) {
-    levels_.push_back({Image<std::uint8_t>(width, height, margin),
-                       Image<std::int16_t>(width, height, margin),
-                       Image<std::int16_t>(width, height, margin)});
+    levels_.emplace_back(width, height, margin);
     width = (width + 1) / 2;
     height = (height + 1) / 2;
   }
@@ -157,29 +123,21 @@ void Pyramid::shape(int width, int height) {
 
 void Pyramid::build(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   shape(picture.width, picture.height);
-  auto& base = levels_[0].picture;
+  auto& base = levels_[0];
   for_each_row(threads, picture.height, [&](int y) {
     base.assign_row(y, picture.row(y));
     reflect_sides(base, y);
   });
   reflect_ends(base);
   for (std::size_t level = 1; level < levels_.size(); ++level) {
-    const auto& from = levels_[level - 1].picture;
-    auto& to = levels_[level].picture;
+    const auto& from = levels_[level - 1];
+    auto& to = levels_[level];
     for_each_row(threads, to.height(), [&](int y) {
       HWY_DYNAMIC_DISPATCH(halve_row)(from, y, to.row(y), to.width());
       reflect_sides(to, y);
     });
     reflect_ends(to);
   }
-}
-
-void Pyramid::build_slopes(ThreadPool& threads) {
-  for (auto& level : levels_)
-    for_each_row(threads, level.picture.height(), [&](int y) {
-      HWY_DYNAMIC_DISPATCH(slope_row)
-      (level.picture, y, level.slope_x.row(y), level.slope_y.row(y));
-    });
 }
 
 }  // namespace eventcamera

@@ -9,19 +9,11 @@
 
 namespace eventcamera {
 
-/// Gaussian pyramid of an image: each level is the previous one blurred with (1 4 6 4 1) / 16 each
-/// way and subsampled by 2, while both sides are longer than `min_side`; at most `max_levels`
-/// levels.
+/// Gaussian pyramid of an image, reflected at its border: each level is the previous one blurred
+/// with (1 4 6 4 1) / 16 each way and subsampled by 2, while both sides are longer than `min_side`;
+/// at most `max_levels` levels.
 class Pyramid {
  public:
-  /// The image, reflected at its border, and its Scharr gradients, in 1/32 of a grey level per
-  /// pixel, 0 beyond the border. All with a margin.
-  struct Level {
-    Image<std::uint8_t> picture;
-    Image<std::int16_t> slope_x;
-    Image<std::int16_t> slope_y;
-  };
-
   static constexpr int margin = 16;  ///< pixels that windows may extend past the border
   static constexpr int max_levels = 4;
   static constexpr int min_side = 15;
@@ -30,15 +22,12 @@ class Pyramid {
   /// the same.
   void build(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
-  /// Computes the gradients, which only the image tracked from needs.
-  void build_slopes(ThreadPool& threads);
-
-  const std::vector<Level>& levels() const { return levels_; }
+  const std::vector<Image<std::uint8_t>>& levels() const { return levels_; }
 
  private:
   void shape(int width, int height);
 
-  std::vector<Level> levels_;
+  std::vector<Image<std::uint8_t>> levels_;
 };
 
 }  // namespace eventcamera

@@ -65,23 +65,26 @@ class Patch {
   static constexpr int stride = 2 * row_values;
 
   /// Covers points in rows first_row ... last_row of the tile.
-  Patch(const Pyramid::Level& level, const Tile& tile, int first_row, int last_row)
+  Patch(const Image<std::uint8_t>& picture, const ScharrGradients& gradients, const Tile& tile,
+        int first_row, int last_row)
       : first_row_(first_row) {
     const int rows = last_row - first_row + window;
     const int x = tile.left - half_window;
     const int y = tile.top + first_row - half_window;
     const Values values;
     const auto load_grey = [&](int row, int column) {
-      const auto* at = level.picture.row(y + row) + x + column;
+      const auto* at = picture.row(y + row) + x + column;
       return hn::ShiftLeft<2>(hn::PromoteTo(values, hn::LoadU(Bytes(), at)));
     };
-    const auto load_from = [&](const Image<std::int16_t>& slope) {
-      return
-          [&](int row, int column) { return hn::LoadU(values, slope.row(y + row) + x + column); };
+    const auto load_x = [&](int row, int column) {
+      return hn::LoadU(values, gradients.x(y + row) + x + column);
+    };
+    const auto load_y = [&](int row, int column) {
+      return hn::LoadU(values, gradients.y(y + row) + x + column);
     };
     interpolate(tile, rows, load_grey, grey_);
-    interpolate(tile, rows, load_from(level.slope_x), slope_x_);
-    interpolate(tile, rows, load_from(level.slope_y), slope_y_);
+    interpolate(tile, rows, load_x, slope_x_);
+    interpolate(tile, rows, load_y, slope_y_);
   }
 
   /// Index of the first value of a point's window; its rows are `stride` values apart.
@@ -222,9 +225,9 @@ HWY_INLINE void store_both_parts(const BothSum& sum0, const BothSum& sum1, const
 /// Searches for the points of a tile, one lane per point.
 class Points {
  public:
-  Points(const Pyramid::Level& to, const Tile& tile, std::span<const Search> searches,
+  Points(const Image<std::uint8_t>& to, const Tile& tile, std::span<const Search> searches,
          const Patch& patch)
-      : to_(to.picture),
+      : to_(to),
         patch_(patch),
         count_(static_cast<int>(searches.size())),
         right_(static_cast<float>(tile.right) / Tile::fractions),
@@ -515,11 +518,11 @@ class Points {
   std::int16_t moved_[most];
 };
 
-void search_all(const Pyramid::Level& from, const Pyramid::Level& to, const Tile& tile,
-                std::span<Search> searches) {
+void search_all(const Image<std::uint8_t>& from, const ScharrGradients& gradients,
+                const Image<std::uint8_t>& to, const Tile& tile, std::span<Search> searches) {
   const auto [first, last] = std::minmax_element(
       searches.begin(), searches.end(), [](const auto& a, const auto& b) { return a.y < b.y; });
-  const Patch patch(from, tile, first->y, last->y);
+  const Patch patch(from, gradients, tile, first->y, last->y);
   Points points(to, tile, searches, patch);
   points.search();
   points.store(searches);
@@ -534,9 +537,9 @@ namespace eventcamera {
 
 HWY_EXPORT(search_all);
 
-void search_tile(const Pyramid::Level& from, const Pyramid::Level& to, const Tile& tile,
-                 std::span<Search> searches) {
-  HWY_DYNAMIC_DISPATCH(search_all)(from, to, tile, searches);
+void search_tile(const Image<std::uint8_t>& from, const ScharrGradients& gradients,
+                 const Image<std::uint8_t>& to, const Tile& tile, std::span<Search> searches) {
+  HWY_DYNAMIC_DISPATCH(search_all)(from, gradients, to, tile, searches);
 }
 
 }  // namespace eventcamera

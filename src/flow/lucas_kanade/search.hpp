@@ -4,7 +4,7 @@
 #include <span>
 
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/lucas_kanade/pyramid.hpp"
+#include "src/flow/lucas_kanade/scharr_gradients.hpp"
 
 namespace eventcamera {
 
@@ -13,6 +13,9 @@ namespace eventcamera {
 struct Tile {
   static constexpr int side = 16;
   static constexpr int fractions = 8;  ///< points lie at multiples of 1/8 of a pixel
+  /// Pixels that the window of a point needs on either side of its pixel.
+  static constexpr int before = 7;
+  static constexpr int after = 8;
 
   int left;
   int top;
@@ -30,13 +33,14 @@ struct Search {
 
 /// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): moves a window of 15x15 pixels
 /// towards the minimum of its squared difference, at most 10 times, until a move is shorter than
-/// 0.03 pixels or undoes the last one. Needs the gradients of `from`. At most one search per pixel
+/// 0.03 pixels or undoes the last one. Needs the gradients
+/// of `from` where the windows are. At most one search per pixel
 /// of the tile.
 ///
 /// The window sum that determines a move is bilinear in the window's position, so it is
 /// interpolated between the integer sums at the four pixels around it. The window is summed once
 /// per pixel that a search visits, not once per move, and results are the same on every processor.
-void search_tile(const Pyramid::Level& from, const Pyramid::Level& to, const Tile& tile,
-                 std::span<Search> searches);
+void search_tile(const Image<std::uint8_t>& from, const ScharrGradients& gradients,
+                 const Image<std::uint8_t>& to, const Tile& tile, std::span<Search> searches);
 
 }  // namespace eventcamera
