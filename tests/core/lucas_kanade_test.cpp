@@ -54,7 +54,8 @@ TEST_P(EverySize, PyramidsEqualTheReference) {
 }
 
 TEST_P(EverySize, GradientsEqualTheReference) {
-  const auto [width, height] = GetParam();
+  const int width = GetParam().width;
+  const int height = GetParam().height;
   const auto picture = scene::noise<std::uint8_t>(width, height, 8, 3);
   ThreadPool threads;
   Pyramid pyramid;
@@ -75,7 +76,8 @@ TEST_P(EverySize, GradientsEqualTheReference) {
 }
 
 TEST_P(EverySize, SearchesEqualTheReference) {
-  const auto [width, height] = GetParam();
+  const int width = GetParam().width;
+  const int height = GetParam().height;
   for (const bool noisy : {true, false}) {
     const auto from = noisy ? scene::noise<std::uint8_t>(width, height, 8, 3)
                             : scene::texture<std::uint8_t>(width, height, 8, 0, 0);
