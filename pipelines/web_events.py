@@ -91,8 +91,8 @@ class Viewer:
             reply = promise.get_reply()  # owns the offer
             if reply and reply.has_field("offer"):
                 # By default libnice asks the router to forward ports.
-                for sink in webrtc.iterate_all_by_element_factory_name("nicesink"):
-                    sink.get_property("agent").set_property("upnp", False)
+                webrtc.iterate_all_by_element_factory_name("nicesink").foreach(
+                    lambda sink: sink.get_property("agent").set_property("upnp", False))
                 offer = reply.get_value("offer")
                 webrtc.emit("set-local-description", offer, Gst.Promise.new_with_change_func(offered))
                 self.send(offer=offer.sdp.as_text())
