@@ -403,21 +403,29 @@ TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
   }
 }
 
-TEST(OpenGl, IsFoundAnewAfterALoss) {
-  take_over_contexts();
-  for (const std::string& out :
-       {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of("gleventsim-frame")}) {
-    Harness h = without_upload("gleventsim-frame");
-    h.caps(video, out);
-    Flashes flashes(h);
-    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
-    lost = GST_GL_CONTEXT(gst_object_ref(current.load()));  // so that no other has its address
-    EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
-    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
-    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
-    EXPECT_NE(current, lost);
-    gst_object_unref(lost.exchange(nullptr));
+/// Events or drawn events of flashes, in contexts that have been taken over.
+class EitherOutput : public testing::TestWithParam<bool> {
+ protected:
+  EitherOutput() {
+    take_over_contexts();
+    h.caps(video, GetParam() ? pictures_of("gleventsim-frame") : GST_EVENT_CAMERA_MEDIA_TYPE);
   }
+
+  Harness h = without_upload("gleventsim-frame");
+  Flashes flashes{h};
+};
+
+INSTANTIATE_TEST_SUITE_P(, EitherOutput, testing::Bool(),
+                         [](const auto& draws) { return draws.param ? "Pictures" : "Events"; });
+
+TEST_P(EitherOutput, IsFoundAnewAfterALoss) {
+  EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+  lost = GST_GL_CONTEXT(gst_object_ref(current.load()));  // so that no other has its address
+  EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
+  EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+  EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+  EXPECT_NE(current, lost);
+  gst_object_unref(lost.exchange(nullptr));
 }
 
 /// Ends the threads of all contexts, as it seems, while it exists.
@@ -459,43 +467,29 @@ TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
-TEST(OpenGl, IsNotMistakenForTheFrameWhereItHasEnded) {
-  take_over_contexts();
-  for (const std::string& out :
-       {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of("gleventsim-frame")}) {
-    Harness h = without_upload("gleventsim-frame");
-    h.caps(video, out);
-    Flashes flashes(h);
-    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
-    {
-      const EndOfThreads end;
-      EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
-    }
-    const auto error = h.message(GST_MESSAGE_ERROR);
-    ASSERT_TRUE(error) << out;
-    EXPECT_EQ(text_of(error.get()), thread_has_ended);
-    EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+TEST_P(EitherOutput, IsNotMistakenForTheFrameWhereItHasEnded) {
+  EXPECT_EQ(flashes.push(), GST_FLOW_OK);
+  {
+    const EndOfThreads end;
+    EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
   }
+  const auto error = h.message(GST_MESSAGE_ERROR);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(text_of(error.get()), thread_has_ended);
+  EXPECT_EQ(flashes.push(), GST_FLOW_OK);
 }
 
-TEST(OpenGl, HoldsFramesUntilItHasReadThem) {
-  take_over_contexts();
-  for (const std::string& out :
-       {std::string(GST_EVENT_CAMERA_MEDIA_TYPE), pictures_of("gleventsim-frame")}) {
-    Harness h = without_upload("gleventsim-frame");
-    h.caps(video, out);
-    Flashes flashes(h);
-    for (int i = 0; i < 3; ++i) {
-      const Buffer frame(flashes.frame());
-      const auto is_held = [&frame] { return GST_MINI_OBJECT_REFCOUNT_VALUE(frame.get()) > 1; };
-      is_busy = true;
-      EXPECT_EQ(h.push(gst_buffer_ref(frame.get())), GST_FLOW_OK);
-      g_usleep(20'000);
-      EXPECT_TRUE(is_held()) << out << i;
-      is_busy = false;
-      for (int wait = 0; wait < 1000 && is_held(); ++wait) g_usleep(10'000);
-      EXPECT_FALSE(is_held()) << out << i;
-    }
+TEST_P(EitherOutput, HoldsFramesUntilItHasReadThem) {
+  for (int i = 0; i < 3; ++i) {
+    const Buffer frame(flashes.frame());
+    const auto is_held = [&frame] { return GST_MINI_OBJECT_REFCOUNT_VALUE(frame.get()) > 1; };
+    is_busy = true;
+    EXPECT_EQ(h.push(gst_buffer_ref(frame.get())), GST_FLOW_OK);
+    g_usleep(20'000);
+    EXPECT_TRUE(is_held()) << i;
+    is_busy = false;
+    for (int wait = 0; wait < 1000 && is_held(); ++wait) g_usleep(10'000);
+    EXPECT_FALSE(is_held()) << i;
   }
 }
 
