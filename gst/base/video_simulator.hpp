@@ -107,7 +107,7 @@ class LumaVideoSimulator final : public VideoSimulator {
     if (const auto* events = std::exchange(events_, nullptr))
       drawing_->accumulator.add(*events, simulator_->threads());
     drawing_->accumulator.draw(palette, pixel_layout_of(drawing_->video), mapped.data(),
-                               mapped.stride());
+                               mapped.stride(), simulator_->threads());
   }
 
   bool is_ready() override { return true; }

@@ -97,21 +97,22 @@ class RowPainter {
 };
 
 template <int bytes>
-void draw_rows(Image<std::uint8_t>& fired, const KindTables& kinds, std::uint8_t* out,
-               std::ptrdiff_t stride) {
+void draw_rows(Image<std::uint8_t>& fired, const BandRows& rows, const KindTables& kinds,
+               std::uint8_t* out, std::ptrdiff_t stride) {
   const RowPainter<bytes> painter(kinds);
-  for (int y = 0; y < fired.height(); ++y)
+  for (int y = rows.first; y < rows.last; ++y)
     painter.draw(fired.row(y), fired.width(), out + y * stride);
 }
 
-void draw_pixels(Image<std::uint8_t>& fired, const KindTables& kinds, int bytes, std::uint8_t* out,
-                 std::ptrdiff_t stride) {
+void draw_band(Image<std::uint8_t>& fired, int band, const KindTables& kinds, int bytes,
+               std::uint8_t* out, std::ptrdiff_t stride) {
+  const BandRows rows(band, fired.height());
   if (bytes == 1)
-    draw_rows<1>(fired, kinds, out, stride);
+    draw_rows<1>(fired, rows, kinds, out, stride);
   else if (bytes == 3)
-    draw_rows<3>(fired, kinds, out, stride);
+    draw_rows<3>(fired, rows, kinds, out, stride);
   else
-    draw_rows<4>(fired, kinds, out, stride);
+    draw_rows<4>(fired, rows, kinds, out, stride);
 }
 
 }  // namespace
@@ -121,7 +122,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace eventcamera {
 
-HWY_EXPORT(draw_pixels);
+HWY_EXPORT(draw_band);
 
 void Accumulator::add(std::span<const Event> events) {
   // In locals, because the bytes written might alias members.
@@ -147,8 +148,18 @@ void Accumulator::add_band(const EventBuckets& events, int band) {
 
 void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
                        std::ptrdiff_t stride) {
-  HWY_DYNAMIC_DISPATCH(draw_pixels)
-  (fired_, KindTables(palette, layout), layout.bytes, reinterpret_cast<std::uint8_t*>(out), stride);
+  const KindTables kinds(palette, layout);
+  for (int band = 0; band < band_count(fired_.height()); ++band) HWY_DYNAMIC_DISPATCH(draw_band)
+  (fired_, band, kinds, layout.bytes, reinterpret_cast<std::uint8_t*>(out), stride);
+}
+
+void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
+                       std::ptrdiff_t stride, ThreadPool& threads) {
+  const KindTables kinds(palette, layout);
+  threads.for_each(band_count(fired_.height()), [&](int band, int) {
+    HWY_DYNAMIC_DISPATCH(draw_band)
+    (fired_, band, kinds, layout.bytes, reinterpret_cast<std::uint8_t*>(out), stride);
+  });
 }
 
 }  // namespace eventcamera

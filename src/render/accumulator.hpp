@@ -24,6 +24,8 @@ class Accumulator {
   /// Draws the accumulated events and starts over. `stride` in bytes.
   void draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
+  void draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
+            std::ptrdiff_t stride, ThreadPool& threads);
 
  private:
   void add_band(const EventBuckets& events, int band);

@@ -206,7 +206,8 @@ TEST(Allocations, AreNotMadeByCopyingOrDrawingEvents) {
   EXPECT_EQ(allocations_in_steady_state([&](int) {
               events->write_to(copied.data(), simulator->threads());
               accumulator.add(*events, simulator->threads());
-              accumulator.draw(palette(PaletteName::dark), {}, picture.data(), width);
+              accumulator.draw(palette(PaletteName::dark), {}, picture.data(), width,
+                               simulator->threads());
             }),
             0);
 }

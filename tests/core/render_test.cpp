@@ -133,21 +133,21 @@ void expect_pictures_as_drawn_plainly() {
   }
 }
 
-TEST(Accumulator, CollectsTheSameWithAnyNumberOfThreads) {
+TEST(Accumulator, DrawsTheSameWithAnyNumberOfThreads) {
   constexpr int width = 70;
-  constexpr int bands = 9;
+  constexpr int height = 5 * rows_per_band + 3;
   EventBuckets events;
-  events.reset(3, bands);
+  events.reset(3, band_count(height));
   for (int step = 1; step <= 3; ++step)
-    for (int y = 0; y < bands; ++y)
+    for (int y = 0; y < height; ++y)
       for (int x = step + y; x < width; x += step)
-        events.bucket(step, y).push_back(
-            Event::at(x, y, step, x % 3 == 0 ? Polarity::on : Polarity::off));
+        events.bucket(step, y / rows_per_band)
+            .push_back(Event::at(x, y, step, x % 3 == 0 ? Polarity::on : Polarity::off));
   const auto draw_with = [&](auto&&... threads) {
-    Accumulator accumulator(width, bands);
+    Accumulator accumulator(width, height);
     accumulator.add(events, threads...);
-    std::vector<std::byte> out(std::size_t{width} * bands);
-    accumulator.draw(palette(PaletteName::grey), {}, out.data(), width);
+    std::vector<std::byte> out(std::size_t{width} * height);
+    accumulator.draw(palette(PaletteName::grey), {}, out.data(), width, threads...);
     return out;
   };
   const auto expected = draw_with();
