@@ -69,7 +69,7 @@ void FiredPixels::write(std::span<const Group> groups, std::uint32_t t, std::spa
 }
 
 void FiredPixels::write_to(Event* out) const {
-  write(groups_, t_, {out, size_});
+  write(groups(), t_, {out, size_});
 }
 
 }  // namespace eventcamera

@@ -28,21 +28,36 @@ class FiredPixels {
   void begin(std::uint32_t t) {
     t_ = t;
     size_ = 0;
-    groups_.clear();
+    group_count_ = 0;
   }
 
   /// Adds 64 pixels of row y, from x on: bit i of `fired` is set if pixel x + i fires, bit i of
   /// `on` if its event is ON. Always inlined, so that SIMD code has it for its own target.
   [[gnu::always_inline]] void add(int x, int y, std::uint64_t fired, std::uint64_t on) {
-    size_ += static_cast<std::size_t>(std::popcount(fired));
-    for (; fired != 0; fired >>= 16, on >>= 16, x += 16)
-      if ((fired & 0xffff) != 0)
-        groups_.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
-                           static_cast<std::uint16_t>(fired), static_cast<std::uint16_t>(on)});
+    size_ += static_cast<std::uint32_t>(std::popcount(fired));
+    if (memory_.size() < group_count_ + 4) memory_.resize(2 * memory_.size() + 4);
+    // Without branches, which would be mispredicted often.
+    Group* const out = memory_.data();
+    std::size_t count = group_count_;
+    for (int i = 0; i < 64; i += 16) {
+      const auto part = static_cast<std::uint16_t>(fired >> i);
+      out[count] = {static_cast<std::uint16_t>(x + i), static_cast<std::uint16_t>(y), part,
+                    static_cast<std::uint16_t>(on >> i)};
+      count += part != 0 ? 1 : 0;
+    }
+    group_count_ = static_cast<std::uint32_t>(count);
   }
 
   /// Number of pixels.
   std::size_t size() const { return size_; }
+
+  /// Number of pixels whose event is ON.
+  std::size_t on_size() const {
+    std::size_t sum = 0;
+    for (const auto& group : groups())
+      sum += static_cast<std::size_t>(std::popcount(static_cast<unsigned>(group.fired & group.on)));
+    return sum;
+  }
 
   /// Writes size() events.
   void write_to(Event* out) const;
@@ -52,13 +67,11 @@ class FiredPixels {
   void visit(const Visit& visit) const {
     constexpr std::size_t groups_at_once = 32;
     Event events[groups_at_once * 16];
-    for (std::size_t first = 0; first < groups_.size(); first += groups_at_once) {
-      const auto groups =
-          std::span(groups_).subspan(first).first(std::min(groups_at_once, groups_.size() - first));
+    for (std::size_t first = 0; first < group_count_; first += groups_at_once) {
+      const auto part = groups().subspan(first, std::min(groups_at_once, group_count_ - first));
       std::size_t count = 0;
-      for (const auto& group : groups)
-        count += static_cast<std::size_t>(std::popcount(group.fired));
-      write(groups, t_, std::span(events).first(count));
+      for (const auto& group : part) count += static_cast<std::size_t>(std::popcount(group.fired));
+      write(part, t_, std::span(events).first(count));
       visit(std::span<const Event>(events, count));
     }
   }
@@ -66,8 +79,11 @@ class FiredPixels {
  private:
   static void write(std::span<const Group> groups, std::uint32_t t, std::span<Event> out);
 
-  std::vector<Group> groups_;
-  std::size_t size_ = 0;
+  std::span<const Group> groups() const { return std::span(memory_).first(group_count_); }
+
+  std::vector<Group> memory_;
+  std::uint32_t group_count_ = 0;
+  std::uint32_t size_ = 0;
   std::uint32_t t_ = 0;
 };
 

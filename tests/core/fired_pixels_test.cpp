@@ -66,6 +66,7 @@ TEST(FiredPixels, BeginAgain) {
   EXPECT_EQ(fired.pixels.size(), 0U);
   fired.pixels.write_to(nullptr);
   fired.pixels.add(65530, 32767, 0b100001, 0b100000);
+  EXPECT_EQ(fired.pixels.on_size(), 1U);
   std::vector<Event> events(2);
   fired.pixels.write_to(events.data());
   EXPECT_EQ(events, (std::vector{Event::at(65530, 32767, 1, Polarity::off),
