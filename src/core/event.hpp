@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <span>
 #include <vector>
 
@@ -56,18 +57,24 @@ inline std::span<const Event> events_until(std::span<const Event> events, Micros
 /// Order of simulated events: by time, then in raster order.
 inline bool is_before(const Event& a, const Event& b) {
   const auto place = [](const Event& event) {
-    return static_cast<std::uint32_t>(event.y()) << 16 | event.x;
+    return std::uint64_t{event.t} << 32 | static_cast<std::uint32_t>(event.y()) << 16 | event.x;
   };
-  return a.t != b.t ? a.t < b.t : place(a) < place(b);
+  return place(a) < place(b);
 }
 
-/// Puts events that are sorted by time, and nearly in that order already, into that order.
-inline void sort_within_times(std::vector<Event>& events) {
-  for (auto run = events.begin(); run != events.end();) {
-    const auto end =
-        std::find_if(run, events.end(), [&](const Event& event) { return event.t != run->t; });
-    if (!std::is_sorted(run, end, is_before)) std::sort(run, end, is_before);
-    run = end;
+/// Puts events that are nearly in that order into that order. Those of earlier spans of
+/// 2^span_bits microseconds are before the others already.
+inline void sort_within_spans(std::span<Event> events, int span_bits) {
+  for (auto next = events.begin();;) {
+    next = std::is_sorted_until(next, events.end(), is_before);
+    if (next == events.end()) return;
+    const auto is_elsewhere = [span = next->t >> span_bits, span_bits](const Event& event) {
+      return event.t >> span_bits != span;
+    };
+    const auto first =
+        std::find_if(std::reverse_iterator(next), events.rend(), is_elsewhere).base();
+    next = std::find_if(next, events.end(), is_elsewhere);
+    std::sort(first, next, is_before);
   }
 }
 

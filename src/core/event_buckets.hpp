@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,7 +16,7 @@ namespace eventcamera {
 /// Events of one interval as kernels produce them: a bucket per step and band of rows. With more
 /// than one band, a bucket holds the events of its rows only, so that threads can draw bands
 /// concurrently. Each thread fills its own buckets; written in order, they are the sorted events of
-/// the interval.
+/// the interval. Steps may also be time slices, whose events are sorted when they are written.
 class EventBuckets {
  public:
   /// Either a list of events, or the pixels that fire in a step, whose events are made when they
@@ -28,6 +30,7 @@ class EventBuckets {
 
   /// Empties the buckets but keeps their memory.
   void reset(int steps, int bands) {
+    slice_bits_.reset();
     bands_ = static_cast<std::size_t>(bands);
     buckets_.resize(static_cast<std::size_t>(steps) * bands_);
     for (auto& bucket : buckets_) {
@@ -40,6 +43,14 @@ class EventBuckets {
   std::vector<Event>& bucket(int step, int band) { return at(step, band).events; }
   FiredPixels& pixels(int step, int band) { return at(step, band).pixels; }
 
+  /// As reset(), for an interval of `duration` microseconds, whose events are added in any order.
+  void reset_slices(std::uint32_t duration, int bands);
+
+  /// Adds an event to its time slice. Different bands may be added from different threads.
+  void add(int band, const Event& event) {
+    bucket(static_cast<int>(event.t >> *slice_bits_) + 1, band).push_back(event);
+  }
+
   int bands() const { return static_cast<int>(bands_); }
 
   /// Number of events in all buckets.
@@ -49,8 +60,8 @@ class EventBuckets {
   void write_to(Event* out) const;
   void write_to(Event* out, ThreadPool& threads) const;
 
-  /// Calls visit(events), events a std::span<const Event>, until it has seen all events of a band
-  /// in order.
+  /// Calls visit(events), events a std::span<const Event>, until it has seen all events of a band,
+  /// step by step.
   template <class Visit>
   void visit_band(int band, const Visit& visit) const {
     for (auto i = static_cast<std::size_t>(band); i < buckets_.size(); i += bands_) {
@@ -63,12 +74,14 @@ class EventBuckets {
   Bucket& at(int step, int band) {
     return buckets_[static_cast<std::size_t>(step - 1) * bands_ + static_cast<std::size_t>(band)];
   }
-  /// Writes the sorted events [first, last) of lists, and those of pixels of which the first is in
-  /// that range.
+  /// Writes the sorted events [first, last) of lists, and those of pixels or of a time slice of
+  /// which the first is in that range.
   void write_part(std::size_t first, std::size_t last, Event* out) const;
+  void write_slices(std::size_t first, std::size_t last, Event* out) const;
 
   std::vector<Bucket> buckets_;
   std::size_t bands_ = 1;
+  std::optional<int> slice_bits_;  ///< steps are time slices of 2^slice_bits_ microseconds
 };
 
 }  // namespace eventcamera

@@ -10,7 +10,9 @@
 #include "src/core/luma.hpp"
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/denoise.hpp"
+#include "src/dvs/interval_events.hpp"
 #include "src/dvs/pixel_solver.hpp"
+#include "src/dvs/readout.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/interpolation.hpp"
@@ -50,7 +52,7 @@ class PixelSimulator final : public DvsSimulator {
     keep(frame, last_);
     finder_.reset();
     sub_interval_count_ = 0;
-    sorter_.reset();
+    fired_.reset();
     if (readout_) readout_->reset();
     adopt(settings_);
     settle();
@@ -59,7 +61,7 @@ class PixelSimulator final : public DvsSimulator {
   void simulate(const LumaView& frame, const StepTimes& interval, const Settings&,
                 EventBuckets& events) override {
     keep(frame, now_);
-    const double duration = begin(interval);
+    const double duration = begin(interval, events);
     if (current_.upsampling == Upsampling::motion)
       advance_along_motion(duration);
     else
@@ -70,7 +72,7 @@ class PixelSimulator final : public DvsSimulator {
 
   bool hold(const StepTimes& interval, const Settings&, EventBuckets& events) override {
     now_.assign(last_.view());
-    const double duration = begin(interval);
+    const double duration = begin(interval, events);
     advance_straight(duration, false);
     finish(duration, events);
     return true;
@@ -86,23 +88,21 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   /// Returns the duration of the interval in microseconds.
-  double begin(const StepTimes& interval) {
+  double begin(const StepTimes& interval, EventBuckets& events) {
     if (settings_ != current_) change_to(settings_);
+    if (current_.max_event_rate > 0 && !readout_) readout_.emplace(format().width, format().height);
     const double duration = in_microseconds(interval.duration());
-    sorter_.begin(duration, band_count(format().height));
+    fired_.begin(duration, band_count(format().height), readout_ ? unread_ : events);
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
     return duration;
   }
 
   void finish(double duration, EventBuckets& events) {
     sub_interval_count_ += sub_intervals_.size();
+    if (!readout_) return;
     const bool is_limited = current_.max_event_rate > 0;
-    if (!is_limited && !readout_) {
-      sorter_.finish(events, threads());
-      return;
-    }
-    if (!readout_) readout_.emplace(format().width, format().height);
-    sorter_.finish(sorted_, threads());
+    sorted_.resize(unread_.size());
+    unread_.write_to(sorted_.data(), threads());
     readout_->pass(sorted_, duration, is_limited ? current_.max_event_rate : unlimited, events);
     if (!is_limited) readout_.reset();  // no events are waiting any more
   }
@@ -258,7 +258,7 @@ class PixelSimulator final : public DvsSimulator {
       auto& scratch = scratch_[static_cast<std::size_t>(thread)];
       scratch.candidates.resize(format().width);
       scratch.luma.resize(static_cast<std::size_t>(format().width) + max_lanes);
-      body(BandRows(band, format().height), scratch, BandEvents{sorter_, band});
+      body(BandRows(band, format().height), scratch, BandEvents{fired_, band});
     });
   }
 
@@ -272,8 +272,9 @@ class PixelSimulator final : public DvsSimulator {
   std::vector<SubInterval> sub_intervals_;  ///< of the current interval, in order of time
   std::vector<ShadeTables> tables_;         ///< one per duration of sub-intervals
   std::uint64_t sub_interval_count_ = 0;    ///< before this interval
-  EventSorter sorter_;
-  EventBuckets sorted_;
+  IntervalEvents fired_;
+  EventBuckets unread_;        ///< events that go to the readout
+  std::vector<Event> sorted_;  ///< the same, sorted
   std::optional<Readout> readout_;
   std::vector<Scratch> scratch_;  ///< by thread
 

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "src/dvs/interval_events.hpp"
 #include "src/dvs/light_response.hpp"
 #include "src/dvs/pixel_array.hpp"
-#include "src/dvs/readout.hpp"
 #include "src/dvs/shot_noise.hpp"
 #include "src/dvs/sub_intervals.hpp"
 #include "src/dvs/trajectory.hpp"

@@ -2,61 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "src/core/event_buckets.hpp"
 
 namespace eventcamera {
-
-/// Sorts the events of an interval, which bands of rows add in any order, by time, then in raster
-/// order.
-class EventSorter {
- public:
-  /// Begins an interval of `duration` microseconds with the deferred events of the last one.
-  void begin(double duration, int bands);
-  /// Drops the deferred events.
-  void reset() { deferred_.clear(); }
-
-  /// Adds an event `t` microseconds after the start of the interval; past its end, the event is
-  /// deferred to the next interval. Different bands may be added from different threads.
-  void add(int band, double t, int x, int y, Polarity polarity) {
-    if (t > duration_) {
-      deferred_[static_cast<std::size_t>(band)].push_back({t, Event::at(x, y, 0, polarity)});
-      return;
-    }
-    const auto microseconds = static_cast<std::uint32_t>(t);
-    collected_.bucket(static_cast<int>(microseconds >> shift_) + 1, band)
-        .push_back(Event::at(x, y, microseconds, polarity));
-  }
-
-  /// Fills `events`, one bucket per time slice.
-  void finish(EventBuckets& events, ThreadPool& threads);
-
- private:
-  struct DeferredEvent {
-    double t;
-    Event event;
-  };
-  struct alignas(64) Deferred : std::vector<DeferredEvent> {};
-  struct alignas(64) Counts : std::vector<std::uint32_t> {};
-
-  void sort_slice(int slice, std::vector<std::uint32_t>& counts, std::vector<Event>& out);
-
-  double duration_ = 0;
-  int shift_ = 0;  ///< a time slice has 2^shift_ microseconds
-  int slices_ = 1;
-  EventBuckets collected_;          ///< by slice and band
-  std::vector<Deferred> deferred_;  ///< by band
-  std::vector<Counts> counts_;      ///< by thread
-};
-
-/// Adds the events of one band of rows to a sorter.
-struct BandEvents {
-  EventSorter& sorter;
-  int band;
-
-  void add(double t, int x, int y, Polarity polarity) const { sorter.add(band, t, x, y, polarity); }
-};
 
 /// Arbiter of the readout: reads one row at a time, the longest waiting row first, at a limited
 /// event rate. The events of a row leave together and get the time at which they leave. A waiting
@@ -69,9 +20,10 @@ class Readout {
   /// Drops the waiting events.
   void reset();
 
-  /// Admits the events of an interval of `duration` microseconds, and fills `out` with those that
-  /// leave within it, sorted; the others stay for the next one.
-  void pass(const EventBuckets& in, double duration, double events_per_second, EventBuckets& out);
+  /// Admits the sorted events of an interval of `duration` microseconds, and fills `out` with those
+  /// that leave within it; the others stay for the next one.
+  void pass(std::span<const Event> in, double duration, double events_per_second,
+            EventBuckets& out);
 
  private:
   static constexpr int none = -1;

@@ -176,14 +176,12 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
                    : to;
     if (x % 7 == 0) pixels.refractory_left[x] = 9000;
   }
-  EventSorter sorter;
-  sorter.begin(sub_interval.duration, 1);
-  solve(RowToSolve{settings, random, sub_interval, tables, pixels, candidates, {sorter, 0}});
-  EventBuckets sorted;
-  ThreadPool pool;
-  sorter.finish(sorted, pool);
+  EventBuckets buckets;
+  IntervalEvents events;
+  events.begin(sub_interval.duration, 1, buckets);
+  solve(RowToSolve{settings, random, sub_interval, tables, pixels, candidates, {events, 0}});
   Solved result;
-  for (const auto& event : scene::copy(sorted))
+  for (const auto& event : scene::copy(buckets))
     result.events[{event.x, 0}].push_back(
         {static_cast<double>(event.t), event.x, 0, event.polarity()});
   for (const float* row : {pixels.reference, pixels.refractory_left})

@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <random>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "src/core/event_buckets.hpp"
@@ -93,6 +95,39 @@ TEST(EventBuckets, OfPixelsAreWrittenOnceByAnyNumberOfThreads) {
     std::vector<Event> events(expected.size());
     buckets.write_to(events.data(), threads);
     EXPECT_TRUE(events == expected) << most << " threads";
+  }
+}
+
+TEST(EventBuckets, OfTimeSlicesAreSortedByAnyNumberOfThreads) {
+  constexpr int bands = 3;
+  constexpr int rows = 5;  // of a band
+  constexpr int width = 8;
+  std::minstd_rand random;
+  EventBuckets buckets;
+  ThreadPool threads;
+  for (const std::uint32_t duration : {0U, 1U, 63U, 64U, 1000U, 33'333U, 3'000'000U, 0xffffffffU}) {
+    for (const int count : {0, 1, 10, 1000, 100'000}) {
+      buckets.reset_slices(duration, bands);
+      EXPECT_EQ(buckets.size(), 0U);
+      std::vector<Event> expected;
+      std::uniform_int_distribution<std::uint32_t> time(0, duration);
+      for (int i = 0; i < count; ++i) {
+        const int band = static_cast<int>(random() % bands);
+        const int y = band * rows + static_cast<int>(random() % rows);
+        expected.push_back(
+            Event::at(static_cast<int>(random() % width), y, time(random), Polarity::on));
+        buckets.add(band, expected.back());
+      }
+      ASSERT_EQ(buckets.size(), expected.size());
+      std::ranges::sort(expected, {},
+                        [](const Event& event) { return std::tuple(event.t, event.y(), event.x); });
+      for (const int most : {1, 2, 0}) {
+        threads.set_threads(most);
+        std::vector<Event> events(expected.size());
+        buckets.write_to(events.data(), threads);
+        EXPECT_TRUE(events == expected) << count << " in " << duration << ", " << most;
+      }
+    }
   }
 }
 

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "src/core/event_buckets.hpp"
+
+namespace eventcamera {
+
+/// Collects the events of an interval, which bands of rows add in any order. Those past its end are
+/// deferred to the next one.
+class IntervalEvents {
+ public:
+  /// Begins an interval of `duration` microseconds with the deferred events of the last one. Its
+  /// events go to `events`.
+  void begin(double duration, int bands, EventBuckets& events) {
+    duration_ = duration;
+    events_ = &events;
+    events.reset_slices(static_cast<std::uint32_t>(duration), bands);
+    deferred_.resize(static_cast<std::size_t>(bands));
+    for (int band = 0; band < bands; ++band) {
+      due_.swap(deferred_[static_cast<std::size_t>(band)]);
+      for (const auto& [t, event] : due_) add(band, t, event.x, event.y(), event.polarity());
+      due_.clear();
+    }
+  }
+
+  /// Drops the deferred events.
+  void reset() { deferred_.clear(); }
+
+  /// Adds an event `t` microseconds after the start of the interval. Different bands may be added
+  /// from different threads.
+  void add(int band, double t, int x, int y, Polarity polarity) {
+    if (t > duration_)
+      deferred_[static_cast<std::size_t>(band)].push_back(
+          {t - duration_, Event::at(x, y, 0, polarity)});
+    else
+      events_->add(band, Event::at(x, y, static_cast<std::uint32_t>(t), polarity));
+  }
+
+ private:
+  struct DeferredEvent {
+    double t;  ///< microseconds after the start of the next interval
+    Event event;
+  };
+  struct alignas(64) Deferred : std::vector<DeferredEvent> {};
+
+  double duration_ = 0;
+  EventBuckets* events_ = nullptr;
+  std::vector<Deferred> deferred_;  ///< by band
+  Deferred due_;                    ///< deferred to the interval that begins
+};
+
+/// Adds the events of one band of rows.
+struct BandEvents {
+  IntervalEvents& events;
+  int band;
+
+  void add(double t, int x, int y, Polarity polarity) const { events.add(band, t, x, y, polarity); }
+};
+
+}  // namespace eventcamera
