@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "bench/scenes.hpp"
+#include "src/dvs/dvs_simulator.hpp"
 #include "src/render/accumulator.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/frame.hpp"
@@ -183,7 +184,8 @@ class Core {
   void draw(const EventBuckets& events) {
     constexpr PixelLayout bgrx{.bytes = 4, .red = 2, .green = 1, .blue = 0};
     accumulator_.add(events, simulator_->threads());
-    accumulator_.draw(palette(PaletteName::dark), bgrx, picture_.data(), stride());
+    accumulator_.draw(palette(PaletteName::dark), bgrx, picture_.data(), stride(),
+                      simulator_->threads());
   }
   std::ptrdiff_t stride() const { return std::ptrdiff_t{4} * scene_.clip[0].width(); }
 
@@ -344,6 +346,11 @@ int main(int argc, char** argv) {
          return make_dense_simulator(format);
        },
        3, 2},
+      {"eventsim-dvs",
+       [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
+         return make_dvs_simulator(format);
+       },
+       DvsSettings().positive_threshold, 20},
   };
   register_all(scenes, methods);
   benchmark::RunSpecifiedBenchmarks();
