@@ -34,6 +34,38 @@ hn::Vec<Tag> load_first(Tag tag, const T* from, int count) {
   return hn::Load(tag, elements);
 }
 
+/// Picks lanes from two vectors of floats that follow each other in memory.
+template <class Floats>
+class Lookup {
+ public:
+  using Vector = hn::Vec<Floats>;
+  using Words = hn::RebindToSigned<Floats>;
+
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+  static_assert(hn::MaxLanes(Floats()) == 16);
+  explicit Lookup(hn::Vec<Words> lanes) : lanes_(lanes) {}
+  HWY_INLINE Vector operator()(Vector low, Vector high) const {
+    return Vector{_mm512_permutex2var_ps(low.raw, lanes_.raw, high.raw)};
+  }
+
+ private:
+  hn::Vec<Words> lanes_;
+#else
+  explicit Lookup(hn::Vec<Words> lanes)
+      : is_low_(hn::RebindMask(Floats(), hn::Lt(lanes, hn::Set(Words(), count)))),
+        lanes_(hn::IndicesFromVec(Floats(), hn::And(lanes, hn::Set(Words(), count - 1)))) {}
+  HWY_INLINE Vector operator()(Vector low, Vector high) const {
+    return hn::IfThenElse(is_low_, hn::TableLookupLanes(low, lanes_),
+                          hn::TableLookupLanes(high, lanes_));
+  }
+
+ private:
+  static constexpr int count = static_cast<int>(hn::MaxLanes(Floats()));
+  hn::Mask<Floats> is_low_;
+  decltype(hn::IndicesFromVec(Floats(), hn::Zero(Words()))) lanes_;
+#endif
+};
+
 }  // namespace eventcamera::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/resampling.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "src/flow/scratch.hpp"
@@ -41,11 +42,24 @@ void resample_flows(const Flow* row, const Resampling& resampling, int begin, in
   const auto times = hn::Set(floats, factor);
   const float* values = &row->x;
   for (int x = begin; x < end; x += lanes) {
-    const auto first = hn::ShiftLeft<1>(hn::LoadU(Words(), resampling.first() + x));
-    const auto right = hn::LoadU(floats, resampling.weight() + x);
-    const auto at = [&](int i) { return hn::GatherIndex(floats, values + i, first); };
-    hn::StoreInterleaved2(hn::Mul(between(at(0), at(2), right), times),
-                          hn::Mul(between(at(1), at(3), right), times), floats, &out[x].x);
+    const std::int32_t* first = resampling.first() + x;
+    const int left = 2 * first[0];
+    const int right = 2 * first[std::min(lanes, end - x) - 1] + 4;
+    const auto index = hn::ShiftLeft<1>(hn::LoadU(Words(), first));
+    const auto weight = hn::LoadU(floats, resampling.weight() + x);
+    const auto blend = [&](const auto& at) {
+      hn::StoreInterleaved2(hn::Mul(between(at(0), at(2), weight), times),
+                            hn::Mul(between(at(1), at(3), weight), times), floats, &out[x].x);
+    };
+    if (right - left <= 2 * lanes) {  // the usual case: the row becomes twice as long
+      const auto low = hn::LoadU(floats, values + left);
+      const auto high = hn::LoadU(floats, values + left + lanes);
+      blend([&](int i) {
+        return Lookup<Floats>(hn::Sub(index, hn::Set(Words(), left - i)))(low, high);
+      });
+    } else {
+      blend([&](int i) { return hn::GatherIndex(floats, values + i, index); });
+    }
   }
 }
 

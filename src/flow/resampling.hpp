@@ -31,7 +31,8 @@ class Resampling {
 /// end of `out`.
 void resample_row(const float* row, const Resampling& resampling, float* out);
 
-/// Resamples a row of a flow, likewise, and multiplies it by `factor`.
+/// Resamples a row of a flow, likewise, and multiplies it by `factor`. Reads up to a vector past
+/// its end.
 void resample_row(const Flow* row, const Resampling& resampling, float factor, Flow* out);
 
 /// The same for columns [first, last) alone.

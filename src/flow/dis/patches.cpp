@@ -466,6 +466,8 @@ void divide_row(const SumRow& sums, int y, SplitPlane& flow_x, SplitPlane& flow_
       hn::StoreU(hn::Div(y_[parity], weight[parity]), floats, flow_y.row(parity, y) + k);
     }
   }
+  flow_x.replicate_ends(y);
+  flow_y.replicate_ends(y);
 }
 
 template <int side>

@@ -44,7 +44,10 @@ class SplitPlane {
   /// exist.
   float* row(int parity, int y) { return values_.data() + start_of(parity, y); }
   const float* row(int parity, int y) const { return values_.data() + start_of(parity, y); }
+  float& at(int x, int y) { return row(x & 1, y)[x / 2]; }
   float at(int x, int y) const { return row(x & 1, y)[x / 2]; }
+  /// From row 0 to row y; the same for all planes of this width.
+  std::ptrdiff_t offset(int y) const { return 2 * odd_ * y; }
 
   /// Makes the pixels beside row y equal to its first and last ones.
   void replicate_ends(int y) {

@@ -17,8 +17,9 @@ namespace {
 
 using Floats = hn::CappedTag<float, row_padding>;
 using Vector = hn::Vec<Floats>;
+using Ints = hn::RebindToSigned<Floats>;
 using Field = VariationalRefinement::Field;
-using Constraints = VariationalRefinement::Constraints;
+using Derivatives = VariationalRefinement::Derivatives;
 using Scratch = VariationalRefinement::Scratch;
 using EquationRows = SplitPlanes<VariationalRefinement::max_coefficients>;
 
@@ -52,7 +53,7 @@ HWY_INLINE Vector square(Vector value) {
 /// two steps of Newton's method, the first with the factors that are best for one step. Faster than
 /// a square root and a division.
 HWY_INLINE Vector inverse_sqrt(Vector value) {
-  const hn::RebindToSigned<Floats> ints;
+  const Ints ints;
   const auto bits = hn::ShiftRight<1>(hn::BitCast(ints, value));
   auto root = hn::BitCast(Floats(), hn::Sub(hn::Set(ints, 0x5F1FFFF9), bits));
   root = hn::Mul(hn::Mul(root, set(0.703952253F)),
@@ -91,30 +92,23 @@ int ring(int y) {
   return y & (Scratch::rows - 1);
 }
 
-/// Linearises the images at a flow.
+/// Computes the derivatives of the images where a flow leads.
 class Linearisation {
  public:
   Linearisation(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, const Field& flow,
-                Scratch& scratch, Constraints& out)
+                Scratch& scratch, Derivatives& out)
       : from_(from), to_(to), flow_(flow), scratch_(scratch), out_(out), end_(from.height() - 1) {}
 
   /// Rows [first, last).
   void run(int first, int last) {
-    int warped = std::max(0, first - 2);
-    int sloped = std::max(0, first - 1);
+    int warped = std::max(0, first - 1);
     for (int y = first; y < last; ++y) {
-      for (; warped <= std::min(y + 2, end_); ++warped) warp(warped);
-      for (; sloped <= std::min(y + 1, end_); ++sloped) slope(sloped);
-      linearise(y);
+      for (; warped <= std::min(y + 1, end_); ++warped) warp(warped);
+      derive(y);
     }
   }
 
  private:
-  using Ints = hn::RebindToSigned<Floats>;
-
-  int above(int y) const { return ring(std::max(y - 1, 0)); }
-  int below(int y) const { return ring(std::min(y + 1, end_)); }
-
   /// Rounds and limits positions in the later image.
   static HWY_INLINE Vector place(Vector exact, int size) {
     const auto rounded = hn::Mul(hn::Round(hn::Mul(exact, set(fractions))), set(1 / fractions));
@@ -134,7 +128,6 @@ class Linearisation {
   void warp(int y) {
     for (int parity = 0; parity < 2; ++parity) warp(y, parity);
     scratch_.mean.replicate_ends(ring(y));
-    scratch_.change.replicate_ends(ring(y));
   }
   void warp(int y, int parity) {
     const Floats floats;
@@ -178,75 +171,44 @@ class Linearisation {
     }
   }
 
-  Neighbours neighbours(const SplitPlane& plane, int parity, int y) const {
-    return {plane, parity, ring(y), above(y), below(y)};
-  }
-
-  void slope(int y) {
+  void derive(int y) {
+    const int here = ring(y);
+    const int above = ring(std::max(y - 1, 0));
+    const int below = ring(std::min(y + 1, end_));
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int parity = 0; parity < 2; ++parity) {
-      const auto mean = neighbours(scratch_.mean, parity, y);
-      float* x = scratch_.slope.x.row(parity, ring(y));
-      float* y_ = scratch_.slope.y.row(parity, ring(y));
+      const Neighbours mean(scratch_.mean, parity, here, above, below);
+      float* x = out_.x.row(parity, y);
+      float* y_ = out_.y.row(parity, y);
       for (int k = 0; k < flow_.x.count(parity); k += lanes) {
         store(mean.across(k), x + k);
         store(mean.along(k), y_ + k);
       }
     }
-    scratch_.slope.x.replicate_ends(ring(y));
-  }
-
-  /// Stores a constraint on the flow, from one on the step from the given flow.
-  static HWY_INLINE void put(Vector a, Vector b, Vector c, Vector flow_x, Vector flow_y,
-                             float* out) {
-    const auto scale = inverse_sqrt(hn::Add(hn::Add(square(a), square(b)), set(min_gradient)));
-    const auto at_0 = hn::Sub(c, hn::Add(hn::Mul(a, flow_x), hn::Mul(b, flow_y)));
-    store(hn::Mul(a, scale), out);
-    store(hn::Mul(b, scale), out + Constraints::block);
-    store(hn::Mul(at_0, scale), out + 2 * Constraints::block);
-  }
-
-  void linearise(int y) {
-    const int lanes = static_cast<int>(hn::Lanes(Floats()));
-    for (int parity = 0; parity < 2; ++parity) {
-      const auto slope_x = neighbours(scratch_.slope.x, parity, y);
-      const auto slope_y = neighbours(scratch_.slope.y, parity, y);
-      const auto change = neighbours(scratch_.change, parity, y);
-      const float* flow_x_row = flow_.x.row(parity, y);
-      const float* flow_y_row = flow_.y.row(parity, y);
-      float* constraints = out_.row(parity, y);
-      for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-        const auto flow_x = load(flow_x_row + k);
-        const auto flow_y = load(flow_y_row + k);
-        const auto xy = slope_x.along(k);
-        float* out = constraints + Constraints::at(k);
-        put(load(slope_x.here + k), load(slope_y.here + k), load(change.here + k), flow_x, flow_y,
-            out);
-        put(slope_x.across(k), xy, change.across(k), flow_x, flow_y, out + 3 * Constraints::block);
-        put(xy, slope_y.along(k), change.along(k), flow_x, flow_y, out + 6 * Constraints::block);
-      }
-    }
+    out_.x.replicate_ends(y);
+    out_.t.copy_row(y, scratch_.change, here);
+    out_.t.replicate_ends(y);
   }
 
   const Image<std::uint8_t>& from_;
   const Image<std::uint8_t>& to_;
   const Field& flow_;
   Scratch& scratch_;
-  Constraints& out_;
+  Derivatives& out_;
   int end_;
 };
 
 void linearise_rows(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
-                    const Field& flow, int first, int last, Scratch& scratch, Constraints& out) {
+                    const Field& flow, int first, int last, Scratch& scratch, Derivatives& out) {
   Linearisation(from, to, flow, scratch, out).run(first, last);
 }
 
 /// Evaluates the penalties at a flow, and improves the flow.
 class Relaxation {
  public:
-  Relaxation(const Constraints& constraints, const Field& start, const Field& flow, int first,
+  Relaxation(const Derivatives& derivatives, const Field& start, const Field& flow, int first,
              int last, Scratch& scratch, Field& out)
-      : constraints_(constraints),
+      : derivatives_(derivatives),
         start_(start),
         flow_(flow),
         first_(first),
@@ -263,11 +225,9 @@ class Relaxation {
     const int end = std::min(height_, last_ + reach);
     load_row(begin - 1);
     load_row(begin);
-    couple(begin - 1);
     for (int y = begin; y < last_ + reach; ++y) {
       if (y < end) {
         load_row(y + 1);
-        couple(y);
         for (int parity = 0; parity < 2; ++parity) assemble(y, parity);
       }
       relax(y);
@@ -276,42 +236,42 @@ class Relaxation {
   }
 
  private:
+  /// Copies the flow of a row, and computes how much a pixel and the ones to the right and below
+  /// pull at each other: little where the flow changes much. Outside the image, the flow is 0, and
+  /// nothing pulls.
   void load_row(int y) {
     const int to = ring(y);
-    const auto load_component = [&](const SplitPlane& from, SplitPlane& row) {
-      if (y < 0 || y >= height_) {
-        row.clear_row(to);
-        return;
-      }
-      row.copy_row(to, from, y);
-      row.replicate_ends(to);
-    };
-    load_component(flow_.x, scratch_.flow.x);
-    load_component(flow_.y, scratch_.flow.y);
-  }
-
-  /// Computes how much pixels pull at each other: little where the flow changes much.
-  void couple(int y) {
-    const int here = ring(y);
-    if (y < 0) {
-      scratch_.down.clear_row(here);
+    if (y < 0 || y >= height_) {
+      for (auto* plane : {&scratch_.flow.x, &scratch_.flow.y, &scratch_.weight})
+        plane->clear_row(to);
       return;
     }
-    const int below = y + 1 < height_ ? ring(y + 1) : here;
+    const int below = std::min(y + 1, height_ - 1);
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int parity = 0; parity < 2; ++parity) {
-      const Neighbours x(scratch_.flow.x, parity, here, here, below);
-      const Neighbours y_(scratch_.flow.y, parity, here, here, below);
-      float* right = scratch_.right.row(parity, here);
-      float* down = scratch_.down.row(parity, here);
+      const Neighbours x(flow_.x, parity, y, y, below);
+      const Neighbours y_(flow_.y, parity, y, y, below);
+      float* x_row = scratch_.flow.x.row(parity, to);
+      float* y_row = scratch_.flow.y.row(parity, to);
+      float* weights = scratch_.weight.row(parity, to);
+      float* right = scratch_.right.row(parity, y & 1);
       for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-        const auto by = weight(smoothness, hn::Add(squares(x, k), squares(y_, k)));
+        const auto squared = hn::Add(squares(x, k), squares(y_, k));
+        const auto by = weight(smoothness, hn::Add(squared, set(min_residual)));
+        store(load(x.here + k), x_row + k);
+        store(load(y_.here + k), y_row + k);
+        store(by, weights + k);
         store(by, right + k);
-        store(by, down + k);
       }
     }
-    scratch_.right.row((width_ - 1) & 1, here)[(width_ - 1) / 2] = 0;
-    if (y + 1 == height_) scratch_.down.clear_row(here);
+    scratch_.right.at(width_ - 1, y & 1) = 0;
+    clear_past_end(to, width_ & 1);
+  }
+
+  /// Past the end of a row, the flow is 0.
+  void clear_past_end(int row, int parity) {
+    const int count = flow_.x.count(parity);
+    scratch_.flow.x.row(parity, row)[count] = scratch_.flow.y.row(parity, row)[count] = 0;
   }
 
   /// Squares of the differences from the neighbours to the right and below.
@@ -321,47 +281,32 @@ class Relaxation {
                    square(hn::Sub(load(flow.below + k), value)));
   }
 
-  /// Constraint of a vector of pixels.
-  struct Term {
-    explicit HWY_INLINE Term(const float* from)
-        : a(load(from)),
-          b(load(from + Constraints::block)),
-          c(load(from + 2 * Constraints::block)) {}
+  /// a x + b y + c = 0 for a step (x, y) from the start.
+  struct Constraint {
     HWY_INLINE Vector residual(Vector x, Vector y) const {
       return hn::Add(hn::Add(c, hn::Mul(a, x)), hn::Mul(b, y));
+    }
+    /// Square of the gradient.
+    HWY_INLINE Vector norm() const {
+      return hn::Add(hn::Add(square(a), square(b)), set(min_gradient));
     }
     Vector a;
     Vector b;
     Vector c;
   };
 
-  struct PixelConstraints {
-    explicit HWY_INLINE PixelConstraints(const float* from)
-        : bright(from),
-          gradient_x(from + 3 * Constraints::block),
-          gradient_y(from + 6 * Constraints::block) {}
-    Term bright;
-    Term gradient_x;
-    Term gradient_y;
-  };
-
   /// Equations of a vector of pixels.
   struct Equations {
     // Not in the declarations: GCC 12 compiles these without the target's instructions.
-    HWY_INLINE Equations(Vector start_x, Vector start_y)
-        : xx(set(min_gradient)),
-          xy(set(0.0F)),
-          yy(xx),
-          x(hn::Mul(xx, start_x)),
-          y(hn::Mul(xx, start_y)) {}
-    HWY_INLINE void add(const Term& term, Vector weight) {
-      const auto a = hn::Mul(weight, term.a);
-      const auto b = hn::Mul(weight, term.b);
-      xx = hn::Add(xx, hn::Mul(a, term.a));
-      xy = hn::Add(xy, hn::Mul(a, term.b));
-      yy = hn::Add(yy, hn::Mul(b, term.b));
-      x = hn::Sub(x, hn::Mul(a, term.c));
-      y = hn::Sub(y, hn::Mul(b, term.c));
+    HWY_INLINE Equations() : xx(set(min_gradient)), xy(set(0.0F)), yy(xx), x(xy), y(xy) {}
+    HWY_INLINE void add(const Constraint& constraint, Vector weight) {
+      const auto a = hn::Mul(weight, constraint.a);
+      const auto b = hn::Mul(weight, constraint.b);
+      xx = hn::Add(xx, hn::Mul(a, constraint.a));
+      xy = hn::Add(xy, hn::Mul(a, constraint.b));
+      yy = hn::Add(yy, hn::Mul(b, constraint.b));
+      x = hn::Sub(x, hn::Mul(a, constraint.c));
+      y = hn::Sub(y, hn::Mul(b, constraint.c));
     }
     Vector xx;
     Vector xy;
@@ -371,128 +316,142 @@ class Relaxation {
   };
 
   static HWY_INLINE Vector weight(float factor, Vector squares) {
-    return hn::Mul(set(factor), inverse_sqrt(hn::Add(squares, set(min_residual))));
+    return hn::Mul(set(factor), inverse_sqrt(squares));
   }
 
-  /// Computes the equations of a row. Each depends on a long sequence of operations, so it is split
-  /// in two stages, of which the processor overlaps the vectors of a few columns.
+  /// Computes the equations of a row.
   void assemble(int y, int parity) {
-    constexpr int columns = 2 * row_padding;
-    HWY_ALIGN float bright_weights[columns];
-    HWY_ALIGN float gradient_weights[columns];
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     const int here = ring(y);
-    const float* constraints = constraints_.row(parity, y);
-    const float* start_x = start_.x.row(parity, y);
-    const float* start_y = start_.y.row(parity, y);
+    const auto derivative = [&](const SplitPlane& plane) {
+      return Neighbours(plane, parity, y, std::max(y - 1, 0), std::min(y + 1, height_ - 1));
+    };
+    const auto dx = derivative(derivatives_.x);
+    const auto dy = derivative(derivatives_.y);
+    const auto dt = derivative(derivatives_.t);
+    const float* start_x_row = start_.x.row(parity, y);
+    const float* start_y_row = start_.y.row(parity, y);
     const float* x_row = scratch_.flow.x.row(parity, here);
     const float* y_row = scratch_.flow.y.row(parity, here);
-    const float* left = beside(scratch_.right, parity, here);
-    const float* right = scratch_.right.row(parity, here);
-    const float* above = scratch_.down.row(parity, ring(y - 1));
-    const float* below = scratch_.down.row(parity, here);
+    const float* left = beside(scratch_.weight, parity, here);
+    const float* right = scratch_.right.row(parity, y & 1);
+    const float* above = scratch_.weight.row(parity, ring(y - 1));
+    const float* below = scratch_.weight.row(parity, y + 1 < height_ ? here : ring(y + 1));
     float* out = scratch_.equations.row(parity, here);
-    for (int first = 0; first < flow_.x.count(parity); first += columns) {
-      for (int i = 0; i < columns; i += lanes) {
-        const int k = first + i;
-        const auto x = load(x_row + k);
-        const auto y_ = load(y_row + k);
-        const PixelConstraints constraint(constraints + Constraints::at(k));
-        store(weight(brightness, square(constraint.bright.residual(x, y_))), bright_weights + i);
-        store(weight(gradient, hn::Add(square(constraint.gradient_x.residual(x, y_)),
-                                       square(constraint.gradient_y.residual(x, y_)))),
-              gradient_weights + i);
-      }
-      for (int i = 0; i < columns; i += lanes) {
-        const int k = first + i;
-        const PixelConstraints constraint(constraints + Constraints::at(k));
-        Equations equations(load(start_x + k), load(start_y + k));
-        const auto gradient_weight = load(gradient_weights + i);
-        equations.add(constraint.bright, load(bright_weights + i));
-        equations.add(constraint.gradient_x, gradient_weight);
-        equations.add(constraint.gradient_y, gradient_weight);
-        const auto all = hn::Add(hn::Add(load(left + k), load(right + k)),
-                                 hn::Add(load(above + k), load(below + k)));
-        const auto xx = hn::Add(equations.xx, all);
-        const auto yy = hn::Add(equations.yy, all);
-        const auto inverse = hn::Div(set(over_relaxation), hn::Mul(xx, yy));
-        float* to = out + EquationRows::at(k);
-        store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
-        store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
-        store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
-        store(equations.x, to + VariationalRefinement::constant_x * EquationRows::block);
-        store(equations.y, to + VariationalRefinement::constant_y * EquationRows::block);
-      }
+    for (int k = 0; k < flow_.x.count(parity); k += lanes) {
+      const auto start_x = load(start_x_row + k);
+      const auto start_y = load(start_y_row + k);
+      const auto x = hn::Sub(load(x_row + k), start_x);
+      const auto y_ = hn::Sub(load(y_row + k), start_y);
+      const auto xy = dx.along(k);
+      const Constraint bright = {load(dx.here + k), load(dy.here + k), load(dt.here + k)};
+      const Constraint gradient_x = {dx.across(k), xy, dt.across(k)};
+      const Constraint gradient_y = {xy, dy.along(k), dt.along(k)};
+      Equations equations;
+      add_brightness(bright, x, y_, equations);
+      add_gradient(gradient_x, gradient_y, x, y_, equations);
+      const auto all = hn::Add(hn::Add(load(left + k), load(right + k)),
+                               hn::Add(load(above + k), load(below + k)));
+      const auto xx = hn::Add(equations.xx, all);
+      const auto yy = hn::Add(equations.yy, all);
+      const auto inverse = hn::Div(set(over_relaxation), hn::Mul(xx, yy));
+      const auto constant_x = hn::Add(
+          equations.x, hn::Add(hn::Mul(equations.xx, start_x), hn::Mul(equations.xy, start_y)));
+      const auto constant_y = hn::Add(
+          equations.y, hn::Add(hn::Mul(equations.xy, start_x), hn::Mul(equations.yy, start_y)));
+      float* to = out + EquationRows::at(k);
+      store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
+      store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
+      store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
+      store(constant_x, to + VariationalRefinement::constant_x * EquationRows::block);
+      store(constant_y, to + VariationalRefinement::constant_y * EquationRows::block);
     }
   }
 
-  /// Every other pixel of a row.
+  // The square of a residual is divided by its norm, and so is its weight, which is
+  // factor / sqrt(square + min_residual). Both are multiplied by the norms instead.
+
+  static HWY_INLINE void add_brightness(const Constraint& bright, Vector x, Vector y,
+                                        Equations& equations) {
+    const auto norm = bright.norm();
+    const auto squares = hn::Add(square(bright.residual(x, y)), hn::Mul(norm, set(min_residual)));
+    equations.add(bright, weight(brightness, hn::Mul(norm, squares)));
+  }
+
+  static HWY_INLINE void add_gradient(const Constraint& gradient_x, const Constraint& gradient_y,
+                                      Vector x, Vector y, Equations& equations) {
+    const auto norm_x = gradient_x.norm();
+    const auto norm_y = gradient_y.norm();
+    const auto norms = hn::Mul(norm_x, norm_y);
+    const auto squares = hn::Add(hn::Add(hn::Mul(square(gradient_x.residual(x, y)), norm_y),
+                                         hn::Mul(square(gradient_y.residual(x, y)), norm_x)),
+                                 hn::Mul(norms, set(min_residual)));
+    const auto both = weight(gradient, hn::Mul(norms, squares));
+    equations.add(gradient_x, hn::Mul(both, norm_y));
+    equations.add(gradient_y, hn::Mul(both, norm_x));
+  }
+
+  /// Every other pixel of the rows, from the first column on; where a row starts is an offset that
+  /// all these planes share.
   struct Pixels {
-    Pixels() = default;
-    Pixels(Scratch& scratch, int parity, int row)
-        : x(scratch.flow.x.row(parity, row)),
-          y(scratch.flow.y.row(parity, row)),
-          beside_x(beside(scratch.flow.x, parity, row)),
-          beside_y(beside(scratch.flow.y, parity, row)),
-          left(beside(scratch.right, parity, row)),
-          right(scratch.right.row(parity, row)),
-          down(scratch.down.row(parity, row)),
-          equations(scratch.equations.row(parity, row)) {}
+    Pixels(Scratch& scratch, int parity)
+        : x(scratch.flow.x.row(parity, 0)),
+          y(scratch.flow.y.row(parity, 0)),
+          beside_x(beside(scratch.flow.x, parity, 0)),
+          beside_y(beside(scratch.flow.y, parity, 0)),
+          left(beside(scratch.weight, parity, 0)),
+          weight(scratch.weight.row(parity, 0)) {}
 
     float* x;
     float* y;
     const float* beside_x;
     const float* beside_y;
     const float* left;
-    const float* right;
-    const float* down;
-    const float* equations;
+    const float* weight;
   };
 
   /// Improves a vector of pixels in one row after the other, upwards.
   class Climb {
    public:
-    HWY_INLINE Climb(const Pixels& below, const Pixels& row, int k)
-        : below_x_(load(below.x + k)),
-          below_y_(load(below.y + k)),
-          x_(load(row.x + k)),
-          y_(load(row.y + k)),
-          down_(load(row.down + k)) {}
+    HWY_INLINE Climb(const Pixels& pixels, std::ptrdiff_t below, std::ptrdiff_t row)
+        : below_x_(load(pixels.x + below)),
+          below_y_(load(pixels.y + below)),
+          x_(load(pixels.x + row)),
+          y_(load(pixels.y + row)),
+          weight_(load(pixels.weight + row)) {}
 
-    HWY_INLINE void improve(const Pixels& row, const Pixels& above, int k) {
-      const float* equation = row.equations + EquationRows::at(k);
+    HWY_INLINE void improve(const Pixels& pixels, std::ptrdiff_t row, std::ptrdiff_t above,
+                            const float* equation) {
       const auto coefficient = [&](int which) HWY_ATTR {
         return load(equation + which * EquationRows::block);
       };
-      const auto above_x = load(above.x + k);
-      const auto above_y = load(above.y + k);
-      const auto up = load(above.down + k);
-      const auto left = load(row.left + k);
-      const auto right = load(row.right + k);
+      const auto above_x = load(pixels.x + above);
+      const auto above_y = load(pixels.y + above);
+      const auto up = load(pixels.weight + above);
+      const auto left = load(pixels.left + row);
       // What the row below adds comes last: it has just been computed.
       const auto pull = [&](const float* beside, Vector above_flow, Vector constant,
                             Vector below_flow) HWY_ATTR {
-        const auto along =
-            hn::Add(hn::Mul(left, load(beside + k)), hn::Mul(right, load(beside + k + 1)));
+        const auto along = hn::Add(hn::Mul(left, load(beside)), hn::Mul(weight_, load(beside + 1)));
         const auto sum = hn::Add(hn::Add(along, constant), hn::Mul(up, above_flow));
-        return hn::Add(sum, hn::Mul(down_, below_flow));
+        return hn::Add(sum, hn::Mul(weight_, below_flow));
       };
       const auto cross = coefficient(VariationalRefinement::cross);
       const auto keep = set(1 - over_relaxation);
       const auto pull_x = pull(
-          row.beside_x, above_x,
+          pixels.beside_x + row, above_x,
           hn::Sub(coefficient(VariationalRefinement::constant_x), hn::Mul(cross, y_)), below_x_);
-      const auto pull_y =
-          pull(row.beside_y, above_y, coefficient(VariationalRefinement::constant_y), below_y_);
+      const auto pull_y = pull(pixels.beside_y + row, above_y,
+                               coefficient(VariationalRefinement::constant_y), below_y_);
       below_x_ = hn::Add(hn::Mul(keep, x_),
                          hn::Mul(pull_x, coefficient(VariationalRefinement::inverse_x)));
       below_y_ = hn::Add(hn::Mul(keep, y_), hn::Mul(hn::Sub(pull_y, hn::Mul(cross, below_x_)),
                                                     coefficient(VariationalRefinement::inverse_y)));
-      store(below_x_, row.x + k);
-      store(below_y_, row.y + k);
+      store(below_x_, pixels.x + row);
+      store(below_y_, pixels.y + row);
       x_ = above_x;
       y_ = above_y;
-      down_ = up;
+      weight_ = up;
     }
 
    private:
@@ -500,7 +459,7 @@ class Relaxation {
     Vector below_y_;
     Vector x_;
     Vector y_;
-    Vector down_;
+    Vector weight_;
   };
 
   /// Half sweep i of row y - i, for every i: the same columns of all these rows. Most of what a row
@@ -510,28 +469,37 @@ class Relaxation {
     const int begin = std::max(0, y - height_ + 1);
     const int end = std::min({half_sweeps, y + 1, (y - first_ + reach) / 2 + 1});
     const int parity = y & 1;
-    Pixels rows[half_sweeps + 1];
-    for (int i = begin; i <= end; ++i) rows[i] = Pixels(scratch_, parity, ring(y - i));
-    const Pixels below(scratch_, parity, ring(y - begin + 1));
+    const Pixels pixels(scratch_, parity);
+    std::ptrdiff_t rows[half_sweeps + 1];
+    const float* equations[half_sweeps + 1];
+    for (int i = begin; i <= end; ++i) {
+      rows[i] = scratch_.weight.offset(ring(y - i));
+      equations[i] = scratch_.equations.row(parity, ring(y - i));
+    }
+    const auto below = scratch_.weight.offset(ring(y - begin + 1));
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     const int count = flow_.x.count(parity);
     for (int k = 0; k < count; k += 2 * lanes) {
-      Climb left(below, rows[begin], k);
-      Climb right(below, rows[begin], k + lanes);
+      const auto at = EquationRows::at(k);
+      const auto next = EquationRows::at(k + lanes);
+      Climb left(pixels, below + k, rows[begin] + k);
+      Climb right(pixels, below + k + lanes, rows[begin] + k + lanes);
       for (int i = begin; i < end; ++i) {
-        left.improve(rows[i], rows[i + 1], k);
-        right.improve(rows[i], rows[i + 1], k + lanes);
+        left.improve(pixels, rows[i] + k, rows[i + 1] + k, equations[i] + at);
+        right.improve(pixels, rows[i] + k + lanes, rows[i + 1] + k + lanes, equations[i] + next);
       }
     }
-    for (int i = begin; i < end; ++i) rows[i].x[count] = rows[i].y[count] = 0;  // outside the image
+    for (int i = begin; i < end; ++i) clear_past_end(ring(y - i), parity);
   }
 
   void store_row(int y) {
     out_.x.copy_row(y, scratch_.flow.x, ring(y));
     out_.y.copy_row(y, scratch_.flow.y, ring(y));
+    out_.x.replicate_ends(y);
+    out_.y.replicate_ends(y);
   }
 
-  const Constraints& constraints_;
+  const Derivatives& derivatives_;
   const Field& start_;
   const Field& flow_;
   int first_;
@@ -543,9 +511,9 @@ class Relaxation {
 };
 
 /// Rows [first, last).
-void relax_rows(const Constraints& constraints, const Field& start, const Field& flow, int first,
+void relax_rows(const Derivatives& derivatives, const Field& start, const Field& flow, int first,
                 int last, Scratch& scratch, Field& out) {
-  Relaxation(constraints, start, flow, first, last, scratch, out).run();
+  Relaxation(derivatives, start, flow, first, last, scratch, out).run();
 }
 
 /// Interleaves the components of a row.
@@ -584,7 +552,7 @@ int band_count_for(int height, int threads) {
 VariationalRefinement::VariationalRefinement(int width, int height)
     : start_(width, height),
       flows_{Field(width, height), Field(width, height)},
-      constraints_(width, height) {}
+      derivatives_(width, height) {}
 
 void VariationalRefinement::run(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
                                 ThreadPool& threads) {
@@ -598,13 +566,13 @@ void VariationalRefinement::run(const Image<std::uint8_t>& from, const Image<std
   };
   for_each_band([&](int first, int last, Scratch& scratch) {
     HWY_DYNAMIC_DISPATCH(linearise_rows)
-    (from, to, start_, first, last, scratch, constraints_);
+    (from, to, start_, first, last, scratch, derivatives_);
   });
   for (int i = 0; i < evaluations; ++i) {
     const Field& flow = i == 0 ? start_ : flows_[0];
     for_each_band([&](int first, int last, Scratch& scratch) {
       HWY_DYNAMIC_DISPATCH(relax_rows)
-      (constraints_, start_, flow, first, last, scratch, flows_[1]);
+      (derivatives_, start_, flow, first, last, scratch, flows_[1]);
     });
     std::swap(flows_[0], flows_[1]);
   }

@@ -26,9 +26,14 @@ class VariationalRefinement {
     SplitPlane y;
   };
 
-  /// Brightness constancy and that of both gradients, linearised: a x + b y + c = 0 for a flow
-  /// (x, y), each scaled by the gradient it depends on. a, b and c of each.
-  using Constraints = SplitPlanes<3 * 3>;
+  /// Derivatives of the images: along x and y, over two pixels, of their mean, and from the earlier
+  /// to the later one.
+  struct Derivatives {
+    Derivatives(int width, int height) : x(width, height), y(width, height), t(width, height) {}
+    SplitPlane x;
+    SplitPlane y;
+    SplitPlane t;
+  };
 
   /// Equations of a pixel: relaxation adds inverse_x (constant_x - cross y + what the neighbours
   /// add) to a multiple of its flow in x, and likewise in y.
@@ -40,22 +45,20 @@ class VariationalRefinement {
 
     explicit Scratch(int width)
         : flow(width, rows),
-          right(width, rows),
-          down(width, rows),
+          weight(width, rows),
+          right(width, 2),
           equations(width, rows),
           mean(width, rows),
-          change(width, rows),
-          slope(width, rows) {}
+          change(width, rows) {}
 
     Field flow;
-    SplitPlane right;  ///< how much a pixel and the one to the right pull at each other
-    SplitPlane down;
+    SplitPlane weight;  ///< how much a pixel and the ones to the right and below pull at each other
+    SplitPlane right;   ///< of the last two rows, but 0 for their last pixels
     SplitPlanes<max_coefficients> equations;
 
     // Of the images.
     SplitPlane mean;
     SplitPlane change;
-    Field slope;
   };
 
   VariationalRefinement(int width, int height);
@@ -73,7 +76,7 @@ class VariationalRefinement {
  private:
   Field start_;
   std::array<Field, 2> flows_;  ///< the current one, the next one
-  Constraints constraints_;
+  Derivatives derivatives_;
   std::vector<Scratch> scratch_;
 };
 

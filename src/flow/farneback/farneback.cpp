@@ -28,7 +28,7 @@ int expansion_bands(int height) {
 struct Tiles {
   Tiles(int level_width, int threads) : width(level_width) {
     constexpr int min_columns = 80;
-    constexpr int max_columns = 480;
+    constexpr int max_columns = 960;
     count = std::clamp(width / min_columns, 1, std::max(threads, width / max_columns));
   }
   int left(int tile) const {

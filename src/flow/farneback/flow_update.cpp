@@ -22,56 +22,46 @@ using Words = hn::Rebind<std::int32_t, Floats>;
 using Vector = hn::Vec<Floats>;
 using WordVector = hn::Vec<Words>;
 constexpr int coefficients = PolynomialExpansion::coefficients;
+constexpr std::ptrdiff_t group = PolynomialExpansion::group;
 constexpr int reach = FlowUpdate::reach;
 constexpr int side = FlowUpdate::side;
 constexpr int strip = FlowUpdate::strip;
 /// Coefficients of the normal equations: symmetric 2x2 matrix and right-hand side.
 constexpr int equations = FlowUpdate::equations;
 
-/// Weights of three neighbouring columns or rows, of which each lane has two at most.
-struct Weights {
-  Vector first;
-  Vector second;
-  Vector third;
+/// Polynomials of a row, interpolated between columns.
+struct Columns {
+  Lookup<Floats> first;
+  Lookup<Floats> second;
+  Vector left;  ///< weight of the first
+  Vector right;
+
+  HWY_INLINE Vector of(const float* low_lanes, const float* high_lanes) const {
+    const Floats floats;
+    const auto low = hn::Load(floats, low_lanes);
+    const auto high = hn::Load(floats, high_lanes);
+    return hn::Add(hn::Mul(left, first(low, high)), hn::Mul(right, second(low, high)));
+  }
 };
 
-/// Adds polynomials of `columns` x `rows` pixels, weighted: lane i reads `at` i pixels further.
-template <int columns, int rows>
-HWY_INLINE void add_weighted(const float* at, std::ptrdiff_t stride, const Weights& across,
-                             const Weights& down, Vector* sums) {
-  const Floats floats;
-  const auto upper_first = hn::Mul(down.first, across.first);
-  const auto upper_second = hn::Mul(down.first, across.second);
-  const auto upper_third = hn::Mul(down.first, across.third);
-  const auto middle_first = hn::Mul(down.second, across.first);
-  const auto middle_second = hn::Mul(down.second, across.second);
-  const auto middle_third = hn::Mul(down.second, across.third);
-  const auto lower_first = hn::Mul(down.third, across.first);
-  const auto lower_second = hn::Mul(down.third, across.second);
-  const auto lower_third = hn::Mul(down.third, across.third);
-  for (int k = 0; k < coefficients; ++k) {
-    const float* upper = at + k * stride;
-    const float* middle = upper + coefficients * stride;
-    auto sum = hn::Add(sums[k], hn::Mul(upper_first, hn::LoadU(floats, upper)));
-    sum = hn::Add(sum, hn::Mul(upper_second, hn::LoadU(floats, upper + 1)));
-    if (columns == 3) sum = hn::Add(sum, hn::Mul(upper_third, hn::LoadU(floats, upper + 2)));
-    sum = hn::Add(sum, hn::Mul(middle_first, hn::LoadU(floats, middle)));
-    sum = hn::Add(sum, hn::Mul(middle_second, hn::LoadU(floats, middle + 1)));
-    if (columns == 3) sum = hn::Add(sum, hn::Mul(middle_third, hn::LoadU(floats, middle + 2)));
-    if (rows == 3) {
-      const float* lower = middle + coefficients * stride;
-      sum = hn::Add(sum, hn::Mul(lower_first, hn::LoadU(floats, lower)));
-      sum = hn::Add(sum, hn::Mul(lower_second, hn::LoadU(floats, lower + 1)));
-      if (columns == 3) sum = hn::Add(sum, hn::Mul(lower_third, hn::LoadU(floats, lower + 2)));
-    }
-    sums[k] = sum;
+/// Adds polynomials of `rows` rows, weighted.
+template <int rows>
+HWY_INLINE void add_weighted(const PolynomialExpansion& to, int column, int row,
+                             const Columns& columns, const Vector* weights, Vector* sums) {
+  constexpr int lanes = static_cast<int>(hn::MaxLanes(Floats()));
+  for (int i = 0; i < rows; ++i) {
+    const float* low = to.at(column, row + i);
+    const float* high = to.at(column + lanes, row + i);
+    for (int k = 0; k < coefficients; ++k)
+      sums[k] =
+          hn::Add(sums[k], hn::Mul(weights[i], columns.of(low + k * group, high + k * group)));
   }
 }
 
 /// Where the flow of a vector of pixels ends.
 struct Ends {
   hn::Mask<Words> inside;  ///< the image
-  WordVector column;       ///< of the pixel before the end, minus that of the first lane
+  WordVector column;       ///< of the pixel before the end
   WordVector row;
   Vector right;  ///< sub-pixel offset from that pixel
   Vector down;
@@ -87,73 +77,61 @@ struct Ends {
                                    hn::And(hn::Ge(to_y, zero), hn::Le(to_y, lower_end)));
     const auto in_x = hn::IfThenElseZero(is_inside, to_x);
     const auto in_y = hn::IfThenElseZero(is_inside, to_y);
-    const auto x0 = hn::ConvertTo(Words(), in_x);
     inside = hn::RebindMask(Words(), is_inside);
+    column = hn::ConvertTo(Words(), in_x);
     row = hn::ConvertTo(Words(), in_y);
-    column = hn::Sub(x0, hn::Iota(Words(), 0));
-    right = hn::Sub(in_x, hn::ConvertTo(floats, x0));
+    right = hn::Sub(in_x, hn::ConvertTo(floats, column));
     down = hn::Sub(in_y, hn::ConvertTo(floats, row));
   }
 };
 
 /// Interpolates the later polynomials bilinearly; outside the image they are 0.
 ///
-/// Neighbours mostly move alike: relative to its lane, a cell of four pixels is that of the other
-/// lanes or the one beside it. Lanes for which this holds read the same vectors of 3x3 pixels;
-/// those that a lane does not need have weight 0, which leaves its sum as it is. The other lanes
-/// follow, in groups that are chosen in the same way.
+/// Neighbours mostly move alike: they end between columns of the same two vectors, in one row or
+/// the one beside it. Lanes for which this holds read the same three rows; one that a lane does not
+/// need has weight 0, which leaves its sum as it is. The other lanes follow, chosen in the same
+/// way.
 HWY_INLINE void interpolate(const PolynomialExpansion& to, const Ends& ends, Vector* sums) {
   const Words words;
   const Floats floats;
-  const auto zero = hn::Zero(floats);
+  constexpr int lanes = static_cast<int>(hn::MaxLanes(words));
   const auto left = hn::Sub(hn::Set(floats, 1.0F), ends.right);
   const auto up = hn::Sub(hn::Set(floats, 1.0F), ends.down);
-  HWY_ALIGN std::int32_t columns[hn::MaxLanes(words)];
-  HWY_ALIGN std::int32_t rows[hn::MaxLanes(words)];
+  HWY_ALIGN std::int32_t columns[lanes];
+  HWY_ALIGN std::int32_t rows[lanes];
   hn::Store(ends.column, words, columns);
   hn::Store(ends.row, words, rows);
-  for (int k = 0; k < coefficients; ++k) sums[k] = zero;
+  for (int k = 0; k < coefficients; ++k) sums[k] = hn::Zero(floats);
   auto remaining = ends.inside;
   for (;;) {
     const auto lane = hn::FindFirstTrue(words, remaining);
     if (lane < 0) return;
-    // Of the cell of this lane and the one before it, if any lane has that.
-    const auto first_of = [&](WordVector cells, int cell) {
-      const auto before = hn::Eq(cells, hn::Set(words, cell - 1));
-      return hn::AllFalse(words, hn::And(before, remaining)) ? cell : cell - 1;
+    const int column = columns[lane] & -lanes;
+    const auto before = hn::Eq(ends.row, hn::Set(words, rows[lane] - 1));
+    const int row = rows[lane] - (hn::AllFalse(words, hn::And(before, remaining)) ? 0 : 1);
+    const auto index = hn::Sub(ends.column, hn::Set(words, column));
+    const auto in_columns =
+        hn::And(hn::Gt(index, hn::Set(words, -1)), hn::Lt(index, hn::Set(words, 2 * lanes - 1)));
+    const auto in_reach = hn::And(in_columns, remaining);
+    const auto in_upper = hn::And(hn::Eq(ends.row, hn::Set(words, row)), in_reach);
+    const auto in_lower = hn::And(hn::Eq(ends.row, hn::Set(words, row + 1)), in_reach);
+    remaining = hn::AndNot(hn::Or(in_upper, in_lower), remaining);
+    const auto upper = hn::RebindMask(floats, in_upper);
+    const auto lower = hn::RebindMask(floats, in_lower);
+    const Vector weights[] = {
+        hn::IfThenElseZero(upper, up),
+        hn::IfThenElse(upper, ends.down, hn::IfThenElseZero(lower, up)),
+        hn::IfThenElseZero(lower, ends.down),
     };
-    const int column = first_of(ends.column, columns[lane]);
-    const int row = first_of(ends.row, rows[lane]);
-    const auto in_first = hn::Eq(ends.column, hn::Set(words, column));
-    const auto in_second = hn::Eq(ends.column, hn::Set(words, column + 1));
-    const auto in_upper = hn::Eq(ends.row, hn::Set(words, row));
-    const auto in_lower = hn::Eq(ends.row, hn::Set(words, row + 1));
-    const auto here =
-        hn::And(hn::And(hn::Or(in_first, in_second), hn::Or(in_upper, in_lower)), remaining);
-    remaining = hn::AndNot(here, remaining);
-    const auto lanes_of = [&](auto mask) { return hn::RebindMask(floats, mask); };
-    const auto first = lanes_of(in_first);
-    const auto upper = lanes_of(hn::And(in_upper, here));
-    const auto lower = lanes_of(hn::And(in_lower, here));
-    const Weights across{hn::IfThenElseZero(first, left), hn::IfThenElse(first, ends.right, left),
-                         hn::IfThenElse(first, zero, ends.right)};
-    const Weights down{hn::IfThenElseZero(upper, up),
-                       hn::IfThenElse(upper, ends.down, hn::IfThenElseZero(lower, up)),
-                       hn::IfThenElseZero(lower, ends.down)};
-    const float* at = to.row(row) + column;
-    for (int k = 0; k < coefficients; ++k)
-      hwy::Prefetch(at + (coefficients + k) * to.stride() + strip);
-    if (hn::AllFalse(words, hn::And(in_second, here))) {
-      if (hn::AllFalse(floats, lower))
-        add_weighted<2, 2>(at, to.stride(), across, down, sums);
-      else
-        add_weighted<2, 3>(at, to.stride(), across, down, sums);
-    } else {
-      if (hn::AllFalse(floats, lower))
-        add_weighted<3, 2>(at, to.stride(), across, down, sums);
-      else
-        add_weighted<3, 3>(at, to.stride(), across, down, sums);
-    }
+    const Lookup<Floats> first(index);
+    const Lookup<Floats> second(hn::Add(index, hn::Set(words, 1)));
+    const Columns between{first, second, left, ends.right};
+    const float* next = to.at(column + strip, row + 1);
+    for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
+    if (hn::AllFalse(floats, lower))
+      add_weighted<2>(to, column, row, between, weights, sums);
+    else
+      add_weighted<3>(to, column, row, between, weights, sums);
   }
 }
 
@@ -201,11 +179,10 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
     const Ends ends(to, dx, dy, x, y);
     Vector there[coefficients];
     interpolate(to, ends, there);
-    const auto here = [&](int k) {
-      const float* coefficient = from.row(y, k) + x;
-      hwy::Prefetch(coefficient + strip);
-      return hn::LoadU(floats, coefficient);
-    };
+    const float* polynomials = from.at(x, y);
+    const float* next = from.at(x + strip, y);
+    for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
+    const auto here = [&](int k) { return hn::Load(floats, polynomials + k * group); };
     const auto weight = hn::Mul(hn::Set(floats, row_weight), hn::LoadU(floats, column_weights + x));
     // Outside the image, a is that of the earlier polynomial alone.
     const auto a_weight = hn::IfThenElse(hn::RebindMask(floats, ends.inside), half, one);
@@ -323,7 +300,7 @@ void update_block(const PolynomialExpansion& from, const PolynomialExpansion& to
   const int width = from.width();
   const int start = block * side;
   const int end = std::min(start + side, from.height() + 2 * reach);
-  const int begin = std::max(first - margin, 0);
+  const int begin = std::max(first - margin, 0) & -PolynomialExpansion::group;
   const int stop = std::min(last + margin, width);
   RowSums* sums =
       scratch_of(scratch.sums, static_cast<std::size_t>((stop - begin + strip - 1) / strip));

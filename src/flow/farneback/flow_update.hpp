@@ -31,7 +31,8 @@ class FlowUpdate {
   static constexpr int equations = 5;  ///< coefficients: symmetric 2x2 matrix and right-hand side
   static constexpr int border = 5;     ///< width of the border where polynomials weigh less
 
-  /// Columns of flow that are read on each side of those that are filled: `reach`, aligned.
+  /// Columns of flow that matter on each side of those that are filled: `reach`, aligned. Those
+  /// before them, up to a multiple of 16, are read too, and have no effect.
   static constexpr int margin = 8;
 
   /// Sums of the equations of a strip over fifteen rows.
@@ -56,7 +57,7 @@ class FlowUpdate {
   static constexpr int blocks(int height) { return (height + 2 * reach + side - 1) / side; }
 
   /// Fills columns [first, last), multiples of 8 or the border, of the `side` rows that end with
-  /// the first row of a block. Reads `flow` in `margin` more columns on each side, and in the rows
+  /// the first row of a block. Needs `flow` in `margin` more columns on each side, and in the rows
   /// from `reach` before to `reach` after that first row. To be called for all blocks in turn; does
   /// nothing for others.
   void run(const PolynomialExpansion& from, const PolynomialExpansion& to, const FlowRows& flow,

@@ -18,6 +18,8 @@ namespace {
 
 using Floats = hn::CappedTag<float, row_padding>;
 constexpr int reach = PolynomialExpansion::reach;
+constexpr std::ptrdiff_t group = PolynomialExpansion::group;
+constexpr int coefficients = PolynomialExpansion::coefficients;
 
 void fit_columns(const PolynomialExpansion::Window& window, int width, const FitKernels& kernels,
                  float* smooth, float* slope, float* bend) {
@@ -43,7 +45,7 @@ void fit_columns(const PolynomialExpansion::Window& window, int width, const Fit
 }
 
 void fit_row(const float* smooth, const float* slope, const float* bend, int width,
-             const FitKernels& kernels, float* out, std::ptrdiff_t stride) {
+             const FitKernels& kernels, float* out) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   for (int x = 0; x < width; x += lanes) {
@@ -66,10 +68,10 @@ void fit_row(const float* smooth, const float* slope, const float* bend, int wid
       a_xx = hn::Add(a_xx, hn::Mul(set(kernels.bend[k]), hn::Add(left, right)));
       a_xy = hn::Add(a_xy, hn::Mul(set(kernels.slope[k]), hn::Sub(right_slope, left_slope)));
     }
-    float* at_x = out + x;
+    float* at_x = out + (x / group * group * coefficients + x % group);
     for (const auto& coefficient : {b_y, b_x, a_yy, a_xx, a_xy}) {
-      hn::StoreU(coefficient, floats, at_x);
-      at_x += stride;
+      hn::Store(coefficient, floats, at_x);
+      at_x += group;
     }
   }
 }
@@ -108,7 +110,9 @@ FitKernels::FitKernels() {
 }
 
 PolynomialExpansion::PolynomialExpansion(int width, int height)
-    : width_(width), height_(height), planes_(width, coefficients * height, row_padding) {}
+    : width_(width),
+      height_(height),
+      groups_(static_cast<int>(place(width + 2 * group)), height + 1) {}
 
 void PolynomialExpansion::fit(int y, const Window& window, Scratch& scratch) {
   static const FitKernels kernels;
@@ -122,7 +126,7 @@ void PolynomialExpansion::fit(int y, const Window& window, Scratch& scratch) {
     std::fill_n(row + width_, reach, row[width_ - 1]);
   }
   HWY_DYNAMIC_DISPATCH(fit_row)
-  (rows[0], rows[1], rows[2], width_, kernels, planes_.row(coefficients * y), stride());
+  (rows[0], rows[1], rows[2], width_, kernels, groups_.row(y));
 }
 
 }  // namespace eventcamera

@@ -16,6 +16,7 @@ class PolynomialExpansion {
  public:
   static constexpr int coefficients = 5;  ///< in the order above
   static constexpr int reach = 5;         ///< pixels each way from the centre of a fit
+  static constexpr int group = 16;  ///< pixels of a row whose coefficients are stored together
   using Window = std::array<const float*, 2 * reach + 1>;  ///< rows y - reach ... y + reach
 
   PolynomialExpansion() = default;
@@ -23,23 +24,24 @@ class PolynomialExpansion {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  /// Coefficient k of each polynomial of a row; coefficient k + 1 is `stride` floats further on.
-  /// `row_padding` more to the left, twice as many to the right, and two rows below the last one
-  /// may be read, and are finite.
-  const float* row(int y, int k = 0) const { return planes_.row(coefficients * y + k); }
-  /// Floats.
-  std::ptrdiff_t stride() const {
-    return planes_.stride() / static_cast<std::ptrdiff_t>(sizeof(float));
-  }
+  /// First coefficient of the polynomial at (x, y); each of the others is `group` floats further
+  /// on. Those of `group` more pixels to the right and of the row below the last one may be read,
+  /// and are finite.
+  const float* at(int x, int y) const { return groups_.row(y) + place(x); }
 
   using Scratch = std::array<std::vector<float>, 3>;  ///< sums along the columns
   /// Fits row y.
   void fit(int y, const Window& window, Scratch& scratch);
 
  private:
+  static constexpr std::size_t place(int x) {
+    const auto column = static_cast<std::size_t>(x);
+    return column / group * group * coefficients + column % group;
+  }
+
   int width_ = 0;
   int height_ = 0;
-  Image<float> planes_;  ///< a row of each coefficient in turn
+  Image<float> groups_;  ///< in a group, each coefficient of all pixels in turn
 };
 
 /// Kernels of the least-squares fit, which is separable: each coefficient is one kernel along the
