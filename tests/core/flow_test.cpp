@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstring>
 #include <opencv2/core/utility.hpp>
+#include <random>
 #include <thread>
 
 #include "src/flow/dense_flow.hpp"
@@ -12,8 +13,9 @@
 #include "src/flow/opencv.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
-#include "src/simulate/motion.hpp"
+#include "src/simulate/moving_points.hpp"
 #include "tests/core/scene.hpp"
+#include "tests/core/targets.hpp"
 
 namespace {
 
@@ -188,6 +190,36 @@ TEST(FixedPoint, RoundsToTheNearestPixel) {
   EXPECT_EQ(moved(100, motion, 2), 105);
   EXPECT_EQ(moved(100, -motion, 1), 98);
   EXPECT_EQ(moved(100, -motion, 4), 90);
+}
+
+TEST(MovingPoints, AreWhereEachOfThemIs) {
+  constexpr int side = max_side;
+  constexpr int steps = 7;
+  constexpr int stride = side + 64;
+  MovingPoints points;
+  std::vector<MovingPoint> each;
+  std::vector<std::int32_t> memory;
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> position(0, side - 1);
+  while (each.size() < 40) {
+    targets::for_each([&](const char* target) {
+      for (int j = 0; j <= steps; ++j) {
+        const auto indices = points.at(j, stride, memory);
+        ASSERT_EQ(indices.size(), each.size());
+        for (std::size_t i = 0; i < each.size(); ++i) {
+          const auto [x, y] = each[i].at(j);
+          EXPECT_EQ(indices[i], y * stride + x) << target;
+        }
+      }
+    });
+    const Point start{position(random), position(random)};
+    const Flow flow{static_cast<float>(position(random) - start.x),
+                    static_cast<float>(position(random) - start.y)};
+    const auto point = moving_point(start, {flow, true}, steps, side, side);
+    ASSERT_TRUE(point);
+    points.push_back(*point);
+    each.push_back(*point);
+  }
 }
 
 TEST(OpenCvThreads, PutsBackWhatTheApplicationHadSet) {

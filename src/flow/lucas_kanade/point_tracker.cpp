@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
+
+#include "src/flow/lucas_kanade/texture.hpp"
 
 namespace eventcamera {
 namespace {
@@ -76,9 +79,12 @@ void PointTracker::follow(std::span<const Point> points, int left, int top, Bloc
     for (auto it = first; it != row.end() && it->x < left + block_side; ++it) {
       const auto index = static_cast<std::uint32_t>(&*it - points.data());
       block.points.push_back(index);
-      tracks_[index].flow = {0, 0};
+      tracks_[index] = {};
     }
   }
+  if (block.points.empty()) return;
+  constexpr std::size_t many = block_side;  // with fewer, that takes longer than it saves
+  if (block.points.size() >= many) drop_flat(points, left, top, block);
   if (block.points.empty()) return;
   block.ordered.resize(block.points.size());
   const int first_row = points[block.points.front()].y;
@@ -90,6 +96,28 @@ void PointTracker::follow(std::span<const Point> points, int left, int top, Bloc
          ((left + block_side) >> level) + Tile::after, (last_row >> level) + 1 + Tile::after});
     search(points, level, left, top, block);
   }
+}
+
+void PointTracker::drop_flat(std::span<const Point> points, int left, int top, Block& block) {
+  constexpr std::size_t tiles_across = block_side / Tile::side;
+  const auto& picture = last_.levels()[0];
+  const int first_tile = points[block.points.front()].y / Tile::side * Tile::side;
+  const int last_tile = points[block.points.back()].y / Tile::side * Tile::side;
+  block.gradients.compute(
+      picture, {left - Tile::before, first_tile - Tile::before, left + block_side + Tile::after,
+                last_tile + Tile::side + Tile::after});
+  std::array<std::optional<TilePixels>, tiles_across * tiles_across> tiles;
+  std::erase_if(block.points, [&](std::uint32_t index) {
+    const auto [x, y] = points[index];
+    const auto row = static_cast<std::size_t>((y - top) / Tile::side);
+    const auto column = static_cast<std::size_t>((x - left) / Tile::side);
+    auto& textured = tiles[row * tiles_across + column];
+    if (!textured)
+      textured = find_texture(block.gradients,
+                              {x / Tile::side * Tile::side, y / Tile::side * Tile::side, 0, 0});
+    const auto pixels = (*textured)[static_cast<std::size_t>(y % Tile::side)];
+    return (pixels >> x % Tile::side & 1) == 0;
+  });
 }
 
 void PointTracker::search(std::span<const Point> points, std::size_t level, int left, int top,

@@ -18,8 +18,8 @@ struct Point {
 
 /// Result of tracking a point.
 struct Track {
-  Flow flow;
-  bool found;  ///< false: the point was lost
+  Flow flow{};         ///< meaningless if not found
+  bool found = false;  ///< false: the point was lost
 };
 
 /// Pyramidal Lucas-Kanade from the last image to the next, each point independently: windows of
@@ -48,6 +48,9 @@ class PointTracker {
 
   void find_rows(std::span<const Point> points, int height);
   void follow(std::span<const Point> points, int left, int top, Block& block);
+  /// Drops the points that the search on the finest level would lose for want of texture, before
+  /// they are followed to it.
+  void drop_flat(std::span<const Point> points, int left, int top, Block& block);
   void search(std::span<const Point> points, std::size_t level, int left, int top, Block& block);
 
   Pyramid last_;

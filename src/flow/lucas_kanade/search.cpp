@@ -2,16 +2,18 @@
 #include "src/flow/lucas_kanade/search.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/core/simd-inl.hpp"
+#include "src/flow/lucas_kanade/window_sums-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -28,19 +30,12 @@ using Sum = hn::Vec<Sums>;
 using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
 
-constexpr int window = 15;
-constexpr int half_window = window / 2;
 /// A window row is processed as 16 values; the last one has weight 0.
 constexpr int row_values = 16;
 constexpr int max_moves = 10;
 constexpr float min_move = 0.03F;
 /// Two successive moves that cancel to within this distance oscillate: the search ends halfway.
 constexpr float turning_back = 0.01F;
-/// Minimum eigenvalue of the mean gradient matrix (structure tensor) for a point to be trackable.
-constexpr float min_texture = 1e-4F;
-/// Scale from gradient products (gradients are in 1/32 of a grey level) to the units of
-/// min_texture.
-constexpr float slope_product = 1.0F / (1 << 20);
 /// Scale from products of a gradient and a grey value (in 1/4 of a grey level) to the same units.
 constexpr float mismatch_product = slope_product * 8;
 
@@ -62,15 +57,18 @@ HWY_INLINE void for_each_row(const Body& body) {
 /// the sub-pixel offset that the points share.
 class Patch {
  public:
-  static constexpr int stride = 2 * row_values;
+  static constexpr int stride = window_columns;
 
   /// Covers points in rows first_row ... last_row of the tile.
   Patch(const Image<std::uint8_t>& picture, const ScharrGradients& gradients, const Tile& tile,
         int first_row, int last_row)
-      : first_row_(first_row) {
+      : left_(tile.left - Tile::before),
+        top_(tile.top + first_row - Tile::before),
+        first_row_(first_row),
+        rows_(last_row - first_row + 1) {
     const int rows = last_row - first_row + window;
-    const int x = tile.left - half_window;
-    const int y = tile.top + first_row - half_window;
+    const int x = left_;
+    const int y = top_;
     const Values values;
     const auto load_grey = [&](int row, int column) {
       const auto* at = picture.row(y + row) + x + column;
@@ -87,8 +85,15 @@ class Patch {
     interpolate(tile, rows, load_y, slope_y_);
   }
 
+  /// Position of the first value.
+  int left() const { return left_; }
+  int top() const { return top_; }
+  /// Rows of points.
+  int rows() const { return rows_; }
   /// Index of the first value of a point's window; its rows are `stride` values apart.
   int index(int x, int y) const { return (y - first_row_) * stride + x; }
+  /// Index of a point among the pixels of the tile from the first row of points on.
+  int pixel(int x, int y) const { return (y - first_row_) * Tile::side + x; }
   const std::int16_t* grey() const { return grey_; }
   const std::int16_t* slope_x() const { return slope_x_; }
   const std::int16_t* slope_y() const { return slope_y_; }
@@ -122,7 +127,10 @@ class Patch {
   HWY_ALIGN std::int16_t grey_[max_values];
   HWY_ALIGN std::int16_t slope_x_[max_values];
   HWY_ALIGN std::int16_t slope_y_[max_values];
+  int left_;
+  int top_;
   int first_row_;
+  int rows_;
 };
 
 /// Lane-wise sum of the products of two columns of vectors. 32 bits hold 15 of the largest
@@ -222,6 +230,125 @@ HWY_INLINE void store_both_parts(const BothSum& sum0, const BothSum& sum1, const
 }
 #endif
 
+/// Sums over a window of the products of both gradients and the pixels of the other image.
+struct GradientSums {
+  std::int32_t x;
+  std::int32_t y;
+};
+
+/// Sums of the windows of all pixels of a tile, moved by displacements where many points search.
+///
+/// Displacements are in whole pixels, and have an index of their own if they are near the start of
+/// the tile's first search. A search needs the sums at four corners: its displacement, and those
+/// one pixel to the right, one below, and both.
+class SharedSums {
+ public:
+  static constexpr int corners = 4;
+
+  SharedSums(const Image<std::uint8_t>& to, const Patch& patch, const Flow& start)
+      : to_(to),
+        patch_(patch),
+        first_x_(std::floor(start.x) - before),
+        first_y_(std::floor(start.y) - before) {}
+
+  /// Indices of displacements.
+  HWY_INLINE hn::Vec<Ints> index(hn::Vec<Floats> x, hn::Vec<Floats> y) const {
+    const Floats floats;
+    const auto column = hn::Sub(x, hn::Set(floats, first_x_));
+    const auto row = hn::Sub(y, hn::Set(floats, first_y_));
+    const auto last = hn::Set(floats, side - 1);
+    const auto near = hn::And(hn::And(hn::Ge(column, hn::Zero(floats)), hn::Lt(column, last)),
+                              hn::And(hn::Ge(row, hn::Zero(floats)), hn::Lt(row, last)));
+    const auto at = hn::Add(hn::Mul(row, hn::Set(floats, side)), column);
+    return hn::ConvertTo(Ints(), hn::IfThenElse(near, at, hn::Set(floats, far)));
+  }
+
+  /// Counts a search at a displacement.
+  void count(std::int32_t displacement) { ++searches_[displacement]; }
+
+  /// Computes the sums of a displacement if enough searches were counted there, which it forgets.
+  void share(std::int32_t displacement) {
+    if (std::exchange(searches_[displacement], std::uint16_t{0}) >= enough && displacement != far)
+      compute(displacement);
+  }
+
+  bool has(std::int32_t displacement) const { return corners_[displacement][0] != none; }
+
+  /// The sums of a pixel at corner c of a displacement that it has.
+  const GradientSums& at(std::int32_t displacement, int c, int pixel) const {
+    return sums_[corners_[displacement][c] - 1][pixel];
+  }
+
+ private:
+  static constexpr int side = 32;  ///< of the square of displacements that have an index
+  static constexpr float before = side / 2.0F;  ///< pixels of it on either side of the start
+  static constexpr std::int32_t far = side * side - 1;  ///< index of all other displacements
+  static constexpr int most = 64;                       ///< corners with sums
+  /// Searches at one displacement that take longer than the sums of all pixels.
+  static constexpr int enough = 12;
+  static constexpr std::uint8_t none = 0;
+
+  void compute(std::int32_t displacement) {
+    const std::array<std::int32_t, corners> all{displacement, displacement + 1, displacement + side,
+                                                displacement + side + 1};
+    if (count_ + corners > most || !all_within(displacement)) return;
+    for (std::size_t c = 0; c < all.size(); ++c) {
+      auto& number = numbers_[all[c]];
+      if (number == none) {
+        number = static_cast<std::uint8_t>(++count_);
+        sum(all[c], sums_[count_ - 1]);
+      }
+      corners_[displacement][c] = number;
+    }
+  }
+
+  int left(std::int32_t displacement) const {
+    return patch_.left() + static_cast<int>(first_x_) + displacement % side;
+  }
+  int top(std::int32_t displacement) const {
+    return patch_.top() + static_cast<int>(first_y_) + displacement / side;
+  }
+
+  /// True if the image has all rows of the windows at all corners.
+  bool all_within(std::int32_t displacement) const {
+    return top(displacement) >= -to_.margin() &&
+           top(displacement) + patch_.rows() + window <= to_.height() + to_.margin();
+  }
+
+  HWY_NOINLINE void sum(std::int32_t displacement, GradientSums* out) const {
+    const Columns columns;
+    const hn::Rebind<std::int16_t, Columns> slopes;
+    const hn::Rebind<std::uint8_t, Columns> bytes;
+    const int x = left(displacement);
+    const int y = top(displacement);
+    sum_windows<2>(
+        patch_.rows(),
+        [&](int row, int column) {
+          const int at = row * Patch::stride + column;
+          const auto pixels =
+              hn::PromoteTo(columns, hn::LoadU(bytes, to_.row(y + row) + x + column));
+          const auto dx = hn::PromoteTo(columns, hn::Load(slopes, patch_.slope_x() + at));
+          const auto dy = hn::PromoteTo(columns, hn::Load(slopes, patch_.slope_y() + at));
+          return std::array<Column, 2>{hn::Mul(dx, pixels), hn::Mul(dy, pixels)};
+        },
+        [&](int row, int column, const auto& left, const auto& right) {
+          hn::StoreInterleaved2(hn::Add(left[0], right[0]), hn::Add(left[1], right[1]), columns,
+                                &out[row * Tile::side + column].x);
+        });
+  }
+
+  const Image<std::uint8_t>& to_;
+  const Patch& patch_;
+  float first_x_;  ///< displacement of index 0
+  float first_y_;
+  int count_ = 0;
+  std::uint16_t searches_[side * side] = {};
+  /// Number of the sums at a displacement, counted from 1.
+  std::uint8_t numbers_[side * side] = {};
+  std::uint8_t corners_[side * side][corners] = {};
+  HWY_ALIGN GradientSums sums_[most][Tile::side * Tile::side];
+};
+
 /// Searches for the points of a tile, one lane per point.
 class Points {
  public:
@@ -235,13 +362,19 @@ class Points {
     for (int i = 0; i < count_; ++i) {
       const auto& search = searches[static_cast<std::size_t>(i)];
       window_[i] = patch.index(search.x, search.y);
-      left_[i] = static_cast<float>(tile.left + search.x - half_window);
-      top_[i] = static_cast<float>(tile.top + search.y - half_window);
+      pixel_[i] = patch.pixel(search.x, search.y);
+      left_[i] = static_cast<float>(tile.left + search.x - Tile::before);
+      top_[i] = static_cast<float>(tile.top + search.y - Tile::before);
       flow_x_[i] = search.flow.x;
       flow_y_[i] = search.flow.y;
       before_x_[i] = before_y_[i] = 0;
       cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
-      see(i);
+    }
+    if (count_ < share_from) {
+      for (int i = 0; i < count_; ++i) see(i);
+    } else {
+      see_all();
+      shared_.emplace(to, patch, searches.front().flow);
     }
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -250,15 +383,9 @@ class Points {
       const auto xx = hn::Mul(hn::Load(floats, xx_ + i), scale);
       const auto xy = hn::Mul(hn::Load(floats, xy_ + i), scale);
       const auto yy = hn::Mul(hn::Load(floats, yy_ + i), scale);
-      const auto difference = hn::Sub(xx, yy);
-      const auto cross = hn::Mul(xy, xy);
-      const auto root =
-          hn::Sqrt(hn::Add(hn::Mul(difference, difference), hn::Mul(hn::Set(floats, 4.0F), cross)));
-      const auto least = hn::Div(hn::Sub(hn::Add(xx, yy), root),
-                                 hn::Set(floats, static_cast<float>(2 * window * window)));
-      const auto determinant = hn::Sub(hn::Mul(xx, yy), cross);
+      const auto determinant = hn::Sub(hn::Mul(xx, yy), hn::Mul(xy, xy));
       const auto followed =
-          hn::And(hn::Ge(least, hn::Set(floats, min_texture)),
+          hn::And(hn::Ge(least_eigenvalue(floats, xx, xy, yy), hn::Set(floats, min_texture)),
                   hn::Ge(determinant, hn::Set(floats, std::numeric_limits<float>::epsilon())));
       const auto present =
           hn::FirstN(floats, static_cast<std::size_t>(std::min(lanes, count_ - i)));
@@ -280,8 +407,7 @@ class Points {
       locate(i, active, hn::Load(floats, flow_x_ + i), hn::Load(floats, flow_y_ + i));
     }
     for (int round = 0; round < max_moves; ++round) {
-      for (int k = 0; k < moved_count_; ++k) mismatch(moved_[k]);
-      moved_count_ = 0;
+      look();
       bool any = false;
       for (int i = 0; i < count_; i += lanes) {
         const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
@@ -306,6 +432,8 @@ class Points {
 
  private:
   static constexpr int most = Tile::side * Tile::side;
+  /// Points that take longer one by one than the sums of all pixels.
+  static constexpr int share_from = 12;
 
   /// Computes the sums over a point's window that stay constant during its search.
   void see(int i) {
@@ -348,6 +476,41 @@ class Points {
     here_y_[i] = static_cast<std::int32_t>(sums[5]);
   }
 
+  /// The same for all points, from the sums of all pixels of the tile.
+  void see_all() {
+    const Columns columns;
+    const hn::Rebind<std::int16_t, Columns> values;
+    enum { xx, yy, grey_x, grey_y, xy, xy_right };
+    HWY_ALIGN std::int32_t sums[6][most];
+    sum_windows<5>(
+        patch_.rows(),
+        [&](int row, int column) {
+          const int at = row * Patch::stride + column;
+          const auto dx = hn::PromoteTo(columns, hn::Load(values, patch_.slope_x() + at));
+          const auto dy = hn::PromoteTo(columns, hn::Load(values, patch_.slope_y() + at));
+          const auto grey = hn::PromoteTo(columns, hn::Load(values, patch_.grey() + at));
+          return std::array<Column, 5>{hn::Mul(dx, dx), hn::Mul(dy, dy), hn::Mul(dx, grey),
+                                       hn::Mul(dy, grey), hn::Mul(dx, dy)};
+        },
+        [&](int row, int column, const auto& left, const auto& right) {
+          const int at = row * Tile::side + column;
+          for (std::size_t k = 0; k < xy; ++k)
+            hn::Store(hn::Add(left[k], right[k]), columns, sums[k] + at);
+          hn::Store(left[xy], columns, sums[xy] + at);
+          hn::Store(right[xy], columns, sums[xy_right] + at);
+        });
+    for (int i = 0; i < count_; ++i) {
+      const int at = pixel_[i];
+      // Gradients are at most 4080, so squares need 32 bits without a sign, and products 33 with
+      // it.
+      xx_[i] = static_cast<float>(static_cast<std::uint32_t>(sums[xx][at]));
+      xy_[i] = static_cast<float>(std::int64_t{sums[xy][at]} + sums[xy_right][at]);
+      yy_[i] = static_cast<float>(static_cast<std::uint32_t>(sums[yy][at]));
+      here_x_[i] = sums[grey_x][at];
+      here_y_[i] = sums[grey_y][at];
+    }
+  }
+
   /// Mask of a window row: all bits set, except in the last of the 16 values.
   static Value weights(int column) {
     HWY_ALIGN static constexpr std::int16_t weight[row_values] = {-1, -1, -1, -1, -1, -1, -1, -1,
@@ -355,9 +518,27 @@ class Points {
     return hn::Load(Values(), weight + column);
   }
 
-  /// Computes the sums of gradient * (there - here) with the window at each of the four pixels
-  /// around its position in the other image.
-  void mismatch(int i) {
+  /// Gets the sums of gradient * there of points that entered another pixel.
+  void look() {
+    if (shared_) {
+      for (int k = 0; k < moved_count_; ++k) shared_->count(displacement_[moved_[k]]);
+      for (int k = 0; k < moved_count_; ++k) shared_->share(displacement_[moved_[k]]);
+    }
+    for (int k = 0; k < moved_count_; ++k) {
+      const int i = moved_[k];
+      if (shared_ && shared_->has(displacement_[i])) {
+        for (int c = 0; c < SharedSums::corners; ++c)
+          there_[c][i] = shared_->at(displacement_[i], c, pixel_[i]);
+      } else {
+        look(i);
+      }
+    }
+    moved_count_ = 0;
+  }
+
+  /// Computes the sums of gradient * there with the window at each of the four pixels around its
+  /// position in the other image.
+  void look(int i) {
     const Values values;
     const int lanes = static_cast<int>(hn::Lanes(values));
     const auto stride = to_.stride();
@@ -386,16 +567,14 @@ class Points {
     }
     HWY_ALIGN std::int32_t part[2 * parts * 4];
     store_both_parts(upper_left, upper_right, lower_left, lower_right, part);
-    const hn::CappedTag<std::int32_t, 4> four;
-    const auto store = [&](const std::int32_t* first, std::int32_t here, std::int32_t* out) {
-      for (int k = 0; k < 4; k += static_cast<int>(hn::Lanes(four))) {
-        auto sum = hn::Load(four, first + k);
-        if (parts == 2) sum = hn::Add(sum, hn::Load(four, first + 4 + k));
-        hn::Store(hn::Sub(hn::ShiftLeft<2>(sum), hn::Set(four, here)), four, out + k);
+    for (std::ptrdiff_t c = 0; c < SharedSums::corners; ++c) {
+      auto& sums = there_[c][i];
+      sums = {part[c], part[4 * parts + c]};
+      if (parts == 2) {
+        sums.x += part[4 + c];
+        sums.y += part[4 * parts + 4 + c];
       }
-    };
-    store(part, here_x_[i], mismatch_x_ + std::ptrdiff_t{4} * i);
-    store(part + 4 * parts, here_y_[i], mismatch_y_ + std::ptrdiff_t{4} * i);
+    }
   }
 
   /// Stores the pixels that points are in, queues points that entered another pixel in moved_, and
@@ -417,6 +596,7 @@ class Points {
     const auto row = hn::ConvertTo(ints, hn::IfThenElseZero(inside, y));
     const auto column = hn::ConvertTo(ints, hn::IfThenElseZero(inside, x));
     hn::Store(hn::Add(hn::Mul(row, stride), column), ints, at_ + i);
+    if (shared_) hn::Store(shared_->index(cell_x, cell_y), ints, displacement_ + i);
     const auto moved = hn::And(active, hn::Or(hn::Ne(cell_x, hn::Load(floats, cell_x_ + i)),
                                               hn::Ne(cell_y, hn::Load(floats, cell_y_ + i))));
     hn::Store(cell_x, floats, cell_x_ + i);
@@ -439,25 +619,29 @@ class Points {
         hn::Sub(hn::Add(flow_x, hn::Set(floats, right_)), hn::Load(floats, cell_x_ + i));
     const auto beyond_y =
         hn::Sub(hn::Add(flow_y, hn::Set(floats, down_)), hn::Load(floats, cell_y_ + i));
-    const auto bilinear = [&](const std::int32_t* mismatch) {
-      hn::Vec<Ints> upper_left;
-      hn::Vec<Ints> upper_right;
-      hn::Vec<Ints> lower_left;
-      hn::Vec<Ints> lower_right;
-      hn::LoadInterleaved4(ints, mismatch + std::ptrdiff_t{4} * i, upper_left, upper_right,
-                           lower_left, lower_right);
+    // Sums of gradient * (there - here).
+    hn::Vec<Floats> mismatch_x[SharedSums::corners];
+    hn::Vec<Floats> mismatch_y[SharedSums::corners];
+    for (int c = 0; c < SharedSums::corners; ++c) {
+      hn::Vec<Ints> there_x;
+      hn::Vec<Ints> there_y;
+      hn::LoadInterleaved2(ints, &there_[c][i].x, there_x, there_y);
+      const auto subtract = [&](auto there, const std::int32_t* here) {
+        return hn::ConvertTo(floats, hn::Sub(hn::ShiftLeft<2>(there), hn::Load(ints, here + i)));
+      };
+      mismatch_x[c] = subtract(there_x, here_x_);
+      mismatch_y[c] = subtract(there_y, here_y_);
+    }
+    const auto bilinear = [&](const auto& corners) {
       const auto between = [](auto a, auto b, auto part) {
         return hn::Add(a, hn::Mul(hn::Sub(b, a), part));
       };
-      const auto across = [&](auto left, auto right) {
-        return between(hn::ConvertTo(floats, left), hn::ConvertTo(floats, right), beyond_x);
-      };
-      return hn::Mul(
-          between(across(upper_left, upper_right), across(lower_left, lower_right), beyond_y),
-          hn::Set(floats, mismatch_product));
+      return hn::Mul(between(between(corners[0], corners[1], beyond_x),
+                             between(corners[2], corners[3], beyond_x), beyond_y),
+                     hn::Set(floats, mismatch_product));
     };
-    const auto x = bilinear(mismatch_x_);
-    const auto y = bilinear(mismatch_y_);
+    const auto x = bilinear(mismatch_x);
+    const auto y = bilinear(mismatch_y);
     const auto xx = hn::Load(floats, xx_ + i);
     const auto xy = hn::Load(floats, xy_ + i);
     const auto yy = hn::Load(floats, yy_ + i);
@@ -489,11 +673,13 @@ class Points {
 
   const Image<std::uint8_t>& to_;
   const Patch& patch_;
+  std::optional<SharedSums> shared_;  ///< if there are many points
   int count_;
   float right_;
   float down_;
   int moved_count_ = 0;
   int window_[most];  ///< index of its first value in the patch
+  int pixel_[most];   ///< its index among the pixels of the patch
   HWY_ALIGN float left_[most];
   HWY_ALIGN float top_[most];
   HWY_ALIGN float flow_x_[most];
@@ -509,12 +695,12 @@ class Points {
   HWY_ALIGN float cell_x_[most];
   HWY_ALIGN float cell_y_[most];
   HWY_ALIGN std::int32_t at_[most];  ///< offset of the window in the other image
-  std::int32_t here_x_[most];
-  std::int32_t here_y_[most];
+  HWY_ALIGN std::int32_t displacement_[most];
+  HWY_ALIGN std::int32_t here_x_[most];
+  HWY_ALIGN std::int32_t here_y_[most];
   /// Sums with the window at each of the four pixels around its position: upper left, upper right,
   /// lower left and lower right.
-  HWY_ALIGN std::int32_t mismatch_x_[4 * most];
-  HWY_ALIGN std::int32_t mismatch_y_[4 * most];
+  HWY_ALIGN GradientSums there_[SharedSums::corners][most];
   std::int16_t moved_[most];
 };
 

@@ -33,13 +33,13 @@ struct Search {
 
 /// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): moves a window of 15x15 pixels
 /// towards the minimum of its squared difference, at most 10 times, until a move is shorter than
-/// 0.03 pixels or undoes the last one. Needs the gradients
-/// of `from` where the windows are. At most one search per pixel
-/// of the tile.
+/// 0.03 pixels or undoes the last one. Needs the gradients of `from` where the windows are. At most
+/// one search per pixel of the tile.
 ///
 /// The window sum that determines a move is bilinear in the window's position, so it is
 /// interpolated between the integer sums at the four pixels around it. The window is summed once
 /// per pixel that a search visits, not once per move, and results are the same on every processor.
+/// Where many points have moved alike, the windows of all pixels of the tile are summed together.
 void search_tile(const Image<std::uint8_t>& from, const ScharrGradients& gradients,
                  const Image<std::uint8_t>& to, const Tile& tile, std::span<Search> searches);
 

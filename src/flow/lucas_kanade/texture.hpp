@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "src/flow/lucas_kanade/scharr_gradients.hpp"
+#include "src/flow/lucas_kanade/search.hpp"
+
+namespace eventcamera {
+
+/// Pixels of a tile without sub-pixel offset: bit x of row y.
+using TilePixels = std::array<std::uint16_t, Tile::side>;
+
+/// Pixels whose windows may have enough texture to be searched for. At all others, search_tile()
+/// finds too little. Needs the gradients where the windows are.
+TilePixels find_texture(const ScharrGradients& gradients, const Tile& tile);
+
+}  // namespace eventcamera
