@@ -2,13 +2,15 @@
 #include "src/simulate/diff.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cstdlib>
+#include <cstring>
+#include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "src/simulate/difference.hpp"
-#include "src/simulate/motion.hpp"
+#include "src/simulate/moving_points.hpp"
 
 namespace eventcamera {
 namespace {
@@ -16,114 +18,131 @@ namespace {
 /// Pixels of a difference frame that exceeded the threshold of one polarity, in raster order.
 struct Kept {
   std::vector<Point> places;
-  std::vector<int> differences;  ///< I(i) - I(i-1) at each pixel
-
-  void clear() {
-    places.clear();
-    differences.clear();
-  }
-};
-
-/// A kept pixel of the last difference frame, moving towards this one.
-struct MovingDifference {
-  MovingPoint point;
-  int difference;
+  std::vector<int> differences;    ///< I(i) - I(i-1) at each pixel
+  std::vector<std::size_t> first;  ///< index of the first one of each band, and the end
 };
 
 /// One polarity of the last two difference frames.
 struct Part {
-  Part(int width, int height) : picture(width, height) {}
+  Part(int width, int height) : picture(width, height, 1) {
+    now.first.assign(static_cast<std::size_t>(band_count(height)) + 1, 0);
+  }
 
   Kept last;
   Kept now;
   Image<std::uint8_t> picture;  ///< `now` as an 8-bit image, 0 for pixels not kept
   PointTracker tracker;
 
+  /// Makes `now` the last frame, and an empty one of bands without size.
   void begin_next() {
-    for (const auto& place : now.places) picture.at(place.x, place.y) = 0;
     std::swap(last, now);
-    now.clear();
+    now.first.assign(1, 0);
   }
 
-  void keep(const Point& place, int difference, int shift) {
-    now.places.push_back(place);
-    now.differences.push_back(difference);
+  void add_band(std::size_t size) { now.first.push_back(now.first.back() + size); }
+
+  /// Makes room for the pixels of all bands.
+  void resize() {
+    now.places.resize(now.first.back());
+    now.differences.resize(now.first.back());
+  }
+
+  /// Removes the last frame's pixels of a band from the picture.
+  void clear(std::size_t band) {
+    for (std::size_t i = last.first[band]; i < last.first[band + 1]; ++i)
+      picture.at(last.places[i].x, last.places[i].y) = 0;
+  }
+
+  void keep(std::size_t i, const Point& place, int difference, int shift) {
+    now.places[i] = place;
+    now.differences[i] = difference;
     picture.at(place.x, place.y) =
         static_cast<std::uint8_t>(std::max(1, std::abs(difference) >> shift));
   }
 
+  /// Prepares to track to this difference frame and, in the next interval, from it.
+  void push(ThreadPool& threads) {
+    if (!now.places.empty()) tracker.push(picture.view(), threads);
+  }
+
   /// True if a pixel of this difference frame is kept within one pixel of `place`.
   bool keeps_near(const Point& place) const {
-    const int bottom = std::min(place.y + 1, picture.height() - 1);
-    const int right = std::min(place.x + 1, picture.width() - 1);
-    for (int y = std::max(place.y - 1, 0); y <= bottom; ++y)
-      for (int x = std::max(place.x - 1, 0); x <= right; ++x)
-        if (picture.at(x, y) != 0) return true;
-    return false;
+    int near = 0;
+    for (int y = place.y - 1; y <= place.y + 1; ++y)
+      for (int x = place.x - 1; x <= place.x + 1; ++x) near |= picture.at(x, y);
+    return near != 0;
   }
 };
 
-/// Pixels that fire in one interpolated difference frame.
-class FiredDifferences {
- public:
-  FiredDifferences(int width, int height)
-      : strongest_(width, height),
-        words_((width + 63) / 64),
-        taken_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)),
-        top_(height) {}
+/// Kept pixels of a band of the last difference frame, moving towards this one. On its own cache
+/// lines, because threads fill neighbouring bands concurrently.
+template <class Strength>
+struct alignas(64) MovingBand {
+  MovingPoints points;
+  std::vector<Strength> strengths;
+};
 
-  /// The largest difference on a pixel wins; ON wins over an equal OFF.
-  void add(const Point& place, int difference) {
-    int& strongest = strongest_.at(place.x, place.y);
-    if (std::abs(difference) > std::abs(strongest) || difference == -strongest)
-      strongest = difference == -strongest ? std::abs(difference) : difference;
-    taken_[word(place)] |= std::uint64_t{1} << (place.x % 64);
-    top_ = std::min(top_, place.y);
-    bottom_ = std::max(bottom_, place.y + 1);
+/// One interpolated difference frame: the strength of each pixel, 0 for those that do not fire.
+template <class Strength>
+class DifferenceFrame {
+ public:
+  DifferenceFrame(int width, int height)
+      : height_(height),
+        words_((width + 63) / 64),
+        strengths_(static_cast<std::size_t>(64 * words_) * static_cast<std::size_t>(height)),
+        touched_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)) {}
+
+  /// Adds pixels where they are after j steps. The strongest on a pixel wins.
+  void add(const MovingBand<Strength>& band, int j) {
+    const auto places = band.points.at(j, 64 * words_, places_);
+    auto* const strengths = strengths_.data();
+    auto* const touched = touched_.data();
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      auto& strongest = strengths[places[i]];
+      strongest = std::max(strongest, band.strengths[i]);
+      touched[places[i] / 64] = 1;
+    }
   }
 
-  /// Emits the accumulated pixels in raster order and clears them.
+  /// Emits the pixels that fire and clears them.
   void fire(int step, std::uint32_t t, EventBuckets& events) {
-    for (int y = top_; y < bottom_; ++y) {
-      auto& out = events.pixels(step, y / rows_per_band);
-      if (y == top_ || y % rows_per_band == 0) out.begin(t);
-      for (int x = 0; x < strongest_.width(); x += 64) {
-        auto& taken = taken_[word({x, y})];
-        if (taken == 0) continue;
-        const auto fired = std::exchange(taken, 0);
-        std::uint64_t on = 0;
-        for (auto bits = fired; bits != 0; bits &= bits - 1) {
-          const int i = std::countr_zero(bits);
-          if (std::exchange(strongest_.at(x + i, y), 0) > 0) on |= std::uint64_t{1} << i;
-        }
-        out.add(x, y, fired, on);
-      }
+    for (int band = 0; band < events.bands(); ++band) {
+      const BandRows rows(band, height_);
+      auto* touched = touched_.data() + std::ptrdiff_t{rows.first} * words_;
+      const int words = (rows.last - rows.first) * words_;
+      if (std::memchr(touched, 1, static_cast<std::size_t>(words)) == nullptr) continue;
+      auto& out = events.pixels(step, band);
+      out.begin(t);
+      for (int y = rows.first; y < rows.last; ++y, touched += words_)
+        fire_strengths(strengths_.data() + std::ptrdiff_t{64} * words_ * y, touched, words_, y,
+                       out);
     }
-    top_ = strongest_.height();
-    bottom_ = 0;
   }
 
  private:
-  std::size_t word(const Point& place) const {
-    return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(words_) +
-           static_cast<std::size_t>(place.x / 64);
-  }
-
-  Image<int> strongest_;
-  int words_;                         ///< 64-pixel words per row
-  std::vector<std::uint64_t> taken_;  ///< one bit per pixel that fires
-  int top_;                           ///< rows [top_, bottom_) hold all of them
-  int bottom_ = 0;
+  int height_;
+  int words_;  ///< per row, of 64 pixels
+  std::vector<Strength> strengths_;
+  std::vector<std::uint8_t> touched_;  ///< 1 for each word with a pixel that fires
+  std::vector<std::int32_t> places_;
 };
 
 template <class Pixel>
 class DiffSimulator final : public Simulator {
+  /// Twice the magnitude of a difference, and 1 more for ON, which wins over an equal OFF.
+  using Strength = std::conditional_t<sizeof(Pixel) == 1, std::uint16_t, std::uint32_t>;
+
+  static Strength strength_of(int difference) {
+    return static_cast<Strength>(2 * std::abs(difference) + (difference > 0 ? 1 : 0));
+  }
+
  public:
   explicit DiffSimulator(const LumaFormat& format)
       : Simulator(format),
         last_(format.width, format.height),
         on_(format.width, format.height),
-        off_(format.width, format.height) {}
+        off_(format.width, format.height),
+        moving_(static_cast<std::size_t>(band_count(format.height))) {}
 
  private:
   void start(const LumaView& frame) override {
@@ -139,10 +158,13 @@ class DiffSimulator final : public Simulator {
     events.reset(m, band_count(now.height));
     fire_differences(last_.view(), now, m, steps.microseconds(m), thresholds, threads(), events);
     keep_difference(now, m, events);
-    on_.tracker.push(on_.picture.view(), threads());
-    off_.tracker.push(off_.picture.view(), threads());
+    on_.push(threads());
+    off_.push(threads());
     if (has_difference_ && m > 1) {
-      moving_.clear();
+      for (auto& band : moving_) {
+        band.points.clear();
+        band.strengths.clear();
+      }
       follow(on_, m);
       follow(off_, m);
       fire_between(steps, events);
@@ -155,38 +177,61 @@ class DiffSimulator final : public Simulator {
   void keep_difference(const ImageView<Pixel>& now, int last_step, EventBuckets& events) {
     on_.begin_next();
     off_.begin_next();
+    const int bands = band_count(now.height);
+    for (int band = 0; band < bands; ++band) {
+      const auto& fired = events.pixels(last_step, band);
+      const auto on = fired.on_size();
+      on_.add_band(on);
+      off_.add_band(fired.size() - on);
+    }
+    on_.resize();
+    off_.resize();
     const int shift = format().bits - 8;
-    const auto keep = [&](std::span<const Event> fired) {
-      for (const auto& event : fired) {
-        const Point place{event.x, event.y()};
-        const int difference = now.row(place.y)[place.x] - last_.at(place.x, place.y);
-        (event.polarity() == Polarity::on ? on_ : off_).keep(place, difference, shift);
-      }
-    };
-    for (int band = 0; band < band_count(now.height); ++band)
-      events.pixels(last_step, band).visit(keep);
+    threads().for_each(bands, [&](int i, int) {
+      const auto band = static_cast<std::size_t>(i);
+      on_.clear(band);
+      off_.clear(band);
+      auto on = on_.now.first[band];
+      auto off = off_.now.first[band];
+      events.pixels(last_step, i).visit([&](std::span<const Event> fired) {
+        for (const auto& event : fired) {
+          const Point place{event.x, event.y()};
+          const int difference = now.row(place.y)[place.x] - last_.at(place.x, place.y);
+          if (event.polarity() == Polarity::on)
+            on_.keep(on++, place, difference, shift);
+          else
+            off_.keep(off++, place, difference, shift);
+        }
+      });
+    });
   }
 
   /// Tracks the kept pixels of the last difference frame into this one.
   void follow(Part& part, int steps) {
-    const auto& places = part.last.places;
-    const auto tracks = part.tracker.track(places, threads());
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const auto point = moving_point(places[i], tracks[i], steps, format().width, format().height);
-      if (point && part.keeps_near(point->at(steps)))
-        moving_.push_back({*point, part.last.differences[i]});
-    }
+    const auto& last = part.last;
+    if (last.places.empty() || part.now.places.empty()) return;  // no track ends near a kept pixel
+    const auto tracks = part.tracker.track(last.places, threads());
+    threads().for_each(static_cast<int>(moving_.size()), [&](int i, int) {
+      const auto index = static_cast<std::size_t>(i);
+      auto& band = moving_[index];
+      for (std::size_t k = last.first[index]; k < last.first[index + 1]; ++k) {
+        const auto point =
+            moving_point(last.places[k], tracks[k], steps, format().width, format().height);
+        if (!point || !part.keeps_near(point->at(steps))) continue;
+        band.points.push_back(*point);
+        band.strengths.push_back(strength_of(last.differences[k]));
+      }
+    });
   }
 
   void fire_between(const StepTimes& steps, EventBuckets& events) {
-    while (static_cast<int>(fired_differences_.size()) < threads().threads())
-      fired_differences_.emplace_back(format().width, format().height);
+    while (static_cast<int>(frames_.size()) < threads().threads())
+      frames_.emplace_back(format().width, format().height);
     threads().for_each(steps.count() - 1, [&](int i, int thread) {
       const int j = i + 1;
-      auto& fired_differences = fired_differences_[static_cast<std::size_t>(thread)];
-      for (const auto& moving : moving_)
-        fired_differences.add(moving.point.at(j), moving.difference);
-      fired_differences.fire(j, steps.microseconds(j), events);
+      auto& frame = frames_[static_cast<std::size_t>(thread)];
+      for (const auto& band : moving_) frame.add(band, j);
+      frame.fire(j, steps.microseconds(j), events);
     });
   }
 
@@ -194,8 +239,8 @@ class DiffSimulator final : public Simulator {
   bool has_difference_ = false;
   Part on_;
   Part off_;
-  std::vector<MovingDifference> moving_;
-  std::vector<FiredDifferences> fired_differences_;  // one per thread
+  std::vector<MovingBand<Strength>> moving_;
+  std::vector<DifferenceFrame<Strength>> frames_;  ///< one per thread
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <limits>
+#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/simulate/difference.cpp"
@@ -76,6 +77,37 @@ void fire_row_16(const std::uint16_t* before, const std::uint16_t* now, int widt
   fire_row(before, now, width, y, thresholds, out);
 }
 
+template <class Strength>
+void fire_words(Strength* strengths, std::uint8_t* touched, int words, int y, FiredPixels& out) {
+  const Pixels<Strength> pixels;
+  const int lanes = static_cast<int>(hn::Lanes(pixels));
+  const auto zero = hn::Zero(pixels);
+  const auto one = hn::Set(pixels, Strength{1});
+  for (int word = 0; word < words; ++word) {
+    if (std::exchange(touched[word], std::uint8_t{0}) == 0) continue;
+    Strength* const first = strengths + std::ptrdiff_t{64} * word;
+    std::uint64_t fired = 0;
+    std::uint64_t on = 0;
+    for (int i = 0; i < 64; i += lanes) {
+      const auto strength = hn::LoadU(pixels, first + i);
+      fired |= bits_of(pixels, hn::Ne(strength, zero)) << i;
+      on |= bits_of(pixels, hn::Ne(hn::And(strength, one), zero)) << i;
+      hn::StoreU(zero, pixels, first + i);
+    }
+    out.add(64 * word, y, fired, on);
+  }
+}
+
+void fire_words_16(std::uint16_t* strengths, std::uint8_t* touched, int words, int y,
+                   FiredPixels& out) {
+  fire_words(strengths, touched, words, y, out);
+}
+
+void fire_words_32(std::uint32_t* strengths, std::uint8_t* touched, int words, int y,
+                   FiredPixels& out) {
+  fire_words(strengths, touched, words, y, out);
+}
+
 template <class Pixel>
 ChangedColumns changed(const Pixel* before, const Pixel* now, int width, int threshold) {
   const Pixels<Pixel> pixels;
@@ -116,6 +148,8 @@ namespace eventcamera {
 
 HWY_EXPORT(fire_row_8);
 HWY_EXPORT(fire_row_16);
+HWY_EXPORT(fire_words_16);
+HWY_EXPORT(fire_words_32);
 HWY_EXPORT(changed_8);
 HWY_EXPORT(changed_16);
 
@@ -127,6 +161,16 @@ void fire_differences(const std::uint8_t* before, const std::uint8_t* now, int w
 void fire_differences(const std::uint16_t* before, const std::uint16_t* now, int width, int y,
                       const Thresholds& thresholds, FiredPixels& out) {
   HWY_DYNAMIC_DISPATCH(fire_row_16)(before, now, width, y, thresholds, out);
+}
+
+void fire_strengths(std::uint16_t* strengths, std::uint8_t* touched, int words, int y,
+                    FiredPixels& out) {
+  HWY_DYNAMIC_DISPATCH(fire_words_16)(strengths, touched, words, y, out);
+}
+
+void fire_strengths(std::uint32_t* strengths, std::uint8_t* touched, int words, int y,
+                    FiredPixels& out) {
+  HWY_DYNAMIC_DISPATCH(fire_words_32)(strengths, touched, words, y, out);
 }
 
 ChangedColumns changed_columns(const std::uint8_t* before, const std::uint8_t* now, int width,

@@ -8,16 +8,20 @@
 
 #include "src/core/luma.hpp"
 #include "src/simulate/difference.hpp"
-#include "src/simulate/motion.hpp"
+#include "src/simulate/moving_points.hpp"
 
 namespace eventcamera {
 namespace {
 
-/// A tracked pixel in motion, with its brightness.
+/// Tracked pixels in motion that start in one band of rows, in raster order. On its own cache
+/// lines, because threads fill neighbouring bands concurrently.
 template <class Pixel>
-struct MovingPixel {
-  MovingPoint point;
-  Pixel brightness;
+struct alignas(64) MovingBand {
+  MovingPoints points;
+  std::vector<Pixel> brightness;
+  std::vector<Pixel> background;  ///< what each uncovers at its start
+  int top;                        ///< the pixels start in and cross rows [top, bottom)
+  int bottom;
 };
 
 /// Two frames and the pixels that move between them.
@@ -25,8 +29,8 @@ template <class Pixel>
 struct Interval {
   ImageView<Pixel> last;
   ImageView<Pixel> now;
-  std::span<const MovingPixel<Pixel>> pixels;  ///< in raster order of their start points
-  const std::vector<char>& touched;            ///< rows that a pixel starts in or crosses
+  std::span<const MovingBand<Pixel>> bands;
+  const std::vector<char>& touched;  ///< rows that pixels of any band start in or cross
 };
 
 /// Draws the interpolated frames of an interval, one after another.
@@ -61,21 +65,25 @@ class Painter {
     for (int y = 0; y < between_.height(); ++y)
       if (interval.touched[static_cast<std::size_t>(y)] != 0)
         between_.assign_row(y, interval.last.row(y));
-    places_.resize(interval.pixels.size());
-    auto* place = places_.data();
-    for (const auto& pixel : interval.pixels) {
-      const auto [x, y] = pixel.point.start;
-      const auto [to_x, to_y] = pixel.point.at(j);
-      *place++ = &between_.at(to_x, to_y);
-      if (to_x != x || to_y != y) between_.at(x, y) = interval.now.row(y)[x];
+    if (j == 0) return;  // nothing has moved yet
+    Pixel* const frame = between_.row(0);
+    const int stride = static_cast<int>(between_.stride() / std::ptrdiff_t{sizeof(Pixel)});
+    for (const auto& band : interval.bands) {
+      const auto starts = band.points.at(0, stride, starts_);
+      const auto places = band.points.at(j, stride, places_);
+      for (std::size_t i = 0; i < places.size(); ++i)
+        frame[starts[i]] = places[i] != starts[i] ? band.background[i] : band.brightness[i];
     }
-    place = places_.data();
-    for (const auto& pixel : interval.pixels) **place++ = pixel.brightness;
+    for (const auto& band : interval.bands) {
+      const auto places = band.points.at(j, stride, places_);
+      for (std::size_t i = 0; i < places.size(); ++i) frame[places[i]] = band.brightness[i];
+    }
   }
 
   Image<Pixel> between_;
   Image<Pixel> before_;
-  std::vector<Pixel*> places_;  ///< targets of the moving pixels, in between_
+  std::vector<std::int32_t> starts_;  ///< of the pixels of a band, in between_
+  std::vector<std::int32_t> places_;  ///< where they are
 };
 
 template <class Pixel>
@@ -84,6 +92,7 @@ class SparseSimulator final : public Simulator {
   explicit SparseSimulator(const LumaFormat& format)
       : Simulator(format),
         last_(format.width, format.height),
+        bands_(static_cast<std::size_t>(band_count(format.height))),
         touched_(static_cast<std::size_t>(format.height)) {}
 
  private:
@@ -98,11 +107,11 @@ class SparseSimulator final : public Simulator {
     const auto thresholds = Thresholds::of(settings, format().bits);
     find_changed(now, std::min(thresholds.positive, thresholds.negative));
     tracker_.push(grey_.of(frame), threads());
-    follow_changed(steps.count());
+    follow_changed(now, steps.count());
 
     const int m = steps.count();
     events.reset(m, 1);
-    const Interval<Pixel> interval{last_.view(), now, pixels_, touched_};
+    const Interval<Pixel> interval{last_.view(), now, bands_, touched_};
     // Each thread draws consecutive steps, so that all frames but the first are used twice.
     const int runs = std::min(threads().threads(), m);
     while (static_cast<int>(painters_.size()) < runs)
@@ -116,28 +125,48 @@ class SparseSimulator final : public Simulator {
 
   /// Finds the pixels whose change exceeds `threshold`, in raster order.
   void find_changed(const ImageView<Pixel>& now, int threshold) {
-    changes_.reset(1, band_count(now.height));
+    const int bands = band_count(now.height);
+    changes_.reset(1, bands);
     fire_differences(last_.view(), now, 1, 0, {threshold, threshold}, threads(), changes_);
-    changed_.clear();
-    for (int band = 0; band < changes_.bands(); ++band)
-      changes_.visit_band(band, [this](std::span<const Event> changes) {
-        for (const auto& change : changes) changed_.push_back({change.x, change.y()});
+    first_.assign(1, 0);
+    for (int band = 0; band < bands; ++band)
+      first_.push_back(first_.back() + changes_.pixels(1, band).size());
+    changed_.resize(first_.back());
+    threads().for_each(bands, [this](int band, int) {
+      Point* out = changed_.data() + first_[static_cast<std::size_t>(band)];
+      changes_.pixels(1, band).visit([&](std::span<const Event> changes) {
+        for (const auto& change : changes) *out++ = {change.x, change.y()};
       });
+    });
   }
 
   /// Tracks the changed pixels into this frame.
-  void follow_changed(int steps) {
-    pixels_.clear();
-    std::fill(touched_.begin(), touched_.end(), 0);
+  void follow_changed(const ImageView<Pixel>& now, int steps) {
     const auto tracks = tracker_.track(changed_, threads());
-    for (std::size_t i = 0; i < changed_.size(); ++i) {
-      const auto point =
-          moving_point(changed_[i], tracks[i], steps, format().width, format().height);
-      if (!point) continue;
-      pixels_.push_back({*point, last_.at(point->start.x, point->start.y)});
-      const auto [top, bottom] = std::minmax({point->start.y, point->at(steps).y});
-      for (int y = top; y <= bottom; ++y) touched_[static_cast<std::size_t>(y)] = 1;
-    }
+    threads().for_each(static_cast<int>(bands_.size()), [&](int i, int) {
+      const auto index = static_cast<std::size_t>(i);
+      auto& band = bands_[index];
+      band.points.clear();
+      band.brightness.clear();
+      band.background.clear();
+      band.top = format().height;
+      band.bottom = 0;
+      for (std::size_t k = first_[index]; k < first_[index + 1]; ++k) {
+        const auto point =
+            moving_point(changed_[k], tracks[k], steps, format().width, format().height);
+        if (!point) continue;
+        const auto [x, y] = point->start;
+        band.points.push_back(*point);
+        band.brightness.push_back(last_.at(x, y));
+        band.background.push_back(now.row(y)[x]);
+        const int end = point->at(steps).y;
+        band.top = std::min({band.top, y, end});
+        band.bottom = std::max({band.bottom, y + 1, end + 1});
+      }
+    });
+    std::fill(touched_.begin(), touched_.end(), 0);
+    for (const auto& band : bands_)
+      for (int y = band.top; y < band.bottom; ++y) touched_[static_cast<std::size_t>(y)] = 1;
   }
 
   Image<Pixel> last_;
@@ -145,7 +174,8 @@ class SparseSimulator final : public Simulator {
   Grey8 grey_;
   EventBuckets changes_;
   std::vector<Point> changed_;
-  std::vector<MovingPixel<Pixel>> pixels_;
+  std::vector<std::size_t> first_;  ///< index of the first changed pixel of each band, and the end
+  std::vector<MovingBand<Pixel>> bands_;
   std::vector<char> touched_;
   std::vector<Painter<Pixel>> painters_;  ///< one per thread
 };

@@ -273,6 +273,21 @@ TEST(DiffSimulator, MovesTheEdgesOfASquareEvenly) {
   }
 }
 
+TEST(DiffSimulator, ForgetsWhatMovedBeforeAStop) {
+  const auto at = [](int left) { return scene::square(160, 90, left, 30, 24, 220, 30); };
+  const auto a = at(20);
+  const auto b = at(40);
+  const auto c = at(48);
+  const auto d = at(56);
+  const auto after_stop = make_diff_simulator({160, 90, 8});
+  const auto without = make_diff_simulator({160, 90, 8});
+  const auto events = scene::last_interval(
+      *after_stop, {},
+      {scene::luma(a), scene::luma(b), scene::luma(b), scene::luma(c), scene::luma(d)});
+  EXPECT_EQ(events,
+            scene::last_interval(*without, {}, {scene::luma(b), scene::luma(c), scene::luma(d)}));
+}
+
 TEST(SparseSimulator, CarriesATexturedPatchAlong) {
   // A textured patch moves 8 pixels to the right in front of a flat background.
   const auto patch = scene::texture<std::uint8_t>(24, 24, 8, 5, 9);
