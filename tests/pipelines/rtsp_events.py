@@ -207,9 +207,9 @@ def in_sync():
     """The events of eventsim-dvs are where the ball is in the video at the same time."""
     with (Server("--simulator", "eventsim-dvs") as server, Client(
             server.base + "/both",
-            "source. ! application/x-rtp,media=video ! rtpvp8depay ! vp8dec ! videoconvert"
+            "source. ! rtpvp8depay ! vp8dec ! videoconvert"
             " ! video/x-raw,format=GRAY8 ! appsink name=video sync=false"
-            "  source. ! application/x-rtp,media=application ! rtpeventdepay ! appsink name=events sync=false",
+            "  source. ! rtpeventdepay ! appsink name=events sync=false",
             buffer_mode=4) as client):  # synced: server and client have one clock
         video, events = [], []
         lag, distance = 0, np.inf

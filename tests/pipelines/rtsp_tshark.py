@@ -35,8 +35,8 @@ class Client:
         Gst.init(None)
         self._pipeline = Gst.parse_launch(
             f"rtspsrc location=rtsp://{Host.address(1)}:8554/both protocols=udp nat-method=none name=source"
-            "  source. ! application/x-rtp,media=video ! rtpvp8depay ! fakesink"
-            "  source. ! application/x-rtp,media=application ! rtpeventdepay ! appsink name=out sync=false")
+            "  source. ! rtpvp8depay ! fakesink"
+            "  source. ! rtpeventdepay ! appsink name=out sync=false")
 
     def play(self, buffers):
         self._pipeline.set_state(Gst.State.PLAYING)
