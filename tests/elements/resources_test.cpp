@@ -78,8 +78,8 @@ TEST_P(Memory, DoesNotGrowFrameByFrame) {
     ASSERT_EQ(buffer != nullptr, draws || i > 0);
     if (i == frames / 10) after_some = Resources::now();
   }
-  // Less than a pointer per frame.
-  EXPECT_LE(Resources::now().heap, after_some.heap + static_cast<std::size_t>(frames) * 7 + 2048);
+  // Less than a pointer per frame, and what drivers may allocate late.
+  EXPECT_LE(Resources::now().heap, after_some.heap + static_cast<std::size_t>(frames) * 7 + 16384);
 }
 
 class EveryElement : public testing::TestWithParam<std::string> {
