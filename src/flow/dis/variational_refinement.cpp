@@ -117,11 +117,15 @@ class Linearisation {
   static HWY_INLINE Vector between(Vector a, Vector b, Vector weight) {
     return hn::Add(a, hn::Mul(weight, hn::Sub(b, a)));
   }
-  /// The mean of two neighbours, each the low and the high byte of a word.
-  static HWY_INLINE Vector along(const std::uint16_t* words, Vector weight) {
-    const auto both = hn::PromoteTo(Ints(), hn::Load(hn::Rebind<std::uint16_t, Floats>(), words));
-    return between(hn::ConvertTo(Floats(), hn::And(both, hn::Set(Ints(), 0xFF))),
-                   hn::ConvertTo(Floats(), hn::ShiftRight<8>(both)), weight);
+  /// The mean of the pixels at offsets and their right neighbours: the two lowest bytes of words.
+  static HWY_INLINE Vector along(const std::uint8_t* pixels, hn::Vec<Ints> offsets, Vector weight) {
+    const Ints ints;
+    const auto words =
+        hn::GatherOffset(ints, reinterpret_cast<const std::int32_t*>(pixels), offsets);
+    const auto pixel = [&](auto lowest) HWY_ATTR {
+      return hn::ConvertTo(Floats(), hn::And(lowest, hn::Set(ints, 0xFF)));
+    };
+    return between(pixel(words), pixel(hn::ShiftRight<8>(words)), weight);
   }
 
   /// Computes the mean and the difference of the earlier image and the later one, moved back.
@@ -133,7 +137,6 @@ class Linearisation {
     const Floats floats;
     const Ints ints;
     const hn::Rebind<std::uint8_t, Floats> bytes;
-    constexpr int max_lanes = hn::MaxLanes(floats);
     const int lanes = static_cast<int>(hn::Lanes(floats));
     const auto iota = hn::Mul(hn::Iota(floats, 0.0F), set(2.0F));
     const std::uint8_t* here = from_.row(y);
@@ -143,26 +146,17 @@ class Linearisation {
     const float* flow_y = flow_.y.row(parity, y);
     float* mean = scratch_.mean.row(parity, ring(y));
     float* change = scratch_.change.row(parity, ring(y));
-    HWY_ALIGN std::int32_t offsets[max_lanes];
-    HWY_ALIGN std::uint16_t upper[max_lanes];
-    HWY_ALIGN std::uint16_t lower[max_lanes];
     for (int k = 0; k < flow_.x.count(parity); k += lanes) {
       const auto start = hn::Add(iota, set(static_cast<float>(2 * k + parity)));
       const auto to_x = place(hn::Add(start, load(flow_x + k)), to_.width());
       const auto to_y = place(hn::Add(set(static_cast<float>(y)), load(flow_y + k)), to_.height());
       const auto cell_x = hn::Floor(to_x);
       const auto cell_y = hn::Floor(to_y);
-      hn::Store(hn::Add(hn::Mul(hn::ConvertTo(ints, cell_y), hn::Set(ints, stride)),
-                        hn::ConvertTo(ints, cell_x)),
-                ints, offsets);
-      for (int lane = 0; lane < lanes; ++lane) {
-        const std::uint8_t* pixels = data + offsets[lane];
-        const std::uint8_t* below = pixels + stride;
-        upper[lane] = static_cast<std::uint16_t>(pixels[0] | pixels[1] << 8);
-        lower[lane] = static_cast<std::uint16_t>(below[0] | below[1] << 8);
-      }
+      const auto offsets = hn::Add(hn::Mul(hn::ConvertTo(ints, cell_y), hn::Set(ints, stride)),
+                                   hn::ConvertTo(ints, cell_x));
       const auto right = hn::Sub(to_x, cell_x);
-      const auto there = between(along(upper, right), along(lower, right), hn::Sub(to_y, cell_y));
+      const auto there = between(along(data, offsets, right), along(data + stride, offsets, right),
+                                 hn::Sub(to_y, cell_y));
       hn::Vec<decltype(bytes)> columns[2];
       hn::LoadInterleaved2(bytes, here + std::ptrdiff_t{2} * k, columns[0], columns[1]);
       const auto grey = hn::ConvertTo(floats, hn::PromoteTo(ints, columns[parity]));
