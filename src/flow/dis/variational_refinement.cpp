@@ -197,6 +197,164 @@ void linearise_rows(const Image<std::uint8_t>& from, const Image<std::uint8_t>& 
   Linearisation(from, to, flow, scratch, out).run(first, last);
 }
 
+/// factor / sqrt(squares)
+HWY_INLINE Vector weight(float factor, Vector squares) {
+  return hn::Mul(set(factor), inverse_sqrt(squares));
+}
+
+/// Computes the equations of every other pixel of a row.
+class Assembly {
+ public:
+  Assembly(const Derivatives& derivatives, const Field& start, Scratch& scratch, int y, int parity)
+      : dx_(neighbours(derivatives.x, y, parity)),
+        dy_(neighbours(derivatives.y, y, parity)),
+        dt_(neighbours(derivatives.t, y, parity)),
+        start_x_(start.x.row(parity, y)),
+        start_y_(start.y.row(parity, y)),
+        x_(scratch.flow.x.row(parity, ring(y))),
+        y_(scratch.flow.y.row(parity, ring(y))),
+        left_(beside(scratch.weight, parity, ring(y))),
+        right_(scratch.right.row(parity, y & 1)),
+        above_(scratch.weight.row(parity, ring(y - 1))),
+        below_(scratch.weight.row(parity, ring(y + 1 < start.x.height() ? y : y + 1))),
+        out_(scratch.equations.row(parity, ring(y))) {}
+
+  /// Two vectors at a time, step by step, because the operations on one wait for each other.
+  void run(int count) const {
+    const int lanes = static_cast<int>(hn::Lanes(Floats()));
+    for (int k = 0; k < count; k += 2 * lanes) {
+      const Terms terms = terms_at(k);
+      const Terms next_terms = terms_at(k + lanes);
+      const Equations equations = weighted(terms);
+      const Equations next_equations = weighted(next_terms);
+      solve(equations, k);
+      solve(next_equations, k + lanes);
+    }
+  }
+
+ private:
+  /// a x + b y + c = 0 for a step (x, y) from the start.
+  struct Constraint {
+    HWY_INLINE Vector residual(Vector x, Vector y) const {
+      return hn::Add(hn::Add(c, hn::Mul(a, x)), hn::Mul(b, y));
+    }
+    /// Square of the gradient.
+    HWY_INLINE Vector norm() const {
+      return hn::Add(hn::Add(square(a), square(b)), set(min_gradient));
+    }
+    Vector a;
+    Vector b;
+    Vector c;
+  };
+
+  /// Equations of a vector of pixels.
+  struct Equations {
+    // Not in the declarations: GCC 12 compiles these without the target's instructions.
+    HWY_INLINE Equations() : xx(set(min_gradient)), xy(set(0.0F)), yy(xx), x(xy), y(xy) {}
+    HWY_INLINE void add(const Constraint& constraint, Vector weight) {
+      const auto a = hn::Mul(weight, constraint.a);
+      const auto b = hn::Mul(weight, constraint.b);
+      xx = hn::Add(xx, hn::Mul(a, constraint.a));
+      xy = hn::Add(xy, hn::Mul(a, constraint.b));
+      yy = hn::Add(yy, hn::Mul(b, constraint.b));
+      x = hn::Sub(x, hn::Mul(a, constraint.c));
+      y = hn::Sub(y, hn::Mul(b, constraint.c));
+    }
+    Vector xx;
+    Vector xy;
+    Vector yy;
+    Vector x;
+    Vector y;
+  };
+
+  /// Terms of the energy. The square of a residual is divided by its norm, and so is its weight,
+  /// which is factor / sqrt(square + min_residual). Both are multiplied by the norms instead.
+  struct Terms {
+    Constraint bright;
+    Constraint gradient_x;
+    Constraint gradient_y;
+    Vector norm_x;
+    Vector norm_y;
+    // What is under the root.
+    Vector bright_squares;
+    Vector gradient_squares;
+  };
+
+  static Neighbours neighbours(const SplitPlane& plane, int y, int parity) {
+    return {plane, parity, y, std::max(y - 1, 0), std::min(y + 1, plane.height() - 1)};
+  }
+
+  HWY_INLINE Terms terms_at(int k) const {
+    const auto x = hn::Sub(load(x_ + k), load(start_x_ + k));
+    const auto y = hn::Sub(load(y_ + k), load(start_y_ + k));
+    const auto xy = dx_.along(k);
+    const Constraint bright = {load(dx_.here + k), load(dy_.here + k), load(dt_.here + k)};
+    const Constraint gradient_x = {dx_.across(k), xy, dt_.across(k)};
+    const Constraint gradient_y = {xy, dy_.along(k), dt_.along(k)};
+    const auto norm = bright.norm();
+    const auto norm_x = gradient_x.norm();
+    const auto norm_y = gradient_y.norm();
+    const auto norms = hn::Mul(norm_x, norm_y);
+    const auto bright_squares =
+        hn::Add(square(bright.residual(x, y)), hn::Mul(norm, set(min_residual)));
+    const auto gradient_squares =
+        hn::Add(hn::Add(hn::Mul(square(gradient_x.residual(x, y)), norm_y),
+                        hn::Mul(square(gradient_y.residual(x, y)), norm_x)),
+                hn::Mul(norms, set(min_residual)));
+    return {bright,
+            gradient_x,
+            gradient_y,
+            norm_x,
+            norm_y,
+            hn::Mul(norm, bright_squares),
+            hn::Mul(norms, gradient_squares)};
+  }
+
+  static HWY_INLINE Equations weighted(const Terms& terms) {
+    Equations equations;
+    equations.add(terms.bright, weight(brightness, terms.bright_squares));
+    const auto both = weight(gradient, terms.gradient_squares);
+    equations.add(terms.gradient_x, hn::Mul(both, terms.norm_y));
+    equations.add(terms.gradient_y, hn::Mul(both, terms.norm_x));
+    return equations;
+  }
+
+  /// Adds what the neighbours pull, and stores the coefficients.
+  HWY_INLINE void solve(const Equations& equations, int k) const {
+    const auto start_x = load(start_x_ + k);
+    const auto start_y = load(start_y_ + k);
+    const auto all = hn::Add(hn::Add(load(left_ + k), load(right_ + k)),
+                             hn::Add(load(above_ + k), load(below_ + k)));
+    const auto xx = hn::Add(equations.xx, all);
+    const auto yy = hn::Add(equations.yy, all);
+    const auto inverse = hn::Div(set(over_relaxation), hn::Mul(xx, yy));
+    const auto constant_x = hn::Add(
+        equations.x, hn::Add(hn::Mul(equations.xx, start_x), hn::Mul(equations.xy, start_y)));
+    const auto constant_y = hn::Add(
+        equations.y, hn::Add(hn::Mul(equations.xy, start_x), hn::Mul(equations.yy, start_y)));
+    float* to = out_ + EquationRows::at(k);
+    store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
+    store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
+    store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
+    store(constant_x, to + VariationalRefinement::constant_x * EquationRows::block);
+    store(constant_y, to + VariationalRefinement::constant_y * EquationRows::block);
+  }
+
+  Neighbours dx_;
+  Neighbours dy_;
+  Neighbours dt_;
+  const float* start_x_;
+  const float* start_y_;
+  const float* x_;
+  const float* y_;
+  // How much the neighbours pull.
+  const float* left_;
+  const float* right_;
+  const float* above_;
+  const float* below_;
+  float* out_;
+};
+
 /// Evaluates the penalties at a flow, and improves the flow.
 class Relaxation {
  public:
@@ -222,7 +380,8 @@ class Relaxation {
     for (int y = begin; y < last_ + reach; ++y) {
       if (y < end) {
         load_row(y + 1);
-        for (int parity = 0; parity < 2; ++parity) assemble(y, parity);
+        for (int parity = 0; parity < 2; ++parity)
+          Assembly(derivatives_, start_, scratch_, y, parity).run(flow_.x.count(parity));
       }
       relax(y);
       if (y - reach >= first_) store_row(y - reach);
@@ -273,116 +432,6 @@ class Relaxation {
     const auto value = load(flow.here + k);
     return hn::Add(square(hn::Sub(flow.right(k), value)),
                    square(hn::Sub(load(flow.below + k), value)));
-  }
-
-  /// a x + b y + c = 0 for a step (x, y) from the start.
-  struct Constraint {
-    HWY_INLINE Vector residual(Vector x, Vector y) const {
-      return hn::Add(hn::Add(c, hn::Mul(a, x)), hn::Mul(b, y));
-    }
-    /// Square of the gradient.
-    HWY_INLINE Vector norm() const {
-      return hn::Add(hn::Add(square(a), square(b)), set(min_gradient));
-    }
-    Vector a;
-    Vector b;
-    Vector c;
-  };
-
-  /// Equations of a vector of pixels.
-  struct Equations {
-    // Not in the declarations: GCC 12 compiles these without the target's instructions.
-    HWY_INLINE Equations() : xx(set(min_gradient)), xy(set(0.0F)), yy(xx), x(xy), y(xy) {}
-    HWY_INLINE void add(const Constraint& constraint, Vector weight) {
-      const auto a = hn::Mul(weight, constraint.a);
-      const auto b = hn::Mul(weight, constraint.b);
-      xx = hn::Add(xx, hn::Mul(a, constraint.a));
-      xy = hn::Add(xy, hn::Mul(a, constraint.b));
-      yy = hn::Add(yy, hn::Mul(b, constraint.b));
-      x = hn::Sub(x, hn::Mul(a, constraint.c));
-      y = hn::Sub(y, hn::Mul(b, constraint.c));
-    }
-    Vector xx;
-    Vector xy;
-    Vector yy;
-    Vector x;
-    Vector y;
-  };
-
-  static HWY_INLINE Vector weight(float factor, Vector squares) {
-    return hn::Mul(set(factor), inverse_sqrt(squares));
-  }
-
-  /// Computes the equations of a row.
-  void assemble(int y, int parity) {
-    const int lanes = static_cast<int>(hn::Lanes(Floats()));
-    const int here = ring(y);
-    const auto derivative = [&](const SplitPlane& plane) {
-      return Neighbours(plane, parity, y, std::max(y - 1, 0), std::min(y + 1, height_ - 1));
-    };
-    const auto dx = derivative(derivatives_.x);
-    const auto dy = derivative(derivatives_.y);
-    const auto dt = derivative(derivatives_.t);
-    const float* start_x_row = start_.x.row(parity, y);
-    const float* start_y_row = start_.y.row(parity, y);
-    const float* x_row = scratch_.flow.x.row(parity, here);
-    const float* y_row = scratch_.flow.y.row(parity, here);
-    const float* left = beside(scratch_.weight, parity, here);
-    const float* right = scratch_.right.row(parity, y & 1);
-    const float* above = scratch_.weight.row(parity, ring(y - 1));
-    const float* below = scratch_.weight.row(parity, y + 1 < height_ ? here : ring(y + 1));
-    float* out = scratch_.equations.row(parity, here);
-    for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-      const auto start_x = load(start_x_row + k);
-      const auto start_y = load(start_y_row + k);
-      const auto x = hn::Sub(load(x_row + k), start_x);
-      const auto y_ = hn::Sub(load(y_row + k), start_y);
-      const auto xy = dx.along(k);
-      const Constraint bright = {load(dx.here + k), load(dy.here + k), load(dt.here + k)};
-      const Constraint gradient_x = {dx.across(k), xy, dt.across(k)};
-      const Constraint gradient_y = {xy, dy.along(k), dt.along(k)};
-      Equations equations;
-      add_brightness(bright, x, y_, equations);
-      add_gradient(gradient_x, gradient_y, x, y_, equations);
-      const auto all = hn::Add(hn::Add(load(left + k), load(right + k)),
-                               hn::Add(load(above + k), load(below + k)));
-      const auto xx = hn::Add(equations.xx, all);
-      const auto yy = hn::Add(equations.yy, all);
-      const auto inverse = hn::Div(set(over_relaxation), hn::Mul(xx, yy));
-      const auto constant_x = hn::Add(
-          equations.x, hn::Add(hn::Mul(equations.xx, start_x), hn::Mul(equations.xy, start_y)));
-      const auto constant_y = hn::Add(
-          equations.y, hn::Add(hn::Mul(equations.xy, start_x), hn::Mul(equations.yy, start_y)));
-      float* to = out + EquationRows::at(k);
-      store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
-      store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
-      store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
-      store(constant_x, to + VariationalRefinement::constant_x * EquationRows::block);
-      store(constant_y, to + VariationalRefinement::constant_y * EquationRows::block);
-    }
-  }
-
-  // The square of a residual is divided by its norm, and so is its weight, which is
-  // factor / sqrt(square + min_residual). Both are multiplied by the norms instead.
-
-  static HWY_INLINE void add_brightness(const Constraint& bright, Vector x, Vector y,
-                                        Equations& equations) {
-    const auto norm = bright.norm();
-    const auto squares = hn::Add(square(bright.residual(x, y)), hn::Mul(norm, set(min_residual)));
-    equations.add(bright, weight(brightness, hn::Mul(norm, squares)));
-  }
-
-  static HWY_INLINE void add_gradient(const Constraint& gradient_x, const Constraint& gradient_y,
-                                      Vector x, Vector y, Equations& equations) {
-    const auto norm_x = gradient_x.norm();
-    const auto norm_y = gradient_y.norm();
-    const auto norms = hn::Mul(norm_x, norm_y);
-    const auto squares = hn::Add(hn::Add(hn::Mul(square(gradient_x.residual(x, y)), norm_y),
-                                         hn::Mul(square(gradient_y.residual(x, y)), norm_x)),
-                                 hn::Mul(norms, set(min_residual)));
-    const auto both = weight(gradient, hn::Mul(norms, squares));
-    equations.add(gradient_x, hn::Mul(both, norm_y));
-    equations.add(gradient_y, hn::Mul(both, norm_x));
   }
 
   /// Every other pixel of the rows, from the first column on; where a row starts is an offset that
