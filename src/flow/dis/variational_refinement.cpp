@@ -440,17 +440,13 @@ class Relaxation {
     Pixels(Scratch& scratch, int parity)
         : x(scratch.flow.x.row(parity, 0)),
           y(scratch.flow.y.row(parity, 0)),
-          beside_x(beside(scratch.flow.x, parity, 0)),
-          beside_y(beside(scratch.flow.y, parity, 0)),
-          left(beside(scratch.weight, parity, 0)),
-          weight(scratch.weight.row(parity, 0)) {}
+          weight(scratch.weight.row(parity, 0)),
+          to_left(beside(scratch.weight, parity, 0) - weight) {}
 
     float* x;
     float* y;
-    const float* beside_x;
-    const float* beside_y;
-    const float* left;
     const float* weight;
+    std::ptrdiff_t to_left;  ///< from a pixel to the one on its left
   };
 
   /// Improves a vector of pixels in one row after the other, upwards.
@@ -471,7 +467,8 @@ class Relaxation {
       const auto above_x = load(pixels.x + above);
       const auto above_y = load(pixels.y + above);
       const auto up = load(pixels.weight + above);
-      const auto left = load(pixels.left + row);
+      const auto left_row = row + pixels.to_left;
+      const auto left = load(pixels.weight + left_row);
       // What the row below adds comes last: it has just been computed.
       const auto pull = [&](const float* beside, Vector above_flow, Vector constant,
                             Vector below_flow) HWY_ATTR {
@@ -482,9 +479,9 @@ class Relaxation {
       const auto cross = coefficient(VariationalRefinement::cross);
       const auto keep = set(1 - over_relaxation);
       const auto pull_x = pull(
-          pixels.beside_x + row, above_x,
+          pixels.x + left_row, above_x,
           hn::Sub(coefficient(VariationalRefinement::constant_x), hn::Mul(cross, y_)), below_x_);
-      const auto pull_y = pull(pixels.beside_y + row, above_y,
+      const auto pull_y = pull(pixels.y + left_row, above_y,
                                coefficient(VariationalRefinement::constant_y), below_y_);
       below_x_ = hn::Add(hn::Mul(keep, x_),
                          hn::Mul(pull_x, coefficient(VariationalRefinement::inverse_x)));
