@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <opencv2/video/tracking.hpp>
+#include <utility>
 
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/lucas_kanade/texture.hpp"
@@ -76,14 +77,25 @@ TEST_P(EverySize, GradientsEqualTheReference) {
   }
 }
 
+/// With the steepest gradients.
+Image<std::uint8_t> in_black_and_white(Image<std::uint8_t> picture) {
+  for (int y = 0; y < picture.height(); ++y)
+    for (int x = 0; x < picture.width(); ++x) picture.at(x, y) = picture.at(x, y) < 128 ? 0 : 255;
+  return picture;
+}
+
 TEST_P(EverySize, SearchesEqualTheReference) {
   const int width = GetParam().width;
   const int height = GetParam().height;
-  for (const bool noisy : {true, false}) {
-    const auto from = noisy ? scene::noise<std::uint8_t>(width, height, 8, 3)
-                            : scene::texture<std::uint8_t>(width, height, 8, 0, 0);
-    const auto to = noisy ? scene::noise<std::uint8_t>(width, height, 8, 4)
-                          : scene::texture<std::uint8_t>(width, height, 8, -1.3, 0.8);
+  const auto noise = [&](int seed) { return scene::noise<std::uint8_t>(width, height, 8, seed); };
+  const auto texture = [&](double x, double y) {
+    return scene::texture<std::uint8_t>(width, height, 8, x, y);
+  };
+  const std::pair<Image<std::uint8_t>, Image<std::uint8_t>> pictures[] = {
+      {noise(3), noise(4)},
+      {texture(0, 0), texture(-1.3, 0.8)},
+      {in_black_and_white(noise(3)), in_black_and_white(noise(4))}};
+  for (const auto& [from, to] : pictures) {
     ThreadPool threads;
     Pyramid from_levels;
     Pyramid to_levels;

@@ -3,16 +3,15 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
+#include "src/flow/lucas_kanade/byte_windows-inl.hpp"
 #include "src/flow/lucas_kanade/window_sums-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -164,16 +163,7 @@ HWY_INLINE void store_parts(const ProductSum<Factors>& sum0, const ProductSum<Fa
   for (const auto* sum : {&sum0, &sum1, &sum2, &sum3}) *out++ = hn::GetLane(sum->lanes());
 #else
   const typename ProductSum<Factors>::Lanes lanes;
-  const hn::Repartition<std::int64_t, decltype(lanes)> pairs;
-  const auto add_pairs = [&](auto a, auto b) {
-    return hn::BitCast(pairs,
-                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
-  };
-  const auto low = add_pairs(sum0.lanes(), sum1.lanes());
-  const auto high = add_pairs(sum2.lanes(), sum3.lanes());
-  hn::Store(hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
-                    hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high))),
-            lanes, out);
+  hn::Store(add_lanes(lanes, sum0.lanes(), sum1.lanes(), sum2.lanes(), sum3.lanes()), lanes, out);
 #endif
 }
 
@@ -230,12 +220,6 @@ HWY_INLINE void store_both_parts(const BothSum& sum0, const BothSum& sum1, const
 }
 #endif
 
-/// Sums over a window of the products of both gradients and the pixels of the other image.
-struct GradientSums {
-  std::int32_t x;
-  std::int32_t y;
-};
-
 /// Sums of the windows of all pixels of a tile, moved by displacements where many points search.
 ///
 /// Displacements are in whole pixels, and have an index of their own if they are near the start of
@@ -243,8 +227,6 @@ struct GradientSums {
 /// one pixel to the right, one below, and both.
 class SharedSums {
  public:
-  static constexpr int corners = 4;
-
   SharedSums(const Image<std::uint8_t>& to, const Patch& patch, const Flow& start)
       : to_(to),
         patch_(patch),
@@ -263,13 +245,15 @@ class SharedSums {
     return hn::ConvertTo(Ints(), hn::IfThenElse(near, at, hn::Set(floats, far)));
   }
 
-  /// Counts a search at a displacement.
-  void count(std::int32_t displacement) { ++searches_[displacement]; }
-
-  /// Computes the sums of a displacement if enough searches were counted there, which it forgets.
-  void share(std::int32_t displacement) {
-    if (std::exchange(searches_[displacement], std::uint16_t{0}) >= enough && displacement != far)
-      compute(displacement);
+  /// Computes the sums of displacements where enough of the points search. False if of none.
+  bool share(std::span<const std::int32_t> points, const std::int32_t* displacement) {
+    if (points.size() < enough) return false;
+    bool any = false;
+    for (const auto i : points)
+      if (++searches_[displacement[i]] == enough && displacement[i] != far)
+        any |= compute(displacement[i]);
+    for (const auto i : points) searches_[displacement[i]] = 0;
+    return any;
   }
 
   bool has(std::int32_t displacement) const { return corners_[displacement][0] != none; }
@@ -285,13 +269,14 @@ class SharedSums {
   static constexpr std::int32_t far = side * side - 1;  ///< index of all other displacements
   static constexpr int most = 64;                       ///< corners with sums
   /// Searches at one displacement that take longer than the sums of all pixels.
-  static constexpr int enough = 12;
+  static constexpr int enough = 18;
   static constexpr std::uint8_t none = 0;
 
-  void compute(std::int32_t displacement) {
+  /// False if there is no room or no image for them.
+  bool compute(std::int32_t displacement) {
     const std::array<std::int32_t, corners> all{displacement, displacement + 1, displacement + side,
                                                 displacement + side + 1};
-    if (count_ + corners > most || !all_within(displacement)) return;
+    if (count_ + corners > most || !all_within(displacement)) return false;
     for (std::size_t c = 0; c < all.size(); ++c) {
       auto& number = numbers_[all[c]];
       if (number == none) {
@@ -300,6 +285,7 @@ class SharedSums {
       }
       corners_[displacement][c] = number;
     }
+    return true;
   }
 
   int left(std::int32_t displacement) const {
@@ -342,11 +328,11 @@ class SharedSums {
   float first_x_;  ///< displacement of index 0
   float first_y_;
   int count_ = 0;
-  std::uint16_t searches_[side * side] = {};
+  std::uint16_t searches_[side * side] = {};  ///< all 0 between calls of share()
   /// Number of the sums at a displacement, counted from 1.
   std::uint8_t numbers_[side * side] = {};
   std::uint8_t corners_[side * side][corners] = {};
-  HWY_ALIGN GradientSums sums_[most][Tile::side * Tile::side];
+  HWY_ALIGN GradientSums sums_[most][tile_pixels];
 };
 
 /// Searches for the points of a tile, one lane per point.
@@ -431,7 +417,7 @@ class Points {
   }
 
  private:
-  static constexpr int most = Tile::side * Tile::side;
+  static constexpr int most = tile_pixels;
   /// Points that take longer one by one than the sums of all pixels.
   static constexpr int share_from = 12;
 
@@ -521,19 +507,47 @@ class Points {
   /// Gets the sums of gradient * there of points that entered another pixel.
   void look() {
     if (shared_) {
-      for (int k = 0; k < moved_count_; ++k) shared_->count(displacement_[moved_[k]]);
-      for (int k = 0; k < moved_count_; ++k) shared_->share(displacement_[moved_[k]]);
+      take_shared();
+      if (shared_->share(moved(), displacement_)) take_shared();
     }
-    for (int k = 0; k < moved_count_; ++k) {
-      const int i = moved_[k];
-      if (shared_ && shared_->has(displacement_[i])) {
-        for (int c = 0; c < SharedSums::corners; ++c)
-          there_[c][i] = shared_->at(displacement_[i], c, pixel_[i]);
-      } else {
-        look(i);
-      }
-    }
+    look_alone();
     moved_count_ = 0;
+  }
+
+  std::span<const std::int32_t> moved() const {
+    return std::span(moved_).first(static_cast<std::size_t>(moved_count_));
+  }
+
+  /// Takes points whose displacement has shared sums out of moved_, and copies their sums.
+  void take_shared() {
+    std::int32_t taken[most];
+    int taken_count = 0;
+    int left = 0;
+    for (const auto i : moved()) {  // without a branch, which would be mispredicted often
+      const bool has = shared_->has(displacement_[i]);
+      taken[taken_count] = i;
+      moved_[left] = i;
+      taken_count += has ? 1 : 0;
+      left += has ? 0 : 1;
+    }
+    moved_count_ = left;
+    for (int k = 0; k < taken_count; ++k) {
+      const int i = taken[k];
+      for (int c = 0; c < corners; ++c) there_[c][i] = shared_->at(displacement_[i], c, pixel_[i]);
+    }
+  }
+
+  /// Computes the sums of each point in moved_.
+  void look_alone() {
+#if HWY_MAX_BYTES == 64
+    if (shared_ && moved_count_ > 0 && ByteWindows::supported()) {
+      if (!byte_windows_)
+        byte_windows_.emplace(patch_.slope_x(), patch_.slope_y(), patch_.rows() + window - 1);
+      byte_windows_->sum(moved(), pixel_, to_, at_, there_);
+      return;
+    }
+#endif
+    for (const auto i : moved()) look(i);
   }
 
   /// Computes the sums of gradient * there with the window at each of the four pixels around its
@@ -567,7 +581,7 @@ class Points {
     }
     HWY_ALIGN std::int32_t part[2 * parts * 4];
     store_both_parts(upper_left, upper_right, lower_left, lower_right, part);
-    for (std::ptrdiff_t c = 0; c < SharedSums::corners; ++c) {
+    for (std::ptrdiff_t c = 0; c < corners; ++c) {
       auto& sums = there_[c][i];
       sums = {part[c], part[4 * parts + c]};
       if (parts == 2) {
@@ -602,10 +616,10 @@ class Points {
     hn::Store(cell_x, floats, cell_x_ + i);
     hn::Store(cell_y, floats, cell_y_ + i);
     hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(floats, moved, bytes);
-    for (unsigned bits = bytes[0] | bytes[1] << 8U; bits != 0; bits &= bits - 1)
-      moved_[moved_count_++] = static_cast<std::int16_t>(i + std::countr_zero(bits));
+    // A whole vector fits, because at most i are queued.
+    hn::StoreU(hn::Compress(hn::Iota(ints, i), hn::RebindMask(ints, moved)), ints,
+               moved_ + moved_count_);
+    moved_count_ += static_cast<int>(hn::CountTrue(floats, moved));
   }
 
   /// Moves a vector of points by one Gauss-Newton step.
@@ -620,9 +634,9 @@ class Points {
     const auto beyond_y =
         hn::Sub(hn::Add(flow_y, hn::Set(floats, down_)), hn::Load(floats, cell_y_ + i));
     // Sums of gradient * (there - here).
-    hn::Vec<Floats> mismatch_x[SharedSums::corners];
-    hn::Vec<Floats> mismatch_y[SharedSums::corners];
-    for (int c = 0; c < SharedSums::corners; ++c) {
+    hn::Vec<Floats> mismatch_x[corners];
+    hn::Vec<Floats> mismatch_y[corners];
+    for (int c = 0; c < corners; ++c) {
       hn::Vec<Ints> there_x;
       hn::Vec<Ints> there_y;
       hn::LoadInterleaved2(ints, &there_[c][i].x, there_x, there_y);
@@ -674,6 +688,9 @@ class Points {
   const Image<std::uint8_t>& to_;
   const Patch& patch_;
   std::optional<SharedSums> shared_;  ///< if there are many points
+#if HWY_MAX_BYTES == 64
+  std::optional<ByteWindows> byte_windows_;  ///< once points of many looked alone
+#endif
   int count_;
   float right_;
   float down_;
@@ -700,8 +717,8 @@ class Points {
   HWY_ALIGN std::int32_t here_y_[most];
   /// Sums with the window at each of the four pixels around its position: upper left, upper right,
   /// lower left and lower right.
-  HWY_ALIGN GradientSums there_[SharedSums::corners][most];
-  std::int16_t moved_[most];
+  HWY_ALIGN GradientSums there_[corners][most];
+  std::int32_t moved_[most];
 };
 
 void search_all(const Image<std::uint8_t>& from, const ScharrGradients& gradients,

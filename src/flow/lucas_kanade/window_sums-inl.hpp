@@ -17,6 +17,7 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 
 constexpr int window = Tile::before + Tile::after;
+constexpr int tile_pixels = Tile::side * Tile::side;
 /// Columns of a tile's windows, rounded up to whole vectors.
 constexpr int window_columns = 2 * Tile::side;
 
@@ -35,6 +36,31 @@ HWY_INLINE Value least_eigenvalue(Floats floats, Value xx, Value xy, Value yy) {
   return hn::Div(hn::Sub(hn::Add(xx, yy), root),
                  hn::Set(floats, static_cast<float>(2 * window * window)));
 }
+
+/// Sums over a window of the products of both gradients and the pixels of the other image.
+struct GradientSums {
+  std::int32_t x;
+  std::int32_t y;
+};
+
+/// Positions that a search needs these sums at: upper left, upper right, lower left, lower right.
+constexpr int corners = 4;
+
+#if HWY_TARGET != HWY_SCALAR
+/// In each 128-bit block, lane c is the sum of the lanes of that block of sum c.
+template <class Lanes, class Value = hn::Vec<Lanes>>
+HWY_INLINE Value add_lanes(Lanes lanes, Value sum0, Value sum1, Value sum2, Value sum3) {
+  const hn::Repartition<std::int64_t, Lanes> pairs;
+  const auto add_pairs = [&](Value a, Value b) {
+    return hn::BitCast(pairs,
+                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
+  };
+  const auto low = add_pairs(sum0, sum1);
+  const auto high = add_pairs(sum2, sum3);
+  return hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
+                 hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high)));
+}
+#endif
 
 /// Neighbouring columns of a row.
 using Columns = hn::CappedTag<std::int32_t, 16>;
