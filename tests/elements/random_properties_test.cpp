@@ -157,8 +157,12 @@ class Playback {
  private:
   void check_messages() {
     const Owned<GstBus> bus(gst_element_get_bus(pipeline_.get()));
-    while (const Owned<GstMessage> message{gst_bus_pop_filtered(bus.get(), GST_MESSAGE_ERROR)})
-      ADD_FAILURE() << harness::text_of(message.get());
+    while (const Owned<GstMessage> message{gst_bus_pop_filtered(bus.get(), GST_MESSAGE_ERROR)}) {
+      gchar* cause = nullptr;
+      gst_message_parse_error(message.get(), nullptr, &cause);
+      ADD_FAILURE() << harness::text_of(message.get()) << " " << cause;
+      g_free(cause);
+    }
   }
 
   Owned<GstElement> pipeline_;

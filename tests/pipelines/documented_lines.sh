@@ -51,7 +51,8 @@ while IFS= read -r line; do
   echo "$line"
   count=$((count + 1))
   if [[ $line == ./pipelines/*-events\ * ]]; then # serves the lines that follow
-    eval "exec $line" >serving 2>&1 </dev/null &
+    : >serving
+    eval "exec $line" >>serving 2>&1 </dev/null &
     servers+=($!)
     served=
     for _ in $(seq 300); do
