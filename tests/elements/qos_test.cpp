@@ -403,10 +403,11 @@ std::vector<GstClockTime> show(const std::string& element, int frames) {
 
 TEST(Qos, ShowsMostOfWhatASlowSinkCanTakeEvenly) {
   auto shown = show("eventsim-frame", 150);
-  ASSERT_GT(shown.size(), 25U);  // of 50 in 5 s; a machine under load misses some
+  EXPECT_GE(shown.size(), 40U);  // of 50 in 5 s
+  ASSERT_GT(shown.size(), 20U);
   for (std::size_t i = shown.size() - 1; i > 0; --i) shown[i] -= shown[i - 1];
   std::sort(shown.begin() + 1, shown.end());
-  EXPECT_LT(shown[shown.size() * 9 / 10], 400 * ms);
+  EXPECT_LT(shown[shown.size() * 9 / 10], 200 * ms);
 }
 
 TEST(Qos, NearlyFreezesWithoutIt) {
