@@ -17,8 +17,8 @@
  * ! vp8enc deadline=1 ! webmmux ! filesink location=events.webm
  * ]|
  */
-#include "gst/base/dense_properties.hpp"
-#include "gst/base/eventsimulator.hpp"
+#include "gst/simulator/dense_properties.hpp"
+#include "gst/simulator/eventsimulator.hpp"
 #include "src/simulate/dense.hpp"
 
 using eventcamera::DenseSimulator;

@@ -34,8 +34,8 @@
 #include <utility>
 #include <variant>
 
-#include "gst/base/eventsimulator.hpp"
 #include "gst/base/types.hpp"
+#include "gst/simulator/eventsimulator.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Simulators without properties of their own: a table of methods.
-#include "gst/base/eventsimulator.hpp"
+#include "gst/simulator/eventsimulator.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"

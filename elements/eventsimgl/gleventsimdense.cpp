@@ -15,8 +15,8 @@
  * eventstats ! fakesink
  * ]|
  */
-#include "gst/base/dense_properties.hpp"
-#include "gst/base/gleventsimulator.hpp"
+#include "gst/glsimulator/gleventsimulator.hpp"
+#include "gst/simulator/dense_properties.hpp"
 #include "src/gl/dense.hpp"
 
 using eventcamera::FlowMethod;

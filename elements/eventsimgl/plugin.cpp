@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/plugin.hpp"
-#include "gst/base/eventsimulator.hpp"
+#include "gst/simulator/eventsimulator.hpp"
 
 const EventSimulatorTypeNames event_simulator_type_names = {.simulator = "GstGLEventSimulatorBase",
                                                             .pool = "GstGLEventPool"};

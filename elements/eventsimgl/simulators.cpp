@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Simulators without properties of their own: a table of methods.
-#include "gst/base/gleventsimulator.hpp"
+#include "gst/glsimulator/gleventsimulator.hpp"
 #include "src/gl/diff.hpp"
 #include "src/gl/frame.hpp"
 #include "src/gl/sparse.hpp"

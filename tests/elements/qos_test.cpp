@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "gst/base/frame_pacer.hpp"
-#include "gst/base/learnt_latency.hpp"
+#include "gst/simulator/frame_pacer.hpp"
+#include "gst/simulator/learnt_latency.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {

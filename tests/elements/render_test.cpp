@@ -2,7 +2,7 @@
 // eventrender: number, times and content of pictures.
 #include <algorithm>
 
-#include "gst/base/drawn_video.hpp"
+#include "gst/drawing/drawn_video.hpp"
 #include "src/core/event.hpp"
 #include "src/render/accumulator.hpp"
 #include "tests/elements/event_buffer.hpp"

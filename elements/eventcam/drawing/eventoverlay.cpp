@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventoverlay
+ * @title: eventoverlay
+ * @short_description: draws events over video
+ *
+ * Draws the events of the pad `events` over the video of the pad `sink`. Each frame shows the
+ * events of the interval that it starts, or those of the #GstEventOverlay:accumulation-time before
+ * the interval's end. The two are synchronized by running time. Events are scaled to the video if
+ * the sensor has a different size.
+ *
+ * Video from a live source waits for events no longer than its latency. Other video waits until the
+ * events of its interval have come, or a GAP event or EOS says that there are none.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc pattern=ball ! tee name=t  t. ! queue ! videoconvert ! eventoverlay
+ * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.events
+ * ]|
+ */
+#include <gst/video/video.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/video_frame.hpp"
+#include "gst/drawing/drawn_video.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "src/render/overlay.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_overlay_debug);
+#define GST_CAT_DEFAULT event_overlay_debug
+
+using eventcamera::Microseconds;
+using eventcamera::Overlay;
+using eventcamera::Size;
+
+namespace {
+
+/// User-settable values, copied once per frame.
+struct Settings {
+  GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_RED_BLUE;
+  gdouble opacity = 1;
+  GstClockTime accumulation_time = 0;
+};
+
+class EventOverlay final : public EventAggregator {
+ public:
+  explicit EventOverlay(GstAggregator* element) : EventAggregator(element, {.verb = "draw"}) {}
+
+  void stop() override;
+  void flush() override;
+  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  GstFlowReturn aggregate(bool timed_out) override;
+  GstClockTime next_time() override;
+
+  GuardedSettings<Settings> settings;
+
+ private:
+  bool take_video_caps(const GstCaps* caps);
+  bool take_event_caps(const GstCaps* caps);
+  std::optional<EventInterval> interval_of_frame(GstBuffer* frame) const;
+  bool take_events(GstBuffer* buffer, GstClockTime start, GstClockTime end);
+  bool take_buffer(GstBuffer* buffer, GstClockTime end);
+  bool take_events_until(GstClockTime end);
+  GstFlowReturn draw(const EventInterval& interval, GstBuffer* buffer);
+  GstFlowReturn take_frame(const std::optional<EventInterval>& interval, bool timed_out);
+
+  GstAggregatorPad* const events_pad_ = pad("events");
+
+  // Accessed by the source pad's thread only, or while there is none.
+  std::optional<GstVideoInfo> video_;
+  std::optional<Size> sensor_;
+  std::optional<Overlay> overlay_;  // set once both are known
+  gsize taken_ = 0;                 // number of processed events of the first queued buffer
+  GstClockTime known_ = 0;          // running time up to which events are complete
+};
+
+/* time */
+
+/// Converts an interval to running time.
+std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
+                                              const EventInterval& interval) {
+  const auto start = running_time(pad, interval.start);
+  if (!start) return std::nullopt;
+  return EventInterval{*start, *start + (interval.end - interval.start)};
+}
+
+/// Interval that a frame is shown, in running time.
+std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) const {
+  const GstClockTime start = GST_BUFFER_PTS(frame);
+  if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
+  const GstClockTime duration =
+      GST_BUFFER_DURATION_IS_VALID(frame) ? GST_BUFFER_DURATION(frame) : frame_duration(*video_);
+  return running_interval(main_pad(),
+                          {start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)});
+}
+
+/* events */
+
+/// Adds the events of a buffer up to running time `end`. Returns true if these were all. May throw.
+bool EventOverlay::take_events(GstBuffer* buffer, GstClockTime start, GstClockTime end) {
+  const MappedEvents mapped(buffer);
+  if (!mapped) {
+    warn(EventFault::partial_event, buffer);
+    return true;
+  }
+  const auto origin = static_cast<Microseconds>(start / 1000);
+  const auto rest = mapped.events().subspan(std::min(taken_, mapped.events().size()));
+  const auto due = events_until(rest, origin, static_cast<Microseconds>(end / 1000));
+  taken_ += due.size();
+  if (overlay_ && overlay_->add(due, origin) > 0) warn(EventFault::beyond_sensor, buffer);
+  return due.size() == rest.size();
+}
+
+/// Adds the events of the first queued buffer up to running time `end`. Returns true if more are
+/// needed to reach `end`. May throw.
+bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
+  const auto interval = interval_of(buffer);
+  const auto running = interval ? running_interval(events_pad_, *interval) : std::nullopt;
+  if (!interval) warn(EventFault::no_pts, buffer);
+  if (running) {
+    if (running->start >= end || !take_events(buffer, running->start, end)) return false;
+    known_ = std::max(known_, running->end);
+  }
+  taken_ = 0;
+  gst_aggregator_pad_drop_buffer(events_pad_);
+  return known_ + event_resolution <= end;
+}
+
+/// Adds the events up to running time `end`. Returns true if no more are expected before `end`. May
+/// throw.
+bool EventOverlay::take_events_until(GstClockTime end) {
+  while (known_ + event_resolution <= end) {
+    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(events_pad_));
+    if (!buffer) return gst_aggregator_pad_is_eos(events_pad_);
+    if (!take_buffer(buffer.get(), end)) return true;
+  }
+  return true;
+}
+
+/* frames */
+
+GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffer) {
+  const Settings current = settings.copy();
+  const VideoFrame frame(*video_, buffer, static_cast<GstMapFlags>(GST_MAP_READWRITE));
+  if (!frame) {
+    GST_ELEMENT_ERROR(
+        element(), RESOURCE, FAILED,
+        ("Cannot draw on a video frame: %s. Check the element upstream.", frame.fault().c_str()),
+        ("%" GST_PTR_FORMAT, buffer));
+    return GST_FLOW_ERROR;
+  }
+  const auto end = static_cast<Microseconds>(interval.end / 1000);
+  const auto start = current.accumulation_time > 0
+                         ? end - static_cast<Microseconds>(current.accumulation_time / 1000)
+                         : static_cast<Microseconds>(interval.start / 1000);
+  overlay_->draw(start, end, eventcamera::palette(palette_name_of(current.palette)),
+                 current.opacity, pixel_layout_of(*video_), frame.data(), frame.stride());
+  return GST_FLOW_OK;
+}
+
+/// Draws on the first queued frame and pushes it. May throw.
+GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& interval,
+                                       bool timed_out) {
+  if (interval) {
+    if (sensor_ && !overlay_)
+      overlay_.emplace(*sensor_,
+                       Size{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)});
+    if (!take_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
+  if (interval && overlay_) {
+    const GstFlowReturn result = draw(*interval, out.get());
+    if (result != GST_FLOW_OK) return result;
+  }
+  return gst_aggregator_finish_buffer(element(), out.release());
+}
+
+GstFlowReturn EventOverlay::aggregate(bool timed_out) {
+  GstBuffer* frame = gst_aggregator_pad_peek_buffer(main_pad());
+  if (frame == nullptr)
+    return gst_aggregator_pad_is_eos(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
+  const auto interval = video_ ? interval_of_frame(frame) : std::nullopt;
+  gst_buffer_unref(frame);  // otherwise it would not be writable in place
+  return video_ ? take_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
+}
+
+/// Time at which a live frame is pushed without waiting for events: at once if it has no time, and
+/// at the end of the video.
+GstClockTime EventOverlay::next_time() {
+  const OwnedBuffer frame(gst_aggregator_pad_peek_buffer(main_pad()));
+  if (!frame) return gst_aggregator_pad_is_eos(main_pad()) ? 0 : GST_CLOCK_TIME_NONE;
+  if (!GST_BUFFER_PTS_IS_VALID(frame.get())) return 0;
+  return running_time(main_pad(), GST_BUFFER_PTS(frame.get())).value_or(0);
+}
+
+/* negotiation, states */
+
+bool EventOverlay::take_video_caps(const GstCaps* caps) {
+  GstVideoInfo video;
+  if (!gst_video_info_from_caps(&video, caps)) return false;
+  if (!video_ || GST_VIDEO_INFO_WIDTH(&*video_) != GST_VIDEO_INFO_WIDTH(&video) ||
+      GST_VIDEO_INFO_HEIGHT(&*video_) != GST_VIDEO_INFO_HEIGHT(&video))
+    overlay_.reset();
+  video_ = video;
+  const GstClockTime latency = frame_duration(video);
+  gst_aggregator_set_latency(element(), latency, latency);
+  if (!gst_pad_is_linked(GST_PAD(events_pad_)))
+    GST_ELEMENT_WARNING(element(), CORE, PAD,
+                        ("No events to draw: link a source of events to the pad \"events\". Until "
+                         "then, video from a live source goes on as it is, and other video waits."),
+                        ("the pad \"events\" is not linked"));
+  return true;
+}
+
+bool EventOverlay::take_event_caps(const GstCaps* caps) {
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+  const Size sensor{info.width, info.height};
+  if (sensor_ != sensor) overlay_.reset();
+  sensor_ = sensor;
+  return true;
+}
+
+bool EventOverlay::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
+  return pad == main_pad() ? take_video_caps(caps) : take_event_caps(caps);
+}
+
+void EventOverlay::flush() {
+  overlay_.reset();
+  taken_ = 0;
+  known_ = 0;
+}
+
+void EventOverlay::stop() {
+  flush();
+  video_.reset();
+  sensor_.reset();
+}
+
+}  // namespace
+
+DEFINE_EVENT_AGGREGATOR(GstEventOverlay, gst_event_overlay, EVENT_OVERLAY, EventOverlay,
+                        eventoverlay, GST_RANK_NONE, "events drawn over video")
+
+static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
+  constexpr auto flags = static_cast<GParamFlags>(
+      G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+  const Settings defaults;
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  properties.add(
+      &Settings::palette,
+      g_param_spec_enum("palette", "Palette", "Colours of pixels with ON, with OFF, and with both",
+                        GST_TYPE_EVENT_CAMERA_PALETTE, defaults.palette, flags));
+  properties.add(&Settings::opacity,
+                 g_param_spec_double("opacity", "Opacity",
+                                     "Opacity of drawn events (0 = invisible, 1 = opaque)", 0, 1,
+                                     defaults.opacity, flags));
+  properties.add(
+      &Settings::accumulation_time,
+      g_param_spec_uint64("accumulation-time", "Accumulation time",
+                          "Time that an event is shown (ns; 0 = one frame)", 0,
+                          std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
+
+#define DRAWN_VIDEO_CAPS                                                    \
+  "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS                     \
+  ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], framerate = " \
+  "(fraction) [ 0, max ]"
+  static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE(
+      "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(DRAWN_VIDEO_CAPS));
+  static GstStaticPadTemplate events_template =
+      GST_STATIC_PAD_TEMPLATE("events", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
+  static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
+      "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(DRAWN_VIDEO_CAPS));
+  gst_event_aggregator_class_add_templates(GST_EVENT_AGGREGATOR_CLASS(klass),
+                                           {&sink_template, &events_template, &src_template});
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event overlay",
+                                        "Filter/Editor/Video", "Draws events over video",
+                                        EVENTSIM_AUTHORS);
+}

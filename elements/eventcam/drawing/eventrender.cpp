@@ -1,0 +1,573 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventrender
+ * @title: eventrender
+ * @short_description: draws events as video
+ *
+ * Turns an event stream into video, at the framerate that downstream requests (default 30/1). A
+ * picture shows the state at the end of its interval, PTS + duration.
+ *
+ * - `accumulate`: pixels with ON, OFF or both within a window;
+ * - `decay`: the exponentially decaying sum of ON minus OFF;
+ * - `time-surface`: age and polarity of the last event of each pixel;
+ * - `count`: ON minus OFF within a window.
+ *
+ * The window is as long as a picture's interval, or #GstEventRender:accumulation-time; windows may
+ * then overlap. #GstEventRender:event-count and #GstEventRender:area-event-count limit the window
+ * by the number of events instead of by time.
+ *
+ * Pictures continue without events: through GAP events and, from a live source, by the clock. At
+ * framerate 0/1 each buffer of events becomes one picture.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc pattern=ball ! eventsim-diff ! eventrender mode=decay !
+ * video/x-raw,framerate=60/1 ! videoconvert ! autovideosink
+ * ]|
+ */
+#include <gst/video/video.h>
+
+#include <algorithm>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/video_frame.hpp"
+#include "gst/drawing/drawn_video.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "src/render/renderer.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_render_debug);
+#define GST_CAT_DEFAULT event_render_debug
+
+using eventcamera::Microseconds;
+using eventcamera::Renderer;
+using eventcamera::RenderMode;
+using eventcamera::RenderSettings;
+
+namespace {
+
+/// Maximum gap between buffers that is filled with pictures; no interval is longer.
+constexpr GstClockTime max_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
+
+/// Maximum time to wait for the first input of a live source.
+constexpr GstClockTime max_wait = 200 * GST_MSECOND;
+
+/// Default time constant of decay and maximum age of time-surface.
+constexpr GstClockTime default_memory = 100 * GST_MSECOND;
+
+/// User-settable values, copied once per picture.
+struct Settings {
+  RenderMode mode = RenderMode::accumulate;
+  GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
+  GstClockTime accumulation_time = 0;
+  guint event_count = 0;
+  guint area_event_count = 0;
+  guint area_size = 16;
+  gdouble full_scale = 2;
+};
+
+/// Converts to the core's settings. Settings that a mode does not use keep their defaults, so that
+/// changing them does not reset the picture.
+RenderSettings core_settings(const Settings& settings) {
+  RenderSettings core;
+  core.mode = settings.mode;
+  core.palette = palette_name_of(settings.palette);
+  const auto time = settings.accumulation_time > 0 ? settings.accumulation_time : default_memory;
+  const auto microseconds = static_cast<Microseconds>(std::max(time / 1000, GstClockTime{1}));
+  if (settings.mode == RenderMode::decay || settings.mode == RenderMode::time_surface)
+    core.time_constant = microseconds;
+  else
+    core.limits = {settings.event_count, settings.area_event_count,
+                   static_cast<int>(settings.area_size)};
+  if (settings.mode == RenderMode::decay || settings.mode == RenderMode::count)
+    core.full_scale = static_cast<float>(settings.full_scale);
+  return core;
+}
+
+/// Start of the window for the picture of an interval.
+Microseconds window_start(const Settings& settings, const EventInterval& interval) {
+  if (settings.accumulation_time > 0)
+    return interval.end > settings.accumulation_time
+               ? static_cast<Microseconds>((interval.end - settings.accumulation_time) / 1000)
+               : -1;
+  if (settings.event_count > 0 || settings.area_event_count > 0) return -1;
+  return static_cast<Microseconds>(interval.start / 1000);
+}
+
+/// Successive intervals of pictures at a framerate.
+class FrameTimes {
+ public:
+  FrameTimes(GstClockTime origin, const GstVideoInfo& video)
+      : origin_(origin),
+        fps_n_(static_cast<guint64>(GST_VIDEO_INFO_FPS_N(&video))),
+        fps_d_(static_cast<guint64>(GST_VIDEO_INFO_FPS_D(&video))) {}
+
+  /// Interval of the picture's events. Rounded up, so that intervals of other elements at the same
+  /// framerate, which are rounded down, end within it.
+  EventInterval events() const {
+    const auto at = [this](guint64 index) {
+      return origin_ + gst_util_uint64_scale_ceil(index, fps_d_ * GST_SECOND, fps_n_);
+    };
+    return {at(index_), at(index_ + 1)};
+  }
+  /// Timestamps of the picture's buffer.
+  EventInterval picture() const {
+    const auto at = [this](guint64 index) {
+      return origin_ + gst_util_uint64_scale(index, fps_d_ * GST_SECOND, fps_n_);
+    };
+    return {at(index_), at(index_ + 1)};
+  }
+  void next() { ++index_; }
+
+ private:
+  GstClockTime origin_;
+  guint64 fps_n_;
+  guint64 fps_d_;
+  guint64 index_ = 0;
+};
+
+/// State from caps to stop.
+struct State {
+  int width;
+  int height;
+  Renderer renderer;
+  std::optional<GstVideoInfo> video{};  ///< output format, once negotiated
+
+  bool has_framerate() const { return GST_VIDEO_INFO_FPS_N(&*video) > 0; }
+};
+
+class EventRender final : public EventAggregator {
+ public:
+  explicit EventRender(GstAggregator* element)
+      : EventAggregator(element, {.verb = "draw", .passes_main_pad = false}) {}
+
+  void stop() override;
+  void flush() override;
+  void release_memory() override { state_.reset(); }
+  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  void take_segment(const GstSegment& segment) override;
+  GstFlowReturn aggregate(bool timed_out) override;
+  GstClockTime next_time() override;
+
+  GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result) const;
+  bool set_video(const GstCaps* caps);
+  void take_qos(GstEvent* event);
+
+  GuardedSettings<Settings> settings;
+
+ private:
+  void start_over();
+  bool approach(GstBuffer* buffer, const EventInterval& interval);
+  bool take_events(const MappedEvents& mapped, std::optional<GstClockTime> end, GstBuffer* buffer);
+  GstFlowReturn take_buffer(GstBuffer* buffer);
+  void drop_buffer();
+  void begin_now();
+  bool is_too_late(const EventInterval& picture);
+  bool has_begun_picture() const;
+  GstFlowReturn acquire_buffer(GstBuffer** buffer);
+  GstFlowReturn draw(const EventInterval& events, GstBuffer* buffer);
+  GstFlowReturn push_picture(const EventInterval& events, const EventInterval& picture);
+  GstFlowReturn push_next_picture();
+  void drain();
+
+  std::mutex mutex_;           // guards earliest_; make no calls while holding it
+  GstClockTime earliest_ = 0;  // running time before which pictures are too late
+
+  // Accessed by the source pad's thread only, or while there is none.
+  std::optional<State> state_;
+  std::optional<FrameTimes> times_;  // interval of the next picture, once the first event is near
+  std::optional<gsize> taken_;       // number of processed events of the first queued buffer
+  GstClockTime known_ = 0;           // time up to which events are complete
+  std::optional<GstClockTime> waiting_since_;  // for the first event; running time
+  bool discontinuous_ = false;                 // the next picture is discontinuous
+};
+
+/* events */
+
+/// Adds the events of a buffer up to `end`, or all if there is none. Returns true if these were
+/// all. May throw.
+bool EventRender::take_events(const MappedEvents& mapped, std::optional<GstClockTime> end,
+                              GstBuffer* buffer) {
+  const auto rest = mapped.events().subspan(std::min(*taken_, mapped.events().size()));
+  const auto due =
+      end ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000)) : rest;
+  *taken_ += due.size();
+  state_->renderer.configure(core_settings(settings.copy()));
+  if (state_->renderer.add(due, mapped.start()) > 0) warn(EventFault::beyond_sensor, buffer);
+  return due.size() == rest.size();
+}
+
+void EventRender::drop_buffer() {
+  taken_.reset();
+  gst_aggregator_pad_drop_buffer(main_pad());
+}
+
+/// Advances to the time of a buffer. Returns true if a picture is due before the buffer can be
+/// processed. May throw.
+bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
+  if (!taken_) {
+    const bool returns =
+        GST_BUFFER_IS_DISCONT(buffer) && interval.start + event_resolution < known_;
+    const bool leaps = times_ && interval.start > times_->events().end + max_gap;
+    if (returns || leaps) start_over();
+    taken_ = 0;
+  }
+  const GstClockTime segment_start = segment_of(main_pad()).start;
+  if (!times_ && state_->has_framerate() &&
+      (interval.end > segment_start || interval.start >= segment_start))
+    times_.emplace(std::max(interval.start, segment_start), *state_->video);
+  return times_ && interval.start >= times_->events().end;
+}
+
+/// Adds the events of a buffer that are due, and pushes the picture that this completes, if any.
+/// May throw.
+GstFlowReturn EventRender::take_buffer(GstBuffer* buffer) {
+  const auto interval = interval_of(buffer);
+  if (!interval) {
+    warn(EventFault::no_pts, buffer);
+    drop_buffer();
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  if (approach(buffer, *interval)) return push_next_picture();
+  std::optional<GstClockTime> due;
+  if (times_) due = times_->events().end;
+  bool all = false;
+  {
+    const MappedEvents mapped(buffer);
+    if (!mapped) {
+      warn(EventFault::partial_event, buffer);
+      drop_buffer();
+      return GST_AGGREGATOR_FLOW_NEED_DATA;
+    }
+    all = take_events(mapped, due, buffer);
+  }
+  known_ = std::max(known_, interval->end);
+  if (due && (!all || interval->end + event_resolution > *due)) return push_next_picture();
+  drop_buffer();
+  if (state_->has_framerate() || interval->end <= segment_of(main_pad()).start)
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  return push_picture(*interval, *interval);
+}
+
+/// Starts the first picture now, because a live source sends nothing.
+void EventRender::begin_now() {
+  const GstSegment segment = segment_of(main_pad());
+  const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
+  const guint64 position = gst_segment_position_from_running_time(&segment, GST_FORMAT_TIME, now);
+  if (GST_CLOCK_TIME_IS_VALID(position) && state_->has_framerate())
+    times_.emplace(position, *state_->video);
+}
+
+GstFlowReturn EventRender::aggregate(bool timed_out) {
+  GstAggregatorPad* pad = main_pad();
+  if (timed_out) waiting_since_.reset();  // if no picture can start yet, wait once more
+  if (!state_ || !state_->video) {
+    if (gst_aggregator_pad_is_eos(pad)) return GST_FLOW_EOS;
+    return gst_aggregator_pad_has_buffer(pad) ? GST_FLOW_NOT_NEGOTIATED
+                                              : GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  if (const OwnedBuffer buffer{gst_aggregator_pad_peek_buffer(pad)})
+    return take_buffer(buffer.get());
+  if (gst_aggregator_pad_is_eos(pad))
+    return has_begun_picture() ? push_next_picture() : GST_FLOW_EOS;
+  if (!timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (times_) return push_next_picture();
+  begin_now();
+  return GST_AGGREGATOR_FLOW_NEED_DATA;
+}
+
+GstClockTime EventRender::next_time() {
+  if (!state_) return GST_CLOCK_TIME_NONE;
+  if (times_)
+    return running_time(main_pad(), times_->picture().start).value_or(GST_CLOCK_TIME_NONE);
+  const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
+  if (!waiting_since_ && GST_CLOCK_TIME_IS_VALID(now)) waiting_since_ = now;
+  return waiting_since_ ? *waiting_since_ + max_wait : GST_CLOCK_TIME_NONE;
+}
+
+/* pictures */
+
+/// True if sinks would drop the picture anyway.
+bool EventRender::is_too_late(const EventInterval& picture) {
+  const auto time = running_time(main_pad(), picture.start);
+  const std::lock_guard lock(mutex_);
+  return time && *time < earliest_;
+}
+
+GstFlowReturn EventRender::draw(const EventInterval& events, GstBuffer* buffer) {
+  const Settings current = settings.copy();
+  state_->renderer.configure(core_settings(current));
+  const VideoFrame frame(*state_->video, buffer, GST_MAP_WRITE);
+  if (!frame) {
+    GST_ELEMENT_ERROR(element(), RESOURCE, FAILED,
+                      ("Cannot draw into an output buffer: %s. Check the element downstream.",
+                       frame.fault().c_str()),
+                      ("%" GST_PTR_FORMAT, buffer));
+    return GST_FLOW_ERROR;
+  }
+  state_->renderer.draw(window_start(current, events), static_cast<Microseconds>(events.end / 1000),
+                        pixel_layout_of(*state_->video), frame.data(), frame.stride());
+  return GST_FLOW_OK;
+}
+
+GstFlowReturn EventRender::acquire_buffer(GstBuffer** buffer) {
+  GstBufferPool* pool = gst_aggregator_get_buffer_pool(element());
+  if (pool == nullptr) return GST_FLOW_NOT_NEGOTIATED;
+  GstFlowReturn result = GST_FLOW_ERROR;
+  if (gst_buffer_pool_set_active(pool, TRUE))  // GstAggregator does not activate it
+    result = gst_buffer_pool_acquire_buffer(pool, buffer, nullptr);
+  else
+    GST_ELEMENT_ERROR(element(), RESOURCE, SETTINGS,
+                      ("Cannot get output buffers; add a queue or a videoconvert downstream."),
+                      ("gst_buffer_pool_set_active() failed for %" GST_PTR_FORMAT, pool));
+  gst_object_unref(pool);
+  return result;
+}
+
+/// Draws the state at the end of an interval and pushes it. May throw.
+GstFlowReturn EventRender::push_picture(const EventInterval& events, const EventInterval& picture) {
+  if (is_too_late(picture)) {
+    GST_DEBUG_OBJECT(element(), "skipped the picture at %" GST_TIME_FORMAT,
+                     GST_TIME_ARGS(picture.start));
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  GstBuffer* acquired = nullptr;
+  GstFlowReturn result = acquire_buffer(&acquired);
+  if (result != GST_FLOW_OK) return result;
+  OwnedBuffer buffer(acquired);
+  result = draw(events, acquired);
+  if (result != GST_FLOW_OK) return result;
+  GST_BUFFER_PTS(acquired) = picture.start;
+  GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION(acquired) = picture.end - picture.start;
+  if (std::exchange(discontinuous_, false)) GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
+  return gst_aggregator_finish_buffer(element(), buffer.release());
+}
+
+/// Draws the next picture and pushes it. May throw.
+GstFlowReturn EventRender::push_next_picture() {
+  const EventInterval events = times_->events();
+  const EventInterval picture = times_->picture();
+  const GstSegment segment = segment_of(main_pad());
+  if (GST_CLOCK_TIME_IS_VALID(segment.stop) && picture.start >= segment.stop) return GST_FLOW_EOS;
+  times_->next();
+  return push_picture(events, picture);
+}
+
+/// True if there is input for the next picture.
+bool EventRender::has_begun_picture() const {
+  return state_ && state_->video && times_ && known_ > times_->events().start + event_resolution;
+}
+
+/// Pushes the incomplete last picture before a change. May throw.
+void EventRender::drain() {
+  if (has_begun_picture()) push_next_picture();
+}
+
+/* negotiation */
+
+GstFlowReturn EventRender::choose_caps(GstCaps* downstream, GstCaps** result) const {
+  if (!state_) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  GstCaps* ours = gst_pad_get_pad_template_caps(GST_AGGREGATOR_SRC_PAD(element()));
+  ours = gst_caps_make_writable(ours);
+  gst_caps_set_simple(ours, "width", G_TYPE_INT, state_->width, "height", G_TYPE_INT,
+                      state_->height, nullptr);
+  *result = gst_caps_intersect_full(downstream, ours, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref(ours);
+  return gst_caps_is_empty(*result) ? GST_FLOW_NOT_NEGOTIATED : GST_FLOW_OK;
+}
+
+bool EventRender::set_video(const GstCaps* caps) {
+  GstVideoInfo video;
+  if (!state_ || !gst_video_info_from_caps(&video, caps)) return false;
+  state_->video = video;
+  if (times_) {
+    const GstClockTime start = times_->picture().start;
+    times_.reset();
+    if (state_->has_framerate()) times_.emplace(start, video);
+  }
+  const GstClockTime latency = frame_duration(video);
+  gst_aggregator_set_latency(element(), latency, latency);
+  return true;
+}
+
+bool EventRender::take_caps(GstAggregatorPad*, GstCaps* caps) {
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+  if (state_ && state_->width == info.width && state_->height == info.height) return true;
+  drain();
+  state_.reset();  // before allocating the next: pictures can be large
+  state_.emplace(State{info.width, info.height,
+                       Renderer(info.width, info.height, core_settings(settings.copy()))});
+  gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
+  return true;
+}
+
+/* segments, QoS, states */
+
+void EventRender::take_segment(const GstSegment& segment) {
+  const GstSegment current = segment_of(main_pad());
+  if (current.rate == segment.rate && current.base == segment.base &&
+      current.start == segment.start && current.time == segment.time)
+    return;
+  drain();
+  start_over();
+}
+
+void EventRender::take_qos(GstEvent* event) {
+  GstClockTimeDiff late = 0;
+  GstClockTime time = GST_CLOCK_TIME_NONE;
+  gst_event_parse_qos(event, nullptr, nullptr, &late, &time);
+  const std::lock_guard lock(mutex_);
+  if (GST_CLOCK_TIME_IS_VALID(time))
+    earliest_ = late > 0 ? time + 2 * static_cast<GstClockTime>(late) : 0;
+}
+
+/// Forgets all events, because the next input is discontinuous. May throw.
+void EventRender::start_over() {
+  if (state_) state_->renderer.reset();
+  discontinuous_ = times_.has_value();
+  times_.reset();
+  taken_.reset();
+  known_ = 0;
+  waiting_since_.reset();
+}
+
+void EventRender::flush() {
+  {
+    const std::lock_guard lock(mutex_);
+    earliest_ = 0;
+  }
+  start_over();
+}
+
+void EventRender::stop() {
+  state_.reset();
+  flush();
+  discontinuous_ = false;
+}
+
+}  // namespace
+
+DEFINE_EVENT_AGGREGATOR(GstEventRender, gst_event_render, EVENT_RENDER, EventRender, eventrender,
+                        GST_RANK_PRIMARY, "events drawn as video")
+
+static GType gst_event_render_mode_get_type() {
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {static_cast<gint>(RenderMode::accumulate), "Polarities that fired within a window",
+         "accumulate"},
+        {static_cast<gint>(RenderMode::decay), "Exponentially decaying sum of ON minus OFF",
+         "decay"},
+        {static_cast<gint>(RenderMode::time_surface), "Age and polarity of the last event",
+         "time-surface"},
+        {static_cast<gint>(RenderMode::count), "ON minus OFF within a window", "count"},
+        {0, nullptr, nullptr},
+    };
+    return g_enum_register_static("GstEventRenderMode", values);
+  }();
+  return type;
+}
+
+static void install_properties(GObjectClass* object_class) {
+  constexpr auto flags = static_cast<GParamFlags>(
+      G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+  const Settings defaults;
+  Properties<settings_of> properties(object_class);
+  properties.add(&Settings::mode, g_param_spec_enum("mode", "Mode", "What a picture shows",
+                                                    gst_event_render_mode_get_type(),
+                                                    static_cast<gint>(defaults.mode), flags));
+  properties.add(
+      &Settings::palette,
+      g_param_spec_enum("palette", "Palette",
+                        "Colours of the picture; viridis and magma show magnitude, not polarity",
+                        GST_TYPE_EVENT_CAMERA_PALETTE, defaults.palette, flags));
+  properties.add(
+      &Settings::accumulation_time,
+      g_param_spec_uint64(
+          "accumulation-time", "Accumulation time",
+          "Length of the window of accumulate and count, time constant of decay, maximum age of "
+          "time-surface (ns; 0 = one frame, or as long as the counts allow, for accumulate and "
+          "count, and 100 ms for the others)",
+          0, std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
+  properties.add(
+      &Settings::event_count,
+      g_param_spec_uint("event-count", "Event count",
+                        "Maximum number of events in the window of accumulate and count (events; "
+                        "0 = no limit)",
+                        0, eventcamera::RecentEvents::max_size, defaults.event_count, flags));
+  properties.add(
+      &Settings::area_event_count,
+      g_param_spec_uint("area-event-count", "Area event count",
+                        "Maximum number of events in any one area in the window of accumulate and "
+                        "count: the busiest area decides how long it is (events; 0 = no limit)",
+                        0, eventcamera::RecentEvents::max_size, defaults.area_event_count, flags));
+  properties.add(&Settings::area_size,
+                 g_param_spec_uint("area-size", "Area size",
+                                   "Side of the squares that area-event-count counts in (pixels)",
+                                   1, 16384, defaults.area_size, flags));
+  properties.add(
+      &Settings::full_scale,
+      g_param_spec_double("full-scale", "Full scale",
+                          "Number of events of a pixel shown in full colour by decay and count "
+                          "(events)",
+                          0.1, 1e6, defaults.full_scale, flags));
+  gst_type_mark_as_plugin_api(gst_event_render_mode_get_type(), static_cast<GstPluginAPIFlags>(0));
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
+}
+
+/// Consumes QoS events: upstream would skip events.
+static gboolean src_event(GstAggregator* element, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) != GST_EVENT_QOS)
+    return GST_AGGREGATOR_CLASS(gst_event_render_parent_class)->src_event(element, event);
+  inside_of<EventRender>(element).take_qos(event);
+  gst_event_unref(event);
+  return TRUE;
+}
+
+static GstCaps* fixate_src_caps(GstAggregator*, GstCaps* caps) {
+  caps = gst_caps_make_writable(caps);
+  gst_structure_fixate_field_nearest_fraction(gst_caps_get_structure(caps, 0), "framerate", 30, 1);
+  return gst_caps_fixate(caps);
+}
+
+static gboolean decide_allocation(GstAggregator*, GstQuery* query) {
+  GstCaps* caps = nullptr;
+  gst_query_parse_allocation(query, &caps, nullptr);
+  return decide_on_drawn_pool(query, caps);
+}
+
+static void gst_event_render_class_init(GstEventRenderClass* klass) {
+  install_properties(G_OBJECT_CLASS(klass));
+
+  static GstStaticPadTemplate sink_template =
+      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
+  static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
+      "src", GST_PAD_SRC, GST_PAD_ALWAYS,
+      GST_STATIC_CAPS("video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS
+                      ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
+                      "framerate = (fraction) [ 0, max ], "
+                      "pixel-aspect-ratio = (fraction) 1/1"));
+  gst_event_aggregator_class_add_templates(GST_EVENT_AGGREGATOR_CLASS(klass),
+                                           {&sink_template, &src_template});
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event renderer",
+                                        "Codec/Decoder/Video", "Draws events as video",
+                                        EVENTSIM_AUTHORS);
+
+  GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
+  aggregator_class->src_event = src_event;
+  aggregator_class->fixate_src_caps = fixate_src_caps;
+  aggregator_class->decide_allocation = decide_allocation;
+  aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
+    return inside_of<EventRender>(element).choose_caps(caps, result);
+  };
+  aggregator_class->negotiated_src_caps = [](GstAggregator* element, GstCaps* caps) -> gboolean {
+    return inside_of<EventRender>(element).set_video(caps);
+  };
+}

@@ -1,0 +1,612 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-aedatmux
+ * @title: aedatmux
+ * @short_description: writes AEDAT 4, events and frames in one file
+ *
+ * Writes one event stream, one video stream, or both, in order of time. The times in the file are
+ * those of the event stream, floor(PTS / 1000) + t microseconds; video is synchronised to it.
+ *
+ * A pad takes either, and learns which from its caps: `queue ! mux.` links both. The pads `events`
+ * and `video` take one kind, for applications that request pads by name.
+ *
+ * Frames of #aedatdemux keep their exposure times and their position on the sensor. Its triggers
+ * and IMU samples come with the events. The property `stats` counts what was written.
+ *
+ * A flushing seek truncates the file and starts over. Events that are earlier than those already
+ * written, or outside the sensor, are dropped; a warning says how many.
+ *
+ * The file is written sequentially, so it can be streamed over a network. If downstream can seek,
+ * as filesink can, the file also ends with a table of its packets, which lets readers seek and know
+ * the duration.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=in.raw ! decodebin caps="application/x-event-camera,format=XYTP"
+ * ! aedatmux compression=zstd ! filesink location=out.aedat4
+ * gst-launch-1.0 filesrc location=davis.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! m.
+ * d.video_0 ! queue ! m.  aedatmux name=m ! filesink location=copy.aedat4
+ * ]|
+ */
+#include <gst/base/gstaggregator.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gst/base/authors.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
+#include "gst/base/video_frame.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "gst/recording/frame_buffer.hpp"
+#include "gst/recording/sensor_events.hpp"
+#include "gst/recording/stream_header.hpp"
+#include "gst/recording/writable_events.hpp"
+#include "src/formats/aedat/aedat4_encoder.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(aedat_mux_debug);
+#define GST_CAT_DEFAULT aedat_mux_debug
+
+using eventcamera::Aedat4Compression;
+using eventcamera::Aedat4Encoder;
+using eventcamera::ImuSample;
+using eventcamera::Microseconds;
+using eventcamera::SensorSize;
+using eventcamera::Trigger;
+
+namespace {
+
+struct Settings {
+  Aedat4Compression compression = Aedat4Compression::lz4;
+};
+
+/// Maximum time that events wait to be written as a packet.
+constexpr Microseconds max_wait = 100'000;
+
+struct UnrefPad {
+  void operator()(GstAggregatorPad* pad) const { gst_object_unref(pad); }
+};
+using Pad = std::unique_ptr<GstAggregatorPad, UnrefPad>;
+
+using Bytes = std::vector<guint8>;
+
+/// State of the file being written, from caps to stop.
+struct State {
+  SensorSize size;  ///< size of the event stream
+  std::optional<GstVideoInfo> video;
+  std::string source;                      ///< name of the camera
+  std::unique_ptr<Aedat4Encoder> encoder;  ///< null until the header is written
+  gint64 shift = 0;                        ///< offset from running time to file time, nanoseconds
+  Microseconds flushed = 0;                ///< file time of the last flushed packet
+  /// Announced, so that the header has a stream for them; then those that wait for the next buffer.
+  std::optional<std::vector<Trigger>> triggers;
+  std::optional<std::vector<ImuSample>> imu_samples;
+  WarnOnce warn;
+};
+
+}  // namespace
+
+struct GstAedatMuxPrivate {
+  explicit GstAedatMuxPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_MUX) {}
+
+  GuardedSettings<Settings> settings;
+
+  // Accessed by the streaming thread only, or while there is none.
+  State state;
+  WritableEvents writable;
+};
+
+G_DECLARE_FINAL_TYPE(GstAedatMux, gst_aedat_mux, GST, AEDAT_MUX, GstAggregator)
+
+struct _GstAedatMux {
+  GstAggregator parent;
+  GstAedatMuxPrivate* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstAedatMux, gst_aedat_mux, GST_TYPE_AGGREGATOR,
+                        GST_DEBUG_CATEGORY_INIT(aedat_mux_debug, "aedatmux", 0, "AEDAT 4 muxer"))
+GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mux_get_type())
+#define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_aedat_mux_parent_class)
+
+#define EVENTS_CAPS                                        \
+  GST_EVENT_CAMERA_MEDIA_TYPE                              \
+  ", format = (string) XYTP, width = (int) [ 1, 32767 ], " \
+  "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"
+
+/// First template, so that it is used by links without a pad name.
+static GstStaticPadTemplate any_template =
+    GST_STATIC_PAD_TEMPLATE("sink_%u", GST_PAD_SINK, GST_PAD_REQUEST,
+                            GST_STATIC_CAPS(EVENTS_CAPS "; " RECORDED_VIDEO_CAPS));
+static GstStaticPadTemplate events_template =
+    GST_STATIC_PAD_TEMPLATE("events", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(EVENTS_CAPS));
+static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
+    "video", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(RECORDED_VIDEO_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS("application/x-aedat, version = (int) 4"));
+
+/* properties */
+
+static GType compression_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Aedat4Compression::none), "No compression", "none"},
+      {static_cast<int>(Aedat4Compression::lz4), "LZ4, the fastest", "lz4"},
+      {static_cast<int>(Aedat4Compression::lz4_high), "LZ4, slower and smaller", "lz4-high"},
+      {static_cast<int>(Aedat4Compression::zstd), "Zstandard", "zstd"},
+      {static_cast<int>(Aedat4Compression::zstd_high), "Zstandard, the smallest", "zstd-high"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstAedatCompression", values);
+}
+
+/* input */
+
+static std::vector<Pad> pads_of(GstAedatMux* self) {
+  std::vector<Pad> pads;
+  GST_OBJECT_LOCK(self);
+  for (const GList* list = GST_ELEMENT(self)->sinkpads; list != nullptr; list = list->next)
+    pads.emplace_back(GST_AGGREGATOR_PAD(gst_object_ref(list->data)));
+  GST_OBJECT_UNLOCK(self);
+  return pads;
+}
+
+enum class Kind { events, video, unknown };
+
+static Kind kind_of(const GstCaps* caps) {
+  bool has_events = false;
+  bool has_video = false;
+  for (guint i = 0; i < gst_caps_get_size(caps); ++i)
+    (gst_structure_has_name(gst_caps_get_structure(caps, i), GST_EVENT_CAMERA_MEDIA_TYPE)
+         ? has_events
+         : has_video) = true;
+  if (has_events == has_video) return Kind::unknown;
+  return has_events ? Kind::events : Kind::video;
+}
+
+/// Kind of the stream of a pad, according to its current or template caps.
+static Kind kind_of(GstAggregatorPad* pad) {
+  OwnedCaps caps(gst_pad_get_current_caps(GST_PAD(pad)));
+  if (!caps) caps.reset(gst_pad_get_pad_template_caps(GST_PAD(pad)));
+  return kind_of(caps.get());
+}
+
+/// Running time of a buffer; GST_CLOCK_TIME_NONE if it has none.
+static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
+  GST_OBJECT_LOCK(pad);
+  const GstSegment segment = pad->segment;
+  GST_OBJECT_UNLOCK(pad);
+  if (segment.format != GST_FORMAT_TIME) return GST_CLOCK_TIME_NONE;
+  return gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
+}
+
+/// Returns the pad with the earliest next buffer; a buffer without a time comes first, and events
+/// come before a frame of the same time. Null if no pad has a buffer.
+static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
+  Pad earliest;
+  for (Pad& pad : pads_of(self)) {
+    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(pad.get()));
+    if (!buffer) continue;
+    const GstClockTime running = running_time(pad.get(), buffer.get());
+    const GstClockTime from = GST_CLOCK_TIME_IS_VALID(running) ? running : 0;
+    if (earliest && from > *time) continue;
+    if (earliest && from == *time && kind_of(pad.get()) != Kind::events) continue;
+    *time = from;
+    earliest = std::move(pad);
+  }
+  return earliest;
+}
+
+/// Warns about dropped input.
+static void warn(GstAedatMux* self, const char* what, const std::string& cause) {
+  self->priv->state.warn(self, {GST_STREAM_ERROR_MUX, std::string("Left out ") + what + "."},
+                         cause);
+}
+
+/* output */
+
+/// Pushes `bytes` downstream.
+static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = false) {
+  if (bytes.empty()) return GST_FLOW_OK;
+  auto owner = std::make_unique<Bytes>(std::move(bytes));
+  const gsize size = owner->size();
+  guint8* const data = owner->data();
+  GstBuffer* const buffer = gst_buffer_new_wrapped_full(
+      GST_MEMORY_FLAG_READONLY, data, size, 0, size, owner.release(),
+      [](gpointer vector) { const std::unique_ptr<Bytes> last(static_cast<Bytes*>(vector)); });
+  if (header) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_HEADER);
+  return gst_aggregator_finish_buffer(GST_AGGREGATOR(self), buffer);
+}
+
+/// Sends the caps, with the header as streamheader for late joiners.
+static void send_caps(GstAedatMux* self, const Bytes& header) {
+  const OwnedBuffer buffer(gst_buffer_new_memdup(header.data(), header.size()));
+  const OwnedCaps caps = with_stream_header(
+      OwnedCaps(gst_caps_new_simple("application/x-aedat", "version", G_TYPE_INT, 4, nullptr)),
+      buffer.get());
+  gst_aggregator_set_src_caps(GST_AGGREGATOR(self), caps.get());
+}
+
+/// Positions the next buffer at `position` in the file.
+static void send_segment(GstAedatMux* self, guint64 position) {
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_BYTES);
+  segment.start = segment.time = segment.position = position;
+  gst_aggregator_update_segment(GST_AGGREGATOR(self), &segment);
+}
+
+/// Offset from running time to the PTS of the event stream, or of the video if there is no event
+/// stream.
+static gint64 shift_of(GstAedatMux* self) {
+  Pad pad;
+  for (Pad& other : pads_of(self))
+    if (!pad || kind_of(other.get()) == Kind::events) pad = std::move(other);
+  if (!pad) return 0;
+  GST_OBJECT_LOCK(pad.get());
+  const GstSegment segment = pad->segment;
+  GST_OBJECT_UNLOCK(pad.get());
+  if (segment.format != GST_FORMAT_TIME) return 0;
+  return static_cast<gint64>(segment.start + segment.offset - segment.base);
+}
+
+/// Writes the header. May throw.
+static GstFlowReturn begin_file(GstAedatMux* self) {
+  State& state = self->priv->state;
+  eventcamera::Aedat4Settings settings;
+  settings.size = state.size;
+  if (state.size == SensorSize{} && state.video)
+    settings.size = {GST_VIDEO_INFO_WIDTH(&*state.video), GST_VIDEO_INFO_HEIGHT(&*state.video)};
+  settings.source = state.source;
+  settings.frames = std::ranges::any_of(
+      pads_of(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
+  settings.table = can_seek_bytes(GST_AGGREGATOR_SRC_PAD(self));
+  settings.compression = self->priv->settings.copy().compression;
+  settings.triggers = state.triggers.has_value();
+  settings.imu_samples = state.imu_samples.has_value();
+  self->priv->writable.begin_file(state.size);
+  state.shift = shift_of(self);
+  state.encoder = std::make_unique<Aedat4Encoder>(settings);
+  Bytes header;
+  state.encoder->flush(header);
+  send_caps(self, header);
+  send_segment(self, 0);
+  return push_bytes(self, std::move(header), true);
+}
+
+/// Encodes the triggers and IMU samples that wait. May throw.
+static Bytes waiting_items(GstAedatMux* self) {
+  State& state = self->priv->state;
+  Bytes out;
+  const auto encode = [&]<class Sample>(std::optional<std::vector<Sample>>& waiting) {
+    const auto samples = waiting ? std::exchange(*waiting, {}) : std::vector<Sample>();
+    return state.encoder->encode(std::span<const Sample>(samples), out);
+  };
+  const auto triggers = encode(state.triggers);
+  const auto imu_samples = encode(state.imu_samples);
+  const auto written = self->priv->writable.written().lock();
+  written->triggers += triggers;
+  written->imu_samples += imu_samples;
+  return out;
+}
+
+/// Writes the end of the file, and patches the header. May throw.
+static GstFlowReturn end_file(GstAedatMux* self) {
+  State& state = self->priv->state;
+  self->priv->writable.end_file();
+  Bytes bytes = waiting_items(self);
+  state.encoder->finish(bytes);
+  const GstFlowReturn result = push_bytes(self, std::move(bytes));
+  auto patch = state.encoder->patch();
+  if (result != GST_FLOW_OK || !patch) return result;
+  send_segment(self, patch->position);
+  return push_bytes(self, std::move(patch->bytes));
+}
+
+/// Converts running time to file time, in microseconds.
+static Microseconds file_time(const State& state, GstClockTime running) {
+  return std::max<gint64>(static_cast<gint64>(running) + state.shift, 0) / 1000;
+}
+
+/// Encodes the events of a buffer that starts at `start`. May throw.
+static void write_events(GstAedatMux* self, GstBuffer* buffer, Microseconds start, Bytes& out) {
+  State& state = self->priv->state;
+  const MappedEvents mapped(buffer);
+  if (!mapped) {
+    warn(self, "a buffer with a partial event",
+         std::to_string(gst_buffer_get_size(buffer)) + " bytes");
+    return;
+  }
+  state.encoder->encode(self->priv->writable.pick(mapped.events(), start), out);
+}
+
+/// Encodes a frame. May throw.
+static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, Bytes& out) {
+  State& state = self->priv->state;
+  const auto reject = [&](const char* cause) {
+    warn(self, "a frame that does not fit into the file", cause);
+  };
+  if (!state.video) return reject("no caps");
+  const VideoFrame video(*state.video, buffer, GST_MAP_READ);
+  if (!video) return reject(video.fault().c_str());
+  const auto frame = recorded_frame(video.get(), t);
+  try {
+    state.encoder->encode(frame, out);
+    ++self->priv->writable.written().lock()->frames;
+  } catch (const std::invalid_argument& error) {
+    reject(error.what());
+  }
+}
+
+/// Writes the earliest buffer. May throw.
+static GstFlowReturn write_next(GstAedatMux* self) {
+  State& state = self->priv->state;
+  GstClockTime time = 0;
+  const Pad pad = earliest_pad(self, &time);
+  if (!pad) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pad.get()));
+  if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const GstClockTime running = running_time(pad.get(), buffer.get());
+  if (!GST_CLOCK_TIME_IS_VALID(running)) {
+    warn(self, "a buffer without a timestamp, or outside its segment",
+         "pad " + std::string(GST_PAD_NAME(pad.get())) + ", no running time");
+    return GST_FLOW_OK;
+  }
+  Bytes out = waiting_items(self);
+  const Microseconds t = file_time(state, running);
+  const bool silent = gst_buffer_get_size(buffer.get()) == 0;
+  if (!silent && kind_of(pad.get()) == Kind::events)
+    write_events(self, buffer.get(), t, out);
+  else if (!silent)
+    write_frame(self, buffer.get(), t, out);
+  if (t - state.flushed >= max_wait) {
+    state.flushed = t;
+    state.encoder->flush(out);
+  }
+  return push_bytes(self, std::move(out));
+}
+
+static bool is_at_end(const Pad& pad) {
+  return gst_aggregator_pad_is_eos(pad.get());
+}
+
+/// True if enough is known to write the header: the caps, and what the events before the first
+/// buffer announce.
+static bool is_known(GstAedatMux* self) {
+  const State& state = self->priv->state;
+  if (state.size != SensorSize{})
+    return std::ranges::all_of(pads_of(self), [](const Pad& pad) {
+      return kind_of(pad.get()) != Kind::events || is_at_end(pad) ||
+             OwnedBuffer(gst_aggregator_pad_peek_buffer(pad.get()));
+    });
+  return state.video && std::ranges::all_of(pads_of(self), [](const Pad& pad) {
+           return kind_of(pad.get()) == Kind::video || is_at_end(pad);
+         });
+}
+
+/// Writes the header, the earliest buffer, or the end of the file. May throw.
+static GstFlowReturn write_some(GstAedatMux* self) {
+  auto& encoder = self->priv->state.encoder;
+  const bool ended = std::ranges::all_of(pads_of(self), is_at_end);
+  if (!encoder) {
+    if (!is_known(self)) {
+      if (!ended) return GST_AGGREGATOR_FLOW_NEED_DATA;
+      GST_ELEMENT_ERROR(self, STREAM, MUX,
+                        ("No stream to write. Link events or video to the muxer."),
+                        ("no pad had caps before the end of the stream"));
+      return GST_FLOW_ERROR;
+    }
+    const GstFlowReturn result = begin_file(self);
+    if (result != GST_FLOW_OK) return result;
+  }
+  if (!ended) return write_next(self);
+  const GstFlowReturn result = end_file(self);
+  return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
+}
+
+static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) {
+  auto* self = GST_AEDAT_MUX(aggregator);
+  return guarded(
+      self,
+      [](const auto& error) {
+        return WritableEvents::failure(error, {GST_STREAM_ERROR_MUX, "Cannot write the file."});
+      },
+      [&] { return write_some(self); });
+}
+
+/// Live pipelines wait for other pads until the running time of the earliest buffer.
+static GstClockTime get_next_time(GstAggregator* aggregator) {
+  auto* self = GST_AEDAT_MUX(aggregator);
+  GstClockTime time = GST_CLOCK_TIME_NONE;
+  return earliest_pad(self, &time) ? time : GST_CLOCK_TIME_NONE;
+}
+
+/* events, queries, pads */
+
+static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
+  State& state = self->priv->state;
+  const Kind kind = kind_of(caps);
+  for (const Pad& other : pads_of(self)) {
+    if (other.get() == pad || kind_of(other.get()) != kind) continue;
+    GST_ELEMENT_ERROR(
+        self, STREAM, MUX,
+        ("Cannot write two streams of %s into one file; link one stream of events and "
+         "one of video.",
+         kind == Kind::events ? "events" : "video"),
+        ("pads %s and %s", GST_PAD_NAME(other.get()), GST_PAD_NAME(pad)));
+    return false;
+  }
+  if (kind == Kind::video) {
+    GstVideoInfo video;
+    if (!gst_video_info_from_caps(&video, caps)) return false;
+    state.video = video;
+    return true;
+  }
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+  const SensorSize size{info.width, info.height};
+  if (state.encoder && !self->priv->writable.accepts(size)) return false;
+  state.size = size;
+  return true;
+}
+
+/// Adds triggers or IMU samples to those that wait. False if the event had others.
+template <class Sample>
+static bool take_waiting(GstAedatMux* self, std::optional<std::vector<Sample>>&& samples,
+                         std::optional<std::vector<Sample>>& waiting) {
+  if (!samples) return false;
+  // Their times are those of the stream, which may have been moved since the file began.
+  const State& state = self->priv->state;
+  const gint64 moved = state.encoder ? (state.shift - shift_of(self)) / 1000 : 0;
+  for (auto& sample : *samples) sample.t += moved;
+  if (!waiting) waiting.emplace();
+  waiting->insert(waiting->end(), samples->begin(), samples->end());
+  return true;
+}
+
+static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
+  auto* self = GST_AEDAT_MUX(aggregator);
+  State& state = self->priv->state;
+  if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
+    GstCaps* caps = nullptr;
+    gst_event_parse_caps(event, &caps);
+    if (!take_caps(self, pad, caps)) {
+      gst_event_unref(event);
+      return FALSE;
+    }
+  } else if (take_waiting(self, triggers_of(event), state.triggers) ||
+             take_waiting(self, imu_samples_of(event), state.imu_samples)) {
+    gst_event_unref(event);
+    return TRUE;
+  } else if (GST_EVENT_TYPE(event) == GST_EVENT_TAG) {
+    GstTagList* tags = nullptr;
+    gchar* source = nullptr;
+    gst_event_parse_tag(event, &tags);
+    if (gst_tag_list_get_string(tags, GST_TAG_DEVICE_MODEL, &source)) state.source = source;
+    g_free(source);
+  }
+  return PARENT_AGGREGATOR_CLASS->sink_event(aggregator, pad, event);
+}
+
+static gboolean src_event(GstAggregator* aggregator, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) != GST_EVENT_SEEK)
+    return PARENT_AGGREGATOR_CLASS->src_event(aggregator, event);
+  gst_event_unref(event);  // a file is written once, from its start
+  return FALSE;
+}
+
+static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
+  if (GST_QUERY_TYPE(query) != GST_QUERY_SEEKING)
+    return PARENT_AGGREGATOR_CLASS->src_query(aggregator, query);
+  GstFormat format = GST_FORMAT_UNDEFINED;
+  gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
+  gst_query_set_seeking(query, format, FALSE, 0, -1);
+  return TRUE;
+}
+
+static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplate* templ,
+                                        const gchar* wanted, const GstCaps* caps) {
+  auto* self = GST_AEDAT_MUX(aggregator);
+  const gchar* const name = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
+  if (GST_STATE(self) > GST_STATE_READY && self->priv->state.encoder) {
+    GST_WARNING_OBJECT(self, "the header is written, and has no stream for a pad %s", name);
+    return nullptr;
+  }
+  if (g_str_equal(name, any_template.name_template))
+    return PARENT_AGGREGATOR_CLASS->create_new_pad(aggregator, templ, wanted, caps);
+  GstPad* const existing = gst_element_get_static_pad(GST_ELEMENT(self), name);
+  if (existing != nullptr) {
+    gst_object_unref(existing);
+    GST_WARNING_OBJECT(self, "there is a pad %s already", name);
+    return nullptr;
+  }
+  return static_cast<GstAggregatorPad*>(g_object_new(GST_TYPE_AGGREGATOR_PAD, "name", name,
+                                                     "direction", GST_PAD_SINK, "template", templ,
+                                                     nullptr));
+}
+
+static gboolean start(GstAggregator* aggregator) {
+  send_segment(GST_AEDAT_MUX(aggregator), 0);
+  return TRUE;
+}
+
+static gboolean stop(GstAggregator* aggregator) {
+  auto* priv = GST_AEDAT_MUX(aggregator)->priv;
+  if (priv->state.encoder) priv->writable.end_file();
+  priv->state = State();
+  return TRUE;
+}
+
+/// After a flush, filesink has truncated the file, so start with a new header.
+static GstFlowReturn flush(GstAggregator* aggregator) {
+  State& state = GST_AEDAT_MUX(aggregator)->priv->state;
+  state.encoder.reset();
+  state.triggers.reset();
+  state.imu_samples.reset();
+  state.flushed = 0;
+  state.warn.reset();
+  return GST_FLOW_OK;
+}
+
+/* type */
+
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_AEDAT_MUX(object)->priv->settings;
+}
+
+static void finalize(GObject* object) {
+  delete GST_AEDAT_MUX(object)->priv;
+  G_OBJECT_CLASS(gst_aedat_mux_parent_class)->finalize(object);
+}
+
+static void gst_aedat_mux_init(GstAedatMux* self) {
+  self->priv = new GstAedatMuxPrivate(GST_ELEMENT(self));
+}
+
+static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+  Properties<settings_of> properties(object_class);
+  properties.add(
+      &Settings::compression,
+      g_param_spec_enum("compression", "Compression", "Compression of the file", compression_type(),
+                        static_cast<int>(Settings().compression),
+                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                 GST_PARAM_MUTABLE_READY)));
+  properties.add_read_only(
+      +[](GObject* object, GValue* value) {
+        g_value_take_boxed(value, GST_AEDAT_MUX(object)->priv->writable.stats());
+      },
+      WritableEvents::stats_spec());
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  gst_element_class_add_static_pad_template_with_gtype(element_class, &any_template,
+                                                       GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_add_static_pad_template_with_gtype(element_class, &events_template,
+                                                       GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_add_static_pad_template_with_gtype(element_class, &video_template,
+                                                       GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_add_static_pad_template_with_gtype(element_class, &src_template,
+                                                       GST_TYPE_AGGREGATOR_PAD);
+  gst_element_class_set_static_metadata(element_class, "AEDAT 4 muxer", "Codec/Muxer",
+                                        "Writes events and frames into AEDAT 4 files",
+                                        EVENTSIM_AUTHORS);
+
+  GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
+  aggregator_class->aggregate = aggregate;
+  aggregator_class->get_next_time = get_next_time;
+  aggregator_class->sink_event = sink_event;
+  aggregator_class->src_event = src_event;
+  aggregator_class->src_query = src_query;
+  aggregator_class->create_new_pad = create_new_pad;
+  aggregator_class->start = start;
+  aggregator_class->stop = stop;
+  aggregator_class->flush = flush;
+  aggregator_class->negotiate = nullptr;  // send_caps() sets the caps
+}

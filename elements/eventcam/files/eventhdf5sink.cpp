@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventhdf5sink
+ * @title: eventhdf5sink
+ * @short_description: writes HDF5 files of events
+ *
+ * Writes events as an HDF5 file in the layout of DSEC or Metavision, whose arrays can be read
+ * directly with h5py. Written times are those of the PTS. `layout=metavision` keeps triggers; the
+ * property `stats` counts them.
+ *
+ * The file is complete at the end of the stream, or when the pipeline is stopped. A flushing seek
+ * truncates the file and starts over. Events that are earlier than those already written, or
+ * outside the sensor, are dropped; a warning says how many.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventhdf5sink layout=metavision
+ * location=events.h5
+ * ]|
+ */
+#include <gst/base/gstbasesink.h>
+
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "gst/base/authors.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "gst/recording/sensor_events.hpp"
+#include "gst/recording/writable_events.hpp"
+#include "src/formats/hdf5/hdf5_writer.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
+#define GST_CAT_DEFAULT event_hdf5_sink_debug
+
+using eventcamera::Hdf5Layout;
+using eventcamera::Hdf5Writer;
+using eventcamera::Trigger;
+
+namespace {
+
+struct Settings {
+  std::string location;
+  Hdf5Layout layout = Hdf5Layout::dsec;
+  Hdf5Writer::Compression compression = Hdf5Writer::Compression::gzip;
+};
+
+/// State of the file, from caps to stop.
+struct State {
+  GstEventCameraInfo info = {};
+  std::unique_ptr<Hdf5Writer> writer;  ///< null before caps and after the end
+  bool begun = false;                  ///< events were written
+  bool ended = false;
+};
+
+}  // namespace
+
+struct GstEventHdf5SinkPrivate {
+  explicit GstEventHdf5SinkPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
+
+  GuardedSettings<Settings> settings;
+
+  // Accessed by the streaming thread only, or while there is none.
+  State state;
+  WritableEvents writable;
+};
+
+G_DECLARE_FINAL_TYPE(GstEventHdf5Sink, gst_event_hdf5_sink, GST, EVENT_HDF5_SINK, GstBaseSink)
+
+struct _GstEventHdf5Sink {
+  GstBaseSink parent;
+  GstEventHdf5SinkPrivate* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstEventHdf5Sink, gst_event_hdf5_sink, GST_TYPE_BASE_SINK,
+                        GST_DEBUG_CATEGORY_INIT(event_hdf5_sink_debug, "eventhdf5sink", 0,
+                                                "writer of HDF5 files of events"))
+GST_ELEMENT_REGISTER_DEFINE(eventhdf5sink, "eventhdf5sink", GST_RANK_NONE,
+                            gst_event_hdf5_sink_get_type())
+
+static GstStaticPadTemplate sink_template =
+    GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+                            GST_STATIC_CAPS(GST_EVENT_CAMERA_MEDIA_TYPE
+                                            ", format = (string) XYTP, width = (int) [ 1, 32768 ], "
+                                            "height = (int) [ 1, 32768 ]"));
+
+/* properties */
+
+static GType layout_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Hdf5Layout::dsec), "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset",
+       "dsec"},
+      {static_cast<int>(Hdf5Layout::metavision),
+       "Metavision: /CD/events, compressed with ECF; at most 2048x2048 pixels", "metavision"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventHdf5Layout", values);
+}
+
+static GType compression_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(Hdf5Writer::Compression::none), "No compression", "none"},
+      {static_cast<int>(Hdf5Writer::Compression::gzip), "gzip, which every reader has", "gzip"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventHdf5Compression", values);
+}
+
+/* the file */
+
+/// Runs `work`; reports any exception and ends the file, because writing on could not repair it.
+template <class Work>
+static bool reported(GstEventHdf5Sink* self, const Work& work) {
+  return guarded(
+      self,
+      [&](const std::exception& error) {
+        auto* priv = self->priv;
+        priv->state.writer.reset();
+        priv->state.ended = true;
+        return WritableEvents::failure(
+            error,
+            {GST_RESOURCE_ERROR_WRITE, "Cannot write " + priv->settings.copy().location + "."});
+      },
+      work);
+}
+
+/// Writes pending events and closes the file.
+static bool end_file(GstEventHdf5Sink* self) {
+  State& state = self->priv->state;
+  state.ended = true;
+  const auto writer = std::exchange(state.writer, nullptr);
+  if (writer) self->priv->writable.end_file();
+  return !writer || reported(self, [&] { writer->close(); });
+}
+
+/// Starts a new file for events of this sensor, overwriting any existing file.
+static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
+  auto* priv = self->priv;
+  priv->state = State();  // close first: HDF5 treats two open files of the same name as one
+  priv->state.info = info;
+  priv->writable.begin_file({info.width, info.height});
+  const auto [location, layout, compression] = priv->settings.copy();
+  const Hdf5Writer::Settings settings{layout, compression, {info.width, info.height}};
+  return reported(self, [&, &path = location] {
+    priv->state.writer = std::make_unique<Hdf5Writer>(path, settings);
+  });
+}
+
+static gboolean start(GstBaseSink* sink) {
+  auto* self = GST_EVENT_HDF5_SINK(sink);
+  if (!self->priv->settings.copy().location.empty()) return TRUE;
+  GST_ELEMENT_ERROR(self, RESOURCE, NOT_FOUND, ("No file to write to. Set the property location."),
+                    ("location is empty"));
+  return FALSE;
+}
+
+static gboolean stop(GstBaseSink* sink) {
+  auto* self = GST_EVENT_HDF5_SINK(sink);
+  const bool ended = end_file(self);
+  self->priv->state = State();
+  return ended;
+}
+
+static gboolean set_caps(GstBaseSink* sink, GstCaps* caps) {
+  auto* self = GST_EVENT_HDF5_SINK(sink);
+  const State& state = self->priv->state;
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) {
+    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
+    return FALSE;
+  }
+  if (state.ended) return TRUE;
+  if (state.writer && info.width == state.info.width && info.height == state.info.height)
+    return TRUE;
+  if (state.begun && !self->priv->writable.accepts({info.width, info.height})) return FALSE;
+  return begin_file(self, info);
+}
+
+/* data */
+
+static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
+  auto* self = GST_EVENT_HDF5_SINK(sink);
+  State& state = self->priv->state;
+  if (state.ended) return GST_FLOW_EOS;
+  if (!state.writer) return GST_FLOW_NOT_NEGOTIATED;
+  const bool written = reported(self, [&] {
+    return self->priv->writable.take(buffer, [&](const auto& events) {
+      state.begun |= !events.empty();
+      state.writer->append(events);
+    });
+  });
+  return written ? GST_FLOW_OK : GST_FLOW_ERROR;
+}
+
+/// Writes triggers, which the layout may not have.
+static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> triggers) {
+  const State& state = self->priv->state;
+  if (!state.writer) return true;
+  return reported(self, [&] {
+    if (state.writer->append(triggers))
+      self->priv->writable.written().lock()->triggers += triggers.size();
+  });
+}
+
+/// Completes the file before EOS is posted to the application, and starts over after a flush.
+static gboolean event(GstBaseSink* sink, GstEvent* event) {
+  auto* self = GST_EVENT_HDF5_SINK(sink);
+  const State& state = self->priv->state;
+  bool done = true;
+  if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
+  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.info.width > 0)
+    done = begin_file(self, GstEventCameraInfo(state.info));
+  if (const auto triggers = triggers_of(event)) done = write_triggers(self, *triggers);
+  if (!done) {
+    gst_event_unref(event);
+    return FALSE;
+  }
+  return GST_BASE_SINK_CLASS(gst_event_hdf5_sink_parent_class)->event(sink, event);
+}
+
+/* type */
+
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_EVENT_HDF5_SINK(object)->priv->settings;
+}
+
+static void finalize(GObject* object) {
+  delete GST_EVENT_HDF5_SINK(object)->priv;
+  G_OBJECT_CLASS(gst_event_hdf5_sink_parent_class)->finalize(object);
+}
+
+static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
+  self->priv = new GstEventHdf5SinkPrivate(GST_ELEMENT(self));
+  gst_base_sink_set_sync(GST_BASE_SINK(self), FALSE);
+}
+
+static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                  GST_PARAM_MUTABLE_READY);
+  const Settings defaults;
+  Properties<settings_of> properties(object_class);
+  properties.add(&Settings::location,
+                 g_param_spec_string("location", "Location",
+                                     "File to write; an existing file is overwritten", "", flags));
+  properties.add(&Settings::layout,
+                 g_param_spec_enum("layout", "Layout", "Layout of the events in the file",
+                                   layout_type(), static_cast<int>(defaults.layout), flags));
+  properties.add(
+      &Settings::compression,
+      g_param_spec_enum("compression", "Compression",
+                        "Compression of layout=dsec: gzip for small files, none for speed. "
+                        "layout=metavision ignores it, since it always uses ECF",
+                        compression_type(), static_cast<int>(defaults.compression), flags));
+  properties.add_read_only(
+      +[](GObject* object, GValue* value) {
+        g_value_take_boxed(value, GST_EVENT_HDF5_SINK(object)->priv->writable.stats());
+      },
+      WritableEvents::stats_spec());
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  gst_element_class_add_static_pad_template(element_class, &sink_template);
+  gst_element_class_set_static_metadata(element_class, "HDF5 file sink", "Sink/File",
+                                        "Writes events as HDF5: DSEC or Metavision",
+                                        EVENTSIM_AUTHORS);
+
+  GstBaseSinkClass* sink_class = GST_BASE_SINK_CLASS(klass);
+  sink_class->start = start;
+  sink_class->stop = stop;
+  sink_class->set_caps = set_caps;
+  sink_class->render = render;
+  sink_class->event = event;
+}

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/// The elements that read event files: a table of formats for GstEventReader.
+#include "elements/eventcam/files/es_origin.hpp"
+#include "elements/eventcam/files/evtformat.hpp"
+#include "gst/recording/eventreader.hpp"
+#include "src/formats/dat/dat.hpp"
+#include "src/formats/es/es.hpp"
+#include "src/formats/evt/raw.hpp"
+#include "src/formats/numpy/npy_decoder.hpp"
+#include "src/formats/text/csv_decoder.hpp"
+#ifdef HAVE_AEDAT
+#include "src/formats/aedat/aedat_reader.hpp"
+#endif
+#ifdef HAVE_HDF5
+#include "src/formats/hdf5/hdf5_reader.hpp"
+#endif
+#ifdef HAVE_NPZ
+#include "src/formats/numpy/npz_reader.hpp"
+#endif
+
+using eventcamera::Decoder;
+using eventcamera::DecoderReader;
+using eventcamera::Reader;
+
+namespace {
+
+/// Creates a reader for a format with a decoder.
+std::unique_ptr<Reader> decoded_by(std::unique_ptr<Decoder> decoder) {
+  return std::make_unique<DecoderReader>(std::move(decoder));
+}
+
+/// Creates a reader for a table.
+template <class TableDecoder>
+std::unique_ptr<Reader> table_read_by(const GstCaps* /*caps*/, const FormatSettings& settings) {
+  return decoded_by(std::make_unique<TableDecoder>(settings.table()));
+}
+
+/// Words without a header have their format and size in the caps; files have a header.
+std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const FormatSettings& /*settings*/) {
+  if (caps != nullptr) {
+    const GstStructure* const structure = gst_caps_get_structure(caps, 0);
+    if (const auto words = evt_format_named(gst_structure_get_string(structure, "format"))) {
+      eventcamera::SensorSize size;
+      gst_structure_get_int(structure, "width", &size.width);
+      gst_structure_get_int(structure, "height", &size.height);
+      return decoded_by(eventcamera::make_evt_decoder(*words, size));
+    }
+  }
+  return decoded_by(eventcamera::make_prophesee_raw_decoder());
+}
+
+}  // namespace
+
+/**
+ * SECTION:element-evtdec
+ * @title: evtdec
+ * @short_description: reads RAW files and EVT words
+ *
+ * Reads Prophesee RAW files, and words without a header whose format is in the caps: EVT2, EVT2.1,
+ * EVT3 and EVT4. Events are output in buffers of #GstEventReader:buffer-time; triggers come with
+ * them, for writers that keep them.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventdatenc ! filesink
+ * location=recording.dat
+ * ]|
+ */
+static const RecordingFormat evt = {
+    .type_name = "GstEvtDec",
+    .long_name = "Prophesee RAW reader",
+    .description = "Reads Prophesee RAW files of events",
+    .caps = "application/x-prophesee-raw; " EVT_WORDS_CAPS,
+    .has_triggers = true,
+    .add_properties = add_sensor_size,
+    .make_reader = make_evt_reader,
+};
+GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_type(evt))
+
+/**
+ * SECTION:element-eventdatdec
+ * @title: eventdatdec
+ * @short_description: reads DAT files
+ *
+ * Reads Prophesee DAT files, versions 1 and 2. Events are output in buffers of
+ * #GstEventReader:buffer-time; triggers come with them, for writers that keep them.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.dat ! eventdatdec ! evtenc ! filesink
+ * location=recording.raw
+ * ]|
+ */
+static const RecordingFormat dat = {
+    .type_name = "GstEventDatDec",
+    .long_name = "Prophesee DAT reader",
+    .description = "Reads Prophesee DAT files of events",
+    .caps = "application/x-prophesee-dat",
+    .has_triggers = true,
+    .add_properties = add_sensor_size,
+    .make_reader = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<Reader> {
+      return decoded_by(eventcamera::make_dat_decoder());
+    },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_reader_type(dat))
+
+/**
+ * SECTION:element-eventesdec
+ * @title: eventesdec
+ * @short_description: reads Event Stream files
+ *
+ * Reads Event Stream 2.0 files with DVS or ATIS events (of the latter, only the change events).
+ * Events are output in buffers of #GstEventReader:buffer-time.
+ *
+ * Tools disagree about where row 0 is. If the picture is upside down, as with files of faery, set
+ * #GstEventEsDec:origin to `top-left`.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.es ! eventesdec ! evtenc ! filesink
+ * location=recording.raw
+ * ]|
+ */
+static const RecordingFormat es = {
+    .type_name = "GstEventEsDec",
+    .long_name = "Event Stream reader",
+    .description = "Reads Event Stream files of events",
+    .caps = "application/x-es",
+    .add_properties =
+        [](FormatProperties& properties) {
+          properties.add(&FormatSettings::variant,
+                         g_param_spec_enum(
+                             "origin", ES_ORIGIN_NICK, ES_ORIGIN_BLURB, es_origin_type(), 0,
+                             static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                      GST_PARAM_MUTABLE_READY)));
+        },
+    .make_reader = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Reader> {
+      return decoded_by(eventcamera::make_event_stream_decoder(
+          static_cast<eventcamera::EsOrigin>(settings.variant)));
+    },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_reader_type(es))
+
+/**
+ * SECTION:element-eventcsvdec
+ * @title: eventcsvdec
+ * @short_description: reads text files of events
+ *
+ * Reads text with one event per line. Columns, separators and time unit are detected from the first
+ * lines, unless #GstEventCsvDec:column-order and #GstEventCsvDec:time-unit are set. A file that may
+ * be in microseconds or in nanoseconds is refused until the unit is set. If the lines do not state
+ * the sensor size, it is that of #GstEventCsvDec:width and #GstEventCsvDec:height, or else that of
+ * downstream's caps, or else that of the smallest known sensor that the events fit into; if later
+ * events do not, the caps change. Writers cannot change the size within a file: set it for them.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.csv ! eventcsvdec ! evtenc ! filesink
+ * location=events.raw
+ * ]|
+ */
+static const RecordingFormat csv = {
+    .type_name = "GstEventCsvDec",
+    .long_name = "CSV reader",
+    .description = "Reads CSV files of events",
+    .caps = "application/x-event-csv",
+    .add_properties = add_table_properties,
+    .make_reader = table_read_by<eventcamera::CsvDecoder>,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_reader_type(csv))
+
+/**
+ * SECTION:element-eventnpydec
+ * @title: eventnpydec
+ * @short_description: reads NumPy files of events
+ *
+ * Reads structured NumPy arrays with the fields t, x, y and p, and arrays of the shape (N, 4),
+ * whose columns are detected from the first rows, unless #GstEventNpyDec:column-order is set.
+ * Integer times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit or a
+ * name such as t_ns says otherwise. Arrays do not contain the sensor size: it is that of
+ * #GstEventNpyDec:width and #GstEventNpyDec:height, or else that of downstream's caps, or else that
+ * of the smallest known sensor that the events fit into; if later events do not, the caps change.
+ * Writers cannot change the size within a file: set it for them.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=events.npy ! eventnpydec ! evtenc ! filesink
+ * location=events.raw
+ * ]|
+ */
+static const RecordingFormat npy = {
+    .type_name = "GstEventNpyDec",
+    .long_name = "NumPy reader",
+    .description = "Reads NumPy files of events",
+    .caps = "application/x-npy",
+    .add_properties = add_table_properties,
+    .make_reader = table_read_by<eventcamera::NpyDecoder>,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_reader_type(npy))
+
+#ifdef HAVE_NPZ
+/**
+ * SECTION:element-eventnpzdec
+ * @title: eventnpzdec
+ * @short_description: reads NumPy archives of events
+ *
+ * Reads archives of numpy.savez() and numpy.savez_compressed(): arrays named t, x, y and p, or an
+ * array as eventnpydec reads it, with the same properties. An archive should be pulled, as from
+ * filesrc. Where it is pushed it is collected in memory, up to 256 MiB, and read at its end.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=events.npz ! eventnpzdec ! evtenc ! filesink
+ * location=events.raw
+ * ]|
+ */
+static const RecordingFormat npz = {
+    .type_name = "GstEventNpzDec",
+    .long_name = "NumPy archive reader",
+    .description = "Reads NumPy archives of events",
+    .caps = "application/x-npz",
+    .add_properties = add_table_properties,
+    .make_reader =
+        [](const GstCaps*, const FormatSettings& settings) {
+          return eventcamera::make_npz_reader(settings.table());
+        },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_reader_type(npz))
+#endif
+
+#ifdef HAVE_HDF5
+/**
+ * SECTION:element-eventhdf5dec
+ * @title: eventhdf5dec
+ * @short_description: reads HDF5 files of events
+ *
+ * Reads the events of HDF5 files from DSEC, Metavision (compressed with ECF) and v2e. They are
+ * output in buffers of #GstEventReader:buffer-time; triggers come with them, for writers that keep
+ * them.
+ *
+ * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
+ * mode the file is collected in memory, up to 256 MiB, and read at its end.
+ *
+ * Files compressed with Blosc, such as those published by DSEC, need HDF5's Blosc plugin (Debian:
+ * hdf5-filter-plugin-blosc-serial).
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.h5 ! eventhdf5dec ! eventrender ! videoconvert !
+ * autovideosink
+ * ]|
+ */
+static const RecordingFormat hdf5 = {
+    .type_name = "GstEventHdf5Dec",
+    .long_name = "HDF5 reader",
+    .description = "Reads HDF5 files of events: DSEC, Metavision, v2e",
+    .caps = "application/x-hdf5",
+    .has_triggers = true,
+    .add_properties = add_sensor_size,
+    .make_reader = [](const GstCaps*,
+                      const FormatSettings&) { return eventcamera::make_hdf5_reader(); },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, event_reader_type(hdf5))
+#endif
+
+#ifdef HAVE_AEDAT
+/**
+ * SECTION:element-aedatdemux
+ * @title: aedatdemux
+ * @short_description: reads AEDAT, the files of DAVIS and DVS cameras
+ *
+ * Splits an AEDAT 4 file into its event streams and video streams. AEDAT 2.0 and 3.1 are read as
+ * one event stream. Triggers and IMU samples come with the events of `events_0`, for writers that
+ * keep them.
+ *
+ * PTS are the times of the file, so that they survive when written again. The segments of all
+ * streams start at the first event or frame of any of them, so that playback starts at once and
+ * events and frames are in sync. A file with negative times is shifted to start at 0.
+ *
+ * The file is pulled if upstream supports it, as filesrc does. A table of packets at its end makes
+ * seeking fast and stores the duration; without one the duration is exact for files up to 16 MiB,
+ * and estimated for longer ones until their end has been read.
+ *
+ * Corrupt input is skipped; the first place is reported as a warning, and `stats` counts all
+ * places.
+ *
+ * An AEDAT 2.0 file may not name its camera. Its first addresses then tell how they are made; the
+ * sensor size is #GstAedatDemux:width and #GstAedatDemux:height, or else that of downstream caps,
+ * or else the smallest DAVIS that events fit into, with a warning.
+ *
+ * A stream without a frame or event in the first second may get its pad only at its first one.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=davis.aedat4 ! aedatdemux name=d  d.events_0 ! queue !
+ * eventrender ! videoconvert ! autovideosink  d.video_0 ! queue ! videoconvert ! autovideosink
+ * ]|
+ */
+static const RecordingFormat aedat = {
+    .type_name = "GstAedatDemux",
+    .long_name = "AEDAT demuxer",
+    .description = "Reads events and frames from AEDAT files",
+    .caps = "application/x-aedat, version = (int) { 2, 3, 4 }",
+    .has_many_streams = true,
+    .has_triggers = true,
+    .add_properties = add_sensor_size,
+    .make_reader = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Reader> {
+      return std::make_unique<eventcamera::AedatReader>(settings.sensor);
+    },
+};
+GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_reader_type(aedat))
+#endif

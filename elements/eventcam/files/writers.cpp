@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/// The elements that write event files: a table of formats for GstEventWriter.
+#include <vector>
+
+#include "elements/eventcam/files/es_origin.hpp"
+#include "elements/eventcam/files/evtformat.hpp"
+#include "gst/base/types.hpp"
+#include "gst/recording/eventwriter.hpp"
+#include "src/formats/dat/dat.hpp"
+#include "src/formats/es/es.hpp"
+#include "src/formats/evt/raw.hpp"
+#include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/text/csv_encoder.hpp"
+
+using eventcamera::EvtFormat;
+using eventcamera::SensorSize;
+
+/**
+ * SECTION:element-evtenc
+ * @title: evtenc
+ * @short_description: writes RAW files and EVT words
+ *
+ * Writes events as a Prophesee RAW file with words of #GstEvtEnc:format. If downstream requests
+ * `application/x-event-camera` with the format EVT2, EVT21, EVT3 or EVT4, writes these words
+ * without a header. Triggers that come with the events are written among them.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 v4l2src ! eventsim-diff ! evtenc format=EVT3 ! filesink location=out.raw
+ * ]|
+ */
+static const GEnumValue evt_formats[] = {
+    {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
+    {static_cast<int>(EvtFormat::evt21), "64-bit words, up to 32 events each", "EVT21"},
+    {static_cast<int>(EvtFormat::evt21), "The same as EVT21", "EVT2.1"},
+    {static_cast<int>(EvtFormat::evt3), "16-bit words, the most compact", "EVT3"},
+    {static_cast<int>(EvtFormat::evt4), "32-bit words, vectors of events", "EVT4"},
+    {0, nullptr, nullptr},
+};
+
+static const EventFileFormat::Variants evt_variants = {
+    .property = "format",
+    .nick = "Format",
+    .blurb =
+        "EVT words to write; read when the stream begins. Downstream caps that name words without "
+        "a header take precedence",
+    .type = [] { return enum_type("GstEvtFormat", evt_formats); },
+    .default_value = static_cast<int>(EvtFormat::evt3),
+};
+
+static const char* evt_name(int format) {
+  for (const auto* value = evt_formats; value->value_nick != nullptr; ++value)
+    if (value->value == format) return value->value_nick;
+  return nullptr;
+}
+
+static std::unique_ptr<eventcamera::Encoder> make_evt(SensorSize size, int variant,
+                                                      const GstCaps* caps) {
+  const auto* words = gst_structure_get_string(gst_caps_get_structure(caps, 0), "format");
+  if (const auto format = evt_format_named(words)) return make_evt_encoder(*format, size);
+  return make_prophesee_raw_encoder(static_cast<EvtFormat>(variant), size);
+}
+
+/// For words without a header, prefers the format of the property, else any that downstream
+/// accepts.
+static GstCaps* fixate_evt(const GstEventCameraInfo& info, int variant, GstCaps* caps) {
+  caps = gst_caps_make_writable(caps);
+  GstStructure* structure = gst_caps_get_structure(caps, 0);
+  if (gst_structure_has_name(structure, GST_EVENT_CAMERA_MEDIA_TYPE)) {
+    gst_structure_fixate_field_string(structure, "format", evt_name(variant));
+    gst_structure_fixate_field_nearest_int(structure, "width", info.width);
+    gst_structure_fixate_field_nearest_int(structure, "height", info.height);
+    if (gst_structure_has_field(structure, "framerate"))
+      gst_structure_fixate_field_nearest_fraction(structure, "framerate", info.fps_n, info.fps_d);
+    else
+      gst_structure_set(structure, "framerate", GST_TYPE_FRACTION, info.fps_n, info.fps_d, nullptr);
+  }
+  return gst_caps_fixate(caps);
+}
+
+static const EventFileFormat evt = {
+    .type_name = "GstEvtEnc",
+    .long_name = "Prophesee RAW writer",
+    .description = "Writes events as Prophesee RAW, or as EVT words",
+    .caps = "application/x-prophesee-raw; " EVT_WORDS_CAPS,
+    .max_width = 2048,
+    .max_height = 2048,
+    .variants = &evt_variants,
+    .has_words = true,
+    .create = make_evt,
+    .fixate = fixate_evt,
+};
+GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_type(evt))
+
+/**
+ * SECTION:element-eventdatenc
+ * @title: eventdatenc
+ * @short_description: writes DAT files
+ *
+ * Writes events as a DAT file, version 2. Timestamps have 32 bits. A file whose first event is
+ * later than 71 minutes, as times since 1970 are, starts at 0. A pause is left out, with a warning,
+ * if readers would mistake it: one of more than 71 minutes, or of more than 35 in which the
+ * timestamps wrap.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventdatenc ! filesink
+ * location=test.dat
+ * ]|
+ */
+static const EventFileFormat dat = {
+    .type_name = "GstEventDatEnc",
+    .long_name = "Prophesee DAT writer",
+    .description = "Writes events as Prophesee DAT",
+    .caps = "application/x-prophesee-dat",
+    .max_width = 16384,
+    .max_height = 16384,
+    .create = [](SensorSize size, int,
+                 const GstCaps*) { return eventcamera::make_dat_encoder(size); },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_writer_type(dat))
+
+/**
+ * SECTION:element-eventesenc
+ * @title: eventesenc
+ * @short_description: writes Event Stream files
+ *
+ * Writes events as an Event Stream 2.0 file of DVS events. Pauses take one byte per 127
+ * microseconds. Tools disagree about where row 0 is: set #GstEventEsEnc:origin for the one that
+ * will read the file.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventesenc ! filesink
+ * location=test.es
+ * ]|
+ */
+static const EventFileFormat::Variants es_variants = {
+    .property = "origin",
+    .nick = ES_ORIGIN_NICK,
+    .blurb = ES_ORIGIN_BLURB ". Read when the stream begins",
+    .type = es_origin_type,
+    .default_value = static_cast<int>(eventcamera::EsOrigin::bottom_left),
+};
+
+static const EventFileFormat event_stream = {
+    .type_name = "GstEventEsEnc",
+    .long_name = "Event Stream writer",
+    .description = "Writes events as Event Stream",
+    .caps = "application/x-es",
+    .variants = &es_variants,
+    .create =
+        [](SensorSize size, int variant, const GstCaps*) {
+          return eventcamera::make_event_stream_encoder(
+              size, static_cast<eventcamera::EsOrigin>(variant));
+        },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
+                            event_writer_type(event_stream))
+
+/**
+ * SECTION:element-eventcsvenc
+ * @title: eventcsvenc
+ * @short_description: writes text files of events
+ *
+ * Writes one line per event, in the #GstEventCsvEnc:dialect of the tool that will read it.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventcsvenc dialect=rpg ! filesink
+ * location=events.txt
+ * ]|
+ */
+static GType csv_dialect_type() {
+  static const auto values = [] {
+    std::vector<GEnumValue> dialects;
+    for (const auto& [name, description, dialect] : eventcamera::csv_dialects())
+      dialects.push_back({static_cast<gint>(dialects.size()), description.data(), name.data()});
+    dialects.push_back({0, nullptr, nullptr});
+    return dialects;
+  }();
+  return enum_type("GstCsvDialect", values.data());
+}
+
+static const EventFileFormat::Variants csv_variants = {
+    .property = "dialect",
+    .nick = "Dialect",
+    .blurb = "Columns, separators, time unit and header; read when the stream begins",
+    .type = csv_dialect_type,
+    .default_value = 0,
+};
+
+static const EventFileFormat csv = {
+    .type_name = "GstEventCsvEnc",
+    .long_name = "CSV writer",
+    .description = "Writes events as lines of text",
+    .caps = "application/x-event-csv",
+    .variants = &csv_variants,
+    .create = [](SensorSize size, int variant,
+                 const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
+      const auto& named = eventcamera::csv_dialects()[static_cast<std::size_t>(variant)];
+      return std::make_unique<eventcamera::CsvEncoder>(named.dialect, size);
+    },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_writer_type(csv))
+
+/**
+ * SECTION:element-eventnpyenc
+ * @title: eventnpyenc
+ * @short_description: writes NumPy files of events
+ *
+ * Writes events as a NumPy array with the fields x, y, t and p. Its header holds the number of
+ * events, which is written at the end: the sink must be able to seek, as filesink is. Otherwise
+ * eventnpydec can read the file, but numpy.load() cannot.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpyenc ! filesink
+ * location=events.npy
+ * ]|
+ */
+static const EventFileFormat npy = {
+    .type_name = "GstEventNpyEnc",
+    .long_name = "NumPy writer",
+    .description = "Writes events as NumPy",
+    .caps = "application/x-npy",
+    .create = [](SensorSize, int, const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
+      return std::make_unique<eventcamera::NpyEncoder>();
+    },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_writer_type(npy))

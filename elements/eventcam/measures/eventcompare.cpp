@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventcompare
+ * @title: eventcompare
+ * @short_description: measures the similarity of two event streams
+ *
+ * Compares the stream on the pad `candidate`, which it passes through, with the one on the pad
+ * `reference`, over the time that both cover. The two are synchronized by stream time, and their
+ * sensors must have the same size. At EOS of the candidate, or on stop, it posts an element message
+ * `eventcompare`:
+ *
+ * - `start`, `end` (#gint64): the time covered by both, in stream time (ns);
+ * - `reference`, `candidate` (#GstStructure): the statistics of each, as in #GstEventStats;
+ * - `map-correlation` (#gdouble): Pearson correlation of the events per pixel;
+ * - `reference-matches`, `candidate-matches` (#GstStructure): the fractions of the events of each
+ *   stream that have a match in the other, of the same polarity, at the same pixel or next to it
+ *   (#gdouble, `within-1ms`, `within-5ms`, `within-10ms`);
+ * - `rate-curve` (#GstStructure): event counts in bins of `bin` ns (#guint64), as two arrays,
+ *   `reference` and `candidate`.
+ *
+ * The same is written to #GstEventCompare:location as JSON. #GstEventCompare:map shows the events
+ * per pixel of the reference, of the candidate and of their difference, blue if the candidate has
+ * more and red if it has fewer.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 eventcompare name=compare location=figures.json ! fakesink  filesrc
+ * location=real.raw ! evtdec ! compare.reference  filesrc location=drive.mp4 ! decodebin !
+ * eventsim-dense ! compare.candidate
+ * ]|
+ */
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "elements/eventcam/measures/report.hpp"
+#include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "src/measure/stream_comparison.hpp"
+#include "src/render/map_picture.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_compare_debug);
+#define GST_CAT_DEFAULT event_compare_debug
+
+using eventcamera::both_roles;
+using eventcamera::PerRole;
+using eventcamera::StreamComparison;
+using eventcamera::StreamRole;
+
+namespace {
+
+/// A sensor's size.
+struct Sensor {
+  int width;
+  int height;
+
+  friend bool operator==(const Sensor&, const Sensor&) = default;
+};
+
+const char* name_of(StreamRole role) {
+  return role == StreamRole::reference ? "reference" : "candidate";
+}
+
+class EventCompare final : public EventAggregator {
+ public:
+  explicit EventCompare(GstAggregator* element)
+      : EventAggregator(element, {.verb = "compare", .main_pad = "candidate"}) {}
+
+  bool start() override { return can_report(element(), settings.copy()); }
+  void stop() override;
+  void flush() override { comparison_.reset(); }
+  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  GstFlowReturn aggregate(bool timed_out) override;
+
+  GuardedSettings<ReportFiles> settings;
+
+ private:
+  bool is_over(StreamRole role) const;
+  bool begin();
+  void compare(StreamRole role, GstBuffer* buffer);
+  GstFlowReturn take_next();
+  void conclude();
+
+  const PerRole<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
+
+  // Accessed by the source pad's thread only, or while there is none.
+  PerRole<std::optional<Sensor>> sensors_;
+  std::optional<StreamComparison> comparison_;  // set once both sensors are known
+  bool concluded_ = true;                       // no events since the last report
+};
+
+/* figures */
+
+/// Moves a structure into a field of another one.
+void put_structure(GstStructure* structure, const char* field, GstStructure* value) {
+  gst_structure_set(structure, field, GST_TYPE_STRUCTURE, value, nullptr);
+  gst_structure_free(value);
+}
+
+GstStructure* matches_of(const std::array<double, 3>& shares) {
+  return gst_structure_new("matches", "within-1ms", G_TYPE_DOUBLE, shares[0], "within-5ms",
+                           G_TYPE_DOUBLE, shares[1], "within-10ms", G_TYPE_DOUBLE, shares[2],
+                           nullptr);
+}
+
+GstStructure* curve_of(const eventcamera::RateCurve& rates) {
+  GstStructure* curve =
+      gst_structure_new("rate-curve", "bin", G_TYPE_UINT64,
+                        static_cast<guint64>(rates.bin_length()) * GST_USECOND, nullptr);
+  for (const auto role : both_roles) {
+    GValue counts = G_VALUE_INIT;
+    g_value_init(&counts, GST_TYPE_ARRAY);
+    for (const auto& bin : rates.bins()) {
+      GValue count = G_VALUE_INIT;
+      g_value_init(&count, G_TYPE_UINT64);
+      g_value_set_uint64(&count, bin[role]);
+      gst_value_array_append_and_take_value(&counts, &count);
+    }
+    gst_structure_take_value(curve, name_of(role), &counts);
+  }
+  return curve;
+}
+
+GstStructure* structure_of(const StreamComparison& comparison) {
+  const auto figures = comparison.figures();
+  GstStructure* structure =
+      gst_structure_new("eventcompare", "start", G_TYPE_INT64, gint64{figures.start}, "end",
+                        G_TYPE_INT64, gint64{figures.end}, nullptr);
+  for (const auto role : both_roles) {
+    GstStructure* stream = gst_structure_new_empty(name_of(role));
+    put_figures(stream, figures.streams[role]);
+    put_structure(structure, name_of(role), stream);
+  }
+  gst_structure_set(structure, "map-correlation", G_TYPE_DOUBLE, figures.map_correlation, nullptr);
+  put_structure(structure, "reference-matches",
+                matches_of(figures.match_shares[StreamRole::reference]));
+  put_structure(structure, "candidate-matches",
+                matches_of(figures.match_shares[StreamRole::candidate]));
+  put_structure(structure, "rate-curve", curve_of(comparison.rates()));
+  return structure;
+}
+
+/// Posts and writes the statistics; those of empty streams if the comparison has not begun.
+void EventCompare::conclude() {
+  concluded_ = true;
+  const StreamComparison nothing(1, 1);
+  const auto& comparison = comparison_ ? *comparison_ : nothing;
+  report(element(), settings.copy(), structure_of(comparison), [&] {
+    return eventcamera::draw_maps(comparison.map(StreamRole::reference),
+                                  comparison.map(StreamRole::candidate));
+  });
+}
+
+/* events */
+
+/// Adds a buffer to the comparison. May throw.
+void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
+  const auto interval = interval_of(buffer);
+  const MappedEvents mapped(buffer);
+  if (!interval || !mapped) {
+    warn(interval ? EventFault::partial_event : EventFault::no_pts, buffer);
+    return;
+  }
+  if (!mapped.events().empty()) concluded_ = false;
+  const GstSegment segment = segment_of(pads_[role]);
+  const auto skipped =
+      comparison_->add(role, mapped.events(), stream_time(segment, interval->start),
+                       stream_time(segment, interval->end));
+  if (skipped > 0) warn(EventFault::beyond_sensor, buffer);
+}
+
+bool EventCompare::is_over(StreamRole role) const {
+  return gst_aggregator_pad_is_eos(pads_[role]) && !gst_aggregator_pad_has_buffer(pads_[role]);
+}
+
+/// Starts the comparison once both sensors are known. Returns true if it is running. May throw.
+bool EventCompare::begin() {
+  const auto& reference = sensors_[StreamRole::reference];
+  const auto& candidate = sensors_[StreamRole::candidate];
+  if (!reference || !candidate || *reference != *candidate) return false;
+  if (!comparison_) {
+    comparison_.emplace(reference->width, reference->height);
+    concluded_ = true;
+  }
+  return true;
+}
+
+/// Processes the next buffer of either stream. May throw.
+GstFlowReturn EventCompare::take_next() {
+  const bool comparing = begin();
+  const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
+  if (behind == StreamRole::reference && !is_over(StreamRole::reference)) {
+    const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[StreamRole::reference]));
+    if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    compare(StreamRole::reference, buffer.get());
+    return GST_FLOW_OK;
+  }
+  {
+    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(main_pad()));
+    if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    if (comparing && behind == StreamRole::candidate) compare(StreamRole::candidate, buffer.get());
+  }
+  return gst_aggregator_finish_buffer(element(), gst_aggregator_pad_pop_buffer(main_pad()));
+}
+
+GstFlowReturn EventCompare::aggregate(bool) {
+  if (is_over(StreamRole::candidate)) {
+    conclude();
+    return GST_FLOW_EOS;
+  }
+  const auto& reference = sensors_[StreamRole::reference];
+  const auto& candidate = sensors_[StreamRole::candidate];
+  if (reference && candidate && *reference != *candidate) {
+    GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                      ("Cannot compare sensors of two sizes: the reference has %d x %d pixels, the "
+                       "candidate %d x %d; scale one of them.",
+                       reference->width, reference->height, candidate->width, candidate->height),
+                      ("width or height differ in the caps of the two sink pads"));
+    return GST_FLOW_NOT_NEGOTIATED;
+  }
+  return take_next();
+}
+
+/* negotiation, states */
+
+bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+  auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
+  const Sensor next{info.width, info.height};
+  if (sensor != next) comparison_.reset();
+  sensor = next;
+  return true;
+}
+
+void EventCompare::stop() {
+  if (comparison_ && !concluded_) conclude();
+  comparison_.reset();
+  sensors_ = {};
+}
+
+}  // namespace
+
+DEFINE_EVENT_AGGREGATOR(GstEventCompare, gst_event_compare, EVENT_COMPARE, EventCompare,
+                        eventcompare, GST_RANK_NONE, "similarity of event streams")
+
+static void gst_event_compare_class_init(GstEventCompareClass* klass) {
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  add_report_properties(properties,
+                        "PNG file of the events per pixel, of both streams and of their "
+                        "difference, written at EOS or on stop");
+
+  static GstStaticPadTemplate reference_template = GST_STATIC_PAD_TEMPLATE(
+      "reference", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
+  static GstStaticPadTemplate candidate_template = GST_STATIC_PAD_TEMPLATE(
+      "candidate", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
+  static GstStaticPadTemplate src_template =
+      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
+  gst_event_aggregator_class_add_templates(
+      GST_EVENT_AGGREGATOR_CLASS(klass), {&reference_template, &candidate_template, &src_template});
+  gst_element_class_set_static_metadata(
+      GST_ELEMENT_CLASS(klass), "Event comparison", "Filter/Analyzer",
+      "Measures the similarity of two event streams", EVENTSIM_AUTHORS);
+}

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventstats
+ * @title: eventstats
+ * @short_description: measures an event stream
+ *
+ * Passes events through and posts element messages `eventstats`: every #GstEventStats:interval of
+ * stream time with the statistics since the last one, and at EOS or on stop with those of the whole
+ * stream. Intervals end at buffer boundaries.
+ *
+ * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream;
+ * - `start`, `end` (#gint64): the time covered, in stream time (ns);
+ * - `events` (#guint64), `rate` (#gdouble, events per second);
+ * - `on-share` (#gdouble): the fraction of ON events;
+ * - `mean`, `std-dev` (#gdouble): over all pixels, events per pixel and second;
+ * - `interval-p5`, `-p25`, `-p50`, `-p75`, `-p95` (#guint64, ns): percentiles of the time between
+ *   successive events of a pixel, accurate to 3 %.
+ *
+ * At EOS or on stop (Ctrl-C), the statistics of the whole stream are written to
+ * #GstEventStats:location as JSON, and an image of the events per pixel to #GstEventStats:map.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 -m filesrc location=recording.raw ! evtdec ! eventstats map=map.png ! fakesink
+ * ]|
+ */
+#include <gst/base/gstbasetransform.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "elements/eventcam/measures/report.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/pads.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "src/core/event_validator.hpp"
+#include "src/measure/event_statistics.hpp"
+#include "src/render/map_picture.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
+#define GST_CAT_DEFAULT event_stats_debug
+
+using eventcamera::EventStatistics;
+using eventcamera::EventValidator;
+using eventcamera::Nanoseconds;
+
+namespace {
+
+/// User-settable values.
+struct Settings : ReportFiles {
+  GstClockTime interval = GST_SECOND;
+};
+
+/// Statistics of a part of the stream.
+struct Part {
+  EventStatistics statistics;
+  std::optional<Nanoseconds> start{};  ///< in stream time
+  Nanoseconds covered = 0;
+
+  void restart() {
+    statistics.restart();
+    start.reset();
+    covered = 0;
+  }
+};
+
+/// Statistics of the stream of one sensor.
+struct Measurement {
+  Measurement(int sensor_width, int sensor_height)
+      : width(sensor_width),
+        height(sensor_height),
+        validator(width, height),
+        cumulative{.statistics = EventStatistics(width, height)},
+        recent{.statistics = EventStatistics(width, height)} {}
+
+  int width;
+  int height;
+  EventValidator validator;
+  Part cumulative;
+  Part recent;                       ///< since the last message
+  std::optional<Nanoseconds> end{};  ///< in stream time
+  bool concluded = true;             ///< no events since the last report
+};
+
+struct Private {
+  GuardedSettings<Settings> settings;
+
+  // Accessed by the streaming thread only, or while there is none.
+  std::optional<Measurement> measurement;
+  EventFaults faults{"count"};
+};
+
+}  // namespace
+
+G_DECLARE_FINAL_TYPE(GstEventStats, gst_event_stats, GST, EVENT_STATS, GstBaseTransform)
+
+struct _GstEventStats {
+  GstBaseTransform parent;
+  Private* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstEventStats, gst_event_stats, GST_TYPE_BASE_TRANSFORM,
+                        GST_DEBUG_CATEGORY_INIT(event_stats_debug, "eventstats", 0,
+                                                "statistics of event streams"))
+#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
+GST_ELEMENT_REGISTER_DEFINE(eventstats, "eventstats", GST_RANK_NONE, gst_event_stats_get_type())
+
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_EVENT_STATS(object)->priv->settings;
+}
+
+/* figures */
+
+static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulative) {
+  const Nanoseconds start = part.start.value_or(end);
+  GstStructure* structure = gst_structure_new(
+      "eventstats", "cumulative", G_TYPE_BOOLEAN, cumulative ? TRUE : FALSE, "start", G_TYPE_INT64,
+      gint64{start}, "end", G_TYPE_INT64, gint64{end}, nullptr);
+  put_figures(structure, part.statistics.figures(part.covered));
+  return structure;
+}
+
+/// Posts a message. Takes ownership of `structure`.
+static void post(GstEventStats* self, GstStructure* structure) {
+  gst_element_post_message(GST_ELEMENT(self), gst_message_new_element(GST_OBJECT(self), structure));
+}
+
+/// Reports the statistics of the whole stream; those of an empty stream if no caps were received.
+static void conclude(GstEventStats* self, const ReportFiles& files) {
+  Measurement nothing(1, 1);
+  auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
+  measurement.concluded = true;
+  report(self, files, figures_of(measurement.cumulative, measurement.end.value_or(0), true),
+         [&] { return eventcamera::draw_map(measurement.cumulative.statistics.map()); });
+}
+
+/// Starts measuring a sensor of this size.
+static bool measure(GstEventStats* self, int width, int height) {
+  const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                      "Not enough memory to count the events of " + std::to_string(width) + " x " +
+                          std::to_string(height) +
+                          " pixels; free memory, or lower the resolution."};
+  return guarded(self, report, [&] { self->priv->measurement.emplace(width, height); });
+}
+
+/* events */
+
+/// Adds an interval. Time between intervals counts as time without events; if time goes backwards,
+/// no inter-event interval spans the discontinuity.
+static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) {
+  if (measurement.end && start < *measurement.end - static_cast<Nanoseconds>(event_resolution)) {
+    measurement.validator = EventValidator(measurement.width, measurement.height);
+    for (auto* part : {&measurement.cumulative, &measurement.recent})
+      part->statistics.forget_times();
+    measurement.end.reset();
+  }
+  const Nanoseconds from = measurement.end.value_or(start);
+  for (auto* part : {&measurement.cumulative, &measurement.recent}) {
+    if (!part->start) part->start = from;
+    const Nanoseconds most = std::numeric_limits<Nanoseconds>::max() - part->covered;
+    part->covered += std::clamp(end - from, Nanoseconds{0}, most);
+  }
+  measurement.end = std::max(end, from);
+}
+
+static void post_if_due(GstEventStats* self, Measurement& measurement) {
+  const auto interval = static_cast<Nanoseconds>(self->priv->settings.copy().interval);
+  if (interval == 0 || measurement.recent.covered < interval) return;
+  post(self, figures_of(measurement.recent, *measurement.end, false));
+  measurement.recent.restart();
+}
+
+static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buffer,
+                  Nanoseconds start) {
+  const MappedEvents mapped(buffer);
+  if (!mapped) {
+    self->priv->faults.warn(self, EventFault::partial_event, buffer);
+    return;
+  }
+  const std::size_t skipped = measurement.validator.take(
+      mapped.events(), start / 1000, [&](const eventcamera::AbsoluteEvent& event) {
+        measurement.concluded = false;
+        measurement.cumulative.statistics.add(event);
+        measurement.recent.statistics.add(event);
+      });
+  if (skipped > 0) self->priv->faults.warn(self, EventFault::beyond_sensor, buffer);
+}
+
+static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
+  auto* self = GST_EVENT_STATS(transform);
+  auto& measurement = self->priv->measurement;
+  const auto interval = interval_of(buffer);
+  if (!interval) {
+    self->priv->faults.warn(self, EventFault::no_pts, buffer);
+    return GST_FLOW_OK;
+  }
+  if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
+  const Nanoseconds start = stream_time(transform->segment, interval->start);
+  cover(*measurement, start, stream_time(transform->segment, interval->end));
+  count(self, *measurement, buffer, start);
+  post_if_due(self, *measurement);
+  return GST_FLOW_OK;
+}
+
+static void take_gap(GstEventStats* self, GstEvent* event) {
+  auto& measurement = self->priv->measurement;
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(event, &start, &duration);
+  if (!measurement || !GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64) return;
+  const GstClockTime end = start + std::min(duration, GstClockTime{G_MAXINT64} - start);
+  const auto& segment = GST_BASE_TRANSFORM(self)->segment;
+  cover(*measurement, stream_time(segment, start), stream_time(segment, end));
+  post_if_due(self, *measurement);
+}
+
+static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
+  auto* self = GST_EVENT_STATS(transform);
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_GAP:
+      take_gap(self, event);
+      break;
+    case GST_EVENT_EOS:
+      conclude(self, self->priv->settings.copy());
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      if (const auto& measurement = self->priv->measurement)
+        measure(self, measurement->width, measurement->height);
+      break;
+    default:
+      break;
+  }
+  return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
+}
+
+/* negotiation, states */
+
+static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
+  auto* self = GST_EVENT_STATS(transform);
+  auto& measurement = self->priv->measurement;
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, in)) return FALSE;
+  if (measurement && measurement->width == info.width && measurement->height == info.height)
+    return TRUE;
+  // Each sensor size is measured separately.
+  if (measurement) conclude(self, {});
+  return measure(self, info.width, info.height) ? TRUE : FALSE;
+}
+
+static gboolean start(GstBaseTransform* transform) {
+  auto* self = GST_EVENT_STATS(transform);
+  return can_report(self, self->priv->settings.copy()) ? TRUE : FALSE;
+}
+
+static gboolean stop(GstBaseTransform* transform) {
+  auto* self = GST_EVENT_STATS(transform);
+  auto& priv = *self->priv;
+  if (priv.measurement && !priv.measurement->concluded) conclude(self, self->priv->settings.copy());
+  priv.measurement.reset();
+  priv.faults.reset();
+  return TRUE;
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  delete GST_EVENT_STATS(object)->priv;
+  G_OBJECT_CLASS(gst_event_stats_parent_class)->finalize(object);
+}
+
+static void gst_event_stats_init(GstEventStats* self) {
+  self->priv = new Private;
+  gst_base_transform_set_passthrough(GST_BASE_TRANSFORM(self), TRUE);
+  gst_base_transform_set_gap_aware(GST_BASE_TRANSFORM(self), TRUE);
+}
+
+static void gst_event_stats_class_init(GstEventStatsClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+
+  Properties<settings_of> properties(object_class);
+  properties.add(
+      &Settings::interval,
+      g_param_spec_uint64("interval", "Interval",
+                          "Time between statistics messages, in stream time (ns; 0 = at EOS only)",
+                          0, std::numeric_limits<gint64>::max(), Settings().interval,
+                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                   GST_PARAM_MUTABLE_PLAYING)));
+  add_report_properties(properties, "PNG file of the events per pixel, written at EOS or on stop");
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  add_pad_templates(element_class, EVENT_CAPS, EVENT_CAPS);
+  gst_element_class_set_static_metadata(element_class, "Event statistics", "Filter/Analyzer",
+                                        "Measures an event stream", EVENTSIM_AUTHORS);
+
+  GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
+  transform_class->start = start;
+  transform_class->stop = stop;
+  transform_class->set_caps = set_caps;
+  transform_class->sink_event = sink_event;
+  transform_class->transform_ip = transform_ip;
+}

@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventdatagramdepay
+ * @title: eventdatagramdepay
+ * @short_description: unpacks events from datagrams of other tools
+ *
+ * Unpacks events from datagrams that SpiNNaker, AEStream, EventCV, faery, tools of Event Stream, or
+ * jAER sent, as #GstEventDatagramDepay:format says. Each buffer is a datagram, as from udpsrc. The
+ * datagrams do not state the sensor size: set #GstEventDatagramDepay:width and
+ * #GstEventDatagramDepay:height.
+ *
+ * A buffer's PTS is the sender's time, with wraps undone. The segment maps it to the running time
+ * at which the first event arrived, and again if sender and receiver drift apart by more than a
+ * second, or if the sender starts over. Events of SPIF without times get the time at which their
+ * datagram arrived: the PTS of its buffer, which udpsrc sets.
+ *
+ * Live sinks wait for #GstEventDatagramDepay:latency, so that events that the sender packed or the
+ * network delayed for up to that long are in time.
+ *
+ * A datagram that is malformed, or has an event outside the sensor, is rejected as a whole. One
+ * that is older than others before it is dropped, so events are sorted. After a loss, which only
+ * the sequence number of jAER reveals, the next buffer is flagged DISCONT.
+ * #GstEventDatagramDepay:stats counts all of these.
+ *
+ * jAER's addresses are read as those of a DVS128 if the sensor has 128x128 pixels, else as those of
+ * a DAVIS. Samples of frames and of the IMU are skipped.
+ *
+ * ## Example launch lines
+ * |[
+ * gst-launch-1.0 udpsrc port=3333 ! eventdatagramdepay format=spif width=640 height=480 !
+ * eventrender ! videoconvert ! autovideosink
+ * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
+ * eventdatagrampay format=spif ! udpsink host=receiver port=3333
+ * ]|
+ */
+#include <gst/gst.h>
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "elements/eventcam/network/arrival_segment.hpp"
+#include "elements/eventcam/network/datagram_properties.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/latency.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "src/wire/datagram_unpacker.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);
+#define GST_CAT_DEFAULT event_datagram_depay_debug
+
+using eventcamera::AbsoluteEvent;
+using eventcamera::DatagramFormat;
+using eventcamera::DatagramSettings;
+using eventcamera::DatagramUnpacker;
+using eventcamera::Event;
+using eventcamera::Microseconds;
+using eventcamera::Reception;
+
+namespace {
+
+/// Largest difference between the running time of an event and of its arrival.
+constexpr GstClockTimeDiff max_drift = GST_SECOND;
+
+/// Shorter silences belong to the interval of the next buffer, longer ones are a GAP event.
+constexpr Microseconds min_gap = 1000;
+static_assert(min_gap + eventcamera::max_datagram_span <= G_MAXUINT32, "wraps times in buffers");
+
+/// State of the stream, from start to stop.
+struct State {
+  DatagramSettings settings;
+  std::unique_ptr<DatagramUnpacker> unpacker;
+  std::vector<AbsoluteEvent> events{};  ///< of the current datagram
+  GstSegment upstream{};                ///< of arrival times
+  guint32 segment_seqnum = gst_util_seqnum_next();
+  ArrivalSegment segment{max_drift};
+  Microseconds end = 0;           ///< of the last buffer
+  bool is_discontinuous = false;  ///< before the next buffer
+  bool has_caps = false;
+};
+
+/// User-settable values.
+struct Settings : DatagramSettings {
+  GstClockTime latency = 10 * GST_MSECOND;
+};
+
+struct Private {
+  GuardedSettings<Settings> settings;
+  GuardedSettings<DatagramCounts> counts;
+  GstPad* sink = nullptr;
+  GstPad* src = nullptr;
+
+  // Accessed by the streaming thread only, or while there is none.
+  std::optional<State> state;
+  WarnOnce warn_of_rejected;
+};
+
+}  // namespace
+
+G_DECLARE_FINAL_TYPE(GstEventDatagramDepay, gst_event_datagram_depay, GST, EVENT_DATAGRAM_DEPAY,
+                     GstElement)
+
+struct _GstEventDatagramDepay {
+  GstElement parent;
+  Private* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstEventDatagramDepay, gst_event_datagram_depay, GST_TYPE_ELEMENT,
+                        GST_DEBUG_CATEGORY_INIT(event_datagram_depay_debug, "eventdatagramdepay", 0,
+                                                "datagrams of events from other tools"))
+GST_ELEMENT_REGISTER_DEFINE(eventdatagramdepay, "eventdatagramdepay", GST_RANK_NONE,
+                            gst_event_datagram_depay_get_type())
+
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_EVENT_DATAGRAM_DEPAY(object)->priv->settings;
+}
+
+static GuardedSettings<DatagramCounts>& counts_of(GObject* object) {
+  return GST_EVENT_DATAGRAM_DEPAY(object)->priv->counts;
+}
+
+/* output */
+
+static GstClockTime nanoseconds(Microseconds t) {
+  return static_cast<GstClockTime>(t) * GST_USECOND;
+}
+
+static bool push_caps(GstEventDatagramDepay* self) {
+  auto& state = *self->priv->state;
+  if (state.has_caps) return true;
+  const OwnedCaps caps = event_caps(state.settings.width, state.settings.height);
+  state.has_caps = gst_pad_push_event(self->priv->src, gst_event_new_caps(caps.get())) != FALSE;
+  return state.has_caps;
+}
+
+/// Buffer of the events of the interval (start, end]. May throw.
+static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds start,
+                            Microseconds end) {
+  std::vector<Event> stream;
+  stream.reserve(events.size());
+  for (const auto& event : events)
+    stream.push_back({static_cast<std::uint32_t>(event.t - start), event.x, event.y_p});
+  GstBuffer* const buffer = copied_buffer(std::as_bytes(std::span(stream)));
+  GST_BUFFER_PTS(buffer) = nanoseconds(start);
+  GST_BUFFER_DURATION(buffer) = nanoseconds(end - start);
+  return buffer;
+}
+
+/// Pushes the events of a datagram. May throw.
+static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& reception,
+                          GstClockTime arrival) {
+  auto& priv = *self->priv;
+  auto& state = *priv.state;
+  const auto first = state.events.front().t;
+  if (!push_caps(self))
+    return GST_PAD_IS_FLUSHING(priv.src) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
+  if (reception.restarted || !state.segment.continues(nanoseconds(first), arrival)) {
+    state.segment.begin(priv.src, state.segment_seqnum, nanoseconds(first), arrival,
+                        nanoseconds(first));
+    state.end = first;
+    state.is_discontinuous = true;
+  } else if (first - state.end > min_gap) {
+    GstEvent* const gap =
+        gst_event_new_gap(nanoseconds(state.end), nanoseconds(first - 1 - state.end));
+    if (reception.lost > 0) gst_event_set_gap_flags(gap, GST_GAP_FLAG_MISSING_DATA);
+    gst_pad_push_event(priv.src, gap);
+    state.end = first - 1;
+  }
+  GstBuffer* const buffer = buffer_of(state.events, state.end, state.events.back().t);
+  state.end = state.events.back().t;
+  state.segment.reach(nanoseconds(state.end));
+  if (std::exchange(state.is_discontinuous, false))
+    GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+  return gst_pad_push(priv.src, buffer);
+}
+
+/* data */
+
+static void reject(GstEventDatagramDepay* self, const char* fault, gsize size) {
+  self->priv->warn_of_rejected(
+      self,
+      {GST_STREAM_ERROR_DECODE,
+       std::string("Rejected a datagram: ") + fault +
+           ". Set format, width and height to those of the sender; stats counts the rejected "
+           "datagrams."},
+      "datagram of " + std::to_string(size) + " bytes");
+}
+
+static GstFlowReturn receive(GstEventDatagramDepay* self, std::span<const std::uint8_t> bytes,
+                             GstClockTime arrival, bool discont) {
+  auto& priv = *self->priv;
+  auto& state = *priv.state;
+  std::optional<Microseconds> time;
+  if (GST_CLOCK_TIME_IS_VALID(arrival)) time = static_cast<Microseconds>(arrival / GST_USECOND);
+  const auto reception = state.unpacker->unpack(bytes, time, state.events);
+  const bool accepted = reception.fault == nullptr && !reception.late;
+  priv.counts.access([&](DatagramCounts& counts) {
+    counts.packets += accepted ? 1 : 0;
+    counts.events += state.events.size();
+    counts.bytes += accepted ? bytes.size() : 0;
+    counts.lost += reception.lost;
+    counts.late += reception.late ? 1 : 0;
+    counts.rejected += reception.fault != nullptr ? 1 : 0;
+  });
+  if (reception.fault != nullptr) reject(self, reception.fault, bytes.size());
+  // A datagram without events, such as jAER's samples of frames, may be the one that tells.
+  state.is_discontinuous |= discont || reception.lost > 0;
+  return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
+}
+
+/// Running time at which a datagram arrived, if its buffer has a PTS.
+static GstClockTime arrival_of(const State& state, GstBuffer* buffer) {
+  if (state.upstream.format != GST_FORMAT_TIME) return GST_CLOCK_TIME_NONE;
+  return gst_segment_to_running_time(&state.upstream, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
+}
+
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+  auto* self = GST_EVENT_DATAGRAM_DEPAY(parent);
+  OwnedBuffer buffer(taken);
+  const auto& state = self->priv->state;
+  if (!state) return GST_FLOW_FLUSHING;
+  const auto arrival = arrival_of(*state, taken);
+  if (!GST_CLOCK_TIME_IS_VALID(arrival) && state->settings.format == DatagramFormat::spif) {
+    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+                      ("Cannot time events of SPIF: their datagrams have no arrival time. Set "
+                       "do-timestamp=true on the source, or format=spif-timestamps."),
+                      ("a buffer has no PTS in a segment of times"));
+    return GST_FLOW_ERROR;
+  }
+  const bool discont = GST_BUFFER_IS_DISCONT(taken);
+  const MappedBytes bytes(GST_ELEMENT(self), std::move(buffer));
+  if (!bytes.is_mapped()) return GST_FLOW_ERROR;
+  return guarded(self,
+                 Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."},
+                 [&] { return receive(self, bytes.get(), arrival, discont); });
+}
+
+/// Starts a new stream with the next datagram.
+static bool start_stream(GstEventDatagramDepay* self, const DatagramSettings& settings) {
+  const auto report = [](const std::exception& error) {
+    return Report{GST_RESOURCE_ERROR_SETTINGS,
+                  std::string("Cannot receive events of this sensor in this format: ") +
+                      error.what() + ". Select another format, or correct width and height."};
+  };
+  return guarded(self, report, [&] {
+    auto unpacker = make_datagram_unpacker(settings);
+    auto& state = self->priv->state;
+    state.emplace(State{.settings = settings, .unpacker = std::move(unpacker)});
+  });
+}
+
+static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
+  auto* self = GST_EVENT_DATAGRAM_DEPAY(parent);
+  auto& state = self->priv->state;
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_SEGMENT:
+      if (state) {
+        gst_event_copy_segment(event, &state->upstream);
+        state->segment_seqnum = gst_event_get_seqnum(event);
+      }
+      gst_event_unref(event);
+      return TRUE;
+    case GST_EVENT_CAPS:
+    case GST_EVENT_GAP:
+      // Events have caps and times of their own.
+      gst_event_unref(event);
+      return TRUE;
+    case GST_EVENT_FLUSH_STOP:
+      if (state) start_stream(self, state->settings);
+      break;
+    default:
+      break;
+  }
+  return gst_pad_event_default(pad, parent, event);
+}
+
+static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  auto& priv = *GST_EVENT_DATAGRAM_DEPAY(parent)->priv;
+  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(priv.sink, query, priv.settings.copy().latency);
+  return gst_pad_query_default(pad, parent, query);
+}
+
+/* states */
+
+static bool start(GstEventDatagramDepay* self) {
+  const auto settings = self->priv->settings.copy();
+  self->priv->counts.access([](DatagramCounts& counts) { counts = {}; });
+  if (settings.width > 0 && settings.height > 0) return start_stream(self, settings);
+  GST_ELEMENT_ERROR(self, RESOURCE, SETTINGS,
+                    ("Cannot receive events: their datagrams do not state the sensor size. Set "
+                     "width and height to those of the sender."),
+                    ("width=%d height=%d", settings.width, settings.height));
+  return false;
+}
+
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  auto* self = GST_EVENT_DATAGRAM_DEPAY(element);
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !start(self))
+    return GST_STATE_CHANGE_FAILURE;
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS(gst_event_datagram_depay_parent_class)->change_state(element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    self->priv->state.reset();
+    self->priv->warn_of_rejected.reset();
+  }
+  return result;
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  delete GST_EVENT_DATAGRAM_DEPAY(object)->priv;
+  G_OBJECT_CLASS(gst_event_datagram_depay_parent_class)->finalize(object);
+}
+
+static void gst_event_datagram_depay_init(GstEventDatagramDepay* self) {
+  self->priv = new Private;
+  auto& priv = *self->priv;
+  priv.sink = add_pad(GST_ELEMENT(self), "sink");
+  gst_pad_set_chain_function(priv.sink, chain);
+  gst_pad_set_event_function(priv.sink, sink_event);
+  priv.src = add_pad(GST_ELEMENT(self), "src");
+  gst_pad_set_query_function(priv.src, src_query);
+  gst_pad_use_fixed_caps(priv.src);
+}
+
+static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+
+  Properties<settings_of> properties(object_class);
+  add_datagram_properties(properties);
+  constexpr guint max_size = 16384;
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                  GST_PARAM_MUTABLE_READY);
+  properties.add(
+      &DatagramSettings::width,
+      g_param_spec_uint("width", "Width", "Width of the sender's sensor (pixels); required", 0,
+                        max_size, 0, flags));
+  properties.add(
+      &DatagramSettings::height,
+      g_param_spec_uint("height", "Height", "Height of the sender's sensor (pixels); required", 0,
+                        max_size, 0, flags));
+  properties.add(
+      &Settings::latency,
+      g_param_spec_uint64("latency", "Latency",
+                          "Time by which events may arrive later than the first did, relative to "
+                          "their own times; live sinks wait for as long (ns)",
+                          0, 10 * GST_SECOND, Settings().latency, flags));
+  add_datagram_stats<counts_of>(
+      object_class,
+      "Counts since the start: packets, events and bytes received; packets lost, where they have a "
+      "sequence number; packets dropped as late, older than others before; packets rejected, "
+      "malformed or outside the sensor",
+      [](const DatagramCounts& counts) {
+        return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
+                                 counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
+                                 G_TYPE_UINT64, counts.bytes, "lost", G_TYPE_UINT64, counts.lost,
+                                 "late", G_TYPE_UINT64, counts.late, "rejected", G_TYPE_UINT64,
+                                 counts.rejected, nullptr);
+      });
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  element_class->change_state = change_state;
+  add_pad_templates(element_class, "ANY", EVENT_CAPS);
+  gst_element_class_set_static_metadata(
+      element_class, "Event datagram depayloader", "Codec/Depayloader/Network",
+      "Unpacks events from datagrams of other tools", EVENTSIM_AUTHORS);
+}

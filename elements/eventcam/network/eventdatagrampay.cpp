@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventdatagrampay
+ * @title: eventdatagrampay
+ * @short_description: packs events into datagrams of other tools
+ *
+ * Packs an event stream into datagrams that SpiNNaker, AEStream, EventCV, faery, tools of Event
+ * Stream, and jAER receive, as #GstEventDatagramPay:format says. Each buffer is a datagram: send it
+ * with udpsink. Its PTS is the time of its first event.
+ *
+ * A datagram is sent when it is full, or when its first event cannot wait for another buffer as
+ * long as the last one. If no buffer comes, it is sent after #GstEventDatagramPay:max-latency.
+ *
+ * jAER's addresses are those of a DVS128 if the sensor has 128x128 pixels, else those of a DAVIS,
+ * with up to 1024x512 pixels: select that camera in jAER.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 v4l2src ! eventsim-sparse ! eventdatagrampay format=t32-x16-y15-on1 ! udpsink
+ * host=receiver port=5000
+ * ]|
+ */
+#include <gst/gst.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "elements/eventcam/network/datagram_properties.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/flush_timer.hpp"
+#include "gst/base/latency.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "src/wire/datagram_packer.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);
+#define GST_CAT_DEFAULT event_datagram_pay_debug
+
+using eventcamera::AbsoluteEvent;
+using eventcamera::Datagram;
+using eventcamera::DatagramPacker;
+using eventcamera::Microseconds;
+
+namespace {
+
+/// User-settable values.
+struct Settings : eventcamera::DatagramSettings {
+  GstClockTime max_latency = 5 * GST_MSECOND;
+};
+
+struct Private {
+  GuardedSettings<Settings> settings;
+  GuardedSettings<DatagramCounts> counts;
+  GstPad* sink = nullptr;
+  GstPad* src = nullptr;
+
+  // Accessed under the stream lock of the sink pad, or while nothing streams.
+  GstEventCameraInfo info{};
+  std::unique_ptr<DatagramPacker> packer;
+  std::vector<AbsoluteEvent> events;   ///< of the current buffer
+  std::vector<OwnedBuffer> datagrams;  ///< complete but not yet pushed
+  EventFaults faults{"send"};
+  std::optional<Microseconds> timed;  ///< first event of the datagram that the timer is set for
+
+  FlushTimer timer;
+};
+
+}  // namespace
+
+G_DECLARE_FINAL_TYPE(GstEventDatagramPay, gst_event_datagram_pay, GST, EVENT_DATAGRAM_PAY,
+                     GstElement)
+
+struct _GstEventDatagramPay {
+  GstElement parent;
+  Private* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstEventDatagramPay, gst_event_datagram_pay, GST_TYPE_ELEMENT,
+                        GST_DEBUG_CATEGORY_INIT(event_datagram_pay_debug, "eventdatagrampay", 0,
+                                                "datagrams of events for other tools"))
+GST_ELEMENT_REGISTER_DEFINE(eventdatagrampay, "eventdatagrampay", GST_RANK_NONE,
+                            gst_event_datagram_pay_get_type())
+
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_EVENT_DATAGRAM_PAY(object)->priv->settings;
+}
+
+static GuardedSettings<DatagramCounts>& counts_of(GObject* object) {
+  return GST_EVENT_DATAGRAM_PAY(object)->priv->counts;
+}
+
+/* datagrams */
+
+static Report report_of(const std::exception& error) {
+  if (is_a<std::invalid_argument>(error))
+    return {GST_STREAM_ERROR_FORMAT,
+            std::string("Cannot send events of this sensor in this format: ") + error.what() +
+                ". Select another format."};
+  return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
+}
+
+/// Keeps a datagram until push(). May throw.
+static void keep(Private& priv, const Datagram& datagram) {
+  OwnedBuffer buffer(copied_buffer(std::as_bytes(datagram.bytes)));
+  GST_BUFFER_PTS(buffer.get()) = static_cast<GstClockTime>(datagram.first) * GST_USECOND;
+  GST_BUFFER_DURATION(buffer.get()) =
+      static_cast<GstClockTime>(datagram.last - datagram.first) * GST_USECOND;
+  priv.datagrams.push_back(std::move(buffer));
+  priv.counts.access([&](DatagramCounts& counts) {
+    ++counts.packets;
+    counts.events += datagram.events;
+    counts.bytes += datagram.bytes.size();
+  });
+}
+
+/// Pushes what was kept, in a list, which udpsink sends with one system call.
+static GstFlowReturn push(Private& priv) {
+  if (priv.datagrams.empty()) return GST_FLOW_OK;
+  GstBufferList* const list = gst_buffer_list_new_sized(static_cast<guint>(priv.datagrams.size()));
+  for (auto& datagram : priv.datagrams) gst_buffer_list_add(list, datagram.release());
+  priv.datagrams.clear();
+  return gst_pad_push_list(priv.src, list);
+}
+
+static void flush_late(GstObject* element);
+
+/// Limits the time that a new incomplete datagram waits. May throw.
+static void set_timer(Private& priv) {
+  const auto since = priv.packer ? priv.packer->waiting_since() : std::nullopt;
+  if (since == priv.timed) return;
+  priv.timed = since;
+  if (since)
+    priv.timer.set(priv.settings.copy().max_latency, priv.sink, flush_late);
+  else
+    priv.timer.cancel();
+}
+
+/// Runs `work`, which packs events, and pushes the datagrams that they complete.
+template <class Work>
+static GstFlowReturn pack(GstEventDatagramPay* self, const Work& work) {
+  auto& priv = *self->priv;
+  const bool packed = guarded(self, report_of, [&] {
+    if (priv.packer) work(*priv.packer, [&](const Datagram& datagram) { keep(priv, datagram); });
+    set_timer(priv);
+  });
+  return packed ? push(priv) : GST_FLOW_ERROR;
+}
+
+static GstFlowReturn flush(GstEventDatagramPay* self) {
+  return pack(self, [](DatagramPacker& packer, const auto& send) { packer.flush(send); });
+}
+
+/// Sends events that have waited long enough.
+static void flush_late(GstObject* element) {
+  flush(GST_EVENT_DATAGRAM_PAY(element));
+}
+
+/// True if events would wait for too long in the incomplete datagram. `interval` is that of the
+/// current buffer; the next one is expected to be as long.
+static bool is_flush_due(GstEventDatagramPay* self, const EventInterval& interval) {
+  const auto& priv = *self->priv;
+  const auto since = priv.packer->waiting_since();
+  if (!since) return false;
+  const auto next = interval.end + (interval.end - interval.start);
+  return next > static_cast<GstClockTime>(*since) * GST_USECOND + priv.settings.copy().max_latency;
+}
+
+/* data */
+
+/// Collects the events of a buffer.
+static void collect(GstEventDatagramPay* self, GstBuffer* buffer, const MappedEvents& mapped) {
+  auto& priv = *self->priv;
+  priv.events.clear();
+  for (const auto& event : mapped.events()) {
+    if (event.x < priv.info.width && event.y() < priv.info.height)
+      priv.events.push_back({mapped.start() + event.t, event.x, event.y_p});
+  }
+  if (priv.events.size() < mapped.events().size())
+    priv.faults.warn(self, EventFault::beyond_sensor, buffer);
+}
+
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+  auto* self = GST_EVENT_DATAGRAM_PAY(parent);
+  auto& priv = *self->priv;
+  const OwnedBuffer buffer(taken);
+  if (!priv.packer) return GST_FLOW_NOT_NEGOTIATED;
+  const auto interval = interval_of(taken);
+  if (!interval) {
+    priv.faults.warn(self, EventFault::no_pts, taken);
+    return GST_FLOW_OK;
+  }
+  const MappedEvents mapped(taken);
+  if (!mapped) {
+    priv.faults.warn(self, EventFault::partial_event, taken);
+    return GST_FLOW_OK;
+  }
+  return pack(self, [&](DatagramPacker& packer, const auto& send) {
+    collect(self, taken, mapped);
+    packer.set_max_span(static_cast<Microseconds>(priv.settings.copy().max_latency / GST_USECOND));
+    packer.pack(priv.events, send);
+    if (is_flush_due(self, *interval)) packer.flush(send);
+  });
+}
+
+static void take_gap(GstEventDatagramPay* self, GstEvent* event) {
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(event, &start, &duration);
+  if (!self->priv->packer) return;
+  if (!GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64 || duration > G_MAXINT64 / 2 ||
+      is_flush_due(self, {start, start + duration}))
+    flush(self);
+}
+
+static gboolean take_caps(GstEventDatagramPay* self, GstEvent* event) {
+  auto& priv = *self->priv;
+  GstCaps* caps = nullptr;
+  gst_event_parse_caps(event, &caps);
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
+  if (priv.packer && priv.info.width == info.width && priv.info.height == info.height) return TRUE;
+  flush(self);
+  Settings settings = priv.settings.copy();
+  settings.width = info.width;
+  settings.height = info.height;
+  priv.info = info;
+  if (!guarded(self, report_of, [&] { priv.packer = make_datagram_packer(settings); }))
+    return FALSE;
+  const GEnumValue* const format =
+      g_enum_get_value(static_cast<GEnumClass*>(g_type_class_peek(datagram_format_type())),
+                       static_cast<int>(settings.format));
+  const OwnedCaps out(gst_caps_new_simple("application/x-event-datagram", "format", G_TYPE_STRING,
+                                          format->value_nick, nullptr));
+  return gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
+}
+
+static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
+  auto* self = GST_EVENT_DATAGRAM_PAY(parent);
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_CAPS: {
+      const gboolean taken = take_caps(self, event);
+      gst_event_unref(event);
+      return taken;
+    }
+    case GST_EVENT_GAP:
+      take_gap(self, event);
+      break;
+    case GST_EVENT_SEGMENT:  // the times of waiting events are those of the last one
+    case GST_EVENT_EOS:
+      flush(self);
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      if (self->priv->packer) self->priv->packer->flush([](const Datagram&) {});
+      set_timer(*self->priv);
+      break;
+    default:
+      break;
+  }
+  return gst_pad_event_default(pad, parent, event);
+}
+
+static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  auto& priv = *GST_EVENT_DATAGRAM_PAY(parent)->priv;
+  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(priv.sink, query, priv.settings.copy().max_latency);
+  return gst_pad_query_default(pad, parent, query);
+}
+
+/* states */
+
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  auto& priv = *GST_EVENT_DATAGRAM_PAY(element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    priv.counts.access([](DatagramCounts& counts) { counts = {}; });
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS(gst_event_datagram_pay_parent_class)->change_state(element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv.timer.stop();
+    priv.timed.reset();
+    priv.packer.reset();
+    priv.datagrams.clear();
+    priv.faults.reset();
+  }
+  return result;
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  delete GST_EVENT_DATAGRAM_PAY(object)->priv;
+  G_OBJECT_CLASS(gst_event_datagram_pay_parent_class)->finalize(object);
+}
+
+static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
+  self->priv = new Private;
+  auto& priv = *self->priv;
+  priv.sink = add_pad(GST_ELEMENT(self), "sink");
+  gst_pad_set_chain_function(priv.sink, chain);
+  gst_pad_set_event_function(priv.sink, sink_event);
+  priv.src = add_pad(GST_ELEMENT(self), "src");
+  gst_pad_set_query_function(priv.src, src_query);
+  gst_pad_use_fixed_caps(priv.src);
+  announce_latency(self, "max-latency");
+}
+
+static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+
+  Properties<settings_of> properties(object_class);
+  add_datagram_properties(properties);
+  properties.add(
+      &Settings::max_latency,
+      g_param_spec_uint64("max-latency", "Maximum latency",
+                          "Longest time that an event waits for its datagram to fill (ns; 0 = "
+                          "events of different times share none)",
+                          0, GST_SECOND * 3600, Settings().max_latency,
+                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                   GST_PARAM_MUTABLE_PLAYING)));
+  add_datagram_stats<counts_of>(
+      object_class, "Counts since the start: packets, events and bytes that were packed",
+      [](const DatagramCounts& counts) {
+        return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
+                                 counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
+                                 G_TYPE_UINT64, counts.bytes, nullptr);
+      });
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  element_class->change_state = change_state;
+  add_pad_templates(element_class, EVENT_CAPS, DATAGRAM_CAPS);
+  gst_element_class_set_static_metadata(
+      element_class, "Event datagram payloader", "Codec/Payloader/Network",
+      "Packs events into datagrams of other tools", EVENTSIM_AUTHORS);
+}

@@ -1,0 +1,401 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-rtpeventdepay
+ * @title: rtpeventdepay
+ * @short_description: receives events in RTP packets
+ *
+ * Gets the events out of the RTP packets of rtpeventpay; docs/rtp-payload-format.md specifies
+ * them. The caps need `width` and `height` of the sensor, as integers or as strings from SDP, and
+ * `format` unless it is EVT3. Put rtpjitterbuffer or rtpbin upstream: packets that come after later
+ * ones are dropped.
+ *
+ * Buffers are the sender's, with its PTS and duration, and an interval without events is a GAP
+ * event. The segment maps the sender's times to the running time at which they arrive: it is
+ * renewed when this changes by more than 5 ms, and when a sender starts over. The event times
+ * never change, so recordings of several receivers agree.
+ *
+ * After a loss, the buffer with the remaining events has the flag DISCONT, or the next. A packet
+ * that is not valid in every detail is dropped as a whole.
+ *
+ * #GstRtpEventDepay:stats has these fields besides those of #GstRTPBaseDepayload, all #guint64:
+ *
+ * - `packets`, `bytes`: packets received, and the size of their payloads;
+ * - `events`: events received;
+ * - `lost-packets`, `lost-events`: what the sender sent and did not arrive in time, since the first
+ *   packet;
+ * - `late-packets`: duplicates, and packets that came after later ones; dropped;
+ * - `rejected-packets`: packets that are not of this format or sensor, or corrupt.
+ *
+ * ## Example launch lines
+ * |[
+ * gst-launch-1.0 udpsrc port=5000
+ * caps="application/x-rtp,media=application,clock-rate=1000000,encoding-name=X-EVENT-CAMERA,width=640,height=480"
+ * ! rtpjitterbuffer ! rtpeventdepay ! eventrender ! videoconvert ! autovideosink
+ * gst-launch-1.0 v4l2src ! videoscale ! video/x-raw,width=640,height=480 ! eventsim-diff !
+ * rtpeventpay ! udpsink host=receiver port=5000
+ * ]|
+ */
+#include <gst/rtp/gstrtpbasedepayload.h>
+#include <gst/rtp/gstrtpbuffer.h>
+
+#include <charconv>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "elements/eventcam/network/arrival_segment.hpp"
+#include "elements/eventcam/network/rtp_events.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "src/wire/rtp_unpacker.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
+#define GST_CAT_DEFAULT rtp_event_depay_debug
+
+using eventcamera::RtpEventFormat;
+using eventcamera::RtpInterval;
+using eventcamera::RtpStatistics;
+using eventcamera::RtpUnpacker;
+using eventcamera::SensorSize;
+
+namespace {
+
+/// Change of the mapping from the sender's times to running time that is not followed.
+constexpr GstClockTimeDiff max_drift = 5 * GST_MSECOND;
+
+/// Maximum sides of XYTP caps.
+constexpr int max_side = 16384;
+
+/// Stream of a sender.
+struct State {
+  State(SensorSize size, RtpEventFormat events_format)
+      : sensor(size), format(events_format), unpacker(size, format) {}
+
+  /// Sequence numbers and counters go on.
+  void change(SensorSize size, RtpEventFormat events_format) {
+    unpacker.change(size, events_format);
+    sensor = size;
+    format = events_format;
+  }
+
+  SensorSize sensor;
+  RtpEventFormat format;
+  RtpUnpacker unpacker;
+  ArrivalSegment segment{max_drift};
+  bool is_discontinuous = false;  ///< before the next buffer
+};
+
+struct Private {
+  // Accessed by the streaming thread only, or while there is none.
+  std::optional<State> state;
+  guint32 segment_seqnum = gst_util_seqnum_next();  ///< of upstream
+  GstPadChainFunction chain = nullptr;              ///< of the base class
+  GstPadChainListFunction chain_list = nullptr;     ///< of the base class
+  guint processed = 0;                              ///< packets that the base class passed on
+
+  Guarded<RtpStatistics> statistics;
+};
+
+}  // namespace
+
+G_DECLARE_FINAL_TYPE(GstRtpEventDepay, gst_rtp_event_depay, GST, RTP_EVENT_DEPAY,
+                     GstRTPBaseDepayload)
+
+struct _GstRtpEventDepay {
+  GstRTPBaseDepayload parent;
+  Private* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstRtpEventDepay, gst_rtp_event_depay, GST_TYPE_RTP_BASE_DEPAYLOAD,
+                        GST_DEBUG_CATEGORY_INIT(rtp_event_depay_debug, "rtpeventdepay", 0,
+                                                "RTP depayloader of events"))
+#define PARENT_DEPAYLOAD_CLASS GST_RTP_BASE_DEPAYLOAD_CLASS(gst_rtp_event_depay_parent_class)
+GST_ELEMENT_REGISTER_DEFINE(rtpeventdepay, "rtpeventdepay", GST_RANK_SECONDARY,
+                            gst_rtp_event_depay_get_type())
+
+/* output */
+
+/// Maps the sender's time `start` to the running time of the packet that brought it, unless the
+/// segment does so already.
+static void update_segment(GstRtpEventDepay* self, GstClockTime start, GstClockTime arrival) {
+  const GstSegment& in = GST_RTP_BASE_DEPAYLOAD(self)->segment;
+  if (in.format != GST_FORMAT_TIME) arrival = GST_CLOCK_TIME_NONE;
+  const guint64 running = gst_segment_to_running_time(&in, in.format, arrival);
+  auto& segment = self->priv->state->segment;
+  if (!segment.continues(start, running))
+    segment.begin(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), self->priv->segment_seqnum, start, running,
+                  gst_segment_to_stream_time(&in, in.format, arrival));
+}
+
+static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
+  const auto start = static_cast<GstClockTime>(interval.start);
+  const auto duration = static_cast<GstClockTime>(interval.duration);
+  update_segment(self, start, interval.arrival);
+  auto& state = *self->priv->state;
+  state.segment.reach(start + duration);
+  state.is_discontinuous |= interval.is_discontinuous;
+  if (interval.events.empty()) {
+    gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), gst_event_new_gap(start, duration));
+    return;
+  }
+  GstBuffer* buffer = gst_buffer_new_memdup(interval.events.data(), interval.events.size_bytes());
+  GST_BUFFER_PTS(buffer) = start;
+  GST_BUFFER_DURATION(buffer) = duration;
+  if (std::exchange(state.is_discontinuous, false))
+    GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+  gst_rtp_base_depayload_push(GST_RTP_BASE_DEPAYLOAD(self), buffer);
+}
+
+static void flush(GstRtpEventDepay* self) {
+  if (auto& state = self->priv->state)
+    state->unpacker.flush([&](const RtpInterval& interval) { push(self, interval); });
+}
+
+/* input */
+
+static std::span<const std::uint8_t> payload_of(GstRTPBuffer* rtp) {
+  return {static_cast<const std::uint8_t*>(gst_rtp_buffer_get_payload(rtp)),
+          gst_rtp_buffer_get_payload_len(rtp)};
+}
+
+static GstBuffer* process(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
+  auto* self = GST_RTP_EVENT_DEPAY(depayload);
+  auto& priv = *self->priv;
+  ++priv.processed;
+  if (!priv.state) return nullptr;
+  auto& state = *priv.state;
+  const eventcamera::RtpPacket packet{
+      .ssrc = gst_rtp_buffer_get_ssrc(rtp),
+      .sequence_number = gst_rtp_buffer_get_seq(rtp),
+      .marker = gst_rtp_buffer_get_marker(rtp) != FALSE,
+      .payload = payload_of(rtp),
+      .arrival = GST_BUFFER_PTS(rtp->buffer),
+  };
+  const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
+  guarded(self, report, [&] {
+    state.unpacker.push(packet, [&](const RtpInterval& interval) { push(self, interval); });
+  });
+  *priv.statistics.lock() = state.unpacker.statistics();
+  return nullptr;
+}
+
+/// True if a packet may be one of rtpeventpay. Others are counted, and must not reach the base
+/// class, which would follow their sequence numbers.
+static bool is_plausible(GstRtpEventDepay* self, GstBuffer* buffer) {
+  auto& priv = *self->priv;
+  if (!priv.state) return true;  // the base class refuses it
+  auto& unpacker = priv.state->unpacker;
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  bool plausible = false;
+  if (gst_rtp_buffer_map(buffer, GST_MAP_READ, &rtp)) {
+    plausible = unpacker.is_plausible(payload_of(&rtp));
+    gst_rtp_buffer_unmap(&rtp);
+  }
+  if (!plausible) {
+    unpacker.count_rejected();
+    *priv.statistics.lock() = unpacker.statistics();
+  }
+  return plausible;
+}
+
+/// Calls `chain`, which gives packets to the base class. It drops those that are late, which are
+/// counted here.
+template <class Chain>
+static GstFlowReturn counting_late(GstRtpEventDepay* self, guint packets, const Chain& chain) {
+  auto& priv = *self->priv;
+  priv.processed = 0;
+  const GstFlowReturn flow = chain();
+  if (flow == GST_FLOW_OK && priv.state && priv.processed < packets) {
+    priv.state->unpacker.count_late(packets - priv.processed);
+    *priv.statistics.lock() = priv.state->unpacker.statistics();
+  }
+  return flow;
+}
+
+static GstFlowReturn chain(GstPad* pad, GstObject* parent, GstBuffer* buffer) {
+  auto* self = GST_RTP_EVENT_DEPAY(parent);
+  if (is_plausible(self, buffer))
+    return counting_late(self, 1, [&] { return self->priv->chain(pad, parent, buffer); });
+  gst_buffer_unref(buffer);
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn chain_list(GstPad* pad, GstObject* parent, GstBufferList* list) {
+  auto* self = GST_RTP_EVENT_DEPAY(parent);
+  list = gst_buffer_list_make_writable(list);
+  gst_buffer_list_foreach(
+      list,
+      [](GstBuffer** buffer, guint, gpointer element) -> gboolean {
+        if (!is_plausible(GST_RTP_EVENT_DEPAY(element), *buffer))
+          gst_clear_buffer(buffer);  // removes it from the list
+        return TRUE;
+      },
+      self);
+  return counting_late(self, gst_buffer_list_length(list),
+                       [&] { return self->priv->chain_list(pad, parent, list); });
+}
+
+static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
+  auto* self = GST_RTP_EVENT_DEPAY(depayload);
+  auto& state = self->priv->state;
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_GAP:  // its times are not the sender's
+      gst_event_unref(event);
+      return TRUE;
+    case GST_EVENT_FLUSH_STOP:
+      if (state) {
+        state->unpacker.reset();
+        state->segment.reset();
+      }
+      break;
+    case GST_EVENT_EOS:
+      flush(self);
+      break;
+    case GST_EVENT_SEGMENT:
+      flush(self);
+      self->priv->segment_seqnum = gst_event_get_seqnum(event);
+      break;
+    default:
+      break;
+  }
+  const gboolean handled = PARENT_DEPAYLOAD_CLASS->handle_event(depayload, event);
+  depayload->need_newsegment = FALSE;  // that of the base class has other times
+  return handled;
+}
+
+/// Lost packets are counted by those that follow. The default would send a GAP event, with times
+/// that are not the sender's.
+static gboolean packet_lost(GstRTPBaseDepayload*, GstEvent*) {
+  return TRUE;
+}
+
+/* negotiation, states */
+
+/// Value of a parameter, an integer or a string from SDP, within 1 ... max_side.
+static std::optional<int> side_of(const GstStructure* caps, const char* name) {
+  int side = 0;
+  if (const auto* text = gst_structure_get_string(caps, name)) {
+    const std::string_view digits = text;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), side);
+    if (error != std::errc() || end != digits.data() + digits.size()) return std::nullopt;
+  } else if (gst_structure_get_int(caps, name, &side) == FALSE) {
+    return std::nullopt;
+  }
+  return side >= 1 && side <= max_side ? std::optional(side) : std::nullopt;
+}
+
+static std::optional<RtpEventFormat> format_of(const GstStructure* caps) {
+  if (!gst_structure_has_field(caps, "format")) return RtpEventFormat::evt3;
+  const auto* name = gst_structure_get_string(caps, "format");
+  for (std::size_t i = 0; i < rtp_event_formats.size(); ++i)
+    if (g_strcmp0(name, rtp_event_formats[i]) == 0) return static_cast<RtpEventFormat>(i);
+  return std::nullopt;
+}
+
+static bool send_caps(GstRtpEventDepay* self, SensorSize sensor) {
+  const OwnedCaps caps = event_caps(sensor.width, sensor.height);
+  return gst_pad_set_caps(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), caps.get()) != FALSE;
+}
+
+static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
+  auto* self = GST_RTP_EVENT_DEPAY(depayload);
+  auto& state = self->priv->state;
+  depayload->clock_rate = rtp_clock_rate;
+  const auto* structure = gst_caps_get_structure(caps, 0);
+  const auto width = side_of(structure, "width");
+  const auto height = side_of(structure, "height");
+  const auto format = format_of(structure);
+  if (!width || !height || !format) {
+    gchar* cause = gst_caps_to_string(caps);
+    post_message(self, GST_MESSAGE_ERROR,
+                 {GST_STREAM_ERROR_FORMAT,
+                  "Cannot receive events without the size of the sensor, or in another format than "
+                  "EVT3 and XYTP; set width, height and format in the RTP caps, for example of "
+                  "udpsrc, as the sender has them."},
+                 cause);
+    g_free(cause);
+    return FALSE;
+  }
+  const SensorSize sensor{*width, *height};
+  if (state && state->sensor == sensor && state->format == *format) return TRUE;
+  flush(self);
+  const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
+  const auto follow = [&] {
+    if (state)
+      state->change(sensor, *format);
+    else
+      state.emplace(sensor, *format);
+  };
+  if (!guarded(self, report, follow)) return FALSE;
+  return send_caps(self, sensor);
+}
+
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS(gst_rtp_event_depay_parent_class)->change_state(element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    auto& priv = *GST_RTP_EVENT_DEPAY(element)->priv;
+    priv.state.reset();
+    *priv.statistics.lock() = {};
+  }
+  return result;
+}
+
+/* type */
+
+static void get_property(GObject* object, guint, GValue* value, GParamSpec*) {
+  GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_DEPAYLOAD);
+  const auto counted = *GST_RTP_EVENT_DEPAY(object)->priv->statistics.lock();
+  gst_structure_set(
+      stats, "packets", G_TYPE_UINT64, guint64{counted.packets}, "bytes", G_TYPE_UINT64,
+      guint64{counted.bytes}, "events", G_TYPE_UINT64, guint64{counted.events}, "lost-packets",
+      G_TYPE_UINT64, guint64{counted.lost_packets}, "lost-events", G_TYPE_UINT64,
+      guint64{counted.lost_events}, "late-packets", G_TYPE_UINT64, guint64{counted.late_packets},
+      "rejected-packets", G_TYPE_UINT64, guint64{counted.rejected_packets}, nullptr);
+  g_value_take_boxed(value, stats);
+}
+
+static void finalize(GObject* object) {
+  delete GST_RTP_EVENT_DEPAY(object)->priv;
+  G_OBJECT_CLASS(gst_rtp_event_depay_parent_class)->finalize(object);
+}
+
+static void gst_rtp_event_depay_init(GstRtpEventDepay* self) {
+  self->priv = new Private;
+  GstPad* sink = GST_RTP_BASE_DEPAYLOAD_SINKPAD(self);
+  self->priv->chain = GST_PAD_CHAINFUNC(sink);
+  self->priv->chain_list = GST_PAD_CHAINLISTFUNC(sink);
+  gst_pad_set_chain_function(sink, chain);
+  gst_pad_set_chain_list_function(sink, chain_list);
+}
+
+static void gst_rtp_event_depay_class_init(GstRtpEventDepayClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+  object_class->get_property = get_property;
+  constexpr guint number = 1;
+  g_object_class_install_property(
+      object_class, number,
+      g_param_spec_boxed("stats", "Statistics", "Counters of packets and events received and lost",
+                         GST_TYPE_STRUCTURE,
+                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  add_pad_templates(element_class, RTP_EVENT_CAPS, EVENT_CAPS);
+  gst_element_class_set_static_metadata(element_class, "RTP event depayloader",
+                                        "Codec/Depayloader/Network/RTP",
+                                        "Gets events out of RTP packets", EVENTSIM_AUTHORS);
+  element_class->change_state = change_state;
+
+  GstRTPBaseDepayloadClass* depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS(klass);
+  depayload_class->set_caps = set_caps;
+  depayload_class->process_rtp_packet = process;
+  depayload_class->handle_event = handle_event;
+  depayload_class->packet_lost = packet_lost;
+}

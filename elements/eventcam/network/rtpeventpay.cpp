@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-rtpeventpay
+ * @title: rtpeventpay
+ * @short_description: sends events in RTP packets
+ *
+ * Packs events in RTP packets of at most #GstRTPBasePayload:mtu bytes, in the payload format of
+ * docs/rtp-payload-format.md. Each packet can be decoded by itself. A buffer of events is sent at
+ * once; short ones are joined for at most #GstRtpEventPay:max-latency to fill packets. A GAP event
+ * becomes a packet without events, so that receivers know of the silence.
+ *
+ * Events outside the sensor or their buffer's interval, or earlier than the event before, are left
+ * out with a warning.
+ *
+ * #GstRtpEventPay:stats has these fields besides those of #GstRTPBasePayload:
+ *
+ * - `packets`, `bytes` (#guint64): packets sent, and the size of their payloads;
+ * - `events` (#guint64): events sent; those received plus those that receivers count as lost;
+ * - `left-out-events` (#guint64): events not sent, for one of these reasons, because their buffer
+ *   has no PTS, one of more than 292 years or a partial event, or because of a flush.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 v4l2src ! eventsim-diff ! rtpeventpay ! udpsink host=receiver port=5000
+ * ]|
+ */
+#include <gst/rtp/gstrtpbasepayload.h>
+#include <gst/rtp/gstrtpbuffer.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include "elements/eventcam/network/rtp_events.hpp"
+#include "elements/eventcam/network/rtp_header_extensions.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/flush_timer.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/latency.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "gst/recording/sensor_events.hpp"
+#include "src/wire/pending_interval.hpp"
+#include "src/wire/rtp_packer.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(rtp_event_pay_debug);
+#define GST_CAT_DEFAULT rtp_event_pay_debug
+
+using eventcamera::Event;
+using eventcamera::Nanoseconds;
+using eventcamera::PendingInterval;
+using eventcamera::RtpEventFormat;
+using eventcamera::RtpPacker;
+using eventcamera::SensorSize;
+
+namespace {
+
+/// User-settable values.
+struct Settings {
+  RtpEventFormat format = RtpEventFormat::evt3;
+  GstClockTime max_latency = 5 * GST_MSECOND;
+};
+
+/// Stream of one sensor.
+struct State {
+  State(SensorSize size, RtpEventFormat events_format, std::uint32_t first_event)
+      : sensor(size), format(events_format), packer(size, format, first_event), pending(size) {}
+
+  SensorSize sensor;
+  RtpEventFormat format;
+  RtpPacker packer;
+  PendingInterval pending;
+};
+
+struct Sent {
+  std::uint64_t packets = 0;
+  std::uint64_t bytes = 0;
+  std::uint64_t events = 0;
+  std::uint64_t left_out = 0;
+};
+
+struct Private {
+  GuardedSettings<Settings> settings;
+  Guarded<Sent> sent;
+
+  // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
+  std::optional<State> state;
+  EventFaults faults{"send"};
+  GstFlowReturn flow = GST_FLOW_OK;  ///< result of the last packets
+  RtpHeaderExtensions extensions;
+
+  FlushTimer timer;
+};
+
+}  // namespace
+
+G_DECLARE_FINAL_TYPE(GstRtpEventPay, gst_rtp_event_pay, GST, RTP_EVENT_PAY, GstRTPBasePayload)
+
+struct _GstRtpEventPay {
+  GstRTPBasePayload parent;
+  Private* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstRtpEventPay, gst_rtp_event_pay, GST_TYPE_RTP_BASE_PAYLOAD,
+                        GST_DEBUG_CATEGORY_INIT(rtp_event_pay_debug, "rtpeventpay", 0,
+                                                "RTP payloader of events"))
+#define PARENT_PAYLOAD_CLASS GST_RTP_BASE_PAYLOAD_CLASS(gst_rtp_event_pay_parent_class)
+GST_ELEMENT_REGISTER_DEFINE(rtpeventpay, "rtpeventpay", GST_RANK_SECONDARY,
+                            gst_rtp_event_pay_get_type())
+
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return GST_RTP_EVENT_PAY(object)->priv->settings;
+}
+
+/* packets */
+
+/// Maximum size of the RTP header, with the CSRCs and header extensions that the base class writes.
+static gsize max_header_size(GstRtpEventPay* self) {
+  auto* payload = GST_RTP_BASE_PAYLOAD(self);
+  const OwnedBuffer packet(gst_rtp_base_payload_allocate_output_buffer(payload, 0, 0, 0));
+  const OwnedCaps caps(gst_pad_get_current_caps(GST_RTP_BASE_PAYLOAD_SRCPAD(self)));
+  return gst_buffer_get_size(packet.get()) +
+         (caps ? self->priv->extensions.max_size(caps, packet.get()) : 0);
+}
+
+/// Maximum size of a payload.
+static gsize max_payload_size(GstRtpEventPay* self) {
+  const gsize header = max_header_size(self);
+  return std::max<gsize>(GST_RTP_BASE_PAYLOAD_MTU(self), header) - header;
+}
+
+static GstBuffer* make_packet(GstRtpEventPay* self, std::span<const std::uint8_t> payload,
+                              bool is_last, GstClockTime pts) {
+  GstBuffer* packet = gst_rtp_base_payload_allocate_output_buffer(
+      GST_RTP_BASE_PAYLOAD(self), static_cast<guint>(payload.size()), 0, 0);
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  gst_rtp_buffer_map(packet, GST_MAP_WRITE, &rtp);
+  std::ranges::copy(payload, static_cast<std::uint8_t*>(gst_rtp_buffer_get_payload(&rtp)));
+  gst_rtp_buffer_set_marker(&rtp, is_last ? TRUE : FALSE);
+  gst_rtp_buffer_unmap(&rtp);
+  GST_BUFFER_PTS(packet) = pts;
+  return packet;
+}
+
+/// Sends the pending interval. May throw.
+static void send(GstRtpEventPay* self) {
+  auto& priv = *self->priv;
+  if (!priv.state || priv.state->pending.empty()) return;
+  auto& pending = priv.state->pending;
+  Sent sent;
+  GstBufferList* list = gst_buffer_list_new();
+  try {
+    priv.state->packer.pack(
+        pending.start(), pending.end() - pending.start(), pending.events(), max_payload_size(self),
+        [&](std::span<const std::uint8_t> payload, bool is_last) {
+          gst_buffer_list_add(list, make_packet(self, payload, is_last,
+                                                static_cast<GstClockTime>(pending.start())));
+          ++sent.packets;
+          sent.bytes += payload.size();
+        });
+  } catch (...) {
+    gst_buffer_list_unref(list);
+    throw;
+  }
+  sent.events = pending.events().size();
+  pending.clear();
+  priv.timer.cancel();
+  {
+    const auto total = priv.sent.lock();
+    total->packets += sent.packets;
+    total->bytes += sent.bytes;
+    total->events += sent.events;
+  }
+  const GstFlowReturn flow = gst_rtp_base_payload_push_list(GST_RTP_BASE_PAYLOAD(self), list);
+  if (priv.flow == GST_FLOW_OK) priv.flow = flow;
+}
+
+/// Runs `work`, which may throw, and returns the result of the packets that it sent.
+template <class Work>
+static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
+  auto& priv = *self->priv;
+  priv.flow = GST_FLOW_OK;
+  const auto failure = [&](const std::exception& error) -> Report {
+    if (is_a<std::invalid_argument>(error))
+      return {GST_STREAM_ERROR_FORMAT,
+              "An RTP packet of " + std::to_string(GST_RTP_BASE_PAYLOAD_MTU(self)) +
+                  " bytes has no space for events; set mtu to at least " +
+                  std::to_string(RtpPacker::min_size + max_header_size(self)) + "."};
+    return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to send the events."};
+  };
+  if (!guarded(self, failure, work)) return GST_FLOW_ERROR;
+  return priv.flow;
+}
+
+/// Sends events that have waited long enough.
+static void send_late(GstObject* element) {
+  auto* self = GST_RTP_EVENT_PAY(element);
+  reported(self, [&] { send(self); });
+}
+
+/// True if the pending events fill a packet, or cannot wait for another interval as long as the
+/// last one.
+static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
+  const auto& [sensor, format, packer, pending] = *self->priv->state;
+  const std::size_t event_size = format == RtpEventFormat::evt3 ? 4 : sizeof(Event);
+  const auto waiting = static_cast<GstClockTime>(pending.end() - pending.start() + last_duration);
+  return pending.events().size() * event_size >= max_payload_size(self) ||
+         waiting >= self->priv->settings.copy().max_latency;
+}
+
+/// Takes an interval, and sends what is due; returns what cannot be sent. May throw.
+static PendingInterval::LeftOut take(GstRtpEventPay* self, EventInterval interval,
+                                     std::span<const Event> events) {
+  auto& priv = *self->priv;
+  auto& pending = priv.state->pending;
+  const auto start = static_cast<Nanoseconds>(interval.start);
+  const auto end = static_cast<Nanoseconds>(interval.end);
+  if (!pending.empty() && pending.end() != start) send(self);
+  const bool is_first = pending.empty();
+  const auto left_out = pending.add(start, end, events, [&] { send(self); });
+  if (is_due(self, end - start)) {
+    send(self);
+  } else if (is_first) {
+    priv.timer.set(priv.settings.copy().max_latency, GST_RTP_BASE_PAYLOAD_SINKPAD(self), send_late);
+  }
+  return left_out;
+}
+
+/* streaming */
+
+/// Leaves out a buffer.
+static GstFlowReturn leave_out(GstRtpEventPay* self, EventFault fault, GstBuffer* buffer) {
+  self->priv->faults.warn(self, fault, buffer);
+  self->priv->sent.lock()->left_out += gst_buffer_get_size(buffer) / sizeof(Event);
+  return GST_FLOW_OK;
+}
+
+static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken) {
+  auto* self = GST_RTP_EVENT_PAY(payload);
+  auto& priv = *self->priv;
+  const OwnedBuffer buffer(taken);
+  if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  if (!GST_BUFFER_PTS_IS_VALID(taken)) return leave_out(self, EventFault::no_pts, taken);
+  const auto interval = interval_of(taken);
+  if (!interval || interval->start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
+    return leave_out(self, EventFault::pts_too_large, taken);
+  const MappedEvents mapped(taken);
+  if (!mapped) return leave_out(self, EventFault::partial_event, taken);
+  return reported(self, [&] {
+    const auto [outside, unsorted] = take(self, *interval, mapped.events());
+    priv.sent.lock()->left_out += outside + unsorted;
+    if (outside > 0) priv.faults.warn(self, EventFault::beyond_sensor, taken);
+    if (unsorted > 0) priv.faults.warn(self, EventFault::unsorted, taken);
+  });
+}
+
+/// Sends a GAP event as an interval without events; at once if its duration is unknown.
+static void take_gap(GstRtpEventPay* self, GstEvent* event) {
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(event, &start, &duration);
+  if (!self->priv->state || start > static_cast<GstClockTime>(eventcamera::max_rtp_start)) return;
+  const bool is_known = GST_CLOCK_TIME_IS_VALID(duration);
+  const GstClockTime end =
+      is_known ? start + std::min(duration, GstClockTime{eventcamera::max_interval}) : start;
+  reported(self, [&] {
+    take(self, {start, end}, {});
+    if (!is_known) send(self);
+  });
+}
+
+static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
+  auto* self = GST_RTP_EVENT_PAY(payload);
+  auto& priv = *self->priv;
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_GAP:
+      take_gap(self, event);
+      gst_event_unref(event);
+      return TRUE;
+    case GST_EVENT_FLUSH_STOP:
+      if (priv.state) {
+        priv.sent.lock()->left_out += priv.state->pending.events().size();
+        priv.state->pending.clear();
+      }
+      break;
+    default:
+      // Those of sensors precede each buffer, and may precede the ones that it is joined to.
+      if ((gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) &&
+          !is_sensor_event(event))
+        reported(self, [&] { send(self); });
+      break;
+  }
+  return PARENT_PAYLOAD_CLASS->sink_event(payload, event);
+}
+
+/// Adds the time for which events wait here.
+static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(GST_RTP_BASE_PAYLOAD_SINKPAD(parent), query,
+                          GST_RTP_EVENT_PAY(parent)->priv->settings.copy().max_latency);
+  return gst_pad_query_default(pad, parent, query);
+}
+
+/* negotiation, states */
+
+static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
+  auto* self = GST_RTP_EVENT_PAY(payload);
+  auto& priv = *self->priv;
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
+  const SensorSize sensor{info.width, info.height};
+  const auto format = priv.settings.copy().format;
+  const std::string width = std::to_string(info.width);
+  const std::string height = std::to_string(info.height);
+  if (!priv.state || priv.state->sensor != sensor) {
+    const auto first_event = priv.state ? priv.state->packer.next_event() : 0;
+    const Report too_large{GST_STREAM_ERROR_FORMAT,
+                           "EVT3 words support sensors of 1x1 to 2048x2048 pixels, not " + width +
+                               "x" + height + "; set format=XYTP."};
+    if (!guarded(self, too_large, [&] { priv.state.emplace(sensor, format, first_event); }))
+      return FALSE;
+  }
+  gst_rtp_base_payload_set_options(payload, "application", TRUE, "X-EVENT-CAMERA", rtp_clock_rate);
+  return gst_rtp_base_payload_set_outcaps(
+      payload, "width", G_TYPE_STRING, width.c_str(), "height", G_TYPE_STRING, height.c_str(),
+      "format", G_TYPE_STRING, rtp_event_formats[static_cast<std::size_t>(priv.state->format)],
+      nullptr);
+}
+
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS(gst_rtp_event_pay_parent_class)->change_state(element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    auto& priv = *GST_RTP_EVENT_PAY(element)->priv;
+    priv.timer.stop();
+    priv.state.reset();
+    priv.faults.reset();
+    *priv.sent.lock() = {};
+  }
+  return result;
+}
+
+/* type */
+
+static void get_stats(GObject* object, GValue* value) {
+  GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_PAYLOAD);
+  const auto sent = *GST_RTP_EVENT_PAY(object)->priv->sent.lock();
+  gst_structure_set(stats, "packets", G_TYPE_UINT64, guint64{sent.packets}, "bytes", G_TYPE_UINT64,
+                    guint64{sent.bytes}, "events", G_TYPE_UINT64, guint64{sent.events},
+                    "left-out-events", G_TYPE_UINT64, guint64{sent.left_out}, nullptr);
+  g_value_take_boxed(value, stats);
+}
+
+static void finalize(GObject* object) {
+  delete GST_RTP_EVENT_PAY(object)->priv;
+  G_OBJECT_CLASS(gst_rtp_event_pay_parent_class)->finalize(object);
+}
+
+static void gst_rtp_event_pay_init(GstRtpEventPay* self) {
+  self->priv = new Private;
+  gst_pad_set_query_function(GST_RTP_BASE_PAYLOAD_SRCPAD(self), src_query);
+  announce_latency(self, "max-latency");
+}
+
+static GType format_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(RtpEventFormat::evt3), "16-bit words, the most compact", "EVT3"},
+      {static_cast<int>(RtpEventFormat::xytp), "8 bytes per event, for sensors of any size",
+       "XYTP"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstRtpEventFormat", values);
+}
+
+static void gst_rtp_event_pay_class_init(GstRtpEventPayClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
+  Properties<settings_of> properties(object_class);
+  properties.add(&Settings::format,
+                 g_param_spec_enum("format", "Format",
+                                   "Format of the events in packets; read when the stream begins",
+                                   format_type(), static_cast<int>(Settings().format),
+                                   static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_READY)));
+  properties.add(&Settings::max_latency,
+                 g_param_spec_uint64(
+                     "max-latency", "Maximum latency",
+                     "Maximum time for which an event waits for others to fill its packet (ns; "
+                     "0 = send each buffer at once)",
+                     0, GST_SECOND, Settings().max_latency,
+                     static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_PLAYING)));
+  properties.add_read_only(
+      get_stats,
+      g_param_spec_boxed("stats", "Statistics", "Counters of packets and events sent",
+                         GST_TYPE_STRUCTURE,
+                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  add_pad_templates(element_class, EVENT_CAPS, RTP_EVENT_CAPS ", payload = (int) [ 96, 127 ]");
+  gst_element_class_set_static_metadata(element_class, "RTP event payloader",
+                                        "Codec/Payloader/Network/RTP",
+                                        "Packs events in RTP packets", EVENTSIM_AUTHORS);
+  element_class->change_state = change_state;
+
+  GstRTPBasePayloadClass* payload_class = GST_RTP_BASE_PAYLOAD_CLASS(klass);
+  payload_class->set_caps = set_caps;
+  payload_class->handle_buffer = handle_buffer;
+  payload_class->sink_event = sink_event;
+}

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/aggregator/eventaggregator.hpp"
+
+#include <new>
+#include <string>
+
+#include "gst/base/errors.hpp"
+#include "gst/base/seek_request.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
+#define GST_CAT_DEFAULT event_aggregator_debug
+
+struct GstEventAggregatorPrivate {
+  EventAggregator* inside;
+};
+
+G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventAggregator, gst_event_aggregator, GST_TYPE_AGGREGATOR,
+                                 G_ADD_PRIVATE(GstEventAggregator)
+                                     GST_DEBUG_CATEGORY_INIT(event_aggregator_debug,
+                                                             "eventaggregator", 0,
+                                                             "aggregators of event streams"))
+#define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_event_aggregator_parent_class)
+
+EventAggregator::EventAggregator(GstAggregator* element, const Role& role)
+    : element_(element), role_(role), main_pad_(pad(role.main_pad)), faults_(role.verb) {}
+
+GstAggregatorPad* EventAggregator::pad(const char* name) const {
+  GstPad* pad = gst_element_get_static_pad(GST_ELEMENT(element_), name);
+  gst_object_unref(pad);  // the element keeps it alive
+  return GST_AGGREGATOR_PAD(pad);
+}
+
+GstSegment segment_of(GstAggregatorPad* pad) {
+  GST_OBJECT_LOCK(pad);
+  GstSegment segment = pad->segment;
+  GST_OBJECT_UNLOCK(pad);
+  if (segment.format != GST_FORMAT_TIME) gst_segment_init(&segment, GST_FORMAT_TIME);
+  return segment;
+}
+
+std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time) {
+  const GstSegment segment = segment_of(pad);
+  const guint64 running = gst_segment_to_running_time(&segment, GST_FORMAT_TIME, time);
+  if (!GST_CLOCK_TIME_IS_VALID(running)) return std::nullopt;
+  return running;
+}
+
+/// True if upstream of a pad would accept a seek. GstAggregator flushes before it forwards a seek,
+/// and never resumes if that fails.
+static bool would_seek(GstAggregatorPad* pad, const SeekRequest& request) {
+  if (!request.plays_on_from_time()) return false;
+  GstQuery* query = gst_query_new_seeking(GST_FORMAT_TIME);
+  gboolean seekable = FALSE;
+  if (gst_pad_peer_query(GST_PAD(pad), query))
+    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
+  gst_query_unref(query);
+  GstSegment segment = segment_of(pad);
+  return seekable && request.apply(segment);
+}
+
+/// Answers a caps query on a pad whose buffers are passed through: the caps that downstream
+/// accepts.
+static void answer_caps_of_passed(GstAggregator* aggregator, GstAggregatorPad* pad,
+                                  GstQuery* query) {
+  GstCaps* filter = nullptr;
+  gst_query_parse_caps(query, &filter);
+  const OwnedCaps ours(gst_pad_get_pad_template_caps(GST_PAD(pad)));
+  const OwnedCaps taken(gst_pad_peer_query_caps(GST_AGGREGATOR_SRC_PAD(aggregator), filter));
+  const OwnedCaps result(
+      gst_caps_intersect_full(taken.get(), ours.get(), GST_CAPS_INTERSECT_FIRST));
+  gst_query_set_caps_result(query, result.get());
+}
+
+/// Virtual functions of GstAggregator.
+struct EventAggregatorFunctions {
+  static EventAggregator& of(GstAggregator* element) {
+    return gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(element));
+  }
+
+  template <class Work>
+  static auto guard(EventAggregator& self, const Work& work) {
+    const auto report = [&self](const std::exception& error) -> Report {
+      self.release_memory();
+      const std::string verb = self.role_.verb;
+      if (is_a<std::bad_alloc>(error))
+        return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                "Not enough memory to " + verb +
+                    " these events; free memory, or lower the resolution."};
+      return {GST_STREAM_ERROR_FAILED, "Cannot " + verb + " these events."};
+    };
+    return guarded(self.element_, report, work);
+  }
+
+  static GstFlowReturn aggregate(GstAggregator* element, gboolean timed_out) {
+    auto& self = of(element);
+    return guard(self, [&] { return self.aggregate(timed_out != FALSE); });
+  }
+
+  static GstClockTime get_next_time(GstAggregator* element) { return of(element).next_time(); }
+
+  static GstFlowReturn update_src_caps(GstAggregator* element, GstCaps*, GstCaps** result) {
+    const auto& caps = of(element).main_caps_;
+    if (!caps) return GST_AGGREGATOR_FLOW_NEED_DATA;
+    *result = gst_caps_ref(caps.get());
+    return GST_FLOW_OK;
+  }
+
+  static bool take_caps(EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
+    GstCaps* caps = nullptr;
+    gst_event_parse_caps(event, &caps);
+    if (!self.take_caps(pad, caps)) {
+      GST_ERROR_OBJECT(self.element_, "cannot %s %" GST_PTR_FORMAT, self.role_.verb, caps);
+      return false;
+    }
+    if (pad == self.main_pad_ && self.role_.passes_main_pad) {
+      self.main_caps_.reset(gst_caps_ref(caps));
+      gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(self.element_));
+    }
+    return true;
+  }
+
+  static bool take_segment(EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
+    const GstSegment* segment = nullptr;
+    gst_event_parse_segment(event, &segment);
+    if (segment->format != GST_FORMAT_TIME) {
+      GST_ELEMENT_ERROR(self.element_, STREAM, FORMAT,
+                        ("Cannot %s %s: this stream has no timestamps. Insert a reader of event "
+                         "files upstream, such as decodebin " ASK_FOR_EVENTS ".",
+                         self.role_.verb, gst_format_get_name(segment->format)),
+                        ("segment %" GST_SEGMENT_FORMAT, segment));
+      return false;
+    }
+    if (segment->rate < 0) {
+      GST_ELEMENT_ERROR(self.element_, STREAM, FAILED,
+                        ("Cannot %s events backwards; play at a positive rate.", self.role_.verb),
+                        ("segment %" GST_SEGMENT_FORMAT, segment));
+      return false;
+    }
+    if (pad == self.main_pad_) {
+      self.take_segment(*segment);
+      gst_aggregator_update_segment(self.element_, segment);
+    }
+    return true;
+  }
+
+  static gboolean sink_event(GstAggregator* element, GstAggregatorPad* pad, GstEvent* event) {
+    auto& self = of(element);
+    if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
+      const bool taken = guard(self, [&] { return take_caps(self, pad, event); });
+      gst_event_unref(event);
+      return taken ? TRUE : FALSE;
+    }
+    if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT &&
+        !guard(self, [&] { return take_segment(self, pad, event); })) {
+      gst_event_unref(event);
+      return FALSE;
+    }
+    return PARENT_AGGREGATOR_CLASS->sink_event(element, pad, event);
+  }
+
+  static gboolean src_event(GstAggregator* element, GstEvent* event) {
+    if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
+      const SeekRequest request(event);
+      for (const GList* pads = GST_ELEMENT(element)->sinkpads; pads != nullptr; pads = pads->next) {
+        if (would_seek(GST_AGGREGATOR_PAD(pads->data), request)) continue;
+        GST_WARNING_OBJECT(element, "refused %" GST_PTR_FORMAT, event);
+        gst_event_unref(event);
+        return FALSE;
+      }
+    }
+    return PARENT_AGGREGATOR_CLASS->src_event(element, event);
+  }
+
+  static gboolean src_query(GstAggregator* element, GstQuery* query) {
+    if (GST_QUERY_TYPE(query) ==
+        GST_QUERY_SEEKING)  // GstAggregator always answers that seeking is impossible
+      return gst_pad_peer_query(GST_PAD(of(element).main_pad_), query);
+    return PARENT_AGGREGATOR_CLASS->src_query(element, query);
+  }
+
+  static gboolean sink_query(GstAggregator* element, GstAggregatorPad* pad, GstQuery* query) {
+    const auto& self = of(element);
+    if (GST_QUERY_TYPE(query) != GST_QUERY_CAPS || pad != self.main_pad_ ||
+        !self.role_.passes_main_pad)
+      return PARENT_AGGREGATOR_CLASS->sink_query(element, pad, query);
+    answer_caps_of_passed(element, pad, query);
+    return TRUE;
+  }
+
+  static GstFlowReturn flush(GstAggregator* element) {
+    auto& self = of(element);
+    return guard(self, [&] {
+      self.flush();
+      return GST_FLOW_OK;
+    });
+  }
+
+  static gboolean start(GstAggregator* element) { return of(element).start() ? TRUE : FALSE; }
+
+  static gboolean stop(GstAggregator* element) {
+    auto& self = of(element);
+    self.stop();
+    self.main_caps_.reset();
+    self.faults_.reset();
+    return TRUE;
+  }
+};
+
+static GstEventAggregatorPrivate& private_of(GstEventAggregator* self) {
+  return *static_cast<GstEventAggregatorPrivate*>(gst_event_aggregator_get_instance_private(self));
+}
+
+void gst_event_aggregator_set_inside(GstEventAggregator* self,
+                                     std::unique_ptr<EventAggregator> inside) {
+  private_of(self).inside = inside.release();
+}
+
+EventAggregator& gst_event_aggregator_inside(GstEventAggregator* self) {
+  return *private_of(self).inside;
+}
+
+void gst_event_aggregator_add_pads(GstEventAggregator* self) {
+  for (const GList* templates =
+           gst_element_class_get_pad_template_list(GST_ELEMENT_GET_CLASS(self));
+       templates != nullptr; templates = templates->next) {
+    auto* pad_template = GST_PAD_TEMPLATE(templates->data);
+    if (GST_PAD_TEMPLATE_DIRECTION(pad_template) == GST_PAD_SINK)
+      gst_element_add_pad(
+          GST_ELEMENT(self),
+          GST_PAD(g_object_new(GST_TYPE_AGGREGATOR_PAD, "name",
+                               GST_PAD_TEMPLATE_NAME_TEMPLATE(pad_template), "direction",
+                               GST_PAD_SINK, "template", pad_template, nullptr)));
+  }
+}
+
+void gst_event_aggregator_class_add_templates(GstEventAggregatorClass* klass,
+                                              std::initializer_list<GstStaticPadTemplate*> list) {
+  for (auto* pad_template : list)
+    gst_element_class_add_static_pad_template_with_gtype(GST_ELEMENT_CLASS(klass), pad_template,
+                                                         GST_TYPE_AGGREGATOR_PAD);
+}
+
+/// Iterates over linked sink pads only. A latency query is sent to the internal links of the source
+/// pad and fails if one of them fails; GstAggregator would then treat a live source as not live.
+static GstIterator* iterate_linked_pads(GstPad*, GstObject* element) {
+  const auto compare = [](gconstpointer item, gconstpointer) {
+    return gst_pad_is_linked(GST_PAD(g_value_get_object(static_cast<const GValue*>(item)))) ? 0 : 1;
+  };
+  return gst_iterator_filter(gst_element_iterate_sink_pads(GST_ELEMENT(element)), compare, nullptr);
+}
+
+static void finalize(GObject* object) {
+  delete &gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(object));
+  G_OBJECT_CLASS(gst_event_aggregator_parent_class)->finalize(object);
+}
+
+static void gst_event_aggregator_init(GstEventAggregator* self) {
+  gst_pad_set_iterate_internal_links_function(GST_AGGREGATOR_SRC_PAD(self), iterate_linked_pads);
+}
+
+static void gst_event_aggregator_class_init(GstEventAggregatorClass* klass) {
+  G_OBJECT_CLASS(klass)->finalize = finalize;
+
+  using Functions = EventAggregatorFunctions;
+  GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
+  aggregator_class->aggregate = Functions::aggregate;
+  aggregator_class->get_next_time = Functions::get_next_time;
+  aggregator_class->update_src_caps = Functions::update_src_caps;
+  aggregator_class->sink_event = Functions::sink_event;
+  aggregator_class->src_event = Functions::src_event;
+  aggregator_class->src_query = Functions::src_query;
+  aggregator_class->sink_query = Functions::sink_query;
+  aggregator_class->flush = Functions::flush;
+  aggregator_class->start = Functions::start;
+  aggregator_class->stop = Functions::stop;
+}

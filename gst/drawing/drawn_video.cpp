@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/drawing/drawn_video.hpp"
+
+#include <gst/video/gstvideopool.h>
+
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+
+using eventcamera::PaletteName;
+
+eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info) {
+  if (GST_VIDEO_INFO_FORMAT(&info) == GST_VIDEO_FORMAT_GRAY8) return {};
+  const auto place = [&info](int component) {
+    return static_cast<int>(GST_VIDEO_INFO_COMP_POFFSET(&info, component));
+  };
+  return {.bytes = GST_VIDEO_INFO_COMP_PSTRIDE(&info, GST_VIDEO_COMP_R),
+          .red = place(GST_VIDEO_COMP_R),
+          .green = place(GST_VIDEO_COMP_G),
+          .blue = place(GST_VIDEO_COMP_B)};
+}
+
+PaletteName palette_name_of(GstEventCameraPalette palette) {
+  static_assert(static_cast<int>(PaletteName::light) == GST_EVENT_CAMERA_PALETTE_LIGHT);
+  static_assert(static_cast<int>(PaletteName::dark) == GST_EVENT_CAMERA_PALETTE_DARK);
+  static_assert(static_cast<int>(PaletteName::grey) == GST_EVENT_CAMERA_PALETTE_GREY);
+  static_assert(static_cast<int>(PaletteName::red_blue) == GST_EVENT_CAMERA_PALETTE_RED_BLUE);
+  static_assert(static_cast<int>(PaletteName::viridis) == GST_EVENT_CAMERA_PALETTE_VIRIDIS);
+  static_assert(static_cast<int>(PaletteName::magma) == GST_EVENT_CAMERA_PALETTE_MAGMA);
+  return static_cast<PaletteName>(palette);
+}
+
+/// True if a meta with the tags of `api` depends neither on the colours of the pixels nor on their
+/// memory layout.
+static bool stays_true(GType api) {
+  constexpr std::string_view kept[] = {GST_META_TAG_VIDEO_STR, GST_META_TAG_VIDEO_SIZE_STR,
+                                       GST_META_TAG_VIDEO_ORIENTATION_STR};
+  for (auto tags = gst_meta_api_type_get_tags(api); tags != nullptr && *tags != nullptr; ++tags)
+    if (std::ranges::find(kept, std::string_view(*tags)) == std::end(kept)) return false;
+  return true;
+}
+
+void keep_metas(GstBuffer* frame, GstBuffer* picture) {
+  const auto keep = [](GstBuffer* from, GstMeta** meta, gpointer to) -> gboolean {
+    const GstMetaInfo* info = (*meta)->info;
+    GstMetaTransformCopy whole = {.region = FALSE, .offset = 0, .size = static_cast<gsize>(-1)};
+    if (info->transform_func != nullptr && stays_true(info->api))
+      info->transform_func(static_cast<GstBuffer*>(to), *meta, from, _gst_meta_transform_copy,
+                           &whole);
+    return TRUE;
+  };
+  gst_buffer_foreach_meta(frame, keep, picture);
+}
+
+bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps) {
+  GstVideoInfo drawn;
+  if (!gst_video_info_from_caps(&drawn, caps)) return false;
+  GstBufferPool* pool = nullptr;
+  guint size = 0;
+  guint min = 0;
+  guint max = 0;
+  const bool offered = gst_query_get_n_allocation_pools(query) > 0;
+  if (offered) gst_query_parse_nth_allocation_pool(query, 0, &pool, &size, &min, &max);
+  if (pool == nullptr) pool = gst_video_buffer_pool_new();
+  size = MAX(size, static_cast<guint>(GST_VIDEO_INFO_SIZE(&drawn)));
+
+  GstStructure* config = gst_buffer_pool_get_config(pool);
+  gst_buffer_pool_config_set_params(config, caps, size, min, max);
+  if (gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr))
+    gst_buffer_pool_config_add_option(config, GST_BUFFER_POOL_OPTION_VIDEO_META);
+  gst_buffer_pool_set_config(pool, config);
+  if (offered)
+    gst_query_set_nth_allocation_pool(query, 0, pool, size, min, max);
+  else
+    gst_query_add_allocation_pool(query, pool, size, min, max);
+  gst_object_unref(pool);
+  return true;
+}

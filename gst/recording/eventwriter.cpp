@@ -1,0 +1,497 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/recording/eventwriter.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "gst/base/types.hpp"
+#include "gst/recording/sensor_events.hpp"
+#include "gst/recording/stream_header.hpp"
+#include "gst/recording/writable_events.hpp"
+#include "src/formats/waiting_items.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_writer_debug);
+#define GST_CAT_DEFAULT event_writer_debug
+
+using eventcamera::AbsoluteEvent;
+using eventcamera::Encoder;
+using eventcamera::Microseconds;
+using eventcamera::Trigger;
+using eventcamera::WaitingItems;
+
+namespace {
+
+enum Property : guint { prop_variant = 1, prop_max_size, prop_stats };
+
+/// Alignment of words, which never straddle multiples of it, bytes.
+constexpr std::size_t word_bytes = 8;
+
+/// Maximum bytes per event, including time words.
+constexpr std::size_t max_event_bytes = 32;
+
+/// State of the file being written, from caps to stop.
+struct State {
+  GstEventCameraInfo info;
+  OwnedCaps caps;      ///< output caps
+  OwnedBuffer header;  ///< pending header; null once pushed, or if the format has none
+  std::unique_ptr<Encoder> encoder;
+  bool written = false;
+  WaitingItems<Trigger> triggers = {};
+  Microseconds last = 0;              ///< time of the last encoded item
+  std::uint64_t pauses_reported = 0;  ///< microseconds left out that were warned of
+};
+
+}  // namespace
+
+struct GstEventWriterPrivate {
+  explicit GstEventWriterPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
+
+  std::atomic<int> variant = 0;
+  std::atomic<guint> max_size = G_MAXUINT;
+  GstPad* sink = nullptr;
+  GstPad* src = nullptr;
+
+  // Accessed by the streaming thread only, or while there is none.
+  std::optional<State> state;
+  WritableEvents writable;
+  std::vector<guint8> bytes;  ///< encoded but not yet pushed
+};
+
+#define GST_TYPE_EVENT_WRITER (gst_event_writer_get_type())
+G_DECLARE_DERIVABLE_TYPE(GstEventWriter, gst_event_writer, GST, EVENT_WRITER, GstElement)
+
+struct _GstEventWriterClass {
+  GstElementClass parent_class;
+  const EventFileFormat* format;
+};
+
+G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventWriter, gst_event_writer, GST_TYPE_ELEMENT,
+                                 G_ADD_PRIVATE(GstEventWriter)
+                                     GST_DEBUG_CATEGORY_INIT(event_writer_debug, "eventwriter", 0,
+                                                             "writers of event files"))
+
+static GstEventWriterPrivate& priv_of(GstEventWriter* self) {
+  return *static_cast<GstEventWriterPrivate*>(gst_event_writer_get_instance_private(self));
+}
+
+static const EventFileFormat& format_of(GstEventWriter* self) {
+  return *GST_EVENT_WRITER_GET_CLASS(self)->format;
+}
+
+/// Runs `work`; reports any exception.
+template <class Work>
+static GstFlowReturn reported(GstEventWriter* self, const Work& work) {
+  return guarded(
+      self,
+      [](const auto& error) {
+        return WritableEvents::failure(error, {GST_STREAM_ERROR_ENCODE, "Cannot write the file."});
+      },
+      work);
+}
+
+/* negotiation */
+
+/// Begins a file. May throw.
+static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, OwnedCaps caps) {
+  auto& priv = priv_of(self);
+  priv.bytes.clear();
+  priv.writable.begin_file({info.width, info.height});
+  auto encoder = format_of(self).create({info.width, info.height}, priv.variant, caps.get());
+  encoder->encode({}, priv.bytes);
+  OwnedBuffer header;
+  if (!priv.bytes.empty()) {
+    header.reset(copied_buffer(std::as_bytes(std::span(priv.bytes))));
+    caps = with_stream_header(std::move(caps), header.get());
+    priv.bytes.clear();
+  }
+  priv.state.emplace(State{.info = info,
+                           .caps = std::move(caps),
+                           .header = std::move(header),
+                           .encoder = std::move(encoder)});
+}
+
+static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& info) {
+  auto& priv = priv_of(self);
+  const auto fixate = format_of(self).fixate;
+  GstCaps* caps = gst_pad_get_allowed_caps(priv.src);
+  if (caps == nullptr) caps = gst_pad_get_pad_template_caps(priv.src);
+  if (!gst_caps_is_empty(caps)) {
+    caps = gst_caps_truncate(caps);
+    if (fixate != nullptr) caps = fixate(info, priv.variant, caps);
+  }
+  OwnedCaps fixed(caps);
+  if (!gst_caps_is_fixed(fixed.get())) return GST_FLOW_NOT_NEGOTIATED;
+  begin_file(self, info, std::move(fixed));
+  return gst_pad_push_event(priv.src, gst_event_new_caps(priv.state->caps.get()))
+             ? GST_FLOW_OK
+             : GST_FLOW_NOT_NEGOTIATED;
+}
+
+/// Caps that the sink pad takes: the sensors that the format holds, and then all others, which the
+/// encoder refuses with a reason. Upstream that can choose takes the first.
+static OwnedCaps sink_caps(GstPad* pad) {
+  GstCaps* caps = gst_caps_make_writable(gst_pad_get_pad_template_caps(pad));
+  gst_caps_append(caps, gst_caps_from_string(GST_EVENT_CAMERA_MEDIA_TYPE ", format=XYTP"));
+  return OwnedCaps(caps);
+}
+
+static gboolean sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  GstCaps* asked = nullptr;
+  switch (GST_QUERY_TYPE(query)) {
+    case GST_QUERY_CAPS: {
+      gst_query_parse_caps(query, &asked);
+      OwnedCaps caps = sink_caps(pad);
+      if (asked != nullptr)
+        caps.reset(gst_caps_intersect_full(asked, caps.get(), GST_CAPS_INTERSECT_FIRST));
+      gst_query_set_caps_result(query, caps.get());
+      return TRUE;
+    }
+    case GST_QUERY_ACCEPT_CAPS:
+      gst_query_parse_accept_caps(query, &asked);
+      gst_query_set_accept_caps_result(query, gst_caps_is_subset(asked, sink_caps(pad).get()));
+      return TRUE;
+    default:
+      return gst_pad_query_default(pad, parent, query);
+  }
+}
+
+static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
+  const auto& priv = priv_of(self);
+  GstCaps* caps = nullptr;
+  gst_event_parse_caps(event, &caps);
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) {
+    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
+    return FALSE;
+  }
+  if (priv.state && priv.state->info.width == info.width && priv.state->info.height == info.height)
+    return TRUE;
+  if (priv.state && priv.state->written && !priv.writable.accepts({info.width, info.height}))
+    return FALSE;
+  return reported(self, [&] { return negotiate(self, info); }) == GST_FLOW_OK;
+}
+
+/* data */
+
+/// Maximum bytes per buffer.
+static std::size_t capacity(GstEventWriter* self) {
+  return priv_of(self).max_size / word_bytes * word_bytes;
+}
+
+static GstFlowReturn push_header(GstEventWriter* self, GstClockTime pts) {
+  auto& state = *priv_of(self).state;
+  const OwnedBuffer header = std::move(state.header);
+  if (!header) return GST_FLOW_OK;
+  GstBuffer* const buffer = gst_buffer_copy(header.get());  // the original belongs to the caps
+  GST_BUFFER_PTS(buffer) = pts;
+  state.written = true;
+  return gst_pad_push(priv_of(self).src, buffer);
+}
+
+/// Pushes the encoded bytes in one buffer, or in several if the words of a silence exceed one. Only
+/// the last has a duration, because the interval continues after the others. May throw.
+static GstFlowReturn push_bytes(GstEventWriter* self, GstClockTime pts, GstClockTime duration) {
+  auto& priv = priv_of(self);
+  std::span<const guint8> bytes = priv.bytes;
+  GstFlowReturn result = GST_FLOW_OK;
+  while (!bytes.empty() && result == GST_FLOW_OK) {
+    const auto piece = bytes.first(std::min(bytes.size(), capacity(self)));
+    bytes = bytes.subspan(piece.size());
+    GstBuffer* const buffer = copied_buffer(std::as_bytes(piece));
+    GST_BUFFER_PTS(buffer) = pts;
+    if (bytes.empty()) GST_BUFFER_DURATION(buffer) = duration;
+    priv.state->written = true;
+    result = gst_pad_push(priv.src, buffer);
+  }
+  priv.bytes.clear();
+  return result;
+}
+
+/// Returns the number of leading events that fit into `room` bytes. Limited to events so close in
+/// time that no words for pauses are written between them.
+static std::size_t count_that_fits(std::span<const AbsoluteEvent> events, std::size_t room) {
+  constexpr Microseconds close = 1000;
+  events = events.first(std::min(events.size(), room / max_event_bytes));
+  const auto end = std::ranges::find_if(
+      events, [&](const auto& event) { return event.t - events.front().t > close; });
+  return static_cast<std::size_t>(end - events.begin());
+}
+
+/// Encodes events, and pushes each full buffer. `start` is the start time of the next buffer. May
+/// throw.
+static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent> events,
+                            GstClockTime& start) {
+  auto& priv = priv_of(self);
+  const auto room = capacity(self);
+  while (!events.empty()) {
+    const auto count = priv.max_size == G_MAXUINT
+                           ? events.size()
+                           : count_that_fits(events, room - std::min(room, priv.bytes.size()));
+    if (count == 0) {
+      const auto end = std::max(start, static_cast<GstClockTime>(events.front().t) * GST_USECOND);
+      const GstFlowReturn result = push_bytes(self, start, end - start);
+      if (result != GST_FLOW_OK) return result;
+      start = end;
+    }
+    priv.state->encoder->encode(events.first(count), priv.bytes);
+    if (count > 0) priv.state->last = events[count - 1].t;
+    events = events.subspan(count);
+  }
+  return GST_FLOW_OK;
+}
+
+/// Encodes the triggers before `t`, without those that come too late. May throw.
+static void encode_triggers(GstEventWriter* self, Microseconds t) {
+  auto& priv = priv_of(self);
+  auto& state = *priv.state;
+  for (const auto& trigger : state.triggers.take_before(t)) {
+    if (trigger.t < state.last || !state.encoder->encode_trigger(trigger, priv.bytes)) continue;
+    state.last = trigger.t;
+    ++priv.writable.written().lock()->triggers;
+  }
+}
+
+/// Encodes events, and the triggers among them. May throw.
+static GstFlowReturn encode_all(GstEventWriter* self, std::span<const AbsoluteEvent> events,
+                                GstClockTime& start) {
+  const auto& triggers = priv_of(self).state->triggers;
+  GstFlowReturn result = GST_FLOW_OK;
+  while (!events.empty() && result == GST_FLOW_OK) {
+    encode_triggers(self, events.front().t);
+    const auto next = triggers.first().value_or(events.back().t);
+    const auto end = std::ranges::upper_bound(events, next, {}, &AbsoluteEvent::t);
+    const auto count = static_cast<std::size_t>(end - events.begin());
+    result = encode(self, events.first(count), start);
+    events = events.subspan(count);
+  }
+  return result;
+}
+
+/// Warns of the first pause that is left out, and at the end of the file of all, if there are more.
+static void warn_of_pauses(GstEventWriter* self, bool at_end) {
+  auto& state = *priv_of(self).state;
+  const auto left_out = state.encoder->left_out();
+  const auto reported = state.pauses_reported;
+  if (left_out == reported || (reported > 0 && !at_end)) return;
+  state.pauses_reported = left_out;
+  const auto seconds = std::to_string(left_out / 1'000'000) + " s";
+  post_message(self, GST_MESSAGE_WARNING,
+               {GST_STREAM_ERROR_ENCODE,
+                (reported == 0 ? "Left out a pause of " + seconds + ", which is"
+                               : "Left out pauses of " + seconds + " in total, which are") +
+                    " too long for this format: all later events are earlier by as much. Write "
+                    "AEDAT4, HDF5, NumPy or text to keep their times."},
+               "the clock of the format cannot tell " + std::to_string(left_out) + " us");
+}
+
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+  auto* self = GST_EVENT_WRITER(parent);
+  auto& priv = priv_of(self);
+  const OwnedBuffer buffer(taken);
+  if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  GstClockTime start = GST_BUFFER_PTS(taken);
+  return reported(self, [&] {
+    GstFlowReturn result = GST_FLOW_OK;
+    const bool encoded = priv.writable.take(taken, [&](const auto& events) {
+      if (result == GST_FLOW_OK) result = push_header(self, start);
+      if (result == GST_FLOW_OK) result = encode_all(self, events, start);
+    });
+    if (!encoded) return GST_FLOW_ERROR;
+    warn_of_pauses(self, false);
+    if (result != GST_FLOW_OK) return result;
+    GstClockTime duration = GST_BUFFER_DURATION(taken);
+    if (GST_CLOCK_TIME_IS_VALID(duration))
+      duration -= std::min(duration, start - GST_BUFFER_PTS(taken));
+    return push_bytes(self, start, duration);
+  });
+}
+
+/// Overwrites part of the header. May throw.
+static GstFlowReturn push_patch(GstEventWriter* self, eventcamera::FilePatch patch) {
+  auto& priv = priv_of(self);
+  if (!can_seek_bytes(priv.src)) {
+    GST_ELEMENT_WARNING(self, STREAM, ENCODE,
+                        ("The file header lacks the number of events. Write to a sink that can "
+                         "seek, such as filesink, to complete it."),
+                        ("downstream does not seek in bytes"));
+    return GST_FLOW_OK;
+  }
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_BYTES);
+  segment.start = patch.position;
+  gst_pad_push_event(priv.src, gst_event_new_segment(&segment));
+  priv.bytes = std::move(patch.bytes);
+  return push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
+}
+
+static void end_file(GstEventWriter* self) {
+  auto& priv = priv_of(self);
+  if (!priv.state) return;
+  priv.writable.end_file();
+  reported(self, [&] {
+    GstFlowReturn result = push_header(self, GST_CLOCK_TIME_NONE);
+    if (result != GST_FLOW_OK) return result;
+    encode_triggers(self, eventcamera::Chunker::max_time);
+    priv.state->encoder->finish(priv.bytes);
+    warn_of_pauses(self, true);
+    result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
+    auto patch = priv.state->encoder->patch();
+    return result == GST_FLOW_OK && patch ? push_patch(self, *std::move(patch)) : result;
+  });
+}
+
+/// After a flush: filesink has truncated the file, and a decoder expects a header.
+static void start_over(GstEventWriter* self) {
+  const auto& state = priv_of(self).state;
+  if (!state) return;
+  reported(self, [&] {
+    begin_file(self, state->info, OwnedCaps(gst_caps_ref(state->caps.get())));
+    return GST_FLOW_OK;
+  });
+}
+
+static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
+  auto* self = GST_EVENT_WRITER(parent);
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_CAPS: {
+      const gboolean taken = take_caps(self, event);
+      gst_event_unref(event);
+      return taken;
+    }
+    case GST_EVENT_EOS:
+      end_file(self);
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      start_over(self);
+      break;
+    case GST_EVENT_CUSTOM_DOWNSTREAM:
+      if (const auto triggers = triggers_of(event)) {
+        if (priv_of(self).state) priv_of(self).state->triggers.push(*triggers);
+        gst_event_unref(event);
+        return TRUE;
+      }
+      break;
+    default:
+      break;
+  }
+  return gst_pad_event_default(pad, parent, event);
+}
+
+/* states */
+
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS(gst_event_writer_parent_class)->change_state(element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    auto& priv = priv_of(GST_EVENT_WRITER(element));
+    if (priv.state) priv.writable.end_file();
+    priv.state.reset();
+    priv.bytes.clear();
+  }
+  return result;
+}
+
+/* type */
+
+static void set_property(GObject* object, guint id, const GValue* value, GParamSpec*) {
+  auto& priv = priv_of(GST_EVENT_WRITER(object));
+  if (id == prop_max_size)
+    priv.max_size = g_value_get_uint(value);
+  else
+    priv.variant = g_value_get_enum(value);
+}
+
+static void get_property(GObject* object, guint id, GValue* value, GParamSpec*) {
+  auto& priv = priv_of(GST_EVENT_WRITER(object));
+  if (id == prop_stats)
+    g_value_take_boxed(value, priv.writable.stats());
+  else if (id == prop_max_size)
+    g_value_set_uint(value, priv.max_size);
+  else
+    g_value_set_enum(value, priv.variant);
+}
+
+/// Creates the pads here, because the format is not yet known in init.
+static void constructed(GObject* object) {
+  auto* element = GST_ELEMENT(object);
+  auto& priv = priv_of(GST_EVENT_WRITER(object));
+  if (const auto* variants = format_of(GST_EVENT_WRITER(object)).variants)
+    priv.variant = variants->default_value;
+  priv.sink = add_pad(element, "sink");
+  gst_pad_set_chain_function(priv.sink, chain);
+  gst_pad_set_event_function(priv.sink, sink_event);
+  gst_pad_set_query_function(priv.sink, sink_query);
+  priv.src = add_pad(element, "src");
+  G_OBJECT_CLASS(gst_event_writer_parent_class)->constructed(object);
+}
+
+static void finalize(GObject* object) {
+  std::destroy_at(&priv_of(GST_EVENT_WRITER(object)));
+  G_OBJECT_CLASS(gst_event_writer_parent_class)->finalize(object);
+}
+
+static void gst_event_writer_init(GstEventWriter* self) {
+  std::construct_at(&priv_of(self), GST_ELEMENT(self));
+}
+
+static void gst_event_writer_class_init(GstEventWriterClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->constructed = constructed;
+  object_class->finalize = finalize;
+  GST_ELEMENT_CLASS(klass)->change_state = change_state;
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_WRITER, static_cast<GstPluginAPIFlags>(0));
+}
+
+static void add_pad_template(GstElementClass* klass, const char* name, GstPadDirection direction,
+                             const OwnedCaps& caps) {
+  gst_element_class_add_pad_template(
+      klass, gst_pad_template_new(name, direction, GST_PAD_ALWAYS, caps.get()));
+}
+
+static void format_class_init(gpointer klass, gpointer data) {
+  const auto& format = *static_cast<const EventFileFormat*>(data);
+  GST_EVENT_WRITER_CLASS(klass)->format = &format;
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->set_property = set_property;
+  object_class->get_property = get_property;
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
+  if (const auto* variants = format.variants)
+    g_object_class_install_property(
+        object_class, prop_variant,
+        g_param_spec_enum(variants->property, variants->nick, variants->blurb, variants->type(),
+                          variants->default_value,
+                          static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_READY)));
+  if (format.has_words)
+    g_object_class_install_property(
+        object_class, prop_max_size,
+        g_param_spec_uint("max-size", "Maximum size",
+                          "Maximum size of a buffer of words in bytes, such as the payload of a "
+                          "network packet; words are never split",
+                          64, G_MAXUINT, G_MAXUINT,
+                          static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_PLAYING)));
+  g_object_class_install_property(object_class, prop_stats, WritableEvents::stats_spec());
+  auto* element_class = GST_ELEMENT_CLASS(klass);
+  add_pad_template(
+      element_class, "sink", GST_PAD_SINK,
+      OwnedCaps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING, "XYTP",
+                                    "width", GST_TYPE_INT_RANGE, 1, format.max_width, "height",
+                                    GST_TYPE_INT_RANGE, 1, format.max_height, nullptr)));
+  add_pad_template(element_class, "src", GST_PAD_SRC, OwnedCaps(gst_caps_from_string(format.caps)));
+  gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Encoder",
+                                        format.description, EVENTSIM_AUTHORS);
+}
+
+GType event_writer_type(const EventFileFormat& format) {
+  return row_type(GST_TYPE_EVENT_WRITER, format.type_name, format_class_init, &format);
+}

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/recording/format_settings.hpp"
+
+#include <utility>
+
+#include "gst/base/types.hpp"
+#include "gst/eventcamera/eventcamera.h"
+
+static constexpr auto flags =
+    static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+
+eventcamera::TableSettings FormatSettings::table() const {
+  eventcamera::TableSettings settings;
+  if (time_unit > 0) settings.unit = static_cast<eventcamera::TimeUnit>(time_unit - 1);
+  if (column_order.empty()) return settings;
+  auto columns = eventcamera::columns_of(column_order);
+  if (!columns)
+    throw eventcamera::UnsupportedFormat(
+        "column-order \"" + column_order +
+        "\" must have each of t, x, y and p once, and '-' for others");
+  settings.columns = *std::move(columns);
+  return settings;
+}
+
+void add_sensor_size(FormatProperties& properties) {
+  properties.add([](FormatSettings& settings) -> int& { return settings.sensor.width; },
+                 g_param_spec_uint("width", "Width",
+                                   "Width of the sensor in pixels, for files that do not state it; "
+                                   "needs height. 0: that of the smallest known sensor that events "
+                                   "fit into",
+                                   0, GST_EVENT_CAMERA_MAX_WIDTH, 0, flags));
+  properties.add([](FormatSettings& settings) -> int& { return settings.sensor.height; },
+                 g_param_spec_uint("height", "Height",
+                                   "Height of the sensor in pixels, for files that do not state "
+                                   "it; needs width. 0: that of the smallest known sensor that "
+                                   "events fit into",
+                                   0, GST_EVENT_CAMERA_MAX_HEIGHT, 0, flags));
+}
+
+static GType time_unit_type() {
+  static const GEnumValue units[] = {
+      {0, "As stated in the file, or detected from its first rows", "auto"},
+      {1, "Seconds", "seconds"},
+      {2, "Milliseconds", "milliseconds"},
+      {3, "Microseconds", "microseconds"},
+      {4, "Nanoseconds", "nanoseconds"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventTimeUnit", units);
+}
+
+void add_table_properties(FormatProperties& properties) {
+  add_sensor_size(properties);
+  properties.add(&FormatSettings::time_unit,
+                 g_param_spec_enum("time-unit", "Time unit",
+                                   "Unit of the times in the file; needed if the file is "
+                                   "refused because its time unit is ambiguous",
+                                   time_unit_type(), 0, flags));
+  properties.add(
+      &FormatSettings::column_order,
+      g_param_spec_string("column-order", "Column order",
+                          "Meaning of the columns: one letter t, x, y or p each, - for "
+                          "others, as in xytp; empty = as stated in the file, or detected from "
+                          "its first rows",
+                          "", flags));
+}

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/recording/writable_events.hpp"
+
+#include <new>
+#include <stdexcept>
+
+using eventcamera::AbsoluteEvent;
+using eventcamera::Event;
+using eventcamera::Microseconds;
+using eventcamera::SensorSize;
+
+static std::string text_of(SensorSize size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+bool can_seek_bytes(GstPad* src) {
+  GstQuery* query = gst_query_new_seeking(GST_FORMAT_BYTES);
+  gboolean seekable = FALSE;
+  if (gst_pad_peer_query(src, query))
+    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
+  gst_query_unref(query);
+  return seekable != FALSE;
+}
+
+void WritableEvents::begin_file(SensorSize sensor) {
+  sensor_ = sensor;
+  latest_ = 0;
+  earlier_ = outside_ = {};
+  *written_.lock() = {};
+}
+
+bool WritableEvents::accepts(SensorSize sensor) const {
+  if (sensor == sensor_) return true;
+  post_message(element_, GST_MESSAGE_ERROR,
+               {GST_STREAM_ERROR_FORMAT,
+                "The sensor size changes from " + text_of(sensor_) + " to " + text_of(sensor) +
+                    " within a file. Start a new file for it, or set width and "
+                    "height where the events are read."},
+               "new caps after events were written");
+  return false;
+}
+
+void WritableEvents::report_buffer(GstBuffer* buffer) const {
+  post_message(element_, GST_MESSAGE_ERROR,
+               {GST_STREAM_ERROR_FORMAT,
+                "Cannot write a buffer that has no PTS or a partial event. Check the elements "
+                "upstream."},
+               GST_BUFFER_PTS(buffer) > G_MAXINT64
+                   ? "no PTS"
+                   : "cannot map " + std::to_string(gst_buffer_get_size(buffer)) +
+                         " bytes as events of 8 bytes");
+}
+
+std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> events,
+                                                    Microseconds start) {
+  picked_.clear();
+  std::size_t before_last_left_out = 0;
+  for (const auto& event : events) {
+    const AbsoluteEvent absolute{start + event.t, event.x, event.y_p};
+    const bool outside = event.x >= sensor_.width || absolute.y() >= sensor_.height;
+    if (outside || absolute.t < latest_) {
+      ++(outside ? outside_ : earlier_).count;
+      before_last_left_out = picked_.size();
+      continue;
+    }
+    latest_ = absolute.t;
+    picked_.push_back(absolute);
+  }
+  if (picked_.size() > before_last_left_out) {
+    if (earlier_.reported == 0) warn_of_earlier();
+    if (outside_.reported == 0) warn_of_outside();
+  }
+  written_.lock()->events += picked_.size();
+  return picked_;
+}
+
+void WritableEvents::end_file() {
+  warn_of_earlier();
+  warn_of_outside();
+}
+
+void WritableEvents::warn_of_earlier() {
+  warn(earlier_,
+       "earlier than others already written. Timestamps must not decrease; start a new file where "
+       "time starts over.",
+       "latest time written: " + std::to_string(latest_) + " us");
+}
+
+void WritableEvents::warn_of_outside() {
+  warn(outside_,
+       "outside the sensor. Correct the size in the caps, " + text_of(sensor_) + " pixels.",
+       "x or y is past the width or height in the caps");
+}
+
+void WritableEvents::warn(LeftOut& left_out, const std::string& what, const std::string& cause) {
+  if (left_out.count == left_out.reported) return;
+  post_message(element_, GST_MESSAGE_WARNING,
+               {code_, "Left out " + std::to_string(left_out.count) + " event" +
+                           (left_out.count == 1 ? "" : "s") +
+                           (left_out.reported == 0 ? " " : " in total ") + what},
+               cause);
+  left_out.reported = left_out.count;
+}
+
+GstStructure* WritableEvents::stats() {
+  const Written written = *written_.lock();
+  return gst_structure_new("application/x-event-writer-stats", "events", G_TYPE_UINT64,
+                           written.events, "triggers", G_TYPE_UINT64, written.triggers, "frames",
+                           G_TYPE_UINT64, written.frames, "imu-samples", G_TYPE_UINT64,
+                           written.imu_samples, nullptr);
+}
+
+GParamSpec* WritableEvents::stats_spec() {
+  return g_param_spec_boxed("stats", "Statistics",
+                            "Counts of what was written to the file: events, triggers, frames and "
+                            "imu-samples",
+                            GST_TYPE_STRUCTURE,
+                            static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS));
+}
+
+Report WritableEvents::failure(const std::exception& error, const Report& otherwise) {
+  if (is_a<std::bad_alloc>(error))
+    return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to write the events."};
+  if (is_a<std::invalid_argument>(error))
+    return {GST_STREAM_ERROR_FORMAT,
+            std::string("This file format cannot hold the stream: ") + error.what() + "."};
+  return otherwise;
+}

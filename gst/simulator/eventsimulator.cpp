@@ -1,0 +1,897 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/simulator/eventsimulator.hpp"
+
+#include <gst/video/video.h>
+
+#include <algorithm>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "gst/base/authors.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/flush_timer.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/latency.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/types.hpp"
+#include "gst/base/video_frame.hpp"
+#include "gst/drawing/drawn_video.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "gst/simulator/buffers.hpp"
+#include "gst/simulator/caps.hpp"
+#include "gst/simulator/frame_clock.hpp"
+#include "gst/simulator/learnt_latency.hpp"
+#include "gst/simulator/qos.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
+#define GST_CAT_DEFAULT event_simulator_debug
+
+using eventcamera::EventBuckets;
+using eventcamera::IntervalSimulator;
+using eventcamera::Nanoseconds;
+
+namespace {
+
+constexpr guint max_interpolated_frames = 255;
+constexpr guint default_interpolated_frames = 10;
+
+/// Limits of the interval and of the processing time in the latency.
+constexpr Nanoseconds max_latency = GST_SECOND;
+
+/// Processing time that sinks allow for (the default of their property processing-deadline).
+/// Multiples of it are reported as latency.
+constexpr Nanoseconds processing_deadline = 20 * GST_MSECOND;
+
+/// Time after which to look whether the events of an interval are ready.
+constexpr GstClockTime poll_interval = GST_MSECOND;
+
+/// User-settable values, copied once per buffer.
+struct Settings {
+  eventcamera::Settings simulation;
+  GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
+};
+
+/// A frame that is worked on, and the interval that it ends, if any.
+struct Awaited {
+  OwnedBuffer frame;
+  Nanoseconds start = 0;
+  Nanoseconds end = 0;
+  std::optional<Nanoseconds> work_began{};
+};
+
+/// State from caps to stop.
+struct State {
+  GstVideoInfo video;  ///< input format
+  std::unique_ptr<VideoSimulator> frames;
+  std::optional<Awaited> awaited{};
+  bool draws = false;  ///< the output is video, not events
+
+  IntervalSimulator& simulator() const { return frames->simulator(); }
+};
+
+/// Delay from the start of an interval to its output.
+struct Latency {
+  LearntLatency interval;
+  LearntLatency processing;
+  Nanoseconds downstream = 0;  ///< of elements downstream that do not report it
+
+  Latency() { processing.expect(0); }
+  GstClockTime total() const {
+    return static_cast<GstClockTime>(interval.value() + processing.value() + downstream);
+  }
+};
+
+/// State from start to stop, independent of caps.
+struct Stream {
+  std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
+  bool backwards = false;                       ///< the segment was refused
+  bool discontinuous = false;                   ///< the next buffer is discontinuous
+  GstFlowReturn flow = GST_FLOW_OK;             ///< result of the last push
+  FrameClock clock;                             ///< for frames without a PTS
+  WarnOnce warn_of_times;
+  WarnOnce warn_of_no_pts;
+  WarnOnce warn_of_interlacing;
+  WarnOnce warn_of_drawn_input;
+};
+
+}  // namespace
+
+struct GstEventSimulatorPrivate {
+  GuardedSettings<Settings> settings;
+  std::shared_ptr<void> method_settings;
+
+  GuardedSettings<SimulatorQos> qos;
+  Guarded<Latency> latency;  // make no calls while holding its lock
+
+  // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
+  std::optional<State> state;
+  Stream stream;
+
+  FlushTimer timer;  ///< for the awaited interval
+};
+
+static gpointer parent_class;
+static gint private_offset;
+#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(parent_class)
+
+static GstEventSimulatorPrivate& priv_of(GstEventSimulator* self) {
+  return *static_cast<GstEventSimulatorPrivate*>(G_STRUCT_MEMBER_P(self, private_offset));
+}
+
+static const EventSimulatorMethod& method_of(GstEventSimulator* self) {
+  return *GST_EVENT_SIMULATOR_GET_CLASS(self)->method;
+}
+
+void* event_simulator_settings(GObject* object) {
+  return priv_of(GST_EVENT_SIMULATOR(object)).method_settings.get();
+}
+
+/// Passes the settings of the method to the simulator.
+static void configure(GstEventSimulator* self) {
+  if (const auto configure = method_of(self).configure)
+    configure(priv_of(self).state->simulator(), G_OBJECT(self));
+}
+
+/* properties */
+
+static GuardedSettings<Settings>& settings_of(GObject* object) {
+  return priv_of(GST_EVENT_SIMULATOR(object)).settings;
+}
+
+static constexpr auto property_flags = static_cast<GParamFlags>(
+    G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+
+static constexpr auto controllable_flags =
+    static_cast<GParamFlags>(property_flags | GST_PARAM_CONTROLLABLE);
+
+static void install_thresholds(GObjectClass* klass, double grey_levels) {
+  Properties<settings_of> properties(klass);
+  properties.add(
+      [](Settings& settings) -> double& { return settings.simulation.positive_threshold; },
+      g_param_spec_double("positive-threshold", "Positive threshold",
+                          "Minimum rise in brightness for an ON event, exclusive "
+                          "(8-bit grey levels, whatever the depth of the video)",
+                          0, 255, grey_levels, controllable_flags));
+  properties.add(
+      [](Settings& settings) -> double& { return settings.simulation.negative_threshold; },
+      g_param_spec_double("negative-threshold", "Negative threshold",
+                          "Minimum fall in brightness for an OFF event, exclusive "
+                          "(8-bit grey levels, a magnitude, whatever the depth of the video)",
+                          0, 255, grey_levels, controllable_flags));
+}
+
+static void install_interpolated_frames(GObjectClass* klass) {
+  Properties<settings_of>(klass).add(
+      [](Settings& settings) -> int& { return settings.simulation.interpolated_frames; },
+      g_param_spec_uint("interpolated-frames", "Interpolated frames",
+                        "Number of frames to interpolate between two frames of the video; "
+                        "events get their times (at most one frame per microsecond)",
+                        0, max_interpolated_frames, default_interpolated_frames, property_flags));
+}
+
+static void install_base_properties(GObjectClass* klass) {
+  Properties<settings_of> properties(klass);
+  properties.add([](Settings& settings) -> int& { return settings.simulation.threads; },
+                 g_param_spec_uint("n-threads", "Threads",
+                                   "Maximum number of threads for one frame (0 = one for each "
+                                   "processor); the events are the same for any number",
+                                   0, G_MAXINT, 0, property_flags));
+  properties.add(&Settings::palette,
+                 g_param_spec_enum("palette", "Palette", "Colours of accumulated-event video",
+                                   GST_TYPE_EVENT_CAMERA_PALETTE, GST_EVENT_CAMERA_PALETTE_DARK,
+                                   property_flags));
+}
+
+static GuardedSettings<SimulatorQos>& qos_of(GObject* object) {
+  return priv_of(GST_EVENT_SIMULATOR(object)).qos;
+}
+
+/// Overrides the property `qos` of GstBaseTransform, whose default is off.
+static void install_qos_properties(GObjectClass* klass) {
+  Properties<qos_of> properties(klass);
+  properties.add(
+      [](SimulatorQos& qos, const GValue* value) { qos.enable(g_value_get_boolean(value)); },
+      [](SimulatorQos& qos, GValue* value) { g_value_set_boolean(value, qos.is_enabled()); },
+      g_param_spec_boolean("qos", "QoS",
+                           "Skip whole frames, without processing them, if downstream is late; the "
+                           "next interval is longer. By default on for events drawn as video, off "
+                           "for events",
+                           TRUE,
+                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                    GST_PARAM_MUTABLE_PLAYING)));
+  properties.add(
+      [](SimulatorQos&, const GValue*) {},
+      [](SimulatorQos& qos, GValue* value) { g_value_take_boxed(value, qos.stats()); },
+      g_param_spec_boxed("stats", "Statistics",
+                         "Counts since start: frames (processed), skipped (frames, because of "
+                         "qos), processing-time (of all processed frames, ns)",
+                         GST_TYPE_STRUCTURE,
+                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+}
+
+/* time */
+
+/// Posts a message if this changes the latency.
+template <class Change>
+static void change_latency(GstEventSimulator* self, const Change& change) {
+  GstClockTime before = 0;
+  GstClockTime after = 0;
+  {
+    const auto latency = priv_of(self).latency.lock();
+    before = latency->total();
+    change(*latency);
+    after = latency->total();
+  }
+  if (after == before) return;
+  GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(after));
+  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+}
+
+/// Adapts the latency to an interval: the framerate in the caps may be missing or wrong.
+static void learn_latency(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
+  change_latency(self, [&](Latency& latency) {
+    latency.interval.add(end, std::min(end - start, max_latency));
+  });
+}
+
+/// Starts processing a frame. Returns false if the frame is skipped instead.
+static bool begin_work(GstEventSimulator* self, GstBuffer* frame) {
+  const bool ends_interval = priv_of(self).state->simulator().last_time().has_value();
+  GstMessage* skipped = nullptr;
+  priv_of(self).qos.access([&](SimulatorQos& qos) {
+    skipped = qos.begin(GST_BASE_TRANSFORM(self), frame, ends_interval);
+  });
+  if (skipped == nullptr) return true;
+  GST_DEBUG_OBJECT(self, "skipped %" GST_PTR_FORMAT, frame);
+  gst_element_post_message(GST_ELEMENT(self), skipped);
+  return false;
+}
+
+/// Ends the work on the frame of this time, and adapts the latency to its duration.
+static void end_work(GstEventSimulator* self, Nanoseconds time,
+                     std::optional<Nanoseconds> work_began) {
+  Nanoseconds work = 0;
+  Nanoseconds downstream = 0;
+  priv_of(self).qos.access([&](SimulatorQos& qos) {
+    work = qos.end_work(GST_BASE_TRANSFORM(self), work_began);
+    downstream = qos.downstream_latency();
+  });
+  change_latency(self, [&](Latency& latency) {
+    latency.processing.add(time,
+                           std::min(work, max_latency) / processing_deadline * processing_deadline);
+    latency.downstream = downstream;
+  });
+}
+
+static std::optional<Nanoseconds> work_began(GstEventSimulator* self) {
+  std::optional<Nanoseconds> began;
+  priv_of(self).qos.access([&](const SimulatorQos& qos) { began = qos.began(); });
+  return began;
+}
+
+/// Ends the processing of a frame, after its output has been pushed.
+static void end_frame(GstEventSimulator* self) {
+  priv_of(self).qos.access([self](SimulatorQos& qos) { qos.end(GST_BASE_TRANSFORM(self)); });
+}
+
+/* intervals out */
+
+/// Pushes a GAP for an interval without events.
+static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
+                              guint32 seqnum) {
+  GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(self);
+  GstEvent* gap =
+      gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start));
+  if (seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(gap, seqnum);
+  return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
+}
+
+/// Sets the timestamps and flags of an output buffer, and pushes it.
+static GstFlowReturn push_buffer(GstEventSimulator* self, OwnedBuffer out, GstClockTime pts,
+                                 GstClockTime duration) {
+  auto* transform = GST_BASE_TRANSFORM(self);
+  GST_BUFFER_PTS(out.get()) = pts;
+  GST_BUFFER_DTS(out.get()) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION(out.get()) = duration;
+  if (std::exchange(priv_of(self).stream.discontinuous, false))
+    GST_BUFFER_FLAG_SET(out.get(), GST_BUFFER_FLAG_DISCONT);
+  if (transform->segment.format == GST_FORMAT_TIME)
+    transform->segment.position = GST_CLOCK_TIME_IS_VALID(duration) ? pts + duration : pts;
+  return gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out.release());
+}
+
+/// Waits until the work on the awaited frame, if any, is done. Pushes the events of the interval
+/// that it ends, or a GAP if there are none. May throw.
+static void push_awaited(GstEventSimulator* self) {
+  auto& state = priv_of(self).state;
+  if (!state || !state->awaited) return;
+  priv_of(self).timer.cancel();
+  auto [frame, start, end, began] = *std::exchange(state->awaited, std::nullopt);
+  const EventBuckets* const events = state->frames->read();
+  if (events == nullptr) return;  // of a first frame, or drawn
+  GST_LOG_OBJECT(self,
+                 "%" G_GSIZE_FORMAT " events in the interval from %" GST_TIME_FORMAT
+                 " to %" GST_TIME_FORMAT,
+                 events->size(), GST_TIME_ARGS(static_cast<GstClockTime>(start)),
+                 GST_TIME_ARGS(static_cast<GstClockTime>(end)));
+
+  auto& flow = priv_of(self).stream.flow;
+  OwnedBuffer out;
+  if (events->size() > 0)
+    flow = event_simulator_write_events(GST_BASE_TRANSFORM(self), *events,
+                                        state->simulator().threads(), frame.get(), out);
+  frame.reset();  // upstream may need it while downstream blocks
+  end_work(self, end, began);
+  learn_latency(self, start, end);
+  if (events->size() == 0)
+    flow = push_gap(self, start, end, GST_SEQNUM_INVALID);
+  else if (flow == GST_FLOW_OK)
+    flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
+                       static_cast<GstClockTime>(end - start));
+  end_frame(self);
+}
+
+/* discontinuities */
+
+/// Makes the next frame a first frame. May throw.
+static void forget_frames(GstEventSimulator* self) {
+  push_awaited(self);
+  auto& state = priv_of(self).state;
+  if (!state || !state->simulator().last_time()) return;
+  state->simulator().reset();
+  priv_of(self).stream.discontinuous = true;
+}
+
+/// Restarts at a first frame, for a new timeline. May throw.
+static void start_over(GstEventSimulator* self) {
+  forget_frames(self);
+  priv_of(self).stream.handed_out_until.reset();
+}
+
+static void warn_of_times(GstEventSimulator* self, const char* what) {
+  priv_of(self).stream.warn_of_times(
+      self,
+      {GST_STREAM_ERROR_FORMAT, std::string("Bad video timestamps: ") + what +
+                                    ". No events are made across it; videorate or a parser "
+                                    "upstream can repair timestamps."},
+      "an interval needs a PTS at both ends");
+}
+
+/// Sets the PTS of a frame without one. False if it cannot be determined.
+static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
+  using Source = FrameClock::Source;
+  auto& stream = priv_of(self).stream;
+  const GstVideoInfo& video = priv_of(self).state->video;
+  const auto source = stream.clock.stamp(GST_BASE_TRANSFORM(self), video, frame);
+  if (source == Source::upstream) return true;
+  const char* text =
+      "The video has neither timestamps nor a framerate, so there are no events. Set the PTS of "
+      "its buffers, or a framerate in its caps.";
+  if (source == Source::arrival)
+    text =
+        "The video has no timestamps: events are timed by when its frames arrive. Set "
+        "do-timestamp=true on the source, or the PTS of its buffers.";
+  else if (source == Source::framerate)
+    text =
+        "The video has no timestamps: events are timed by its framerate. Set the PTS of its "
+        "buffers if frames are not evenly spaced.";
+  stream.warn_of_no_pts(self, {GST_STREAM_ERROR_FORMAT, text},
+                        "a buffer has no PTS; the framerate in the caps is " +
+                            std::to_string(GST_VIDEO_INFO_FPS_N(&video)) + "/" +
+                            std::to_string(GST_VIDEO_INFO_FPS_D(&video)));
+  return source != Source::nowhere;
+}
+
+/// Validates the time of a frame and prepares the simulator for it. False if the frame must be
+/// skipped. May throw.
+static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
+  const GstClockTime pts = GST_BUFFER_PTS(buffer);
+  if (GST_BUFFER_IS_DISCONT(buffer)) {
+    start_over(self);
+    priv_of(self).stream.discontinuous = true;
+  }
+  if (pts > G_MAXINT64) {
+    warn_of_times(self, "the PTS of a frame is out of range");
+    forget_frames(self);
+    return false;
+  }
+  const auto time = static_cast<Nanoseconds>(pts);
+  const auto last = priv_of(self).state->simulator().last_time();
+  if (last && time <= *last) {
+    warn_of_times(self, "a frame is not later than the previous one");
+    forget_frames(self);
+  } else if (last && time - *last > eventcamera::max_interval) {
+    warn_of_times(self, "two frames are more than 71 minutes apart");
+    forget_frames(self);
+  }
+  // An interval starting with this frame would overlap the last one.
+  return !(priv_of(self).stream.handed_out_until && time < *priv_of(self).stream.handed_out_until);
+}
+
+/// Runs `work`; reports any exception and drops the state, because the simulator is then unusable.
+/// What comes after it, if anything, is discontinuous.
+template <class Work>
+static void reported(GstEventSimulator* self, const Work& work) {
+  const auto failure = [&](const std::exception& error) -> Report {
+    priv_of(self).state.reset();
+    priv_of(self).stream.discontinuous = true;
+    if (is_a<std::bad_alloc>(error))
+      return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+              "Not enough memory for the events of a frame. Raise the thresholds, or lower "
+              "interpolated-frames."};
+    if (const auto* known = dynamic_cast<const VideoSimulatorError*>(&error))
+      return known->report();
+    return {GST_STREAM_ERROR_FAILED, "The simulation failed."};
+  };
+  if (!guarded(self, failure, work)) priv_of(self).stream.flow = GST_FLOW_ERROR;
+}
+
+/// Ends the wait for the awaited interval.
+static void finish_interval(GstEventSimulator* self) {
+  reported(self, [self] { push_awaited(self); });
+}
+
+/* negotiation */
+
+static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection direction,
+                               GstCaps* caps, GstCaps* filter) {
+  const SimulatorVideo& video = method_of(GST_EVENT_SIMULATOR(transform)).video;
+  GstCaps* other = direction == GST_PAD_SINK ? video.output_caps(caps) : video.input_caps(caps);
+  if (filter == nullptr) return other;
+  GstCaps* filtered = gst_caps_intersect_full(filter, other, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref(other);
+  return filtered;
+}
+
+static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCaps*,
+                            GstCaps* other) {
+  if (direction == GST_PAD_SRC || gst_caps_is_empty(other)) return gst_caps_fixate(other);
+  return event_simulator_fixate_output(other);
+}
+
+/// Warns about interlaced video, whose two fields are taken at different times.
+static void check_interlacing(GstEventSimulator* self, GstBuffer* frame) {
+  auto& priv = priv_of(self);
+  const auto mode = GST_VIDEO_INFO_INTERLACE_MODE(&priv.state->video);
+  if (mode == GST_VIDEO_INTERLACE_MODE_PROGRESSIVE ||
+      (mode == GST_VIDEO_INTERLACE_MODE_MIXED &&
+       !GST_BUFFER_FLAG_IS_SET(frame, GST_VIDEO_BUFFER_FLAG_INTERLACED)))
+    return;
+  priv.stream.warn_of_interlacing(
+      self,
+      {GST_STREAM_ERROR_FORMAT,
+       "The video is interlaced: moving edges will fire in every other row. Insert a deinterlace "
+       "element upstream."},
+      std::string("interlace-mode=") + gst_video_interlace_mode_to_string(mode));
+}
+
+/// Name of a query that a simulator upstream answers where it draws its events.
+static constexpr const char* draws_query = "event-simulator-draws";
+
+/// Warns where the video is drawn events, such as those of one simulator right before another.
+static void check_input(GstEventSimulator* self) {
+  GstQuery* query = gst_query_new_custom(GST_QUERY_CUSTOM, gst_structure_new_empty(draws_query));
+  if (gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(self), query))
+    priv_of(self).stream.warn_of_drawn_input(
+        self,
+        {GST_STREAM_ERROR_FORMAT,
+         "The video already shows events, which a simulator upstream drew. To simulate one video "
+         "twice, put a tee in front of both simulators."},
+        std::string("answered upstream: ") + draws_query);
+  gst_query_unref(query);
+}
+
+/// Whether this is that query, and the events are drawn here.
+static bool draws_for(GstBaseTransform* transform, GstQuery* query) {
+  if (GST_QUERY_TYPE(query) != GST_QUERY_CUSTOM) return false;
+  const GstStructure* asked = gst_query_get_structure(query);
+  if (asked == nullptr || !gst_structure_has_name(asked, draws_query)) return false;
+  GstCaps* caps = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform));
+  const bool draws = caps != nullptr && event_simulator_draws(caps);
+  gst_clear_caps(&caps);
+  return draws;
+}
+
+static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  auto& state = priv_of(self).state;
+  finish_interval(self);
+  GstVideoInfo video;
+  GstVideoInfo drawn;
+  if (!gst_video_info_from_caps(&video, in) ||
+      (event_simulator_draws(out) && !gst_video_info_from_caps(&drawn, out))) {
+    GST_ERROR_OBJECT(self, "cannot make %" GST_PTR_FORMAT " of %" GST_PTR_FORMAT, out, in);
+    return FALSE;
+  }
+  const auto luma = FrameLuma::format_of(video);
+  const auto failure = [&](const std::exception& error) -> Report {
+    state.reset();
+    if (const auto* known = dynamic_cast<const VideoSimulatorError*>(&error))
+      return known->report();
+    return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for frames of " +
+                                                  std::to_string(luma.width) + "x" +
+                                                  std::to_string(luma.height) + " pixels."};
+  };
+  const bool made = guarded(self, failure, [&] {
+    if (!state || FrameLuma::format_of(state->video) != luma) {
+      if (state && state->simulator().last_time()) priv_of(self).stream.discontinuous = true;
+      state.reset();  // before allocating the next: frames can be large
+      state.emplace(State{.video = video, .frames = method_of(self).create(G_OBJECT(self), video)});
+    } else {
+      state->video = video;
+      state->frames->set_video(video);
+    }
+    state->draws = event_simulator_draws(out);
+    if (state->draws) state->frames->set_drawn_video(drawn);
+  });
+  if (!made) return FALSE;
+  check_input(self);
+  // Pictures have the time of their frame, intervals that of the previous frame.
+  const GstClockTime duration = state->draws ? 0 : frame_duration(video);
+  if (duration > 0 || state->draws)
+    change_latency(self, [duration](Latency& latency) {
+      latency.interval.expect(static_cast<Nanoseconds>(duration));
+    });
+  priv_of(self).qos.access([&](SimulatorQos& qos) { qos.take_output(state->draws); });
+  return TRUE;
+}
+
+/// Ensures that there is a state. Errors drop it while the pads keep their caps; if the application
+/// continues, it is recreated from these. False if that fails.
+static bool is_ready(GstEventSimulator* self) {
+  if (priv_of(self).state) return true;
+  auto* transform = GST_BASE_TRANSFORM(self);
+  GstCaps* in = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SINK_PAD(transform));
+  GstCaps* out = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform));
+  const bool ready = in != nullptr && out != nullptr && set_caps(transform, in, out);
+  gst_clear_caps(&in);
+  gst_clear_caps(&out);
+  return ready;
+}
+
+/* frames in */
+
+/// Updates controlled properties to their values at `time`, a timestamp of the segment.
+static void sync_controlled_properties(GstEventSimulator* self, GstClockTime time) {
+  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
+  if (segment.format != GST_FORMAT_TIME) return;  // e.g. from appsrc
+  const auto stream_time = gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, time);
+  if (GST_CLOCK_TIME_IS_VALID(stream_time)) gst_object_sync_values(GST_OBJECT(self), stream_time);
+}
+
+static void look_for_events(GstObject* element);
+
+/// Lets the awaited frame go, and pushes its interval, if the work on it is done, else looks again
+/// later. May throw.
+static void push_if_ready(GstEventSimulator* self) {
+  auto& priv = priv_of(self);
+  if (priv.state->frames->is_ready())
+    push_awaited(self);
+  else
+    priv.timer.set(poll_interval, GST_BASE_TRANSFORM_SINK_PAD(self), look_for_events);
+}
+
+/// Draws the events since the last frame (none for a first frame). The picture replaces the frame,
+/// at its `time`. May throw.
+static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& settings, Nanoseconds time,
+                                OwnedBuffer in) {
+  auto* transform = GST_BASE_TRANSFORM(self);
+  auto& state = *priv_of(self).state;
+  OwnedBuffer picture;
+  GstFlowReturn result = event_simulator_make_picture(transform, in.get(), picture);
+  if (result == GST_FLOW_OK) {
+    state.frames->draw(in.get(), time, settings.simulation,
+                       eventcamera::palette(palette_name_of(settings.palette)), picture.get());
+    push_awaited(self);
+  }
+  end_work(self, time, work_began(self));
+  if (result != GST_FLOW_OK) return result;
+  GST_BUFFER_DURATION(picture.get()) = GST_BUFFER_DURATION(in.get());
+  state.awaited.emplace(Awaited{.frame = std::move(in)});
+  push_if_ready(self);  // upstream may need the frame while downstream blocks
+  priv_of(self).qos.access([&](const SimulatorQos& qos) {
+    qos.extend(transform, picture.get(), frame_duration(state.video));
+  });
+  const GstClockTime duration = GST_BUFFER_DURATION(picture.get());
+  result = push_buffer(self, std::move(picture), static_cast<GstClockTime>(time), duration);
+  end_frame(self);
+  return result;
+}
+
+/// Processes a frame and outputs the interval that it ends, if any: at once if its events are
+/// ready, else as soon as they are. May throw.
+static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
+  auto& stream = priv_of(self).stream;
+  auto& state = *priv_of(self).state;
+  sync_controlled_properties(self, GST_BUFFER_PTS(in.get()));
+  const Settings settings = priv_of(self).settings.copy();
+
+  check_interlacing(self, in.get());
+  if (!check_time(self, in.get()) || !begin_work(self, in.get())) return;
+  const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in.get()));
+  const auto start = state.simulator().last_time();
+  configure(self);
+  if (state.draws) {
+    stream.handed_out_until = end;
+    stream.flow = draw_frame(self, settings, end, std::move(in));
+    return;
+  }
+  state.frames->queue(in.get(), end, settings.simulation);
+  push_awaited(self);  // whose events are read while the GPU works on this frame
+  if (start) {
+    stream.handed_out_until = end;
+  } else {
+    end_work(self, end, work_began(self));
+    end_frame(self);
+  }
+  state.awaited.emplace(Awaited{std::move(in), start.value_or(end), end, work_began(self)});
+  push_if_ready(self);
+}
+
+static void look_for_events(GstObject* element) {
+  auto* self = GST_EVENT_SIMULATOR(element);
+  const auto& state = priv_of(self).state;
+  if (state && state->awaited) reported(self, [self] { push_if_ready(self); });
+}
+
+static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  auto& flow = priv_of(self).stream.flow;
+  *out = nullptr;  // output is pushed here, because that of the last frame may follow later
+  OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
+  // Since the timer or an event pushed, downstream may have been linked anew.
+  if (flow != GST_FLOW_EOS && flow != GST_FLOW_ERROR) {
+    flow = GST_FLOW_OK;
+    if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
+    if (give_pts(self, in)) reported(self, [&] { take_frame(self, std::move(in)); });
+  }
+  return std::exchange(flow, GST_FLOW_OK);
+}
+
+/* events, queries, states */
+
+/// Replaces a segment in another format than TIME, as from byte sources, by the TIME segment of the
+/// timestamps that frames are given. Takes ownership of `event`.
+static GstEvent* segment_of_times(GstEvent* event) {
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event, &segment);
+  if (segment->format == GST_FORMAT_TIME) return event;
+  GstSegment times;
+  gst_segment_init(&times, GST_FORMAT_TIME);
+  GstEvent* replacement = gst_event_new_segment(&times);
+  gst_event_set_seqnum(replacement, gst_event_get_seqnum(event));
+  gst_event_unref(event);
+  return replacement;
+}
+
+/// Starts a new timeline, discontinuous with the previous one.
+static void start_timeline(GstEventSimulator* self) {
+  auto& state = priv_of(self).state;
+  if (state && std::exchange(state->awaited, std::nullopt)) state->frames->drop();
+  priv_of(self).stream.flow = GST_FLOW_OK;
+  start_over(self);
+  priv_of(self).stream.clock.start_over();
+  priv_of(self).qos.access([](SimulatorQos& qos) { qos.start_over(); });
+}
+
+static bool take_segment(GstEventSimulator* self, GstEvent* event) {
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event, &segment);
+  if (segment->rate < 0) {
+    if (std::exchange(priv_of(self).stream.backwards, true)) return false;  // repeated segment
+    GST_ELEMENT_ERROR(self, STREAM, FAILED,
+                      ("Cannot simulate events backwards. Play at a positive rate."),
+                      ("the segment has rate %g", segment->rate));
+    return false;
+  }
+  priv_of(self).stream.backwards = false;
+  const GstSegment& current = GST_BASE_TRANSFORM(self)->segment;
+  if (current.format != segment->format || current.rate != segment->rate ||
+      current.base != segment->base || current.start != segment->start ||
+      current.time != segment->time)
+    start_timeline(self);
+  return true;
+}
+
+/// Holds the last frame until `end` and pushes the events of that time, or a GAP if there are none.
+/// May throw.
+static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum) {
+  auto* transform = GST_BASE_TRANSFORM(self);
+  auto& state = *priv_of(self).state;
+  const Nanoseconds start = *state.simulator().last_time();
+  sync_controlled_properties(self, static_cast<GstClockTime>(end));
+  configure(self);
+  const EventBuckets* events =
+      state.simulator().hold_until(end, priv_of(self).settings.copy().simulation);
+  priv_of(self).stream.handed_out_until = end;
+  auto& flow = priv_of(self).stream.flow;
+  if (events == nullptr || events->size() == 0) {
+    flow = push_gap(self, start, end, seqnum);
+    return;
+  }
+  const OwnedBuffer in(gst_buffer_new());
+  OwnedBuffer out;
+  flow =
+      event_simulator_write_events(transform, *events, state.simulator().threads(), in.get(), out);
+  if (flow == GST_FLOW_OK)
+    flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
+                       static_cast<GstClockTime>(end - start));
+}
+
+/// Handles a GAP from upstream: holds the last frame until one frame duration before the end of the
+/// gap, where the next interval begins; for drawn video, only forwards the gap. Returns true if the
+/// event must be forwarded.
+static bool take_gap(GstEventSimulator* self, GstEvent* event) {
+  GstClockTime pts = GST_CLOCK_TIME_NONE;
+  GstClockTime duration = GST_CLOCK_TIME_NONE;
+  gst_event_parse_gap(event, &pts, &duration);
+  auto& state = priv_of(self).state;
+  const auto start = state ? state->simulator().last_time() : std::nullopt;
+  if (!start || state->draws) return true;
+  const auto frame = static_cast<GstClockTime>(priv_of(self).latency.lock()->interval.value());
+  const GstClockTime rest =
+      GST_CLOCK_TIME_IS_VALID(duration) && duration > frame ? duration - frame : 0;
+  if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
+  const auto end = static_cast<Nanoseconds>(pts + rest);
+  if (end <= *start) return false;
+  reported(self, [&] { hold_until(self, end, gst_event_get_seqnum(event)); });
+  return false;
+}
+
+static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  const bool is_serialized =
+      (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) != 0;
+  if (is_serialized && GST_EVENT_TYPE(event) != GST_EVENT_FLUSH_STOP) finish_interval(self);
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_SEGMENT:
+      event = segment_of_times(event);
+      if (!take_segment(self, event)) {
+        gst_event_unref(event);
+        return FALSE;
+      }
+      break;
+    case GST_EVENT_GAP:
+      if (!take_gap(self, event)) {
+        gst_event_unref(event);
+        return TRUE;
+      }
+      break;
+    case GST_EVENT_STREAM_START:
+    case GST_EVENT_FLUSH_STOP:
+      start_timeline(self);
+      break;
+    default:
+      break;
+  }
+  return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
+}
+
+static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
+  if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
+    // Not forwarded: frames are skipped here, where that is wanted, and nowhere else.
+    priv_of(GST_EVENT_SIMULATOR(transform)).qos.access([&](SimulatorQos& qos) {
+      qos.take_event(transform, event);
+    });
+    gst_event_unref(event);
+    return TRUE;
+  }
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
+    gdouble rate = 1;
+    gst_event_parse_seek(event, &rate, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
+    if (rate < 0) {
+      GST_WARNING_OBJECT(transform,
+                         "refused to seek at rate %g: events cannot be simulated "
+                         "backwards",
+                         rate);
+      gst_event_unref(event);
+      return FALSE;
+    }
+  }
+  return PARENT_TRANSFORM_CLASS->src_event(transform, event);
+}
+
+static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
+  if (direction == GST_PAD_SRC && draws_for(transform, query)) return TRUE;
+  const bool is_serialized =
+      (gst_query_type_get_flags(GST_QUERY_TYPE(query)) & GST_QUERY_TYPE_SERIALIZED) != 0;
+  if (direction == GST_PAD_SINK && is_serialized) finish_interval(GST_EVENT_SIMULATOR(transform));
+  if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
+    return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
+
+  const GstClockTime latency = priv_of(GST_EVENT_SIMULATOR(transform)).latency.lock()->total();
+  return answer_latency(GST_BASE_TRANSFORM_SINK_PAD(transform), query, latency);
+}
+
+static gboolean start(GstBaseTransform* transform) {
+  priv_of(GST_EVENT_SIMULATOR(transform)).qos.access([](SimulatorQos& qos) {
+    qos.start_over();
+    qos.reset_stats();
+  });
+  return TRUE;
+}
+
+static gboolean stop(GstBaseTransform* transform) {
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  priv_of(self).timer.stop();
+  priv_of(self).state.reset();
+  priv_of(self).stream = {};
+  *priv_of(self).latency.lock() = {};
+  return TRUE;
+}
+
+/* type */
+
+/// Creates the method's settings here, because the method is not yet known in init.
+static void constructed(GObject* object) {
+  auto* self = GST_EVENT_SIMULATOR(object);
+  if (const auto make_settings = method_of(self).make_settings)
+    priv_of(self).method_settings = make_settings();
+  G_OBJECT_CLASS(parent_class)->constructed(object);
+}
+
+static void finalize(GObject* object) {
+  std::destroy_at(&priv_of(GST_EVENT_SIMULATOR(object)));
+  G_OBJECT_CLASS(parent_class)->finalize(object);
+}
+
+static void gst_event_simulator_init(GstEventSimulator* self) {
+  std::construct_at(&priv_of(self));
+  // SimulatorQos decides which frames are skipped.
+  gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
+}
+
+static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
+  parent_class = g_type_class_peek_parent(klass);
+  g_type_class_adjust_private_offset(klass, &private_offset);
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->constructed = constructed;
+  object_class->finalize = finalize;
+  install_base_properties(object_class);
+  install_qos_properties(object_class);
+
+  GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
+  transform_class->transform_caps = transform_caps;
+  transform_class->fixate_caps = fixate_caps;
+  transform_class->set_caps = set_caps;
+  event_simulator_class_install_buffers(transform_class);
+  transform_class->generate_output = generate_output;
+  transform_class->sink_event = sink_event;
+  transform_class->src_event = src_event;
+  transform_class->query = query;
+  transform_class->start = start;
+  transform_class->stop = stop;
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_SIMULATOR, static_cast<GstPluginAPIFlags>(0));
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
+}
+
+GType gst_event_simulator_get_type() {
+  static const GType type = [] {
+    GST_DEBUG_CATEGORY_INIT(event_simulator_debug, "eventsim", 0, "event simulators");
+    const GType registered = register_type(
+        GST_TYPE_BASE_TRANSFORM, event_simulator_type_names.simulator,
+        gst_event_simulator_class_init, gst_event_simulator_init, G_TYPE_FLAG_ABSTRACT);
+    private_offset = g_type_add_instance_private(registered, sizeof(GstEventSimulatorPrivate));
+    return registered;
+  }();
+  return type;
+}
+
+static void method_class_init(gpointer klass, gpointer row) {
+  const auto& method = *static_cast<const EventSimulatorMethod*>(row);
+  auto* object_class = G_OBJECT_CLASS(klass);
+  GST_EVENT_SIMULATOR_CLASS(klass)->method = &method;
+  method.video.install_pads(GST_ELEMENT_CLASS(klass));
+  if (method.threshold) install_thresholds(object_class, *method.threshold);
+  if (method.interpolates) install_interpolated_frames(object_class);
+  if (method.install_properties != nullptr) method.install_properties(object_class);
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), method.long_name,
+                                        "Filter/Effect/Converter/Video", method.description,
+                                        EVENTSIM_AUTHORS);
+}
+
+GType event_simulator_type(const EventSimulatorMethod& method, GType parent) {
+  return row_type(parent, method.type_name, method_class_init, &method);
+}

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/base/gstbasetransform.h>
+
+#include <memory>
+#include <optional>
+
+#include "gst/base/properties.hpp"
+#include "gst/simulator/caps.hpp"
+#include "gst/simulator/video_simulator.hpp"
+#include "src/simulate/simulator.hpp"
+
+/// A simulation method, and its element: video in, events or accumulated-event video out.
+///
+/// N frames give N - 1 intervals; the first frame after start, flush or a discontinuity only serves
+/// as reference for the next one. An interval has the PTS of its first frame and is pushed when its
+/// last frame arrives, so the latency is one frame plus the processing time. Where the events come
+/// later, as from a GPU, the interval is pushed as soon as they do, from the streaming thread or a
+/// timer; at the latest, after the next frame has been queued and before any serialized event or
+/// query is handled. At most this one interval is awaited; a flush drops it. Frames are held until
+/// the GPU has read them, first frames and drawn ones too. In the event stream an interval without
+/// events is a GAP. In drawn video, an interval is a picture that replaces its
+/// last frame, with that frame's timestamps and those of its metas that remain valid, so the
+/// latency is the processing time. Where frames are skipped, its duration lasts until the expected
+/// next picture. A first frame gives an empty picture.
+struct EventSimulatorMethod {
+  const char* type_name;
+  const char* long_name;
+  const char* description;
+  /// Default of positive-threshold and negative-threshold, in grey levels; if unset, the element
+  /// does not have these properties.
+  std::optional<double> threshold;
+  bool interpolates = false;  ///< has the property interpolated-frames
+
+  /// Creates the simulator of an element for frames of this format. May throw.
+  std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);
+
+  /// Video taken and drawn.
+  const SimulatorVideo& video = system_memory_video;
+
+  /// For methods with their own properties, else null: create a GuardedSettings, install the
+  /// properties, and pass the settings to the simulator before each frame.
+  std::shared_ptr<void> (*make_settings)() = nullptr;
+  void (*install_properties)(GObjectClass* klass) = nullptr;
+  void (*configure)(eventcamera::IntervalSimulator& simulator, GObject* object) = nullptr;
+};
+
+/// Names of the types in the plugin that this library is linked to. Each plugin defines its own.
+struct EventSimulatorTypeNames {
+  const char* simulator;
+  const char* pool;
+};
+extern const EventSimulatorTypeNames event_simulator_type_names;
+
+/// Base class of all simulators.
+#define GST_TYPE_EVENT_SIMULATOR (gst_event_simulator_get_type())
+G_DECLARE_DERIVABLE_TYPE(GstEventSimulator, gst_event_simulator, GST, EVENT_SIMULATOR,
+                         GstBaseTransform)
+
+struct _GstEventSimulatorClass {
+  GstBaseTransformClass parent_class;
+  const EventSimulatorMethod* method;
+};
+
+/// Returns the element type of `method`, which must have static storage duration: a subclass of
+/// `parent`.
+GType event_simulator_type(const EventSimulatorMethod& method,
+                           GType parent = GST_TYPE_EVENT_SIMULATOR);
+
+/// Returns the result of make_settings() for an element.
+void* event_simulator_settings(GObject* object);
+
+template <class Settings>
+GuardedSettings<Settings>& event_simulator_settings(GObject* object) {
+  return *static_cast<GuardedSettings<Settings>*>(event_simulator_settings(object));
+}
