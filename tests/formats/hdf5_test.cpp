@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <hdf5.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
@@ -223,6 +224,65 @@ TEST_F(Hdf5, AFullDiskIsToldAndSurvived) {
     EXPECT_TRUE(read_all(reader) == events);
   }
   EXPECT_EQ(H5Fget_obj_count(static_cast<hid_t>(H5F_OBJ_ALL), H5F_OBJ_FILE), 0);
+}
+
+/// Writes part of the events in a process that commits `commits` times, and is killed after more
+/// events.
+Events left_by_a_killed_process(const std::filesystem::path& file, const Settings& settings,
+                                std::span<const AbsoluteEvent> events, int commits) {
+  const pid_t child = fork();
+  if (child == 0) {
+    Hdf5Writer writer(file, settings);
+    const auto part = events.size() / static_cast<std::size_t>(commits + 1);
+    for (int i = 0; i < commits; ++i) {
+      writer.append(events.first(part));
+      events = events.subspan(part);
+      writer.commit();
+    }
+    for (; events.size() > 1000; events = events.subspan(1000)) writer.append(events.first(1000));
+    std::raise(SIGKILL);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  Hdf5Reader reader(file);
+  EXPECT_EQ(reader.corruption().places, 0U);
+  return read_all(reader);
+}
+
+TEST_F(Hdf5, WhatWasCommittedSurvivesTheProcess) {
+  for (const auto& settings : all_settings({640, 480})) {
+    for (const std::size_t count : {3000, 150'000}) {
+      const auto events = random_events(count, settings.size, 21, 1'000'000);
+      for (const int commits : {1, 20}) {
+        const auto left = left_by_a_killed_process(path(), settings, events, commits);
+        EXPECT_GE(left.size(), count / static_cast<std::size_t>(commits + 1) *
+                                   static_cast<std::size_t>(commits));
+        EXPECT_TRUE(std::ranges::equal(left, std::span(events).first(left.size())));
+      }
+    }
+  }
+}
+
+TEST_F(Hdf5, CommitsDoNotChangeTheFile) {
+  const auto events = random_events(200'000, {640, 480}, 22, 1'000'000);
+  for (const auto& settings : all_settings({640, 480})) {
+    {
+      Hdf5Writer writer(path(), settings);
+      for (auto rest = std::span(events); !rest.empty();) {
+        const auto part = rest.first(std::min<std::size_t>(rest.size(), 7777));
+        writer.append(part);
+        writer.commit();
+        rest = rest.subspan(part.size());
+      }
+    }
+    Hdf5Reader reader(path());
+    EXPECT_TRUE(read_all(reader) == events);
+    reader.seek(events[150'000].t);
+    Events found;
+    reader.read(1, found);
+    EXPECT_EQ(found.front().t, events[150'000].t);
+  }
 }
 
 TEST_F(Hdf5, WhatIsNoFileOfEventsIsRefused) {

@@ -87,6 +87,28 @@ convert --compression=none ball.raw plain.aedat4
 convert --dialect=rpg ball.raw rpg.csv
 cmp ball.txt rpg.csv || fail "the dialect is not that of .txt"
 
+# h5py and eventhdf5dec read what eventhdf5sink wrote before it was killed, up to the last second.
+# The 20 s that the events may take to get there bear any load.
+for layout in dsec metavision; do
+  "$GST_LAUNCH" -q videotestsrc pattern=ball is-live=true ! eventsim-diff ! eventhdf5sink layout=$layout location=killed.h5 &
+  for _ in {1..200}; do
+    [ "$(stat -c %s killed.h5 2>/dev/null || echo 0)" -gt 20000 ] && break
+    sleep 0.1
+  done
+  sleep 2
+  kill -KILL $!
+  wait $! || true
+  /usr/bin/python3 - killed.h5 <<'END' || fail "h5py does not read what was killed"
+import sys
+import h5py
+with h5py.File(sys.argv[1]) as killed:
+    events = killed["CD/events" if "CD" in killed else "events/t"]
+    assert len(events) > 1000, len(events)
+END
+  convert killed.h5 killed.csv
+  [ "$(wc -l <killed.csv)" -gt 1000 ] || fail "eventhdf5dec does not read what was killed"
+done
+
 # h5py reads what eventhdf5sink wrote.
 /usr/bin/python3 - ball.h5 ball.hdf5 ball.csv <<'PYTHON'
 import csv

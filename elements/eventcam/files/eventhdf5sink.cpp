@@ -8,7 +8,8 @@
  * directly with h5py. Written times are those of the PTS. `layout=metavision` keeps triggers; the
  * property `stats` counts them.
  *
- * The file is complete at the end of the stream, or when the pipeline is stopped. A flushing seek
+ * The file is complete at the end of the stream, or when the pipeline is stopped. If the process is
+ * killed, all but the events of the last second can be read. A flushing seek
  * truncates the file and starts over. Events that are earlier than those already written, or
  * outside the sensor, are dropped; a warning says how many.
  *
@@ -37,6 +38,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
 #define GST_CAT_DEFAULT event_hdf5_sink_debug
 
+using eventcamera::AbsoluteEvent;
 using eventcamera::Hdf5Layout;
 using eventcamera::Hdf5Writer;
 using eventcamera::Trigger;
@@ -206,6 +208,13 @@ static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> trig
   });
 }
 
+/// Commits events that waited while no others came.
+static bool keep_up(GstEventHdf5Sink* self) {
+  const State& state = self->priv->state;
+  return !state.writer ||
+         reported(self, [&] { state.writer->append(std::span<const AbsoluteEvent>()); });
+}
+
 /// Completes the file before EOS is posted to the application, and starts over after a flush.
 static gboolean event(GstBaseSink* sink, GstEvent* event) {
   auto* self = GST_EVENT_HDF5_SINK(sink);
@@ -214,6 +223,7 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
   if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.info.width > 0)
     done = begin_file(self, GstEventCameraInfo(state.info));
+  if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) done = keep_up(self);
   if (const auto triggers = triggers_of(event)) done = write_triggers(self, *triggers);
   if (!done) {
     gst_event_unref(event);

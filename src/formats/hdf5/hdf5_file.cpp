@@ -180,7 +180,7 @@ void Hdf5Output::read(std::uint64_t position, std::span<std::uint8_t> out) const
     left = left.subspan(static_cast<std::size_t>(got));
   }
   std::ranges::fill(left, 0);
-  for (const auto& [start, bytes] : unwritten_) {
+  for (const auto& [start, bytes] : held_) {
     const auto begin = std::max(position, start);
     const auto end = std::min(position + out.size(), start + bytes.size());
     if (begin >= end) continue;
@@ -191,6 +191,17 @@ void Hdf5Output::read(std::uint64_t position, std::span<std::uint8_t> out) const
 
 void Hdf5Output::write(std::uint64_t position, std::span<const std::uint8_t> bytes) {
   size_ = std::max<std::uint64_t>(size_, position + bytes.size());
+  const auto replaced = committed_ - std::min(position, committed_);
+  const auto first_new = std::min<std::uint64_t>(replaced, bytes.size());
+  hold(position, bytes.first(first_new));
+  position += first_new;
+  const auto failed = write_to_file(position, bytes.subspan(first_new));
+  hold(position + (bytes.size() - first_new - failed.size()), failed);
+}
+
+/// Returns the bytes that could not be written.
+std::span<const std::uint8_t> Hdf5Output::write_to_file(std::uint64_t position,
+                                                        std::span<const std::uint8_t> bytes) {
   while (!bytes.empty() && error_ == 0) {
     const auto put = pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(position));
     if (put < 0 && errno != EINTR) error_ = errno;
@@ -198,13 +209,25 @@ void Hdf5Output::write(std::uint64_t position, std::span<const std::uint8_t> byt
     position += static_cast<std::uint64_t>(put);
     bytes = bytes.subspan(static_cast<std::size_t>(put));
   }
-  if (!bytes.empty()) unwritten_.push_back({position, {bytes.begin(), bytes.end()}});
+  return bytes;
+}
+
+void Hdf5Output::hold(std::uint64_t position, std::span<const std::uint8_t> bytes) {
+  if (!bytes.empty()) held_.push_back({position, {bytes.begin(), bytes.end()}});
 }
 
 void Hdf5Output::truncate(std::uint64_t size) {
-  if (size_ == size || error_ != 0) return;
   size_ = size;
-  if (ftruncate(fd_, static_cast<off_t>(size)) != 0) error_ = errno;
+}
+
+void Hdf5Output::commit() {
+  // New bytes reach the disk before the pointers to them. Some file systems cannot sync.
+  if (error_ == 0 && fdatasync(fd_) != 0 && errno != EINVAL) error_ = errno;
+  for (const auto& [position, bytes] : held_) write_to_file(position, bytes);
+  if (error_ == 0 && ftruncate(fd_, static_cast<off_t>(size_)) != 0) error_ = errno;
+  if (error_ != 0) return;
+  held_.clear();
+  committed_ = size_;
 }
 
 }  // namespace eventcamera

@@ -15,9 +15,12 @@ namespace eventcamera {
 /// on failure.
 Hdf5Handle open_hdf5(ByteSource& source);
 
-/// Output file for the HDF5 library. The library does not survive a failed write, as on a full
-/// disk: it crashes when it closes the file or when the process ends. So every write succeeds for
-/// the library; callers must call check() and stop writing after an error.
+/// Output file for the HDF5 library, which survives the end of the process: new bytes are written
+/// at the end of the file, and bytes that replace committed ones are held until the next commit().
+///
+/// The library does not survive a failed write, as on a full disk: it crashes when it closes the
+/// file or when the process ends. So every write succeeds for the library; callers must call
+/// check() and stop writing after an error.
 class Hdf5Output {
  public:
   /// Overwrites an existing file. Throws std::runtime_error.
@@ -29,6 +32,9 @@ class Hdf5Output {
   /// Creates the library's handle, which must be closed before this object is destroyed. Empty on
   /// failure.
   Hdf5Handle create();
+
+  /// Makes the file what the library has flushed or closed.
+  void commit();
 
   /// Throws std::runtime_error if a write failed.
   void check() const;
@@ -45,14 +51,18 @@ class Hdf5Output {
     std::vector<std::uint8_t> bytes;
   };
 
+  std::span<const std::uint8_t> write_to_file(std::uint64_t position,
+                                              std::span<const std::uint8_t> bytes);
+  void hold(std::uint64_t position, std::span<const std::uint8_t> bytes);
   [[noreturn]] void fail(int error) const;
 
   std::filesystem::path path_;
   int fd_ = -1;
-  int error_ = 0;           ///< first error, as in errno
-  std::uint64_t size_ = 0;  ///< as seen by the library
-  std::vector<Piece>
-      unwritten_;  ///< failed writes, which the library may read again when it closes the file
+  int error_ = 0;                ///< first error, as in errno
+  std::uint64_t size_ = 0;       ///< as seen by the library
+  std::uint64_t committed_ = 0;  ///< size at the last commit
+  /// Writes below that size, and failed ones, which the library may read again.
+  std::vector<Piece> held_;
 };
 
 }  // namespace eventcamera

@@ -28,6 +28,9 @@ class Hdf5Writer::Layout {
   virtual ~Layout() = default;
   virtual void append(std::span<const AbsoluteEvent> events) = 0;
   virtual bool append(std::span<const Trigger> triggers) = 0;
+
+  /// Hands all rows to the library.
+  virtual void flush() = 0;
   virtual void close() = 0;
 };
 
@@ -42,6 +45,9 @@ constexpr Microseconds max_recording = 7LL * 24 * 3600 * 1'000'000;
 void check(bool done) {
   if (!done) throw std::runtime_error("the HDF5 library failed to write the file");
 }
+
+/// Time between two commits.
+constexpr std::chrono::seconds commit_interval{1};
 
 /// Microseconds since the first event of the recording.
 Microseconds since(Microseconds first, Microseconds t) {
@@ -88,10 +94,9 @@ class GrowingDataset {
     check(H5Dwrite(dataset_.get(), memory_, memory.get(), space.get(), H5P_DEFAULT, rows) >= 0);
   }
 
-  /// Appends an already filtered chunk.
-  void append_chunk(std::span<const std::uint8_t> chunk, hsize_t count) {
-    const auto begin = rows_;
-    extend(count);
+  /// Writes the last chunk, of `count` rows from `begin` on, already filtered.
+  void write_chunk(std::span<const std::uint8_t> chunk, hsize_t begin, hsize_t count) {
+    extend(begin + count - rows_);
     check(H5Dwrite_chunk(dataset_.get(), H5P_DEFAULT, 0, &begin, chunk.size(), chunk.data()) >= 0);
   }
 
@@ -121,7 +126,7 @@ class GrowingDataset {
   hsize_t rows_ = 0;
 };
 
-/// Growing dataset of Row, written one chunk at a time.
+/// Growing dataset of Row, written one chunk at a time, or flushed in between.
 template <class Row>
 class BufferedDataset : public GrowingDataset {
  public:
@@ -131,7 +136,7 @@ class BufferedDataset : public GrowingDataset {
 
   void put(const Row& row) {
     buffer_.push_back(row);
-    if (buffer_.size() == chunk_) flush();
+    if (count() % chunk_ == 0) flush();
   }
 
   void flush() {
@@ -189,15 +194,18 @@ class DsecLayout final : public Hdf5Writer::Layout {
 
   bool append(std::span<const Trigger> /*triggers*/) override { return false; }
 
+  void flush() override {
+    p_.flush();
+    x_.flush();
+    y_.flush();
+    t_.flush();
+    index_.flush();
+    if (first_ && !has_offset_) write_offset(*first_);
+  }
+
   void close() override {
     flush();
-    index_.flush();
-    const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-    const Hdf5Handle offset(H5Dcreate2(file_, "t_offset", H5T_STD_I64LE, space.get(), H5P_DEFAULT,
-                                       H5P_DEFAULT, H5P_DEFAULT),
-                            H5Dclose);
-    const Microseconds first = first_.value_or(0);
-    check(H5Dwrite(offset.get(), H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &first) >= 0);
+    if (!has_offset_) write_offset(0);
   }
 
  private:
@@ -210,10 +218,19 @@ class DsecLayout final : public Hdf5Writer::Layout {
     check(H5Awrite(attribute.get(), H5T_NATIVE_INT, &number) >= 0);
   }
 
+  void write_offset(Microseconds first) {
+    const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    const Hdf5Handle offset(H5Dcreate2(file_, "t_offset", H5T_STD_I64LE, space.get(), H5P_DEFAULT,
+                                       H5P_DEFAULT, H5P_DEFAULT),
+                            H5Dclose);
+    check(H5Dwrite(offset.get(), H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &first) >= 0);
+    has_offset_ = true;
+  }
+
   /// DSEC stores times with 32 bits (71 minutes). Longer recordings get 64 bits, which readers
   /// accept.
   void widen() {
-    flush();
+    t_.flush();
     wide_ = true;
     Times wide(group_.get(), "t64", H5T_STD_U64LE, H5T_NATIVE_UINT64, chunk, compression_);
     std::vector<std::uint64_t> times(chunk);
@@ -227,13 +244,6 @@ class DsecLayout final : public Hdf5Writer::Layout {
           H5Lmove(group_.get(), "t64", group_.get(), "t", H5P_DEFAULT, H5P_DEFAULT) >= 0);
   }
 
-  void flush() {
-    p_.flush();
-    x_.flush();
-    y_.flush();
-    t_.flush();
-  }
-
   using Times = BufferedDataset<std::uint64_t>;
 
   hid_t file_;
@@ -244,6 +254,7 @@ class DsecLayout final : public Hdf5Writer::Layout {
   Times t_;                               ///< relative to the first event
   BufferedDataset<std::uint64_t> index_;  ///< first event at or after each millisecond
   std::optional<Microseconds> first_;
+  bool has_offset_ = false;
   bool wide_ = false;
 };
 
@@ -268,6 +279,8 @@ class MetavisionIndex {
       if (count_ == periods) last_ = {id, passed};
     }
   }
+
+  void flush() { out_.flush(); }
 
   void close() {
     if (first_) out_.put(last_);
@@ -318,9 +331,12 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
 
   void append(std::span<const AbsoluteEvent> events) override {
     for (const auto& event : events) {
-      event_index_.add(events_out_.rows() + events_.size(), event.t);
+      event_index_.add(complete_ + events_.size(), event.t);
       events_.push_back(event);
-      if (events_.size() == chunk) flush_events();
+      if (events_.size() < chunk) continue;
+      write_chunk();
+      complete_ += chunk;
+      events_.clear();
     }
   }
 
@@ -336,9 +352,15 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
     return true;
   }
 
-  void close() override {
-    flush_events();
+  void flush() override {
+    write_chunk();
     triggers_.flush();
+    event_index_.flush();
+    trigger_index_.flush();
+  }
+
+  void close() override {
+    flush();
     event_index_.close();
     trigger_index_.close();
   }
@@ -372,12 +394,11 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
                                               {"id", offsetof(TriggerRow, id), H5T_NATIVE_INT16}});
   }
 
-  void flush_events() {
+  void write_chunk() {
     if (events_.empty()) return;
     encoded_.clear();
     encode_ecf(events_, encoded_);
-    events_out_.append_chunk(encoded_, events_.size());
-    events_.clear();
+    events_out_.write_chunk(encoded_, complete_, events_.size());
   }
 
   Hdf5Handle cd_, trigger_;
@@ -385,7 +406,8 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
   GrowingDataset events_out_;
   BufferedDataset<TriggerRow> triggers_;
   MetavisionIndex event_index_, trigger_index_;
-  std::vector<AbsoluteEvent> events_;
+  hsize_t complete_ = 0;               ///< events in complete chunks
+  std::vector<AbsoluteEvent> events_;  ///< of the last chunk
   std::vector<std::uint8_t> encoded_;
 };
 
@@ -439,6 +461,7 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   }
   layout_->append(events);
   file_->output.check();
+  if (Clock::now() - committed_ >= commit_interval) commit();
 }
 
 bool Hdf5Writer::append(std::span<const Trigger> triggers) {
@@ -449,6 +472,15 @@ bool Hdf5Writer::append(std::span<const Trigger> triggers) {
   return written;
 }
 
+void Hdf5Writer::commit() {
+  const Hdf5Session session;
+  layout_->flush();
+  check(H5Fflush(file_->handle.get(), H5F_SCOPE_GLOBAL) >= 0);
+  file_->output.commit();
+  file_->output.check();
+  committed_ = Clock::now();
+}
+
 void Hdf5Writer::close() {
   if (!layout_) return;
   const Hdf5Session session;
@@ -457,6 +489,7 @@ void Hdf5Writer::close() {
   layout->close();
   layout.reset();
   file_->handle = {};
+  file_->output.commit();
   file_->output.check();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -13,6 +14,8 @@ namespace eventcamera {
 
 /// Writes events to an HDF5 file. All functions throw std::runtime_error if the file cannot be
 /// written, and std::invalid_argument if the layout does not support the data.
+///
+/// Events appended before a commit() can be read even if the process is killed later.
 class Hdf5Writer {
  public:
   enum class Compression : std::uint8_t { none, gzip };
@@ -32,21 +35,25 @@ class Hdf5Writer {
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
 
-  /// Events must be sorted by time and within the sensor.
+  /// Events must be sorted by time and within the sensor. Commits, too, if the last commit is a
+  /// second ago.
   void append(std::span<const AbsoluteEvent> events);
 
   /// False for the DSEC layout, which has no triggers.
   bool append(std::span<const Trigger> triggers);
 
+  void commit();
   void close();
 
  private:
+  using Clock = std::chrono::steady_clock;
   struct File;
 
   SensorSize size_;
   std::unique_ptr<File> file_;
   std::unique_ptr<Layout> layout_;
   Microseconds latest_ = INT64_MIN;
+  Clock::time_point committed_{};  ///< time of the last commit
 };
 
 }  // namespace eventcamera
