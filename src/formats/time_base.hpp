@@ -7,44 +7,67 @@
 
 namespace eventcamera {
 
-/// Unwraps a counter of `bits` bits in units of 2^`shift` microseconds, such as that of TIME_HIGH
-/// words.
+/// Unwraps a counter of `bits` bits in units of 2^`shift` microseconds: that of TIME_HIGH words.
 ///
-/// A count that falls by more than half its range has wrapped. A smaller fall is a sensor error,
-/// such as a flipped bit: the time base then goes back, and the next intact word corrects it.
+/// Counts rise in small steps, in which they may wrap. Any other count is a leap, after a pause or
+/// a flipped bit, and does not wrap. If the next count goes on from before the leap, so does the
+/// time.
 template <int bits, int shift>
 class TimeBase {
  public:
   bool known() const { return known_; }
-  std::uint32_t count() const { return count_; }
+  std::uint32_t count() const { return count_of(time_); }
 
   /// In microseconds; unsigned, because overflow must be well-defined for any file.
-  std::uint64_t time() const { return wraps_ + (std::uint64_t{count_} << shift); }
+  std::uint64_t time() const { return time_; }
 
-  void follow(std::uint32_t count) {
-    constexpr auto half = std::uint32_t{1} << (bits - 1);
-    const bool wrapped = count < count_ && count_ - count > half;
-    wraps_ += std::uint64_t{wrapped} << (bits + shift);
-    count_ = count;
+  /// False if the time goes back: this count, or the one before, is corrupt.
+  bool follow(std::uint32_t count) {
+    const auto last = time_;
+    const auto from = step(before_leap_, count) <= max_step ? before_leap_ : last;
+    if (!known_) {
+      advance_to(std::uint64_t{count} << shift);
+    } else if (step(from, count) <= max_step) {
+      advance_to(from + (std::uint64_t{step(from, count)} << shift));
+    } else {
+      before_leap_ = last;
+      time_ += (std::uint64_t{count} - count_of(last)) << shift;
+    }
     known_ = true;
+    return static_cast<std::int64_t>(time_ - last) >= 0;
   }
 
+  /// Small steps are shorter than this. There are none after a leap, for follow() to judge it.
+  std::uint32_t small_step_end() const { return before_leap_ == time_ ? max_step + 1 : 0; }
+
+  /// Small steps lead to `time`.
+  void advance_to(std::uint64_t time) { before_leap_ = time_ = time; }
+
   UnitReader::State state() const {
-    return {static_cast<Microseconds>(time()), static_cast<std::uint64_t>(known_)};
+    return {static_cast<Microseconds>(time_), static_cast<std::uint64_t>(known_)};
   }
 
   void restore(Microseconds clock, bool known) {
-    const auto time = static_cast<std::uint64_t>(clock);
-    count_ = static_cast<std::uint32_t>(time >> shift) & mask;
-    wraps_ = time - (std::uint64_t{count_} << shift);
+    advance_to(static_cast<std::uint64_t>(clock));
     known_ = known;
   }
 
  private:
+  /// Limit of small steps: two minutes of 28 bits, two seconds of 12.
+  static constexpr std::uint32_t max_step = std::uint32_t{1} << (bits * 3 / 4);
   static constexpr std::uint32_t mask = ~std::uint32_t{0} >> (32 - bits);
 
-  std::uint64_t wraps_ = 0;  ///< sum of the wraps so far, in microseconds
-  std::uint32_t count_ = 0;
+  static std::uint32_t count_of(std::uint64_t time) {
+    return static_cast<std::uint32_t>(time >> shift) & mask;
+  }
+
+  /// Counts from `time` to the next time at `count`.
+  static std::uint32_t step(std::uint64_t time, std::uint32_t count) {
+    return (count - count_of(time)) & mask;
+  }
+
+  std::uint64_t time_ = 0;
+  std::uint64_t before_leap_ = 0;  ///< the time itself if the last step was small
   bool known_ = false;
 };
 

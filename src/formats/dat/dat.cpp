@@ -7,8 +7,8 @@
 #include <string>
 
 #include "src/formats/prophesee_header.hpp"
-#include "src/formats/time_base.hpp"
 #include "src/formats/unit_decoder.hpp"
+#include "src/formats/unit_reader.hpp"
 #include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
@@ -21,17 +21,33 @@ enum Type : std::uint8_t { event_2d = 0x00, event_cd = 0x0c, event_trigger = 0x0
 
 constexpr std::uint8_t record_size = 8;
 
-using DatTime = TimeBase<32, 0>;
+/// Unwraps timestamps of 32 bits. One that falls by more than half its range has wrapped; a smaller
+/// fall is disorder.
+class DatTime {
+ public:
+  Microseconds follow(std::uint32_t timestamp) {
+    constexpr auto half = std::uint32_t{1} << 31;
+    const auto last = static_cast<std::uint32_t>(time_);
+    const bool wrapped = timestamp < last && last - timestamp > half;
+    // Unsigned, because overflow must be well-defined for any file.
+    time_ += std::uint64_t{timestamp} - last + (std::uint64_t{wrapped} << 32);
+    return time();
+  }
+  Microseconds time() const { return static_cast<Microseconds>(time_); }
+  void restore(Microseconds time) { time_ = static_cast<std::uint64_t>(time); }
+
+ private:
+  std::uint64_t time_ = 0;
+};
 
 class DatReader : public UnitReader {
  public:
-  State state() const final { return {static_cast<Microseconds>(time_.time()), 0}; }
-  void restore(const State& state) final { time_.restore(state.clock, true); }
+  State state() const final { return {time_.time(), 0}; }
+  void restore(const State& state) final { time_.restore(state.clock); }
 
  protected:
   static Microseconds next(DatTime& time, const std::uint8_t* record) {
-    time.follow(little_endian<std::uint32_t>(record));
-    return static_cast<Microseconds>(time.time());
+    return time.follow(little_endian<std::uint32_t>(record));
   }
 
   DatTime time_;
@@ -126,7 +142,7 @@ class DatDecoder final : public UnitDecoder {
       if (source.read(at, bytes) != bytes.size()) break;
       time.follow(little_endian<std::uint32_t>(bytes.data()));
     }
-    return static_cast<Microseconds>(time.time());
+    return time.time();
   }
 
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended) override {

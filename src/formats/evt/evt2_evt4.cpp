@@ -72,7 +72,7 @@ class CdReader : public UnitReader {
   /// Reads a word of size `bytes` without events.
   void read_other(CdWord word, const std::uint8_t* at, std::size_t bytes, Batch& batch) {
     if (word.type() == types.time_high) {
-      time_.follow(word.count());
+      if (!time_.follow(word.count())) batch.bad(at, bytes, time_falls);
     } else if (word.type() == types.trigger) {
       if (time_.known()) batch.triggers->push_back(word.trigger(time_.time()));
     } else if ((types.ignored >> word.type() & 1) == 0) {
@@ -241,16 +241,19 @@ class Evt2Reader final : public CdReader<Evt2::types> {
     const auto bounds = bounds_;
     auto time = time_.time();
     auto count = time_.count();
+    auto small_step_end = time_.small_step_end();
     std::uint64_t outside = 0;
     for (; from != end; from += 4) {
       const CdWord word{little_endian<std::uint32_t>(from)};
       const bool is_event = word.type() <= Evt2::cd_on;
-      const bool is_time = word.type() == Evt2::types.time_high && word.count() >= count;
+      const bool is_time =
+          word.type() == Evt2::types.time_high && word.count() - count < small_step_end;
       if (!(is_event || is_time)) [[unlikely]] {
-        time_.follow(count);
+        if (time != time_.time()) time_.advance_to(time);
         read_other(word, from, 4, batch);
         time = time_.time();
         count = time_.count();
+        small_step_end = time_.small_step_end();
         continue;
       }
       // Branch-free, because events and times alternate unpredictably.
@@ -262,7 +265,7 @@ class Evt2Reader final : public CdReader<Evt2::types> {
       event += static_cast<int>(is_event) & static_cast<int>(inside);
       outside += static_cast<std::uint64_t>(static_cast<int>(is_event) & static_cast<int>(!inside));
     }
-    if (time_.known()) time_.follow(count);
+    if (time != time_.time()) time_.advance_to(time);
     batch.end = event;
     batch.outside(outside);
     return from;

@@ -127,7 +127,7 @@ class Evt3Reader final : public UnitReader {
       case time_high: {
         const auto count = word & 0xfff;
         if (!time_.known() || count != time_.count()) low_ = 0;
-        time_.follow(count);
+        if (!time_.follow(count)) batch.bad(at, 2, time_falls);
         break;
       }
       case ext_trigger:

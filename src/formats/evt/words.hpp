@@ -16,6 +16,9 @@ namespace eventcamera {
 /// Columns and rows have 11 bits.
 constexpr int max_evt_side = 2048;
 
+/// Corruption of a TIME_HIGH, or of the one before it.
+inline constexpr const char* time_falls = "EVT time falls without a wrap";
+
 /// A size of 0x0 means unknown.
 std::unique_ptr<UnitReader> make_evt_reader(EvtFormat format, SensorSize size);
 std::unique_ptr<UnitReader> make_evt3_reader(SensorSize size);
