@@ -51,7 +51,7 @@ class MappedEvents {
 /// Caps of events in memory format, from a sensor of this size, at a framerate that varies.
 OwnedCaps event_caps(int width, int height);
 
-/// A time interval (start, end].
+/// Interval of a buffer: the times of its events are at least `start` and at most `end`.
 struct EventInterval {
   GstClockTime start;
   GstClockTime end;

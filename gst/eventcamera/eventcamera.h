@@ -10,9 +10,10 @@
  * - `width`, `height`: of the sensor, in pixels; every x < width, every y < height;
  * - `framerate`: buffers per second, 0/1 if variable.
  *
- * A buffer holds the events of an interval (t0, t1]: its PTS is t0, its duration t1 - t0, and its
- * memory an array of events sorted by time. The time of an event is floor(PTS / 1000) + t
- * microseconds. Intervals never overlap. An interval without events is a GAP event.
+ * A buffer holds the events of an interval, which starts at its PTS and has its duration: an array
+ * sorted by time, with 0 <= t <= duration, in microseconds rounded down. The time of an event is
+ * floor(PTS / 1000) + t microseconds, and no element changes it. Intervals never overlap. An
+ * interval without events is a GAP event.
  *
  * Simulators put events of the same time into raster order, and no pixel fires twice in a
  * microsecond. Recordings keep every event of the file, in its own order within a time: a pixel may

@@ -25,7 +25,7 @@ enum class Polarity : std::uint8_t { off = 0, on = 1 };
 
 /// One event, in the layout of caps format XYTP.
 struct Event {
-  std::uint32_t t;    ///< microseconds after the start of the interval, rounded down
+  std::uint32_t t;    ///< microseconds after the start of the interval, at most its duration
   std::uint16_t x;    ///< column, from the left
   std::uint16_t y_p;  ///< row from the top in bits 0-14; bit 15 is the polarity, 1 = ON
 
@@ -40,17 +40,11 @@ struct Event {
 };
 static_assert(sizeof(Event) == 8);
 
-/// Time of an event in microseconds. Rounding may put it at the start of its interval (start, end];
-/// it is then moved inside.
-constexpr Microseconds time_of(const Event& event, Microseconds start) {
-  return start + (event.t == 0 ? 1 : event.t);
-}
-
 /// Returns those of sorted events, with times relative to `start`, that are not later than `end`.
 inline std::span<const Event> events_until(std::span<const Event> events, Microseconds start,
                                            Microseconds end) {
   const auto first_after =
-      std::ranges::find_if(events, [&](const Event& event) { return time_of(event, start) > end; });
+      std::ranges::find_if(events, [&](const Event& event) { return start + event.t > end; });
   return events.first(static_cast<std::size_t>(first_after - events.begin()));
 }
 

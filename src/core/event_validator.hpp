@@ -15,8 +15,8 @@ class EventValidator {
  public:
   EventValidator(int width, int height) : width_(width), height_(height) {}
 
-  /// Calls take() for each event; event times are relative to `start`. A late event gets the time
-  /// of the previous one, or the first time after the last pass(); events outside the sensor are
+  /// Calls take() for each event; event times are relative to `start`. An event that is earlier
+  /// than the previous one, or than passed(), gets that time; events outside the sensor are
   /// dropped. Returns the number of dropped events.
   template <class Take>
   std::size_t take(std::span<const Event> events, Microseconds start, const Take& take) {
@@ -26,19 +26,17 @@ class EventValidator {
         ++dropped;
         continue;
       }
-      earliest_ = std::max(earliest_, time_of(event, start));
+      earliest_ = std::max(earliest_, start + event.t);
       take(AbsoluteEvent{earliest_, event.x, event.y_p});
     }
     return dropped;
   }
 
-  /// Declares that a picture was drawn up to `end`. Returns `end`, or the time of the last event if
-  /// that is later.
-  Microseconds pass(Microseconds end) {
-    const auto latest = std::max(earliest_, end);
-    earliest_ = std::max(earliest_, end + 1);
-    return latest;
-  }
+  /// Events before `time` are late from now on.
+  void pass(Microseconds time) { earliest_ = std::max(earliest_, time); }
+
+  /// Time before which events are late.
+  Microseconds passed() const { return earliest_; }
 
  private:
   int width_;

@@ -22,8 +22,8 @@ Microseconds distance_between(Microseconds earlier, Microseconds later) {
 
 void RateCurve::extend_to(Microseconds end) {
   if (end <= covered_) return;
-  while (bin_of(end) >= max_bins) join_bins();
-  bins_.resize(std::max(bins_.size(), bin_of(end) + 1));
+  while (bin_of(end - 1) >= max_bins) join_bins();
+  bins_.resize(std::max(bins_.size(), bin_of(end - 1) + 1));
   covered_ = start_ + length_ * static_cast<Microseconds>(bins_.size());
 }
 
@@ -150,7 +150,7 @@ void StreamComparison::take_until(Microseconds end) {
             : StreamRole::candidate;
     const auto& event = due[role].front();
     due[role] = due[role].subspan(1);
-    if (event.t <= begin) continue;
+    if (event.t < begin) continue;
     statistics_[role].add(event);
     matcher_.add(role, event);
     rates_.add(role, event.t);

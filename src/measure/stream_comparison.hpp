@@ -48,9 +48,9 @@ class RateCurve {
 
   explicit RateCurve(Microseconds start = 0) : start_(start), covered_(start) {}
 
-  /// Adds an event, which must be after the start and after `end` of the last extend_to().
+  /// Adds an event, which must not be before the start, nor before `end` of the last extend_to().
   void add(StreamRole role, Microseconds time) {
-    if (time > covered_) extend_to(time);
+    if (time >= covered_) extend_to(time + 1);
     ++bins_.back()[role];
   }
 
@@ -62,9 +62,8 @@ class RateCurve {
   std::span<const Bin> bins() const { return bins_; }
 
  private:
-  /// Bin of a `time` after the start; (start, start + length] is bin 0.
   std::size_t bin_of(Microseconds time) const {
-    return static_cast<std::size_t>((time - start_ - 1) / length_);
+    return static_cast<std::size_t>((time - start_) / length_);
   }
   void join_bins();
 
@@ -145,7 +144,7 @@ class StreamComparison {
   /// The stream that lags behind; its events are needed next.
   StreamRole behind() const;
 
-  /// Adds the sorted events of (start, end] of one stream, with times relative to `start`. Returns
+  /// Adds the sorted events of [start, end] of one stream, with times relative to `start`. Returns
   /// the number of events skipped because they lie outside the sensor.
   std::size_t add(StreamRole role, std::span<const Event> events, Nanoseconds start,
                   Nanoseconds end);

@@ -38,8 +38,8 @@ void EventWindow::add(const AbsoluteEvent& event) {
   }
 }
 
-void EventWindow::begin_after(Microseconds time) {
-  while (!events_.empty() && events_.front().t <= time) drop_oldest();
+void EventWindow::begin_at(Microseconds time) {
+  while (!events_.empty() && events_.front().t < time) drop_oldest();
 }
 
 void EventWindow::drop_oldest() {

@@ -70,8 +70,8 @@ class EventWindow {
   /// drops the oldest events beyond the limits.
   void add(const AbsoluteEvent& event);
 
-  /// Drops the events at or before `time`.
-  void begin_after(Microseconds time);
+  /// Drops the events before `time`.
+  void begin_at(Microseconds time);
 
   const Counts* row(int y) const { return counts_.row(y); }
 

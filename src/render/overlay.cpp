@@ -40,8 +40,8 @@ void Overlay::mark(int x, int y, std::uint8_t kind) {
 
 void Overlay::draw(Microseconds start, Microseconds end, const Palette& palette, double opacity,
                    const PixelLayout& layout, std::byte* picture, std::ptrdiff_t stride) {
-  window_.begin_after(start);
-  validator_.pass(end);
+  window_.begin_at(std::exchange(has_drawn_, true) ? start + 1 : start);
+  validator_.pass(end + 1);
   for (int y = 0; y < sensor_.height; ++y) {
     const auto* row = window_.row(y);
     for (int x = 0; x < sensor_.width; ++x)

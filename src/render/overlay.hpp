@@ -30,7 +30,8 @@ class Overlay {
   /// Like Renderer::add().
   std::size_t add(std::span<const Event> events, Microseconds start);
 
-  /// Draws the events of (start, end] over a frame; `opacity` from 0 to 1, `stride` in bytes.
+  /// Draws the events of (start, end], and of [start, end] the first time, over a frame; `opacity`
+  /// from 0 to 1, `stride` in bytes.
   void draw(Microseconds start, Microseconds end, const Palette& palette, double opacity,
             const PixelLayout& layout, std::byte* picture, std::ptrdiff_t stride);
 
@@ -41,6 +42,7 @@ class Overlay {
   Size picture_;
   EventValidator validator_;
   EventWindow window_;
+  bool has_drawn_ = false;
   Image<std::uint8_t> kinds_;  ///< per pixel of the frame; all 0 between calls
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <utility>
 
 namespace eventcamera {
 namespace {
@@ -62,6 +63,7 @@ void Renderer::configure(const RenderSettings& settings) {
 void Renderer::reset() {
   memory_ = make_memory(width_, height_, settings_);
   validator_ = EventValidator(width_, height_);
+  has_drawn_ = false;
 }
 
 std::size_t Renderer::add(std::span<const Event> events, Microseconds start) {
@@ -95,8 +97,11 @@ void Renderer::shade_row(int y, Microseconds time) {
 
 void Renderer::draw(Microseconds start, Microseconds end, const PixelLayout& layout, std::byte* out,
                     std::ptrdiff_t stride) {
-  const auto time = validator_.pass(end);
-  if (auto* window = std::get_if<EventWindow>(&memory_)) window->begin_after(start);
+  const auto time = std::max(validator_.passed(), end);
+  validator_.pass(end + 1);
+  const bool is_first = !std::exchange(has_drawn_, true);
+  if (auto* window = std::get_if<EventWindow>(&memory_))
+    window->begin_at(is_first ? start : start + 1);
   const auto pixels = pixels_of(settings_, layout);
   for (int y = 0; y < height_; ++y) {
     shade_row(y, time);

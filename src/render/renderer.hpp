@@ -45,13 +45,13 @@ class Renderer {
   /// Forgets all events and their times.
   void reset();
 
-  /// Adds sorted events whose times are relative to `start`. A late event is moved to the time of
-  /// the last one, or to just after the last picture; events outside the picture are skipped.
-  /// Returns the number of skipped events.
+  /// Adds sorted events whose times are relative to `start`. An event that is not later than the
+  /// last picture is drawn in the next one; events outside the picture are skipped. Returns the
+  /// number of skipped events.
   std::size_t add(std::span<const Event> events, Microseconds start);
 
-  /// Draws the picture at `end`. The window for accumulate and count is (start, end]. `stride` in
-  /// bytes.
+  /// Draws the picture at `end`. The window for accumulate and count is (start, end], and [start,
+  /// end] for the first picture. `stride` in bytes.
   void draw(Microseconds start, Microseconds end, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
 
@@ -69,6 +69,7 @@ class Renderer {
   RenderSettings settings_;
   Memory memory_;
   EventValidator validator_;
+  bool has_drawn_ = false;
   std::vector<std::uint8_t> row_;  ///< shades or kinds of the pixels of a row
 };
 

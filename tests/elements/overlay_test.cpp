@@ -62,7 +62,7 @@ using Places = std::vector<std::pair<int, int>>;
 TEST_F(OverlayTest, DrawsTheEventsOfEachFramesInterval) {
   begin("width=8, height=4");
   push_frame(0);
-  push_events(0, {Event::at(1, 0, 5, Polarity::on), Event::at(2, 1, 40'000, Polarity::off)});
+  push_events(0, {Event::at(1, 0, 0, Polarity::on), Event::at(2, 1, 40'000, Polarity::off)});
   EXPECT_EQ(drawn(), (Places{{1, 255}, {10, 0}}));
   push_frame(40 * ms);
   push_events(40 * ms, {Event::at(7, 3, 5, Polarity::on), Event::at(7, 3, 6, Polarity::off)});

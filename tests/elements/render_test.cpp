@@ -247,8 +247,18 @@ TEST_F(Render, ShowsNothingFromOutsideTheSegment) {
   push(120 * ms, column(3));
   push(160 * ms, column(4));
   const auto pictures = finish();
-  expect(pictures, {{100 * ms, 40 * ms, accumulated(column(3))},
-                    {140 * ms, 40 * ms, accumulated(column(4))}});
+  auto first = column(2);
+  std::ranges::copy(column(3), std::back_inserter(first));
+  expect(pictures,
+         {{100 * ms, 40 * ms, accumulated(first)}, {140 * ms, 40 * ms, accumulated(column(4))}});
+}
+
+TEST_F(Render, ShowsAnEventAtTheVeryStart) {
+  begin(grey_at("25/1"));
+  const std::vector first = {Event::at(2, 1, 0, Polarity::on)};
+  push(0, first);
+  push(40 * ms, column(1));
+  expect(finish(), {{0, 40 * ms, accumulated(first)}, {40 * ms, 40 * ms, accumulated(column(1))}});
 }
 
 TEST_F(Render, RefusesToRunBackwards) {

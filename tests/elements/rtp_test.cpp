@@ -152,6 +152,19 @@ TEST_P(EveryFormat, GivesBackEveryBufferAndGap) {
   }
 }
 
+TEST_P(EveryFormat, KeepsTheTimesOfAllEvents) {
+  Harness h("rtpeventpay format=" + std::string(GetParam()) + " ! rtpeventdepay");
+  h.caps(davis_caps);
+  // From the start of an interval, which is not at a whole microsecond, to its end.
+  const Interval interval{5'000'300,
+                          20'000'000,
+                          {Event::at(1, 2, 0, Polarity::on), Event::at(3, 4, 0, Polarity::off),
+                           Event::at(5, 6, 20'000, Polarity::on)}};
+  push(h, interval);
+  end(h);
+  EXPECT_TRUE(absolute(Output(h).intervals) == absolute({interval}));
+}
+
 TEST_P(EveryFormat, SendsPacketsUpToTheMtu) {
   const auto intervals = rtp_packets::random_intervals(davis, 40, 5);
   for (const unsigned mtu : {64U, 576U, 1500U, 9000U}) {

@@ -140,7 +140,7 @@ static bool push_caps(GstEventDatagramDepay* self) {
   return state.has_caps;
 }
 
-/// Buffer of the events of the interval (start, end]. May throw.
+/// Buffer of the events of the interval from start to end. May throw.
 static GstBuffer* buffer_of(std::span<const AbsoluteEvent> events, Microseconds start,
                             Microseconds end) {
   std::vector<Event> stream;
