@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "gst/eventcamera/eventcamera.h"
-#include "src/formats/decoder.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/encoder.hpp"
 
 /// An event file format, and the element that writes it: an event stream in, bytes out.

@@ -5,6 +5,7 @@
 
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
+#include "src/formats/unsupported_format.hpp"
 
 static constexpr auto flags =
     static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);

@@ -11,7 +11,8 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/guarded.hpp"
-#include "src/formats/decoder.hpp"
+#include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
 
 /// True if downstream of a source pad can seek in bytes.
 bool can_seek_bytes(GstPad* src);

@@ -1,98 +1,20 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/byte_source.hpp"
+#include "src/formats/corruption.hpp"
+#include "src/formats/decoded.hpp"
+#include "src/formats/seek_points.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
-
-/// Sensor size in pixels.
-struct SensorSize {
-  int width = 0;
-  int height = 0;
-
-  friend constexpr bool operator==(const SensorSize&, const SensorSize&) = default;
-};
-
-/// Output of a decoder, which only appends.
-struct Decoded {
-  std::vector<AbsoluteEvent> events;
-  std::vector<Trigger> triggers;
-};
-
-/// Thrown if the bytes are not of this format, or of an unsupported version or codec. what() is a
-/// message for users.
-class UnsupportedFormat : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-/// Corruption found so far. A decoder skips it and continues at the next valid place.
-struct Corruption {
-  std::uint64_t places = 0;    ///< number of corrupt places
-  std::uint64_t first_at = 0;  ///< byte offset of the first in the file
-  std::string first;           ///< description of the first, for users
-  std::uint64_t unsorted = 0;  ///< events earlier than one before them, delivered as read
-  std::uint64_t outside = 0;   ///< events outside the sensor, dropped
-
-  /// Records one more place.
-  void note(std::uint64_t at, const char* what) {
-    if (places++ == 0) {
-      first_at = at;
-      first = what;
-    }
-  }
-};
-
-/// Position in a file at which a decoder can resume as if it had read everything before.
-struct SeekPoint {
-  Microseconds t = 0;  ///< time of the latest event before it; the minimum value if there is none
-  std::uint64_t position = 0;  ///< offset in the file, bytes
-  Microseconds clock = 0;      ///< private to the decoder
-  std::uint64_t state = 0;     ///< private to the decoder
-};
-
-/// Seek points of the part of a file that was read. Their number is bounded for files of any
-/// length.
-class SeekPoints {
- public:
-  bool due(std::uint64_t position) const { return position >= next_; }
-
-  void note(const SeekPoint& seek_point) {
-    known_.push_back(seek_point);
-    if (known_.size() == max_count) {
-      for (std::size_t i = 1; i < max_count / 2; ++i) known_[i] = known_[2 * i];
-      known_.resize(max_count / 2);
-      spacing_ *= 2;
-    }
-    next_ = seek_point.position + spacing_;
-  }
-
-  /// Returns the last seek point without events at `t` or later before it; none before the header
-  /// is read.
-  std::optional<SeekPoint> before(Microseconds t) const {
-    if (known_.empty()) return std::nullopt;
-    const auto later = std::partition_point(known_.begin() + 1, known_.end(),
-                                            [t](const SeekPoint& known) { return known.t < t; });
-    return *(later - 1);
-  }
-
- private:
-  static constexpr std::size_t max_count = 4096;
-
-  std::vector<SeekPoint> known_;
-  std::uint64_t spacing_ = std::uint64_t{1} << 16;
-  std::uint64_t next_ = 0;
-};
 
 /// Bytes at the end of a file that are read to find its last event; covers the disorder of events.
 constexpr std::size_t tail_size = std::size_t{1} << 16;

@@ -10,7 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "src/formats/decoder.hpp"
+#include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
+#include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 

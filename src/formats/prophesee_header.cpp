@@ -5,7 +5,7 @@
 #include <charconv>
 #include <string_view>
 
-#include "src/formats/decoder.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 namespace {

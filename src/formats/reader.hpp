@@ -12,8 +12,13 @@
 #include <variant>
 #include <vector>
 
+#include "src/core/sensor_size.hpp"
 #include "src/formats/byte_source.hpp"
+#include "src/formats/corruption.hpp"
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/seek_points.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

@@ -6,7 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "src/formats/decoder.hpp"
+#include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
 

@@ -6,8 +6,12 @@
 #include <memory>
 #include <vector>
 
+#include "src/core/sensor_size.hpp"
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/seek_points.hpp"
 #include "src/formats/unit_reader.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

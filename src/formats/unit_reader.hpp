@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "src/formats/decoder.hpp"
+#include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/little_endian.hpp"
 
 namespace eventcamera {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "src/core/event.hpp"
-#include "src/formats/decoder.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/wire/rtp_payload.hpp"
 
 namespace eventcamera {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "src/formats/decoder.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/wire/rtp_payload.hpp"
 
 namespace eventcamera {

@@ -8,7 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "src/formats/decoder.hpp"
+#include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/unit_reader.hpp"
 #include "src/wire/rtp_payload.hpp"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "src/core/event.hpp"
-#include "src/formats/decoder.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera::aedat_files {
 

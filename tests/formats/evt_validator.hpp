@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "src/formats/decoder.hpp"
+#include "src/core/sensor_size.hpp"
 
 /// Checks what all known readers of EVT words rely on, word by word. Each function returns the
 /// first fault, or nothing.

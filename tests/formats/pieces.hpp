@@ -9,6 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "src/core/sensor_size.hpp"
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera::pieces {

@@ -8,8 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "src/core/sensor_size.hpp"
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace recordings {
 

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "src/core/sensor_size.hpp"
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
 

@@ -11,7 +11,10 @@
 #include <tuple>
 #include <vector>
 
+#include "src/core/sensor_size.hpp"
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 /// Invariants of every decoder for arbitrary bytes.
 namespace fuzz {

@@ -6,9 +6,11 @@
 #include <optional>
 #include <string>
 
+#include "src/core/sensor_size.hpp"
 #include "src/formats/aedat/aedat2_layout.hpp"
 #include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera {

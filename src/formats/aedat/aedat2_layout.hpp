@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "src/core/address_layout.hpp"
-#include "src/formats/decoder.hpp"
+#include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
 

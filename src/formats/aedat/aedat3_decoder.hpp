@@ -7,6 +7,7 @@
 
 #include "src/formats/aedat/aedat_header.hpp"
 #include "src/formats/byte_queue.hpp"
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 
 namespace eventcamera {

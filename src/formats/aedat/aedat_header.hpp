@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "src/formats/byte_queue.hpp"
-#include "src/formats/decoder.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

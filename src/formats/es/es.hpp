@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "src/core/sensor_size.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
 

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "src/core/sensor_size.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
 

@@ -6,10 +6,10 @@
 #include <cstring>
 #include <new>
 
-#include "src/formats/decoder.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
 #include "src/formats/little_endian.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

@@ -5,10 +5,13 @@
 #include <optional>
 #include <vector>
 
-#include "src/formats/decoder.hpp"
+#include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
+#include "src/formats/corruption.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_dataset.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

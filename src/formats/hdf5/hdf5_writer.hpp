@@ -7,7 +7,8 @@
 #include <memory>
 #include <span>
 
-#include "src/formats/decoder.hpp"
+#include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/formats/hdf5/hdf5_layout.hpp"
 
 namespace eventcamera {

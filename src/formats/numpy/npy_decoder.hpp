@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/numpy/npy_header.hpp"

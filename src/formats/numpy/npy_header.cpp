@@ -6,6 +6,7 @@
 #include <string>
 
 #include "src/formats/little_endian.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

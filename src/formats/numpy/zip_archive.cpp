@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "src/formats/decoder.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/table_sample.hpp"

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace eventcamera {
+
+/// Corruption found so far. A decoder skips it and continues at the next valid place.
+struct Corruption {
+  std::uint64_t places = 0;    ///< number of corrupt places
+  std::uint64_t first_at = 0;  ///< byte offset of the first in the file
+  std::string first;           ///< description of the first, for users
+  std::uint64_t unsorted = 0;  ///< events earlier than one before them, delivered as read
+  std::uint64_t outside = 0;   ///< events outside the sensor, dropped
+
+  /// Records one more place.
+  void note(std::uint64_t at, const char* what) {
+    if (places++ == 0) {
+      first_at = at;
+      first = what;
+    }
+  }
+};
+
+}  // namespace eventcamera
