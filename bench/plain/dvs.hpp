@@ -88,7 +88,7 @@ class DvsPixels {
           }
         }
       }
-      if (settings_.shot_noise_rate_hz > 0) add_noise(frame, duration, end, band, out);
+      if (settings_.shot_noise_rate > 0) add_noise(frame, duration, end, band, out);
     });
   }
 
@@ -104,8 +104,8 @@ class DvsPixels {
   void count(const Picture& frame, float duration, int band) {
     const BandRows rows(band, frame.height);
     const auto bandwidth =
-        static_cast<float>(2 * std::numbers::pi * settings_.cutoff_hz) * duration;
-    const auto leak = static_cast<float>(settings_.leak_rate_hz) * duration;
+        static_cast<float>(2 * std::numbers::pi * settings_.cutoff_frequency) * duration;
+    const auto leak = static_cast<float>(settings_.leak_rate) * duration;
     int max_count = 0;
     for (int y = rows.first; y < rows.last; ++y) {
       for (int x = 0; x < frame.width; ++x) {
@@ -113,7 +113,7 @@ class DvsPixels {
         float& filtered = filtered_.at(x, y);
         float& reference = reference_.at(x, y);
         const float share =
-            settings_.cutoff_hz > 0 ? std::min(1.0F, brightness(grey) * bandwidth) : 1;
+            settings_.cutoff_frequency > 0 ? std::min(1.0F, brightness(grey) * bandwidth) : 1;
         filtered += share * (lin_log(grey) - filtered);
         reference -= leak * positive_.at(x, y);
         const float change = filtered - reference;
@@ -134,7 +134,7 @@ class DvsPixels {
     const BandRows rows(band, frame.height);
     auto& random = random_[static_cast<std::size_t>(band)];
     std::uniform_real_distribution<float> uniform(0, 1);
-    const auto rate = static_cast<float>(settings_.shot_noise_rate_hz) / 2 * duration;
+    const auto rate = static_cast<float>(settings_.shot_noise_rate) / 2 * duration;
     const auto t = static_cast<std::uint32_t>(end * 1e6);
     for (int y = rows.first; y < rows.last; ++y) {
       for (int x = 0; x < frame.width; ++x) {
@@ -197,7 +197,8 @@ class DvsSimulator final : public Simulator {
       for (int y = 0; y < now.height; ++y)
         for (int x = 0; x < now.width; ++x)
           longest = std::max(longest, std::hypot(flow.row(y)[x].x, flow.row(y)[x].y));
-      steps = std::clamp(static_cast<int>(std::ceil(longest)), 1, settings_.max_steps);
+      steps = std::clamp(static_cast<int>(std::ceil(longest)), 1,
+                         settings_.max_interpolated_frames + 1);
     }
     events.reset(steps, band_count(now.height));
     const Warp<std::uint8_t> warp{last_.view(), now, steps};

@@ -136,17 +136,17 @@ const Setting table[] = {
      &DvsSettings::log_eps, 1e-6, 1},
     {"upsampling", "Upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0,
      0, fixed, upsampling_type},
-    {"max-steps", "Maximum steps",
-     "Maximum number of steps between two frames with upsampling=motion; there are as many as the "
-     "pixels that the fastest point moves",
-     &DvsSettings::max_steps, 1, 255},
-    {"cutoff-hz", "Cutoff",
+    {"max-interpolated-frames", "Maximum interpolated frames",
+     "Maximum number of frames interpolated between two frames with upsampling=motion; with enough "
+     "of them, no point moves more than a pixel from one to the next",
+     &DvsSettings::max_interpolated_frames, 0, 254},
+    {"cutoff-frequency", "Cutoff frequency",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
-     &DvsSettings::cutoff_hz, 0, 1e6, controllable},
+     &DvsSettings::cutoff_frequency, 0, 1e6, controllable},
     {"dark-light", "Dark light",
      "Background light that limits how slow and how noisy dark pixels get (fraction of white): the "
-     "bandwidth of a pixel is cutoff-hz times its brightness, (light + dark-light) / (1 + "
-     "dark-light), and its shot noise falls from all of shot-noise-rate-hz at brightness 0 to a "
+     "bandwidth of a pixel is cutoff-frequency times its brightness, (light + dark-light) / (1 + "
+     "dark-light), and its shot noise falls from all of shot-noise-rate at brightness 0 to a "
      "quarter at 1",
      &DvsSettings::dark_light, 1e-6, 1, controllable},
     {"positive-threshold", "Positive threshold",
@@ -161,14 +161,14 @@ const Setting table[] = {
     {"threshold-jitter", "Threshold jitter",
      "Standard deviation of the thresholds between events (units of the response)",
      &DvsSettings::threshold_jitter, 0, 10, controllable},
-    {"leak-rate-hz", "Leak rate",
+    {"leak-rate", "Leak rate",
      "Mean rate of ON events of a pixel without change, from the leak of its reference level (Hz)",
-     &DvsSettings::leak_rate_hz, 0, 1e4, controllable},
+     &DvsSettings::leak_rate, 0, 1e4, controllable},
     {"leak-spread", "Leak spread", "Standard deviation of the leak rate between pixels (decades)",
      &DvsSettings::leak_spread, 0, 1},
-    {"shot-noise-rate-hz", "Shot-noise rate",
+    {"shot-noise-rate", "Shot-noise rate",
      "Rate of random events of a pixel in the dark, ON and OFF together (Hz)",
-     &DvsSettings::shot_noise_rate_hz, 0, 1e4, controllable},
+     &DvsSettings::shot_noise_rate, 0, 1e4, controllable},
     {"hot-pixels", "Hot pixels",
      "Fraction of pixels that leak 10 to 1000 ON events per second, regardless of light",
      &DvsSettings::hot_pixels, 0, 1},
@@ -187,16 +187,16 @@ const Setting table[] = {
      "How long before a frame's timestamp its exposure begins, and with it exposure-pulse (ns); "
      "longer than the time between frames, there is no pulse",
      &DvsSettings::exposure_lead, 0, max_time, controllable},
-    {"latency", "Latency",
+    {"pixel-latency", "Pixel latency",
      "Time from the crossing of a threshold to the event, with which the refractory period begins "
      "(ns). Events past the last frame are not sent",
-     &DvsSettings::latency, 0, max_time, controllable},
-    {"latency-jitter", "Latency jitter", "Standard deviation of the latency (ns)",
-     &DvsSettings::latency_jitter, 0, max_time, controllable},
-    {"max-event-rate", "Maximum event rate",
+     &DvsSettings::pixel_latency, 0, max_time, controllable},
+    {"pixel-latency-jitter", "Pixel latency jitter", "Standard deviation of pixel-latency (ns)",
+     &DvsSettings::pixel_latency_jitter, 0, max_time, controllable},
+    {"max-rate", "Maximum rate",
      "Capacity of the readout: further events wait, row by row, and a waiting pixel fires no other "
      "event (events/s; 0 = no limit)",
-     &DvsSettings::max_event_rate, 0, 1e12, controllable},
+     &DvsSettings::max_rate, 0, 1e12, controllable},
     {"seed", "Seed", "Seed of all random numbers: the same seed gives the same events",
      &DvsSettings::seed},
 };

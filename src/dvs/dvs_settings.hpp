@@ -40,9 +40,9 @@ struct DvsSettings {
   double log_eps = 1e-3;  ///< of Response::log; white is 1
 
   Upsampling upsampling = Upsampling::linear;
-  int max_steps = 32;  ///< between two frames, for Upsampling::motion
+  int max_interpolated_frames = 31;  ///< between two frames, for Upsampling::motion
 
-  double cutoff_hz = 0;              ///< cutoff of the photoreceptor at white
+  double cutoff_frequency = 0;       ///< cutoff of the photoreceptor at white
   double dark_light = 20.0 / 255.0;  ///< background light; white is 1
 
   double positive_threshold = 0.2;  ///< units of the response
@@ -50,11 +50,11 @@ struct DvsSettings {
   double threshold_sigma = 0;       ///< std-dev between pixels, units of the response
   double threshold_jitter = 0;      ///< std-dev between events, units of the response
 
-  double leak_rate_hz = 0;        ///< ON events per second of a pixel in constant light
-  double leak_spread = 0;         ///< std-dev of the leak rate between pixels, decades
-  double shot_noise_rate_hz = 0;  ///< events per second of a dark pixel, both polarities together
-  double hot_pixels = 0;          ///< fraction of all pixels
-  double dead_pixels = 0;         ///< fraction of all pixels
+  double leak_rate = 0;        ///< ON events per second of a pixel in constant light
+  double leak_spread = 0;      ///< std-dev of the leak rate between pixels, decades
+  double shot_noise_rate = 0;  ///< events per second of a dark pixel, both polarities together
+  double hot_pixels = 0;       ///< fraction of all pixels
+  double dead_pixels = 0;      ///< fraction of all pixels
 
   Nanoseconds refractory_period = 0;
   RefractoryReset refractory_reset = RefractoryReset::level;
@@ -62,9 +62,9 @@ struct DvsSettings {
   double exposure_pulse = 0;      ///< rise of all signals at the start of an exposure, same units
   Nanoseconds exposure_lead = 0;  ///< from the start of the exposure to the frame's time
 
-  Nanoseconds latency = 0;         ///< from the crossing to the event
-  Nanoseconds latency_jitter = 0;  ///< std-dev of the latency
-  double max_event_rate = 0;       ///< limit of the readout, events per second; 0 = no limit
+  Nanoseconds pixel_latency = 0;         ///< from the crossing to the event
+  Nanoseconds pixel_latency_jitter = 0;  ///< std-dev of the latency
+  double max_rate = 0;                   ///< limit of the readout, events per second; 0 = no limit
 
   std::uint64_t seed = 0;
 

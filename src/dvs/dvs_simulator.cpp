@@ -24,7 +24,7 @@ namespace {
 bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
   return a.positive_threshold == b.positive_threshold &&
          a.negative_threshold == b.negative_threshold && a.threshold_sigma == b.threshold_sigma &&
-         a.leak_rate_hz == b.leak_rate_hz && a.leak_spread == b.leak_spread &&
+         a.leak_rate == b.leak_rate && a.leak_spread == b.leak_spread &&
          a.hot_pixels == b.hot_pixels && a.dead_pixels == b.dead_pixels && a.seed == b.seed;
 }
 
@@ -90,7 +90,7 @@ class PixelSimulator final : public DvsSimulator {
   /// Returns the duration of the interval in microseconds.
   double begin(const StepTimes& interval, EventBuckets& events) {
     if (settings_ != current_) change_to(settings_);
-    if (current_.max_event_rate > 0 && !readout_) readout_.emplace(format().width, format().height);
+    if (current_.max_rate > 0 && !readout_) readout_.emplace(format().width, format().height);
     const double duration = in_microseconds(interval.duration());
     fired_.begin(duration, band_count(format().height), readout_ ? unread_ : events);
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
@@ -100,10 +100,10 @@ class PixelSimulator final : public DvsSimulator {
   void finish(double duration, EventBuckets& events) {
     sub_interval_count_ += sub_intervals_.size();
     if (!readout_) return;
-    const bool is_limited = current_.max_event_rate > 0;
+    const bool is_limited = current_.max_rate > 0;
     sorted_.resize(unread_.size());
     unread_.write_to(sorted_.data(), threads());
-    readout_->pass(sorted_, duration, is_limited ? current_.max_event_rate : unlimited, events);
+    readout_->pass(sorted_, duration, is_limited ? current_.max_rate : unlimited, events);
     if (!is_limited) readout_.reset();  // no events are waiting any more
   }
 
@@ -127,7 +127,7 @@ class PixelSimulator final : public DvsSimulator {
 
   void advance_along_motion(double duration) {
     const auto flow = find_flow();
-    const int steps = std::clamp(steps_of(flow), 1, current_.max_steps);
+    const int steps = std::clamp(steps_of(flow), 1, current_.max_interpolated_frames + 1);
     plan(duration, steps, true);
     const Warp<Pixel> warp{last_.view(), now_.view(), steps};
     for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
@@ -191,8 +191,8 @@ class PixelSimulator final : public DvsSimulator {
     auto& candidates = scratch.candidates;
     candidates.count = 0;
     const PixelRow pixels = pixels_.row(y);
-    filter_row({sub_interval, tables, responses_, luma_bits(current_), current_.cutoff_hz > 0,
-                current_.shot_noise_rate_hz > 0},
+    filter_row({sub_interval, tables, responses_, luma_bits(current_),
+                current_.cutoff_frequency > 0, current_.shot_noise_rate > 0},
                luma, pixels, format().width, candidates);
     const RowToSolve solved{current_, random_, sub_interval, tables, pixels, candidates, events};
     switch (solver_for(current_)) {
@@ -226,7 +226,7 @@ class PixelSimulator final : public DvsSimulator {
   /// Changes settings mid-stream. Pixels keep their state unless its units changed.
   void change_to(const DvsSettings& settings) {
     const bool is_comparable = have_same_response(settings, current_);
-    const bool had_bandwidth = current_.cutoff_hz > 0;
+    const bool had_bandwidth = current_.cutoff_frequency > 0;
     adopt(settings);
     if (!is_comparable)
       settle();

@@ -63,8 +63,8 @@ struct ShadeTables {
     constexpr double min_cutoff_hz = 1e-3;  // minutes; slower makes no difference
     constexpr double noise_at_white = 0.25;
     const double max_bandwidth =
-        2 * std::numbers::pi * std::max(settings.cutoff_hz, min_cutoff_hz) / 1e6;
-    const double max_noise_rate = settings.shot_noise_rate_hz / 1e6;
+        2 * std::numbers::pi * std::max(settings.cutoff_frequency, min_cutoff_hz) / 1e6;
+    const double max_noise_rate = settings.shot_noise_rate / 1e6;
     for (std::size_t i = 0; i < shades; ++i) {
       const double light = light_of(static_cast<double>(i) / 255, settings.linear_light);
       // In (0, 1]; scales the bandwidth, and reduces the noise, relative to a dark pixel.

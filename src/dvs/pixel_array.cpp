@@ -49,16 +49,16 @@ PixelTraits Mismatch::of(std::uint64_t pixel) const {
 
   const double positive = fixed_threshold(pixel, Polarity::on);
   const double negative = fixed_threshold(pixel, Polarity::off);
-  double leak_rate_hz = settings_.leak_rate_hz;
-  if (settings_.leak_spread > 0 && leak_rate_hz > 0) {
+  double leak_rate = settings_.leak_rate;
+  if (settings_.leak_spread > 0 && leak_rate > 0) {
     // Keeps the mean over all pixels at the configured rate.
     const double spread = settings_.leak_spread * std::numbers::ln10;
-    leak_rate_hz *= std::exp(spread * random_.normal(pixel, Purpose::leak) - spread * spread / 2);
+    leak_rate *= std::exp(spread * random_.normal(pixel, Purpose::leak) - spread * spread / 2);
   }
   if (defect < settings_.dead_pixels + settings_.hot_pixels)
-    leak_rate_hz +=
+    leak_rate +=
         min_hot_hz * std::pow(max_hot_hz / min_hot_hz, random_.uniform(pixel, Purpose::heat));
-  return {positive, negative, leak_rate_hz * positive / 1e6};
+  return {positive, negative, leak_rate * positive / 1e6};
 }
 
 double Mismatch::leaked(std::uint64_t pixel, const PixelTraits& traits, double noise_rate) const {
@@ -108,7 +108,7 @@ void PixelArray::draw_traits(int y, const DvsSettings& settings, const Random& r
 
 void PixelArray::settle(int y, const DvsSettings& settings, const Random& random) {
   const Mismatch mismatch(settings, random);
-  const double noise_rate = settings.shot_noise_rate_hz / 1e6;
+  const double noise_rate = settings.shot_noise_rate / 1e6;
   const PixelRow pixels = row(y);
   for (int x = 0; x < width(); ++x) {
     const auto number = pixels.first_number + static_cast<std::uint64_t>(x);

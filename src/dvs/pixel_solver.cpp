@@ -11,8 +11,8 @@ namespace {
 struct Delays {
   explicit Delays(const DvsSettings& settings)
       : refractory_period(in_microseconds(settings.refractory_period)),
-        latency(in_microseconds(settings.latency)),
-        latency_jitter(in_microseconds(settings.latency_jitter)) {}
+        latency(in_microseconds(settings.pixel_latency)),
+        latency_jitter(in_microseconds(settings.pixel_latency_jitter)) {}
 
   double refractory_period;
   double latency;
@@ -158,7 +158,7 @@ void solve_pixels(const RowToSolve& row) {
     const double last_target = row.candidates.last_target[i];
     const double target = row.pixels.target[x];
     const double duration = row.sub_interval.duration;
-    const auto signal = row.settings.cutoff_hz > 0
+    const auto signal = row.settings.cutoff_frequency > 0
                             ? Trajectory::low_pass(row.candidates.last_signal[i], last_target,
                                                    target, duration, row.tables.bandwidth[shade])
                             : Trajectory::line(last_target, target, duration);
@@ -197,11 +197,11 @@ void solve_lines(const RowToSolve& row) {
 }
 
 Solver solver_for(const DvsSettings& settings) {
-  const bool has_side_effects = settings.latency > 0 || settings.latency_jitter > 0 ||
+  const bool has_side_effects = settings.pixel_latency > 0 || settings.pixel_latency_jitter > 0 ||
                                 settings.threshold_jitter > 0 ||
                                 settings.refractory_reset == RefractoryReset::signal;
   if (has_side_effects) return Solver::pixels;
-  const bool has_lines = settings.cutoff_hz == 0 && settings.shot_noise_rate_hz == 0;
+  const bool has_lines = settings.cutoff_frequency == 0 && settings.shot_noise_rate == 0;
   return has_lines ? Solver::lines : Solver::row;
 }
 

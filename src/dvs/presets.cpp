@@ -10,13 +10,13 @@ struct Row {
   DvsPreset preset;
   Response response;
   double log_eps, dark_light;
-  double cutoff_hz;
+  double cutoff_frequency;
   double positive_threshold, negative_threshold, threshold_sigma, threshold_jitter;
-  double leak_rate_hz, leak_spread, shot_noise_rate_hz, hot_pixels;
+  double leak_rate, leak_spread, shot_noise_rate, hot_pixels;
   Nanoseconds refractory_period;
   RefractoryReset refractory_reset;
-  Nanoseconds latency, latency_jitter;
-  double max_event_rate;
+  Nanoseconds pixel_latency, pixel_latency_jitter;
+  double max_rate;
 };
 
 using enum Response;
@@ -61,21 +61,21 @@ DvsSettings settings_of(DvsPreset preset) {
   const Row& row = *std::ranges::find(table, preset, &Row::preset);
   return {.response = row.response,
           .log_eps = row.log_eps,
-          .cutoff_hz = row.cutoff_hz,
+          .cutoff_frequency = row.cutoff_frequency,
           .dark_light = row.dark_light,
           .positive_threshold = row.positive_threshold,
           .negative_threshold = row.negative_threshold,
           .threshold_sigma = row.threshold_sigma,
           .threshold_jitter = row.threshold_jitter,
-          .leak_rate_hz = row.leak_rate_hz,
+          .leak_rate = row.leak_rate,
           .leak_spread = row.leak_spread,
-          .shot_noise_rate_hz = row.shot_noise_rate_hz,
+          .shot_noise_rate = row.shot_noise_rate,
           .hot_pixels = row.hot_pixels,
           .refractory_period = row.refractory_period,
           .refractory_reset = row.refractory_reset,
-          .latency = row.latency,
-          .latency_jitter = row.latency_jitter,
-          .max_event_rate = row.max_event_rate};
+          .pixel_latency = row.pixel_latency,
+          .pixel_latency_jitter = row.pixel_latency_jitter,
+          .max_rate = row.max_rate};
 }
 
 }  // namespace eventcamera

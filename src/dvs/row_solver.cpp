@@ -174,7 +174,7 @@ class RowSolver {
       : row_(row),
         unsolved_(unsolved),
         duration_(row.sub_interval.duration),
-        has_bandwidth_(row.settings.cutoff_hz > 0),
+        has_bandwidth_(row.settings.cutoff_frequency > 0),
         gap_(std::max(in_microseconds(row.settings.refractory_period), min_gap)) {}
 
   void solve() {

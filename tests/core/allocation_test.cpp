@@ -151,7 +151,7 @@ TEST(Allocations, AreNotMadeByPhysicalPixels) {
   const auto limited = [](const LumaFormat& format) -> std::unique_ptr<Simulator> {
     auto simulator = make_dvs_simulator(format);
     // The limit of the readout is constant.
-    simulator->set({.cutoff_hz = 100, .refractory_period = 100'000, .max_event_rate = 2e5});
+    simulator->set({.cutoff_frequency = 100, .refractory_period = 100'000, .max_rate = 2e5});
     return simulator;
   };
   EXPECT_EQ(allocations_of<std::uint16_t>(limited, 12), 0);

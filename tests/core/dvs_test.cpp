@@ -22,9 +22,9 @@
 namespace eventcamera {
 
 inline void PrintTo(const DvsSettings& settings, std::ostream* out) {
-  *out << "response " << static_cast<int>(settings.response) << ", cutoff " << settings.cutoff_hz
-       << " Hz, leak " << settings.leak_rate_hz << " Hz, refractory period "
-       << settings.refractory_period << " ns, reset "
+  *out << "response " << static_cast<int>(settings.response) << ", cutoff "
+       << settings.cutoff_frequency << " Hz, leak " << settings.leak_rate
+       << " Hz, refractory period " << settings.refractory_period << " ns, reset "
        << static_cast<int>(settings.refractory_reset);
 }
 
@@ -163,7 +163,7 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
   for (int x = 0; x < width; ++x) {
     const int shade = static_cast<int>(draw() % shades);
     const float from = pixels.target[x];
-    const bool is_lagging = settings.cutoff_hz > 0;
+    const bool is_lagging = settings.cutoff_frequency > 0;
     const float signal = is_lagging ? from + 0.1F * (level(draw) - 0.75F) : from;
     const float to = x % 5 == 0 ? from : level(draw);
     candidates.add(x, shade, from, signal);
@@ -208,7 +208,7 @@ void expect_equal(const Solved& found, const Solved& expected) {
 
 TEST(Solvers, AreEqualOnAllTargets) {
   DvsSettings settings{.threshold_sigma = 0.03,
-                       .leak_rate_hz = 5,
+                       .leak_rate = 5,
                        .leak_spread = 0.1,
                        .dead_pixels = 0.05,
                        .refractory_period = 700'000};
@@ -216,10 +216,10 @@ TEST(Solvers, AreEqualOnAllTargets) {
     ASSERT_EQ(solver_for(settings), Solver::lines);
     expect_equal(solved(settings, width, solve_lines), solved(settings, width, solve_pixels));
     for (const double noise_hz : {0.0, 30.0}) {
-      for (const double cutoff_hz : {0.0, 3.0, 30.0, 3000.0}) {
+      for (const double cutoff_frequency : {0.0, 3.0, 30.0, 3000.0}) {
         auto others = settings;
-        others.cutoff_hz = cutoff_hz;
-        others.shot_noise_rate_hz = noise_hz;
+        others.cutoff_frequency = cutoff_frequency;
+        others.shot_noise_rate = noise_hz;
         const auto expected = solved(others, width, solve_pixels);
         std::optional<Solved> first;
         targets::for_each([&](const char* target) {
@@ -267,17 +267,17 @@ void stand(Playback& playback, const Image<std::uint8_t>& picture, int frames,
 class Reference : public testing::TestWithParam<DvsSettings> {};
 INSTANTIATE_TEST_SUITE_P(
     , Reference,
-    testing::Values(DvsSettings{}, DvsSettings{.response = Response::log, .cutoff_hz = 40},
-                    DvsSettings{.linear_light = true, .cutoff_hz = 200, .negative_threshold = 0.31},
-                    DvsSettings{.response = Response::linear, .cutoff_hz = 15, .leak_rate_hz = 7},
-                    DvsSettings{.leak_rate_hz = 30, .refractory_period = 900'000},
-                    DvsSettings{.cutoff_hz = 100, .refractory_period = 1'500'000},
-                    DvsSettings{.cutoff_hz = 100,
-                                .leak_rate_hz = 9,
-                                .refractory_period = 1'500'000,
-                                .refractory_reset = RefractoryReset::signal},
-                    DvsSettings{.refractory_period = 15'000'000,
-                                .refractory_reset = RefractoryReset::signal}));
+    testing::Values(
+        DvsSettings{}, DvsSettings{.response = Response::log, .cutoff_frequency = 40},
+        DvsSettings{.linear_light = true, .cutoff_frequency = 200, .negative_threshold = 0.31},
+        DvsSettings{.response = Response::linear, .cutoff_frequency = 15, .leak_rate = 7},
+        DvsSettings{.leak_rate = 30, .refractory_period = 900'000},
+        DvsSettings{.cutoff_frequency = 100, .refractory_period = 1'500'000},
+        DvsSettings{.cutoff_frequency = 100,
+                    .leak_rate = 9,
+                    .refractory_period = 1'500'000,
+                    .refractory_reset = RefractoryReset::signal},
+        DvsSettings{.refractory_period = 15'000'000, .refractory_reset = RefractoryReset::signal}));
 
 TEST_P(Reference, IsEqualled) {
   constexpr int width = 19;
@@ -309,7 +309,7 @@ TEST_P(Reference, IsEqualled) {
 }
 
 TEST(Dvs, LeaksAtItsRate) {
-  const DvsSettings settings{.leak_rate_hz = 5, .leak_spread = 0.1};
+  const DvsSettings settings{.leak_rate = 5, .leak_spread = 0.1};
   Playback playback({96, 80, 8}, settings);
   stand(playback, flat(96, 80, 90), 40, 250'000'000);
   const double expected = 96 * 80 * 5 * 10.0;
@@ -322,7 +322,7 @@ TEST(Dvs, LeaksAtItsRate) {
 }
 
 TEST(Dvs, MakesShotNoiseThatIsPoisson) {
-  const DvsSettings settings{.shot_noise_rate_hz = 20};
+  const DvsSettings settings{.shot_noise_rate = 20};
   for (const int grey : {0, 128, 255}) {
     Playback playback({64, 48, 8}, settings);
     stand(playback, flat(64, 48, grey), 250, 40'000'000);
@@ -353,13 +353,13 @@ TEST(Dvs, MakesShotNoiseThatIsPoisson) {
 }
 
 TEST(Dvs, AnswersAStepWithItsTimeConstant) {
-  for (const double cutoff_hz : {3.0, 30.0, 300.0}) {
-    const DvsSettings settings{.cutoff_hz = cutoff_hz, .positive_threshold = 0.05};
+  for (const double cutoff_frequency : {3.0, 30.0, 300.0}) {
+    const DvsSettings settings{.cutoff_frequency = cutoff_frequency, .positive_threshold = 0.05};
     Playback playback({4, 3, 8}, settings);
     playback.push(flat(4, 3, 60), 8, 0);
     playback.push(flat(4, 3, 200), 8, 1000);  // within a microsecond
     playback.push(flat(4, 3, 200), 8, 3'000'000'000);
-    const double tau = second / (2 * std::numbers::pi * cutoff_hz * 220 / 275);
+    const double tau = second / (2 * std::numbers::pi * cutoff_frequency * 220 / 275);
     const double step = std::log(200 / 60.0);
     for (const auto& [place, events] : by_pixel(playback.events)) {
       ASSERT_EQ(events.size(), static_cast<std::size_t>(step / 0.05));
@@ -395,14 +395,14 @@ TEST(Dvs, HasTheSpreadOfThresholdsThatIsSet) {
 
 TEST(Dvs, RestsForTheRefractoryPeriod) {
   for (const auto reset : {RefractoryReset::level, RefractoryReset::signal}) {
-    DvsSettings settings{.cutoff_hz = 500,
+    DvsSettings settings{.cutoff_frequency = 500,
                          .threshold_jitter = 0.02,
-                         .leak_rate_hz = 50,
-                         .shot_noise_rate_hz = 200,
+                         .leak_rate = 50,
+                         .shot_noise_rate = 200,
                          .refractory_period = 3'000'000,
                          .refractory_reset = reset,
-                         .latency = 700'000,
-                         .latency_jitter = 300'000};
+                         .pixel_latency = 700'000,
+                         .pixel_latency_jitter = 300'000};
     Playback playback({40, 30, 8}, settings);
     for (int i = 0; i < 60; ++i)
       playback.push(scene::noise<std::uint8_t>(40, 30, 8, static_cast<unsigned>(i)), 8,
@@ -415,8 +415,8 @@ TEST(Dvs, RestsForTheRefractoryPeriod) {
 }
 
 TEST(Dvs, AnswersASineOfLightWithAsManyOnAsOff) {
-  for (const double cutoff_hz : {0.0, 50.0}) {
-    Playback playback({8, 8, 16}, DvsSettings{.cutoff_hz = cutoff_hz,
+  for (const double cutoff_frequency : {0.0, 50.0}) {
+    Playback playback({8, 8, 16}, DvsSettings{.cutoff_frequency = cutoff_frequency,
                                               .positive_threshold = 0.11,
                                               .negative_threshold = 0.11});
     for (int i = 0; i <= 400; ++i) {
@@ -432,7 +432,7 @@ TEST(Dvs, AnswersASineOfLightWithAsManyOnAsOff) {
       for (const auto& event : events) on += event.polarity == Polarity::on ? 1 : -1;
       ASSERT_GT(events.size(), 200U);
       // It may end one swing away from its start, and the first one settles.
-      ASSERT_LE(std::abs(on), cutoff_hz > 0 ? 4 : 1);
+      ASSERT_LE(std::abs(on), cutoff_frequency > 0 ? 4 : 1);
     }
   }
 }
@@ -452,21 +452,21 @@ TEST(Dvs, GivesRampsTheirExactTimes) {
 DvsSettings everything() {
   return {.denoise = 4,
           .response = Response::log,
-          .cutoff_hz = 60,
+          .cutoff_frequency = 60,
           .threshold_sigma = 0.03,
           .threshold_jitter = 0.02,
-          .leak_rate_hz = 3,
+          .leak_rate = 3,
           .leak_spread = 0.2,
-          .shot_noise_rate_hz = 8,
+          .shot_noise_rate = 8,
           .hot_pixels = 0.01,
           .dead_pixels = 0.02,
           .refractory_period = 400'000,
           .refractory_reset = RefractoryReset::signal,
           .exposure_pulse = 0.05,
           .exposure_lead = 9'000'000,
-          .latency = 300'000,
-          .latency_jitter = 100'000,
-          .max_event_rate = 2e7,
+          .pixel_latency = 300'000,
+          .pixel_latency_jitter = 100'000,
+          .max_rate = 2e7,
           .seed = 11};
 }
 
@@ -502,7 +502,7 @@ TEST(Dvs, IsTheSameForAllThreadsStridesAndTargets) {
   for (const auto& size : {Size{1, 1}, Size{3, 17}, Size{31, 33}, Size{97, 61}, Size{130, 40}}) {
     auto along_motion = everything();
     along_motion.upsampling = Upsampling::motion;
-    along_motion.max_steps = 5;
+    along_motion.max_interpolated_frames = 4;
     for (const auto& settings : {everything(), along_motion, settings_of(DvsPreset::v2e_noisy)}) {
       for (const int bits : {8, 10, 12, 16}) {
         const auto play = [&](int threads, int padding) {
@@ -557,7 +557,7 @@ TEST(Dvs, ForgetsAndRepeatsItself) {
 
 TEST(Dvs, GoesOnWhileTheLastFrameStands) {
   const auto grey = flat(50, 40, 100);
-  const DvsSettings settings{.leak_rate_hz = 10};
+  const DvsSettings settings{.leak_rate = 10};
   auto simulator = make_dvs_simulator({50, 40, 8});
   simulator->set(settings);
   EXPECT_EQ(simulator->hold_until(5), nullptr);
@@ -574,11 +574,11 @@ TEST(Dvs, IsBoundedWhateverComes) {
   settings.positive_threshold = settings.negative_threshold = 0;
   settings.threshold_sigma = settings.threshold_jitter = 0;
   settings.log_eps = 1e-6;
-  settings.shot_noise_rate_hz = settings.leak_rate_hz = 10'000;
-  settings.refractory_period = settings.latency = settings.latency_jitter = 0;
-  settings.max_event_rate = 0;
-  for (const double cutoff_hz : {0.0, 1e-9, 1e6}) {
-    settings.cutoff_hz = cutoff_hz;
+  settings.shot_noise_rate = settings.leak_rate = 10'000;
+  settings.refractory_period = settings.pixel_latency = settings.pixel_latency_jitter = 0;
+  settings.max_rate = 0;
+  for (const double cutoff_frequency : {0.0, 1e-9, 1e6}) {
+    settings.cutoff_frequency = cutoff_frequency;
     Playback playback({20, 10, 8}, settings);
     Nanoseconds time = 0;
     const Nanoseconds gaps[] = {1, 999, 1001, 40'000'000, max_interval};
@@ -625,7 +625,7 @@ TEST(Dvs, HasItsSharesOfHotAndDeadPixels) {
     EXPECT_GE(events.size(), 9U);
     EXPECT_LE(events.size(), 1001U);
   }
-  Playback dead({200, 150, 8}, DvsSettings{.shot_noise_rate_hz = 10, .dead_pixels = 0.1});
+  Playback dead({200, 150, 8}, DvsSettings{.shot_noise_rate = 10, .dead_pixels = 0.1});
   dead.push(flat(200, 150, 10), 8, 0);
   dead.push(flat(200, 150, 240), 8, 40'000'000);
   EXPECT_NEAR(static_cast<double>(by_pixel(dead.events).size()), 27'000, 300);
@@ -696,7 +696,7 @@ TEST(Dvs, SendsEventsAsLateAsItsLatency) {
   const auto dark = flat(6, 5, 40);
   const auto bright = flat(6, 5, 200);
   const auto play = [&](Nanoseconds latency) {
-    Playback playback({6, 5, 8}, DvsSettings{.positive_threshold = 0.5, .latency = latency});
+    Playback playback({6, 5, 8}, DvsSettings{.positive_threshold = 0.5, .pixel_latency = latency});
     playback.push(dark, 8, 0);
     playback.push(bright, 8, 40'000'000);
     playback.push(bright, 8, 80'000'000);
@@ -718,7 +718,7 @@ TEST(Dvs, ReadsOutNoMoreThanItCan) {
   constexpr int width = 40;
   constexpr int height = 30;
   const auto play = [&](double rate) {
-    Playback playback({width, height, 8}, DvsSettings{.max_event_rate = rate});
+    Playback playback({width, height, 8}, DvsSettings{.max_rate = rate});
     for (int i = 0; i < 8; ++i)
       playback.push(scene::texture<std::uint8_t>(width, height, 8, 3.0 * i, 2.0 * i), 8,
                     i * scene::frame_time);
@@ -783,7 +783,7 @@ TEST(Dvs, TakesSettingsFromFrameToFrame) {
   EXPECT_EQ(push(200), 0U);
   playback.set({.response = Response::log});  // other units: starts over
   EXPECT_EQ(push(200), 0U);
-  playback.set({.response = Response::log, .cutoff_hz = 1});
+  playback.set({.response = Response::log, .cutoff_frequency = 1});
   EXPECT_EQ(push(220), 0U);
   playback.set({.response = Response::log, .upsampling = Upsampling::motion});
   EXPECT_EQ(push(220), 0U);

@@ -162,14 +162,14 @@ TEST(Dvs, TakesWhatIsNotSetFromItsPreset) {
     set("seed", "18446744073709551615");
     if (!preset_is_first) set("preset", "v2e-noisy");
     EXPECT_EQ(number(element, "threshold-sigma"), 0.07);
-    EXPECT_EQ(number(element, "cutoff-hz"), 30);
-    EXPECT_EQ(number(element, "shot-noise-rate-hz"), 5);
-    EXPECT_EQ(number(element, "leak-rate-hz"), 0.1);
+    EXPECT_EQ(number(element, "cutoff-frequency"), 30);
+    EXPECT_EQ(number(element, "shot-noise-rate"), 5);
+    EXPECT_EQ(number(element, "leak-rate"), 0.1);
     set("preset", "icns");
     EXPECT_EQ(number(element, "threshold-sigma"), 0.07);
     EXPECT_EQ(number(element, "positive-threshold"), 0.4);
     EXPECT_EQ(number(element, "refractory-period"), 100'000);
-    EXPECT_EQ(number(element, "latency"), 100'000);
+    EXPECT_EQ(number(element, "pixel-latency"), 100'000);
     gint reset = 0;
     guint64 seed = 0;
     g_object_get(element, "refractory-reset", &reset, "seed", &seed, nullptr);
@@ -208,13 +208,14 @@ TEST(Dvs, NamesItsPresetsAndTheirsAreInRange) {
 TEST(Dvs, CountsTimeInNanoseconds) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
-  for (const char* name : {"refractory-period", "exposure-lead", "latency", "latency-jitter"}) {
+  for (const char* name :
+       {"refractory-period", "exposure-lead", "pixel-latency", "pixel-latency-jitter"}) {
     GParamSpec* spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), name);
     ASSERT_TRUE(G_IS_PARAM_SPEC_UINT64(spec)) << name;
     EXPECT_EQ(G_PARAM_SPEC_UINT64(spec)->maximum, GST_SECOND) << name;
     EXPECT_NE(std::string(g_param_spec_get_blurb(spec)).find("(ns)"), std::string::npos) << name;
   }
-  Harness h("eventsim-dvs latency=7000000");
+  Harness h("eventsim-dvs pixel-latency=7000000");
   h.caps("video/x-raw, format=GRAY8, width=8, height=8, framerate=25/1");
   h.push(h.flat(0, 20));
   h.push(h.flat(40 * GST_MSECOND, 200));
@@ -272,9 +273,9 @@ TEST(Dvs, ChangesOverTimeButItsSensorStaysTheSame) {
                  GST_PARAM_CONTROLLABLE)
         << trait;
   for (const char* property :
-       {"denoise", "cutoff-hz", "dark-light", "negative-threshold", "threshold-jitter",
-        "leak-rate-hz", "shot-noise-rate-hz", "exposure-pulse", "exposure-lead", "latency",
-        "latency-jitter", "max-event-rate"})
+       {"denoise", "cutoff-frequency", "dark-light", "negative-threshold", "threshold-jitter",
+        "leak-rate", "shot-noise-rate", "exposure-pulse", "exposure-lead", "pixel-latency",
+        "pixel-latency-jitter", "max-rate"})
     EXPECT_TRUE(g_object_class_find_property(G_OBJECT_GET_CLASS(h.element()), property)->flags &
                 GST_PARAM_CONTROLLABLE)
         << property;

@@ -148,9 +148,9 @@ TEST_P(EveryElement, TakesPropertiesWhilePlaying) {
       g_object_set(h.element(), "positive-threshold", unit * (i % 50 + 1.5), "negative-threshold",
                    unit * (i % 40 + 0.5), "n-threads", i % 3, "palette", i % 4, nullptr);
       if (is_physical(GetParam()))
-        g_object_set(h.element(), "preset", i % 7, "cutoff-hz", i % 3 * 50.0, "response", i % 3,
-                     "upsampling", i % 2, "latency",
-                     guint64{30} * static_cast<guint64>(i % 4) * GST_MSECOND, "max-event-rate",
+        g_object_set(h.element(), "preset", i % 7, "cutoff-frequency", i % 3 * 50.0, "response",
+                     i % 3, "upsampling", i % 2, "pixel-latency",
+                     guint64{30} * static_cast<guint64>(i % 4) * GST_MSECOND, "max-rate",
                      i % 2 * 1e5, nullptr);
       else if (!std::string(GetParam()).ends_with("-frame"))
         g_object_set(h.element(), "interpolated-frames", i % 20, nullptr);

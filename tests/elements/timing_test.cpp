@@ -401,7 +401,7 @@ TEST_P(EveryElement, LearnsItsLatencyWhereTheFramerateVaries) {
 }
 
 TEST(Dvs, SendsTheNoiseOfAGap) {
-  Harness h("eventsim-dvs leak-rate-hz=100");
+  Harness h("eventsim-dvs leak-rate=100");
   h.caps(video);
   h.push(h.flat(0, 90));
   gst_harness_push_event(h.get(), gst_event_new_gap(40 * GST_MSECOND, 100 * GST_MSECOND));

@@ -112,14 +112,14 @@ class DvsPixel {
     const double next = response(light(luma));
     const double dark = settings_.dark_light;
     const double shade = std::min(std::floor(luma * 65535 / 256), 255.0) / 255;
-    const double bandwidth =
-        2 * std::numbers::pi * settings_.cutoff_hz / 1e6 * (light(shade) + dark) / (1 + dark);
+    const double bandwidth = 2 * std::numbers::pi * settings_.cutoff_frequency / 1e6 *
+                             (light(shade) + dark) / (1 + dark);
     // Sampled every microsecond, the line is exact to the resolution of events.
     for (int i = 1; i <= microseconds; ++i, ++now_) {
       input_ = last + (next - last) * i / microseconds;
-      signal_ =
-          settings_.cutoff_hz > 0 ? input_ + (signal_ - input_) * std::exp(-bandwidth) : input_;
-      reference_ -= settings_.leak_rate_hz / 1e6 * settings_.positive_threshold;
+      signal_ = settings_.cutoff_frequency > 0 ? input_ + (signal_ - input_) * std::exp(-bandwidth)
+                                               : input_;
+      reference_ -= settings_.leak_rate / 1e6 * settings_.positive_threshold;
       const bool is_refractory = now_ + 1 < ready_;
       if (settings_.refractory_reset == RefractoryReset::signal && is_refractory) {
         reference_ = signal_;
