@@ -49,9 +49,9 @@ static const Format formats[] = {
      "eventdatenc name=writer ! filesink name=out", NULL},
     {".es", "Event Stream", "application/x-es", "eventesenc name=writer ! filesink name=out", NULL},
     {".csv", "text", "application/x-event-csv", "eventcsvenc name=writer ! filesink name=out",
-     "dialect"},
-    {".txt", "text, dialect rpg by default", "application/x-event-csv",
-     "eventcsvenc name=writer dialect=rpg ! filesink name=out", "dialect"},
+     "format"},
+    {".txt", "text, format rpg by default", "application/x-event-csv",
+     "eventcsvenc name=writer format=rpg ! filesink name=out", "format"},
     {".npy", "NumPy array", "application/x-npy", "eventnpyenc name=writer ! filesink name=out",
      NULL},
     {".npz", "NumPy archive, read only", "application/x-npz", NULL, NULL},
@@ -61,7 +61,7 @@ static const Format formats[] = {
     {".h5", "HDF5, written in the layout of DSEC", "application/x-hdf5",
      "eventhdf5sink name=writer", "compression"},
     {".hdf5", "HDF5, written in the layout of Metavision", "application/x-hdf5",
-     "eventhdf5sink name=writer layout=metavision", NULL},
+     "eventhdf5sink name=writer format=metavision", NULL},
 };
 
 typedef struct {
@@ -72,7 +72,6 @@ typedef struct {
 
 static Option properties[] = {
     {"format", NULL, NULL},
-    {"dialect", NULL, NULL},
     {"compression", NULL, NULL},
     {"time-unit", "text or NumPy files", NULL},
     {"column-order", "text or NumPy files", NULL},
@@ -83,18 +82,17 @@ static Option properties[] = {
 static gboolean print_version;
 
 static const GOptionEntry options[] = {
-    {"format", 'f', 0, G_OPTION_ARG_STRING, &properties[0].value, "Words of a .raw file", "NAME"},
-    {"dialect", 'd', 0, G_OPTION_ARG_STRING, &properties[1].value, "Dialect of a .csv or .txt file",
-     "NAME"},
-    {"compression", 'c', 0, G_OPTION_ARG_STRING, &properties[2].value,
+    {"format", 'f', 0, G_OPTION_ARG_STRING, &properties[0].value,
+     "Words of a .raw file, or columns of a .csv or .txt file", "NAME"},
+    {"compression", 'c', 0, G_OPTION_ARG_STRING, &properties[1].value,
      "Compression of an .aedat4 or .h5 file", "NAME"},
-    {"time-unit", 'u', 0, G_OPTION_ARG_STRING, &properties[3].value,
+    {"time-unit", 'u', 0, G_OPTION_ARG_STRING, &properties[2].value,
      "Unit of the times in text or NumPy files that are read", "NAME"},
-    {"column-order", 'o', 0, G_OPTION_ARG_STRING, &properties[4].value,
+    {"column-order", 'o', 0, G_OPTION_ARG_STRING, &properties[3].value,
      "Columns of text or NumPy files that are read, such as txyp", "LETTERS"},
-    {"width", 0, 0, G_OPTION_ARG_STRING, &properties[5].value,
+    {"width", 0, 0, G_OPTION_ARG_STRING, &properties[4].value,
      "Width of the sensor, if IN does not state it", "PIXELS"},
-    {"height", 0, 0, G_OPTION_ARG_STRING, &properties[6].value,
+    {"height", 0, 0, G_OPTION_ARG_STRING, &properties[5].value,
      "Height of the sensor, if IN does not state it", "PIXELS"},
     {"version", 0, 0, G_OPTION_ARG_NONE, &print_version, "Print the version", NULL},
     G_OPTION_ENTRY_NULL,
@@ -130,7 +128,7 @@ static gchar* help(void) {
     g_string_append_printf(text, "  %-8s %s\n", formats[i].extension, formats[i].description);
   g_string_append(text, "\nNames that options accept:\n");
   append_names(text, ".raw", "evtenc", "format");
-  append_names(text, ".csv and .txt", "eventcsvenc", "dialect");
+  append_names(text, ".csv and .txt", "eventcsvenc", "format");
   append_names(text, ".aedat4", "aedatmux", "compression");
   append_names(text, ".h5", "eventhdf5sink", "compression");
   append_names(text, "text and NumPy", "eventcsvdec", "time-unit");

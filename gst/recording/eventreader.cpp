@@ -43,9 +43,9 @@ using eventcamera::UnsupportedFormat;
 
 namespace {
 
-enum Property : guint { prop_buffer_time = 1, prop_stats };
+enum Property : guint { prop_buffer_duration = 1, prop_stats };
 
-constexpr GstClockTime default_buffer_time = 10 * GST_MSECOND;
+constexpr GstClockTime default_buffer_duration = 10 * GST_MSECOND;
 
 /// Returned by step() if no output is available.
 constexpr GstFlowReturn nothing_ready = GST_FLOW_CUSTOM_SUCCESS;
@@ -80,8 +80,8 @@ class EventReader {
   EventReader(const EventReader&) = delete;
   EventReader& operator=(const EventReader&) = delete;
 
-  void set_buffer_time(GstClockTime time) { shared_.lock()->buffer_time = time; }
-  GstClockTime buffer_time() { return shared_.lock()->buffer_time; }
+  void set_buffer_duration(GstClockTime time) { shared_.lock()->buffer_duration = time; }
+  GstClockTime buffer_duration() { return shared_.lock()->buffer_duration; }
   GuardedSettings<FormatSettings>& format_settings() { return format_settings_; }
   GstStructure* stats();
 
@@ -99,7 +99,7 @@ class EventReader {
   struct Shared {
     Shared() { gst_segment_init(&segment, GST_FORMAT_TIME); }
 
-    GstClockTime buffer_time = default_buffer_time;
+    GstClockTime buffer_duration = default_buffer_duration;
     GstSegment segment = {};  ///< relative to the origin; its position is that of the output
     GstClockTime duration = GST_CLOCK_TIME_NONE;
     RecordingReader::Counts counts;
@@ -219,15 +219,15 @@ static EventReader& reader_of(gpointer object) {
 }
 
 static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  if (id == prop_buffer_time)
-    reader_of(object).set_buffer_time(g_value_get_uint64(value));
+  if (id == prop_buffer_duration)
+    reader_of(object).set_buffer_duration(g_value_get_uint64(value));
   else
     G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
 }
 
 static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  if (id == prop_buffer_time)
-    g_value_set_uint64(value, reader_of(object).buffer_time());
+  if (id == prop_buffer_duration)
+    g_value_set_uint64(value, reader_of(object).buffer_duration());
   else if (id == prop_stats)
     g_value_take_boxed(value, reader_of(object).stats());
   else
@@ -264,10 +264,10 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
   object_class->finalize = finalize;
   GST_ELEMENT_CLASS(klass)->change_state = change_state;
   g_object_class_install_property(
-      object_class, prop_buffer_time,
-      g_param_spec_uint64("buffer-time", "Buffer time",
+      object_class, prop_buffer_duration,
+      g_param_spec_uint64("buffer-duration", "Buffer duration",
                           "Duration of a buffer of events (nanoseconds, in whole microseconds)",
-                          GST_USECOND, 10 * GST_SECOND, default_buffer_time,
+                          GST_USECOND, 10 * GST_SECOND, default_buffer_duration,
                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                    GST_PARAM_MUTABLE_READY)));
   g_object_class_install_property(
@@ -380,10 +380,10 @@ void EventReader::reset() {
   group_ = GST_GROUP_ID_INVALID;
   seqnum_ = GST_SEQNUM_INVALID;
   const auto shared = shared_.lock();
-  const auto buffer_time = shared->buffer_time;
+  const auto buffer_duration = shared->buffer_duration;
   const bool is_pulling = shared->is_pulling;
   *shared = {};
-  shared->buffer_time = buffer_time;
+  shared->buffer_duration = buffer_duration;
   shared->is_pulling = is_pulling;
 }
 
@@ -398,7 +398,7 @@ void EventReader::open_recording() {
     return make_reader(caps.get(), settings);
   };
   close_recording();
-  const auto length = static_cast<Microseconds>(buffer_time() / GST_USECOND);
+  const auto length = static_cast<Microseconds>(buffer_duration() / GST_USECOND);
   recording_ = std::make_shared<RecordingReader>(
       make, length, is_timed() ? RecordingReader::Clock::stream : RecordingReader::Clock::file);
   if (bytes_) recording_->open(*bytes_);
@@ -420,7 +420,7 @@ Report EventReader::report_of(const std::exception& error) const {
             std::string("Cannot read this file: ") + error.what() + "."};
   if (is_a<std::bad_alloc>(error))
     return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
-            "There is not enough memory for the events. Lower buffer-time."};
+            "There is not enough memory for the events. Lower buffer-duration."};
   return {format_.has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE,
           "Cannot read this file. Check that it is complete and that its extension matches its "
           "format."};
@@ -1055,7 +1055,7 @@ GstClockTime EventReader::duration() {
 gboolean EventReader::src_query(GstPad* pad, GstQuery* query) {
   GstFormat format = GST_FORMAT_UNDEFINED;
   if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(sink_, query, buffer_time()) ||
+    return answer_latency(sink_, query, buffer_duration()) ||
            gst_pad_query_default(pad, GST_OBJECT(element_), query);
   if (is_timed()) return gst_pad_query_default(pad, GST_OBJECT(element_), query);
   switch (GST_QUERY_TYPE(query)) {

@@ -10,8 +10,8 @@
 
 /// A recording format, and the element that reads it: bytes in, streams of events and video out.
 ///
-/// Events come in buffers of duration `buffer-time`; a silence of any length is one GAP. PTS are
-/// the times of the file, so that they survive when written again. The segments of all streams
+/// Events come in buffers of duration `buffer-duration`; a silence of any length is one GAP. PTS
+/// are the times of the file, so that they survive when written again. The segments of all streams
 /// start at the first event or frame of the file, so that running time and stream time are 0 there
 /// and streams are in sync. A file with negative times is shifted to start at 0.
 ///

@@ -32,7 +32,7 @@ using eventcamera::WaitingItems;
 
 namespace {
 
-enum Property : guint { prop_variant = 1, prop_max_size, prop_stats };
+enum Property : guint { prop_variant = 1, prop_mtu, prop_stats };
 
 /// Alignment of words, which never straddle multiples of it, bytes.
 constexpr std::size_t word_bytes = 8;
@@ -58,7 +58,7 @@ struct GstEventWriterPrivate {
   explicit GstEventWriterPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
 
   std::atomic<int> variant = 0;
-  std::atomic<guint> max_size = G_MAXUINT;
+  std::atomic<guint> mtu = G_MAXUINT;
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
@@ -186,7 +186,7 @@ static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
 
 /// Maximum bytes per buffer.
 static std::size_t capacity(GstEventWriter* self) {
-  return priv_of(self).max_size / word_bytes * word_bytes;
+  return priv_of(self).mtu / word_bytes * word_bytes;
 }
 
 static GstFlowReturn push_header(GstEventWriter* self, GstClockTime pts) {
@@ -235,7 +235,7 @@ static GstFlowReturn encode(GstEventWriter* self, std::span<const AbsoluteEvent>
   auto& priv = priv_of(self);
   const auto room = capacity(self);
   while (!events.empty()) {
-    const auto count = priv.max_size == G_MAXUINT
+    const auto count = priv.mtu == G_MAXUINT
                            ? events.size()
                            : count_that_fits(events, room - std::min(room, priv.bytes.size()));
     if (count == 0) {
@@ -406,8 +406,8 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 static void set_property(GObject* object, guint id, const GValue* value, GParamSpec*) {
   auto& priv = priv_of(GST_EVENT_WRITER(object));
-  if (id == prop_max_size)
-    priv.max_size = g_value_get_uint(value);
+  if (id == prop_mtu)
+    priv.mtu = g_value_get_uint(value);
   else
     priv.variant = g_value_get_enum(value);
 }
@@ -416,8 +416,8 @@ static void get_property(GObject* object, guint id, GValue* value, GParamSpec*) 
   auto& priv = priv_of(GST_EVENT_WRITER(object));
   if (id == prop_stats)
     g_value_take_boxed(value, priv.writable.stats());
-  else if (id == prop_max_size)
-    g_value_set_uint(value, priv.max_size);
+  else if (id == prop_mtu)
+    g_value_set_uint(value, priv.mtu);
   else
     g_value_set_enum(value, priv.variant);
 }
@@ -474,8 +474,8 @@ static void format_class_init(gpointer klass, gpointer data) {
                           static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_READY)));
   if (format.has_words)
     g_object_class_install_property(
-        object_class, prop_max_size,
-        g_param_spec_uint("max-size", "Maximum size",
+        object_class, prop_mtu,
+        g_param_spec_uint("mtu", "MTU",
                           "Maximum size of a buffer of words in bytes, such as the payload of a "
                           "network packet; words are never split",
                           64, G_MAXUINT, G_MAXUINT,

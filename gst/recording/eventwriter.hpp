@@ -31,7 +31,7 @@ struct EventFileFormat {
   int max_width = GST_EVENT_CAMERA_MAX_WIDTH;
   int max_height = GST_EVENT_CAMERA_MAX_HEIGHT;
   const Variants* variants = nullptr;
-  bool has_words = false;  ///< has property max-size, which limits the words per buffer
+  bool has_words = false;  ///< has property mtu, which limits the words per buffer
 
   /// Creates the encoder for a stream with these output caps. May throw.
   std::unique_ptr<eventcamera::Encoder> (*create)(eventcamera::SensorSize size, int variant,

@@ -45,7 +45,7 @@ const Format formats[] = {
     {"evt4", "evtenc format=EVT4", "evtdec", "application/x-prophesee-raw"},
     {"dat", "eventdatenc", "eventdatdec", "application/x-prophesee-dat"},
     {"es", "eventesenc", "eventesdec", "application/x-es"},
-    {"csv", "eventcsvenc dialect=metavision", "eventcsvdec", "application/x-event-csv", "no\n"},
+    {"csv", "eventcsvenc format=metavision", "eventcsvdec", "application/x-event-csv", "no\n"},
     {"npy", "eventnpyenc", "eventnpydec", "application/x-npy", "", false},
 };
 
@@ -287,7 +287,7 @@ TEST_P(EveryFormat, BeginsAtTheFirstEventAndTellsSilence) {
 }
 
 TEST_P(EveryFormat, CutsByBufferTime) {
-  auto h = Harness::with_late_pad(std::string(format().reader) + " buffer-time=100000000");
+  auto h = Harness::with_late_pad(std::string(format().reader) + " buffer-duration=100000000");
   begin_file(h, format());
   push_file(h, file_of(format(), some_events()), 5000);
   int buffers = 0;
@@ -827,7 +827,7 @@ TEST_P(EveryWord, FollowsGapsAndFlushes) {
 
 TEST_P(EveryWord, FillBuffersOfALimitedSize) {
   constexpr gsize max_size = 100;
-  Harness writer("evtenc max-size=100");
+  Harness writer("evtenc mtu=100");
   gst_harness_set_sink_caps_str(writer.get(), words_caps(GetParam()).c_str());
   gst_harness_set_src_caps_str(writer.get(), events_caps.c_str());
   auto reader = Harness::with_late_pad("evtdec");
@@ -866,7 +866,7 @@ TEST(EvtEnc, PutsManyEventsIntoABufferOfALimitedSize) {
   for (int i = 0; i < 10'000; ++i)
     events.push_back(AbsoluteEvent::at(i % 320, i / 320, i / 100, Polarity::on));
   for (const char* const limit : {"1400", "4294967295"}) {
-    Harness writer(std::string("evtenc max-size=") + limit);
+    Harness writer(std::string("evtenc mtu=") + limit);
     gst_harness_set_sink_caps_str(writer.get(), words_caps("EVT2").c_str());
     gst_harness_set_src_caps_str(writer.get(), events_caps.c_str());
     writer.push(buffer_of(events, 0));
@@ -1042,7 +1042,7 @@ TEST(EventNpyDec, ChangesCapsWhereEventsLieOutsideTheAssumedSensor) {
 }
 
 TEST(TableReaders, TakeTheSizeOfTheirProperties) {
-  const Format csv{"csv", "eventcsvenc dialect=names", "eventcsvdec", "application/x-event-csv"};
+  const Format csv{"csv", "eventcsvenc format=names", "eventcsvdec", "application/x-event-csv"};
   const auto events = growing_events();
   for (const auto& format : {npy, csv}) {
     SCOPED_TRACE(format.name);
@@ -1079,8 +1079,7 @@ TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
 }
 
 TEST(EventCsvDec, TakesTimesInTheUnitThatIsFoundOrSet) {
-  const Format esim = {"esim", "eventcsvenc dialect=esim", "eventcsvdec",
-                       "application/x-event-csv"};
+  const Format esim = {"esim", "eventcsvenc format=esim", "eventcsvdec", "application/x-event-csv"};
   const auto file = file_of(esim, some_events());
   for (const char* const reader : {"eventcsvdec", "eventcsvdec time-unit=nanoseconds"}) {
     auto h = Harness::with_late_pad(reader);

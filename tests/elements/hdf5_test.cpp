@@ -219,7 +219,7 @@ TEST_P(Hdf5, IsFoundByDecodebin) {
 
 TEST_P(Hdf5, CutsByBufferTime) {
   Player player("filesrc location=" + in_quotes(written(some_events())) +
-                " ! eventhdf5dec buffer-time=100000000");
+                " ! eventhdf5dec buffer-duration=100000000");
   ASSERT_TRUE(player.ends_well());
   EXPECT_EQ(player.buffers, 10);
 }
@@ -295,7 +295,7 @@ TEST_P(Hdf5, IsWritten) {
   const auto events = some_events();
   const auto path = folder_ / "out.h5";
   Player player("filesrc location=" + in_quotes(written(events)) +
-                " ! eventhdf5dec ! tee name=t  t. ! queue ! eventhdf5sink layout=" + GetParam() +
+                " ! eventhdf5dec ! tee name=t  t. ! queue ! eventhdf5sink format=" + GetParam() +
                 " location=" + in_quotes(path) + "  t. ! queue");
   ASSERT_TRUE(player.ends_well());
   // The file is complete at the end of the stream, not only after the stop.
@@ -328,7 +328,7 @@ TEST(Hdf5Elements, KeepTriggers) {
     const auto out = folder / (layout + ".hdf5");
     Player player("filesrc location=" + in_quotes(in) +
                   " ! eventhdf5dec ! evtenc ! evtdec ! tee name=t  t. ! queue ! eventhdf5sink "
-                  "name=out layout=" +
+                  "name=out format=" +
                   layout + " location=" + in_quotes(out) + "  t. ! queue");
     ASSERT_TRUE(player.ends_well());
     EXPECT_TRUE(read(out) == events);
@@ -385,7 +385,7 @@ TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
   const auto path = folder_ / "out.h5";
   const Events events = {AbsoluteEvent::at(5, 6, 1'000'007, Polarity::on),
                          AbsoluteEvent::at(7, 8, 1'000'009, Polarity::off)};
-  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + in_quotes(path));
+  Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));
   sink.caps(events_caps);
   EXPECT_EQ(sink.push(events, 1'000'000), GST_FLOW_OK);
   sink.stop();
@@ -394,7 +394,7 @@ TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
 
 TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
   const auto path = folder_ / "out.h5";
-  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + in_quotes(path));
+  Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));
   sink.caps(events_caps);
   const Events events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
                          AbsoluteEvent::at(width, 5, 1001, Polarity::on),
@@ -414,7 +414,7 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
 
 TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
   const auto path = folder_ / "out.h5";
-  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) + " location=" + in_quotes(path));
+  Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));
   sink.caps(events_caps);
   const auto late = AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on);
   const auto early = AbsoluteEvent::at(6, 6, 1003, Polarity::off);
@@ -435,7 +435,7 @@ TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
 }
 
 TEST_P(Hdf5, IsOfOneSize) {
-  Sink sink("eventhdf5sink layout=" + std::string(GetParam()) +
+  Sink sink("eventhdf5sink format=" + std::string(GetParam()) +
             " location=" + in_quotes(folder_ / "out.h5"));
   sink.caps("application/x-event-camera, format=XYTP, width=64, height=48, framerate=0/1");
   sink.caps(events_caps);  // nothing is written yet
@@ -461,7 +461,7 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
               std::string::npos);
   }
   {
-    Sink sink("eventhdf5sink layout=metavision location=" + in_quotes(folder / "out.h5"));
+    Sink sink("eventhdf5sink format=metavision location=" + in_quotes(folder / "out.h5"));
     sink.caps("application/x-event-camera, format=XYTP, width=4000, height=48, framerate=0/1");
     EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("at most 2048 pixels"), std::string::npos);
   }

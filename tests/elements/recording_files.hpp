@@ -106,11 +106,11 @@ class Folder {
     for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
                                        {"a.es", "eventesenc ! filesink"},
                                        {"a.csv", "eventcsvenc ! filesink"},
-                                       {"a.txt", "eventcsvenc dialect=rpg ! filesink"},
+                                       {"a.txt", "eventcsvenc format=rpg ! filesink"},
                                        {"a.npy", "eventnpyenc ! filesink"},
                                        {"a.aedat4", "aedatmux ! filesink"},
                                        {"dsec.h5", "eventhdf5sink"},
-                                       {"metavision.hdf5", "eventhdf5sink layout=metavision"}})
+                                       {"metavision.hdf5", "eventhdf5sink format=metavision"}})
       EXPECT_TRUE(run("filesrc location=" + in_quotes(path_ / "evt3.raw") + " ! evtdec ! " +
                       writer + " location=" + in_quotes(path_ / name)));
   }

@@ -15,7 +15,7 @@ ball="videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=I420,framera
 eval "$GST_LAUNCH -q $ball ! x264enc ! mp4mux ! filesink location=drive.mp4"
 eval "$GST_LAUNCH -q filesrc location=drive.mp4 ! decodebin ! eventsim-dvs ! evtenc ! filesink location=drive.raw"
 eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-dvs ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=davis.aedat4"
-eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc dialect=esim ! filesink location=events.txt"
+eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc format=esim ! filesink location=events.txt"
 for name in in recording real simulated; do cp drive.raw $name.raw; done
 for ending in dat es csv; do event-convert drive.raw recording.$ending; done
 /usr/bin/python3 -c 'import numpy; numpy.savez("events.npz", **{name: numpy.zeros(9, int) for name in "txyp"})'

@@ -56,7 +56,7 @@ convert --width=500 --height=400 ball.npy sized.raw
 grep -aq "geometry 500x400" sized.raw || fail "the size is not the one that was set: $(grep -a geometry sized.raw)"
 
 # Text and NumPy of other tools.
-convert --dialect=esim ball.raw esim.csv
+convert --format=esim ball.raw esim.csv
 convert --time-unit=nanoseconds esim.csv esim-back.csv
 cmp ball.csv esim-back.csv || fail "esim.csv in nanoseconds has other events"
 convert --column-order=txyp --time-unit=microseconds ball.csv set.csv
@@ -84,13 +84,13 @@ convert --format=EVT2 ball.raw evt2.raw
 grep -aq "format EVT2" evt2.raw || fail "the words are not EVT2"
 convert --compression=none ball.raw plain.aedat4
 [ "$(stat -c %s plain.aedat4)" -gt "$(stat -c %s ball.aedat4)" ] || fail "plain.aedat4 is compressed"
-convert --dialect=rpg ball.raw rpg.csv
-cmp ball.txt rpg.csv || fail "the dialect is not that of .txt"
+convert --format=rpg ball.raw rpg.csv
+cmp ball.txt rpg.csv || fail "the format is not that of .txt"
 
 # h5py and eventhdf5dec read what eventhdf5sink wrote before it was killed, up to the last second.
 # The 20 s that the events may take to get there bear any load.
 for layout in dsec metavision; do
-  "$GST_LAUNCH" -q videotestsrc pattern=ball is-live=true ! eventsim-diff ! eventhdf5sink layout=$layout location=killed.h5 &
+  "$GST_LAUNCH" -q videotestsrc pattern=ball is-live=true ! eventsim-diff ! eventhdf5sink format=$layout location=killed.h5 &
   for _ in {1..200}; do
     [ "$(stat -c %s killed.h5 2>/dev/null || echo 0)" -gt 20000 ] && break
     sleep 0.1
@@ -212,7 +212,7 @@ cp words.txt words.raw
 refused "Cannot read" words.raw out.dat
 refused "unknown extension" ball.raw ball.mp3
 refused "choose one of EVT2 EVT21 EVT2.1 EVT3 EVT4" ball.raw other.raw --format=EVT5
-refused "does not apply to .dat" ball.raw ball.dat --dialect=rpg
+refused "does not apply to .dat" ball.raw ball.dat --format=rpg
 refused "can only be read" ball.raw ball.aedat
 refused "can only be read" ball.raw ball.npz
 refused "choose one of auto seconds" --time-unit=hours ball.csv other.raw

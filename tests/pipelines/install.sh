@@ -85,6 +85,6 @@ for program in event-convert event-calibrate; do
 done
 completed event-convert --format EVT21 | grep -qx EVT21
 completed event-convert --compression = zstd-h | grep -qx zstd-high
-completed event-convert -d v | grep -qx v2e
+completed event-convert -f v | grep -qx v2e
 completed event-calibrate --element eventsim-de | grep -qx eventsim-dense
 "$root/count_events" "videotestsrc num-buffers=5 pattern=ball ! eventsim-frame ! appsink name=events"

@@ -156,8 +156,8 @@ launch videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=
 launch filesrc location=out.raw ! decodebin caps="application/x-event-camera,format=XYTP" ! aedatmux compression=zstd ! filesink location=out.aedat4
 launch filesrc location=out.raw ! evtdec ! eventesenc ! filesink location=out.es
 launch filesrc location=out.es ! eventesdec ! eventrender mode=decay accumulation-time=20000000 ! video/x-raw,framerate=60/1 ! videoconvert ! fakesink
-launch filesrc location=out.raw ! decodebin ! eventhdf5sink layout=metavision location=out.h5 && fail "pictures were written as events"
-launch filesrc location=out.raw ! decodebin caps=application/x-event-camera ! eventhdf5sink layout=metavision location=out.h5
+launch filesrc location=out.raw ! decodebin ! eventhdf5sink format=metavision location=out.h5 && fail "pictures were written as events"
+launch filesrc location=out.raw ! decodebin caps=application/x-event-camera ! eventhdf5sink format=metavision location=out.h5
 launch filesrc location=out.h5 ! eventhdf5dec ! evtenc ! filesink location=again.raw
 # Two files with different time origins, side by side.
 launch filesrc location=out.aedat4 ! decodebin ! videoconvert ! mixer.  filesrc location=out.h5 ! decodebin ! videoconvert ! mixer.  compositor name=mixer sink_1::xpos=320 ! fakesink

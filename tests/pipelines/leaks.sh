@@ -33,7 +33,7 @@ for pair in evtenc:evtdec eventdatenc:eventdatdec eventesenc:eventesdec eventcsv
 done
 for layout in dsec metavision; do
   file=$work/$layout.h5
-  check videotestsrc num-buffers=8 ! eventsim-frame ! eventhdf5sink layout=$layout location="$file"
+  check videotestsrc num-buffers=8 ! eventsim-frame ! eventhdf5sink format=$layout location="$file"
   check filesrc location="$file" ! eventhdf5dec ! fakesink
   check filesrc location="$file" ! queue ! eventhdf5dec ! fakesink num-buffers=1
   check filesrc location="$file" ! decodebin caps=application/x-event-camera ! fakesink

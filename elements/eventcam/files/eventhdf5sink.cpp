@@ -5,7 +5,7 @@
  * @short_description: writes HDF5 files of events
  *
  * Writes events as an HDF5 file in the layout of DSEC or Metavision, whose arrays can be read
- * directly with h5py. Written times are those of the PTS. `layout=metavision` keeps triggers; the
+ * directly with h5py. Written times are those of the PTS. `format=metavision` keeps triggers; the
  * property `stats` counts them.
  *
  * The file is complete at the end of the stream, or when the pipeline is stopped. If the process is
@@ -15,7 +15,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventhdf5sink layout=metavision
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventhdf5sink format=metavision
  * location=events.h5
  * ]|
  */
@@ -47,7 +47,7 @@ namespace {
 
 struct Settings {
   std::string location;
-  Hdf5Layout layout = Hdf5Layout::dsec;
+  Hdf5Layout format = Hdf5Layout::dsec;
   Hdf5Writer::Compression compression = Hdf5Writer::Compression::gzip;
 };
 
@@ -92,7 +92,7 @@ static GstStaticPadTemplate sink_template =
 
 /* properties */
 
-static GType layout_type() {
+static GType format_type() {
   static const GEnumValue values[] = {
       {static_cast<int>(Hdf5Layout::dsec), "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset",
        "dsec"},
@@ -145,8 +145,8 @@ static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
   priv->state = State();  // close first: HDF5 treats two open files of the same name as one
   priv->state.info = info;
   priv->writable.begin_file({info.width, info.height});
-  const auto [location, layout, compression] = priv->settings.copy();
-  const Hdf5Writer::Settings settings{layout, compression, {info.width, info.height}};
+  const auto [location, format, compression] = priv->settings.copy();
+  const Hdf5Writer::Settings settings{format, compression, {info.width, info.height}};
   return reported(self, [&, &path = location] {
     priv->state.writer = std::make_unique<Hdf5Writer>(path, settings);
   });
@@ -198,7 +198,7 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   return written ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/// Writes triggers, which the layout may not have.
+/// Writes triggers, which the format may not have.
 static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> triggers) {
   const State& state = self->priv->state;
   if (!state.writer) return true;
@@ -258,14 +258,14 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   properties.add(&Settings::location,
                  g_param_spec_string("location", "Location",
                                      "File to write; an existing file is overwritten", "", flags));
-  properties.add(&Settings::layout,
-                 g_param_spec_enum("layout", "Layout", "Layout of the events in the file",
-                                   layout_type(), static_cast<int>(defaults.layout), flags));
+  properties.add(&Settings::format,
+                 g_param_spec_enum("format", "Format", "Format of the events in the file",
+                                   format_type(), static_cast<int>(defaults.format), flags));
   properties.add(
       &Settings::compression,
       g_param_spec_enum("compression", "Compression",
-                        "Compression of layout=dsec: gzip for small files, none for speed. "
-                        "layout=metavision ignores it, since it always uses ECF",
+                        "Compression of format=dsec: gzip for small files, none for speed. "
+                        "format=metavision ignores it, since it always uses ECF",
                         compression_type(), static_cast<int>(defaults.compression), flags));
   properties.add_read_only(
       +[](GObject* object, GValue* value) {

@@ -57,8 +57,8 @@ std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const FormatSetting
  * @short_description: reads RAW files and EVT words
  *
  * Reads Prophesee RAW files, and words without a header whose format is in the caps: EVT2, EVT2.1,
- * EVT3 and EVT4. Events are output in buffers of #GstEventReader:buffer-time; triggers come with
- * them, for writers that keep them.
+ * EVT3 and EVT4. Events are output in buffers of #GstEventReader:buffer-duration; triggers come
+ * with them, for writers that keep them.
  *
  * ## Example launch line
  * |[
@@ -83,7 +83,7 @@ GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_typ
  * @short_description: reads DAT files
  *
  * Reads Prophesee DAT files, versions 1 and 2. Events are output in buffers of
- * #GstEventReader:buffer-time; triggers come with them, for writers that keep them.
+ * #GstEventReader:buffer-duration; triggers come with them, for writers that keep them.
  *
  * ## Example launch line
  * |[
@@ -110,7 +110,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  * @short_description: reads Event Stream files
  *
  * Reads Event Stream 2.0 files with DVS or ATIS events (of the latter, only the change events).
- * Events are output in buffers of #GstEventReader:buffer-time.
+ * Events are output in buffers of #GstEventReader:buffer-duration.
  *
  * Tools disagree about where row 0 is. If the picture is upside down, as with files of faery, set
  * #GstEventEsDec:origin to `top-left`.
@@ -235,8 +235,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * @short_description: reads HDF5 files of events
  *
  * Reads the events of HDF5 files from DSEC, Metavision (compressed with ECF) and v2e. They are
- * output in buffers of #GstEventReader:buffer-time; triggers come with them, for writers that keep
- * them.
+ * output in buffers of #GstEventReader:buffer-duration; triggers come with them, for writers that
+ * keep them.
  *
  * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
  * mode the file is collected in memory, up to 256 MiB, and read at its end.

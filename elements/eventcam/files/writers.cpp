@@ -163,11 +163,11 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
  * @title: eventcsvenc
  * @short_description: writes text files of events
  *
- * Writes one line per event, in the #GstEventCsvEnc:dialect of the tool that will read it.
+ * Writes one line per event, in the #GstEventCsvEnc:format of the tool that will read it.
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventcsvenc dialect=rpg ! filesink
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventcsvenc format=rpg ! filesink
  * location=events.txt
  * ]|
  */
@@ -183,8 +183,8 @@ static GType csv_dialect_type() {
 }
 
 static const EventFileFormat::Variants csv_variants = {
-    .property = "dialect",
-    .nick = "Dialect",
+    .property = "format",
+    .nick = "Format",
     .blurb = "Columns, separators, time unit and header; read when the stream begins",
     .type = csv_dialect_type,
     .default_value = 0,
