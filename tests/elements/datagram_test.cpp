@@ -245,7 +245,8 @@ TEST_P(EveryFormat, GoesThroughSockets) {
     ASSERT_EQ(received[i].y_p, sent[i].y_p);
     ASSERT_TRUE(!GetParam().has_times || received[i].t == sent[i].t);
   }
-  for (const auto* name : {"lost", "late", "rejected"}) EXPECT_EQ(receiver.stat(name), 0) << name;
+  for (const auto* name : {"lost-packets", "late-packets", "rejected-packets"})
+    EXPECT_EQ(receiver.stat(name), 0) << name;
   EXPECT_EQ(receiver.stat("packets"), stat_of(h.element(), "packets"));
   EXPECT_EQ(receiver.stat("bytes"), stat_of(h.element(), "bytes"));
 }
@@ -270,7 +271,7 @@ TEST_P(EveryFormat, RejectsRandomDatagrams) {
     ASSERT_EQ(h.push(good.release()), GST_FLOW_OK);
   }
   EXPECT_EQ(pull_events(h).size(), sent.size());
-  EXPECT_EQ(stat_of(h.element(), "rejected"), bad);
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), bad);
   const auto warning = h.message(GST_MESSAGE_WARNING);
   ASSERT_TRUE(warning);
   EXPECT_NE(text_of(warning.get()).find("Set format, width and height"), std::string::npos);
@@ -318,10 +319,10 @@ TEST_P(TimedFormat, BringsNoWrongEventThroughABadNetwork) {
     ASSERT_NE(original, sent.end());
     ASSERT_EQ(*original, event);
   }
-  EXPECT_GT(stat_of(h.element(), "late"), 0);
-  EXPECT_EQ(stat_of(h.element(), "rejected"), 0);
+  EXPECT_GT(stat_of(h.element(), "late-packets"), 0);
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 0);
   const bool is_numbered = properties == "format=jaer";
-  EXPECT_EQ(stat_of(h.element(), "lost"),
+  EXPECT_EQ(stat_of(h.element(), "lost-packets"),
             is_numbered ? stat_of(pay.element(), "packets") - stat_of(h.element(), "packets") : 0);
 }
 
@@ -595,8 +596,8 @@ TEST(Depayloader, TellsOfLosses) {
   GstGapFlags flags{};
   gst_event_parse_gap_flags(gap.get(), &flags);
   EXPECT_EQ(flags, GST_GAP_FLAG_MISSING_DATA);
-  EXPECT_EQ(stat_of(h.element(), "lost"), 2);
-  EXPECT_EQ(stat_of(h.element(), "late"), 1);
+  EXPECT_EQ(stat_of(h.element(), "lost-packets"), 2);
+  EXPECT_EQ(stat_of(h.element(), "late-packets"), 1);
   EXPECT_EQ(stat_of(h.element(), "packets"), 4);
   EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
 }
@@ -679,7 +680,7 @@ TEST(Depayloader, KeepsTimesOfEventsThatAreFarApart) {
       EXPECT_EQ(times, (std::vector{first, next, next + span}));
     else
       EXPECT_EQ(times, std::vector{first}) << span;
-    EXPECT_EQ(stat_of(h.element(), "rejected"), span == longest ? 0 : 1);
+    EXPECT_EQ(stat_of(h.element(), "rejected-packets"), span == longest ? 0 : 1);
   }
 }
 
@@ -707,7 +708,7 @@ TEST(Depayloader, StartsOverAfterAFlush) {
   h.push(jaer(2, 8'999'999, 2 * GST_SECOND));
   ASSERT_TRUE(h.pull());
   EXPECT_TRUE(h.pull());
-  EXPECT_EQ(stat_of(h.element(), "rejected"), 0);
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 0);
 }
 
 }  // namespace

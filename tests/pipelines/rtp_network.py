@@ -331,9 +331,9 @@ def exchange_datagrams(options, *, loss=0.0, has_times=True, is_numbered=False):
         received, everything_sent = target.events()[:, first:], sent()[:, first:]
         assert source.stat("events") == len(everything_sent)
         assert target.stat("events") == len(received)
-        assert target.stat("rejected") == target.stat("late") == 0
+        assert target.stat("rejected-packets") == target.stat("late-packets") == 0
         assert (network.switch.lost > 0) == (loss > 0)
-        assert target.stat("lost") == (network.switch.lost if is_numbered else 0)
+        assert target.stat("lost-packets") == (network.switch.lost if is_numbered else 0)
         if loss:
             assert 0.5 * len(everything_sent) < len(received) < len(everything_sent)
             assert is_part(received, everything_sent), "events that were not sent, or in another order"

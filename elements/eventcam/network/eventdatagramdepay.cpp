@@ -363,9 +363,9 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
       [](const DatagramCounts& counts) {
         return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
                                  counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
-                                 G_TYPE_UINT64, counts.bytes, "lost", G_TYPE_UINT64, counts.lost,
-                                 "late", G_TYPE_UINT64, counts.late, "rejected", G_TYPE_UINT64,
-                                 counts.rejected, nullptr);
+                                 G_TYPE_UINT64, counts.bytes, "lost-packets", G_TYPE_UINT64,
+                                 counts.lost, "late-packets", G_TYPE_UINT64, counts.late,
+                                 "rejected-packets", G_TYPE_UINT64, counts.rejected, nullptr);
       });
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
