@@ -25,7 +25,7 @@
 #include "src/render/accumulator.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/frame.hpp"
-#include "tests/core/scene.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

@@ -18,8 +18,8 @@
 #include "src/gl/diff.hpp"
 #include "src/gl/frame.hpp"
 #include "src/gl/sparse.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/gl/egl_context.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

@@ -6,10 +6,10 @@
 #include "bench/methods.hpp"
 #include "bench/scenes.hpp"
 #include "src/simulate/interpolation.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/reference/dense.hpp"
 #include "tests/reference/diff.hpp"
 #include "tests/reference/sparse.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

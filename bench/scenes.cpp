@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "tests/core/scene.hpp"
 #include "tests/pipelines/video_frames.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace bench {
 namespace {

@@ -54,5 +54,5 @@ endian = 'little'
 CROSS
 targets=("${tests[@]/%/_test}")
 ./compile $build --cross-file=$build/cross.ini -Dtests=true -Dintrospection=disabled -Deventsimgl=disabled \
-  -Doptimization=2 -Ddebug=false "${targets[@]/#/tests/core/}"
+  -Doptimization=2 -Ddebug=false "${targets[@]}"
 meson test -C $build --no-rebuild --print-errorlogs "${tests[@]}"

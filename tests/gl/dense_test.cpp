@@ -16,8 +16,8 @@
 #include "src/gl/interpolation.hpp"
 #include "src/simulate/dense.hpp"
 #include "src/simulate/interpolation.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/gl/every_api.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

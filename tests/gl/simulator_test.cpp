@@ -22,8 +22,8 @@
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/gl/every_api.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

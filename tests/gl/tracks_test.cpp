@@ -12,10 +12,10 @@
 #include "src/gl/diff.hpp"
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/sparse.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/gl/every_api.hpp"
 #include "tests/reference/diff.hpp"
 #include "tests/reference/sparse.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

@@ -22,7 +22,7 @@
 #include "src/simulate/dense.hpp"
 #include "src/simulate/diff.hpp"
 #include "src/simulate/sparse.hpp"
-#include "tests/core/opencv_dis.hpp"
+#include "tests/flow/opencv_dis.hpp"
 #include "tests/pipelines/video_frames.hpp"
 #include "tests/reference/dense.hpp"
 #include "tests/reference/diff.hpp"

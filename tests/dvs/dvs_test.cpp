@@ -15,9 +15,9 @@
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/trajectory.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/dvs.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace eventcamera {
 

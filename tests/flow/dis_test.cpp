@@ -9,9 +9,9 @@
 #include <cmath>
 #include <cstring>
 
-#include "tests/core/moving_pictures.hpp"
-#include "tests/core/opencv_dis.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/flow/moving_pictures.hpp"
+#include "tests/flow/opencv_dis.hpp"
 #include "tests/reference/dis.hpp"
 
 namespace {

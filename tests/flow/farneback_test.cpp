@@ -7,8 +7,8 @@
 
 #include <cmath>
 
-#include "tests/core/moving_pictures.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/flow/moving_pictures.hpp"
 #include "tests/reference/farneback.hpp"
 
 namespace {

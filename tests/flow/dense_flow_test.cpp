@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "src/flow/dense_flow.hpp"
-#include "tests/core/moving_pictures.hpp"
+#include "tests/flow/moving_pictures.hpp"
 
 namespace {
 

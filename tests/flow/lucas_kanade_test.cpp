@@ -12,9 +12,9 @@
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "src/flow/lucas_kanade/texture.hpp"
 #include "src/flow/opencv.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/lucas_kanade.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"
-#include "tests/core/scene.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

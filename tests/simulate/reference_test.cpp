@@ -12,11 +12,11 @@
 #include "src/simulate/diff.hpp"
 #include "src/simulate/frame.hpp"
 #include "src/simulate/sparse.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/dense.hpp"
 #include "tests/reference/diff.hpp"
 #include "tests/reference/sparse.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

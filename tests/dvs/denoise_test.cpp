@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/dvs.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

@@ -14,8 +14,8 @@
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
 #include "src/simulate/moving_points.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "src/render/accumulator.hpp"
-#include "tests/core/scene.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

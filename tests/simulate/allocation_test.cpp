@@ -15,7 +15,7 @@
 #include "src/simulate/frame.hpp"
 #include "src/simulate/interpolation.hpp"
 #include "src/simulate/sparse.hpp"
-#include "tests/core/scene.hpp"
+#include "tests/simulate/scene.hpp"
 
 namespace {
 

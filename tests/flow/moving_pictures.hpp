@@ -5,7 +5,7 @@
 #include <ostream>
 
 #include "src/flow/dense_flow.hpp"
-#include "tests/core/scene.hpp"
+#include "tests/simulate/scene.hpp"
 
 /// Pictures to find the flow between, and flows to compare.
 namespace eventcamera {
