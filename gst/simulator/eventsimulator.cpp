@@ -205,7 +205,7 @@ static void install_qos_properties(GObjectClass* klass) {
       [](SimulatorQos&, const GValue*) {},
       [](SimulatorQos& qos, GValue* value) { g_value_take_boxed(value, qos.stats()); },
       g_param_spec_boxed("stats", "Statistics",
-                         "Counts since start: frames (processed), skipped (frames, because of "
+                         "Counts since start: frames (processed), skipped-frames (because of "
                          "qos), processing-time (of all processed frames, ns)",
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));

@@ -90,6 +90,6 @@ void SimulatorQos::reset_stats() {
 
 GstStructure* SimulatorQos::stats() const {
   return gst_structure_new("application/x-event-simulator-stats", "frames", G_TYPE_UINT64, frames_,
-                           "skipped", G_TYPE_UINT64, skipped_, "processing-time", G_TYPE_UINT64,
-                           processing_time_, nullptr);
+                           "skipped-frames", G_TYPE_UINT64, skipped_, "processing-time",
+                           G_TYPE_UINT64, processing_time_, nullptr);
 }

@@ -249,9 +249,9 @@ TEST_P(EveryElement, SkipsWholeFramesWhereDownstreamIsLate) {
     Harness expected(GetParam());
     expected.caps(video, draws ? pictures_of(GetParam()) : GST_EVENT_CAMERA_MEDIA_TYPE);
     EXPECT_TRUE(output(h, true) == output(expected, false));
-    EXPECT_EQ(stat(h, "skipped"), 2U);
+    EXPECT_EQ(stat(h, "skipped-frames"), 2U);
     EXPECT_EQ(stat(h, "frames"), 7U);
-    EXPECT_EQ(stat(expected, "skipped"), 0U);
+    EXPECT_EQ(stat(expected, "skipped-frames"), 0U);
     guint64 skipped = 0;
     while (const auto message = h.message(GST_MESSAGE_QOS)) {
       GstFormat format = GST_FORMAT_UNDEFINED;
@@ -279,8 +279,8 @@ TEST_P(EveryElement, SkipsFramesOfPicturesUnlessToldOtherwise) {
     output(h, true);
     gboolean enabled = FALSE;
     g_object_get(h.element(), "qos", &enabled, nullptr);
-    EXPECT_EQ(enabled != FALSE, stat(h, "skipped") > 0);
-    return stat(h, "skipped");
+    EXPECT_EQ(enabled != FALSE, stat(h, "skipped-frames") > 0);
+    return stat(h, "skipped-frames");
   };
   const std::string element = GetParam();
   EXPECT_EQ(skipped(element, pictures_of(element)), 2U);
@@ -300,7 +300,7 @@ TEST_P(EveryElement, SkipsNothingAfterAFlush) {
   flush({h.get()});
   push_segment(h.get());
   for (int i = 2; i < 5; ++i) h.push(frame_at(h, i));
-  EXPECT_EQ(stat(h, "skipped"), 0U);
+  EXPECT_EQ(stat(h, "skipped-frames"), 0U);
 }
 
 TEST(Qos, SkipsFramesThatDownstreamDoesNotWant) {
@@ -311,7 +311,7 @@ TEST(Qos, SkipsFramesThatDownstreamDoesNotWant) {
     h.push(frame_at(h, i));
     if (i == 1) report(h, frame_time(1), 600 * ms, GST_QOS_TYPE_THROTTLE);
   }
-  EXPECT_EQ(stat(h, "skipped"), 8U);  // one picture at once, then one in 600 ms
+  EXPECT_EQ(stat(h, "skipped-frames"), 8U);  // one picture at once, then one in 600 ms
 }
 
 /// A frame that takes `work` to process.
@@ -365,7 +365,8 @@ TEST(Qos, CountsFromTheStart) {
   gst_element_set_state(h.element(), GST_STATE_READY);
   EXPECT_EQ(stat(h, "frames"), 8U);
   gst_element_set_state(h.element(), GST_STATE_PAUSED);
-  for (const char* count : {"frames", "skipped", "processing-time"}) EXPECT_EQ(stat(h, count), 0U);
+  for (const char* count : {"frames", "skipped-frames", "processing-time"})
+    EXPECT_EQ(stat(h, count), 0U);
 }
 
 /// Plays into a sink that takes 100 ms for a picture; returns when pictures were shown.
