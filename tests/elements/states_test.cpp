@@ -22,7 +22,8 @@ TEST_P(AllStates, AreReachedFromEachOther) {
       for (const auto state : {from, to, from})
         EXPECT_NE(gst_element_set_state(element.get(), state), GST_STATE_CHANGE_FAILURE)
             << gst_element_state_get_name(from) << " and " << gst_element_state_get_name(to);
-  gst_element_set_state(element.get(), GST_STATE_NULL);
+  EXPECT_EQ(gst_element_set_state(element.get(), GST_STATE_NULL), GST_STATE_CHANGE_SUCCESS);
+  EXPECT_EQ(GST_OBJECT_REFCOUNT_VALUE(element.get()), 1);
 }
 
 TEST_P(EveryElement, PlaysAgainAfterAStop) {
@@ -52,9 +53,16 @@ TEST_P(EveryElement, PlaysAgainAfterAStop) {
 
 TEST_P(EveryElement, IsFreedWhileInUse) {
   for (int frames = 0; frames < 4; ++frames) {
-    Harness h(GetParam());
-    h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1");
-    for (int i = 0; i < frames; ++i) h.push(h.flat(i * 40 * GST_MSECOND, 60 * i));
+    bool freed = false;
+    {
+      Harness h(GetParam());
+      g_object_weak_ref(
+          G_OBJECT(h.element()),
+          +[](gpointer was_freed, GObject*) { *static_cast<bool*>(was_freed) = true; }, &freed);
+      h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1");
+      for (int i = 0; i < frames; ++i) h.push(h.flat(i * 40 * GST_MSECOND, 60 * i));
+    }
+    EXPECT_TRUE(freed) << frames;
   }
 }
 
