@@ -23,8 +23,8 @@
 #include "bench/scenes.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/render/accumulator.hpp"
-#include "src/simulate/dense.hpp"
-#include "src/simulate/frame.hpp"
+#include "src/simulate/dense_simulator.hpp"
+#include "src/simulate/frame_simulator.hpp"
 #include "tests/simulate/scene.hpp"
 
 namespace {

@@ -13,10 +13,10 @@
 #include "bench/plain/frame.hpp"
 #include "bench/plain/sparse.hpp"
 #include "src/dvs/dvs_simulator.hpp"
-#include "src/simulate/dense.hpp"
-#include "src/simulate/diff.hpp"
-#include "src/simulate/frame.hpp"
-#include "src/simulate/sparse.hpp"
+#include "src/simulate/dense_simulator.hpp"
+#include "src/simulate/diff_simulator.hpp"
+#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/sparse_simulator.hpp"
 
 namespace bench {
 

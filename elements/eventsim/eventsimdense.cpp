@@ -19,7 +19,7 @@
  */
 #include "gst/simulator/dense_properties.hpp"
 #include "gst/simulator/eventsimulator.hpp"
-#include "src/simulate/dense.hpp"
+#include "src/simulate/dense_simulator.hpp"
 
 using eventcamera::DenseSimulator;
 using eventcamera::FlowMethod;

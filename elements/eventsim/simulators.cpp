@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Simulators without properties of their own: a table of methods.
 #include "gst/simulator/eventsimulator.hpp"
-#include "src/simulate/diff.hpp"
-#include "src/simulate/frame.hpp"
-#include "src/simulate/sparse.hpp"
+#include "src/simulate/diff_simulator.hpp"
+#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/sparse_simulator.hpp"
 
 /**
  * SECTION:element-eventsim-frame

@@ -14,7 +14,7 @@
 #include "src/gl/dense.hpp"
 #include "src/gl/farneback.hpp"
 #include "src/gl/interpolation.hpp"
-#include "src/simulate/dense.hpp"
+#include "src/simulate/dense_simulator.hpp"
 #include "src/simulate/interpolation.hpp"
 #include "tests/gl/every_api.hpp"
 #include "tests/simulate/scene.hpp"

@@ -19,9 +19,9 @@
 #include "src/gl/point_tracker.hpp"
 #include "src/gl/sparse.hpp"
 #include "src/render/accumulator.hpp"
-#include "src/simulate/diff.hpp"
-#include "src/simulate/frame.hpp"
-#include "src/simulate/sparse.hpp"
+#include "src/simulate/diff_simulator.hpp"
+#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/sparse_simulator.hpp"
 #include "tests/gl/every_api.hpp"
 #include "tests/simulate/scene.hpp"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/simulate/dense.hpp"
+#include "src/simulate/dense_simulator.hpp"
 #include "src/simulate/motion.hpp"
 #include "tests/reference/differences.hpp"
 

@@ -7,10 +7,10 @@
 #include <functional>
 #include <map>
 
-#include "src/simulate/dense.hpp"
-#include "src/simulate/diff.hpp"
-#include "src/simulate/frame.hpp"
-#include "src/simulate/sparse.hpp"
+#include "src/simulate/dense_simulator.hpp"
+#include "src/simulate/diff_simulator.hpp"
+#include "src/simulate/frame_simulator.hpp"
+#include "src/simulate/sparse_simulator.hpp"
 #include "tests/simulate/scene.hpp"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/simulate/dense.hpp"
+#include "src/simulate/dense_simulator.hpp"
 
 #include <algorithm>
 #include <optional>
