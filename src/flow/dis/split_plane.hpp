@@ -82,8 +82,8 @@ class SplitPlanes {
 
   float* row(int parity, int y) { return values_.data() + (2 * y + parity) * odd_; }
   const float* row(int parity, int y) const { return values_.data() + (2 * y + parity) * odd_; }
-  /// Where the first of the values at k in a row is; the others follow `block` floats apart.
-  static std::ptrdiff_t at(int k) { return k / block * block * values + k % block; }
+  /// Offset of the first value of pixel k in a row; the others follow `block` floats apart.
+  static std::ptrdiff_t offset_of(int k) { return k / block * block * values + k % block; }
 
  private:
   std::ptrdiff_t odd_;

@@ -27,7 +27,7 @@ using EquationRows = SplitPlanes<VariationalRefinement::max_coefficients>;
 constexpr float smoothness = 20.0F / 2;
 constexpr float brightness = 5.0F / 2;
 constexpr float gradient = 10.0F / 2;
-/// Squares of what keeps quotients finite.
+/// Squared regularisation constants.
 constexpr float min_gradient = 0.1F * 0.1F;
 constexpr float min_residual = 0.001F * 0.001F;
 constexpr float over_relaxation = 1.6F;
@@ -319,7 +319,7 @@ class Assembly {
     return equations;
   }
 
-  /// Adds what the neighbours pull, and stores the coefficients.
+  /// Adds the smoothness terms, and stores the coefficients.
   HWY_INLINE void solve(const Equations& equations, int k) const {
     const auto start_x = load(start_x_ + k);
     const auto start_y = load(start_y_ + k);
@@ -332,7 +332,7 @@ class Assembly {
         equations.x, hn::Add(hn::Mul(equations.xx, start_x), hn::Mul(equations.xy, start_y)));
     const auto constant_y = hn::Add(
         equations.y, hn::Add(hn::Mul(equations.xy, start_x), hn::Mul(equations.yy, start_y)));
-    float* to = out_ + EquationRows::at(k);
+    float* to = out_ + EquationRows::offset_of(k);
     store(equations.xy, to + VariationalRefinement::cross * EquationRows::block);
     store(hn::Mul(yy, inverse), to + VariationalRefinement::inverse_x * EquationRows::block);
     store(hn::Mul(xx, inverse), to + VariationalRefinement::inverse_y * EquationRows::block);
@@ -520,8 +520,8 @@ class Relaxation {
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     const int count = flow_.x.count(parity);
     for (int k = 0; k < count; k += 2 * lanes) {
-      const auto at = EquationRows::at(k);
-      const auto next = EquationRows::at(k + lanes);
+      const auto at = EquationRows::offset_of(k);
+      const auto next = EquationRows::offset_of(k + lanes);
       Climb left(pixels, below + k, rows[begin] + k);
       Climb right(pixels, below + k + lanes, rows[begin] + k + lanes);
       for (int i = begin; i < end; ++i) {

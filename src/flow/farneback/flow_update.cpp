@@ -58,15 +58,15 @@ HWY_INLINE void add_weighted(const PolynomialExpansion& to, int column, int row,
   }
 }
 
-/// Where the flow of a vector of pixels ends.
-struct Ends {
+/// Positions in the later image that the flow of a vector of pixels leads to.
+struct Targets {
   hn::Mask<Words> inside;  ///< the image
-  WordVector column;       ///< of the pixel before the end
+  WordVector column;       ///< of the pixel left of and above the target
   WordVector row;
   Vector right;  ///< sub-pixel offset from that pixel
   Vector down;
 
-  HWY_INLINE Ends(const PolynomialExpansion& to, Vector dx, Vector dy, int x, int y) {
+  HWY_INLINE Targets(const PolynomialExpansion& to, Vector dx, Vector dy, int x, int y) {
     const Floats floats;
     const auto zero = hn::Zero(floats);
     const auto to_x = hn::Add(hn::Iota(floats, static_cast<float>(x)), dx);
@@ -91,41 +91,41 @@ struct Ends {
 /// the one beside it. Lanes for which this holds read the same three rows; one that a lane does not
 /// need has weight 0, which leaves its sum as it is. The other lanes follow, chosen in the same
 /// way.
-HWY_INLINE void interpolate(const PolynomialExpansion& to, const Ends& ends, Vector* sums) {
+HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& targets, Vector* sums) {
   const Words words;
   const Floats floats;
   constexpr int lanes = static_cast<int>(hn::MaxLanes(words));
-  const auto left = hn::Sub(hn::Set(floats, 1.0F), ends.right);
-  const auto up = hn::Sub(hn::Set(floats, 1.0F), ends.down);
+  const auto left = hn::Sub(hn::Set(floats, 1.0F), targets.right);
+  const auto up = hn::Sub(hn::Set(floats, 1.0F), targets.down);
   HWY_ALIGN std::int32_t columns[lanes];
   HWY_ALIGN std::int32_t rows[lanes];
-  hn::Store(ends.column, words, columns);
-  hn::Store(ends.row, words, rows);
+  hn::Store(targets.column, words, columns);
+  hn::Store(targets.row, words, rows);
   for (int k = 0; k < coefficients; ++k) sums[k] = hn::Zero(floats);
-  auto remaining = ends.inside;
+  auto remaining = targets.inside;
   for (;;) {
     const auto lane = hn::FindFirstTrue(words, remaining);
     if (lane < 0) return;
     const int column = columns[lane] & -lanes;
-    const auto before = hn::Eq(ends.row, hn::Set(words, rows[lane] - 1));
+    const auto before = hn::Eq(targets.row, hn::Set(words, rows[lane] - 1));
     const int row = rows[lane] - (hn::AllFalse(words, hn::And(before, remaining)) ? 0 : 1);
-    const auto index = hn::Sub(ends.column, hn::Set(words, column));
+    const auto index = hn::Sub(targets.column, hn::Set(words, column));
     const auto in_columns =
         hn::And(hn::Gt(index, hn::Set(words, -1)), hn::Lt(index, hn::Set(words, 2 * lanes - 1)));
     const auto in_reach = hn::And(in_columns, remaining);
-    const auto in_upper = hn::And(hn::Eq(ends.row, hn::Set(words, row)), in_reach);
-    const auto in_lower = hn::And(hn::Eq(ends.row, hn::Set(words, row + 1)), in_reach);
+    const auto in_upper = hn::And(hn::Eq(targets.row, hn::Set(words, row)), in_reach);
+    const auto in_lower = hn::And(hn::Eq(targets.row, hn::Set(words, row + 1)), in_reach);
     remaining = hn::AndNot(hn::Or(in_upper, in_lower), remaining);
     const auto upper = hn::RebindMask(floats, in_upper);
     const auto lower = hn::RebindMask(floats, in_lower);
     const Vector weights[] = {
         hn::IfThenElseZero(upper, up),
-        hn::IfThenElse(upper, ends.down, hn::IfThenElseZero(lower, up)),
-        hn::IfThenElseZero(lower, ends.down),
+        hn::IfThenElse(upper, targets.down, hn::IfThenElseZero(lower, up)),
+        hn::IfThenElseZero(lower, targets.down),
     };
     const Lookup<Floats> first(index);
     const Lookup<Floats> second(hn::Add(index, hn::Set(words, 1)));
-    const Columns between{first, second, left, ends.right};
+    const Columns between{first, second, left, targets.right};
     const float* next = to.at(column + strip, row + 1);
     for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
     if (hn::AllFalse(floats, lower))
@@ -176,16 +176,16 @@ void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, con
     Vector dx;
     Vector dy;
     hn::LoadInterleaved2(floats, &flow[x].x, dx, dy);
-    const Ends ends(to, dx, dy, x, y);
+    const Targets targets(to, dx, dy, x, y);
     Vector there[coefficients];
-    interpolate(to, ends, there);
+    interpolate(to, targets, there);
     const float* polynomials = from.at(x, y);
     const float* next = from.at(x + strip, y);
     for (int k = 0; k < coefficients; ++k) hwy::Prefetch(next + k * group);
     const auto here = [&](int k) { return hn::Load(floats, polynomials + k * group); };
     const auto weight = hn::Mul(hn::Set(floats, row_weight), hn::LoadU(floats, column_weights + x));
     // Outside the image, a is that of the earlier polynomial alone.
-    const auto a_weight = hn::IfThenElse(hn::RebindMask(floats, ends.inside), half, one);
+    const auto a_weight = hn::IfThenElse(hn::RebindMask(floats, targets.inside), half, one);
     auto a_yy = hn::Mul(hn::Add(here(2), there[2]), a_weight);
     auto a_xx = hn::Mul(hn::Add(here(3), there[3]), a_weight);
     auto a_xy = hn::Mul(hn::Add(here(4), there[4]), hn::Mul(a_weight, half));

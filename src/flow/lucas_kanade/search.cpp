@@ -357,9 +357,9 @@ class Points {
       cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
     }
     if (count_ < share_from) {
-      for (int i = 0; i < count_; ++i) see(i);
+      for (int i = 0; i < count_; ++i) sum_window(i);
     } else {
-      see_all();
+      sum_all_windows();
       shared_.emplace(to, patch, searches.front().flow);
     }
     const Floats floats;
@@ -422,7 +422,7 @@ class Points {
   static constexpr int share_from = 12;
 
   /// Computes the sums over a point's window that stay constant during its search.
-  void see(int i) {
+  void sum_window(int i) {
     const Values values;
     const int lanes = static_cast<int>(hn::Lanes(values));
     std::int64_t sums[8] = {};
@@ -463,7 +463,7 @@ class Points {
   }
 
   /// The same for all points, from the sums of all pixels of the tile.
-  void see_all() {
+  void sum_all_windows() {
     const Columns columns;
     const hn::Rebind<std::int16_t, Columns> values;
     enum { xx, yy, grey_x, grey_y, xy, xy_right };
