@@ -6,6 +6,32 @@
 #include "src/core/image.hpp"
 #include "src/core/thread_pool.hpp"
 
+// Guide to this folder: which file computes which equation. I is the earlier image, J the later
+// one.
+//
+// dis/: Kroeger et al., Fast optical flow using dense inverse search, ECCV 2016
+//   pyramid.cpp                   scales and image gradients
+//   patches.cpp                   inverse search: the flow u of a patch that minimises the sum of
+//                                 (J(x + u) - I(x))^2, less the means; densification: the mean of
+//                                 the flows of the patches that cover a pixel, weighted by match
+//   variational_refinement.cpp    energy of brightness constancy, gradient constancy and
+//   smoothness:
+//                                 Brox et al., High accuracy optical flow estimation based on a
+//                                 theory for warping, ECCV 2004
+//   dis.cpp                       scales, coarse to fine
+// farneback/: Farneback, Two-frame motion estimation based on polynomial expansion, SCIA 2003
+//   pyramid.cpp                   scales
+//   polynomial_expansion.cpp      I(x) ~ x^T A x + b^T x + c around each pixel
+//   flow_update.cpp               A d = -(b_J - b_I) / 2 by least squares over a window
+//   farneback.cpp                 scales and iterations
+// lucas_kanade/: Lucas and Kanade, An iterative image registration technique, IJCAI 1981;
+// Bouguet, Pyramidal implementation of the Lucas Kanade feature tracker, Intel 2000
+//   pyramid.cpp                   scales
+//   scharr_gradients.cpp          image gradients g
+//   texture.cpp                   pixels whose sum(g g^T) may suffice for tracking
+//   search.cpp                    sum(g g^T) d = sum(g (I - J)) over a window, iterated
+//   point_tracker.cpp             scales and points
+
 namespace eventcamera {
 
 /// Displacement of a pixel from the earlier frame to the later one, in pixels.
