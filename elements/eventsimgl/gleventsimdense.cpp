@@ -17,7 +17,7 @@
  */
 #include "gst/glsimulator/gleventsimulator.hpp"
 #include "gst/simulator/dense_properties.hpp"
-#include "src/gl/dense.hpp"
+#include "src/gl/dense_simulator.hpp"
 
 using eventcamera::FlowMethod;
 using eventcamera::gl::DenseSimulator;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Simulators without properties of their own: a table of methods.
 #include "gst/glsimulator/gleventsimulator.hpp"
-#include "src/gl/diff.hpp"
-#include "src/gl/frame.hpp"
-#include "src/gl/sparse.hpp"
+#include "src/gl/diff_simulator.hpp"
+#include "src/gl/frame_simulator.hpp"
+#include "src/gl/sparse_simulator.hpp"
 
 /**
  * SECTION:element-gleventsim-frame

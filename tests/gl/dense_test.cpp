@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "src/flow/farneback/farneback.hpp"
-#include "src/gl/dense.hpp"
+#include "src/gl/dense_simulator.hpp"
 #include "src/gl/farneback.hpp"
 #include "src/gl/interpolation.hpp"
 #include "src/simulate/dense_simulator.hpp"

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "src/gl/diff.hpp"
+#include "src/gl/diff_simulator.hpp"
 #include "src/gl/point_tracker.hpp"
-#include "src/gl/sparse.hpp"
+#include "src/gl/sparse_simulator.hpp"
 #include "tests/gl/every_api.hpp"
 #include "tests/reference/diff.hpp"
 #include "tests/reference/sparse.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/gl/dense.hpp"
+#include "src/gl/dense_simulator.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/gl/diff.hpp"
+#include "src/gl/diff_simulator.hpp"
 
 #include "src/gl/difference.hpp"
 #include "src/gl/point_tracker.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/gl/sparse.hpp"
+#include "src/gl/sparse_simulator.hpp"
 
 #include <algorithm>
 

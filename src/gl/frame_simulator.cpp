@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/gl/frame.hpp"
+#include "src/gl/frame_simulator.hpp"
 
 #include <utility>
 
