@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Builds the plugins and programs with each feature disabled, in one directory, so that only what a
-# feature changes is built again. Without the simulators nothing may need OpenCV.
+# feature changes is built again. Nothing but one optical flow may need OpenCV.
 set -eu
 cd "$(dirname "$0")/.."
 scratch=$(mktemp -d)
@@ -16,7 +16,7 @@ fail() {
 without() { # FEATURE...
   echo "Without $*"
   local feature options=()
-  for feature in eventsim eventsimgl eventcam aedat hdf5 npz; do
+  for feature in eventsim opencv eventsimgl eventcam aedat hdf5 npz; do
     case " $* " in
       *" $feature "*) options+=("-D$feature=disabled") ;;
       *) options+=("-D$feature=auto") ;;
@@ -27,15 +27,27 @@ without() { # FEATURE...
     --prefix="$scratch/installed" "${options[@]}"
 }
 
+uses_opencv() {
+  grep -qE 'opencv(4|_)' "$build/compile_commands.json" "$build/build.ninja"
+}
+
 plugins() {
   (cd "$build/elements" && find . -name '*.so' | sort | tr '\n' ' ')
 }
 
 without eventsim
-if grep -q opencv "$build/compile_commands.json" "$build/build.ninja"; then
-  fail "OpenCV is in the commands of a build without simulators"
-fi
+if uses_opencv; then fail "OpenCV is in the commands of a build without simulators"; fi
 [ "$(plugins)" = "./eventcam/libgsteventcam.so ./eventsimgl/libgsteventsimgl.so " ] || fail "built $(plugins)"
+
+without opencv
+if uses_opencv; then fail "OpenCV is in the commands of a build without it"; fi
+[ "$(plugins)" = "./eventcam/libgsteventcam.so ./eventsim/libgsteventsim.so ./eventsimgl/libgsteventsimgl.so " ] ||
+  fail "built $(plugins)"
+for element in eventsim-frame eventsim-dense eventsim-sparse eventsim-diff eventsim-dvs; do
+  meson devenv -C "$build" gst-inspect-1.0 $element >"$scratch/$element" || fail "$element is missing without OpenCV"
+done
+grep -q dis-hq "$scratch/eventsim-dense" || fail "flow=dis-hq is missing without OpenCV"
+if grep -q opencv-dis "$scratch/eventsim-dense"; then fail "flow=opencv-dis is there without OpenCV"; fi
 
 without eventsim aedat
 without eventsim hdf5

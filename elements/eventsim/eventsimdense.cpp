@@ -32,8 +32,10 @@ static GType flow_type() {
        "DIS, low quality: fast, misses small objects that move far", "dis-lq"},
       {static_cast<int>(FlowMethod::dis_hq), "DIS, high quality", "dis-hq"},
       farneback_flow,
+#ifdef HAVE_OPENCV
       {static_cast<int>(FlowMethod::opencv_dis),
        "OpenCV's DIS with the parameters of dis-hq, for comparison: slower", "opencv-dis"},
+#endif
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventSimFlowMethod", values);

@@ -14,8 +14,7 @@
 //   patches.cpp                   inverse search: the flow u of a patch that minimises the sum of
 //                                 (J(x + u) - I(x))^2, less the means; densification: the mean of
 //                                 the flows of the patches that cover a pixel, weighted by match
-//   variational_refinement.cpp    energy of brightness constancy, gradient constancy and
-//   smoothness:
+//   variational_refinement.cpp    energy of constant brightness and gradients, and of smoothness:
 //                                 Brox et al., High accuracy optical flow estimation based on a
 //                                 theory for warping, ECCV 2004
 //   dis.cpp                       scales, coarse to fine
@@ -45,7 +44,7 @@ enum class FlowMethod {
   dis_lq,      ///< DIS, low quality and fast: patches of 4 at strides of 3, 8 iterations, 3 scales
   dis_hq,      ///< DIS, high quality: patches of 8 at strides of 4, 32 iterations
   farneback,   ///< Farneback: up to 4 levels, window 15, 3 iterations, polynomials of 5 pixels
-  opencv_dis,  ///< OpenCV's DIS with the parameters of dis_hq
+  opencv_dis,  ///< OpenCV's DIS with the parameters of dis_hq; only in builds with OpenCV
 };
 
 /// Dense optical flow between 8-bit images of any size. Each image serves twice, first as the
