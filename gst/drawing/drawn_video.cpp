@@ -7,6 +7,8 @@
 #include <iterator>
 #include <string_view>
 
+#include "gst/base/types.hpp"
+
 using eventcamera::PaletteName;
 
 eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info) {
@@ -20,14 +22,21 @@ eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info) {
           .blue = place(GST_VIDEO_COMP_B)};
 }
 
-PaletteName palette_name_of(GstEventCameraPalette palette) {
-  static_assert(static_cast<int>(PaletteName::light) == GST_EVENT_CAMERA_PALETTE_LIGHT);
-  static_assert(static_cast<int>(PaletteName::dark) == GST_EVENT_CAMERA_PALETTE_DARK);
-  static_assert(static_cast<int>(PaletteName::grey) == GST_EVENT_CAMERA_PALETTE_GREY);
-  static_assert(static_cast<int>(PaletteName::red_blue) == GST_EVENT_CAMERA_PALETTE_RED_BLUE);
-  static_assert(static_cast<int>(PaletteName::viridis) == GST_EVENT_CAMERA_PALETTE_VIRIDIS);
-  static_assert(static_cast<int>(PaletteName::magma) == GST_EVENT_CAMERA_PALETTE_MAGMA);
-  return static_cast<PaletteName>(palette);
+GType palette_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(PaletteName::light), "On white: ON blue, OFF dark, both dark blue",
+       "light"},
+      {static_cast<int>(PaletteName::dark), "On dark: ON white, OFF blue, both light blue", "dark"},
+      {static_cast<int>(PaletteName::grey), "On grey: ON white, OFF black, both dark grey", "grey"},
+      {static_cast<int>(PaletteName::red_blue), "On white: ON blue, OFF red, both purple",
+       "red-blue"},
+      {static_cast<int>(PaletteName::viridis),
+       "From purple over green to yellow, perceptually uniform", "viridis"},
+      {static_cast<int>(PaletteName::magma),
+       "From black over red to light yellow, perceptually uniform", "magma"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventPalette", values);
 }
 
 /// True if a meta with the tags of `api` depends neither on the colours of the pixels nor on their

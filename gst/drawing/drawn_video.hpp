@@ -3,7 +3,6 @@
 
 #include <gst/video/video.h>
 
-#include "gst/eventcamera/eventcamera.h"
 #include "src/render/palette.hpp"
 
 /// Video formats that events can be drawn in, the most common first.
@@ -12,8 +11,8 @@
 /// Pixel layout of a video of DRAWN_VIDEO_FORMATS.
 eventcamera::PixelLayout pixel_layout_of(const GstVideoInfo& info);
 
-/// Converts the public palette enum to the core's.
-eventcamera::PaletteName palette_name_of(GstEventCameraPalette palette);
+/// Enum type of properties that are a PaletteName.
+GType palette_type();
 
 /// Copies the metas of a frame to the picture of its events, if they remain valid although the
 /// colours differ: those that depend only on size, orientation and time, such as crop and regions

@@ -10,22 +10,6 @@ static_assert(sizeof(GstEventCameraEvent) == sizeof(eventcamera::Event) &&
                   offsetof(GstEventCameraEvent, y_p) == offsetof(eventcamera::Event, y_p),
               "the core's events are handed to applications as they are");
 
-GType gst_event_camera_palette_get_type(void) {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {GST_EVENT_CAMERA_PALETTE_LIGHT, "On white: ON blue, OFF dark, both dark blue", "light"},
-        {GST_EVENT_CAMERA_PALETTE_DARK, "On the dark: ON white, OFF blue, both light blue", "dark"},
-        {GST_EVENT_CAMERA_PALETTE_GREY, "On grey: ON white, OFF black, both dark grey", "grey"},
-        {GST_EVENT_CAMERA_PALETTE_RED_BLUE, "On white: ON blue, OFF red, both purple", "red-blue"},
-        {GST_EVENT_CAMERA_PALETTE_VIRIDIS, "Purple by green to yellow, uniform", "viridis"},
-        {GST_EVENT_CAMERA_PALETTE_MAGMA, "Black by red to light yellow, uniform", "magma"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstEventCameraPalette", values);
-  }();
-  return type;
-}
-
 static GstEventCameraInfo* gst_event_camera_info_copy(const GstEventCameraInfo* info) {
   return static_cast<GstEventCameraInfo*>(g_memdup2(info, sizeof *info));
 }

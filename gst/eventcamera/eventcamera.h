@@ -100,34 +100,6 @@ static inline gboolean gst_event_camera_event_is_on(const GstEventCameraEvent* e
   return (event->y_p & 0x8000u) != 0;
 }
 
-/**
- * GstEventCameraPalette:
- * @GST_EVENT_CAMERA_PALETTE_LIGHT: on white: ON blue, OFF dark, both dark blue
- * @GST_EVENT_CAMERA_PALETTE_DARK: on dark: ON white, OFF blue, both light blue
- * @GST_EVENT_CAMERA_PALETTE_GREY: on grey: ON white, OFF black, both dark grey
- * @GST_EVENT_CAMERA_PALETTE_RED_BLUE: on white: ON blue, OFF red, both purple
- * @GST_EVENT_CAMERA_PALETTE_VIRIDIS: from purple over green to yellow, perceptually uniform
- * @GST_EVENT_CAMERA_PALETTE_MAGMA: from black over red to light yellow, perceptually uniform
- *
- * The colours of drawn events. In accumulated-event video, they distinguish pixels with no events,
- * ON events, OFF events and both. In modes with shades, the first four palettes shade ON and OFF
- * separately, and the uniform ones show the magnitude, regardless of polarity.
- *
- * Since: 0.1
- */
-typedef enum {
-  GST_EVENT_CAMERA_PALETTE_LIGHT,
-  GST_EVENT_CAMERA_PALETTE_DARK,
-  GST_EVENT_CAMERA_PALETTE_GREY,
-  GST_EVENT_CAMERA_PALETTE_RED_BLUE,
-  GST_EVENT_CAMERA_PALETTE_VIRIDIS,
-  GST_EVENT_CAMERA_PALETTE_MAGMA,
-} GstEventCameraPalette;
-
-#define GST_TYPE_EVENT_CAMERA_PALETTE (gst_event_camera_palette_get_type())
-GST_EVENT_CAMERA_API
-GType gst_event_camera_palette_get_type(void);
-
 #define GST_TYPE_EVENT_CAMERA_INFO (gst_event_camera_info_get_type())
 GST_EVENT_CAMERA_API
 GType gst_event_camera_info_get_type(void);

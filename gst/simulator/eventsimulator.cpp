@@ -31,6 +31,7 @@ GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 using eventcamera::EventBuckets;
 using eventcamera::IntervalSimulator;
 using eventcamera::Nanoseconds;
+using eventcamera::PaletteName;
 
 namespace {
 
@@ -50,7 +51,7 @@ constexpr GstClockTime poll_interval = GST_MSECOND;
 /// User-settable values, copied once per buffer.
 struct Settings {
   eventcamera::Settings simulation;
-  GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
+  PaletteName palette = PaletteName::dark;
 };
 
 /// A frame that is worked on, and the interval that it ends, if any.
@@ -178,10 +179,10 @@ static void install_base_properties(GObjectClass* klass) {
                                    "Maximum number of threads for one frame (0 = one for each "
                                    "processor); the events are the same for any number",
                                    0, G_MAXINT, 0, property_flags));
-  properties.add(&Settings::palette,
-                 g_param_spec_enum("palette", "Palette", "Colours of accumulated-event video",
-                                   GST_TYPE_EVENT_CAMERA_PALETTE, GST_EVENT_CAMERA_PALETTE_DARK,
-                                   property_flags));
+  properties.add(
+      &Settings::palette,
+      g_param_spec_enum("palette", "Palette", "Colours of accumulated-event video", palette_type(),
+                        static_cast<int>(PaletteName::dark), property_flags));
 }
 
 static GuardedSettings<SimulatorQos>& qos_of(GObject* object) {
@@ -582,8 +583,8 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
   OwnedBuffer picture;
   GstFlowReturn result = event_simulator_make_picture(transform, in.get(), picture);
   if (result == GST_FLOW_OK) {
-    state.frames->draw(in.get(), time, settings.simulation,
-                       eventcamera::palette(palette_name_of(settings.palette)), picture.get());
+    state.frames->draw(in.get(), time, settings.simulation, eventcamera::palette(settings.palette),
+                       picture.get());
     push_awaited(self);
   }
   end_work(self, time, work_began(self));
@@ -864,7 +865,6 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   transform_class->start = start;
   transform_class->stop = stop;
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_SIMULATOR, static_cast<GstPluginAPIFlags>(0));
-  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
 }
 
 GType gst_event_simulator_get_type() {

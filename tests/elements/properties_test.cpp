@@ -4,6 +4,7 @@
 #include <gst/controller/gstdirectcontrolbinding.h>
 #include <gst/controller/gstinterpolationcontrolsource.h>
 
+#include "src/render/palette.hpp"
 #include "tests/elements/harness.hpp"
 
 namespace {
@@ -63,7 +64,7 @@ TEST_P(EveryElement, KeepsWhatIsSet) {
   EXPECT_EQ(number(element.get(), "negative-threshold"), negative);
   gint palette = 0;
   g_object_get(element.get(), "palette", &palette, nullptr);
-  EXPECT_EQ(palette, GST_EVENT_CAMERA_PALETTE_RED_BLUE);
+  EXPECT_EQ(palette, static_cast<int>(eventcamera::PaletteName::red_blue));
 }
 
 TEST_P(EveryElement, DescribesItself) {

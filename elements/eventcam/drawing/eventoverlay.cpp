@@ -38,13 +38,14 @@ GST_DEBUG_CATEGORY_STATIC(event_overlay_debug);
 
 using eventcamera::Microseconds;
 using eventcamera::Overlay;
+using eventcamera::PaletteName;
 using eventcamera::Size;
 
 namespace {
 
 /// User-settable values, copied once per frame.
 struct Settings {
-  GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_RED_BLUE;
+  PaletteName palette = PaletteName::red_blue;
   gdouble opacity = 1;
   GstClockTime accumulation_time = 0;
 };
@@ -160,8 +161,8 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
   const auto start = current.accumulation_time > 0
                          ? end - static_cast<Microseconds>(current.accumulation_time / 1000)
                          : static_cast<Microseconds>(interval.start / 1000);
-  overlay_->draw(start, end, eventcamera::palette(palette_name_of(current.palette)),
-                 current.opacity, pixel_layout_of(*video_), frame.data(), frame.stride());
+  overlay_->draw(start, end, eventcamera::palette(current.palette), current.opacity,
+                 pixel_layout_of(*video_), frame.data(), frame.stride());
   return GST_FLOW_OK;
 }
 
@@ -257,7 +258,7 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
   properties.add(
       &Settings::palette,
       g_param_spec_enum("palette", "Palette", "Colours of pixels with ON, with OFF, and with both",
-                        GST_TYPE_EVENT_CAMERA_PALETTE, defaults.palette, flags));
+                        palette_type(), static_cast<int>(defaults.palette), flags));
   properties.add(&Settings::opacity,
                  g_param_spec_double("opacity", "Opacity",
                                      "Opacity of drawn events (0 = invisible, 1 = opaque)", 0, 1,
@@ -267,7 +268,6 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
       g_param_spec_uint64("accumulation-time", "Accumulation time",
                           "Time that an event is shown (ns; 0 = one frame)", 0,
                           std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
-  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
 
 #define DRAWN_VIDEO_CAPS                                                    \
   "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS                     \

@@ -46,6 +46,7 @@ GST_DEBUG_CATEGORY_STATIC(event_render_debug);
 #define GST_CAT_DEFAULT event_render_debug
 
 using eventcamera::Microseconds;
+using eventcamera::PaletteName;
 using eventcamera::Renderer;
 using eventcamera::RenderMode;
 using eventcamera::RenderSettings;
@@ -64,7 +65,7 @@ constexpr GstClockTime default_memory = 100 * GST_MSECOND;
 /// User-settable values, copied once per picture.
 struct Settings {
   RenderMode mode = RenderMode::accumulate;
-  GstEventCameraPalette palette = GST_EVENT_CAMERA_PALETTE_DARK;
+  PaletteName palette = PaletteName::dark;
   GstClockTime accumulation_time = 0;
   guint event_count = 0;
   guint area_event_count = 0;
@@ -77,7 +78,7 @@ struct Settings {
 RenderSettings core_settings(const Settings& settings) {
   RenderSettings core;
   core.mode = settings.mode;
-  core.palette = palette_name_of(settings.palette);
+  core.palette = settings.palette;
   const auto time = settings.accumulation_time > 0 ? settings.accumulation_time : default_memory;
   const auto microseconds = static_cast<Microseconds>(std::max(time / 1000, GstClockTime{1}));
   if (settings.mode == RenderMode::decay || settings.mode == RenderMode::time_surface)
@@ -487,7 +488,7 @@ static void install_properties(GObjectClass* object_class) {
       &Settings::palette,
       g_param_spec_enum("palette", "Palette",
                         "Colours of the picture; viridis and magma show magnitude, not polarity",
-                        GST_TYPE_EVENT_CAMERA_PALETTE, defaults.palette, flags));
+                        palette_type(), static_cast<int>(defaults.palette), flags));
   properties.add(
       &Settings::accumulation_time,
       g_param_spec_uint64(
@@ -519,7 +520,6 @@ static void install_properties(GObjectClass* object_class) {
                           "(events)",
                           0.1, 1e6, defaults.full_scale, flags));
   gst_type_mark_as_plugin_api(gst_event_render_mode_get_type(), static_cast<GstPluginAPIFlags>(0));
-  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_CAMERA_PALETTE, static_cast<GstPluginAPIFlags>(0));
 }
 
 /// Consumes QoS events: upstream would skip events.
