@@ -22,7 +22,10 @@ G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventAggregator, gst_event_aggregator, GST_T
 #define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_event_aggregator_parent_class)
 
 EventAggregator::EventAggregator(GstAggregator* element, const Role& role)
-    : element_(element), role_(role), main_pad_(pad(role.main_pad)), faults_(role.verb) {}
+    : element_(element),
+      role_(role),
+      main_pad_(pad(role.main_pad)),
+      faults_(role.verb, GST_CAT_DEFAULT) {}
 
 GstAggregatorPad* EventAggregator::pad(const char* name) const {
   GstPad* pad = gst_element_get_static_pad(GST_ELEMENT(element_), name);

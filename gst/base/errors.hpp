@@ -52,11 +52,12 @@ inline void post_message(gpointer element, GstMessageType type, const Report& re
 /// Posts a warning only the first time, and logs it every time. For conditions that tend to repeat.
 class WarnOnce {
  public:
+  explicit WarnOnce(GstDebugCategory* category) : category_(category) {}
+
   void operator()(gpointer element, const Report& report, const std::string& cause,
                   CallSite at = CallSite()) {
     if (std::exchange(posted_, true))
-      GST_CAT_WARNING_OBJECT(GST_CAT_DEFAULT, element, "%s (%s)", report.text.c_str(),
-                             cause.c_str());
+      GST_CAT_WARNING_OBJECT(category_, element, "%s (%s)", report.text.c_str(), cause.c_str());
     else
       post_message(element, GST_MESSAGE_WARNING, report, cause, at);
   }
@@ -65,6 +66,7 @@ class WarnOnce {
   void reset() { posted_ = false; }
 
  private:
+  GstDebugCategory* category_;
   bool posted_ = false;
 };
 

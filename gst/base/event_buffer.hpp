@@ -71,14 +71,19 @@ enum class EventFault { no_pts, pts_too_large, partial_event, beyond_sensor, uns
 class EventFaults {
  public:
   /// `verb` is what the element does with events, such as "draw".
-  explicit EventFaults(const char* verb) : verb_(verb) {}
+  EventFaults(const char* verb, GstDebugCategory* category)
+      : verb_(verb),
+        warnings_{WarnOnce(category), WarnOnce(category), WarnOnce(category), WarnOnce(category),
+                  WarnOnce(category)} {}
 
   void warn(gpointer element, EventFault fault, GstBuffer* buffer);
 
   /// For a new stream: warnings are posted again.
-  void reset() { warnings_ = {}; }
+  void reset() {
+    for (auto& warning : warnings_) warning.reset();
+  }
 
  private:
   const char* verb_;
-  std::array<WarnOnce, 5> warnings_{};
+  std::array<WarnOnce, 5> warnings_;  ///< one per EventFault
 };

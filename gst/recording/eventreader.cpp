@@ -15,6 +15,8 @@
 
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
@@ -31,9 +33,6 @@
 
 GST_DEBUG_CATEGORY_STATIC(event_reader_debug);
 #define GST_CAT_DEFAULT event_reader_debug
-
-#include "gst/base/errors.hpp"
-#include "gst/base/event_buffer.hpp"
 
 using eventcamera::Microseconds;
 using eventcamera::RecordingReader;
@@ -178,8 +177,8 @@ class EventReader {
   bool is_consuming_ = false;         ///< bytes were passed to the recording
   GstFlowReturn flow_ = GST_FLOW_OK;  ///< anything else refuses pushed bytes
   guint64 corrupt_places_ = 0;        ///< already signalled by DISCONT and a warning
-  WarnOnce warn_of_corruption_;
-  WarnOnce warn_of_assumption_;
+  WarnOnce warn_of_corruption_{GST_CAT_DEFAULT};
+  WarnOnce warn_of_assumption_{GST_CAT_DEFAULT};
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;
   std::map<std::size_t, ReaderPad*> pad_of_stream_;

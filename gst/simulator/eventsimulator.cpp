@@ -91,10 +91,10 @@ struct Stream {
   bool discontinuous = false;                   ///< the next buffer is discontinuous
   GstFlowReturn flow = GST_FLOW_OK;             ///< result of the last push
   FrameClock clock;                             ///< for frames without a PTS
-  WarnOnce warn_of_times;
-  WarnOnce warn_of_no_pts;
-  WarnOnce warn_of_interlacing;
-  WarnOnce warn_of_drawn_input;
+  WarnOnce warn_of_times{GST_CAT_DEFAULT};
+  WarnOnce warn_of_no_pts{GST_CAT_DEFAULT};
+  WarnOnce warn_of_interlacing{GST_CAT_DEFAULT};
+  WarnOnce warn_of_drawn_input{GST_CAT_DEFAULT};
 };
 
 }  // namespace

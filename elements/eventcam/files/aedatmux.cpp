@@ -90,7 +90,7 @@ struct State {
   /// Announced, so that the header has a stream for them; then those that wait for the next buffer.
   std::optional<std::vector<Trigger>> triggers;
   std::optional<std::vector<ImuSample>> imu_samples;
-  WarnOnce warn;
+  WarnOnce warn{GST_CAT_DEFAULT};
 };
 
 }  // namespace

@@ -91,7 +91,7 @@ struct Private {
 
   // Accessed by the streaming thread only, or while there is none.
   std::optional<Measurement> measurement;
-  EventFaults faults{"count"};
+  EventFaults faults{"count", GST_CAT_DEFAULT};
 };
 
 }  // namespace

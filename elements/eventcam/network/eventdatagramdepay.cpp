@@ -99,7 +99,7 @@ struct Private {
 
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
-  WarnOnce warn_of_rejected;
+  WarnOnce warn_of_rejected{GST_CAT_DEFAULT};
 };
 
 }  // namespace

@@ -66,7 +66,7 @@ struct Private {
   std::unique_ptr<DatagramPacker> packer;
   std::vector<AbsoluteEvent> events;   ///< of the current buffer
   std::vector<OwnedBuffer> datagrams;  ///< complete but not yet pushed
-  EventFaults faults{"send"};
+  EventFaults faults{"send", GST_CAT_DEFAULT};
   std::optional<Microseconds> timed;  ///< first event of the datagram that the timer is set for
 
   FlushTimer timer;

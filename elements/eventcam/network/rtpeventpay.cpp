@@ -90,7 +90,7 @@ struct Private {
 
   // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
   std::optional<State> state;
-  EventFaults faults{"send"};
+  EventFaults faults{"send", GST_CAT_DEFAULT};
   GstFlowReturn flow = GST_FLOW_OK;  ///< result of the last packets
   RtpHeaderExtensions extensions;
 
