@@ -14,6 +14,9 @@
 #include "gst/glsimulator/gl_display.hpp"
 #include "gst/simulator/frame_luma.hpp"
 
+GST_DEBUG_CATEGORY_STATIC(gl_event_simulator_debug);
+#define GST_CAT_DEFAULT gl_event_simulator_debug
+
 using eventcamera::EventBuckets;
 using eventcamera::LumaWeights;
 using eventcamera::Nanoseconds;
@@ -26,8 +29,12 @@ struct GstGLEventSimulatorPrivate {
   GstGLContext* context = nullptr;
 };
 
-G_DEFINE_ABSTRACT_TYPE_WITH_PRIVATE(GstGLEventSimulator, gst_gl_event_simulator,
-                                    GST_TYPE_EVENT_SIMULATOR)
+G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstGLEventSimulator, gst_gl_event_simulator,
+                                 GST_TYPE_EVENT_SIMULATOR,
+                                 G_ADD_PRIVATE(GstGLEventSimulator)
+                                     GST_DEBUG_CATEGORY_INIT(gl_event_simulator_debug,
+                                                             "gleventsimulator", 0,
+                                                             "event simulators on the GPU"))
 #define PARENT_ELEMENT_CLASS GST_ELEMENT_CLASS(gst_gl_event_simulator_parent_class)
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_gl_event_simulator_parent_class)
 
@@ -127,6 +134,7 @@ static void forget_context(GstElement* self, GstGLContext* context) {
   auto& priv = priv_of(self);
   const std::lock_guard lock(priv.mutex);
   if (priv.context != context) return;
+  GST_WARNING_OBJECT(self, "lost %" GST_PTR_FORMAT ", looking for another", context);
   GST_OBJECT_LOCK(priv.display);
   gst_gl_display_remove_context(priv.display, context);
   GST_OBJECT_UNLOCK(priv.display);
@@ -263,6 +271,9 @@ class TextureVideoSimulator final : public VideoSimulator {
         gl_.emplace(
             [context](const char* name) { return gst_gl_context_get_proc_address(context, name); });
         simulator_ = make(*gl_, frame_.format);
+        const auto* functions = context_->gl_vtable;
+        GST_INFO_OBJECT(element_, "%s, OpenGL %s", functions->GetString(GL_RENDERER),
+                        functions->GetString(GL_VERSION));
       });
     } catch (...) {
       close();

@@ -402,6 +402,9 @@ void EventReader::open_recording() {
       make, length, is_timed() ? RecordingReader::Clock::stream : RecordingReader::Clock::file);
   if (bytes_) recording_->open(*bytes_);
   shared_.lock()->recording = recording_;
+  GST_DEBUG_OBJECT(element_, "opened in %s mode, with %s of %" GST_PTR_FORMAT,
+                   bytes_ ? "pull" : "push", is_timed() ? "the times of upstream" : "its own times",
+                   caps_.get());
 }
 
 void EventReader::close_recording() {
@@ -732,6 +735,11 @@ GstFlowReturn EventReader::step() {
 /// New streams are known.
 GstFlowReturn EventReader::push(const RecordingReader::Start& /*start*/) {
   if (const auto length = recording_->duration()) set_duration(nanoseconds(*length));
+  GST_DEBUG_OBJECT(element_,
+                   "%" G_GSIZE_FORMAT " streams, origin %" GST_TIME_FORMAT
+                   ", duration %" GST_TIME_FORMAT,
+                   recording_->streams().size(), GST_TIME_ARGS(nanoseconds(recording_->origin())),
+                   GST_TIME_ARGS(duration()));
   return begin_output();
 }
 
@@ -742,6 +750,9 @@ GstFlowReturn EventReader::push(const RecordingReader::Chunk& chunk) {
   if (!send_caps(chunk.stream)) return refused_size(chunk.stream);
   const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(chunk.start);
   const GstClockTime duration = nanoseconds(chunk.duration);
+  GST_LOG_OBJECT(pad.get(),
+                 "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
+                 chunk.events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(duration));
   if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
   GstBuffer* const buffer = copied_buffer(std::as_bytes(chunk.events));
   GST_BUFFER_DURATION(buffer) = duration;
@@ -756,6 +767,7 @@ GstFlowReturn EventReader::push(const RecordingReader::TimedFrame& item) {
   if (!frame_video_info(item.frame, &info)) return GST_FLOW_OK;
   if (!pad.send_caps(info) && GST_PAD_IS_FLUSHING(pad.get())) return GST_FLOW_FLUSHING;
   const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(item.time);
+  GST_LOG_OBJECT(pad.get(), "frame at %" GST_TIME_FORMAT, GST_TIME_ARGS(pts));
   return combined(pad, pad.push(frame_buffer(item.frame, &info), pts));
 }
 
@@ -910,7 +922,13 @@ void EventReader::find_size(std::size_t index) {
 bool EventReader::send_caps(std::size_t index) {
   const auto& stream = recording_->streams()[index];
   auto& pad = pad_of(index);
-  if (stream.info.kind == StreamKind::events) return pad.send_caps(stream.info.size);
+  if (stream.info.kind == StreamKind::events) {
+    const bool taken = pad.send_caps(stream.info.size);
+    if (!taken)
+      GST_DEBUG_OBJECT(pad.get(), "a sensor of %dx%d pixels is refused", stream.info.size.width,
+                       stream.info.size.height);
+    return taken;
+  }
   GstVideoInfo info;
   return pad.has_video() || !frame_video_info(*stream.first_frame, &info) || pad.send_caps(info);
 }
@@ -978,11 +996,19 @@ void EventReader::push_to_pads(GstEvent* event) {
 void EventReader::note_progress() {
   const auto counts = recording_->counts();
   const auto position = nanoseconds(recording_->position());
+  guint64 dropped = 0;
   {
     const auto shared = shared_.lock();
+    dropped = counts.outside + counts.late + counts.stray - shared->counts.outside -
+              shared->counts.late - shared->counts.stray;
     shared->counts = counts;
     if (!shared->is_timed) shared->segment.position = std::max(shared->segment.position, position);
   }
+  if (dropped > 0)
+    GST_LOG_OBJECT(element_,
+                   "dropped %" G_GUINT64_FORMAT " items before %" GST_TIME_FORMAT
+                   ": outside the sensor, late, or at an impossible time",
+                   dropped, GST_TIME_ARGS(position));
   if (counts.corrupt_places > corrupt_places_)
     for (auto& pad : pads_) pad->interrupt_data();
   if (counts.corrupt_places > 0 && counts.corrupt_places != corrupt_places_) {
@@ -1135,6 +1161,11 @@ bool EventReader::seek(GstEvent* event) {
   if (!is_pulling && !request.flushes()) return false;
   if (!is_pulling && recording)
     restart.seek_point = recording->seek_point_before(position_of(restart.segment));
+  GST_DEBUG_OBJECT(element_,
+                   "seek in %s mode to %" GST_TIME_FORMAT ", from byte %" G_GUINT64_FORMAT
+                   " on: %" GST_SEGMENT_FORMAT,
+                   is_pulling ? "pull" : "push", GST_TIME_ARGS(restart.segment.position),
+                   guint64{restart.seek_point.value_or(SeekPoint{}).position}, &restart.segment);
   const bool done = is_pulling ? seek_pulling(request) : seek_pushed(restart, request.rate());
   if (done) shared_.lock()->last_seek = request.seqnum();
   return done;

@@ -132,6 +132,8 @@ static GstFlowReturn negotiate(GstEventWriter* self, const GstEventCameraInfo& i
   }
   OwnedCaps fixed(caps);
   if (!gst_caps_is_fixed(fixed.get())) return GST_FLOW_NOT_NEGOTIATED;
+  GST_DEBUG_OBJECT(self, "writing the events of %dx%d pixels as %" GST_PTR_FORMAT, info.width,
+                   info.height, fixed.get());
   begin_file(self, info, std::move(fixed));
   return gst_pad_push_event(priv.src, gst_event_new_caps(priv.state->caps.get()))
              ? GST_FLOW_OK
@@ -211,6 +213,8 @@ static GstFlowReturn push_bytes(GstEventWriter* self, GstClockTime pts, GstClock
     GstBuffer* const buffer = copied_buffer(std::as_bytes(piece));
     GST_BUFFER_PTS(buffer) = pts;
     if (bytes.empty()) GST_BUFFER_DURATION(buffer) = duration;
+    GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " bytes at %" GST_TIME_FORMAT, piece.size(),
+                   GST_TIME_ARGS(pts));
     priv.state->written = true;
     result = gst_pad_push(priv.src, buffer);
   }
@@ -320,6 +324,8 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
 /// Overwrites part of the header. May throw.
 static GstFlowReturn push_patch(GstEventWriter* self, eventcamera::FilePatch patch) {
   auto& priv = priv_of(self);
+  GST_DEBUG_OBJECT(self, "completing the header: %" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT,
+                   patch.bytes.size(), patch.position);
   if (!can_seek_bytes(priv.src)) {
     GST_ELEMENT_WARNING(self, STREAM, ENCODE,
                         ("The file header lacks the number of events. Write to a sink that can "

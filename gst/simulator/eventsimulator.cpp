@@ -245,7 +245,7 @@ static bool begin_work(GstEventSimulator* self, GstBuffer* frame) {
     skipped = qos.begin(GST_BASE_TRANSFORM(self), frame, ends_interval);
   });
   if (skipped == nullptr) return true;
-  GST_DEBUG_OBJECT(self, "skipped %" GST_PTR_FORMAT, frame);
+  GST_DEBUG_OBJECT(self, "downstream is late: skipped %" GST_PTR_FORMAT, frame);
   gst_element_post_message(GST_ELEMENT(self), skipped);
   return false;
 }
@@ -341,6 +341,8 @@ static void forget_frames(GstEventSimulator* self) {
   push_awaited(self);
   auto& state = priv_of(self).state;
   if (!state || !state->simulator().last_time()) return;
+  GST_DEBUG_OBJECT(self, "the next frame begins an interval; the last was at %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(static_cast<GstClockTime>(*state->simulator().last_time())));
   state->simulator().reset();
   priv_of(self).stream.discontinuous = true;
 }
@@ -408,7 +410,12 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
     forget_frames(self);
   }
   // An interval starting with this frame would overlap the last one.
-  return !(priv_of(self).stream.handed_out_until && time < *priv_of(self).stream.handed_out_until);
+  const auto until = priv_of(self).stream.handed_out_until;
+  if (!until || time >= *until) return true;
+  GST_LOG_OBJECT(
+      self, "skipping the frame at %" GST_TIME_FORMAT ": there are events until %" GST_TIME_FORMAT,
+      GST_TIME_ARGS(pts), GST_TIME_ARGS(static_cast<GstClockTime>(*until)));
+  return false;
 }
 
 /// Runs `work`; reports any exception and drops the state, because the simulator is then unusable.
@@ -528,6 +535,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     if (state->draws) state->frames->set_drawn_video(drawn);
   });
   if (!made) return FALSE;
+  GST_DEBUG_OBJECT(self, "%s of %" GST_PTR_FORMAT, state->draws ? "event frames" : "events", in);
   check_input(self);
   // Pictures have the time of their frame, intervals that of the previous frame.
   const GstClockTime duration = state->draws ? 0 : frame_duration(video);

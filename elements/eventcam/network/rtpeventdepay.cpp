@@ -128,9 +128,12 @@ static void update_segment(GstRtpEventDepay* self, GstClockTime start, GstClockT
   if (in.format != GST_FORMAT_TIME) arrival = GST_CLOCK_TIME_NONE;
   const guint64 running = gst_segment_to_running_time(&in, in.format, arrival);
   auto& segment = self->priv->state->segment;
-  if (!segment.continues(start, running))
-    segment.begin(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), self->priv->segment_seqnum, start, running,
-                  gst_segment_to_stream_time(&in, in.format, arrival));
+  if (segment.continues(start, running)) return;
+  GST_DEBUG_OBJECT(self,
+                   "the sender's %" GST_TIME_FORMAT " arrives at running time %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(start), GST_TIME_ARGS(running));
+  segment.begin(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), self->priv->segment_seqnum, start, running,
+                gst_segment_to_stream_time(&in, in.format, arrival));
 }
 
 static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
@@ -140,6 +143,10 @@ static void push(GstRtpEventDepay* self, const RtpInterval& interval) {
   auto& state = *self->priv->state;
   state.segment.reach(start + duration);
   state.is_discontinuous |= interval.is_discontinuous;
+  GST_LOG_OBJECT(self,
+                 "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT "%s",
+                 interval.events.size(), GST_TIME_ARGS(start), GST_TIME_ARGS(duration),
+                 interval.is_discontinuous ? ", after a loss" : "");
   if (interval.events.empty()) {
     gst_pad_push_event(GST_RTP_BASE_DEPAYLOAD_SRCPAD(self), gst_event_new_gap(start, duration));
     return;
@@ -181,7 +188,14 @@ static GstBuffer* process(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
   guarded(self, report, [&] {
     state.unpacker.push(packet, [&](const RtpInterval& interval) { push(self, interval); });
   });
-  *priv.statistics.lock() = state.unpacker.statistics();
+  const auto& counted = state.unpacker.statistics();
+  const auto before = std::exchange(*priv.statistics.lock(), counted);
+  if (counted.lost_packets > before.lost_packets)
+    GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u",
+                     guint64{counted.lost_packets - before.lost_packets}, packet.sequence_number);
+  if (counted.rejected_packets > before.rejected_packets)
+    GST_LOG_OBJECT(self, "rejected packet number %u: corrupt, or of another sensor",
+                   packet.sequence_number);
   return nullptr;
 }
 
@@ -198,6 +212,7 @@ static bool is_plausible(GstRtpEventDepay* self, GstBuffer* buffer) {
     gst_rtp_buffer_unmap(&rtp);
   }
   if (!plausible) {
+    GST_LOG_OBJECT(self, "rejected %" GST_PTR_FORMAT ": not a packet of events", buffer);
     unpacker.count_rejected();
     *priv.statistics.lock() = unpacker.statistics();
   }
@@ -212,6 +227,7 @@ static GstFlowReturn counting_late(GstRtpEventDepay* self, guint packets, const 
   priv.processed = 0;
   const GstFlowReturn flow = chain();
   if (flow == GST_FLOW_OK && priv.state && priv.processed < packets) {
+    GST_LOG_OBJECT(self, "%u late packets", packets - priv.processed);
     priv.state->unpacker.count_late(packets - priv.processed);
     *priv.statistics.lock() = priv.state->unpacker.statistics();
   }
