@@ -144,7 +144,8 @@ const Setting table[] = {
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
      &DvsSettings::cutoff_frequency, 0, 1e6, controllable},
     {"dark-light", "Dark light",
-     "Background light that limits how slow and how noisy dark pixels get (fraction of white): the "
+     "Background illuminance, which limits how slow and how noisy dark pixels get (fraction of "
+     "white): the "
      "bandwidth of a pixel is cutoff-frequency times its brightness, (light + dark-light) / (1 + "
      "dark-light), and its shot noise falls from all of shot-noise-rate at brightness 0 to a "
      "quarter at 1",

@@ -35,7 +35,7 @@ static bool is_named(GstEvent* event, const char* name) {
   return GST_EVENT_TYPE(event) == GST_EVENT_CUSTOM_DOWNSTREAM && gst_event_has_name(event, name);
 }
 
-/// A partial record at the end is ignored, and records at an impossible time are.
+/// Skips truncated records, and records with a time out of range.
 template <class Record>
 static std::optional<std::vector<Record>> records_of(GstEvent* event, const char* name) {
   if (!is_named(event, name)) return std::nullopt;

@@ -22,8 +22,8 @@
 #include "gst/simulator/buffers.hpp"
 #include "gst/simulator/caps.hpp"
 #include "gst/simulator/frame_clock.hpp"
-#include "gst/simulator/learnt_latency.hpp"
 #include "gst/simulator/qos.hpp"
+#include "src/simulate/learnt_latency.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 #define GST_CAT_DEFAULT event_simulator_debug
@@ -74,8 +74,8 @@ struct State {
 
 /// Delay from the start of an interval to its output.
 struct Latency {
-  LearntLatency interval;
-  LearntLatency processing;
+  eventcamera::LearntLatency interval;
+  eventcamera::LearntLatency processing;
   Nanoseconds downstream = 0;  ///< of elements downstream that do not report it
 
   Latency() { processing.expect(0); }
@@ -168,7 +168,7 @@ static void install_interpolated_frames(GObjectClass* klass) {
       [](Settings& settings) -> int& { return settings.simulation.interpolated_frames; },
       g_param_spec_uint("interpolated-frames", "Interpolated frames",
                         "Number of frames to interpolate between two frames of the video; "
-                        "events get their times (at most one frame per microsecond)",
+                        "events take those frames' timestamps (at most one frame per microsecond)",
                         0, max_interpolated_frames, default_interpolated_frames, property_flags));
 }
 
@@ -486,7 +486,7 @@ static void check_input(GstEventSimulator* self) {
         self,
         {GST_STREAM_ERROR_FORMAT,
          "The video already shows events, which a simulator upstream drew. To simulate one video "
-         "twice, put a tee in front of both simulators."},
+         "twice, put a tee before both simulators."},
         std::string("answered upstream: ") + draws_query);
   gst_query_unref(query);
 }
@@ -650,7 +650,7 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   auto& flow = priv_of(self).stream.flow;
   *out = nullptr;  // output is pushed here, because that of the last frame may follow later
   OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
-  // Since the timer or an event pushed, downstream may have been linked anew.
+  // Since the timer or an event pushed, downstream may have been relinked.
   if (flow != GST_FLOW_EOS && flow != GST_FLOW_ERROR) {
     flow = GST_FLOW_OK;
     if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;

@@ -5,13 +5,13 @@
 
 #include <optional>
 
-#include "gst/simulator/frame_pacer.hpp"
+#include "src/simulate/frame_pacer.hpp"
 
 /// Quality of service of a simulator: skips frames if downstream is late, and counts them. All
 /// times are running times. Shared between threads, under a lock.
 class SimulatorQos {
  public:
-  using Nanoseconds = FramePacer::Nanoseconds;
+  using Nanoseconds = eventcamera::Nanoseconds;
 
   /// Overrides the default.
   void enable(bool enabled) { enabled_ = enabled; }
@@ -52,7 +52,7 @@ class SimulatorQos {
 
   std::optional<bool> enabled_;
   bool is_video_ = true;
-  FramePacer pacer_;
+  eventcamera::FramePacer pacer_;
   GstClockTimeDiff lateness_ = 0;     ///< of the last picture downstream
   gdouble proportion_ = 1;            ///< of real time that downstream needs
   std::optional<Nanoseconds> last_;   ///< frame that was processed last

@@ -43,7 +43,7 @@ struct DvsSettings {
   int max_interpolated_frames = 31;  ///< between two frames, for Upsampling::motion
 
   double cutoff_frequency = 0;       ///< cutoff of the photoreceptor at white
-  double dark_light = 20.0 / 255.0;  ///< background light; white is 1
+  double dark_light = 20.0 / 255.0;  ///< background illuminance; white is 1
 
   double positive_threshold = 0.2;  ///< units of the response
   double negative_threshold = 0.2;  ///< units of the response, a magnitude

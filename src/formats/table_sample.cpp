@@ -113,14 +113,14 @@ std::optional<Columns> TableSample::find_columns() const {
 
 std::optional<TimeUnit> TableSample::find_unit(const Columns& columns, bool is_either) const {
   // Dates from 1973 on; no recording that starts at 0 is that long.
-  constexpr double least_date_in_microseconds = 1e14;
-  constexpr double least_date_in_nanoseconds = 1e17;
+  constexpr double min_date_in_microseconds = 1e14;
+  constexpr double min_date_in_nanoseconds = 1e17;
   const auto times = times_of(columns);
   if (times.empty()) return TimeUnit::microseconds;
   if (!std::ranges::all_of(times, is_whole, &TableNumber::value)) return TimeUnit::seconds;
   const auto last = std::ranges::max(times, {}, &TableNumber::value).value;
-  if (last >= least_date_in_nanoseconds) return TimeUnit::nanoseconds;
-  if (last >= least_date_in_microseconds) return TimeUnit::microseconds;
+  if (last >= min_date_in_nanoseconds) return TimeUnit::nanoseconds;
+  if (last >= min_date_in_microseconds) return TimeUnit::microseconds;
   const auto form = std::ranges::max(times, {}, &TableNumber::form).form;
   if (form == Form::integer) return is_either ? unit_by_gaps(times) : TimeUnit::microseconds;
 

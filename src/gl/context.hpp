@@ -83,8 +83,8 @@ class Context {
     return max_buffer_size_;
   }
 
-  /// Calls OpenGL no more to free what was made with this: it ended with the context. Anything else
-  /// may no longer be done.
+  /// Stops deleting GL objects once the context is lost, which deleted them. Nothing else may be
+  /// called afterwards.
   void abandon();
 
   /// Forgets that OpenGL calls failed. Throws ContextLost if that is why.

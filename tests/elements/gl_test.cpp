@@ -398,7 +398,7 @@ TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
                 "OpenGL cannot simulate: the OpenGL context was lost, because the GPU was reset or "
                 "removed. Use " +
                     element.substr(2) + ", which runs on the CPU.");
-      EXPECT_EQ(flashes.push(), GST_FLOW_OK);  // begins anew, if the application goes on
+      EXPECT_EQ(flashes.push(), GST_FLOW_OK);  // starts over, if the application goes on
     }
   }
 }

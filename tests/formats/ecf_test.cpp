@@ -14,7 +14,7 @@ using Events = std::vector<AbsoluteEvent>;
 Bytes encoded_chunk(const Events& events) {
   Bytes chunk;
   encode_ecf(events, chunk);
-  EXPECT_LE(chunk.size(), ecf_most_bytes(events.size()));
+  EXPECT_LE(chunk.size(), ecf_max_bytes(events.size()));
   return chunk;
 }
 
@@ -100,7 +100,7 @@ TEST(Ecf, ComesBack) {
   for (const auto size : sizes())
     for (unsigned seed = 0; seed < 60; ++seed)
       expect_comes_back(random_events(seed < 40 ? seed : seed * seed * 10, size, seed));
-  expect_comes_back(random_events(ecf_most_events, {2048, 2048}, 1, -5'000'000'000));
+  expect_comes_back(random_events(ecf_max_events, {2048, 2048}, 1, -5'000'000'000));
   // Runs at and around the lengths at which the encoding changes.
   for (const std::size_t count : {14, 15, 16, 30, 31, 32, 126, 127, 128, 65534, 65535})
     expect_comes_back(Events(count, AbsoluteEvent::at(2047, 2047, 1LL << 62, Polarity::on)));
@@ -132,7 +132,7 @@ TEST(Ecf, CorruptChunksAreRefused) {
       corrupt[random() % corrupt.size()] = static_cast<std::uint8_t>(random());
     out.clear();
     decode_ecf(corrupt, out);
-    EXPECT_LE(out.size(), ecf_most_events);
+    EXPECT_LE(out.size(), ecf_max_events);
   }
   // More events than a chunk can have, a run longer than the chunk, a time of more than 64 bits.
   EXPECT_FALSE(decode_ecf(Bytes{0, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3}, out));

@@ -7,7 +7,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace eventcamera;
   std::vector<AbsoluteEvent> events;
   const bool sound = decode_ecf({data, size}, events);
-  fuzz::require(events.size() <= ecf_most_events, "memory is bounded");
+  fuzz::require(events.size() <= ecf_max_events, "memory is bounded");
   fuzz::require(sound || events.empty(), "a corrupt chunk has no events");
   return 0;
 }

@@ -347,7 +347,7 @@ class Assembly {
   const float* start_y_;
   const float* x_;
   const float* y_;
-  // How much the neighbours pull.
+  // Smoothness weights of the neighbours.
   const float* left_;
   const float* right_;
   const float* above_;

@@ -263,7 +263,7 @@ std::uint32_t packing(std::span<const AbsoluteEvent> events) {
 }  // namespace
 
 void encode_ecf(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
-  assert(events.size() <= ecf_most_events);
+  assert(events.size() <= ecf_max_events);
   Writer writer(out);
   if (events.empty()) {
     writer.put<std::uint32_t>(0);
@@ -292,7 +292,7 @@ bool decode_ecf(std::span<const std::uint8_t> chunk, std::vector<AbsoluteEvent>&
   Reader reader(chunk);
   const auto head = reader.take<std::uint32_t>();
   const std::size_t count = head >> 2;
-  if (count > ecf_most_events) return false;
+  if (count > ecf_max_events) return false;
   const auto begin = out.size();
   out.resize(begin + count);
   const auto events = std::span(out).subspan(begin);

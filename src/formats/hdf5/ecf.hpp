@@ -16,16 +16,16 @@ namespace eventcamera {
 /// HDF5 ID of the filter.
 constexpr int ecf_filter = 0x8ecf;
 
-constexpr std::size_t ecf_most_events = 65535;
-constexpr int ecf_most_pixels = 2048;  ///< per row or column
+constexpr std::size_t ecf_max_events = 65535;
+constexpr int ecf_max_pixels = 2048;  ///< per row or column
 
 /// Upper bound for the size of a chunk with this many events: a time takes at most 17 bytes, x, y
 /// and p take 7, and groups of 4 are padded.
-constexpr std::size_t ecf_most_bytes(std::size_t events) {
+constexpr std::size_t ecf_max_bytes(std::size_t events) {
   return 32 + 24 * events;
 }
 
-/// Appends a chunk with `events` to `out`: at most ecf_most_events, sorted, within ecf_most_pixels.
+/// Appends a chunk with `events` to `out`: at most ecf_max_events, sorted, within ecf_max_pixels.
 void encode_ecf(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out);
 
 /// Appends the events of a chunk to `out`. Returns false and appends nothing if it is corrupt.

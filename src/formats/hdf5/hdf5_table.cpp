@@ -272,7 +272,7 @@ class EcfTable final : public Hdf5Table {
       : Hdf5Table(Hdf5Layout::metavision),
         events_(std::move(events)),
         chunk_rows_(events_.chunk_rows()) {
-    if (chunk_rows_ == 0 || chunk_rows_ > ecf_most_events)
+    if (chunk_rows_ == 0 || chunk_rows_ > ecf_max_events)
       throw UnsupportedFormat("HDF5 dataset /CD/events has chunks too large for ECF");
     size_ = size;
     rows_ = events_.rows();
@@ -316,7 +316,7 @@ class EcfTable final : public Hdf5Table {
 
  private:
   bool read_stored(std::uint64_t chunk) {
-    return events_.read_chunk(chunk * chunk_rows_, ecf_most_bytes(chunk_rows_), stored_);
+    return events_.read_chunk(chunk * chunk_rows_, ecf_max_bytes(chunk_rows_), stored_);
   }
 
   bool read_chunk(std::uint64_t chunk) {

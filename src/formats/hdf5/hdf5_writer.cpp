@@ -421,7 +421,7 @@ void check(const Hdf5Writer::Settings& settings) {
   if (settings.layout == Hdf5Layout::v2e)
     throw std::invalid_argument("v2e's HDF5 layout can only be read");
   const bool ecf = settings.layout == Hdf5Layout::metavision;
-  const int max_side = ecf ? ecf_most_pixels : 32768;
+  const int max_side = ecf ? ecf_max_pixels : 32768;
   if (width <= 0 || height <= 0 || width > max_side || height > max_side)
     throw std::invalid_argument("HDF5 files need a sensor size of at most " +
                                 std::to_string(max_side) + " pixels in a row or column");

@@ -8,6 +8,8 @@
 
 #include "src/core/event.hpp"
 
+namespace eventcamera {
+
 /// Decides which frames to skip where there is no time for all of them, so that the others are
 /// shown in time. All times are running times. A frame is skipped
 /// - if it has waited upstream, because those before it took long, and its picture would come when
@@ -18,8 +20,6 @@
 /// Nothing is skipped unless downstream reports when it got the pictures.
 class FramePacer {
  public:
-  using Nanoseconds = eventcamera::Nanoseconds;
-
   /// Takes the next frame. Returns whether to skip it.
   bool skip(Nanoseconds frame, Nanoseconds now) {
     if (frame < frame_) start_over();
@@ -90,7 +90,7 @@ class FramePacer {
   struct Picture {
     Nanoseconds start;
     Nanoseconds lag;  ///< for which its frame waited upstream
-    bool is_alone;    ///< what it waits for downstream is not for others
+    bool is_alone;    ///< nothing else is queued ahead of it downstream
   };
 
   /// Latencies are learnt from at least so many reports in so long a time.
@@ -150,3 +150,5 @@ class FramePacer {
   Reports reports_;
   Nanoseconds latency_ = 0;
 };
+
+}  // namespace eventcamera

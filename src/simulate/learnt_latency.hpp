@@ -7,13 +7,13 @@
 
 #include "src/core/event.hpp"
 
+namespace eventcamera {
+
 /// Latency learnt from measured delays. It rises to the second largest of the recent delays, so
 /// that a single one, such as a pause of the source, does not delay everything after it. It falls
 /// once all recent delays are clearly smaller. Jitter does not change it.
 class LearntLatency {
  public:
-  using Nanoseconds = eventcamera::Nanoseconds;
-
   /// Sets the latency known without measurement, which is the minimum.
   void expect(Nanoseconds expected) {
     if (expected_ == expected) return;
@@ -63,3 +63,5 @@ class LearntLatency {
   std::optional<Nanoseconds> expected_;
   Nanoseconds value_ = 0;
 };
+
+}  // namespace eventcamera
