@@ -1,49 +1,105 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What our implementations of dense flow have in common, on odd sizes and strides, textures and
-// noise: no flow between equal pictures, and independence of the number of threads, of earlier
-// calls, and of what lies around a picture.
+// The contract of dense flow, which every method keeps, on odd sizes and strides, textures and
+// noise: it equals its reference on every SIMD target, there is none between equal pictures, and it
+// does not depend on the number of threads, on earlier calls, or on what lies around a picture.
+#include "src/flow/dense_flow.hpp"
+
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 #include <tuple>
 #include <vector>
 
-#include "src/flow/dense_flow.hpp"
+#include "tests/core/targets.hpp"
 #include "tests/flow/moving_pictures.hpp"
+#include "tests/reference/dis.hpp"
+#include "tests/reference/farneback.hpp"
 
 namespace {
 
 using namespace eventcamera;
 
-class OurFlow : public testing::TestWithParam<std::tuple<FlowMethod, Pictures>> {
+/// The border of a picture replicated, to a size that DIS takes.
+Picture padded(const Picture& picture) {
+  const int side = DisFlow::min_side;
+  Picture result(std::max(side, picture.width()), std::max(side, picture.height()));
+  for (int y = 0; y < result.height(); ++y)
+    for (int x = 0; x < result.width(); ++x) result.at(x, y) = reference::pixel_of(picture, x, y);
+  return result;
+}
+
+/// A method and what it must equal.
+struct Method {
+  const char* name;
+  FlowMethod method;
+  double mean_error;
+  double max_error;
+
+  std::unique_ptr<DenseFlow> make() const { return make_dense_flow(method); }
+  Image<Flow> reference(const Picture& from, const Picture& to) const {
+    if (method == FlowMethod::farneback) return reference::farneback(from, to);
+    return reference::dis(padded(from), padded(to),
+                          method == FlowMethod::dis_lq ? DisFlow::low : DisFlow::high);
+  }
+};
+
+// A search of DIS may stop a step earlier or later where its error hardly changes.
+constexpr Method methods[] = {{"dis_lq", FlowMethod::dis_lq, 1e-3, 0.05},
+                              {"dis_hq", FlowMethod::dis_hq, 1e-3, 0.05},
+                              {"farneback", FlowMethod::farneback, 1e-4, 1e-4},
+                              {"opencv_dis", FlowMethod::opencv_dis, 0.02, 0.5}};
+
+void PrintTo(const Method& method, std::ostream* out) {
+  *out << method.name;
+}
+
+class EveryFlow : public testing::TestWithParam<std::tuple<Method, Pictures>> {
  protected:
-  static std::unique_ptr<DenseFlow> make() { return make_dense_flow(std::get<0>(GetParam())); }
   Image<Flow> flow_of(const Picture& from, const Picture& to) {
-    return copy(make()->find(from.view(), to.view(), threads));
+    return copy(method.make()->find(from.view(), to.view(), threads));
   }
 
+  const Method method = std::get<0>(GetParam());
   const Pictures pictures = std::get<1>(GetParam());
   ThreadPool threads;
 };
 
 INSTANTIATE_TEST_SUITE_P(
-    , OurFlow,
-    testing::Combine(testing::Values(FlowMethod::dis_lq, FlowMethod::dis_hq, FlowMethod::farneback),
+    , EveryFlow,
+    testing::Combine(testing::ValuesIn(methods),
                      testing::Values(Pictures{1, 1, true}, Pictures{1, 9, true},
+                                     Pictures{9, 1, true}, Pictures{2, 3, false},
                                      Pictures{13, 7, true}, Pictures{16, 15, false},
-                                     Pictures{64, 64, true}, Pictures{67, 83, false},
-                                     Pictures{161, 130, true}, Pictures{64, 600, true},
-                                     Pictures{300, 257, false})));
+                                     Pictures{17, 33, true}, Pictures{64, 64, true},
+                                     Pictures{67, 83, false}, Pictures{150, 111, false},
+                                     Pictures{161, 130, true}, Pictures{64, 600, false},
+                                     Pictures{64, 600, true}, Pictures{257, 300, false},
+                                     Pictures{259, 261, true})),
+    [](const auto& test) {
+      return std::get<0>(test.param).name + ("_" + testing::PrintToString(std::get<1>(test.param)));
+    });
 
-TEST_P(OurFlow, IsNothingBetweenEqualPictures) {
+TEST_P(EveryFlow, EqualsItsReferenceOnEveryTarget) {
+  const auto from = pictures.at(0);
+  const auto to = pictures.at(1);
+  const auto best = flow_of(from, to);
+  const auto error = difference(best, method.reference(from, to));
+  EXPECT_LT(error.mean, method.mean_error);
+  EXPECT_LT(error.max, method.max_error);
+  targets::for_each(
+      [&](const char* target) { EXPECT_TRUE(equal(flow_of(from, to), best)) << "on " << target; });
+}
+
+TEST_P(EveryFlow, IsNothingBetweenEqualPictures) {
   const auto flow = flow_of(pictures.at(0), pictures.at(0));
   for (int y = 0; y < flow.height(); ++y)
     for (int x = 0; x < flow.width(); ++x)
       ASSERT_TRUE(flow.at(x, y).x == 0 && flow.at(x, y).y == 0) << x << ", " << y;
 }
 
-TEST_P(OurFlow, DoesNotDependOnThreads) {
+TEST_P(EveryFlow, DoesNotDependOnThreads) {
   const auto one = flow_of(pictures.at(0), pictures.at(1));
   for (const int count : {2, 3, 7, 16}) {  // also more than there are processors
     threads.set_threads(count);
@@ -51,8 +107,8 @@ TEST_P(OurFlow, DoesNotDependOnThreads) {
   }
 }
 
-TEST_P(OurFlow, DoesNotDependOnWhatCameBefore) {
-  const auto flow = make();
+TEST_P(EveryFlow, DoesNotDependOnWhatCameBefore) {
+  const auto flow = method.make();
   const auto small = scene::noise<std::uint8_t>(40, 30, 8, 5);
   flow->find(small.view(), small.view(), threads);
   EXPECT_TRUE(equal(copy(flow->find(pictures.at(0).view(), pictures.at(1).view(), threads)),
@@ -62,7 +118,7 @@ TEST_P(OurFlow, DoesNotDependOnWhatCameBefore) {
 }
 
 /// Nothing outside the view is read, neither beside it nor past its end.
-TEST_P(OurFlow, TakesAPartOfAPictureWhereItLies) {
+TEST_P(EveryFlow, TakesAPartOfAPictureWhereItLies) {
   const int width = pictures.width;
   const int height = pictures.height;
   const int stride = width + 13;
@@ -75,10 +131,32 @@ TEST_P(OurFlow, TakesAPartOfAPictureWhereItLies) {
   };
   const auto from = bytes_of(pictures.at(0), 255);
   const auto to = bytes_of(pictures.at(1), 0);
-  const auto flow = make();
-  EXPECT_TRUE(equal(copy(flow->find({from.data(), stride, width, height},
-                                    {to.data(), stride, width, height}, threads)),
+  EXPECT_TRUE(equal(copy(method.make()->find({from.data(), stride, width, height},
+                                             {to.data(), stride, width, height}, threads)),
                     flow_of(pictures.at(0), pictures.at(1))));
+}
+
+class EveryMethod : public testing::TestWithParam<Method> {};
+INSTANTIATE_TEST_SUITE_P(, EveryMethod, testing::ValuesIn(methods),
+                         [](const auto& test) { return test.param.name; });
+
+TEST_P(EveryMethod, PointsFromTheEarlierFrameToTheLater) {
+  const auto from = scene::texture<std::uint8_t>(320, 240, 8, 0, 0);
+  const auto to = scene::texture<std::uint8_t>(320, 240, 8, -3, 2);  // moves right and up
+  ThreadPool threads;
+  const auto finder = GetParam().make();
+  const auto flow = finder->find(from.view(), to.view(), threads);
+  double x = 0;
+  double y = 0;
+  for (int v = 40; v < 200; ++v) {
+    for (int u = 40; u < 280; ++u) {
+      x += flow.row(v)[u].x;
+      y += flow.row(v)[u].y;
+    }
+  }
+  const double error = GetParam().method == FlowMethod::dis_lq ? 0.8 : 0.2;
+  EXPECT_NEAR(x / (160 * 240), 3, error);
+  EXPECT_NEAR(y / (160 * 240), -2, error);
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <ostream>
 
@@ -25,7 +27,7 @@ struct Pictures {
 };
 
 inline void PrintTo(const Pictures& pictures, std::ostream* out) {
-  *out << pictures.width << "x" << pictures.height << (pictures.noise ? " noise" : " texture");
+  *out << pictures.width << "x" << pictures.height << (pictures.noise ? "_noise" : "_texture");
 }
 
 inline Image<Flow> copy(const ImageView<Flow>& flow) {
@@ -41,6 +43,25 @@ inline bool equal(const Image<Flow>& a, const Image<Flow>& b) {
   for (int y = 0; y < a.height(); ++y)
     if (std::memcmp(a.row(y), b.row(y), row_size) != 0) return false;
   return true;
+}
+
+/// Distance in pixels between what two flows point at.
+struct Difference {
+  double mean = 0;
+  double max = 0;
+};
+
+/// `b` may be larger.
+inline Difference difference(const Image<Flow>& a, const Image<Flow>& b) {
+  Difference result;
+  for (int y = 0; y < a.height(); ++y) {
+    for (int x = 0; x < a.width(); ++x) {
+      const double error = std::hypot(a.at(x, y).x - b.at(x, y).x, a.at(x, y).y - b.at(x, y).y);
+      result.mean += error / (a.width() * a.height());
+      result.max = std::max(result.max, error);
+    }
+  }
+  return result;
 }
 
 }  // namespace eventcamera
