@@ -92,21 +92,6 @@ GstBuffer* bytes(std::string_view text) {
   return gst_buffer_new_memdup(text.data(), text.size());
 }
 
-void append_events(GstBuffer* buffer, std::vector<AbsoluteEvent>& out) {
-  GstEventCameraMap map;
-  ASSERT_TRUE(gst_event_camera_map(&map, buffer));
-  for (std::size_t i = 0; i < map.n_events; ++i)
-    out.push_back({static_cast<Microseconds>(map.start + map.events[i].t), map.events[i].x,
-                   map.events[i].y_p});
-  gst_event_camera_unmap(&map);
-}
-
-std::vector<AbsoluteEvent> pull_events(Harness& h) {
-  std::vector<AbsoluteEvent> events;
-  while (const auto buffer = h.pull()) append_events(buffer.get(), events);
-  return events;
-}
-
 void begin_file(Harness& h, const Format& format) {
   gst_harness_set_src_caps_str(h.get(), format.caps);
   GstSegment segment;

@@ -10,8 +10,7 @@
 #include <mutex>
 #include <random>
 
-#include "tests/elements/event_buffer.hpp"
-#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -46,30 +45,6 @@ void push(Harness& h, std::span<const AbsoluteEvent> events) {
     ASSERT_EQ(h.push(buffer_of(events.first(count), start)), GST_FLOW_OK);
     events = events.subspan(count);
   }
-}
-
-void append_events(GstBuffer* buffer, std::vector<AbsoluteEvent>& out) {
-  GstEventCameraMap map;
-  ASSERT_TRUE(gst_event_camera_map(&map, buffer));
-  for (std::size_t i = 0; i < map.n_events; ++i)
-    out.push_back({static_cast<Microseconds>(map.start + map.events[i].t), map.events[i].x,
-                   map.events[i].y_p});
-  gst_event_camera_unmap(&map);
-}
-
-std::vector<AbsoluteEvent> pull_events(Harness& h) {
-  std::vector<AbsoluteEvent> events;
-  while (const auto buffer = h.pull()) append_events(buffer.get(), events);
-  return events;
-}
-
-guint64 stat_of(GstElement* element, const char* name) {
-  GstStructure* stats = nullptr;
-  g_object_get(element, "stats", &stats, nullptr);
-  guint64 value = 0;
-  EXPECT_TRUE(gst_structure_get_uint64(stats, name, &value)) << name;
-  gst_structure_free(stats);
-  return value;
 }
 
 /// An element that unpacks, as after udpsrc.
@@ -174,32 +149,23 @@ TEST_P(EveryFormat, HasIntervalsThatFollowOneAnother) {
 /// Receives from a socket on this machine.
 class UdpReceiver {
  public:
-  explicit UdpReceiver(const std::string& properties) {
-    gst_init(nullptr, nullptr);
-    const auto launch =
-        "udpsrc name=source address=127.0.0.1 port=0 buffer-size=4000000 ! eventdatagramdepay "
-        "name=depay " +
-        properties + depay_size +
-        " ! fakesink name=sink signal-handoffs=true sync=false async=false";
-    pipeline_.reset(gst_parse_launch(launch.c_str(), nullptr));
-    Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "sink"));
-    g_signal_connect(sink.get(), "handoff",
+  explicit UdpReceiver(const std::string& properties)
+      : pipeline_(
+            "udpsrc name=source address=127.0.0.1 port=0 buffer-size=4000000 ! eventdatagramdepay "
+            "name=depay " +
+            properties + depay_size +
+            " ! fakesink name=sink signal-handoffs=true sync=false async=false") {
+    g_signal_connect(pipeline_["sink"], "handoff",
                      G_CALLBACK(+[](GstElement*, GstBuffer* buffer, GstPad*, UdpReceiver* self) {
                        self->take(buffer);
                      }),
                      this);
-    gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING);
-    EXPECT_NE(gst_element_get_state(pipeline_.get(), nullptr, nullptr, 10 * GST_SECOND),
-              GST_STATE_CHANGE_FAILURE);
+    EXPECT_TRUE(pipeline_.reaches(GST_STATE_PLAYING));
   }
-  ~UdpReceiver() { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
-  UdpReceiver(const UdpReceiver&) = delete;
-  UdpReceiver& operator=(const UdpReceiver&) = delete;
 
   int port() const {
-    Owned<GstElement> source(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "source"));
     int port = 0;
-    g_object_get(source.get(), "port", &port, nullptr);
+    g_object_get(pipeline_["source"], "port", &port, nullptr);
     return port;
   }
 
@@ -210,10 +176,7 @@ class UdpReceiver {
     return events_;
   }
 
-  guint64 stat(const char* name) const {
-    Owned<GstElement> depay(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "depay"));
-    return stat_of(depay.get(), name);
-  }
+  guint64 stat(const char* name) const { return pipeline_.stat("depay", name); }
 
  private:
   void take(GstBuffer* buffer) {
@@ -222,10 +185,10 @@ class UdpReceiver {
     changed_.notify_all();
   }
 
-  Owned<GstElement> pipeline_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<AbsoluteEvent> events_;
+  Pipeline pipeline_;
 };
 
 TEST_P(EveryFormat, GoesThroughSockets) {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <gst/gst.h>
-
 #include <span>
 #include <vector>
 
-#include "gst/eventcamera/eventcamera.h"
 #include "src/core/event.hpp"
+#include "tests/elements/harness.hpp"
 
 /// Buffer of events whose times are relative to its PTS.
 inline GstBuffer* buffer_of(GstClockTime pts, const std::vector<eventcamera::Event>& events,
@@ -30,4 +28,17 @@ inline GstBuffer* buffer_of(std::span<const eventcamera::AbsoluteEvent> events,
   GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(start) * GST_USECOND;
   GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
   return buffer;
+}
+
+/// Appends the events of a buffer, with the times of their stream.
+inline void append_events(GstBuffer* buffer, std::vector<eventcamera::AbsoluteEvent>& out) {
+  const auto start = static_cast<eventcamera::Microseconds>(GST_BUFFER_PTS(buffer) / GST_USECOND);
+  for (const auto& event : harness::events_of(buffer))
+    out.push_back({start + event.t, event.x, event.y_p});
+}
+
+inline std::vector<eventcamera::AbsoluteEvent> pull_events(harness::Harness& h) {
+  std::vector<eventcamera::AbsoluteEvent> events;
+  while (const auto buffer = h.pull()) append_events(buffer.get(), events);
+  return events;
 }

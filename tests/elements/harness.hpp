@@ -72,6 +72,16 @@ inline std::string with_upload(const std::string& launch) {
   return (is_on_gpu(launch) ? "glupload ! " : "") + launch;
 }
 
+/// A counter of an element's `stats`.
+inline guint64 stat_of(GstElement* element, const char* name) {
+  GstStructure* stats = nullptr;
+  g_object_get(element, "stats", &stats, nullptr);
+  guint64 value = G_MAXUINT64;
+  EXPECT_TRUE(gst_structure_get_uint64(stats, name, &value)) << name;
+  gst_structure_free(stats);
+  return value;
+}
+
 class Harness {
  public:
   /// For example "eventsim-dense flow=dis-hq".

@@ -150,12 +150,7 @@ TEST(LiveOverlay, GoesOnWhereNoEventsAreLinked) {
   EXPECT_TRUE(
       Owned<GstMessage>(gst_bus_timed_pop_filtered(bus.get(), 20 * GST_SECOND, GST_MESSAGE_EOS)));
   const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
-  GstStructure* stats = nullptr;
-  guint64 rendered = 0;
-  g_object_get(sink.get(), "stats", &stats, nullptr);
-  gst_structure_get_uint64(stats, "rendered", &rendered);
-  gst_structure_free(stats);
-  EXPECT_EQ(rendered, 10U);
+  EXPECT_EQ(stat_of(sink.get(), "rendered"), 10U);
   gst_element_set_state(pipeline.get(), GST_STATE_NULL);
 }
 

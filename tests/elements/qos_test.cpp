@@ -34,15 +34,6 @@ void report(Harness& h, GstClockTime start, GstClockTimeDiff lateness,
   gst_harness_push_upstream_event(h.get(), gst_event_new_qos(type, 2, lateness, start));
 }
 
-guint64 stat(const Harness& h, const char* name) {
-  GstStructure* stats = nullptr;
-  g_object_get(h.element(), "stats", &stats, nullptr);
-  guint64 value = 0;
-  EXPECT_TRUE(gst_structure_get_uint64(stats, name, &value));
-  gst_structure_free(stats);
-  return value;
-}
-
 /// Elements downstream take frame 1 until frame 4 has arrived.
 constexpr GstClockTime slow_until = frame_time(4) + 120 * ms;
 
@@ -86,9 +77,9 @@ TEST_P(EveryElement, SkipsWholeFramesWhereDownstreamIsLate) {
     Harness expected(GetParam());
     expected.caps(video, draws ? pictures_of(GetParam()) : GST_EVENT_CAMERA_MEDIA_TYPE);
     EXPECT_TRUE(output(h, true) == output(expected, false));
-    EXPECT_EQ(stat(h, "skipped-frames"), 2U);
-    EXPECT_EQ(stat(h, "frames"), 7U);
-    EXPECT_EQ(stat(expected, "skipped-frames"), 0U);
+    EXPECT_EQ(stat_of(h.element(), "skipped-frames"), 2U);
+    EXPECT_EQ(stat_of(h.element(), "frames"), 7U);
+    EXPECT_EQ(stat_of(expected.element(), "skipped-frames"), 0U);
     guint64 skipped = 0;
     while (const auto message = h.message(GST_MESSAGE_QOS)) {
       GstFormat format = GST_FORMAT_UNDEFINED;
@@ -116,8 +107,8 @@ TEST_P(EveryElement, SkipsFramesOfPicturesUnlessToldOtherwise) {
     output(h, true);
     gboolean enabled = FALSE;
     g_object_get(h.element(), "qos", &enabled, nullptr);
-    EXPECT_EQ(enabled != FALSE, stat(h, "skipped-frames") > 0);
-    return stat(h, "skipped-frames");
+    EXPECT_EQ(enabled != FALSE, stat_of(h.element(), "skipped-frames") > 0);
+    return stat_of(h.element(), "skipped-frames");
   };
   const std::string element = GetParam();
   EXPECT_EQ(skipped(element, pictures_of(element)), 2U);
@@ -137,7 +128,7 @@ TEST_P(EveryElement, SkipsNothingAfterAFlush) {
   flush({h.get()});
   push_segment(h.get());
   for (int i = 2; i < 5; ++i) h.push(frame_at(h, i));
-  EXPECT_EQ(stat(h, "skipped-frames"), 0U);
+  EXPECT_EQ(stat_of(h.element(), "skipped-frames"), 0U);
 }
 
 TEST(Qos, SkipsFramesThatDownstreamDoesNotWant) {
@@ -148,7 +139,7 @@ TEST(Qos, SkipsFramesThatDownstreamDoesNotWant) {
     h.push(frame_at(h, i));
     if (i == 1) report(h, frame_time(1), 600 * ms, GST_QOS_TYPE_THROTTLE);
   }
-  EXPECT_EQ(stat(h, "skipped-frames"), 8U);  // one picture at once, then one in 600 ms
+  EXPECT_EQ(stat_of(h.element(), "skipped-frames"), 8U);  // one picture at once, then one in 600 ms
 }
 
 /// A frame that takes `work` to process.
@@ -190,7 +181,7 @@ TEST_P(EveryElementOnTheCpu, ReportsTheLatencyOfProcessing) {
   EXPECT_EQ(latency(50 * ms), 240 * ms);
   EXPECT_EQ(latency(130 * ms), 320 * ms);
   EXPECT_EQ(latency(15 * ms), 200 * ms);
-  EXPECT_EQ(stat(h, "processing-time"), 5 * (15 + 50 + 130 + 15) * ms);
+  EXPECT_EQ(stat_of(h.element(), "processing-time"), 5 * (15 + 50 + 130 + 15) * ms);
 }
 
 TEST(Qos, CountsFromTheStart) {
@@ -198,12 +189,12 @@ TEST(Qos, CountsFromTheStart) {
   h.caps(video, pictures);
   output(h, true);
   h.push(slow_frame(h, 9, 15 * ms));
-  EXPECT_EQ(stat(h, "processing-time"), 15 * ms);
+  EXPECT_EQ(stat_of(h.element(), "processing-time"), 15 * ms);
   gst_element_set_state(h.element(), GST_STATE_READY);
-  EXPECT_EQ(stat(h, "frames"), 8U);
+  EXPECT_EQ(stat_of(h.element(), "frames"), 8U);
   gst_element_set_state(h.element(), GST_STATE_PAUSED);
   for (const char* count : {"frames", "skipped-frames", "processing-time"})
-    EXPECT_EQ(stat(h, count), 0U);
+    EXPECT_EQ(stat_of(h.element(), count), 0U);
 }
 
 /// Plays into a sink that takes 100 ms for a picture; returns when pictures were shown.

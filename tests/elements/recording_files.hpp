@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "src/formats/evt/raw.hpp"
-#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
 #include "tests/formats/aedat_files.hpp"
 #include "tests/formats/npz_file.hpp"
 
@@ -41,38 +41,6 @@ inline std::vector<AbsoluteEvent> some_events() {
   return events;
 }
 
-/// A NumPy archive, which no element writes.
-inline Bytes npz(const std::vector<AbsoluteEvent>& events) {
-  std::vector<std::int64_t> t;
-  std::vector<std::uint16_t> x;
-  std::vector<std::uint16_t> y;
-  std::vector<std::uint8_t> p;
-  for (const auto& event : events) {
-    t.push_back(event.t);
-    x.push_back(event.x);
-    y.push_back(static_cast<std::uint16_t>(event.y()));
-    p.push_back(event.polarity() == Polarity::on);
-  }
-  using npz_file::column;
-  return npz_file::archive({{"t.npy", column("<i8", t)},
-                            {"x.npy", column("<u2", x)},
-                            {"y.npy", column("<u2", y)},
-                            {"p.npy", column("|u1", p)}},
-                           true);
-}
-
-/// Runs a launch line to its end. False after an error or a timeout.
-inline bool run(const std::string& launch) {
-  const Owned<GstElement> pipeline(gst_parse_launch(launch.c_str(), nullptr));
-  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
-  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
-  const Owned<GstMessage> end(
-      gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND,
-                                 static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
-  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
-  return end && GST_MESSAGE_TYPE(end.get()) == GST_MESSAGE_EOS;
-}
-
 /// The files, in a folder that lasts as long as the tests.
 class Folder {
  public:
@@ -102,7 +70,8 @@ class Folder {
     }
     save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
     save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
-    save("a.npz", npz(events));
+    // No element writes NumPy archives.
+    save("a.npz", npz_file::archive(npz_file::columns_of_events(events), true));
     for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
                                        {"a.es", "eventesenc ! filesink"},
                                        {"a.csv", "eventcsvenc ! filesink"},
@@ -110,9 +79,11 @@ class Folder {
                                        {"a.npy", "eventnpyenc ! filesink"},
                                        {"a.aedat4", "aedatmux ! filesink"},
                                        {"dsec.h5", "eventhdf5sink"},
-                                       {"metavision.hdf5", "eventhdf5sink format=metavision"}})
-      EXPECT_TRUE(run("filesrc location=" + in_quotes(path_ / "evt3.raw") + " ! evtdec ! " +
-                      writer + " location=" + in_quotes(path_ / name)));
+                                       {"metavision.hdf5", "eventhdf5sink format=metavision"}}) {
+      Pipeline pipeline("filesrc location=" + in_quotes(path_ / "evt3.raw") + " ! evtdec ! " +
+                        writer + " location=" + in_quotes(path_ / name));
+      EXPECT_TRUE(pipeline.play()) << pipeline.error;
+    }
   }
 
   void save(const std::string& name, const Bytes& bytes) const {

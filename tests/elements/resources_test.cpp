@@ -114,12 +114,7 @@ TEST_P(EveryElement, ReleasesEverythingOnStop) {
 
 guint64 rendered_buffers(GstElement* pipeline) {
   const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline), "sink"));
-  GstStructure* stats = nullptr;
-  guint64 buffers = 0;
-  g_object_get(sink.get(), "stats", &stats, nullptr);
-  gst_structure_get_uint64(stats, "rendered", &buffers);
-  gst_structure_free(stats);
-  return buffers;
+  return stat_of(sink.get(), "rendered");
 }
 
 /// Nearly every pixel fires in every frame.

@@ -77,15 +77,6 @@ std::vector<AbsoluteEvent> absolute(const std::vector<Interval>& intervals) {
   return events;
 }
 
-guint64 stat(const Harness& h, const char* field) {
-  GstStructure* stats = nullptr;
-  g_object_get(h.element(), "stats", &stats, nullptr);
-  guint64 value = G_MAXUINT64;
-  EXPECT_TRUE(gst_structure_get_uint64(stats, field, &value)) << field;
-  gst_structure_free(stats);
-  return value;
-}
-
 /// Fields of an RTP packet.
 struct Fields {
   guint16 sequence_number;
@@ -114,8 +105,8 @@ std::vector<Buffer> packets_of(const std::vector<Interval>& intervals,
   for (const auto& interval : intervals) push(pay, interval);
   std::vector<Buffer> packets;
   while (auto packet = pay.pull()) packets.push_back(std::move(packet));
-  EXPECT_EQ(stat(pay, "packets"), packets.size());
-  EXPECT_EQ(stat(pay, "events"), absolute(intervals).size());
+  EXPECT_EQ(stat_of(pay.element(), "packets"), packets.size());
+  EXPECT_EQ(stat_of(pay.element(), "events"), absolute(intervals).size());
   return packets;
 }
 
@@ -253,7 +244,8 @@ TEST_P(EveryFormat, CountsLossDuplicationAndReordering) {
     }
     Depayloader h(GetParam());
     for (auto* packet : arriving) h.take(packet);
-    EXPECT_EQ(stat(h, "packets") + stat(h, "late-packets"), arriving.size());
+    EXPECT_EQ(stat_of(h.element(), "packets") + stat_of(h.element(), "late-packets"),
+              arriving.size());
     end(h);
     const Output output(h);
     const auto received = absolute(output.intervals);
@@ -264,10 +256,10 @@ TEST_P(EveryFormat, CountsLossDuplicationAndReordering) {
       ASSERT_NE(next, all.end()) << "an event that was not sent";
       ++next;
     }
-    EXPECT_EQ(stat(h, "events"), received.size());
-    EXPECT_EQ(stat(h, "lost-events"), all.size() - received.size());
-    EXPECT_EQ(stat(h, "lost-packets"), sent.size() - stat(h, "packets"));
-    EXPECT_EQ(stat(h, "rejected-packets"), 0U);
+    EXPECT_EQ(stat_of(h.element(), "events"), received.size());
+    EXPECT_EQ(stat_of(h.element(), "lost-events"), all.size() - received.size());
+    EXPECT_EQ(stat_of(h.element(), "lost-packets"), sent.size() - stat_of(h.element(), "packets"));
+    EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 0U);
     EXPECT_GT(output.discontinuities, loss > 1 ? 2 : 0);
   }
 }
@@ -290,8 +282,8 @@ TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
   const Output output(h);
   EXPECT_EQ(output.intervals, intervals);
   EXPECT_EQ(output.discontinuities, 1);
-  EXPECT_EQ(stat(h, "rejected-packets"), flood);
-  EXPECT_EQ(stat(h, "lost-packets"), 0U);
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), flood);
+  EXPECT_EQ(stat_of(h.element(), "lost-packets"), 0U);
 }
 
 TEST(RtpEventPay, JoinsShortBuffersUpToItsLatency) {
@@ -418,8 +410,8 @@ TEST(RtpEventPay, WarnsOfEventsThatItCannotSend) {
   const auto unsorted = h.message(GST_MESSAGE_WARNING);
   ASSERT_TRUE(unsorted);
   EXPECT_NE(text_of(unsorted.get()).find("earlier than those before them"), std::string::npos);
-  EXPECT_EQ(stat(h, "left-out-events"), 2U);
-  EXPECT_EQ(stat(h, "events"), 2U);
+  EXPECT_EQ(stat_of(h.element(), "left-out-events"), 2U);
+  EXPECT_EQ(stat_of(h.element(), "events"), 2U);
 }
 
 TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
@@ -432,7 +424,7 @@ TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
     const auto warning = h.message(GST_MESSAGE_WARNING);
     ASSERT_TRUE(warning) << reason;
     EXPECT_NE(text_of(warning.get()).find(reason), std::string::npos) << text_of(warning.get());
-    EXPECT_EQ(stat(h, "left-out-events"), left_out += 3) << reason;
+    EXPECT_EQ(stat_of(h.element(), "left-out-events"), left_out += 3) << reason;
   };
   skips(buffer_of(GST_CLOCK_TIME_NONE, events, ms), "has no PTS");
   skips(buffer_of(static_cast<GstClockTime>(max_rtp_start) + 1, events, ms), "292 years");
@@ -441,8 +433,8 @@ TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
   // Those that a flush drops.
   push(h, {0, 1'000'000, events});
   flush({h.get()});
-  EXPECT_EQ(stat(h, "left-out-events"), left_out + 3);
-  EXPECT_EQ(stat(h, "events"), 0U);
+  EXPECT_EQ(stat_of(h.element(), "left-out-events"), left_out + 3);
+  EXPECT_EQ(stat_of(h.element(), "events"), 0U);
 }
 
 TEST(RtpEventPay, SendsUpToTheLatestStart) {
@@ -452,7 +444,7 @@ TEST(RtpEventPay, SendsUpToTheLatestStart) {
   const auto packet = h.pull();
   ASSERT_TRUE(packet);
   EXPECT_EQ(Fields(packet.get()).header->start, max_rtp_start);
-  EXPECT_EQ(stat(h, "left-out-events"), 0U);
+  EXPECT_EQ(stat_of(h.element(), "left-out-events"), 0U);
 }
 
 TEST(RtpEventPay, RefusesWhatItCannotSend) {
@@ -564,7 +556,7 @@ TEST(RtpEventDepay, StartsOverWithItsSender) {
   EXPECT_EQ(output.segments.back().start, 0U);
   EXPECT_EQ(output.segments.back().base, 500 * ms);
   EXPECT_EQ(output.discontinuities, 2);
-  EXPECT_EQ(stat(h, "lost-events"), 0U);
+  EXPECT_EQ(stat_of(h.element(), "lost-events"), 0U);
 }
 
 TEST(RtpEventDepay, ContinuesWithoutArrivalTimesWhenItsSenderStartsOver) {
@@ -612,9 +604,9 @@ TEST(RtpEventDepay, CountsOnWithAnotherSensor) {
   push(pay, last);
   h.take(pay.pull().get());
   EXPECT_EQ(Output(h).intervals, (std::vector{first, last}));
-  EXPECT_EQ(stat(h, "events"), 2U);
-  EXPECT_EQ(stat(h, "lost-events"), 1U);
-  EXPECT_EQ(stat(pay, "events"), 3U);
+  EXPECT_EQ(stat_of(h.element(), "events"), 2U);
+  EXPECT_EQ(stat_of(h.element(), "lost-events"), 1U);
+  EXPECT_EQ(stat_of(pay.element(), "events"), 3U);
 }
 
 TEST(RtpEventDepay, NeedsTheSizeOfTheSensor) {

@@ -12,6 +12,7 @@ namespace {
 using namespace table_events;
 using npz_file::archive;
 using npz_file::column;
+using npz_file::columns_of_events;
 using npz_file::Member;
 
 struct Read {
@@ -52,25 +53,6 @@ std::vector<AbsoluteEvent> events_of(std::size_t count) {
                                        static_cast<Microseconds>(i * 3),
                                        i % 3 == 0 ? Polarity::on : Polarity::off));
   return events;
-}
-
-/// Arrays of these events, with random number types.
-std::vector<Member> columns_of_events(const std::vector<AbsoluteEvent>& events) {
-  std::vector<std::int64_t> t;
-  std::vector<std::uint16_t> x;
-  std::vector<std::int32_t> y;
-  std::vector<std::uint8_t> p;
-  for (const auto& event : events) {
-    t.push_back(event.t);
-    x.push_back(event.x);
-    y.push_back(event.y());
-    p.push_back(event.polarity() == Polarity::on ? 1 : 0);
-  }
-  return {{"x.npy", column("<u2", x)},
-          {"frames.npy", column("<u2", x)},
-          {"y.npy", column("<i4", y)},
-          {"t.npy", column("<i8", t)},
-          {"p.npy", column("|b1", p)}};
 }
 
 TEST(Npz, ArraysOfTheColumns) {

@@ -18,8 +18,8 @@
 #include <thread>
 #include <vector>
 
-#include "gst/eventcamera/eventcamera.h"
-#include "tests/elements/event_buffer.hpp"
+#include "tests/elements/pipeline.hpp"
+#include "tests/wire/is_part.hpp"
 
 namespace {
 
@@ -61,66 +61,6 @@ void wait_until(const Condition& condition) {
   EXPECT_TRUE(condition());
 }
 
-/// A pipeline of a test.
-class Pipeline {
- public:
-  explicit Pipeline(const std::string& launch) {
-    gst_init(nullptr, nullptr);
-    GError* error = nullptr;
-    pipeline_ = gst_parse_launch(launch.c_str(), &error);
-    EXPECT_EQ(error, nullptr) << launch << ": " << error->message;
-    g_clear_error(&error);
-    bus_ = gst_element_get_bus(pipeline_);
-  }
-  ~Pipeline() {
-    gst_element_set_state(pipeline_, GST_STATE_NULL);
-    gst_object_unref(bus_);
-    gst_object_unref(pipeline_);
-  }
-  Pipeline(const Pipeline&) = delete;
-  Pipeline& operator=(const Pipeline&) = delete;
-
-  void play() { gst_element_set_state(pipeline_, GST_STATE_PLAYING); }
-
-  /// Waits for the end; false after an error or half a minute.
-  bool wait() {
-    GstMessage* message = gst_bus_timed_pop_filtered(
-        bus_, 30 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-    const bool ended = message != nullptr && GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS;
-    if (message != nullptr && !ended) {
-      GError* error = nullptr;
-      gchar* cause = nullptr;
-      gst_message_parse_error(message, &error, &cause);
-      ADD_FAILURE() << error->message << " (" << cause << ")";
-      g_error_free(error);
-      g_free(cause);
-    }
-    if (message != nullptr) gst_message_unref(message);
-    return ended;
-  }
-
-  /// An element, valid as long as the pipeline.
-  GstElement* operator[](const char* name) const {
-    GstElement* element = gst_bin_get_by_name(GST_BIN(pipeline_), name);
-    EXPECT_NE(element, nullptr) << name;
-    gst_object_unref(element);
-    return element;
-  }
-
-  guint64 stat(const char* element, const char* field) const {
-    GstStructure* stats = nullptr;
-    g_object_get((*this)[element], "stats", &stats, nullptr);
-    guint64 value = 0;
-    EXPECT_TRUE(gst_structure_get_uint64(stats, field, &value)) << field;
-    gst_structure_free(stats);
-    return value;
-  }
-
- private:
-  GstElement* pipeline_;
-  GstBus* bus_;
-};
-
 std::vector<AbsoluteEvent> sent_events() {
   std::vector<AbsoluteEvent> events;
   for (int i = 0; i < buffers; ++i)
@@ -157,15 +97,10 @@ class Receiver {
 
  private:
   void take(GstSample* sample) {
-    GstEventCameraMap map;
-    ASSERT_TRUE(gst_event_camera_map(&map, gst_sample_get_buffer(sample)));
     {
       const std::lock_guard lock(mutex_);
-      for (gsize i = 0; i < map.n_events; ++i)
-        events_.push_back({static_cast<eventcamera::Microseconds>(map.start) + map.events[i].t,
-                           map.events[i].x, map.events[i].y_p});
+      append_events(gst_sample_get_buffer(sample), events_);
     }
-    gst_event_camera_unmap(&map);
     gst_sample_unref(sample);
   }
 
@@ -212,16 +147,6 @@ void wait_until_sent(const Pipeline& pipeline, int count) {
   wait_until([&] { return pipeline.stat("pay", "events") >= events; });
 }
 
-bool is_part(const std::vector<AbsoluteEvent>& some, const std::vector<AbsoluteEvent>& all) {
-  auto next = all.begin();
-  for (const auto& event : some) {
-    next = std::find(next, all.end(), event);
-    if (next == all.end()) return false;
-    ++next;
-  }
-  return true;
-}
-
 /// Even port number that this process uses for no other test.
 int next_port() {
   static int port = 20000 + static_cast<int>(g_get_monotonic_time() / 1000 % 20000) / 2 * 2;
@@ -254,9 +179,9 @@ void expect_everything(
   Pipeline pipeline(source + " ! rtpeventpay name=pay ! " + way + " ! " + sink);
   prepare(pipeline);
   Receiver receiver(pipeline);
-  pipeline.play();
+  pipeline.set(GST_STATE_PLAYING);
   Sender(pipeline).send_all();
-  EXPECT_TRUE(pipeline.wait()) << way;
+  EXPECT_TRUE(pipeline.wait()) << way << ": " << pipeline.error;
   EXPECT_EQ(receiver.events(), sent_events()) << way;
   EXPECT_EQ(pipeline.stat("depay", "lost-events"), 0U) << way;
 }
@@ -265,9 +190,9 @@ void expect_everything(
 void expect_everything(const std::string& to, const std::string& from) {
   Pipeline receiving(from + " ! " + sink);
   Receiver receiver(receiving);
-  receiving.play();
+  receiving.set(GST_STATE_PLAYING);
   Pipeline sending(source + " ! rtpeventpay ! " + to);
-  sending.play();
+  sending.set(GST_STATE_PLAYING);
   Sender(sending).send(0, buffers, receiver);
   EXPECT_EQ(receiver.events(), sent_events()) << to;
   EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U) << from;
@@ -344,10 +269,10 @@ TEST(Rtp, AWrongSrtpKeyYieldsNoEvent) {
   Receiver receiver(receiving);
   std::atomic<guint64> arrived = 0;
   count_buffers(receiving["decrypt"], "rtp_sink", arrived);
-  receiving.play();
+  receiving.set(GST_STATE_PLAYING);
   Pipeline sending(source + " ! rtpeventpay name=pay ssrc=1234 ! srtpenc key=" + key +
                    " ! udpsink host=127.0.0.1 port=" + port);
-  sending.play();
+  sending.set(GST_STATE_PLAYING);
   send_counted(sending, [&] { return arrived.load(); });
   EXPECT_TRUE(receiver.events().empty());
 }
@@ -356,10 +281,10 @@ TEST(Rtp, EncryptedPacketsAreRejected) {
   const auto port = std::to_string(next_port());
   Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
   Receiver receiver(receiving);
-  receiving.play();
+  receiving.set(GST_STATE_PLAYING);
   Pipeline sending(source + " ! rtpeventpay name=pay ! srtpenc key=" + key +
                    " ! udpsink host=127.0.0.1 port=" + port);
-  sending.play();
+  sending.set(GST_STATE_PLAYING);
   send_counted(sending, [&] { return receiving.stat("depay", "rejected-packets"); });
   EXPECT_TRUE(receiver.events().empty());
 }
@@ -421,8 +346,8 @@ TEST(Rtp, RetransmissionLosesNothing) {
   gst_element_link_pads(sending["s"], "send_rtp_src_0", sending["loss"], "sink");
   std::atomic<int> dropped = 0;
   drop_every_50th(sending, dropped);
-  receiving.play();
-  sending.play();
+  receiving.set(GST_STATE_PLAYING);
+  sending.set(GST_STATE_PLAYING);
   Sender(sending).send(0, buffers, receiver);
   EXPECT_EQ(dropped, 2);
   EXPECT_EQ(receiver.events(), sent_events());
@@ -486,7 +411,7 @@ TEST_P(EveryNetwork, WhatIsLostIsCounted) {
   Pipeline pipeline(source + " ! rtpeventpay mtu=576 name=pay ! netsim name=net " +
                     GetParam().properties + " ! " + sink);
   Receiver receiver(pipeline);
-  pipeline.play();
+  pipeline.set(GST_STATE_PLAYING);
   Sender sender(pipeline);
   sender.send(0, buffers - 1);
   wait_until_sent(pipeline, buffers - 1);
@@ -495,7 +420,7 @@ TEST_P(EveryNetwork, WhatIsLostIsCounted) {
                "delay-probability", 0.0, nullptr);
   sender.send(buffers - 1, buffers);
   sender.end();
-  EXPECT_TRUE(pipeline.wait());
+  EXPECT_TRUE(pipeline.wait()) << pipeline.error;
   const auto sent = sent_events();
   const auto received = receiver.events();
   ASSERT_FALSE(received.empty());
@@ -515,7 +440,7 @@ TEST(Rtp, AReorderedStreamIsWholeAfterAJitterBuffer) {
                     "rtpjitterbuffer latency=20000 faststart-min-packets=1 ! " +
                     sink);
   Receiver receiver(pipeline);
-  pipeline.play();
+  pipeline.set(GST_STATE_PLAYING);
   Sender sender(pipeline);
   // A jitter buffer starts with the first packet that it gets.
   sender.send(0, 1);
@@ -530,14 +455,14 @@ TEST(Rtp, AReorderedStreamIsWholeAfterAJitterBuffer) {
 TEST(Rtp, AReceiverJoinsLateLeavesAndReturns) {
   const auto port = std::to_string(next_port());
   Pipeline sending(source + " ! rtpeventpay name=pay ! udpsink host=127.0.0.1 port=" + port);
-  sending.play();
+  sending.set(GST_STATE_PLAYING);
   Sender sender(sending);
   for (const int first : {0, 40}) {
     sender.send(first, first + 20);
     wait_until_sent(sending, first + 20);
     Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
     Receiver receiver(receiving);
-    receiving.play();
+    receiving.set(GST_STATE_PLAYING);
     sender.send(first + 20, first + 40, receiver);
     EXPECT_TRUE(is_part(receiver.events(), sent_events()));
     EXPECT_EQ(receiving.stat("depay", "lost-events"), 0U);
@@ -548,10 +473,10 @@ TEST(Rtp, ASenderRestarts) {
   const auto port = std::to_string(next_port());
   Pipeline receiving("udpsrc port=" + port + " " + from_caps + " ! " + sink);
   Receiver receiver(receiving);
-  receiving.play();
+  receiving.set(GST_STATE_PLAYING);
   for (int i = 0; i < 2; ++i) {
     Pipeline sending(source + " ! rtpeventpay ! udpsink host=127.0.0.1 port=" + port);
-    sending.play();
+    sending.set(GST_STATE_PLAYING);
     Sender(sending).send(0, buffers, receiver);
   }
   auto twice = sent_events();
@@ -577,10 +502,10 @@ TEST(Rtp, ASlowReceiverLosesPacketsAndCountsThem) {
   Pipeline receiving("udpsrc buffer-size=4096 port=" + std::to_string(port) + " " + from_caps +
                      " ! " + sink);
   Receiver receiver(receiving);
-  receiving.play();
+  receiving.set(GST_STATE_PLAYING);
   Pipeline sending(source +
                    " ! rtpeventpay name=pay ! udpsink host=127.0.0.1 port=" + std::to_string(port));
-  sending.play();
+  sending.set(GST_STATE_PLAYING);
   Sender sender(sending);
   sender.send(0, 1, receiver);
   {

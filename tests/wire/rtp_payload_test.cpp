@@ -4,6 +4,7 @@
 #include <set>
 
 #include "src/wire/pending_interval.hpp"
+#include "tests/wire/is_part.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
 namespace eventcamera {
@@ -47,17 +48,6 @@ std::vector<AbsoluteEvent> events_of(const std::vector<Interval>& intervals) {
   for (const auto& [start, duration, some] : intervals)
     for (const auto& event : some) events.push_back({start / 1000 + event.t, event.x, event.y_p});
   return events;
-}
-
-/// True if all of `some` are in `all`, in the same order.
-bool is_part(const std::vector<AbsoluteEvent>& some, const std::vector<AbsoluteEvent>& all) {
-  auto next = all.begin();
-  for (const auto& event : some) {
-    next = std::find(next, all.end(), event);
-    if (next == all.end()) return false;
-    ++next;
-  }
-  return true;
 }
 
 class EveryFormat : public testing::TestWithParam<RtpEventFormat> {};
