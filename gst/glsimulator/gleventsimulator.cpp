@@ -258,11 +258,62 @@ class MappedTexture {
   std::string fault_;
 };
 
+/// Time after which to look again whether the GPU has finished.
+constexpr GstClockTime look_interval = GST_MSECOND;
+
+/// Lets the simulator of an element push what is finished, a little later.
+class LaterLook {
+ public:
+  explicit LaterLook(GstElement* element) : element_(element) {}
+  ~LaterLook() { cancel(); }
+  LaterLook(const LaterLook&) = delete;
+  LaterLook& operator=(const LaterLook&) = delete;
+
+  /// Replaces the look that is due, if any.
+  void schedule() {
+    cancel();
+    GstClock* clock = gst_system_clock_obtain();
+    id_ = gst_clock_new_single_shot_id(clock, gst_clock_get_time(clock) + look_interval);
+    gst_object_unref(clock);
+    auto* element = g_new0(GWeakRef, 1);
+    g_weak_ref_init(element, element_);
+    gst_clock_id_wait_async(id_, look, element, [](gpointer data) {
+      g_weak_ref_clear(static_cast<GWeakRef*>(data));
+      g_free(data);
+    });
+  }
+
+  void cancel() {
+    if (id_ == nullptr) return;
+    gst_clock_id_unschedule(id_);
+    gst_clock_id_unref(std::exchange(id_, nullptr));
+  }
+
+ private:
+  /// Called in the thread of the clock, which must not wait for the stream lock or the GPU.
+  static gboolean look(GstClock*, GstClockTime, GstClockID, gpointer data) {
+    auto* element = static_cast<GstElement*>(g_weak_ref_get(static_cast<GWeakRef*>(data)));
+    if (element == nullptr) return TRUE;
+    gst_element_call_async(
+        element, [](GstElement* self, gpointer) { event_simulator_push_finished(self); }, nullptr,
+        nullptr);
+    gst_object_unref(element);
+    return TRUE;
+  }
+
+  GstElement* element_;
+  GstClockID id_ = nullptr;
+};
+
+/// A simulator on the GPU. The events of an interval are read while the GPU works on the next one,
+/// or as soon as they are ready, so at most one interval is awaited. Its frame is held until the
+/// GPU has read it; first frames and drawn ones, too.
 class TextureVideoSimulator final : public VideoSimulator {
  public:
   TextureVideoSimulator(GstElement* element, GstGLContext* context, const GstVideoInfo& video,
                         MakeGlSimulator make)
       : element_(element),
+        later_look_(element),
         context_(static_cast<GstGLContext*>(gst_object_ref(context))),
         frame_{FrameLuma::format_of(video), 0, {}} {
     set_video(video);
@@ -292,18 +343,21 @@ class TextureVideoSimulator final : public VideoSimulator {
 
   void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
 
-  void queue(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings) override {
-    const OwnedBuffer uploaded = in_texture(buffer);
-    const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
-    if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
-    frame_.texture = texture.name();
-    run([&] { simulator_->queue(frame_, time, settings); });
+  void push(Interval interval, const eventcamera::Settings& settings) override {
+    {
+      const OwnedBuffer uploaded = in_texture(interval.frame.get());
+      const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
+      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
+      frame_.texture = texture.name();
+      run([&] { simulator_->queue(frame_, interval.end, settings); });
+    }
+    await({std::move(interval), false});
   }
 
-  void draw(GstBuffer* buffer, Nanoseconds time, const eventcamera::Settings& settings,
+  void draw(OwnedBuffer frame, Nanoseconds time, const eventcamera::Settings& settings,
             const eventcamera::Palette& palette, GstBuffer* picture) override {
     {
-      const OwnedBuffer uploaded = in_texture(buffer);
+      const OwnedBuffer uploaded = in_texture(frame.get());
       const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
       if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
       const MappedTexture drawn(drawn_, picture, context_, GST_MAP_WRITE);
@@ -317,25 +371,49 @@ class TextureVideoSimulator final : public VideoSimulator {
     auto* sync = gst_buffer_get_gl_sync_meta(picture);
     if (sync == nullptr) sync = gst_buffer_add_gl_sync_meta(context_, picture);
     gst_gl_sync_meta_set_sync_point(sync, context_);
+    await({{.frame = std::move(frame)}, true});
   }
 
-  bool is_ready() override {
-    bool ready = false;
-    run([&] { ready = simulator_->is_ready(); });
-    return ready;
+  void push_finished() override {
+    if (!awaited_) return;
+    bool is_ready = false;
+    run([&] { is_ready = simulator_->is_ready(); });
+    if (is_ready)
+      finish();
+    else
+      later_look_.schedule();
   }
 
-  const EventBuckets* read() override {
+  void finish() override {
+    if (!awaited_) return;
+    later_look_.cancel();
+    auto [interval, is_drawn] = *std::exchange(awaited_, std::nullopt);
     const EventBuckets* events = nullptr;
     run([&] { events = simulator_->read(); });
-    return events;
+    if (!is_drawn) event_simulator_push_interval(G_OBJECT(element_), std::move(interval), events);
   }
 
-  void drop() override { simulator_->drop(); }
+  void drop() override {
+    later_look_.cancel();
+    awaited_.reset();
+    simulator_->drop();
+  }
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 
  private:
+  struct Awaited {
+    Interval interval;
+    bool is_drawn;
+  };
+
+  /// Awaits the frame queued last, after having pushed the interval before.
+  void await(Awaited awaited) {
+    finish();
+    awaited_ = std::move(awaited);
+    push_finished();
+  }
+
   /// The frame in a texture: uploaded where it is in system memory.
   OwnedBuffer in_texture(GstBuffer* buffer) {
     if (gst_buffer_n_memory(buffer) > 0 && gst_is_gl_memory(gst_buffer_peek_memory(buffer, 0)))
@@ -408,6 +486,8 @@ class TextureVideoSimulator final : public VideoSimulator {
   }
 
   GstElement* element_;
+  LaterLook later_look_;
+  std::optional<Awaited> awaited_;
   GstGLContext* context_;
   GstVideoInfo video_;
   GstVideoInfo drawn_{};

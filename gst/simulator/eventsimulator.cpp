@@ -11,7 +11,6 @@
 
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
-#include "gst/base/flush_timer.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
@@ -45,28 +44,16 @@ constexpr Nanoseconds max_latency = GST_SECOND;
 /// Multiples of it are reported as latency.
 constexpr Nanoseconds processing_deadline = 20 * GST_MSECOND;
 
-/// Time after which to look whether the events of an interval are ready.
-constexpr GstClockTime poll_interval = GST_MSECOND;
-
 /// User-settable values, copied once per buffer.
 struct Settings {
   eventcamera::Settings simulation;
   PaletteName palette = PaletteName::dark;
 };
 
-/// A frame that is worked on, and the interval that it ends, if any.
-struct Awaited {
-  OwnedBuffer frame;
-  Nanoseconds start = 0;
-  Nanoseconds end = 0;
-  std::optional<Nanoseconds> work_began{};
-};
-
 /// State from caps to stop.
 struct State {
   GstVideoInfo video;  ///< input format
   std::unique_ptr<VideoSimulator> frames;
-  std::optional<Awaited> awaited{};
   bool draws = false;  ///< the output is video, not events
 
   IntervalSimulator& simulator() const { return frames->simulator(); }
@@ -109,8 +96,6 @@ struct GstEventSimulatorPrivate {
   // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
   std::optional<State> state;
   Stream stream;
-
-  FlushTimer timer;  ///< for the awaited interval
 };
 
 static gpointer parent_class;
@@ -303,15 +288,15 @@ static GstFlowReturn push_buffer(GstEventSimulator* self, OwnedBuffer out, GstCl
   return gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out.release());
 }
 
-/// Waits until the work on the awaited frame, if any, is done. Pushes the events of the interval
-/// that it ends, or a GAP if there are none. May throw.
-static void push_awaited(GstEventSimulator* self) {
-  auto& state = priv_of(self).state;
-  if (!state || !state->awaited) return;
-  priv_of(self).timer.cancel();
-  auto [frame, start, end, began] = *std::exchange(state->awaited, std::nullopt);
-  const EventBuckets* const events = state->frames->read();
-  if (events == nullptr) return;  // of a first frame, or drawn
+void event_simulator_push_interval(GObject* element, Interval interval,
+                                   const EventBuckets* events) {
+  auto* self = GST_EVENT_SIMULATOR(element);
+  auto& [frame, start, end, began] = interval;
+  if (events == nullptr) {
+    end_work(self, end, began);
+    end_frame(self);
+    return;
+  }
   GST_LOG_OBJECT(self,
                  "%" G_GSIZE_FORMAT " events in the interval from %" GST_TIME_FORMAT
                  " to %" GST_TIME_FORMAT,
@@ -321,8 +306,9 @@ static void push_awaited(GstEventSimulator* self) {
   auto& flow = priv_of(self).stream.flow;
   OwnedBuffer out;
   if (events->size() > 0)
-    flow = event_simulator_write_events(GST_BASE_TRANSFORM(self), *events,
-                                        state->simulator().threads(), frame.get(), out);
+    flow =
+        event_simulator_write_events(GST_BASE_TRANSFORM(self), *events,
+                                     priv_of(self).state->simulator().threads(), frame.get(), out);
   frame.reset();  // upstream may need it while downstream blocks
   end_work(self, end, began);
   learn_latency(self, start, end);
@@ -338,9 +324,10 @@ static void push_awaited(GstEventSimulator* self) {
 
 /// Makes the next frame a first frame. May throw.
 static void forget_frames(GstEventSimulator* self) {
-  push_awaited(self);
   auto& state = priv_of(self).state;
-  if (!state || !state->simulator().last_time()) return;
+  if (!state) return;
+  state->frames->finish();
+  if (!state->simulator().last_time()) return;
   GST_DEBUG_OBJECT(self, "the next frame begins an interval; the last was at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(static_cast<GstClockTime>(*state->simulator().last_time())));
   state->simulator().reset();
@@ -436,9 +423,18 @@ static void reported(GstEventSimulator* self, const Work& work) {
   if (!guarded(self, failure, work)) priv_of(self).stream.flow = GST_FLOW_ERROR;
 }
 
-/// Ends the wait for the awaited interval.
-static void finish_interval(GstEventSimulator* self) {
-  reported(self, [self] { push_awaited(self); });
+/// Pushes the intervals that are not finished, before what follows them.
+static void finish_intervals(GstEventSimulator* self) {
+  if (const auto& state = priv_of(self).state) reported(self, [&] { state->frames->finish(); });
+}
+
+void event_simulator_push_finished(GstElement* element) {
+  auto* self = GST_EVENT_SIMULATOR(element);
+  GstPad* pad = GST_BASE_TRANSFORM_SINK_PAD(self);
+  GST_PAD_STREAM_LOCK(pad);
+  if (const auto& state = priv_of(self).state)
+    reported(self, [&] { state->frames->push_finished(); });
+  GST_PAD_STREAM_UNLOCK(pad);
 }
 
 /* negotiation */
@@ -505,7 +501,7 @@ static bool draws_for(GstBaseTransform* transform, GstQuery* query) {
 static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   auto& state = priv_of(self).state;
-  finish_interval(self);
+  finish_intervals(self);
   GstVideoInfo video;
   GstVideoInfo drawn;
   if (!gst_video_info_from_caps(&video, in) ||
@@ -570,18 +566,6 @@ static void sync_controlled_properties(GstEventSimulator* self, GstClockTime tim
   if (GST_CLOCK_TIME_IS_VALID(stream_time)) gst_object_sync_values(GST_OBJECT(self), stream_time);
 }
 
-static void look_for_events(GstObject* element);
-
-/// Lets the awaited frame go, and pushes its interval, if the work on it is done, else looks again
-/// later. May throw.
-static void push_if_ready(GstEventSimulator* self) {
-  auto& priv = priv_of(self);
-  if (priv.state->frames->is_ready())
-    push_awaited(self);
-  else
-    priv.timer.set(poll_interval, GST_BASE_TRANSFORM_SINK_PAD(self), look_for_events);
-}
-
 /// Draws the events since the last frame (none for a first frame). The picture replaces the frame,
 /// at its `time`. May throw.
 static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& settings, Nanoseconds time,
@@ -591,15 +575,12 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
   OwnedBuffer picture;
   GstFlowReturn result = event_simulator_make_picture(transform, in.get(), picture);
   if (result == GST_FLOW_OK) {
-    state.frames->draw(in.get(), time, settings.simulation, eventcamera::palette(settings.palette),
-                       picture.get());
-    push_awaited(self);
+    GST_BUFFER_DURATION(picture.get()) = GST_BUFFER_DURATION(in.get());
+    state.frames->draw(std::move(in), time, settings.simulation,
+                       eventcamera::palette(settings.palette), picture.get());
   }
   end_work(self, time, work_began(self));
   if (result != GST_FLOW_OK) return result;
-  GST_BUFFER_DURATION(picture.get()) = GST_BUFFER_DURATION(in.get());
-  state.awaited.emplace(Awaited{.frame = std::move(in)});
-  push_if_ready(self);  // upstream may need the frame while downstream blocks
   priv_of(self).qos.access([&](const SimulatorQos& qos) {
     qos.extend(transform, picture.get(), frame_duration(state.video));
   });
@@ -609,8 +590,7 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
   return result;
 }
 
-/// Processes a frame and outputs the interval that it ends, if any: at once if its events are
-/// ready, else as soon as they are. May throw.
+/// Processes a frame and outputs the interval that it ends, if any. May throw.
 static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
   auto& stream = priv_of(self).stream;
   auto& state = *priv_of(self).state;
@@ -627,30 +607,17 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
     stream.flow = draw_frame(self, settings, end, std::move(in));
     return;
   }
-  state.frames->queue(in.get(), end, settings.simulation);
-  push_awaited(self);  // whose events are read while the GPU works on this frame
-  if (start) {
-    stream.handed_out_until = end;
-  } else {
-    end_work(self, end, work_began(self));
-    end_frame(self);
-  }
-  state.awaited.emplace(Awaited{std::move(in), start.value_or(end), end, work_began(self)});
-  push_if_ready(self);
-}
-
-static void look_for_events(GstObject* element) {
-  auto* self = GST_EVENT_SIMULATOR(element);
-  const auto& state = priv_of(self).state;
-  if (state && state->awaited) reported(self, [self] { push_if_ready(self); });
+  if (start) stream.handed_out_until = end;
+  state.frames->push({std::move(in), start.value_or(end), end, work_began(self)},
+                     settings.simulation);
 }
 
 static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   auto& flow = priv_of(self).stream.flow;
-  *out = nullptr;  // output is pushed here, because that of the last frame may follow later
+  *out = nullptr;  // output is pushed here, because it may follow later
   OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
-  // Since the timer or an event pushed, downstream may have been relinked.
+  // Since output was pushed outside of this function, downstream may have been relinked.
   if (flow != GST_FLOW_EOS && flow != GST_FLOW_ERROR) {
     flow = GST_FLOW_OK;
     if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
@@ -678,7 +645,7 @@ static GstEvent* segment_of_times(GstEvent* event) {
 /// Starts a new timeline, discontinuous with the previous one.
 static void start_timeline(GstEventSimulator* self) {
   auto& state = priv_of(self).state;
-  if (state && std::exchange(state->awaited, std::nullopt)) state->frames->drop();
+  if (state) state->frames->drop();
   priv_of(self).stream.flow = GST_FLOW_OK;
   start_over(self);
   priv_of(self).stream.clock.start_over();
@@ -753,7 +720,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   const bool is_serialized =
       (gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) != 0;
-  if (is_serialized && GST_EVENT_TYPE(event) != GST_EVENT_FLUSH_STOP) finish_interval(self);
+  if (is_serialized && GST_EVENT_TYPE(event) != GST_EVENT_FLUSH_STOP) finish_intervals(self);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
       event = segment_of_times(event);
@@ -806,7 +773,7 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   if (direction == GST_PAD_SRC && draws_for(transform, query)) return TRUE;
   const bool is_serialized =
       (gst_query_type_get_flags(GST_QUERY_TYPE(query)) & GST_QUERY_TYPE_SERIALIZED) != 0;
-  if (direction == GST_PAD_SINK && is_serialized) finish_interval(GST_EVENT_SIMULATOR(transform));
+  if (direction == GST_PAD_SINK && is_serialized) finish_intervals(GST_EVENT_SIMULATOR(transform));
   if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 
@@ -824,9 +791,10 @@ static gboolean start(GstBaseTransform* transform) {
 
 static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_SIMULATOR(transform);
-  priv_of(self).timer.stop();
+  GST_PAD_STREAM_LOCK(GST_BASE_TRANSFORM_SINK_PAD(self));  // see event_simulator_push_finished()
   priv_of(self).state.reset();
   priv_of(self).stream = {};
+  GST_PAD_STREAM_UNLOCK(GST_BASE_TRANSFORM_SINK_PAD(self));
   *priv_of(self).latency.lock() = {};
   return TRUE;
 }

@@ -15,12 +15,9 @@
 ///
 /// N frames give N - 1 intervals; the first frame after start, flush or a discontinuity only serves
 /// as reference for the next one. An interval has the PTS of its first frame and is pushed when its
-/// last frame arrives, so the latency is one frame plus the processing time. Where the events come
-/// later, as from a GPU, the interval is pushed as soon as they do, from the streaming thread or a
-/// timer; at the latest, after the next frame has been queued and before any serialized event or
-/// query is handled. At most this one interval is awaited; a flush drops it. Frames are held until
-/// the GPU has read them, first frames and drawn ones too. In the event stream an interval without
-/// events is a GAP. In drawn video, an interval is a picture that replaces its
+/// last frame arrives, so the latency is one frame plus the processing time; at the latest, before
+/// any serialized event or query is handled. In the event stream an interval without events is a
+/// GAP. In drawn video, an interval is a picture that replaces its
 /// last frame, with that frame's timestamps and those of its metas that remain valid, so the
 /// latency is the processing time. Where frames are skipped, its duration lasts until the expected
 /// next picture. A first frame gives an empty picture.

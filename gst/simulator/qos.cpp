@@ -59,7 +59,8 @@ GstMessage* SimulatorQos::begin(GstBaseTransform* element, GstBuffer* frame, boo
 SimulatorQos::Nanoseconds SimulatorQos::end_work(GstBaseTransform* element,
                                                  std::optional<Nanoseconds> began) {
   const auto time = now(element);
-  const Nanoseconds work = time && began ? std::max(*time - *began, Nanoseconds{0}) : 0;
+  const Nanoseconds work =
+      time && began ? std::max(*time - std::max(*began, pushed_), Nanoseconds{0}) : 0;
   ++frames_;
   processing_time_ += static_cast<guint64>(work);
   return work;
@@ -79,7 +80,7 @@ void SimulatorQos::end(GstBaseTransform* element) {
   const auto time = now(element);
   if (!time) return;
   pacer_.end(*time);
-  began_ = time;
+  pushed_ = *time;
 }
 
 void SimulatorQos::reset_stats() {

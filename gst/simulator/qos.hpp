@@ -25,10 +25,10 @@ class SimulatorQos {
   /// Starts processing a frame. If the frame is skipped instead, returns the message that reports
   /// it; only frames that end an interval are `skippable`.
   GstMessage* begin(GstBaseTransform* element, GstBuffer* frame, bool skippable);
-  /// When the work on the last frame began, or, if that is later, when the output of another one
-  /// had been pushed; none without a clock.
+  /// When the work on the last frame began; none without a clock.
   std::optional<Nanoseconds> began() const { return began_; }
-  /// Ends the work on a frame, which began then. Returns its duration; 0 without a clock.
+  /// Ends the work on a frame, which began then, or, if that is later, when the last output had
+  /// been pushed. Returns its duration; 0 without a clock.
   Nanoseconds end_work(GstBaseTransform* element, std::optional<Nanoseconds> began);
   /// Extends the duration of its picture over the frames that will probably be skipped after it,
   /// because sinks drop a picture that comes after its end.
@@ -43,6 +43,7 @@ class SimulatorQos {
   void start_over() {
     pacer_.start_over();
     last_.reset();
+    pushed_ = 0;
   }
   void reset_stats();
   GstStructure* stats() const;
@@ -57,6 +58,7 @@ class SimulatorQos {
   gdouble proportion_ = 1;            ///< of real time that downstream needs
   std::optional<Nanoseconds> last_;   ///< frame that was processed last
   std::optional<Nanoseconds> began_;  ///< when the work on it began
+  Nanoseconds pushed_ = 0;            ///< when the last output had been pushed
   guint64 frames_ = 0;
   guint64 skipped_ = 0;
   guint64 processing_time_ = 0;  ///< ns

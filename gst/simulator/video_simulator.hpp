@@ -10,12 +10,31 @@
 #include <utility>
 
 #include "gst/base/errors.hpp"
+#include "gst/base/owned.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "gst/simulator/frame_luma.hpp"
 #include "src/render/accumulator.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// A simulator of the frames in buffers, wherever their pixels are.
+/// An interval, whose PTS and length are those of its events.
+struct Interval {
+  OwnedBuffer frame;  ///< that ends it
+  eventcamera::Nanoseconds start = 0;
+  eventcamera::Nanoseconds end = 0;
+  std::optional<eventcamera::Nanoseconds> work_began{};  ///< on the frame
+};
+
+/// Ends the work on the frame of an interval, lets it go, and pushes the events of the interval: a
+/// GAP if there are none, nothing if `events` is null, because it is a first frame. A
+/// VideoSimulator of this element calls it with the stream lock. May throw.
+void event_simulator_push_interval(GObject* element, Interval interval,
+                                   const eventcamera::EventBuckets* events);
+
+/// Calls push_finished() of the simulator of this element, if it has one, with the stream lock.
+/// Failures are reported, and drop the simulator.
+void event_simulator_push_finished(GstElement* element);
+
+/// A simulator of the frames in buffers, wherever their pixels are. Called with the stream lock.
 class VideoSimulator {
  public:
   virtual ~VideoSimulator() = default;
@@ -26,27 +45,24 @@ class VideoSimulator {
   /// Draws pictures of this format from now on.
   virtual void set_drawn_video(const GstVideoInfo& drawn) = 0;
 
-  /// Takes the frame in a buffer, as BasicSimulator::push(), but may return before it has the
-  /// events, which are to be read(); the buffer must be kept until then. Up to two frames may wait.
-  /// Throws VideoSimulatorError as well.
-  virtual void queue(GstBuffer* frame, eventcamera::Nanoseconds time,
-                     const eventcamera::Settings& settings) = 0;
+  /// Simulates the interval and calls event_simulator_push_interval(): before it returns, or, where
+  /// the events come later, from a later call, in order. Throws VideoSimulatorError as well.
+  virtual void push(Interval interval, const eventcamera::Settings& settings) = 0;
 
-  /// As queue(), but draws the events in the buffer `picture` (none for a first frame); read()
-  /// returns none.
-  virtual void draw(GstBuffer* frame, eventcamera::Nanoseconds time,
+  /// Draws the events until `frame` in the buffer `picture` (none for a first frame). Throws
+  /// VideoSimulatorError as well.
+  virtual void draw(OwnedBuffer frame, eventcamera::Nanoseconds time,
                     const eventcamera::Settings& settings, const eventcamera::Palette& palette,
                     GstBuffer* picture) = 0;
 
-  /// Whether read() would return at once.
-  virtual bool is_ready() = 0;
+  /// Pushes the intervals that are finished, and lets go of frames that have been read.
+  virtual void push_finished() {}
 
-  /// Returns the events of the interval that the first frame that waits ends, valid until the next
-  /// call; nullptr if it ends none. Throws VideoSimulatorError as well.
-  virtual const eventcamera::EventBuckets* read() = 0;
+  /// Waits for the intervals that are not finished, and pushes them.
+  virtual void finish() {}
 
-  /// Forgets the frames that wait.
-  virtual void drop() = 0;
+  /// Forgets the intervals that are not finished.
+  virtual void drop() {}
 
   virtual eventcamera::IntervalSimulator& simulator() = 0;
 };
@@ -80,8 +96,9 @@ inline VideoSimulatorError cannot_draw(const std::string& fault) {
 /// Simulator of frames in system memory.
 class LumaVideoSimulator final : public VideoSimulator {
  public:
-  LumaVideoSimulator(const GstVideoInfo& video, std::unique_ptr<eventcamera::Simulator> simulator)
-      : video_(video), luma_(video), simulator_(std::move(simulator)) {}
+  LumaVideoSimulator(GObject* element, const GstVideoInfo& video,
+                     std::unique_ptr<eventcamera::Simulator> simulator)
+      : element_(element), video_(video), luma_(video), simulator_(std::move(simulator)) {}
 
   void set_video(const GstVideoInfo& video) override {
     video_ = video;
@@ -92,27 +109,20 @@ class LumaVideoSimulator final : public VideoSimulator {
     drawing_ = Drawing{drawn, {GST_VIDEO_INFO_WIDTH(&drawn), GST_VIDEO_INFO_HEIGHT(&drawn)}};
   }
 
-  void queue(GstBuffer* frame, eventcamera::Nanoseconds time,
-             const eventcamera::Settings& settings) override {
-    const VideoFrame mapped(video_, frame, GST_MAP_READ);
-    if (!mapped) throw cannot_read(mapped.fault());
-    events_ = simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
+  void push(Interval interval, const eventcamera::Settings& settings) override {
+    const auto* events = simulate(interval.frame.get(), interval.end, settings);
+    event_simulator_push_interval(element_, std::move(interval), events);
   }
 
-  void draw(GstBuffer* frame, eventcamera::Nanoseconds time, const eventcamera::Settings& settings,
+  void draw(OwnedBuffer frame, eventcamera::Nanoseconds time, const eventcamera::Settings& settings,
             const eventcamera::Palette& palette, GstBuffer* picture) override {
-    queue(frame, time, settings);
+    const auto* events = simulate(frame.get(), time, settings);
     const VideoFrame mapped(drawing_->video, picture, GST_MAP_WRITE);
     if (!mapped) throw cannot_draw(mapped.fault());
-    if (const auto* events = std::exchange(events_, nullptr))
-      drawing_->accumulator.add(*events, simulator_->threads());
+    if (events != nullptr) drawing_->accumulator.add(*events, simulator_->threads());
     drawing_->accumulator.draw(palette, pixel_layout_of(drawing_->video), mapped.data(),
                                mapped.stride(), simulator_->threads());
   }
-
-  bool is_ready() override { return true; }
-  const eventcamera::EventBuckets* read() override { return events_; }
-  void drop() override {}
 
   eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
 
@@ -122,15 +132,22 @@ class LumaVideoSimulator final : public VideoSimulator {
     eventcamera::Accumulator accumulator;
   };
 
+  const eventcamera::EventBuckets* simulate(GstBuffer* frame, eventcamera::Nanoseconds time,
+                                            const eventcamera::Settings& settings) {
+    const VideoFrame mapped(video_, frame, GST_MAP_READ);
+    if (!mapped) throw cannot_read(mapped.fault());
+    return simulator_->push(luma_.of(mapped, simulator_->threads()), time, settings);
+  }
+
+  GObject* element_;
   GstVideoInfo video_;
   FrameLuma luma_;
   std::optional<Drawing> drawing_;
   std::unique_ptr<eventcamera::Simulator> simulator_;
-  const eventcamera::EventBuckets* events_ = nullptr;
 };
 
 /// For EventSimulatorMethod::create: a simulator made by `make` from the format of the luma.
 template <auto make>
-std::unique_ptr<VideoSimulator> in_system_memory(GObject*, const GstVideoInfo& video) {
-  return std::make_unique<LumaVideoSimulator>(video, make(FrameLuma::format_of(video)));
+std::unique_ptr<VideoSimulator> in_system_memory(GObject* element, const GstVideoInfo& video) {
+  return std::make_unique<LumaVideoSimulator>(element, video, make(FrameLuma::format_of(video)));
 }

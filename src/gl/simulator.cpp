@@ -52,14 +52,4 @@ const EventBuckets* Simulator::read() {
   return &events_;
 }
 
-void Simulator::simulate(const TextureFrame& frame, const StepTimes& steps,
-                         const Settings& settings, EventBuckets& events) {
-  auto& [list, is_sorted, done] = queue_[first_];
-  mark(frame, steps, settings, list);
-  list.sort();
-  done.set();
-  done.wait();
-  list.read(events);
-}
-
 }  // namespace eventcamera::gl

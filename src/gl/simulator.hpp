@@ -10,16 +10,24 @@
 namespace eventcamera::gl {
 
 /// Simulator of 8-bit frames in textures. It is made, used and destroyed while its context is
-/// current; hold_until() and reset() need none. push() and draw() throw Error as well.
+/// current; hold_until() and reset() need none. All others throw Error and std::bad_alloc; after
+/// that the simulator may only be destroyed.
+///
+/// The way of a frame: a LumaKernel turns its texture into a GreyFrame; a method (frame_, dense_,
+/// sparse_ or diff_simulator) compares it with the last one and marks the pixels that fire in each
+/// step; an EventList counts, sorts and reads back the marked pixels, or a DrawKernel draws them.
+/// The kernels are compute shaders (shaders/), one Kernel each. Dense motion is computed in
+/// farneback, tracks in point_tracker, with the formulas and bounds of their namesakes in src/flow.
 ///
 /// Reading events back need not make the caller, or the GPU, wait: queue() the next frame, then
 /// read() the events of the interval before.
-class Simulator : public BasicSimulator<TextureFrame> {
+class Simulator : public IntervalSimulator {
  public:
   static constexpr int max_queued = 2;  ///< frames
 
-  /// As push(), but only queues the work, whose result is to be read(). The contents of the texture
-  /// may not change until then.
+  /// Queues the work on the next frame, whose `format` must be the simulator's, and whose events
+  /// are to be read(). The contents of the texture may not change until then. `time` must be later
+  /// than that of the last frame, by at most max_interval.
   void queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings);
 
   /// As queue(), but draws the events in a texture (none for the first frame); read() returns none.
@@ -29,7 +37,8 @@ class Simulator : public BasicSimulator<TextureFrame> {
   /// Whether the GPU is done with the first of the queued frames.
   bool is_ready() const { return queue_[first_].done.is_reached(); }
 
-  /// Waits until the GPU is done with the first of the queued frames. Returns what push() does.
+  /// Waits until the GPU is done with the first of the queued frames. Returns the sorted events of
+  /// the interval that it ends, valid until the next call; nullptr if it ends none.
   const EventBuckets* read();
 
   /// Forgets the queued frames.
@@ -37,13 +46,15 @@ class Simulator : public BasicSimulator<TextureFrame> {
 
  protected:
   Simulator(const Context& gl, const LumaFormat& format)
-      : BasicSimulator(format),
+      : IntervalSimulator(format),
         gl_(gl),
         kernels_(gl),
         queue_{{{gl, format, kernels_}, false, Fence(gl)},
                {{gl, format, kernels_}, false, Fence(gl)}},
         draw_(gl, format) {}
 
+  /// Stores the first frame.
+  virtual void start(const TextureFrame& frame) = 0;
   /// Queues the marks of the pixels that fire between the last frame and this one, in `list`, and
   /// stores this one.
   virtual void mark(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
@@ -55,9 +66,6 @@ class Simulator : public BasicSimulator<TextureFrame> {
     bool is_sorted;  ///< to be read
     Fence done;
   };
-
-  void simulate(const TextureFrame& frame, const StepTimes& steps, const Settings& settings,
-                EventBuckets& events) final;
 
   /// Queues all work on a frame but the sorting. Returns whether it ends an interval.
   bool take(const TextureFrame& frame, Nanoseconds time, const Settings& settings, EventList& list);

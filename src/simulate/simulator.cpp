@@ -26,4 +26,16 @@ void IntervalSimulator::reset() {
   last_time_.reset();
 }
 
+const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
+                                    const Settings& settings) {
+  assert(frame.format == format());
+  const auto steps = steps_to(time, settings);
+  if (steps)
+    simulate(frame, *steps, settings, events_);
+  else
+    start(frame);
+  last_time_ = time;
+  return steps ? &events_ : nullptr;
+}
+
 }  // namespace eventcamera

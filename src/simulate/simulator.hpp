@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
 #include <cstdint>
 #include <optional>
 
@@ -99,39 +98,25 @@ class IntervalSimulator {
   ThreadPool threads_;
 };
 
-/// Turns frames into the events between them. One call per frame does all the work, so that an
-/// implementation may run on any processor. The same frames, times and settings give the same
-/// events for any number of threads.
-template <class Frame>
-class BasicSimulator : public IntervalSimulator {
+/// Turns frames into the events between them, on the CPU. One call per frame does all the work. The
+/// same frames, times and settings give the same events for any number of threads.
+class Simulator : public IntervalSimulator {
  public:
   /// Processes the next frame, whose `format` must be the simulator's. `time` must be later than
   /// that of the last frame, by at most max_interval. Returns the sorted events of (time of the
   /// last frame, time], valid until the next call; nullptr for the first frame. Throws
-  /// std::bad_alloc or an exception of the implementation (cv::Exception, gl::Error); after that
-  /// the simulator may only be destroyed.
-  const EventBuckets* push(const Frame& frame, Nanoseconds time, const Settings& settings) {
-    assert(frame.format == format());
-    const auto steps = steps_to(time, settings);
-    if (steps)
-      simulate(frame, *steps, settings, events_);
-    else
-      start(frame);
-    last_time_ = time;
-    return steps ? &events_ : nullptr;
-  }
+  /// std::bad_alloc or an exception of the implementation (cv::Exception); after that the simulator
+  /// may only be destroyed.
+  const EventBuckets* push(const LumaView& frame, Nanoseconds time, const Settings& settings);
 
  protected:
   using IntervalSimulator::IntervalSimulator;
 
   /// Stores the first frame.
-  virtual void start(const Frame& frame) = 0;
+  virtual void start(const LumaView& frame) = 0;
   /// Fills `events` with the events between the last frame and this one, and stores this one.
-  virtual void simulate(const Frame& frame, const StepTimes& steps, const Settings& settings,
+  virtual void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
                         EventBuckets& events) = 0;
 };
-
-/// Simulator on the CPU.
-using Simulator = BasicSimulator<LumaView>;
 
 }  // namespace eventcamera

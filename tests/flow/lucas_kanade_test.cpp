@@ -158,7 +158,7 @@ TEST_P(EverySize, FindsTexture) {
     ScharrGradients gradients(32, 32);
     gradients.compute(finest, {left - 7, top - 7, left + 24, top + 24});
     targets::for_each([&](const char* target) {
-      const auto textured = find_texture(gradients, tile);
+      const auto textured = textured_pixels(gradients, tile);
       for (int y = 0; y < std::min(16, height - top); ++y) {
         for (int x = 0; x < std::min(16, width - left); ++x) {
           Search search{x, y, {0, 0}, false};

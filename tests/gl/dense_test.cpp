@@ -167,7 +167,8 @@ void expect_similar_events(gl::DenseSimulator& ours, DenseSimulator& reference,
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const auto time = static_cast<Nanoseconds>(i) * scene::frame_time;
       texture.upload(gl_test::bytes_of(frames[i]));
-      const auto* made = ours.push(texture.frame({gl_test::one, 0, 0, 0}), time, settings);
+      const auto* made =
+          gl_test::events_until(ours, texture.frame({gl_test::one, 0, 0, 0}), time, settings);
       const auto* expected = reference.push(scene::luma(frames[i]), time, settings);
       if (i == 0) continue;
       const auto events = scene::copy(*made);

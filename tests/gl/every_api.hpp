@@ -13,6 +13,7 @@
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/gl/grey_frame.hpp"
+#include "src/gl/simulator.hpp"
 #include "tests/gl/egl_context.hpp"
 
 namespace gl_test {
@@ -41,6 +42,15 @@ class EveryApi : public testing::TestWithParam<bool> {
   eventcamera::gl::Context context{load};
   eventcamera::gl::LumaKernel luma_kernel{context};
 };
+
+/// Simulates the next frame, and waits for the events of the interval that it ends, if any.
+inline const eventcamera::EventBuckets* events_until(eventcamera::gl::Simulator& simulator,
+                                                     const eventcamera::gl::TextureFrame& frame,
+                                                     eventcamera::Nanoseconds time,
+                                                     const eventcamera::Settings& settings) {
+  simulator.queue(frame, time, settings);
+  return simulator.read();
+}
 
 inline std::string name_of_api(const testing::TestParamInfo<bool>& api) {
   return api.param ? "OpenGLES" : "OpenGL";

@@ -45,7 +45,7 @@ void expect_same_events(gl::Simulator& ours, Simulator& reference, const Setting
   std::size_t events = 0;
   for (const auto& frame : frames) {
     texture.upload(bytes_of(frame));
-    const auto* made = ours.push(texture.frame({one, 0, 0, 0}), time, settings);
+    const auto* made = gl_test::events_until(ours, texture.frame({one, 0, 0, 0}), time, settings);
     const auto* expected = reference.push(scene::luma(frame), time, settings);
     ASSERT_EQ(made == nullptr, expected == nullptr);
     if (made != nullptr) {
@@ -100,8 +100,9 @@ TEST_P(EveryApi, ComputesTheLumaOfColoursBitForBit) {
                         {bgra.data(), width * 4, 0}},
                 weights, threads, luma);
     texture.upload(bgra);
-    const auto* made = ours->push(texture.frame({weights.blue, weights.green, weights.red, 0}),
-                                  i * scene::frame_time, settings);
+    const auto* made =
+        gl_test::events_until(*ours, texture.frame({weights.blue, weights.green, weights.red, 0}),
+                              i * scene::frame_time, settings);
     const auto* expected = reference->push(scene::luma(luma), i * scene::frame_time, settings);
     if (i == 0) continue;
     ASSERT_EQ(scene::copy(*made), scene::copy(*expected));
@@ -122,7 +123,8 @@ void expect_similar_events(gl::Simulator& ours, Simulator& reference) {
     const auto frame = scene::texture<std::uint8_t>(width, height, 8, 1.7 * i, 0.6 * i);
     texture.upload(bytes_of(frame));
     settings.interpolated_frames = i == 3 ? 0 : 10;
-    const auto* made = ours.push(texture.frame({one, 0, 0, 0}), i * scene::frame_time, settings);
+    const auto* made =
+        gl_test::events_until(ours, texture.frame({one, 0, 0, 0}), i * scene::frame_time, settings);
     const auto* expected = reference.push(scene::luma(frame), i * scene::frame_time, settings);
     if (i == 0) continue;
     const auto events = scene::copy(*made);
@@ -186,7 +188,7 @@ TEST_P(EveryApi, DrawsItsEventsAsTheCpuDoes) {
         drawing->draw(frame, time, settings,
                       {picture.name(), pixels_by_kind(colours, {.bytes = 4})});
         EXPECT_EQ(drawing->read(), nullptr);
-        const auto* events = listing->push(frame, time, settings);
+        const auto* events = gl_test::events_until(*listing, frame, time, settings);
         ASSERT_EQ(picture.download(), drawn(events, colours, format)) << width << " " << i;
         if (i == 2) {  // a first frame again
           drawing->reset();
@@ -317,7 +319,8 @@ TEST(Simulator, ReadsEventsBackWhileTheGpuWorksOnTheNextFrame) {
     const auto waiting = make(context, format);
     std::vector<std::vector<Event>> expected;
     for (int i = 0; i < 4; ++i)
-      if (const auto* events = waiting->push(frame_of(i), i * scene::frame_time, settings))
+      if (const auto* events =
+              gl_test::events_until(*waiting, frame_of(i), i * scene::frame_time, settings))
         expected.push_back(scene::copy(*events));
 
     const auto simulator = make(context, format);
@@ -424,7 +427,7 @@ TEST(Context, IsReportedAsLostByWhateverTellsOfIt) {
             simulator->draw(frame, i * scene::frame_time, {}, {picture.name(), {}});
             simulator->drop();
           } else {
-            simulator->push(frame, i * scene::frame_time, {});
+            gl_test::events_until(*simulator, frame, i * scene::frame_time, {});
           }
         };
         push();

@@ -71,8 +71,8 @@ class Tracks : public EveryApi {
     std::vector<Event> events;
     for (int i = 0; i < frame_count; ++i) {
       texture.upload(gl_test::bytes_of(frames[static_cast<std::size_t>(i)]));
-      const auto* made =
-          simulator.push(texture.frame({gl_test::one, 0, 0, 0}), i * scene::frame_time, settings);
+      const auto* made = gl_test::events_until(simulator, texture.frame({gl_test::one, 0, 0, 0}),
+                                               i * scene::frame_time, settings);
       if (made != nullptr) events = scene::copy(*made);
     }
     return events;

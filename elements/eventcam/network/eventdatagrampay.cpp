@@ -30,11 +30,11 @@
 #include <vector>
 
 #include "elements/eventcam/network/datagram_properties.hpp"
+#include "elements/eventcam/network/flush_timer.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/flush_timer.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"

@@ -31,12 +31,12 @@
 #include <optional>
 #include <string>
 
+#include "elements/eventcam/network/flush_timer.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "elements/eventcam/network/rtp_header_extensions.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/flush_timer.hpp"
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"

@@ -113,8 +113,8 @@ void PointTracker::drop_flat(std::span<const Point> points, int left, int top, B
     const auto column = static_cast<std::size_t>((x - left) / Tile::side);
     auto& textured = tiles[row * tiles_across + column];
     if (!textured)
-      textured = find_texture(block.gradients,
-                              {x / Tile::side * Tile::side, y / Tile::side * Tile::side, 0, 0});
+      textured = textured_pixels(block.gradients,
+                                 {x / Tile::side * Tile::side, y / Tile::side * Tile::side, 0, 0});
     const auto pixels = (*textured)[static_cast<std::size_t>(y % Tile::side)];
     return (pixels >> x % Tile::side & 1) == 0;
   });

@@ -52,7 +52,7 @@ namespace eventcamera {
 
 HWY_EXPORT(textured_pixels);
 
-TilePixels find_texture(const ScharrGradients& gradients, const Tile& tile) {
+TilePixels textured_pixels(const ScharrGradients& gradients, const Tile& tile) {
   return HWY_DYNAMIC_DISPATCH(textured_pixels)(gradients, tile);
 }
 

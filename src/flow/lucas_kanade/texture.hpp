@@ -14,6 +14,6 @@ using TilePixels = std::array<std::uint16_t, Tile::side>;
 
 /// Pixels whose windows may have enough texture to be searched for. At all others, search_tile()
 /// finds too little. Needs the gradients where the windows are.
-TilePixels find_texture(const ScharrGradients& gradients, const Tile& tile);
+TilePixels textured_pixels(const ScharrGradients& gradients, const Tile& tile);
 
 }  // namespace eventcamera
