@@ -306,9 +306,9 @@ inline void flush(std::initializer_list<GstHarness*> inputs) {
 }
 
 /// Pushes a segment that starts at 0.
-inline void push_segment(GstHarness* h) {
+inline void push_segment(GstHarness* h, GstFormat format = GST_FORMAT_TIME) {
   GstSegment segment;
-  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_segment_init(&segment, format);
   gst_harness_push_event(h, gst_event_new_segment(&segment));
 }
 

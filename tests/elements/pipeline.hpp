@@ -83,12 +83,14 @@ class Pipeline {
     while (const harness::Owned<GstMessage> message{
         gst_bus_timed_pop_filtered(bus_.get(), 60 * GST_SECOND, types)}) {
       end = GST_MESSAGE_TYPE(message.get());
-      if (end == GST_MESSAGE_WARNING)
-        warnings.push_back(harness::text_of(message.get()));
-      else if (end == GST_MESSAGE_ERROR)
+      if (end == GST_MESSAGE_EOS || end == GST_MESSAGE_SEGMENT_DONE) return true;
+      if (end == GST_MESSAGE_ERROR) {
         error = harness::text_of(message.get());
-      if (end != GST_MESSAGE_WARNING) return end != GST_MESSAGE_ERROR;
+        return false;
+      }
+      warnings.push_back(harness::text_of(message.get()));
     }
+    end = GST_MESSAGE_UNKNOWN;
     error = "nothing happens";
     return false;
   }

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// aedatmux, fed by the test.
+#include <numeric>
+
+#include "tests/elements/aedat_recordings.hpp"
+#include "tests/elements/event_buffer.hpp"
+
+namespace {
+
+using namespace harness;
+using namespace aedat_recordings;
+
+/// The muxer with one sink pad.
+struct Mux : Harness {
+  Mux(const char* pad, const char* caps)
+      : Harness((gst_init(nullptr, nullptr), gst_harness_new_with_padnames("aedatmux", pad, "src")),
+                "aedatmux") {
+    gst_harness_set_src_caps_str(get(), caps);
+  }
+  Mux()
+      : Mux("events",
+            "application/x-event-camera, format=XYTP, width=346, height=260, framerate=0/1") {}
+
+  GstFlowReturn push(GstClockTime pts, const std::vector<Event>& events) {
+    return Harness::push(buffer_of(pts, events, 10 * GST_MSECOND));
+  }
+
+  /// Ends the file, and returns what is not pulled yet.
+  Content end() {
+    EXPECT_TRUE(gst_harness_push_event(get(), gst_event_new_eos()));
+    bool ended = false;
+    while (const Owned<GstEvent> event{ended ? nullptr : gst_harness_pull_event(get())})
+      ended = GST_EVENT_TYPE(event.get()) == GST_EVENT_EOS;
+    EXPECT_TRUE(ended);
+    Bytes bytes;
+    while (const auto buffer = pull()) {
+      const auto piece = bytes_of(buffer.get());
+      bytes.insert(bytes.end(), piece.begin(), piece.end());
+    }
+    return Content(bytes);
+  }
+};
+
+TEST(AedatMux, WritesTheTimesOfTheStream) {
+  Mux mux;
+  EXPECT_EQ(mux.push(5 * GST_SECOND + 999, {{0, 1, 2}, {7, 3, 0x8004}}), GST_FLOW_OK);
+  EXPECT_EQ(mux.push(5 * GST_SECOND + 10 * GST_MSECOND, {{9'999, 345, 259}}), GST_FLOW_OK);
+  const auto content = mux.end();
+  EXPECT_EQ(content.events, (Events{AbsoluteEvent::at(1, 2, 5'000'000, Polarity::off),
+                                    AbsoluteEvent::at(3, 4, 5'000'007, Polarity::on),
+                                    AbsoluteEvent::at(345, 259, 5'019'999, Polarity::off)}));
+  EXPECT_FALSE(content.has_table) << "nothing could seek to where the header tells of it";
+}
+
+TEST(AedatMux, LeavesOutWhatDoesNotFit) {
+  Mux mux;
+  EXPECT_EQ(mux.push(GST_SECOND, {{0, 346, 2}, {1, 3, 260}, {5, 6, 7}, {4, 6, 7}}), GST_FLOW_OK);
+  EXPECT_EQ(mux.push(GST_CLOCK_TIME_NONE, {{0, 1, 1}}), GST_FLOW_OK);
+  EXPECT_EQ(mux.push(0, {{0, 1, 1}}), GST_FLOW_OK);
+  EXPECT_EQ(mux.Harness::push(gst_buffer_new_memdup("123", 3)), GST_FLOW_OK);
+  EXPECT_EQ(mux.push(2 * GST_SECOND, {{0, 1, 1}}), GST_FLOW_OK);
+  EXPECT_EQ(mux.end().events, (Events{AbsoluteEvent::at(6, 7, 1'000'005, Polarity::off),
+                                      AbsoluteEvent::at(1, 1, 2'000'000, Polarity::off)}));
+  for (const char* left_out :
+       {"a buffer without a timestamp", "2 events earlier than", "2 events outside"}) {
+    const auto warning = mux.message(GST_MESSAGE_WARNING);
+    ASSERT_TRUE(warning) << left_out;
+    EXPECT_TRUE(text_of(warning.get()).starts_with(std::string("Left out ") + left_out))
+        << text_of(warning.get());
+  }
+  EXPECT_FALSE(mux.message(GST_MESSAGE_WARNING));
+}
+
+TEST(AedatMux, WritesFramesInTheSizeOfTheirCaps) {
+  Mux mux("video", "video/x-raw, format=GRAY8, width=4, height=3, framerate=0/1");
+  // Rows of 16 bytes; the meta's frame is larger than the memory.
+  Bytes pixels(3 * 16);
+  std::iota(pixels.begin(), pixels.end(), std::uint8_t{0});
+  GstBuffer* const buffer = gst_buffer_new_memdup(pixels.data(), pixels.size());
+  gsize offsets[GST_VIDEO_MAX_PLANES] = {0};
+  gint strides[GST_VIDEO_MAX_PLANES] = {16};
+  gst_buffer_add_video_meta_full(buffer, GST_VIDEO_FRAME_FLAG_NONE, GST_VIDEO_FORMAT_GRAY8, 16, 999,
+                                 1, offsets, strides);
+  GST_BUFFER_PTS(buffer) = GST_SECOND;
+  EXPECT_EQ(mux.Harness::push(buffer), GST_FLOW_OK);
+  const auto pictures = mux.end().pictures;
+  ASSERT_EQ(pictures.size(), 1U);
+  EXPECT_EQ(pictures[0].box, (std::array{4, 3, 0, 0}));
+  EXPECT_EQ(pictures[0].pixels, (Bytes{0, 1, 2, 3, 16, 17, 18, 19, 32, 33, 34, 35}));
+}
+
+TEST(AedatMux, WritesAnewAfterAFlush) {
+  Mux mux;
+  EXPECT_EQ(mux.push(GST_SECOND, {{0, 1, 2}}), GST_FLOW_OK);
+  EXPECT_TRUE(Buffer(gst_harness_pull(mux.get())));  // the header, so the file has begun
+  flush({mux.get()});
+  while (mux.pull()) continue;
+  // The running time of the continued stream is 0 again.
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = segment.time = 500 * GST_MSECOND;
+  EXPECT_TRUE(gst_harness_push_event(mux.get(), gst_event_new_segment(&segment)));
+  EXPECT_EQ(mux.push(600 * GST_MSECOND, {{0, 3, 4}, {7, 5, 6}}), GST_FLOW_OK);
+  EXPECT_EQ(mux.end().events, (Events{AbsoluteEvent::at(3, 4, 600'000, Polarity::off),
+                                      AbsoluteEvent::at(5, 6, 600'007, Polarity::off)}));
+}
+
+TEST(AedatMux, HasOnePadOfAKind) {
+  gst_init(nullptr, nullptr);
+  const Owned<GstElement> mux(gst_element_factory_make("aedatmux", nullptr));
+  GstPad* const events = gst_element_request_pad_simple(mux.get(), "events");
+  GstPad* const video = gst_element_request_pad_simple(mux.get(), "video");
+  ASSERT_NE(events, nullptr);
+  ASSERT_NE(video, nullptr);
+  GstPadTemplate* const of_events = gst_pad_get_pad_template(events);
+  EXPECT_EQ(gst_element_request_pad(mux.get(), of_events, nullptr, nullptr), nullptr);
+  gst_object_unref(of_events);
+  for (GstPad* pad : {events, video}) {
+    gst_element_release_request_pad(mux.get(), pad);
+    gst_object_unref(pad);
+  }
+}
+
+}  // namespace
