@@ -394,16 +394,52 @@ TEST(Aedat4, ACorruptXmlIsReportedAndTheStreamsFoundByTheirPackets) {
     aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
     Aedat4Decoder decoder;
     EXPECT_TRUE(decoded(decoder, bytes).events[0] == events) << xml;
+    EXPECT_EQ(decoder.corruption().places, 1U) << xml;
   }
 }
 
-TEST(Aedat4, AttributesWithoutEndTakeTimeInProportion) {
-  std::string xml = "<dv><node ";
-  for (int i = 0; i < 2'000'000; ++i) xml += "x=''";
-  xml += "/></dv>";
+TEST(Aedat4, AnXmlCutAnywhereLosesNoStream) {
+  const std::string_view xml =
+      "<dv><node name='outInfo'><node name='0'><attr key='typeIdentifier'>EVTS</attr></node>"
+      "<node name='1'><attr key='typeIdentifier'>TRIG</attr></node></node></dv>";
+  const auto events = some_events(10);
+  const std::vector<aedat_files::TriggerSource> triggers{{1000, 1}, {1001, 2}};
+  for (std::size_t size = 0; size <= xml.size(); ++size) {
+    SCOPED_TRACE(xml.substr(0, size));
+    auto bytes = aedat_files::aedat4_header(xml.substr(0, size));
+    aedat_files::add_packet(bytes, 0, aedat_files::events_content(events));
+    aedat_files::add_packet(bytes, 1, aedat_files::triggers_content(triggers));
+    Aedat4Decoder decoder;
+    const auto found = decoded(decoder, bytes);
+    ASSERT_EQ(found.events.size(), 2U);
+    EXPECT_TRUE(found.events[0] == events);
+    EXPECT_EQ(found.triggers.size(), 2U);
+    EXPECT_EQ(decoder.corruption().places, size == 0 || size == xml.size() ? 0U : 1U);
+  }
+}
+
+TEST(Aedat4, HostileXmlTakesTimeInProportion) {
+  const auto repeated = [](std::string_view text) {
+    std::string many;
+    for (int i = 0; i < 1'000'000; ++i) many += text;
+    return many;
+  };
+  for (const auto& xml : {"<dv><node " + repeated(" x=''") + "/></dv>",
+                          "<dv>" + repeated("<node>") + repeated("</node>") + "</dv>"}) {
+    Aedat4Decoder decoder;
+    decoded(decoder, aedat_files::aedat4_header(xml));
+    EXPECT_EQ(decoder.corruption().places, 0U);
+  }
+}
+
+TEST(Aedat4, EntitiesThatTheXmlDeclaresAreNotExpanded) {
+  std::string xml = "<!DOCTYPE dv [<!ENTITY many '&#65;&#65;'>]>";
+  xml += aedat_files::xml_of_one_stream;
+  xml.insert(xml.find("<attr key=\"sizeX"), "<attr key='source'>&many; &#65;</attr>");
   Aedat4Decoder decoder;
-  const auto bytes = aedat_files::aedat4_header(xml);
-  decoded(decoder, bytes);
+  decoded(decoder, aedat_files::aedat4_header(xml));
+  ASSERT_EQ(decoder.streams().size(), 1U);
+  EXPECT_EQ(decoder.streams()[0].source, "&many; A");
   EXPECT_EQ(decoder.corruption().places, 0U);
 }
 

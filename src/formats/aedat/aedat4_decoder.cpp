@@ -142,12 +142,12 @@ bool Aedat4Decoder::read_header() {
     throw UnsupportedFormat("this AEDAT4 file has an unknown compression, number " +
                             std::to_string(header->compression()));
   compression_ = static_cast<Aedat4Compression>(header->compression());
-  if (const auto xml = aedat4::elements_of(header->info_node()); xml.data != nullptr) {
+  if (const auto xml = aedat4::elements_of(header->info_node()); xml.count > 0) {
     auto info = read_info_node({reinterpret_cast<const char*>(xml.data), xml.count});
     if (!info.whole) corruption_.note(size_at, "the header's XML is corrupt");
     streams_ = std::move(info.streams);
+    listed_ = info.whole && !streams_.empty();
   }
-  listed_ = !streams_.empty();
   newest_.assign(streams_.size(), std::numeric_limits<Microseconds>::min());
   packets_at_ = before + size;
   if (header->data_table_position() >= static_cast<std::int64_t>(packets_at_)) {

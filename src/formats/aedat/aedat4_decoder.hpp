@@ -103,7 +103,7 @@ class Aedat4Decoder final : public Reader {
   ByteQueue queue_;
   bool finished_ = false;
   bool scanning_ = false;  ///< searching for the next packet
-  bool listed_ = false;    ///< the header lists the streams
+  bool listed_ = false;    ///< the header lists all streams
   std::uint64_t packets_at_ = 0;
   std::optional<std::uint64_t> table_at_;
   std::uint64_t table_field_at_ = 0;

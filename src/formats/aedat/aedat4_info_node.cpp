@@ -5,40 +5,19 @@
 #include <array>
 #include <charconv>
 #include <optional>
-#include <utility>
+#include <pugixml.hpp>
+#include <sstream>
 
 namespace eventcamera {
 
 namespace {
 
 constexpr std::size_t max_streams = 256;
-constexpr std::size_t deepest_node = 64;
 constexpr int max_side = 32767;
 
-constexpr std::array<std::pair<std::string_view, char>, 5> entities{
-    {{"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}}};
-
-std::string unescaped(std::string_view text) {
-  std::string plain;
-  while (!text.empty()) {
-    const auto* const entity = std::ranges::find_if(
-        entities, [&](const auto& candidate) { return text.starts_with(candidate.first); });
-    const bool found = entity != entities.end();
-    plain += found ? entity->second : text.front();
-    text.remove_prefix(found ? entity->first.size() : 1);
-  }
-  return plain;
-}
-
-std::string escaped(std::string_view text) {
-  std::string safe;
-  for (const char c : text) {
-    const auto* const entity =
-        std::ranges::find(entities, c, &std::pair<std::string_view, char>::second);
-    safe += entity != entities.end() ? entity->first : std::string_view(&c, 1);
-  }
-  return safe;
-}
+/// Keeps text as it was written, and expands no entities but the five of XML.
+constexpr unsigned parse_options =
+    pugi::parse_escapes | pugi::parse_cdata | pugi::parse_ws_pcdata_single;
 
 std::optional<int> number(std::string_view text) {
   int value = 0;
@@ -47,112 +26,30 @@ std::optional<int> number(std::string_view text) {
   return value;
 }
 
-/// Value of the attribute `name` in the text of a tag.
-std::string_view attribute(std::string_view tag, std::string_view name) {
-  const auto is_name = [](char c) { return c != ' ' && c != '\t' && c != '\r' && c != '\n'; };
-  std::size_t before = 0;  // end of the previous attribute
-  for (auto equals = tag.find('='); equals != std::string_view::npos;
-       equals = tag.find('=', equals + 1)) {
-    if (equals + 1 >= tag.size() || (tag[equals + 1] != '"' && tag[equals + 1] != '\'')) return {};
-    const auto end = tag.find(tag[equals + 1], equals + 2);
-    if (end == std::string_view::npos) return {};
-    auto start = equals;
-    while (start > before && is_name(tag[start - 1])) --start;
-    if (tag.substr(start, equals - start) == name) return tag.substr(equals + 2, end - equals - 2);
-    equals = end;
-    before = end + 1;
-  }
-  return {};
+const char* value_of(const pugi::xml_node& node, const char* key) {
+  return node.find_child_by_attribute("attr", "key", key).child_value();
 }
 
-/// Parses the tags and collects the nodes outInfo/N and outInfo/N/info.
-class XmlReader {
- public:
-  explicit XmlReader(std::string_view xml) : xml_(xml) {}
-
-  Aedat4InfoNode read() {
-    info_.whole = walk() && path_.empty();
-    for (auto& stream : info_.streams)
-      if (stream.size.width == 0 || stream.size.height == 0) stream.size = {};
-    return std::move(info_);
-  }
-
- private:
-  bool walk() {
-    while (true) {
-      const auto open = xml_.find('<');
-      if (open == std::string_view::npos) return true;
-      xml_.remove_prefix(open);
-      const bool comment = xml_.starts_with("<!--");
-      const auto close = comment ? xml_.find("-->") : xml_.find('>');
-      if (close == std::string_view::npos) return false;
-      const auto tag = xml_.substr(1, close - 1);
-      xml_.remove_prefix(close + 1);
-      if (!comment && !take(tag)) return false;
-    }
-  }
-
-  bool take(std::string_view tag) {
-    if (tag.starts_with("node ")) {
-      if (path_.size() == deepest_node) return false;
-      path_.push_back(attribute(tag, "name"));
-      if (of_stream(1) && !add_stream()) return false;
-      if (tag.ends_with('/')) path_.pop_back();
-    } else if (tag == "/node") {
-      if (path_.empty()) return false;
-      path_.pop_back();
-    } else if (tag.starts_with("attr ") && !tag.ends_with('/')) {
-      const auto end = xml_.find('<');
-      if (end == std::string_view::npos) return false;
-      note(attribute(tag, "key"), xml_.substr(0, end));
-    }
-    return true;
-  }
-
-  /// True if the current node is `below` levels below outInfo.
-  bool of_stream(std::size_t below) const {
-    return path_.size() > below && path_[path_.size() - 1 - below] == "outInfo" &&
-           (below == 1 || path_.back() == "info");
-  }
-
-  bool add_stream() {
-    const auto id = number(path_.back());
-    const auto& streams = info_.streams;
-    named_ = id.has_value();
-    if (!named_) return true;
-    if (streams.size() == max_streams ||
-        std::ranges::find(streams, *id, &StreamInfo::id) != streams.end())
-      return false;
-    info_.streams.emplace_back().id = *id;
-    return true;
-  }
-
-  void note(std::string_view key, std::string_view value) {
-    if (!named_ || info_.streams.empty()) return;
-    auto& stream = info_.streams.back();
-    if (of_stream(1)) {
-      if (key == "typeIdentifier") stream.kind = aedat4_kind(value);
-    } else if (of_stream(2)) {
-      const auto side = number(value).value_or(0);
-      if (key == "source") stream.source = unescaped(value);
-      if (key == "sizeX" && side <= max_side) stream.size.width = side;
-      if (key == "sizeY" && side <= max_side) stream.size.height = side;
-    }
-  }
-
-  std::string_view xml_;
-  std::vector<std::string_view> path_;  ///< names of open nodes
-  bool named_ = false;                  ///< the node of the last stream has a number
-  Aedat4InfoNode info_;
-};
-
-std::string node(const std::string& name, const std::string& path, const std::string& inside) {
-  return "<node name=\"" + name + "\" path=\"" + path + "\">" + inside + "</node>";
+SensorSize size_of(const pugi::xml_node& info) {
+  const auto width = number(value_of(info, "sizeX")).value_or(0);
+  const auto height = number(value_of(info, "sizeY")).value_or(0);
+  const auto is_side = [](int side) { return side > 0 && side <= max_side; };
+  return is_side(width) && is_side(height) ? SensorSize{width, height} : SensorSize{};
 }
 
-std::string text_attribute(const std::string& key, const std::string& value,
-                           const std::string& type = "string") {
-  return "<attr key=\"" + key + "\" type=\"" + type + "\">" + escaped(value) + "</attr>";
+pugi::xml_node add_node(pugi::xml_node parent, const std::string& name, const std::string& path) {
+  auto node = parent.append_child("node");
+  node.append_attribute("name") = name.c_str();
+  node.append_attribute("path") = path.c_str();
+  return node;
+}
+
+void add_value(pugi::xml_node node, const char* key, const std::string& value,
+               const char* type = "string") {
+  auto attribute = node.append_child("attr");
+  attribute.append_attribute("key") = key;
+  attribute.append_attribute("type") = type;
+  attribute.text() = value.c_str();
 }
 
 /// Indexed by Aedat4Compression.
@@ -179,30 +76,55 @@ StreamKind aedat4_kind(std::string_view identifier) {
   return text != kinds.end() ? text->kind : StreamKind::other;
 }
 
+/// Reads the nodes outInfo/N and outInfo/N/info.
 Aedat4InfoNode read_info_node(std::string_view xml) {
-  return XmlReader(xml).read();
+  pugi::xml_document document;
+  Aedat4InfoNode info;
+  // Keeps what precedes an error.
+  info.whole = document.load_buffer(xml.data(), xml.size(), parse_options, pugi::encoding_utf8);
+  const auto out_info = document.find_node([](const pugi::xml_node& node) {
+    return std::string_view(node.attribute("name").value()) == "outInfo";
+  });
+  for (const auto& stream : out_info.children("node")) {
+    const auto id = number(stream.attribute("name").value());
+    if (!id) continue;
+    if (info.streams.size() == max_streams ||
+        std::ranges::find(info.streams, *id, &StreamInfo::id) != info.streams.end()) {
+      info.whole = false;
+      break;
+    }
+    const auto kind = aedat4_kind(value_of(stream, "typeIdentifier"));
+    if (!info.whole && kind == StreamKind::other) continue;  // the error precedes its kind
+    const auto details = stream.find_child_by_attribute("node", "name", "info");
+    info.streams.push_back({*id, kind, size_of(details), value_of(details, "source")});
+  }
+  return info;
 }
 
 std::string write_info_node(std::span<const StreamInfo> streams, Aedat4Compression compression) {
   const std::string path = "/mainloop/Recorder/outInfo/";
-  std::string inside;
+  pugi::xml_document document;
+  auto root = document.append_child("dv");
+  root.append_attribute("version") = "2.0";
+  const auto out_info = add_node(root, "outInfo", path);
   for (const auto& stream : streams) {
     const auto* const text = std::ranges::find(kinds, stream.kind, &KindText::kind);
     if (text == kinds.end()) continue;
     const auto id = std::to_string(stream.id);
-    const auto stream_path = path + id + "/";
-    inside += node(id, stream_path,
-                   text_attribute("compression", compression_names[static_cast<int>(compression)]) +
-                       text_attribute("originalModuleName", "gst-eventsim") +
-                       text_attribute("originalOutputName", text->name) +
-                       text_attribute("typeDescription", text->description) +
-                       text_attribute("typeIdentifier", std::string(text->identifier)) +
-                       node("info", stream_path + "info/",
-                            text_attribute("sizeX", std::to_string(stream.size.width), "int") +
-                                text_attribute("sizeY", std::to_string(stream.size.height), "int") +
-                                text_attribute("source", stream.source)));
+    const auto node = add_node(out_info, id, path + id + "/");
+    add_value(node, "compression", compression_names[static_cast<int>(compression)]);
+    add_value(node, "originalModuleName", "gst-eventsim");
+    add_value(node, "originalOutputName", text->name);
+    add_value(node, "typeDescription", text->description);
+    add_value(node, "typeIdentifier", std::string(text->identifier));
+    const auto info = add_node(node, "info", path + id + "/info/");
+    add_value(info, "sizeX", std::to_string(stream.size.width), "int");
+    add_value(info, "sizeY", std::to_string(stream.size.height), "int");
+    add_value(info, "source", stream.source);
   }
-  return "<dv version=\"2.0\">" + node("outInfo", path, inside) + "</dv>";
+  std::ostringstream text;
+  root.print(text, "", pugi::format_raw);
+  return text.str();
 }
 
 }  // namespace eventcamera
