@@ -9,7 +9,10 @@
 #include <string>
 #include <tuple>
 
+#include "src/formats/aedat/aedat4_compression.hpp"
+#include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
+#include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/aedat/aedat_reader.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/evt/raw.hpp"
@@ -81,9 +84,26 @@ File aedat_file(bool has_table) {
           [] { return std::make_unique<AedatReader>(); }};
 }
 
+/// As an older DV writes them: the table has the positions of the packets, and zeros.
+File aedat_file_with_a_table_of_zeros() {
+  auto file = aedat_file(true);
+  Aedat4Decoder decoder;
+  decoder.push(file.bytes);
+  while (decoder.next()) continue;
+  const auto table_at = static_cast<std::ptrdiff_t>(decoder.table_at().value());
+  auto table = read_aedat4_table(std::span(file.bytes).subspan(*decoder.table_at()),
+                                 decoder.compression(), decoder.packets_at());
+  for (auto& entry : table.value()) entry.elements = entry.start = entry.end = 0;
+  file.name = "aedat_with_a_table_of_zeros";
+  file.bytes.erase(file.bytes.begin() + table_at, file.bytes.end());
+  Aedat4Compressor(decoder.compression()).compress(aedat4_table_content(*table), file.bytes);
+  return file;
+}
+
 std::vector<File> all_files() {
   std::vector<File> files{raw_file(), npy_file()};
   files.push_back(aedat_file(true));
+  files.push_back(aedat_file_with_a_table_of_zeros());
   files.push_back(aedat_file(false));
   return files;
 }

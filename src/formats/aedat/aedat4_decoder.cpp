@@ -62,6 +62,11 @@ SensorSize limit_of(SensorSize size) {
   return {size.width != 0 ? size.width : widest, size.height != 0 ? size.height : widest};
 }
 
+/// True for the entries of older versions of DV, which state neither times nor counts.
+bool is_blank(const Aedat4TableEntry& entry) {
+  return entry.elements == 0 && entry.start == 0 && entry.end == 0;
+}
+
 Trigger trigger_of(const aedat4::Trigger& trigger) {
   const auto source = static_cast<std::size_t>(static_cast<std::uint8_t>(trigger.source()));
   const auto edge =
@@ -176,7 +181,7 @@ void Aedat4Decoder::read_table() {
   if (!bytes.empty() && source_->read(*table_at_, bytes) != bytes.size()) bytes.clear();
   auto table = read_aedat4_table(bytes, compression_, packets_at_);
   table_missing_ = !table;
-  if (table) table_ = std::move(*table);
+  if (table && !std::ranges::all_of(*table, is_blank)) table_ = std::move(*table);
 }
 
 /// A missing table is reported after all other corruption, which may be its cause.
