@@ -11,14 +11,6 @@ namespace {
 using namespace harness;
 using namespace aedat_recordings;
 
-/// A file's copy, made by these elements.
-Bytes copied(const TemporaryFile& in, const std::string& elements) {
-  const TemporaryFile out;
-  Pipeline pipeline(in.source() + elements + out.sink());
-  EXPECT_TRUE(pipeline.play()) << pipeline.error;
-  return out.bytes();
-}
-
 const std::string both_streams =
     "aedatdemux name=d  d.events_0 ! queue ! m.events  d.video_0 ! queue ! m.video  aedatmux "
     "name=m";

@@ -196,7 +196,7 @@ TEST(AedatDemux, PlaysAgainAfterAStop) {
 TEST(AedatDemux, BeginsAnewAfterAFlush) {
   const auto events = steady_events(200'000, 100);
   const auto bytes = aedat4(events);
-  auto h = Harness::with_late_pad("aedatdemux");
+  Harness h(Harness::with_late_pad("aedatdemux"), "aedatdemux");
   gst_harness_set_src_caps_str(h.get(), "application/x-aedat, version=(int)4");
   const auto push = [&](std::size_t size) {
     return h.push(gst_buffer_new_memdup(bytes.data(), size));

@@ -35,18 +35,6 @@ std::vector<AbsoluteEvent> stream(int count) {
   return events;
 }
 
-/// Pushes events in buffers of 10 ms.
-void push(Harness& h, std::span<const AbsoluteEvent> events) {
-  while (!events.empty()) {
-    const auto start = events.front().t / 10'000 * 10'000;
-    const auto end =
-        std::ranges::find_if(events, [&](const auto& event) { return event.t >= start + 10'000; });
-    const auto count = static_cast<std::size_t>(end - events.begin());
-    ASSERT_EQ(h.push(buffer_of(events.first(count), start)), GST_FLOW_OK);
-    events = events.subspan(count);
-  }
-}
-
 /// An element that unpacks, as after udpsrc.
 struct Depay : Harness {
   explicit Depay(const std::string& properties)
@@ -110,7 +98,7 @@ TEST_P(EveryFormat, BringsEveryEvent) {
   Harness h("eventdatagrampay " + properties + " ! eventdatagramdepay " + properties + depay_size);
   h.caps(events_caps);
   const auto sent = stream(50'000);
-  push(h, sent);
+  push_events(h, sent);
   gst_harness_push_event(h.get(), gst_event_new_eos());
   const auto received = pull_events(h);
   ASSERT_EQ(received.size(), sent.size());
@@ -132,7 +120,7 @@ TEST_P(EveryFormat, HasIntervalsThatFollowOneAnother) {
   const std::string properties = GetParam().properties;
   Harness h("eventdatagrampay " + properties + " ! eventdatagramdepay " + properties + depay_size);
   h.caps(events_caps);
-  push(h, stream(5000));
+  push_events(h, stream(5000));
   GstClockTime end = 0;
   int count = 0;
   while (const auto buffer = h.pull()) {
@@ -199,7 +187,7 @@ TEST_P(EveryFormat, GoesThroughSockets) {
       " ! udpsink sync=false async=false host=127.0.0.1 port=" + std::to_string(receiver.port()));
   gst_harness_set_src_caps_str(h.get(), events_caps);
   const auto sent = stream(20'000);
-  push(h, sent);
+  push_events(h, sent);
   gst_harness_push_event(h.get(), gst_event_new_eos());
   const auto received = receiver.events(sent.size());
   ASSERT_EQ(received.size(), sent.size());
@@ -219,7 +207,7 @@ TEST_P(EveryFormat, RejectsRandomDatagrams) {
   Harness pay("eventdatagrampay " + properties);
   pay.caps(events_caps, "application/x-event-datagram");
   const auto sent = stream(5000);
-  push(pay, sent);
+  push_events(pay, sent);
   gst_harness_push_event(pay.get(), gst_event_new_eos());
   Depay h(properties);
   std::mt19937 random(1);
@@ -266,7 +254,7 @@ TEST_P(TimedFormat, BringsNoWrongEventThroughABadNetwork) {
   Harness pay("eventdatagrampay " + properties);
   pay.caps(events_caps, "application/x-event-datagram");
   const auto sent = stream(100'000);
-  push(pay, sent);
+  push_events(pay, sent);
   gst_harness_push_event(pay.get(), gst_event_new_eos());
   Depay h(properties);
   for (auto& buffer : through_bad_network(pay)) h.push(buffer.release());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,18 @@ inline GstBuffer* buffer_of(std::span<const eventcamera::AbsoluteEvent> events,
   GST_BUFFER_PTS(buffer) = static_cast<GstClockTime>(start) * GST_USECOND;
   GST_BUFFER_DURATION(buffer) = 10 * GST_MSECOND;
   return buffer;
+}
+
+/// Pushes events in buffers of 10 ms.
+inline void push_events(harness::Harness& h, std::span<const eventcamera::AbsoluteEvent> events) {
+  while (!events.empty()) {
+    const auto start = events.front().t / 10'000 * 10'000;
+    const auto end =
+        std::ranges::find_if(events, [&](const auto& event) { return event.t >= start + 10'000; });
+    const auto count = static_cast<std::size_t>(end - events.begin());
+    ASSERT_EQ(h.push(buffer_of(events.first(count), start)), GST_FLOW_OK);
+    events = events.subspan(count);
+  }
 }
 
 /// Appends the events of a buffer, with the times of their stream.

@@ -72,6 +72,17 @@ inline std::string with_upload(const std::string& launch) {
   return (is_on_gpu(launch) ? "glupload ! " : "") + launch;
 }
 
+inline std::string text_of(GstMessage* message) {
+  GError* error = nullptr;
+  if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR)
+    gst_message_parse_error(message, &error, nullptr);
+  else
+    gst_message_parse_warning(message, &error, nullptr);
+  std::string text = error->message;
+  g_error_free(error);
+  return text;
+}
+
 /// A counter of an element's `stats`.
 inline guint64 stat_of(GstElement* element, const char* name) {
   GstStructure* stats = nullptr;
@@ -90,7 +101,7 @@ class Harness {
                 launch) {}
 
   /// For elements whose source pad appears with its first output.
-  static Harness with_late_pad(const std::string& launch) {
+  static GstHarness* with_late_pad(const std::string& launch) {
     gst_init(nullptr, nullptr);
     static GstStaticPadTemplate src =
         GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS_ANY);
@@ -104,7 +115,7 @@ class Harness {
                      }),
                      h);
     gst_object_unref(element);
-    return Harness(h, launch);
+    return h;
   }
 
   Harness(GstHarness* h, const std::string& launch) {
@@ -190,6 +201,9 @@ class Harness {
   Owned<GstMessage> message(GstMessageType type) {
     return Owned<GstMessage>(gst_bus_pop_filtered(bus_.get(), type));
   }
+  /// Texts of the next warning and the next error, or empty.
+  std::string warning() { return text_of_next(GST_MESSAGE_WARNING); }
+  std::string error() { return text_of_next(GST_MESSAGE_ERROR); }
 
   std::string out_caps() const {
     GstCaps* caps = gst_pad_get_current_caps(h_->sinkpad);
@@ -202,6 +216,11 @@ class Harness {
   }
 
  private:
+  std::string text_of_next(GstMessageType type) {
+    const auto next = message(type);
+    return next ? text_of(next.get()) : "";
+  }
+
   /// Draws one component; others in the same words stay.
   void draw(GstBuffer* buffer, int component, const std::function<int(int x, int y)>& value) const {
     GstVideoFrame video;
@@ -253,17 +272,6 @@ inline std::string bytes_of(GstBuffer* buffer) {
   std::string bytes(gst_buffer_get_size(buffer), '\0');
   gst_buffer_extract(buffer, 0, bytes.data(), bytes.size());
   return bytes;
-}
-
-inline std::string text_of(GstMessage* message) {
-  GError* error = nullptr;
-  if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR)
-    gst_message_parse_error(message, &error, nullptr);
-  else
-    gst_message_parse_warning(message, &error, nullptr);
-  std::string text = error->message;
-  g_error_free(error);
-  return text;
 }
 
 /// Links a pad that appears on `element` to `sink`, at every start: a launch line does so only

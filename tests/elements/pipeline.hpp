@@ -110,6 +110,12 @@ class Pipeline {
     return static_cast<GstClockTime>(duration);
   }
 
+  GstClockTime position() const {
+    gint64 position = -1;
+    gst_element_query_position(get(), GST_FORMAT_TIME, &position);
+    return static_cast<GstClockTime>(position);
+  }
+
   guint64 stat(const char* element, const char* name) const {
     return harness::stat_of((*this)[element], name);
   }
@@ -122,6 +128,14 @@ class Pipeline {
   harness::Owned<GstElement> pipeline_;
   harness::Owned<GstBus> bus_;
 };
+
+/// A file's copy, made by these elements.
+inline std::vector<std::uint8_t> copied(const TemporaryFile& in, const std::string& elements) {
+  const TemporaryFile out;
+  Pipeline pipeline(in.source() + elements + out.sink());
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  return out.bytes();
+}
 
 /// A pipeline that ends in events.
 class Player : public Pipeline {

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// EVT words without a header, as streams; and what else is particular to EVT.
+#include "src/formats/evt/raw.hpp"
+#include "tests/elements/event_files.hpp"
+
+namespace {
+
+using namespace harness;
+using namespace event_files;
+
+std::string words_caps(const std::string& format) {
+  return "application/x-event-camera, format=" + format + ", width=320, height=240, framerate=0/1";
+}
+
+class EveryWord : public testing::TestWithParam<const char*> {
+ protected:
+  const std::string caps = words_caps(GetParam());
+};
+INSTANTIATE_TEST_SUITE_P(, EveryWord, testing::Values("EVT2", "EVT21", "EVT3", "EVT4"));
+
+TEST_P(EveryWord, KeepsTheTimesOfItsBuffers) {
+  // Hours into the stream, beyond the range of the words' clocks.
+  const GstClockTime late = 5 * 3600 * GST_SECOND;
+  Writer writer("evtenc", caps);
+  Reader reader("evtdec", caps);
+  Events expected;
+  Events read;
+  for (int i = 0; i < 20; ++i) {
+    const auto start = static_cast<Microseconds>(late / GST_USECOND) + 10'000 * i;
+    const std::vector events = {AbsoluteEvent::at(i, 7, start + 17, Polarity::on),
+                                AbsoluteEvent::at(i, 9, start + 9'999, Polarity::off)};
+    expected.insert(expected.end(), events.begin(), events.end());
+    writer.write(events, start);
+    const auto words = writer.pull();
+    ASSERT_TRUE(words);
+    EXPECT_EQ(GST_BUFFER_PTS(words.get()), static_cast<GstClockTime>(start) * GST_USECOND);
+    reader.push(gst_buffer_ref(words.get()));
+    while (const auto buffer = reader.pull()) append_events(buffer.get(), read);
+    // Nothing is delayed by more than an interval.
+    EXPECT_GE(read.size() + 4, expected.size());
+  }
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  while (const auto buffer = reader.pull()) append_events(buffer.get(), read);
+  EXPECT_EQ(read, expected);
+  EXPECT_EQ(gst_harness_query_latency(reader.get()), 10 * GST_MSECOND);
+}
+
+TEST_P(EveryWord, FollowsGapsAndFlushes) {
+  Writer writer("evtenc", caps);
+  Reader reader("evtdec", caps);
+  gst_harness_push_event(reader.get(), gst_event_new_gap(0, 10 * GST_MSECOND));
+  EXPECT_TRUE(reader.pull_event(GST_EVENT_GAP));
+  const auto event = AbsoluteEvent::at(3, 4, 12'000, Polarity::on);
+  writer.write(event, 10'000);
+  reader.push(writer.pull().release());
+  gst_harness_push_event(reader.get(), gst_event_new_gap(20 * GST_MSECOND, 30 * GST_MSECOND));
+  EXPECT_EQ(pull_events(reader), std::vector{event});
+  EXPECT_TRUE(reader.pull_event(GST_EVENT_GAP));
+
+  flush({reader.get()});
+  push_segment(reader.get());
+  writer.write(AbsoluteEvent::at(3, 4, 70'000, Polarity::on), 70'000);
+  GstBuffer* words = writer.pull().release();
+  GST_BUFFER_PTS(words) = 5 * GST_MSECOND;
+  reader.push(words);
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  const auto moved = AbsoluteEvent::at(3, 4, 5'000, Polarity::on);
+  EXPECT_EQ(pull_events(reader), std::vector{moved});
+}
+
+TEST_P(EveryWord, FillBuffersOfALimitedSize) {
+  constexpr gsize max_size = 100;
+  Writer writer("evtenc mtu=100", caps);
+  Reader reader("evtdec", caps);
+  // Dense rows, isolated events, and a silence that may take words of its own.
+  Events expected;
+  GstClockTime end = 7 * 3600 * GST_SECOND;
+  for (int i = 0; i < 30; ++i) {
+    const auto start = static_cast<Microseconds>(end / GST_USECOND);
+    const Microseconds length = i == 15 ? 500'000 : 10'000;
+    Events events;
+    for (int x = 0; x < 320; ++x)
+      events.push_back(
+          AbsoluteEvent::at(x, i, start + 17 + (i % 2 == 0 ? x / 40 : 20 * x), Polarity::on));
+    events.push_back(AbsoluteEvent::at(i, 9, start + length - 1, Polarity::off));
+    expected.insert(expected.end(), events.begin(), events.end());
+    GstBuffer* const buffer = buffer_of(events, start);
+    GST_BUFFER_DURATION(buffer) = static_cast<GstClockTime>(length) * GST_USECOND;
+    writer.push(buffer);
+    while (const auto words = writer.pull()) {
+      EXPECT_LE(gst_buffer_get_size(words.get()), max_size);
+      EXPECT_EQ(gst_buffer_get_size(words.get()) % 2, 0U);
+      EXPECT_GE(GST_BUFFER_PTS(words.get()), end);
+      if (GST_BUFFER_DURATION_IS_VALID(words.get()))
+        end = GST_BUFFER_PTS(words.get()) + GST_BUFFER_DURATION(words.get());
+      reader.push(gst_buffer_ref(words.get()));
+    }
+    EXPECT_EQ(end, static_cast<GstClockTime>(start + length) * GST_USECOND);
+  }
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  EXPECT_EQ(pull_events(reader), expected);
+}
+
+TEST(EvtEnc, PutsManyEventsIntoABufferOfALimitedSize) {
+  Events events;
+  for (int i = 0; i < 10'000; ++i)
+    events.push_back(AbsoluteEvent::at(i % 320, i / 320, i / 100, Polarity::on));
+  for (const char* const limit : {"1400", "4294967295"}) {
+    Writer writer(std::string("evtenc mtu=") + limit, words_caps("EVT2"));
+    writer.write(events, 0);
+    const auto count = gst_harness_buffers_in_queue(writer.get());
+    if (std::string_view(limit) == "1400")
+      EXPECT_LE(count, 31U);  // 29 of them would be full
+    else
+      EXPECT_EQ(count, 1U);
+  }
+}
+
+TEST(EvtDec, NeedsNoFramerateInCaps) {
+  const auto file = file_of(format_of("evt3"), some_events());
+  const TemporaryFile words(file.substr(file.find("% end\n") + 6));
+  Player player(words.source() +
+                "application/x-event-camera,format=EVT3,width=320,height=240 ! evtdec");
+  EXPECT_TRUE(player.play()) << player.error;
+  EXPECT_EQ(player.events.size(), 20'000U);
+}
+
+TEST(EvtEnc, KeepsTriggers) {
+  using eventcamera::Trigger;
+  const auto events = some_events();
+  const std::span<const AbsoluteEvent> all(events);
+  const std::vector<Trigger> triggers{{events[5000].t, 2, true},
+                                      {events[5000].t + 20, 2, false},
+                                      {events[9'999].t + 1'500'000, 7, true},
+                                      {events.back().t + 40'000, 7, false}};
+  const auto encoder =
+      eventcamera::make_prophesee_raw_encoder(eventcamera::EvtFormat::evt3, {width, height});
+  std::vector<std::uint8_t> bytes;
+  encoder->encode(all.first(5001), bytes);
+  for (const auto& trigger : {triggers[0], triggers[1]})
+    EXPECT_TRUE(encoder->encode_trigger(trigger, bytes));
+  encoder->encode(all.subspan(5001, 4999), bytes);
+  EXPECT_TRUE(encoder->encode_trigger(triggers[2], bytes));
+  encoder->encode(all.subspan(10'000), bytes);
+  EXPECT_TRUE(encoder->encode_trigger(triggers[3], bytes));
+  const TemporaryFile in(bytes);
+  for (const std::string between : {"", "identity ! "})
+    for (const std::string words : {"EVT2", "EVT21", "EVT3", "EVT4"}) {
+      SCOPED_TRACE(words + between);
+      const auto decoder = eventcamera::make_prophesee_raw_decoder();
+      eventcamera::Decoded decoded;
+      decoder->decode(copied(in, between + "evtdec ! queue ! evtenc format=" + words), decoded);
+      decoder->finish(decoded);
+      EXPECT_EQ(decoded.triggers, triggers);
+      EXPECT_EQ(decoded.events, events);
+      EXPECT_EQ(decoder->corruption().places, 0U);
+    }
+}
+
+TEST(EvtEnc, TakesTheFormatThatDownstreamLeaves) {
+  Writer h("evtenc format=EVT4", "application/x-event-camera, format=(string){ EVT2, EVT3, EVT4 }");
+  EXPECT_NE(h.out_caps().find("EVT4"), std::string::npos);
+  EXPECT_NE(h.out_caps().find("width=(int)320"), std::string::npos);
+}
+
+}  // namespace

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Event files of every format are read as they were written, however they come.
+#include <tuple>
+
+#include "tests/elements/event_files.hpp"
+
+namespace {
+
+using namespace harness;
+using namespace event_files;
+
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats), name_of);
+
+TEST_P(EveryFormat, IsReadAsItWasWrittenHoweverItIsSplit) {
+  const auto events = some_events();
+  const auto file = file_of(format(), events);
+  for (const std::size_t piece : {1UL, 1000UL, 1UL << 24}) {
+    Reader h(format());
+    h.read(file, piece);
+    EXPECT_EQ(pull_events(h), events);
+    if (format().tells_size) {
+      EXPECT_EQ(h.out_caps(),
+                "application/x-event-camera, format=(string)XYTP, width=(int)320, height=(int)240, "
+                "framerate=(fraction)0/1");
+    }
+    EXPECT_EQ(h.warning() + h.error(), "");
+    EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+  }
+}
+
+TEST_P(EveryFormat, KeepsEveryEventOfATimeInTheFilesOrder) {
+  // Events of the same microsecond, with repeated pixels, against raster order.
+  Events events;
+  for (const Microseconds t : {5'000, 5'001, 25'000})
+    for (const auto& [x, y, polarity] :
+         {std::tuple(9, 9, Polarity::on), std::tuple(1, 2, Polarity::off),
+          std::tuple(1, 2, Polarity::on), std::tuple(1, 2, Polarity::on),
+          std::tuple(2, 2, Polarity::on), std::tuple(0, 0, Polarity::off)})
+      events.push_back(AbsoluteEvent::at(x, y, t, polarity));
+  Reader h(format());
+  h.read(file_of(format(), events));
+  EXPECT_EQ(pull_events(h), events);
+}
+
+TEST_P(EveryFormat, BeginsAtTheFirstEventAndTellsSilence) {
+  Reader h(format());
+  h.read(file_of(format(), some_events()), 5000);
+  const auto event = h.pull_event(GST_EVENT_SEGMENT);
+  ASSERT_TRUE(event);
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event.get(), &segment);
+  EXPECT_EQ(segment->format, GST_FORMAT_TIME);
+  EXPECT_EQ(segment->start, 2 * GST_SECOND);
+  EXPECT_EQ(gst_segment_to_running_time(segment, GST_FORMAT_TIME, 2 * GST_SECOND), 0U);
+  EXPECT_EQ(gst_segment_to_stream_time(segment, GST_FORMAT_TIME, 2 * GST_SECOND), 0U);
+
+  const auto gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  const auto [start, duration] = gap_of(gap.get());
+  EXPECT_EQ(start, 2500 * GST_MSECOND);
+  EXPECT_GT(duration, 2900 * GST_MSECOND);
+  int gaps = 1;
+  while (h.pull_event(GST_EVENT_GAP)) ++gaps;
+  EXPECT_LE(gaps, 2);
+
+  GstClockTime end = 2 * GST_SECOND;
+  int buffers = 0;
+  while (const auto buffer = h.pull()) {
+    EXPECT_GE(GST_BUFFER_PTS(buffer.get()), end);
+    EXPECT_LE(GST_BUFFER_DURATION(buffer.get()), 10 * GST_MSECOND);
+    end = GST_BUFFER_PTS(buffer.get()) + GST_BUFFER_DURATION(buffer.get());
+    ++buffers;
+  }
+  EXPECT_EQ(buffers, 100);
+}
+
+TEST_P(EveryFormat, CutsByBufferTime) {
+  Reader h(format(), " buffer-duration=100000000");
+  h.read(file_of(format(), some_events()), 5000);
+  int buffers = 0;
+  while (h.pull()) ++buffers;
+  EXPECT_EQ(buffers, 10);
+}
+
+TEST_P(EveryFormat, IsEmptyWhereThereAreNoEvents) {
+  const auto file = file_of(format(), {});
+  EXPECT_FALSE(file.empty());
+  Reader h(format());
+  h.read(file, 5);
+  EXPECT_FALSE(h.pull());
+  EXPECT_NE(h.out_caps().find(format().tells_size ? "width=(int)320" : "width=(int)128"),
+            std::string::npos);
+  EXPECT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
+  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+  EXPECT_EQ(h.error(), "");
+}
+
+TEST_P(EveryFormat, EndsEachOfTwoFilesInItsOwnStream) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  Player player(file.source() + "queue ! c.  " + file.source() + "concat name=c ! " +
+                format().reader);
+  struct Streams {
+    Player& player;
+    std::vector<std::size_t> start_at;
+  } streams{player, {}};
+  gst_pad_add_probe(
+      GST_BASE_SINK_PAD(player["sink"]), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
+        auto& to = *static_cast<Streams*>(data);
+        if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_STREAM_START)
+          to.start_at.push_back(to.player.events.size());
+        return GST_PAD_PROBE_OK;
+      },
+      &streams, nullptr);
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_EQ(player.events.size(), 2 * events.size());
+  EXPECT_EQ(streams.start_at, (std::vector<std::size_t>{0, events.size()}));
+}
+
+TEST_P(EveryFormat, IsFoundByDecodebin) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  Player player(file.source() + "decodebin caps=application/x-event-camera");
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_EQ(player.events, events);
+}
+
+TEST_P(EveryFormat, PlaysAgainAfterAStop) {
+  const TemporaryFile file(file_of(format(), some_events()));
+  Player player(file.source() + format().reader);
+  for (int times = 0; times < 3; ++times) {
+    EXPECT_TRUE(player.reaches(GST_STATE_PAUSED));
+    EXPECT_TRUE(player.play()) << player.error;
+    EXPECT_EQ(player.events.size(), 20'000U);
+    EXPECT_TRUE(player.reaches(times % 2 == 0 ? GST_STATE_READY : GST_STATE_NULL));
+  }
+  EXPECT_TRUE(player.reaches(GST_STATE_PAUSED));
+}
+
+TEST_P(EveryFormat, BeginsAnewAfterAFlush) {
+  const auto events = some_events();
+  const auto file = file_of(format(), events);
+  Reader h(format());
+  h.push_bytes(file.substr(0, file.size() / 2));
+  pull_events(h);
+  flush({h.get()});
+  push_segment(h.get(), GST_FORMAT_BYTES);
+  h.read(file, 10'000);
+  EXPECT_EQ(pull_events(h), events);
+  EXPECT_EQ(h.warning(), "");
+}
+
+TEST_P(EveryFormat, IsFreedWhileInUse) {
+  const auto file = file_of(format(), some_events());
+  for (const std::size_t count : {std::size_t{1}, file.size() / 2}) {
+    bool freed = false;
+    {
+      Reader h(format());
+      g_object_weak_ref(
+          G_OBJECT(h.element()),
+          +[](gpointer was_freed, GObject*) { *static_cast<bool*>(was_freed) = true; }, &freed);
+      gst_harness_push_event(h.get(), gst_event_new_tag(gst_tag_list_new_empty()));
+      h.push_bytes(file.substr(0, count));
+    }
+    EXPECT_TRUE(freed);
+  }
+}
+
+}  // namespace

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Seeks in event files of every format.
+#include "tests/elements/event_files.hpp"
+
+namespace {
+
+using namespace harness;
+using namespace event_files;
+
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats), name_of);
+
+/// Those whose time in the player is in [from, to).
+Events between(Events events, GstClockTime from, GstClockTime to = GST_CLOCK_TIME_NONE) {
+  std::erase_if(events, [&, first = events.front().t](const auto& event) {
+    const auto time = static_cast<GstClockTime>(event.t - first) * GST_USECOND;
+    return time < from || time >= to;
+  });
+  return events;
+}
+
+TEST_P(EveryFormat, IsPulledAndSoughtIn) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(file.source() + way + format().reader);
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    if (way.empty()) {
+      EXPECT_EQ(player.duration(), 3'999'951 * GST_USECOND);
+    }
+    EXPECT_EQ(player.position(), 0U);
+    ASSERT_TRUE(player.play()) << player.error;
+    EXPECT_NE(player.duration(), GST_CLOCK_TIME_NONE);
+
+    const GstClockTime from = 3'700 * GST_MSECOND;
+    const GstClockTime to = 3'804'321 * GST_USECOND;
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    ASSERT_TRUE(player.seek(from, GST_CLOCK_TIME_NONE, GST_SEEK_FLAG_ACCURATE));
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    EXPECT_EQ(player.position(), from);
+    ASSERT_TRUE(player.play()) << player.error;
+    EXPECT_EQ(player.events, between(events, from));
+
+    // Backwards, and with a stop position.
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    ASSERT_TRUE(player.seek(100 * GST_MSECOND));
+    ASSERT_TRUE(player.seek(from, to));
+    ASSERT_TRUE(player.play()) << player.error;
+    EXPECT_EQ(player.events, between(events, from, to));
+
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    EXPECT_FALSE(gst_element_seek(player.get(), -1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                  GST_SEEK_TYPE_SET, GST_SECOND, GST_SEEK_TYPE_NONE, -1));
+  }
+}
+
+TEST_P(EveryFormat, KeepsItsPlaceWhenTheRateChanges) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  for (const std::string way : {"", "queue ! "}) {
+    Player player(file.source() + way + format().reader);
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    ASSERT_TRUE(gst_element_seek(player.get(), 2, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+                                 GST_SEEK_TYPE_NONE, 0, GST_SEEK_TYPE_NONE, 0));
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    ASSERT_TRUE(player.play()) << player.error;
+    ASSERT_FALSE(player.events.empty());
+    EXPECT_GT(player.events.front().t, events.front().t) << "it went back to the start";
+    EXPECT_EQ(player.events.back(), events.back());
+  }
+}
+
+TEST_P(EveryFormat, HoldsWhatComesAfterASeekAlone) {
+  const auto events = some_events();
+  const TemporaryFile in(file_of(format(), events));
+  const TemporaryFile out;
+  Player player(in.source() + format().reader + " ! tee name=t  t. ! queue ! " + format().writer +
+                out.sink() + "  t. ! queue");
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  ASSERT_TRUE(player.seek(3 * GST_SECOND));
+  ASSERT_TRUE(player.play()) << player.error;
+  const auto bytes = out.bytes();
+  EXPECT_EQ(events_in(format(), std::string(bytes.begin(), bytes.end())),
+            between(events, 3 * GST_SECOND));
+}
+
+}  // namespace

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// What writers of event files of every format write, leave out, and tell of.
+#include "tests/elements/event_files.hpp"
+
+namespace {
+
+using namespace harness;
+using namespace event_files;
+
+INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats), name_of);
+
+TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
+  Writer h(format());
+  const std::vector events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
+                              AbsoluteEvent::at(width, 5, 1001, Polarity::on),
+                              AbsoluteEvent::at(5, height, 1002, Polarity::on),
+                              AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
+  h.write(events, 0);
+  gst_harness_push_event(h.get(), gst_event_new_gap(10 * GST_MSECOND, 10 * GST_MSECOND));
+  EXPECT_TRUE(h.pull_event(GST_EVENT_GAP));
+  EXPECT_TRUE(
+      h.warning().starts_with("Left out 2 events outside the sensor. Correct the size in the "
+                              "caps, 320x240 pixels"));
+  EXPECT_EQ(events_in(format(), h.end()), (std::vector{events[0], events[3]}));
+  EXPECT_EQ(h.left_out(), "");
+  EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
+}
+
+TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
+  Writer h(format());
+  const auto push = [&](const std::vector<Microseconds>& times) {
+    Events events;
+    for (const auto t : times) events.push_back(AbsoluteEvent::at(5, 5, t, Polarity::on));
+    h.write(events, 0);
+  };
+  push({3000});
+  // Another segment with earlier times.
+  push_segment(h.get());
+  for (int times = 0; times < 3; ++times) push({1000, 2000});
+  EXPECT_EQ(h.warning(), "");
+  push({2000, 4000, 5000});
+  EXPECT_TRUE(h.warning().starts_with("Left out 7 events earlier than"));
+  // Further dropped events are reported once, at the end.
+  push({1000, 2000, 4999});
+  push({6000});
+  EXPECT_EQ(h.warning(), "");
+  std::vector<Microseconds> written;
+  for (const auto& event : events_in(format(), h.end())) written.push_back(event.t);
+  EXPECT_TRUE(h.warning().starts_with("Left out 10 events in total earlier"));
+  EXPECT_EQ(written, (std::vector<Microseconds>{3000, 4000, 5000, 6000}));
+}
+
+TEST_P(EveryFormat, TellsOfEventsLeftOutWhereItIsStopped) {
+  Writer h(format());
+  h.write(AbsoluteEvent::at(5, 5, 1000, Polarity::on), 0);
+  h.write(AbsoluteEvent::at(5, 5, 10, Polarity::on), 0);
+  EXPECT_EQ(h.warning(), "");
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  EXPECT_TRUE(h.warning().starts_with("Left out 1 event earlier"));
+}
+
+TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
+  Writer h(format());
+  const auto early = AbsoluteEvent::at(6, 6, 1000, Polarity::off);
+  for (const bool ended : {false, true}) {
+    h.write(AbsoluteEvent::at(5, 5, 1'000'000, Polarity::on), 1'000'000);
+    if (ended) gst_harness_push_event(h.get(), gst_event_new_eos());
+    h.pull_bytes();
+    flush({h.get()});
+    push_segment(h.get());
+    while (h.message(GST_MESSAGE_WARNING)) continue;
+  }
+  h.write(early, 0);
+  EXPECT_EQ(events_in(format(), h.end()), std::vector{early});
+  EXPECT_EQ(h.left_out(), "");
+}
+
+TEST_P(EveryFormat, IsOfOneSize) {
+  Writer h(format());
+  h.write(AbsoluteEvent::at(5, 5, 1000, Polarity::on), 0);
+  gst_harness_set_src_caps_str(
+      h.get(), "application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
+  EXPECT_EQ(h.error(), "");
+  gst_harness_push_event(
+      h.get(),
+      gst_event_new_caps(
+          Owned<GstCaps>(gst_caps_from_string("application/x-event-camera, format=XYTP, width=64, "
+                                              "height=48, framerate=30/1"))
+              .get()));
+  EXPECT_NE(h.error(), "");
+}
+
+TEST_P(EveryFormat, HoldsALongPauseOrTellsThatItIsLeftOut) {
+  // Longer than 32 bits of microseconds.
+  const std::vector events = {AbsoluteEvent::at(5, 5, 1000, Polarity::on),
+                              AbsoluteEvent::at(6, 6, 4'320'000'000, Polarity::off),
+                              AbsoluteEvent::at(7, 7, 4'320'000'001, Polarity::off)};
+  Writer h(format());
+  for (const auto& event : events) h.write(event, event.t / 10'000 * 10'000);
+  const auto read = events_in(format(), h.end());
+  if (format().name != "dat") {
+    EXPECT_EQ(read, events);
+    EXPECT_EQ(h.left_out(), "");
+    return;
+  }
+  EXPECT_TRUE(h.warning().starts_with("Left out a pause of 4319 s"));
+  ASSERT_EQ(read.size(), 3U);
+  EXPECT_EQ(read[2].t, 1001);
+}
+
+TEST(EventDatEnc, TellsOfAllPausesThatAreLeftOut) {
+  Writer h(format_of("dat"));
+  for (const Microseconds hour : {0, 2, 7}) {
+    const auto t = hour * 3'600'000'000 + 1000;
+    h.write(AbsoluteEvent::at(5, 5, t, Polarity::on), t);
+  }
+  h.end();
+  EXPECT_TRUE(h.warning().starts_with("Left out a pause of 7200 s"));
+  EXPECT_TRUE(h.warning().starts_with("Left out pauses of 25200 s in total"));
+  EXPECT_EQ(h.warning(), "");
+}
+
+TEST_P(EveryFormat, RefusesBuffersThatAreNoEvents) {
+  Writer h(format());
+  GstBuffer* buffer = gst_buffer_new_memdup("seven b", 7);
+  GST_BUFFER_PTS(buffer) = 0;
+  EXPECT_EQ(h.push(buffer), GST_FLOW_ERROR);
+  EXPECT_NE(h.error(), "");
+}
+
+/// A client that joins late, as of tcpserversink, gets it from there.
+TEST_P(EveryFormat, HasItsHeaderInTheCaps) {
+  const auto events = some_events();
+  Writer writer(format());
+  writer.write(std::span(events).first(10'000), 0);
+  const auto begun = writer.pull();
+  ASSERT_TRUE(begun);
+  EXPECT_TRUE(GST_BUFFER_FLAG_IS_SET(begun.get(), GST_BUFFER_FLAG_HEADER));
+  while (const auto buffer = writer.pull())
+    EXPECT_FALSE(GST_BUFFER_FLAG_IS_SET(buffer.get(), GST_BUFFER_FLAG_HEADER));
+
+  GstPad* const pad = gst_element_get_static_pad(writer.element(), "src");
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(pad));
+  gst_object_unref(pad);
+  const GValue* const headers =
+      gst_structure_get_value(gst_caps_get_structure(caps.get(), 0), "streamheader");
+  ASSERT_TRUE(headers != nullptr && GST_VALUE_HOLDS_ARRAY(headers));
+  ASSERT_EQ(gst_value_array_get_size(headers), 1U);
+  const auto header = bytes_of(gst_value_get_buffer(gst_value_array_get_value(headers, 0)));
+  EXPECT_EQ(header, bytes_of(begun.get()));
+
+  writer.write(std::span(events).subspan(10'000), 6'000'000);
+  const auto read = events_in(format(), header + writer.pull_bytes());
+  // EVT3 has to wait for the next row.
+  const auto missed = 10'000 - read.size();
+  ASSERT_LE(missed, format().name == "evt3" ? 320U : 0U);
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    const auto& event = events[10'000 + missed + i];
+    ASSERT_TRUE(read[i].x == event.x && read[i].y_p == event.y_p) << i;
+  }
+}
+
+/// A custom event may come from anywhere, with any content.
+TEST_P(EveryFormat, SurvivesTriggersOfAnyKind) {
+  Writer h(format());
+  const auto push = [&](GstStructure* structure) {
+    EXPECT_TRUE(gst_harness_push_event(
+        h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, structure)));
+  };
+  const auto push_records = [&](const char* name, const std::vector<gint64>& numbers, gsize size) {
+    GBytes* const records = g_bytes_new(numbers.data(), size);
+    push(gst_structure_new(name, "records", G_TYPE_BYTES, records, nullptr));
+    g_bytes_unref(records);
+  };
+  for (const char* name : {"GstEventCameraTriggers", "GstEventCameraImu"}) {
+    push(gst_structure_new_empty(name));
+    push(gst_structure_new(name, "records", G_TYPE_STRING, "none", nullptr));
+    push_records(name, {}, 0);
+    push_records(name, {G_MININT64, -1, G_MAXINT64, -1, -1, -1, 0, 0, 7'000'000, 1}, 75);
+  }
+  auto events = some_events();
+  events.resize(100);
+  h.write(events, 2'000'000);
+  push_records("GstEventCameraTriggers", {2'000'000, 1, 2'004'950, -1},
+               32);  // the first is late
+  Reader reader(format());
+  reader.read(h.end());
+  EXPECT_EQ(pull_events(reader), events);
+  EXPECT_EQ(reader.warning(), "");
+}
+
+}  // namespace
