@@ -10,6 +10,7 @@
 #include <gst/app/gstappsink.h>
 #include <gst/eventcamera/eventcamera.h>
 #include <signal.h>
+#include <string.h>
 #include <unistd.h>
 
 typedef struct {
@@ -33,15 +34,36 @@ static void count_buffer(Count* count, GstBuffer* buffer) {
   gst_event_camera_unmap(&map);
 }
 
-/* Prints the error that ended the pipeline, if any. True if there was one. */
+/* Prints the error that ended the pipeline, if any, and its cause: the last line of the debug text.
+ * True if there was one. */
 static gboolean failed(GstBus* bus) {
   GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
   GError* error = NULL;
+  gchar* debug = NULL;
+  const gchar* cause;
   if (message == NULL) return FALSE;
-  gst_message_parse_error(message, &error, NULL);
-  g_printerr("%s: %s\n", GST_OBJECT_NAME(GST_MESSAGE_SRC(message)), error->message);
+  gst_message_parse_error(message, &error, &debug);
+  cause = debug != NULL ? strrchr(debug, '\n') : NULL;
+  g_printerr("%s: %s %s\n", GST_OBJECT_NAME(GST_MESSAGE_SRC(message)), error->message,
+             cause != NULL ? cause + 1 : "");
+  g_free(debug);
   g_clear_error(&error);
   gst_message_unref(message);
+  return TRUE;
+}
+
+/* Prints the size of the sensor, or if these are no caps of events, how to get events. */
+static gboolean check_caps(const GstCaps* caps) {
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) {
+    g_printerr(
+        "The appsink gets no events but %s. Write a simulator before it (! eventsim-diff ! appsink "
+        "name=events), or if a file has events: decodebin "
+        "caps=\"application/x-event-camera,format=XYTP\" ! appsink name=events\n",
+        gst_structure_get_name(gst_caps_get_structure(caps, 0)));
+    return FALSE;
+  }
+  g_print("Events of a %dx%d sensor\n", info.width, info.height);
   return TRUE;
 }
 
@@ -62,9 +84,10 @@ static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
     }
     buffer = gst_sample_get_buffer(sample);
     if (start == GST_CLOCK_TIME_NONE) {
-      GstEventCameraInfo info;
-      if (gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample)))
-        g_print("Events of a %dx%d sensor\n", info.width, info.height);
+      if (!check_caps(gst_sample_get_caps(sample))) {
+        gst_sample_unref(sample);
+        return FALSE;
+      }
       start = printed = GST_BUFFER_PTS(buffer);
     }
     count_buffer(&second, buffer);
@@ -119,7 +142,7 @@ int main(int argc, char** argv) {
   }
   sink = GST_IS_BIN(pipeline) ? gst_bin_get_by_name(GST_BIN(pipeline), "events") : NULL;
   if (sink == NULL || !GST_IS_APP_SINK(sink)) {
-    g_printerr("The pipeline has no appsink name=events\n");
+    g_printerr("The pipeline has no appsink name=events; end it in: ! appsink name=events\n");
     gst_clear_object(&sink);
     gst_object_unref(pipeline);
     return 2;

@@ -5,18 +5,21 @@ appsink in a NumPy array, one row (t, x, y, p) per event, t in microseconds.
 
     events_to_numpy.py "videotestsrc num-buffers=90 ! eventsim-diff ! appsink name=events" out.npy
 
-Needs the system's Python with PyGObject and NumPy (Debian: python3-gi python3-numpy
-gir1.2-gstreamer-1.0 gir1.2-gst-plugins-base-1.0).
+Needs the system's Python with PyGObject and NumPy.
 """
 import sys
 
-import gi
-import numpy as np
+try:
+    import gi
+    import numpy as np
 
-gi.require_version("Gst", "1.0")
-gi.require_version("GstApp", "1.0")
-gi.require_version("GstEventCamera", "1.0")
-from gi.repository import Gst, GstApp, GstEventCamera  # noqa: E402
+    gi.require_version("Gst", "1.0")
+    gi.require_version("GstApp", "1.0")
+    gi.require_version("GstEventCamera", "1.0")
+    from gi.repository import GLib, Gst, GstApp, GstEventCamera
+except (ImportError, ValueError) as missing:
+    sys.exit(f"error: {missing}\nOn Debian, install: python3-gi python3-numpy gir1.2-gstreamer-1.0"
+             " gir1.2-gst-plugins-base-1.0 gir1.2-gsteventcamera-1.0")
 
 XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
 EVENT = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")])
@@ -33,26 +36,48 @@ def events_of(buffer):
     return events
 
 
+def sink_of(pipeline):
+    sink = pipeline.get_by_name("events") if isinstance(pipeline, Gst.Bin) else None
+    if not isinstance(sink, GstApp.AppSink):
+        raise RuntimeError("The pipeline has no appsink name=events; end it in: ! appsink name=events")
+    return sink
+
+
+def size_of(caps):
+    """The size of the sensor."""
+    is_events, info = GstEventCamera.Info.from_caps(caps)
+    if not is_events:
+        raise RuntimeError(f"The appsink gets no events but {caps.get_structure(0).get_name()}. Write a"
+                           " simulator before it (! eventsim-diff ! appsink name=events), or if a file has events:"
+                           ' decodebin caps="application/x-event-camera,format=XYTP" ! appsink name=events')
+    return info.width, info.height
+
+
+def collect(pipeline):
+    """All events of a pipeline."""
+    sink = sink_of(pipeline)
+    bus = pipeline.get_bus()
+    size = None
+    parts = []
+    pipeline.set_state(Gst.State.PLAYING)
+    while not sink.is_eos():
+        if sample := sink.try_pull_sample(Gst.SECOND // 10):
+            if size != (size := size_of(sample.get_caps())):
+                print(f"Events of a {size[0]}x{size[1]} sensor")
+            parts.append(events_of(sample.get_buffer()))
+        elif message := bus.pop_filtered(Gst.MessageType.ERROR):
+            error, cause = message.parse_error()
+            raise RuntimeError(f"{message.src.get_name()}: {error.message} {cause.splitlines()[-1]}")
+    return np.concatenate(parts) if parts else np.empty(0, EVENT)
+
+
 def main(launch, path=None):
     Gst.init(None)
     pipeline = Gst.parse_launch(launch)
-    sink = pipeline.get_by_name("events")
-    pipeline.set_state(Gst.State.PLAYING)
-    bus = pipeline.get_bus()
-    parts = []
-    while not sink.is_eos():
-        sample = sink.try_pull_sample(Gst.SECOND // 10)
-        if not sample:
-            if message := bus.pop_filtered(Gst.MessageType.ERROR):
-                sys.exit(message.parse_error()[0].message)
-            continue
-        if not parts:
-            _, info = GstEventCamera.Info.from_caps(sample.get_caps())
-            print(f"Events of a {info.width}x{info.height} sensor")
-        parts.append(events_of(sample.get_buffer()))
-    pipeline.set_state(Gst.State.NULL)
-
-    events = np.concatenate(parts) if parts else np.empty(0, EVENT)
+    try:
+        events = collect(pipeline)
+    finally:
+        pipeline.set_state(Gst.State.NULL)
     print(f"{len(events)} events, {np.count_nonzero(events['p'])} ON")
     if path:
         np.save(path, events)
@@ -61,4 +86,7 @@ def main(launch, path=None):
 if __name__ == "__main__":
     if len(sys.argv) not in (2, 3):
         sys.exit(f"usage: {sys.argv[0]} PIPELINE [FILE.npy]")
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except (RuntimeError, OSError, GLib.Error) as failure:
+        sys.exit(f"error: {failure}")

@@ -10,20 +10,30 @@
 
 int main(int argc, char** argv) {
   guint64 on = 0, events = 0;
+  GError* error = NULL;
   GstElement *pipeline, *sink;
   GstSample* sample;
 
   gst_init(&argc, &argv);
   pipeline = gst_parse_launch(
       "videotestsrc pattern=ball num-buffers=40 ! eventsim-diff ! appsink name=events sync=false",
-      NULL);
+      &error);
+  if (error != NULL) {
+    g_printerr("%s\n", error->message);
+    return 1;
+  }
   sink = gst_bin_get_by_name(GST_BIN(pipeline), "events");
   gst_element_set_state(pipeline, GST_STATE_PLAYING);
   while ((sample = gst_app_sink_pull_sample(GST_APP_SINK(sink))) != NULL) {
     GstEventCameraInfo info;
     GstEventCameraMap map;
-    if (events == 0 && gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample)))
-      g_print("Events of a %dx%d sensor\n", info.width, info.height);
+    if (!gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample))) {
+      g_printerr(
+          "The appsink gets no events; write a simulator or a reader before it: "
+          "! eventsim-diff ! appsink\n");
+      return 1;
+    }
+    if (events == 0) g_print("Events of a %dx%d sensor\n", info.width, info.height);
     if (gst_event_camera_map(&map, gst_sample_get_buffer(sample))) {
       for (gsize i = 0; i < map.n_events; ++i) on += gst_event_camera_event_is_on(&map.events[i]);
       events += map.n_events;

@@ -5,6 +5,7 @@
 import Gst from 'gi://Gst?version=1.0';
 import 'gi://GstApp?version=1.0';
 import GstEventCamera from 'gi://GstEventCamera?version=1.0';
+import {exit} from 'system';
 
 Gst.init(null);
 const pipeline = Gst.parse_launch(
@@ -13,8 +14,12 @@ const sink = pipeline.get_by_name('events');
 pipeline.set_state(Gst.State.PLAYING);
 let on = 0, events = 0, sample;
 while ((sample = sink.pull_sample())) {
-    const [known, info] = GstEventCamera.Info.from_caps(sample.get_caps());
-    if (events === 0 && known)
+    const [isEvents, info] = GstEventCamera.Info.from_caps(sample.get_caps());
+    if (!isEvents) {
+        printerr('The appsink gets no events; write a simulator or a reader before it: ! eventsim-diff ! appsink');
+        exit(1);
+    }
+    if (events === 0)
         print(`Events of a ${info.width}x${info.height} sensor`);
     const buffer = sample.get_buffer();
     const bytes = buffer.extract_dup(0, buffer.get_size());

@@ -3,6 +3,7 @@
 """Counts ON and OFF events; the same in C, Python and JavaScript. Debian: python3-gi
 gir1.2-gsteventcamera-1.0 gir1.2-gst-plugins-base-1.0"""
 import struct
+import sys
 
 import gi
 
@@ -18,8 +19,10 @@ sink = pipeline.get_by_name("events")
 pipeline.set_state(Gst.State.PLAYING)
 on = events = 0
 while sample := sink.pull_sample():
-    known, info = GstEventCamera.Info.from_caps(sample.get_caps())
-    if events == 0 and known:
+    is_events, info = GstEventCamera.Info.from_caps(sample.get_caps())
+    if not is_events:
+        sys.exit("The appsink gets no events; write a simulator or a reader before it: ! eventsim-diff ! appsink")
+    if events == 0:
         print(f"Events of a {info.width}x{info.height} sensor")
     buffer = sample.get_buffer()
     for t, x, y_p in struct.iter_unpack("<IHH", buffer.extract_dup(0, buffer.get_size())):

@@ -10,10 +10,28 @@ line="videotestsrc pattern=ball num-buffers=40 ! eventsim-diff ! appsink name=ev
 counted=$(sed -n 's/^Total *\([0-9]*\) events.*/\1/p' "$work/c")
 [ "$counted" -gt 10000 ]
 
-if "$BUILD/pipelines/count_events" "filesrc location=/nowhere ! decodebin ! eventsim-diff ! appsink name=events"; then
-  echo "FAILED: a missing file was read"
-  exit 1
-fi
+# Errors say what is wrong, and what to write instead.
+refused() { # WORDS COMMAND...
+  local words=$1
+  shift
+  echo "$*"
+  if timeout 60 "$@" >/dev/null 2>"$work/errors"; then
+    echo "FAILED: it succeeded"
+    exit 1
+  fi
+  cat "$work/errors"
+  grep -q -e "$words" "$work/errors"
+  if grep -e Traceback -e CRITICAL "$work/errors"; then exit 1; fi
+}
+checks_pipelines() { # PROGRAM
+  refused "no events but video/x-raw.*! eventsim-diff ! appsink name=events" \
+    "$1" "videotestsrc num-buffers=3 ! appsink name=events"
+  refused "end it in: ! appsink name=events" "$1" "videotestsrc num-buffers=3 ! fakesink"
+  refused "end it in: ! appsink name=events" "$1" "fakesink name=events"
+  refused 'no element "eventdim"' "$1" "videotestsrc ! eventdim ! appsink name=events"
+  refused 'No such file "/nowhere"' "$1" "filesrc location=/nowhere ! decodebin ! appsink name=events"
+}
+checks_pipelines "$BUILD/pipelines/count_events"
 
 if [ ! -f "$GI_TYPELIB_PATH/GstEventCamera-1.0.typelib" ]; then
   echo "built without introspection: Python example skipped"
@@ -21,6 +39,9 @@ if [ ! -f "$GI_TYPELIB_PATH/GstEventCamera-1.0.typelib" ]; then
 fi
 "$SOURCE/pipelines/events_to_numpy.py" "$line" "$work/events.npy" | tee "$work/python"
 grep -q "^$counted events" "$work/python"
+checks_pipelines "$SOURCE/pipelines/events_to_numpy.py"
+refused "No such file or directory: '/nowhere/events.npy'" "$SOURCE/pipelines/events_to_numpy.py" "$line" /nowhere/events.npy
+GI_TYPELIB_PATH=/nowhere refused "install:.* gir1.2-gsteventcamera-1.0" "$SOURCE/pipelines/events_to_numpy.py" "$line"
 /usr/bin/python3 - "$work/events.npy" <<'PYTHON'
 import sys
 import numpy as np
@@ -37,3 +58,13 @@ grep -qx "[1-9][0-9]* ON, [1-9][0-9]* OFF" "$work/expected"
 for language in py js; do
   "$SOURCE/pipelines/examples/on_and_off.$language" | diff "$work/expected" -
 done
+# Without its simulator.
+for language in py js c; do
+  sed 's/eventsim-diff ! appsink name/appsink name/' "$SOURCE/pipelines/examples/on_and_off.$language" >"$work/video.$language"
+done
+# shellcheck disable=SC2046
+cc -o "$work/video" "$work/video.c" -I"$SOURCE" -L"$BUILD/gst/eventcamera" -lgsteventcamera-1.0 \
+  $(pkg-config --cflags --libs gstreamer-app-1.0)
+refused "gets no events; write a simulator" "$work/video"
+refused "gets no events; write a simulator" /usr/bin/python3 "$work/video.py"
+refused "gets no events; write a simulator" gjs -m "$work/video.js"
