@@ -136,6 +136,20 @@ static gchar* help(void) {
   return g_string_free(text, FALSE);
 }
 
+/* False if GStreamer lacks the elements of this project. */
+static gboolean find_plugin(void) {
+  GstPlugin* plugin = gst_registry_find_plugin(gst_registry_get(), "eventcam");
+  if (plugin == NULL) {
+    PRINT_ERROR(
+        "GStreamer does not find the plugin eventcam. In a checkout, enter the development shell: "
+        "meson devenv -C build -w .\nOtherwise install it: the Debian package "
+        "gstreamer1.0-eventcam, or as root: meson install -C build\n");
+    return FALSE;
+  }
+  gst_object_unref(plugin);
+  return TRUE;
+}
+
 /* Format selected by a file's extension, or NULL. */
 static const Format* format_of(const char* path) {
   for (gsize i = 0; i < G_N_ELEMENTS(formats); ++i) {
@@ -477,6 +491,7 @@ int main(int argc, char** argv) {
     g_clear_error(&error);
     return 2;
   }
+  if (!find_plugin()) return 1;
   to = format_of(argv[2]);
   if (!can_write(argv[2], to)) return 2;
   from = find_reader(argv[1]);

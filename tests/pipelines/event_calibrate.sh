@@ -60,5 +60,7 @@ refused() { # WORDS ARGUMENT...
 }
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
 refused "nowhere.mkv" nowhere.mkv recorded.raw
+GST_PLUGIN_PATH= GST_PLUGIN_SYSTEM_PATH=/nowhere GST_REGISTRY=none.bin \
+  refused "plugin eventcam.*meson devenv -C build -w \\." scene.mkv recorded.raw
 refused "do not overlap in time" scene.mkv recorded.raw --element eventsim-frame --from 5
 echo "all thresholds were recovered"

@@ -211,6 +211,8 @@ refused "Cannot read" words.txt words.raw
 cp words.txt words.raw
 refused "Cannot read" words.raw out.dat
 refused "unknown extension" ball.raw ball.mp3
+GST_PLUGIN_PATH= GST_PLUGIN_SYSTEM_PATH=/nowhere GST_REGISTRY=none.bin \
+  refused "plugin eventcam.*meson devenv -C build -w \\." ball.raw out.dat
 refused "choose one of EVT2 EVT21 EVT2.1 EVT3 EVT4" ball.raw other.raw --format=EVT5
 refused "does not apply to .dat" ball.raw ball.dat --format=rpg
 refused "can only be read" ball.raw ball.aedat
