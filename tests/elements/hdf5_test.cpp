@@ -238,52 +238,25 @@ TEST(Hdf5Elements, KeepTriggers) {
 }
 
 /// Sink fed by the test.
-class Sink {
- public:
-  explicit Sink(const std::string& launch) {
-    gst_init(nullptr, nullptr);
-    h_.reset(gst_harness_new_parse(launch.c_str()));
-    bus_.reset(gst_bus_new());
-    gst_element_set_bus(h_->element, bus_.get());
-  }
-  ~Sink() {
-    if (h_) gst_element_set_bus(h_->element, nullptr);
-  }
-  Sink(const Sink&) = delete;
-  Sink& operator=(const Sink&) = delete;
+struct Sink : Harness {
+  explicit Sink(const std::string& launch) : Harness(launch) {}
 
-  GstHarness* get() const { return h_.get(); }
-  void caps(const char* caps) { gst_harness_set_src_caps_str(h_.get(), caps); }
-
+  void caps(const char* caps) { gst_harness_set_src_caps_str(get(), caps); }
   GstFlowReturn push(const Events& events, Microseconds start) {
-    return gst_harness_push(h_.get(), buffer_of(events, start));
+    return Harness::push(buffer_of(events, start));
   }
-
-  void end() { gst_harness_push_event(h_.get(), gst_event_new_eos()); }
-
-  std::string message(GstMessageType type) {
-    const Owned<GstMessage> message(gst_bus_pop_filtered(bus_.get(), type));
-    return message ? text_of(message.get()) : "";
-  }
-
-  void stop() {
-    gst_element_set_bus(h_->element, nullptr);
-    h_.reset();
-  }
-
- private:
-  Owned<GstHarness> h_;
-  Owned<GstBus> bus_;
+  void end() { gst_harness_push_event(get(), gst_event_new_eos()); }
 };
 
 TEST_P(Hdf5, IsWholeWhereThePipelineIsStoppedBeforeTheEnd) {
   const auto path = folder_ / "out.h5";
   const Events events = {AbsoluteEvent::at(5, 6, 1'000'007, Polarity::on),
                          AbsoluteEvent::at(7, 8, 1'000'009, Polarity::off)};
-  Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));
-  sink.caps(events_caps);
-  EXPECT_EQ(sink.push(events, 1'000'000), GST_FLOW_OK);
-  sink.stop();
+  {
+    Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));
+    sink.caps(events_caps);
+    EXPECT_EQ(sink.push(events, 1'000'000), GST_FLOW_OK);
+  }
   EXPECT_TRUE(read(path) == events);
 }
 
@@ -296,14 +269,14 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
                          AbsoluteEvent::at(5, height, 1002, Polarity::on),
                          AbsoluteEvent::at(6, 6, 1003, Polarity::off)};
   EXPECT_EQ(sink.push(events, 0), GST_FLOW_OK);
-  EXPECT_TRUE(sink.message(GST_MESSAGE_WARNING).starts_with("Left out 2 events outside"));
+  EXPECT_TRUE(sink.warning().starts_with("Left out 2 events outside"));
   // Time goes backwards.
   EXPECT_EQ(sink.push({events[0]}, 0), GST_FLOW_OK);
-  EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
+  EXPECT_EQ(sink.warning(), "");
   sink.end();
-  EXPECT_TRUE(sink.message(GST_MESSAGE_WARNING).starts_with("Left out 1 event earlier"));
-  EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
-  EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
+  EXPECT_TRUE(sink.warning().starts_with("Left out 1 event earlier"));
+  EXPECT_EQ(sink.warning(), "");
+  EXPECT_EQ(sink.error(), "");
   EXPECT_TRUE(read(path) == (Events{events[0], events[3]}));
 }
 
@@ -316,16 +289,13 @@ TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
   for (const bool ended : {false, true}) {
     EXPECT_EQ(sink.push({late}, 1'000'000), GST_FLOW_OK);
     if (ended) sink.end();
-    gst_harness_push_event(sink.get(), gst_event_new_flush_start());
-    gst_harness_push_event(sink.get(), gst_event_new_flush_stop(TRUE));
-    GstSegment segment;
-    gst_segment_init(&segment, GST_FORMAT_TIME);
-    gst_harness_push_event(sink.get(), gst_event_new_segment(&segment));
+    flush({sink.get()});
+    push_segment(sink.get());
   }
   EXPECT_EQ(sink.push({early}, 0), GST_FLOW_OK);
   sink.end();
-  EXPECT_EQ(sink.message(GST_MESSAGE_WARNING), "");
-  EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
+  EXPECT_EQ(sink.warning(), "");
+  EXPECT_EQ(sink.error(), "");
   EXPECT_TRUE(read(path) == Events{early});
 }
 
@@ -336,14 +306,14 @@ TEST_P(Hdf5, IsOfOneSize) {
   sink.caps(events_caps);  // nothing is written yet
   EXPECT_EQ(sink.push({AbsoluteEvent::at(200, 5, 0, Polarity::on)}, 0), GST_FLOW_OK);
   sink.caps("application/x-event-camera, format=XYTP, width=320, height=240, framerate=30/1");
-  EXPECT_EQ(sink.message(GST_MESSAGE_ERROR), "");
+  EXPECT_EQ(sink.error(), "");
   gst_harness_push_event(
       sink.get(),
       gst_event_new_caps(
           Owned<GstCaps>(gst_caps_from_string("application/x-event-camera, format=XYTP, width=64, "
                                               "height=48, framerate=30/1"))
               .get()));
-  EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("The sensor size changes"), std::string::npos);
+  EXPECT_NE(sink.error().find("The sensor size changes"), std::string::npos);
 }
 
 TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
@@ -352,21 +322,20 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
   {
     Sink sink("eventhdf5sink location=/no/such/folder/out.h5");
     sink.caps(events_caps);
-    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("Cannot write /no/such/folder/out.h5"),
-              std::string::npos);
+    EXPECT_NE(sink.error().find("Cannot write /no/such/folder/out.h5"), std::string::npos);
   }
   {
     Sink sink("eventhdf5sink format=metavision location=" + in_quotes(folder / "out.h5"));
     sink.caps("application/x-event-camera, format=XYTP, width=4000, height=48, framerate=0/1");
-    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("at most 2048 pixels"), std::string::npos);
+    EXPECT_NE(sink.error().find("at most 2048 pixels"), std::string::npos);
   }
   {
     Sink sink("eventhdf5sink location=" + in_quotes(folder / "out.h5"));
     sink.caps(events_caps);
     GstBuffer* buffer = gst_buffer_new_memdup("seven b", 7);
     GST_BUFFER_PTS(buffer) = 0;
-    EXPECT_EQ(gst_harness_push(sink.get(), buffer), GST_FLOW_ERROR);
-    EXPECT_NE(sink.message(GST_MESSAGE_ERROR).find("partial event"), std::string::npos);
+    EXPECT_EQ(sink.Harness::push(buffer), GST_FLOW_ERROR);
+    EXPECT_NE(sink.error().find("partial event"), std::string::npos);
   }
   const Owned<GstElement> nowhere(gst_element_factory_make("eventhdf5sink", nullptr));
   EXPECT_EQ(gst_element_set_state(nowhere.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
