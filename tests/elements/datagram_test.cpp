@@ -223,11 +223,9 @@ TEST_P(EveryFormat, RejectsRandomDatagrams) {
   }
   EXPECT_EQ(pull_events(h).size(), sent.size());
   EXPECT_EQ(stat_of(h.element(), "rejected-packets"), bad);
-  const auto warning = h.message(GST_MESSAGE_WARNING);
-  ASSERT_TRUE(warning);
-  EXPECT_NE(text_of(warning.get()).find("Set format, width and height"), std::string::npos);
-  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
-  EXPECT_FALSE(h.message(GST_MESSAGE_ERROR));
+  EXPECT_NE(h.warning().find("Set format, width and height"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
+  EXPECT_EQ(h.error(), "");
 }
 
 /// Loses 5 % of datagrams, repeats 5 %, and swaps 5 % with the next one.
@@ -339,9 +337,7 @@ TEST(Payloader, ReportsThatItsTimerCannotStart) {
   h.caps(events_caps, "application/x-event-datagram");
   const NoThreads none;
   EXPECT_EQ(h.push(buffer_of(0, {Event::at(1, 2, 3, Polarity::on)}, GST_MSECOND)), GST_FLOW_ERROR);
-  const auto error = h.message(GST_MESSAGE_ERROR);
-  ASSERT_TRUE(error);
-  EXPECT_EQ(text_of(error.get()), "Not enough memory to send the events.");
+  EXPECT_EQ(h.error(), "Not enough memory to send the events.");
 }
 
 TEST(Payloader, FillsDatagramsIfItMay) {
@@ -413,10 +409,7 @@ TEST(Payloader, SkipsEventsOutsideTheSensor) {
                     Event::at(1, 480, 3, Polarity::on)},
                    40 * GST_MSECOND));
   EXPECT_EQ(gst_buffer_get_size(h.pull().get()), 4);
-  const auto warning = h.message(GST_MESSAGE_WARNING);
-  ASSERT_TRUE(warning);
-  EXPECT_EQ(text_of(warning.get()),
-            "Cannot send all events: some lie beyond the sensor; skipping these.");
+  EXPECT_EQ(h.warning(), "Cannot send all events: some lie beyond the sensor; skipping these.");
 }
 
 TEST(Payloader, SkipsInvalidBuffers) {
@@ -434,9 +427,7 @@ TEST(Payloader, RefusesSensorsThatTheFormatDoesNotSupport) {
   Harness h("eventdatagrampay format=jaer");
   h.caps("application/x-event-camera, format=XYTP, width=1280, height=720",
          "application/x-event-datagram");
-  const auto error = h.message(GST_MESSAGE_ERROR);
-  ASSERT_TRUE(error);
-  EXPECT_NE(text_of(error.get()).find("up to 1024x512 pixels"), std::string::npos);
+  EXPECT_NE(h.error().find("up to 1024x512 pixels"), std::string::npos);
 }
 
 TEST(Payloader, ReportsItsLatency) {
@@ -550,7 +541,7 @@ TEST(Depayloader, TellsOfLosses) {
   EXPECT_EQ(stat_of(h.element(), "lost-packets"), 2);
   EXPECT_EQ(stat_of(h.element(), "late-packets"), 1);
   EXPECT_EQ(stat_of(h.element(), "packets"), 4);
-  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+  EXPECT_EQ(h.warning(), "");
 }
 
 TEST(Depayloader, TellsOfLossesBeforeDatagramsWithoutEvents) {
@@ -576,9 +567,7 @@ TEST(Depayloader, GivesEventsWithoutTimesThatOfTheirArrival) {
 TEST(Depayloader, NeedsArrivalTimesForEventsWithoutTimes) {
   Depay h("format=spif");
   EXPECT_EQ(h.push(datagram({1, 0, 2, 0x80}, GST_CLOCK_TIME_NONE)), GST_FLOW_ERROR);
-  const auto error = h.message(GST_MESSAGE_ERROR);
-  ASSERT_TRUE(error);
-  EXPECT_NE(text_of(error.get()).find("do-timestamp=true"), std::string::npos);
+  EXPECT_NE(h.error().find("do-timestamp=true"), std::string::npos);
 }
 
 TEST(Depayloader, DoesWithoutArrivalTimes) {

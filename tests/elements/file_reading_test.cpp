@@ -157,9 +157,7 @@ TEST_P(EveryFormat, IsFreedWhileInUse) {
     bool freed = false;
     {
       Reader h(format());
-      g_object_weak_ref(
-          G_OBJECT(h.element()),
-          +[](gpointer was_freed, GObject*) { *static_cast<bool*>(was_freed) = true; }, &freed);
+      tell_when_freed(h.element(), freed);
       gst_harness_push_event(h.get(), gst_event_new_tag(gst_tag_list_new_empty()));
       h.push_bytes(file.substr(0, count));
     }

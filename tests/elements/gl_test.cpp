@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -132,24 +132,14 @@ TEST(Dense, InterpolatesAsSet) {
 }
 
 TEST(OpenGl, IsSharedWithThePipeline) {
-  gst_init(nullptr, nullptr);
-  const Owned<GstElement> pipeline(gst_parse_launch(
-      "videotestsrc num-buffers=3 ! gleventsim-frame name=it ! fakesink", nullptr));
-  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
-  EXPECT_EQ(gst_element_set_state(pipeline.get(), GST_STATE_READY), GST_STATE_CHANGE_SUCCESS);
-  const Owned<GstElement> element(gst_bin_get_by_name(GST_BIN(pipeline.get()), "it"));
-  for (GstElement* holder : {pipeline.get(), element.get()}) {
+  Pipeline pipeline("videotestsrc num-buffers=3 ! gleventsim-frame name=it ! fakesink");
+  EXPECT_TRUE(pipeline.reaches(GST_STATE_READY));
+  for (GstElement* holder : {pipeline.get(), pipeline["it"]}) {
     GstContext* context = gst_element_get_context(holder, "gst.gl.GLDisplay");
     ASSERT_NE(context, nullptr) << GST_OBJECT_NAME(holder);
     gst_context_unref(context);
   }
-  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
-  const Owned<GstMessage> end(
-      gst_bus_timed_pop_filtered(bus.get(), 20 * GST_SECOND,
-                                 static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
-  ASSERT_TRUE(end);
-  EXPECT_EQ(GST_MESSAGE_TYPE(end.get()), GST_MESSAGE_EOS);
-  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
 }
 
 TEST(OpenGl, SharesWhatItDrawsWithTheApplication) {
@@ -392,9 +382,7 @@ TEST(OpenGl, IsAnErrorWhereItsContextIsLost) {
       is_lost = true;
       EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
       is_lost = false;
-      const auto error = h.message(GST_MESSAGE_ERROR);
-      ASSERT_TRUE(error);
-      EXPECT_EQ(text_of(error.get()),
+      EXPECT_EQ(h.error(),
                 "OpenGL cannot simulate: the OpenGL context was lost, because the GPU was reset or "
                 "removed. Use " +
                     element.substr(2) + ", which runs on the CPU.");
@@ -461,9 +449,7 @@ TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {
     gst_harness_push_event(h.get(), gst_event_new_eos());
   }
   is_busy = false;
-  const auto error = h.message(GST_MESSAGE_ERROR);
-  ASSERT_TRUE(error);
-  EXPECT_EQ(text_of(error.get()), thread_has_ended);
+  EXPECT_EQ(h.error(), thread_has_ended);
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
@@ -473,9 +459,7 @@ TEST_P(EitherOutput, IsNotMistakenForTheFrameWhereItHasEnded) {
     const EndOfThreads end;
     EXPECT_EQ(flashes.push(), GST_FLOW_ERROR);
   }
-  const auto error = h.message(GST_MESSAGE_ERROR);
-  ASSERT_TRUE(error);
-  EXPECT_EQ(text_of(error.get()), thread_has_ended);
+  EXPECT_EQ(h.error(), thread_has_ended);
   EXPECT_EQ(flashes.push(), GST_FLOW_OK);
 }
 

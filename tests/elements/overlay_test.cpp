@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventoverlay: which events are drawn over which frame, and where.
 #include "src/core/event.hpp"
-#include "tests/elements/event_buffer.hpp"
-#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -134,24 +133,13 @@ TEST_F(OverlayTest, GoesOnWithoutEventsThatEndBeforeTheyBegin) {
 }
 
 TEST(LiveOverlay, GoesOnWhereNoEventsAreLinked) {
-  gst_init(nullptr, nullptr);
-  const Owned<GstElement> pipeline(GST_ELEMENT(gst_object_ref_sink(gst_parse_launch(
+  Pipeline pipeline(
       "videotestsrc is-live=true num-buffers=10 ! video/x-raw,format=GRAY8,framerate=50/1 ! "
-      "eventoverlay ! fakesink name=sink sync=true",
-      nullptr))));
-  const Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
-  gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
-  const Owned<GstMessage> end(gst_bus_timed_pop_filtered(
-      bus.get(), 20 * GST_SECOND,
-      static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING)));
-  ASSERT_TRUE(end);
-  ASSERT_EQ(GST_MESSAGE_TYPE(end.get()), GST_MESSAGE_WARNING);
-  EXPECT_NE(text_of(end.get()).find("link a source of events"), std::string::npos);
-  EXPECT_TRUE(
-      Owned<GstMessage>(gst_bus_timed_pop_filtered(bus.get(), 20 * GST_SECOND, GST_MESSAGE_EOS)));
-  const Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
-  EXPECT_EQ(stat_of(sink.get(), "rendered"), 10U);
-  gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+      "eventoverlay ! fakesink name=sink sync=true");
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  ASSERT_EQ(pipeline.warnings.size(), 1U);
+  EXPECT_NE(pipeline.warnings[0].find("link a source of events"), std::string::npos);
+  EXPECT_EQ(pipeline.stat("sink", "rendered"), 10U);
 }
 
 TEST_F(OverlayTest, LeavesEventsBeyondTheSensorOut) {

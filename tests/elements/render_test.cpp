@@ -5,8 +5,7 @@
 #include "gst/drawing/drawn_video.hpp"
 #include "src/core/event.hpp"
 #include "src/render/accumulator.hpp"
-#include "tests/elements/event_buffer.hpp"
-#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -289,7 +288,7 @@ TEST_F(Render, DrainsWhenTheSensorChanges) {
   ASSERT_EQ(pictures.size(), 2U);
   EXPECT_TRUE(bytes_of(pictures[0].get()) == accumulated(column(1)));
   EXPECT_EQ(gst_buffer_get_size(pictures[1].get()), 16U * 8U);
-  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+  EXPECT_EQ(h.warning(), "");
 }
 
 TEST_F(Render, LeavesBrokenEventsOutWithAWarning) {
@@ -303,13 +302,9 @@ TEST_F(Render, LeavesBrokenEventsOutWithAWarning) {
   EXPECT_EQ(h.push(gst_buffer_new_memdup("seven b", 7)), GST_FLOW_OK);
   expect(finish(),
          {{0, 40 * ms, accumulated(column(1))}, {40 * ms, 40 * ms, accumulated(column(1))}});
-  const auto beyond = h.message(GST_MESSAGE_WARNING);
-  ASSERT_TRUE(beyond);
-  EXPECT_NE(text_of(beyond.get()).find("beyond the sensor"), std::string::npos);
-  const auto timeless = h.message(GST_MESSAGE_WARNING);
-  ASSERT_TRUE(timeless);
-  EXPECT_NE(text_of(timeless.get()).find("no PTS"), std::string::npos);
-  EXPECT_FALSE(h.message(GST_MESSAGE_WARNING));
+  EXPECT_NE(h.warning().find("beyond the sensor"), std::string::npos);
+  EXPECT_NE(h.warning().find("no PTS"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
 }
 
 TEST_F(Render, TakesEventsInAnyOrder) {
@@ -465,25 +460,18 @@ TEST_F(RenderLive, BeginsWithoutAnyEvent) {
 }
 
 TEST(RenderSilence, BeginsWithoutASegment) {
-  GError* error = nullptr;
-  GstElement* pipeline = gst_parse_launch(
+  Pipeline pipeline(
       "appsrc is-live=true format=time "
       "caps=application/x-event-camera,format=XYTP,width=4,height=4,framerate=0/1 "
-      "! eventrender ! fakesink name=sink",
-      &error);
-  ASSERT_EQ(error, nullptr) << error->message;
-  GstElement* sink = gst_bin_get_by_name(GST_BIN(pipeline), "sink");
-  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+      "! eventrender ! fakesink name=sink");
+  pipeline.set(GST_STATE_PLAYING);
   GstSample* sample = nullptr;
   for (int i = 0; i < 100 && sample == nullptr; ++i) {
     g_usleep(50'000);
-    g_object_get(sink, "last-sample", &sample, nullptr);
+    g_object_get(pipeline["sink"], "last-sample", &sample, nullptr);
   }
-  EXPECT_NE(sample, nullptr);
-  if (sample != nullptr) gst_sample_unref(sample);
-  gst_element_set_state(pipeline, GST_STATE_NULL);
-  gst_object_unref(sink);
-  gst_object_unref(pipeline);
+  ASSERT_NE(sample, nullptr);
+  gst_sample_unref(sample);
 }
 
 TEST_F(RenderLive, IsOnePictureLate) {
@@ -495,10 +483,15 @@ TEST_F(RenderLive, IsOnePictureLate) {
 
 TEST_F(Render, IsFreedWhileInUse) {
   for (int buffers = 0; buffers < 4; ++buffers) {
-    Harness other("eventrender");
-    gst_harness_set_sink_caps_str(other.get(), grey_at("25/1").c_str());
-    gst_harness_set_src_caps_str(other.get(), events_caps.c_str());
-    for (int i = 0; i < buffers; ++i) other.push(buffer_of(i * 40 * ms, column(i), 40 * ms));
+    bool freed = false;
+    {
+      Harness other("eventrender");
+      tell_when_freed(other.element(), freed);
+      gst_harness_set_sink_caps_str(other.get(), grey_at("25/1").c_str());
+      gst_harness_set_src_caps_str(other.get(), events_caps.c_str());
+      for (int i = 0; i < buffers; ++i) other.push(buffer_of(i * 40 * ms, column(i), 40 * ms));
+    }
+    EXPECT_TRUE(freed) << buffers;
   }
 }
 

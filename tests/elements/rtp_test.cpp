@@ -401,15 +401,11 @@ TEST(RtpEventPay, WarnsOfEventsThatItCannotSend) {
   Harness h("rtpeventpay");
   h.caps(davis_caps, "application/x-rtp");
   push(h, {0, 10'000'000, {Event::at(346, 2, 3, Polarity::on), Event::at(1, 2, 3, Polarity::on)}});
-  const auto outside = h.message(GST_MESSAGE_WARNING);
-  ASSERT_TRUE(outside);
-  EXPECT_NE(text_of(outside.get()).find("beyond the sensor"), std::string::npos);
+  EXPECT_NE(h.warning().find("beyond the sensor"), std::string::npos);
   push(h, {10'000'000,
            10'000'000,
            {Event::at(1, 2, 3, Polarity::on), Event::at(1, 2, 2, Polarity::on)}});
-  const auto unsorted = h.message(GST_MESSAGE_WARNING);
-  ASSERT_TRUE(unsorted);
-  EXPECT_NE(text_of(unsorted.get()).find("earlier than those before them"), std::string::npos);
+  EXPECT_NE(h.warning().find("earlier than those before them"), std::string::npos);
   EXPECT_EQ(stat_of(h.element(), "left-out-events"), 2U);
   EXPECT_EQ(stat_of(h.element(), "events"), 2U);
 }
@@ -421,9 +417,8 @@ TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
   guint64 left_out = 0;
   const auto skips = [&](GstBuffer* buffer, const char* reason) {
     EXPECT_EQ(h.push(buffer), GST_FLOW_OK);
-    const auto warning = h.message(GST_MESSAGE_WARNING);
-    ASSERT_TRUE(warning) << reason;
-    EXPECT_NE(text_of(warning.get()).find(reason), std::string::npos) << text_of(warning.get());
+    const auto warning = h.warning();
+    EXPECT_NE(warning.find(reason), std::string::npos) << warning;
     EXPECT_EQ(stat_of(h.element(), "left-out-events"), left_out += 3) << reason;
   };
   skips(buffer_of(GST_CLOCK_TIME_NONE, events, ms), "has no PTS");
@@ -451,18 +446,14 @@ TEST(RtpEventPay, RefusesWhatItCannotSend) {
   Harness small("rtpeventpay mtu=40");
   small.caps(davis_caps, "application/x-rtp");
   EXPECT_EQ(small.push(buffer_of(0, {Event::at(1, 2, 3, Polarity::on)}, 10 * ms)), GST_FLOW_ERROR);
-  const auto error = small.message(GST_MESSAGE_ERROR);
-  ASSERT_TRUE(error);
-  EXPECT_NE(text_of(error.get()).find("set mtu to at least 56"), std::string::npos);
+  EXPECT_NE(small.error().find("set mtu to at least 56"), std::string::npos);
 
   const std::string large = "application/x-event-camera, format=XYTP, width=2049, height=1";
   Harness evt3("rtpeventpay");
   evt3.caps(large, "application/x-rtp");
   EXPECT_EQ(evt3.push(buffer_of(0, {Event::at(1, 0, 3, Polarity::on)}, 10 * ms)),
             GST_FLOW_NOT_NEGOTIATED);
-  const auto refusal = evt3.message(GST_MESSAGE_ERROR);
-  ASSERT_TRUE(refusal);
-  EXPECT_NE(text_of(refusal.get()).find("format=XYTP"), std::string::npos);
+  EXPECT_NE(evt3.error().find("format=XYTP"), std::string::npos);
   Harness xytp("rtpeventpay format=XYTP");
   xytp.caps(large, "application/x-rtp");
   push(xytp, {0, 10'000'000, {Event::at(2048, 0, 3, Polarity::on)}});

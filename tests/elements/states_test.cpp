@@ -27,26 +27,16 @@ TEST_P(AllStates, AreReachedFromEachOther) {
 }
 
 TEST_P(EveryElement, PlaysAgainAfterAStop) {
-  gst_init(nullptr, nullptr);
-  const std::string launch =
+  Pipeline pipeline(
       "videotestsrc name=source pattern=ball num-buffers=6 ! video/x-raw,width=80,height=60 ! " +
-      with_upload(GetParam()) + " ! fakesink name=sink signal-handoffs=true";
-  Owned<GstElement> pipeline(gst_parse_launch(launch.c_str(), nullptr));
-  ASSERT_TRUE(pipeline);
+      with_upload(GetParam()) + " ! fakesink name=sink signal-handoffs=true");
   int buffers = 0;
-  Owned<GstElement> sink(gst_bin_get_by_name(GST_BIN(pipeline.get()), "sink"));
-  g_signal_connect(sink.get(), "handoff",
+  g_signal_connect(pipeline["sink"], "handoff",
                    G_CALLBACK(+[](GstElement*, GstBuffer*, GstPad*, int* count) { ++*count; }),
                    &buffers);
-  Owned<GstBus> bus(gst_element_get_bus(pipeline.get()));
   for (int times = 1; times <= 3; ++times) {
-    gst_element_set_state(pipeline.get(), GST_STATE_PLAYING);
-    Owned<GstMessage> message(gst_bus_timed_pop_filtered(
-        bus.get(), 20 * GST_SECOND,
-        static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
-    ASSERT_TRUE(message);
-    EXPECT_EQ(GST_MESSAGE_TYPE(message.get()), GST_MESSAGE_EOS);
-    gst_element_set_state(pipeline.get(), GST_STATE_NULL);
+    ASSERT_TRUE(pipeline.play()) << pipeline.error;
+    pipeline.set(GST_STATE_NULL);
     EXPECT_EQ(buffers, 5 * times);
   }
 }
@@ -56,9 +46,7 @@ TEST_P(EveryElement, IsFreedWhileInUse) {
     bool freed = false;
     {
       Harness h(GetParam());
-      g_object_weak_ref(
-          G_OBJECT(h.element()),
-          +[](gpointer was_freed, GObject*) { *static_cast<bool*>(was_freed) = true; }, &freed);
+      tell_when_freed(h.element(), freed);
       h.caps("video/x-raw, format=GRAY8, width=32, height=24, framerate=25/1");
       for (int i = 0; i < frames; ++i) h.push(h.flat(i * 40 * GST_MSECOND, 60 * i));
     }

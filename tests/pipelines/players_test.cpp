@@ -128,28 +128,15 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_P(EveryDecodebin, DrawsTheWholeFile) {
   const auto& [bin, file] = GetParam();
-  gst_init(nullptr, nullptr);
-  GError* error = nullptr;
-  const auto launch = "filesrc location=" + in_quotes(file.path()) + " ! " + bin +
-                      " ! video/x-raw ! fakesink name=sink signal-handoffs=true";
-  GstElement* pipeline = gst_parse_launch(launch.c_str(), &error);
-  ASSERT_EQ(error, nullptr) << error->message;
+  Pipeline pipeline("filesrc location=" + in_quotes(file.path()) + " ! " + bin +
+                    " ! video/x-raw ! fakesink name=sink signal-handoffs=true");
   std::atomic<int> pictures = 0;
-  GstElement* sink = gst_bin_get_by_name(GST_BIN(pipeline), "sink");
   g_signal_connect(
-      sink, "handoff",
+      pipeline["sink"], "handoff",
       G_CALLBACK(+[](GstElement*, GstBuffer*, GstPad*, std::atomic<int>* count) { ++*count; }),
       &pictures);
-  gst_object_unref(sink);
-  GstBus* bus = gst_element_get_bus(pipeline);
-  gst_element_set_state(pipeline, GST_STATE_PLAYING);
-  GstMessage* message = gst_bus_timed_pop_filtered(
-      bus, 20 * GST_SECOND, static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-  EXPECT_TRUE(message != nullptr && GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS);
-  if (message != nullptr) gst_message_unref(message);
-  gst_element_set_state(pipeline, GST_STATE_NULL);
-  gst_object_unref(bus);
-  gst_object_unref(pipeline);
+  EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  pipeline.set(GST_STATE_NULL);
   EXPECT_EQ(pictures, length / 1'000'000 * 30);
 }
 
