@@ -57,9 +57,10 @@ class Pipeline {
 
   /// An element, valid as long as the pipeline.
   GstElement* operator[](const char* name) const {
-    const harness::Owned<GstElement> element(gst_bin_get_by_name(GST_BIN(get()), name));
-    EXPECT_TRUE(element) << name;
-    return element.get();
+    GstElement* const element = gst_bin_get_by_name(GST_BIN(get()), name);
+    EXPECT_NE(element, nullptr) << name;
+    gst_object_unref(element);
+    return element;
   }
 
   /// Does not wait.
