@@ -392,10 +392,14 @@ std::optional<RecordingReader::Output> RecordingReader::next_output() {
 
 /// Triggers or IMU samples before `end`, in time since the origin.
 std::optional<RecordingReader::Output> RecordingReader::next_accompanying(Microseconds end) {
-  if (const auto triggers = taken_before(end, triggers_); !triggers.empty())
+  if (const auto triggers = taken_before(end, triggers_); !triggers.empty()) {
+    counts_.triggers += triggers.size();
     return TriggerItem{0, triggers};
-  if (const auto samples = taken_before(end, imu_samples_); !samples.empty())
+  }
+  if (const auto samples = taken_before(end, imu_samples_); !samples.empty()) {
+    counts_.imu_samples += samples.size();
     return ImuItem{0, samples};
+  }
   return std::nullopt;
 }
 
@@ -466,13 +470,11 @@ void RecordingReader::take(const FrameItem& item) {
 }
 
 void RecordingReader::take(const TriggerItem& item) {
-  counts_.triggers += item.triggers.size();
-  triggers_.push(item.triggers);
+  counts_.stray += triggers_.push(item.triggers);
 }
 
 void RecordingReader::take(const ImuItem& item) {
-  counts_.imu_samples += item.samples.size();
-  imu_samples_.push(item.samples);
+  counts_.stray += imu_samples_.push(item.samples);
 }
 
 /// Shifts the clock of words to that of their interval. If the two differ only by wraps of the

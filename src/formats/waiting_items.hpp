@@ -17,11 +17,13 @@ namespace eventcamera {
 template <class Item>
 class WaitingItems {
  public:
-  /// Drops items at an erroneous time.
-  void push(std::span<const Item> items) {
+  /// Drops items at an erroneous time, and returns their number.
+  std::size_t push(std::span<const Item> items) {
+    const auto before = waiting_.size();
     std::ranges::copy_if(items, std::back_inserter(waiting_), [](const Item& item) {
       return item.t >= -Chunker::max_time && item.t <= Chunker::max_time;
     });
+    return before + items.size() - waiting_.size();
   }
 
   /// Removes and returns the items before `end`, sorted by time; all items if too many wait. Valid

@@ -325,6 +325,7 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   sought.starts = 1;
   sought.take_all(reader);
   ASSERT_EQ(sought.triggers.size(), 4U);
+  EXPECT_EQ(reader.counts().triggers, 4U);
   for (const auto& trigger : sought.triggers) {
     EXPECT_GE(trigger.t, 3'700'000);
     EXPECT_LT(trigger.t, 3'900'000);
