@@ -4,15 +4,20 @@
  *
  *   event-convert recording.raw recording.dat
  *   event-convert --format=EVT2 recording.aedat4 recording.raw
+ *   event-convert --output-directory=texts --extension=csv *.raw
  */
+#define _XOPEN_SOURCE 700 /* for realpath() */
 #include <errno.h>
 #include <gst/base/gsttypefindhelper.h>
 #include <gst/gst.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "crop.h"
 
 /* Texts are printed as they are: names are bytes, messages are UTF-8. g_print() would replace what
  * the locale lacks. */
@@ -79,6 +84,15 @@ static Option properties[] = {
     {"height", "files that may lack a sensor size", NULL},
 };
 
+/* What is converted, in seconds after the start of a recording. */
+static gdouble from_seconds;
+static gdouble to_seconds = G_MAXDOUBLE;
+static gchar* crop_text;
+static Region region;
+
+static gchar* output_directory;
+static gchar* output_extension;
+static gchar** files;
 static gboolean print_version;
 
 static const GOptionEntry options[] = {
@@ -94,6 +108,18 @@ static const GOptionEntry options[] = {
      "Width of the sensor, if IN does not state it", "PIXELS"},
     {"height", 0, 0, G_OPTION_ARG_STRING, &properties[5].value,
      "Height of the sensor, if IN does not state it", "PIXELS"},
+    {"from", 0, 0, G_OPTION_ARG_DOUBLE, &from_seconds,
+     "Leave out what is earlier, counted from the start of IN", "SECONDS"},
+    {"to", 0, 0, G_OPTION_ARG_DOUBLE, &to_seconds,
+     "Leave out what is at that time or later, counted from the start of IN", "SECONDS"},
+    {"crop", 0, 0, G_OPTION_ARG_STRING, &crop_text,
+     "Leave out events outside a region of the sensor, whose first pixel becomes (0, 0)",
+     "WIDTHxHEIGHT+X+Y"},
+    {"output-directory", 0, 0, G_OPTION_ARG_FILENAME, &output_directory,
+     "Convert each IN to a file of its name in this folder", "DIRECTORY"},
+    {"extension", 0, 0, G_OPTION_ARG_STRING, &output_extension,
+     "Extension of the files in the output directory, by default that of IN", "NAME"},
+    {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &files, NULL, NULL},
     {"version", 0, 0, G_OPTION_ARG_NONE, &print_version, "Print the version", NULL},
     G_OPTION_ENTRY_NULL,
 };
@@ -132,6 +158,10 @@ static gchar* help(void) {
   append_names(text, ".aedat4", "aedatmux", "compression");
   append_names(text, ".h5", "eventhdf5sink", "compression");
   append_names(text, "text and NumPy", "eventcsvdec", "time-unit");
+  g_string_append(text, "  --extension, all:");
+  for (gsize i = 0; i < G_N_ELEMENTS(formats); ++i)
+    if (formats[i].writer != NULL) g_string_append_printf(text, " %s", formats[i].extension + 1);
+  g_string_append_c(text, '\n');
   g_string_append(text, "\nExit status: 0 = converted, 1 = failed or interrupted, 2 = wrong usage");
   return g_string_free(text, FALSE);
 }
@@ -336,8 +366,8 @@ static GstStructure* stats_of(GstElement* pipeline, const char* name) {
   return stats;
 }
 
-/* Says what of IN is not in OUT. */
-static void print_left_out(GstElement* pipeline) {
+/* Says what of `in` is not in OUT. */
+static void print_left_out(const char* in, GstElement* pipeline) {
   static const struct {
     const char* field;
     const char* name;
@@ -354,7 +384,7 @@ static void print_left_out(GstElement* pipeline) {
       g_string_append_printf(text, "%s%" G_GUINT64_FORMAT " %s", text->len > 0 ? ", " : "",
                              of_in - of_out, kinds[i].name);
   }
-  if (text->len > 0) PRINT_ERROR("left out: %s\n", text->str);
+  if (text->len > 0) PRINT_ERROR("%s: left out: %s\n", in, text->str);
   g_string_free(text, TRUE);
   gst_structure_free(written);
   gst_structure_free(read);
@@ -363,9 +393,34 @@ static void print_left_out(GstElement* pipeline) {
 /* Runs in the streaming thread, while the main thread prints. */
 static GstPadProbeReturn count_events(GstPad* pad, GstPadProbeInfo* info, gpointer events) {
   (void)pad;
-  __atomic_add_fetch((guint64*)events, gst_buffer_get_size(GST_PAD_PROBE_INFO_BUFFER(info)) / 8,
-                     __ATOMIC_RELAXED);
+  if ((info->type & GST_PAD_PROBE_TYPE_BUFFER) != 0)
+    __atomic_add_fetch((guint64*)events, gst_buffer_get_size(GST_PAD_PROBE_INFO_BUFFER(info)) / 8,
+                       __ATOMIC_RELAXED);
+  else if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_FLUSH_STOP)
+    __atomic_store_n((guint64*)events, 0, __ATOMIC_RELAXED); /* the file starts over */
   return GST_PAD_PROBE_OK;
+}
+
+/* Time of a pipeline at an option's seconds. */
+static gint64 nanoseconds(gdouble seconds) {
+  return (gint64)(seconds * GST_SECOND + 0.5);
+}
+
+/* True if only a part of the time is converted. */
+static gboolean is_trimmed(void) {
+  return from_seconds > 0 || to_seconds < G_MAXDOUBLE;
+}
+
+/* Makes the reader start over at the first time, and end at the last. */
+static gboolean trim(GstElement* pipeline) {
+  const gboolean ends = to_seconds < G_MAXDOUBLE;
+  GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
+  const gboolean ok = gst_element_seek(
+      reader, 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE, GST_SEEK_TYPE_SET,
+      nanoseconds(from_seconds), ends ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
+      ends ? nanoseconds(to_seconds) : -1);
+  gst_object_unref(reader);
+  return ok;
 }
 
 /* Prints a bar that is overwritten on a terminal, or one line per second elsewhere. */
@@ -373,11 +428,14 @@ static void print_progress(GstElement* pipeline, guint64 events) {
   static const char full[] = "########################################";
   gint64 position = 0;
   gint64 duration = 0;
+  gdouble end;
   gdouble share;
   if (!gst_element_query_position(pipeline, GST_FORMAT_TIME, &position) ||
       !gst_element_query_duration(pipeline, GST_FORMAT_TIME, &duration) || duration <= 0)
     return;
-  share = CLAMP((gdouble)position / (gdouble)duration, 0.0, 1.0);
+  end = MIN((gdouble)duration, to_seconds * GST_SECOND);
+  share = ((gdouble)position - from_seconds * GST_SECOND) / (end - from_seconds * GST_SECOND);
+  share = CLAMP(share, 0.0, 1.0);
   if (isatty(STDERR_FILENO))
     PRINT_ERROR("\r[%-40.*s] %3.0f %%, %" G_GUINT64_FORMAT " events", (int)(40 * share), full,
                 100 * share, events);
@@ -390,7 +448,7 @@ static void clear_progress(void) {
 }
 
 /* Prints an error or a warning with its cause: the debug text, after the code location. */
-static void print_message(GstMessage* message) {
+static void print_message(const char* in, GstMessage* message) {
   const gboolean fatal = GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR;
   GError* error = NULL;
   gchar* debug = NULL;
@@ -400,7 +458,7 @@ static void print_message(GstMessage* message) {
   else
     gst_message_parse_warning(message, &error, &debug);
   clear_progress();
-  PRINT_ERROR("%s: %s\n", fatal ? "error" : "warning", error->message);
+  PRINT_ERROR("%s: %s: %s\n", in, fatal ? "error" : "warning", error->message);
   cause = debug != NULL ? strchr(debug, '\n') : NULL;
   if (cause != NULL && cause[1] != '\0') PRINT_ERROR("  %s\n", cause + 1);
   g_free(debug);
@@ -416,30 +474,44 @@ static void interrupt(int number) {
 }
 
 /* Runs until the file is written. FALSE on failure. */
-static gboolean run(GstElement* pipeline, const guint64* events) {
+static gboolean run(const char* in, GstElement* pipeline, const guint64* events) {
   GstBus* bus = gst_element_get_bus(pipeline);
+  gboolean trimming = is_trimmed();
   gboolean ended = FALSE;
   gboolean ending = FALSE;
   gboolean ok = TRUE;
-  gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  gst_element_set_state(pipeline, trimming ? GST_STATE_PAUSED : GST_STATE_PLAYING);
   while (!ended) {
-    if (interrupted && !ending) {
+    if (interrupted && !ending && !trimming) {
       ending = TRUE;
       gst_element_send_event(pipeline, gst_event_new_eos());
     }
     GstMessage* message = gst_bus_timed_pop_filtered(
-        bus, GST_SECOND, GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING);
+        bus, GST_SECOND,
+        GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING | GST_MESSAGE_ASYNC_DONE);
     if (message == NULL) {
       print_progress(pipeline, __atomic_load_n(events, __ATOMIC_RELAXED));
       continue;
     }
+    if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_ASYNC_DONE) {
+      gst_message_unref(message);
+      if (!trimming) continue;
+      trimming = FALSE;
+      if (!trim(pipeline)) {
+        PRINT_ERROR("%s cannot be sought, so --from and --to do not apply\n", in);
+        ok = FALSE;
+        break;
+      }
+      gst_element_set_state(pipeline, GST_STATE_PLAYING);
+      continue;
+    }
     ended = GST_MESSAGE_TYPE(message) != GST_MESSAGE_WARNING;
     ok = GST_MESSAGE_TYPE(message) != GST_MESSAGE_ERROR;
-    if (GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS) print_message(message);
+    if (GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS) print_message(in, message);
     gst_message_unref(message);
   }
   clear_progress();
-  if (ok) print_left_out(pipeline);
+  if (ok) print_left_out(in, pipeline);
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(bus);
   return ok;
@@ -460,18 +532,158 @@ static gboolean finish(const char* part, const char* path, gboolean ok) {
   return ok && !interrupted;
 }
 
-int main(int argc, char** argv) {
-  const Reader* from;
-  const Format* to;
-  GOptionContext* context;
-  GstElement* pipeline;
+/* OUT, or what it links to, so that the link stays. NULL if that is missing. */
+static gchar* target_of(const char* path) {
+  gchar* target;
+  if (!g_file_test(path, G_FILE_TEST_IS_SYMLINK)) return g_strdup(path);
+  target = realpath(path, NULL);
+  if (target == NULL) PRINT_ERROR("%s: what it links to: %s\n", path, g_strerror(errno));
+  return target;
+}
+
+/* A pipeline that reads `in` and writes `part`, and counts its events. NULL, and the exit status,
+ * on failure. */
+static GstElement* make_pipeline(const char* in, const Reader* from, const char* part,
+                                 const Format* to, guint64* events, int* status) {
+  GError* error = NULL;
   GstElement* queue;
   GstPad* pad;
-  GError* error = NULL;
-  gchar* text;
-  gchar* line;
-  gchar* part;
+  gchar* line =
+      g_strdup_printf("filesrc name=in ! %s ! queue name=events ! %s", from->element, to->writer);
+  GstElement* pipeline = gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
+  g_free(line);
+  if (pipeline == NULL) {
+    PRINT_ERROR("%s\n", error->message);
+    g_clear_error(&error);
+    *status = 1;
+    return NULL;
+  }
+  if (!set_options(pipeline)) {
+    gst_object_unref(pipeline);
+    *status = 2;
+    return NULL;
+  }
+  set_location(pipeline, "in", in);
+  set_location(pipeline, "out", part);
+  queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
+  pad = gst_element_get_static_pad(queue, "src");
+  if (crop_text != NULL) crop_events(pad, &region);
+  gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_FLUSH, count_events,
+                    events, NULL);
+  gst_object_unref(pad);
+  /* Frames are not cropped, so they would not match the events. */
+  if (crop_text == NULL && strcmp(from->media_type, "application/x-aedat") == 0 &&
+      strcmp(to->media_type, from->media_type) == 0)
+    convert_frames(pipeline, queue);
+  gst_object_unref(queue);
+  return pipeline;
+}
+
+/* Returns the exit status. */
+static int write_file(const char* in, const Reader* from, const char* path, const Format* to) {
   guint64 events = 0;
+  int status = 0;
+  gchar* part = unfinished(path);
+  GstElement* pipeline = make_pipeline(in, from, part, to, &events, &status);
+  if (pipeline != NULL) {
+    gboolean ok = run(in, pipeline, &events);
+    gst_object_unref(pipeline);
+    ok = finish(part, path, ok);
+    if (ok) printf("%" G_GUINT64_FORMAT " events from %s to %s\n", events, in, path);
+    status = ok ? 0 : 1;
+  }
+  g_free(part);
+  return status;
+}
+
+/* Returns the exit status. */
+static int convert(const char* in, const char* out) {
+  const Format* to = format_of(out);
+  const Reader* from;
+  gchar* path;
+  int status;
+  if (!can_write(out, to)) return 2;
+  from = find_reader(in);
+  if (from == NULL) return 1;
+  if (!options_apply(to)) return 2;
+  if (same_file(in, out)) {
+    PRINT_ERROR("%s and %s are the same file\n", in, out);
+    return 2;
+  }
+  path = target_of(out);
+  if (path == NULL) return 1;
+  status = write_file(in, from, path, to);
+  g_free(path);
+  return status;
+}
+
+/* Path of the converted file in the output directory. */
+static gchar* output_of(const char* in) {
+  gchar* name = g_path_get_basename(in);
+  gchar* dot = strrchr(name, '.');
+  gchar* path;
+  if (output_extension == NULL) {
+    path = g_build_filename(output_directory, name, NULL);
+  } else {
+    const int length = (int)(dot != NULL && dot != name ? dot - name : (gssize)strlen(name));
+    const char* extension = output_extension + (output_extension[0] == '.');
+    path = g_strdup_printf("%s/%.*s.%s", output_directory, length, name, extension);
+  }
+  g_free(name);
+  return path;
+}
+
+/* True if no two files would become the same. */
+static gboolean are_distinct(gchar** outputs) {
+  for (gsize i = 0; outputs[i] != NULL; ++i)
+    for (gsize j = 0; j < i; ++j)
+      if (strcmp(outputs[i], outputs[j]) == 0) {
+        PRINT_ERROR("%s and %s would both become %s\n", files[j], files[i], outputs[i]);
+        return FALSE;
+      }
+  return TRUE;
+}
+
+/* Converts each file; a failure does not stop the others. Returns the exit status. */
+static int convert_all(void) {
+  gchar** outputs = g_new0(gchar*, g_strv_length(files) + 1);
+  int status = 0;
+  for (gsize i = 0; files[i] != NULL; ++i) outputs[i] = output_of(files[i]);
+  if (!are_distinct(outputs)) {
+    status = 2;
+  } else if (g_mkdir_with_parents(output_directory, 0777) != 0) {
+    PRINT_ERROR("%s: %s\n", output_directory, g_strerror(errno));
+    status = 1;
+  } else {
+    for (gsize i = 0; status < 2 && files[i] != NULL && !interrupted; ++i) {
+      const int outcome = convert(files[i], outputs[i]);
+      status = MAX(status, outcome);
+    }
+  }
+  g_strfreev(outputs);
+  return status;
+}
+
+/* What is wrong with the options and the names of files, or NULL. */
+static const char* misuse(void) {
+  const guint count = files != NULL ? g_strv_length(files) : 0;
+  if (output_directory == NULL && count != 2) return "needs IN and OUT";
+  if (output_directory != NULL && count == 0) return "needs IN";
+  if (output_directory == NULL && output_extension != NULL)
+    return "--extension needs --output-directory";
+  if (!(from_seconds >= 0 && from_seconds < to_seconds && from_seconds < 1e9))
+    return "--from must be at least 0 and less than --to";
+  if (to_seconds < G_MAXDOUBLE && to_seconds >= 1e9) return "--to must be less than 1e9";
+  if (crop_text != NULL && !region_from_text(&region, crop_text))
+    return "--crop needs WIDTHxHEIGHT+X+Y, such as 320x240+100+50";
+  return NULL;
+}
+
+int main(int argc, char** argv) {
+  GOptionContext* context;
+  GError* error = NULL;
+  const char* wrong;
+  gchar* text;
   gboolean ok;
 
   gst_init(&argc, &argv);
@@ -486,51 +698,13 @@ int main(int argc, char** argv) {
     printf("event-convert %s\n", PACKAGE_VERSION);
     return 0;
   }
-  if (!ok || argc != 3) {
-    PRINT_ERROR("%s; see %s --help\n", ok ? "needs IN and OUT" : error->message, g_get_prgname());
+  wrong = ok ? misuse() : error->message;
+  if (wrong != NULL) {
+    PRINT_ERROR("%s; see %s --help\n", wrong, g_get_prgname());
     g_clear_error(&error);
     return 2;
   }
   if (!find_plugin()) return 1;
-  to = format_of(argv[2]);
-  if (!can_write(argv[2], to)) return 2;
-  from = find_reader(argv[1]);
-  if (from == NULL) return 1;
-  if (!options_apply(to)) return 2;
-  if (same_file(argv[1], argv[2])) {
-    PRINT_ERROR("%s and %s are the same file\n", argv[1], argv[2]);
-    return 2;
-  }
-  line =
-      g_strdup_printf("filesrc name=in ! %s ! queue name=events ! %s", from->element, to->writer);
-  pipeline = gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
-  g_free(line);
-  if (pipeline == NULL) {
-    PRINT_ERROR("%s\n", error->message);
-    g_clear_error(&error);
-    return 1;
-  }
-  if (!set_options(pipeline)) {
-    gst_object_unref(pipeline);
-    return 2;
-  }
-  set_location(pipeline, "in", argv[1]);
-  part = unfinished(argv[2]);
-  set_location(pipeline, "out", part);
-  queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
-  pad = gst_element_get_static_pad(queue, "src");
-  gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_BUFFER, count_events, &events, NULL);
-  gst_object_unref(pad);
-  if (strcmp(from->media_type, "application/x-aedat") == 0 &&
-      strcmp(to->media_type, from->media_type) == 0)
-    convert_frames(pipeline, queue);
-  gst_object_unref(queue);
-
   signal(SIGINT, interrupt);
-  ok = run(pipeline, &events);
-  gst_object_unref(pipeline);
-  ok = finish(part, argv[2], ok);
-  g_free(part);
-  if (ok) printf("%" G_GUINT64_FORMAT " events from %s to %s\n", events, argv[1], argv[2]);
-  return ok ? 0 : 1;
+  return output_directory != NULL ? convert_all() : convert(files[0], files[1]);
 }

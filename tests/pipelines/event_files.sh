@@ -189,7 +189,7 @@ done
 # Frames come along where they can; what is left out is said.
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=framed.aedat4
 convert framed.aedat4 framed.csv 2>left-out
-grep -qx "left out: 40 frames" left-out || fail "frames are left out: $(cat left-out)"
+grep -q ": left out: 40 frames$" left-out || fail "frames are left out: $(cat left-out)"
 convert framed.aedat4 again.aedat4 2>left-out
 if grep "left out" left-out; then fail "frames are left out of an AEDAT 4 file"; fi
 for file in framed.aedat4 again.aedat4; do
@@ -199,6 +199,53 @@ cmp framed.aedat4.frames again.aedat4.frames || fail "again.aedat4 has other fra
 convert again.aedat4 again.csv
 cmp framed.csv again.csv || fail "again.aedat4 has other events"
 
+# Parts of a recording: from 0.5 s after its first event to before 1 s.
+awk -F, 'NR == 2 { start = $1 } NR == 1 || ($1 >= start + 500000 && $1 < start + 1000000)' ball.csv >expected.csv
+[ "$(wc -l <expected.csv)" -gt 10000 ] || fail "the part has $(wc -l <expected.csv) lines"
+for ending in "${!types[@]}"; do
+  convert --from=0.5 --to=1 "ball.$ending" "part.$ending" 2>left-out
+  if grep "left out" left-out; then fail "something of a part is left out"; fi
+  convert "part.$ending" part-back.csv
+  cmp expected.csv part-back.csv || fail "a part of ball.$ending has other events"
+done
+convert --from=0.5 --to=1 framed.aedat4 part-framed.aedat4 2>left-out
+if grep "left out" left-out; then fail "frames of a part are left out"; fi
+timeout 60 "$GST_LAUNCH" -q filesrc location=part-framed.aedat4 ! aedatdemux name=d  d.video_0 ! queue ! filesink location=part.frames
+[ "$(stat -c %s part.frames)" -eq $((12 * 320 * 240)) ] || fail "$(stat -c %s part.frames) bytes of 12 frames"
+
+# A region of the sensor, which becomes the sensor.
+awk -F, 'NR == 1 || ($2 >= 50 && $2 < 150 && $3 >= 60 && $3 < 140) { if (NR > 1) { $2 -= 50; $3 -= 60 } print }' OFS=, ball.csv >expected.csv
+[ "$(wc -l <expected.csv)" -gt 1000 ] || fail "the region has $(wc -l <expected.csv) lines"
+convert --crop=100x80+50+60 ball.raw region.raw
+grep -aq "geometry 100x80" region.raw || fail "the size is not that of the region: $(grep -a geometry region.raw)"
+convert region.raw region.csv
+cmp expected.csv region.csv || fail "region.raw has other events"
+convert --crop=100x80+50+60 framed.aedat4 region.aedat4 2>left-out
+grep -q ": left out: 40 frames$" left-out || fail "frames are cropped: $(cat left-out)"
+
+# Several files, to a directory that is made.
+mkdir inputs
+cp ball.raw inputs/a.raw
+cp ball.dat inputs/b.dat
+convert --output-directory=some/outputs --extension=csv inputs/*
+for name in a b; do cmp ball.csv some/outputs/$name.csv || fail "$name.csv has other events"; done
+convert --to=1 --output-directory=some inputs/*
+[ "$(stat -c %s some/a.raw)" -lt "$(stat -c %s ball.raw)" ] || fail "a.raw is whole"
+[ -s some/b.dat ] || fail "there is no b.dat"
+if convert --output-directory=others --extension=.csv inputs/a.raw nowhere.raw inputs/b.dat; then fail "nowhere.raw was converted"; fi
+cmp ball.csv others/b.csv || fail "b.dat was not converted after a failure"
+
+# Names that begin with a dash, and links, which stay.
+cp ball.raw ./-ball.raw
+convert -- -ball.raw -ball.csv
+cmp ball.csv ./-ball.csv || fail "-ball.csv has other events"
+mkdir elsewhere
+echo old >elsewhere/target
+ln -s elsewhere/target link.csv
+convert ball.raw link.csv
+[ -L link.csv ] || fail "the link is replaced"
+cmp ball.csv elsewhere/target || fail "the file that the link points to has other events"
+
 # Errors say what is wrong.
 refused() { # WORDS ARGUMENT...
   local words=$1
@@ -207,12 +254,22 @@ refused() { # WORDS ARGUMENT...
   cat errors
   grep -q -e "$words" errors || fail "the error does not say \"$words\""
 }
-refused "Cannot read" words.txt words.raw
+refused "words.txt: error: Cannot read" words.txt words.raw
 cp words.txt words.raw
 refused "Cannot read" words.raw out.dat
 refused "unknown extension" ball.raw ball.mp3
 GST_PLUGIN_PATH= GST_PLUGIN_SYSTEM_PATH=/nowhere GST_REGISTRY=none.bin \
   refused "plugin eventcam.*meson devenv -C build -w \\." ball.raw out.dat
+ln -s nowhere.dat broken.dat
+refused "broken.dat: what it links to: No such file" ball.raw broken.dat
+refused "needs IN and OUT" ball.raw ball.dat ball.es
+refused "needs --output-directory" --extension=dat ball.raw ball.es
+refused "ball.raw and ball.csv would both become outputs/ball.dat" --output-directory=outputs --extension=dat ball.raw ball.csv
+refused "the same file" --output-directory=. ball.raw
+refused "less than --to" --from=2 --to=1 ball.raw out.dat
+refused "less than --to" --from=-1 ball.raw out.dat
+refused "needs WIDTHxHEIGHT" --crop=100x80 ball.raw out.dat
+refused "region 100x80+250+60 is not within the sensor" --crop=100x80+250+60 ball.raw out.dat
 refused "choose one of EVT2 EVT21 EVT2.1 EVT3 EVT4" ball.raw other.raw --format=EVT5
 refused "does not apply to .dat" ball.raw ball.dat --format=rpg
 refused "can only be read" ball.raw ball.aedat
@@ -294,7 +351,7 @@ for ending in aedat4 h5 hdf5; do
 done
 davis=$recordings/davis346-frames-events-imu.aedat4
 counted 117667 "$davis" 2>left-out
-grep -qx "left out: 3 frames, 15 triggers, 130 IMU samples" left-out || fail "the user is told: $(cat left-out)"
+grep -q ": left out: 3 frames, 15 triggers, 130 IMU samples$" left-out || fail "the user is told: $(cat left-out)"
 
 # Triggers, frames and IMU samples come along where both formats have them.
 complete() { # IN OUT
@@ -308,11 +365,11 @@ complete "$davis" davis.aedat4
 complete davis.aedat4 davis-again.aedat4
 cmp davis.aedat4 davis-again.aedat4 || fail "the copy of a copy is another file"
 convert "$davis" davis.raw 2>left-out
-grep -qx "left out: 3 frames, 130 IMU samples" left-out || fail "the user is told: $(cat left-out)"
+grep -q ": left out: 3 frames, 130 IMU samples$" left-out || fail "the user is told: $(cat left-out)"
 complete davis.raw davis-events.aedat4
 convert "$recordings/evt3-640x480-triggers.raw" triggers.h5 2>left-out
-grep -qx "left out: [0-9]* triggers" left-out || fail "the user is told: $(cat left-out)"
-/usr/bin/python3 - triggers.hdf5 triggers-again.hdf5 "$(grep -o "[0-9]*" left-out)" <<'PYTHON'
+grep -q ": left out: [0-9]* triggers$" left-out || fail "the user is told: $(cat left-out)"
+/usr/bin/python3 - triggers.hdf5 triggers-again.hdf5 "$(sed "s/.*left out: \\([0-9]*\\).*/\\1/" left-out)" <<'PYTHON'
 import sys
 
 import h5py

@@ -86,5 +86,11 @@ done
 completed event-convert --format EVT21 | grep -qx EVT21
 completed event-convert --compression = zstd-h | grep -qx zstd-high
 completed event-convert -f v | grep -qx v2e
+completed event-convert --extension = h | grep -qx hdf5
+completed event-convert --output-directory "$root/us" | grep -qx "$root/usr"
+# Its manual lists the formats.
+for format in $("$root/usr/bin/event-convert" --help | sed -n 's/^  --format, .raw: //p'); do
+  grep -qF "$format" "$root/usr/share/man/man1/event-convert.1"
+done
 completed event-calibrate --element eventsim-de | grep -qx eventsim-dense
 "$root/count_events" "videotestsrc num-buffers=5 pattern=ball ! eventsim-frame ! appsink name=events"
