@@ -26,7 +26,22 @@ def option_parser(program, description, address, port):
                         help="IP address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=port_number, default=port,
                         help="0 = any that is free (default: %(default)s)")
+    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
+                        help="print the version and exit")
     return parser
+
+
+def find_elements(names, packages):
+    """Raises RuntimeError if GStreamer lacks a plugin of this project, or one of these elements, which
+    are in these Debian packages."""
+    for plugin in ("eventcam", "eventsim"):
+        if not Gst.Registry.get().find_plugin(plugin):
+            raise RuntimeError(
+                f"GStreamer does not find the plugin {plugin}. In a checkout, enter the development shell:"
+                " meson devenv -C build -w .\nOtherwise install it: the Debian package"
+                f" gstreamer1.0-{plugin}, or as root: meson install -C build")
+    if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
+        raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, install: {packages}")
 
 
 def port_number(text):

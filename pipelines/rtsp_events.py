@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Serves over RTSP the events of a camera, and what it sees, to any number of clients, until Ctrl-C:
 
@@ -19,11 +19,12 @@ try:
     gi.require_version("GstRtspServer", "1.0")
     from gi.repository import Gio, GLib, Gst, GstRtsp, GstRtspServer
 except (ImportError, ValueError) as missing:
-    sys.exit(f"error: {missing}\nOn Debian, run: ./install-packages run rtsp")
+    sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
+             " gir1.2-gst-rtsp-server-1.0")
 
-from capture import Capture, host_of, option_parser  # noqa: E402
+from capture import Capture, find_elements, host_of, option_parser  # noqa: E402
 
-ELEMENTS = ["rtpeventpay", "vp8enc", "rtpvp8pay"]
+ELEMENTS = ["vp8enc", "rtpvp8pay"]
 
 # Media that are too slow leave frames out.
 FRAMES = "appsrc name=frames is-live=true format=time"
@@ -107,9 +108,7 @@ def main():
     if (chosen.user is None) != (chosen.password is None):
         parser.error("--user and --password need each other")
     Gst.init(None)
-    missing = [name for name in ELEMENTS if not Gst.ElementFactory.find(name)]
-    if missing:
-        raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, run: ./install-packages run rtsp")
+    find_elements(ELEMENTS, "gstreamer1.0-plugins-good")
     server = Server(chosen.device, chosen.simulator)
     if chosen.user or chosen.certificate:
         server.protect(chosen.user, chosen.password, chosen.certificate)

@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Serves a page that shows the events of a camera live, with the event rate beside them; any number
 of browsers can watch. Ctrl-C ends it.
@@ -22,12 +22,13 @@ try:
     gi.require_version("Soup", "3.0")
     from gi.repository import Gio, GLib, Gst, GstSdp, GstVideo, GstWebRTC, Soup
 except (ImportError, ValueError) as missing:
-    sys.exit(f"error: {missing}\nOn Debian, run: ./install-packages run web")
+    sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
+             " gir1.2-gst-plugins-bad-1.0 gir1.2-soup-3.0")
 
-from capture import Capture, host_of, option_parser  # noqa: E402
+from capture import Capture, find_elements, host_of, option_parser  # noqa: E402
 
 PAGE = os.path.join(os.path.dirname(os.path.realpath(__file__)), "web_events.html")
-ELEMENTS = ["eventstats", "eventrender", "vp8enc", "rtpvp8pay", "webrtcbin", "nicesink", "dtlssrtpenc"]
+ELEMENTS = ["vp8enc", "rtpvp8pay", "webrtcbin", "nicesink", "dtlssrtpenc"]
 
 DRAW_AND_ENCODE = (
     "{simulator} ! application/x-event-camera ! eventstats interval=500000000 ! eventrender"
@@ -241,9 +242,7 @@ class Server:
 def main():
     chosen = option_parser("web-events", __doc__, "127.0.0.1", 8080).parse_args()
     Gst.init(None)
-    missing = [name for name in ELEMENTS if not Gst.ElementFactory.find(name)]
-    if missing:
-        raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, run: ./install-packages run web")
+    find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice")
     Server(chosen.device, chosen.simulator).run(chosen.address, chosen.port)
 
 

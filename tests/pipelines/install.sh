@@ -67,11 +67,11 @@ completed() { # PROGRAM WORD...
   (
     source "$root/usr/share/bash-completion/completions/$1"
     COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
-    "_${1//-/_}" "$1"
+    "$(complete -p "$1" | sed 's/.*-F \([^ ]*\) .*/\1/')" "$1"
     printf '%s\n' "${COMPREPLY[@]}"
   )
 }
-for program in event-convert event-calibrate; do
+for program in event-convert event-calibrate web-events rtsp-events virtual-camera; do
   "$root/usr/bin/$program" --help >"$root/help"
   grep -qi "^usage" "$root/help"
   [[ $(GST_PLUGIN_PATH= GST_REGISTRY=$root/none.bin "$root/usr/bin/$program" --version) =~ ^$program\ [0-9]+\.[0-9]+\.[0-9]+$ ]]
@@ -93,4 +93,12 @@ for format in $("$root/usr/bin/event-convert" --help | sed -n 's/^  --format, .r
   grep -qF "$format" "$root/usr/share/man/man1/event-convert.1"
 done
 completed event-calibrate --element eventsim-de | grep -qx eventsim-dense
+completed rtsp-events --simulator eventsim-de | grep -qx eventsim-dense
+touch "$root/camera0"
+completed web-events --device "$root/cam" | grep -qx "$root/camera0"
+# The servers find what they are made of.
+for program in web-events rtsp-events; do
+  timeout --preserve-status --signal INT 5 "$root/usr/bin/$program" --port 0 | tee "$root/served"
+  grep -q "until Ctrl-C" "$root/served"
+done
 "$root/count_events" "videotestsrc num-buffers=5 pattern=ball ! eventsim-frame ! appsink name=events"

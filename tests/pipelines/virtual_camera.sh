@@ -22,13 +22,12 @@ start() { # PROGRAM ARGUMENT...
   started+=($!)
 }
 unset G_DEBUG # warnings of daemons about the machine do not matter
-export MESON_DEVENV=1
 start pipewire
 wait_for test -S run/pipewire-0
 start wireplumber
 wait_for sh -c 'pw-cli ls Client | grep WirePlumber'
 # Pictures come late, as the first one of a webcam does.
-start "$SOURCE/pipelines/virtual-camera" --simulator "eventsim-diff palette=light ! identity sleep-time=200000"
+start "$BUILD/pipelines/virtual-camera" --simulator "eventsim-diff palette=light ! identity sleep-time=200000"
 wait_for sh -c 'pw-cli ls Node | grep "node.description = \"Event camera\""'
 pw-cli ls Node | grep -A1 'node.name = "event-camera"' | grep -q 'media.class = "Video/Source"' || fail "it is not a camera"
 timeout 60 "$GST_LAUNCH" -q pipewiresrc target-object=event-camera num-buffers=10 ! videoconvert ! \
@@ -37,5 +36,7 @@ timeout 60 "$GST_LAUNCH" -q pipewiresrc target-object=event-camera num-buffers=1
 # The ball moves on a white background.
 [ "$(tail -c $((320 * 240)) pictures | od -An -v -tu1 -w1 | sort -u | wc -l)" -gt 2 ] || fail "the last picture is empty"
 
-if "$SOURCE/pipelines/virtual-camera" --device 2>usage; then fail "--device needs a value"; fi
+if "$BUILD/pipelines/virtual-camera" --device 2>usage; then fail "--device needs a value"; fi
 grep -q -- "--device DEVICE" usage || fail "the usage is $(cat usage)"
+if GST_PLUGIN_PATH= GST_REGISTRY=$work/none.bin "$BUILD/pipelines/virtual-camera" 2>missing; then fail "there are no simulators"; fi
+grep -q "plugin eventsim.*meson devenv -C build -w \\." missing || fail "it says $(cat missing)"
