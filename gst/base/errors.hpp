@@ -49,6 +49,18 @@ inline void post_message(gpointer element, GstMessageType type, const Report& re
                            at.function, at.line);
 }
 
+/// Log level of a condition that tends to repeat: WARNING the first time, then LOG.
+class RepeatLevel {
+ public:
+  GstDebugLevel next() { return std::exchange(repeats_, true) ? GST_LEVEL_LOG : GST_LEVEL_WARNING; }
+
+  /// For a new stream: the next level is WARNING again.
+  void reset() { repeats_ = false; }
+
+ private:
+  bool repeats_ = false;
+};
+
 /// Posts a warning only the first time, and logs it every time. For conditions that tend to repeat.
 class WarnOnce {
  public:
@@ -56,18 +68,17 @@ class WarnOnce {
 
   void operator()(gpointer element, const Report& report, const std::string& cause,
                   CallSite at = CallSite()) {
-    if (std::exchange(posted_, true))
-      GST_CAT_WARNING_OBJECT(category_, element, "%s (%s)", report.text.c_str(), cause.c_str());
-    else
-      post_message(element, GST_MESSAGE_WARNING, report, cause, at);
+    const GstDebugLevel level = level_.next();
+    GST_CAT_LEVEL_LOG(category_, level, element, "%s (%s)", report.text.c_str(), cause.c_str());
+    if (level == GST_LEVEL_WARNING) post_message(element, GST_MESSAGE_WARNING, report, cause, at);
   }
 
   /// For a new stream: posts the next warning again.
-  void reset() { posted_ = false; }
+  void reset() { level_.reset(); }
 
  private:
   GstDebugCategory* category_;
-  bool posted_ = false;
+  RepeatLevel level_;
 };
 
 /// Runs `work` in a function called by GStreamer, which exceptions must not leave. An exception is
