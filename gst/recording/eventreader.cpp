@@ -803,7 +803,7 @@ ReaderPad& EventReader::pad_of(std::size_t index) {
   auto* const templ = gst_element_class_get_pad_template(
       GST_ELEMENT_GET_CLASS(element_),
       format_.has_many_streams ? (kind + std::string("%u")).c_str() : "src");
-  found = pads_.emplace_back(std::make_unique<ReaderPad>(templ, name)).get();
+  found = pads_.emplace_back(std::make_unique<ReaderPad>(templ, name, GST_CAT_DEFAULT)).get();
   gst_pad_set_event_function(
       found->get(), +[](GstPad* pad, GstObject* parent, GstEvent* event) {
         return reader_of(parent).src_event(pad, event);
@@ -1080,7 +1080,7 @@ GstClockTime EventReader::duration() {
 gboolean EventReader::src_query(GstPad* pad, GstQuery* query) {
   GstFormat format = GST_FORMAT_UNDEFINED;
   if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(sink_, query, buffer_duration()) ||
+    return answer_latency(GST_CAT_DEFAULT, sink_, query, buffer_duration()) ||
            gst_pad_query_default(pad, GST_OBJECT(element_), query);
   if (is_timed()) return gst_pad_query_default(pad, GST_OBJECT(element_), query);
   switch (GST_QUERY_TYPE(query)) {

@@ -13,8 +13,8 @@ GstEvent* with_seqnum(GstEvent* event, guint32 seqnum) {
   return event;
 }
 
-ReaderPad::ReaderPad(GstPadTemplate* templ, const std::string& name)
-    : pad_(gst_pad_new_from_template(templ, name.c_str())), name_(name) {
+ReaderPad::ReaderPad(GstPadTemplate* templ, const std::string& name, GstDebugCategory* category)
+    : pad_(gst_pad_new_from_template(templ, name.c_str())), name_(name), category_(category) {
   gst_object_ref_sink(pad_);
   gst_pad_use_fixed_caps(pad_);
 }
@@ -85,6 +85,7 @@ bool ReaderPad::send_caps(const GstVideoInfo& info) {
 }
 
 bool ReaderPad::push_caps(GstCaps* caps) {
+  GST_CAT_DEBUG_OBJECT(category_, pad_, "sending %" GST_PTR_FORMAT, caps);
   if (GstStream* const stream = gst_pad_get_stream(pad_)) {
     gst_stream_set_caps(stream, caps);
     gst_object_unref(stream);

@@ -14,8 +14,8 @@
 /// segment.
 class ReaderPad {
  public:
-  /// Creates the pad without adding it to an element.
-  ReaderPad(GstPadTemplate* templ, const std::string& name);
+  /// Creates the pad without adding it to an element. Logs in `category`.
+  ReaderPad(GstPadTemplate* templ, const std::string& name, GstDebugCategory* category);
   ~ReaderPad();
   ReaderPad(const ReaderPad&) = delete;
   ReaderPad& operator=(const ReaderPad&) = delete;
@@ -63,6 +63,7 @@ class ReaderPad {
 
   GstPad* pad_;
   std::string name_;
+  GstDebugCategory* category_;
   bool started_ = false;
   bool segment_due_ = true;
   bool discontinuous_ = true;

@@ -778,7 +778,7 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 
   const GstClockTime latency = priv_of(GST_EVENT_SIMULATOR(transform)).latency.lock()->total();
-  return answer_latency(GST_BASE_TRANSFORM_SINK_PAD(transform), query, latency);
+  return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query, latency);
 }
 
 static gboolean start(GstBaseTransform* transform) {

@@ -82,7 +82,7 @@ class RtpUnpacker {
 
   /// Count packets that were dropped before they came here: not plausible, or late.
   void count_rejected() { ++statistics_.rejected_packets; }
-  void count_late(std::uint64_t packets) { statistics_.late_packets += packets; }
+  void count_late() { ++statistics_.late_packets; }
 
   const RtpStatistics& statistics() const { return statistics_; }
 

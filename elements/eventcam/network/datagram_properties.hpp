@@ -32,6 +32,11 @@ inline GType datagram_format_type() {
   return enum_type("GstEventDatagramFormat", values);
 }
 
+inline const char* name_of(eventcamera::DatagramFormat format) {
+  auto* formats = static_cast<GEnumClass*>(g_type_class_peek(datagram_format_type()));
+  return g_enum_get_value(formats, static_cast<int>(format))->value_nick;
+}
+
 inline GType datagram_byte_order_type() {
   static const GEnumValue values[] = {
       {static_cast<int>(std::endian::little), "Little-endian, as AEStream on a PC",

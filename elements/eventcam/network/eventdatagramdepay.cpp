@@ -100,6 +100,7 @@ struct Private {
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
   WarnOnce warn_of_rejected{GST_CAT_DEFAULT};
+  RepeatLevel late_level;
 };
 
 }  // namespace
@@ -136,6 +137,7 @@ static bool push_caps(GstEventDatagramDepay* self) {
   auto& state = *self->priv->state;
   if (state.has_caps) return true;
   const OwnedCaps caps = event_caps(state.settings.width, state.settings.height);
+  GST_DEBUG_OBJECT(self, "the stream begins, with %" GST_PTR_FORMAT, caps.get());
   state.has_caps = gst_pad_push_event(self->priv->src, gst_event_new_caps(caps.get())) != FALSE;
   return state.has_caps;
 }
@@ -162,6 +164,10 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
   if (!push_caps(self))
     return GST_PAD_IS_FLUSHING(priv.src) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
   if (reception.restarted || !state.segment.continues(nanoseconds(first), arrival)) {
+    GST_DEBUG_OBJECT(
+        self, "the sender's %" GST_TIME_FORMAT " arrives at running time %" GST_TIME_FORMAT "%s",
+        GST_TIME_ARGS(nanoseconds(first)), GST_TIME_ARGS(arrival),
+        reception.restarted ? ": the sender starts over" : "");
     state.segment.begin(priv.src, state.segment_seqnum, nanoseconds(first), arrival,
                         nanoseconds(first));
     state.end = first;
@@ -175,6 +181,9 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
   }
   GstBuffer* const buffer = buffer_of(state.events, state.end, state.events.back().t);
   state.end = state.events.back().t;
+  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
+                 state.events.size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)),
+                 GST_TIME_ARGS(GST_BUFFER_DURATION(buffer)));
   state.segment.reach(nanoseconds(state.end));
   if (std::exchange(state.is_discontinuous, false))
     GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
@@ -183,14 +192,26 @@ static GstFlowReturn push(GstEventDatagramDepay* self, const Reception& receptio
 
 /* data */
 
-static void reject(GstEventDatagramDepay* self, const char* fault, gsize size) {
+static void reject(GstEventDatagramDepay* self, const char* fault, gsize size,
+                   GstClockTime arrival) {
+  gchar* cause = g_strdup_printf("%" G_GSIZE_FORMAT " bytes at running time %" GST_TIME_FORMAT,
+                                 size, GST_TIME_ARGS(arrival));
   self->priv->warn_of_rejected(
       self,
       {GST_STREAM_ERROR_DECODE,
        std::string("Rejected a datagram: ") + fault +
            ". Set format, width and height to those of the sender; stats counts the rejected "
            "datagrams."},
-      "datagram of " + std::to_string(size) + " bytes");
+      cause);
+  g_free(cause);
+}
+
+static void log_late(GstEventDatagramDepay* self, GstClockTime arrival) {
+  const auto level = self->priv->late_level.next();
+  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
+                    "dropped the datagram of running time %" GST_TIME_FORMAT
+                    ": later events arrived before it",
+                    GST_TIME_ARGS(arrival));
 }
 
 static GstFlowReturn receive(GstEventDatagramDepay* self, std::span<const std::uint8_t> bytes,
@@ -209,7 +230,12 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, std::span<const std::u
     counts.late += reception.late ? 1 : 0;
     counts.rejected += reception.fault != nullptr ? 1 : 0;
   });
-  if (reception.fault != nullptr) reject(self, reception.fault, bytes.size());
+  if (reception.fault != nullptr) reject(self, reception.fault, bytes.size(), arrival);
+  if (reception.late) log_late(self, arrival);
+  if (reception.lost > 0)
+    GST_DEBUG_OBJECT(
+        self, "lost %" G_GUINT64_FORMAT " datagrams before that of running time %" GST_TIME_FORMAT,
+        guint64{reception.lost}, GST_TIME_ARGS(arrival));
   // A datagram without events, such as jAER's samples of frames, may be the one that tells.
   state.is_discontinuous |= discont || reception.lost > 0;
   return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
@@ -244,6 +270,8 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
 
 /// Starts a new stream with the next datagram.
 static bool start_stream(GstEventDatagramDepay* self, const DatagramSettings& settings) {
+  GST_DEBUG_OBJECT(self, "expecting datagrams of %dx%d pixels of format %s", settings.width,
+                   settings.height, name_of(settings.format));
   const auto report = [](const std::exception& error) {
     return Report{GST_RESOURCE_ERROR_SETTINGS,
                   std::string("Cannot receive events of this sensor in this format: ") +
@@ -272,7 +300,11 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       // Events have caps and times of their own.
       gst_event_unref(event);
       return TRUE;
+    case GST_EVENT_EOS:
+      GST_DEBUG_OBJECT(self, "the stream ends");
+      break;
     case GST_EVENT_FLUSH_STOP:
+      GST_DEBUG_OBJECT(self, "flushed: the next datagram begins a stream");
       if (state) start_stream(self, state->settings);
       break;
     default:
@@ -284,7 +316,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
 static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
   auto& priv = *GST_EVENT_DATAGRAM_DEPAY(parent)->priv;
   if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(priv.sink, query, priv.settings.copy().latency);
+    return answer_latency(GST_CAT_DEFAULT, priv.sink, query, priv.settings.copy().latency);
   return gst_pad_query_default(pad, parent, query);
 }
 
@@ -310,6 +342,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     self->priv->state.reset();
     self->priv->warn_of_rejected.reset();
+    self->priv->late_level.reset();
   }
   return result;
 }

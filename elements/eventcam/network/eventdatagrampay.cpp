@@ -123,6 +123,9 @@ static void keep(Private& priv, const Datagram& datagram) {
 /// Pushes what was kept, in a list, which udpsink sends with one system call.
 static GstFlowReturn push(Private& priv) {
   if (priv.datagrams.empty()) return GST_FLOW_OK;
+  GST_LOG_OBJECT(priv.src, "%" G_GSIZE_FORMAT " datagrams, the first at %" GST_TIME_FORMAT,
+                 priv.datagrams.size(),
+                 GST_TIME_ARGS(GST_BUFFER_PTS(priv.datagrams.front().get())));
   GstBufferList* const list = gst_buffer_list_new_sized(static_cast<guint>(priv.datagrams.size()));
   for (auto& datagram : priv.datagrams) gst_buffer_list_add(list, datagram.release());
   priv.datagrams.clear();
@@ -159,6 +162,7 @@ static GstFlowReturn flush(GstEventDatagramPay* self) {
 
 /// Sends events that have waited long enough.
 static void flush_late(GstObject* element) {
+  GST_LOG_OBJECT(element, "max-latency is over: sending an incomplete datagram");
   flush(GST_EVENT_DATAGRAM_PAY(element));
 }
 
@@ -177,6 +181,8 @@ static bool is_flush_due(GstEventDatagramPay* self, const EventInterval& interva
 /// Collects the events of a buffer.
 static void collect(GstEventDatagramPay* self, GstBuffer* buffer, const MappedEvents& mapped) {
   auto& priv = *self->priv;
+  GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                 mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
   priv.events.clear();
   for (const auto& event : mapped.events()) {
     if (event.x < priv.info.width && event.y() < priv.info.height)
@@ -233,11 +239,10 @@ static gboolean take_caps(GstEventDatagramPay* self, GstEvent* event) {
   priv.info = info;
   if (!guarded(self, report_of, [&] { priv.packer = make_datagram_packer(settings); }))
     return FALSE;
-  const GEnumValue* const format =
-      g_enum_get_value(static_cast<GEnumClass*>(g_type_class_peek(datagram_format_type())),
-                       static_cast<int>(settings.format));
   const OwnedCaps out(gst_caps_new_simple("application/x-event-datagram", "format", G_TYPE_STRING,
-                                          format->value_nick, nullptr));
+                                          name_of(settings.format), nullptr));
+  GST_DEBUG_OBJECT(self, "sending the events of %dx%d pixels as %" GST_PTR_FORMAT, info.width,
+                   info.height, out.get());
   return gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
 }
 
@@ -254,9 +259,11 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       break;
     case GST_EVENT_SEGMENT:  // the times of waiting events are those of the last one
     case GST_EVENT_EOS:
+      GST_DEBUG_OBJECT(pad, "sending what waits before %s", GST_EVENT_TYPE_NAME(event));
       flush(self);
       break;
     case GST_EVENT_FLUSH_STOP:
+      GST_DEBUG_OBJECT(pad, "flushed: dropping events that wait");
       if (self->priv->packer) self->priv->packer->flush([](const Datagram&) {});
       set_timer(*self->priv);
       break;
@@ -269,7 +276,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
 static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
   auto& priv = *GST_EVENT_DATAGRAM_PAY(parent)->priv;
   if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(priv.sink, query, priv.settings.copy().max_latency);
+    return answer_latency(GST_CAT_DEFAULT, priv.sink, query, priv.settings.copy().max_latency);
   return gst_pad_query_default(pad, parent, query);
 }
 
@@ -307,7 +314,7 @@ static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
   priv.src = add_pad(GST_ELEMENT(self), "src");
   gst_pad_set_query_function(priv.src, src_query);
   gst_pad_use_fixed_caps(priv.src);
-  announce_latency(self, "max-latency");
+  announce_latency(GST_CAT_DEFAULT, self, "max-latency");
 }
 
 static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {

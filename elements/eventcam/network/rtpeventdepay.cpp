@@ -38,6 +38,7 @@
 #include <gst/rtp/gstrtpbasedepayload.h>
 #include <gst/rtp/gstrtpbuffer.h>
 
+#include <array>
 #include <charconv>
 #include <optional>
 #include <span>
@@ -96,8 +97,9 @@ struct Private {
   std::optional<State> state;
   guint32 segment_seqnum = gst_util_seqnum_next();  ///< of upstream
   GstPadChainFunction chain = nullptr;              ///< of the base class
-  GstPadChainListFunction chain_list = nullptr;     ///< of the base class
-  guint processed = 0;                              ///< packets that the base class passed on
+  bool was_processed = false;                       ///< the base class passed on the last packet
+  RepeatLevel rejected_level;
+  RepeatLevel late_level;
 
   Guarded<RtpStatistics> statistics;
 };
@@ -166,15 +168,35 @@ static void flush(GstRtpEventDepay* self) {
 
 /* input */
 
+static void log_rejected(GstRtpEventDepay* self, guint number) {
+  const auto level = self->priv->rejected_level.next();
+  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
+                    "rejected packet number %u: corrupt, or of another sensor or format", number);
+}
+
+static void log_late(GstRtpEventDepay* self, guint number) {
+  const auto level = self->priv->late_level.next();
+  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
+                    "dropped packet number %u: later ones arrived before it, or it came twice",
+                    number);
+}
+
 static std::span<const std::uint8_t> payload_of(GstRTPBuffer* rtp) {
   return {static_cast<const std::uint8_t*>(gst_rtp_buffer_get_payload(rtp)),
           gst_rtp_buffer_get_payload_len(rtp)};
 }
 
+/// Sequence number of an RTP packet.
+static guint number_of(GstBuffer* packet) {
+  std::array<guint8, 2> bytes = {};
+  gst_buffer_extract(packet, 2, bytes.data(), bytes.size());
+  return GST_READ_UINT16_BE(bytes.data());
+}
+
 static GstBuffer* process(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
   auto* self = GST_RTP_EVENT_DEPAY(depayload);
   auto& priv = *self->priv;
-  ++priv.processed;
+  priv.was_processed = true;
   if (!priv.state) return nullptr;
   auto& state = *priv.state;
   const eventcamera::RtpPacket packet{
@@ -194,8 +216,8 @@ static GstBuffer* process(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
     GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u",
                      guint64{counted.lost_packets - before.lost_packets}, packet.sequence_number);
   if (counted.rejected_packets > before.rejected_packets)
-    GST_LOG_OBJECT(self, "rejected packet number %u: corrupt, or of another sensor",
-                   packet.sequence_number);
+    log_rejected(self, packet.sequence_number);
+  if (counted.late_packets > before.late_packets) log_late(self, packet.sequence_number);
   return nullptr;
 }
 
@@ -212,49 +234,39 @@ static bool is_plausible(GstRtpEventDepay* self, GstBuffer* buffer) {
     gst_rtp_buffer_unmap(&rtp);
   }
   if (!plausible) {
-    GST_LOG_OBJECT(self, "rejected %" GST_PTR_FORMAT ": not a packet of events", buffer);
+    log_rejected(self, number_of(buffer));
     unpacker.count_rejected();
     *priv.statistics.lock() = unpacker.statistics();
   }
   return plausible;
 }
 
-/// Calls `chain`, which gives packets to the base class. It drops those that are late, which are
-/// counted here.
-template <class Chain>
-static GstFlowReturn counting_late(GstRtpEventDepay* self, guint packets, const Chain& chain) {
+/// Gives a packet to the base class, which drops it if it is late. Those are counted here.
+static GstFlowReturn chain(GstPad* pad, GstObject* parent, GstBuffer* buffer) {
+  auto* self = GST_RTP_EVENT_DEPAY(parent);
   auto& priv = *self->priv;
-  priv.processed = 0;
-  const GstFlowReturn flow = chain();
-  if (flow == GST_FLOW_OK && priv.state && priv.processed < packets) {
-    GST_LOG_OBJECT(self, "%u late packets", packets - priv.processed);
-    priv.state->unpacker.count_late(packets - priv.processed);
+  if (!is_plausible(self, buffer)) {
+    gst_buffer_unref(buffer);
+    return GST_FLOW_OK;
+  }
+  const guint number = number_of(buffer);
+  priv.was_processed = false;
+  const GstFlowReturn flow = priv.chain(pad, parent, buffer);
+  if (flow == GST_FLOW_OK && priv.state && !priv.was_processed) {
+    log_late(self, number);
+    priv.state->unpacker.count_late();
     *priv.statistics.lock() = priv.state->unpacker.statistics();
   }
   return flow;
 }
 
-static GstFlowReturn chain(GstPad* pad, GstObject* parent, GstBuffer* buffer) {
-  auto* self = GST_RTP_EVENT_DEPAY(parent);
-  if (is_plausible(self, buffer))
-    return counting_late(self, 1, [&] { return self->priv->chain(pad, parent, buffer); });
-  gst_buffer_unref(buffer);
-  return GST_FLOW_OK;
-}
-
+/// Gives packets one by one, to know which of them are late.
 static GstFlowReturn chain_list(GstPad* pad, GstObject* parent, GstBufferList* list) {
-  auto* self = GST_RTP_EVENT_DEPAY(parent);
-  list = gst_buffer_list_make_writable(list);
-  gst_buffer_list_foreach(
-      list,
-      [](GstBuffer** buffer, guint, gpointer element) -> gboolean {
-        if (!is_plausible(GST_RTP_EVENT_DEPAY(element), *buffer))
-          gst_clear_buffer(buffer);  // removes it from the list
-        return TRUE;
-      },
-      self);
-  return counting_late(self, gst_buffer_list_length(list),
-                       [&] { return self->priv->chain_list(pad, parent, list); });
+  GstFlowReturn flow = GST_FLOW_OK;
+  for (guint i = 0; i < gst_buffer_list_length(list) && flow == GST_FLOW_OK; ++i)
+    flow = chain(pad, parent, gst_buffer_ref(gst_buffer_list_get(list, i)));
+  gst_buffer_list_unref(list);
+  return flow;
 }
 
 static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
@@ -265,12 +277,14 @@ static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
       gst_event_unref(event);
       return TRUE;
     case GST_EVENT_FLUSH_STOP:
+      GST_DEBUG_OBJECT(self, "flushed: the next packet begins a stream");
       if (state) {
         state->unpacker.reset();
         state->segment.reset();
       }
       break;
     case GST_EVENT_EOS:
+      GST_DEBUG_OBJECT(self, "the stream ends");
       flush(self);
       break;
     case GST_EVENT_SEGMENT:
@@ -341,6 +355,8 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
   const SensorSize sensor{*width, *height};
   if (state && state->sensor == sensor && state->format == *format) return TRUE;
   flush(self);
+  GST_DEBUG_OBJECT(self, "receiving the events of %dx%d pixels as %s", sensor.width, sensor.height,
+                   rtp_event_formats[static_cast<std::size_t>(*format)]);
   const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
   const auto follow = [&] {
     if (state)
@@ -358,6 +374,8 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     auto& priv = *GST_RTP_EVENT_DEPAY(element)->priv;
     priv.state.reset();
+    priv.rejected_level.reset();
+    priv.late_level.reset();
     *priv.statistics.lock() = {};
   }
   return result;
@@ -386,7 +404,6 @@ static void gst_rtp_event_depay_init(GstRtpEventDepay* self) {
   self->priv = new Private;
   GstPad* sink = GST_RTP_BASE_DEPAYLOAD_SINKPAD(self);
   self->priv->chain = GST_PAD_CHAINFUNC(sink);
-  self->priv->chain_list = GST_PAD_CHAINLISTFUNC(sink);
   gst_pad_set_chain_function(sink, chain);
   gst_pad_set_chain_list_function(sink, chain_list);
 }

@@ -168,6 +168,11 @@ static void send(GstRtpEventPay* self) {
     throw;
   }
   sent.events = pending.events().size();
+  GST_LOG_OBJECT(self,
+                 "%" G_GUINT64_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT
+                 " in %" G_GUINT64_FORMAT " packets",
+                 guint64{sent.events}, GST_TIME_ARGS(static_cast<GstClockTime>(pending.start())),
+                 GST_TIME_ARGS(static_cast<GstClockTime>(pending.end())), guint64{sent.packets});
   pending.clear();
   priv.timer.cancel();
   {
@@ -200,6 +205,7 @@ static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
 /// Sends events that have waited long enough.
 static void send_late(GstObject* element) {
   auto* self = GST_RTP_EVENT_PAY(element);
+  GST_LOG_OBJECT(self, "max-latency is over: sending an incomplete packet");
   reported(self, [&] { send(self); });
 }
 
@@ -251,6 +257,8 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
     return leave_out(self, EventFault::pts_too_large, taken);
   const MappedEvents mapped(taken);
   if (!mapped) return leave_out(self, EventFault::partial_event, taken);
+  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
+                 GST_TIME_ARGS(interval->start));
   return reported(self, [&] {
     const auto [outside, unsorted] = take(self, *interval, mapped.events());
     priv.sent.lock()->left_out += outside + unsorted;
@@ -284,10 +292,15 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       return TRUE;
     case GST_EVENT_FLUSH_STOP:
       if (priv.state) {
+        GST_DEBUG_OBJECT(self, "flushed: dropping %" G_GSIZE_FORMAT " events that wait",
+                         priv.state->pending.events().size());
         priv.sent.lock()->left_out += priv.state->pending.events().size();
         priv.state->pending.clear();
       }
       break;
+    case GST_EVENT_EOS:
+      GST_DEBUG_OBJECT(self, "the stream ends");
+      [[fallthrough]];
     default:
       // Those of sensors precede each buffer, and may precede the ones that it is joined to.
       if ((gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) &&
@@ -301,7 +314,7 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
 /// Adds the time for which events wait here.
 static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
   if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(GST_RTP_BASE_PAYLOAD_SINKPAD(parent), query,
+    return answer_latency(GST_CAT_DEFAULT, GST_RTP_BASE_PAYLOAD_SINKPAD(parent), query,
                           GST_RTP_EVENT_PAY(parent)->priv->settings.copy().max_latency);
   return gst_pad_query_default(pad, parent, query);
 }
@@ -325,11 +338,13 @@ static gboolean set_caps(GstRTPBasePayload* payload, GstCaps* caps) {
     if (!guarded(self, too_large, [&] { priv.state.emplace(sensor, format, first_event); }))
       return FALSE;
   }
+  const char* format_name = rtp_event_formats[static_cast<std::size_t>(priv.state->format)];
+  GST_DEBUG_OBJECT(self, "sending the events of %dx%d pixels as %s", info.width, info.height,
+                   format_name);
   gst_rtp_base_payload_set_options(payload, "application", TRUE, "X-EVENT-CAMERA", rtp_clock_rate);
-  return gst_rtp_base_payload_set_outcaps(
-      payload, "width", G_TYPE_STRING, width.c_str(), "height", G_TYPE_STRING, height.c_str(),
-      "format", G_TYPE_STRING, rtp_event_formats[static_cast<std::size_t>(priv.state->format)],
-      nullptr);
+  return gst_rtp_base_payload_set_outcaps(payload, "width", G_TYPE_STRING, width.c_str(), "height",
+                                          G_TYPE_STRING, height.c_str(), "format", G_TYPE_STRING,
+                                          format_name, nullptr);
 }
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
@@ -364,7 +379,7 @@ static void finalize(GObject* object) {
 static void gst_rtp_event_pay_init(GstRtpEventPay* self) {
   self->priv = new Private;
   gst_pad_set_query_function(GST_RTP_BASE_PAYLOAD_SRCPAD(self), src_query);
-  announce_latency(self, "max-latency");
+  announce_latency(GST_CAT_DEFAULT, self, "max-latency");
 }
 
 static GType format_type() {
