@@ -55,7 +55,8 @@ struct State {
 }  // namespace
 
 struct GstEventWriterPrivate {
-  explicit GstEventWriterPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
+  explicit GstEventWriterPrivate(GstElement* self)
+      : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
   std::atomic<int> variant = 0;
   std::atomic<guint> mtu = G_MAXUINT;

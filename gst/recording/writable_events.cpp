@@ -66,6 +66,13 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
     latest_ = absolute.t;
     picked_.push_back(absolute);
   }
+  if (picked_.size() < events.size())
+    GST_CAT_LOG_OBJECT(category_, element_,
+                       "left out %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT
+                       " events at %" GST_TIME_FORMAT
+                       ": outside the sensor, or earlier than those written",
+                       events.size() - picked_.size(), events.size(),
+                       GST_TIME_ARGS(static_cast<GstClockTime>(start) * GST_USECOND));
   if (picked_.size() > before_last_left_out) {
     if (earlier_.reported == 0) warn_of_earlier();
     if (outside_.reported == 0) warn_of_outside();
@@ -94,11 +101,11 @@ void WritableEvents::warn_of_outside() {
 
 void WritableEvents::warn(LeftOut& left_out, const std::string& what, const std::string& cause) {
   if (left_out.count == left_out.reported) return;
-  post_message(element_, GST_MESSAGE_WARNING,
-               {code_, "Left out " + std::to_string(left_out.count) + " event" +
-                           (left_out.count == 1 ? "" : "s") +
-                           (left_out.reported == 0 ? " " : " in total ") + what},
-               cause);
+  const Report report{code_, "Left out " + std::to_string(left_out.count) + " event" +
+                                 (left_out.count == 1 ? "" : "s") +
+                                 (left_out.reported == 0 ? " " : " in total ") + what};
+  GST_CAT_WARNING_OBJECT(category_, element_, "%s (%s)", report.text.c_str(), cause.c_str());
+  post_message(element_, GST_MESSAGE_WARNING, report, cause);
   left_out.reported = left_out.count;
 }
 

@@ -31,7 +31,8 @@ struct Written {
 class WritableEvents {
  public:
   /// `code` is the error code of the warnings.
-  WritableEvents(GstElement* element, GstStreamError code) : element_(element), code_(code) {}
+  WritableEvents(GstElement* element, GstDebugCategory* category, GstStreamError code)
+      : element_(element), category_(category), code_(code) {}
 
   /// Starts a new file, whose first event may have any time.
   void begin_file(eventcamera::SensorSize sensor);
@@ -50,6 +51,8 @@ class WritableEvents {
       report_buffer(buffer);
       return false;
     }
+    GST_CAT_LOG_OBJECT(category_, element_, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                       mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
     for (auto left = mapped.events(); !left.empty();) {
       const auto few = left.first(std::min(left.size(), block));
       left = left.subspan(few.size());
@@ -90,6 +93,7 @@ class WritableEvents {
   void warn(LeftOut& left_out, const std::string& what, const std::string& cause);
 
   GstElement* element_;
+  GstDebugCategory* category_;
   GstStreamError code_;
   eventcamera::SensorSize sensor_;
   eventcamera::Microseconds latest_ = 0;  ///< latest time written

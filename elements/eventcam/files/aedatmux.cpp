@@ -96,7 +96,8 @@ struct State {
 }  // namespace
 
 struct GstAedatMuxPrivate {
-  explicit GstAedatMuxPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_MUX) {}
+  explicit GstAedatMuxPrivate(GstElement* self)
+      : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_MUX) {}
 
   GuardedSettings<Settings> settings;
 
@@ -272,6 +273,13 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   settings.imu_samples = state.imu_samples.has_value();
   self->priv->writable.begin_file(state.size);
   state.shift = shift_of(self);
+  GST_DEBUG_OBJECT(
+      self,
+      "beginning a file of %dx%d pixels%s%s%s, %s a table of packets; running time 0 is "
+      "%" GST_STIME_FORMAT " in the file",
+      settings.size.width, settings.size.height, settings.frames ? ", frames" : "",
+      settings.triggers ? ", triggers" : "", settings.imu_samples ? ", IMU samples" : "",
+      settings.table ? "with" : "without", GST_STIME_ARGS(state.shift));
   state.encoder = std::make_unique<Aedat4Encoder>(settings);
   Bytes header;
   state.encoder->flush(header);
@@ -304,6 +312,7 @@ static GstFlowReturn end_file(GstAedatMux* self) {
   state.encoder->finish(bytes);
   const GstFlowReturn result = push_bytes(self, std::move(bytes));
   auto patch = state.encoder->patch();
+  GST_DEBUG_OBJECT(self, "the file ends%s", patch ? "; completing its header" : "");
   if (result != GST_FLOW_OK || !patch) return result;
   send_segment(self, patch->position);
   return push_bytes(self, std::move(patch->bytes));
@@ -319,18 +328,23 @@ static void write_events(GstAedatMux* self, GstBuffer* buffer, Microseconds star
   State& state = self->priv->state;
   const MappedEvents mapped(buffer);
   if (!mapped) {
-    warn(self, "a buffer with a partial event",
-         std::to_string(gst_buffer_get_size(buffer)) + " bytes");
+    warn(
+        self, "a buffer with a partial event",
+        std::to_string(gst_buffer_get_size(buffer)) + " bytes at " + std::to_string(start) + " us");
     return;
   }
+  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" G_GINT64_FORMAT " us of the file",
+                 mapped.events().size(), gint64{start});
   state.encoder->encode(self->priv->writable.pick(mapped.events(), start), out);
 }
 
 /// Encodes a frame. May throw.
 static void write_frame(GstAedatMux* self, GstBuffer* buffer, Microseconds t, Bytes& out) {
   State& state = self->priv->state;
+  GST_LOG_OBJECT(self, "frame at %" G_GINT64_FORMAT " us of the file", gint64{t});
   const auto reject = [&](const char* cause) {
-    warn(self, "a frame that does not fit into the file", cause);
+    warn(self, "a frame that does not fit into the file",
+         std::string(cause) + ", at " + std::to_string(t) + " us");
   };
   if (!state.video) return reject("no caps");
   const VideoFrame video(*state.video, buffer, GST_MAP_READ);
@@ -476,6 +490,7 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);
+    GST_DEBUG_OBJECT(pad, "%" GST_PTR_FORMAT, caps);
     if (!take_caps(self, pad, caps)) {
       gst_event_unref(event);
       return FALSE;
@@ -497,7 +512,9 @@ static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, Gst
 static gboolean src_event(GstAggregator* aggregator, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_SEEK)
     return PARENT_AGGREGATOR_CLASS->src_event(aggregator, event);
-  gst_event_unref(event);  // a file is written once, from its start
+  GST_DEBUG_OBJECT(aggregator, "a file is written once, from its start: refused %" GST_PTR_FORMAT,
+                   event);
+  gst_event_unref(event);
   return FALSE;
 }
 
@@ -546,6 +563,7 @@ static gboolean stop(GstAggregator* aggregator) {
 /// After a flush, filesink has truncated the file, so start with a new header.
 static GstFlowReturn flush(GstAggregator* aggregator) {
   State& state = GST_AEDAT_MUX(aggregator)->priv->state;
+  GST_DEBUG_OBJECT(aggregator, "flushed: beginning a new file");
   state.encoder.reset();
   state.triggers.reset();
   state.imu_samples.reset();

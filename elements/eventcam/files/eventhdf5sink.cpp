@@ -62,7 +62,8 @@ struct State {
 }  // namespace
 
 struct GstEventHdf5SinkPrivate {
-  explicit GstEventHdf5SinkPrivate(GstElement* self) : writable(self, GST_STREAM_ERROR_ENCODE) {}
+  explicit GstEventHdf5SinkPrivate(GstElement* self)
+      : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
   GuardedSettings<Settings> settings;
 
@@ -135,7 +136,10 @@ static bool end_file(GstEventHdf5Sink* self) {
   State& state = self->priv->state;
   state.ended = true;
   const auto writer = std::exchange(state.writer, nullptr);
-  if (writer) self->priv->writable.end_file();
+  if (writer) {
+    GST_DEBUG_OBJECT(self, "closing the file");
+    self->priv->writable.end_file();
+  }
   return !writer || reported(self, [&] { writer->close(); });
 }
 
@@ -146,6 +150,8 @@ static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
   priv->state.info = info;
   priv->writable.begin_file({info.width, info.height});
   const auto [location, format, compression] = priv->settings.copy();
+  GST_DEBUG_OBJECT(self, "writing the events of %dx%d pixels to %s", info.width, info.height,
+                   location.c_str());
   const Hdf5Writer::Settings settings{format, compression, {info.width, info.height}};
   return reported(self, [&, &path = location] {
     priv->state.writer = std::make_unique<Hdf5Writer>(path, settings);
@@ -203,8 +209,10 @@ static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> trig
   const State& state = self->priv->state;
   if (!state.writer) return true;
   return reported(self, [&] {
-    if (state.writer->append(triggers))
-      self->priv->writable.written().lock()->triggers += triggers.size();
+    const bool written = state.writer->append(triggers);
+    GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " triggers, %s", triggers.size(),
+                   written ? "written" : "left out: the format has none");
+    if (written) self->priv->writable.written().lock()->triggers += triggers.size();
   });
 }
 
