@@ -96,6 +96,7 @@ struct EventAggregatorFunctions {
 
   static GstFlowReturn aggregate(GstAggregator* element, gboolean timed_out) {
     auto& self = of(element);
+    if (timed_out) GST_LOG_OBJECT(element, "the latency is over: going on without further input");
     return guard(self, [&] { return self.aggregate(timed_out != FALSE); });
   }
 
@@ -112,9 +113,10 @@ struct EventAggregatorFunctions {
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);
     if (!self.take_caps(pad, caps)) {
-      GST_ERROR_OBJECT(self.element_, "cannot %s %" GST_PTR_FORMAT, self.role_.verb, caps);
+      GST_ERROR_OBJECT(pad, "cannot %s %" GST_PTR_FORMAT, self.role_.verb, caps);
       return false;
     }
+    GST_DEBUG_OBJECT(pad, "takes %" GST_PTR_FORMAT, caps);
     if (pad == self.main_pad_ && self.role_.passes_main_pad) {
       self.main_caps_.reset(gst_caps_ref(caps));
       gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(self.element_));
@@ -139,6 +141,7 @@ struct EventAggregatorFunctions {
                         ("segment %" GST_SEGMENT_FORMAT, segment));
       return false;
     }
+    GST_DEBUG_OBJECT(pad, "%" GST_SEGMENT_FORMAT, segment);
     if (pad == self.main_pad_) {
       self.take_segment(*segment);
       gst_aggregator_update_segment(self.element_, segment);
@@ -166,10 +169,11 @@ struct EventAggregatorFunctions {
       const SeekRequest request(event);
       for (const GList* pads = GST_ELEMENT(element)->sinkpads; pads != nullptr; pads = pads->next) {
         if (would_seek(GST_AGGREGATOR_PAD(pads->data), request)) continue;
-        GST_WARNING_OBJECT(element, "refused %" GST_PTR_FORMAT, event);
+        GST_WARNING_OBJECT(pads->data, "upstream would refuse: refused %" GST_PTR_FORMAT, event);
         gst_event_unref(event);
         return FALSE;
       }
+      GST_DEBUG_OBJECT(element, "forwarding %" GST_PTR_FORMAT, event);
     }
     return PARENT_AGGREGATOR_CLASS->src_event(element, event);
   }
@@ -192,6 +196,7 @@ struct EventAggregatorFunctions {
 
   static GstFlowReturn flush(GstAggregator* element) {
     auto& self = of(element);
+    GST_DEBUG_OBJECT(element, "flushed: dropping events that wait");
     return guard(self, [&] {
       self.flush();
       return GST_FLOW_OK;

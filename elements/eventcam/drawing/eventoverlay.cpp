@@ -113,6 +113,9 @@ bool EventOverlay::take_events(GstBuffer* buffer, GstClockTime start, GstClockTi
   }
   const auto origin = static_cast<Microseconds>(start / 1000);
   const auto rest = mapped.events().subspan(std::min(taken_, mapped.events().size()));
+  if (taken_ == 0)
+    GST_LOG_OBJECT(events_pad_, "%" G_GSIZE_FORMAT " events at running time %" GST_TIME_FORMAT,
+                   rest.size(), GST_TIME_ARGS(start));
   const auto due = events_until(rest, origin, static_cast<Microseconds>(end / 1000));
   taken_ += due.size();
   if (overlay_ && overlay_->add(due, origin) > 0) warn(EventFault::beyond_sensor, buffer);
@@ -124,7 +127,10 @@ bool EventOverlay::take_events(GstBuffer* buffer, GstClockTime start, GstClockTi
 bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
   const auto interval = interval_of(buffer);
   const auto running = interval ? running_interval(events_pad_, *interval) : std::nullopt;
-  if (!interval) warn(EventFault::no_pts, buffer);
+  if (!interval)
+    warn(EventFault::no_pts, buffer);
+  else if (!running)
+    GST_LOG_OBJECT(events_pad_, "outside the segment: dropped %" GST_PTR_FORMAT, buffer);
   if (running) {
     if (running->start >= end || !take_events(buffer, running->start, end)) return false;
     known_ = std::max(known_, running->end);
@@ -170,12 +176,18 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
 GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& interval,
                                        bool timed_out) {
   if (interval) {
-    if (sensor_ && !overlay_)
-      overlay_.emplace(*sensor_,
-                       Size{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)});
+    if (sensor_ && !overlay_) {
+      const Size frame{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
+      GST_DEBUG_OBJECT(element(), "drawing the events of %dx%d pixels on frames of %dx%d",
+                       sensor_->width, sensor_->height, frame.width, frame.height);
+      overlay_.emplace(*sensor_, frame);
+    }
     if (!take_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
   OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
+  GST_LOG_OBJECT(main_pad(),
+                 "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
+                 GST_TIME_ARGS(GST_BUFFER_PTS(out.get())), GST_TIME_ARGS(known_));
   if (interval && overlay_) {
     const GstFlowReturn result = draw(*interval, out.get());
     if (result != GST_FLOW_OK) return result;
@@ -211,6 +223,7 @@ bool EventOverlay::take_video_caps(const GstCaps* caps) {
     overlay_.reset();
   video_ = video;
   const GstClockTime latency = frame_duration(video);
+  GST_DEBUG_OBJECT(element(), "latency %" GST_TIME_FORMAT ", one frame", GST_TIME_ARGS(latency));
   gst_aggregator_set_latency(element(), latency, latency);
   if (!gst_pad_is_linked(GST_PAD(events_pad_)))
     GST_ELEMENT_WARNING(element(), CORE, PAD,

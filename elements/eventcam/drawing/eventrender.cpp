@@ -196,6 +196,9 @@ class EventRender final : public EventAggregator {
 bool EventRender::take_events(const MappedEvents& mapped, std::optional<GstClockTime> end,
                               GstBuffer* buffer) {
   const auto rest = mapped.events().subspan(std::min(*taken_, mapped.events().size()));
+  if (*taken_ == 0)
+    GST_LOG_OBJECT(main_pad(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, rest.size(),
+                   GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
   const auto due =
       end ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000)) : rest;
   *taken_ += due.size();
@@ -216,7 +219,12 @@ bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
     const bool returns =
         GST_BUFFER_IS_DISCONT(buffer) && interval.start + event_resolution < known_;
     const bool leaps = times_ && interval.start > times_->events().end + max_gap;
-    if (returns || leaps) start_over();
+    if (returns || leaps) {
+      GST_DEBUG_OBJECT(
+          main_pad(), "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+          returns ? "goes back" : "leaps", GST_TIME_ARGS(known_), GST_TIME_ARGS(interval.start));
+      start_over();
+    }
     taken_ = 0;
   }
   const GstClockTime segment_start = segment_of(main_pad()).start;
@@ -261,8 +269,10 @@ void EventRender::begin_now() {
   const GstSegment segment = segment_of(main_pad());
   const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
   const guint64 position = gst_segment_position_from_running_time(&segment, GST_FORMAT_TIME, now);
-  if (GST_CLOCK_TIME_IS_VALID(position) && state_->has_framerate())
-    times_.emplace(position, *state_->video);
+  if (!GST_CLOCK_TIME_IS_VALID(position) || !state_->has_framerate()) return;
+  GST_DEBUG_OBJECT(element(), "no events yet: first picture at %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(position));
+  times_.emplace(position, *state_->video);
 }
 
 GstFlowReturn EventRender::aggregate(bool timed_out) {
@@ -334,7 +344,7 @@ GstFlowReturn EventRender::acquire_buffer(GstBuffer** buffer) {
 /// Draws the state at the end of an interval and pushes it. May throw.
 GstFlowReturn EventRender::push_picture(const EventInterval& events, const EventInterval& picture) {
   if (is_too_late(picture)) {
-    GST_DEBUG_OBJECT(element(), "skipped the picture at %" GST_TIME_FORMAT,
+    GST_DEBUG_OBJECT(element(), "downstream is late: skipped the picture at %" GST_TIME_FORMAT,
                      GST_TIME_ARGS(picture.start));
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
@@ -348,6 +358,11 @@ GstFlowReturn EventRender::push_picture(const EventInterval& events, const Event
   GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
   GST_BUFFER_DURATION(acquired) = picture.end - picture.start;
   if (std::exchange(discontinuous_, false)) GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
+  GST_LOG_OBJECT(element(),
+                 "picture at %" GST_TIME_FORMAT " of the events from %" GST_TIME_FORMAT
+                 " to %" GST_TIME_FORMAT,
+                 GST_TIME_ARGS(picture.start), GST_TIME_ARGS(events.start),
+                 GST_TIME_ARGS(events.end));
   return gst_aggregator_finish_buffer(element(), buffer.release());
 }
 
@@ -394,6 +409,8 @@ bool EventRender::set_video(const GstCaps* caps) {
     if (state_->has_framerate()) times_.emplace(start, video);
   }
   const GstClockTime latency = frame_duration(video);
+  GST_DEBUG_OBJECT(element(), "drawing %" GST_PTR_FORMAT ", latency %" GST_TIME_FORMAT, caps,
+                   GST_TIME_ARGS(latency));
   gst_aggregator_set_latency(element(), latency, latency);
   return true;
 }

@@ -147,6 +147,8 @@ void EventCompare::conclude() {
   concluded_ = true;
   const StreamComparison nothing(1, 1);
   const auto& comparison = comparison_ ? *comparison_ : nothing;
+  GST_DEBUG_OBJECT(element(), "concluding%s",
+                   comparison_ ? "" : ": the caps of one of the streams never came");
   report(element(), settings.copy(), structure_of(comparison), [&] {
     return eventcamera::draw_maps(comparison.map(StreamRole::reference),
                                   comparison.map(StreamRole::candidate));
@@ -163,6 +165,8 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
     warn(interval ? EventFault::partial_event : EventFault::no_pts, buffer);
     return;
   }
+  GST_LOG_OBJECT(pads_[role], "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                 mapped.events().size(), GST_TIME_ARGS(interval->start));
   if (!mapped.events().empty()) concluded_ = false;
   const GstSegment segment = segment_of(pads_[role]);
   const auto skipped =
@@ -181,6 +185,8 @@ bool EventCompare::begin() {
   const auto& candidate = sensors_[StreamRole::candidate];
   if (!reference || !candidate || *reference != *candidate) return false;
   if (!comparison_) {
+    GST_DEBUG_OBJECT(element(), "comparing sensors of %dx%d pixels", reference->width,
+                     reference->height);
     comparison_.emplace(reference->width, reference->height);
     concluded_ = true;
   }

@@ -134,7 +134,9 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
   Measurement nothing(1, 1);
   auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
   measurement.concluded = true;
-  report(self, files, figures_of(measurement.cumulative, measurement.end.value_or(0), true),
+  GstStructure* figures = figures_of(measurement.cumulative, measurement.end.value_or(0), true);
+  GST_DEBUG_OBJECT(self, "concluding: %" GST_PTR_FORMAT, figures);
+  report(self, files, figures,
          [&] { return eventcamera::draw_map(measurement.cumulative.statistics.map()); });
 }
 
@@ -144,6 +146,7 @@ static bool measure(GstEventStats* self, int width, int height) {
                       "Not enough memory to count the events of " + std::to_string(width) + " x " +
                           std::to_string(height) +
                           " pixels; free memory, or lower the resolution."};
+  GST_DEBUG_OBJECT(self, "counting the events of %dx%d pixels", width, height);
   return guarded(self, report, [&] { self->priv->measurement.emplace(width, height); });
 }
 
@@ -151,8 +154,11 @@ static bool measure(GstEventStats* self, int width, int height) {
 
 /// Adds an interval. Time between intervals counts as time without events; if time goes backwards,
 /// no inter-event interval spans the discontinuity.
-static void cover(Measurement& measurement, Nanoseconds start, Nanoseconds end) {
+static void cover(GstEventStats* self, Nanoseconds start, Nanoseconds end) {
+  auto& measurement = *self->priv->measurement;
   if (measurement.end && start < *measurement.end - static_cast<Nanoseconds>(event_resolution)) {
+    GST_DEBUG_OBJECT(self, "stream time goes back from %" GST_STIME_FORMAT " to %" GST_STIME_FORMAT,
+                     GST_STIME_ARGS(*measurement.end), GST_STIME_ARGS(start));
     measurement.validator = EventValidator(measurement.width, measurement.height);
     for (auto* part : {&measurement.cumulative, &measurement.recent})
       part->statistics.forget_times();
@@ -181,6 +187,8 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
     self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
+  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at stream time %" GST_STIME_FORMAT,
+                 mapped.events().size(), GST_STIME_ARGS(start));
   const std::size_t skipped = measurement.validator.take(
       mapped.events(), start / 1000, [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
@@ -200,7 +208,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
   const Nanoseconds start = stream_time(transform->segment, interval->start);
-  cover(*measurement, start, stream_time(transform->segment, interval->end));
+  cover(self, start, stream_time(transform->segment, interval->end));
   count(self, *measurement, buffer, start);
   post_if_due(self, *measurement);
   return GST_FLOW_OK;
@@ -214,7 +222,7 @@ static void take_gap(GstEventStats* self, GstEvent* event) {
   if (!measurement || !GST_CLOCK_TIME_IS_VALID(duration) || start > G_MAXINT64) return;
   const GstClockTime end = start + std::min(duration, GstClockTime{G_MAXINT64} - start);
   const auto& segment = GST_BASE_TRANSFORM(self)->segment;
-  cover(*measurement, stream_time(segment, start), stream_time(segment, end));
+  cover(self, stream_time(segment, start), stream_time(segment, end));
   post_if_due(self, *measurement);
 }
 

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// What elements write to GStreamer's log.
+#include <gst/rtp/gstrtpbuffer.h>
+
+#include <algorithm>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "tests/elements/event_buffer.hpp"
+#include "tests/elements/harness.hpp"
+#include "tests/elements/pipeline.hpp"
+
+namespace {
+
+using namespace harness;
+
+/// The log of a category, as long as this object lives.
+class Log {
+ public:
+  struct Line {
+    GstDebugLevel level;
+    std::string text;
+  };
+
+  explicit Log(const std::string& category) : category_(category) {
+    gst_init(nullptr, nullptr);
+    gst_debug_remove_log_function(gst_debug_log_default);
+    gst_debug_add_log_function(add, this, nullptr);
+    gst_debug_set_threshold_for_name(category.c_str(), GST_LEVEL_LOG);
+  }
+  ~Log() {
+    gst_debug_unset_threshold_for_name(category_.c_str());
+    gst_debug_remove_log_function_by_data(this);
+  }
+  Log(const Log&) = delete;
+  Log& operator=(const Log&) = delete;
+
+  /// Lines that contain `part`, in order.
+  std::vector<Line> with(const std::string& part) {
+    const std::lock_guard lock(mutex_);
+    std::vector<Line> found;
+    std::ranges::copy_if(lines_, std::back_inserter(found), [&](const Line& line) {
+      return line.text.find(part) != std::string::npos;
+    });
+    return found;
+  }
+
+  /// The first of these lines is a warning, the others are of level LOG.
+  void expect_one_warning(const std::string& part, std::size_t count) {
+    const auto lines = with(part);
+    ASSERT_EQ(lines.size(), count) << part;
+    EXPECT_EQ(lines.front().level, GST_LEVEL_WARNING);
+    for (std::size_t i = 1; i < count; ++i) EXPECT_EQ(lines[i].level, GST_LEVEL_LOG);
+  }
+
+ private:
+  static void add(GstDebugCategory* category, GstDebugLevel level, const gchar*, const gchar*, gint,
+                  GObject*, GstDebugMessage* message, gpointer log) {
+    auto& self = *static_cast<Log*>(log);
+    if (gst_debug_category_get_name(category) != self.category_) return;
+    const std::lock_guard lock(self.mutex_);
+    self.lines_.push_back({level, gst_debug_message_get(message)});
+  }
+
+  std::string category_;
+  std::mutex mutex_;
+  std::vector<Line> lines_;
+};
+
+struct Case {
+  const char* category;
+  const char* launch;  ///< for events of 320x240 pixels; a path follows `location=` at its end
+};
+
+class EveryElement : public testing::TestWithParam<Case> {};
+
+#define EVENTS                                                      \
+  "videotestsrc pattern=ball num-buffers=4 ! "                      \
+  "video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1 ! " \
+  "eventsim-diff ! application/x-event-camera,format=XYTP "
+
+constexpr Case cases[] = {
+    {"eventwriter", EVENTS "! evtenc ! fakesink"},
+    {"eventreader", EVENTS "! evtenc ! evtdec ! fakesink"},
+    {"eventhdf5sink", EVENTS "! eventhdf5sink location="},
+    {"aedatmux", EVENTS "! aedatmux ! fakesink"},
+    {"eventstats", EVENTS "! eventstats ! fakesink"},
+    {"eventcompare", EVENTS "! tee name=t ! queue ! compare.reference eventcompare name=compare ! "
+                            "fakesink t. ! queue ! compare.candidate"},
+    {"eventrender", EVENTS "! eventrender ! fakesink"},
+    {"eventoverlay", EVENTS "! overlay.events eventoverlay name=overlay ! fakesink videotestsrc "
+                            "num-buffers=4 ! video/x-raw,width=320,height=240,framerate=25/1 ! "
+                            "overlay.sink"},
+    {"eventdatagrampay", EVENTS "! eventdatagrampay ! fakesink"},
+    {"eventdatagramdepay", EVENTS "! eventdatagrampay format=es ! eventdatagramdepay format=es "
+                                  "width=320 height=240 ! fakesink"},
+    {"rtpeventpay", EVENTS "! rtpeventpay ! fakesink"},
+    {"rtpeventdepay", EVENTS "! rtpeventpay ! rtpeventdepay ! fakesink"},
+};
+INSTANTIATE_TEST_SUITE_P(, EveryElement, testing::ValuesIn(cases),
+                         [](const auto& test) { return std::string(test.param.category); });
+
+TEST_P(EveryElement, LogsItsFormatAndTheEventsOfEachBuffer) {
+  Log log(GetParam().category);
+  const TemporaryFile file;
+  const std::string launch = GetParam().launch;
+  {
+    Pipeline pipeline(launch.ends_with("=") ? launch + in_quotes(file.path()) : launch);
+    ASSERT_TRUE(pipeline.play()) << pipeline.error;
+  }
+  EXPECT_TRUE(std::ranges::any_of(
+      log.with("320"), [](const Log::Line& line) { return line.level == GST_LEVEL_DEBUG; }));
+  const auto buffers = log.with(" events ");
+  EXPECT_GE(std::ranges::count(buffers, GST_LEVEL_LOG, &Log::Line::level), 3);
+}
+
+TEST(Log, WarnsOnceOfSkippedEvents) {
+  Log log("eventstats");
+  Harness h("eventstats");
+  h.caps("application/x-event-camera, format=XYTP, width=8, height=8",
+         "application/x-event-camera");
+  for (const GstClockTime time : {1, 2, 3})
+    h.push(buffer_of(time * GST_SECOND, {{0, 9, 0}}, GST_MSECOND));
+  log.expect_one_warning("beyond the sensor", 3);
+}
+
+TEST(Log, WarnsOnceOfLateDatagrams) {
+  Log log("eventdatagramdepay");
+  Harness h("eventdatagramdepay format=t32-x16-y15-on1 width=8 height=8");
+  gst_harness_set_src_caps_str(h.get(), "application/x-event-datagram");
+  for (const guint8 time : {9, 5, 4, 3}) {
+    const guint8 event[] = {time, 0, 0, 0, 1, 0, 1, 0};
+    GstBuffer* datagram = gst_buffer_new_memdup(event, sizeof event);
+    GST_BUFFER_PTS(datagram) = GST_SECOND;
+    h.push(datagram);
+  }
+  log.expect_one_warning("later events arrived before it", 3);
+}
+
+/// Gives rtpeventdepay packets with the numbers 7, 8, 7, 8, by `give`.
+template <class Give>
+void log_of_late_packets(const Give& give) {
+  std::vector<Buffer> packets;
+  {
+    Harness pay("rtpeventpay max-latency=0 seqnum-offset=7");
+    pay.caps("application/x-event-camera, format=XYTP, width=8, height=8", "application/x-rtp");
+    for (const GstClockTime time : {1, 2})
+      pay.push(buffer_of(time * GST_SECOND, {{0, 1, 1}}, GST_MSECOND));
+    while (auto packet = pay.pull()) packets.push_back(std::move(packet));
+  }
+  ASSERT_EQ(packets.size(), 2);
+  Log log("rtpeventdepay");
+  Harness h("rtpeventdepay");
+  h.caps(
+      "application/x-rtp, media=application, clock-rate=1000000, encoding-name=X-EVENT-CAMERA, "
+      "width=8, height=8");
+  GstBufferList* list = gst_buffer_list_new();
+  for (const auto index : {0U, 1U, 0U, 1U})
+    gst_buffer_list_add(list, gst_buffer_ref(packets[index].get()));
+  give(h, list);
+  gst_buffer_list_unref(list);
+  EXPECT_EQ(stat_of(h.element(), "late-packets"), 2);
+  log.expect_one_warning("later ones arrived before it", 2);
+  EXPECT_EQ(log.with("packet number 7").size(), 1);
+  EXPECT_EQ(log.with("packet number 8").size(), 1);
+}
+
+TEST(Log, TellsTheNumbersOfLatePackets) {
+  log_of_late_packets([](Harness& h, GstBufferList* list) {
+    for (guint i = 0; i < gst_buffer_list_length(list); ++i)
+      h.push(gst_buffer_ref(gst_buffer_list_get(list, i)));
+  });
+}
+
+TEST(Log, TellsTheNumbersOfLatePacketsInLists) {
+  log_of_late_packets([](Harness& h, GstBufferList* list) {
+    gst_pad_push_list(h->srcpad, gst_buffer_list_ref(list));
+  });
+}
+
+}  // namespace
