@@ -69,7 +69,8 @@ class WarnOnce {
   void operator()(gpointer element, const Report& report, const std::string& cause,
                   CallSite at = CallSite()) {
     const GstDebugLevel level = level_.next();
-    GST_CAT_LEVEL_LOG(category_, level, element, "%s (%s)", report.text.c_str(), cause.c_str());
+    gst_debug_log(category_, level, at.file, at.function, at.line, G_OBJECT(element), "%s (%s)",
+                  report.text.c_str(), cause.c_str());
     if (level == GST_LEVEL_WARNING) post_message(element, GST_MESSAGE_WARNING, report, cause, at);
   }
 
