@@ -154,6 +154,7 @@ class EventReader {
   void push_to_pads(GstEvent* event);
 
   void note_progress();
+  void log_dropped(guint64 outside, guint64 late, guint64 stray, GstClockTime position);
   void set_duration(GstClockTime duration);
   GstClockTime duration();
   void warn_of_dropped();
@@ -179,6 +180,7 @@ class EventReader {
   guint64 corrupt_places_ = 0;        ///< already signalled by DISCONT and a warning
   WarnOnce warn_of_corruption_{GST_CAT_DEFAULT};
   WarnOnce warn_of_assumption_{GST_CAT_DEFAULT};
+  RepeatLevel dropped_level_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;
   std::map<std::size_t, ReaderPad*> pad_of_stream_;
@@ -365,6 +367,7 @@ void EventReader::reset() {
   flow_ = GST_FLOW_OK;
   warn_of_corruption_.reset();
   warn_of_assumption_.reset();
+  dropped_level_.reset();
   for (auto& pad : pads_) {
     pad->reset();
     if (!format_.has_many_streams) continue;
@@ -992,23 +995,28 @@ void EventReader::push_to_pads(GstEvent* event) {
 
 /* progress, statistics and warnings */
 
+void EventReader::log_dropped(guint64 outside, guint64 late, guint64 stray, GstClockTime position) {
+  if (outside + late + stray == 0) return;
+  const auto level = dropped_level_.next();
+  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, element_,
+                    "dropped %" G_GUINT64_FORMAT " events outside the sensor, %" G_GUINT64_FORMAT
+                    " late items and %" G_GUINT64_FORMAT
+                    " at impossible times, before %" GST_TIME_FORMAT,
+                    outside, late, stray, GST_TIME_ARGS(position));
+}
+
 /// Updates position and counts, and reports new corruption.
 void EventReader::note_progress() {
   const auto counts = recording_->counts();
   const auto position = nanoseconds(recording_->position());
-  guint64 dropped = 0;
+  auto before = counts;
   {
     const auto shared = shared_.lock();
-    dropped = counts.outside + counts.late + counts.stray - shared->counts.outside -
-              shared->counts.late - shared->counts.stray;
-    shared->counts = counts;
+    std::swap(shared->counts, before);
     if (!shared->is_timed) shared->segment.position = std::max(shared->segment.position, position);
   }
-  if (dropped > 0)
-    GST_LOG_OBJECT(element_,
-                   "dropped %" G_GUINT64_FORMAT " items before %" GST_TIME_FORMAT
-                   ": outside the sensor, late, or at an impossible time",
-                   dropped, GST_TIME_ARGS(position));
+  log_dropped(counts.outside - before.outside, counts.late - before.late,
+              counts.stray - before.stray, position);
   if (counts.corrupt_places > corrupt_places_)
     for (auto& pad : pads_) pad->interrupt_data();
   if (counts.corrupt_places > 0 && counts.corrupt_places != corrupt_places_) {

@@ -125,6 +125,17 @@ TEST(Log, WarnsOnceOfSkippedEvents) {
   log.expect_one_warning("beyond the sensor", 3);
 }
 
+TEST(Log, WarnsOnceOfEventsThatReadersDrop) {
+  Log log("eventreader");
+  std::string table = "t,x,y,p\n";
+  for (int t = 0; t < 15'000; ++t)
+    table += std::to_string(20 * t) + (t % 5000 == 1 ? ",9,1,1\n" : ",1,1,1\n");
+  const TemporaryFile file(table);
+  Pipeline pipeline(file.source() + "queue ! eventcsvdec width=8 height=8 ! fakesink");
+  ASSERT_TRUE(pipeline.play()) << pipeline.error;
+  log.expect_one_warning("dropped 1 events outside the sensor", 3);
+}
+
 TEST(Log, WarnsOnceOfLateDatagrams) {
   Log log("eventdatagramdepay");
   Harness h("eventdatagramdepay format=t32-x16-y15-on1 width=8 height=8");
