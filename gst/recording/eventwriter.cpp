@@ -261,7 +261,12 @@ static void encode_triggers(GstEventWriter* self, Microseconds t) {
   auto& priv = priv_of(self);
   auto& state = *priv.state;
   for (const auto& trigger : state.triggers.take_before(t)) {
-    if (trigger.t < state.last || !state.encoder->encode_trigger(trigger, priv.bytes)) continue;
+    if (trigger.t < state.last || !state.encoder->encode_trigger(trigger, priv.bytes)) {
+      GST_LOG_OBJECT(self,
+                     "left out a trigger at %" G_GINT64_FORMAT " us: late, or the format has none",
+                     gint64{trigger.t});
+      continue;
+    }
     state.last = trigger.t;
     ++priv.writable.written().lock()->triggers;
   }

@@ -292,12 +292,17 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
 static Bytes waiting_items(GstAedatMux* self) {
   State& state = self->priv->state;
   Bytes out;
-  const auto encode = [&]<class Sample>(std::optional<std::vector<Sample>>& waiting) {
+  const auto encode = [&]<class Sample>(const char* name,
+                                        std::optional<std::vector<Sample>>& waiting) {
     const auto samples = waiting ? std::exchange(*waiting, {}) : std::vector<Sample>();
-    return state.encoder->encode(std::span<const Sample>(samples), out);
+    const auto count = state.encoder->encode(std::span<const Sample>(samples), out);
+    if (!samples.empty())
+      GST_LOG_OBJECT(self, "wrote %" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " %s", count,
+                     samples.size(), name);
+    return count;
   };
-  const auto triggers = encode(state.triggers);
-  const auto imu_samples = encode(state.imu_samples);
+  const auto triggers = encode("triggers", state.triggers);
+  const auto imu_samples = encode("IMU samples", state.imu_samples);
   const auto written = self->priv->writable.written().lock();
   written->triggers += triggers;
   written->imu_samples += imu_samples;
