@@ -37,35 +37,33 @@ void RtpUnpacker::close_interval() {
   is_discontinuous_ = false;
 }
 
-bool RtpUnpacker::is_plausible(std::span<const std::uint8_t> payload) const {
-  const auto header = RtpPayloadHeader::read(payload);
-  return header && header->format == format_;
+bool RtpUnpacker::decode(const RtpPacket& packet) {
+  const auto header = RtpPayloadHeader::read(packet.payload);
+  bool is_valid = header && header->format == format_;
+  if (is_valid) {
+    header_ = *header;
+    is_valid = decode_events(packet.payload.subspan(RtpPayloadHeader::size));
+  }
+  // A late packet is behind the events of its interval.
+  if (is_valid && is_of_interval(packet) && packets_before(packet) >= 0)
+    is_valid = continues_interval();
+  if (!is_valid) count_rejected();
+  return is_valid;
 }
 
-std::optional<RtpPayloadHeader> RtpUnpacker::accept(const RtpPacket& packet) {
-  const auto header = RtpPayloadHeader::read(packet.payload);
-  if (!header || header->format != format_) {
-    ++statistics_.rejected_packets;
-    return std::nullopt;
-  }
-  if (is_late(packet)) {
-    ++statistics_.late_packets;
-    return std::nullopt;
-  }
-  bool is_valid = decode(*header, packet.payload.subspan(RtpPayloadHeader::size));
-  if (is_valid && !decoded_.empty() && !events_.empty() && is_of_interval(packet, *header))
-    is_valid = decoded_.front().t >= events_.back().t &&
-               events_.size() + decoded_.size() <= max_rtp_interval_events;
-  if (is_valid) return header;
-  ++statistics_.rejected_packets;
-  return std::nullopt;
+bool RtpUnpacker::continues_interval() const {
+  return decoded_.empty() || events_.empty() ||
+         (decoded_.front().t >= events_.back().t &&
+          events_.size() + decoded_.size() <= max_rtp_interval_events);
+}
+
+int RtpUnpacker::packets_before(const RtpPacket& packet) const {
+  return static_cast<std::int16_t>(packet.sequence_number - position_->next_sequence_number);
 }
 
 bool RtpUnpacker::is_late(const RtpPacket& packet) {
   const auto number = packet.sequence_number;
-  if (!position_ || packet.ssrc != position_->ssrc) return false;
-  const auto ahead = static_cast<std::int16_t>(number - position_->next_sequence_number);
-  if (ahead >= 0) return false;
+  if (!position_ || packet.ssrc != position_->ssrc || packets_before(packet) >= 0) return false;
   late_in_a_row_ = number == next_late_ ? late_in_a_row_ + 1 : 1;
   next_late_ = static_cast<std::uint16_t>(number + 1);
   if (late_in_a_row_ < max_late_in_a_row) return true;
@@ -73,32 +71,32 @@ bool RtpUnpacker::is_late(const RtpPacket& packet) {
   return false;
 }
 
-bool RtpUnpacker::is_of_interval(const RtpPacket& packet, const RtpPayloadHeader& header) const {
+bool RtpUnpacker::is_of_interval(const RtpPacket& packet) const {
   return interval_ && position_ && position_->ssrc == packet.ssrc &&
-         header.start == interval_->start && header.duration == interval_->duration;
+         header_.start == interval_->start && header_.duration == interval_->duration;
 }
 
-void RtpUnpacker::append(const RtpPacket& packet, const RtpPayloadHeader& header) {
-  follow(packet, header);
+void RtpUnpacker::add(const RtpPacket& packet) {
+  follow(packet);
   if (!interval_) {
-    is_discontinuous_ |= header.start < end_;
-    interval_ = header;
+    is_discontinuous_ |= header_.start < end_;
+    interval_ = header_;
     arrival_ = packet.arrival;
   }
   events_.insert(events_.end(), decoded_.begin(), decoded_.end());
   ++statistics_.packets;
   statistics_.bytes += packet.payload.size();
-  statistics_.events += header.event_count;
+  statistics_.events += header_.event_count;
 }
 
-void RtpUnpacker::follow(const RtpPacket& packet, const RtpPayloadHeader& header) {
+void RtpUnpacker::follow(const RtpPacket& packet) {
   late_in_a_row_ = 0;
   if (!position_ || position_->ssrc != packet.ssrc) {
     is_discontinuous_ = true;
   } else {
     const auto packets =
         static_cast<std::uint16_t>(packet.sequence_number - position_->next_sequence_number);
-    const auto events = static_cast<std::int32_t>(header.first_event - position_->next_event);
+    const auto events = static_cast<std::int32_t>(header_.first_event - position_->next_event);
     statistics_.lost_packets += packets;
     // A negative number is that of a sender that started over.
     if (events > 0) statistics_.lost_events += static_cast<std::uint32_t>(events);
@@ -106,16 +104,15 @@ void RtpUnpacker::follow(const RtpPacket& packet, const RtpPayloadHeader& header
   }
   position_ = {.ssrc = packet.ssrc,
                .next_sequence_number = static_cast<std::uint16_t>(packet.sequence_number + 1),
-               .next_event = header.first_event + header.event_count};
+               .next_event = header_.first_event + header_.event_count};
 }
 
-bool RtpUnpacker::decode(const RtpPayloadHeader& header, std::span<const std::uint8_t> body) {
+bool RtpUnpacker::decode_events(std::span<const std::uint8_t> body) {
   decoded_.clear();
-  return header.format == RtpEventFormat::evt3 ? decode_evt3(header, body)
-                                               : decode_xytp(header, body);
+  return format_ == RtpEventFormat::evt3 ? decode_evt3(body) : decode_xytp(body);
 }
 
-bool RtpUnpacker::decode_evt3(const RtpPayloadHeader& header, std::span<const std::uint8_t> words) {
+bool RtpUnpacker::decode_evt3(std::span<const std::uint8_t> words) {
   reader_->restore({});
   corruption_ = {};
   batch_->triggers = &triggers_;
@@ -127,27 +124,26 @@ bool RtpUnpacker::decode_evt3(const RtpPayloadHeader& header, std::span<const st
     from = reader_->read(from, to, *batch_);
     triggers_.clear();
     for (const auto* event = batch_->begin(); event != batch_->end; ++event)
-      if (!decode(header, static_cast<std::uint64_t>(event->t), event->x, event->y_p)) return false;
+      if (!decode(static_cast<std::uint64_t>(event->t), event->x, event->y_p)) return false;
   }
   return corruption_.places == 0 && corruption_.outside == 0 &&
-         decoded_.size() == header.event_count;
+         decoded_.size() == header_.event_count;
 }
 
-bool RtpUnpacker::decode_xytp(const RtpPayloadHeader& header, std::span<const std::uint8_t> body) {
+bool RtpUnpacker::decode_xytp(std::span<const std::uint8_t> body) {
   for (std::size_t i = 0; i < body.size(); i += sizeof(Event)) {
     const auto event = little_endian<Event>(body.data() + i);
     if (event.x >= sensor_.width || event.y() >= sensor_.height ||
-        !decode(header, event.t, event.x, event.y_p))
+        !decode(event.t, event.x, event.y_p))
       return false;
   }
   return true;
 }
 
 /// Decodes an event at `t`, relative to the header's base.
-bool RtpUnpacker::decode(const RtpPayloadHeader& header, std::uint64_t t, std::uint16_t x,
-                         std::uint16_t y_p) {
-  t += header.base;
-  const auto latest = (header.start + header.duration) / 1000 - header.start / 1000;
+bool RtpUnpacker::decode(std::uint64_t t, std::uint16_t x, std::uint16_t y_p) {
+  t += header_.base;
+  const auto latest = (header_.start + header_.duration) / 1000 - header_.start / 1000;
   if (t > static_cast<std::uint64_t>(latest) || (!decoded_.empty() && t < decoded_.back().t))
     return false;
   decoded_.push_back({static_cast<std::uint32_t>(t), x, y_p});

@@ -46,8 +46,8 @@ struct RtpStatistics {
 };
 
 /// Decodes the payloads of RTP packets, and joins the packets of each interval. Drops packets that
-/// are late, so that every interval and event is in the sender's order, and packets that are not
-/// valid in every detail.
+/// are not valid in every detail, and packets that are late, so that every interval and event is in
+/// the sender's order.
 class RtpUnpacker {
  public:
   RtpUnpacker(SensorSize sensor, RtpEventFormat format);
@@ -55,14 +55,27 @@ class RtpUnpacker {
   /// Goes on with another sensor or format. Flush before.
   void change(SensorSize sensor, RtpEventFormat format);
 
-  /// Calls take(RtpInterval) for each interval that ends with this packet or ended before it. The
-  /// events are valid during the call only.
+  /// Decodes a packet, and appends it if it is valid.
   template <class Take>
   void push(const RtpPacket& packet, const Take& take) {
-    const auto header = accept(packet);
-    if (!header) return;
-    if (!is_of_interval(packet, *header)) flush(take);
-    append(packet, *header);
+    if (decode(packet)) append(packet, take);
+  }
+
+  /// Decodes the events of a packet. False if it is not valid in every detail: it is counted as
+  /// rejected, and changes nothing else.
+  bool decode(const RtpPacket& packet);
+
+  /// Appends the packet that was decoded last, unless it is late. Calls take(RtpInterval) for each
+  /// interval that ends with this packet or ended before it. The events are valid during the call
+  /// only.
+  template <class Take>
+  void append(const RtpPacket& packet, const Take& take) {
+    if (is_late(packet)) {
+      count_late();
+      return;
+    }
+    if (!is_of_interval(packet)) flush(take);
+    add(packet);
     if (packet.marker) flush(take);
   }
 
@@ -77,11 +90,9 @@ class RtpUnpacker {
   /// Forgets the stream; the next packet starts a new one. The statistics go on.
   void reset();
 
-  /// True if a packet may be one of this format: a quick check of its header.
-  bool is_plausible(std::span<const std::uint8_t> payload) const;
-
-  /// Count packets that were dropped before they came here: not plausible, or late.
+  /// Counts a packet that was dropped before decode(): not RTP.
   void count_rejected() { ++statistics_.rejected_packets; }
+  /// Counts a packet that was dropped before append(): late.
   void count_late() { ++statistics_.late_packets; }
 
   const RtpStatistics& statistics() const { return statistics_; }
@@ -94,18 +105,21 @@ class RtpUnpacker {
     std::uint32_t next_event;
   };
 
-  /// Decodes the events of a packet, and returns its header; none if the packet is late or corrupt.
-  std::optional<RtpPayloadHeader> accept(const RtpPacket& packet);
   bool is_late(const RtpPacket& packet);
-  bool is_of_interval(const RtpPacket& packet, const RtpPayloadHeader& header) const;
-  bool decode(const RtpPayloadHeader& header, std::span<const std::uint8_t> body);
-  bool decode_evt3(const RtpPayloadHeader& header, std::span<const std::uint8_t> words);
-  bool decode_xytp(const RtpPayloadHeader& header, std::span<const std::uint8_t> body);
-  bool decode(const RtpPayloadHeader& header, std::uint64_t t, std::uint16_t x, std::uint16_t y_p);
+  /// Number of packets that are missing before this one; negative after the expected one.
+  int packets_before(const RtpPacket& packet) const;
+  /// Whether the decoded packet belongs to the current interval.
+  bool is_of_interval(const RtpPacket& packet) const;
+  /// Whether the decoded events may follow those of the current interval.
+  bool continues_interval() const;
+  bool decode_events(std::span<const std::uint8_t> body);
+  bool decode_evt3(std::span<const std::uint8_t> words);
+  bool decode_xytp(std::span<const std::uint8_t> body);
+  bool decode(std::uint64_t t, std::uint16_t x, std::uint16_t y_p);
   /// Adds the decoded events to the interval.
-  void append(const RtpPacket& packet, const RtpPayloadHeader& header);
+  void add(const RtpPacket& packet);
   /// Counts what was lost before a packet.
-  void follow(const RtpPacket& packet, const RtpPayloadHeader& header);
+  void follow(const RtpPacket& packet);
   void close_interval();
 
   SensorSize sensor_;
@@ -114,6 +128,7 @@ class RtpUnpacker {
   std::unique_ptr<Batch> batch_;
   Corruption corruption_;          ///< of the current packet
   std::vector<Trigger> triggers_;  ///< of the current packet
+  RtpPayloadHeader header_;        ///< of the current packet
   std::vector<Event> decoded_;     ///< of the current packet
 
   std::optional<Position> position_;

@@ -286,6 +286,57 @@ TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
   EXPECT_EQ(stat_of(h.element(), "lost-packets"), 0U);
 }
 
+/// Copy of a packet with another sequence number and, after the header of its payload, other bytes.
+GstBuffer* with_garbage(GstBuffer* packet, guint16 sequence_number) {
+  GstBuffer* copy = gst_buffer_copy_deep(packet);
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  EXPECT_TRUE(gst_rtp_buffer_map(copy, GST_MAP_READWRITE, &rtp));
+  gst_rtp_buffer_set_seq(&rtp, sequence_number);
+  auto* payload = static_cast<guint8*>(gst_rtp_buffer_get_payload(&rtp));
+  std::fill(payload + RtpPayloadHeader::size, payload + gst_rtp_buffer_get_payload_len(&rtp), 0xff);
+  gst_rtp_buffer_unmap(&rtp);
+  return copy;
+}
+
+TEST_P(EveryFormat, AnInvalidPacketAheadDelaysNoOthers) {
+  std::vector<Interval> intervals;
+  for (int i = 0; i < 60; ++i)
+    intervals.push_back({i * 10'000'000, 10'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  const auto packets = packets_of(intervals, std::string("format=") + GetParam());
+  Depayloader h(GetParam());
+  h.take(packets[0].get());
+  const auto next = Fields(packets[1].get()).sequence_number;
+  h.push(with_garbage(packets[1].get(), static_cast<guint16>(next + 50)));
+  for (std::size_t i = 1; i < packets.size(); ++i) h.take(packets[i].get());
+  EXPECT_EQ(Output(h).intervals, intervals);
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 1U);
+  EXPECT_EQ(stat_of(h.element(), "late-packets"), 0U);
+}
+
+TEST_P(EveryFormat, APacketAheadThatContradictsItsIntervalDelaysNoOthers) {
+  std::vector<Event> events;
+  for (int i = 0; i < 20'000; ++i)
+    events.push_back(Event::at(i * 7919 % 346, i * 104729 % 260, static_cast<std::uint32_t>(i / 2),
+                               Polarity::on));
+  const std::vector<Interval> intervals = {{0, 10'000'000, events}};
+  const auto packets = packets_of(intervals, std::string("format=") + GetParam());
+  ASSERT_GT(packets.size(), 60U);
+  Depayloader h(GetParam());
+  const auto take = [&](std::size_t i) { h.take(packets[i].get()); };
+  for (std::size_t i = 0; i < 4; ++i) take(i);
+  // The events of packet 1 again, which are before those of packet 3.
+  const Buffer again(gst_buffer_copy_deep(packets[1].get()));
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  ASSERT_TRUE(gst_rtp_buffer_map(again.get(), GST_MAP_READWRITE, &rtp));
+  gst_rtp_buffer_set_seq(&rtp, static_cast<guint16>(gst_rtp_buffer_get_seq(&rtp) + 50));
+  gst_rtp_buffer_unmap(&rtp);
+  h.take(again.get());
+  for (std::size_t i = 4; i < packets.size(); ++i) take(i);
+  EXPECT_EQ(Output(h).intervals, intervals);
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 1U);
+  EXPECT_EQ(stat_of(h.element(), "late-packets"), 0U);
+}
+
 TEST(RtpEventPay, JoinsShortBuffersUpToItsLatency) {
   Harness h("rtpeventpay max-latency=5000000 ! rtpeventdepay");
   h.caps(davis_caps);

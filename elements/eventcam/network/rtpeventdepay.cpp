@@ -40,8 +40,8 @@
 
 #include <array>
 #include <charconv>
+#include <exception>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -61,6 +61,7 @@ GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
 
 using eventcamera::RtpEventFormat;
 using eventcamera::RtpInterval;
+using eventcamera::RtpPacket;
 using eventcamera::RtpStatistics;
 using eventcamera::RtpUnpacker;
 using eventcamera::SensorSize;
@@ -168,6 +169,10 @@ static void flush(GstRtpEventDepay* self) {
 
 /* input */
 
+static Report no_memory(const std::exception&) {
+  return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
+}
+
 static void log_rejected(GstRtpEventDepay* self, guint number) {
   const auto level = self->priv->rejected_level.next();
   GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
@@ -181,9 +186,15 @@ static void log_late(GstRtpEventDepay* self, guint number) {
                     number);
 }
 
-static std::span<const std::uint8_t> payload_of(GstRTPBuffer* rtp) {
-  return {static_cast<const std::uint8_t*>(gst_rtp_buffer_get_payload(rtp)),
-          gst_rtp_buffer_get_payload_len(rtp)};
+static RtpPacket packet_of(GstRTPBuffer* rtp) {
+  return {
+      .ssrc = gst_rtp_buffer_get_ssrc(rtp),
+      .sequence_number = gst_rtp_buffer_get_seq(rtp),
+      .marker = gst_rtp_buffer_get_marker(rtp) != FALSE,
+      .payload = {static_cast<const std::uint8_t*>(gst_rtp_buffer_get_payload(rtp)),
+                  gst_rtp_buffer_get_payload_len(rtp)},
+      .arrival = GST_BUFFER_PTS(rtp->buffer),
+  };
 }
 
 /// Sequence number of an RTP packet.
@@ -193,70 +204,60 @@ static guint number_of(GstBuffer* packet) {
   return GST_READ_UINT16_BE(bytes.data());
 }
 
+/// Decodes a packet. Those that are not valid must not reach the base class, which would follow
+/// their sequence numbers.
+static bool decode(GstRtpEventDepay* self, GstBuffer* buffer) {
+  auto& unpacker = self->priv->state->unpacker;
+  bool is_valid = false;
+  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
+  if (gst_rtp_buffer_map(buffer, GST_MAP_READ, &rtp)) {
+    is_valid = guarded(self, no_memory, [&] { return unpacker.decode(packet_of(&rtp)); });
+    gst_rtp_buffer_unmap(&rtp);
+  } else {
+    unpacker.count_rejected();
+  }
+  return is_valid;
+}
+
+/// Appends the decoded packet, which the base class found not to be late.
 static GstBuffer* process(GstRTPBaseDepayload* depayload, GstRTPBuffer* rtp) {
   auto* self = GST_RTP_EVENT_DEPAY(depayload);
   auto& priv = *self->priv;
   priv.was_processed = true;
-  if (!priv.state) return nullptr;
-  auto& state = *priv.state;
-  const eventcamera::RtpPacket packet{
-      .ssrc = gst_rtp_buffer_get_ssrc(rtp),
-      .sequence_number = gst_rtp_buffer_get_seq(rtp),
-      .marker = gst_rtp_buffer_get_marker(rtp) != FALSE,
-      .payload = payload_of(rtp),
-      .arrival = GST_BUFFER_PTS(rtp->buffer),
-  };
-  const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
-  guarded(self, report, [&] {
-    state.unpacker.push(packet, [&](const RtpInterval& interval) { push(self, interval); });
+  guarded(self, no_memory, [&] {
+    priv.state->unpacker.append(packet_of(rtp),
+                                [&](const RtpInterval& interval) { push(self, interval); });
   });
-  const auto& counted = state.unpacker.statistics();
-  const auto before = std::exchange(*priv.statistics.lock(), counted);
-  if (counted.lost_packets > before.lost_packets)
-    GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u",
-                     guint64{counted.lost_packets - before.lost_packets}, packet.sequence_number);
-  if (counted.rejected_packets > before.rejected_packets)
-    log_rejected(self, packet.sequence_number);
-  if (counted.late_packets > before.late_packets) log_late(self, packet.sequence_number);
   return nullptr;
 }
 
-/// True if a packet may be one of rtpeventpay. Others are counted, and must not reach the base
-/// class, which would follow their sequence numbers.
-static bool is_plausible(GstRtpEventDepay* self, GstBuffer* buffer) {
+/// Publishes the statistics after packet `number`, and logs how it changed them.
+static void update_statistics(GstRtpEventDepay* self, guint number) {
   auto& priv = *self->priv;
-  if (!priv.state) return true;  // the base class refuses it
-  auto& unpacker = priv.state->unpacker;
-  GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
-  bool plausible = false;
-  if (gst_rtp_buffer_map(buffer, GST_MAP_READ, &rtp)) {
-    plausible = unpacker.is_plausible(payload_of(&rtp));
-    gst_rtp_buffer_unmap(&rtp);
-  }
-  if (!plausible) {
-    log_rejected(self, number_of(buffer));
-    unpacker.count_rejected();
-    *priv.statistics.lock() = unpacker.statistics();
-  }
-  return plausible;
+  const auto& counted = priv.state->unpacker.statistics();
+  const auto before = std::exchange(*priv.statistics.lock(), counted);
+  if (counted.lost_packets > before.lost_packets)
+    GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u",
+                     guint64{counted.lost_packets - before.lost_packets}, number);
+  if (counted.rejected_packets > before.rejected_packets) log_rejected(self, number);
+  if (counted.late_packets > before.late_packets) log_late(self, number);
 }
 
-/// Gives a packet to the base class, which drops it if it is late. Those are counted here.
+/// Gives a valid packet to the base class, which drops it if it is late. Those are counted here.
 static GstFlowReturn chain(GstPad* pad, GstObject* parent, GstBuffer* buffer) {
   auto* self = GST_RTP_EVENT_DEPAY(parent);
   auto& priv = *self->priv;
-  if (!is_plausible(self, buffer)) {
-    gst_buffer_unref(buffer);
-    return GST_FLOW_OK;
-  }
+  if (!priv.state) return priv.chain(pad, parent, buffer);  // which refuses it
   const guint number = number_of(buffer);
-  priv.was_processed = false;
-  const GstFlowReturn flow = priv.chain(pad, parent, buffer);
-  if (flow == GST_FLOW_OK && priv.state && !priv.was_processed) {
-    log_late(self, number);
-    priv.state->unpacker.count_late();
-    *priv.statistics.lock() = priv.state->unpacker.statistics();
+  GstFlowReturn flow = GST_FLOW_OK;
+  if (decode(self, buffer)) {
+    priv.was_processed = false;
+    flow = priv.chain(pad, parent, buffer);
+    if (flow == GST_FLOW_OK && !priv.was_processed) priv.state->unpacker.count_late();
+  } else {
+    gst_buffer_unref(buffer);
   }
+  update_statistics(self, number);
   return flow;
 }
 
@@ -357,14 +358,13 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
   flush(self);
   GST_DEBUG_OBJECT(self, "receiving the events of %dx%d pixels as %s", sensor.width, sensor.height,
                    rtp_event_formats[static_cast<std::size_t>(*format)]);
-  const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
   const auto follow = [&] {
     if (state)
       state->change(sensor, *format);
     else
       state.emplace(sensor, *format);
   };
-  if (!guarded(self, report, follow)) return FALSE;
+  if (!guarded(self, no_memory, follow)) return FALSE;
   return send_caps(self, sensor);
 }
 
