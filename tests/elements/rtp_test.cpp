@@ -337,6 +337,50 @@ TEST_P(EveryFormat, APacketAheadThatContradictsItsIntervalDelaysNoOthers) {
   EXPECT_EQ(stat_of(h.element(), "late-packets"), 0U);
 }
 
+/// A meta whose buffer has another owner, who releases it while it is copied.
+struct ReleasedWhenCopied {
+  GstMeta meta;
+  bool was_copied;
+
+  static const GstMetaInfo* info() {
+    static const GType api = [] {
+      static const gchar* tags[] = {nullptr};
+      return gst_meta_api_type_register("ReleasedWhenCopiedAPI", tags);
+    }();
+    static const GstMetaInfo* const registered = gst_meta_register(
+        api, "ReleasedWhenCopied", sizeof(ReleasedWhenCopied),
+        [](GstMeta* meta, gpointer, GstBuffer*) -> gboolean {
+          reinterpret_cast<ReleasedWhenCopied*>(meta)->was_copied = false;
+          return TRUE;
+        },
+        nullptr,
+        [](GstBuffer*, GstMeta* meta, GstBuffer* buffer, GQuark, gpointer) -> gboolean {
+          auto& was_copied = reinterpret_cast<ReleasedWhenCopied*>(meta)->was_copied;
+          if (!std::exchange(was_copied, true)) gst_buffer_unref(buffer);
+          return TRUE;
+        });
+    return registered;
+  }
+};
+
+TEST(RtpEventDepay, TakesPacketsThatTheirOwnersReleaseMeanwhile) {
+  std::vector<Interval> intervals;
+  for (int i = 0; i < 9; ++i)
+    intervals.push_back({i * 10'000'000, 10'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  const auto packets = packets_of(intervals);
+  Depayloader h;
+  for (std::size_t i = 0; i < packets.size(); i += 2) {  // the base class copies those after a loss
+    GstBuffer* const packet = gst_buffer_copy(packets[i].get());
+    if (i > 0) {
+      gst_buffer_add_meta(packet, ReleasedWhenCopied::info(), nullptr);
+      gst_buffer_ref(packet);  // for the other owner
+    }
+    EXPECT_EQ(h.push(packet), GST_FLOW_OK);
+  }
+  EXPECT_EQ(stat_of(h.element(), "packets"), 5U);
+  EXPECT_EQ(stat_of(h.element(), "lost-packets"), 4U);
+}
+
 TEST(RtpEventPay, JoinsShortBuffersUpToItsLatency) {
   Harness h("rtpeventpay max-latency=5000000 ! rtpeventdepay");
   h.caps(davis_caps);

@@ -248,14 +248,18 @@ static GstFlowReturn chain(GstPad* pad, GstObject* parent, GstBuffer* buffer) {
   auto* self = GST_RTP_EVENT_DEPAY(parent);
   auto& priv = *self->priv;
   if (!priv.state) return priv.chain(pad, parent, buffer);  // which refuses it
+  // In GStreamer 1.22 and 1.24, GstRTPBaseDepayload marks a packet after a gap as DISCONT
+  // by gst_buffer_make_writable(), which replaces a packet that has other owners, and then unmaps
+  // the packet that it no longer owns. When those owners release it meanwhile, it unmaps what was
+  // freed ("gst_buffer_unmap: assertion 'GST_IS_BUFFER (buffer)' failed"), and leaks its memory.
+  // So this is one more owner.
+  const OwnedBuffer packet(buffer);
   const guint number = number_of(buffer);
   GstFlowReturn flow = GST_FLOW_OK;
   if (decode(self, buffer)) {
     priv.was_processed = false;
-    flow = priv.chain(pad, parent, buffer);
+    flow = priv.chain(pad, parent, gst_buffer_ref(buffer));
     if (flow == GST_FLOW_OK && !priv.was_processed) priv.state->unpacker.count_late();
-  } else {
-    gst_buffer_unref(buffer);
   }
   update_statistics(self, number);
   return flow;
