@@ -4,9 +4,12 @@
 #include <gst/rtp/gstrtphdrext.h>
 #include <gst/rtp/gstrtpmeta.h>
 #include <gst/sdp/gstsdpmessage.h>
+#define GST_USE_UNSTABLE_API  // of tracers
+#include <gst/gsttracer.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <optional>
 #include <random>
 
@@ -398,6 +401,36 @@ TEST(RtpEventPay, JoinsShortBuffersUpToItsLatency) {
 void push_custom_event(Harness& h, const char* name) {
   gst_harness_push_event(
       h.get(), gst_event_new_custom(GST_EVENT_CUSTOM_DOWNSTREAM, gst_structure_new_empty(name)));
+}
+
+/// Number of GstBuffers made by this process, from the first call on.
+int buffers_made() {
+  static std::atomic<int> made = 0;
+  static const bool is_counting = [] {
+    const auto count = +[](GObject*, GstClockTime, GstMiniObject* object) {
+      if (GST_IS_BUFFER(object)) ++made;
+    };
+    const GType counter =
+        g_type_register_static_simple(GST_TYPE_TRACER, "BufferCounter", sizeof(GstTracerClass),
+                                      nullptr, sizeof(GstTracer), nullptr, GTypeFlags{});
+    auto* tracer = static_cast<GstTracer*>(g_object_new(counter, nullptr));
+    gst_tracing_register_hook(tracer, "mini-object-created", G_CALLBACK(count));
+    return true;
+  }();
+  return is_counting ? made.load() : 0;
+}
+
+TEST(RtpEventPay, MakesNoPacketsWhileEventsWait) {
+  Harness h("rtpeventpay max-latency=1000000000");
+  h.caps(davis_caps, "application/x-rtp");
+  std::vector<Interval> intervals;
+  for (int i = 0; i < 20; ++i)
+    intervals.push_back({i * 1'000'000, 1'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  push(h, intervals.front());
+  const int before = buffers_made();
+  for (std::size_t i = 1; i < intervals.size(); ++i) push(h, intervals[i]);
+  EXPECT_EQ(buffers_made() - before, 19);  // the test's own
+  EXPECT_FALSE(h.pull());
 }
 
 TEST(RtpEventPay, JoinsBuffersWithTriggersAndImuSamplesBetweenThem) {

@@ -13,10 +13,10 @@
 /// class does not tell, so extensions of the same kind are asked.
 class RtpHeaderExtensions {
  public:
-  /// Maximum size in bytes, with the extensions' common header. `packet` has any content.
-  gsize max_size(const OwnedCaps& caps, GstBuffer* packet) {
+  /// Maximum size in bytes, with the extensions' common header.
+  gsize max_size(const OwnedCaps& caps) {
     if (caps.get() != caps_.get()) {
-      size_ = size_of(*gst_caps_get_structure(caps.get(), 0), packet);
+      size_ = size_of(*gst_caps_get_structure(caps.get(), 0));
       caps_.reset(gst_caps_ref(caps.get()));
     }
     return size_;
@@ -39,7 +39,8 @@ class RtpHeaderExtensions {
     return G_VALUE_HOLDS_STRING(extmap) ? g_value_get_string(extmap) : nullptr;
   }
 
-  static gsize size_of(const GstStructure& caps, GstBuffer* packet) {
+  static gsize size_of(const GstStructure& caps) {
+    const OwnedBuffer any(gst_buffer_new());  // extensions may ask what they are added to
     gsize count = 0;
     gsize size = 0;
     bool is_short = true;
@@ -55,7 +56,7 @@ class RtpHeaderExtensions {
       gsize largest = id <= max_short_id ? max_short_size : max_long_size;
       if (extension) {
         gst_rtp_header_extension_set_id(extension.get(), id);
-        largest = gst_rtp_header_extension_get_max_size(extension.get(), packet);
+        largest = gst_rtp_header_extension_get_max_size(extension.get(), any.get());
         is_short &= (gst_rtp_header_extension_get_supported_flags(extension.get()) &
                      GST_RTP_HEADER_EXTENSION_ONE_BYTE) != 0;
       }

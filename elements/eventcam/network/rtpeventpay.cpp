@@ -92,6 +92,7 @@ struct Private {
   std::optional<State> state;
   EventFaults faults{"send", GST_CAT_DEFAULT};
   GstFlowReturn flow = GST_FLOW_OK;  ///< result of the last packets
+  guint8 csrc_count = 0;             ///< of the packets sent for the last buffer; others have none
   RtpHeaderExtensions extensions;
 
   FlushTimer timer;
@@ -121,11 +122,9 @@ static GuardedSettings<Settings>& settings_of(GObject* object) {
 
 /// Maximum size of the RTP header, with the CSRCs and header extensions that the base class writes.
 static gsize max_header_size(GstRtpEventPay* self) {
-  auto* payload = GST_RTP_BASE_PAYLOAD(self);
-  const OwnedBuffer packet(gst_rtp_base_payload_allocate_output_buffer(payload, 0, 0, 0));
   const OwnedCaps caps(gst_pad_get_current_caps(GST_RTP_BASE_PAYLOAD_SRCPAD(self)));
-  return gst_buffer_get_size(packet.get()) +
-         (caps ? self->priv->extensions.max_size(caps, packet.get()) : 0);
+  return gst_rtp_buffer_calc_header_len(self->priv->csrc_count) +
+         (caps ? self->priv->extensions.max_size(caps) : 0);
 }
 
 /// Maximum size of a payload.
@@ -251,6 +250,9 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   auto& priv = *self->priv;
   const OwnedBuffer buffer(taken);
   if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  constexpr guint max_csrc_count = 15;
+  priv.csrc_count = static_cast<guint8>(
+      std::min(gst_rtp_base_payload_get_source_count(payload, taken), max_csrc_count));
   if (!GST_BUFFER_PTS_IS_VALID(taken)) return leave_out(self, EventFault::no_pts, taken);
   const auto interval = interval_of(taken);
   if (!interval || interval->start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
