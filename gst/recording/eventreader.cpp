@@ -1027,7 +1027,8 @@ void EventReader::note_progress() {
         {format_.has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE,
          "Corrupt data at byte " + at + ": " + corruption.first +
              "; skipping it. The stats property counts what is dropped."},
-        "first corruption at byte " + at + ": " + corruption.first);
+        std::to_string(counts.corrupt_places) + " corrupt places, the last at byte " +
+            std::to_string(corruption.last_at));
   }
   corrupt_places_ = counts.corrupt_places;
 }

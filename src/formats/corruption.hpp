@@ -11,6 +11,7 @@ struct Corruption {
   std::uint64_t places = 0;    ///< number of corrupt places
   std::uint64_t first_at = 0;  ///< byte offset of the first in the file
   std::string first;           ///< description of the first, for users
+  std::uint64_t last_at = 0;   ///< byte offset of the last that was found
   std::uint64_t unsorted = 0;  ///< events earlier than one before them, delivered as read
   std::uint64_t outside = 0;   ///< events outside the sensor, dropped
 
@@ -20,6 +21,7 @@ struct Corruption {
       first_at = at;
       first = what;
     }
+    last_at = at;
   }
 };
 

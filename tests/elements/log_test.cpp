@@ -136,6 +136,22 @@ TEST(Log, WarnsOnceOfEventsThatReadersDrop) {
   log.expect_one_warning("dropped 1 events outside the sensor", 3);
 }
 
+TEST(Log, TellsWhereDataAreCorrupt) {
+  Log log("eventreader");
+  std::string table = "t,x,y,p\n";
+  std::vector<std::size_t> corrupt;
+  for (int t = 0; t < 15'000; ++t) {
+    if (t % 5000 == 1) corrupt.push_back(table.size());
+    table += t % 5000 == 1 ? "?\n" : std::to_string(20 * t) + ",1,1,1\n";
+  }
+  const TemporaryFile file(table);
+  Pipeline pipeline(file.source() + "queue ! eventcsvdec width=8 height=8 ! fakesink");
+  ASSERT_TRUE(pipeline.play()) << pipeline.error;
+  log.expect_one_warning("Corrupt data at byte", 3);
+  for (const auto at : corrupt)
+    EXPECT_EQ(log.with("the last at byte " + std::to_string(at)).size(), 1) << at;
+}
+
 TEST(Log, WarnsOnceOfLateDatagrams) {
   Log log("eventdatagramdepay");
   Harness h("eventdatagramdepay format=t32-x16-y15-on1 width=8 height=8");
