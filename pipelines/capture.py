@@ -72,6 +72,7 @@ class Capture:
         self._appsrcs = ()  # replaced, never changed: the thread that captures reads it
         self._attaching = threading.Lock()
         self._on_element_message = on_element_message
+        self._loop = GLib.MainLoop()
 
     def attach(self, appsrc, pipeline):
         """`pipeline`, in which `appsrc` is, gets the clock of the capture: buffers keep their times."""
@@ -90,10 +91,11 @@ class Capture:
             message = self.pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
             self.pipeline.set_state(Gst.State.NULL)
             raise RuntimeError(described(message))
+        for number in (signal.SIGINT, signal.SIGTERM):
+            GLib.unix_signal_add(GLib.PRIORITY_DEFAULT, number, self._loop.quit)
 
     def run(self):
         """Returns at Ctrl-C or SIGTERM; raises RuntimeError if the pipeline fails."""
-        loop = GLib.MainLoop()
         failures = []
 
         def receive(_, message):
@@ -101,14 +103,12 @@ class Capture:
                 self._on_element_message(message)
             elif message.type in (Gst.MessageType.ERROR, Gst.MessageType.EOS):
                 failures.append(described(message))
-                loop.quit()
+                self._loop.quit()
 
         bus = self.pipeline.get_bus()
         bus.add_signal_watch()
         bus.connect("message", receive)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            GLib.unix_signal_add(GLib.PRIORITY_DEFAULT, number, loop.quit)
-        loop.run()
+        self._loop.run()
         bus.remove_signal_watch()
         self.pipeline.set_state(Gst.State.NULL)
         if failures:
