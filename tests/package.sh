@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Builds the Debian packages, checks them with lintian, and installs, uses, upgrades and removes them
-# in a fresh chroot, as root:
+# Builds the Debian packages, checks them with lintian, installs, uses, upgrades and removes them in a
+# fresh chroot, and runs the lines of the README from them in another, as root:
 #   tests/package.sh [DIRECTORY]     the packages are left in DIRECTORY, or used if they are there
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -61,10 +61,10 @@ used() {
   for ending in dat es npy csv aedat4 hdf5 h5; do try event-convert ball.raw ball.$ending; done
   for ending in raw dat es npy csv aedat4 hdf5 h5; do try gst-play-1.0 --no-interactive --videosink=fakesink ball.$ending; done
   try event-calibrate --version
-  try man --whatis event-convert
+  for program in event-convert web-events rtsp-events virtual-camera; do try man --whatis $program; done
   try test -s /usr/share/doc/gsteventcamera-1.0/struct.Info.html
   try pkg-config --exists --print-errors gsteventcamera-1.0
-  try cc count_events.c -o count_events $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
+  try cc /usr/share/doc/libgsteventcamera-1.0-dev/examples/count_events.c -o count_events $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
   try ./count_events "videotestsrc pattern=ball num-buffers=10 ! eventsim-diff ! appsink name=events"
   try python3 -c 'import gi; gi.require_version("GstEventCamera", "1.0"); from gi.repository import Gst, GstEventCamera; Gst.init(None); print(GstEventCamera.Info)'
   for file in ball.raw=application/x-prophesee-raw ball.h5=application/x-event-hdf5; do
@@ -99,5 +99,31 @@ mkdir "$scratch/old"
 cp "$packages"/*.deb "$scratch/old/"
 rm -f "$scratch"/old/*-dbgsym_*
 tests/mmdebstrap.sh host --variant=apt --format=null \
-  --customize-hook="copy-in '$scratch/old' '$scratch/new' '$scratch/use' pipelines/count_events.c /tmp" \
+  --customize-hook="copy-in '$scratch/old' '$scratch/new' '$scratch/use' /tmp" \
   --customize-hook='chroot "$1" bash /tmp/use'
+
+# Runs in another chroot: what a new user does. Of the checkout, it has the pages and how to run their lines.
+cat >"$scratch/read" <<'READ'
+set -euo pipefail
+export DEBIAN_FRONTEND=noninteractive
+apt-get update -q
+mkdir /tmp/old/gst-eventsim
+cd /tmp/old/gst-eventsim
+# By default apt installs what is recommended, but not where mmdebstrap calls it.
+install=$(sed -n 's/^apt install /apt-get install -q -y --install-recommends /p' /tmp/pages/README.md)
+eval "${install:?}"
+source /tmp/pages/scratch_folder.sh
+source /tmp/pages/run_lines.sh
+ln -s /usr/share/doc/gir1.2-gsteventcamera-1.0/examples pipelines
+run_lines /tmp/pages/README.md /tmp/pages/applications.md /tmp/pages/network.md
+for file in ball.npy out.raw out.h5 events.npy; do
+  [ -s $file ] || fail "$file is missing or empty"
+done
+./pipelines/on_and_off.py
+echo "The $count lines of the README and of two more pages were run"
+READ
+mkdir "$scratch/pages"
+cp README.md docs/applications.md docs/network.md tests/pipelines/scratch_folder.sh tests/pipelines/run_lines.sh "$scratch/pages/"
+tests/mmdebstrap.sh host --variant=apt --format=null \
+  --customize-hook="copy-in '$scratch/old' '$scratch/pages' '$scratch/read' /tmp" \
+  --customize-hook='chroot "$1" bash /tmp/read'

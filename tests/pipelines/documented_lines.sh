@@ -1,15 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Runs the command lines of README.md and docs/, each once, with test pictures instead of cameras and
-# without windows.
+# Runs the command lines of README.md and docs/.
 set -eu
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
+source "$SOURCE/tests/pipelines/run_lines.sh"
 export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
 cp "$SOURCE/pipelines/events_to_numpy.py" pipelines/
 
 # The files that the lines read.
-ball="videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=I420,framerate=25/1"
 eval "$GST_LAUNCH -q $ball ! x264enc ! mp4mux ! filesink location=drive.mp4"
 eval "$GST_LAUNCH -q filesrc location=drive.mp4 ! decodebin ! eventsim-dvs ! evtenc ! filesink location=drive.raw"
 eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-dvs ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=davis.aedat4"
@@ -18,67 +17,8 @@ for name in in recording real simulated; do cp drive.raw $name.raw; done
 for ending in dat es csv; do event-convert drive.raw recording.$ending; done
 /usr/bin/python3 -c 'import numpy; numpy.savez("events.npz", **{name: numpy.zeros(9, int) for name in "txyp"})'
 
-# rtspsrc interrupts its PAUSE with TEARDOWN when a pipeline stops, and may then send PAUSE to a server that
-# has closed the connection: an error after the last frame.
-ended_before_pause() {
-  grep -q '^Got EOS' "$1" && ! sed '/^Got EOS/q' "$1" | grep -q ERROR && grep -q 'Could not send message' "$1"
-}
-
-servers=()
-trap 'kill "${servers[@]}" 2>/dev/null || true; rm -rf "$work"' EXIT
-count=0
-receiver=
-while IFS= read -r line; do
-  line=${line//v4l2src/$ball}
-  line=${line//rtspsrc location=rtsp:\/\/camera\/stream ! decodebin/$ball}
-  line=$(sed -E 's/num-buffers=(90|100|300)/num-buffers=40/; s/(videotestsrc pattern=ball) (!|foreground)/\1 num-buffers=40 \2/' <<<"$line")
-  line=${line//autovideosink/fakesink}
-  line=${line//glimagesink/"'video/x-raw(memory:GLMemory)' ! fakesink"}
-  line=${line// --device \/dev\/video0/ --port 0}
-  line=${line//host=receiver/host=127.0.0.1}
-  line=${line//server:8554/127.0.0.1:${served:-}}
-  case $line in
-    *glupload*) line=${line/num-buffers=40/num-buffers=5} ;; # the renderer may be in software
-    *rtspsrc*) line=${line/fakesink/fakesink num-buffers=10} ;;
-    gst-play*) line="$line --no-interactive --videosink=fakesink" ;;
-    event-calibrate*) # one and a half seconds are enough
-      line=${line/--to 2 --measure-from 2 --measure-to 10/--to 0.3 --measure-from 0.3 --measure-to 1}
-      line="${line/eventsim-dvs/\"eventsim-dvs response=log log-eps=0.02 denoise=0\"}"
-      ;;
-  esac
-  echo "$line"
-  count=$((count + 1))
-  if [[ $line =~ ^(web|rtsp)-events\  ]]; then # serves the lines that follow
-    : >serving
-    eval "exec $line" >>serving 2>&1 </dev/null &
-    servers+=($!)
-    served=
-    for _ in $(seq 300); do
-      served=$(sed -n 's#.*://[^/]*:\([0-9]*\)/.*#\1#p' serving)
-      [ -n "$served" ] && break
-      sleep 0.2
-    done
-    [ -n "$served" ] || fail "$(cat serving)"
-    continue
-  fi
-  if [[ $line == *udpsrc* ]]; then # a receiver of what the next line sends
-    eval "timeout 120 ${line/udpsrc/udpsrc num-buffers=5}" >received 2>&1 </dev/null &
-    receiver=$!
-    port=$(sed 's/.*udpsrc port=\([0-9]*\).*/\1/' <<<"$line")
-    while kill -0 $receiver && ! grep -q "$(printf ':%04X ' "$port")" /proc/net/udp; do sleep 0.1; done
-    continue
-  fi
-  eval "timeout --verbose 120 $line" >output 2>&1 </dev/null || ended_before_pause output || fail "$(cat output)"
-  if [ -n "$receiver" ]; then
-    wait $receiver || fail "$(cat received)"
-    receiver=
-  fi
-done < <(awk '/^```/ { inside = !inside } inside && !seen[$0]++ && /^(gst-|ges-|event-|web-|rtsp-|\.\/pipelines\/events_)/' "$SOURCE/README.md" "$SOURCE"/docs/*.md "$SOURCE"/docs/elements/*.md)
+run_lines "$SOURCE/README.md" "$SOURCE"/docs/*.md "$SOURCE"/docs/elements/*.md
 [ $count -ge 60 ] || fail "found only $count lines"
 for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy received.raw; do
   [ -s $file ] || fail "$file is missing or empty"
-done
-for server in "${servers[@]}"; do
-  kill "$server"
-  wait "$server" || fail "a server ended with status $?"
 done

@@ -96,9 +96,20 @@ completed event-calibrate --element eventsim-de | grep -qx eventsim-dense
 completed rtsp-events --simulator eventsim-de | grep -qx eventsim-dense
 touch "$root/camera0"
 completed web-events --device "$root/cam" | grep -qx "$root/camera0"
-# The servers find what they are made of.
+# The servers find what they are made of, such as the page.
 for program in web-events rtsp-events; do
-  timeout --preserve-status --signal INT 5 "$root/usr/bin/$program" --port 0 | tee "$root/served"
-  grep -q "until Ctrl-C" "$root/served"
+  : >"$root/served"
+  "$root/usr/bin/$program" --port 0 >"$root/served" &
+  trap 'kill $! 2>/dev/null || true; rm -rf "$root"' EXIT
+  for _ in $(seq 300); do
+    if grep -q "until Ctrl-C" "$root/served"; then break; fi
+    sleep 0.1
+  done
+  if [ $program = web-events ]; then
+    /usr/bin/python3 -c 'import sys, urllib.request; assert b"<html" in urllib.request.urlopen(sys.argv[1]).read()' \
+      "$(grep -o 'http://[^ ]*' "$root/served")"
+  fi
+  kill $!
+  wait $!
 done
 "$root/count_events" "videotestsrc num-buffers=5 pattern=ball ! eventsim-frame ! appsink name=events"
