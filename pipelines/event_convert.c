@@ -411,8 +411,9 @@ static gboolean is_trimmed(void) {
   return from_seconds > 0 || to_seconds < G_MAXDOUBLE;
 }
 
-/* Makes the reader start over at the first time, and end at the last. */
-static gboolean trim(GstElement* pipeline) {
+/* Makes a reader that knows its file start over at the first time and end at the last, and plays.
+ * FALSE on failure. */
+static gboolean trim(const char* in, GstElement* pipeline) {
   const gboolean ends = to_seconds < G_MAXDOUBLE;
   GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
   const gboolean ok = gst_element_seek(
@@ -420,6 +421,10 @@ static gboolean trim(GstElement* pipeline) {
       nanoseconds(from_seconds), ends ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE,
       ends ? nanoseconds(to_seconds) : -1);
   gst_object_unref(reader);
+  if (ok)
+    gst_element_set_state(pipeline, GST_STATE_PLAYING);
+  else
+    PRINT_ERROR("%s cannot be sought, so --from and --to do not apply\n", in);
   return ok;
 }
 
@@ -494,20 +499,14 @@ static gboolean run(const char* in, GstElement* pipeline, const guint64* events)
       continue;
     }
     if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_ASYNC_DONE) {
-      gst_message_unref(message);
-      if (!trimming) continue;
+      if (trimming) ok = trim(in, pipeline);
       trimming = FALSE;
-      if (!trim(pipeline)) {
-        PRINT_ERROR("%s cannot be sought, so --from and --to do not apply\n", in);
-        ok = FALSE;
-        break;
-      }
-      gst_element_set_state(pipeline, GST_STATE_PLAYING);
-      continue;
+      ended = !ok;
+    } else {
+      ended = GST_MESSAGE_TYPE(message) != GST_MESSAGE_WARNING;
+      ok = GST_MESSAGE_TYPE(message) != GST_MESSAGE_ERROR;
+      if (GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS) print_message(in, message);
     }
-    ended = GST_MESSAGE_TYPE(message) != GST_MESSAGE_WARNING;
-    ok = GST_MESSAGE_TYPE(message) != GST_MESSAGE_ERROR;
-    if (GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS) print_message(in, message);
     gst_message_unref(message);
   }
   clear_progress();
