@@ -277,23 +277,38 @@ TEST_P(TimedFormat, BringsNoWrongEventThroughABadNetwork) {
 
 /* payloader */
 
-/// A buffer of a second with 10 events. That long, no timer interferes.
-GstBuffer* second(int number) {
+/// One of successive buffers with 10 events each.
+GstBuffer* ten_events(int number, GstClockTime duration = 200 * GST_MSECOND) {
   std::vector<Event> events;
-  for (int i = 0; i < 10; ++i)
-    events.push_back(Event::at(i, 2, static_cast<std::uint32_t>(100'000 * i), Polarity::on));
-  return buffer_of(static_cast<GstClockTime>(number) * GST_SECOND, events, GST_SECOND);
+  for (guint64 i = 0; i < 10; ++i)
+    events.push_back(Event::at(static_cast<int>(i), 2,
+                               static_cast<std::uint32_t>(duration / GST_USECOND * i / 10),
+                               Polarity::on));
+  return buffer_of(static_cast<GstClockTime>(number) * duration, events, duration);
 }
 
+/// So long that no timer interferes.
+constexpr auto patient = "eventdatagrampay format=t32-x16-y15-on1 max-latency=1000000000";
+
 TEST(Payloader, LetsNoEventWaitForTheNextBuffer) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
+  Harness h(patient);
   h.caps(events_caps, "application/x-event-datagram");
   for (int i = 0; i < 40; ++i) {
-    h.push(second(i));
-    // Whatever is older than 4 s would be older than 5 s with the next buffer.
-    EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), (static_cast<guint>(i) + 1) / 5);
+    h.push(ten_events(i));
+    // With the next buffer, the events of the last 800 ms would have waited for a second.
+    EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), (static_cast<guint>(i) + 1) / 4);
   }
-  while (const auto buffer = h.pull()) EXPECT_EQ(gst_buffer_get_size(buffer.get()), 50 * 8);
+  while (const auto buffer = h.pull()) EXPECT_EQ(gst_buffer_get_size(buffer.get()), 40 * 8);
+}
+
+TEST(Payloader, SendsEachBufferAtOnceIfNothingMayWait) {
+  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=0");
+  h.caps(events_caps, "application/x-event-datagram");
+  for (int i = 0; i < 3; ++i) {
+    h.push(ten_events(i));
+    ASSERT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
+    EXPECT_EQ(gst_buffer_get_size(h.pull().get()), 10 * 8);
+  }
 }
 
 TEST(Payloader, LetsNoEventWaitIfNoBufferComes) {
@@ -341,16 +356,16 @@ TEST(Payloader, ReportsThatItsTimerCannotStart) {
 }
 
 TEST(Payloader, FillsDatagramsIfItMay) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=1000000000000");
+  Harness h(patient);
   h.caps(events_caps, "application/x-event-datagram");
-  for (int i = 0; i < 39; ++i) h.push(second(i));
+  for (int i = 0; i < 39; ++i) h.push(ten_events(i, 10 * GST_MSECOND));
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 3);
   gst_harness_push_event(h.get(), gst_event_new_eos());
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 4);
   const auto first = h.pull();
   EXPECT_EQ(GST_BUFFER_PTS(first.get()), 0);
-  EXPECT_EQ(GST_BUFFER_DURATION(first.get()), 9900 * GST_MSECOND);
-  EXPECT_EQ(GST_BUFFER_PTS(h.pull().get()), 10 * GST_SECOND);
+  EXPECT_EQ(GST_BUFFER_DURATION(first.get()), 99 * GST_MSECOND);
+  EXPECT_EQ(GST_BUFFER_PTS(h.pull().get()), 100 * GST_MSECOND);
   EXPECT_EQ(stat_of(h.element(), "packets"), 4);
   EXPECT_EQ(stat_of(h.element(), "events"), 390);
   EXPECT_EQ(stat_of(h.element(), "bytes"), 390 * 8);
@@ -369,30 +384,30 @@ TEST(Payloader, SendsAtOnceIfBuffersAreLong) {
 }
 
 TEST(Payloader, SendsDuringAGap) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
+  Harness h(patient);
   h.caps(events_caps, "application/x-event-datagram");
-  h.push(second(0));
-  gst_harness_push_event(h.get(), gst_event_new_gap(GST_SECOND, GST_SECOND));
+  h.push(ten_events(0));
+  gst_harness_push_event(h.get(), gst_event_new_gap(200 * GST_MSECOND, 200 * GST_MSECOND));
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 0);
-  gst_harness_push_event(h.get(), gst_event_new_gap(2 * GST_SECOND, 10 * GST_SECOND));
+  gst_harness_push_event(h.get(), gst_event_new_gap(400 * GST_MSECOND, 2 * GST_SECOND));
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
 }
 
 TEST(Payloader, SendsBeforeANewSegment) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
+  Harness h(patient);
   h.caps(events_caps, "application/x-event-datagram");
-  h.push(second(0));
+  h.push(ten_events(0));
   push_segment(h.get());
   EXPECT_EQ(gst_harness_buffers_in_queue(h.get()), 1);
 }
 
 TEST(Payloader, ForgetsEventsThatAreFlushed) {
-  Harness h("eventdatagrampay format=t32-x16-y15-on1 max-latency=5000000000");
+  Harness h(patient);
   h.caps(events_caps, "application/x-event-datagram");
-  h.push(second(5));
+  h.push(ten_events(5));
   flush({h.get()});
   push_segment(h.get());
-  h.push(second(0));
+  h.push(ten_events(0));
   gst_harness_push_event(h.get(), gst_event_new_eos());
   const auto buffer = h.pull();
   ASSERT_TRUE(buffer);

@@ -9,7 +9,9 @@
  * with udpsink. Its PTS is the time of its first event.
  *
  * A datagram is sent when it is full, or when its first event cannot wait for another buffer as
- * long as the last one. If no buffer comes, it is sent after #GstEventDatagramPay:max-latency.
+ * long as the last one. If no buffer comes, it is sent after #GstEventDatagramPay:max-latency, and
+ * events that are further apart share no datagram. If this is 0, each buffer is sent at once, in
+ * as few datagrams as possible.
  *
  * jAER's addresses are those of a DVS128 if the sensor has 128x128 pixels, else those of a DAVIS,
  * with up to 1024x512 pixels: select that camera in jAER.
@@ -173,10 +175,16 @@ static bool is_flush_due(GstEventDatagramPay* self, const EventInterval& interva
   const auto since = priv.packer->waiting_since();
   if (!since) return false;
   const auto next = interval.end + (interval.end - interval.start);
-  return next > static_cast<GstClockTime>(*since) * GST_USECOND + priv.settings.copy().max_latency;
+  return next >= static_cast<GstClockTime>(*since) * GST_USECOND + priv.settings.copy().max_latency;
 }
 
 /* data */
+
+/// Maximum time between two events of a datagram; not limited if each buffer is sent at once.
+static Microseconds max_span(GstClockTime max_latency) {
+  if (max_latency == 0) return std::numeric_limits<Microseconds>::max();
+  return static_cast<Microseconds>(max_latency / GST_USECOND);
+}
 
 /// Collects the events of a buffer.
 static void collect(GstEventDatagramPay* self, GstBuffer* buffer, const MappedEvents& mapped) {
@@ -209,7 +217,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   }
   return pack(self, [&](DatagramPacker& packer, const auto& send) {
     collect(self, taken, mapped);
-    packer.set_max_span(static_cast<Microseconds>(priv.settings.copy().max_latency / GST_USECOND));
+    packer.set_max_span(max_span(priv.settings.copy().max_latency));
     packer.pack(priv.events, send);
     if (is_flush_due(self, *interval)) packer.flush(send);
   });
@@ -326,9 +334,9 @@ static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
   properties.add(
       &Settings::max_latency,
       g_param_spec_uint64("max-latency", "Maximum latency",
-                          "Longest time that an event waits for its datagram to fill (ns; 0 = "
-                          "events of different times share none)",
-                          0, GST_SECOND * 3600, Settings().max_latency,
+                          "Maximum time for which an event waits for others to fill its datagram "
+                          "(ns; 0 = send each buffer at once)",
+                          0, GST_SECOND, Settings().max_latency,
                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                    GST_PARAM_MUTABLE_PLAYING)));
   add_datagram_stats<counts_of>(
