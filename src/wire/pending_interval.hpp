@@ -17,7 +17,7 @@ namespace eventcamera {
 class PendingInterval {
  public:
   /// Events that cannot be sent.
-  struct LeftOut {
+  struct Rejected {
     std::uint64_t outside = 0;   ///< outside the sensor
     std::uint64_t unsorted = 0;  ///< earlier than the one before, or later than the interval
   };
@@ -39,12 +39,12 @@ class PendingInterval {
   /// with events relative to its start. Calls flush(), which must clear, whenever there are
   /// max_rtp_interval_events.
   template <class Flush>
-  LeftOut add(Nanoseconds start, Nanoseconds end, std::span<const Event> events,
-              const Flush& flush) {
+  Rejected add(Nanoseconds start, Nanoseconds end, std::span<const Event> events,
+               const Flush& flush) {
     if (!is_open_) start_ = start;
     is_open_ = true;
     end_ = std::clamp(end, start, start_ + max_interval);
-    LeftOut left_out;
+    Rejected rejected;
     // What is added to the times of events, and their maximum.
     auto shift = microseconds(start) - microseconds(start_);
     const auto latest = microseconds(end_) - microseconds(start);
@@ -52,7 +52,7 @@ class PendingInterval {
     for (const auto& event : events) {
       const bool is_outside = event.x >= sensor_.width || event.y() >= sensor_.height;
       if (is_outside || event.t < earliest || event.t > latest) {
-        ++(is_outside ? left_out.outside : left_out.unsorted);
+        ++(is_outside ? rejected.outside : rejected.unsorted);
         continue;
       }
       if (events_.size() == max_rtp_interval_events) {
@@ -62,7 +62,7 @@ class PendingInterval {
       earliest = event.t;
       events_.push_back({static_cast<std::uint32_t>(event.t + shift), event.x, event.y_p});
     }
-    return left_out;
+    return rejected;
   }
 
  private:

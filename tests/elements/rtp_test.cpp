@@ -534,7 +534,7 @@ TEST(RtpEventPay, WarnsOfEventsThatItCannotSend) {
            10'000'000,
            {Event::at(1, 2, 3, Polarity::on), Event::at(1, 2, 2, Polarity::on)}});
   EXPECT_NE(h.warning().find("earlier than those before them"), std::string::npos);
-  EXPECT_EQ(stat_of(h.element(), "left-out-events"), 2U);
+  EXPECT_EQ(stat_of(h.element(), "rejected-events"), 2U);
   EXPECT_EQ(stat_of(h.element(), "events"), 2U);
 }
 
@@ -542,12 +542,12 @@ TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
   Harness h("rtpeventpay max-latency=1000000000");
   h.caps(davis_caps, "application/x-rtp");
   const std::vector events(3, Event::at(1, 2, 3, Polarity::on));
-  guint64 left_out = 0;
+  guint64 rejected = 0;
   const auto skips = [&](GstBuffer* buffer, const char* reason) {
     EXPECT_EQ(h.push(buffer), GST_FLOW_OK);
     const auto warning = h.warning();
     EXPECT_NE(warning.find(reason), std::string::npos) << warning;
-    EXPECT_EQ(stat_of(h.element(), "left-out-events"), left_out += 3) << reason;
+    EXPECT_EQ(stat_of(h.element(), "rejected-events"), rejected += 3) << reason;
   };
   skips(buffer_of(GST_CLOCK_TIME_NONE, events, ms), "has no PTS");
   skips(buffer_of(static_cast<GstClockTime>(max_rtp_start) + 1, events, ms), "292 years");
@@ -556,7 +556,7 @@ TEST(RtpEventPay, CountsTheEventsOfBuffersThatItCannotSend) {
   // Those that a flush drops.
   push(h, {0, 1'000'000, events});
   flush({h.get()});
-  EXPECT_EQ(stat_of(h.element(), "left-out-events"), left_out + 3);
+  EXPECT_EQ(stat_of(h.element(), "rejected-events"), rejected + 3);
   EXPECT_EQ(stat_of(h.element(), "events"), 0U);
 }
 
@@ -567,7 +567,7 @@ TEST(RtpEventPay, SendsUpToTheLatestStart) {
   const auto packet = h.pull();
   ASSERT_TRUE(packet);
   EXPECT_EQ(Fields(packet.get()).header->start, max_rtp_start);
-  EXPECT_EQ(stat_of(h.element(), "left-out-events"), 0U);
+  EXPECT_EQ(stat_of(h.element(), "rejected-events"), 0U);
 }
 
 TEST(RtpEventPay, RefusesWhatItCannotSend) {

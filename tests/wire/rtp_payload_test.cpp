@@ -314,9 +314,9 @@ TEST(PendingInterval, LeavesOutWhatIsOutsideOrUnsorted) {
       Event::at(0, 0, 5, Polarity::on),   Event::at(346, 0, 5, Polarity::on),
       Event::at(0, 260, 5, Polarity::on), Event::at(0, 0, 4, Polarity::on),
       Event::at(1, 0, 10, Polarity::on),  Event::at(1, 0, 11, Polarity::on)};
-  const auto left_out = pending.add(0, 10'000, events, [] { FAIL(); });
-  EXPECT_EQ(left_out.outside, 2U);
-  EXPECT_EQ(left_out.unsorted, 2U);
+  const auto rejected = pending.add(0, 10'000, events, [] { FAIL(); });
+  EXPECT_EQ(rejected.outside, 2U);
+  EXPECT_EQ(rejected.unsorted, 2U);
   const std::vector expected = {events[0], events[4]};
   EXPECT_TRUE(std::ranges::equal(pending.events(), expected));
 }

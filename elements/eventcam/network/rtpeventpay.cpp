@@ -16,7 +16,7 @@
  *
  * - `packets`, `bytes` (#guint64): packets sent, and the size of their payloads;
  * - `events` (#guint64): events sent; those received plus those that receivers count as lost;
- * - `left-out-events` (#guint64): events not sent, for one of these reasons, because their buffer
+ * - `rejected-events` (#guint64): events not sent, for one of these reasons, because their buffer
  *   has no PTS, one of more than 292 years or a partial event, or because of a flush.
  *
  * ## Example launch line
@@ -81,7 +81,7 @@ struct Sent {
   std::uint64_t packets = 0;
   std::uint64_t bytes = 0;
   std::uint64_t events = 0;
-  std::uint64_t left_out = 0;
+  std::uint64_t rejected = 0;
 };
 
 struct Private {
@@ -219,29 +219,29 @@ static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
 }
 
 /// Takes an interval, and sends what is due; returns what cannot be sent. May throw.
-static PendingInterval::LeftOut take(GstRtpEventPay* self, EventInterval interval,
-                                     std::span<const Event> events) {
+static PendingInterval::Rejected take(GstRtpEventPay* self, EventInterval interval,
+                                      std::span<const Event> events) {
   auto& priv = *self->priv;
   auto& pending = priv.state->pending;
   const auto start = static_cast<Nanoseconds>(interval.start);
   const auto end = static_cast<Nanoseconds>(interval.end);
   if (!pending.empty() && pending.end() != start) send(self);
   const bool is_first = pending.empty();
-  const auto left_out = pending.add(start, end, events, [&] { send(self); });
+  const auto rejected = pending.add(start, end, events, [&] { send(self); });
   if (is_due(self, end - start)) {
     send(self);
   } else if (is_first) {
     priv.timer.set(priv.settings.copy().max_latency, GST_RTP_BASE_PAYLOAD_SINKPAD(self), send_late);
   }
-  return left_out;
+  return rejected;
 }
 
 /* streaming */
 
-/// Leaves out a buffer.
-static GstFlowReturn leave_out(GstRtpEventPay* self, EventFault fault, GstBuffer* buffer) {
+/// Skips a buffer that cannot be sent.
+static GstFlowReturn reject(GstRtpEventPay* self, EventFault fault, GstBuffer* buffer) {
   self->priv->faults.warn(self, fault, buffer);
-  self->priv->sent.lock()->left_out += gst_buffer_get_size(buffer) / sizeof(Event);
+  self->priv->sent.lock()->rejected += gst_buffer_get_size(buffer) / sizeof(Event);
   return GST_FLOW_OK;
 }
 
@@ -253,17 +253,17 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   constexpr guint max_csrc_count = 15;
   priv.csrc_count = static_cast<guint8>(
       std::min(gst_rtp_base_payload_get_source_count(payload, taken), max_csrc_count));
-  if (!GST_BUFFER_PTS_IS_VALID(taken)) return leave_out(self, EventFault::no_pts, taken);
+  if (!GST_BUFFER_PTS_IS_VALID(taken)) return reject(self, EventFault::no_pts, taken);
   const auto interval = interval_of(taken);
   if (!interval || interval->start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
-    return leave_out(self, EventFault::pts_too_large, taken);
+    return reject(self, EventFault::pts_too_large, taken);
   const MappedEvents mapped(taken);
-  if (!mapped) return leave_out(self, EventFault::partial_event, taken);
+  if (!mapped) return reject(self, EventFault::partial_event, taken);
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
                  GST_TIME_ARGS(interval->start));
   return reported(self, [&] {
     const auto [outside, unsorted] = take(self, *interval, mapped.events());
-    priv.sent.lock()->left_out += outside + unsorted;
+    priv.sent.lock()->rejected += outside + unsorted;
     if (outside > 0) priv.faults.warn(self, EventFault::beyond_sensor, taken);
     if (unsorted > 0) priv.faults.warn(self, EventFault::unsorted, taken);
   });
@@ -296,7 +296,7 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       if (priv.state) {
         GST_DEBUG_OBJECT(self, "flushed: dropping %" G_GSIZE_FORMAT " events that wait",
                          priv.state->pending.events().size());
-        priv.sent.lock()->left_out += priv.state->pending.events().size();
+        priv.sent.lock()->rejected += priv.state->pending.events().size();
         priv.state->pending.clear();
       }
       break;
@@ -369,7 +369,7 @@ static void get_stats(GObject* object, GValue* value) {
   const auto sent = *GST_RTP_EVENT_PAY(object)->priv->sent.lock();
   gst_structure_set(stats, "packets", G_TYPE_UINT64, guint64{sent.packets}, "bytes", G_TYPE_UINT64,
                     guint64{sent.bytes}, "events", G_TYPE_UINT64, guint64{sent.events},
-                    "left-out-events", G_TYPE_UINT64, guint64{sent.left_out}, nullptr);
+                    "rejected-events", G_TYPE_UINT64, guint64{sent.rejected}, nullptr);
   g_value_take_boxed(value, stats);
 }
 
