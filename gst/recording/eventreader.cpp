@@ -275,9 +275,9 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
       object_class, prop_stats,
       g_param_spec_boxed("stats", "Statistics",
                          "Counts since the start or the last seek: events, triggers, frames and "
-                         "imu-samples read; corrupt-places where bytes were skipped; events "
-                         "dropped as outside the sensor; items dropped as late, after their "
-                         "buffer was sent, or stray, at an impossible time (untimely is both)",
+                         "imu-samples read; corrupt-places where bytes were skipped; and what was "
+                         "dropped: outside-events, outside the sensor; late-items, after their "
+                         "buffer was sent; stray-items, at an impossible time",
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_READER, static_cast<GstPluginAPIFlags>(0));
@@ -1035,19 +1035,16 @@ void EventReader::note_progress() {
 
 GstStructure* EventReader::stats() {
   const auto counts = shared_.lock()->counts;
-  GstStructure* const stats =
-      gst_structure_new(format_.has_many_streams ? "application/x-aedat-demux-stats"
-                                                 : "application/x-event-decoder-stats",
-                        "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64,
-                        counts.triggers, "corrupt-places", G_TYPE_UINT64, counts.corrupt_places,
-                        "outside", G_TYPE_UINT64, counts.outside, nullptr);
+  GstStructure* const stats = gst_structure_new(
+      format_.has_many_streams ? "application/x-aedat-demux-stats"
+                               : "application/x-event-decoder-stats",
+      "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64, counts.triggers,
+      "corrupt-places", G_TYPE_UINT64, counts.corrupt_places, "outside-events", G_TYPE_UINT64,
+      counts.outside, "late-items", G_TYPE_UINT64, counts.late, "stray-items", G_TYPE_UINT64,
+      counts.stray, nullptr);
   if (format_.has_many_streams)
     gst_structure_set(stats, "frames", G_TYPE_UINT64, counts.frames, "imu-samples", G_TYPE_UINT64,
-                      counts.imu_samples, "untimely", G_TYPE_UINT64, counts.late + counts.stray,
-                      nullptr);
-  else
-    gst_structure_set(stats, "late", G_TYPE_UINT64, counts.late, "stray", G_TYPE_UINT64,
-                      counts.stray, nullptr);
+                      counts.imu_samples, nullptr);
   return stats;
 }
 

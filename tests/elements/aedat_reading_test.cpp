@@ -46,6 +46,8 @@ TEST(AedatDemux, HandsOutTheEventsOfEveryVersion) {
       EXPECT_TRUE(track.events == expected) << track.events.size() << " of " << expected.size();
       EXPECT_EQ(track.eos, 1U);
       EXPECT_EQ(player.stat("events"), expected.size());
+      for (const char* const dropped : {"outside-events", "late-items", "stray-items"})
+        EXPECT_EQ(player.stat(dropped), 0U);
     }
   }
 }

@@ -94,6 +94,8 @@ TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
   h.read(file);
   EXPECT_EQ(pull_events(h).size(), 10'080U);
   EXPECT_NE(h.warning().find("9920 events outside the sensor"), std::string::npos);
+  EXPECT_EQ(stat_of(h.element(), "outside-events"), 9920U);
+  EXPECT_EQ(stat_of(h.element(), "late-items") + stat_of(h.element(), "stray-items"), 0U);
 }
 
 TEST(EventCsvDec, TakesTimesInTheUnitThatIsFoundOrSet) {
