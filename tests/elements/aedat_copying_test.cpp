@@ -12,7 +12,7 @@ using namespace harness;
 using namespace aedat_recordings;
 
 const std::string both_streams =
-    "aedatdemux name=d  d.events_0 ! queue ! m.events  d.video_0 ! queue ! m.video  aedatmux "
+    "aedatdemux name=d  d.events_0 ! queue ! m.events_0  d.video_0 ! queue ! m.video_0  aedatmux "
     "name=m";
 
 TEST(AedatMux, WritesWhatTheDemuxerReads) {

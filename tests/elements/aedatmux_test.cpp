@@ -18,7 +18,7 @@ struct Mux : Harness {
     gst_harness_set_src_caps_str(get(), caps);
   }
   Mux()
-      : Mux("events",
+      : Mux("events_0",
             "application/x-event-camera, format=XYTP, width=346, height=260, framerate=0/1") {}
 
   GstFlowReturn push(GstClockTime pts, const std::vector<Event>& events) {
@@ -70,7 +70,7 @@ TEST(AedatMux, LeavesOutWhatDoesNotFit) {
 }
 
 TEST(AedatMux, WritesFramesInTheSizeOfTheirCaps) {
-  Mux mux("video", "video/x-raw, format=GRAY8, width=4, height=3, framerate=0/1");
+  Mux mux("video_0", "video/x-raw, format=GRAY8, width=4, height=3, framerate=0/1");
   // Rows of 16 bytes; the meta's frame is larger than the memory.
   Bytes pixels(3 * 16);
   std::iota(pixels.begin(), pixels.end(), std::uint8_t{0});
@@ -106,10 +106,12 @@ TEST(AedatMux, WritesAnewAfterAFlush) {
 TEST(AedatMux, HasOnePadOfAKind) {
   gst_init(nullptr, nullptr);
   const Owned<GstElement> mux(gst_element_factory_make("aedatmux", nullptr));
-  GstPad* const events = gst_element_request_pad_simple(mux.get(), "events");
-  GstPad* const video = gst_element_request_pad_simple(mux.get(), "video");
+  GstPad* const events = gst_element_request_pad_simple(mux.get(), "events_%u");
+  GstPad* const video = gst_element_request_pad_simple(mux.get(), "video_7");
   ASSERT_NE(events, nullptr);
   ASSERT_NE(video, nullptr);
+  EXPECT_STREQ(GST_PAD_NAME(events), "events_0");
+  EXPECT_STREQ(GST_PAD_NAME(video), "video_7");
   GstPadTemplate* const of_events = gst_pad_get_pad_template(events);
   EXPECT_EQ(gst_element_request_pad(mux.get(), of_events, nullptr, nullptr), nullptr);
   gst_object_unref(of_events);

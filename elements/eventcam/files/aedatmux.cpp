@@ -7,8 +7,8 @@
  * Writes one event stream, one video stream, or both, in order of time. The times in the file are
  * those of the event stream, floor(PTS / 1000) + t microseconds; video is synchronised to it.
  *
- * A pad takes either, and learns which from its caps: `queue ! mux.` links both. The pads `events`
- * and `video` take one kind, for applications that request pads by name.
+ * A link without a pad name, `queue ! mux.`, takes either, and learns which from its caps. The pads
+ * `events_0` and `video_0` take one kind, for applications that request pads by name.
  *
  * Frames of #aedatdemux keep their exposure times and their position on the sensor. Its triggers
  * and IMU samples come with the events. The property `stats` counts what was written.
@@ -36,6 +36,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -127,10 +128,10 @@ GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mu
 static GstStaticPadTemplate any_template =
     GST_STATIC_PAD_TEMPLATE("sink_%u", GST_PAD_SINK, GST_PAD_REQUEST,
                             GST_STATIC_CAPS(EVENTS_CAPS "; " RECORDED_VIDEO_CAPS));
-static GstStaticPadTemplate events_template =
-    GST_STATIC_PAD_TEMPLATE("events", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(EVENTS_CAPS));
+static GstStaticPadTemplate events_template = GST_STATIC_PAD_TEMPLATE(
+    "events_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(EVENTS_CAPS));
 static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
-    "video", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(RECORDED_VIDEO_CAPS));
+    "video_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(RECORDED_VIDEO_CAPS));
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
     "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS("application/x-aedat, version = (int) 4"));
 
@@ -535,22 +536,22 @@ static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
 static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplate* templ,
                                         const gchar* wanted, const GstCaps* caps) {
   auto* self = GST_AEDAT_MUX(aggregator);
-  const gchar* const name = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
+  const std::string_view kind = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
   if (GST_STATE(self) > GST_STATE_READY && self->priv->state.encoder) {
-    GST_WARNING_OBJECT(self, "the header is written, and has no stream for a pad %s", name);
+    GST_WARNING_OBJECT(self, "the header is written, and has no stream for a pad %s", kind.data());
     return nullptr;
   }
-  if (g_str_equal(name, any_template.name_template))
+  if (kind == any_template.name_template)
     return PARENT_AGGREGATOR_CLASS->create_new_pad(aggregator, templ, wanted, caps);
-  GstPad* const existing = gst_element_get_static_pad(GST_ELEMENT(self), name);
-  if (existing != nullptr) {
-    gst_object_unref(existing);
-    GST_WARNING_OBJECT(self, "there is a pad %s already", name);
+  const auto is_of_kind = [&](const Pad& pad) { return GST_PAD_PAD_TEMPLATE(pad.get()) == templ; };
+  if (std::ranges::any_of(pads_of(self), is_of_kind)) {
+    GST_WARNING_OBJECT(self, "there is a pad %s already", kind.data());
     return nullptr;
   }
-  return static_cast<GstAggregatorPad*>(g_object_new(GST_TYPE_AGGREGATOR_PAD, "name", name,
-                                                     "direction", GST_PAD_SINK, "template", templ,
-                                                     nullptr));
+  const auto first = std::string(kind.substr(0, kind.find('%'))) + '0';
+  return static_cast<GstAggregatorPad*>(
+      g_object_new(GST_TYPE_AGGREGATOR_PAD, "name", wanted != nullptr ? wanted : first.c_str(),
+                   "direction", GST_PAD_SINK, "template", templ, nullptr));
 }
 
 static gboolean start(GstAggregator* aggregator) {
