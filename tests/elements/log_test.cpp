@@ -89,9 +89,10 @@ constexpr Case cases[] = {
     {"eventcompare", EVENTS "! tee name=t ! queue ! compare.reference eventcompare name=compare ! "
                             "fakesink t. ! queue ! compare.candidate"},
     {"eventrender", EVENTS "! eventrender ! fakesink"},
-    {"eventoverlay", EVENTS "! overlay.events eventoverlay name=overlay ! fakesink videotestsrc "
-                            "num-buffers=4 ! video/x-raw,width=320,height=240,framerate=25/1 ! "
-                            "overlay.sink"},
+    {"eventoverlay",
+     EVENTS "! overlay.event_sink eventoverlay name=overlay ! fakesink videotestsrc "
+            "num-buffers=4 ! video/x-raw,width=320,height=240,framerate=25/1 ! "
+            "overlay.video_sink"},
     {"eventdatagrampay", EVENTS "! eventdatagrampay ! fakesink"},
     {"eventdatagramdepay", EVENTS "! eventdatagrampay format=es ! eventdatagramdepay format=es "
                                   "width=320 height=240 ! fakesink"},

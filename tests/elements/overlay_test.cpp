@@ -14,7 +14,7 @@ constexpr GstClockTime ms = GST_MSECOND;
 class OverlayTest : public testing::Test {
  protected:
   explicit OverlayTest(const std::string& launch = "eventoverlay palette=grey")
-      : overlay(launch, "sink", "events") {}
+      : overlay(launch, "video_sink", "event_sink") {}
 
   void begin(const std::string& sensor_size, const std::string& format = "GRAY8") {
     gst_harness_set_src_caps_str(

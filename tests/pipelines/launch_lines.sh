@@ -79,8 +79,8 @@ launch videotestsrc pattern=ball num-buffers=30 ! eventsim-frame ! eventrender p
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! eventsim-diff ! eventrender event-count=5000 ! video/x-raw,framerate=50/1 ! fakesink sync=true
 launch videotestsrc is-live=true pattern=black num-buffers=20 ! eventsim-diff ! eventrender ! fakesink sync=true
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventrender ! video/x-raw,framerate=0/1 ! fakesink
-launch videotestsrc pattern=ball num-buffers=30 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink  t. ! queue ! eventsim-diff ! overlay.events
-launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink sync=true  t. ! queue ! eventsim-diff ! overlay.events
+launch videotestsrc pattern=ball num-buffers=30 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink  t. ! queue ! eventsim-diff ! overlay.event_sink
+launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink sync=true  t. ! queue ! eventsim-diff ! overlay.event_sink
 
 # Measured, and compared with another simulator.
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventstats location=stats.json map=map.png ! eventrender ! fakesink

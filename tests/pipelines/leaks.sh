@@ -56,7 +56,7 @@ check filesrc location="$aedat" ! decodebin ! fakesink
 for mode in accumulate decay time-surface count; do
   check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender mode=$mode ! videoconvert ! fakesink
 done
-check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.events
+check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.event_sink
 for element in frame dense sparse diff; do
   check videotestsrc num-buffers=8 ! video/x-raw,width=64,height=48 ! glupload ! gleventsim-$element ! fakesink
 done
@@ -81,7 +81,7 @@ check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! fakesink
 check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! aedatmux ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-frame ! eventrender ! fakesink
-check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! identity error-after=2 ! fakesink  t. ! queue ! eventsim-frame ! overlay.events
+check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! identity error-after=2 ! fakesink  t. ! queue ! eventsim-frame ! overlay.event_sink
 check videotestsrc num-buffers=8 ! eventsim-frame ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-dense ! fakesink

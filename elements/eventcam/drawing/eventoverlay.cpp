@@ -4,10 +4,10 @@
  * @title: eventoverlay
  * @short_description: draws events over video
  *
- * Draws the events of the pad `events` over the video of the pad `sink`. Each frame shows the
- * events of the interval that it starts, or those of the #GstEventOverlay:accumulation-time before
- * the interval's end. The two are synchronized by running time. Events are scaled to the video if
- * the sensor has a different size.
+ * Draws the events of the pad `event_sink` over the video of the pad `video_sink`. Each frame shows
+ * the events of the interval that it starts, or those of the #GstEventOverlay:accumulation-time
+ * before the interval's end. The two are synchronized by running time. Events are scaled to the
+ * video if the sensor has a different size.
  *
  * Video from a live source waits for events no longer than its latency. Other video waits until the
  * events of its interval have come, or a GAP event or EOS says that there are none.
@@ -15,7 +15,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball ! tee name=t  t. ! queue ! videoconvert ! eventoverlay
- * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.events
+ * name=overlay ! videoconvert ! autovideosink  t. ! queue ! eventsim-diff ! overlay.event_sink
  * ]|
  */
 #include <gst/video/video.h>
@@ -52,7 +52,8 @@ struct Settings {
 
 class EventOverlay final : public EventAggregator {
  public:
-  explicit EventOverlay(GstAggregator* element) : EventAggregator(element, {.verb = "draw"}) {}
+  explicit EventOverlay(GstAggregator* element)
+      : EventAggregator(element, {.verb = "draw", .main_pad = "video_sink"}) {}
 
   void stop() override;
   void flush() override;
@@ -72,7 +73,7 @@ class EventOverlay final : public EventAggregator {
   GstFlowReturn draw(const EventInterval& interval, GstBuffer* buffer);
   GstFlowReturn take_frame(const std::optional<EventInterval>& interval, bool timed_out);
 
-  GstAggregatorPad* const events_pad_ = pad("events");
+  GstAggregatorPad* const events_pad_ = pad("event_sink");
 
   // Accessed by the source pad's thread only, or while there is none.
   std::optional<GstVideoInfo> video_;
@@ -226,10 +227,11 @@ bool EventOverlay::take_video_caps(const GstCaps* caps) {
   GST_DEBUG_OBJECT(element(), "latency %" GST_TIME_FORMAT ", one frame", GST_TIME_ARGS(latency));
   gst_aggregator_set_latency(element(), latency, latency);
   if (!gst_pad_is_linked(GST_PAD(events_pad_)))
-    GST_ELEMENT_WARNING(element(), CORE, PAD,
-                        ("No events to draw: link a source of events to the pad \"events\". Until "
-                         "then, video from a live source goes on as it is, and other video waits."),
-                        ("the pad \"events\" is not linked"));
+    GST_ELEMENT_WARNING(
+        element(), CORE, PAD,
+        ("No events to draw: link a source of events to the pad \"event_sink\". Until "
+         "then, video from a live source goes on as it is, and other video waits."),
+        ("the pad \"event_sink\" is not linked"));
   return true;
 }
 
@@ -286,14 +288,14 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
   "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS                     \
   ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], framerate = " \
   "(fraction) [ 0, max ]"
-  static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE(
-      "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(DRAWN_VIDEO_CAPS));
-  static GstStaticPadTemplate events_template =
-      GST_STATIC_PAD_TEMPLATE("events", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
+  static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
+      "video_sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(DRAWN_VIDEO_CAPS));
+  static GstStaticPadTemplate event_template = GST_STATIC_PAD_TEMPLATE(
+      "event_sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
   static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
       "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(DRAWN_VIDEO_CAPS));
   gst_event_aggregator_class_add_templates(GST_EVENT_AGGREGATOR_CLASS(klass),
-                                           {&sink_template, &events_template, &src_template});
+                                           {&video_template, &event_template, &src_template});
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event overlay",
                                         "Filter/Editor/Video", "Draws events over video",
                                         EVENTSIM_AUTHORS);
