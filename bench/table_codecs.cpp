@@ -90,10 +90,10 @@ void add(const std::string& name, const MakeEncoder& make_encoder,
 }
 
 void add_csv(const std::string& name) {
-  const auto named = std::ranges::find(csv_dialects(), name, &NamedCsvDialect::name);
-  const auto dialect = named->dialect;
+  const auto named = std::ranges::find(csv_formats(), name, &NamedCsvFormat::name);
+  const auto format = named->format;
   add(
-      "csv-" + name, [=] { return CsvEncoder(dialect, size); }, [] { return CsvDecoder(); });
+      "csv-" + name, [=] { return CsvEncoder(format, size); }, [] { return CsvDecoder(); });
 }
 
 void add_ecf() {
@@ -120,11 +120,11 @@ void add_ecf() {
   });
 }
 
-void add_hdf5(const std::string& name, Hdf5Layout layout, Hdf5Writer::Compression compression) {
+void add_hdf5(const std::string& name, Hdf5Format format, Hdf5Writer::Compression compression) {
   const auto path = std::filesystem::temp_directory_path() /
                     ("table_codecs." + name + "." + std::to_string(getpid()));
   const auto write = [=] {
-    Hdf5Writer writer(path, {layout, compression, size});
+    Hdf5Writer writer(path, {format, compression, size});
     writer.append(events());
     writer.close();
   };
@@ -153,9 +153,9 @@ int main(int argc, char** argv) {
   add(
       "npy", [] { return NpyEncoder(); }, [] { return NpyDecoder({.size = size}); });
   add_ecf();
-  add_hdf5("dsec", Hdf5Layout::dsec, Hdf5Writer::Compression::none);
-  add_hdf5("dsec-gzip", Hdf5Layout::dsec, Hdf5Writer::Compression::gzip);
-  add_hdf5("metavision", Hdf5Layout::metavision, Hdf5Writer::Compression::none);
+  add_hdf5("dsec", Hdf5Format::dsec, Hdf5Writer::Compression::none);
+  add_hdf5("dsec-gzip", Hdf5Format::dsec, Hdf5Writer::Compression::gzip);
+  add_hdf5("metavision", Hdf5Format::metavision, Hdf5Writer::Compression::none);
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
 }

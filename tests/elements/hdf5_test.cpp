@@ -14,7 +14,7 @@ namespace {
 
 using namespace harness;
 using eventcamera::AbsoluteEvent;
-using eventcamera::Hdf5Layout;
+using eventcamera::Hdf5Format;
 using eventcamera::Hdf5Reader;
 using eventcamera::Hdf5Writer;
 using eventcamera::Microseconds;
@@ -68,7 +68,7 @@ class Hdf5 : public testing::TestWithParam<const char*> {
 
   std::string written(const Events& events) const {
     const auto path = folder_ / (std::string(GetParam()) + ".h5");
-    Hdf5Writer writer(path, {is_dsec() ? Hdf5Layout::dsec : Hdf5Layout::metavision,
+    Hdf5Writer writer(path, {is_dsec() ? Hdf5Format::dsec : Hdf5Format::metavision,
                              Hdf5Writer::Compression::gzip,
                              {width, height}});
     writer.append(events);
@@ -213,7 +213,7 @@ TEST(Hdf5Elements, KeepTriggers) {
   const Folder folder;
   const auto in = folder / "in.hdf5";
   {
-    Hdf5Writer writer(in, {Hdf5Layout::metavision, Hdf5Writer::Compression::none, {width, height}});
+    Hdf5Writer writer(in, {Hdf5Format::metavision, Hdf5Writer::Compression::none, {width, height}});
     writer.append(events);
     EXPECT_TRUE(writer.append(std::span<const Trigger>(triggers)));
     writer.close();

@@ -287,44 +287,44 @@ TEST(Csv, AHeaderAloneIsARecordingWithoutEventsAndAnEmptyFileIsNone) {
   }
 }
 
-TEST(Csv, EveryDialectComesBack) {
-  for (const auto& [name, description, dialect] : csv_dialects()) {
+TEST(Csv, EveryFormatComesBack) {
+  for (const auto& [name, description, format] : csv_formats()) {
     SCOPED_TRACE(name);
     for (const auto size : sizes()) {
       const auto events = random_events(20'000, size, static_cast<unsigned>(size.width), 1000);
-      CsvEncoder encoder(dialect, size);
+      CsvEncoder encoder(format, size);
       const auto bytes = encoded(encoder, events);
       TableSettings settings;
       // Bursts and silences make these ambiguous.
-      if (name == "esim" || name == "dvs-voltmeter") settings.unit = dialect.unit;
+      if (name == "esim" || name == "dvs-voltmeter") settings.unit = format.unit;
       // With a sensor of a few pixels, times and coordinates are indistinguishable.
-      if (size.width < 100) settings.columns = {dialect.order.begin(), dialect.order.end()};
+      if (size.width < 100) settings.columns = {format.order.begin(), format.order.end()};
       CsvDecoder decoder(settings);
       EXPECT_TRUE(decoded(decoder, bytes) == events) << size.width;
       EXPECT_EQ(decoder.corruption().places, 0U);
       EXPECT_EQ(decoder.corruption().unsorted, 0U);
       EXPECT_EQ(decoder.corruption().outside, 0U);
-      using Header = CsvDialect::Header;
-      const auto header = dialect.header;
+      using Header = CsvFormat::Header;
+      const auto header = format.header;
       const bool sized =
           header == Header::names_and_size || header == Header::geometry || header == Header::size;
       EXPECT_EQ(decoder.size(), sized ? size : SensorSize{});
     }
     const auto events = random_events(1500, {640, 480}, 5, 12345);
-    CsvEncoder encoder(dialect, {640, 480});
+    CsvEncoder encoder(format, {640, 480});
     TableSettings settings;
-    settings.unit = dialect.unit;
+    settings.unit = format.unit;
     expect_same_however_cut([&] { return std::make_unique<CsvDecoder>(settings); },
                             encoded(encoder, events, 7));
   }
 }
 
 TEST(Csv, NoEventsComeBack) {
-  for (const auto& [name, description, dialect] : csv_dialects()) {
-    CsvEncoder encoder(dialect, {640, 480});
+  for (const auto& [name, description, format] : csv_formats()) {
+    CsvEncoder encoder(format, {640, 480});
     CsvDecoder decoder;
     const auto bytes = encoded(encoder, {});
-    EXPECT_EQ(bytes.empty(), dialect.header == CsvDialect::Header::none) << name;
+    EXPECT_EQ(bytes.empty(), format.header == CsvFormat::Header::none) << name;
     if (bytes.empty()) continue;
     EXPECT_TRUE(decoded(decoder, bytes).empty()) << name;
   }
@@ -332,11 +332,11 @@ TEST(Csv, NoEventsComeBack) {
 
 TEST(Csv, TimesBelowZeroComeBack) {
   const Events events = {on(1, 1, -3'000'001), on(1, 1, -1), on(1, 1, 0), on(1, 1, 1)};
-  for (const auto& [name, description, dialect] : csv_dialects()) {
-    CsvEncoder encoder(dialect, {640, 480});
+  for (const auto& [name, description, format] : csv_formats()) {
+    CsvEncoder encoder(format, {640, 480});
     TableSettings settings;
-    settings.unit = dialect.unit;
-    settings.columns = {dialect.order.begin(), dialect.order.end()};
+    settings.unit = format.unit;
+    settings.columns = {format.order.begin(), format.order.end()};
     CsvDecoder decoder(settings);
     EXPECT_EQ(decoded(decoder, encoded(encoder, events)), events) << name;
   }

@@ -65,9 +65,9 @@ std::unique_ptr<ByteSource> in_memory(Bytes file) {
 }
 
 std::vector<Settings> all_settings(SensorSize size) {
-  return {{Hdf5Layout::dsec, Compression::none, size},
-          {Hdf5Layout::dsec, Compression::gzip, size},
-          {Hdf5Layout::metavision, Compression::none, size}};
+  return {{Hdf5Format::dsec, Compression::none, size},
+          {Hdf5Format::dsec, Compression::gzip, size},
+          {Hdf5Format::metavision, Compression::none, size}};
 }
 
 Events read_all(Hdf5Reader& reader, std::size_t at_once = 10'000) {
@@ -84,7 +84,7 @@ TEST_F(Hdf5, ComesBack) {
           random_events(40'000, size, static_cast<unsigned>(size.height), 1'000'000);
       for (const std::size_t at_once : {777, 1'000'000}) {
         Hdf5Reader reader(write(events, settings, at_once));
-        EXPECT_EQ(reader.layout(), settings.layout);
+        EXPECT_EQ(reader.format(), settings.format);
         EXPECT_EQ(reader.size(), size);
         EXPECT_EQ(reader.count(), events.size());
         ASSERT_TRUE(reader.time_range());
@@ -146,7 +146,7 @@ TEST_F(Hdf5, TriggersComeBack) {
   for (int i = 0; i < 40'000; ++i)
     triggers.push_back({i * 100, static_cast<std::uint16_t>(i % 3), i % 2 == 0});
   {
-    Hdf5Writer writer(path(), {Hdf5Layout::metavision, Compression::none, {640, 480}});
+    Hdf5Writer writer(path(), {Hdf5Format::metavision, Compression::none, {640, 480}});
     writer.append(std::span<const Trigger>(triggers).first(100));
     writer.append(std::span<const Trigger>(triggers).subspan(100));
   }
@@ -162,12 +162,12 @@ TEST_F(Hdf5, TriggersComeBack) {
 }
 
 TEST_F(Hdf5, WhatALayoutCannotHoldIsRefused) {
-  const Settings dsec = {Hdf5Layout::dsec, Compression::none, {640, 480}};
-  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Layout::v2e, Compression::none, {640, 480}}),
+  const Settings dsec = {Hdf5Format::dsec, Compression::none, {640, 480}};
+  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Format::v2e, Compression::none, {640, 480}}),
                std::invalid_argument);
-  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Layout::dsec, Compression::none, {}}),
+  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Format::dsec, Compression::none, {}}),
                std::invalid_argument);
-  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Layout::metavision, Compression::none, {2049, 480}}),
+  EXPECT_THROW(Hdf5Writer(path(), {Hdf5Format::metavision, Compression::none, {2049, 480}}),
                std::invalid_argument);
   EXPECT_THROW(Hdf5Writer("/nowhere/at/all.h5", dsec), std::runtime_error);
   for (const auto& settings : all_settings({640, 480})) {
@@ -296,7 +296,7 @@ TEST_F(Hdf5, WhatIsNoFileOfEventsIsRefused) {
 TEST_F(Hdf5, CorruptChunksAreLeftOutAndCounted) {
   const auto events = random_events(60'000, {640, 480}, 2, 5);
   const auto file =
-      contents(write(events, {Hdf5Layout::metavision, Compression::none, {640, 480}}));
+      contents(write(events, {Hdf5Format::metavision, Compression::none, {640, 480}}));
   // Header of the third chunk: number of events and first time.
   std::uint32_t count = 16384 << 2;
   Bytes head(12);
@@ -329,7 +329,7 @@ TEST_F(Hdf5, AChunkOfLessThanANumberIsCorrupt) {
 
 TEST_F(Hdf5, ASizeThatNoSensorHasIsNone) {
   auto bytes = contents(
-      write(random_events(10, {4, 4}, 1), {Hdf5Layout::metavision, Compression::none, {640, 480}}));
+      write(random_events(10, {4, 4}, 1), {Hdf5Format::metavision, Compression::none, {640, 480}}));
   constexpr std::string_view size = "640x480";
   constexpr std::string_view none = "65537x9";
   const auto found = std::search(bytes.begin(), bytes.end(), size.begin(), size.end());

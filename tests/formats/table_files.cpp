@@ -49,9 +49,9 @@ void write_file(const std::string& kind, const std::string& file, const std::str
     save(file, out.data(), out.size());
     return;
   }
-  for (const auto& [name, description, dialect] : csv_dialects()) {
+  for (const auto& [name, description, format] : csv_formats()) {
     if (kind != name) continue;
-    CsvEncoder encoder(dialect, size);
+    CsvEncoder encoder(format, size);
     encoder.encode(events, out);
     encoder.finish(out);
     save(file, out.data(), out.size());
@@ -59,7 +59,7 @@ void write_file(const std::string& kind, const std::string& file, const std::str
   }
   Hdf5Writer::Settings settings;
   settings.size = size;
-  settings.layout = kind == "metavision-hdf5" ? Hdf5Layout::metavision : Hdf5Layout::dsec;
+  settings.format = kind == "metavision-hdf5" ? Hdf5Format::metavision : Hdf5Format::dsec;
   settings.compression =
       kind == "dsec-gzip" ? Hdf5Writer::Compression::gzip : Hdf5Writer::Compression::none;
   Hdf5Writer writer(file, settings);

@@ -24,8 +24,8 @@ inline Bytes bytes_of(std::string_view text) {
 
 inline std::vector<Seed> csv_seeds() {
   std::vector<Seed> seeds;
-  for (const auto& [name, description, dialect] : csv_dialects()) {
-    CsvEncoder encoder(dialect, {640, 480});
+  for (const auto& [name, description, format] : csv_formats()) {
+    CsvEncoder encoder(format, {640, 480});
     seeds.push_back(
         {std::string(name), recordings::encode(encoder, few_events(1, {640, 480}, 20))});
   }

@@ -39,7 +39,7 @@ GST_DEBUG_CATEGORY_STATIC(event_hdf5_sink_debug);
 #define GST_CAT_DEFAULT event_hdf5_sink_debug
 
 using eventcamera::AbsoluteEvent;
-using eventcamera::Hdf5Layout;
+using eventcamera::Hdf5Format;
 using eventcamera::Hdf5Writer;
 using eventcamera::Trigger;
 
@@ -47,7 +47,7 @@ namespace {
 
 struct Settings {
   std::string location;
-  Hdf5Layout format = Hdf5Layout::dsec;
+  Hdf5Format format = Hdf5Format::dsec;
   Hdf5Writer::Compression compression = Hdf5Writer::Compression::gzip;
 };
 
@@ -95,13 +95,13 @@ static GstStaticPadTemplate sink_template =
 
 static GType format_type() {
   static const GEnumValue values[] = {
-      {static_cast<int>(Hdf5Layout::dsec), "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset",
+      {static_cast<int>(Hdf5Format::dsec), "DSEC: /events/{t,x,y,p}, /ms_to_idx, /t_offset",
        "dsec"},
-      {static_cast<int>(Hdf5Layout::metavision),
+      {static_cast<int>(Hdf5Format::metavision),
        "Metavision: /CD/events, compressed with ECF; at most 2048x2048 pixels", "metavision"},
       {0, nullptr, nullptr},
   };
-  return enum_type("GstEventHdf5Layout", values);
+  return enum_type("GstEventHdf5Format", values);
 }
 
 static GType compression_type() {

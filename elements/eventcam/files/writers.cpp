@@ -171,22 +171,22 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
  * location=events.txt
  * ]|
  */
-static GType csv_dialect_type() {
+static GType csv_format_type() {
   static const auto values = [] {
-    std::vector<GEnumValue> dialects;
-    for (const auto& [name, description, dialect] : eventcamera::csv_dialects())
-      dialects.push_back({static_cast<gint>(dialects.size()), description.data(), name.data()});
-    dialects.push_back({0, nullptr, nullptr});
-    return dialects;
+    std::vector<GEnumValue> formats;
+    for (const auto& [name, description, format] : eventcamera::csv_formats())
+      formats.push_back({static_cast<gint>(formats.size()), description.data(), name.data()});
+    formats.push_back({0, nullptr, nullptr});
+    return formats;
   }();
-  return enum_type("GstCsvDialect", values.data());
+  return enum_type("GstEventCsvFormat", values.data());
 }
 
 static const EventFileFormat::Variants csv_variants = {
     .property = "format",
     .nick = "Format",
     .blurb = "Columns, separators, time unit and header; read when the stream begins",
-    .type = csv_dialect_type,
+    .type = csv_format_type,
     .default_value = 0,
 };
 
@@ -198,8 +198,8 @@ static const EventFileFormat csv = {
     .variants = &csv_variants,
     .create = [](SensorSize size, int variant,
                  const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
-      const auto& named = eventcamera::csv_dialects()[static_cast<std::size_t>(variant)];
-      return std::make_unique<eventcamera::CsvEncoder>(named.dialect, size);
+      const auto& named = eventcamera::csv_formats()[static_cast<std::size_t>(variant)];
+      return std::make_unique<eventcamera::CsvEncoder>(named.format, size);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvenc, "eventcsvenc", GST_RANK_PRIMARY, event_writer_type(csv))

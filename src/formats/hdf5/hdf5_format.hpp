@@ -5,8 +5,8 @@
 
 namespace eventcamera {
 
-/// Layout of events in an HDF5 file.
-enum class Hdf5Layout : std::uint8_t {
+/// Format of an HDF5 file of events.
+enum class Hdf5Format : std::uint8_t {
   dsec,        ///< /events/{t,x,y,p}, /ms_to_idx, /t_offset
   v2e,         ///< /events, rows of t, x, y, p
   metavision,  ///< /CD/events and /EXT_TRIGGER/events, compressed with ECF

@@ -87,9 +87,9 @@ Hdf5Reader::Hdf5Reader(File file) : file_(std::make_unique<File>(std::move(file)
   const Hdf5Session session;
   const auto id = file_->handle.get();
   table_ = Hdf5Table::open(id);
-  layout_ = table_->layout();
+  format_ = table_->format();
   size_ = table_->size();
-  if (layout_ == Hdf5Layout::metavision) triggers_ = Hdf5Triggers::open(id);
+  if (format_ == Hdf5Format::metavision) triggers_ = Hdf5Triggers::open(id);
   validator_.set_size(size_);
   if (table_->rows() < table_->claimed_rows())
     corruption_.note(0, "there are fewer events than the file says");

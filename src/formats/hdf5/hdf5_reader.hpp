@@ -7,7 +7,7 @@
 
 #include "src/formats/byte_source.hpp"
 #include "src/formats/event_table.hpp"
-#include "src/formats/hdf5/hdf5_layout.hpp"
+#include "src/formats/hdf5/hdf5_format.hpp"
 #include "src/formats/reader.hpp"
 
 namespace eventcamera {
@@ -31,7 +31,7 @@ class Hdf5Reader {
   Hdf5Reader(const Hdf5Reader&) = delete;
   Hdf5Reader& operator=(const Hdf5Reader&) = delete;
 
-  Hdf5Layout layout() const { return layout_; }
+  Hdf5Format format() const { return format_; }
 
   /// Sensor size; 0x0 if not stated in the file.
   SensorSize size() const { return size_; }
@@ -60,7 +60,7 @@ class Hdf5Reader {
   void fill();
 
   std::unique_ptr<File> file_;
-  Hdf5Layout layout_ = Hdf5Layout::dsec;
+  Hdf5Format format_ = Hdf5Format::dsec;
   SensorSize size_;
   std::unique_ptr<Hdf5Table> table_;
   std::unique_ptr<Hdf5Triggers> triggers_;

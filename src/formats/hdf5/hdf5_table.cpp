@@ -139,7 +139,7 @@ class NumberTable : public Hdf5Table {
 class DsecTable final : public NumberTable {
  public:
   explicit DsecTable(hid_t file)
-      : NumberTable(Hdf5Layout::dsec),
+      : NumberTable(Hdf5Format::dsec),
         columns_{{Hdf5Dataset(file, "events/t"), Hdf5Dataset(file, "events/x"),
                   Hdf5Dataset(file, "events/y"), Hdf5Dataset(file, "events/p")}} {
     rows_ = columns_[0].rows();
@@ -235,8 +235,8 @@ class DsecTable final : public NumberTable {
 class RowTable final : public NumberTable {
  public:
   /// `events` has columns t, x, y and p, with 32 bits if `wraps`.
-  RowTable(Hdf5Layout layout, Hdf5Dataset events, SensorSize size, bool wraps)
-      : NumberTable(layout), events_(std::move(events)) {
+  RowTable(Hdf5Format format, Hdf5Dataset events, SensorSize size, bool wraps)
+      : NumberTable(format), events_(std::move(events)) {
     events_.require_filters();
     size_ = size;
     rows_ = events_.rows();
@@ -269,7 +269,7 @@ class RowTable final : public NumberTable {
 class EcfTable final : public Hdf5Table {
  public:
   EcfTable(Hdf5Dataset events, SensorSize size)
-      : Hdf5Table(Hdf5Layout::metavision),
+      : Hdf5Table(Hdf5Format::metavision),
         events_(std::move(events)),
         chunk_rows_(events_.chunk_rows()) {
     if (chunk_rows_ == 0 || chunk_rows_ > ecf_max_events)
@@ -345,7 +345,7 @@ std::unique_ptr<Hdf5Table> open_v2e(hid_t file) {
       size = {static_cast<int>(extent[2]), static_cast<int>(extent[1])};
   }
   const bool wraps = events.is_unsigned_32();
-  return std::make_unique<RowTable>(Hdf5Layout::v2e, std::move(events), size, wraps);
+  return std::make_unique<RowTable>(Hdf5Format::v2e, std::move(events), size, wraps);
 }
 
 std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
@@ -356,7 +356,7 @@ std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
   const auto size = read_geometry(read_text_attribute(file, "geometry").value_or(""));
   if (events.has_only_filter(ecf_filter))
     return std::make_unique<EcfTable>(std::move(events), size);
-  return std::make_unique<RowTable>(Hdf5Layout::metavision, std::move(events), size, false);
+  return std::make_unique<RowTable>(Hdf5Format::metavision, std::move(events), size, false);
 }
 
 }  // namespace

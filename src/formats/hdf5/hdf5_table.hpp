@@ -10,7 +10,7 @@
 #include "src/formats/corruption.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_dataset.hpp"
-#include "src/formats/hdf5/hdf5_layout.hpp"
+#include "src/formats/hdf5/hdf5_format.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
@@ -25,7 +25,7 @@ class Hdf5Table {
   /// Throws UnsupportedFormat if the layout is unknown or invalid.
   static std::unique_ptr<Hdf5Table> open(hid_t file);
 
-  Hdf5Layout layout() const { return layout_; }
+  Hdf5Format format() const { return format_; }
   SensorSize size() const { return size_; }
   std::uint64_t rows() const { return rows_; }
   std::uint64_t claimed_rows() const { return claimed_rows_; }
@@ -41,9 +41,9 @@ class Hdf5Table {
   virtual std::optional<Microseconds> time_at(std::uint64_t row) = 0;
 
  protected:
-  explicit Hdf5Table(Hdf5Layout layout) : layout_(layout) {}
+  explicit Hdf5Table(Hdf5Format format) : format_(format) {}
 
-  Hdf5Layout layout_;
+  Hdf5Format format_;
   SensorSize size_;
   std::uint64_t rows_ = 0, claimed_rows_ = 0;
 };

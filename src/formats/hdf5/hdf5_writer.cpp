@@ -412,15 +412,15 @@ class MetavisionLayout final : public Hdf5Writer::Layout {
 };
 
 std::unique_ptr<Hdf5Writer::Layout> make_layout(hid_t file, const Hdf5Writer::Settings& settings) {
-  if (settings.layout == Hdf5Layout::dsec) return std::make_unique<DsecLayout>(file, settings);
+  if (settings.format == Hdf5Format::dsec) return std::make_unique<DsecLayout>(file, settings);
   return std::make_unique<MetavisionLayout>(file, settings);
 }
 
 void check(const Hdf5Writer::Settings& settings) {
   const auto [width, height] = settings.size;
-  if (settings.layout == Hdf5Layout::v2e)
+  if (settings.format == Hdf5Format::v2e)
     throw std::invalid_argument("v2e's HDF5 layout can only be read");
-  const bool ecf = settings.layout == Hdf5Layout::metavision;
+  const bool ecf = settings.format == Hdf5Format::metavision;
   const int max_side = ecf ? ecf_max_pixels : 32768;
   if (width <= 0 || height <= 0 || width > max_side || height > max_side)
     throw std::invalid_argument("HDF5 files need a sensor size of at most " +

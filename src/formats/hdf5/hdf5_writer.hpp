@@ -9,7 +9,7 @@
 
 #include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
-#include "src/formats/hdf5/hdf5_layout.hpp"
+#include "src/formats/hdf5/hdf5_format.hpp"
 
 namespace eventcamera {
 
@@ -22,7 +22,7 @@ class Hdf5Writer {
   enum class Compression : std::uint8_t { none, gzip };
 
   struct Settings {
-    Hdf5Layout layout = Hdf5Layout::dsec;         ///< dsec or metavision
+    Hdf5Format format = Hdf5Format::dsec;         ///< dsec or metavision
     Compression compression = Compression::gzip;  ///< for DSEC; Metavision always uses ECF
     SensorSize size;
   };

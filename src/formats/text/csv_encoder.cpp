@@ -11,13 +11,13 @@ namespace {
 
 using enum TimeUnit;
 using Column = EventColumn;
-using Header = CsvDialect::Header;
+using Header = CsvFormat::Header;
 
 constexpr ColumnOrder txyp = {Column::t, Column::x, Column::y, Column::p};
 constexpr ColumnOrder xypt = {Column::x, Column::y, Column::p, Column::t};
 constexpr ColumnOrder xytp = {Column::x, Column::y, Column::t, Column::p};
 
-constexpr NamedCsvDialect dialects[] = {
+constexpr NamedCsvFormat formats[] = {
     {"names",
      "t,x,y,p in microseconds below a line of names",
      {txyp, ',', microseconds, Header::names, false, false}},
@@ -56,19 +56,19 @@ char* write_number(char* at, Number number) {
   return std::to_chars(at, at + max_line, number).ptr;
 }
 
-std::string header_text(const CsvDialect& dialect, SensorSize size) {
-  const std::string end = dialect.carriage_return ? "\r\n" : "\n";
+std::string header_text(const CsvFormat& format, SensorSize size) {
+  const std::string end = format.carriage_return ? "\r\n" : "\n";
   const auto width = std::to_string(size.width);
   const auto height = std::to_string(size.height);
-  const bool sized = dialect.header == Header::names_and_size;
+  const bool sized = format.header == Header::names_and_size;
   const std::string names_of[] = {"t", sized ? "x@" + width : "x", sized ? "y@" + height : "y",
                                   sized ? "on" : "p"};
   std::string names;
-  for (const auto column : dialect.order) {
-    if (!names.empty()) names += dialect.separator;
+  for (const auto column : format.order) {
+    if (!names.empty()) names += format.separator;
     names += names_of[static_cast<std::size_t>(column)];
   }
-  switch (dialect.header) {
+  switch (format.header) {
     case Header::none:
       return {};
     case Header::names:
@@ -77,7 +77,7 @@ std::string header_text(const CsvDialect& dialect, SensorSize size) {
     case Header::geometry:
       return "%geometry:" + width + "," + height + end;
     case Header::size:
-      return width + dialect.separator + height + end;
+      return width + format.separator + height + end;
     case Header::comment:
       return "# " + names + end;
   }
@@ -86,21 +86,21 @@ std::string header_text(const CsvDialect& dialect, SensorSize size) {
 
 }  // namespace
 
-std::span<const NamedCsvDialect> csv_dialects() {
-  return dialects;
+std::span<const NamedCsvFormat> csv_formats() {
+  return formats;
 }
 
-CsvEncoder::CsvEncoder(const CsvDialect& dialect, SensorSize size)
-    : Encoder(header_text(dialect, size)), dialect_(dialect) {}
+CsvEncoder::CsvEncoder(const CsvFormat& format, SensorSize size)
+    : Encoder(header_text(format, size)), format_(format) {}
 
 char* CsvEncoder::write(char* at, Microseconds t) const {
-  if (dialect_.unit == microseconds) return write_number(at, t);
+  if (format_.unit == microseconds) return write_number(at, t);
   auto magnitude = static_cast<std::uint64_t>(t);
   if (t < 0) {
     *at++ = '-';
     magnitude = 0 - magnitude;
   }
-  if (dialect_.unit == nanoseconds) {
+  if (format_.unit == nanoseconds) {
     at = write_number(at, magnitude);
     if (magnitude == 0) return at;
     return std::fill_n(at, 3, '0');
@@ -114,7 +114,7 @@ char* CsvEncoder::write(char* at, Microseconds t) const {
 }
 
 char* CsvEncoder::write(char* at, const AbsoluteEvent& event) const {
-  for (const auto column : dialect_.order) {
+  for (const auto column : format_.order) {
     switch (column) {
       case Column::t:
         at = write(at, event.t);
@@ -128,7 +128,7 @@ char* CsvEncoder::write(char* at, const AbsoluteEvent& event) const {
       case Column::p:
         if (event.polarity() == Polarity::on) {
           *at++ = '1';
-        } else if (dialect_.minus_one) {
+        } else if (format_.minus_one) {
           *at++ = '-';
           *at++ = '1';
         } else {
@@ -136,10 +136,10 @@ char* CsvEncoder::write(char* at, const AbsoluteEvent& event) const {
         }
         break;
     }
-    *at++ = dialect_.separator;
+    *at++ = format_.separator;
   }
   --at;
-  if (dialect_.carriage_return) *at++ = '\r';
+  if (format_.carriage_return) *at++ = '\r';
   *at++ = '\n';
   return at;
 }

@@ -14,7 +14,7 @@ namespace eventcamera {
 using ColumnOrder = std::array<EventColumn, 4>;
 
 /// Format of a text file of events.
-struct CsvDialect {
+struct CsvFormat {
   /// Lines before the first event.
   enum class Header : std::uint8_t {
     none,
@@ -33,26 +33,26 @@ struct CsvDialect {
   bool carriage_return = false;  ///< lines end with CR LF
 };
 
-struct NamedCsvDialect {
+struct NamedCsvFormat {
   std::string_view name;
   std::string_view description;
-  CsvDialect dialect;
+  CsvFormat format;
 };
 
-/// Dialects of other tools.
-std::span<const NamedCsvDialect> csv_dialects();
+/// Formats of other tools.
+std::span<const NamedCsvFormat> csv_formats();
 
 /// Encodes events as lines of text.
 class CsvEncoder final : public Encoder {
  public:
-  CsvEncoder(const CsvDialect& dialect, SensorSize size);
+  CsvEncoder(const CsvFormat& format, SensorSize size);
 
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
   char* write(char* at, Microseconds t) const;
   char* write(char* at, const AbsoluteEvent& event) const;
 
-  CsvDialect dialect_;
+  CsvFormat format_;
 };
 
 }  // namespace eventcamera
