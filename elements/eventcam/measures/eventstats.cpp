@@ -187,8 +187,6 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
     self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
-  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at stream time %" GST_STIME_FORMAT,
-                 mapped.events().size(), GST_STIME_ARGS(start));
   const std::size_t skipped = measurement.validator.take(
       mapped.events(), start / 1000, [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
@@ -208,6 +206,8 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
   const Nanoseconds start = stream_time(transform->segment, interval->start);
+  GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at stream time %" GST_STIME_FORMAT,
+                 gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent), GST_STIME_ARGS(start));
   cover(self, start, stream_time(transform->segment, interval->end));
   count(self, *measurement, buffer, start);
   post_if_due(self, *measurement);
