@@ -9,11 +9,14 @@
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event.hpp"
+#include "src/core/max_side.hpp"
+
+/// Caps fields of a frame or sensor of any size.
+#define SIZE_CAPS "width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ]"
+static_assert(eventcamera::max_side == 16384);
 
 /// Caps of an event stream in memory format.
-#define EVENT_CAPS            \
-  GST_EVENT_CAMERA_MEDIA_TYPE \
-  ", format = (string) XYTP, width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ]"
+#define EVENT_CAPS GST_EVENT_CAMERA_MEDIA_TYPE ", format = (string) XYTP, " SIZE_CAPS
 
 /// What to set on decodebin for events, which it draws as video otherwise.
 #define ASK_FOR_EVENTS "caps=\"application/x-event-camera,format=XYTP\""

@@ -3,6 +3,7 @@
 
 #include <initializer_list>
 
+#include "gst/base/event_buffer.hpp"
 #include "gst/eventcamera/eventcamera.h"
 
 namespace {
@@ -68,10 +69,8 @@ GstCaps* SimulatorVideo::input_caps(const GstCaps* output) const {
 }
 
 void SimulatorVideo::install_pads(GstElementClass* klass) const {
-  // As wide and high as eventcamera::max_side.
   GstCaps* any = gst_caps_from_string(GST_EVENT_CAMERA_MEDIA_TYPE
-                                      ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
-                                      "framerate = (fraction) [ 0, max ]");
+                                      ", " SIZE_CAPS ", framerate = (fraction) [ 0, max ]");
   GstCaps* input = input_caps(any);
   GstCaps* output = output_caps(any);
   gst_element_class_add_pad_template(

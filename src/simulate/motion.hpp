@@ -6,15 +6,13 @@
 #include <cstdint>
 #include <optional>
 
+#include "src/core/max_side.hpp"
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 
 namespace eventcamera {
 
-/// Width and height limit of frames; positions and flows within it fit into a Motion.
-inline constexpr int max_side = 16384;
-
-/// Displacement in one step, in 1/65536 of a pixel. All arithmetic after the conversion from float
-/// is integer, so results are the same on every processor.
+/// Displacement in one step, in 1/65536 of a pixel: up to max_side. All arithmetic after the
+/// conversion from float is integer, so results are the same on every processor.
 using Motion = std::int32_t;
 
 /// The flow of an interval (pixels) divided by its steps. NaN counts as 0; flows are clamped to

@@ -284,10 +284,9 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
                           "Time that an event is shown (ns; 0 = one frame)", 0,
                           std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
 
-#define DRAWN_VIDEO_CAPS                                                    \
-  "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS                     \
-  ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], framerate = " \
-  "(fraction) [ 0, max ]"
+#define DRAWN_VIDEO_CAPS                                               \
+  "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS ", " SIZE_CAPS \
+  ", framerate = (fraction) [ 0, max ]"
   static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
       "video_sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(DRAWN_VIDEO_CAPS));
   static GstStaticPadTemplate event_template = GST_STATIC_PAD_TEMPLATE(

@@ -529,7 +529,7 @@ static void install_properties(GObjectClass* object_class) {
   properties.add(&Settings::area_size,
                  g_param_spec_uint("area-size", "Area size",
                                    "Side of the squares that area-event-count counts in (pixels)",
-                                   1, 16384, defaults.area_size, flags));
+                                   1, eventcamera::max_side, defaults.area_size, flags));
   properties.add(
       &Settings::full_scale,
       g_param_spec_double("full-scale", "Full scale",
@@ -565,12 +565,11 @@ static void gst_event_render_class_init(GstEventRenderClass* klass) {
 
   static GstStaticPadTemplate sink_template =
       GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
-      "src", GST_PAD_SRC, GST_PAD_ALWAYS,
-      GST_STATIC_CAPS("video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS
-                      ", width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "
-                      "framerate = (fraction) [ 0, max ], "
-                      "pixel-aspect-ratio = (fraction) 1/1"));
+  static GstStaticPadTemplate src_template =
+      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS,
+                              GST_STATIC_CAPS("video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS
+                                              ", " SIZE_CAPS ", framerate = (fraction) [ 0, max ], "
+                                              "pixel-aspect-ratio = (fraction) 1/1"));
   gst_event_aggregator_class_add_templates(GST_EVENT_AGGREGATOR_CLASS(klass),
                                            {&sink_template, &src_template});
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event renderer",

@@ -6,6 +6,7 @@
 #include "elements/eventcam/files/evtformat.hpp"
 #include "gst/base/types.hpp"
 #include "gst/recording/eventwriter.hpp"
+#include "src/core/max_side.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
@@ -113,8 +114,8 @@ static const EventFileFormat dat = {
     .long_name = "Prophesee DAT writer",
     .description = "Writes events as Prophesee DAT",
     .caps = "application/x-prophesee-dat",
-    .max_width = 16384,
-    .max_height = 16384,
+    .max_width = eventcamera::max_side,
+    .max_height = eventcamera::max_side,
     .create = [](SensorSize size, int,
                  const GstCaps*) { return eventcamera::make_dat_encoder(size); },
 };

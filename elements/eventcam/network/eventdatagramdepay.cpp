@@ -51,6 +51,7 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "src/core/max_side.hpp"
 #include "src/wire/datagram_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_depay_debug);
@@ -371,17 +372,16 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
 
   Properties<settings_of> properties(object_class);
   add_datagram_properties(properties);
-  constexpr guint max_size = 16384;
   constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                   GST_PARAM_MUTABLE_READY);
   properties.add(
       &DatagramSettings::width,
       g_param_spec_uint("width", "Width", "Width of the sender's sensor (pixels); required", 0,
-                        max_size, 0, flags));
+                        eventcamera::max_side, 0, flags));
   properties.add(
       &DatagramSettings::height,
       g_param_spec_uint("height", "Height", "Height of the sender's sensor (pixels); required", 0,
-                        max_size, 0, flags));
+                        eventcamera::max_side, 0, flags));
   properties.add(
       &Settings::latency,
       g_param_spec_uint64("latency", "Latency",

@@ -54,11 +54,13 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "src/core/max_side.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
 #define GST_CAT_DEFAULT rtp_event_depay_debug
 
+using eventcamera::max_side;
 using eventcamera::RtpEventFormat;
 using eventcamera::RtpInterval;
 using eventcamera::RtpPacket;
@@ -70,9 +72,6 @@ namespace {
 
 /// Change of the mapping from the sender's times to running time that is not followed.
 constexpr GstClockTimeDiff max_drift = 5 * GST_MSECOND;
-
-/// Maximum sides of XYTP caps.
-constexpr int max_side = 16384;
 
 /// Stream of a sender.
 struct State {

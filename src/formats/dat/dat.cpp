@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/unit_decoder.hpp"
 #include "src/formats/unit_reader.hpp"
@@ -14,8 +15,7 @@
 namespace eventcamera {
 namespace {
 
-/// Columns and rows have 14 bits.
-constexpr int max_side = 16384;
+static_assert(max_side == 1 << 14);  // columns and rows have 14 bits
 
 enum Type : std::uint8_t { event_2d = 0x00, event_cd = 0x0c, event_trigger = 0x0e };
 
