@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What servers of events share: their options, and the capture of a camera, or without one of a test
-scene, until Ctrl-C."""
+"""Shared by the event servers: command-line options, and capturing from a camera or a test scene until
+Ctrl-C."""
 import argparse
 import ipaddress
 import signal
@@ -25,15 +25,15 @@ def option_parser(program, description, address, port):
     parser.add_argument("--address", type=ipaddress.ip_address, default=address,
                         help="IP address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=port_number, default=port,
-                        help="0 = any that is free (default: %(default)s)")
+                        help="0 = any free port (default: %(default)s)")
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
                         help="print the version and exit")
     return parser
 
 
 def find_elements(names, packages):
-    """Raises RuntimeError if GStreamer lacks a plugin of this project, or one of these elements, which
-    are in these Debian packages."""
+    """Raises RuntimeError if GStreamer lacks a plugin of this project or one of these elements, which
+    the Debian `packages` contain."""
     for plugin in ("eventcam", "eventsim"):
         if not Gst.Registry.get().find_plugin(plugin):
             raise RuntimeError(
@@ -51,31 +51,31 @@ def port_number(text):
 
 
 def host_of(address):
-    """The host of URLs."""
+    """Host part of the printed URLs."""
     if address.is_unspecified:
         return socket.gethostname()
     return f"[{address}]" if address.version == 6 else str(address)
 
 
 class Capture:
-    """A pipeline of a camera, or of the test scene, and `launch`. What it makes is pushed to the
-    appsrcs that are attached. on_element_message(message) is called for messages of its elements."""
+    """Pipeline from a camera, or the test scene, through `launch`. Its output is pushed to all attached
+    appsrcs. on_element_message(message) is called for messages of its elements."""
 
     def __init__(self, device, launch, on_element_message=None):
-        # Frames that come too fast are dropped, so that latency does not grow.
+        # Drops frames that arrive faster than they are processed, so that latency does not grow.
         self.pipeline = Gst.parse_launch(
             f"{CAMERA if device else SCENE} ! queue leaky=downstream max-size-buffers=2 ! {launch}"
             " ! appsink name=captured emit-signals=true sync=false")
         if device:
             self.pipeline.get_by_name("camera").set_property("device", device)
         self.pipeline.get_by_name("captured").connect("new-sample", self._push)
-        self._appsrcs = ()  # replaced, never changed: the thread that captures reads it
+        self._appsrcs = ()  # replaced, never modified: the streaming thread reads it
         self._attaching = threading.Lock()
         self._on_element_message = on_element_message
         self._loop = GLib.MainLoop()
 
     def attach(self, appsrc, pipeline):
-        """`pipeline`, in which `appsrc` is, gets the clock of the capture: buffers keep their times."""
+        """Feeds `appsrc`. Its `pipeline` takes the capture's clock, so that timestamps stay valid."""
         pipeline.use_clock(self.pipeline.get_clock())
         pipeline.set_start_time(Gst.CLOCK_TIME_NONE)
         pipeline.set_base_time(self.pipeline.get_base_time())

@@ -19,23 +19,23 @@ typedef struct {
 } Count;
 
 static void print(const char* what, const Count* count, gdouble seconds) {
-  g_print("%s %9" G_GUINT64_FORMAT " events, %.2f million a second, %2.0f %% ON\n", what,
-          count->events, seconds > 0 ? (gdouble)count->events / seconds / 1e6 : 0.0,
+  g_print("%s %9" G_GUINT64_FORMAT " events, %.2f Mev/s, %2.0f %% ON\n", what, count->events,
+          seconds > 0 ? (gdouble)count->events / seconds / 1e6 : 0.0,
           count->events > 0 ? 100.0 * (gdouble)count->on / (gdouble)count->events : 0.0);
 }
 
 static void count_buffer(Count* count, GstBuffer* buffer) {
   GstEventCameraMap map;
   if (!gst_event_camera_map(&map, buffer)) return;
-  /* map.events is an array; the time of an event, in microseconds, is map.start + t. */
+  /* map.events is an array; an event's time in microseconds is map.start + t. */
   for (gsize i = 0; i < map.n_events; ++i)
     count->on += gst_event_camera_event_is_on(&map.events[i]) ? 1 : 0;
   count->events += map.n_events;
   gst_event_camera_unmap(&map);
 }
 
-/* Prints the error that ended the pipeline, if any, and its cause: the last line of the debug text.
- * True if there was one. */
+/* Prints the error that stopped the pipeline, if any, and its cause: the last line of the debug
+ * text. Returns TRUE if there was one. */
 static gboolean failed(GstBus* bus) {
   GstMessage* message = gst_bus_pop_filtered(bus, GST_MESSAGE_ERROR);
   GError* error = NULL;
@@ -52,13 +52,13 @@ static gboolean failed(GstBus* bus) {
   return TRUE;
 }
 
-/* Prints the size of the sensor, or if these are no caps of events, how to get events. */
+/* Prints the size of the sensor or, if the caps are not those of events, how to get events. */
 static gboolean check_caps(const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) {
     g_printerr(
-        "The appsink gets no events but %s. Write a simulator before it (! eventsim-diff ! appsink "
-        "name=events), or if a file has events: decodebin "
+        "The appsink receives %s, not events. Insert a simulator (! eventsim-diff ! appsink "
+        "name=events) or, for an event file, use: decodebin "
         "caps=\"application/x-event-camera,format=XYTP\" ! appsink name=events\n",
         gst_structure_get_name(gst_caps_get_structure(caps, 0)));
     return FALSE;
@@ -67,7 +67,7 @@ static gboolean check_caps(const GstCaps* caps) {
   return TRUE;
 }
 
-/* Counts events until the end of the stream; prints a line per second of the stream. */
+/* Counts events until the end of the stream, and prints a line per second of stream time. */
 static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
   Count all = {0, 0};
   Count second = {0, 0};
@@ -109,7 +109,7 @@ static gboolean count_stream(GstAppSink* sink, GstBus* bus) {
 
 static GstElement* pipeline;
 
-/* Ctrl-C ends the stream, so that sinks complete their files. */
+/* Sends EOS on Ctrl-C, so that sinks complete their files. */
 static gpointer wait_for_interrupt(gpointer signals) {
   int caught;
   if (sigwait(signals, &caught) != 0) return NULL;

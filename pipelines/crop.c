@@ -23,12 +23,12 @@ static GstBuffer* cropped_buffer(const Region* region, GstBuffer* in) {
     gst_buffer_map(out, &bytes, GST_MAP_WRITE);
     for (gsize i = 0; i < events.n_events; ++i) {
       GstEventCameraEvent event = events.events[i];
-      /* Unsigned: what lies before the region is past its end. */
+      /* Unsigned: a pixel before the region wraps past its end. */
       if (event.x - region->x >= region->width ||
           gst_event_camera_event_get_y(&event) - region->y >= region->height)
         continue;
       event.x = (guint16)(event.x - region->x);
-      event.y_p = (guint16)(event.y_p - region->y); /* leaves the polarity */
+      event.y_p = (guint16)(event.y_p - region->y); /* does not change the polarity */
       ((GstEventCameraEvent*)bytes.data)[count++] = event;
     }
     gst_buffer_unmap(out, &bytes);

@@ -10,9 +10,9 @@ typedef struct {
   guint width, height, x, y;
 } Region;
 
-/* Parses WIDTHxHEIGHT+X+Y. FALSE if the text is something else. */
+/* Parses WIDTHxHEIGHT+X+Y. Returns FALSE if the text is invalid. */
 gboolean region_from_text(Region* region, const char* text);
 
-/* Makes a pad push the events within the region only, moved to (0, 0). The region must outlive the
+/* Makes a pad push only the events within the region, moved to (0, 0). The region must outlive the
  * pad. */
 void crop_events(GstPad* pad, const Region* region);

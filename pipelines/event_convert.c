@@ -19,8 +19,8 @@
 
 #include "crop.h"
 
-/* Texts are printed as they are: names are bytes, messages are UTF-8. g_print() would replace what
- * the locale lacks. */
+/* Prints text unchanged: names are bytes, messages are UTF-8. g_print() would replace characters
+ * that the locale lacks. */
 #define PRINT_ERROR(...) fprintf(stderr, __VA_ARGS__)
 
 typedef struct {
@@ -84,7 +84,7 @@ static Option properties[] = {
     {"height", "files that may lack a sensor size", NULL},
 };
 
-/* What is converted, in seconds after the start of a recording. */
+/* Part to convert, in seconds after the start of a recording. */
 static gdouble from_seconds;
 static gdouble to_seconds = G_MAXDOUBLE;
 static gchar* crop_text;
@@ -97,26 +97,25 @@ static gboolean print_version;
 
 static const GOptionEntry options[] = {
     {"format", 'f', 0, G_OPTION_ARG_STRING, &properties[0].value,
-     "Words of a .raw file, or columns of a .csv or .txt file", "NAME"},
+     "Encoding of a .raw file, or dialect of a .csv or .txt file", "NAME"},
     {"compression", 'c', 0, G_OPTION_ARG_STRING, &properties[1].value,
      "Compression of an .aedat4 or .h5 file", "NAME"},
     {"time-unit", 'u', 0, G_OPTION_ARG_STRING, &properties[2].value,
-     "Unit of the times in text or NumPy files that are read", "NAME"},
+     "Time unit of a text or NumPy file that is read", "NAME"},
     {"column-order", 'o', 0, G_OPTION_ARG_STRING, &properties[3].value,
-     "Columns of text or NumPy files that are read, such as txyp", "LETTERS"},
+     "Columns of a text or NumPy file that is read, such as txyp", "LETTERS"},
     {"width", 0, 0, G_OPTION_ARG_STRING, &properties[4].value,
      "Width of the sensor, if IN does not state it", "PIXELS"},
     {"height", 0, 0, G_OPTION_ARG_STRING, &properties[5].value,
      "Height of the sensor, if IN does not state it", "PIXELS"},
     {"from", 0, 0, G_OPTION_ARG_DOUBLE, &from_seconds,
-     "Leave out what is earlier, counted from the start of IN", "SECONDS"},
+     "Start of the part to convert, counted from the start of IN", "SECONDS"},
     {"to", 0, 0, G_OPTION_ARG_DOUBLE, &to_seconds,
-     "Leave out what is at that time or later, counted from the start of IN", "SECONDS"},
+     "End of the part to convert, exclusive, counted from the start of IN", "SECONDS"},
     {"crop", 0, 0, G_OPTION_ARG_STRING, &crop_text,
-     "Leave out events outside a region of the sensor, whose first pixel becomes (0, 0)",
-     "WIDTHxHEIGHT+X+Y"},
+     "Convert only a region of the sensor, whose first pixel becomes (0, 0)", "WIDTHxHEIGHT+X+Y"},
     {"output-directory", 0, 0, G_OPTION_ARG_FILENAME, &output_directory,
-     "Convert each IN to a file of its name in this folder", "DIRECTORY"},
+     "Convert each IN to a file of the same name in this folder", "DIRECTORY"},
     {"extension", 0, 0, G_OPTION_ARG_STRING, &output_extension,
      "Extension of the files in the output directory, by default that of IN", "NAME"},
     {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &files, NULL, NULL},
@@ -219,7 +218,7 @@ static const Reader* find_reader(const char* path) {
   }
   if (reader == NULL && format != NULL) reader = reader_of(format->media_type);
   if (reader == NULL)
-    PRINT_ERROR("%s: neither its content nor its extension is that of a known format; see --help\n",
+    PRINT_ERROR("%s: neither its content nor its extension matches a known format; see --help\n",
                 path);
   return reader;
 }
@@ -261,7 +260,7 @@ static gboolean options_apply(const Format* format) {
 static gboolean set_option(GstElement* element, const Option* option) {
   GParamSpec* spec = g_object_class_find_property(G_OBJECT_GET_CLASS(element), option->name);
   if (spec == NULL) {
-    PRINT_ERROR("--%s applies only where %s are read\n", option->name, option->inputs);
+    PRINT_ERROR("--%s applies only to reading %s\n", option->name, option->inputs);
     return FALSE;
   }
   if (G_IS_PARAM_SPEC_ENUM(spec)) {
@@ -345,9 +344,8 @@ static void link_frames(GstElement* reader, GstPad* pad, gpointer writer) {
   gst_object_unref(pipeline);
 }
 
-/* Lets frames come with the events. The muxer waits for the later of both, so that the queue of
- * events is limited by time alone: a video stream without frames is half a second behind at most.
- */
+/* Converts frames along with the events. The muxer waits for the later of both, so the queue of
+ * events is limited by time alone: a video stream without frames lags by half a second at most. */
 static void convert_frames(GstElement* pipeline, GstElement* queue) {
   GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
   GstElement* writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
@@ -366,7 +364,7 @@ static GstStructure* stats_of(GstElement* pipeline, const char* name) {
   return stats;
 }
 
-/* Says what of `in` is not in OUT. */
+/* Prints what OUT cannot store of `in`. */
 static void print_left_out(const char* in, GstElement* pipeline) {
   static const struct {
     const char* field;
@@ -521,7 +519,7 @@ static gboolean finish(const char* part, const char* path, gboolean ok) {
   if (!ok) {
     remove(part);
   } else if (interrupted && access(path, F_OK) == 0) {
-    PRINT_ERROR("interrupted: %s stays as it was; the events so far are in %s\n", path, part);
+    PRINT_ERROR("interrupted: %s is unchanged; the events so far are in %s\n", path, part);
   } else if (rename(part, path) != 0) {
     PRINT_ERROR("%s: %s; the events are in %s\n", path, g_strerror(errno), part);
     ok = FALSE;
@@ -531,12 +529,13 @@ static gboolean finish(const char* part, const char* path, gboolean ok) {
   return ok && !interrupted;
 }
 
-/* OUT, or what it links to, so that the link stays. NULL if that is missing. */
+/* OUT or, if it is a symbolic link, its target, so that the link is kept. NULL if that is missing.
+ */
 static gchar* target_of(const char* path) {
   gchar* target;
   if (!g_file_test(path, G_FILE_TEST_IS_SYMLINK)) return g_strdup(path);
   target = realpath(path, NULL);
-  if (target == NULL) PRINT_ERROR("%s: what it links to: %s\n", path, g_strerror(errno));
+  if (target == NULL) PRINT_ERROR("%s: target of the link: %s\n", path, g_strerror(errno));
   return target;
 }
 
@@ -663,7 +662,7 @@ static int convert_all(void) {
   return status;
 }
 
-/* What is wrong with the options and the names of files, or NULL. */
+/* Returns the error in the options and file names, or NULL. */
 static const char* misuse(void) {
   const guint count = files != NULL ? g_strv_length(files) : 0;
   if (output_directory == NULL && count != 2) return "needs IN and OUT";

@@ -26,7 +26,7 @@ EVENT = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")])
 
 
 def events_of(buffer):
-    """The events of a buffer, with times since the start of the stream."""
+    """The events of a buffer, with 64-bit times."""
     packed = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), XYTP)
     events = np.empty(len(packed), EVENT)
     events["t"] = buffer.pts // 1000 + packed["t"].astype("<i8")
@@ -47,8 +47,8 @@ def size_of(caps):
     """The size of the sensor."""
     is_events, info = GstEventCamera.Info.from_caps(caps)
     if not is_events:
-        raise RuntimeError(f"The appsink gets no events but {caps.get_structure(0).get_name()}. Write a"
-                           " simulator before it (! eventsim-diff ! appsink name=events), or if a file has events:"
+        raise RuntimeError(f"The appsink receives {caps.get_structure(0).get_name()}, not events. Insert a"
+                           " simulator (! eventsim-diff ! appsink name=events) or, for an event file, use:"
                            ' decodebin caps="application/x-event-camera,format=XYTP" ! appsink name=events')
     return info.width, info.height
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3 -B
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Serves over RTSP the events of a camera, and what it sees, to any number of clients, until Ctrl-C:
+"""Serves the events and the video of a camera over RTSP to any number of clients, until Ctrl-C:
 
     rtsp-events --device /dev/video0
 
@@ -26,11 +26,11 @@ from capture import Capture, find_elements, host_of, option_parser  # noqa: E402
 
 ELEMENTS = ["vp8enc", "rtpvp8pay"]
 
-# Media that are too slow leave frames out.
+# The leaky queues drop frames if a simulator or an encoder is too slow.
 FRAMES = "appsrc name=frames is-live=true format=time"
 QUEUE = "queue leaky=downstream max-size-buffers=2"
 EVENTS = f"{QUEUE} ! {{simulator}} ! application/x-event-camera ! rtpeventpay"
-# Clients of RTSP cannot ask for a key frame: there is one every second.
+# RTSP clients cannot request a key frame, so there is one every second.
 VIDEO = (f"{QUEUE} ! videoconvert ! vp8enc deadline=1 cpu-used=8 threads=2 target-bitrate=4000000"
          " keyframe-max-dist=30 ! rtpvp8pay picture-id-mode=15-bit")
 MEDIA = {
@@ -43,7 +43,7 @@ SECONDS_BETWEEN_CLEANUPS = 5
 
 
 class Server:
-    """The media of a capture: clients of a path share one, and all share the camera."""
+    """RTSP server: clients of a path share its media, and all media share the camera."""
 
     def __init__(self, device, simulator):
         self._capture = Capture(device, "identity")
@@ -88,7 +88,7 @@ class Server:
         finally:
             self._server.client_filter(lambda *_: GstRtspServer.RTSPFilterResult.REMOVE)
             sessions.filter(lambda *_: GstRtspServer.RTSPFilterResult.REMOVE)
-            # Waits for the threads that call _feed's handler.
+            # Waits for the threads that call the handler connected in _feed.
             GstRtspServer.RTSPThreadPool.cleanup()
 
     def _feed(self, _, media):
@@ -100,8 +100,8 @@ class Server:
 
 def main():
     parser = option_parser("rtsp-events", __doc__, "0.0.0.0", 8554)
-    parser.add_argument("--user", help="user that clients must name")
-    parser.add_argument("--password", help="password of the user")
+    parser.add_argument("--user", help="user name that clients must log in with")
+    parser.add_argument("--password", help="password of that user")
     parser.add_argument("--certificate", metavar="PEM",
                         help="TLS certificate and its private key, in one file")
     chosen = parser.parse_args()

@@ -5,8 +5,8 @@ usage() {
   cat <<'USAGE'
 usage: virtual-camera [--help] [--version] [--device DEVICE] [--simulator SIMULATOR]
 
-Makes the events of a webcam a camera of its own, until Ctrl-C. Applications that take cameras from PipeWire list it
-as "Event camera".
+Offers the events of a webcam as a camera, drawn as video, until Ctrl-C. Applications that find cameras through
+PipeWire list it as "Event camera".
 
     virtual-camera --device /dev/video0 --simulator "eventsim-sparse palette=light"
 
@@ -50,7 +50,7 @@ while [ $# -gt 0 ]; do
   esac
 done
 
-has() { # ELEMENT, of a plugin of any version
+has() { # ELEMENT, from a plugin of any version
   gst-inspect-1.0 --exists --atleast-version=0.0 "$1"
 }
 if ! has eventsim-diff; then
@@ -63,10 +63,10 @@ if ! has pipewiresink; then
   echo "error: GStreamer has no pipewiresink; on Debian, install: gstreamer1.0-pipewire" >&2
   exit 1
 fi
-echo "\"Event camera\" is a camera of PipeWire until Ctrl-C"
+echo "PipeWire offers the camera \"Event camera\" until Ctrl-C"
 # pipewiresink 0.3.65 offers buffers without memory if the allocation query reaches it, and crashes if an application
-# connects before the first picture. It lists the camera when caps arrive, which funnel keeps until then.
-# A leaky queue would make simulators start over at each lost frame, with an empty picture.
+# connects before the first picture. It lists the camera when caps arrive, and funnel holds them back until then.
+# A leaky queue would reset the simulator at each dropped frame, with an empty picture.
 exec gst-launch-1.0 -q "${camera[@]}" ! queue max-size-buffers=2 ! "${simulator[@]}" ! videoconvert ! \
   video/x-raw,format=YUY2 ! identity drop-allocation=true ! funnel ! \
   pipewiresink sync=false mode=provide client-name=event-camera \

@@ -5,8 +5,8 @@ of browsers can watch. Ctrl-C ends it.
 
     web-events --device /dev/video0
 
-Without --device it shows a test scene. Only browsers on this machine are served, unless --address
-is given: 0.0.0.0 serves whoever reaches this machine, without a password."""
+Without --device it shows a test scene. By default only browsers on this machine can connect; with
+--address 0.0.0.0, anyone who can reach this machine can, without a password."""
 import json
 import os
 import sys
@@ -35,7 +35,7 @@ DRAW_AND_ENCODE = (
     " ! video/x-raw,framerate=30/1 ! videoconvert ! queue leaky=downstream max-size-buffers=2"
     " ! vp8enc name=encoder deadline=1 cpu-used=8 threads=2 target-bitrate=4000000"
     " keyframe-max-dist=3600")
-# A browser that is too slow loses frames, and asks for a key frame.
+# If a browser is too slow, frames are dropped, and it requests a key frame.
 SEND = ("appsrc name=encoded is-live=true format=time leaky-type=downstream"
         " max-buffers=8 max-bytes=0 max-time=0 ! rtpvp8pay picture-id-mode=15-bit ! webrtcbin"
         " name=webrtc bundle-policy=max-bundle")
@@ -43,15 +43,15 @@ RTP = "application/x-rtp,media=video,encoding-name=VP8,clock-rate=90000,payload=
 
 
 def forward(_, info, need_key_frame):
-    """Passes a browser's request for a key frame on."""
+    """Forwards a browser's request for a key frame."""
     if info.get_event().has_name("GstForceKeyUnit"):
         need_key_frame()
     return Gst.PadProbeReturn.OK
 
 
 class Viewer:
-    """A browser: its WebSocket, and the WebRTC connection negotiated through it. `need_key_frame` is
-    called, from any thread, when it cannot decode without one; `end` when it has left."""
+    """A browser: its WebSocket, and the WebRTC connection negotiated through it. Calls `need_key_frame`,
+    from any thread, when the browser needs one to decode, and `end` when it has disconnected."""
 
     def __init__(self, websocket, capture, need_key_frame, end):
         self._websocket = websocket
@@ -85,7 +85,7 @@ class Viewer:
     def send(self, **message):
         GLib.idle_add(self._send, json.dumps(message))
 
-    # from threads of the pipeline
+    # from streaming threads
 
     def _create_offer(self, webrtc):
         def created(promise):
@@ -170,7 +170,7 @@ class Viewer:
 
     def _closed(self, _):
         self._has_left = True
-        # webrtcbin 1.22 that is stopped while it sets its offer does not close its sockets.
+        # webrtcbin 1.22 leaks its sockets if it is stopped while it sets its offer.
         if self._has_offered:
             self._leave()
 
@@ -180,7 +180,7 @@ class Viewer:
 
 
 class Server:
-    """The page, and the viewers that it brings."""
+    """Serves the page, and streams to its viewers."""
 
     def __init__(self, device, simulator):
         self._capture = Capture(device, DRAW_AND_ENCODE.format(simulator=simulator), self._tell_rate)
@@ -218,7 +218,7 @@ class Server:
                 message.set_response("text/html; charset=utf-8", Soup.MemoryUse.COPY, page.read())
 
     def _refuse_strangers(self, _, message, path, query):
-        """Pages of other sites, in a browser that can reach this server."""
+        """Rejects connections from pages of other sites."""
         headers = message.get_request_headers()
         origin = headers.get_one("Origin")
         if origin and urlsplit(origin).netloc != headers.get_one("Host"):

@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
     GstEventCameraMap map;
     if (!gst_event_camera_info_from_caps(&info, gst_sample_get_caps(sample))) {
       g_printerr(
-          "The appsink gets no events; write a simulator or a reader before it: "
+          "The appsink receives no events; insert a simulator or a reader: "
           "! eventsim-diff ! appsink\n");
       return 1;
     }

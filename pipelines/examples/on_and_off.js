@@ -16,7 +16,7 @@ let on = 0, events = 0, sample;
 while ((sample = sink.pull_sample())) {
     const [isEvents, info] = GstEventCamera.Info.from_caps(sample.get_caps());
     if (!isEvents) {
-        printerr('The appsink gets no events; write a simulator or a reader before it: ! eventsim-diff ! appsink');
+        printerr('The appsink receives no events; insert a simulator or a reader: ! eventsim-diff ! appsink');
         exit(1);
     }
     if (events === 0)

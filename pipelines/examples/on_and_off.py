@@ -21,7 +21,7 @@ on = events = 0
 while sample := sink.pull_sample():
     is_events, info = GstEventCamera.Info.from_caps(sample.get_caps())
     if not is_events:
-        sys.exit("The appsink gets no events; write a simulator or a reader before it: ! eventsim-diff ! appsink")
+        sys.exit("The appsink receives no events; insert a simulator or a reader: ! eventsim-diff ! appsink")
     if events == 0:
         print(f"Events of a {info.width}x{info.height} sensor")
     buffer = sample.get_buffer()

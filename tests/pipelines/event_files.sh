@@ -261,7 +261,7 @@ refused "unknown extension" ball.raw ball.mp3
 GST_PLUGIN_PATH= GST_PLUGIN_SYSTEM_PATH=/nowhere GST_REGISTRY=none.bin \
   refused "plugin eventcam.*meson devenv -C build -w \\." ball.raw out.dat
 ln -s nowhere.dat broken.dat
-refused "broken.dat: what it links to: No such file" ball.raw broken.dat
+refused "broken.dat: target of the link: No such file" ball.raw broken.dat
 refused "needs IN and OUT" ball.raw ball.dat ball.es
 refused "needs --output-directory" --extension=dat ball.raw ball.es
 refused "ball.raw and ball.csv would both become outputs/ball.dat" --output-directory=outputs --extension=dat ball.raw ball.csv
@@ -276,8 +276,8 @@ refused "can only be read" ball.raw ball.aedat
 refused "can only be read" ball.raw ball.npz
 refused "choose one of auto seconds" --time-unit=hours ball.csv other.raw
 refused "must have each of t, x, y and p once" --column-order=xy ball.csv other.raw
-refused "only where text or NumPy" --time-unit=seconds ball.raw other.raw
-refused "only where files that may lack a sensor size" --width=320 ball.es other.raw
+refused "only to reading text or NumPy" --time-unit=seconds ball.raw other.raw
+refused "only to reading files that may lack a sensor size" --width=320 ball.es other.raw
 refused "--height: " --height=tall ball.csv other.raw
 printf '1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n' >unclear.txt
 refused "set time-unit" unclear.txt out.dat
@@ -321,7 +321,7 @@ converting=$!
 while [ "$(stat -c %s kept.aedat4.part 2>/dev/null || echo 0)" -lt 10000 ]; do sleep 0.01; done
 kill -INT $converting
 if wait $converting; then fail "it was already done"; fi
-grep -q "interrupted: kept.aedat4 stays as it was; the events so far are in kept.aedat4.part" interruption ||
+grep -q "interrupted: kept.aedat4 is unchanged; the events so far are in kept.aedat4.part" interruption ||
   fail "the user is told: $(cat interruption)"
 cmp ball.aedat4 kept.aedat4 || fail "an interrupted file replaced a whole one"
 convert kept.aedat4.part kept.csv

@@ -24,7 +24,7 @@ refused() { # WORDS COMMAND...
   if grep -e Traceback -e CRITICAL "$work/errors"; then exit 1; fi
 }
 checks_pipelines() { # PROGRAM
-  refused "no events but video/x-raw.*! eventsim-diff ! appsink name=events" \
+  refused "receives video/x-raw, not events..*! eventsim-diff ! appsink name=events" \
     "$1" "videotestsrc num-buffers=3 ! appsink name=events"
   refused "end it in: ! appsink name=events" "$1" "videotestsrc num-buffers=3 ! fakesink"
   refused "end it in: ! appsink name=events" "$1" "fakesink name=events"
@@ -65,6 +65,6 @@ done
 # shellcheck disable=SC2046
 cc -o "$work/video" "$work/video.c" -I"$SOURCE" -L"$BUILD/gst/eventcamera" -lgsteventcamera-1.0 \
   $(pkg-config --cflags --libs gstreamer-app-1.0)
-refused "gets no events; write a simulator" "$work/video"
-refused "gets no events; write a simulator" /usr/bin/python3 "$work/video.py"
-refused "gets no events; write a simulator" gjs -m "$work/video.js"
+refused "receives no events; insert a simulator" "$work/video"
+refused "receives no events; insert a simulator" /usr/bin/python3 "$work/video.py"
+refused "receives no events; insert a simulator" gjs -m "$work/video.js"
