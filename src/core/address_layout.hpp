@@ -5,7 +5,7 @@
 
 namespace eventcamera {
 
-/// How the 32-bit addresses of AEDAT 2.0 and of jAER's datagrams hold a pixel, which depends on the
+/// Bit layout of the 32-bit addresses in AEDAT 2.0 and in jAER's datagrams, which depends on the
 /// camera. Columns count from the right and rows from the bottom.
 struct AddressLayout {
   int x_shift;
@@ -13,11 +13,11 @@ struct AddressLayout {
   int y_shift;
   std::uint32_t y_mask;
   std::uint32_t polarity;  ///< bit of the polarity
-  bool set_is_on;          ///< where it is set
+  bool set_is_on;          ///< true: the bit is set for ON events
   std::uint32_t sample;    ///< bit of samples of frames and of the IMU, if any
   std::uint32_t external;  ///< bit of external events, if any
-  std::uint32_t pixel;     ///< bits of which an external event has none
-  std::uint32_t largest;   ///< address
+  std::uint32_t pixel;     ///< bits that are 0 in an external event
+  std::uint32_t largest;   ///< maximum address
 
   constexpr int width() const { return static_cast<int>(x_mask) + 1; }   ///< largest
   constexpr int height() const { return static_cast<int>(y_mask) + 1; }  ///< largest
@@ -30,12 +30,12 @@ struct AddressLayout {
   int y(std::uint32_t address) const { return static_cast<int>(address >> y_shift & y_mask); }
   bool is_on(std::uint32_t address) const { return ((address & polarity) != 0) == set_is_on; }
   bool is_sample(std::uint32_t address) const { return (address & sample) != 0; }
-  /// v2e marks noise with the bit of external events, and leaves them their pixel.
+  /// True for an external event. v2e sets the same bit for noise events, which also have a pixel.
   bool is_external(std::uint32_t address) const {
     return (address & external) != 0 && (address & pixel) == 0;
   }
 
-  /// Of an external event; only a DAVIS tells edges apart.
+  /// Edge of an external event; only a DAVIS distinguishes edges.
   bool is_rising(std::uint32_t address) const {
     constexpr std::uint32_t edge = 7;
     constexpr std::uint32_t falling = 2;
@@ -48,7 +48,7 @@ struct AddressLayout {
 inline constexpr AddressLayout davis_layout{12,   0x3ff,       22,       0x1ff,       1U << 11,
                                             true, 0x8000'0000, 1U << 10, 0xffff'fbf8, 0xffff'ffff};
 inline constexpr AddressLayout dvs128_layout{1, 0x7f, 8, 0x7f, 1, false, 0, 0x8000, 0, 0xffff};
-/// As v2e has it.
+/// Layout that v2e writes.
 inline constexpr AddressLayout dvs640_layout{1, 0x3ff, 11, 0x3ff, 1, true, 0, 0, 0, 0xf'ffff};
 
 }  // namespace eventcamera

@@ -12,7 +12,7 @@
 namespace eventcamera {
 
 static_assert(std::endian::native == std::endian::little,
-              "events are passed on in memory layout, and XYTP is little-endian");
+              "events are sent in memory layout, and XYTP is little-endian");
 
 /// Time on a recording's own clock, with all wraps of its format undone.
 using Microseconds = std::int64_t;
@@ -56,8 +56,8 @@ inline bool is_before(const Event& a, const Event& b) {
   return place(a) < place(b);
 }
 
-/// Puts events that are nearly in that order into that order. Those of earlier spans of
-/// 2^span_bits microseconds are before the others already.
+/// Sorts events with is_before(). Events of different spans of 2^span_bits microseconds must
+/// already be in order.
 inline void sort_within_spans(std::span<Event> events, int span_bits) {
   for (auto next = events.begin();;) {
     next = std::is_sorted_until(next, events.end(), is_before);

@@ -19,8 +19,8 @@ namespace eventcamera {
 /// the interval. Steps may also be time slices, whose events are sorted when they are written.
 class EventBuckets {
  public:
-  /// Either a list of events, or the pixels that fire in a step, whose events are made when they
-  /// are written. On its own cache line, because threads fill neighbouring buckets concurrently.
+  /// Either a list of events, or the pixels that fire in a step, which become events when they are
+  /// written. On its own cache line, because threads fill neighbouring buckets concurrently.
   struct alignas(64) Bucket {
     std::vector<Event> events;
     FiredPixels pixels;
@@ -43,7 +43,7 @@ class EventBuckets {
   std::vector<Event>& bucket(int step, int band) { return at(step, band).events; }
   FiredPixels& pixels(int step, int band) { return at(step, band).pixels; }
 
-  /// As reset(), for an interval of `duration` microseconds, whose events are added in any order.
+  /// Like reset(), for an interval of `duration` microseconds whose events are added in any order.
   void reset_slices(std::uint32_t duration, int bands);
 
   /// Adds an event to its time slice. Different bands may be added from different threads.
@@ -60,8 +60,7 @@ class EventBuckets {
   void write_to(Event* out) const;
   void write_to(Event* out, ThreadPool& threads) const;
 
-  /// Calls visit(events), events a std::span<const Event>, until it has seen all events of a band,
-  /// step by step.
+  /// Passes all events of a band to visit(std::span<const Event>), step by step, in several calls.
   template <class Visit>
   void visit_band(int band, const Visit& visit) const {
     for (auto i = static_cast<std::size_t>(band); i < buckets_.size(); i += bands_) {
@@ -74,8 +73,8 @@ class EventBuckets {
   Bucket& at(int step, int band) {
     return buckets_[static_cast<std::size_t>(step - 1) * bands_ + static_cast<std::size_t>(band)];
   }
-  /// Writes the sorted events [first, last) of lists, and those of pixels or of a time slice of
-  /// which the first is in that range.
+  /// Writes the sorted events [first, last) of lists. Events of a FiredPixels or of a time slice
+  /// are written if the first of them is in that range.
   void write_part(std::size_t first, std::size_t last, Event* out) const;
   void write_slices(std::size_t first, std::size_t last, Event* out) const;
 

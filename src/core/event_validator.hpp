@@ -32,7 +32,7 @@ class EventValidator {
     return dropped;
   }
 
-  /// Events before `time` are late from now on.
+  /// Treats events before `time` as late from now on.
   void pass(Microseconds time) { earliest_ = std::max(earliest_, time); }
 
   /// Time before which events are late.

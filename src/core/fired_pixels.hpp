@@ -12,8 +12,8 @@
 
 namespace eventcamera {
 
-/// Pixels that fire at the same time, in raster order: bits, from which their events are written
-/// straight to where they stay.
+/// Pixels that fire at the same time, in raster order, as bits; events are written from them
+/// directly to their destination.
 class FiredPixels {
  public:
   /// 16 pixels of row y, from x on; at least one fires.
@@ -21,7 +21,7 @@ class FiredPixels {
     std::uint16_t x;
     std::uint16_t y;
     std::uint16_t fired;  ///< bit i is set if pixel x + i fires
-    std::uint16_t on;     ///< bit i of those pixels: its event is ON
+    std::uint16_t on;     ///< bit i is set if the event of pixel x + i is ON
   };
 
   /// Drops all pixels but keeps their memory.
@@ -32,7 +32,7 @@ class FiredPixels {
   }
 
   /// Adds 64 pixels of row y, from x on: bit i of `fired` is set if pixel x + i fires, bit i of
-  /// `on` if its event is ON. Always inlined, so that SIMD code has it for its own target.
+  /// `on` if its event is ON. Always inlined, so that SIMD code compiles it for its own target.
   [[gnu::always_inline]] void add(int x, int y, std::uint64_t fired, std::uint64_t on) {
     size_ += static_cast<std::uint32_t>(std::popcount(fired));
     if (memory_.size() < group_count_ + 4) memory_.resize(2 * memory_.size() + 4);
@@ -62,7 +62,7 @@ class FiredPixels {
   /// Writes size() events.
   void write_to(Event* out) const;
 
-  /// Calls visit(events), events a std::span<const Event>, for some of the events at a time.
+  /// Passes all events to visit(std::span<const Event>), in several calls.
   template <class Visit>
   void visit(const Visit& visit) const {
     constexpr std::size_t groups_at_once = 32;

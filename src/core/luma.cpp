@@ -6,7 +6,7 @@
 namespace eventcamera {
 namespace {
 
-/// With a constant step, so that compilers vectorize it.
+/// The step is a template argument, so that compilers vectorize the loop.
 template <int step>
 void gather(const std::uint8_t* data, std::ptrdiff_t stride, Image<std::uint8_t>& out) {
   for (int y = 0; y < out.height(); ++y) {

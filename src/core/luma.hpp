@@ -41,7 +41,7 @@ void swap_luma(const void* data, std::ptrdiff_t stride, Image<std::uint16_t>& ou
 /// deeper ones are reduced to their upper 8 bits.
 class Grey8 {
  public:
-  /// Valid as long as `frame` and until the next call.
+  /// The view is valid until the next call, and no longer than `frame`.
   ImageView<std::uint8_t> of(const LumaView& frame) {
     if (frame.format.bits == 8) return frame.as<std::uint8_t>();
     const auto picture = frame.as<std::uint16_t>();

@@ -10,7 +10,7 @@
 
 namespace eventcamera {
 
-/// Contributions of the colours to luma, in units of 1/one.
+/// Weights of the colours in luma, in units of 1/one.
 struct LumaWeights {
   static constexpr int bits = 15;
   static constexpr std::int32_t one = 1 << bits;

@@ -69,8 +69,8 @@ class ThreadPool {
   std::exception_ptr thrown_;
 };
 
-/// Runs body(y) for y = 0 ... rows - 1 in rounds of many rows, because single rows are too little
-/// work.
+/// Runs body(y) for y = 0 ... rows - 1 in rounds of many rows, because a single row is too little
+/// work for a round.
 template <class Body>
 void for_each_row(ThreadPool& threads, int rows, const Body& body) {
   constexpr int rows_per_round = 32;

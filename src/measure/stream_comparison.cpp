@@ -156,7 +156,7 @@ void StreamComparison::take_until(Microseconds end) {
     rates_.add(role, event.t);
   }
   for (const auto role : both_roles) {
-    // Not every time, because a long buffer may be processed in many short pieces.
+    // Not in every call, because a long buffer may be processed in many short pieces.
     auto& waiting = arriving_[role].waiting;
     auto& taken = arriving_[role].taken;
     if (2 * taken < waiting.size()) continue;

@@ -83,9 +83,9 @@ using MatchCounts = std::array<std::uint64_t, match_distances.size()>;
 /// polarity, at the same pixel or one of its eight neighbours, close in time. Several events may
 /// match the same one.
 ///
-/// Earlier matches are known when an event is added, because each pixel remembers its last event of
-/// either polarity. For later matches, an event without a close enough match waits at its pixel
-/// until one is added or it is too late for one.
+/// Each pixel stores its last event of either polarity, so earlier matches are known when an event
+/// is added. An event without a close enough match waits at its pixel until a later match is added,
+/// or can no longer be added.
 class EventMatcher {
  public:
   /// Throws std::bad_alloc, as does add().
@@ -109,7 +109,7 @@ class EventMatcher {
   struct Waiting {
     Microseconds time;
     Microseconds nearest;  ///< distance to the nearest match so far
-    Number before;         ///< previous waiting event at the same pixel
+    Number before;         ///< previous waiting event at this pixel
   };
   struct Stream {
     std::array<Image<Pixel>, 2> pixels;  ///< by polarity, with a margin of one

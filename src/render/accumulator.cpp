@@ -11,7 +11,7 @@
 #define EVENTCAMERA_KIND_TABLES
 namespace eventcamera {
 
-/// Lookup tables for SIMD code: the value of each byte of a pixel, by kind.
+/// Lookup tables for SIMD code: each byte of a pixel, by kind.
 struct KindTables {
   KindTables(const Palette& palette, const PixelLayout& layout) {
     const auto pixels = pixels_by_kind(palette, layout);

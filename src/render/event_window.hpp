@@ -56,7 +56,7 @@ struct WindowLimits {
 };
 
 /// Sliding window of the latest events, with counts per pixel. Windows of successive pictures may
-/// overlap at no extra cost: an event costs work only when it enters and when it leaves.
+/// overlap at no extra cost: an event is processed only when it enters and when it leaves.
 class EventWindow {
  public:
   struct Counts {

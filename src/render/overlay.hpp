@@ -21,10 +21,10 @@ struct Size {
 };
 
 /// Draws the events of a time window over video frames, scaled to their size. Events and frames
-/// must be passed in order of time.
+/// must be passed in time order.
 class Overlay {
  public:
-  /// Throws std::bad_alloc, as does add().
+  /// Throws std::bad_alloc, like add().
   Overlay(Size sensor, Size picture);
 
   /// Like Renderer::add().

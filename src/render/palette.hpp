@@ -14,7 +14,7 @@ struct Colour {
   std::uint8_t blue;
 };
 
-/// Colours of accumulated events. The four also differ in brightness, for grey output.
+/// Colours of accumulated events, which also differ in brightness, for grey output.
 struct Palette {
   Colour none;  ///< no event
   Colour off;   ///< OFF only
@@ -35,8 +35,8 @@ constexpr std::uint8_t shade(float value) {
   return static_cast<std::uint8_t>(128.5F + scaled);
 }
 
-/// Perceptually uniform shades from the colour of no event to that of OFF for negative values, and
-/// to that of ON for positive ones. Viridis and magma show only the magnitude.
+/// Perceptually uniform shades from the colour of `none` to those of `off` for negative and `on`
+/// for positive values. Viridis and magma show only the magnitude.
 const Shades& shades(PaletteName name);
 
 /// Layout of output pixels: one byte of grey, or bytes of red, green, blue and, in some layouts,

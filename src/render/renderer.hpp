@@ -23,7 +23,7 @@ enum class RenderMode {
   count,         ///< ON minus OFF within a window
 };
 
-/// A change of any setting except the palette forgets all events.
+/// Changing any setting except the palette forgets all events.
 struct RenderSettings {
   RenderMode mode = RenderMode::accumulate;
   PaletteName palette = PaletteName::dark;
@@ -34,7 +34,7 @@ struct RenderSettings {
   friend bool operator==(const RenderSettings&, const RenderSettings&) = default;
 };
 
-/// Draws pictures of the events up to given times. Events and pictures must be in order of time.
+/// Draws pictures of the events up to given times. Events and pictures must be in time order.
 class Renderer {
  public:
   /// At most 65535 x 32768 pixels. Throws std::bad_alloc, as do configure() and add().

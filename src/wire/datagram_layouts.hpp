@@ -16,11 +16,11 @@
 #include "src/wire/datagram_settings.hpp"
 #include "src/wire/wrapped_time.hpp"
 
-/// How each format lays out its datagrams. A layout has
+/// Layouts of the datagrams of each format. A layout has
 ///
-/// - min_event_size and max_size, in bytes: the least that an event takes, and the size of a full
-///   datagram that is sent; received ones may have any size;
-/// - begin(first, out): writes what precedes the events;
+/// - min_event_size and max_size, in bytes: the minimum size of an event, and the maximum size of
+///   a sent datagram; received ones may have any size;
+/// - begin(first, out): writes the header, if any;
 /// - size_of(event): bytes that write() would write;
 /// - write(event, out): writes an event;
 /// - read(bytes, in): reads a received datagram, and returns why it is invalid, or null.
@@ -43,7 +43,7 @@ class Writer {
   }
 
  private:
-  std::array<std::uint8_t, 1400> bytes_;  // fits into a frame of Ethernet
+  std::array<std::uint8_t, 1400> bytes_;  // fits into an Ethernet frame
   std::size_t size_ = 0;
 };
 
@@ -55,7 +55,7 @@ inline constexpr Fault no_time = "an event has no time";
 inline constexpr Fault time_range = "a time is out of range";
 inline constexpr Fault not_boolean = "a polarity is neither 0 nor 1";
 
-/// What is read of a datagram.
+/// Contents of a received datagram.
 struct Reading {
   std::vector<AbsoluteEvent>& events;
   int width;   ///< of the sensor
@@ -76,13 +76,13 @@ inline bool is_on(const AbsoluteEvent& event) {
   return event.polarity() == Polarity::on;
 }
 
-/// 32-bit words of bit 31: no time follows, 30-16: x, 15: ON, 14-0: y; then, perhaps, a word with
-/// the low bits of the time.
+/// 32-bit words: bit 31: no timestamp follows, 30-16: x, 15: ON, 14-0: y; then optionally a word
+/// with the low 32 bits of the time.
 template <bool has_timestamps>
 class Spif {
  public:
   static constexpr std::size_t min_event_size = has_timestamps ? 8 : 4;
-  // 128 events. AEStream reads no more than 512 bytes, without times; spiffer no more than 1024.
+  // 128 events: AEStream reads at most 512 bytes, without timestamps, and spiffer at most 1024.
   static constexpr std::size_t max_size = 128 * min_event_size;
 
   explicit Spif(const DatagramSettings& settings) : order_(settings.byte_order) {}
@@ -237,10 +237,10 @@ class EventStream {
   static constexpr std::uint8_t ignored = 0xfe;
 
   int height_;
-  Microseconds written_ = 0;  ///< time that the bytes so far amount to
+  Microseconds written_ = 0;  ///< time at the end of the bytes so far
 };
 
-/// Perhaps a sequence number, then pairs of a camera's address and the low 32 bits of t;
+/// Optionally a sequence number, then pairs of a camera address and the low 32 bits of t;
 /// big-endian.
 class Jaer {
  public:
@@ -253,7 +253,7 @@ class Jaer {
         width_(settings.width),
         height_(settings.height) {
     if (settings.width > addresses_.width() || settings.height > addresses_.height())
-      throw std::invalid_argument("addresses of jAER support sensors of up to 1024x512 pixels");
+      throw std::invalid_argument("jAER's addresses support sensors of up to 1024x512 pixels");
   }
 
   void begin(Microseconds /*first*/, Writer& out) {
@@ -313,7 +313,7 @@ auto with_layout(const DatagramSettings& settings, const Use& use) {
     case DatagramFormat::jaer:
       return use(Jaer(settings));
   }
-  throw std::invalid_argument("no format of datagrams");
+  throw std::invalid_argument("unknown datagram format");
 }
 
 }  // namespace eventcamera::datagram_layouts

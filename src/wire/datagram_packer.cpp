@@ -38,7 +38,7 @@ class PackerOf final : public DatagramPacker {
   }
 
  private:
-  /// True if the event belongs into the incomplete datagram.
+  /// True if the event may join the incomplete datagram.
   bool is_next(const AbsoluteEvent& event) const {
     return event.t >= last_ && event.t - first_ <= max_span_ &&
            bytes_.size() + layout_.size_of(event) <= Layout::max_size;

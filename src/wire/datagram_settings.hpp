@@ -8,15 +8,15 @@ namespace eventcamera {
 
 /// Formats of UDP datagrams of other tools.
 enum class DatagramFormat : std::uint8_t {
-  spif,             ///< SpiNNaker, AEStream, EventCV; events have no time
-  spif_timestamps,  ///< the same, with times
+  spif,             ///< SpiNNaker, AEStream, EventCV; no timestamps
+  spif_timestamps,  ///< the same, with timestamps
   t64_x16_y16_on8,  ///< faery
   t32_x16_y15_on1,  ///< faery
   es,               ///< Event Stream
   jaer,             ///< jAER's AER-UDP
 };
 
-/// What sender and receiver must agree on; datagrams state none of it.
+/// Settings that sender and receiver must share; they are not part of the datagrams.
 struct DatagramSettings {
   DatagramFormat format = DatagramFormat::spif;
   int width = 0;                                 ///< of the sensor, in pixels

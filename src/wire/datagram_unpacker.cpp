@@ -11,8 +11,7 @@ namespace {
 
 using datagram_layouts::Reading;
 
-/// Datagrams that are older than this were sent by a sender that started over, not delayed by the
-/// network.
+/// Maximum delay by the network; an older datagram means that the sender has restarted.
 constexpr Microseconds max_delay = 1'000'000;
 
 template <class Layout>

@@ -13,30 +13,30 @@
 
 namespace eventcamera {
 
-/// Maximum time between the first and the last event of a datagram: 71 minutes, so that a 32-bit
-/// time tells it even after a short pause.
+/// Maximum time between the first and the last event of a datagram: 71 minutes, so that 32-bit
+/// times are unambiguous even after a short pause.
 inline constexpr Microseconds max_datagram_span = Microseconds{71} * 60 * 1'000'000;
 
-/// What became of a received datagram.
+/// Outcome of receiving a datagram.
 struct Reception {
   const char* fault = nullptr;  ///< why it was rejected, for users; null if it was not
-  bool late = false;            ///< dropped, because later events were received before it
-  bool restarted = false;       ///< its times or sequence numbers start over: a new stream
+  bool late = false;            ///< dropped, because later events had already arrived
+  bool restarted = false;       ///< times or sequence numbers start over: a new stream
   std::uint64_t lost = 0;       ///< datagrams that were lost before this one
 };
 
-/// Unpacks datagrams of a format. Each stands alone; only the wraps of 32-bit times and sequence
-/// numbers are followed from one to the next. A datagram that is malformed, or that has an event
-/// outside the sensor, is rejected as a whole and changes nothing.
+/// Unpacks datagrams of a format, each by itself; only wraps of 32-bit times and sequence numbers
+/// are tracked across datagrams. A datagram that is malformed, or that has an event outside the
+/// sensor, is rejected as a whole and changes no state.
 class DatagramUnpacker {
  public:
   virtual ~DatagramUnpacker() = default;
   DatagramUnpacker(const DatagramUnpacker&) = delete;
   DatagramUnpacker& operator=(const DatagramUnpacker&) = delete;
 
-  /// Replaces `events` by those of the datagram, sorted by time and not earlier than any before, or
-  /// by none. `arrival` is the receiver's time, if known; it becomes the time of events without
-  /// one, and finds wraps during silences of hours.
+  /// Replaces `events` by those of the datagram, sorted by time and not earlier than all before, or
+  /// by none. `arrival` is the receiver's time, if known; it is the time of events without a
+  /// timestamp, and reveals wraps during pauses of hours.
   virtual Reception unpack(std::span<const std::uint8_t> bytes, std::optional<Microseconds> arrival,
                            std::vector<AbsoluteEvent>& events) = 0;
 

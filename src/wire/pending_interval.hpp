@@ -13,7 +13,7 @@
 
 namespace eventcamera {
 
-/// Events to be sent: those of an interval, or of several that follow one another, joined.
+/// Events to be sent: those of an interval, or of several consecutive intervals, joined.
 class PendingInterval {
  public:
   /// Events that cannot be sent.

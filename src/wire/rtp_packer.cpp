@@ -13,11 +13,11 @@ namespace {
 /// The header has 16 bits for the number of events.
 constexpr std::size_t max_events = 0xffff;
 
-/// Maximum number of TIME_HIGH words for a pause. A longer one ends the packet, because the header
-/// of the next takes no more.
+/// Maximum number of TIME_HIGH words for a pause. A longer pause ends the packet, because another
+/// header takes no more bytes.
 constexpr std::uint64_t max_pause_words = 32;
 
-/// Words of a packet tell 24 bits of a time.
+/// The words of a packet hold 24 bits of a time.
 constexpr std::uint64_t max_time = 0xffffff;
 
 }  // namespace

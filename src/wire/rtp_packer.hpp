@@ -11,7 +11,7 @@
 
 namespace eventcamera {
 
-/// Makes the payloads of RTP packets. Each can be decoded by itself.
+/// Packs events into RTP payloads, each of which can be decoded by itself.
 class RtpPacker {
  public:
   /// Minimum of max_size.
@@ -38,7 +38,7 @@ class RtpPacker {
   std::uint32_t next_event() const { return next_event_; }
 
  private:
-  /// Makes the payload of one packet and returns the number of its events.
+  /// Packs one payload, and returns the number of its events.
   std::size_t pack_one(Nanoseconds start, Nanoseconds duration, std::span<const Event> events,
                        std::size_t max_size);
   std::size_t append_evt3(std::span<const Event> events, std::size_t max_size);

@@ -17,7 +17,7 @@ enum class RtpEventFormat : std::uint8_t { evt3 = 0, xytp = 1 };
 /// Maximum number of events in an interval; senders split longer ones.
 inline constexpr std::size_t max_rtp_interval_events = std::size_t{1} << 20;
 
-/// Latest start of an interval, so that no end overflows.
+/// Maximum start of an interval; its end cannot overflow.
 inline constexpr Nanoseconds max_rtp_start = std::numeric_limits<Nanoseconds>::max() - max_interval;
 
 /// First bytes of the payload of each RTP packet.
@@ -29,7 +29,7 @@ struct RtpPayloadHeader {
   std::uint32_t first_event = 0;  ///< number of its first event, modulo 2^32
   Nanoseconds start = 0;          ///< of the interval, on the sender's clock
   Nanoseconds duration = 0;       ///< of the interval
-  std::uint32_t base = 0;         ///< what event times are relative to, microseconds after `start`
+  std::uint32_t base = 0;         ///< added to event times; microseconds after `start`
 
   /// Writes `size` bytes.
   void write(std::uint8_t* to) const;

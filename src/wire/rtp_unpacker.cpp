@@ -7,7 +7,7 @@
 namespace eventcamera {
 namespace {
 
-/// Consecutive late packets after which the sender is taken to have started over.
+/// Number of consecutive late packets after which the sender is assumed to have restarted.
 constexpr int max_late_in_a_row = 16;
 
 }  // namespace
@@ -98,7 +98,7 @@ void RtpUnpacker::follow(const RtpPacket& packet) {
         static_cast<std::uint16_t>(packet.sequence_number - position_->next_sequence_number);
     const auto events = static_cast<std::int32_t>(header_.first_event - position_->next_event);
     statistics_.lost_packets += packets;
-    // A negative number is that of a sender that started over.
+    // Negative if the sender has restarted.
     if (events > 0) statistics_.lost_events += static_cast<std::uint32_t>(events);
     is_discontinuous_ |= packets != 0 || events != 0;
   }

@@ -16,16 +16,16 @@
 
 namespace eventcamera {
 
-/// What the unpacker needs of an RTP packet.
+/// The parts of an RTP packet that the unpacker needs.
 struct RtpPacket {
   std::uint32_t ssrc;
   std::uint16_t sequence_number;
   bool marker;  ///< last packet of its interval
   std::span<const std::uint8_t> payload;
-  std::uint64_t arrival = 0;  ///< passed on, on any clock
+  std::uint64_t arrival = 0;  ///< on any clock; passed through
 };
 
-/// An interval and those of its events that arrived.
+/// An interval, with those of its events that arrived.
 struct RtpInterval {
   Nanoseconds start;
   Nanoseconds duration;
@@ -41,7 +41,7 @@ struct RtpStatistics {
   std::uint64_t events = 0;            ///< received
   std::uint64_t lost_packets = 0;      ///< by sequence number
   std::uint64_t lost_events = 0;       ///< by event number
-  std::uint64_t late_packets = 0;      ///< duplicate, or after a later one; dropped
+  std::uint64_t late_packets = 0;      ///< duplicate or out of order; dropped
   std::uint64_t rejected_packets = 0;  ///< not of this format or sensor, or corrupt; dropped
 };
 
@@ -52,7 +52,7 @@ class RtpUnpacker {
  public:
   RtpUnpacker(SensorSize sensor, RtpEventFormat format);
 
-  /// Goes on with another sensor or format. Flush before.
+  /// Changes the sensor or format; call flush() first.
   void change(SensorSize sensor, RtpEventFormat format);
 
   /// Decodes a packet, and appends it if it is valid.
@@ -87,7 +87,7 @@ class RtpUnpacker {
     close_interval();
   }
 
-  /// Forgets the stream; the next packet starts a new one. The statistics go on.
+  /// Forgets the stream; the next packet starts a new one. Statistics continue.
   void reset();
 
   /// Counts a packet that was dropped before decode(): not RTP.

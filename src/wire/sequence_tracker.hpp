@@ -6,14 +6,14 @@
 
 namespace eventcamera {
 
-/// Follows sequence numbers of 31 bits, in the manner of RFC 3550: a jump is believed only once the
-/// next number confirms it, so a stray datagram neither disturbs the stream nor counts as loss.
+/// Tracks 31-bit sequence numbers, like RFC 3550: a jump is accepted only once the next number
+/// confirms it, so a stray datagram neither disturbs the stream nor counts as loss.
 class SequenceTracker {
  public:
   enum class Verdict : std::uint8_t { next, late, stray, restarted };
   struct Result {
     Verdict verdict = Verdict::next;
-    std::uint32_t lost = 0;  ///< numbers left out before this one
+    std::uint32_t lost = 0;  ///< numbers missing before this one
   };
 
   Result take(std::uint32_t number) {

@@ -8,8 +8,8 @@
 
 namespace eventcamera {
 
-/// Undoes the wraps of times of 32 bits, in microseconds: a time is taken to be less than half the
-/// range (36 minutes) from where the clock was expected to be.
+/// Unwraps 32-bit times in microseconds: each is assumed to be less than half the range (36
+/// minutes) from the expected time.
 class WrappedTime {
  public:
   Microseconds at(std::uint32_t t) {
@@ -21,7 +21,7 @@ class WrappedTime {
     return *expected_;
   }
 
-  /// Declares that time passed since the last one.
+  /// Advances the expected time.
   void pass(Microseconds time) {
     if (expected_) *expected_ += time;
   }
