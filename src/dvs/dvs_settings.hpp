@@ -31,10 +31,10 @@ enum class RefractoryReset {
   signal,  ///< the signal at the end of the refractory period
 };
 
-/// Parameters of a pixel array. Every stage except response and upsampling is off if its numbers
+/// Parameters of a pixel array. Every stage except response and upsampling is off if its parameters
 /// are 0.
 struct DvsSettings {
-  double denoise = 0;         ///< limit of noise amplitude in the frames; white is 255
+  double denoise = 0;         ///< maximum noise amplitude in the frames; white is 255
   bool linear_light = false;  ///< undo the sRGB transfer function first
   Response response = Response::lin_log;
   double log_eps = 1e-3;  ///< of Response::log; white is 1
@@ -52,7 +52,7 @@ struct DvsSettings {
 
   double leak_rate = 0;        ///< ON events per second of a pixel in constant light
   double leak_spread = 0;      ///< std-dev of the leak rate between pixels, decades
-  double shot_noise_rate = 0;  ///< events per second of a dark pixel, both polarities together
+  double shot_noise_rate = 0;  ///< events per second of a dark pixel, ON plus OFF
   double hot_pixels = 0;       ///< fraction of all pixels
   double dead_pixels = 0;      ///< fraction of all pixels
 

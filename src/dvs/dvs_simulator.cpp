@@ -20,7 +20,7 @@
 namespace eventcamera {
 namespace {
 
-/// True if both give each pixel the same traits.
+/// True if both settings give each pixel the same traits.
 bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
   return a.positive_threshold == b.positive_threshold &&
          a.negative_threshold == b.negative_threshold && a.threshold_sigma == b.threshold_sigma &&
@@ -32,7 +32,7 @@ bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
   return a.linear_light == b.linear_light && a.response == b.response && a.log_eps == b.log_eps;
 }
 
-/// Event rate that no array reaches, events per second.
+/// Event rate limit that no array reaches, events per second.
 constexpr double unlimited = 1e18;
 
 /// Scratch memory of a thread.
@@ -109,7 +109,7 @@ class PixelSimulator final : public DvsSimulator {
 
   /// Advances all pixels with linear interpolation.
   void advance_straight(double duration, bool is_exposed) {
-    finder_.reset();  // it would miss this frame
+    finder_.reset();  // its last frame is outdated
     plan(duration, 1, is_exposed);
     const bool is_widened = luma_bits(current_) != format().bits;
     for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
@@ -237,7 +237,7 @@ class PixelSimulator final : public DvsSimulator {
       });
   }
 
-  /// Settles the pixels as if the last frame had been constant for long.
+  /// Settles the pixels as if the last frame had been shown for a long time.
   void settle() {
     pulse_.reset();
     const int widening = luma_bits(current_) == format().bits ? 1 : 257;

@@ -8,12 +8,12 @@
 
 namespace eventcamera {
 
-/// Collects the events of an interval, which bands of rows add in any order. Those past its end are
-/// deferred to the next one.
+/// Collects the events of an interval, which bands of rows add in any order. Events past its end
+/// are deferred to the next interval.
 class IntervalEvents {
  public:
-  /// Begins an interval of `duration` microseconds with the deferred events of the last one. Its
-  /// events go to `events`.
+  /// Begins an interval of `duration` microseconds with the deferred events of the last one. Events
+  /// are written to `events`.
   void begin(double duration, int bands, EventBuckets& events) {
     duration_ = duration;
     events_ = &events;

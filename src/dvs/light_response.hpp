@@ -13,8 +13,8 @@
 
 namespace eventcamera {
 
-/// Light of a luma value, both relative to white: the same value, or with the sRGB transfer
-/// function (IEC 61966-2-1) undone.
+/// Light of a luma value, both relative to white: the same value or, if `linear_light`, with the
+/// sRGB transfer function (IEC 61966-2-1) inverted.
 inline double light_of(double luma, bool linear_light) {
   if (!linear_light) return luma;
   return luma <= 0.04045 ? luma / 12.92 : std::pow((luma + 0.055) / 1.055, 2.4);
@@ -43,8 +43,8 @@ inline std::vector<float> responses(const DvsSettings& settings, int bits) {
 /// Shot noise is counted in fixed point, in units of 1/noise_unit events.
 inline constexpr double noise_unit = 1 << 27;
 
-/// Number of shades of luma for bandwidth and noise, which depend on the light (v2e) but need not
-/// be exact.
+/// Number of luma levels for bandwidth and noise, which depend on the light (v2e) but need not be
+/// exact.
 inline constexpr int shades = 256;
 
 /// Bandwidth and noise of pixels of each shade in a sub-interval.
@@ -60,7 +60,7 @@ struct ShadeTables {
   double duration;  ///< microseconds
 
   ShadeTables(const DvsSettings& settings, double microseconds) : duration(microseconds) {
-    constexpr double min_cutoff_hz = 1e-3;  // minutes; slower makes no difference
+    constexpr double min_cutoff_hz = 1e-3;  // minutes; a lower one makes no difference
     constexpr double noise_at_white = 0.25;
     const double max_bandwidth =
         2 * std::numbers::pi * std::max(settings.cutoff_frequency, min_cutoff_hz) / 1e6;

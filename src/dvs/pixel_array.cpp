@@ -65,7 +65,7 @@ double Mismatch::leaked(std::uint64_t pixel, const PixelTraits& traits, double n
   if (traits.leak <= 0) return 0;
   const double max_age = traits.positive_threshold / traits.leak;
   const double u = random_.uniform(pixel, Purpose::leak_phase);
-  // Age of a reference that is reset by noise, and at max_age by a leak event.
+  // Age of a reference level that is reset by noise, and at max_age by a leak event.
   const double age = noise_rate > 0
                          ? -std::log1p(u * std::expm1(-noise_rate * max_age)) / noise_rate
                          : u * max_age;

@@ -98,8 +98,8 @@ class Mismatch {
   /// Threshold after event `counter`, if thresholds vary between events.
   double next_threshold(std::uint64_t pixel, Polarity polarity, std::uint64_t counter) const;
 
-  /// Fall of the reference before the first frame, if noise of this rate (1/us) resets it: the
-  /// camera has been on for long.
+  /// Fall of the reference before the first frame, if noise of this rate (1/us) resets it and the
+  /// camera has been on for a long time.
   double leaked(std::uint64_t pixel, const PixelTraits& traits, double noise_rate) const;
 
  private:
@@ -134,7 +134,8 @@ class PixelArray {
   /// Draws the thresholds and leak of a row of pixels.
   void draw_traits(int y, const DvsSettings& settings, const Random& random);
 
-  /// Resets a row as if its target had been constant for long, and draws its initial noise budgets.
+  /// Resets a row as if its target had been constant for a long time, and draws its initial noise
+  /// budgets.
   void settle(int y, const DvsSettings& settings, const Random& random);
 
  private:

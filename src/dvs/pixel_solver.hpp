@@ -52,15 +52,15 @@ struct RowFilter {
   bool has_noise;
 };
 
-/// Advances a row of pixels through a sub-interval: targets and signals of all pixels, references
-/// and noise budgets of those in which nothing can happen, which are most. The others become
-/// the `candidates`. The decision has a margin for float rounding, and is the same on every
-/// processor. Luma values are std::uint8_t if they have 8 bits, std::uint16_t otherwise.
+/// Advances a row of pixels through a sub-interval: targets and signals of all pixels; references
+/// and noise budgets of those that cannot fire, which are most. The others become `candidates`. The
+/// decision has a margin for float rounding, and is the same on every processor. Luma values are
+/// std::uint8_t if they have 8 bits, std::uint16_t otherwise.
 void filter_row(const RowFilter& row_filter, const void* luma, const PixelRow& pixels, int width,
                 Candidates& candidates);
 
-/// Limit of events of a pixel in one sub-interval, including those lost in its refractory period;
-/// at the limit its reference is set to its signal. A change from black to white is 35 events at
+/// Maximum number of events of a pixel in one sub-interval, including those lost in its refractory
+/// period; then its reference is set to its signal. A change from black to white is 35 events at
 /// common thresholds.
 inline constexpr int max_events = 512;
 
@@ -82,8 +82,8 @@ struct RowToSolve {
 class UnsolvedPixels {
  public:
   /// Times are microseconds after the start of the sub-interval. Values are multiplied by `sign`,
-  /// such that the slope of the trajectory never decreases: it may turn towards the level above
-  /// the reference, which is then the far one.
+  /// so that the slope of the trajectory never decreases: it can only turn upwards, and the level
+  /// above the reference is the far one.
   enum Column : std::size_t {
     index,  ///< in Candidates
     sign,
@@ -119,20 +119,20 @@ class UnsolvedPixels {
 };
 
 /// Advances reference, refractory_left and noise_budget of a row's candidates to the end of the
-/// sub-interval, exactly: threshold crossings, leak, shot noise, refractory period, latency. One
-/// pixel at a time.
+/// sub-interval, one pixel at a time, with exact threshold crossings, leak, shot noise, refractory
+/// period and latency.
 void solve_pixels(const RowToSolve& row);
 
-/// Solvers for the settings with which solve_pixels() is not needed.
+/// Solvers: solve_pixels(), or a faster one for settings that allow it.
 enum class Solver { pixels, lines, row };
 Solver solver_for(const DvsSettings& settings);
 
-/// As solve_pixels(), for signals that are straight lines, and events that are crossings without
-/// side effects but the refractory period.
+/// Like solve_pixels(), for signals that are straight lines, and events that are crossings without
+/// side effects except the refractory period.
 void solve_lines(const RowToSolve& row);
 
-/// As solve_pixels(), for events without side effects but the refractory period: many pixels at a
-/// time.
+/// Like solve_pixels(), for events without side effects except the refractory period; many pixels
+/// at a time.
 void solve_row(const RowToSolve& row, UnsolvedPixels& unsolved);
 
 }  // namespace eventcamera

@@ -10,9 +10,8 @@
 namespace eventcamera {
 
 /// Arbiter of the readout: reads one row at a time, the longest waiting row first, at a limited
-/// event rate. The events of a row leave together and get the time at which they leave. A waiting
-/// pixel drops further events, so events beyond the rate of the readout are lost, and at most one
-/// event per pixel is waiting.
+/// event rate. The events of a row take the time of its readout. A waiting pixel drops further
+/// events, so events beyond the readout rate are lost, and at most one event per pixel waits.
 class Readout {
  public:
   Readout(int width, int height);
@@ -21,7 +20,7 @@ class Readout {
   void reset();
 
   /// Admits the sorted events of an interval of `duration` microseconds, and fills `out` with those
-  /// that leave within it; the others stay for the next one.
+  /// read out within it; the others wait for the next interval.
   void pass(std::span<const Event> in, double duration, double events_per_second,
             EventBuckets& out);
 
@@ -30,7 +29,7 @@ class Readout {
 
   struct WaitingEvent {
     Event event;
-    int next;  ///< next one of its row
+    int next;  ///< next entry of the same list
   };
   struct Row {
     int first = none;

@@ -70,7 +70,7 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
       const auto lag = hn::Sub(last_signal, last_target);
       signal = hn::Add(hn::Sub(target, hn::Mul(hn::Sub(target, last_target), mean_decay_factor)),
                        hn::Mul(lag, decay_factor));
-      // The signal may turn in between, but not beyond the tangents at both ends.
+      // The signal may reverse in between, but not cross the tangents at both ends.
       const auto first_slope = hn::Sub(leaked, hn::Mul(lag, exponent));
       const auto last_slope = hn::Add(leaked, hn::Mul(hn::Sub(target, signal), exponent));
       const auto turns = hn::Lt(hn::Mul(first_slope, last_slope), zero);

@@ -27,7 +27,7 @@ Values all(double value) {
   return hn::Set(Doubles(), value);
 }
 
-/// exp(-x) as the function of trajectory.hpp.
+/// exp(-x), like decay() of trajectory.hpp.
 HWY_INLINE Values decays(Values x) {
   const Doubles doubles;
   const Bits bits;
@@ -82,7 +82,7 @@ struct Points {
   Values value;
 };
 
-/// Trajectories whose slope never decreases, as in Crossings.
+/// Trajectories whose slope never decreases, like those in Crossings.
 struct Trajectories {
   Values offset;
   Values slope;
@@ -101,7 +101,7 @@ struct Trajectories {
                    hn::Mul(lag_at(points), decays(hn::Mul(bandwidth, hn::Sub(t, points.t)))));
   }
 
-  /// As Crossings::turn_after().
+  /// Like Crossings::turn_after().
   HWY_INLINE Points turn_after(const Points& from, const Points& end) const {
     const auto final_lag = hn::Div(slope, bandwidth);
     const auto ratio = hn::Div(lag_at(from), final_lag);
@@ -113,7 +113,7 @@ struct Trajectories {
             hn::IfThenElse(turns, hn::IfThenElse(is_before_end, value, end.value), from.value)};
   }
 
-  /// As Crossings::time_of(), for the lanes of `wanted`.
+  /// Like Crossings::time_of(), for the lanes of `wanted`.
   HWY_INLINE Values times_of(Values levels, const Points& a, const Points& b, Mask wanted) const {
     const auto zero = all(0);
     const auto two = all(2);
@@ -253,7 +253,7 @@ class RowSolver {
     store(Column::ready, gather(pixels.refractory_left));
   }
 
-  /// Finds the next event of each pixel; pixels that have none are stored.
+  /// Finds the next event of each pixel; stores pixels that have none.
   void pass() {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < count_; i += lanes()) kept += advance(i, kept);
@@ -280,7 +280,7 @@ class RowSolver {
     const auto near = hn::Sub(reference, to_near);
     const auto margin = all(rounding);
 
-    // As Crossings::first().
+    // Like Crossings::first().
     const auto is_far = hn::Ge(now.value, far);
     const auto is_near = hn::Le(now.value, near);
     const auto is_crossed = hn::Or(is_far, is_near);
@@ -412,7 +412,7 @@ class RowSolver {
     pixels.noise_budget[x] = unsolved_.noise[index].left();
   }
 
-  /// Stores a pixel in which too much happens.
+  /// Stores a pixel that has reached max_events.
   void give_up(std::size_t i) {
     const auto index = index_of(i);
     const auto x = static_cast<std::uint64_t>(row_.candidates.x[index]);

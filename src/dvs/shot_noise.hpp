@@ -11,7 +11,7 @@ namespace eventcamera {
 
 inline constexpr double never = std::numeric_limits<double>::infinity();
 
-/// Upper bound of the random numbers that a pixel draws in a sub-interval.
+/// Maximum number of random numbers that a pixel draws in a sub-interval.
 inline constexpr std::uint64_t draws_per_sub_interval = 1 << 16;
 
 /// Shot noise of a pixel in a sub-interval, in units of 1/noise_unit events.
@@ -33,8 +33,8 @@ struct ShotNoise {
     budget = draw_noise_budget(random, pixel, Random::Purpose::event, counter);
   }
 
-  /// Drops noise that is due until the end of the sub-interval, and draws the next. Noise has no
-  /// memory, so its new budget starts there.
+  /// Drops the noise events until the end of the sub-interval, and draws the next one. Noise has no
+  /// memory, so the new budget starts there.
   void skip(const Random& random, std::uint64_t pixel, std::uint64_t counter) {
     if (expected < 1 || passed + budget > expected) return;
     draw(random, pixel, counter);

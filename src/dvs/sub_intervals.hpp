@@ -17,15 +17,15 @@ struct PulseEdge {
   double rise;   ///< units of the response
 };
 
-/// Cross-talk in cameras whose pixels give both frames and events, such as the DAVIS: when an
-/// exposure begins, all signals rise a little and fall again. Pixels that were about to fire ON do
-/// so at once, all over the array, and hardly any fire during the pulse. The durations are from the
+/// Cross-talk in cameras whose pixels output both frames and events, such as the DAVIS: when an
+/// exposure begins, all signals rise a little and fall again. All over the array, pixels close to
+/// an ON event fire at once, and hardly any fire during the pulse. The durations are from the
 /// recording slider-depth of a DAVIS240C (docs/realism.md).
 class ExposurePulse {
  public:
   static constexpr double plateau = 800;  ///< from one edge to the other, microseconds
 
-  /// Returns the edges within the next interval, in order of time. `is_exposed` is true if the
+  /// Returns the edges within the next interval, in time order. `is_exposed` is true if the
   /// interval ends with a frame, whose exposure began settings.exposure_lead earlier. A pulse that
   /// does not end within the interval ends in the next one; an exposure that began before the
   /// interval, or during another pulse, has no pulse.
@@ -51,7 +51,7 @@ struct SubInterval {
   std::uint64_t number;  ///< counted from the first frame
 };
 
-/// Divides an interval into equal steps, and these at the begins and ends of pulse edges.
+/// Divides an interval into equal steps, and splits these where pulse edges begin and end.
 /// Sub-intervals are numbered from `number` on.
 void divide_interval(double duration, int steps, std::span<const PulseEdge> edges,
                      std::uint64_t number, std::vector<SubInterval>& sub_intervals);

@@ -15,8 +15,8 @@ TrajectoryPoint Crossings::turn_after(TrajectoryPoint from) const {
                     : end_;
 }
 
-/// Returns the time at which a level is crossed between `a` and `b`, where it is crossed once, or
-/// missed by rounding. Halley's method with bisection as fallback.
+/// Returns the time at which a level is crossed between `a` and `b`. It must be crossed once there,
+/// or missed by rounding. Halley's method, with bisection as fallback.
 double Crossings::time_of(double level, TrajectoryPoint a, TrajectoryPoint b) const {
   constexpr double precision = crossing_precision;
   const double rise = level - a.value;

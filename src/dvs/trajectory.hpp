@@ -69,7 +69,7 @@ struct Crossing {
   Polarity polarity;
 };
 
-/// A level missed by less than this counts as reached. Float rounding accumulates to this much over
+/// A level missed by less than this counts as reached: the float rounding that accumulates over
 /// several events from one grey level to another and back.
 inline constexpr float rounding = 2e-6F;
 
@@ -105,7 +105,7 @@ class Crossings {
   double time_of(double level, TrajectoryPoint a, TrajectoryPoint b) const;
 
   /// The trajectory times `sign_` has a slope that never decreases. So it may turn once, from
-  /// falling to rising, and of two levels around it only the lower one can be crossed in both
+  /// falling to rising, and only the lower of two levels around it can be crossed in both
   /// directions.
   double sign_;
   Trajectory trajectory_;

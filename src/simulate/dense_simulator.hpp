@@ -11,7 +11,7 @@ namespace eventcamera {
 
 /// Dense frame interpolation (paper, section III-A): frames between I(i-1) and I(i) are sampled
 /// bilinearly along the flow F from I(i-1) to I(i), with replicated borders; I(1) = I(i).
-/// Differences of successive frames are thresholded and timed at the later frame.
+/// Differences of successive frames are thresholded; events take the time of the later frame.
 class DenseSimulator : public Simulator {
  public:
   void set_flow(FlowMethod flow) { flow_ = flow; }

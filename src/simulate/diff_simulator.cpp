@@ -33,7 +33,7 @@ struct Part {
   Image<std::uint8_t> picture;  ///< `now` as an 8-bit image, 0 for pixels not kept
   PointTracker tracker;
 
-  /// Makes `now` the last frame, and an empty one of bands without size.
+  /// Makes `now` the last difference frame, and starts a new one with empty bands.
   void begin_next() {
     std::swap(last, now);
     now.first.assign(1, 0);
@@ -41,7 +41,7 @@ struct Part {
 
   void add_band(std::size_t size) { now.first.push_back(now.first.back() + size); }
 
-  /// Makes room for the pixels of all bands.
+  /// Resizes the lists to the pixels of all bands.
   void resize() {
     now.places.resize(now.first.back());
     now.differences.resize(now.first.back());
@@ -92,7 +92,7 @@ class DifferenceFrame {
         strengths_(static_cast<std::size_t>(64 * words_) * static_cast<std::size_t>(height)),
         touched_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(height)) {}
 
-  /// Adds pixels where they are after j steps. The strongest on a pixel wins.
+  /// Adds the pixels of a band at their positions after j steps. The strongest on a pixel wins.
   void add(const MovingBand<Strength>& band, int j) {
     const auto places = band.points.at(j, 64 * words_, places_);
     auto* const strengths = strengths_.data();
@@ -129,7 +129,7 @@ class DifferenceFrame {
 
 template <class Pixel>
 class DiffSimulator final : public Simulator {
-  /// Twice the magnitude of a difference, and 1 more for ON, which wins over an equal OFF.
+  /// Twice the magnitude of a difference, plus 1 for ON, which wins over an equal OFF.
   using Strength = std::conditional_t<sizeof(Pixel) == 1, std::uint16_t, std::uint32_t>;
 
   static Strength strength_of(int difference) {

@@ -14,7 +14,7 @@ namespace eventcamera {
 /// difference). The last difference frame is D(i) itself.
 ///
 /// A track is dropped if it is lost, leaves the frame, or ends more than a pixel away from all kept
-/// pixels of its polarity in D(i): what has stopped does not fire.
+/// pixels of its polarity in D(i): a pixel that has stopped moving does not fire.
 ///
 /// The first interval has only one difference frame, so all its events are those of D(1). Width and
 /// height of `format` must not exceed max_side.

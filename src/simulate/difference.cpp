@@ -41,7 +41,7 @@ void fire_row(const Pixel* before, const Pixel* now, int width, int y, const Thr
     if (hn::AllFalse(pixels, fired)) return;
     out.add(x, y, bits_of(pixels, fired), bits_of(pixels, hn::Ne(rise, zero)));
   };
-  // Most of a frame does not change: several vectors are passed at once.
+  // Most of a frame does not change: several vectors are skipped at once.
   constexpr int at_once = 4;
   const auto smaller = hn::Min(positive, negative);
   const auto none = [&](int x) {

@@ -10,14 +10,14 @@
 
 namespace eventcamera {
 
-/// Decides which frames to skip where there is no time for all of them, so that the others are
-/// shown in time. All times are running times. A frame is skipped
-/// - if it has waited upstream, because those before it took long, and its picture would come when
-///   that of the next frame is due;
-/// - if two pictures are on their way downstream, and the first will be late;
+/// Decides which frames to skip if there is no time for all of them, so that the others are shown
+/// in time. All times are running times. A frame is skipped
+/// - if it waited upstream, because earlier frames took long, and its picture would not be shown
+///   before that of the next frame is due;
+/// - if two pictures are in flight downstream, and the first will be late;
 /// - if downstream wants fewer pictures.
 ///
-/// Nothing is skipped unless downstream reports when it got the pictures.
+/// No frame is skipped unless downstream reports when pictures arrive.
 class FramePacer {
  public:
   /// Takes the next frame. Returns whether to skip it.
@@ -32,29 +32,29 @@ class FramePacer {
     const bool is_late = due_after_ && (lag_ > step_ + slack_ || is_downstream_behind(now));
     if (!is_late && frame >= wanted_from_) return false;
     if (now - ended_ < max_pause) return true;
-    due_after_.reset();  // reports have ceased
+    due_after_.reset();  // downstream no longer reports
     return false;
   }
 
-  /// Starts processing the frame. The output that it completes starts at `output`.
+  /// Starts processing the frame, which completes the output that starts at `output`.
   void begin(std::optional<Nanoseconds> output) {
-    if (!due_after_) on_their_way_.clear();
-    if (output) on_their_way_.push_back({*output, lag_, on_their_way_.size() < 2});
+    if (!due_after_) in_flight_.clear();
+    if (output) in_flight_.push_back({*output, lag_, in_flight_.size() < 2});
     wanted_from_ = frame_ + throttle_;
     period_ = frame_ - std::exchange(begun_, frame_);
     began_ = left_;
   }
 
-  /// Expected time from the picture of the frame that is being processed to the next picture; 0 if
-  /// no frames are skipped.
+  /// Expected time from the current frame's picture to the next picture; 0 if no frames are
+  /// skipped.
   Nanoseconds period(Nanoseconds now) const {
     return due_after_ ? std::min(std::max(now - began_, period_), max_period) : 0;
   }
 
-  /// The output has been pushed.
+  /// Ends processing: the output has been pushed.
   void end(Nanoseconds now) { left_ = ended_ = now; }
 
-  /// Downstream reports how late (if negative, early) the output that starts at `start` was.
+  /// Takes a report by how much the output that starts at `start` was late (early if negative).
   void take_lateness(Nanoseconds start, Nanoseconds lateness, Nanoseconds now) {
     throttle_ = 0;
     due_after_ = now - std::max(lateness, Nanoseconds{0}) - start;
@@ -64,13 +64,14 @@ class FramePacer {
     if (picture->is_alone) learn_latency(lateness, now);
   }
 
-  /// Downstream, which got the output that starts at `start`, wants at most one per `interval`.
+  /// Takes a report on the output that starts at `start`: downstream wants at most one picture per
+  /// `interval`.
   void take_throttle(Nanoseconds start, Nanoseconds interval) {
     throttle_ = std::clamp(interval, Nanoseconds{0}, max_throttle);
     arrived(start);
   }
 
-  /// Latency of elements downstream that they do not report.
+  /// Latency of downstream elements that they do not report.
   Nanoseconds downstream_latency() const { return latency_; }
 
   /// Forgets the frames, at a new segment.
@@ -89,11 +90,11 @@ class FramePacer {
 
   struct Picture {
     Nanoseconds start;
-    Nanoseconds lag;  ///< for which its frame waited upstream
+    Nanoseconds lag;  ///< time that its frame waited upstream
     bool is_alone;    ///< nothing else is queued ahead of it downstream
   };
 
-  /// Latencies are learnt from at least so many reports in so long a time.
+  /// Minimum number of reports, and time that they must cover, to learn a latency from.
   static constexpr int min_reports = 3;
   static constexpr Nanoseconds learning_time = 500 * ms;
   static constexpr Nanoseconds max_earliness = 20 * ms;
@@ -101,51 +102,50 @@ class FramePacer {
   struct Reports {
     Nanoseconds since = 0;
     int count = 0;
-    Nanoseconds least = 0;
-    Nanoseconds most = 0;
+    Nanoseconds min_lateness = 0;
+    Nanoseconds max_lateness = 0;
   };
 
-  /// The picture that starts at `start`, which is no longer on its way, as those before it.
+  /// Returns the picture that starts at `start`, and removes it and all before it from in_flight_.
   std::optional<Picture> arrived(Nanoseconds start) {
     std::optional<Picture> picture;
-    for (; !on_their_way_.empty() && on_their_way_.front().start <= start;
-         on_their_way_.pop_front())
-      picture = on_their_way_.front();
+    for (; !in_flight_.empty() && in_flight_.front().start <= start; in_flight_.pop_front())
+      picture = in_flight_.front();
     return picture;
   }
 
-  /// True if a second picture is on its way, although the time to work on the first has begun.
+  /// True if a second picture is in flight although downstream should have started on the first.
   bool is_downstream_behind(Nanoseconds now) const {
-    return on_their_way_.size() >= 2 && now + latency_ > on_their_way_.front().start + *due_after_;
+    return in_flight_.size() >= 2 && now + latency_ > in_flight_.front().start + *due_after_;
   }
 
-  /// Raises the latency where all pictures are late, and lowers it where all are early.
+  /// Raises the latency if all pictures are late, and lowers it if all are early.
   void learn_latency(Nanoseconds lateness, Nanoseconds now) {
     if (reports_.count++ == 0) reports_ = {now, 1, lateness, lateness};
-    reports_.least = std::min(reports_.least, lateness);
-    reports_.most = std::max(reports_.most, lateness);
+    reports_.min_lateness = std::min(reports_.min_lateness, lateness);
+    reports_.max_lateness = std::max(reports_.max_lateness, lateness);
     if (reports_.count < min_reports || now - reports_.since < learning_time) return;
-    if (reports_.least > 0)
-      latency_ = std::min(latency_ + reports_.least, max_latency);
-    else if (reports_.most < -max_earliness)
-      latency_ = std::max(latency_ + reports_.most, Nanoseconds{0});
+    if (reports_.min_lateness > 0)
+      latency_ = std::min(latency_ + reports_.min_lateness, max_latency);
+    else if (reports_.max_lateness < -max_earliness)
+      latency_ = std::max(latency_ + reports_.max_lateness, Nanoseconds{0});
     reports_.count = 0;
   }
 
-  Nanoseconds frame_ = 0;   ///< the last one
-  Nanoseconds step_ = 0;    ///< from the frame before to that frame
-  Nanoseconds lag_ = 0;     ///< for which it waited upstream
-  Nanoseconds slack_ = 0;   ///< for which a frame may wait, and its picture be in time
-  Nanoseconds left_ = 0;    ///< when upstream could send the next one
-  Nanoseconds begun_ = 0;   ///< the last processed frame
-  Nanoseconds period_ = 0;  ///< from the processed frame before to that frame
-  Nanoseconds began_ = 0;   ///< when its processing began
+  Nanoseconds frame_ = 0;   ///< last frame
+  Nanoseconds step_ = 0;    ///< from the previous frame to the last one
+  Nanoseconds lag_ = 0;     ///< time that the last frame waited upstream
+  Nanoseconds slack_ = 0;   ///< time that a frame may wait and still be shown in time
+  Nanoseconds left_ = 0;    ///< when upstream could send the next frame
+  Nanoseconds begun_ = 0;   ///< last processed frame
+  Nanoseconds period_ = 0;  ///< from the previous processed frame to the last one
+  Nanoseconds began_ = 0;   ///< when processing of that frame began
   Nanoseconds ended_ = 0;   ///< when it ended
-  std::optional<Nanoseconds> usual_delay_;  ///< of frames that do not wait
+  std::optional<Nanoseconds> usual_delay_;  ///< of frames that did not wait
   Nanoseconds throttle_ = 0;
   Nanoseconds wanted_from_ = 0;
 
-  std::deque<Picture> on_their_way_;      ///< not yet reported
+  std::deque<Picture> in_flight_;         ///< not yet reported
   std::optional<Nanoseconds> due_after_;  ///< time from the start of a picture to its showing
   Reports reports_;
   Nanoseconds latency_ = 0;

@@ -37,8 +37,8 @@ class LargestDifference {
   HWY_ALIGN std::uint8_t columns_[columns_at_once] = {};
 };
 
-/// Measures the row of 4x4 cells that starts at row `top`. Reads past the right border, which can
-/// only make the bound larger.
+/// Measures the row of 4x4 cells that starts at image row `top`. Reads past the right border, which
+/// can only increase the bound.
 void measure_row(const ImageView<std::uint8_t>& picture, int top, std::uint8_t* x_out,
                  std::uint8_t* y_out) {
   const int bottom = std::min(top + 4, picture.height);

@@ -250,7 +250,8 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
     if (first > 1) {
       before = value_at(first);
     } else {
-      // The branch on firing is hard to predict: sample ahead, so that no sample waits for it.
+      // Whether pixels fire is hard to predict: sample ahead, so that no sample waits for the
+      // branch.
       HWY_ALIGN std::int32_t values[steps_at_once * hn::MaxLanes(words)];
       for (int begin = 1; begin < steps; begin += steps_at_once) {
         const int count = std::min(steps_at_once, steps - begin);
@@ -310,7 +311,7 @@ int first_step(const InterpolatedInterval<std::uint8_t>& interval,
   // Positions are rounded to 1/64 of a pixel: a pixel that moves by less than half of that samples
   // itself.
   if (std::max(dx, dy) * (steps - 1) < 512) return steps;
-  // Rounding may lengthen a step.
+  // Margin for rounding.
   dx += 1024;
   dy += 1024;
   // For long flows, finding the bound costs more than it saves.

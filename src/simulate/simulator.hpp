@@ -35,8 +35,8 @@ struct Thresholds {
 };
 
 /// Times of the steps of an interval (t0, t1]: step j of `count` is at t0 + (t1 - t0) * j / count,
-/// the last at t1. A step lasts at least a microsecond, the resolution of an event stream, if the
-/// interval does.
+/// the last at t1. Unless the interval is shorter, a step lasts at least a microsecond, the
+/// resolution of an event stream.
 class StepTimes {
  public:
   /// `duration` in (0, max_interval]; `wanted` steps, at least 1.
@@ -57,7 +57,7 @@ class StepTimes {
   int count_;
 };
 
-/// Time and threads of a simulator, whatever kind of frame it takes.
+/// Time and threads of a simulator, independent of the kind of frames.
 class IntervalSimulator {
  public:
   virtual ~IntervalSimulator() = default;
@@ -87,7 +87,7 @@ class IntervalSimulator {
   /// first frame.
   std::optional<StepTimes> steps_to(Nanoseconds time, const Settings& settings);
 
-  /// Fills `events` with those that fire while the frame does not change; false if there are none.
+  /// Fills `events` with noise events of an unchanged frame; false if the simulator has no noise.
   virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
 
   std::optional<Nanoseconds> last_time_;
@@ -98,8 +98,8 @@ class IntervalSimulator {
   ThreadPool threads_;
 };
 
-/// Turns frames into the events between them, on the CPU. One call per frame does all the work. The
-/// same frames, times and settings give the same events for any number of threads.
+/// Simulates the events between frames, on the CPU, in one call per frame. The same frames, times
+/// and settings give the same events for any number of threads.
 class Simulator : public IntervalSimulator {
  public:
   /// Processes the next frame, whose `format` must be the simulator's. `time` must be later than

@@ -19,7 +19,7 @@ template <class Pixel>
 struct alignas(64) MovingBand {
   MovingPoints points;
   std::vector<Pixel> brightness;
-  std::vector<Pixel> background;  ///< what each uncovers at its start
+  std::vector<Pixel> background;  ///< uncovered where each pixel starts
   int top;                        ///< the pixels start in and cross rows [top, bottom)
   int bottom;
 };
@@ -82,8 +82,8 @@ class Painter {
 
   Image<Pixel> between_;
   Image<Pixel> before_;
-  std::vector<std::int32_t> starts_;  ///< of the pixels of a band, in between_
-  std::vector<std::int32_t> places_;  ///< where they are
+  std::vector<std::int32_t> starts_;  ///< indices in between_ where the pixels of a band start
+  std::vector<std::int32_t> places_;  ///< their indices in the current step
 };
 
 template <class Pixel>

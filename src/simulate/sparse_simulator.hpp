@@ -12,7 +12,8 @@ namespace eventcamera {
 /// leaves the frame is dropped. The interpolated frame I(a) is I(i-1), except that each tracked
 /// pixel p with flow f is drawn at p + a f, rounded (the last in raster order wins), and the pixel
 /// it left shows the uncovered background, I(i). I(1) = I(i). Differences of successive frames are
-/// thresholded and timed at the later frame. Width and height of `format` must not exceed max_side.
+/// thresholded; events take the time of the later frame. Width and height of `format` must not
+/// exceed max_side.
 std::unique_ptr<Simulator> make_sparse_simulator(const LumaFormat& format);
 
 }  // namespace eventcamera
