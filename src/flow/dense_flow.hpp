@@ -47,8 +47,8 @@ enum class FlowMethod {
   opencv_dis,  ///< OpenCV's DIS with the parameters of dis_hq; only in builds with OpenCV
 };
 
-/// Dense optical flow between 8-bit images of any size. Each image serves twice, first as the
-/// later, then as the earlier one; what depends on it alone is computed only once.
+/// Dense optical flow between 8-bit images of any size. Each image is used twice, first as the
+/// later, then as the earlier one; whatever depends only on this image is computed once.
 class DenseFlow {
  public:
   virtual ~DenseFlow() = default;

@@ -10,7 +10,7 @@ namespace {
 
 std::mutex mutex;  // guards the variables below and OpenCV's thread count
 std::condition_variable changed;
-unsigned next_ticket = 0;  // first come, first served: no starvation
+unsigned next_ticket = 0;  // first come, first served, so that no thread starves
 unsigned serving = 0;
 int calls = 0;
 int in_force = 0;

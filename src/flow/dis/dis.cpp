@@ -124,7 +124,7 @@ ImageView<Flow> DisFlow::flow(ThreadPool& threads) {
     level.refinement.run(last, next, threads);
     coarser = &level;
   }
-  constexpr int wide_rows = 64;  // that share rows of the finest level
+  constexpr int wide_rows = 64;  // per round; neighbouring rows share rows of the finest level
   threads.for_each((height_ + wide_rows - 1) / wide_rows, [&](int round, int thread) {
     const int first = round * wide_rows;
     widen(first, std::min(first + wide_rows, height_), scratch_[thread]);

@@ -22,9 +22,9 @@ class DisFlow final : public DenseFlow {
     int iterations;
     int scales;  ///< number of pyramid levels; 0 = from the coarsest to half the size
 
-    /// Number of times an image is halved for the coarsest level: on it, the largest displacement
-    /// that is searched for, a quarter of the longer side, is about one patch; at most until the
-    /// shorter side is one patch.
+    /// Number of times an image is halved for the coarsest level. There, the largest displacement
+    /// to be found, a quarter of the longer side, is about one patch, and the shorter side at least
+    /// one patch.
     int coarsest_scale(int width, int height) const;
     int finest_scale(int width, int height) const;
   };

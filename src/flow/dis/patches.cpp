@@ -18,7 +18,7 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// Pixels of a patch: up to two rows of one of 8x8, all four of one of 4x4.
+/// Pixels of a patch: up to two rows of 8x8 pixels, or all four of 4x4.
 using Words = hn::CappedTag<std::int16_t, 16>;
 using Sums = hn::Repartition<std::int32_t, Words>;
 using Word = hn::Vec<Words>;
@@ -30,7 +30,7 @@ using Quarters = hn::CappedTag<std::int32_t, 4>;
 using Floats = hn::CappedTag<float, row_padding>;
 using Vector = hn::Vec<Floats>;
 
-/// Determinants of gradient matrices below this count as this.
+/// Lower bound to which determinants of gradient matrices are clamped.
 constexpr double min_determinant = 1e-3;
 
 /// Lane-wise sum of products, exact in 32 bits.
@@ -58,7 +58,7 @@ class ProductSum {
 
 /// Sums at one of the four pixels of a patch's cell.
 struct Corner {
-  // Not defaulted, as that of ProductSum.
+  // Not defaulted, like that of ProductSum.
   Corner() {}  // NOLINT(modernize-use-equals-default)
   HWY_INLINE void add(Word d, Word slope_x, Word slope_y) {
     square.add(d, d);
@@ -95,9 +95,9 @@ HWY_INLINE void store_totals(const ProductSum& sum0, const ProductSum& sum1, con
 
 /// Searches for up to `capacity` patches of a row, one lane per patch.
 ///
-/// Where a patch lies between four pixels of the other image, its differences from there are the
-/// bilinear mean of the differences at these four, and their sums are polynomials of the four
-/// weights. So pixels are read only when a patch enters another cell of four pixels.
+/// Between four pixels of the other image, the differences of a patch are the bilinear mean of its
+/// differences at these four, and their sums are polynomials of the four weights. So pixels are
+/// read only when a patch enters another cell of four pixels.
 template <int side>
 class Search {
  public:
@@ -160,7 +160,7 @@ class Search {
 
   static constexpr int vector_size = hn::MaxLanes(Words());
 
-  /// Pixels of the patch at (x, y), row by row, from the `first` on.
+  /// Pixels of the patch at (x, y), row by row, starting at number `first`.
   template <class Tag, class T>
   static HWY_INLINE hn::Vec<Tag> load_pixels(Tag tag, const Image<T>& plane, int x, int y,
                                              int first) {
@@ -182,7 +182,7 @@ class Search {
     return load_pixels(Words(), plane, x, y, first);
   }
 
-  /// Computes what stays constant during the search for a patch.
+  /// Computes the values that stay constant during the search for a patch.
   void read_gradients(int i) {
     const int x = left_ + i * stride_;
     ProductSum xx;
@@ -258,7 +258,7 @@ class Search {
     for (int k = 0; k < max_sums; ++k) sums_[k][i] = static_cast<float>(totals[k]);
   }
 
-  /// Stores where patches are, and queues those that entered another cell.
+  /// Stores the positions of patches, and queues those that entered another cell.
   template <class Mask>
   void locate(int i, Mask active, Vector flow_x, Vector flow_y) {
     const Floats floats;

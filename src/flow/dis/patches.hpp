@@ -27,7 +27,8 @@ struct PatchGrid {
 
 /// Inverse search (Kroeger et al., ECCV 2016): finds the patches of a row in the other image by
 /// gradient descent from their flows, and updates these. Compares deviations from the mean, so
-/// brightness may change. A patch that ends further than its side from where it started stays.
+/// brightness may change. A patch that would end farther from its start than its side keeps its
+/// flow.
 void search_row(const PatchGrid& grid, const Image<std::uint8_t>& from, const Gradients& gradients,
                 const Image<std::uint8_t>& to, int row, int iterations, Flow* flows);
 

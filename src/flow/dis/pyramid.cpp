@@ -44,7 +44,7 @@ void add_row(const std::uint8_t* row, float weight, int width, float* out) {
   });
 }
 
-/// Means of 2x2 pixels, rounded up from a half.
+/// Means of 2x2 pixels; halves are rounded up.
 void halve_rows(const std::uint8_t* upper, const std::uint8_t* lower, int width,
                 std::uint8_t* out) {
   const hn::CappedTag<std::uint16_t, row_padding> words;

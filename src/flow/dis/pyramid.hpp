@@ -20,8 +20,8 @@ class AreaShrink {
            std::uint8_t* out) const;
 
  private:
-  /// How much of each pixel a shrunk pixel covers along one axis, in whole numbers, so that sums
-  /// are exact: `from` in all.
+  /// Coverage of each pixel by a shrunk pixel along one axis, in integers that add up to `from`, so
+  /// that sums are exact.
   struct Axis {
     Axis(int from, int to);
     int size() const { return static_cast<int>(first.size()); }

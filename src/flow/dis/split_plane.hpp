@@ -9,7 +9,7 @@
 
 namespace eventcamera {
 
-/// Floats that start on a cache line, a multiple of a line. All 0 at first.
+/// Floats that start on a cache line and fill whole lines; initially 0.
 class AlignedFloats {
  public:
   explicit AlignedFloats(std::ptrdiff_t count)
@@ -29,7 +29,7 @@ class AlignedFloats {
 /// other pixel of a row are then contiguous, as red-black relaxation needs them.
 class SplitPlane {
  public:
-  /// All 0.
+  /// All values are 0.
   SplitPlane(int width, int height)
       : width_(width),
         height_(height),
@@ -49,13 +49,13 @@ class SplitPlane {
   /// From row 0 to row y; the same for all planes of this width.
   std::ptrdiff_t offset(int y) const { return 2 * odd_ * y; }
 
-  /// Makes the pixels beside row y equal to its first and last ones.
+  /// Replicates the first and the last pixel of row y beyond its ends.
   void replicate_ends(int y) {
     row(1, y)[-1] = row(0, y)[0];
     row(width_ & 1, y)[width_ / 2] = at(width_ - 1, y);
   }
   void clear_row(int y) { std::fill_n(row(0, y) - 1, 2 * odd_, 0.0F); }
-  /// Makes row y equal to a row of a plane of the same width.
+  /// Copies a row of a plane of the same width to row y.
   void copy_row(int y, const SplitPlane& from, int from_y) {
     std::copy_n(from.row(0, from_y), odd_ + count(1), row(0, y));
   }
@@ -69,8 +69,8 @@ class SplitPlane {
   AlignedFloats values_;
 };
 
-/// Several values per pixel, split as in SplitPlane. They are interleaved in blocks, so that
-/// reading them all is reading one stream.
+/// Several values per pixel, split like in SplitPlane. They are interleaved in blocks, so that all
+/// of them are read as one stream.
 template <int values>
 class SplitPlanes {
  public:

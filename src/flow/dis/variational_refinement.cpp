@@ -32,7 +32,7 @@ constexpr float min_gradient = 0.1F * 0.1F;
 constexpr float min_residual = 0.001F * 0.001F;
 constexpr float over_relaxation = 1.6F;
 constexpr int half_sweeps = 2 * 5;      ///< per evaluation of the penalties
-constexpr int reach = half_sweeps - 1;  ///< rows to the farthest that affects a row
+constexpr int reach = half_sweeps - 1;  ///< distance to the farthest row that affects a row
 /// Positions in the later image are rounded to a fraction of a pixel.
 constexpr float fractions = 32;
 
@@ -50,8 +50,8 @@ HWY_INLINE Vector square(Vector value) {
 }
 
 /// 1 / sqrt(value) with a relative error below 1e-6: an estimate from the bits of the exponent, and
-/// two steps of Newton's method, the first with the factors that are best for one step. Faster than
-/// a square root and a division.
+/// two steps of Newton's method, the first with factors optimised for a single step. Faster than a
+/// square root and a division.
 HWY_INLINE Vector inverse_sqrt(Vector value) {
   const Ints ints;
   const auto bits = hn::ShiftRight<1>(hn::BitCast(ints, value));
@@ -92,7 +92,7 @@ int ring(int y) {
   return y & (Scratch::rows - 1);
 }
 
-/// Computes the derivatives of the images where a flow leads.
+/// Computes the derivatives of the images at the positions to which a flow leads.
 class Linearisation {
  public:
   Linearisation(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to, const Field& flow,
@@ -109,7 +109,7 @@ class Linearisation {
   }
 
  private:
-  /// Rounds and limits positions in the later image.
+  /// Rounds and clamps positions in the later image.
   static HWY_INLINE Vector place(Vector exact, int size) {
     const auto rounded = hn::Mul(hn::Round(hn::Mul(exact, set(fractions))), set(1 / fractions));
     return hn::Min(hn::Max(rounded, set(0.0F)), set(static_cast<float>(size - 1)));
@@ -219,7 +219,7 @@ class Assembly {
         below_(scratch.weight.row(parity, ring(y + 1 < start.x.height() ? y : y + 1))),
         out_(scratch.equations.row(parity, ring(y))) {}
 
-  /// Two vectors at a time, step by step, because the operations on one wait for each other.
+  /// Processes two vectors at a time, because the operations on one depend on each other.
   void run(int count) const {
     const int lanes = static_cast<int>(hn::Lanes(Floats()));
     for (int k = 0; k < count; k += 2 * lanes) {
@@ -268,14 +268,14 @@ class Assembly {
   };
 
   /// Terms of the energy. The square of a residual is divided by its norm, and so is its weight,
-  /// which is factor / sqrt(square + min_residual). Both are multiplied by the norms instead.
+  /// factor / sqrt(square + min_residual). To avoid the divisions, both are scaled by the norms.
   struct Terms {
     Constraint bright;
     Constraint gradient_x;
     Constraint gradient_y;
     Vector norm_x;
     Vector norm_y;
-    // What is under the root.
+    // Arguments of the square roots.
     Vector bright_squares;
     Vector gradient_squares;
   };
@@ -370,8 +370,8 @@ class Relaxation {
         width_(flow.x.width()),
         height_(flow.x.height()) {}
 
-  /// A half sweep of a row follows the previous half sweep of the next row, so all of them are done
-  /// in one pass over rows that stay in the cache.
+  /// A half sweep of a row needs only the previous half sweep of the next row, so all of them are
+  /// done in one pass over rows that stay in the cache.
   void run() {
     const int begin = std::max(0, first_ - reach);
     const int end = std::min(height_, last_ + reach);
@@ -389,9 +389,9 @@ class Relaxation {
   }
 
  private:
-  /// Copies the flow of a row, and computes how much a pixel and the ones to the right and below
-  /// pull at each other: little where the flow changes much. Outside the image, the flow is 0, and
-  /// nothing pulls.
+  /// Copies the flow of a row, and computes the smoothness weights between a pixel and its right
+  /// and lower neighbours: small where the flow changes much. Outside the image, flow and weights
+  /// are 0.
   void load_row(int y) {
     const int to = ring(y);
     if (y < 0 || y >= height_) {
@@ -421,7 +421,7 @@ class Relaxation {
     clear_past_end(to, width_ & 1);
   }
 
-  /// Past the end of a row, the flow is 0.
+  /// Sets the flow past the end of a row to 0.
   void clear_past_end(int row, int parity) {
     const int count = flow_.x.count(parity);
     scratch_.flow.x.row(parity, row)[count] = scratch_.flow.y.row(parity, row)[count] = 0;
@@ -434,8 +434,8 @@ class Relaxation {
                    square(hn::Sub(load(flow.below + k), value)));
   }
 
-  /// Every other pixel of the rows, from the first column on; where a row starts is an offset that
-  /// all these planes share.
+  /// Every other pixel of the rows, from the first column on; all these planes share the offset of
+  /// a row.
   struct Pixels {
     Pixels(Scratch& scratch, int parity)
         : x(scratch.flow.x.row(parity, 0)),
@@ -449,7 +449,7 @@ class Relaxation {
     std::ptrdiff_t to_left;  ///< from a pixel to the one on its left
   };
 
-  /// Improves a vector of pixels in one row after the other, upwards.
+  /// Relaxes a vector of pixels, row by row, upwards.
   class Climb {
    public:
     HWY_INLINE Climb(const Pixels& pixels, std::ptrdiff_t below, std::ptrdiff_t row)
@@ -469,7 +469,7 @@ class Relaxation {
       const auto up = load(pixels.weight + above);
       const auto left_row = row + pixels.to_left;
       const auto left = load(pixels.weight + left_row);
-      // What the row below adds comes last: it has just been computed.
+      // Adds the row below last, because it has just been computed.
       const auto pull = [&](const float* beside, Vector above_flow, Vector constant,
                             Vector below_flow) HWY_ATTR {
         const auto along = hn::Add(hn::Mul(left, load(beside)), hn::Mul(weight_, load(beside + 1)));
@@ -502,9 +502,9 @@ class Relaxation {
     Vector weight_;
   };
 
-  /// Half sweep i of row y - i, for every i: the same columns of all these rows. Most of what a row
-  /// needs has just been loaded for the row below it, if a few columns are improved in all of them
-  /// at a time. Two vectors at a time, because each row waits for the one below it.
+  /// Does half sweep i of row y - i, for every i. A few columns are relaxed in all these rows at a
+  /// time, so that most of what a row needs has just been loaded for the row below it. Two vectors
+  /// at a time, because each row depends on the row below it.
   void relax(int y) {
     const int begin = std::max(0, y - height_ + 1);
     const int end = std::min({half_sweeps, y + 1, (y - first_ + reach) / 2 + 1});
@@ -581,7 +581,7 @@ namespace {
 
 constexpr int evaluations = 5;
 
-/// Rows around a band are computed twice, so there are as few bands as keep the threads busy.
+/// Number of bands: as few as keep the threads busy, because rows around a band are computed twice.
 int band_count_for(int height, int threads) {
   constexpr int min_rows = 24;
   return std::clamp(height / min_rows, 1, threads);

@@ -16,7 +16,7 @@ namespace eventcamera {
 /// linearised once, at the given flow. Five times, the penalties are evaluated at the refined flow,
 /// and five rounds of red-black successive over-relaxation solve the resulting linear equations.
 ///
-/// Threads compute bands of rows, and for each evaluation as many rows around them as affect them.
+/// Threads compute bands of rows and, for each evaluation, the rows around them that affect them.
 class VariationalRefinement {
  public:
   /// Components of a flow field.
@@ -35,8 +35,8 @@ class VariationalRefinement {
     SplitPlane t;
   };
 
-  /// Equations of a pixel: relaxation adds inverse_x (constant_x - cross y + what the neighbours
-  /// add) to a multiple of its flow in x, and likewise in y.
+  /// Equations of a pixel: relaxation adds inverse_x (constant_x - cross y + smoothness terms) to a
+  /// multiple of its flow in x, and likewise in y.
   enum { cross, inverse_x, inverse_y, constant_x, constant_y, max_coefficients };
 
   /// Rows that a thread is working on; row y is at y % rows.
@@ -52,8 +52,8 @@ class VariationalRefinement {
           change(width, rows) {}
 
     Field flow;
-    SplitPlane weight;  ///< how much a pixel and the ones to the right and below pull at each other
-    SplitPlane right;   ///< of the last two rows, but 0 for their last pixels
+    SplitPlane weight;  ///< smoothness weight between a pixel and its right and lower neighbours
+    SplitPlane right;   ///< the same for the last two rows, but 0 for their last pixels
     SplitPlanes<max_coefficients> equations;
 
     // Of the images.

@@ -14,17 +14,17 @@ namespace {
 constexpr int max_levels = 4;
 constexpr int min_side = 32;  ///< of a pyramid level
 
-/// Neighbouring bands of polynomials share image rows, which are computed twice, so bands must not
-/// be thin.
+/// Rows of the image at the edge of a band are blurred twice, for both bands, so bands must not be
+/// thin.
 constexpr int rows_per_expansion = 32;
 
 int expansion_bands(int height) {
   return (height + rows_per_expansion - 1) / rows_per_expansion;
 }
 
-/// A tile of flow, as high as the image, goes through all iterations block by block, while the
-/// polynomials of the last blocks are in the cache. Each iteration needs more columns around it. So
-/// tiles are wide, but numerous enough for all threads. They end at multiples of 16 pixels.
+/// A tile of flow, as high as the image, passes through all iterations block by block, while the
+/// polynomials of the last blocks are in the cache. Each iteration needs more columns around the
+/// tile. So tiles are as wide as the number of threads allows. They end at multiples of 16 pixels.
 struct Tiles {
   Tiles(int level_width, int threads) : width(level_width) {
     constexpr int min_columns = 80;
@@ -134,7 +134,7 @@ void FarnebackFlow::find_columns(const Level* coarser, Level& level, int first, 
   const auto last_of = [&](int iteration) {
     return std::min(width, last + FlowUpdate::margin * (iterations - iteration));
   };
-  // Each iteration is a block behind the one before it.
+  // Each iteration follows the previous one at a distance of one block.
   constexpr int kept_rows = 2 * side;
   std::array<FlowRows, iterations + 1> rows;
   for (int i = 0; i < iterations; ++i)

@@ -44,7 +44,7 @@ struct Columns {
   }
 };
 
-/// Adds polynomials of `rows` rows, weighted.
+/// Adds the weighted polynomials of `rows` rows.
 template <int rows>
 HWY_INLINE void add_weighted(const PolynomialExpansion& to, int column, int row,
                              const Columns& columns, const Vector* weights, Vector* sums) {
@@ -58,7 +58,7 @@ HWY_INLINE void add_weighted(const PolynomialExpansion& to, int column, int row,
   }
 }
 
-/// Positions in the later image that the flow of a vector of pixels leads to.
+/// Positions in the later image to which the flow moves a vector of pixels.
 struct Targets {
   hn::Mask<Words> inside;  ///< the image
   WordVector column;       ///< of the pixel left of and above the target
@@ -87,10 +87,9 @@ struct Targets {
 
 /// Interpolates the later polynomials bilinearly; outside the image they are 0.
 ///
-/// Neighbours mostly move alike: they end between columns of the same two vectors, in one row or
-/// the one beside it. Lanes for which this holds read the same three rows; one that a lane does not
-/// need has weight 0, which leaves its sum as it is. The other lanes follow, chosen in the same
-/// way.
+/// Neighbours mostly move alike: they end between columns of the same two vectors, in the same row
+/// or an adjacent one. All such lanes read the same three rows; the row that a lane does not need
+/// has weight 0. The remaining lanes are processed next, grouped in the same way.
 HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& targets, Vector* sums) {
   const Words words;
   const Floats floats;
@@ -137,7 +136,7 @@ HWY_INLINE void interpolate(const PolynomialExpansion& to, const Targets& target
 
 using RowSums = FlowUpdate::RowSums;
 
-/// Replaces the equations of each row of a block by the sum of its and all later rows.
+/// Replaces the equations of each row of a block by the sum over this row and all later ones.
 void complete_block(RowSums& sums) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
@@ -157,14 +156,14 @@ void complete_block(RowSums& sums) {
 template <int width>
 using EquationRows = float[equations][width + 2 * row_padding];
 
-/// Sums over fifteen rows: those of a strip, and before it the last ones of the strip to the left.
+/// Sums over fifteen rows: those of a strip, preceded by the last ones of the strip to the left.
 struct Window {
   static constexpr int before = row_padding;
   HWY_ALIGN EquationRows<before + strip> sums = {};
 };
 
-/// Adds the equations of columns [left, right) of image row y, as row `row` of the present block.
-/// Computes the sums over the last fifteen rows.
+/// Adds the equations of columns [left, right) of image row y, as row `row` of the current block,
+/// and computes the sums over the last fifteen rows.
 void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
              int y, int left, int right, float row_weight, const float* column_weights, int row,
              RowSums& sums, Window& window) {
@@ -237,8 +236,8 @@ void add_fives(const float* row, int width, float* out) {
   }
 }
 
-/// Solves the equations of a row of windows. At straight edges the products of sums nearly cancel,
-/// so they are computed in double.
+/// Solves the equations of a row of windows. Products of sums nearly cancel at straight edges, so
+/// they are computed in double.
 void solve(const EquationRows<strip>& sums, int width, Flow* flow) {
   const hn::CappedTag<double, 8> doubles;
   const hn::Rebind<float, decltype(doubles)> floats;
@@ -267,9 +266,9 @@ void solve(const EquationRows<strip>& sums, int width, Flow* flow) {
   }
 }
 
-/// Solves columns [first, last) of a row with the sums of columns [left, right), a strip; the
-/// border of the image is replicated. `edge` has the last sums of the strip to the left, and gets
-/// those of this one.
+/// Solves columns [first, last) of a row from the sums of columns [left, right), a strip; the
+/// border of the image is replicated. `edge` holds the last sums of the strip to the left, and is
+/// overwritten with those of this one.
 void solve_strip(Window& window, int left, int right, int first, int last, int width, float* edge,
                  Flow* flow) {
   constexpr int before = Window::before;
@@ -312,7 +311,7 @@ void update_block(const PolynomialExpansion& from, const PolynomialExpansion& to
     const int solved_first = left == begin ? first : left - margin;
     const int solved_last = right == stop ? last : right - margin;
     std::fill_n(sums->start[0], equations * strip, 0.0F);
-    // A row is solved after the next one's equations, when its sums have arrived in the cache.
+    // Solves each row after adding the next one's equations, when its sums have reached the cache.
     for (int i = start; i <= end; ++i) {
       if (i < end) {
         const int y = std::clamp(i - reach, 0, from.height() - 1);  // the border is replicated

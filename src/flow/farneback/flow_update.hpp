@@ -20,7 +20,7 @@ struct FlowRows {
 
 /// One iteration of Farneback's method, which refines a flow.
 ///
-/// The polynomials at both ends of a pixel's flow differ by a shift, which solves two linear
+/// The polynomials at both ends of a pixel's flow differ by a shift, the solution of two linear
 /// equations. These are summed over a window (least squares) and solved for the flow of its centre.
 /// The result does not depend on how columns are divided between calls.
 class FlowUpdate {
@@ -31,23 +31,23 @@ class FlowUpdate {
   static constexpr int equations = 5;  ///< coefficients: symmetric 2x2 matrix and right-hand side
   static constexpr int border = 5;     ///< width of the border where polynomials weigh less
 
-  /// Columns of flow that matter on each side of those that are filled: `reach`, aligned. Those
-  /// before them, up to a multiple of 16, are read too, and have no effect.
+  /// Columns of flow needed on each side of those that are filled: `reach`, aligned. Columns before
+  /// them, up to a multiple of 16, are read too, but have no effect.
   static constexpr int margin = 8;
 
   /// Sums of the equations of a strip over fifteen rows.
   ///
-  /// Rows are counted from the first window's first one, in blocks of fifteen. The sum over a
-  /// window is that of the end of a block and that of the start of the next one.
+  /// Rows are counted in blocks of fifteen, from the first row of the first window. The sum over a
+  /// window is the sum over the end of a block plus that over the start of the next one.
   struct RowSums {
-    /// Equations of the rows of a block; once it is complete, of each row and all after it. The
-    /// last row is 0.
+    /// Equations of the rows of a block; once it is complete, sums over each row and all later
+    /// ones. The last row is 0.
     alignas(64) float rows[side + 1][equations][strip];
-    alignas(64) float start[equations][strip];  ///< sum of the first rows of the present block
+    alignas(64) float start[equations][strip];  ///< sum of the first rows of the current block
   };
   struct Scratch {
     std::vector<RowSums> sums;
-    std::vector<float> edges;  ///< of a strip, which the one to the right needs
+    std::vector<float> edges;  ///< last sums of a strip, needed by the strip to the right
   };
 
   FlowUpdate() = default;
@@ -58,8 +58,8 @@ class FlowUpdate {
 
   /// Fills columns [first, last), multiples of 8 or the border, of the `side` rows that end with
   /// the first row of a block. Needs `flow` in `margin` more columns on each side, and in the rows
-  /// from `reach` before to `reach` after that first row. To be called for all blocks in turn; does
-  /// nothing for others.
+  /// from `reach` before to `reach` after that first row. Must be called for all blocks in turn;
+  /// does nothing for others.
   void run(const PolynomialExpansion& from, const PolynomialExpansion& to, const FlowRows& flow,
            int first, int last, int block, Scratch& scratch, const FlowRows& out) const;
 

@@ -10,8 +10,8 @@
 namespace eventcamera {
 
 /// Quadratic polynomials fitted to an image around each pixel with Gaussian weights: b_y y + b_x x
-/// + a_yy y^2 + a_xx x^2 + a_xy x y, with (0, 0) at the pixel. The constant term, which flow does
-/// not need, is left out.
+/// + a_yy y^2 + a_xx x^2 + a_xy x y, with (0, 0) at the pixel. The constant term is omitted,
+/// because flow does not need it.
 class PolynomialExpansion {
  public:
   static constexpr int coefficients = 5;  ///< in the order above
@@ -24,9 +24,9 @@ class PolynomialExpansion {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  /// First coefficient of the polynomial at (x, y); each of the others is `group` floats further
-  /// on. Those of `group` more pixels to the right and of the row below the last one may be read,
-  /// and are finite.
+  /// First coefficient of the polynomial at (x, y); the others follow `group` floats apart. The
+  /// coefficients of `group` more pixels to the right, and of the row below the last one, may be
+  /// read, and are finite.
   const float* at(int x, int y) const { return groups_.row(y) + place(x); }
 
   using Scratch = std::array<std::vector<float>, 3>;  ///< sums along the columns

@@ -10,7 +10,7 @@
 namespace eventcamera {
 
 /// Blurs an image with a Gaussian and shrinks it to 1 / 2^level of its size, row by row. A blur of
-/// about half a pixel of the shrunk image prevents aliasing; level 0 is blurred slightly, against
+/// about half a pixel of the shrunk image prevents aliasing; level 0 is blurred slightly, to reduce
 /// noise.
 class PyramidLevel {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Sums over single windows on processors with AVX-512 VNNI, which multiply bytes. Included once per
-// SIMD target, after foreach_target.h.
+// Sums over single windows with the byte products of AVX-512 VNNI. Included once per SIMD target,
+// after foreach_target.h.
 #if defined(EVENTCAMERA_BYTE_WINDOWS_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef EVENTCAMERA_BYTE_WINDOWS_INL
 #undef EVENTCAMERA_BYTE_WINDOWS_INL
@@ -17,14 +17,14 @@
 HWY_PUSH_ATTRIBUTES(HWY_TARGET_STR ",avx512vnni")
 namespace eventcamera::HWY_NAMESPACE {
 
-/// The windows of all pixels of a tile, ready to be multiplied with pixels as bytes. A gradient is
-/// 64 * high + low; the row of a window is 16 high and 16 low parts of the horizontal gradients,
-/// and the same of the vertical ones. The last of the 16 has weight 0.
+/// The windows of all pixels of a tile, as bytes to be multiplied with pixels. A gradient is 64 *
+/// high + low; a row of a window has 16 high and 16 low parts of the horizontal gradients, then the
+/// same of the vertical ones. The last of the 16 has weight 0.
 class ByteWindows {
  public:
   static bool supported() { return __builtin_cpu_supports("avx512vnni") != 0; }
 
-  /// From `rows` rows of window_columns gradients, at most those of all windows of a tile.
+  /// Takes `rows` rows of window_columns gradients, at most those of all windows of a tile.
   ByteWindows(const std::int16_t* slope_x, const std::int16_t* slope_y, int rows) {
     const hn::FixedTag<std::int16_t, window_columns> slopes;
     const hn::Rebind<std::int8_t, decltype(slopes)> bytes;
@@ -73,12 +73,12 @@ class ByteWindows {
   using Sum = hn::Vec<Sums>;
 
   static constexpr int low_width = 6;
-  /// Sums per corner, because additions to only one would wait for each other.
+  /// Independent sums per corner, because additions to a single one would wait for each other.
   static constexpr int chains = 3;
   static_assert(window % chains == 0);
 
-  /// The first four lanes are the sums of the horizontal gradients at each corner; those in the
-  /// upper half are of the vertical ones.
+  /// Sums of the horizontal gradients at the four corners in the first four lanes, those of the
+  /// vertical gradients at the start of the upper half.
   static HWY_INLINE Sum sum_corners(const std::int8_t (*row)[64], const std::uint8_t* pixels,
                                     std::ptrdiff_t stride) {
     Sum sums[chains][corners];

@@ -83,7 +83,7 @@ void PointTracker::follow(std::span<const Point> points, int left, int top, Bloc
     }
   }
   if (block.points.empty()) return;
-  constexpr std::size_t many = block_side;  // with fewer, that takes longer than it saves
+  constexpr std::size_t many = block_side;  // with fewer points, the test costs more than it saves
   if (block.points.size() >= many) drop_flat(points, left, top, block);
   if (block.points.empty()) return;
   block.ordered.resize(block.points.size());

@@ -43,13 +43,13 @@ class PointTracker {
   struct Block {
     std::vector<std::uint32_t> points;
     std::vector<std::uint32_t> ordered;  ///< the same by their tiles on a level
-    ScharrGradients gradients;           ///< of a level, where the points' windows are
+    ScharrGradients gradients;           ///< of a level, in the windows of the points
   };
 
   void find_rows(std::span<const Point> points, int height);
   void follow(std::span<const Point> points, int left, int top, Block& block);
-  /// Drops the points that the search on the finest level would lose for want of texture, before
-  /// they are followed to it.
+  /// Drops the points that the search on the finest level would lose for lack of texture, before
+  /// they are tracked on the coarser levels.
   void drop_flat(std::span<const Point> points, int left, int top, Block& block);
   void search(std::span<const Point> points, std::size_t level, int left, int top, Block& block);
 

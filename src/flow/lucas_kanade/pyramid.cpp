@@ -20,7 +20,7 @@ using Bytes = hn::Rebind<std::uint8_t, Words>;
 constexpr int max_row = 16384 + 64;
 
 // NOLINTBEGIN(clang-analyzer-core.uninitialized.Assign): the second loop reads what the first
-// wrote; what a vector reads beyond it is not used.
+// wrote; lanes beyond that are not used.
 /// Computes row y of the next level from the rows around row 2y of this one. Writes up to a vector
 /// past the end.
 void halve_row(const Image<std::uint8_t>& picture, int y, std::uint8_t* out, int width) {

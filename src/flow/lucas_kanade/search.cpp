@@ -245,7 +245,8 @@ class SharedSums {
     return hn::ConvertTo(Ints(), hn::IfThenElse(near, at, hn::Set(floats, far)));
   }
 
-  /// Computes the sums of displacements where enough of the points search. False if of none.
+  /// Computes the sums of displacements at which enough of the points search. False if there are
+  /// none.
   bool share(std::span<const std::int32_t> points, const std::int32_t* displacement) {
     if (points.size() < enough) return false;
     bool any = false;
@@ -265,18 +266,19 @@ class SharedSums {
 
  private:
   static constexpr int side = 32;  ///< of the square of displacements that have an index
-  static constexpr float before = side / 2.0F;  ///< pixels of it on either side of the start
+  static constexpr float before =
+      side / 2.0F;  ///< pixels of the square on either side of the start
   static constexpr std::int32_t far = side * side - 1;  ///< index of all other displacements
-  static constexpr int most = 64;                       ///< corners with sums
-  /// Searches at one displacement that take longer than the sums of all pixels.
+  static constexpr int max_sums = 64;                   ///< maximum number of corners with sums
+  /// Number of searches at one displacement that take longer than the sums of all pixels.
   static constexpr int enough = 18;
   static constexpr std::uint8_t none = 0;
 
-  /// False if there is no room or no image for them.
+  /// Returns false if there is no memory left for them, or a window leaves the image.
   bool compute(std::int32_t displacement) {
     const std::array<std::int32_t, corners> all{displacement, displacement + 1, displacement + side,
                                                 displacement + side + 1};
-    if (count_ + corners > most || !all_within(displacement)) return false;
+    if (count_ + corners > max_sums || !all_within(displacement)) return false;
     for (std::size_t c = 0; c < all.size(); ++c) {
       auto& number = numbers_[all[c]];
       if (number == none) {
@@ -295,7 +297,7 @@ class SharedSums {
     return patch_.top() + static_cast<int>(first_y_) + displacement / side;
   }
 
-  /// True if the image has all rows of the windows at all corners.
+  /// True if the rows of the windows at all corners are within the image.
   bool all_within(std::int32_t displacement) const {
     return top(displacement) >= -to_.margin() &&
            top(displacement) + patch_.rows() + window <= to_.height() + to_.margin();
@@ -332,7 +334,7 @@ class SharedSums {
   /// Number of the sums at a displacement, counted from 1.
   std::uint8_t numbers_[side * side] = {};
   std::uint8_t corners_[side * side][corners] = {};
-  HWY_ALIGN GradientSums sums_[most][tile_pixels];
+  HWY_ALIGN GradientSums sums_[max_sums][tile_pixels];
 };
 
 /// Searches for the points of a tile, one lane per point.
@@ -417,8 +419,8 @@ class Points {
   }
 
  private:
-  static constexpr int most = tile_pixels;
-  /// Points that take longer one by one than the sums of all pixels.
+  static constexpr int capacity = tile_pixels;
+  /// Number of points that take longer one by one than the sums of all pixels.
   static constexpr int share_from = 12;
 
   /// Computes the sums over a point's window that stay constant during its search.
@@ -467,7 +469,7 @@ class Points {
     const Columns columns;
     const hn::Rebind<std::int16_t, Columns> values;
     enum { xx, yy, grey_x, grey_y, xy, xy_right };
-    HWY_ALIGN std::int32_t sums[6][most];
+    HWY_ALIGN std::int32_t sums[6][capacity];
     sum_windows<5>(
         patch_.rows(),
         [&](int row, int column) {
@@ -520,7 +522,7 @@ class Points {
 
   /// Takes points whose displacement has shared sums out of moved_, and copies their sums.
   void take_shared() {
-    std::int32_t taken[most];
+    std::int32_t taken[capacity];
     int taken_count = 0;
     int left = 0;
     for (const auto i : moved()) {  // without a branch, which would be mispredicted often
@@ -689,36 +691,36 @@ class Points {
   const Patch& patch_;
   std::optional<SharedSums> shared_;  ///< if there are many points
 #if HWY_MAX_BYTES == 64
-  std::optional<ByteWindows> byte_windows_;  ///< once points of many looked alone
+  std::optional<ByteWindows> byte_windows_;  ///< made once many points are summed one by one
 #endif
   int count_;
   float right_;
   float down_;
   int moved_count_ = 0;
-  int window_[most];  ///< index of its first value in the patch
-  int pixel_[most];   ///< its index among the pixels of the patch
-  HWY_ALIGN float left_[most];
-  HWY_ALIGN float top_[most];
-  HWY_ALIGN float flow_x_[most];
-  HWY_ALIGN float flow_y_[most];
-  HWY_ALIGN float before_x_[most];
-  HWY_ALIGN float before_y_[most];
-  HWY_ALIGN float xx_[most];
-  HWY_ALIGN float xy_[most];
-  HWY_ALIGN float yy_[most];
-  HWY_ALIGN float inverse_[most];
-  HWY_ALIGN float followed_[most];
-  HWY_ALIGN float active_[most];
-  HWY_ALIGN float cell_x_[most];
-  HWY_ALIGN float cell_y_[most];
-  HWY_ALIGN std::int32_t at_[most];  ///< offset of the window in the other image
-  HWY_ALIGN std::int32_t displacement_[most];
-  HWY_ALIGN std::int32_t here_x_[most];
-  HWY_ALIGN std::int32_t here_y_[most];
+  int window_[capacity];  ///< index of its first value in the patch
+  int pixel_[capacity];   ///< its index among the pixels of the patch
+  HWY_ALIGN float left_[capacity];
+  HWY_ALIGN float top_[capacity];
+  HWY_ALIGN float flow_x_[capacity];
+  HWY_ALIGN float flow_y_[capacity];
+  HWY_ALIGN float before_x_[capacity];
+  HWY_ALIGN float before_y_[capacity];
+  HWY_ALIGN float xx_[capacity];
+  HWY_ALIGN float xy_[capacity];
+  HWY_ALIGN float yy_[capacity];
+  HWY_ALIGN float inverse_[capacity];
+  HWY_ALIGN float followed_[capacity];
+  HWY_ALIGN float active_[capacity];
+  HWY_ALIGN float cell_x_[capacity];
+  HWY_ALIGN float cell_y_[capacity];
+  HWY_ALIGN std::int32_t at_[capacity];  ///< offset of the window in the other image
+  HWY_ALIGN std::int32_t displacement_[capacity];
+  HWY_ALIGN std::int32_t here_x_[capacity];
+  HWY_ALIGN std::int32_t here_y_[capacity];
   /// Sums with the window at each of the four pixels around its position: upper left, upper right,
   /// lower left and lower right.
-  HWY_ALIGN GradientSums there_[corners][most];
-  std::int32_t moved_[most];
+  HWY_ALIGN GradientSums there_[corners][capacity];
+  std::int32_t moved_[capacity];
 };
 
 void search_all(const Image<std::uint8_t>& from, const ScharrGradients& gradients,

@@ -13,7 +13,7 @@ namespace eventcamera {
 struct Tile {
   static constexpr int side = 16;
   static constexpr int fractions = 8;  ///< points lie at multiples of 1/8 of a pixel
-  /// Pixels that the window of a point needs on either side of its pixel.
+  /// Pixels of a window on either side of the point's pixel.
   static constexpr int before = 7;
   static constexpr int after = 8;
 
@@ -33,8 +33,8 @@ struct Search {
 
 /// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): moves a window of 15x15 pixels
 /// towards the minimum of its squared difference, at most 10 times, until a move is shorter than
-/// 0.03 pixels or undoes the last one. Needs the gradients of `from` where the windows are. At most
-/// one search per pixel of the tile.
+/// 0.03 pixels or undoes the last one. Needs the gradients of `from` in all windows. At most one
+/// search per pixel of the tile.
 ///
 /// The window sum that determines a move is bilinear in the window's position, so it is
 /// interpolated between the integer sums at the four pixels around it. The window is summed once

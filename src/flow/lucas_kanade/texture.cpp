@@ -15,7 +15,7 @@ TilePixels textured_pixels(const ScharrGradients& gradients, const Tile& tile) {
   const Columns columns;
   const hn::Rebind<std::int16_t, Columns> slopes;
   const hn::Rebind<float, Columns> floats;
-  // More than what these sums, and those of a search, are rounded by, as a part of xx + yy.
+  // Upper bound of the rounding of these sums, and of those of a search, relative to xx + yy.
   constexpr float rounding = 1e-8F;
   TilePixels textured{};
   sum_windows<3>(

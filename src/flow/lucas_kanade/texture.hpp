@@ -12,8 +12,8 @@ namespace eventcamera {
 /// Pixels of a tile without sub-pixel offset: bit x of row y.
 using TilePixels = std::array<std::uint16_t, Tile::side>;
 
-/// Pixels whose windows may have enough texture to be searched for. At all others, search_tile()
-/// finds too little. Needs the gradients where the windows are.
+/// Pixels whose windows may have enough texture for search_tile(); all others certainly have too
+/// little. Needs the gradients in all windows.
 TilePixels textured_pixels(const ScharrGradients& gradients, const Tile& tile);
 
 }  // namespace eventcamera

@@ -27,7 +27,7 @@ constexpr float min_texture = 1e-4F;
 /// min_texture.
 constexpr float slope_product = 1.0F / (1 << 20);
 
-/// The lesser eigenvalue of the mean gradient matrix over a window, from its sums.
+/// Smaller eigenvalue of the mean gradient matrix over a window, from its sums.
 template <class Floats, class Value = hn::Vec<Floats>>
 HWY_INLINE Value least_eigenvalue(Floats floats, Value xx, Value xy, Value yy) {
   const auto difference = hn::Sub(xx, yy);
@@ -43,7 +43,7 @@ struct GradientSums {
   std::int32_t y;
 };
 
-/// Positions that a search needs these sums at: upper left, upper right, lower left, lower right.
+/// Positions at which a search needs these sums: upper left, upper right, lower left, lower right.
 constexpr int corners = 4;
 
 #if HWY_TARGET != HWY_SCALAR
@@ -136,8 +136,8 @@ HWY_INLINE WindowRow add_columns(const WindowRow& row) {
 template <std::size_t count, class Products, class Store>
 HWY_INLINE void sum_windows(int rows, const Products& products, const Store& store) {
   const Columns columns;
-  // All windows include the middle row. A column's sum is that of its rows down to the middle and
-  // that of the rows below.
+  // All windows include the middle row. The sum of a column is that of its rows down to the middle
+  // plus that of the rows below.
   constexpr int middle = window - 1;
   static_assert(Tile::side <= window + 1);
   HWY_ALIGN std::int32_t upper[Tile::side][count][window_columns];
