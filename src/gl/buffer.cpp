@@ -13,9 +13,10 @@ Buffer::Buffer(const Context& gl, GLenum usage) : gl_(gl), usage_(usage) {
 void Buffer::reserve(std::size_t size) {
   if (size <= size_) return;
   if (size > static_cast<std::size_t>(gl_.max_buffer_size()))
-    throw Error("the frames are too large, or there are too many interpolated frames: " +
-                std::to_string(size) + " bytes are needed in a buffer of OpenGL, the limit is " +
-                std::to_string(gl_.max_buffer_size()));
+    throw Error(
+        std::string("the frames are too large, or there are too many interpolated frames: ") +
+        "an OpenGL buffer of " + std::to_string(size) + " bytes is needed, the limit is " +
+        std::to_string(gl_.max_buffer_size()));
   gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, name_);
   gl_.BufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(size), nullptr, usage_);
   size_ = size;
@@ -39,7 +40,7 @@ void Buffer::read(std::span<std::byte> out) const {
   const void* mapped = gl_.MapBufferRange(GL_SHADER_STORAGE_BUFFER, 0, size, GL_MAP_READ_BIT);
   if (mapped == nullptr) {
     gl_.check();
-    throw Error("cannot read a buffer of OpenGL");
+    throw Error("cannot map an OpenGL buffer");
   }
   std::memcpy(out.data(), mapped, out.size());
   gl_.UnmapBuffer(GL_SHADER_STORAGE_BUFFER);

@@ -8,10 +8,10 @@
 
 namespace eventcamera::gl {
 
-/// Memory of the GPU that shaders read and write.
+/// GPU memory that shaders read and write.
 class Buffer {
  public:
-  /// `usage`: GL_DYNAMIC_COPY for what stays on the GPU, GL_DYNAMIC_READ for what is read back.
+  /// `usage`: GL_DYNAMIC_COPY for data that stay on the GPU, GL_DYNAMIC_READ for data to read back.
   explicit Buffer(const Context& gl, GLenum usage = GL_DYNAMIC_COPY);
   ~Buffer() { gl_.DeleteBuffers(1, &name_); }
   Buffer(const Buffer&) = delete;

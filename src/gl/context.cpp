@@ -61,8 +61,8 @@ GLenum Context::next_error() const {
 }
 
 void Context::forget_errors() const {
-  constexpr int most = 8;  // without a context there is no end of them
-  for (int i = 0; i < most && next_error() != GL_NO_ERROR; ++i) {
+  constexpr int max_errors = 8;  // without a context, glGetError() reports errors forever
+  for (int i = 0; i < max_errors && next_error() != GL_NO_ERROR; ++i) {
   }
 }
 

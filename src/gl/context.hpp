@@ -9,13 +9,13 @@
 
 namespace eventcamera::gl {
 
-/// OpenGL is missing, too old, lost, or refused something. The text is for the user.
+/// OpenGL is missing, too old or lost, or a call failed. The text is for the user.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The context, and all that was made with it, is of no more use.
+/// The context is lost, with all its objects.
 class ContextLost : public Error {
  public:
   using Error::Error;
@@ -56,11 +56,11 @@ class ContextLost : public Error {
   X(PFNGLUNMAPBUFFERPROC, UnmapBuffer)             \
   X(PFNGLUSEPROGRAMPROC, UseProgram)
 
-/// Functions and limits of the current OpenGL context. This object and all that is made with it may
+/// Functions and limits of the current OpenGL context. This object and all objects made with it may
 /// only be used, and destroyed, while that context, or one that shares its objects, is current.
 class Context {
  public:
-  /// Returns the address of an OpenGL function, nullptr if there is none of this name.
+  /// Returns the address of an OpenGL function; nullptr if there is none.
   using Load = std::function<void*(const char* name)>;
 
   /// Throws Error if the context has no compute shaders: they need OpenGL ES 3.1 or OpenGL 4.3.
@@ -78,16 +78,16 @@ class Context {
                   : "#version 430\n";
   }
 
-  /// Largest buffer that a shader can reach, in bytes.
+  /// Maximum size of a buffer that a shader can access, in bytes.
   GLint64 max_buffer_size() const {
     return max_buffer_size_;
   }
 
-  /// Stops deleting GL objects once the context is lost, which deleted them. Nothing else may be
-  /// called afterwards.
+  /// Stops deleting GL objects: a lost context has deleted them. Nothing else may be called
+  /// afterwards.
   void abandon();
 
-  /// Forgets that OpenGL calls failed. Throws ContextLost if that is why.
+  /// Clears the errors of OpenGL calls. Throws ContextLost if the context is lost.
   void forget_errors() const;
 
   /// Throws Error if the context is lost, or an OpenGL call failed since the last check.
@@ -97,7 +97,7 @@ class Context {
   /// Throws ContextLost.
   GLenum next_error() const;
 
-  GLenum(GL_APIENTRY* get_reset_status_)() = nullptr;  ///< of a robust context, else null
+  GLenum(GL_APIENTRY* get_reset_status_)() = nullptr;  ///< null if the context is not robust
   bool is_es_ = false;
   GLint64 max_buffer_size_ = 0;
 };

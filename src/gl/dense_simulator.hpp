@@ -8,9 +8,9 @@
 
 namespace eventcamera::gl {
 
-/// As eventcamera::DenseSimulator, with Farneback's flow. Given the same flow, the events are the
-/// same. Flow is computed for the whole frame, so where the CPU computes it only around the pixels
-/// that changed, pyramid and borders differ; elsewhere the last bits of floating-point numbers.
+/// Like eventcamera::DenseSimulator, with Farneback's flow; the same flow gives the same events.
+/// Flow is always computed for the whole frame. If the CPU computes it only around changed pixels,
+/// pyramid and borders differ; otherwise the last bits of floating-point numbers may differ.
 class DenseSimulator : public Simulator {
  public:
   void set_interpolation(Interpolation interpolation) { interpolation_ = interpolation; }

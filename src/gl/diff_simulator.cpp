@@ -16,7 +16,7 @@ struct Part {
   }
 
   Pyramid pictures[2];  ///< 0 for pixels that did not fire
-  Buffer motions;       ///< of the pixels of the earlier one
+  Buffer motions;       ///< of the pixels of the earlier difference frame
 };
 
 class DiffSimulator final : public Simulator {
@@ -87,11 +87,11 @@ class DiffSimulator final : public Simulator {
   Kernel land_;
   Kernel mark_;
   PointTracker tracker_;
-  Buffer strongest_;  ///< difference on each pixel of an interpolated frame
+  Buffer strongest_;  ///< largest difference on each pixel of an interpolated frame
   GreyFrame frames_[2];
   Part on_;
   Part off_;
-  int last_ = 0;  ///< of the two frames, and of the pictures of the parts
+  int last_ = 0;  ///< index of the last of the two frames, and of the pictures of the parts
   bool has_difference_ = false;
 };
 

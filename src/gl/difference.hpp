@@ -7,12 +7,12 @@
 
 namespace eventcamera::gl {
 
-/// Marks the pixels that fire between two frames, as fire_differences() does.
+/// Marks the pixels that fire between two frames, like fire_differences().
 class DifferenceKernel {
  public:
   DifferenceKernel(const Context& gl, const LumaFormat& format);
 
-  /// Marks those of `step`, 1 or later.
+  /// Writes the marks of `step`, 1 or later.
   void run(const GreyFrame& before, const GreyFrame& now, const Thresholds& thresholds, int step,
            const EventList& out) const;
 

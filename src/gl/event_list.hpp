@@ -11,7 +11,7 @@
 
 namespace eventcamera::gl {
 
-/// Kernels that make a sorted list of marks.
+/// Kernels that turn marks into a sorted list.
 struct EventListKernels {
   explicit EventListKernels(const Context& gl);
 
@@ -21,10 +21,10 @@ struct EventListKernels {
 };
 
 /// Collects the pixels that fire in the steps of an interval, and reads them back as a sorted list
-/// of events: while the GPU works on the next interval, which has a list of its own.
+/// of events. Each interval has its own list, so that the GPU can already work on the next one.
 ///
-/// Kernels mark pixels in marks(): two words for 32 pixels of a row, whose bits are set for pixels
-/// that fire and for those of them that become brighter; by step, then in raster order.
+/// Kernels mark pixels in marks(), by step, then in raster order: two words for 32 pixels of a row,
+/// with a bit set for each pixel that fires, and for each that fires ON.
 class EventList {
  public:
   EventList(const Context& gl, const LumaFormat& format, const EventListKernels& kernels);
@@ -43,7 +43,7 @@ class EventList {
   /// Queues the sorting of the marks. Does not wait.
   void sort();
 
-  /// Replaces the contents of `events`, once the GPU is done with that. Throws Error.
+  /// Waits until the GPU has sorted the marks, and replaces the contents of `events`. Throws Error.
   void read(EventBuckets& events);
 
  private:

@@ -8,7 +8,7 @@
 
 namespace eventcamera::gl {
 
-/// Dense optical flow, as eventcamera::FarnebackFlow; the flow between equal pictures is 0.
+/// Dense optical flow, like eventcamera::FarnebackFlow; the flow between equal pictures is 0.
 class FarnebackFlow {
  public:
   FarnebackFlow(const Context& gl, const LumaFormat& format);
@@ -16,7 +16,7 @@ class FarnebackFlow {
   /// Makes `picture` the later picture, and the previous one the earlier picture.
   void push(const GreyFrame& picture);
 
-  /// Computes the flow from the earlier picture to the later one: two floats a pixel, x and y, in
+  /// Computes the flow from the earlier picture to the later one: two floats per pixel, x and y, in
   /// raster order. Needs two push() first. Valid until the next call.
   const Buffer& find() const;
 
@@ -43,7 +43,7 @@ class FarnebackFlow {
   Buffer no_flow_;           ///< of the coarsest level
   Buffer shrunk_;            ///< picture of a level
   Buffer equations_of_pixels_;
-  int last_ = 0;  ///< of the polynomials
+  int last_ = 0;  ///< index of the later polynomials
 };
 
 }  // namespace eventcamera::gl

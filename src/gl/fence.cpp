@@ -3,7 +3,7 @@
 
 namespace eventcamera::gl {
 
-/// Time in which a driver must complete an interval, nanoseconds.
+/// Maximum time in which a driver must complete an interval, nanoseconds.
 static constexpr GLuint64 patience = 60'000'000'000;
 
 void Fence::set() {

@@ -5,7 +5,7 @@
 
 namespace eventcamera::gl {
 
-/// A point in the work of the GPU.
+/// A point in the GPU's command queue.
 class Fence {
  public:
   explicit Fence(const Context& gl) : gl_(gl) {}
@@ -13,13 +13,13 @@ class Fence {
   Fence(const Fence&) = delete;
   Fence& operator=(const Fence&) = delete;
 
-  /// Moves it past all that has been queued.
+  /// Moves it to the end of the queue.
   void set();
 
-  /// Whether the GPU has come to it.
+  /// True if the GPU has reached it.
   bool is_reached() const;
 
-  /// Waits until the GPU has come to it. Throws Error.
+  /// Waits until the GPU has reached it. Throws Error.
   void wait() const;
 
  private:

@@ -7,7 +7,7 @@
 
 namespace eventcamera::gl {
 
-/// The same events as eventcamera::make_frame_simulator() for the same luma.
+/// Like eventcamera::make_frame_simulator(); the same luma gives the same events.
 std::unique_ptr<Simulator> make_frame_simulator(const Context& gl, const LumaFormat& format);
 
 }  // namespace eventcamera::gl

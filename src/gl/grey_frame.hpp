@@ -7,11 +7,11 @@
 
 namespace eventcamera::gl {
 
-/// A frame in a 2D texture of bytes, as a simulator takes it.
+/// Input frame of a simulator, a 2D texture of bytes.
 struct TextureFrame {
   LumaFormat format;
   GLuint texture;
-  /// Contributions of the four channels to luma, in units of 1/LumaWeights::one. Their sum is
+  /// Weights of the four channels in luma, in units of 1/LumaWeights::one. Their sum is
   /// LumaWeights::one.
   int weights[4];
 };
@@ -20,7 +20,7 @@ inline std::size_t pixel_count(const LumaFormat& format) {
   return static_cast<std::size_t>(format.width) * static_cast<std::size_t>(format.height);
 }
 
-/// The luma of a frame: bytes, four to a word; rows start at whole words.
+/// The luma of a frame: bytes, four per word; each row starts with a new word.
 class GreyFrame {
  public:
   GreyFrame(const Context& gl, const LumaFormat& format) : buffer_(gl) {

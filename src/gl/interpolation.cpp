@@ -15,7 +15,7 @@ void InterpolationKernel::run(const GreyFrame& last, const GreyFrame& now, const
                               Interpolation interpolation, const Thresholds& thresholds,
                               const EventList& out) const {
   const int steps = out.steps();
-  constexpr int max_steps = 64;  // of a run, as in the shader
+  constexpr int max_steps = 64;  // per run, as in the shader
   const int factor = std::bit_cast<int>(65536.0F / static_cast<float>(steps));
   for (int first = 1; first <= steps; first += max_steps)
     kernel_.run({groups_of(64, format_.width), format_.height},

@@ -7,13 +7,13 @@
 
 namespace eventcamera::gl {
 
-/// Marks the pixels that fire in the frames interpolated between two, as
-/// eventcamera::InterpolationKernel; given the same flow, the events are the same.
+/// Marks the pixels that fire in the frames interpolated between two frames, like
+/// eventcamera::InterpolationKernel; the same flow gives the same events.
 class InterpolationKernel {
  public:
   InterpolationKernel(const Context& gl, const LumaFormat& format);
 
-  /// Marks all steps of an interval. `flow` is that of FarnebackFlow.
+  /// Writes the marks of all steps of an interval. `flow` is laid out as by FarnebackFlow.
   void run(const GreyFrame& last, const GreyFrame& now, const Buffer& flow,
            Interpolation interpolation, const Thresholds& thresholds, const EventList& out) const;
 

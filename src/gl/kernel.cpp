@@ -8,7 +8,7 @@
 namespace eventcamera::gl {
 namespace {
 
-/// The log of a shader or program, from the functions that tell its length and its text.
+/// Log of a shader or program, from the functions that return its length and its text.
 template <class GetParameter, class GetLog>
 std::string log_of(GLuint object, GetParameter get_parameter, GetLog get_log) {
   GLint length = 0;
@@ -45,7 +45,7 @@ Kernel::Kernel(const Context& gl, std::string_view name, std::string_view source
   if (linked != GL_FALSE) return;
   gl.DeleteProgram(program_);
   gl.check();
-  throw Error("the driver does not compile the compute shader '" + std::string(name) + "': " + log);
+  throw Error("the driver cannot compile the compute shader '" + std::string(name) + "': " + log);
 }
 
 void Kernel::run(Groups groups, std::initializer_list<const Buffer*> buffers,

@@ -15,7 +15,7 @@ struct Groups {
   int y = 1;
 };
 
-/// Number of groups of `size` that hold `count`.
+/// Number of groups of `size` that cover `count`.
 constexpr int groups_of(int size, int count) {
   return (count + size - 1) / size;
 }
@@ -31,7 +31,7 @@ class Kernel {
   Kernel& operator=(const Kernel&) = delete;
 
   /// Runs it with `buffers` at bindings 0, 1, ... and the integers `values` at uniform locations 0,
-  /// 1, ... Kernels run one after another, and see what those before them wrote.
+  /// 1, ... Kernels run one after another, and see what earlier ones wrote.
   void run(Groups groups, std::initializer_list<const Buffer*> buffers,
            std::initializer_list<int> values) const;
 

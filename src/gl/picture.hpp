@@ -9,15 +9,15 @@
 
 namespace eventcamera::gl {
 
-/// A 2D texture of RGBA bytes that events are drawn in, and the colours of pixels without events,
-/// with OFF, with ON, and with both.
+/// A 2D texture of RGBA bytes to draw events in, and the colours of pixels without events, with
+/// OFF, with ON, and with both.
 struct Picture {
   GLuint texture;
   std::array<std::array<std::uint8_t, 4>, 4> colours;
 };
 
-/// Draws the marks of an event list, as Accumulator does its events. Drawn as they are, marks need
-/// neither be counted nor sorted.
+/// Draws the marks of an event list like Accumulator draws events. For this, marks need neither be
+/// counted nor sorted.
 class DrawKernel {
  public:
   DrawKernel(const Context& gl, const LumaFormat& format);
@@ -27,8 +27,8 @@ class DrawKernel {
   const Context& gl_;
   LumaFormat format_;
   Kernel kernel_;
-  /// OpenGL ES 3.1 lets shaders write to no texture that GStreamer makes: they are mutable. Copied
-  /// to the texture on the GPU.
+  /// Output of the shader, copied to the texture on the GPU: in OpenGL ES 3.1, shaders can only
+  /// write to immutable textures, but those of GStreamer are mutable.
   Buffer pixels_;
 };
 

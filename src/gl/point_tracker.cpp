@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t max_levels = 4;
 constexpr int min_side = 15;
 
-/// Groups of the kernels that take a pixel an invocation.
+/// Groups of the kernels that process one pixel per invocation.
 Groups groups_of(const LumaFormat& format) {
   return {gl::groups_of(64, format.width), format.height};
 }

@@ -28,10 +28,10 @@ class Pyramid {
   std::list<Level> levels_;
 };
 
-/// Pyramidal Lucas-Kanade, as eventcamera::PointTracker.
+/// Pyramidal Lucas-Kanade, like eventcamera::PointTracker.
 ///
-/// Points are the pixels of a buffer of two words each: none in the first if the pixel is no point;
-/// else its flow, two floats, or its motion in a step, two integers.
+/// Points are stored in a buffer of two words per pixel: the flow, two floats, or the motion per
+/// step, two integers; the first word is `none` if the pixel is not a point.
 class PointTracker {
  public:
   PointTracker(const Context& gl, const LumaFormat& format);
@@ -39,14 +39,14 @@ class PointTracker {
   /// Computes the levels above 0.
   void build(const Pyramid& pyramid) const;
 
-  /// Makes points of the pixels of level 0 that are not 0.
+  /// Makes each pixel of level 0 that is not 0 a point.
   void find_points(const Pyramid& pyramid, const Buffer& points) const;
 
-  /// Tracks points, which have no flow, from one picture to the next. Lost ones become none.
+  /// Tracks points, whose flow is 0, from one picture to the next. Lost points are removed.
   void track(const Pyramid& from, const Pyramid& to, const Buffer& points) const;
 
-  /// Replaces flow by motion. Points that leave the frame become none, and, if they `must_arrive`,
-  /// those that end more than a pixel away from all pixels of `frame` that are not 0.
+  /// Replaces flow by motion. Removes points that leave the frame and, if they `must_arrive`, those
+  /// that end more than a pixel away from all pixels of `frame` that are not 0.
   void to_motion(const Buffer& points, int steps, const GreyFrame& frame, bool must_arrive) const;
 
  private:

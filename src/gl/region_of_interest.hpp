@@ -5,7 +5,7 @@
 
 namespace eventcamera::gl {
 
-/// Limits flow to the surroundings of changed pixels, as RegionOfInterestFlow does.
+/// Limits flow to the surroundings of changed pixels, like RegionOfInterestFlow.
 class RegionOfInterest {
  public:
   RegionOfInterest(const Context& gl, const LumaFormat& format);

@@ -9,36 +9,37 @@
 
 namespace eventcamera::gl {
 
-/// Simulator of 8-bit frames in textures. It is made, used and destroyed while its context is
-/// current; hold_until() and reset() need none. All others throw Error and std::bad_alloc; after
-/// that the simulator may only be destroyed.
+/// Simulator of 8-bit frames in textures. Must be made, used and destroyed while its context is
+/// current, except hold_until() and reset(). All other functions throw Error and std::bad_alloc;
+/// after that the simulator may only be destroyed.
 ///
-/// The way of a frame: a LumaKernel turns its texture into a GreyFrame; a method (frame_, dense_,
-/// sparse_ or diff_simulator) compares it with the last one and marks the pixels that fire in each
-/// step; an EventList counts, sorts and reads back the marked pixels, or a DrawKernel draws them.
-/// The kernels are compute shaders (shaders/), one Kernel each. Dense motion is computed in
-/// farneback, tracks in point_tracker, with the formulas and bounds of their namesakes in src/flow.
+/// Processing of a frame: a LumaKernel turns its texture into a GreyFrame; a method (frame_,
+/// dense_, sparse_ or diff_simulator) compares it with the last one and marks the pixels that fire
+/// in each step; an EventList counts, sorts and reads back the marked pixels, or a DrawKernel draws
+/// them. Each kernel is a compute shader (shaders/). Dense flow is computed in farneback, tracks in
+/// point_tracker, with the formulas and bounds of their namesakes in src/flow.
 ///
-/// Reading events back need not make the caller, or the GPU, wait: queue() the next frame, then
-/// read() the events of the interval before.
+/// To read events back without making the caller, or the GPU, wait, queue() the next frame before
+/// read() of the previous interval's events.
 class Simulator : public IntervalSimulator {
  public:
-  static constexpr int max_queued = 2;  ///< frames
+  static constexpr int max_queued = 2;  ///< maximum number of queued frames
 
-  /// Queues the work on the next frame, whose `format` must be the simulator's, and whose events
-  /// are to be read(). The contents of the texture may not change until then. `time` must be later
-  /// than that of the last frame, by at most max_interval.
+  /// Queues the work on the next frame, whose `format` must be the simulator's. The texture must
+  /// not change until the events have been read(). `time` must be later than that of the last
+  /// frame, by at most max_interval.
   void queue(const TextureFrame& frame, Nanoseconds time, const Settings& settings);
 
-  /// As queue(), but draws the events in a texture (none for the first frame); read() returns none.
+  /// Like queue(), but draws the events in a texture (none for the first frame); read() returns
+  /// none.
   void draw(const TextureFrame& frame, Nanoseconds time, const Settings& settings,
             const Picture& picture);
 
-  /// Whether the GPU is done with the first of the queued frames.
+  /// True if the GPU has finished the first queued frame.
   bool is_ready() const { return queue_[first_].done.is_reached(); }
 
-  /// Waits until the GPU is done with the first of the queued frames. Returns the sorted events of
-  /// the interval that it ends, valid until the next call; nullptr if it ends none.
+  /// Waits until the GPU has finished the first queued frame. Returns the sorted events of the
+  /// interval that it ends, valid until the next call; nullptr if it ends none.
   const EventBuckets* read();
 
   /// Forgets the queued frames.
@@ -67,17 +68,17 @@ class Simulator : public IntervalSimulator {
     Fence done;
   };
 
-  /// Queues all work on a frame but the sorting. Returns whether it ends an interval.
+  /// Queues all work on a frame except sorting. Returns true if the frame ends an interval.
   bool take(const TextureFrame& frame, Nanoseconds time, const Settings& settings, EventList& list);
 
-  /// Adds a frame to those that are queued.
+  /// Adds a frame to the queue.
   Queued& next();
 
   const Context& gl_;
   EventListKernels kernels_;
   Queued queue_[max_queued];
-  int first_ = 0;   ///< of those that are queued
-  int queued_ = 0;  ///< their number
+  int first_ = 0;   ///< index of the first queued frame
+  int queued_ = 0;  ///< number of queued frames
   DrawKernel draw_;
 };
 

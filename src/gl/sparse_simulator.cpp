@@ -78,7 +78,7 @@ class SparseSimulator final : public Simulator {
   Kernel paint_;
   PointTracker tracker_;
   Buffer points_;
-  Buffer winners_;  ///< points that reach the pixels of an interpolated frame
+  Buffer winners_;  ///< last point on each pixel of an interpolated frame
   Pyramid frames_[2];
   GreyFrame between_[2];  ///< interpolated frames
   int now_ = 0;

@@ -7,8 +7,8 @@
 
 namespace eventcamera::gl {
 
-/// As eventcamera::make_sparse_simulator(). Given the same tracks, the events are the same; tracks
-/// may differ in the last bits of floating-point numbers.
+/// Like eventcamera::make_sparse_simulator(). The same tracks give the same events; tracks may
+/// differ in the last bits of floating-point numbers.
 std::unique_ptr<Simulator> make_sparse_simulator(const Context& gl, const LumaFormat& format);
 
 }  // namespace eventcamera::gl

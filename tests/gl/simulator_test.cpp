@@ -399,7 +399,7 @@ TEST(Context, IsReportedAsLostByWhateverTellsOfIt) {
   const std::pair<Loss, const char*> losses[] = {
       {Loss::error, lost},
       {Loss::reset, lost},
-      {Loss::no_mapping, "cannot read a buffer of OpenGL"},
+      {Loss::no_mapping, "cannot map an OpenGL buffer"},
       {Loss::no_wait, "OpenGL cannot wait for the GPU"},
       {Loss::garbage, "OpenGL returned more events than there are pixels"}};
   Texture texture(33, 21, 1);
@@ -455,7 +455,7 @@ TEST(Kernel, ReportsWhatTheCompilerSays) {
     FAIL();
   } catch (const gl::Error& error) {
     const std::string text = error.what();
-    EXPECT_TRUE(text.starts_with("the driver does not compile the compute shader 'wrong': "));
+    EXPECT_TRUE(text.starts_with("the driver cannot compile the compute shader 'wrong': "));
     EXPECT_NE(text.find("`x' undeclared"), text.npos) << text;
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Makes a point of each pixel that changed by more than a threshold, without motion.
+// Makes each pixel that changed by more than a threshold a point without motion.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Before { uint before[]; };

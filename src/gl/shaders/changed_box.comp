@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Smallest box that holds all pixels that changed by more than a threshold. Four pixels an
+// Smallest box that holds all pixels that changed by more than a threshold. Four pixels per
 // invocation.
 layout(local_size_x = 64) in;
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Number of events of each block of 512 marks: four an invocation, a step a row of groups.
+// Counts the events of each block of 512 marks. Four marks per invocation; each row of groups is a
+// step.
 layout(local_size_x = 128) in;
 
 layout(std430, binding = 0) readonly buffer Fired { uvec2 fired[]; };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Marks the pixels that fire between two frames, four pixels an invocation, a row a group of rows.
+// Marks the pixels that fire between two frames. Four pixels per invocation; each row of groups is a
+// row of pixels.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Before { uint before[]; };
@@ -12,7 +13,7 @@ layout(location = 3) uniform int first_mark;
 layout(location = 4) uniform int positive;
 layout(location = 5) uniform int negative;
 
-// Of 32 pixels each: a bit for those that fire, and one for those of them that become brighter.
+// Per 32 pixels: a bit for each that fires, and one for each that fires ON.
 shared uint changed[8];
 shared uint brighter[8];
 

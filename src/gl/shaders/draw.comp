@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Draws which polarities fired at each pixel in any step. 64 marks of a row a group.
+// Draws the polarities that fired at each pixel in any step. 64 marks of a row per group.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Fired { uvec2 fired[]; };

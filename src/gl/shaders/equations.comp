@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Equations for a better flow of each pixel, from the polynomials at both ends of its flow, as
-// src/flow/farneback/flow_update computes them.
+// Equations for the improved flow of each pixel, from the polynomials at both ends of its flow, like
+// those of src/flow/farneback/flow_update.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer From { float from[]; };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Fits a polynomial around each pixel, as src/flow/farneback/polynomial_expansion does: first along
-// the columns, then along the rows. 32x4 pixels a group.
+// Fits a polynomial around each pixel, like src/flow/farneback/polynomial_expansion: first along the
+// columns, then along the rows. 32x4 pixels per group.
 layout(local_size_x = 32, local_size_y = 4) in;
 
 layout(std430, binding = 0) readonly buffer Picture { float picture[]; };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Next level of a Gaussian pyramid, as src/flow/lucas_kanade/pyramid does. Four pixels an
+// Computes the next level of a Gaussian pyramid, like src/flow/lucas_kanade/pyramid. Four pixels per
 // invocation.
 layout(local_size_x = 64) in;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Marks the pixels that fire in the frames interpolated along a flow, as src/simulate/interpolation
-// does: 64 pixels of a row a group, through at most 64 steps.
+// Marks the pixels that fire in the frames interpolated along a flow, like
+// src/simulate/interpolation. 64 pixels of a row per group, through at most 64 steps.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Last { uint last[]; };
@@ -12,13 +12,12 @@ layout(location = 1) uniform int height;
 layout(location = 2) uniform int blends;
 layout(location = 3) uniform int steps;
 layout(location = 4) uniform int factor;      // bits of the float 65536 / steps
-layout(location = 5) uniform int first_step;  // of those marked
+layout(location = 5) uniform int first_step;  // to be marked
 layout(location = 6) uniform int last_step;
 layout(location = 7) uniform int positive;
 layout(location = 8) uniform int negative;
 
-// Of 32 pixels in a step each: a bit for those that fire, and one for those of them that become
-// brighter.
+// Per 32 pixels and step: a bit for each that fires, and one for each that fires ON.
 shared uint changed[128];
 shared uint brighter[128];
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Moves the pixels of a difference frame by a number of steps. The largest difference on a pixel
-// wins; ON wins over an equal OFF.
+// Moves the pixels of a difference frame by a number of steps. If several reach the same pixel, the
+// largest difference wins, and ON wins over an equal OFF.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Picture { uint picture[]; };
 layout(std430, binding = 1) readonly buffer Motions { ivec2 motions[]; };
-layout(std430, binding = 2) buffer Strongest { uint strongest[]; };  // twice, plus 1 for ON
+layout(std430, binding = 2) buffer Strongest { uint strongest[]; };  // doubled, plus 1 for ON
 layout(location = 0) uniform int width;
 layout(location = 1) uniform int steps;
 layout(location = 2) uniform int is_on;

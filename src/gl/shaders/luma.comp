@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Luma of a texture, four pixels an invocation.
+// Computes the luma of a texture. Four pixels per invocation.
 layout(local_size_x = 64) in;
 
 layout(binding = 0) uniform highp sampler2D frame;

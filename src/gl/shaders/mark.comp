@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Marks the pixels that a difference landed on, and forgets them. 32 pixels an invocation.
+// Marks the pixels that a difference has reached, and clears the differences. 32 pixels per
+// invocation.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) buffer Strongest { uint strongest[]; };

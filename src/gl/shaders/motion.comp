@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Replaces the flow of each track by its motion in a step, in 1/65536 of a pixel, or by none where
-// it leaves the frame, or, if it must arrive, ends more than a pixel away from all pixels that are
-// not 0.
+// Replaces the flow of each track by its motion per step, in 1/65536 of a pixel. Removes tracks that
+// leave the frame and, if they must arrive, those that end more than a pixel away from all pixels
+// that are not 0.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Picture { uint picture[]; };

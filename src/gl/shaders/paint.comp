@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Draws an interpolated frame: the last one, in which points have left their pixels and reached
-// others. Forgets the winners. Four pixels an invocation.
+// Draws an interpolated frame: the last frame with moved points. Clears the winners. Four pixels per
+// invocation.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Last { uint last[]; };

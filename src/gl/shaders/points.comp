@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Makes a point of each pixel that is not 0, without motion.
+// Makes each pixel that is not 0 a point without motion.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Picture { uint picture[]; };

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Functions that any shader may call.
 
-// Position p on a row of pixels, mirrored at its ends until it is on it.
+// Position p on a row of pixels, mirrored at the ends of the row until it is inside.
 int mirrored(int p, int size) {
   if (size == 1) return 0;
   while (p < 0 || p >= size) p = p < 0 ? -p : 2 * (size - 1) - p;
   return p;
 }
 
-// Position of pixel i of `to` on a row of `from` pixels: the first of two of these, and the weight
-// of the second one.
+// Position of pixel i of `to` on a row of `from` pixels: returns the first of two pixels, and the
+// weight of the second one.
 int place(int i, int from, int to, out float weight) {
   int numerator = (2 * i + 1) * from - to;
   int first = max(numerator, 0) / (2 * to);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Moves points by a number of steps. The last one in raster order on a pixel wins. In a second run,
-// points that moved mark the pixels that they left.
+// Moves points by a number of steps. If several reach the same pixel, the last one in raster order
+// wins. In a second run, points that moved mark the pixels that they left.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Motions { ivec2 motions[]; };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Lucas-Kanade on one level of a pyramid, a point an invocation: search_tile() of
-// src/flow/lucas_kanade/search, pixel by pixel.
+// Lucas-Kanade on one level of a pyramid, like search_tile() of src/flow/lucas_kanade/search. One
+// point per invocation.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer From { uint from[]; };
@@ -68,7 +68,7 @@ void main() {
   first = ivec2(x >> level, y >> level) - 7;
   vec2 part = vec2(offset) / 8.0;
 
-  // The window is computed anew in each move: registers could not hold it.
+  // The window is recomputed in each move, because it does not fit into registers.
   ivec3 high = ivec3(0);
   ivec3 low = ivec3(0);
   for (int u = 0; u < 15; ++u) {

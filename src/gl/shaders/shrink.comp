@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Blurs a picture with a Gaussian and shrinks it, as src/flow/farneback/pyramid does: first along
-// the columns, then along the rows. 64 pixels of a row a group.
+// Blurs a picture with a Gaussian and shrinks it, like src/flow/farneback/pyramid: first along the
+// columns, then along the rows. 64 pixels of a row per group.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Picture { uint picture[]; };
@@ -12,7 +12,7 @@ layout(location = 2) uniform int shrunk_width;
 layout(location = 3) uniform int shrunk_height;
 layout(location = 4) uniform int reach;
 
-// Of the pixels that 64 pixels, 1/8 as many, depend on.
+// Column sums that 64 pixels depend on, at a factor of up to 8.
 shared float sums[576];
 
 float grey(int x, int y) {

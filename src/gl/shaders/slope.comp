@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Scharr gradients of a picture: of x in the lower half of a word, of y in the upper one.
+// Scharr gradients of a picture: along x in the lower half of a word, along y in the upper half.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Picture { uint picture[]; };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Solves the equations of 15x15 pixels for the flow of the pixel in their middle. 64x4 pixels a
-// group, a column of four an invocation; the border is replicated.
+// Solves the equations of 15x15 pixels for the flow of their centre; the border is replicated. 64x4
+// pixels per group, a column of four per invocation.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Equations { float equations[]; };
@@ -13,7 +13,7 @@ const float regularization = 1e-3 * 225.0 * 225.0;
 
 shared float sums[5 * 4 * across];  // over 15 rows
 
-// Equation of plane k in row i of those that a group reads.
+// Equation of plane k in row i of the rows that a group reads.
 float equation(int k, int x, int i) {
   int y = clamp(int(gl_WorkGroupID.y) * 4 - 7 + i, 0, height - 1);
   return equations[(k * height + y) * width + x];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Difference frame, one picture a polarity: by how much a pixel rose or fell, 0 if by no more than
-// the threshold. Four pixels an invocation.
+// Difference frame, one picture per polarity: the rise or fall of each pixel, 0 if it does not exceed
+// the threshold. Four pixels per invocation.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Before { uint before[]; };

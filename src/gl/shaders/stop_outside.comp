@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Sets the flow to 0 outside the region of interest around a box of changed pixels, which
-// src/flow/region_of_interest_flow defines.
+// Sets the flow to 0 outside the region of interest around a box of changed pixels, as defined in
+// src/flow/region_of_interest_flow.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Box { int box[4]; };  // as in changed_box

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Starts the flow of a level with twice that of the coarser level, interpolated.
+// Initializes the flow of a level with twice that of the coarser level, interpolated.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Coarser { vec2 coarser[]; };

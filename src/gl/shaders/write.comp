@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Writes the events of the marks, in the layout of Event: by step, then in raster order.
+// Writes the events of the marks in the layout of Event, by step, then in raster order.
 layout(local_size_x = 128) in;
 
 layout(std430, binding = 0) readonly buffer Fired { uvec2 fired[]; };
