@@ -48,8 +48,8 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
   return running;
 }
 
-/// True if upstream of a pad would accept a seek. GstAggregator flushes before it forwards a seek,
-/// and never resumes if that fails.
+/// True if the element upstream of a pad would accept a seek. GstAggregator flushes before it
+/// forwards a seek, and never resumes if that fails.
 static bool would_seek(GstAggregatorPad* pad, const SeekRequest& request) {
   if (!request.plays_on_from_time()) return false;
   GstQuery* query = gst_query_new_seeking(GST_FORMAT_TIME);
@@ -180,7 +180,7 @@ struct EventAggregatorFunctions {
 
   static gboolean src_query(GstAggregator* element, GstQuery* query) {
     if (GST_QUERY_TYPE(query) ==
-        GST_QUERY_SEEKING)  // GstAggregator always answers that seeking is impossible
+        GST_QUERY_SEEKING)  // GstAggregator would always answer that seeking is impossible
       return gst_pad_peer_query(GST_PAD(of(element).main_pad_), query);
     return PARENT_AGGREGATOR_CLASS->src_query(element, query);
   }

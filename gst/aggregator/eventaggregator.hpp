@@ -20,7 +20,7 @@
 class EventAggregator {
  public:
   struct Role {
-    const char* verb;               ///< what it does with events, for messages: "draw"
+    const char* verb;               ///< what the element does with events, for messages: "draw"
     const char* main_pad = "sink";  ///< name of the main pad
     /// Output buffers are those of the main pad, with its caps.
     bool passes_main_pad = true;
@@ -40,9 +40,9 @@ class EventAggregator {
   /// Frees as much memory as possible, after an allocation failed.
   virtual void release_memory() { flush(); }
 
-  /// False if `caps` are refused. May throw.
+  /// Returns false to reject `caps`. May throw.
   virtual bool take_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
-  /// Handles a new segment of the main pad, which still has the last one. May throw.
+  /// Handles a new segment of the main pad, before the pad stores it. May throw.
   virtual void take_segment(const GstSegment&) {}
   /// Like GstAggregatorClass::aggregate. May throw.
   virtual GstFlowReturn aggregate(bool timed_out) = 0;

@@ -16,7 +16,7 @@ MappedBytes::MappedBytes(GstElement* element, OwnedBuffer buffer)
     : buffer_(std::move(buffer)),
       is_mapped_(gst_buffer_map(buffer_.get(), &map_, GST_MAP_READ) != FALSE) {
   if (is_mapped_) return;
-  GST_ELEMENT_ERROR(element, RESOURCE, READ, ("Cannot read a buffer of the file."),
+  GST_ELEMENT_ERROR(element, RESOURCE, READ, ("Cannot read a buffer from the file."),
                     ("gst_buffer_map() for reading failed at byte %" G_GUINT64_FORMAT,
                      GST_BUFFER_OFFSET(buffer_.get())));
 }

@@ -12,7 +12,7 @@
 /// would abort the process.
 GstBuffer* copied_buffer(std::span<const std::byte> bytes);
 
-/// Maps a buffer of a file for reading. Posts an error on the element if that fails.
+/// Maps a buffer that is part of a file for reading. Posts an error on the element if that fails.
 class MappedBytes {
  public:
   MappedBytes(GstElement* element, OwnedBuffer buffer);

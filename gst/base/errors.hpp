@@ -83,7 +83,7 @@ class WarnOnce {
 };
 
 /// Runs `work` in a function called by GStreamer, which exceptions must not leave. An exception is
-/// posted as an error message of `element`; `report` is its Report, or a function that makes one
+/// posted as an error message of `element`, with `report`, a Report or a function that makes one
 /// from the exception. The result is then GST_FLOW_ERROR, false or nullptr. If `work` returns void,
 /// the result is true on success.
 template <class MakeReport, std::invocable Work>

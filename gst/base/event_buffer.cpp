@@ -29,14 +29,14 @@ std::optional<EventInterval> interval_of(GstBuffer* buffer) {
 void EventFaults::warn(gpointer element, EventFault fault, GstBuffer* buffer) {
   static constexpr std::array reasons = {
       "a buffer has no PTS", "a buffer's PTS is more than 292 years",
-      "a buffer's size is not a multiple of 8 bytes", "some lie beyond the sensor",
-      "some are earlier than those before them, or later than "
+      "a buffer's size is not a multiple of 8 bytes", "some are outside the sensor",
+      "some are earlier than the previous one, or later than "
       "the end of their buffer"};
   const auto index = static_cast<std::size_t>(fault);
   gchar* cause = gst_info_strdup_printf("%" GST_PTR_FORMAT, buffer);
   warnings_[index](element,
                    {GST_STREAM_ERROR_FORMAT, std::string("Cannot ") + verb_ + " all events: " +
-                                                 reasons[index] + "; skipping these."},
+                                                 reasons[index] + "; skipping them."},
                    cause);
   g_free(cause);
 }

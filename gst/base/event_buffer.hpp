@@ -18,7 +18,7 @@ static_assert(eventcamera::max_side == 16384);
 /// Caps of an event stream in memory format.
 #define EVENT_CAPS GST_EVENT_CAMERA_MEDIA_TYPE ", format = (string) XYTP, " SIZE_CAPS
 
-/// What to set on decodebin for events, which it draws as video otherwise.
+/// Property of decodebin to get events, which it would otherwise draw as video.
 #define ASK_FOR_EVENTS "caps=\"application/x-event-camera,format=XYTP\""
 
 /// Maps the events of a buffer for reading.
@@ -36,7 +36,7 @@ class MappedEvents {
   /// may be called then.
   explicit operator bool() const { return mapped_; }
 
-  /// The core's Event has the layout of GstEventCameraEvent.
+  /// The events as the core's Event, which has the layout of GstEventCameraEvent.
   std::span<const eventcamera::Event> events() const {
     return {reinterpret_cast<const eventcamera::Event*>(map_.events), map_.n_events};
   }
@@ -51,7 +51,7 @@ class MappedEvents {
   bool mapped_;
 };
 
-/// Caps of events in memory format, from a sensor of this size, at a framerate that varies.
+/// Caps of events in memory format, from a sensor of this size, with a variable framerate.
 OwnedCaps event_caps(int width, int height);
 
 /// Interval of a buffer: the times of its events are at least `start` and at most `end`.

@@ -5,7 +5,7 @@
 
 #include "gst/base/owned.hpp"
 
-/// For class_init: adds the templates of pads that are always there, "sink" and "src".
+/// For class_init: adds the templates of the always pads "sink" and "src".
 inline void add_pad_templates(GstElementClass* klass, const char* sink_caps, const char* src_caps) {
   const auto add = [klass](const char* name, GstPadDirection direction, const char* text) {
     const OwnedCaps caps(gst_caps_from_string(text));

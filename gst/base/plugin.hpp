@@ -8,7 +8,7 @@
 #define PACKAGE "gst-eventsim"
 
 // clang-format off
-/// A plugin of these elements and type finders: macros that apply a macro to each name.
+/// Defines a plugin. ELEMENTS and TYPE_FINDERS are macros that apply a macro to each name.
 #define EVENTSIM_PLUGIN(name, description, ELEMENTS, TYPE_FINDERS)                         \
   G_BEGIN_DECLS                                                                            \
   ELEMENTS(EVENTSIM_DECLARE_ELEMENT)                                                       \

@@ -67,8 +67,8 @@ class VideoFrame {
                    static_cast<guint>(GST_VIDEO_INFO_HEIGHT(&info)));
   }
 
-  /// True if the frame that a GstVideoMeta describes contains one of the caps. GStreamer requires
-  /// it.
+  /// True if the frame that a GstVideoMeta describes contains a frame of the caps, which GStreamer
+  /// requires.
   static bool holds(const GstVideoMeta& meta, const GstVideoInfo& info) {
     return meta.format == GST_VIDEO_INFO_FORMAT(&info) &&
            meta.width >= static_cast<guint>(GST_VIDEO_INFO_WIDTH(&info)) &&

@@ -31,16 +31,16 @@ GType palette_type() {
       {static_cast<int>(PaletteName::red_blue), "On white: ON blue, OFF red, both purple",
        "red-blue"},
       {static_cast<int>(PaletteName::viridis),
-       "From purple over green to yellow, perceptually uniform", "viridis"},
+       "From purple through green to yellow, perceptually uniform", "viridis"},
       {static_cast<int>(PaletteName::magma),
-       "From black over red to light yellow, perceptually uniform", "magma"},
+       "From black through red to light yellow, perceptually uniform", "magma"},
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventPalette", values);
 }
 
-/// True if a meta with the tags of `api` depends neither on the colours of the pixels nor on their
-/// memory layout.
+/// True if a meta of type `api` depends neither on the colours of the pixels nor on their memory
+/// layout.
 static bool stays_true(GType api) {
   constexpr std::string_view kept[] = {GST_META_TAG_VIDEO_STR, GST_META_TAG_VIDEO_SIZE_STR,
                                        GST_META_TAG_VIDEO_ORIENTATION_STR};

@@ -8,7 +8,7 @@
 static_assert(sizeof(GstEventCameraEvent) == sizeof(eventcamera::Event) &&
                   offsetof(GstEventCameraEvent, x) == offsetof(eventcamera::Event, x) &&
                   offsetof(GstEventCameraEvent, y_p) == offsetof(eventcamera::Event, y_p),
-              "the core's events are handed to applications as they are");
+              "the core's events are passed to applications unchanged");
 
 static GstEventCameraInfo* gst_event_camera_info_copy(const GstEventCameraInfo* info) {
   return static_cast<GstEventCameraInfo*>(g_memdup2(info, sizeof *info));

@@ -4,7 +4,7 @@
  * @title: GstEventCamera
  * @short_description: event streams of event cameras
  *
- * Events travel in buffers with the caps `application/x-event-camera`:
+ * Event streams are buffers with the caps `application/x-event-camera`:
  *
  * - `format`: `XYTP`, an array of #GstEventCameraEvent;
  * - `width`, `height`: of the sensor, in pixels; every x < width, every y < height;
@@ -15,9 +15,9 @@
  * floor(PTS / 1000) + t microseconds, and no element changes it. Intervals never overlap. An
  * interval without events is a GAP event.
  *
- * Simulators put events of the same time into raster order, and no pixel fires twice in a
- * microsecond. Recordings keep every event of the file, in its own order within a time: a pixel may
- * have several, of the same polarity or of both.
+ * In simulated streams, events of the same time are in raster order, and no pixel fires twice in a
+ * microsecond. Readers of recordings keep every event of the file; events of the same time stay in
+ * the order of the file, and a pixel may have several, of one or both polarities.
  */
 #pragma once
 
@@ -141,7 +141,7 @@ gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps
 
 /**
  * gst_event_camera_info_to_caps:
- * @info: the content of the caps
+ * @info: sensor size and framerate
  *
  * Returns: (transfer full): the caps of an event stream of format XYTP
  *
@@ -154,7 +154,7 @@ GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info);
  * GstEventCameraMap:
  * @events: (array length=n_events): the events of the buffer, sorted by time
  * @n_events: the number of events
- * @start: the time that each event's t is relative to, in microseconds: floor(PTS / 1000)
+ * @start: the time at which t is 0, in microseconds: floor(PTS / 1000)
  *
  * The events of a mapped buffer.
  *

@@ -26,12 +26,12 @@ static GstGLDisplay* that_works(GstGLDisplay* display) {
 
 static GstGLDisplay* display_of_screen() {
   GstGLDisplay* display = gst_gl_display_new();
-  // Without a screen, GStreamer makes a display of no kind, and crashes where it opens a window.
+  // Without a screen, GStreamer makes a display of no type, and crashes when it opens a window.
   if (G_OBJECT_TYPE(display) == GST_TYPE_GL_DISPLAY) gst_clear_object(&display);
   return that_works(display);
 }
 
-/// GstGL does not try devices without a screen by itself.
+/// Finds a display of a device without a screen, which GstGL does not do itself.
 static GstGLDisplay* find_device() {
   for (guint device = 0;; ++device) {
     auto* found = gst_gl_display_egl_device_new(device);
@@ -40,15 +40,15 @@ static GstGLDisplay* find_device() {
   }
 }
 
-/// Of all elements without a screen: EGL has one display of a device in a process, which GstGL
-/// terminates with the first object that stands for it, whoever else draws with it.
+/// The display that all elements without a screen share: EGL has one display per device and
+/// process, which GstGL terminates with the first of its objects, even if others are still in use.
 static GstGLDisplay* display_of_device() {
   static GstGLDisplay* const display = [] {
     GstGLDisplay* const found = find_device();
     if (found == nullptr) return found;
     GstGLDisplayEGL* const egl = gst_gl_display_egl_from_gl_display(found);
     GST_OBJECT_FLAG_SET(found, GST_OBJECT_FLAG_MAY_BE_LEAKED);
-    GST_OBJECT_FLAG_SET(egl, GST_OBJECT_FLAG_MAY_BE_LEAKED);  // which `found` holds
+    GST_OBJECT_FLAG_SET(egl, GST_OBJECT_FLAG_MAY_BE_LEAKED);  // held by `found`
     gst_object_unref(egl);
     return found;
   }();
@@ -56,7 +56,7 @@ static GstGLDisplay* display_of_device() {
 }
 
 GstGLDisplay* gl_display() {
-  // What users set to choose a screen.
+  // Variables with which users select a screen.
   const bool has_screen = g_getenv("DISPLAY") != nullptr ||
                           g_getenv("WAYLAND_DISPLAY") != nullptr ||
                           g_getenv("GST_GL_WINDOW") != nullptr;

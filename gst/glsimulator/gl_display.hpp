@@ -3,11 +3,10 @@
 
 #include <gst/gl/gl.h>
 
-/// Returns a new reference to a display that OpenGL contexts can be created in, with one in it:
-/// that of the screen, or, without one, that of a GPU or a software renderer. nullptr if there is
-/// none.
+/// Returns a new reference to a display with an OpenGL context: that of the screen or, without a
+/// screen, that of a GPU or a software renderer. nullptr if there is none.
 GstGLDisplay* gl_display();
 
-/// Returns a new reference to the context of a display, made if it has none; nullptr if that fails.
+/// Returns a new reference to the context of a display, creating it if needed; nullptr on failure.
 /// `other`, if any, is a context to share objects with.
 GstGLContext* gl_context_of(GstGLDisplay* display, GstGLContext* other, GError** error);

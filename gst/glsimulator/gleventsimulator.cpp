@@ -21,7 +21,7 @@ using eventcamera::EventBuckets;
 using eventcamera::LumaWeights;
 using eventcamera::Nanoseconds;
 
-/// Locked while they change: contexts are set and queried from any thread.
+/// Guarded by `mutex`, because contexts are set and queried from any thread.
 struct GstGLEventSimulatorPrivate {
   std::recursive_mutex mutex;
   GstGLDisplay* display = nullptr;
@@ -43,7 +43,8 @@ static GstGLEventSimulatorPrivate& priv_of(gpointer self) {
       gst_gl_event_simulator_get_instance_private(GST_GL_EVENT_SIMULATOR(self)));
 }
 
-/// What to do without OpenGL: the element on the CPU has the same name without "gl".
+/// Advice if OpenGL is unavailable: use the element on the CPU, which has the same name without
+/// "gl".
 static std::string advice_of(gpointer self) {
   const auto* factory = gst_element_get_factory(GST_ELEMENT(self));
   if (factory == nullptr) return " Use the element that runs on the CPU.";
@@ -53,7 +54,7 @@ static std::string advice_of(gpointer self) {
 /* display and context */
 
 /// Asks the neighbours and the application for an object, which set_context() then stores. Returns
-/// whether there is one. To be called without the lock: those asked may ask back.
+/// true if there is one. Must be called without the lock: neighbours may query this element.
 template <class Object>
 static bool ask_for(GstElement* self, const char* type,
                     Object* GstGLEventSimulatorPrivate::*object) {
@@ -95,8 +96,8 @@ static bool open_display(GstElement* self) {
   }
   post_message(self, GST_MESSAGE_ERROR,
                {GST_RESOURCE_ERROR_NOT_FOUND,
-                "OpenGL does not work here: neither a screen nor a GPU, nor a software renderer "
-                "(in Debian's libgl1-mesa-dri)." +
+                "OpenGL does not work here: there is no screen, no GPU and no software renderer "
+                "(Debian: libgl1-mesa-dri)." +
                     advice_of(self)},
                "no GstGLDisplay has a context");
   return false;
@@ -118,7 +119,7 @@ static GstGLContext* find_context(GstElement* self, GError** error) {
     const std::lock_guard lock(priv.mutex);
     if (priv.context != nullptr) return priv.context;
   }
-  GstGLContext* shared = nullptr;  // neighbours may ask back, so they are asked without the lock
+  GstGLContext* shared = nullptr;  // asked for without the lock: neighbours may query this element
   gst_gl_query_local_gl_context(self, GST_PAD_SRC, &shared);
   if (shared == nullptr) gst_gl_query_local_gl_context(self, GST_PAD_SINK, &shared);
 
@@ -129,7 +130,7 @@ static GstGLContext* find_context(GstElement* self, GError** error) {
   return priv.context;
 }
 
-/// Makes find_context() look for another context than this one, which is lost.
+/// Makes find_context() replace this context, which is lost.
 static void forget_context(GstElement* self, GstGLContext* context) {
   auto& priv = priv_of(self);
   const std::lock_guard lock(priv.mutex);
@@ -174,8 +175,8 @@ static gboolean query(GstBaseTransform* self, GstPadDirection direction, GstQuer
 
 namespace {
 
-/// Runs `work` in the thread of a context; passes on its exceptions. Returns false if the context
-/// has no thread any more.
+/// Runs `work` in the thread of a context, and rethrows its exceptions. Returns false if the
+/// context no longer has a thread.
 template <class Work>
 bool run_in(GstGLContext* context, const Work& work) {
   struct Call {
@@ -197,7 +198,7 @@ bool run_in(GstGLContext* context, const Work& work) {
   return call.has_run;
 }
 
-/// Contributions of the channels of the first texture to luma.
+/// Weights of the channels of the first texture in luma.
 void find_weights(const GstVideoInfo& video, int (&weights)[4]) {
   const auto channel = [&](guint component) -> int& {
     return weights[GST_VIDEO_INFO_COMP_POFFSET(&video, component)];
@@ -226,7 +227,7 @@ class MappedTexture {
     }
     auto* texture = GST_GL_MEMORY_CAST(memory);
     if (!gst_gl_context_can_share(texture->mem.context, context)) {
-      fault_ = "its texture is in an OpenGL context that shares nothing with that of this element";
+      fault_ = "its texture is in an OpenGL context that is not shared with this element";
       return;
     }
     if (gst_gl_memory_get_texture_target(texture) != GST_GL_TEXTURE_TARGET_2D ||
@@ -258,10 +259,10 @@ class MappedTexture {
   std::string fault_;
 };
 
-/// Time after which to look again whether the GPU has finished.
+/// Interval at which to check whether the GPU has finished.
 constexpr GstClockTime look_interval = GST_MSECOND;
 
-/// Lets the simulator of an element push what is finished, a little later.
+/// Makes the simulator of an element push finished intervals, a little later.
 class LaterLook {
  public:
   explicit LaterLook(GstElement* element) : element_(element) {}
@@ -269,7 +270,7 @@ class LaterLook {
   LaterLook(const LaterLook&) = delete;
   LaterLook& operator=(const LaterLook&) = delete;
 
-  /// Replaces the look that is due, if any.
+  /// Schedules a check, and cancels the pending one, if any.
   void schedule() {
     cancel();
     GstClock* clock = gst_system_clock_obtain();
@@ -306,8 +307,8 @@ class LaterLook {
 };
 
 /// A simulator on the GPU. The events of an interval are read while the GPU works on the next one,
-/// or as soon as they are ready, so at most one interval is awaited. Its frame is held until the
-/// GPU has read it; first frames and drawn ones, too.
+/// or as soon as they are ready, so at most one interval is awaited. Every frame, including first
+/// and drawn ones, is held until the GPU has read it.
 class TextureVideoSimulator final : public VideoSimulator {
  public:
   TextureVideoSimulator(GstElement* element, GstGLContext* context, const GstVideoInfo& video,
@@ -367,7 +368,7 @@ class TextureVideoSimulator final : public VideoSimulator {
           drawn.name(), eventcamera::pixels_by_kind(palette, pixel_layout_of(drawn_))};
       run([&] { simulator_->draw(frame_, time, settings, out); });
     }
-    // What reads the picture in another context waits until it is drawn.
+    // Makes readers of the picture in another context wait until it is drawn.
     auto* sync = gst_buffer_get_gl_sync_meta(picture);
     if (sync == nullptr) sync = gst_buffer_add_gl_sync_meta(context_, picture);
     gst_gl_sync_meta_set_sync_point(sync, context_);
@@ -407,14 +408,14 @@ class TextureVideoSimulator final : public VideoSimulator {
     bool is_drawn;
   };
 
-  /// Awaits the frame queued last, after having pushed the interval before.
+  /// Awaits the frame queued last, after pushing the previous interval.
   void await(Awaited awaited) {
     finish();
     awaited_ = std::move(awaited);
     push_finished();
   }
 
-  /// The frame in a texture: uploaded where it is in system memory.
+  /// Returns the frame as a texture; uploads it if it is in system memory.
   OwnedBuffer in_texture(GstBuffer* buffer) {
     if (gst_buffer_n_memory(buffer) > 0 && gst_is_gl_memory(gst_buffer_peek_memory(buffer, 0)))
       return OwnedBuffer(gst_buffer_ref(buffer));
@@ -432,20 +433,20 @@ class TextureVideoSimulator final : public VideoSimulator {
     }
     GstBuffer* uploaded = nullptr;
     auto result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
-    if (result == GST_GL_UPLOAD_RECONFIGURE)  // it has chosen how to upload
+    if (result == GST_GL_UPLOAD_RECONFIGURE)  // it has selected an upload method
       result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
     if (result != GST_GL_UPLOAD_DONE)
       refuse(cannot_read("it cannot be uploaded to an OpenGL texture"));
     return OwnedBuffer(uploaded);
   }
 
-  /// Throws what is wrong with a frame or a picture, unless it is the context.
+  /// Throws the fault of a frame or a picture, or ContextLost if the context is the cause.
   [[noreturn]] void refuse(const VideoSimulatorError& fault) {
     run([] {});
     throw fault;
   }
 
-  /// Runs `work` in the context, which others use, too; turns errors of OpenGL into messages.
+  /// Runs `work` in the context, which other elements share; turns OpenGL errors into messages.
   template <class Work>
   void run(const Work& work) {
     try {
@@ -454,7 +455,7 @@ class TextureVideoSimulator final : public VideoSimulator {
         work();
         gst_gl_context_clear_shader(context_);
       });
-      if (!has_run) throw eventcamera::gl::ContextLost("the OpenGL context has ended");
+      if (!has_run) throw eventcamera::gl::ContextLost("the OpenGL context was destroyed");
     } catch (const eventcamera::gl::Error& error) {
       if (dynamic_cast<const eventcamera::gl::ContextLost*>(&error) != nullptr)
         forget_context(element_, context_);
@@ -516,13 +517,13 @@ std::unique_ptr<VideoSimulator> make_texture_simulator(GObject* element, const G
 
 /* allocation */
 
-/// Upstream's textures may be of another context.
+/// Proposes nothing, because upstream's textures may be of another context.
 static gboolean propose_allocation(GstBaseTransform* self, GstQuery* decide, GstQuery* query) {
   gst_query_add_allocation_meta(query, GST_GL_SYNC_META_API_TYPE, nullptr);
   return PARENT_TRANSFORM_CLASS->propose_allocation(self, decide, query);
 }
 
-/// Puts a pool of textures first: downstream's, if it has one that the context can draw in.
+/// Puts a pool of textures first: downstream's, if the context can draw in its textures.
 static void choose_texture_pool(GstQuery* query, GstCaps* caps, GstGLContext* context) {
   GstBufferPool* pool = nullptr;
   guint size = 0;

@@ -9,7 +9,7 @@
 #include "src/gl/simulator.hpp"
 
 /// Base class of the simulators of frames in OpenGL textures. It shares the display and the context
-/// with the elements around it, or finds them itself, with or without a screen.
+/// with neighbouring elements, or finds them itself, with or without a screen.
 #define GST_TYPE_GL_EVENT_SIMULATOR (gst_gl_event_simulator_get_type())
 G_DECLARE_DERIVABLE_TYPE(GstGLEventSimulator, gst_gl_event_simulator, GST, GL_EVENT_SIMULATOR,
                          GstEventSimulator)

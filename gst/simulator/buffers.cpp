@@ -16,9 +16,9 @@ using eventcamera::ThreadPool;
 
 /* a pool of event buffers */
 
-/// A pool of buffers of events, of which there are many in one interval and few in the next. Its
-/// buffers come empty; reserve() gives one the memory it needs, which it keeps when it returns. The
-/// memory is freed when no interval has needed as much for a while, or when too much lies idle.
+/// A pool of event buffers, whose size varies between intervals. Acquired buffers are empty;
+/// reserve() allocates the memory, which a buffer keeps when it returns to the pool. Memory is
+/// freed when no interval has needed as much for a while, or when too much is idle.
 G_DECLARE_FINAL_TYPE(GstEventPool, gst_event_pool, GST, EVENT_POOL, GstBufferPool)
 
 struct _GstEventPool {
@@ -82,7 +82,7 @@ GType gst_event_pool_get_type() {
   return type;
 }
 
-/// Gives an empty buffer of the pool `size` > 0 bytes to write. False if memory is short. Not
+/// Gives an empty buffer of the pool `size` > 0 bytes to write. False if out of memory. Not
 /// thread-safe.
 static bool reserve(GstBuffer* buffer, gsize size) {
   gsize& needed = GST_EVENT_POOL(buffer->pool)->needed;
@@ -91,7 +91,7 @@ static bool reserve(GstBuffer* buffer, gsize size) {
   const gsize capacity = capacity_of(buffer);
   if (capacity < size || capacity / 4 > wanted) {
     gst_buffer_remove_all_memory(buffer);
-    // GStreamer's own allocator would abort the process if memory is short.
+    // GStreamer's own allocator would abort the process when out of memory.
     void* memory = g_try_malloc(wanted);
     if (memory == nullptr) return false;
     gst_buffer_append_memory(buffer, gst_memory_new_wrapped(static_cast<GstMemoryFlags>(0), memory,
@@ -146,7 +146,7 @@ static gboolean transform_size(GstBaseTransform*, GstPadDirection direction, Gst
   return TRUE;
 }
 
-/// Intervals inherit no metadata from the frame that ends them.
+/// Copies nothing: intervals inherit no metadata from the frame that ends them.
 static gboolean copy_no_metadata(GstBaseTransform*, GstBuffer*, GstBuffer*) {
   return TRUE;
 }

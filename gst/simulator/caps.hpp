@@ -15,15 +15,15 @@
   "GBR, GBRA, RGBP, BGRP, RGB16, BGR16, RGB15, BGR15, GBR_10LE, GBRA_10LE, GBR_12LE, "           \
   "GBRA_12LE, ARGB64, ARGB64_LE, RGBA64_LE, BGRA64_LE, ABGR64_LE }"
 
-/// Video that a simulator takes, and that it draws events in.
+/// Input video of a simulator, and the video that it draws events in.
 struct SimulatorVideo {
   const char* memory;                    ///< caps feature
-  const char* formats;                   ///< taken
-  const char* drawn_formats;             ///< nullptr if it draws none
-  const char* texture_target = nullptr;  ///< of OpenGL; video in system memory is taken, too
+  const char* formats;                   ///< of the input
+  const char* drawn_formats;             ///< nullptr if it cannot draw
+  const char* texture_target = nullptr;  ///< of OpenGL; such simulators also accept system memory
 
-  /// Output caps for this input: events (preferred) or accumulated-event video of the same size and
-  /// framerate.
+  /// Output caps for this input: events (preferred) or event frames (accumulated-event video) of
+  /// the same size and framerate.
   GstCaps* output_caps(const GstCaps* input) const;
 
   /// Input caps for this output, events or accumulated-event video.

@@ -25,7 +25,7 @@ inline GParamSpec* interpolation_property(eventcamera::Interpolation interpolati
        "The earlier frame moved forward and the later frame moved back, blended", "blend"},
       {0, nullptr, nullptr},
   };
-  return g_param_spec_enum("interpolation", "Interpolation", "Method of interpolating frames",
+  return g_param_spec_enum("interpolation", "Interpolation", "Frame interpolation method",
                            enum_type("GstEventSimInterpolation", values),
                            static_cast<int>(interpolation), dense_property_flags);
 }
@@ -42,13 +42,14 @@ struct DenseSettings {
     return event_simulator_settings<DenseSettings>(object);
   }
 
-  /// `flows` is the type of the methods that the element has.
+  /// `flows` is the enum type of the methods that the element supports.
   static void install(GObjectClass* klass, GType flows) {
     const DenseSettings defaults;
     Properties<of> properties(klass);
-    properties.add(&DenseSettings::flow,
-                   g_param_spec_enum("flow", "Flow", "Method of finding the motion between frames",
-                                     flows, static_cast<int>(defaults.flow), dense_property_flags));
+    properties.add(
+        &DenseSettings::flow,
+        g_param_spec_enum("flow", "Flow", "Optical flow method, for the motion between frames",
+                          flows, static_cast<int>(defaults.flow), dense_property_flags));
     properties.add(&DenseSettings::interpolation, interpolation_property(defaults.interpolation));
   }
 };

@@ -37,11 +37,11 @@ namespace {
 constexpr guint max_interpolated_frames = 255;
 constexpr guint default_interpolated_frames = 10;
 
-/// Limits of the interval and of the processing time in the latency.
+/// Maximum interval, and maximum processing time, in the latency.
 constexpr Nanoseconds max_latency = GST_SECOND;
 
-/// Processing time that sinks allow for (the default of their property processing-deadline).
-/// Multiples of it are reported as latency.
+/// Default processing-deadline of sinks: processing time that they already add to the latency. More
+/// is reported in multiples of it.
 constexpr Nanoseconds processing_deadline = 20 * GST_MSECOND;
 
 /// User-settable values, copied once per buffer.
@@ -74,7 +74,7 @@ struct Latency {
 /// State from start to stop, independent of caps.
 struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
-  bool backwards = false;                       ///< the segment was refused
+  bool backwards = false;                       ///< the segment was rejected: its rate is negative
   bool discontinuous = false;                   ///< the next buffer is discontinuous
   GstFlowReturn flow = GST_FLOW_OK;             ///< result of the last push
   FrameClock clock;                             ///< for frames without a PTS
@@ -137,14 +137,14 @@ static void install_thresholds(GObjectClass* klass, double grey_levels) {
   properties.add(
       [](Settings& settings) -> double& { return settings.simulation.positive_threshold; },
       g_param_spec_double("positive-threshold", "Positive threshold",
-                          "Minimum rise in brightness for an ON event, exclusive "
-                          "(8-bit grey levels, whatever the depth of the video)",
+                          "Contrast threshold of ON events: brightness must rise by more than "
+                          "this (8-bit grey levels at any bit depth)",
                           0, 255, grey_levels, controllable_flags));
   properties.add(
       [](Settings& settings) -> double& { return settings.simulation.negative_threshold; },
       g_param_spec_double("negative-threshold", "Negative threshold",
-                          "Minimum fall in brightness for an OFF event, exclusive "
-                          "(8-bit grey levels, a magnitude, whatever the depth of the video)",
+                          "Contrast threshold of OFF events: brightness must fall by more than "
+                          "this (8-bit grey levels at any bit depth, a magnitude)",
                           0, 255, grey_levels, controllable_flags));
 }
 
@@ -161,13 +161,13 @@ static void install_base_properties(GObjectClass* klass) {
   Properties<settings_of> properties(klass);
   properties.add([](Settings& settings) -> int& { return settings.simulation.threads; },
                  g_param_spec_uint("n-threads", "Threads",
-                                   "Maximum number of threads for one frame (0 = one for each "
-                                   "processor); the events are the same for any number",
+                                   "Maximum number of threads (0 = one per processor); the events "
+                                   "do not depend on it",
                                    0, G_MAXINT, 0, property_flags));
   properties.add(
       &Settings::palette,
-      g_param_spec_enum("palette", "Palette", "Colours of accumulated-event video", palette_type(),
-                        static_cast<int>(PaletteName::dark), property_flags));
+      g_param_spec_enum("palette", "Palette", "Colours of event frames (accumulated-event video)",
+                        palette_type(), static_cast<int>(PaletteName::dark), property_flags));
 }
 
 static GuardedSettings<SimulatorQos>& qos_of(GObject* object) {
@@ -191,15 +191,15 @@ static void install_qos_properties(GObjectClass* klass) {
       [](SimulatorQos&, const GValue*) {},
       [](SimulatorQos& qos, GValue* value) { g_value_take_boxed(value, qos.stats()); },
       g_param_spec_boxed("stats", "Statistics",
-                         "Counts since start: frames (processed), skipped-frames (because of "
-                         "qos), processing-time (of all processed frames, ns)",
+                         "Counters since start: frames (processed), skipped-frames (due to qos), "
+                         "processing-time (of all processed frames, ns)",
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 }
 
 /* time */
 
-/// Posts a message if this changes the latency.
+/// Changes the latency, and posts a message if it differs.
 template <class Change>
 static void change_latency(GstEventSimulator* self, const Change& change) {
   GstClockTime before = 0;
@@ -344,8 +344,8 @@ static void warn_of_times(GstEventSimulator* self, const char* what) {
   priv_of(self).stream.warn_of_times(
       self,
       {GST_STREAM_ERROR_FORMAT, std::string("Bad video timestamps: ") + what +
-                                    ". No events are made across it; videorate or a parser "
-                                    "upstream can repair timestamps."},
+                                    ". No events are simulated across this point; videorate or a "
+                                    "parser upstream can repair timestamps."},
       "an interval needs a PTS at both ends");
 }
 
@@ -361,12 +361,12 @@ static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
       "its buffers, or a framerate in its caps.";
   if (source == Source::arrival)
     text =
-        "The video has no timestamps: events are timed by when its frames arrive. Set "
+        "The video has no timestamps: using the arrival times of its frames. Set "
         "do-timestamp=true on the source, or the PTS of its buffers.";
   else if (source == Source::framerate)
     text =
-        "The video has no timestamps: events are timed by its framerate. Set the PTS of its "
-        "buffers if frames are not evenly spaced.";
+        "The video has no timestamps: using its framerate. Set the PTS of its buffers if frames "
+        "are not evenly spaced.";
   stream.warn_of_no_pts(self, {GST_STREAM_ERROR_FORMAT, text},
                         "a buffer has no PTS; the framerate in the caps is " +
                             std::to_string(GST_VIDEO_INFO_FPS_N(&video)) + "/" +
@@ -399,14 +399,15 @@ static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   // An interval starting with this frame would overlap the last one.
   const auto until = priv_of(self).stream.handed_out_until;
   if (!until || time >= *until) return true;
-  GST_LOG_OBJECT(
-      self, "skipping the frame at %" GST_TIME_FORMAT ": there are events until %" GST_TIME_FORMAT,
-      GST_TIME_ARGS(pts), GST_TIME_ARGS(static_cast<GstClockTime>(*until)));
+  GST_LOG_OBJECT(self,
+                 "skipping the frame at %" GST_TIME_FORMAT ": events until %" GST_TIME_FORMAT
+                 " were sent",
+                 GST_TIME_ARGS(pts), GST_TIME_ARGS(static_cast<GstClockTime>(*until)));
   return false;
 }
 
 /// Runs `work`; reports any exception and drops the state, because the simulator is then unusable.
-/// What comes after it, if anything, is discontinuous.
+/// The next output, if any, is discontinuous.
 template <class Work>
 static void reported(GstEventSimulator* self, const Work& work) {
   const auto failure = [&](const std::exception& error) -> Report {
@@ -423,7 +424,7 @@ static void reported(GstEventSimulator* self, const Work& work) {
   if (!guarded(self, failure, work)) priv_of(self).stream.flow = GST_FLOW_ERROR;
 }
 
-/// Pushes the intervals that are not finished, before what follows them.
+/// Finishes and pushes all pending intervals.
 static void finish_intervals(GstEventSimulator* self) {
   if (const auto& state = priv_of(self).state) reported(self, [&] { state->frames->finish(); });
 }
@@ -455,7 +456,7 @@ static GstCaps* fixate_caps(GstBaseTransform*, GstPadDirection direction, GstCap
   return event_simulator_fixate_output(other);
 }
 
-/// Warns about interlaced video, whose two fields are taken at different times.
+/// Warns about interlaced video, whose two fields are captured at different times.
 static void check_interlacing(GstEventSimulator* self, GstBuffer* frame) {
   auto& priv = priv_of(self);
   const auto mode = GST_VIDEO_INFO_INTERLACE_MODE(&priv.state->video);
@@ -471,23 +472,23 @@ static void check_interlacing(GstEventSimulator* self, GstBuffer* frame) {
       std::string("interlace-mode=") + gst_video_interlace_mode_to_string(mode));
 }
 
-/// Name of a query that a simulator upstream answers where it draws its events.
+/// Name of a query that a simulator upstream answers if it draws its events.
 static constexpr const char* draws_query = "event-simulator-draws";
 
-/// Warns where the video is drawn events, such as those of one simulator right before another.
+/// Warns if the video already shows drawn events, such as those of another simulator upstream.
 static void check_input(GstEventSimulator* self) {
   GstQuery* query = gst_query_new_custom(GST_QUERY_CUSTOM, gst_structure_new_empty(draws_query));
   if (gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(self), query))
     priv_of(self).stream.warn_of_drawn_input(
         self,
         {GST_STREAM_ERROR_FORMAT,
-         "The video already shows events, which a simulator upstream drew. To simulate one video "
-         "twice, put a tee before both simulators."},
+         "The video already shows events drawn by a simulator upstream. To feed one video to two "
+         "simulators, insert a tee before both."},
         std::string("answered upstream: ") + draws_query);
   gst_query_unref(query);
 }
 
-/// Whether this is that query, and the events are drawn here.
+/// True if this is that query, and the events are drawn here.
 static bool draws_for(GstBaseTransform* transform, GstQuery* query) {
   if (GST_QUERY_TYPE(query) != GST_QUERY_CUSTOM) return false;
   const GstStructure* asked = gst_query_get_structure(query);
@@ -506,7 +507,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   GstVideoInfo drawn;
   if (!gst_video_info_from_caps(&video, in) ||
       (event_simulator_draws(out) && !gst_video_info_from_caps(&drawn, out))) {
-    GST_ERROR_OBJECT(self, "cannot make %" GST_PTR_FORMAT " of %" GST_PTR_FORMAT, out, in);
+    GST_ERROR_OBJECT(self, "cannot make %" GST_PTR_FORMAT " from %" GST_PTR_FORMAT, out, in);
     return FALSE;
   }
   const auto luma = FrameLuma::format_of(video);
@@ -615,7 +616,7 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
 static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
   auto& flow = priv_of(self).stream.flow;
-  *out = nullptr;  // output is pushed here, because it may follow later
+  *out = nullptr;  // output is pushed by the simulator, possibly later
   OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
   // Since output was pushed outside of this function, downstream may have been relinked.
   if (flow != GST_FLOW_EOS && flow != GST_FLOW_ERROR) {
@@ -628,8 +629,8 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
 
 /* events, queries, states */
 
-/// Replaces a segment in another format than TIME, as from byte sources, by the TIME segment of the
-/// timestamps that frames are given. Takes ownership of `event`.
+/// Replaces a segment in another format than TIME, as from byte sources, by a TIME segment for the
+/// timestamps that frames get here. Takes ownership of `event`.
 static GstEvent* segment_of_times(GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
@@ -747,7 +748,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
-    // Not forwarded: frames are skipped here, where that is wanted, and nowhere else.
+    // Not forwarded: only this element skips frames.
     priv_of(GST_EVENT_SIMULATOR(transform)).qos.access([&](SimulatorQos& qos) {
       qos.take_event(transform, event);
     });

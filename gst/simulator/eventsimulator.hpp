@@ -11,16 +11,17 @@
 #include "gst/simulator/video_simulator.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// A simulation method, and its element: video in, events or accumulated-event video out.
+/// A simulation method, and its element: video in, events or event frames (accumulated-event video)
+/// out.
 ///
 /// N frames give N - 1 intervals; the first frame after start, flush or a discontinuity only serves
 /// as reference for the next one. An interval has the PTS of its first frame and is pushed when its
 /// last frame arrives, so the latency is one frame plus the processing time; at the latest, before
-/// any serialized event or query is handled. In the event stream an interval without events is a
-/// GAP. In drawn video, an interval is a picture that replaces its
-/// last frame, with that frame's timestamps and those of its metas that remain valid, so the
-/// latency is the processing time. Where frames are skipped, its duration lasts until the expected
-/// next picture. A first frame gives an empty picture.
+/// any serialized event or query is handled. In an event stream, an interval without events is a
+/// GAP. In drawn video, an interval is a picture that replaces its last frame, with that frame's
+/// timestamps and those of its metas that remain valid, so the latency is the processing time. If
+/// frames are skipped, the picture lasts until the next expected picture. A first frame gives an
+/// empty picture.
 struct EventSimulatorMethod {
   const char* type_name;
   const char* long_name;
@@ -33,7 +34,7 @@ struct EventSimulatorMethod {
   /// Creates the simulator of an element for frames of this format. May throw.
   std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);
 
-  /// Video taken and drawn.
+  /// Input video and drawn video.
   const SimulatorVideo& video = system_memory_video;
 
   /// For methods with their own properties, else null: create a GuardedSettings, install the

@@ -8,8 +8,8 @@
 
 #include "gst/base/owned.hpp"
 
-/// Timestamps frames without PTS: by the running time of their arrival if the source is live, else
-/// by the framerate in the caps.
+/// Timestamps frames without a PTS: with the running time of their arrival if the source is live,
+/// else according to the framerate in the caps.
 class FrameClock {
  public:
   /// Origin of the PTS of a frame.

@@ -25,18 +25,18 @@ class SimulatorQos {
   /// Starts processing a frame. If the frame is skipped instead, returns the message that reports
   /// it; only frames that end an interval are `skippable`.
   GstMessage* begin(GstBaseTransform* element, GstBuffer* frame, bool skippable);
-  /// When the work on the last frame began; none without a clock.
+  /// Time at which the work on the last frame began; none without a clock.
   std::optional<Nanoseconds> began() const { return began_; }
-  /// Ends the work on a frame, which began then, or, if that is later, when the last output had
+  /// Ends the work on a frame. It began at `began` or, if that is later, when the last output had
   /// been pushed. Returns its duration; 0 without a clock.
   Nanoseconds end_work(GstBaseTransform* element, std::optional<Nanoseconds> began);
-  /// Extends the duration of its picture over the frames that will probably be skipped after it,
-  /// because sinks drop a picture that comes after its end.
+  /// Extends the duration of the frame's picture over the frames that will probably be skipped
+  /// next, because sinks drop a picture that arrives after its end.
   void extend(GstBaseTransform* element, GstBuffer* picture, GstClockTime frame_duration) const;
   /// Ends the processing of a frame, after the output has been pushed.
   void end(GstBaseTransform* element);
 
-  /// Latency of elements downstream that they do not report.
+  /// Latency of downstream elements that they do not report.
   Nanoseconds downstream_latency() const { return pacer_.downstream_latency(); }
 
   /// Forgets the frames, at a new segment.

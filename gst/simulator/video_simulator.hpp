@@ -16,17 +16,17 @@
 #include "src/render/accumulator.hpp"
 #include "src/simulate/simulator.hpp"
 
-/// An interval, whose PTS and length are those of its events.
+/// An interval between two frames.
 struct Interval {
-  OwnedBuffer frame;  ///< that ends it
+  OwnedBuffer frame;  ///< frame that ends it
   eventcamera::Nanoseconds start = 0;
   eventcamera::Nanoseconds end = 0;
   std::optional<eventcamera::Nanoseconds> work_began{};  ///< on the frame
 };
 
-/// Ends the work on the frame of an interval, lets it go, and pushes the events of the interval: a
-/// GAP if there are none, nothing if `events` is null, because it is a first frame. A
-/// VideoSimulator of this element calls it with the stream lock. May throw.
+/// Ends the work on the frame of an interval, releases it, and pushes the events of the interval: a
+/// GAP if there are none; nothing if `events` is null, after a first frame. Called by the element's
+/// VideoSimulator, with the stream lock. May throw.
 void event_simulator_push_interval(GObject* element, Interval interval,
                                    const eventcamera::EventBuckets* events);
 
@@ -34,19 +34,19 @@ void event_simulator_push_interval(GObject* element, Interval interval,
 /// Failures are reported, and drop the simulator.
 void event_simulator_push_finished(GstElement* element);
 
-/// A simulator of the frames in buffers, wherever their pixels are. Called with the stream lock.
+/// Simulator of frames in buffers of any kind of memory. Called with the stream lock.
 class VideoSimulator {
  public:
   virtual ~VideoSimulator() = default;
 
-  /// Takes frames of this format from now on. Size and depth must be the same.
+  /// Sets the format of the next frames. Size and depth must stay the same.
   virtual void set_video(const GstVideoInfo& video) = 0;
 
-  /// Draws pictures of this format from now on.
+  /// Sets the format of the next pictures.
   virtual void set_drawn_video(const GstVideoInfo& drawn) = 0;
 
-  /// Simulates the interval and calls event_simulator_push_interval(): before it returns, or, where
-  /// the events come later, from a later call, in order. Throws VideoSimulatorError as well.
+  /// Simulates the interval, and calls event_simulator_push_interval() before it returns or, if the
+  /// events are ready later, from a later call, in order. Throws VideoSimulatorError as well.
   virtual void push(Interval interval, const eventcamera::Settings& settings) = 0;
 
   /// Draws the events until `frame` in the buffer `picture` (none for a first frame). Throws
@@ -55,19 +55,19 @@ class VideoSimulator {
                     const eventcamera::Settings& settings, const eventcamera::Palette& palette,
                     GstBuffer* picture) = 0;
 
-  /// Pushes the intervals that are finished, and lets go of frames that have been read.
+  /// Pushes the finished intervals, and releases frames that have been read.
   virtual void push_finished() {}
 
-  /// Waits for the intervals that are not finished, and pushes them.
+  /// Waits for the pending intervals, and pushes them.
   virtual void finish() {}
 
-  /// Forgets the intervals that are not finished.
+  /// Forgets the pending intervals.
   virtual void drop() {}
 
   virtual eventcamera::IntervalSimulator& simulator() = 0;
 };
 
-/// Failure that has a message of its own.
+/// Failure with its own message.
 class VideoSimulatorError : public std::runtime_error {
  public:
   VideoSimulatorError(Report report, const std::string& cause)
@@ -79,14 +79,14 @@ class VideoSimulatorError : public std::runtime_error {
   Report report_;
 };
 
-/// A frame that is not what its caps say.
+/// Error for a frame that does not match its caps.
 inline VideoSimulatorError cannot_read(const std::string& fault) {
   return {{GST_RESOURCE_ERROR_FAILED,
            "Cannot read a video frame: " + fault + ". Check the element upstream."},
           fault};
 }
 
-/// An output buffer that is not what its caps say.
+/// Error for an output buffer that does not match its caps.
 inline VideoSimulatorError cannot_draw(const std::string& fault) {
   return {{GST_RESOURCE_ERROR_FAILED,
            "Cannot draw into an output buffer: " + fault + ". Check the element downstream."},

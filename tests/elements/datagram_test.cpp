@@ -424,7 +424,7 @@ TEST(Payloader, SkipsEventsOutsideTheSensor) {
                     Event::at(1, 480, 3, Polarity::on)},
                    40 * GST_MSECOND));
   EXPECT_EQ(gst_buffer_get_size(h.pull().get()), 4);
-  EXPECT_EQ(h.warning(), "Cannot send all events: some lie beyond the sensor; skipping these.");
+  EXPECT_EQ(h.warning(), "Cannot send all events: some are outside the sensor; skipping them.");
 }
 
 TEST(Payloader, SkipsInvalidBuffers) {

@@ -434,7 +434,8 @@ class EndOfThreads {
 };
 
 constexpr const char* thread_has_ended =
-    "OpenGL cannot simulate: the OpenGL context has ended. Use eventsim-frame, which runs on the "
+    "OpenGL cannot simulate: the OpenGL context was destroyed. Use eventsim-frame, which runs on "
+    "the "
     "CPU.";
 
 TEST(OpenGl, IsAnErrorWhereItsThreadHasEnded) {

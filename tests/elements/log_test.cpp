@@ -123,7 +123,7 @@ TEST(Log, WarnsOnceOfSkippedEvents) {
          "application/x-event-camera");
   for (const GstClockTime time : {1, 2, 3})
     h.push(buffer_of(time * GST_SECOND, {{0, 9, 0}}, GST_MSECOND));
-  log.expect_one_warning("beyond the sensor", 3);
+  log.expect_one_warning("outside the sensor", 3);
 }
 
 TEST(Log, WarnsOnceOfEventsThatReadersDrop) {

@@ -529,11 +529,11 @@ TEST(RtpEventPay, WarnsOfEventsThatItCannotSend) {
   Harness h("rtpeventpay");
   h.caps(davis_caps, "application/x-rtp");
   push(h, {0, 10'000'000, {Event::at(346, 2, 3, Polarity::on), Event::at(1, 2, 3, Polarity::on)}});
-  EXPECT_NE(h.warning().find("beyond the sensor"), std::string::npos);
+  EXPECT_NE(h.warning().find("outside the sensor"), std::string::npos);
   push(h, {10'000'000,
            10'000'000,
            {Event::at(1, 2, 3, Polarity::on), Event::at(1, 2, 2, Polarity::on)}});
-  EXPECT_NE(h.warning().find("earlier than those before them"), std::string::npos);
+  EXPECT_NE(h.warning().find("earlier than the previous one"), std::string::npos);
   EXPECT_EQ(stat_of(h.element(), "rejected-events"), 2U);
   EXPECT_EQ(stat_of(h.element(), "events"), 2U);
 }

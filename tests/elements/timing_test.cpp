@@ -213,7 +213,7 @@ TEST_P(EveryElement, TimesFramesOfALiveSourceWithoutPtsByTheClock) {
   }
   expect_interval(7 * GST_MSECOND, 50 * GST_MSECOND);
   expect_interval(50 * GST_MSECOND, 81 * GST_MSECOND);
-  EXPECT_NE(h.warning().find("arrive"), std::string::npos);
+  EXPECT_NE(h.warning().find("arrival"), std::string::npos);
   EXPECT_EQ(h.warning(), "");
 }
 

@@ -193,8 +193,8 @@ refused "up to 1024x512 pixels" videotestsrc num-buffers=3 ! video/x-raw,width=1
 warnings() { # ARGUMENT...
   timeout 60 "$GST_LAUNCH" "$@" 2>&1 | grep "^WARNING" || true
 }
-warnings videotestsrc num-buffers=3 ! eventsim-diff ! queue ! videoconvert ! eventsim-dense ! fakesink | grep -q "put a tee in front of both simulators" ||
-  fail "no warning of events of drawn events"
+warnings videotestsrc num-buffers=3 ! eventsim-diff ! queue ! videoconvert ! eventsim-dense ! fakesink | grep -q "insert a tee before both" ||
+  fail "no warning about events of drawn events"
 [ -z "$(warnings videotestsrc num-buffers=3 ! tee name=t  t. ! queue ! eventsim-diff ! videoconvert ! fakesink  t. ! queue ! eventsim-dense ! fakesink)" ] ||
   fail "a warning of two simulators side by side"
 
