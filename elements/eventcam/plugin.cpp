@@ -30,5 +30,5 @@
 #define TYPE_FINDERS(X) \
   X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(npz) X(propheseedat) X(propheseeraw)
 
-EVENTSIM_PLUGIN(eventcam, "Event streams: render, read, write, send, measure", ELEMENTS,
+EVENTSIM_PLUGIN(eventcam, "Event streams: read, write, draw, measure and send events", ELEMENTS,
                 TYPE_FINDERS)

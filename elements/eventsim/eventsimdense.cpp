@@ -4,12 +4,12 @@
  * @title: eventsim-dense
  * @short_description: events from frames interpolated with dense optical flow
  *
- * Turns video into the events that an event camera would have seen. Frames are interpolated with
- * dense optical flow; pixels that change between successive interpolated frames by more than the
- * thresholds fire, at the time of the later one (Ziegler et al., Real-time event simulation with
- * frame-based cameras, ICRA 2023, section III-A).
+ * Turns video into the events that an event camera would have reported. Frames are interpolated
+ * with dense optical flow; pixels that change between successive interpolated frames by more than
+ * the contrast thresholds fire, at the time of the later frame (Ziegler et al., Real-time event
+ * simulation with frame-based cameras, ICRA 2023, section III-A).
  *
- * For scenes in which everything moves, as with a moving camera.
+ * For scenes in which everything moves, such as those of a moving camera.
  *
  * ## Example launch line
  * |[

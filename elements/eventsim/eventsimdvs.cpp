@@ -4,19 +4,18 @@
  * @title: eventsim-dvs
  * @short_description: events from a physical pixel model
  *
- * Turns video into the events that an event camera would have seen, by simulating its pixels:
+ * Turns video into the events that an event camera would have reported, by simulating its pixels:
  * response to light, photoreceptor bandwidth, a reference level stored across frames, threshold
  * mismatch, leak, shot noise, hot and dead pixels, refractory period, latency, and the limits of
- * the readout. Each event has the time at which its pixel's signal crossed its threshold, to the
- * microsecond.
+ * the readout. The time of an event is that of the pixel's threshold crossing, to the microsecond.
  *
  * A preset sets all of these; properties that are set explicitly, before or after the preset,
  * override it. Times are nanoseconds. Properties that gst-inspect-1.0 marks as controllable are
- * read at the time of each frame. Thresholds are in units of the response: with log and lin-log a
- * threshold of 0.2 is a change of light by 22 %; linear has as many units from black to white as
- * lin-log, ln(255) = 5.54, so that 0.2 is 9.2 grey levels of 8-bit video.
+ * read at the time of each frame. Contrast thresholds are in units of the response: with log and
+ * lin-log, a threshold of 0.2 is a change of light by 22 %; linear has the same range from black to
+ * white as lin-log, ln(255) = 5.54, so 0.2 is 9.2 grey levels of 8-bit video.
  *
- * If the sensor noise of a webcam makes a static or dark scene fire, denoise removes the noise and
+ * If a static or dark scene fires because of a webcam's sensor noise, denoise removes the noise and
  * keeps the edges.
  *
  * The same video, settings and seed give the same events for any number of threads.
@@ -84,9 +83,9 @@ static GType refractory_reset_type() {
 static GType preset_type() {
   static const GEnumValue values[] = {
       {static_cast<int>(DvsPreset::ideal), "No noise, no delay; lin-log", "ideal"},
-      {static_cast<int>(DvsPreset::esim), "ESIM: the same with a logarithm", "esim"},
-      {static_cast<int>(DvsPreset::v2e_clean), "v2e, clean: mismatch only", "v2e-clean"},
-      {static_cast<int>(DvsPreset::v2e_noisy), "v2e, noisy: in dim light", "v2e-noisy"},
+      {static_cast<int>(DvsPreset::esim), "ESIM: like ideal, with a logarithmic response", "esim"},
+      {static_cast<int>(DvsPreset::v2e_clean), "v2e, clean: threshold mismatch only", "v2e-clean"},
+      {static_cast<int>(DvsPreset::v2e_noisy), "v2e, noisy: dim light", "v2e-noisy"},
       {static_cast<int>(DvsPreset::icns), "IEBCS, the simulator of the ICNS", "icns"},
       {static_cast<int>(DvsPreset::davis346), "iniVation DAVIS346", "davis346"},
       {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636", "gen4"},
@@ -97,7 +96,7 @@ static GType preset_type() {
 
 namespace {
 
-/// Flags of properties that a GstController can change over time, and of traits of the sensor.
+/// Flags of properties that a GstController can change over time, and of sensor traits.
 constexpr auto controllable = static_cast<GParamFlags>(GST_PARAM_CONTROLLABLE);
 constexpr GParamFlags fixed = {};
 
@@ -120,64 +119,65 @@ struct Setting {
 
 const Setting table[] = {
     {"denoise", "Denoise",
-     "Remove camera noise from each frame first: differences between neighbouring pixels of up to "
-     "this size are smoothed, larger ones such as edges stay (grey levels, white is 255; 0 = off, "
-     "8 suits noisy webcams)",
+     "Remove camera noise from each frame first: smooth differences between neighbouring pixels of "
+     "up to this size, and keep larger ones such as edges (grey levels, white is 255; 0 = off, 8 "
+     "suits noisy webcams)",
      &DvsSettings::denoise, 0, 255, controllable},
     {"linear-light", "Linear light",
-     "Undo the sRGB transfer function (IEC 61966-2-1) first, to recover the light that the camera "
-     "saw; otherwise luma is used as light",
+     "Invert the sRGB transfer function (IEC 61966-2-1) first, to recover the light that reached "
+     "the camera; otherwise luma is used as light",
      &DvsSettings::linear_light},
     {"response", "Response", "Response of the photoreceptor to light", &DvsSettings::response, 0, 0,
      fixed, response_type},
     {"log-eps", "Offset of the logarithm",
-     "Light that response=log adds before the logarithm, which limits how dark pixels get (white "
-     "is 1)",
+     "Light that response=log adds before the logarithm, which limits the response to dark pixels "
+     "(white is 1)",
      &DvsSettings::log_eps, 1e-6, 1},
     {"upsampling", "Upsampling", "Model of light between two frames", &DvsSettings::upsampling, 0,
      0, fixed, upsampling_type},
     {"max-interpolated-frames", "Maximum interpolated frames",
-     "Maximum number of frames interpolated between two frames with upsampling=motion; with enough "
-     "of them, no point moves more than a pixel from one to the next",
+     "Maximum number of frames interpolated between two frames with upsampling=motion; without "
+     "this limit, no point moves by more than a pixel between them",
      &DvsSettings::max_interpolated_frames, 0, 254},
     {"cutoff-frequency", "Cutoff frequency",
      "Bandwidth of the photoreceptor at white; darker pixels are slower (Hz; 0 = no limit)",
      &DvsSettings::cutoff_frequency, 0, 1e6, controllable},
     {"dark-light", "Dark light",
-     "Background illuminance, which limits how slow and how noisy dark pixels get (fraction of "
+     "Background illuminance, which limits how slow and noisy dark pixels get (fraction of "
      "white): the "
      "bandwidth of a pixel is cutoff-frequency times its brightness, (light + dark-light) / (1 + "
      "dark-light), and its shot noise falls from all of shot-noise-rate at brightness 0 to a "
      "quarter at 1",
      &DvsSettings::dark_light, 1e-6, 1, controllable},
     {"positive-threshold", "Positive threshold",
-     "Rise above the reference level that fires an ON event (units of the response)",
+     "Contrast threshold of ON events: rise above the reference level (units of the response)",
      &DvsSettings::positive_threshold, 1e-3, 10, controllable},
     {"negative-threshold", "Negative threshold",
-     "Fall below the reference level that fires an OFF event (units of the response, a magnitude)",
+     "Contrast threshold of OFF events: fall below the reference level (units of the response, a "
+     "magnitude)",
      &DvsSettings::negative_threshold, 1e-3, 10, controllable},
     {"threshold-sigma", "Threshold mismatch",
-     "Standard deviation of the thresholds between pixels (units of the response)",
+     "Standard deviation of the contrast thresholds between pixels (units of the response)",
      &DvsSettings::threshold_sigma, 0, 10},
     {"threshold-jitter", "Threshold jitter",
-     "Standard deviation of the thresholds between events (units of the response)",
+     "Standard deviation of the contrast thresholds between events (units of the response)",
      &DvsSettings::threshold_jitter, 0, 10, controllable},
     {"leak-rate", "Leak rate",
-     "Mean rate of ON events of a pixel without change, from the leak of its reference level (Hz)",
+     "Mean rate of ON events of a pixel in constant light, due to the leak of its reference level "
+     "(Hz)",
      &DvsSettings::leak_rate, 0, 1e4, controllable},
     {"leak-spread", "Leak spread", "Standard deviation of the leak rate between pixels (decades)",
      &DvsSettings::leak_spread, 0, 1},
-    {"shot-noise-rate", "Shot-noise rate",
-     "Rate of random events of a pixel in the dark, ON and OFF together (Hz)",
+    {"shot-noise-rate", "Shot-noise rate", "Rate of noise events of a dark pixel, ON plus OFF (Hz)",
      &DvsSettings::shot_noise_rate, 0, 1e4, controllable},
     {"hot-pixels", "Hot pixels",
-     "Fraction of pixels that leak 10 to 1000 ON events per second, regardless of light",
+     "Fraction of pixels whose leak fires 10 to 1000 ON events per second, regardless of light",
      &DvsSettings::hot_pixels, 0, 1},
     {"dead-pixels", "Dead pixels", "Fraction of pixels that never fire", &DvsSettings::dead_pixels,
      0, 1},
     {"refractory-period", "Refractory period",
-     "Time after an event in which a pixel does not fire again (ns)",
-     &DvsSettings::refractory_period, 0, max_time, controllable},
+     "Time after an event during which the pixel cannot fire (ns)", &DvsSettings::refractory_period,
+     0, max_time, controllable},
     {"refractory-reset", "Refractory reset", "Reference level of a pixel after an event",
      &DvsSettings::refractory_reset, 0, 0, fixed, refractory_reset_type},
     {"exposure-pulse", "Exposure pulse",
@@ -185,18 +185,19 @@ const Setting table[] = {
      "frames (units of the response)",
      &DvsSettings::exposure_pulse, 0, 10, controllable},
     {"exposure-lead", "Exposure lead",
-     "How long before a frame's timestamp its exposure begins, and with it exposure-pulse (ns); "
-     "longer than the time between frames, there is no pulse",
+     "Time from the start of a frame's exposure, and of exposure-pulse, to the frame's timestamp "
+     "(ns); if longer than the time between frames, there is no pulse",
      &DvsSettings::exposure_lead, 0, max_time, controllable},
     {"pixel-latency", "Pixel latency",
-     "Time from the crossing of a threshold to the event, with which the refractory period begins "
-     "(ns). Events past the last frame are not sent",
+     "Time from the threshold crossing to the event, when the refractory period begins (ns). "
+     "Events "
+     "after the last frame are not sent",
      &DvsSettings::pixel_latency, 0, max_time, controllable},
     {"pixel-latency-jitter", "Pixel latency jitter", "Standard deviation of pixel-latency (ns)",
      &DvsSettings::pixel_latency_jitter, 0, max_time, controllable},
     {"max-rate", "Maximum rate",
-     "Capacity of the readout: further events wait, row by row, and a waiting pixel fires no other "
-     "event (events/s; 0 = no limit)",
+     "Capacity of the readout: further events wait, row by row, and a waiting pixel cannot fire "
+     "again (events/s; 0 = no limit)",
      &DvsSettings::max_rate, 0, 1e12, controllable},
     {"seed", "Seed", "Seed of all random numbers: the same seed gives the same events",
      &DvsSettings::seed},
@@ -252,8 +253,8 @@ static void install_properties(GObjectClass* klass) {
       [](Choice& choice, const GValue* value) { choice.take_preset(value); },
       [](Choice& choice, GValue* value) { write_value(choice.preset, value); },
       g_param_spec_enum("preset", "Preset",
-                        "Camera model: gives values to all properties of the pixel, except those "
-                        "that are set explicitly, before or after",
+                        "Camera model: sets all properties of the pixel, except those that are set "
+                        "explicitly, before or after",
                         preset_type(), static_cast<int>(defaults.preset), property_flags));
   for (std::size_t i = 0; i < std::size(table); ++i) {
     const auto add = [&](auto member) {

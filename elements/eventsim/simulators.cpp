@@ -8,13 +8,13 @@
 /**
  * SECTION:element-eventsim-frame
  * @title: eventsim-frame
- * @short_description: events from the difference frame
+ * @short_description: events from the difference of two frames
  *
- * Turns video into the events that an event camera would have seen: an ON event if a pixel became
- * brighter than in the last frame by more than #GstEventSimFrame:positive-threshold, an OFF event
- * if it became darker by more than #GstEventSimFrame:negative-threshold, all at the time of the
- * frame (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA 2023, section
- * III).
+ * Turns video into the events that an event camera would have reported: an ON event if a pixel
+ * became brighter than in the last frame by more than #GstEventSimFrame:positive-threshold, an OFF
+ * event if it became darker by more than #GstEventSimFrame:negative-threshold, all at the time of
+ * the frame (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA 2023,
+ * section III).
  *
  * The cheapest simulator, and the only one without event times between frames.
  *
@@ -38,14 +38,13 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_frame, "eventsim-frame", GST_RANK_NONE,
  * @title: eventsim-sparse
  * @short_description: events from frames interpolated where pixels changed
  *
- * Turns video into the events that an event camera would have seen. Only pixels that changed
+ * Turns video into the events that an event camera would have reported. Only pixels that changed
  * between two frames by more than the smaller threshold are tracked, with Lucas-Kanade, and drawn
  * into each interpolated frame; pixels that change between successive interpolated frames by more
- * than the thresholds fire (Ziegler et al., Real-time event simulation with frame-based cameras,
- * ICRA 2023, section III-B).
+ * than the contrast thresholds fire (Ziegler et al., Real-time event simulation with frame-based
+ * cameras, ICRA 2023, section III-B).
  *
- * For small objects that move in front of a static background; if everything moves, it is the
- * slowest simulator.
+ * For small objects that move in front of a static background. If everything moves, it is slow.
  *
  * ## Example launch line
  * |[
@@ -71,13 +70,13 @@ GST_ELEMENT_REGISTER_DEFINE(eventsim_sparse, "eventsim-sparse", GST_RANK_NONE,
  * @title: eventsim-diff
  * @short_description: events from interpolated difference frames
  *
- * Turns video into the events that an event camera would have seen. Pixels whose difference between
- * two frames exceeds the thresholds are tracked into the next difference frame with Lucas-Kanade,
- * and fire on the way (Ziegler et al., Real-time event simulation with frame-based cameras, ICRA
- * 2023, section III-C).
+ * Turns video into the events that an event camera would have reported. Pixels whose difference
+ * between two frames exceeds the contrast thresholds are tracked into the next difference frame
+ * with Lucas-Kanade, and fire along the track (Ziegler et al., Real-time event simulation with
+ * frame-based cameras, ICRA 2023, section III-C).
  *
- * For objects of steady motion and appearance in front of a static background. The second frame of
- * a stream has no earlier difference: its events are those of eventsim-frame.
+ * For objects with steady motion and appearance in front of a static background. The second frame
+ * of a stream has no earlier difference frame: its events are those of eventsim-frame.
  *
  * ## Example launch line
  * |[

@@ -4,10 +4,10 @@
  * @title: gleventsim-dense
  * @short_description: events from frames interpolated with dense optical flow, on the GPU
  *
- * #GstEventSimDense for video in OpenGL textures, with compute shaders. The events are the same
- * given the same flow. Flow differs in the last bits of floating-point numbers, and more where the
- * CPU computes it only around the pixels that changed, with another pyramid and other borders.
- * Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen.
+ * #GstEventSimDense for video in OpenGL textures, with compute shaders. The same flow gives the
+ * same events. The flow differs in the last bits of floating-point numbers, and more if the CPU
+ * computes it only around changed pixels, with another pyramid and other borders. Needs OpenGL ES
+ * 3.1 or OpenGL 4.3; works without a screen.
  *
  * ## Example launch line
  * |[

@@ -8,11 +8,11 @@
 /**
  * SECTION:element-gleventsim-frame
  * @title: gleventsim-frame
- * @short_description: events from the difference frame, on the GPU
+ * @short_description: events from the difference of two frames, on the GPU
  *
- * #GstEventSimFrame for video in OpenGL textures, with compute shaders: the same events for the
- * same frames. Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen. It pays where the video
- * is in the memory of the GPU already; video in system memory is uploaded.
+ * #GstEventSimFrame for video in OpenGL textures, with compute shaders; the same frames give the
+ * same events. Needs OpenGL ES 3.1 or OpenGL 4.3; works without a screen. Use it for video that is
+ * already in GPU memory; video in system memory is uploaded first.
  *
  * ## Example launch line
  * |[
@@ -35,9 +35,9 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_frame, "gleventsim-frame", GST_RANK_NONE,
  * @title: gleventsim-sparse
  * @short_description: events by sparse interpolation, on the GPU
  *
- * #GstEventSimSparse for video in OpenGL textures, with compute shaders. The events are the same
- * given the same tracks; tracks differ at most in the last bits of floating-point numbers. Needs
- * OpenGL ES 3.1 or OpenGL 4.3; works without a screen.
+ * #GstEventSimSparse for video in OpenGL textures, with compute shaders. The same tracks give the
+ * same events; tracks differ at most in the last bits of floating-point numbers. Needs OpenGL ES
+ * 3.1 or OpenGL 4.3; works without a screen.
  *
  * ## Example launch line
  * |[
@@ -62,9 +62,9 @@ GST_ELEMENT_REGISTER_DEFINE(gleventsim_sparse, "gleventsim-sparse", GST_RANK_NON
  * @title: gleventsim-diff
  * @short_description: events by difference interpolation, on the GPU
  *
- * #GstEventSimDiff for video in OpenGL textures, with compute shaders. The events are the same
- * given the same tracks; tracks differ at most in the last bits of floating-point numbers. Needs
- * OpenGL ES 3.1 or OpenGL 4.3; works without a screen.
+ * #GstEventSimDiff for video in OpenGL textures, with compute shaders. The same tracks give the
+ * same events; tracks differ at most in the last bits of floating-point numbers. Needs OpenGL ES
+ * 3.1 or OpenGL 4.3; works without a screen.
  *
  * ## Example launch line
  * |[

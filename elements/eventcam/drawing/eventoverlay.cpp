@@ -9,8 +9,8 @@
  * before the interval's end. The two are synchronized by running time. Events are scaled to the
  * video if the sensor has a different size.
  *
- * Video from a live source waits for events no longer than its latency. Other video waits until the
- * events of its interval have come, or a GAP event or EOS says that there are none.
+ * Video from a live source waits for events no longer than its latency. Other video waits for the
+ * events of its interval, or for a GAP event or EOS.
  *
  * ## Example launch line
  * |[
@@ -93,7 +93,7 @@ std::optional<EventInterval> running_interval(GstAggregatorPad* pad,
   return EventInterval{*start, *start + (interval.end - interval.start)};
 }
 
-/// Interval that a frame is shown, in running time.
+/// Interval during which a frame is shown, in running time.
 std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) const {
   const GstClockTime start = GST_BUFFER_PTS(frame);
   if (!GST_CLOCK_TIME_IS_VALID(start) || start > G_MAXINT64) return std::nullopt;
@@ -230,7 +230,7 @@ bool EventOverlay::take_video_caps(const GstCaps* caps) {
     GST_ELEMENT_WARNING(
         element(), CORE, PAD,
         ("No events to draw: link a source of events to the pad \"event_sink\". Until "
-         "then, video from a live source goes on as it is, and other video waits."),
+         "then, video from a live source passes unchanged, and other video waits."),
         ("the pad \"event_sink\" is not linked"));
   return true;
 }
@@ -270,10 +270,10 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
       G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
   const Settings defaults;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::palette,
-      g_param_spec_enum("palette", "Palette", "Colours of pixels with ON, with OFF, and with both",
-                        palette_type(), static_cast<int>(defaults.palette), flags));
+  properties.add(&Settings::palette,
+                 g_param_spec_enum("palette", "Palette",
+                                   "Colours of pixels with ON events, OFF events, and both",
+                                   palette_type(), static_cast<int>(defaults.palette), flags));
   properties.add(&Settings::opacity,
                  g_param_spec_double("opacity", "Opacity",
                                      "Opacity of drawn events (0 = invisible, 1 = opaque)", 0, 1,
@@ -281,7 +281,7 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
   properties.add(
       &Settings::accumulation_time,
       g_param_spec_uint64("accumulation-time", "Accumulation time",
-                          "Time that an event is shown (ns; 0 = one frame)", 0,
+                          "Time for which an event is shown (ns; 0 = one frame)", 0,
                           std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
 
 #define DRAWN_VIDEO_CAPS                                               \

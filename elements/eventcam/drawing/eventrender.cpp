@@ -264,7 +264,7 @@ GstFlowReturn EventRender::take_buffer(GstBuffer* buffer) {
   return push_picture(*interval, *interval);
 }
 
-/// Starts the first picture now, because a live source sends nothing.
+/// Starts the first picture now, because the live source has not sent events.
 void EventRender::begin_now() {
   const GstSegment segment = segment_of(main_pad());
   const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
@@ -277,7 +277,7 @@ void EventRender::begin_now() {
 
 GstFlowReturn EventRender::aggregate(bool timed_out) {
   GstAggregatorPad* pad = main_pad();
-  if (timed_out) waiting_since_.reset();  // if no picture can start yet, wait once more
+  if (timed_out) waiting_since_.reset();  // if no picture can start yet, wait again
   if (!state_ || !state_->video) {
     if (gst_aggregator_pad_is_eos(pad)) return GST_FLOW_EOS;
     return gst_aggregator_pad_has_buffer(pad) ? GST_FLOW_NOT_NEGOTIATED
@@ -511,8 +511,9 @@ static void install_properties(GObjectClass* object_class) {
       g_param_spec_uint64(
           "accumulation-time", "Accumulation time",
           "Length of the window of accumulate and count, time constant of decay, maximum age of "
-          "time-surface (ns; 0 = one frame, or as long as the counts allow, for accumulate and "
-          "count, and 100 ms for the others)",
+          "time-surface (ns; 0 = for accumulate and count, one frame, or as long as event-count "
+          "and "
+          "area-event-count allow; for the others, 100 ms)",
           0, std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
   properties.add(
       &Settings::event_count,
@@ -523,8 +524,8 @@ static void install_properties(GObjectClass* object_class) {
   properties.add(
       &Settings::area_event_count,
       g_param_spec_uint("area-event-count", "Area event count",
-                        "Maximum number of events in any one area in the window of accumulate and "
-                        "count: the busiest area decides how long it is (events; 0 = no limit)",
+                        "Maximum number of events per area in the window of accumulate and count: "
+                        "the busiest area determines its length (events; 0 = no limit)",
                         0, eventcamera::RecentEvents::max_size, defaults.area_event_count, flags));
   properties.add(&Settings::area_size,
                  g_param_spec_uint("area-size", "Area size",
@@ -539,7 +540,7 @@ static void install_properties(GObjectClass* object_class) {
   gst_type_mark_as_plugin_api(gst_event_render_mode_get_type(), static_cast<GstPluginAPIFlags>(0));
 }
 
-/// Consumes QoS events: upstream would skip events.
+/// Consumes QoS events, because upstream would skip events.
 static gboolean src_event(GstAggregator* element, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_QOS)
     return GST_AGGREGATOR_CLASS(gst_event_render_parent_class)->src_event(element, event);

@@ -4,21 +4,20 @@
  * @title: aedatmux
  * @short_description: writes AEDAT 4, events and frames in one file
  *
- * Writes one event stream, one video stream, or both, in order of time. The times in the file are
+ * Writes one event stream, one video stream, or both, in time order. The times in the file are
  * those of the event stream, floor(PTS / 1000) + t microseconds; video is synchronised to it.
  *
  * A link without a pad name, `queue ! mux.`, takes either, and learns which from its caps. The pads
  * `events_0` and `video_0` take one kind, for applications that request pads by name.
  *
  * Frames of #aedatdemux keep their exposure times and their position on the sensor. Its triggers
- * and IMU samples come with the events. The property `stats` counts what was written.
+ * and IMU samples arrive with the events. The property `stats` counts what was written.
  *
  * A flushing seek truncates the file and starts over. Events that are earlier than those already
  * written, or outside the sensor, are dropped; a warning says how many.
  *
  * The file is written sequentially, so it can be streamed over a network. If downstream can seek,
- * as filesink can, the file also ends with a table of its packets, which lets readers seek and know
- * the duration.
+ * as filesink can, the file ends with a table of its packets, for fast seeks and an exact duration.
  *
  * ## Example launch line
  * |[
@@ -88,7 +87,8 @@ struct State {
   std::unique_ptr<Aedat4Encoder> encoder;  ///< null until the header is written
   gint64 shift = 0;                        ///< offset from running time to file time, nanoseconds
   Microseconds flushed = 0;                ///< file time of the last flushed packet
-  /// Announced, so that the header has a stream for them; then those that wait for the next buffer.
+  /// Set once they are announced, so that the header has a stream for them; then those waiting for
+  /// the next buffer.
   std::optional<std::vector<Trigger>> triggers;
   std::optional<std::vector<ImuSample>> imu_samples;
   WarnOnce warn{GST_CAT_DEFAULT};
@@ -289,7 +289,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   return push_bytes(self, std::move(header), true);
 }
 
-/// Encodes the triggers and IMU samples that wait. May throw.
+/// Encodes the waiting triggers and IMU samples. May throw.
 static Bytes waiting_items(GstAedatMux* self) {
   State& state = self->priv->state;
   Bytes out;
@@ -396,8 +396,8 @@ static bool is_at_end(const Pad& pad) {
   return gst_aggregator_pad_is_eos(pad.get());
 }
 
-/// True if enough is known to write the header: the caps, and what the events before the first
-/// buffer announce.
+/// True if enough is known to write the header: the caps, and the announcements before the first
+/// buffer.
 static bool is_known(GstAedatMux* self) {
   const State& state = self->priv->state;
   if (state.size != SensorSize{})
@@ -476,12 +476,12 @@ static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* c
   return true;
 }
 
-/// Adds triggers or IMU samples to those that wait. False if the event had others.
+/// Adds triggers or IMU samples to the waiting ones. False if the event has other contents.
 template <class Sample>
 static bool take_waiting(GstAedatMux* self, std::optional<std::vector<Sample>>&& samples,
                          std::optional<std::vector<Sample>>& waiting) {
   if (!samples) return false;
-  // Their times are those of the stream, which may have been moved since the file began.
+  // Their times are stream times, whose offset to file times may have changed.
   const State& state = self->priv->state;
   const gint64 moved = state.encoder ? (state.shift - shift_of(self)) / 1000 : 0;
   for (auto& sample : *samples) sample.t += moved;
@@ -538,14 +538,15 @@ static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplat
   auto* self = GST_AEDAT_MUX(aggregator);
   const std::string_view kind = GST_PAD_TEMPLATE_NAME_TEMPLATE(templ);
   if (GST_STATE(self) > GST_STATE_READY && self->priv->state.encoder) {
-    GST_WARNING_OBJECT(self, "the header is written, and has no stream for a pad %s", kind.data());
+    GST_WARNING_OBJECT(self, "the header is already written, without a stream for pad %s",
+                       kind.data());
     return nullptr;
   }
   if (kind == any_template.name_template)
     return PARENT_AGGREGATOR_CLASS->create_new_pad(aggregator, templ, wanted, caps);
   const auto is_of_kind = [&](const Pad& pad) { return GST_PAD_PAD_TEMPLATE(pad.get()) == templ; };
   if (std::ranges::any_of(pads_of(self), is_of_kind)) {
-    GST_WARNING_OBJECT(self, "there is a pad %s already", kind.data());
+    GST_WARNING_OBJECT(self, "pad %s already exists", kind.data());
     return nullptr;
   }
   const auto first = std::string(kind.substr(0, kind.find('%'))) + '0';

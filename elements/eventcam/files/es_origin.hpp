@@ -6,7 +6,7 @@
 
 /// Property `origin` of the Event Stream reader and writer.
 #define ES_ORIGIN_NICK "Origin"
-#define ES_ORIGIN_BLURB "Position of row 0; the file does not state it"
+#define ES_ORIGIN_BLURB "Position of row 0, which the file does not contain"
 
 inline GType es_origin_type() {
   using eventcamera::EsOrigin;

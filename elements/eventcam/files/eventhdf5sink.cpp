@@ -9,9 +9,9 @@
  * property `stats` counts them.
  *
  * The file is complete at the end of the stream, or when the pipeline is stopped. If the process is
- * killed, all but the events of the last second can be read. A flushing seek
- * truncates the file and starts over. Events that are earlier than those already written, or
- * outside the sensor, are dropped; a warning says how many.
+ * killed, all but the events of the last second can be read. A flushing seek truncates the file and
+ * starts over. Events that are earlier than those already written, or outside the sensor, are
+ * dropped; a warning says how many.
  *
  * ## Example launch line
  * |[
@@ -107,7 +107,8 @@ static GType format_type() {
 static GType compression_type() {
   static const GEnumValue values[] = {
       {static_cast<int>(Hdf5Writer::Compression::none), "No compression", "none"},
-      {static_cast<int>(Hdf5Writer::Compression::gzip), "gzip, which every reader has", "gzip"},
+      {static_cast<int>(Hdf5Writer::Compression::gzip), "gzip, which every reader supports",
+       "gzip"},
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventHdf5Compression", values);
@@ -115,7 +116,7 @@ static GType compression_type() {
 
 /* the file */
 
-/// Runs `work`; reports any exception and ends the file, because writing on could not repair it.
+/// Runs `work`; reports any exception and ends the file, because it cannot be repaired.
 template <class Work>
 static bool reported(GstEventHdf5Sink* self, const Work& work) {
   return guarded(
@@ -204,7 +205,7 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   return written ? GST_FLOW_OK : GST_FLOW_ERROR;
 }
 
-/// Writes triggers, which the format may not have.
+/// Writes triggers, if the format supports them.
 static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> triggers) {
   const State& state = self->priv->state;
   if (!state.writer) return true;
@@ -216,7 +217,7 @@ static bool write_triggers(GstEventHdf5Sink* self, std::span<const Trigger> trig
   });
 }
 
-/// Commits events that waited while no others came.
+/// Commits waiting events although no others arrive.
 static bool keep_up(GstEventHdf5Sink* self) {
   const State& state = self->priv->state;
   return !state.writer ||

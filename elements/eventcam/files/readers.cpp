@@ -35,7 +35,7 @@ std::unique_ptr<Reader> table_read_by(const GstCaps* /*caps*/, const FormatSetti
   return decoded_by(std::make_unique<TableDecoder>(settings.table()));
 }
 
-/// Words without a header have their format and size in the caps; files have a header.
+/// For words without a header, takes format and size from the caps; files have a header.
 std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const FormatSettings& /*settings*/) {
   if (caps != nullptr) {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
@@ -57,8 +57,8 @@ std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const FormatSetting
  * @short_description: reads RAW files and EVT words
  *
  * Reads Prophesee RAW files, and words without a header whose format is in the caps: EVT2, EVT2.1,
- * EVT3 and EVT4. Events are output in buffers of #GstEventReader:buffer-duration; triggers come
- * with them, for writers that keep them.
+ * EVT3 and EVT4. Events are output in buffers of #GstEventReader:buffer-duration, with triggers for
+ * writers that store them.
  *
  * ## Example launch line
  * |[
@@ -83,7 +83,7 @@ GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_typ
  * @short_description: reads DAT files
  *
  * Reads Prophesee DAT files, versions 1 and 2. Events are output in buffers of
- * #GstEventReader:buffer-duration; triggers come with them, for writers that keep them.
+ * #GstEventReader:buffer-duration, with triggers for writers that store them.
  *
  * ## Example launch line
  * |[
@@ -109,11 +109,11 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  * @title: eventesdec
  * @short_description: reads Event Stream files
  *
- * Reads Event Stream 2.0 files with DVS or ATIS events (of the latter, only the change events).
+ * Reads Event Stream 2.0 files with DVS events, or with ATIS events (change events only).
  * Events are output in buffers of #GstEventReader:buffer-duration.
  *
- * Tools disagree about where row 0 is. If the picture is upside down, as with files of faery, set
- * #GstEventEsDec:origin to `top-left`.
+ * Tools disagree about the position of row 0. If the picture is upside down, as with files of
+ * faery, set #GstEventEsDec:origin to `top-left`.
  *
  * ## Example launch line
  * |[
@@ -147,11 +147,12 @@ GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_re
  * @short_description: reads text files of events
  *
  * Reads text with one event per line. Columns, separators and time unit are detected from the first
- * lines, unless #GstEventCsvDec:column-order and #GstEventCsvDec:time-unit are set. A file that may
- * be in microseconds or in nanoseconds is refused until the unit is set. If the lines do not state
- * the sensor size, it is that of #GstEventCsvDec:width and #GstEventCsvDec:height, or else that of
- * downstream's caps, or else that of the smallest known sensor that the events fit into; if later
- * events do not, the caps change. Writers cannot change the size within a file: set it for them.
+ * lines, unless #GstEventCsvDec:column-order and #GstEventCsvDec:time-unit are set. A file whose
+ * times may be microseconds or nanoseconds is rejected unless the unit is set. If the file does not
+ * contain the sensor size, it is that of #GstEventCsvDec:width and #GstEventCsvDec:height, or else
+ * that of downstream's caps, or else that of the smallest known sensor that contains the events; if
+ * later events lie outside it, the caps change. Writers cannot change the size within a file: set
+ * it for them.
  *
  * ## Example launch line
  * |[
@@ -179,8 +180,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_
  * Integer times are microseconds and fractional ones seconds, unless #GstEventNpyDec:time-unit or a
  * name such as t_ns says otherwise. Arrays do not contain the sensor size: it is that of
  * #GstEventNpyDec:width and #GstEventNpyDec:height, or else that of downstream's caps, or else that
- * of the smallest known sensor that the events fit into; if later events do not, the caps change.
- * Writers cannot change the size within a file: set it for them.
+ * of the smallest known sensor that contains the events; if later events lie outside it, the caps
+ * change. Writers cannot change the size within a file: set it for them.
  *
  * ## Example launch line
  * |[
@@ -204,9 +205,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_
  * @title: eventnpzdec
  * @short_description: reads NumPy archives of events
  *
- * Reads archives of numpy.savez() and numpy.savez_compressed(): arrays named t, x, y and p, or an
- * array as eventnpydec reads it, with the same properties. An archive should be pulled, as from
- * filesrc. Where it is pushed it is collected in memory, up to 256 MiB, and read at its end.
+ * Reads archives of numpy.savez() and numpy.savez_compressed(): arrays named t, x, y and p, or one
+ * array as in eventnpydec, with the same properties. Upstream should support pull mode, as filesrc
+ * does. In push mode the archive is collected in memory, up to 256 MiB, and read at its end.
  *
  * ## Example launch line
  * |[
@@ -235,8 +236,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * @short_description: reads HDF5 files of events
  *
  * Reads the events of HDF5 files from DSEC, Metavision (compressed with ECF) and v2e. They are
- * output in buffers of #GstEventReader:buffer-duration; triggers come with them, for writers that
- * keep them.
+ * output in buffers of #GstEventReader:buffer-duration, with triggers for writers that store them.
  *
  * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
  * mode the file is collected in memory, up to 256 MiB, and read at its end.
@@ -270,25 +270,24 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * @short_description: reads AEDAT, the files of DAVIS and DVS cameras
  *
  * Splits an AEDAT 4 file into its event streams and video streams. AEDAT 2.0 and 3.1 are read as
- * one event stream. Triggers and IMU samples come with the events of `events_0`, for writers that
- * keep them.
+ * one event stream. Triggers and IMU samples are sent with the events of `events_0`, for writers
+ * that store them.
  *
- * PTS are the times of the file, so that they survive when written again. The segments of all
+ * PTS are the times of the file, so rewriting a file preserves its times. The segments of all
  * streams start at the first event or frame of any of them, so that playback starts at once and
  * events and frames are in sync. A file with negative times is shifted to start at 0.
  *
- * The file is pulled if upstream supports it, as filesrc does. A table of packets at its end makes
- * seeking fast and stores the duration; without one the duration is exact for files up to 16 MiB,
- * and estimated for longer ones until their end has been read.
+ * The file is read in pull mode if upstream supports it, as filesrc does. A table of packets at its
+ * end makes seeking fast and the duration exact; without one the duration is exact for files up to
+ * 16 MiB, and estimated for longer ones until their end has been read.
  *
- * Corrupt input is skipped; the first place is reported as a warning, and `stats` counts all
- * places.
+ * Corrupt data are skipped; a warning reports the first occurrence, and `stats` counts all.
  *
- * An AEDAT 2.0 file may not name its camera. Its first addresses then tell how they are made; the
- * sensor size is #GstAedatDemux:width and #GstAedatDemux:height, or else that of downstream caps,
- * or else the smallest DAVIS that events fit into, with a warning.
+ * An AEDAT 2.0 file may not name its camera. The layout of addresses is then inferred from the
+ * first ones; the sensor size is #GstAedatDemux:width and #GstAedatDemux:height, or else that of
+ * downstream caps, or else that of the smallest DAVIS that contains the events, with a warning.
  *
- * A stream without a frame or event in the first second may get its pad only at its first one.
+ * A stream without a frame or event in the first second may get its pad only with the first one.
  *
  * ## Example launch line
  * |[

@@ -7,7 +7,7 @@
 
 using eventcamera::FileKind;
 
-/// Peeks at the start of the file, as much as recognise() examines.
+/// Peeks at the part at the start of the file that recognise() examines.
 static std::span<const guint8> first_bytes(GstTypeFind* find) {
   constexpr guint64 max_bytes = eventcamera::max_recognised_bytes;
   const guint64 length = gst_type_find_get_length(find);

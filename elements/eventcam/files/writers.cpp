@@ -23,7 +23,7 @@ using eventcamera::SensorSize;
  *
  * Writes events as a Prophesee RAW file with words of #GstEvtEnc:format. If downstream requests
  * `application/x-event-camera` with the format EVT2, EVT21, EVT3 or EVT4, writes these words
- * without a header. Triggers that come with the events are written among them.
+ * without a header. Triggers that arrive with the events are written, too.
  *
  * ## Example launch line
  * |[
@@ -43,8 +43,8 @@ static const EventFileFormat::Variants evt_variants = {
     .property = "format",
     .nick = "Format",
     .blurb =
-        "EVT words to write; read when the stream begins. Downstream caps that name words without "
-        "a header take precedence",
+        "EVT words to write; read when the stream begins. Downstream caps that request words "
+        "without a header take precedence",
     .type = [] { return enum_type("GstEvtFormat", evt_formats); },
     .default_value = static_cast<int>(EvtFormat::evt3),
 };
@@ -99,9 +99,9 @@ GST_ELEMENT_REGISTER_DEFINE(evtenc, "evtenc", GST_RANK_PRIMARY, event_writer_typ
  * @short_description: writes DAT files
  *
  * Writes events as a DAT file, version 2. Timestamps have 32 bits. A file whose first event is
- * later than 71 minutes, as times since 1970 are, starts at 0. A pause is left out, with a warning,
- * if readers would mistake it: one of more than 71 minutes, or of more than 35 in which the
- * timestamps wrap.
+ * later than 71 minutes, such as one with times since 1970, starts at 0. A pause that readers would
+ * misinterpret is removed, with a warning: one of more than 71 minutes, or of more than 35 minutes
+ * in which the timestamps wrap.
  *
  * ## Example launch line
  * |[
@@ -127,8 +127,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_
  * @short_description: writes Event Stream files
  *
  * Writes events as an Event Stream 2.0 file of DVS events. Pauses take one byte per 127
- * microseconds. Tools disagree about where row 0 is: set #GstEventEsEnc:origin for the one that
- * will read the file.
+ * microseconds. Tools disagree about the position of row 0: set #GstEventEsEnc:origin for the tool
+ * that will read the file.
  *
  * ## Example launch line
  * |[

@@ -220,8 +220,8 @@ GstFlowReturn EventCompare::aggregate(bool) {
   const auto& candidate = sensors_[StreamRole::candidate];
   if (reference && candidate && *reference != *candidate) {
     GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                      ("Cannot compare sensors of two sizes: the reference has %d x %d pixels, the "
-                       "candidate %d x %d; scale one of them.",
+                      ("Cannot compare sensors of different sizes: the reference has %d x %d "
+                       "pixels, the candidate %d x %d; scale one of them.",
                        reference->width, reference->height, candidate->width, candidate->height),
                       ("width or height differ in the caps of the two sink pads"));
     return GST_FLOW_NOT_NEGOTIATED;

@@ -4,9 +4,9 @@
  * @title: eventstats
  * @short_description: measures an event stream
  *
- * Passes events through and posts element messages `eventstats`: every #GstEventStats:interval of
- * stream time with the statistics since the last one, and at EOS or on stop with those of the whole
- * stream. Intervals end at buffer boundaries.
+ * Passes events through and posts element messages `eventstats`: after every
+ * #GstEventStats:interval of stream time with the statistics since the last one, and at EOS or on
+ * stop with those of the whole stream. Intervals end at buffer boundaries.
  *
  * - `cumulative` (#gboolean): %TRUE for the statistics of the whole stream;
  * - `start`, `end` (#gint64): the time covered, in stream time (ns);
@@ -152,7 +152,7 @@ static bool measure(GstEventStats* self, int width, int height) {
 
 /* events */
 
-/// Adds an interval. Time between intervals counts as time without events; if time goes backwards,
+/// Adds an interval. Gaps between intervals count as time without events; if time goes backwards,
 /// no inter-event interval spans the discontinuity.
 static void cover(GstEventStats* self, Nanoseconds start, Nanoseconds end) {
   auto& measurement = *self->priv->measurement;

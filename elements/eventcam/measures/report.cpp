@@ -61,7 +61,7 @@ JsonNode* node_of(const GstStructure* structure) {
   return node;
 }
 
-/// Returns why a file cannot be written; nothing if it can, or if `path` is empty.
+/// Returns why a file cannot be written; none if it can, or if `path` is empty.
 std::optional<std::string> obstacle_to(const std::string& path) {
   if (path.empty()) return std::nullopt;
   const Owned<gchar> folder(g_path_get_dirname(path.c_str()));

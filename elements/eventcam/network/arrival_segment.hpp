@@ -10,11 +10,11 @@
 /// Segment that maps a sender's times to the running times at which they arrive.
 class ArrivalSegment {
  public:
-  /// Follows changes of the mapping by more than `max_drift`.
+  /// The mapping follows drifts of more than `max_drift`.
   explicit ArrivalSegment(GstClockTimeDiff max_drift) : max_drift_(max_drift) {}
 
-  /// True if it goes on at `start`, which arrived at this running time; if that is not known,
-  /// `start` must not be earlier than what was received before.
+  /// True if the segment holds for `start`, which arrived at this running time; if that is unknown,
+  /// `start` must not be earlier than the previous data.
   bool continues(GstClockTime start, GstClockTime arrival) const {
     if (!segment_ || start < segment_->start) return false;
     if (!GST_CLOCK_TIME_IS_VALID(arrival))
@@ -23,7 +23,7 @@ class ArrivalSegment {
     return std::abs(GST_CLOCK_DIFF(mapped, arrival)) <= max_drift_;
   }
 
-  /// Pushes a segment from `start`, which arrived at this running time; if that is not known, it
+  /// Pushes a segment from `start`, which arrived at this running time; if that is unknown, it
   /// begins where the last one ended. Without stream time, that is the running time.
   void begin(GstPad* src, guint32 seqnum, GstClockTime start, GstClockTime arrival,
              GstClockTime stream_time) {
@@ -41,10 +41,10 @@ class ArrivalSegment {
     gst_pad_push_event(src, event);
   }
 
-  /// What was received ends at `end`.
+  /// Sets the end of the received data.
   void reach(GstClockTime end) { segment_->position = std::max(segment_->position, end); }
 
-  /// The next time starts a new one.
+  /// Ends the segment; the next data start a new one.
   void reset() { segment_.reset(); }
 
  private:

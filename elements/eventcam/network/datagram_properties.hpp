@@ -17,10 +17,10 @@
 inline GType datagram_format_type() {
   using eventcamera::DatagramFormat;
   static const GEnumValue values[] = {
-      {static_cast<int>(DatagramFormat::spif), "SPIF without times: SpiNNaker, AEStream, EventCV",
-       "spif"},
-      {static_cast<int>(DatagramFormat::spif_timestamps), "SPIF with times: SpiNNaker, EventCV",
-       "spif-timestamps"},
+      {static_cast<int>(DatagramFormat::spif),
+       "SPIF without timestamps: SpiNNaker, AEStream, EventCV", "spif"},
+      {static_cast<int>(DatagramFormat::spif_timestamps),
+       "SPIF with timestamps: SpiNNaker, EventCV", "spif-timestamps"},
       {static_cast<int>(DatagramFormat::t64_x16_y16_on8), "faery, 13 bytes per event",
        "t64-x16-y16-on8"},
       {static_cast<int>(DatagramFormat::t32_x16_y15_on1), "faery, 8 bytes per event",
@@ -39,7 +39,7 @@ inline const char* name_of(eventcamera::DatagramFormat format) {
 
 inline GType datagram_byte_order_type() {
   static const GEnumValue values[] = {
-      {static_cast<int>(std::endian::little), "Little-endian, as AEStream on a PC",
+      {static_cast<int>(std::endian::little), "Little-endian, like AEStream on a PC",
        "little-endian"},
       {static_cast<int>(std::endian::big), "Big-endian, network byte order", "big-endian"},
       {0, nullptr, nullptr},
@@ -47,7 +47,7 @@ inline GType datagram_byte_order_type() {
   return enum_type("GstEventDatagramByteOrder", values);
 }
 
-/// Adds the properties that sender and receiver must agree on. Settings are derived from
+/// Adds the properties that sender and receiver must share. Settings are derived from
 /// DatagramSettings.
 template <auto settings_of>
 void add_datagram_properties(Properties<settings_of>& properties) {

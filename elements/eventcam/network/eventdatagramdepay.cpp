@@ -4,22 +4,22 @@
  * @title: eventdatagramdepay
  * @short_description: unpacks events from datagrams of other tools
  *
- * Unpacks events from datagrams that SpiNNaker, AEStream, EventCV, faery, tools of Event Stream, or
- * jAER sent, as #GstEventDatagramDepay:format says. Each buffer is a datagram, as from udpsrc. The
- * datagrams do not state the sensor size: set #GstEventDatagramDepay:width and
+ * Unpacks events from datagrams of SpiNNaker, AEStream, EventCV, faery, Event Stream tools or jAER,
+ * selected by #GstEventDatagramDepay:format. Each buffer is a datagram, as from udpsrc. Datagrams
+ * do not contain the sensor size: set #GstEventDatagramDepay:width and
  * #GstEventDatagramDepay:height.
  *
- * A buffer's PTS is the sender's time, with wraps undone. The segment maps it to the running time
- * at which the first event arrived, and again if sender and receiver drift apart by more than a
- * second, or if the sender starts over. Events of SPIF without times get the time at which their
- * datagram arrived: the PTS of its buffer, which udpsrc sets.
+ * A buffer's PTS is the sender's time, unwrapped. The segment maps it to the running time at which
+ * the first event arrived, and changes if sender and receiver drift apart by more than a second, or
+ * if the sender restarts. Events of SPIF without timestamps take the arrival time of their
+ * datagram: the PTS of its buffer, which udpsrc sets.
  *
- * Live sinks wait for #GstEventDatagramDepay:latency, so that events that the sender packed or the
- * network delayed for up to that long are in time.
+ * Live sinks wait for #GstEventDatagramDepay:latency, so that events which the sender or the
+ * network delayed by up to this time are not late.
  *
  * A datagram that is malformed, or has an event outside the sensor, is rejected as a whole. One
- * that is older than others before it is dropped, so events are sorted. After a loss, which only
- * the sequence number of jAER reveals, the next buffer is flagged DISCONT.
+ * that is older than an earlier one is dropped, so events are sorted. After a loss, which only the
+ * sequence number of jAER reveals, the next buffer is flagged DISCONT.
  * #GstEventDatagramDepay:stats counts all of these.
  *
  * jAER's addresses are read as those of a DVS128 if the sensor has 128x128 pixels, else as those of
@@ -70,7 +70,7 @@ namespace {
 /// Largest difference between the running time of an event and of its arrival.
 constexpr GstClockTimeDiff max_drift = GST_SECOND;
 
-/// Shorter silences belong to the interval of the next buffer, longer ones are a GAP event.
+/// Shorter gaps belong to the interval of the next buffer, longer ones are sent as a GAP event.
 constexpr Microseconds min_gap = 1000;
 static_assert(min_gap + eventcamera::max_datagram_span <= G_MAXUINT32, "wraps times in buffers");
 
@@ -237,7 +237,7 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, std::span<const std::u
     GST_DEBUG_OBJECT(
         self, "lost %" G_GUINT64_FORMAT " datagrams before that of running time %" GST_TIME_FORMAT,
         guint64{reception.lost}, GST_TIME_ARGS(arrival));
-  // A datagram without events, such as jAER's samples of frames, may be the one that tells.
+  // A datagram without events, such as one with jAER's frame samples, may reveal a loss, too.
   state.is_discontinuous |= discont || reception.lost > 0;
   return state.events.empty() ? GST_FLOW_OK : push(self, reception, arrival);
 }
@@ -256,7 +256,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   const auto arrival = arrival_of(*state, taken);
   if (!GST_CLOCK_TIME_IS_VALID(arrival) && state->settings.format == DatagramFormat::spif) {
     GST_ELEMENT_ERROR(self, STREAM, FORMAT,
-                      ("Cannot time events of SPIF: their datagrams have no arrival time. Set "
+                      ("SPIF events have no timestamps, and their datagrams no arrival time. Set "
                        "do-timestamp=true on the source, or format=spif-timestamps."),
                       ("a buffer has no PTS in a segment of times"));
     return GST_FLOW_ERROR;
@@ -328,7 +328,7 @@ static bool start(GstEventDatagramDepay* self) {
   self->priv->counts.access([](DatagramCounts& counts) { counts = {}; });
   if (settings.width > 0 && settings.height > 0) return start_stream(self, settings);
   GST_ELEMENT_ERROR(self, RESOURCE, SETTINGS,
-                    ("Cannot receive events: their datagrams do not state the sensor size. Set "
+                    ("Cannot receive events: their datagrams do not contain the sensor size. Set "
                      "width and height to those of the sender."),
                     ("width=%d height=%d", settings.width, settings.height));
   return false;
@@ -385,14 +385,14 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
   properties.add(
       &Settings::latency,
       g_param_spec_uint64("latency", "Latency",
-                          "Time by which events may arrive later than the first did, relative to "
-                          "their own times; live sinks wait for as long (ns)",
+                          "Maximum delay of events relative to the first one; live sinks wait for "
+                          "it (ns)",
                           0, 10 * GST_SECOND, Settings().latency, flags));
   add_datagram_stats<counts_of>(
       object_class,
-      "Counts since the start: packets, events and bytes received; packets lost, where they have a "
-      "sequence number; packets dropped as late, older than others before; packets rejected, "
-      "malformed or outside the sensor",
+      "Counters since the start: packets, events and bytes received; lost packets, if they have a "
+      "sequence number; late packets, older than earlier ones and dropped; rejected packets, "
+      "malformed or with events outside the sensor",
       [](const DatagramCounts& counts) {
         return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
                                  counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",

@@ -4,9 +4,9 @@
  * @title: eventdatagrampay
  * @short_description: packs events into datagrams of other tools
  *
- * Packs an event stream into datagrams that SpiNNaker, AEStream, EventCV, faery, tools of Event
- * Stream, and jAER receive, as #GstEventDatagramPay:format says. Each buffer is a datagram: send it
- * with udpsink. Its PTS is the time of its first event.
+ * Packs an event stream into datagrams for SpiNNaker, AEStream, EventCV, faery, Event Stream tools
+ * or jAER, selected by #GstEventDatagramPay:format. Each buffer is a datagram: send it with
+ * udpsink. Its PTS is the time of its first event.
  *
  * A datagram is sent when it is full, or when its first event cannot wait for another buffer as
  * long as the last one. If no buffer comes, it is sent after #GstEventDatagramPay:max-latency, and
@@ -122,7 +122,7 @@ static void keep(Private& priv, const Datagram& datagram) {
   });
 }
 
-/// Pushes what was kept, in a list, which udpsink sends with one system call.
+/// Pushes the kept datagrams as a list, which udpsink sends with one system call.
 static GstFlowReturn push(Private& priv) {
   if (priv.datagrams.empty()) return GST_FLOW_OK;
   GST_LOG_OBJECT(priv.src, "%" G_GSIZE_FORMAT " datagrams, the first at %" GST_TIME_FORMAT,
@@ -162,7 +162,7 @@ static GstFlowReturn flush(GstEventDatagramPay* self) {
   return pack(self, [](DatagramPacker& packer, const auto& send) { packer.flush(send); });
 }
 
-/// Sends events that have waited long enough.
+/// Sends events that have waited for max-latency.
 static void flush_late(GstObject* element) {
   GST_LOG_OBJECT(element, "max-latency is over: sending an incomplete datagram");
   flush(GST_EVENT_DATAGRAM_PAY(element));
@@ -340,7 +340,7 @@ static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                    GST_PARAM_MUTABLE_PLAYING)));
   add_datagram_stats<counts_of>(
-      object_class, "Counts since the start: packets, events and bytes that were packed",
+      object_class, "Counters since the start: packets, events and bytes packed",
       [](const DatagramCounts& counts) {
         return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
                                  counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",

@@ -33,13 +33,13 @@ class FlushTimer {
     if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
   }
 
-  /// Removes the deadline; a running call may still go on.
+  /// Removes the deadline; does not wait for a running call.
   void cancel() {
     const std::lock_guard lock(mutex_);
     deadline_.reset();
   }
 
-  /// Removes the deadline and ends the thread, after a running call.
+  /// Removes the deadline, waits for a running call, and ends the thread.
   void stop() {
     {
       const std::lock_guard lock(mutex_);

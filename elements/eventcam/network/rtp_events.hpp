@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What the RTP elements share.
+// Shared by the RTP elements.
 #pragma once
 
 #include <gst/gst.h>
@@ -17,7 +17,7 @@ inline constexpr guint rtp_clock_rate = 1'000'000;
 /// Names of RtpEventFormat in caps.
 inline constexpr std::array rtp_event_formats = {"EVT3", "XYTP"};
 
-/// Returns the property `stats` of the RTP base class, which that of a subclass hides. The caller
+/// Returns the property `stats` of the RTP base class, which the subclass overrides. The caller
 /// owns it.
 inline GstStructure* base_rtp_stats(GObject* object, GType base) {
   auto* klass = G_OBJECT_CLASS(g_type_class_peek(base));

@@ -9,8 +9,8 @@
 
 #include "gst/base/owned.hpp"
 
-/// Size of the RTP header extensions that a payloader of these caps writes in each packet. Its base
-/// class does not tell, so extensions of the same kind are asked.
+/// Size of the RTP header extensions that a payloader with given caps writes in each packet. The
+/// base class does not expose it, so it is asked from other instances of the same extensions.
 class RtpHeaderExtensions {
  public:
   /// Maximum size in bytes, with the extensions' common header.
@@ -52,7 +52,7 @@ class RtpHeaderExtensions {
       const char* const uri = uri_of(gst_structure_get_value(&caps, name));
       const std::unique_ptr<GstRTPHeaderExtension, UnrefObject> extension(
           uri != nullptr ? gst_rtp_header_extension_create_from_uri(uri) : nullptr);
-      // An application may have one that is not registered.
+      // An application may use an extension that is not registered.
       gsize largest = id <= max_short_id ? max_short_size : max_long_size;
       if (extension) {
         gst_rtp_header_extension_set_id(extension.get(), id);
@@ -70,6 +70,6 @@ class RtpHeaderExtensions {
     return header_size + (size + count * (is_short ? 1 : 2) + word - 1) / word * word;
   }
 
-  OwnedCaps caps_;  ///< that the size is of
+  OwnedCaps caps_;  ///< caps to which the size applies
   gsize size_ = 0;
 };

@@ -4,26 +4,25 @@
  * @title: rtpeventdepay
  * @short_description: receives events in RTP packets
  *
- * Gets the events out of the RTP packets of rtpeventpay; docs/rtp-payload-format.md specifies
+ * Extracts the events from the RTP packets of rtpeventpay; docs/rtp-payload-format.md specifies
  * them. The caps need `width` and `height` of the sensor, as integers or as strings from SDP, and
- * `format` unless it is EVT3. Put rtpjitterbuffer or rtpbin upstream: packets that come after later
- * ones are dropped.
+ * `format` unless it is EVT3. Put rtpjitterbuffer or rtpbin upstream: packets that arrive out of
+ * order are dropped.
  *
- * Buffers are the sender's, with its PTS and duration, and an interval without events is a GAP
- * event. The segment maps the sender's times to the running time at which they arrive: it is
- * renewed when this changes by more than 5 ms, and when a sender starts over. The event times
- * never change, so recordings of several receivers agree.
+ * Buffers have the sender's PTS and duration, and an interval without events is a GAP event. The
+ * segment maps the sender's times to the running time at which they arrive: it is updated when this
+ * mapping drifts by more than 5 ms, and when the sender restarts. Event times never change, so
+ * recordings of several receivers agree.
  *
- * After a loss, the buffer with the remaining events has the flag DISCONT, or the next. A packet
- * that is not valid in every detail is dropped as a whole.
+ * After a loss, the buffer with the remaining events, or else the next one, is flagged DISCONT. An
+ * invalid packet is dropped as a whole.
  *
  * #GstRtpEventDepay:stats has these fields besides those of #GstRTPBaseDepayload, all #guint64:
  *
  * - `packets`, `bytes`: packets received, and the size of their payloads;
  * - `events`: events received;
- * - `lost-packets`, `lost-events`: what the sender sent and did not arrive in time, since the first
- *   packet;
- * - `late-packets`: duplicates, and packets that came after later ones; dropped;
+ * - `lost-packets`, `lost-events`: sent after the first packet, but did not arrive in time;
+ * - `late-packets`: duplicates, and packets that arrived out of order; dropped;
  * - `rejected-packets`: packets that are not of this format or sensor, or corrupt.
  *
  * ## Example launch lines
@@ -70,7 +69,7 @@ using eventcamera::SensorSize;
 
 namespace {
 
-/// Change of the mapping from the sender's times to running time that is not followed.
+/// Maximum drift of the mapping from the sender's times to running time.
 constexpr GstClockTimeDiff max_drift = 5 * GST_MSECOND;
 
 /// Stream of a sender.
@@ -78,7 +77,7 @@ struct State {
   State(SensorSize size, RtpEventFormat events_format)
       : sensor(size), format(events_format), unpacker(size, format) {}
 
-  /// Sequence numbers and counters go on.
+  /// Sequence numbers and counters continue.
   void change(SensorSize size, RtpEventFormat events_format) {
     unpacker.change(size, events_format);
     sensor = size;
@@ -123,8 +122,8 @@ GST_ELEMENT_REGISTER_DEFINE(rtpeventdepay, "rtpeventdepay", GST_RANK_SECONDARY,
 
 /* output */
 
-/// Maps the sender's time `start` to the running time of the packet that brought it, unless the
-/// segment does so already.
+/// Maps the sender's time `start` to the running time of its packet, unless the segment already
+/// does.
 static void update_segment(GstRtpEventDepay* self, GstClockTime start, GstClockTime arrival) {
   const GstSegment& in = GST_RTP_BASE_DEPAYLOAD(self)->segment;
   if (in.format != GST_FORMAT_TIME) arrival = GST_CLOCK_TIME_NONE;
@@ -303,8 +302,8 @@ static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
   return handled;
 }
 
-/// Lost packets are counted by those that follow. The default would send a GAP event, with times
-/// that are not the sender's.
+/// Does nothing, because later packets reveal losses. The default would send a GAP event, with
+/// times that are not the sender's.
 static gboolean packet_lost(GstRTPBaseDepayload*, GstEvent*) {
   return TRUE;
 }
@@ -350,8 +349,8 @@ static gboolean set_caps(GstRTPBaseDepayload* depayload, GstCaps* caps) {
     post_message(self, GST_MESSAGE_ERROR,
                  {GST_STREAM_ERROR_FORMAT,
                   "Cannot receive events without the size of the sensor, or in another format than "
-                  "EVT3 and XYTP; set width, height and format in the RTP caps, for example of "
-                  "udpsrc, as the sender has them."},
+                  "EVT3 and XYTP; set width, height and format in the RTP caps, for example on "
+                  "udpsrc, to those of the sender."},
                  cause);
     g_free(cause);
     return FALSE;
@@ -426,7 +425,7 @@ static void gst_rtp_event_depay_class_init(GstRtpEventDepayClass* klass) {
   add_pad_templates(element_class, RTP_EVENT_CAPS, EVENT_CAPS);
   gst_element_class_set_static_metadata(element_class, "RTP event depayloader",
                                         "Codec/Depayloader/Network/RTP",
-                                        "Gets events out of RTP packets", EVENTSIM_AUTHORS);
+                                        "Extracts events from RTP packets", EVENTSIM_AUTHORS);
   element_class->change_state = change_state;
 
   GstRTPBaseDepayloadClass* depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS(klass);

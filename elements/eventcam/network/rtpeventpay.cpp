@@ -4,20 +4,20 @@
  * @title: rtpeventpay
  * @short_description: sends events in RTP packets
  *
- * Packs events in RTP packets of at most #GstRTPBasePayload:mtu bytes, in the payload format of
+ * Packs events into RTP packets of at most #GstRTPBasePayload:mtu bytes, in the payload format of
  * docs/rtp-payload-format.md. Each packet can be decoded by itself. A buffer of events is sent at
  * once; short ones are joined for at most #GstRtpEventPay:max-latency to fill packets. A GAP event
- * becomes a packet without events, so that receivers know of the silence.
+ * becomes a packet without events, so that receivers know that there are none.
  *
- * Events outside the sensor or their buffer's interval, or earlier than the event before, are left
- * out with a warning.
+ * Events outside the sensor or their buffer's interval, or earlier than the previous event, are
+ * dropped with a warning.
  *
  * #GstRtpEventPay:stats has these fields besides those of #GstRTPBasePayload:
  *
  * - `packets`, `bytes` (#guint64): packets sent, and the size of their payloads;
- * - `events` (#guint64): events sent; those received plus those that receivers count as lost;
- * - `rejected-events` (#guint64): events not sent, for one of these reasons, because their buffer
- *   has no PTS, one of more than 292 years or a partial event, or because of a flush.
+ * - `events` (#guint64): events sent: those received plus those that a receiver counts as lost;
+ * - `rejected-events` (#guint64): events not sent: those above, those of a buffer without a PTS,
+ *   with a PTS of more than 292 years or with a partial event, and those dropped by a flush.
  *
  * ## Example launch line
  * |[
@@ -201,7 +201,7 @@ static GstFlowReturn reported(GstRtpEventPay* self, const Work& work) {
   return priv.flow;
 }
 
-/// Sends events that have waited long enough.
+/// Sends events that have waited for max-latency.
 static void send_late(GstObject* element) {
   auto* self = GST_RTP_EVENT_PAY(element);
   GST_LOG_OBJECT(self, "max-latency is over: sending an incomplete packet");
@@ -304,7 +304,7 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       GST_DEBUG_OBJECT(self, "the stream ends");
       [[fallthrough]];
     default:
-      // Those of sensors precede each buffer, and may precede the ones that it is joined to.
+      // Triggers and IMU samples precede each buffer, and may precede the interval that it joins.
       if ((gst_event_type_get_flags(GST_EVENT_TYPE(event)) & GST_EVENT_TYPE_SERIALIZED) &&
           !is_sensor_event(event))
         reported(self, [&] { send(self); });
@@ -313,7 +313,7 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
   return PARENT_PAYLOAD_CLASS->sink_event(payload, event);
 }
 
-/// Adds the time for which events wait here.
+/// Answers latency queries: adds the time for which events wait here.
 static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
   if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
     return answer_latency(GST_CAT_DEFAULT, GST_RTP_BASE_PAYLOAD_SINKPAD(parent), query,
@@ -422,7 +422,7 @@ static void gst_rtp_event_pay_class_init(GstRtpEventPayClass* klass) {
   add_pad_templates(element_class, EVENT_CAPS, RTP_EVENT_CAPS ", payload = (int) [ 96, 127 ]");
   gst_element_class_set_static_metadata(element_class, "RTP event payloader",
                                         "Codec/Payloader/Network/RTP",
-                                        "Packs events in RTP packets", EVENTSIM_AUTHORS);
+                                        "Packs events into RTP packets", EVENTSIM_AUTHORS);
   element_class->change_state = change_state;
 
   GstRTPBasePayloadClass* payload_class = GST_RTP_BASE_PAYLOAD_CLASS(klass);
