@@ -334,7 +334,7 @@ static void link_frames(GstElement* reader, GstPad* pad, gpointer writer) {
   if (strcmp(name, "video_0") == 0) {
     queue = gst_element_factory_make("queue", NULL);
     gst_bin_add(GST_BIN(pipeline), queue);
-    gst_element_link_pads(queue, "src", GST_ELEMENT(writer), "video");
+    gst_element_link_pads(queue, "src", GST_ELEMENT(writer), "video_0");
     sink = gst_element_get_static_pad(queue, "sink");
     gst_pad_link(pad, sink);
     gst_object_unref(sink);
