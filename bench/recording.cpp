@@ -22,7 +22,7 @@ constexpr SensorSize size{1280, 720};
 constexpr std::size_t piece_size = std::size_t{1} << 18;
 constexpr int turns = 3;
 
-/// Writes a RAW file of EVT3 words: single events and runs, 20 million a second.
+/// Writes a RAW file of EVT3 words: single events and runs, 10 million a second.
 void write_recording(const std::string& path, std::size_t count) {
   recordings::Random random(1);
   const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, size);
@@ -32,8 +32,8 @@ void write_recording(const std::string& path, std::size_t count) {
   Microseconds t = 0;
   for (std::size_t written = 0; written < count; written += events.size(), t += 1000) {
     events.clear();
-    while (events.size() < 20'000) {
-      const auto time = t + static_cast<Microseconds>(events.size() / 20);
+    while (events.size() < 10'000) {
+      const auto time = t + static_cast<Microseconds>(events.size() / 10);
       const int y = recordings::below(random, size.height);
       const int first = recordings::below(random, size.width);
       const int end = std::min(size.width, first + 1 + recordings::below(random, 4));

@@ -12,7 +12,7 @@
 
 #include "bench/codec_timing.hpp"
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
@@ -133,7 +133,7 @@ void add_hdf5(const std::string& name, Hdf5Format format, Hdf5Writer::Compressio
     Events out;
     bench::measure(state, events(), [&] {
       out.clear();
-      Hdf5Reader reader(path);
+      Hdf5Decoder reader(path);
       while (reader.read(10'000, out) > 0) {
       }
     });

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/plugin.hpp"
+#include "gst/base/event_pool.hpp"
+
+const char* const event_pool_type_name = "GstRecordedEventPool";
 
 #ifdef HAVE_AEDAT
 #define AEDAT_ELEMENTS(X) X(aedatdemux) X(aedatmux)

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/plugin.hpp"
+#include "gst/base/event_pool.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 
-const EventSimulatorTypeNames event_simulator_type_names = {.simulator = "GstGLEventSimulatorBase",
-                                                            .pool = "GstGLEventPool"};
+const char* const event_simulator_type_name = "GstGLEventSimulatorBase";
+const char* const event_pool_type_name = "GstGLEventPool";
 
 #define ELEMENTS(X) X(gleventsim_frame) X(gleventsim_dense) X(gleventsim_sparse) X(gleventsim_diff)
 

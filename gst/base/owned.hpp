@@ -9,8 +9,10 @@
 
 struct Unref {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
+  void operator()(GstBufferPool* pool) const { gst_object_unref(pool); }
   void operator()(GstCaps* caps) const { gst_caps_unref(caps); }
 };
 
 using OwnedBuffer = std::unique_ptr<GstBuffer, Unref>;
+using OwnedBufferPool = std::unique_ptr<GstBufferPool, Unref>;
 using OwnedCaps = std::unique_ptr<GstCaps, Unref>;

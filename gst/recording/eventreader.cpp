@@ -396,8 +396,8 @@ static void unref_caps(GstCaps* caps) {
 /// Creates the recording, to read a file from its start or a stream of words. May throw.
 void EventReader::open_recording() {
   const std::shared_ptr<GstCaps> caps(caps_ ? gst_caps_copy(caps_.get()) : nullptr, unref_caps);
-  auto make = [make_reader = format_.make_reader, caps, settings = format_settings_.copy()] {
-    return make_reader(caps.get(), settings);
+  auto make = [make_decoder = format_.make_decoder, caps, settings = format_settings_.copy()] {
+    return make_decoder(caps.get(), settings);
   };
   close_recording();
   const auto length = static_cast<Microseconds>(buffer_duration() / GST_USECOND);
@@ -757,9 +757,7 @@ GstFlowReturn EventReader::push(const RecordingReader::Chunk& chunk) {
                  "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  chunk.events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(duration));
   if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
-  GstBuffer* const buffer = copied_buffer(std::as_bytes(chunk.events));
-  GST_BUFFER_DURATION(buffer) = duration;
-  return combined(pad, pad.push(buffer, pts));
+  return combined(pad, pad.push(chunk.events, pts, duration));
 }
 
 GstFlowReturn EventReader::push(const RecordingReader::TimedFrame& item) {

@@ -3,7 +3,7 @@
 
 #include <gst/video/video.h>
 
-#include "src/formats/reader.hpp"
+#include "src/formats/recording_decoder.hpp"
 
 /// Caps of the video frames of recordings.
 #define RECORDED_VIDEO_CAPS                                                                      \

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/reader_pad.hpp"
 
+#include <new>
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/owned.hpp"
+#include "gst/base/event_pool.hpp"
 
 using eventcamera::SensorSize;
 
@@ -20,12 +21,15 @@ ReaderPad::ReaderPad(GstPadTemplate* templ, const std::string& name, GstDebugCat
 }
 
 ReaderPad::~ReaderPad() {
+  reset();
   gst_object_unref(pad_);
 }
 
 void ReaderPad::reset() {
   interrupt();
   started_ = false;
+  if (pool_) gst_buffer_pool_set_active(pool_.get(), FALSE);
+  pool_.reset();
   size_ = {};
   video_.reset();
 }
@@ -108,6 +112,29 @@ GstFlowReturn ReaderPad::push(GstBuffer* buffer, GstClockTime pts) {
   GST_BUFFER_PTS(buffer) = pts;
   if (std::exchange(discontinuous_, false)) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
   return gst_pad_push(pad_, buffer);
+}
+
+GstFlowReturn ReaderPad::push(const eventcamera::IntervalEvents& events, GstClockTime pts,
+                              GstClockTime duration) {
+  if (!pool_) {
+    pool_.reset(event_pool_new());
+    GstStructure* config = gst_buffer_pool_get_config(pool_.get());
+    gst_buffer_pool_config_set_params(config, nullptr, 0, 0, 0);
+    if (!gst_buffer_pool_set_config(pool_.get(), config) ||
+        !gst_buffer_pool_set_active(pool_.get(), TRUE))
+      throw std::bad_alloc();
+  }
+  GstBuffer* acquired = nullptr;
+  const auto result = gst_buffer_pool_acquire_buffer(pool_.get(), &acquired, nullptr);
+  if (result != GST_FLOW_OK) return result;
+  OwnedBuffer buffer(acquired);
+  event_pool_reserve(acquired, events.size() * sizeof(eventcamera::Event));
+  GstMapInfo map;
+  if (!gst_buffer_map(acquired, &map, GST_MAP_WRITE)) throw std::bad_alloc();
+  events.write_to(reinterpret_cast<eventcamera::Event*>(map.data));
+  gst_buffer_unmap(acquired, &map);
+  GST_BUFFER_DURATION(acquired) = duration;
+  return push(buffer.release(), pts);
 }
 
 GstFlowReturn ReaderPad::push_gap(GstClockTime pts, GstClockTime duration) {

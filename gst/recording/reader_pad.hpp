@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "gst/base/owned.hpp"
 #include "src/formats/recording_reader.hpp"
 
 /// Source pad for one stream of a file, with the state of its events: stream-start, caps, tags and
@@ -53,6 +54,9 @@ class ReaderPad {
   void need_segment(bool due) { segment_due_ = due; }
 
   GstFlowReturn push(GstBuffer* buffer, GstClockTime pts);
+  /// Pushes events, at least one. Throws std::bad_alloc.
+  GstFlowReturn push(const eventcamera::IntervalEvents& events, GstClockTime pts,
+                     GstClockTime duration);
   GstFlowReturn push_gap(GstClockTime pts, GstClockTime duration);
 
   /// Flow return after send_caps() failed.
@@ -64,6 +68,7 @@ class ReaderPad {
   GstPad* pad_;
   std::string name_;
   GstDebugCategory* category_;
+  OwnedBufferPool pool_;  ///< of events, while the stream lasts
   bool started_ = false;
   bool segment_due_ = true;
   bool discontinuous_ = true;

@@ -847,9 +847,9 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
 GType gst_event_simulator_get_type() {
   static const GType type = [] {
     GST_DEBUG_CATEGORY_INIT(event_simulator_debug, "eventsim", 0, "event simulators");
-    const GType registered = register_type(
-        GST_TYPE_BASE_TRANSFORM, event_simulator_type_names.simulator,
-        gst_event_simulator_class_init, gst_event_simulator_init, G_TYPE_FLAG_ABSTRACT);
+    const GType registered = register_type(GST_TYPE_BASE_TRANSFORM, event_simulator_type_name,
+                                           gst_event_simulator_class_init, gst_event_simulator_init,
+                                           G_TYPE_FLAG_ABSTRACT);
     private_offset = g_type_add_instance_private(registered, sizeof(GstEventSimulatorPrivate));
     return registered;
   }();

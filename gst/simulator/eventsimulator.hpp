@@ -44,12 +44,9 @@ struct EventSimulatorMethod {
   void (*configure)(eventcamera::IntervalSimulator& simulator, GObject* object) = nullptr;
 };
 
-/// Names of the types in the plugin that this library is linked to. Each plugin defines its own.
-struct EventSimulatorTypeNames {
-  const char* simulator;
-  const char* pool;
-};
-extern const EventSimulatorTypeNames event_simulator_type_names;
+/// Name of the base class in the plugin that this library is linked to. Each plugin defines its
+/// own.
+extern const char* const event_simulator_type_name;
 
 /// Base class of all simulators.
 #define GST_TYPE_EVENT_SIMULATOR (gst_event_simulator_get_type())

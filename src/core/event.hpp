@@ -78,6 +78,11 @@ struct AbsoluteEvent {
   std::uint16_t x;    ///< column, from the left
   std::uint16_t y_p;  ///< row from the top in bits 0-14; bit 15 is the polarity, 1 = ON
 
+  /// Leaves the members uninitialized: a vector grows at no cost, and decoders write in place.
+  AbsoluteEvent() {}  // NOLINT(*-member-init,*-use-equals-default)
+  constexpr AbsoluteEvent(Microseconds time, std::uint16_t column, std::uint16_t row_and_polarity)
+      : t(time), x(column), y_p(row_and_polarity) {}
+
   static constexpr AbsoluteEvent at(int x, int y, Microseconds t, Polarity polarity) {
     const auto event = Event::at(x, y, 0, polarity);
     return {t, event.x, event.y_p};

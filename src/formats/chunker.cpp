@@ -2,6 +2,7 @@
 #include "src/formats/chunker.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 namespace eventcamera {
 namespace {
@@ -12,20 +13,41 @@ bool earlier(const AbsoluteEvent& a, const AbsoluteEvent& b) {
 
 }  // namespace
 
+IntervalEvents IntervalEvents::before(Microseconds duration) const {
+  const auto end = std::ranges::partition_point(
+      events_, [&](const AbsoluteEvent& event) { return event.t < start_ + duration; });
+  return {start_, {events_.begin(), end}};
+}
+
+void IntervalEvents::write_to(Event* out) const {
+  const auto start = start_;
+  for (const auto& event : events_)
+    *out++ = {static_cast<std::uint32_t>(event.t - start), event.x, event.y_p};
+}
+
 Chunker::Chunker(Microseconds length, Microseconds start)
     : length_(length), first_(start), given_start_(true), start_(start) {}
 
 void Chunker::push(std::span<const AbsoluteEvent> events) {
   if (events.empty()) return;
+  drop_handed_out();
   // Fast path: nearly always the events are in order and can be added at once.
   if (ahead_.empty() && latest_ != never && events.front().t >= std::max(latest_, start_) &&
-      events.back().t <= latest_ + settled &&
-      std::is_sorted(events.begin(), events.end(), earlier)) {
-    kept_.insert(kept_.end(), events.begin(), events.end());
-    latest_ = events.back().t;
+      events.back().t <= latest_ + settled && keep_sorted(events))
     return;
-  }
   for (const auto& event : events) place(event);
+}
+
+/// Keeps events if they are sorted.
+bool Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
+  bool falls = false;  // without a branch, the loop runs at the speed of memory
+  for (std::size_t i = 1; i < events.size(); ++i) falls |= events[i].t < events[i - 1].t;
+  if (falls) return false;
+  const auto before = kept_.size();
+  kept_.resize(before + events.size());
+  std::memcpy(static_cast<void*>(kept_.data() + before), events.data(), events.size_bytes());
+  latest_ = events.back().t;
+  return true;
 }
 
 void Chunker::place(const AbsoluteEvent& event) {
@@ -79,6 +101,13 @@ void Chunker::finish() {
   finished_ = true;
 }
 
+/// Erases returned events once they are by far the greater part, so that little is moved.
+void Chunker::drop_handed_out() {
+  if (head_ <= kept_.size() / 4 * 3) return;
+  kept_.erase(kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(head_));
+  head_ = 0;
+}
+
 void Chunker::sort() {
   if (sorted_) return;
   std::stable_sort(kept_.begin() + static_cast<std::ptrdiff_t>(head_), kept_.end(), earlier);
@@ -112,17 +141,8 @@ Chunker::Interval Chunker::hand_out(Microseconds end) {
   const auto from = kept_.begin() + static_cast<std::ptrdiff_t>(head_);
   const auto to =
       std::partition_point(from, kept_.end(), [end](const auto& event) { return event.t < end; });
-  handed_out_.resize(static_cast<std::size_t>(to - from));
-  std::transform(from, to, handed_out_.begin(), [this](const AbsoluteEvent& event) {
-    return Event{static_cast<std::uint32_t>(event.t - start_), event.x, event.y_p};
-  });
+  const Interval interval{start_, end - start_, {start_, {from, to}}};
   head_ = static_cast<std::size_t>(to - kept_.begin());
-  // Erase returned events once they are the greater part, so that little is moved.
-  if (head_ > kept_.size() / 2) {
-    kept_.erase(kept_.begin(), to);
-    head_ = 0;
-  }
-  const Interval interval{start_, end - start_, handed_out_};
   start_ = end;
   return interval;
 }

@@ -12,6 +12,27 @@
 
 namespace eventcamera {
 
+/// Sorted events of an interval, whose times are counted from its start as they are written.
+class IntervalEvents {
+ public:
+  IntervalEvents() = default;
+  IntervalEvents(Microseconds start, std::span<const AbsoluteEvent> events)
+      : start_(start), events_(events) {}
+
+  std::size_t size() const { return events_.size(); }
+  bool empty() const { return events_.empty(); }
+
+  /// Those less than `duration` after the start.
+  IntervalEvents before(Microseconds duration) const;
+
+  /// Writes size() events.
+  void write_to(Event* out) const;
+
+ private:
+  Microseconds start_ = 0;
+  std::span<const AbsoluteEvent> events_;
+};
+
 /// Cuts the events of a recording into intervals of equal length, each sorted by time. Events
 /// with the same time keep the order in which they came. Times are whole microseconds, rounded
 /// down, so an interval includes its start and excludes its end.
@@ -30,7 +51,7 @@ class Chunker {
   struct Interval {
     Microseconds start;
     Microseconds duration;
-    std::span<const Event> events;  ///< empty: a silence, of any length; valid until next()
+    IntervalEvents events;  ///< none: a silence, of any length; valid until next() or push()
   };
 
   struct Dropped {
@@ -67,10 +88,12 @@ class Chunker {
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
   static constexpr std::size_t max_ahead = std::size_t{1} << 16;
 
+  bool keep_sorted(std::span<const AbsoluteEvent> events);
   void place(const AbsoluteEvent& event);
   void keep(const AbsoluteEvent& event);
   void believe_ahead();
   void sort();
+  void drop_handed_out();
   Interval hand_out(Microseconds end);
   Microseconds grid_before(Microseconds t) const { return t - (t - *first_) % length_; }
 
@@ -86,7 +109,6 @@ class Chunker {
   std::size_t head_ = 0;
   bool sorted_ = true;
   std::vector<AbsoluteEvent> ahead_;  ///< far ahead of latest_: not yet trusted
-  std::vector<Event> handed_out_;
   Dropped dropped_;
 };
 

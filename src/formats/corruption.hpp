@@ -12,7 +12,6 @@ struct Corruption {
   std::uint64_t first_at = 0;  ///< byte offset of the first in the file
   std::string first;           ///< description of the first, for users
   std::uint64_t last_at = 0;   ///< byte offset of the last that was found
-  std::uint64_t unsorted = 0;  ///< events earlier than one before them, delivered as read
   std::uint64_t outside = 0;   ///< events outside the sensor, dropped
 
   /// Records one more place.

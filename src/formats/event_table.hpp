@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -66,24 +65,15 @@ class RowValidator {
       ++corruption.outside;
       return;
     }
-    if (t < latest_) {
-      ++corruption.unsorted;
-    } else {
-      latest_ = t;
-    }
     out.push_back(
         {t, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y | (on ? 0x8000 : 0))});
   }
-
-  /// Allows the next event to be earlier.
-  void restart() { latest_ = std::numeric_limits<Microseconds>::min(); }
 
  private:
   static constexpr int max_x = 0x10000;
   static constexpr int max_y = 0x8000;
 
   std::uint64_t x_end_ = max_x, y_end_ = max_y;
-  Microseconds latest_ = std::numeric_limits<Microseconds>::min();
 };
 
 }  // namespace eventcamera

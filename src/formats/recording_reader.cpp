@@ -10,12 +10,10 @@ namespace eventcamera {
 
 namespace {
 
-/// Limit of the survey at the start of a file, in bytes, or in events if the reader reads from the
-/// source itself.
+/// Limit of the survey at the start of a file, in bytes.
 constexpr std::uint64_t max_surveyed_bytes = std::uint64_t{1} << 24;
-constexpr std::uint64_t max_surveyed_events = std::uint64_t{1} << 22;
-/// Limits of held items, in bytes and in time.
-constexpr std::size_t max_held = std::size_t{1} << 24;
+/// Limits of held items, in bytes of memory (4 million events) and in time.
+constexpr std::size_t max_held = std::size_t{1} << 26;
 constexpr Microseconds max_hold = 1'000'000;
 /// A stream lagging by more than this is treated as silent.
 constexpr Microseconds max_lag = 500'000;
@@ -34,11 +32,11 @@ bool is_time(Microseconds t) {
 
 }  // namespace
 
-RecordingReader::RecordingReader(MakeReader make_reader, Microseconds chunk_length, Clock clock)
-    : make_reader_(std::move(make_reader)),
+RecordingReader::RecordingReader(MakeDecoder make_decoder, Microseconds chunk_length, Clock clock)
+    : make_decoder_(std::move(make_decoder)),
       chunk_length_(chunk_length),
       clock_(clock),
-      reader_(make_reader_()) {
+      decoder_(make_decoder_()) {
   learn_streams();
   if (clock_ == Clock::file) return;
   begun_ = true;
@@ -49,20 +47,20 @@ RecordingReader::RecordingReader(MakeReader make_reader, Microseconds chunk_leng
 
 void RecordingReader::push(std::span<const std::uint8_t> bytes, std::optional<Interval> interval) {
   const auto lock = reading();
-  reader_->push(bytes);
+  decoder_->push(bytes);
   interval_ = interval;
   finished_ = finishing_ = drained_ = false;
 }
 
 void RecordingReader::finish() {
   const auto lock = reading();
-  reader_->finish();
+  decoder_->finish();
   finished_ = true;
 }
 
 void RecordingReader::discard() {
   const auto lock = reading();
-  while (reader_->next()) continue;
+  while (decoder_->next()) continue;
 }
 
 void RecordingReader::interrupt() {
@@ -82,7 +80,7 @@ bool RecordingReader::reach(Microseconds t) {
   return chunker.first().has_value();
 }
 
-/// Next item from the held items, else from the reader.
+/// Next item from the held items, else from the decoder.
 std::optional<Item> RecordingReader::next_item() {
   if (begun_ && held_next_ < held_.size()) {
     const auto& held = held_[held_next_++];
@@ -112,13 +110,13 @@ std::optional<Item> RecordingReader::next_item() {
 
 std::optional<Item> RecordingReader::read_item() {
   const auto lock = reading();
-  const auto item = reader_->next();
+  const auto item = decoder_->next();
   learn_streams();
   return item;
 }
 
 void RecordingReader::learn_streams() {
-  const auto& known = reader_->streams();
+  const auto& known = decoder_->streams();
   for (std::size_t i = 0; i < std::min(known.size(), streams_.size()); ++i) {
     if (known[i].kind != streams_[i].info.kind)
       throw std::runtime_error("the file changed while it was read: its streams are different now");
@@ -143,41 +141,45 @@ void RecordingReader::learn_streams() {
 
 /* the start of a file */
 
-/// Reads ahead to find the origin, the duration and sizes not stated in the file, then goes back.
-/// False if bytes cannot be read.
+/// Reads ahead to find the origin, the duration and sizes not stated in the file. What is read is
+/// held, unless output starts elsewhere. False if bytes cannot be read.
 bool RecordingReader::survey() {
   {
     const auto lock = reading();
-    reader_ = make_reader_();
-    reads_itself_ = reader_->open(*source_);
+    decoder_ = make_decoder_();
+    reads_itself_ = decoder_->open(*source_);
   }
   streams_.clear();
   position_ = 0;
   start_due_ = finished_ = false;
-  std::uint64_t events = 0;
-  while (!is_surveyed(events)) {
+  held_.clear();
+  held_size_ = 0;
+  while (!is_surveyed()) {
     const auto item = next_item();
     if (!item && !finished_) return false;
     if (!item) break;
     std::visit([this](const auto& some) { note(some); }, *item);
-    if (const auto* const some = std::get_if<EventItem>(&*item)) events += some->events.size();
+    hold(*item);
   }
   if (finished_) finish_chunkers();
   const bool is_whole = finished_;
-  const auto last = reader_->last_time();
+  const auto last = decoder_->last_time();
   if (source_->failed()) return false;
   begin();
   learn_duration(last, is_whole);
-  seek(start_, stop_);
+  if (start_ > 0)
+    restart(seek_point_before(start_), start_, stop_);
+  else
+    begin_segment(start_, stop_);
   return true;
 }
 
-bool RecordingReader::is_surveyed(std::uint64_t events) const {
-  if (reads_itself_ ? events >= max_surveyed_events : position_ >= max_surveyed_bytes) return true;
+bool RecordingReader::is_surveyed() const {
+  if (held_size_ >= max_held || position_ >= max_surveyed_bytes) return true;
   const bool sizes_known = std::ranges::all_of(streams_, [](const Stream& stream) {
     return stream.info.kind != StreamKind::events || stream.info.size.width > 0;
   });
-  const auto last = sizes_known && is_origin_known() ? reader_->last_time() : std::nullopt;
+  const auto last = sizes_known && is_origin_known() ? decoder_->last_time() : std::nullopt;
   return last && *last < Chunker::max_time;
 }
 
@@ -231,7 +233,7 @@ bool RecordingReader::is_origin_known() const {
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     const auto& stream = streams_[i];
     if (!stream.first) {
-      awaited |= is_shown(stream.info.kind) && !reader_->is_empty(i);
+      awaited |= is_shown(stream.info.kind) && !decoder_->is_empty(i);
       continue;
     }
     const bool of_events = stream.info.kind == StreamKind::events;
@@ -288,7 +290,7 @@ void RecordingReader::learn_duration(std::optional<Microseconds> told, bool is_w
 
 std::optional<SeekPoint> RecordingReader::seek_point_before(Microseconds start) const {
   const auto lock = reading();
-  return reader_->seek_point_before(start > 0 ? origin_ + start : always);
+  return decoder_->seek_point_before(start > 0 ? origin_ + start : always);
 }
 
 void RecordingReader::seek(Microseconds start, std::optional<Microseconds> stop) {
@@ -302,20 +304,27 @@ void RecordingReader::restart(const std::optional<SeekPoint>& seek_point, Micros
   {
     const auto lock = reading();
     if (seek_point) {
-      reader_->restart(*seek_point);
-      before_ = reader_->corruption();
+      decoder_->restart(*seek_point);
+      before_ = decoder_->corruption();
     } else {
-      reader_ = make_reader_();
-      if (source_ != nullptr) reads_itself_ = reader_->open(*source_);
+      decoder_ = make_decoder_();
+      if (source_ != nullptr) reads_itself_ = decoder_->open(*source_);
       before_ = {};
     }
   }
   position_ = seek_point ? seek_point->position : 0;
+  finished_ = false;
+  held_.clear();
+  held_size_ = 0;
+  begin_segment(start, stop);
+}
+
+/// Prepares for items at `start` or later: those held, and those that the decoder reads next.
+void RecordingReader::begin_segment(Microseconds start, std::optional<Microseconds> stop) {
   start_ = newest_ = caught_up_ = start;
   stop_ = stop;
-  finished_ = finishing_ = drained_ = false;
-  held_.clear();
-  held_next_ = held_size_ = next_stream_ = 0;
+  finishing_ = drained_ = false;
+  held_next_ = next_stream_ = 0;
   output_due_.reset();
   triggers_.clear();
   imu_samples_.clear();
@@ -515,9 +524,7 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
 void RecordingReader::cut_at_stop(Chunk& chunk) const {
   if (!stop_ || chunk.start + chunk.duration <= *stop_) return;
   chunk.duration = std::max<Microseconds>(*stop_ - chunk.start, 0);
-  const auto end = std::ranges::partition_point(
-      chunk.events, [&](const Event& event) { return event.t < chunk.duration; });
-  chunk.events = {chunk.events.begin(), end};
+  chunk.events = chunk.events.before(chunk.duration);
 }
 
 /// Treats event streams that lag far behind the newest item as silent.
@@ -556,7 +563,7 @@ void RecordingReader::finish_chunkers() {
 
 RecordingReader::Counts RecordingReader::counts() const {
   Counts counts = counts_;
-  const auto& corruption = reader_->corruption();
+  const auto& corruption = decoder_->corruption();
   counts.corrupt_places = corruption.places - before_.places;
   counts.outside = corruption.outside - before_.outside;
   for (const auto& stream : streams_) {

@@ -12,32 +12,32 @@
 #include <vector>
 
 #include "src/formats/chunker.hpp"
-#include "src/formats/reader.hpp"
+#include "src/formats/recording_decoder.hpp"
 #include "src/formats/sensor_sizes.hpp"
 #include "src/formats/waiting_items.hpp"
 
 namespace eventcamera {
 
-/// Plays a recording: turns the items of its Reader into chunks of events, frames, triggers and IMU
-/// samples, timed from a common origin, the time of the first event or frame. Knows streams,
+/// Plays a recording: turns the items of its decoder into chunks of events, frames, triggers and
+/// IMU samples, timed from a common origin, the time of the first event or frame. Knows streams,
 /// duration and seek points, and counts items read and dropped.
 ///
-/// In push mode the first items are held until the time origin is known. In pull mode the start of
-/// the file, up to 16 MiB, is surveyed first: this gives an exact or estimated duration, and the
-/// sensor size if the file does not state it.
+/// The first items are held until the time origin is known. In pull mode the start of the file, up
+/// to 16 MiB or 4 million events, is surveyed first: this gives an exact or estimated duration, and
+/// the sensor size if the file does not state it.
 ///
 ///     recording.push(bytes);  // or open(), once
 ///     while (const auto output = recording.next()) ...
 class RecordingReader {
  public:
-  /// Creates a Reader for the file, positioned at its start. May throw.
-  using MakeReader = std::function<std::unique_ptr<Reader>()>;
+  /// Creates a decoder of the file, positioned at its start. May throw.
+  using MakeDecoder = std::function<std::unique_ptr<RecordingDecoder>()>;
 
   /// Source of output times: the file's own times, or those of the buffers that carry encoded
   /// words.
   enum class Clock : std::uint8_t { file, stream };
 
-  RecordingReader(MakeReader make_reader, Microseconds chunk_length, Clock clock = Clock::file);
+  RecordingReader(MakeDecoder make_decoder, Microseconds chunk_length, Clock clock = Clock::file);
 
   /// Origin of a sensor size. An assumed size grows with the events: info.size covers each chunk
   /// before it is returned.
@@ -67,7 +67,7 @@ class RecordingReader {
     std::size_t stream;
     Microseconds start;
     Microseconds duration;
-    std::span<const Event> events;  ///< empty: a gap, in a stream of any kind
+    IntervalEvents events;  ///< none: a gap, in a stream of any kind
   };
 
   /// A frame and its time since the origin.
@@ -137,7 +137,7 @@ class RecordingReader {
     streams_[stream].size_from = SizeFrom::user;
   }
 
-  std::string format_name() const { return reader_->format_name(); }
+  std::string format_name() const { return decoder_->format_name(); }
 
   /// Time in the file that output times count from; valid after a Start.
   Microseconds origin() const { return origin_; }
@@ -162,7 +162,7 @@ class RecordingReader {
   Counts counts() const;
 
   /// The first corruption of the file.
-  const Corruption& corruption() const { return reader_->corruption(); }
+  const Corruption& corruption() const { return decoder_->corruption(); }
 
  private:
   /// An item read before the origin was known.
@@ -187,9 +187,11 @@ class RecordingReader {
   void note(const ImuItem& /*item*/) {}
   void hold(const Item& item);
   bool is_origin_known() const;
-  bool is_surveyed(std::uint64_t events) const;
+  bool is_surveyed() const;
   void begin();
   void learn_duration(std::optional<Microseconds> told, bool is_whole);
+
+  void begin_segment(Microseconds start, std::optional<Microseconds> stop);
 
   void show(Stream& stream);
   void start_chunker(Stream& stream);
@@ -208,19 +210,19 @@ class RecordingReader {
   void set_shift(Microseconds first);
   void finish_chunkers();
 
-  MakeReader make_reader_;
+  MakeDecoder make_decoder_;
   Microseconds chunk_length_;
   Clock clock_;
 
-  mutable std::mutex mutex_;  ///< guards reader_ and origin_ against seek_point_before()
-  std::unique_ptr<Reader> reader_;
+  mutable std::mutex mutex_;  ///< guards decoder_ and origin_ against seek_point_before()
+  std::unique_ptr<RecordingDecoder> decoder_;
   Microseconds origin_ = 0;
 
   ByteSource* source_ = nullptr;  ///< in pull mode
-  bool reads_itself_ = false;     ///< the reader reads from the source
+  bool reads_itself_ = false;     ///< the decoder reads from the source
   std::uint64_t position_ = 0;    ///< offset of the next byte to pull
 
-  std::vector<Stream> streams_;  ///< same indices as in the reader
+  std::vector<Stream> streams_;  ///< same indices as in the decoder
   bool begun_ = false;           ///< the origin is known
   bool start_due_ = false;
   bool finished_ = false;   ///< no more bytes
@@ -244,8 +246,8 @@ class RecordingReader {
   std::size_t next_stream_ = 0;  ///< next stream to ask for a chunk
   Microseconds newest_ = 0;      ///< maximum position of all streams
   Microseconds caught_up_ = 0;   ///< newest_ at the last catch_up()
-  Corruption before_;            ///< the reader's corruption at its last restart
-  Counts counts_;                ///< without those that reader and chunkers count
+  Corruption before_;            ///< the decoder's corruption at its last restart
+  Counts counts_;                ///< without those that decoder and chunkers count
 };
 
 }  // namespace eventcamera

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "src/formats/unit_reader.hpp"
+#include "src/formats/unit_decoder.hpp"
 
 namespace eventcamera {
 
@@ -43,7 +43,7 @@ class TimeBase {
   /// Small steps lead to `time`.
   void advance_to(std::uint64_t time) { before_leap_ = time_ = time; }
 
-  UnitReader::State state() const {
+  UnitDecoder::State state() const {
     return {static_cast<Microseconds>(time_), static_cast<std::uint64_t>(known_)};
   }
 

@@ -13,13 +13,10 @@ constexpr int max_late_in_a_row = 16;
 }  // namespace
 
 RtpUnpacker::RtpUnpacker(SensorSize sensor, RtpEventFormat format)
-    : sensor_(sensor),
-      format_(format),
-      reader_(make_evt3_reader(sensor)),
-      batch_(std::make_unique<Batch>(corruption_)) {}
+    : sensor_(sensor), format_(format), decoder_(make_evt3_unit_decoder(sensor)) {}
 
 void RtpUnpacker::change(SensorSize sensor, RtpEventFormat format) {
-  reader_ = make_evt3_reader(sensor);
+  decoder_ = make_evt3_unit_decoder(sensor);
   sensor_ = sensor;
   format_ = format;
 }
@@ -113,18 +110,19 @@ bool RtpUnpacker::decode_events(std::span<const std::uint8_t> body) {
 }
 
 bool RtpUnpacker::decode_evt3(std::span<const std::uint8_t> words) {
-  reader_->restore({});
+  decoder_->restore({});
   corruption_ = {};
-  batch_->triggers = &triggers_;
-  batch_->start = words.data();
+  words_.events.clear();
+  words_.triggers.clear();
+  Batch batch(corruption_);
+  batch.start = words.data();
   const auto* from = words.data();
   const auto* const to = from + words.size();
   while (from != to) {
-    batch_->end = batch_->begin();
-    from = reader_->read(from, to, *batch_);
-    triggers_.clear();
-    for (const auto* event = batch_->begin(); event != batch_->end; ++event)
-      if (!decode(static_cast<std::uint64_t>(event->t), event->x, event->y_p)) return false;
+    batch.open(words_);
+    from = decoder_->read(from, to, batch);
+    for (const auto& event : batch.close())
+      if (!decode(static_cast<std::uint64_t>(event.t), event.x, event.y_p)) return false;
   }
   return corruption_.places == 0 && corruption_.outside == 0 &&
          decoded_.size() == header_.event_count;

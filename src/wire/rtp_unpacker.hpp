@@ -11,7 +11,7 @@
 #include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
-#include "src/formats/unit_reader.hpp"
+#include "src/formats/unit_decoder.hpp"
 #include "src/wire/rtp_payload.hpp"
 
 namespace eventcamera {
@@ -124,12 +124,11 @@ class RtpUnpacker {
 
   SensorSize sensor_;
   RtpEventFormat format_;
-  std::unique_ptr<UnitReader> reader_;  ///< of EVT3 words
-  std::unique_ptr<Batch> batch_;
-  Corruption corruption_;          ///< of the current packet
-  std::vector<Trigger> triggers_;  ///< of the current packet
-  RtpPayloadHeader header_;        ///< of the current packet
-  std::vector<Event> decoded_;     ///< of the current packet
+  std::unique_ptr<UnitDecoder> decoder_;  ///< of EVT3 words
+  Corruption corruption_;                 ///< of the current packet
+  Decoded words_;                         ///< of the current packet, with times of the words
+  RtpPayloadHeader header_;               ///< of the current packet
+  std::vector<Event> decoded_;            ///< of the current packet
 
   std::optional<Position> position_;
   std::uint16_t next_late_ = 0;  ///< sequence number that continues the last late packet

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <random>
 
-#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "tests/elements/pipeline.hpp"
 
@@ -14,8 +14,8 @@ namespace {
 
 using namespace harness;
 using eventcamera::AbsoluteEvent;
+using eventcamera::Hdf5Decoder;
 using eventcamera::Hdf5Format;
-using eventcamera::Hdf5Reader;
 using eventcamera::Hdf5Writer;
 using eventcamera::Microseconds;
 using eventcamera::Polarity;
@@ -82,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(, Hdf5, testing::Values("dsec", "metavision"),
                          [](const auto& test) { return test.param; });
 
 Events read(const std::string& path) {
-  Hdf5Reader reader(path);
+  Hdf5Decoder reader(path);
   Events events;
   while (reader.read(10'000, events) > 0) continue;
   EXPECT_EQ(reader.corruption().places, 0U) << reader.corruption().first;
@@ -228,7 +228,7 @@ TEST(Hdf5Elements, KeepTriggers) {
     ASSERT_TRUE(player.play()) << player.error;
     EXPECT_TRUE(read(out) == events);
     std::vector<Trigger> found;
-    Hdf5Reader reader(out);
+    Hdf5Decoder reader(out);
     while (reader.read_triggers(1000, found) > 0) continue;
     const bool has_triggers = layout == "metavision";
     EXPECT_EQ(found, has_triggers ? triggers : std::vector<Trigger>());

@@ -27,8 +27,7 @@ struct Cut {
 
 void take_whole(Chunker& chunker, std::vector<Cut>& cuts) {
   while (const auto interval = chunker.next())
-    cuts.push_back(
-        {interval->start, interval->duration, {interval->events.begin(), interval->events.end()}});
+    cuts.push_back({interval->start, interval->duration, recordings::written(interval->events)});
 }
 
 std::vector<Cut> slice(Chunker& chunker, std::span<const AbsoluteEvent> events,

@@ -228,12 +228,10 @@ TEST(Csv, CorruptionIsSkippedAndCounted) {
   EXPECT_EQ(found.corruption.places, 5U);
   EXPECT_EQ(found.corruption.first_at, 16U);
   EXPECT_EQ(found.corruption.outside, 3U);
-  EXPECT_EQ(found.corruption.unsorted, 0U);
   expect_same_however_cut([] { return std::make_unique<CsvDecoder>(); }, bytes_of(text));
 
   const auto unsorted = read("t,x,y,p\n5,1,1,1\n3,1,1,1\n4,1,1,1\n5,1,1,1\n");
   EXPECT_EQ(unsorted.events.size(), 4U);
-  EXPECT_EQ(unsorted.corruption.unsorted, 2U);
 
   TableSettings settings;
   settings.size = {10, 8};
@@ -302,7 +300,6 @@ TEST(Csv, EveryFormatComesBack) {
       CsvDecoder decoder(settings);
       EXPECT_TRUE(decoded(decoder, bytes) == events) << size.width;
       EXPECT_EQ(decoder.corruption().places, 0U);
-      EXPECT_EQ(decoder.corruption().unsorted, 0U);
       EXPECT_EQ(decoder.corruption().outside, 0U);
       using Header = CsvFormat::Header;
       const auto header = format.header;
@@ -357,9 +354,7 @@ TEST(Csv, RealEventsOfTheEventCameraDataset) {
   CsvDecoder decoder(settings);
   const auto events = decoded(decoder, bytes);
   ASSERT_EQ(events.size(), 50'000U);
-  EXPECT_EQ(
-      decoder.corruption().places + decoder.corruption().unsorted + decoder.corruption().outside,
-      0U);
+  EXPECT_EQ(decoder.corruption().places + decoder.corruption().outside, 0U);
   EXPECT_EQ(events.front(), off(96, 133, 3811));
   EXPECT_EQ(events[1], off(127, 171, 3820));
   EXPECT_EQ(events.back(), on(70, 103, 174'156));

@@ -14,8 +14,8 @@
 #include <thread>
 
 #include "src/formats/byte_source.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
-#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "tests/formats/table_events.hpp"
 
@@ -70,7 +70,7 @@ std::vector<Settings> all_settings(SensorSize size) {
           {Hdf5Format::metavision, Compression::none, size}};
 }
 
-Events read_all(Hdf5Reader& reader, std::size_t at_once = 10'000) {
+Events read_all(Hdf5Decoder& reader, std::size_t at_once = 10'000) {
   Events events;
   while (reader.read(at_once, events) > 0) {
   }
@@ -83,7 +83,7 @@ TEST_F(Hdf5, ComesBack) {
       const auto events =
           random_events(40'000, size, static_cast<unsigned>(size.height), 1'000'000);
       for (const std::size_t at_once : {777, 1'000'000}) {
-        Hdf5Reader reader(write(events, settings, at_once));
+        Hdf5Decoder reader(write(events, settings, at_once));
         EXPECT_EQ(reader.format(), settings.format);
         EXPECT_EQ(reader.size(), size);
         EXPECT_EQ(reader.count(), events.size());
@@ -91,13 +91,11 @@ TEST_F(Hdf5, ComesBack) {
         EXPECT_EQ(reader.time_range()->first, events.front().t);
         EXPECT_EQ(reader.time_range()->last, events.back().t);
         EXPECT_TRUE(read_all(reader, at_once) == events);
-        EXPECT_EQ(
-            reader.corruption().places + reader.corruption().unsorted + reader.corruption().outside,
-            0U);
+        EXPECT_EQ(reader.corruption().places + reader.corruption().outside, 0U);
       }
       const auto other = random_events(100, size, 1);
-      Hdf5Reader reader(in_memory(contents(path())));
-      Hdf5Reader other_reader(in_memory(contents(write(other, settings))));
+      Hdf5Decoder reader(in_memory(contents(path())));
+      Hdf5Decoder other_reader(in_memory(contents(write(other, settings))));
       EXPECT_TRUE(read_all(reader) == events);
       EXPECT_TRUE(read_all(other_reader) == other);
     }
@@ -106,7 +104,7 @@ TEST_F(Hdf5, ComesBack) {
 
 TEST_F(Hdf5, NoEventsComeBack) {
   for (const auto& settings : all_settings({640, 480})) {
-    Hdf5Reader reader(write({}, settings));
+    Hdf5Decoder reader(write({}, settings));
     EXPECT_EQ(reader.count(), 0U);
     EXPECT_FALSE(reader.time_range());
     EXPECT_TRUE(read_all(reader).empty());
@@ -119,7 +117,7 @@ TEST_F(Hdf5, NoEventsComeBack) {
 TEST_F(Hdf5, SeeksToTheFirstEventNotBefore) {
   const auto events = random_events(200'000, {640, 480}, 11, 777'777);
   for (const auto& settings : all_settings({640, 480})) {
-    Hdf5Reader reader(write(events, settings));
+    Hdf5Decoder reader(write(events, settings));
     std::mt19937 random(4);
     std::vector<Microseconds> times = {
         INT64_MIN, 0, events.front().t, events.back().t, events.back().t + 1, INT64_MAX};
@@ -137,7 +135,6 @@ TEST_F(Hdf5, SeeksToTheFirstEventNotBefore) {
     }
     reader.seek(0);
     EXPECT_TRUE(read_all(reader) == events);
-    EXPECT_EQ(reader.corruption().unsorted, 0U);
   }
 }
 
@@ -150,7 +147,7 @@ TEST_F(Hdf5, TriggersComeBack) {
     writer.append(std::span<const Trigger>(triggers).first(100));
     writer.append(std::span<const Trigger>(triggers).subspan(100));
   }
-  Hdf5Reader reader(path());
+  Hdf5Decoder reader(path());
   std::vector<Trigger> found;
   while (reader.read_triggers(777, found) > 0) {
   }
@@ -220,7 +217,7 @@ TEST_F(Hdf5, AFullDiskIsToldAndSurvived) {
       }
     }
     // The library still works.
-    Hdf5Reader reader(write(events, settings));
+    Hdf5Decoder reader(write(events, settings));
     EXPECT_TRUE(read_all(reader) == events);
   }
   EXPECT_EQ(H5Fget_obj_count(static_cast<hid_t>(H5F_OBJ_ALL), H5F_OBJ_FILE), 0);
@@ -245,7 +242,7 @@ Events left_by_a_killed_process(const std::filesystem::path& file, const Setting
   int status = 0;
   waitpid(child, &status, 0);
   EXPECT_TRUE(WIFSIGNALED(status));
-  Hdf5Reader reader(file);
+  Hdf5Decoder reader(file);
   EXPECT_EQ(reader.corruption().places, 0U);
   return read_all(reader);
 }
@@ -276,7 +273,7 @@ TEST_F(Hdf5, CommitsDoNotChangeTheFile) {
         rest = rest.subspan(part.size());
       }
     }
-    Hdf5Reader reader(path());
+    Hdf5Decoder reader(path());
     EXPECT_TRUE(read_all(reader) == events);
     reader.seek(events[150'000].t);
     Events found;
@@ -286,11 +283,11 @@ TEST_F(Hdf5, CommitsDoNotChangeTheFile) {
 }
 
 TEST_F(Hdf5, WhatIsNoFileOfEventsIsRefused) {
-  EXPECT_THROW(Hdf5Reader reader(path("missing.h5")), std::runtime_error);
+  EXPECT_THROW(Hdf5Decoder reader(path("missing.h5")), std::runtime_error);
   std::ofstream(path("text.h5")) << "t,x,y,p\n";
-  EXPECT_THROW(Hdf5Reader reader(path("text.h5")), UnsupportedFormat);
-  EXPECT_THROW(Hdf5Reader reader(in_memory(bytes_of("\x89HDF\r\n\x1a\n"))), UnsupportedFormat);
-  EXPECT_THROW(Hdf5Reader reader(in_memory({})), UnsupportedFormat);
+  EXPECT_THROW(Hdf5Decoder reader(path("text.h5")), UnsupportedFormat);
+  EXPECT_THROW(Hdf5Decoder reader(in_memory(bytes_of("\x89HDF\r\n\x1a\n"))), UnsupportedFormat);
+  EXPECT_THROW(Hdf5Decoder reader(in_memory({})), UnsupportedFormat);
 }
 
 TEST_F(Hdf5, CorruptChunksAreLeftOutAndCounted) {
@@ -310,7 +307,7 @@ TEST_F(Hdf5, CorruptChunksAreLeftOutAndCounted) {
   ASSERT_NE(at, file.end());
   auto corrupt = file;
   corrupt[static_cast<std::size_t>(at - file.begin()) + 3] = 0xff;
-  Hdf5Reader reader(in_memory(corrupt));
+  Hdf5Decoder reader(in_memory(corrupt));
   auto expected = events;
   expected.erase(expected.begin() + 16384 * 2, expected.begin() + 16384 * 3);
   EXPECT_TRUE(read_all(reader) == expected);
@@ -335,7 +332,7 @@ TEST_F(Hdf5, ASizeThatNoSensorHasIsNone) {
   const auto found = std::search(bytes.begin(), bytes.end(), size.begin(), size.end());
   ASSERT_NE(found, bytes.end());
   std::ranges::copy(none, found);
-  Hdf5Reader reader(in_memory(bytes));
+  Hdf5Decoder reader(in_memory(bytes));
   EXPECT_EQ(reader.size(), SensorSize{});
 }
 
@@ -352,7 +349,7 @@ TEST_F(Hdf5, FilesAreReadAndWrittenByThreads) {
         for (std::size_t j = 0; j < events.size(); j += 1000)
           writer.append(std::span(events).subspan(j, 1000));
       }
-      Hdf5Reader reader(file);
+      Hdf5Decoder reader(file);
       equal[i] = read_all(reader, 1000) == events;
     });
   }

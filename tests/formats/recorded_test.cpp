@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "src/formats/evt/raw.hpp"
+#include "src/formats/one_stream_decoder.hpp"
 #include "src/formats/recording_reader.hpp"
 #include "tests/formats/evt_validator.hpp"
 #include "tests/formats/recordings.hpp"
@@ -82,12 +83,12 @@ TEST(Recorded, PlaysEveryEventInTheOrderOfTheFile) {
     std::ranges::stable_sort(events, {}, &AbsoluteEvent::t);
     MemoryBytes bytes(bytes_of(name));
     RecordingReader reader(
-        [] { return std::make_unique<DecoderReader>(make_prophesee_raw_decoder()); }, 10'000);
+        [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); }, 10'000);
     reader.open(bytes);
     std::vector<AbsoluteEvent> played;
     while (const auto output = reader.next())
       if (const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output))
-        for (const auto& event : chunk->events)
+        for (const auto& event : recordings::written(chunk->events))
           played.push_back({reader.origin() + chunk->start + event.t, event.x, event.y_p});
     EXPECT_TRUE(played == events) << name;
   }

@@ -13,11 +13,12 @@
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
 #include "src/formats/aedat/aedat4_table.hpp"
-#include "src/formats/aedat/aedat_reader.hpp"
+#include "src/formats/aedat/aedat_decoder.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/one_stream_decoder.hpp"
 #include "tests/formats/pieces.hpp"
 #include "tests/formats/recordings.hpp"
 
@@ -46,20 +47,20 @@ Events some_events() {
 struct File {
   std::string name;
   Bytes bytes;
-  RecordingReader::MakeReader make_reader;
+  RecordingReader::MakeDecoder make_decoder;
 };
 
 File raw_file() {
   const auto encoder = make_prophesee_raw_encoder(EvtFormat::evt3, sensor);
   return {"raw", recordings::encode(*encoder, some_events()),
-          [] { return std::make_unique<DecoderReader>(make_prophesee_raw_decoder()); }};
+          [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); }};
 }
 
 /// Without a stated size, and readable only from the start.
 File npy_file() {
   NpyEncoder encoder;
   return {"npy", recordings::encode(encoder, some_events()),
-          [] { return std::make_unique<DecoderReader>(std::make_unique<NpyDecoder>()); }};
+          [] { return std::make_unique<OneStreamDecoder>(std::make_unique<NpyDecoder>()); }};
 }
 
 /// Events, and a frame every 100 ms, starting 50 ms earlier, whose pixels contain its number.
@@ -81,7 +82,7 @@ File aedat_file(bool has_table) {
   if (const auto patch = encoder.patch())
     std::ranges::copy(patch->bytes, bytes.begin() + static_cast<std::ptrdiff_t>(patch->position));
   return {has_table ? "aedat_with_a_table" : "aedat_without_a_table", std::move(bytes),
-          [] { return std::make_unique<AedatReader>(); }};
+          [] { return std::make_unique<AedatDecoder>(); }};
 }
 
 /// As an older DV writes them: the table has the positions of the packets, and zeros.
@@ -122,7 +123,7 @@ struct Outcome {
   void take(const RecordingReader::Chunk& chunk) {
     EXPECT_GE(starts, 1U);
     chunks.emplace_back(chunk.stream, chunk.start, chunk.duration,
-                        std::vector<Event>(chunk.events.begin(), chunk.events.end()));
+                        recordings::written(chunk.events));
   }
   void take(const RecordingReader::TimedFrame& item) {
     pictures.emplace_back(item.stream, item.time, item.frame.pixels[0]);
@@ -169,14 +170,14 @@ class Recording : public testing::TestWithParam<File> {
   Microseconds origin() const {
     return GetParam().name.starts_with("aedat") ? 1'950'000 : 2'000'000;
   }
-  RecordingReader reader() const { return {GetParam().make_reader, chunk_length}; }
+  RecordingReader reader() const { return {GetParam().make_decoder, chunk_length}; }
 };
 INSTANTIATE_TEST_SUITE_P(, Recording, testing::ValuesIn(all_files()),
                          [](const auto& test) { return test.param.name; });
 
 TEST_P(Recording, IsTheSamePushedAndPulled) {
   MemoryBytes bytes(GetParam().bytes);
-  RecordingReader pulled(GetParam().make_reader, chunk_length);
+  RecordingReader pulled(GetParam().make_decoder, chunk_length);
   pulled.open(bytes);
   Outcome expected;
   expected.take_all(pulled);
@@ -189,7 +190,7 @@ TEST_P(Recording, IsTheSamePushedAndPulled) {
   EXPECT_EQ(pulled.counts().frames, expected.pictures.size());
   EXPECT_EQ(pulled.counts().corrupt_places, 0U);
   for (const std::size_t size : {1UL, 0UL, 1UL << 24}) {
-    RecordingReader pushed(GetParam().make_reader, chunk_length);
+    RecordingReader pushed(GetParam().make_decoder, chunk_length);
     Outcome outcome;
     for (const auto piece : pieces::of(GetParam().bytes, size)) {
       const Bytes copy(piece.begin(), piece.end());
@@ -210,7 +211,7 @@ TEST_P(Recording, IsTheSamePushedAndPulled) {
 
 TEST_P(Recording, TellsItsDuration) {
   MemoryBytes bytes(GetParam().bytes);
-  RecordingReader reader(GetParam().make_reader, chunk_length);
+  RecordingReader reader(GetParam().make_decoder, chunk_length);
   reader.open(bytes);
   EXPECT_FALSE(reader.duration());
   ASSERT_TRUE(reader.next());
@@ -219,7 +220,7 @@ TEST_P(Recording, TellsItsDuration) {
 
 TEST_P(Recording, IsSeekedIn) {
   MemoryBytes bytes(GetParam().bytes);
-  RecordingReader reader(GetParam().make_reader, chunk_length);
+  RecordingReader reader(GetParam().make_decoder, chunk_length);
   reader.open(bytes);
   reader.seek(3'700'000, std::nullopt);  // before the survey
   const auto expect_from = [&](Microseconds start, std::optional<Microseconds> stop) {
@@ -252,7 +253,7 @@ TEST_P(Recording, IsSeekedIn) {
 
 TEST_P(Recording, IsRestartedWhereItIsPushed) {
   const auto& bytes = GetParam().bytes;
-  RecordingReader reader(GetParam().make_reader, chunk_length);
+  RecordingReader reader(GetParam().make_decoder, chunk_length);
   Outcome all;
   reader.push(bytes);
   all.take_all(reader);
@@ -281,11 +282,11 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
     encoder->encode_trigger(triggers.back(), bytes);
   }
   encoder->finish(bytes);
-  const auto make_reader = [] {
-    return std::make_unique<DecoderReader>(make_prophesee_raw_decoder());
+  const auto make_decoder = [] {
+    return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder());
   };
   for (const std::size_t size : {1UL, 0UL, 1UL << 24}) {
-    RecordingReader reader(make_reader, chunk_length);
+    RecordingReader reader(make_decoder, chunk_length);
     std::vector<Trigger> found;
     std::vector<Microseconds> waiting;
     Microseconds end = 0;
@@ -318,7 +319,7 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   }
 
   MemoryBytes source(bytes);
-  RecordingReader reader(make_reader, chunk_length);
+  RecordingReader reader(make_decoder, chunk_length);
   reader.open(source);
   reader.seek(3'700'000, 3'900'000);
   Outcome sought;
@@ -335,7 +336,7 @@ TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
 TEST(RecordingReader, GuessesTheSizeOfASensor) {
   const auto file = npy_file();
   for (const std::size_t size : {1UL, 1UL << 24}) {
-    RecordingReader reader(file.make_reader, chunk_length);
+    RecordingReader reader(file.make_decoder, chunk_length);
     for (const auto piece : pieces::of(file.bytes, size)) {
       reader.push(piece);
       if (reader.next()) break;
@@ -354,12 +355,12 @@ File growing_file() {
                                        i % 2 == 0 ? Polarity::off : Polarity::on));
   NpyEncoder encoder;
   return {"growing", recordings::encode(encoder, events),
-          [] { return std::make_unique<DecoderReader>(std::make_unique<NpyDecoder>()); }};
+          [] { return std::make_unique<OneStreamDecoder>(std::make_unique<NpyDecoder>()); }};
 }
 
 TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
   const auto file = growing_file();
-  RecordingReader reader(file.make_reader, chunk_length);
+  RecordingReader reader(file.make_decoder, chunk_length);
   std::vector<SensorSize> sizes;
   std::size_t events = 0;
   const auto take_all = [&] {
@@ -368,7 +369,7 @@ TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
       if (chunk == nullptr) continue;
       const auto size = reader.streams().front().info.size;
       if (sizes.empty() || sizes.back() != size) sizes.push_back(size);
-      for (const auto& event : chunk->events) {
+      for (const auto& event : recordings::written(chunk->events)) {
         EXPECT_LT(event.x, size.width);
         EXPECT_LT(event.y(), size.height);
       }
@@ -390,7 +391,7 @@ TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
 
 TEST(RecordingReader, LeavesOutWhatLiesOutsideASizeThatIsSet) {
   const auto file = npy_file();
-  RecordingReader reader(file.make_reader, chunk_length);
+  RecordingReader reader(file.make_decoder, chunk_length);
   reader.push(file.bytes);
   reader.finish();
   ASSERT_TRUE(std::holds_alternative<RecordingReader::Start>(*reader.next()));
@@ -422,15 +423,15 @@ TEST(RecordingReader, ReadsTheDurationOfFixedRecordsAtTheEnd) {
   const struct {
     Encoder& encoder;
     Events events;
-    RecordingReader::MakeReader make_reader;
+    RecordingReader::MakeDecoder make_decoder;
   } files[] = {
-      {npy, many_events(7, 100), npy_file().make_reader},
+      {npy, many_events(7, 100), npy_file().make_decoder},
       {*dat, many_events(hour, 8'000),
-       [] { return std::make_unique<DecoderReader>(make_dat_decoder()); }},
+       [] { return std::make_unique<OneStreamDecoder>(make_dat_decoder()); }},
   };
-  for (const auto& [encoder, events, make_reader] : files) {
+  for (const auto& [encoder, events, make_decoder] : files) {
     MemoryBytes bytes(recordings::encode(encoder, events));
-    RecordingReader reader(make_reader, chunk_length);
+    RecordingReader reader(make_decoder, chunk_length);
     reader.open(bytes);
     ASSERT_TRUE(reader.next());
     const auto last = std::ranges::max_element(events, {}, &AbsoluteEvent::t)->t;
@@ -445,7 +446,7 @@ TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
   const auto encoder = make_evt_encoder(EvtFormat::evt3, sensor);
   const auto bytes = recordings::encode(*encoder, events);
   RecordingReader reader(
-      [] { return std::make_unique<DecoderReader>(make_evt_decoder(EvtFormat::evt3, sensor)); },
+      [] { return std::make_unique<OneStreamDecoder>(make_evt_decoder(EvtFormat::evt3, sensor)); },
       chunk_length, RecordingReader::Clock::stream);
   EXPECT_FALSE(reader.reach(5'000'000));
   const Microseconds hours = Microseconds{5} * 3600 * 1'000'000;
@@ -461,7 +462,7 @@ TEST(RecordingReader, MovesWordsToTheTimeOfTheirStream) {
 }
 
 TEST(RecordingReader, SaysWhatIsNoRecording) {
-  const auto make = [] { return std::make_unique<DecoderReader>(make_prophesee_raw_decoder()); };
+  const auto make = [] { return std::make_unique<OneStreamDecoder>(make_prophesee_raw_decoder()); };
   RecordingReader pushed(make, chunk_length);
   pushed.finish();
   EXPECT_THROW(pushed.next(), UnsupportedFormat);
@@ -495,7 +496,7 @@ class Broken final : public ByteSource {
 
 TEST_P(Recording, IsReadWhereBytesCanBeReadAgain) {
   Broken bytes(GetParam().bytes);
-  RecordingReader reader(GetParam().make_reader, chunk_length);
+  RecordingReader reader(GetParam().make_decoder, chunk_length);
   reader.open(bytes);
   EXPECT_FALSE(reader.next());
   EXPECT_FALSE(reader.at_end());

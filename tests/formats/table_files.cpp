@@ -8,11 +8,11 @@
 #include <memory>
 #include <string>
 
-#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
-#include "src/formats/numpy/npz_reader.hpp"
+#include "src/formats/numpy/npz_decoder.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
 
@@ -71,13 +71,13 @@ void read_file(const std::string& kind, const std::string& file, const std::stri
   Decoded out;
   Corruption corruption;
   if (kind == "hdf5") {
-    Hdf5Reader reader(file);
+    Hdf5Decoder reader(file);
     while (reader.read(10'000, out.events) > 0) {
     }
     corruption = reader.corruption();
   } else if (kind == "npz") {
     MemoryBytes bytes(load(file));
-    const auto reader = make_npz_reader();
+    const auto reader = make_npz_decoder();
     reader->open(bytes);
     while (const auto item = reader->next()) {
       const auto events = std::get<EventItem>(*item).events;
@@ -93,9 +93,8 @@ void read_file(const std::string& kind, const std::string& file, const std::stri
     corruption = decoder->corruption();
   }
   save(raw, out.events.data(), out.events.size() * sizeof(AbsoluteEvent));
-  std::printf("%d %d %d %s\n", static_cast<int>(corruption.places),
-              static_cast<int>(corruption.unsorted), static_cast<int>(corruption.outside),
-              corruption.first.c_str());
+  std::printf("%d %d %s\n", static_cast<int>(corruption.places),
+              static_cast<int>(corruption.outside), corruption.first.c_str());
 }
 
 }  // namespace

@@ -108,7 +108,6 @@ auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces piece
   const auto corruption = decoder->corruption();
   require((corruption.places == 0) == corruption.first.empty(), "corruption says what it is");
   require(corruption.first_at <= bytes.size(), "corruption is within the file");
-  require(corruption.unsorted == unsorted(decoded.events), "disorder is counted");
   require(decoded.events.size() + decoded.triggers.size() <= bytes.size() * events_per_byte,
           "memory is bounded");
   require_within(decoder->size(), decoded.events);
@@ -121,7 +120,7 @@ auto outcome(const Make& make, std::span<const std::uint8_t> bytes, Pieces piece
     require_restarts(*decoder, bytes, decoded);
   }
   return std::tuple(decoded.events, decoded.triggers, error, decoder->size(), corruption.places,
-                    corruption.first_at, corruption.first, corruption.unsorted, corruption.outside);
+                    corruption.first_at, corruption.first, corruption.outside);
 }
 
 template <class Make>

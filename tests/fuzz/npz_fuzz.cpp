@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/numpy/npz_reader.hpp"
+#include "src/formats/numpy/npz_decoder.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace eventcamera;
   try {
     MemoryBytes bytes({data, data + size});
-    const auto reader = make_npz_reader();
+    const auto reader = make_npz_decoder();
     reader->open(bytes);
     // A few compressed bytes can be many events.
     constexpr std::size_t most = 1'000'000;

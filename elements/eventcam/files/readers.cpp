@@ -7,36 +7,39 @@
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
+#include "src/formats/one_stream_decoder.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #ifdef HAVE_AEDAT
-#include "src/formats/aedat/aedat_reader.hpp"
+#include "src/formats/aedat/aedat_decoder.hpp"
 #endif
 #ifdef HAVE_HDF5
-#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 #endif
 #ifdef HAVE_NPZ
-#include "src/formats/numpy/npz_reader.hpp"
+#include "src/formats/numpy/npz_decoder.hpp"
 #endif
 
 using eventcamera::Decoder;
-using eventcamera::DecoderReader;
-using eventcamera::Reader;
+using eventcamera::OneStreamDecoder;
+using eventcamera::RecordingDecoder;
 
 namespace {
 
 /// Creates a reader for a format with a decoder.
-std::unique_ptr<Reader> decoded_by(std::unique_ptr<Decoder> decoder) {
-  return std::make_unique<DecoderReader>(std::move(decoder));
+std::unique_ptr<RecordingDecoder> decoded_by(std::unique_ptr<Decoder> decoder) {
+  return std::make_unique<OneStreamDecoder>(std::move(decoder));
 }
 
 /// Creates a reader for a table.
 template <class TableDecoder>
-std::unique_ptr<Reader> table_read_by(const GstCaps* /*caps*/, const FormatSettings& settings) {
+std::unique_ptr<RecordingDecoder> table_read_by(const GstCaps* /*caps*/,
+                                                const FormatSettings& settings) {
   return decoded_by(std::make_unique<TableDecoder>(settings.table()));
 }
 
 /// For words without a header, takes format and size from the caps; files have a header.
-std::unique_ptr<Reader> make_evt_reader(const GstCaps* caps, const FormatSettings& /*settings*/) {
+std::unique_ptr<RecordingDecoder> make_evt_decoder_of(const GstCaps* caps,
+                                                      const FormatSettings& /*settings*/) {
   if (caps != nullptr) {
     const GstStructure* const structure = gst_caps_get_structure(caps, 0);
     if (const auto words = evt_format_named(gst_structure_get_string(structure, "format"))) {
@@ -73,7 +76,7 @@ static const RecordingFormat evt = {
     .caps = "application/x-prophesee-raw; " EVT_WORDS_CAPS,
     .has_triggers = true,
     .add_properties = add_sensor_size,
-    .make_reader = make_evt_reader,
+    .make_decoder = make_evt_decoder_of,
 };
 GST_ELEMENT_REGISTER_DEFINE(evtdec, "evtdec", GST_RANK_PRIMARY, event_reader_type(evt))
 
@@ -98,7 +101,7 @@ static const RecordingFormat dat = {
     .caps = "application/x-prophesee-dat",
     .has_triggers = true,
     .add_properties = add_sensor_size,
-    .make_reader = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<Reader> {
+    .make_decoder = [](const GstCaps*, const FormatSettings&) -> std::unique_ptr<RecordingDecoder> {
       return decoded_by(eventcamera::make_dat_decoder());
     },
 };
@@ -134,7 +137,8 @@ static const RecordingFormat es = {
                              static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                       GST_PARAM_MUTABLE_READY)));
         },
-    .make_reader = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Reader> {
+    .make_decoder = [](const GstCaps*,
+                       const FormatSettings& settings) -> std::unique_ptr<RecordingDecoder> {
       return decoded_by(eventcamera::make_event_stream_decoder(
           static_cast<eventcamera::EsOrigin>(settings.variant)));
     },
@@ -166,7 +170,7 @@ static const RecordingFormat csv = {
     .description = "Reads CSV files of events",
     .caps = "application/x-event-csv",
     .add_properties = add_table_properties,
-    .make_reader = table_read_by<eventcamera::CsvDecoder>,
+    .make_decoder = table_read_by<eventcamera::CsvDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventcsvdec, "eventcsvdec", GST_RANK_PRIMARY, event_reader_type(csv))
 
@@ -195,7 +199,7 @@ static const RecordingFormat npy = {
     .description = "Reads NumPy files of events",
     .caps = "application/x-npy",
     .add_properties = add_table_properties,
-    .make_reader = table_read_by<eventcamera::NpyDecoder>,
+    .make_decoder = table_read_by<eventcamera::NpyDecoder>,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_reader_type(npy))
 
@@ -221,9 +225,9 @@ static const RecordingFormat npz = {
     .description = "Reads NumPy archives of events",
     .caps = "application/x-npz",
     .add_properties = add_table_properties,
-    .make_reader =
+    .make_decoder =
         [](const GstCaps*, const FormatSettings& settings) {
-          return eventcamera::make_npz_reader(settings.table());
+          return eventcamera::make_npz_decoder(settings.table());
         },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_reader_type(npz))
@@ -257,8 +261,8 @@ static const RecordingFormat hdf5 = {
     .caps = "application/x-hdf5",
     .has_triggers = true,
     .add_properties = add_sensor_size,
-    .make_reader = [](const GstCaps*,
-                      const FormatSettings&) { return eventcamera::make_hdf5_reader(); },
+    .make_decoder = [](const GstCaps*,
+                       const FormatSettings&) { return eventcamera::make_hdf5_decoder(); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, event_reader_type(hdf5))
 #endif
@@ -303,8 +307,9 @@ static const RecordingFormat aedat = {
     .has_many_streams = true,
     .has_triggers = true,
     .add_properties = add_sensor_size,
-    .make_reader = [](const GstCaps*, const FormatSettings& settings) -> std::unique_ptr<Reader> {
-      return std::make_unique<eventcamera::AedatReader>(settings.sensor);
+    .make_decoder = [](const GstCaps*,
+                       const FormatSettings& settings) -> std::unique_ptr<RecordingDecoder> {
+      return std::make_unique<eventcamera::AedatDecoder>(settings.sensor);
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_reader_type(aedat))

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "src/core/event.hpp"
-#include "src/formats/reader.hpp"
+#include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
 

@@ -492,7 +492,6 @@ std::span<const AbsoluteEvent> Aedat4Decoder::checked_events(std::size_t count) 
     } else if (event.x >= width || row_at(bytes) >= height) {
       ++corruption_.outside;
     } else {
-      if (event.t < newest) ++corruption_.unsorted;
       newest = std::max(newest, event.t);
       events_[kept++] = event;
     }

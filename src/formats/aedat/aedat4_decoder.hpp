@@ -11,7 +11,7 @@
 #include "src/formats/aedat/aedat4_compression.hpp"
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/byte_queue.hpp"
-#include "src/formats/reader.hpp"
+#include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
 
@@ -21,7 +21,7 @@ namespace eventcamera {
 ///
 /// The ID of a trigger is the source of the edge: 0 the camera's input, 1 its generator, 2 a frame,
 /// 3 an exposure, 4 a reset of its clock, 5 a pulse at its input, 6 any other.
-class Aedat4Decoder final : public Reader {
+class Aedat4Decoder final : public RecordingDecoder {
  public:
   Aedat4Decoder();
 

@@ -9,7 +9,7 @@
 #include "src/core/max_side.hpp"
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/unit_decoder.hpp"
-#include "src/formats/unit_reader.hpp"
+#include "src/formats/unit_stream_decoder.hpp"
 #include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
@@ -40,7 +40,7 @@ class DatTime {
   std::uint64_t time_ = 0;
 };
 
-class DatReader : public UnitReader {
+class DatRecordDecoder : public UnitDecoder {
  public:
   State state() const final { return {time_.time(), 0}; }
   void restore(const State& state) final { time_.restore(state.clock); }
@@ -54,13 +54,13 @@ class DatReader : public UnitReader {
 };
 
 template <int version>
-class DatEventReader final : public DatReader {
+class DatEventDecoder final : public DatRecordDecoder {
  public:
-  explicit DatEventReader(SensorSize size) : bounds_(size, max_side) {}
+  explicit DatEventDecoder(SensorSize size) : bounds_(size, max_side) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
-    auto* event = batch.begin();
+    auto* event = batch.end;
     const auto* const end =
         from + record_size * std::min((to - from) / record_size, batch.full() - event);
     const auto bounds = bounds_;
@@ -88,46 +88,45 @@ class DatEventReader final : public DatReader {
   Bounds bounds_;
 };
 
-class DatTriggerReader final : public DatReader {
+class DatTriggerDecoder final : public DatRecordDecoder {
  public:
-  explicit DatTriggerReader(SensorSize /*size*/) {}
+  explicit DatTriggerDecoder(SensorSize /*size*/) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
     for (; to - from >= record_size; from += record_size) {
       const auto t = next(time_, from);
       const auto word = little_endian<std::uint32_t>(from + 4);
-      batch.triggers->push_back({t, static_cast<std::uint16_t>(word >> 26), (word & 15) != 0});
+      batch.triggers().push_back({t, static_cast<std::uint16_t>(word >> 26), (word & 15) != 0});
     }
     return from;
   }
 };
 
 /// Ignores "T0", which some writers add: the time of the first event since some epoch.
-class DatDecoder final : public UnitDecoder {
+class DatDecoder final : public UnitStreamDecoder {
  public:
   void decode_tail(ByteSource& source, Decoded& out) const override {
-    if (make_reader_ == nullptr || source.size() < units_begin()) return;
+    if (make_decoder_ == nullptr || source.size() < units_begin()) return;
     const auto count = (source.size() - units_begin()) / record_size;
     const auto last = std::min<std::uint64_t>(count, tail_size / record_size);
-    const auto reader = make_reader_(size());
-    reader->restore({time_before(source, count - last), 0});
+    const auto decoder = make_decoder_(size());
+    decoder->restore({time_before(source, count - last), 0});
     std::vector<std::uint8_t> bytes(last * record_size);
     const auto begin = units_begin() + (count - last) * record_size;
     if (source.read(begin, bytes) != bytes.size()) return;
     Corruption ignored;
     Batch batch(ignored);
-    batch.triggers = &out.triggers;
     const auto* from = bytes.data();
     while (from != bytes.data() + bytes.size()) {
-      batch.end = batch.begin();
-      from = reader->read(from, bytes.data() + bytes.size(), batch);
-      out.events.insert(out.events.end(), batch.begin(), batch.end);
+      batch.open(out);
+      from = decoder->read(from, bytes.data() + bytes.size(), batch);
+      batch.close();
     }
   }
 
  private:
-  using MakeReader = std::unique_ptr<UnitReader> (*)(SensorSize size);
+  using MakeDecoder = std::unique_ptr<UnitDecoder> (*)(SensorSize size);
 
   /// Time of the record before this one. Wraps are counted by sampling a few earlier records, which
   /// must be less than about half an hour apart.
@@ -170,22 +169,22 @@ class DatDecoder final : public UnitDecoder {
     if (size.width == 0 || size.height == 0) size = version == "2" ? SensorSize{} : first_camera;
     if (type != event_trigger && type != event_2d && type != event_cd)
       throw UnsupportedFormat("unsupported DAT event type " + std::to_string(type));
-    make_reader_ = type == event_trigger ? make<DatTriggerReader>
-                   : version == "2"      ? make<DatEventReader<2>>
-                                         : make<DatEventReader<1>>;
-    begin(make_reader_(size), size);
+    make_decoder_ = type == event_trigger ? make<DatTriggerDecoder>
+                    : version == "2"      ? make<DatEventDecoder<2>>
+                                          : make<DatEventDecoder<1>>;
+    begin(make_decoder_(size), size);
   }
 
-  template <class Reader>
-  static std::unique_ptr<UnitReader> make(SensorSize size) {
-    return std::make_unique<Reader>(size);
+  template <class RecordingDecoder>
+  static std::unique_ptr<UnitDecoder> make(SensorSize size) {
+    return std::make_unique<RecordingDecoder>(size);
   }
 
   /// Sensor of the first camera, whose files do not state the size.
   static constexpr SensorSize first_camera{304, 240};
 
   PropheseeHeader header_;
-  MakeReader make_reader_ = nullptr;  ///< for the records; set once the header is read
+  MakeDecoder make_decoder_ = nullptr;  ///< for the records; set once the header is read
 };
 
 /// Converts times to the lower 32 bits that are written. Readers detect a wrap by a fall of more

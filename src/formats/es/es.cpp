@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "src/formats/unit_decoder.hpp"
+#include "src/formats/unit_stream_decoder.hpp"
 #include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
@@ -38,9 +38,9 @@ class Rows {
 /// An event is a byte with the microseconds since the last event and `flag_bits` flags, followed by
 /// x and y with 16 bits each. If all bits of the microseconds are set, it is that byte alone.
 template <int flag_bits>
-class EsReader final : public UnitReader {
+class EsEventDecoder final : public UnitDecoder {
  public:
-  EsReader(SensorSize size, EsOrigin origin)
+  EsEventDecoder(SensorSize size, EsOrigin origin)
       : bounds_(size, max_rows), rows_(size.height, origin) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
@@ -50,7 +50,7 @@ class EsReader final : public UnitReader {
     // An ATIS event with bit 0 set is the start or end of an exposure.
     constexpr std::uint32_t exposure = flag_bits == 2 ? 1 : 0;
     constexpr std::uint32_t on = flag_bits == 2 ? 2 : 1;
-    auto* event = batch.begin();
+    auto* event = batch.end;
     const auto* const full = batch.full();
     const auto rows = rows_;
     auto t = t_;
@@ -91,7 +91,7 @@ class EsReader final : public UnitReader {
   std::uint64_t t_ = 0;
 };
 
-class EsDecoder final : public UnitDecoder {
+class EsDecoder final : public UnitStreamDecoder {
  public:
   explicit EsDecoder(EsOrigin origin) : origin_(origin) {}
 
@@ -131,7 +131,7 @@ class EsDecoder final : public UnitDecoder {
     if (size.width == 0 || size.height == 0 || size.height > max_rows)
       throw UnsupportedFormat("Event Stream with an impossible sensor size of " +
                               std::to_string(size.width) + "x" + std::to_string(size.height));
-    begin(std::make_unique<EsReader<flag_bits>>(size, origin_), size);
+    begin(std::make_unique<EsEventDecoder<flag_bits>>(size, origin_), size);
   }
 
   EsOrigin origin_;

@@ -60,13 +60,13 @@ struct CdTypes {
 
 /// Base of the readers; the only state is the time.
 template <CdTypes types>
-class CdReader : public UnitReader {
+class CdDecoder : public UnitDecoder {
  public:
   State state() const override { return time_.state(); }
   void restore(const State& state) override { time_.restore(state.clock, state.rest != 0); }
 
  protected:
-  CdReader(SensorSize size, const char* unknown_type)
+  CdDecoder(SensorSize size, const char* unknown_type)
       : bounds_(size, max_evt_side), unknown_type_(unknown_type) {}
 
   /// Reads a word of size `bytes` without events.
@@ -74,7 +74,7 @@ class CdReader : public UnitReader {
     if (word.type() == types.time_high) {
       if (!time_.follow(word.count())) batch.bad(at, bytes, time_falls);
     } else if (word.type() == types.trigger) {
-      if (time_.known()) batch.triggers->push_back(word.trigger(time_.time()));
+      if (time_.known()) batch.triggers().push_back(word.trigger(time_.time()));
     } else if ((types.ignored >> word.type() & 1) == 0) {
       batch.bad(at, bytes, unknown_type_);
     }
@@ -228,15 +228,15 @@ struct Evt2 {
   }
 };
 
-class Evt2Reader final : public CdReader<Evt2::types> {
+class Evt2Decoder final : public CdDecoder<Evt2::types> {
  public:
-  explicit Evt2Reader(SensorSize size) : CdReader(size, "EVT2 word of unknown type") {}
+  explicit Evt2Decoder(SensorSize size) : CdDecoder(size, "EVT2 word of unknown type") {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
     for (; !time_.known() && to - from >= 4; from += 4)
       read_other(CdWord{little_endian<std::uint32_t>(from)}, from, 4, batch);
-    auto* event = batch.begin();
+    auto* event = batch.end;
     const auto* const end = from + 4 * std::min((to - from) / 4, batch.full() - event);
     const auto bounds = bounds_;
     auto time = time_.time();
@@ -303,14 +303,14 @@ struct Evt21 {
 };
 
 template <EvtFormat format>
-class Evt21Reader final : public CdReader<evt21_types> {
+class Evt21Decoder final : public CdDecoder<evt21_types> {
  public:
-  explicit Evt21Reader(SensorSize size)
-      : CdReader<evt21_types>(size, "EVT2.1 word of unknown type") {}
+  explicit Evt21Decoder(SensorSize size)
+      : CdDecoder<evt21_types>(size, "EVT2.1 word of unknown type") {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
-    auto* event = batch.begin();
+    auto* event = batch.end;
     const auto* const full = batch.full();
     std::uint64_t outside = 0;
     for (; to - from >= 8 && event < full; from += 8) {
@@ -368,13 +368,13 @@ struct Evt4 {
   }
 };
 
-class Evt4Reader final : public CdReader<Evt4::types> {
+class Evt4Decoder final : public CdDecoder<Evt4::types> {
  public:
-  explicit Evt4Reader(SensorSize size) : CdReader(size, "EVT4 word of unknown type") {}
+  explicit Evt4Decoder(SensorSize size) : CdDecoder(size, "EVT4 word of unknown type") {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
-    auto* event = batch.begin();
+    auto* event = batch.end;
     const auto* const full = batch.full();
     std::uint64_t outside = 0;
     for (; to - from >= 4 && event < full; from += 4) {
@@ -410,18 +410,18 @@ class Evt4Reader final : public CdReader<Evt4::types> {
 
 }  // namespace
 
-std::unique_ptr<UnitReader> make_evt_reader(EvtFormat format, SensorSize size) {
+std::unique_ptr<UnitDecoder> make_evt_unit_decoder(EvtFormat format, SensorSize size) {
   switch (format) {
     case EvtFormat::evt2:
-      return std::make_unique<Evt2Reader>(size);
+      return std::make_unique<Evt2Decoder>(size);
     case EvtFormat::evt21:
-      return std::make_unique<Evt21Reader<EvtFormat::evt21>>(size);
+      return std::make_unique<Evt21Decoder<EvtFormat::evt21>>(size);
     case EvtFormat::evt21_legacy:
-      return std::make_unique<Evt21Reader<EvtFormat::evt21_legacy>>(size);
+      return std::make_unique<Evt21Decoder<EvtFormat::evt21_legacy>>(size);
     case EvtFormat::evt3:
-      return make_evt3_reader(size);
+      return make_evt3_unit_decoder(size);
     case EvtFormat::evt4:
-      return std::make_unique<Evt4Reader>(size);
+      return std::make_unique<Evt4Decoder>(size);
   }
   throw std::invalid_argument("unknown EVT format");
 }

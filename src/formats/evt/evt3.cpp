@@ -17,9 +17,9 @@ constexpr std::uint32_t polarity_bit = 0x800;
 /// Row or column beyond any sensor: none yet, or not one of events.
 constexpr std::uint32_t nowhere = 0x1fff;
 
-class Evt3Reader final : public UnitReader {
+class Evt3Decoder final : public UnitDecoder {
  public:
-  explicit Evt3Reader(SensorSize size) : bounds_(size, max_evt_side) {}
+  explicit Evt3Decoder(SensorSize size) : bounds_(size, max_evt_side) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
@@ -132,8 +132,8 @@ class Evt3Reader final : public UnitReader {
       }
       case ext_trigger:
         if (time_.known())
-          batch.triggers->push_back({static_cast<Microseconds>(t),
-                                     static_cast<std::uint16_t>(word >> 8 & 15), (word & 1) != 0});
+          batch.triggers().push_back({static_cast<Microseconds>(t),
+                                      static_cast<std::uint16_t>(word >> 8 & 15), (word & 1) != 0});
         break;
       case others:
       case continued_4:
@@ -213,8 +213,8 @@ class Evt3Encoder final : public Encoder {
 
 }  // namespace
 
-std::unique_ptr<UnitReader> make_evt3_reader(SensorSize size) {
-  return std::make_unique<Evt3Reader>(size);
+std::unique_ptr<UnitDecoder> make_evt3_unit_decoder(SensorSize size) {
+  return std::make_unique<Evt3Decoder>(size);
 }
 
 std::unique_ptr<Encoder> make_evt3_encoder(SensorSize size, std::string header) {

@@ -7,7 +7,7 @@
 
 #include "src/formats/evt/words.hpp"
 #include "src/formats/prophesee_header.hpp"
-#include "src/formats/unit_decoder.hpp"
+#include "src/formats/unit_stream_decoder.hpp"
 
 namespace eventcamera {
 namespace {
@@ -72,14 +72,14 @@ SensorSize size_of(const PropheseeHeader& header) {
   return size_from(geometry.substr(0, cross), geometry.substr(cross + 1));
 }
 
-class RawDecoder final : public UnitDecoder {
+class RawDecoder final : public UnitStreamDecoder {
  private:
   std::size_t read_header(std::span<const std::uint8_t> bytes, bool ended) override {
     const auto taken = header_.take(bytes, ended);
     if (header_.ended()) {
       if (!header_.found()) throw UnsupportedFormat("not a Prophesee RAW file: no header");
       const auto size = size_of(header_);
-      begin(make_evt_reader(format_of(header_), size), size);
+      begin(make_evt_unit_decoder(format_of(header_), size), size);
     }
     return taken;
   }
@@ -110,7 +110,7 @@ std::unique_ptr<Encoder> make_prophesee_raw_encoder(EvtFormat format, SensorSize
 }
 
 std::unique_ptr<Decoder> make_evt_decoder(EvtFormat format, SensorSize size) {
-  return std::make_unique<UnitDecoder>(make_evt_reader(format, size), size);
+  return std::make_unique<UnitStreamDecoder>(make_evt_unit_decoder(format, size), size);
 }
 
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size) {

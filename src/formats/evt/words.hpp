@@ -9,7 +9,7 @@
 
 #include "src/formats/encoder.hpp"
 #include "src/formats/evt/raw.hpp"
-#include "src/formats/unit_reader.hpp"
+#include "src/formats/unit_decoder.hpp"
 
 namespace eventcamera {
 
@@ -20,8 +20,8 @@ constexpr int max_evt_side = 2048;
 inline constexpr const char* time_falls = "EVT time falls without a wrap";
 
 /// A size of 0x0 means unknown.
-std::unique_ptr<UnitReader> make_evt_reader(EvtFormat format, SensorSize size);
-std::unique_ptr<UnitReader> make_evt3_reader(SensorSize size);
+std::unique_ptr<UnitDecoder> make_evt_unit_decoder(EvtFormat format, SensorSize size);
+std::unique_ptr<UnitDecoder> make_evt3_unit_decoder(SensorSize size);
 
 /// `header` is written before the words.
 std::unique_ptr<Encoder> make_evt_encoder(EvtFormat format, SensorSize size, std::string header);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/aedat/aedat_reader.hpp"
+#include "src/formats/aedat/aedat_decoder.hpp"
 
 #include <algorithm>
 #include <string_view>
@@ -8,6 +8,7 @@
 #include "src/formats/aedat/aedat2_decoder.hpp"
 #include "src/formats/aedat/aedat3_decoder.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
+#include "src/formats/one_stream_decoder.hpp"
 
 namespace eventcamera {
 
@@ -18,30 +19,30 @@ constexpr std::size_t magic_size = any_version.size() + 3;
 
 }  // namespace
 
-void AedatReader::push(std::span<const std::uint8_t> piece) {
+void AedatDecoder::push(std::span<const std::uint8_t> piece) {
   if (reader_)
     reader_->push(piece);
   else
     start_.insert(start_.end(), piece.begin(), piece.end());
 }
 
-void AedatReader::finish() {
+void AedatDecoder::finish() {
   finished_ = true;
   if (reader_) reader_->finish();
 }
 
-bool AedatReader::open(ByteSource& source) {
+bool AedatDecoder::open(ByteSource& source) {
   source_ = &source;
   return false;
 }
 
-std::optional<Item> AedatReader::next() {
+std::optional<Item> AedatDecoder::next() {
   if (!reader_ && !find_version()) return std::nullopt;
   return reader_->next();
 }
 
 /// Creates the reader for the version in the first line. False if more bytes are needed.
-bool AedatReader::find_version() {
+bool AedatDecoder::find_version() {
   const std::string_view text(reinterpret_cast<const char*>(start_.data()),
                               std::min(start_.size(), magic_size));
   const auto known = std::min(text.size(), any_version.size());
@@ -53,9 +54,9 @@ bool AedatReader::find_version() {
   if (version == "4.0")
     reader_ = std::make_unique<Aedat4Decoder>();
   else if (version == "3.1")
-    reader_ = std::make_unique<DecoderReader>(std::make_unique<Aedat3Decoder>());
+    reader_ = std::make_unique<OneStreamDecoder>(std::make_unique<Aedat3Decoder>());
   else if (version == "2.0")
-    reader_ = std::make_unique<DecoderReader>(std::make_unique<Aedat2Decoder>(assumed_));
+    reader_ = std::make_unique<OneStreamDecoder>(std::make_unique<Aedat2Decoder>(assumed_));
   else
     throw UnsupportedFormat("this is AEDAT " + std::string(version) +
                             "; only versions 4.0, 3.1 and 2.0 are supported");
@@ -66,38 +67,38 @@ bool AedatReader::find_version() {
   return true;
 }
 
-const std::vector<StreamInfo>& AedatReader::streams() const {
+const std::vector<StreamInfo>& AedatDecoder::streams() const {
   static const std::vector<StreamInfo> none;
   return reader_ ? reader_->streams() : none;
 }
 
-const Corruption& AedatReader::corruption() const {
+const Corruption& AedatDecoder::corruption() const {
   static const Corruption none;
   return reader_ ? reader_->corruption() : none;
 }
 
-std::optional<SeekPoint> AedatReader::seek_point_before(Microseconds t) const {
+std::optional<SeekPoint> AedatDecoder::seek_point_before(Microseconds t) const {
   return reader_ ? reader_->seek_point_before(t) : std::nullopt;
 }
 
-void AedatReader::restart(const SeekPoint& seek_point) {
+void AedatDecoder::restart(const SeekPoint& seek_point) {
   finished_ = false;
   reader_->restart(seek_point);
 }
 
-std::optional<Microseconds> AedatReader::last_time() {
+std::optional<Microseconds> AedatDecoder::last_time() {
   return reader_ ? reader_->last_time() : std::nullopt;
 }
 
-bool AedatReader::is_empty(std::size_t stream) const {
+bool AedatDecoder::is_empty(std::size_t stream) const {
   return reader_ && reader_->is_empty(stream);
 }
 
-std::string AedatReader::format_name() const {
+std::string AedatDecoder::format_name() const {
   return "AEDAT " + version_;
 }
 
-const Aedat4Decoder* AedatReader::aedat4() const {
+const Aedat4Decoder* AedatDecoder::aedat4() const {
   return dynamic_cast<const Aedat4Decoder*>(reader_.get());
 }
 

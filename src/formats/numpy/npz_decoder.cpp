@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/numpy/npz_reader.hpp"
+#include "src/formats/numpy/npz_decoder.hpp"
 
 #include <algorithm>
 #include <array>
@@ -206,10 +206,10 @@ class Archive {
   bool ended_ = false;
 };
 
-/// Reader for the events of an archive.
-class NpzReader final : public Reader {
+/// The events of an archive.
+class NpzDecoder final : public RecordingDecoder {
  public:
-  explicit NpzReader(const TableSettings& settings) : settings_(settings) {}
+  explicit NpzDecoder(const TableSettings& settings) : settings_(settings) {}
 
   void push(std::span<const std::uint8_t> piece) override {
     constexpr std::size_t max_collected = std::size_t{1} << 28;
@@ -261,8 +261,8 @@ class NpzReader final : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> make_npz_reader(const TableSettings& settings) {
-  return std::make_unique<NpzReader>(settings);
+std::unique_ptr<RecordingDecoder> make_npz_decoder(const TableSettings& settings) {
+  return std::make_unique<NpzDecoder>(settings);
 }
 
 }  // namespace eventcamera

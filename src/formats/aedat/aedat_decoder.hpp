@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "src/formats/reader.hpp"
+#include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
 
@@ -11,10 +11,10 @@ class Aedat4Decoder;
 
 /// Reads AEDAT 4, 3.1 and 2.0, according to the first line of the file. The older versions are read
 /// as a single stream of events (and triggers).
-class AedatReader final : public Reader {
+class AedatDecoder final : public RecordingDecoder {
  public:
   /// `assumed` is the sensor size to use if an AEDAT 2.0 file does not state it.
-  explicit AedatReader(SensorSize assumed = {}) : assumed_(assumed) {}
+  explicit AedatDecoder(SensorSize assumed = {}) : assumed_(assumed) {}
 
   void push(std::span<const std::uint8_t> piece) override;
   void finish() override;
@@ -39,7 +39,7 @@ class AedatReader final : public Reader {
   bool finished_ = false;
   ByteSource* source_ = nullptr;
   std::string version_;  ///< empty until known
-  std::unique_ptr<Reader> reader_;
+  std::unique_ptr<RecordingDecoder> reader_;
 };
 
 }  // namespace eventcamera

@@ -79,7 +79,7 @@ struct ImuSample {
   friend bool operator==(const ImuSample&, const ImuSample&) = default;
 };
 
-/// Events of a stream. `stream` is an index into the reader's streams().
+/// Events of a stream. `stream` is an index into the decoder's streams().
 struct EventItem {
   std::size_t stream;
   std::span<const AbsoluteEvent> events;
@@ -105,15 +105,15 @@ struct ImuItem {
 
 using Item = std::variant<EventItem, FrameItem, TriggerItem, ImuItem>;
 
-/// Reads the items of a recording of any format, in file order.
+/// Decodes a recording of any format into items, in file order.
 ///
-///     reader.push(piece);
-///     while (const auto item = reader.next()) ...
-class Reader {
+///     decoder.push(piece);
+///     while (const auto item = decoder.next()) ...
+class RecordingDecoder {
  public:
-  virtual ~Reader() = default;
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
+  virtual ~RecordingDecoder() = default;
+  RecordingDecoder(const RecordingDecoder&) = delete;
+  RecordingDecoder& operator=(const RecordingDecoder&) = delete;
 
   /// Adds bytes, which must stay valid until next() returns nothing; only then more may be pushed.
   virtual void push(std::span<const std::uint8_t> piece) = 0;
@@ -121,7 +121,7 @@ class Reader {
   /// Declares the end of the bytes.
   virtual void finish() = 0;
 
-  /// Gives access to all bytes of the file; `source` must outlive the reader. True if the reader
+  /// Gives access to all bytes of the file; `source` must outlive the decoder. True if the decoder
   /// reads from it directly and no bytes must be pushed.
   virtual bool open(ByteSource& /*source*/) { return false; }
 
@@ -134,7 +134,7 @@ class Reader {
 
   virtual const Corruption& corruption() const = 0;
 
-  /// Where to restart to get everything at `t` or later; nothing if that takes a new reader at the
+  /// Where to restart to get everything at `t` or later; nothing if that takes a new decoder at the
   /// start of the file.
   virtual std::optional<SeekPoint> seek_point_before(Microseconds t) const = 0;
 
@@ -151,41 +151,7 @@ class Reader {
   virtual std::string format_name() const { return {}; }
 
  protected:
-  Reader() = default;
-};
-
-/// Reader for formats with a single stream of events (and triggers), on top of their decoder.
-class DecoderReader final : public Reader {
- public:
-  explicit DecoderReader(std::unique_ptr<Decoder> decoder) : decoder_(std::move(decoder)) {
-    streams_.front().size = decoder_->size();
-  }
-
-  void push(std::span<const std::uint8_t> piece) override { rest_ = piece; }
-  void finish() override { finish_due_ = true; }
-  bool open(ByteSource& source) override {
-    source_ = &source;
-    return false;
-  }
-  std::optional<Item> next() override;
-  const std::vector<StreamInfo>& streams() const override { return streams_; }
-  const Corruption& corruption() const override { return decoder_->corruption(); }
-  std::optional<SeekPoint> seek_point_before(Microseconds t) const override {
-    return decoder_->seek_point_before(t);
-  }
-  void restart(const SeekPoint& seek_point) override;
-  std::optional<Microseconds> last_time() override;
-
- private:
-  std::unique_ptr<Decoder> decoder_;
-  ByteSource* source_ = nullptr;           ///< null in push mode, and once the last time is known
-  std::optional<Microseconds> last_time_;  ///< if the decoder can find it
-  std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
-  std::span<const std::uint8_t> rest_;
-  bool finish_due_ = false;
-  Decoded decoded_;
-  bool events_due_ = false;  ///< events in decoded_ are to be returned
-  bool triggers_due_ = false;
+  RecordingDecoder() = default;
 };
 
 }  // namespace eventcamera

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/hdf5/hdf5_reader.hpp"
+#include "src/formats/hdf5/hdf5_decoder.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace eventcamera {
 
-struct Hdf5Reader::File {
+struct Hdf5Decoder::File {
   File() = default;
   File(File&&) = default;
   File& operator=(File&&) = delete;
@@ -61,29 +61,29 @@ Hdf5Handle open_source(ByteSource& bytes) {
 
 }  // namespace
 
-Hdf5Reader::Hdf5Reader(const std::filesystem::path& path)
-    : Hdf5Reader([&] {
+Hdf5Decoder::Hdf5Decoder(const std::filesystem::path& path)
+    : Hdf5Decoder([&] {
         File file;
         file.handle = open_path(path);
         return file;
       }()) {}
 
-Hdf5Reader::Hdf5Reader(std::unique_ptr<ByteSource> bytes)
-    : Hdf5Reader([&] {
+Hdf5Decoder::Hdf5Decoder(std::unique_ptr<ByteSource> bytes)
+    : Hdf5Decoder([&] {
         File file;
         file.handle = open_source(*bytes);
         file.bytes = std::move(bytes);
         return file;
       }()) {}
 
-Hdf5Reader::Hdf5Reader(ByteSource& bytes)
-    : Hdf5Reader([&] {
+Hdf5Decoder::Hdf5Decoder(ByteSource& bytes)
+    : Hdf5Decoder([&] {
         File file;
         file.handle = open_source(bytes);
         return file;
       }()) {}
 
-Hdf5Reader::Hdf5Reader(File file) : file_(std::make_unique<File>(std::move(file))) {
+Hdf5Decoder::Hdf5Decoder(File file) : file_(std::make_unique<File>(std::move(file))) {
   const Hdf5Session session;
   const auto id = file_->handle.get();
   table_ = Hdf5Table::open(id);
@@ -95,18 +95,18 @@ Hdf5Reader::Hdf5Reader(File file) : file_(std::make_unique<File>(std::move(file)
     corruption_.note(0, "there are fewer events than the file says");
 }
 
-Hdf5Reader::~Hdf5Reader() {
+Hdf5Decoder::~Hdf5Decoder() {
   const Hdf5Session session;
   triggers_.reset();
   table_.reset();
   file_.reset();
 }
 
-std::uint64_t Hdf5Reader::count() const {
+std::uint64_t Hdf5Decoder::count() const {
   return table_->rows();
 }
 
-std::optional<Hdf5Reader::TimeRange> Hdf5Reader::time_range() const {
+std::optional<Hdf5Decoder::TimeRange> Hdf5Decoder::time_range() const {
   const Hdf5Session session;
   if (table_->rows() == 0) return std::nullopt;
   const auto first = table_->time_at(0);
@@ -116,7 +116,7 @@ std::optional<Hdf5Reader::TimeRange> Hdf5Reader::time_range() const {
 }
 
 /// Reads until there are events to return, or to the end.
-void Hdf5Reader::fill() {
+void Hdf5Decoder::fill() {
   while (taken_ == events_.size() && row_ < table_->rows()) {
     events_.clear();
     taken_ = 0;
@@ -129,7 +129,7 @@ void Hdf5Reader::fill() {
   }
 }
 
-std::size_t Hdf5Reader::read(std::size_t count, std::vector<AbsoluteEvent>& out) {
+std::size_t Hdf5Decoder::read(std::size_t count, std::vector<AbsoluteEvent>& out) {
   const Hdf5Session session;
   std::size_t read = 0;
   while (read < count) {
@@ -144,7 +144,7 @@ std::size_t Hdf5Reader::read(std::size_t count, std::vector<AbsoluteEvent>& out)
   return read;
 }
 
-std::size_t Hdf5Reader::read_triggers(std::size_t count, std::vector<Trigger>& out) {
+std::size_t Hdf5Decoder::read_triggers(std::size_t count, std::vector<Trigger>& out) {
   const Hdf5Session session;
   const auto before = out.size();
   while (triggers_ && triggers_->read(count - (out.size() - before), out, corruption_)) {
@@ -152,20 +152,19 @@ std::size_t Hdf5Reader::read_triggers(std::size_t count, std::vector<Trigger>& o
   return out.size() - before;
 }
 
-void Hdf5Reader::seek(Microseconds t) {
+void Hdf5Decoder::seek(Microseconds t) {
   const Hdf5Session session;
   events_.clear();
   taken_ = 0;
   row_ = table_->row_before(t);
   not_before_ = t;
-  validator_.restart();
   if (triggers_) triggers_->seek(t);
 }
 
 namespace {
 
-/// Reader for the events of a file.
-class Hdf5Items final : public Reader {
+/// The events of a file.
+class Hdf5Items final : public RecordingDecoder {
  public:
   void push(std::span<const std::uint8_t> piece) override {
     constexpr std::size_t max_collected = std::size_t{1} << 28;
@@ -175,12 +174,12 @@ class Hdf5Items final : public Reader {
   }
 
   void finish() override {
-    file_ = std::make_unique<Hdf5Reader>(std::make_unique<MemoryBytes>(std::move(collected_)));
+    file_ = std::make_unique<Hdf5Decoder>(std::make_unique<MemoryBytes>(std::move(collected_)));
     tell_size();
   }
 
   bool open(ByteSource& source) override {
-    file_ = std::make_unique<Hdf5Reader>(source);
+    file_ = std::make_unique<Hdf5Decoder>(source);
     opened_ = true;
     tell_size();
     return true;
@@ -235,7 +234,7 @@ class Hdf5Items final : public Reader {
   void tell_size() { streams_.front().size = file_->size(); }
 
   std::vector<std::uint8_t> collected_;
-  std::unique_ptr<Hdf5Reader> file_;  ///< set once the file can be read
+  std::unique_ptr<Hdf5Decoder> file_;  ///< set once the file can be read
   std::vector<StreamInfo> streams_{{.id = 0, .kind = StreamKind::events, .size = {}, .source = {}}};
   std::vector<AbsoluteEvent> events_;
   std::vector<Trigger> triggers_;
@@ -246,7 +245,7 @@ class Hdf5Items final : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> make_hdf5_reader() {
+std::unique_ptr<RecordingDecoder> make_hdf5_decoder() {
   return std::make_unique<Hdf5Items>();
 }
 

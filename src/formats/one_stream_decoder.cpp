@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/formats/reader.hpp"
+#include "src/formats/one_stream_decoder.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -9,9 +9,9 @@
 namespace eventcamera {
 
 /// Bytes decoded at once; the output stays in the cache, however large the pieces are.
-constexpr std::size_t block_size = std::size_t{1} << 16;
+constexpr std::size_t block_size = std::size_t{1} << 14;
 
-std::optional<Item> DecoderReader::next() {
+std::optional<Item> OneStreamDecoder::next() {
   while (true) {
     if (std::exchange(triggers_due_, false) && !decoded_.triggers.empty())
       return TriggerItem{0, decoded_.triggers};
@@ -34,13 +34,13 @@ std::optional<Item> DecoderReader::next() {
   }
 }
 
-void DecoderReader::restart(const SeekPoint& seek_point) {
+void OneStreamDecoder::restart(const SeekPoint& seek_point) {
   rest_ = {};
   finish_due_ = events_due_ = triggers_due_ = false;
   decoder_->restart(seek_point);
 }
 
-std::optional<Microseconds> DecoderReader::last_time() {
+std::optional<Microseconds> OneStreamDecoder::last_time() {
   if (auto* const source = std::exchange(source_, nullptr); source != nullptr) {
     Decoded tail;
     decoder_->decode_tail(*source, tail);

@@ -4,13 +4,13 @@
 #include <memory>
 
 #include "src/formats/event_table.hpp"
-#include "src/formats/reader.hpp"
+#include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
 
 /// Creates a reader for NumPy archives: arrays named t, x, y and p, or one array of events as in an
 /// .npy file. Pushed bytes are collected in memory, up to 256 MiB, and read at their end, because
 /// an archive's directory is at its end.
-std::unique_ptr<Reader> make_npz_reader(const TableSettings& settings = {});
+std::unique_ptr<RecordingDecoder> make_npz_decoder(const TableSettings& settings = {});
 
 }  // namespace eventcamera

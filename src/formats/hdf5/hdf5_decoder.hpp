@@ -8,7 +8,7 @@
 #include "src/formats/byte_source.hpp"
 #include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_format.hpp"
-#include "src/formats/reader.hpp"
+#include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
 
@@ -16,20 +16,20 @@ class Hdf5Table;
 class Hdf5Triggers;
 
 /// Reads the events of an HDF5 file of any known layout. Skips corrupt rows.
-class Hdf5Reader {
+class Hdf5Decoder {
  public:
   struct TimeRange {
     Microseconds first, last;
   };
 
   /// Throws UnsupportedFormat, or std::runtime_error if the file cannot be opened.
-  explicit Hdf5Reader(const std::filesystem::path& path);
-  explicit Hdf5Reader(std::unique_ptr<ByteSource> bytes);
+  explicit Hdf5Decoder(const std::filesystem::path& path);
+  explicit Hdf5Decoder(std::unique_ptr<ByteSource> bytes);
   /// `bytes` must outlive the reader.
-  explicit Hdf5Reader(ByteSource& bytes);
-  ~Hdf5Reader();
-  Hdf5Reader(const Hdf5Reader&) = delete;
-  Hdf5Reader& operator=(const Hdf5Reader&) = delete;
+  explicit Hdf5Decoder(ByteSource& bytes);
+  ~Hdf5Decoder();
+  Hdf5Decoder(const Hdf5Decoder&) = delete;
+  Hdf5Decoder& operator=(const Hdf5Decoder&) = delete;
 
   Hdf5Format format() const { return format_; }
 
@@ -55,7 +55,7 @@ class Hdf5Reader {
 
  private:
   struct File;
-  explicit Hdf5Reader(File file);
+  explicit Hdf5Decoder(File file);
 
   void fill();
 
@@ -75,6 +75,6 @@ class Hdf5Reader {
 
 /// Creates a reader for HDF5 files. A pushed file is collected in memory, up to 256 MiB, and read
 /// at its end, because HDF5 needs random access.
-std::unique_ptr<Reader> make_hdf5_reader();
+std::unique_ptr<RecordingDecoder> make_hdf5_decoder();
 
 }  // namespace eventcamera

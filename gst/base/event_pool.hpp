@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/gst.h>
+
+/// Makes a pool of event buffers, whose size varies between intervals. Acquired buffers are empty;
+/// event_pool_reserve() allocates the memory, which a buffer keeps when it returns to the pool.
+/// Memory is freed when no interval has needed as much for a while, or when too much is idle.
+GstBufferPool* event_pool_new();
+
+/// Gives an empty buffer of such a pool `size` > 0 bytes to write. Throws std::bad_alloc. Not
+/// thread-safe.
+void event_pool_reserve(GstBuffer* buffer, gsize size);
+
+/// Name of the type in the plugin that this library is linked to. Each plugin defines its own.
+extern const char* const event_pool_type_name;
