@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/// Output: streams, their pads, and what is pushed from them.
+#include <algorithm>
+#include <utility>
+
+#include "gst/base/event_buffer.hpp"
+#include "gst/recording/frame_buffer.hpp"
+#include "gst/recording/reader/event_reader.hpp"
+#include "gst/recording/sensor_events.hpp"
+
+#define GST_CAT_DEFAULT event_reader_debug
+
+using eventcamera::Microseconds;
+using eventcamera::RecordingReader;
+using eventcamera::StreamKind;
+
+/// Reads and pushes one item. May throw.
+GstFlowReturn EventReader::step() {
+  const auto output = recording_->next();
+  if (bytes_ && bytes_->failed()) return bytes_->flow();
+  note_progress();
+  if (!output) return nothing_ready;
+  return std::visit([this](const auto& item) { return push(item); }, *output);
+}
+
+/// New streams are known.
+GstFlowReturn EventReader::push(const RecordingReader::Start& /*start*/) {
+  if (const auto length = recording_->duration()) set_duration(nanoseconds(*length));
+  GST_DEBUG_OBJECT(element_,
+                   "%" G_GSIZE_FORMAT " streams, origin %" GST_TIME_FORMAT
+                   ", duration %" GST_TIME_FORMAT,
+                   recording_->streams().size(), GST_TIME_ARGS(nanoseconds(recording_->origin())),
+                   GST_TIME_ARGS(duration()));
+  return begin_output();
+}
+
+GstFlowReturn EventReader::push(const RecordingReader::Chunk& chunk) {
+  if (output_due_)
+    if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
+  auto& pad = *pad_of_stream_.at(chunk.stream);
+  if (!send_caps(chunk.stream)) return refused_size(chunk.stream);
+  const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(chunk.start);
+  const GstClockTime duration = nanoseconds(chunk.duration);
+  GST_LOG_OBJECT(pad.get(),
+                 "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
+                 chunk.events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(duration));
+  if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
+  return combined(pad, pad.push(chunk.events, pts, duration));
+}
+
+GstFlowReturn EventReader::push(const RecordingReader::TimedFrame& item) {
+  if (output_due_)
+    if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
+  auto& pad = *pad_of_stream_.at(item.stream);
+  GstVideoInfo info;
+  if (!frame_video_info(item.frame, &info)) return GST_FLOW_OK;
+  if (!pad.send_caps(info) && GST_PAD_IS_FLUSHING(pad.get())) return GST_FLOW_FLUSHING;
+  const GstClockTime pts = nanoseconds(recording_->origin()) + nanoseconds(item.time);
+  GST_LOG_OBJECT(pad.get(), "frame at %" GST_TIME_FORMAT, GST_TIME_ARGS(pts));
+  return combined(pad, pad.push(frame_buffer(item.frame, &info), pts));
+}
+
+/// Sends triggers or IMU samples with the first stream of events, if there is one.
+template <class Sample>
+GstFlowReturn EventReader::push_to_first(std::span<const Sample> samples) {
+  if (output_due_)
+    if (const GstFlowReturn begun = begin_output(); begun != GST_FLOW_OK) return begun;
+  std::vector<Sample> of_stream(samples.begin(), samples.end());
+  for (auto& sample : of_stream) sample.t += std::max<Microseconds>(recording_->origin(), 0);
+  const auto& streams = recording_->streams();
+  const auto first = std::ranges::find_if(streams, [](const RecordingReader::Stream& stream) {
+    return stream.shown && stream.info.kind == StreamKind::events;
+  });
+  if (first == streams.end()) return GST_FLOW_OK;
+  auto& pad = pad_of(static_cast<std::size_t>(first - streams.begin()));
+  gst_pad_push_event(pad.get(), new_sensor_event(std::span<const Sample>(of_stream)));
+  return GST_FLOW_OK;
+}
+
+GstFlowReturn EventReader::push(const eventcamera::TriggerItem& item) {
+  return push_to_first(item.triggers);
+}
+
+GstFlowReturn EventReader::push(const eventcamera::ImuItem& item) {
+  return push_to_first(item.samples);
+}
+
+GstFlowReturn EventReader::combined(ReaderPad& pad, GstFlowReturn result) {
+  return gst_flow_combiner_update_pad_flow(combiner_, pad.get(), result);
+}
+
+ReaderPad& EventReader::pad_of(std::size_t index) {
+  auto& found = pad_of_stream_[index];
+  if (found != nullptr) return *found;
+  const auto& stream = recording_->streams()[index];
+  const char* const kind = stream.info.kind == StreamKind::frames ? "video_" : "events_";
+  const auto name = format_.has_many_streams ? kind + std::to_string(stream.number) : "src";
+  for (auto& pad : pads_)
+    if (pad->name() == name) return *(found = pad.get());
+  auto* const templ = gst_element_class_get_pad_template(
+      GST_ELEMENT_GET_CLASS(element_),
+      format_.has_many_streams ? (kind + std::string("%u")).c_str() : "src");
+  found = pads_.emplace_back(std::make_unique<ReaderPad>(templ, name, GST_CAT_DEFAULT)).get();
+  gst_pad_set_event_function(
+      found->get(), +[](GstPad* pad, GstObject* parent, GstEvent* event) {
+        return event_reader_of(parent).src_event(pad, event);
+      });
+  gst_pad_set_query_function(
+      found->get(), +[](GstPad* pad, GstObject* parent, GstQuery* query) {
+        return event_reader_of(parent).src_query(pad, query);
+      });
+  return *found;
+}
+
+/// Sends all events that must precede data.
+GstFlowReturn EventReader::begin_output() {
+  output_due_ = false;
+  start_streams();
+  const auto& streams = recording_->streams();
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    if (!streams[i].shown) continue;
+    find_size(i);
+    if (!send_caps(i)) {
+      output_due_ = true;
+      return pad_of(i).refusal();
+    }
+    send_segment(pad_of(i));
+  }
+  for (GstEvent* event : std::exchange(held_, {})) push_to_pads(event);
+  // Writers must know these streams before the first buffer.
+  if (format_.has_triggers) push(eventcamera::TriggerItem{});
+  if (std::ranges::any_of(streams,
+                          [](const auto& stream) { return stream.info.kind == StreamKind::imu; }))
+    push(eventcamera::ImuItem{});
+  return GST_FLOW_OK;
+}
+
+/// Starts streams and adds their pads. With many streams, pads have caps before they are added,
+/// except where the linked element may determine the sensor size, as with a single pad.
+void EventReader::start_streams() {
+  const auto& streams = recording_->streams();
+  const bool is_upstreams = is_timed() && stream_start_ != nullptr;
+  bool is_any_new = false;
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    if (!streams[i].shown) continue;
+    auto& pad = pad_of(i);
+    if (pad.is_started()) continue;
+    is_any_new = true;
+    if (group_ == GST_GROUP_ID_INVALID) {
+      GstEvent* const sticky = gst_pad_get_sticky_event(sink_, GST_EVENT_STREAM_START, 0);
+      if (sticky == nullptr || !gst_event_parse_group_id(sticky, &group_))
+        group_ = gst_util_group_id_next();
+      if (sticky != nullptr) gst_event_unref(sticky);
+    }
+    if (is_upstreams)
+      pad.start_stream(gst_event_ref(stream_start_));
+    else
+      pad.start_stream(element_, group_);
+    if (is_timed()) pad.need_segment(false);
+    if (!format_.has_many_streams) continue;
+    if (streams[i].size_from == RecordingReader::SizeFrom::file) {
+      send_caps(i);
+      send_segment(pad);
+    }
+    pad.send_tags(recording_->format_name(), streams[i].info.source);
+  }
+  if (!is_any_new) return;
+  if (!is_upstreams) {
+    GstStreamCollection* const collection = gst_stream_collection_new(nullptr);
+    for (auto& pad : pads_)
+      if (GstStream* const stream = gst_pad_get_stream(pad->get()))
+        gst_stream_collection_add_stream(collection, stream);
+    gst_element_post_message(element_,
+                             gst_message_new_stream_collection(GST_OBJECT(element_), collection));
+    for (auto& pad : pads_)
+      gst_pad_push_event(pad->get(), gst_event_new_stream_collection(collection));
+    gst_object_unref(collection);
+  }
+  for (auto& pad : pads_) {
+    if (pad->is_added()) continue;
+    gst_flow_combiner_add_pad(combiner_, pad->get());
+    gst_element_add_pad(element_, pad->get());
+  }
+  if (!std::exchange(has_no_more_pads_, true)) gst_element_no_more_pads(element_);
+}
+
+/// If the file does not state the sensor size, uses that of the properties, else the size in
+/// downstream's caps, else one that all events fit into.
+void EventReader::find_size(std::size_t index) {
+  const auto& stream = recording_->streams()[index];
+  if (stream.size_from != RecordingReader::SizeFrom::assumption) return;
+  if (const auto size = format_settings_.copy().sensor; size.width > 0 && size.height > 0) {
+    recording_->set_size(index, size);
+    return;
+  }
+  GstPad* const pad = pad_of(index).get();
+  const OwnedCaps templ(gst_pad_get_pad_template_caps(pad));
+  const OwnedCaps peer(gst_pad_peer_query_caps(pad, templ.get()));
+  eventcamera::SensorSize size;
+  if (!gst_caps_is_empty(peer.get())) {
+    const auto* const structure = gst_caps_get_structure(peer.get(), 0);
+    if (gst_structure_get_int(structure, "width", &size.width) &&
+        gst_structure_get_int(structure, "height", &size.height)) {
+      recording_->set_size(index, size);
+      return;
+    }
+  }
+  const auto text =
+      std::to_string(stream.info.size.width) + "x" + std::to_string(stream.info.size.height);
+  GST_INFO_OBJECT(element_, "the file does not state the sensor size; assuming %s", text.c_str());
+  if (stream.info.mirrored)
+    warn_of_assumption_(element_,
+                        {GST_STREAM_ERROR_FORMAT,
+                         "The file does not state its sensor size; assuming " + text +
+                             " pixels. If events are in the wrong place, set width and height."},
+                        "columns and rows of the file count from the far corner");
+}
+
+bool EventReader::send_caps(std::size_t index) {
+  const auto& stream = recording_->streams()[index];
+  auto& pad = pad_of(index);
+  if (stream.info.kind == StreamKind::events) {
+    const bool taken = pad.send_caps(stream.info.size);
+    if (!taken)
+      GST_DEBUG_OBJECT(pad.get(), "a sensor of %dx%d pixels is refused", stream.info.size.width,
+                       stream.info.size.height);
+    return taken;
+  }
+  GstVideoInfo info;
+  return pad.has_video() || !frame_video_info(*stream.first_frame, &info) || pad.send_caps(info);
+}
+
+/// Handles downstream's refusal of a sensor size that has grown.
+GstFlowReturn EventReader::refused_size(std::size_t index) {
+  const GstFlowReturn refusal = pad_of(index).refusal();
+  if (refusal == GST_FLOW_FLUSHING) return refusal;
+  const auto size = recording_->streams()[index].info.size;
+  const auto text = std::to_string(size.width) + "x" + std::to_string(size.height);
+  post_message(element_, GST_MESSAGE_ERROR,
+               {GST_STREAM_ERROR_FORMAT,
+                "Events lie outside the assumed sensor, whose size the file does not state. Set "
+                "width and height; the events so far need " +
+                    text + " pixels."},
+               "downstream refuses to change the size to " + text);
+  return GST_FLOW_ERROR;
+}
+
+void EventReader::send_segment(ReaderPad& pad) {
+  GstSegment segment;
+  {
+    const auto shared = shared_.lock();
+    shared->segment.duration = shared->duration;
+    segment = shared->segment;
+  }
+  const GstClockTime origin = nanoseconds(recording_->origin());
+  segment.start += origin;
+  segment.position += origin;
+  if (GST_CLOCK_TIME_IS_VALID(segment.stop)) segment.stop += origin;
+  pad.send_segment(segment, seqnum_);
+}
+
+/// Marks the next output as discontinuous.
+void EventReader::interrupt_output() {
+  for (auto& pad : pads_) pad->interrupt();
+  output_due_ = true;
+}
+
+/// Ends the streams with EOS, or the segment with SEGMENT_DONE if a segment seek was requested.
+void EventReader::end_output(bool failed) {
+  const auto segment = shared_.lock()->segment;
+  if (failed || (segment.flags & GST_SEGMENT_FLAG_SEGMENT) == 0) {
+    push_to_pads(with_seqnum(gst_event_new_eos(), seqnum_));
+    return;
+  }
+  const auto position =
+      static_cast<gint64>(GST_CLOCK_TIME_IS_VALID(segment.stop) ? segment.stop : segment.position);
+  GstMessage* const message =
+      gst_message_new_segment_done(GST_OBJECT(element_), GST_FORMAT_TIME, position);
+  if (seqnum_ != GST_SEQNUM_INVALID) gst_message_set_seqnum(message, seqnum_);
+  gst_element_post_message(element_, message);
+  push_to_pads(with_seqnum(gst_event_new_segment_done(GST_FORMAT_TIME, position), seqnum_));
+}
+
+/// Takes ownership of `event`.
+void EventReader::push_to_pads(GstEvent* event) {
+  for (auto& pad : pads_) gst_pad_push_event(pad->get(), gst_event_ref(event));
+  gst_event_unref(event);
+}
