@@ -220,7 +220,7 @@ struct Choice {
 
 }  // namespace
 
-static GuardedSettings<Choice>& choice_of(GObject* object) {
+static Guarded<Choice>& choice_of(GObject* object) {
   return event_simulator_settings<Choice>(object);
 }
 
@@ -282,9 +282,7 @@ static const EventSimulatorMethod dvs = {
         "noise",
     .threshold = std::nullopt,
     .create = in_system_memory<eventcamera::make_dvs_simulator>,
-    .make_settings = []() -> std::shared_ptr<void> {
-      return std::make_shared<GuardedSettings<Choice>>();
-    },
+    .make_settings = []() -> std::shared_ptr<void> { return std::make_shared<Guarded<Choice>>(); },
     .install_properties = install_properties,
     .configure = configure,
 };

@@ -8,9 +8,13 @@
 ///
 ///     const auto shared = shared_.lock();
 ///     shared->duration = duration;
+///
+/// Make no calls while holding the lock.
 template <class Value>
 class Guarded {
  public:
+  using Type = Value;
+
   class Access {
    public:
     explicit Access(Guarded& guarded) : lock_(guarded.mutex_), value_(guarded.value_) {}
@@ -24,7 +28,12 @@ class Guarded {
 
   Access lock() { return Access(*this); }
 
+  Value copy() const {
+    const std::lock_guard lock(mutex_);
+    return value_;
+  }
+
  private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   Value value_;
 };

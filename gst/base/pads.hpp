@@ -5,15 +5,21 @@
 
 #include "gst/base/owned.hpp"
 
+/// For class_init: adds the template of a pad.
+inline void add_pad_template(GstElementClass* klass, const char* name, GstPadDirection direction,
+                             const OwnedCaps& caps, GstPadPresence presence = GST_PAD_ALWAYS) {
+  gst_element_class_add_pad_template(klass,
+                                     gst_pad_template_new(name, direction, presence, caps.get()));
+}
+inline void add_pad_template(GstElementClass* klass, const char* name, GstPadDirection direction,
+                             const char* caps, GstPadPresence presence = GST_PAD_ALWAYS) {
+  add_pad_template(klass, name, direction, OwnedCaps(gst_caps_from_string(caps)), presence);
+}
+
 /// For class_init: adds the templates of the always pads "sink" and "src".
 inline void add_pad_templates(GstElementClass* klass, const char* sink_caps, const char* src_caps) {
-  const auto add = [klass](const char* name, GstPadDirection direction, const char* text) {
-    const OwnedCaps caps(gst_caps_from_string(text));
-    gst_element_class_add_pad_template(
-        klass, gst_pad_template_new(name, direction, GST_PAD_ALWAYS, caps.get()));
-  };
-  add("sink", GST_PAD_SINK, sink_caps);
-  add("src", GST_PAD_SRC, src_caps);
+  add_pad_template(klass, "sink", GST_PAD_SINK, sink_caps);
+  add_pad_template(klass, "src", GST_PAD_SRC, src_caps);
 }
 
 /// For init: adds the pad of the template `name`.

@@ -5,31 +5,11 @@
 
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <type_traits>
 #include <utility>
 
-/// Settings that the application may change at any time; the element works with a copy.
-template <class Settings>
-class GuardedSettings {
- public:
-  using Type = Settings;
-
-  Settings copy() const {
-    const std::lock_guard lock(mutex_);
-    return settings_;
-  }
-  template <class Access>
-  void access(const Access& access) {
-    const std::lock_guard lock(mutex_);
-    access(settings_);
-  }
-
- private:
-  mutable std::mutex mutex_;  // make no calls while holding it
-  Settings settings_;
-};
+#include "gst/base/guarded.hpp"
 
 // Types of properties besides strings: numbers, enums and booleans.
 #define FOR_EACH_PROPERTY_TYPE(X) \
@@ -88,22 +68,31 @@ struct PropertyAccess {
   }
 };
 
+/// For class_init: installs a property. `functions.set` is null if it is read-only.
+inline void install_property(GObjectClass* klass, PropertyAccess functions, GParamSpec* spec) {
+  klass->set_property = [](GObject* object, guint, const GValue* value, GParamSpec* of) {
+    PropertyAccess::of(of).set(object, value);
+  };
+  klass->get_property = [](GObject* object, guint, GValue* value, GParamSpec* of) {
+    PropertyAccess::of(of).get(object, value);
+  };
+  auto access = std::make_unique<PropertyAccess>(std::move(functions));
+  g_param_spec_set_qdata_full(spec, PropertyAccess::quark(), access.release(), [](gpointer last) {
+    const std::unique_ptr<PropertyAccess> owned(static_cast<PropertyAccess*>(last));
+  });
+  constexpr guint number = 1;  // properties are distinguished by their GParamSpec
+  g_object_class_install_property(klass, number, spec);
+}
+
 /// For class_init: installs properties that are fields of the settings. `settings_of` returns the
-/// GuardedSettings of an object. A class may have properties in several settings.
+/// Guarded settings of an object. A class may have properties in several settings.
 template <auto settings_of>
 class Properties {
  public:
   using Settings =
       typename std::remove_reference_t<decltype(settings_of(static_cast<GObject*>(nullptr)))>::Type;
 
-  explicit Properties(GObjectClass* klass) : klass_(klass) {
-    klass->set_property = [](GObject* object, guint, const GValue* value, GParamSpec* spec) {
-      PropertyAccess::of(spec).set(object, value);
-    };
-    klass->get_property = [](GObject* object, guint, GValue* value, GParamSpec* spec) {
-      PropertyAccess::of(spec).get(object, value);
-    };
-  }
+  explicit Properties(GObjectClass* klass) : klass_(klass) {}
 
   /// Adds a property stored in `field`: a pointer to a member of Settings, or a function that
   /// returns a reference into it. Fields are numbers, enums, booleans or strings.
@@ -120,29 +109,18 @@ class Properties {
   /// Adds a property with a custom setter and getter.
   template <class Set, class Get>
   void add(Set set, Get get, GParamSpec* spec) {
-    install({[set](GObject* object, const GValue* value) {
-               settings_of(object).access([&](Settings& settings) { set(settings, value); });
-             },
-             [get](GObject* object, GValue* value) {
-               settings_of(object).access([&](Settings& settings) { get(settings, value); });
-             }},
-            spec);
+    install_property(
+        klass_,
+        {[set](GObject* object, const GValue* value) { set(*settings_of(object).lock(), value); },
+         [get](GObject* object, GValue* value) { get(*settings_of(object).lock(), value); }},
+        spec);
   }
 
   /// Adds a read-only property that is not in the settings.
   void add_read_only(void (*get)(GObject*, GValue*), GParamSpec* spec) {
-    install({nullptr, get}, spec);
+    install_property(klass_, {nullptr, get}, spec);
   }
 
  private:
-  void install(PropertyAccess functions, GParamSpec* spec) {
-    auto access = std::make_unique<PropertyAccess>(std::move(functions));
-    g_param_spec_set_qdata_full(spec, PropertyAccess::quark(), access.release(), [](gpointer last) {
-      const std::unique_ptr<PropertyAccess> owned(static_cast<PropertyAccess*>(last));
-    });
-    constexpr guint number = 1;  // properties are distinguished by their GParamSpec
-    g_object_class_install_property(klass_, number, spec);
-  }
-
   GObjectClass* klass_;
 };

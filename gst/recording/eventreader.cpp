@@ -18,12 +18,6 @@ using eventcamera::Microseconds;
 using eventcamera::RecordingReader;
 using eventcamera::UnsupportedFormat;
 
-namespace {
-
-enum Property : guint { prop_buffer_duration = 1, prop_stats };
-
-}  // namespace
-
 /* type */
 
 namespace {
@@ -50,22 +44,6 @@ EventReader& event_reader_of(gpointer object) {
   return *static_cast<GstEventReader*>(object)->reader;
 }
 
-static void set_property(GObject* object, guint id, const GValue* value, GParamSpec* spec) {
-  if (id == prop_buffer_duration)
-    event_reader_of(object).set_buffer_duration(g_value_get_uint64(value));
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-}
-
-static void get_property(GObject* object, guint id, GValue* value, GParamSpec* spec) {
-  if (id == prop_buffer_duration)
-    g_value_set_uint64(value, event_reader_of(object).buffer_duration());
-  else if (id == prop_stats)
-    g_value_take_boxed(value, event_reader_of(object).stats());
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID(object, id, spec);
-}
-
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   const auto result =
       GST_ELEMENT_CLASS(gst_event_reader_parent_class)->change_state(element, transition);
@@ -90,20 +68,26 @@ static void gst_event_reader_init(GstEventReader*) {}
 
 static void gst_event_reader_class_init(GstEventReaderClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = set_property;
-  object_class->get_property = get_property;
   object_class->constructed = constructed;
   object_class->finalize = finalize;
   GST_ELEMENT_CLASS(klass)->change_state = change_state;
-  g_object_class_install_property(
-      object_class, prop_buffer_duration,
+  install_property(
+      object_class,
+      {[](GObject* object, const GValue* value) {
+         event_reader_of(object).set_buffer_duration(g_value_get_uint64(value));
+       },
+       [](GObject* object, GValue* value) {
+         g_value_set_uint64(value, event_reader_of(object).buffer_duration());
+       }},
       g_param_spec_uint64("buffer-duration", "Buffer duration",
                           "Duration of a buffer of events (nanoseconds, in whole microseconds)",
                           GST_USECOND, 10 * GST_SECOND, default_buffer_duration,
                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                    GST_PARAM_MUTABLE_READY)));
-  g_object_class_install_property(
-      object_class, prop_stats,
+  install_property(
+      object_class,
+      {nullptr, [](GObject* object,
+                   GValue* value) { g_value_take_boxed(value, event_reader_of(object).stats()); }},
       g_param_spec_boxed("stats", "Statistics",
                          "Counts since the start or the last seek: events, triggers, frames and "
                          "imu-samples read; corrupt-places where bytes were skipped; and what was "
@@ -114,22 +98,16 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_READER, static_cast<GstPluginAPIFlags>(0));
 }
 
-static void add_template(GstElementClass* klass, const char* name, GstPadDirection direction,
-                         GstPadPresence presence, const char* caps) {
-  const OwnedCaps owned(gst_caps_from_string(caps));
-  gst_element_class_add_pad_template(klass,
-                                     gst_pad_template_new(name, direction, presence, owned.get()));
-}
-
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const RecordingFormat*>(data);
   static_cast<GstEventReaderClass*>(klass)->format = &format;
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   const char* const name = format.has_many_streams ? "events_%u" : "src";
-  add_template(element_class, "sink", GST_PAD_SINK, GST_PAD_ALWAYS, format.caps);
-  add_template(element_class, name, GST_PAD_SRC, GST_PAD_SOMETIMES, FILE_EVENTS_CAPS);
+  add_pad_template(element_class, "sink", GST_PAD_SINK, format.caps);
+  add_pad_template(element_class, name, GST_PAD_SRC, FILE_EVENTS_CAPS, GST_PAD_SOMETIMES);
   if (format.has_many_streams)
-    add_template(element_class, "video_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, RECORDED_VIDEO_CAPS);
+    add_pad_template(element_class, "video_%u", GST_PAD_SRC, RECORDED_VIDEO_CAPS,
+                     GST_PAD_SOMETIMES);
   gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Demuxer",
                                         format.description, EVENTSIM_AUTHORS);
   if (format.add_properties != nullptr) {
@@ -138,7 +116,7 @@ static void format_class_init(gpointer klass, gpointer data) {
   }
 }
 
-GuardedSettings<FormatSettings>& format_settings_of(GObject* reader) {
+Guarded<FormatSettings>& format_settings_of(GObject* reader) {
   return event_reader_of(reader).format_settings();
 }
 

@@ -15,6 +15,7 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/recording/sensor_events.hpp"
 #include "gst/recording/stream_header.hpp"
@@ -31,8 +32,6 @@ using eventcamera::Trigger;
 using eventcamera::WaitingItems;
 
 namespace {
-
-enum Property : guint { prop_variant = 1, prop_mtu, prop_stats };
 
 /// Alignment of words, which never straddle multiples of it, bytes.
 constexpr std::size_t word_bytes = 8;
@@ -416,24 +415,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static void set_property(GObject* object, guint id, const GValue* value, GParamSpec*) {
-  auto& priv = priv_of(GST_EVENT_WRITER(object));
-  if (id == prop_mtu)
-    priv.mtu = g_value_get_uint(value);
-  else
-    priv.variant = g_value_get_enum(value);
-}
-
-static void get_property(GObject* object, guint id, GValue* value, GParamSpec*) {
-  auto& priv = priv_of(GST_EVENT_WRITER(object));
-  if (id == prop_stats)
-    g_value_take_boxed(value, priv.writable.stats());
-  else if (id == prop_mtu)
-    g_value_set_uint(value, priv.mtu);
-  else
-    g_value_set_enum(value, priv.variant);
-}
-
 /// Creates the pads here, because the format is not yet known in init.
 static void constructed(GObject* object) {
   auto* element = GST_ELEMENT(object);
@@ -465,41 +446,49 @@ static void gst_event_writer_class_init(GstEventWriterClass* klass) {
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_WRITER, static_cast<GstPluginAPIFlags>(0));
 }
 
-static void add_pad_template(GstElementClass* klass, const char* name, GstPadDirection direction,
-                             const OwnedCaps& caps) {
-  gst_element_class_add_pad_template(
-      klass, gst_pad_template_new(name, direction, GST_PAD_ALWAYS, caps.get()));
-}
-
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const EventFileFormat*>(data);
   GST_EVENT_WRITER_CLASS(klass)->format = &format;
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = set_property;
-  object_class->get_property = get_property;
   constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
   if (const auto* variants = format.variants)
-    g_object_class_install_property(
-        object_class, prop_variant,
-        g_param_spec_enum(variants->property, variants->nick, variants->blurb, variants->type(),
-                          variants->default_value,
-                          static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_READY)));
+    install_property(object_class,
+                     {[](GObject* object, const GValue* value) {
+                        priv_of(GST_EVENT_WRITER(object)).variant = g_value_get_enum(value);
+                      },
+                      [](GObject* object, GValue* value) {
+                        g_value_set_enum(value, priv_of(GST_EVENT_WRITER(object)).variant);
+                      }},
+                     g_param_spec_enum(variants->property, variants->nick, variants->blurb,
+                                       variants->type(), variants->default_value,
+                                       static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_READY)));
   if (format.has_words)
-    g_object_class_install_property(
-        object_class, prop_mtu,
+    install_property(
+        object_class,
+        {[](GObject* object, const GValue* value) {
+           priv_of(GST_EVENT_WRITER(object)).mtu = g_value_get_uint(value);
+         },
+         [](GObject* object, GValue* value) {
+           g_value_set_uint(value, priv_of(GST_EVENT_WRITER(object)).mtu);
+         }},
         g_param_spec_uint("mtu", "MTU",
                           "Maximum size of a buffer of words in bytes, such as the payload of a "
                           "network packet; words are never split",
                           64, G_MAXUINT, G_MAXUINT,
                           static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_PLAYING)));
-  g_object_class_install_property(object_class, prop_stats, WritableEvents::stats_spec());
+  install_property(object_class,
+                   {nullptr,
+                    [](GObject* object, GValue* value) {
+                      g_value_take_boxed(value, priv_of(GST_EVENT_WRITER(object)).writable.stats());
+                    }},
+                   WritableEvents::stats_spec());
   auto* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_template(
       element_class, "sink", GST_PAD_SINK,
       OwnedCaps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING, "XYTP",
                                     "width", GST_TYPE_INT_RANGE, 1, format.max_width, "height",
                                     GST_TYPE_INT_RANGE, 1, format.max_height, nullptr)));
-  add_pad_template(element_class, "src", GST_PAD_SRC, OwnedCaps(gst_caps_from_string(format.caps)));
+  add_pad_template(element_class, "src", GST_PAD_SRC, format.caps);
   gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Encoder",
                                         format.description, EVENTSIM_AUTHORS);
 }

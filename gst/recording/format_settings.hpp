@@ -19,7 +19,7 @@ struct FormatSettings {
 };
 
 /// Settings of a reader element.
-GuardedSettings<FormatSettings>& format_settings_of(GObject* reader);
+Guarded<FormatSettings>& format_settings_of(GObject* reader);
 
 using FormatProperties = Properties<format_settings_of>;
 

@@ -4,6 +4,7 @@
 #include <initializer_list>
 
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/eventcamera/eventcamera.h"
 
 namespace {
@@ -69,17 +70,10 @@ GstCaps* SimulatorVideo::input_caps(const GstCaps* output) const {
 }
 
 void SimulatorVideo::install_pads(GstElementClass* klass) const {
-  GstCaps* any = gst_caps_from_string(GST_EVENT_CAMERA_MEDIA_TYPE
-                                      ", " SIZE_CAPS ", framerate = (fraction) [ 0, max ]");
-  GstCaps* input = input_caps(any);
-  GstCaps* output = output_caps(any);
-  gst_element_class_add_pad_template(
-      klass, gst_pad_template_new("sink", GST_PAD_SINK, GST_PAD_ALWAYS, input));
-  gst_element_class_add_pad_template(
-      klass, gst_pad_template_new("src", GST_PAD_SRC, GST_PAD_ALWAYS, output));
-  gst_caps_unref(input);
-  gst_caps_unref(output);
-  gst_caps_unref(any);
+  const OwnedCaps any(gst_caps_from_string(GST_EVENT_CAMERA_MEDIA_TYPE
+                                           ", " SIZE_CAPS ", framerate = (fraction) [ 0, max ]"));
+  add_pad_template(klass, "sink", GST_PAD_SINK, OwnedCaps(input_caps(any.get())));
+  add_pad_template(klass, "src", GST_PAD_SRC, OwnedCaps(output_caps(any.get())));
 }
 
 GstCaps* event_simulator_fixate_output(GstCaps* caps) {

@@ -36,9 +36,9 @@ struct DenseSettings {
   eventcamera::FlowMethod flow = method;
   eventcamera::Interpolation interpolation = eventcamera::Interpolation::forward;
 
-  static std::shared_ptr<void> make() { return std::make_shared<GuardedSettings<DenseSettings>>(); }
+  static std::shared_ptr<void> make() { return std::make_shared<Guarded<DenseSettings>>(); }
 
-  static GuardedSettings<DenseSettings>& of(GObject* object) {
+  static Guarded<DenseSettings>& of(GObject* object) {
     return event_simulator_settings<DenseSettings>(object);
   }
 

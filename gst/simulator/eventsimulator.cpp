@@ -87,10 +87,10 @@ struct Stream {
 }  // namespace
 
 struct GstEventSimulatorPrivate {
-  GuardedSettings<Settings> settings;
+  Guarded<Settings> settings;
   std::shared_ptr<void> method_settings;
 
-  GuardedSettings<SimulatorQos> qos;
+  Guarded<SimulatorQos> qos;
   Guarded<Latency> latency;  // make no calls while holding its lock
 
   // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
@@ -122,7 +122,7 @@ static void configure(GstEventSimulator* self) {
 
 /* properties */
 
-static GuardedSettings<Settings>& settings_of(GObject* object) {
+static Guarded<Settings>& settings_of(GObject* object) {
   return priv_of(GST_EVENT_SIMULATOR(object)).settings;
 }
 
@@ -170,7 +170,7 @@ static void install_base_properties(GObjectClass* klass) {
                         palette_type(), static_cast<int>(PaletteName::dark), property_flags));
 }
 
-static GuardedSettings<SimulatorQos>& qos_of(GObject* object) {
+static Guarded<SimulatorQos>& qos_of(GObject* object) {
   return priv_of(GST_EVENT_SIMULATOR(object)).qos;
 }
 
@@ -225,10 +225,8 @@ static void learn_latency(GstEventSimulator* self, Nanoseconds start, Nanosecond
 /// Starts processing a frame. Returns false if the frame is skipped instead.
 static bool begin_work(GstEventSimulator* self, GstBuffer* frame) {
   const bool ends_interval = priv_of(self).state->simulator().last_time().has_value();
-  GstMessage* skipped = nullptr;
-  priv_of(self).qos.access([&](SimulatorQos& qos) {
-    skipped = qos.begin(GST_BASE_TRANSFORM(self), frame, ends_interval);
-  });
+  GstMessage* skipped =
+      priv_of(self).qos.lock()->begin(GST_BASE_TRANSFORM(self), frame, ends_interval);
   if (skipped == nullptr) return true;
   GST_DEBUG_OBJECT(self, "downstream is late: skipped %" GST_PTR_FORMAT, frame);
   gst_element_post_message(GST_ELEMENT(self), skipped);
@@ -240,10 +238,11 @@ static void end_work(GstEventSimulator* self, Nanoseconds time,
                      std::optional<Nanoseconds> work_began) {
   Nanoseconds work = 0;
   Nanoseconds downstream = 0;
-  priv_of(self).qos.access([&](SimulatorQos& qos) {
-    work = qos.end_work(GST_BASE_TRANSFORM(self), work_began);
-    downstream = qos.downstream_latency();
-  });
+  {
+    const auto qos = priv_of(self).qos.lock();
+    work = qos->end_work(GST_BASE_TRANSFORM(self), work_began);
+    downstream = qos->downstream_latency();
+  }
   change_latency(self, [&](Latency& latency) {
     latency.processing.add(time,
                            std::min(work, max_latency) / processing_deadline * processing_deadline);
@@ -252,14 +251,12 @@ static void end_work(GstEventSimulator* self, Nanoseconds time,
 }
 
 static std::optional<Nanoseconds> work_began(GstEventSimulator* self) {
-  std::optional<Nanoseconds> began;
-  priv_of(self).qos.access([&](const SimulatorQos& qos) { began = qos.began(); });
-  return began;
+  return priv_of(self).qos.lock()->began();
 }
 
 /// Ends the processing of a frame, after its output has been pushed.
 static void end_frame(GstEventSimulator* self) {
-  priv_of(self).qos.access([self](SimulatorQos& qos) { qos.end(GST_BASE_TRANSFORM(self)); });
+  priv_of(self).qos.lock()->end(GST_BASE_TRANSFORM(self));
 }
 
 /* intervals out */
@@ -540,7 +537,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
     change_latency(self, [duration](Latency& latency) {
       latency.interval.expect(static_cast<Nanoseconds>(duration));
     });
-  priv_of(self).qos.access([&](SimulatorQos& qos) { qos.take_output(state->draws); });
+  priv_of(self).qos.lock()->take_output(state->draws);
   return TRUE;
 }
 
@@ -582,9 +579,7 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
   }
   end_work(self, time, work_began(self));
   if (result != GST_FLOW_OK) return result;
-  priv_of(self).qos.access([&](const SimulatorQos& qos) {
-    qos.extend(transform, picture.get(), frame_duration(state.video));
-  });
+  priv_of(self).qos.lock()->extend(transform, picture.get(), frame_duration(state.video));
   const GstClockTime duration = GST_BUFFER_DURATION(picture.get());
   result = push_buffer(self, std::move(picture), static_cast<GstClockTime>(time), duration);
   end_frame(self);
@@ -650,7 +645,7 @@ static void start_timeline(GstEventSimulator* self) {
   priv_of(self).stream.flow = GST_FLOW_OK;
   start_over(self);
   priv_of(self).stream.clock.start_over();
-  priv_of(self).qos.access([](SimulatorQos& qos) { qos.start_over(); });
+  priv_of(self).qos.lock()->start_over();
 }
 
 static bool take_segment(GstEventSimulator* self, GstEvent* event) {
@@ -749,9 +744,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
     // Not forwarded: only this element skips frames.
-    priv_of(GST_EVENT_SIMULATOR(transform)).qos.access([&](SimulatorQos& qos) {
-      qos.take_event(transform, event);
-    });
+    priv_of(GST_EVENT_SIMULATOR(transform)).qos.lock()->take_event(transform, event);
     gst_event_unref(event);
     return TRUE;
   }
@@ -783,10 +776,11 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
 }
 
 static gboolean start(GstBaseTransform* transform) {
-  priv_of(GST_EVENT_SIMULATOR(transform)).qos.access([](SimulatorQos& qos) {
-    qos.start_over();
-    qos.reset_stats();
-  });
+  {
+    const auto qos = priv_of(GST_EVENT_SIMULATOR(transform)).qos.lock();
+    qos->start_over();
+    qos->reset_stats();
+  }
   return TRUE;
 }
 

@@ -37,7 +37,7 @@ struct EventSimulatorMethod {
   /// Input video and drawn video.
   const SimulatorVideo& video = system_memory_video;
 
-  /// For methods with their own properties, else null: create a GuardedSettings, install the
+  /// For methods with their own properties, else null: create a Guarded, install the
   /// properties, and pass the settings to the simulator before each frame.
   std::shared_ptr<void> (*make_settings)() = nullptr;
   void (*install_properties)(GObjectClass* klass) = nullptr;
@@ -67,6 +67,6 @@ GType event_simulator_type(const EventSimulatorMethod& method,
 void* event_simulator_settings(GObject* object);
 
 template <class Settings>
-GuardedSettings<Settings>& event_simulator_settings(GObject* object) {
-  return *static_cast<GuardedSettings<Settings>*>(event_simulator_settings(object));
+Guarded<Settings>& event_simulator_settings(GObject* object) {
+  return *static_cast<Guarded<Settings>*>(event_simulator_settings(object));
 }

@@ -61,7 +61,7 @@ class EventOverlay final : public EventAggregator {
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
 
-  GuardedSettings<Settings> settings;
+  Guarded<Settings> settings;
 
  private:
   bool take_video_caps(const GstCaps* caps);

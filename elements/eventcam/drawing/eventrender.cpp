@@ -160,7 +160,7 @@ class EventRender final : public EventAggregator {
   bool set_video(const GstCaps* caps);
   void take_qos(GstEvent* event);
 
-  GuardedSettings<Settings> settings;
+  Guarded<Settings> settings;
 
  private:
   void start_over();

@@ -100,7 +100,7 @@ struct GstAedatMuxPrivate {
   explicit GstAedatMuxPrivate(GstElement* self)
       : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_MUX) {}
 
-  GuardedSettings<Settings> settings;
+  Guarded<Settings> settings;
 
   // Accessed by the streaming thread only, or while there is none.
   State state;
@@ -581,7 +581,7 @@ static GstFlowReturn flush(GstAggregator* aggregator) {
 
 /* type */
 
-static GuardedSettings<Settings>& settings_of(GObject* object) {
+static Guarded<Settings>& settings_of(GObject* object) {
   return GST_AEDAT_MUX(object)->priv->settings;
 }
 

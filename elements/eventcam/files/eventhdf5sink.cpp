@@ -65,7 +65,7 @@ struct GstEventHdf5SinkPrivate {
   explicit GstEventHdf5SinkPrivate(GstElement* self)
       : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
-  GuardedSettings<Settings> settings;
+  Guarded<Settings> settings;
 
   // Accessed by the streaming thread only, or while there is none.
   State state;
@@ -243,7 +243,7 @@ static gboolean event(GstBaseSink* sink, GstEvent* event) {
 
 /* type */
 
-static GuardedSettings<Settings>& settings_of(GObject* object) {
+static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_HDF5_SINK(object)->priv->settings;
 }
 

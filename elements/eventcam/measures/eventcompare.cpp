@@ -74,7 +74,7 @@ class EventCompare final : public EventAggregator {
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
 
-  GuardedSettings<ReportFiles> settings;
+  Guarded<ReportFiles> settings;
 
  private:
   bool is_over(StreamRole role) const;

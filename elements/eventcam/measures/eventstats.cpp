@@ -87,7 +87,7 @@ struct Measurement {
 };
 
 struct Private {
-  GuardedSettings<Settings> settings;
+  Guarded<Settings> settings;
 
   // Accessed by the streaming thread only, or while there is none.
   std::optional<Measurement> measurement;
@@ -109,7 +109,7 @@ G_DEFINE_TYPE_WITH_CODE(GstEventStats, gst_event_stats, GST_TYPE_BASE_TRANSFORM,
 #define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_stats_parent_class)
 GST_ELEMENT_REGISTER_DEFINE(eventstats, "eventstats", GST_RANK_NONE, gst_event_stats_get_type())
 
-static GuardedSettings<Settings>& settings_of(GObject* object) {
+static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_STATS(object)->priv->settings;
 }
 

@@ -93,8 +93,8 @@ struct Settings : DatagramSettings {
 };
 
 struct Private {
-  GuardedSettings<Settings> settings;
-  GuardedSettings<DatagramCounts> counts;
+  Guarded<Settings> settings;
+  Guarded<DatagramCounts> counts;
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
@@ -120,11 +120,11 @@ G_DEFINE_TYPE_WITH_CODE(GstEventDatagramDepay, gst_event_datagram_depay, GST_TYP
 GST_ELEMENT_REGISTER_DEFINE(eventdatagramdepay, "eventdatagramdepay", GST_RANK_NONE,
                             gst_event_datagram_depay_get_type())
 
-static GuardedSettings<Settings>& settings_of(GObject* object) {
+static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_DEPAY(object)->priv->settings;
 }
 
-static GuardedSettings<DatagramCounts>& counts_of(GObject* object) {
+static Guarded<DatagramCounts>& counts_of(GObject* object) {
   return GST_EVENT_DATAGRAM_DEPAY(object)->priv->counts;
 }
 
@@ -223,14 +223,15 @@ static GstFlowReturn receive(GstEventDatagramDepay* self, std::span<const std::u
   if (GST_CLOCK_TIME_IS_VALID(arrival)) time = static_cast<Microseconds>(arrival / GST_USECOND);
   const auto reception = state.unpacker->unpack(bytes, time, state.events);
   const bool accepted = reception.fault == nullptr && !reception.late;
-  priv.counts.access([&](DatagramCounts& counts) {
-    counts.packets += accepted ? 1 : 0;
-    counts.events += state.events.size();
-    counts.bytes += accepted ? bytes.size() : 0;
-    counts.lost += reception.lost;
-    counts.late += reception.late ? 1 : 0;
-    counts.rejected += reception.fault != nullptr ? 1 : 0;
-  });
+  {
+    const auto counts = priv.counts.lock();
+    counts->packets += accepted ? 1 : 0;
+    counts->events += state.events.size();
+    counts->bytes += accepted ? bytes.size() : 0;
+    counts->lost += reception.lost;
+    counts->late += reception.late ? 1 : 0;
+    counts->rejected += reception.fault != nullptr ? 1 : 0;
+  }
   if (reception.fault != nullptr) reject(self, reception.fault, bytes.size(), arrival);
   if (reception.late) log_late(self, arrival);
   if (reception.lost > 0)
@@ -325,7 +326,7 @@ static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
 
 static bool start(GstEventDatagramDepay* self) {
   const auto settings = self->priv->settings.copy();
-  self->priv->counts.access([](DatagramCounts& counts) { counts = {}; });
+  *self->priv->counts.lock() = {};
   if (settings.width > 0 && settings.height > 0) return start_stream(self, settings);
   GST_ELEMENT_ERROR(self, RESOURCE, SETTINGS,
                     ("Cannot receive events: their datagrams do not contain the sensor size. Set "

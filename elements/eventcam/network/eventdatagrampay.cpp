@@ -58,8 +58,8 @@ struct Settings : eventcamera::DatagramSettings {
 };
 
 struct Private {
-  GuardedSettings<Settings> settings;
-  GuardedSettings<DatagramCounts> counts;
+  Guarded<Settings> settings;
+  Guarded<DatagramCounts> counts;
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
 
@@ -90,11 +90,11 @@ G_DEFINE_TYPE_WITH_CODE(GstEventDatagramPay, gst_event_datagram_pay, GST_TYPE_EL
 GST_ELEMENT_REGISTER_DEFINE(eventdatagrampay, "eventdatagrampay", GST_RANK_NONE,
                             gst_event_datagram_pay_get_type())
 
-static GuardedSettings<Settings>& settings_of(GObject* object) {
+static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_PAY(object)->priv->settings;
 }
 
-static GuardedSettings<DatagramCounts>& counts_of(GObject* object) {
+static Guarded<DatagramCounts>& counts_of(GObject* object) {
   return GST_EVENT_DATAGRAM_PAY(object)->priv->counts;
 }
 
@@ -115,11 +115,12 @@ static void keep(Private& priv, const Datagram& datagram) {
   GST_BUFFER_DURATION(buffer.get()) =
       static_cast<GstClockTime>(datagram.last - datagram.first) * GST_USECOND;
   priv.datagrams.push_back(std::move(buffer));
-  priv.counts.access([&](DatagramCounts& counts) {
-    ++counts.packets;
-    counts.events += datagram.events;
-    counts.bytes += datagram.bytes.size();
-  });
+  {
+    const auto counts = priv.counts.lock();
+    ++counts->packets;
+    counts->events += datagram.events;
+    counts->bytes += datagram.bytes.size();
+  }
 }
 
 /// Pushes the kept datagrams as a list, which udpsink sends with one system call.
@@ -292,8 +293,7 @@ static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
 
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
   auto& priv = *GST_EVENT_DATAGRAM_PAY(element)->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
-    priv.counts.access([](DatagramCounts& counts) { counts = {}; });
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.counts.lock() = {};
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS(gst_event_datagram_pay_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {

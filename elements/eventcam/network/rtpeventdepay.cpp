@@ -53,6 +53,7 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
 #include "src/core/max_side.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 
@@ -385,7 +386,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static void get_property(GObject* object, guint, GValue* value, GParamSpec*) {
+static void get_stats(GObject* object, GValue* value) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_DEPAYLOAD);
   const auto counted = *GST_RTP_EVENT_DEPAY(object)->priv->statistics.lock();
   gst_structure_set(
@@ -413,10 +414,8 @@ static void gst_rtp_event_depay_init(GstRtpEventDepay* self) {
 static void gst_rtp_event_depay_class_init(GstRtpEventDepayClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  object_class->get_property = get_property;
-  constexpr guint number = 1;
-  g_object_class_install_property(
-      object_class, number,
+  install_property(
+      object_class, {nullptr, get_stats},
       g_param_spec_boxed("stats", "Statistics", "Counters of packets and events received and lost",
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));

@@ -85,7 +85,7 @@ struct Sent {
 };
 
 struct Private {
-  GuardedSettings<Settings> settings;
+  Guarded<Settings> settings;
   Guarded<Sent> sent;
 
   // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
@@ -114,7 +114,7 @@ G_DEFINE_TYPE_WITH_CODE(GstRtpEventPay, gst_rtp_event_pay, GST_TYPE_RTP_BASE_PAY
 GST_ELEMENT_REGISTER_DEFINE(rtpeventpay, "rtpeventpay", GST_RANK_SECONDARY,
                             gst_rtp_event_pay_get_type())
 
-static GuardedSettings<Settings>& settings_of(GObject* object) {
+static Guarded<Settings>& settings_of(GObject* object) {
   return GST_RTP_EVENT_PAY(object)->priv->settings;
 }
 

@@ -60,7 +60,7 @@ class EventReader {
 
   void set_buffer_duration(GstClockTime time) { shared_.lock()->buffer_duration = time; }
   GstClockTime buffer_duration() { return shared_.lock()->buffer_duration; }
-  GuardedSettings<FormatSettings>& format_settings() { return format_settings_; }
+  Guarded<FormatSettings>& format_settings() { return format_settings_; }
   GstStructure* stats();
 
   /// Forgets the file.
@@ -148,7 +148,7 @@ class EventReader {
   const RecordingFormat& format_;
 
   Guarded<Shared> shared_;
-  GuardedSettings<FormatSettings> format_settings_;
+  Guarded<FormatSettings> format_settings_;
 
   // Accessed under the sink pad's stream lock only, or while there is no streaming thread.
   OwnedCaps caps_;                 ///< input caps
@@ -157,8 +157,8 @@ class EventReader {
   bool is_consuming_ = false;         ///< bytes were passed to the recording
   GstFlowReturn flow_ = GST_FLOW_OK;  ///< anything else refuses pushed bytes
   guint64 corrupt_places_ = 0;        ///< already signalled by DISCONT and a warning
-  WarnOnce warn_of_corruption_{GST_CAT_DEFAULT};
-  WarnOnce warn_of_assumption_{GST_CAT_DEFAULT};
+  WarnOnce warn_of_corruption_{event_reader_debug};
+  WarnOnce warn_of_assumption_{event_reader_debug};
   RepeatLevel dropped_level_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;
