@@ -7,10 +7,12 @@ of browsers can watch. Ctrl-C ends it.
 
 Without --device it shows a test scene. By default only browsers on this machine can connect; with
 --address 0.0.0.0, anyone who can reach this machine can, without a password."""
+import ipaddress
 import json
 import os
+import socket
 import sys
-from urllib.parse import urlsplit
+from urllib.parse import unquote_to_bytes, urlsplit
 
 try:
     import gi
@@ -47,6 +49,14 @@ def forward(_, info, need_key_frame):
     if info.get_event().has_name("GstForceKeyUnit"):
         need_key_frame()
     return Gst.PadProbeReturn.OK
+
+
+def is_address(host):
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
 
 
 class Viewer:
@@ -139,7 +149,7 @@ class Viewer:
                     self._set_answer(value)
                 elif name == "candidate":
                     self._webrtc.emit("add-ice-candidate", value["sdpMLineIndex"], value["candidate"])
-        except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as cause:
+        except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as cause:
             self._refuse(f"unexpected message: {cause}")
 
     def _set_answer(self, text):
@@ -182,13 +192,14 @@ class Viewer:
 class Server:
     """Serves the page, and streams to its viewers."""
 
-    def __init__(self, device, simulator):
+    def __init__(self, device, simulator, hosts):
         self._capture = Capture(device, DRAW_AND_ENCODE.format(simulator=simulator), self._tell_rate)
         self._encoder = self._capture.pipeline.get_by_name("encoder").get_static_pad("src")
         self._viewers = []
+        self._hosts = {"localhost", socket.gethostname(), *hosts}
         self._http = Soup.Server()
+        self._http.connect("request-started", lambda _, message: message.connect("got-headers", self._check))
         self._http.add_handler("/", self._serve_page)
-        self._http.add_early_handler("/viewer", self._refuse_strangers)
         self._http.add_websocket_handler("/viewer", None, None, self._add_viewer)
 
     def run(self, address, port):
@@ -207,6 +218,26 @@ class Server:
                 viewer.stop()
             self._http.disconnect()
 
+    def _check(self, message):
+        """Rejects requests that cannot be parsed, and those for or from another site: a page of a stranger
+        may have any name resolve to this machine, but not an IP address."""
+        headers = message.get_request_headers()
+        host = headers.get_one("Host")
+        message.get_response_headers().replace("Connection", "close")  # libsoup keeps closed ones otherwise
+        try:
+            unquote_to_bytes(message.get_uri().to_string()).decode()
+            name = urlsplit(f"//{host}").hostname
+            if host is None or name is None:
+                raise ValueError("no Host")
+            origin = headers.get_one("Origin")
+            is_strange = origin is not None and urlsplit(origin).netloc != host
+        except ValueError as cause:
+            print(f"A bad request is refused: {cause}", file=sys.stderr)
+            message.set_status(Soup.Status.BAD_REQUEST, None)
+            return
+        if is_strange or not (name in self._hosts or is_address(name)):
+            message.set_status(Soup.Status.FORBIDDEN, None)
+
     def _serve_page(self, _, message, path, query):
         if path != "/":
             message.set_status(Soup.Status.NOT_FOUND, None)
@@ -216,13 +247,6 @@ class Server:
             with open(PAGE, "rb") as page:
                 message.set_status(Soup.Status.OK, None)
                 message.set_response("text/html; charset=utf-8", Soup.MemoryUse.COPY, page.read())
-
-    def _refuse_strangers(self, _, message, path, query):
-        """Rejects connections from pages of other sites."""
-        headers = message.get_request_headers()
-        origin = headers.get_one("Origin")
-        if origin and urlsplit(origin).netloc != headers.get_one("Host"):
-            message.set_status(Soup.Status.FORBIDDEN, None)
 
     def _add_viewer(self, _, message, path, websocket):
         websocket.set_keepalive_interval(20)
@@ -240,10 +264,14 @@ class Server:
 
 
 def main():
-    chosen = option_parser("web-events", __doc__, "127.0.0.1", 8080).parse_args()
+    parser = option_parser("web-events", __doc__, "127.0.0.1", 8080)
+    parser.add_argument("--host", action="append", default=[],
+                        help="name by which browsers may call this machine, besides localhost, its host name and"
+                        " IP addresses; may be repeated")
+    chosen = parser.parse_args()
     Gst.init(None)
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice")
-    Server(chosen.device, chosen.simulator).run(chosen.address, chosen.port)
+    Server(chosen.device, chosen.simulator, chosen.host).run(chosen.address, chosen.port)
 
 
 if __name__ == "__main__":

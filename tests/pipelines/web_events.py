@@ -79,15 +79,30 @@ def closing_code(page, url, message):
     }})""")
 
 
-def handshake(url, origin):
-    """The HTTP status that a WebSocket opened by a page of `origin` is answered with."""
+def status_of(url, path, **headers):
+    """The HTTP status that a request is answered with."""
     connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=SECONDS)
-    connection.request("GET", "/viewer", headers={
-        "Origin": origin, "Connection": "Upgrade", "Upgrade": "websocket",
-        "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="})
+    connection.request("GET", path, headers=headers)
     status = connection.getresponse().status
     connection.close()
     return status
+
+
+def handshake(url, **headers):
+    """The HTTP status that a WebSocket is answered with."""
+    return status_of(url, "/viewer", **headers, **{
+        "Connection": "Upgrade", "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="})
+
+
+def stay_connected(url, count):
+    """Loads the page with clients that would keep their connection, and then close it."""
+    clients = [http.client.HTTPConnection(urlsplit(url).netloc, timeout=SECONDS) for _ in range(count)]
+    for client in clients:
+        client.request("GET", "/")
+        assert client.getresponse().read()
+    for client in clients:
+        client.close()
 
 
 with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, contextlib.ExitStack() as at_end:
@@ -102,6 +117,13 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     see_rate(first)
     print("one viewer sees events and their rate")
 
+    first.resize(390, 844)
+    video, rate = (first.evaluate(f"document.querySelector('{name}').getBoundingClientRect().toJSON()")
+                   for name in ("video", "output"))
+    assert video["width"] == 390 and rate["top"] >= video["bottom"], f"on a phone: {video}, {rate}"
+    first.resize(1280, 720)
+    print("on a phone the picture is as wide as the page, and the rate is below it")
+
     alone = server.descriptors() + 3  # browsers keep connections for later; a viewer needs about 20
     for name in ("second", "third"):
         other = browser.open(url)
@@ -112,20 +134,29 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
         wait_for(f"all that the {name} viewer needed is closed", lambda: server.descriptors() <= alone)
         see_events(first)
     for _ in range(9):  # left before anything is negotiated
-        assert handshake(url, url[:-1]) == 101
+        assert handshake(url, Origin=url[:-1]) == 101
     browser.open(url).close()
     wait_for("all that a hasty viewer needed is closed", lambda: server.descriptors() <= alone)
+    stay_connected(url, 100)
+    wait_for("connections that clients closed are closed", lambda: server.descriptors() <= alone)
     see_events(first)
     print("viewers come and leave, and the first sees events still")
 
     for message in ("nonsense", "[]", '{"answer": ""}', '{"answer": 5}',
-                    '{"answer": "nonsense"}', '{"candidate": {}}', '{"candidate": null}',
+                    '{"answer": "nonsense"}', '{"candidate": {}}', '{"candidate": null}', "[" * 100_000,
                     '{"candidate": {"sdpMLineIndex": -1, "candidate": ""}}'):
         code = closing_code(first, url, message)
         assert code == 1007, f"{message}: it was answered with {code}"
-    for origin, status in (("http://elsewhere", 403), ("null", 403), (url[:-1], 101)):
-        answer = handshake(url, origin)
+    for origin, status in (("http://elsewhere", 403), ("null", 403), ("http://[bad", 400), (url[:-1], 101)):
+        answer = handshake(url, Origin=origin)
         assert answer == status, f"a page of {origin} is answered with {answer}"
+    for host, status in (("elsewhere.example", 403), ("[bad", 400), (f"localhost:{urlsplit(url).port}", 200)):
+        answer = status_of(url, "/", Host=host)
+        assert answer == status, f"a request to {host} is answered with {answer}"
+    assert handshake(url, Host="elsewhere.example", Origin="http://elsewhere.example") == 403
+    for path, status in (("/%ff", 400), ("/viewer/%ff", 400), ("/nowhere", 404)):
+        answer = status_of(url, path)
+        assert answer == status, f"{path} is answered with {answer}"
     see_events(first)
     print("strange messages and other sites' pages are refused")
 
@@ -137,6 +168,15 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, context
     print("errors are told")
 
     server.interrupt()
-    wait_for("the viewer learns that the server has ended", lambda: "disconnected" in first.evaluate(
+    wait_for("the viewer learns that the server has ended", lambda: "reconnecting" in first.evaluate(
         "document.querySelector('output').textContent"))
-    print("Ctrl-C ends it")
+    assert first.evaluate("!last.hidden && last.width > 0"), "the last picture is gone"
+    print("Ctrl-C ends it, and the last picture stays")
+
+    server = ServerProcess(PROGRAM, "--port", port)
+    at_end.callback(server.process.kill)
+    wait_for("the viewer reconnects", lambda: first.evaluate("last.hidden"))
+    see_events(first)
+    see_rate(first)
+    server.interrupt()
+    print("viewers reconnect when the server is back")
