@@ -352,14 +352,14 @@ struct ReleasedWhenCopied {
     }();
     static const GstMetaInfo* const registered = gst_meta_register(
         api, "ReleasedWhenCopied", sizeof(ReleasedWhenCopied),
-        [](GstMeta* meta, gpointer, GstBuffer*) -> gboolean {
-          reinterpret_cast<ReleasedWhenCopied*>(meta)->was_copied = false;
+        [](GstMeta* made, gpointer, GstBuffer*) -> gboolean {
+          reinterpret_cast<ReleasedWhenCopied*>(made)->was_copied = false;
           return TRUE;
         },
         nullptr,
-        [](GstBuffer*, GstMeta* meta, GstBuffer* buffer, GQuark, gpointer) -> gboolean {
-          auto& was_copied = reinterpret_cast<ReleasedWhenCopied*>(meta)->was_copied;
-          if (!std::exchange(was_copied, true)) gst_buffer_unref(buffer);
+        [](GstBuffer*, GstMeta* copied, GstBuffer* buffer, GQuark, gpointer) -> gboolean {
+          auto* const self = reinterpret_cast<ReleasedWhenCopied*>(copied);
+          if (!std::exchange(self->was_copied, true)) gst_buffer_unref(buffer);
           return TRUE;
         });
     return registered;
