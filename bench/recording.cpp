@@ -20,7 +20,7 @@ using namespace eventcamera;
 
 constexpr SensorSize size{1280, 720};
 constexpr std::size_t piece_size = std::size_t{1} << 18;
-constexpr int turns = 3;
+constexpr int turns = 5;
 
 /// Writes a RAW file of EVT3 words: single events and runs, 10 million a second.
 void write_recording(const std::string& path, std::size_t count) {
@@ -98,6 +98,7 @@ int main(int argc, char** argv) {
   const std::string path = std::string(directory) + "/events.raw";
   write_recording(path, static_cast<std::size_t>(millions * 1e6));
   std::size_t events = decode(path);  // the file is in memory now
+  play(path);                         // and the plugin loaded
   std::vector<double> ratios;
   for (int i = 0; i < turns; ++i) {
     const auto decoder = cost_of([&] { events = decode(path); });

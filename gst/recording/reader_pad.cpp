@@ -114,7 +114,7 @@ GstFlowReturn ReaderPad::push(GstBuffer* buffer, GstClockTime pts) {
   return gst_pad_push(pad_, buffer);
 }
 
-GstFlowReturn ReaderPad::push(const eventcamera::IntervalEvents& events, GstClockTime pts,
+GstFlowReturn ReaderPad::push(std::span<const eventcamera::Event> events, GstClockTime pts,
                               GstClockTime duration) {
   if (!pool_) {
     pool_.reset(event_pool_new());
@@ -128,11 +128,8 @@ GstFlowReturn ReaderPad::push(const eventcamera::IntervalEvents& events, GstCloc
   const auto result = gst_buffer_pool_acquire_buffer(pool_.get(), &acquired, nullptr);
   if (result != GST_FLOW_OK) return result;
   OwnedBuffer buffer(acquired);
-  event_pool_reserve(acquired, events.size() * sizeof(eventcamera::Event));
-  GstMapInfo map;
-  if (!gst_buffer_map(acquired, &map, GST_MAP_WRITE)) throw std::bad_alloc();
-  events.write_to(reinterpret_cast<eventcamera::Event*>(map.data));
-  gst_buffer_unmap(acquired, &map);
+  event_pool_reserve(acquired, events.size_bytes());
+  gst_buffer_fill(acquired, 0, events.data(), events.size_bytes());
   GST_BUFFER_DURATION(acquired) = duration;
   return push(buffer.release(), pts);
 }

@@ -55,7 +55,7 @@ class ReaderPad {
 
   GstFlowReturn push(GstBuffer* buffer, GstClockTime pts);
   /// Pushes events, at least one. Throws std::bad_alloc.
-  GstFlowReturn push(const eventcamera::IntervalEvents& events, GstClockTime pts,
+  GstFlowReturn push(std::span<const eventcamera::Event> events, GstClockTime pts,
                      GstClockTime duration);
   GstFlowReturn push_gap(GstClockTime pts, GstClockTime duration);
 

@@ -2,52 +2,46 @@
 #include "src/formats/chunker.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <array>
+#include <utility>
+
+#include "src/core/interval_times.hpp"
 
 namespace eventcamera {
-namespace {
 
-bool earlier(const AbsoluteEvent& a, const AbsoluteEvent& b) {
-  return a.t < b.t;
-}
-
-}  // namespace
-
-IntervalEvents IntervalEvents::before(Microseconds duration) const {
-  const auto end = std::ranges::partition_point(
-      events_, [&](const AbsoluteEvent& event) { return event.t < start_ + duration; });
-  return {start_, {events_.begin(), end}};
-}
-
-void IntervalEvents::write_to(Event* out) const {
-  const auto start = start_;
-  for (const auto& event : events_)
-    *out++ = {static_cast<std::uint32_t>(event.t - start), event.x, event.y_p};
-}
+/// Events added at once.
+static constexpr std::size_t block_size = 512;
 
 Chunker::Chunker(Microseconds length, Microseconds start)
     : length_(length), first_(start), given_start_(true), start_(start) {}
 
 void Chunker::push(std::span<const AbsoluteEvent> events) {
-  if (events.empty()) return;
-  drop_handed_out();
-  // Fast path: nearly always the events are in order and can be added at once.
-  if (ahead_.empty() && latest_ != never && events.front().t >= std::max(latest_, start_) &&
-      events.back().t <= latest_ + settled && keep_sorted(events))
-    return;
+  // Fast path: nearly always the events are in order and can be added in blocks.
+  while (!events.empty()) {
+    const auto kept = keep_sorted(events.first(std::min(events.size(), block_size)));
+    if (kept == 0) break;
+    events = events.subspan(kept);
+  }
   for (const auto& event : events) place(event);
 }
 
-/// Keeps events if they are sorted.
-bool Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
-  bool falls = false;  // without a branch, the loop runs at the speed of memory
-  for (std::size_t i = 1; i < events.size(); ++i) falls |= events[i].t < events[i - 1].t;
-  if (falls) return false;
-  const auto before = kept_.size();
-  kept_.resize(before + events.size());
-  std::memcpy(static_cast<void*>(kept_.data() + before), events.data(), events.size_bytes());
+/// Keeps the events up to the end of their cell if they are sorted. Returns their number.
+std::size_t Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
+  const auto soon = [this](const AbsoluteEvent& event) { return event.t <= latest_ + settled; };
+  if (!ahead_.empty() || latest_ == never || events.front().t < std::max(latest_, start_) ||
+      !soon(events.front()) || !soon(events.back()))
+    return 0;
+  auto& cell = cell_of(events.front().t);
+  if (events.back().t >= cell.end)
+    events = {events.begin(), std::ranges::partition_point(
+                                  events, [&](const auto& event) { return event.t < cell.end; })};
+  std::array<Event, block_size> block;
+  if (!count_times_from(cell.start, latest_, events, block.data()))
+    return 0;  // the cell is not left empty: place() keeps the first event
+  cell.events.insert(cell.events.end(), block.begin(), block.begin() + events.size());
   latest_ = events.back().t;
-  return true;
+  waiting_ += events.size();
+  return events.size();
 }
 
 void Chunker::place(const AbsoluteEvent& event) {
@@ -77,14 +71,17 @@ void Chunker::keep(const AbsoluteEvent& event) {
     dropped_.late += static_cast<std::uint64_t>(!given_start_ || event.t >= *first_);
     return;
   }
-  sorted_ &= event.t >= latest_;
+  auto& cell = cell_of(event.t);
+  const auto t = static_cast<std::uint32_t>(event.t - cell.start);
+  cell.is_sorted &= cell.events.empty() || t >= cell.events.back().t;
+  cell.events.push_back({t, event.x, event.y_p});
+  ++waiting_;
   latest_ = std::max(latest_, event.t);
-  kept_.push_back(event);
 }
 
 void Chunker::believe_ahead() {
   if (!first_) {
-    first_ = std::min_element(ahead_.begin(), ahead_.end(), earlier)->t;
+    first_ = std::ranges::min_element(ahead_, {}, &AbsoluteEvent::t)->t;
     start_ = *first_;
   }
   for (const auto& event : ahead_) keep(event);
@@ -101,49 +98,72 @@ void Chunker::finish() {
   finished_ = true;
 }
 
-/// Erases returned events once they are by far the greater part, so that little is moved.
-void Chunker::drop_handed_out() {
-  if (head_ <= kept_.size() / 4 * 3) return;
-  kept_.erase(kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(head_));
-  head_ = 0;
-}
-
-void Chunker::sort() {
-  if (sorted_) return;
-  std::stable_sort(kept_.begin() + static_cast<std::ptrdiff_t>(head_), kept_.end(), earlier);
-  sorted_ = true;
+/// The cell of a time that was not returned yet.
+Chunker::Cell& Chunker::cell_of(Microseconds t) {
+  // Nearly always the last one.
+  auto after = cells_.end();
+  while (after != cells_.begin() && std::prev(after)->start > t) --after;
+  if (after != cells_.begin() && t < std::prev(after)->end) return *std::prev(after);
+  const auto on_grid = grid_before(t);
+  const auto made = cells_.insert(after, {std::max(on_grid, start_), on_grid + length_, {}});
+  if (!spare_.empty()) {
+    made->events = std::move(spare_.back());
+    made->events.clear();
+    spare_.pop_back();
+  }
+  return *made;
 }
 
 std::optional<Chunker::Interval> Chunker::next() {
   if (!first_) return std::nullopt;
-  const auto waiting = kept_.size() - head_;
   auto due = reached_;
   if (latest_ != never) due = std::max(due, latest_ - settled);
   const auto end = grid_before(start_) + length_;
   if (finished_) {
-    if (waiting == 0) return std::nullopt;
+    if (waiting_ == 0) return std::nullopt;
     due = latest_ + 1;
-  } else if (end > due && waiting < max_events) {
+  } else if (end > due && waiting_ < max_events) {
     return std::nullopt;
   }
-  sort();
-  if (end > due) {
-    // The last interval ends with the last event; an overfull one is cut at its median.
-    const auto middle = kept_[head_ + waiting / 2].t;
-    return hand_out(finished_ ? due : std::max(middle, start_ + 1));
-  }
-  const auto silent_until =
-      waiting == 0 ? grid_before(due) : grid_before(std::min(due, kept_[head_].t));
+  // The last interval ends with the last event.
+  if (end > due) return hand_out(finished_ ? due : std::min(end, middle()));
+  const auto silent_until = grid_before(cells_.empty() ? due : std::min(due, cells_.front().start));
   return hand_out(std::max(end, silent_until));
 }
 
+/// Where to cut while too many events wait: in the first cell if it has most of them.
+Microseconds Chunker::middle() {
+  auto& cell = cells_.front();
+  const auto half = waiting_ / 2;
+  if (cell.events.size() <= half) return cell.end;
+  sort(cell);
+  return std::max(cell.start + cell.events[half].t, start_ + 1);
+}
+
+void Chunker::sort(Cell& cell) {
+  if (!std::exchange(cell.is_sorted, true)) std::ranges::stable_sort(cell.events, {}, &Event::t);
+}
+
 Chunker::Interval Chunker::hand_out(Microseconds end) {
-  const auto from = kept_.begin() + static_cast<std::ptrdiff_t>(head_);
-  const auto to =
-      std::partition_point(from, kept_.end(), [end](const auto& event) { return event.t < end; });
-  const Interval interval{start_, end - start_, {start_, {from, to}}};
-  head_ = static_cast<std::size_t>(to - kept_.begin());
+  Interval interval{start_, end - start_, {}};
   start_ = end;
+  if (cells_.empty() || cells_.front().start >= end) return interval;
+  if (returned_.capacity() > 0) spare_.push_back(std::move(returned_));
+  auto& cell = cells_.front();
+  sort(cell);
+  returned_ = std::move(cell.events);
+  const auto later = std::ranges::partition_point(
+      returned_, [&](const Event& event) { return cell.start + event.t < end; });
+  if (later == returned_.end()) {
+    cells_.pop_front();
+  } else {  // cut in the middle
+    cell.events.assign(later, returned_.end());
+    for (auto& event : cell.events) event.t -= static_cast<std::uint32_t>(end - cell.start);
+    cell.start = end;
+    returned_.erase(later, returned_.end());
+  }
+  waiting_ -= returned_.size();
+  interval.events = returned_;
   return interval;
 }
 

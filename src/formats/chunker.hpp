@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <optional>
 #include <span>
@@ -11,27 +12,6 @@
 #include "src/core/event.hpp"
 
 namespace eventcamera {
-
-/// Sorted events of an interval, whose times are counted from its start as they are written.
-class IntervalEvents {
- public:
-  IntervalEvents() = default;
-  IntervalEvents(Microseconds start, std::span<const AbsoluteEvent> events)
-      : start_(start), events_(events) {}
-
-  std::size_t size() const { return events_.size(); }
-  bool empty() const { return events_.empty(); }
-
-  /// Those less than `duration` after the start.
-  IntervalEvents before(Microseconds duration) const;
-
-  /// Writes size() events.
-  void write_to(Event* out) const;
-
- private:
-  Microseconds start_ = 0;
-  std::span<const AbsoluteEvent> events_;
-};
 
 /// Cuts the events of a recording into intervals of equal length, each sorted by time. Events
 /// with the same time keep the order in which they came. Times are whole microseconds, rounded
@@ -51,7 +31,8 @@ class Chunker {
   struct Interval {
     Microseconds start;
     Microseconds duration;
-    IntervalEvents events;  ///< none: a silence, of any length; valid until next() or push()
+    /// Sorted, with times from the start; valid until next(). None: a silence, of any length.
+    std::span<const Event> events;
   };
 
   struct Dropped {
@@ -88,12 +69,21 @@ class Chunker {
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
   static constexpr std::size_t max_ahead = std::size_t{1} << 16;
 
-  bool keep_sorted(std::span<const AbsoluteEvent> events);
+  /// Events of an interval of the grid, or of its rest.
+  struct Cell {
+    Microseconds start;         ///< its events count from here
+    Microseconds end;           ///< on the grid
+    std::vector<Event> events;  ///< in the order in which they came
+    bool is_sorted = true;
+  };
+
+  std::size_t keep_sorted(std::span<const AbsoluteEvent> events);
   void place(const AbsoluteEvent& event);
   void keep(const AbsoluteEvent& event);
   void believe_ahead();
-  void sort();
-  void drop_handed_out();
+  Cell& cell_of(Microseconds t);
+  Microseconds middle();
+  static void sort(Cell& cell);
   Interval hand_out(Microseconds end);
   Microseconds grid_before(Microseconds t) const { return t - (t - *first_) % length_; }
 
@@ -105,10 +95,11 @@ class Chunker {
   Microseconds reached_ = never;  ///< nothing earlier will follow
   bool finished_ = false;
 
-  std::vector<AbsoluteEvent> kept_;  ///< the first head_ of them were returned
-  std::size_t head_ = 0;
-  bool sorted_ = true;
-  std::vector<AbsoluteEvent> ahead_;  ///< far ahead of latest_: not yet trusted
+  std::deque<Cell> cells_;                 ///< those with events, in order of time
+  std::size_t waiting_ = 0;                ///< events in them
+  std::vector<Event> returned_;            ///< by the last next()
+  std::vector<std::vector<Event>> spare_;  ///< memory for further cells
+  std::vector<AbsoluteEvent> ahead_;       ///< far ahead of latest_: not yet trusted
   Dropped dropped_;
 };
 

@@ -524,7 +524,9 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
 void RecordingReader::cut_at_stop(Chunk& chunk) const {
   if (!stop_ || chunk.start + chunk.duration <= *stop_) return;
   chunk.duration = std::max<Microseconds>(*stop_ - chunk.start, 0);
-  chunk.events = chunk.events.before(chunk.duration);
+  const auto end = std::ranges::partition_point(
+      chunk.events, [&](const Event& event) { return event.t < chunk.duration; });
+  chunk.events = {chunk.events.begin(), end};
 }
 
 /// Treats event streams that lag far behind the newest item as silent.

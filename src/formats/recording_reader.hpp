@@ -62,12 +62,12 @@ class RecordingReader {
   /// More streams are shown. Precedes the first item of each of them.
   struct Start {};
 
-  /// Events of an interval. Its times are microseconds since the origin.
+  /// Events of an interval, timed from its start, which counts from the origin.
   struct Chunk {
     std::size_t stream;
     Microseconds start;
     Microseconds duration;
-    IntervalEvents events;  ///< none: a gap, in a stream of any kind
+    std::span<const Event> events;  ///< none: a gap, in a stream of any kind
   };
 
   /// A frame and its time since the origin.

@@ -27,7 +27,8 @@ struct Cut {
 
 void take_whole(Chunker& chunker, std::vector<Cut>& cuts) {
   while (const auto interval = chunker.next())
-    cuts.push_back({interval->start, interval->duration, recordings::written(interval->events)});
+    cuts.push_back(
+        {interval->start, interval->duration, {interval->events.begin(), interval->events.end()}});
 }
 
 std::vector<Cut> slice(Chunker& chunker, std::span<const AbsoluteEvent> events,
@@ -182,6 +183,43 @@ TEST(Chunker, BoundsTheEventsOfAnInterval) {
   chunker.finish();
   take_whole(chunker, cuts);
   EXPECT_GT(chunker.dropped().late, 0U);  // once the microsecond was returned
+}
+
+TEST(Chunker, CutsAnOverfullIntervalWithoutLoss) {
+  constexpr std::size_t per_time = 1'000;
+  constexpr Microseconds end = 2 * length;
+  Chunker chunker(length);
+  std::vector<AbsoluteEvent> events;
+  std::size_t taken = 0;
+  std::size_t misplaced = 0;
+  std::size_t largest = 0;
+  Microseconds reached = 0;
+  const auto take = [&] {
+    while (const auto interval = chunker.next()) {
+      EXPECT_EQ(interval->start, reached);
+      reached += interval->duration;
+      largest = std::max(largest, interval->events.size());
+      for (const auto& event : interval->events) {
+        const auto t = static_cast<Microseconds>(taken / per_time);
+        misplaced += interval->start + event.t != t || event.x != taken % per_time;
+        ++taken;
+      }
+    }
+  };
+  for (Microseconds t = 0; t < end; ++t) {
+    events.clear();
+    for (std::size_t i = 0; i < per_time; ++i) events.push_back(at(t, static_cast<int>(i)));
+    chunker.push(events);
+    take();
+  }
+  chunker.finish();
+  take();
+  EXPECT_EQ(reached, end);
+  EXPECT_EQ(taken, per_time * end);
+  EXPECT_EQ(misplaced, 0U);
+  EXPECT_GT(largest, 0U);
+  EXPECT_LE(largest, Chunker::max_events);
+  EXPECT_EQ(chunker.dropped().late, 0U);
 }
 
 TEST(Chunker, LeavesOutWhatIsBeforeItsStart) {

@@ -88,7 +88,7 @@ TEST(Recorded, PlaysEveryEventInTheOrderOfTheFile) {
     std::vector<AbsoluteEvent> played;
     while (const auto output = reader.next())
       if (const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output))
-        for (const auto& event : recordings::written(chunk->events))
+        for (const auto& event : chunk->events)
           played.push_back({reader.origin() + chunk->start + event.t, event.x, event.y_p});
     EXPECT_TRUE(played == events) << name;
   }

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "src/core/sensor_size.hpp"
-#include "src/formats/chunker.hpp"
 #include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
 #include "src/formats/encoder.hpp"
@@ -19,13 +18,6 @@ namespace recordings {
 
 using namespace eventcamera;
 using Random = std::mt19937_64;
-
-/// Events of an interval, with times from its start.
-inline std::vector<Event> written(const IntervalEvents& events) {
-  std::vector<Event> out(events.size());
-  events.write_to(out.data());
-  return out;
-}
 
 inline int below(Random& random, int end) {
   return std::uniform_int_distribution<int>(0, end - 1)(random);

@@ -28,17 +28,15 @@ std::uint64_t take(Chunker& chunker, std::optional<Microseconds>& end) {
     require(!end || interval->start == *end, "an interval begins where the last one ended");
     require(interval->duration > 0, "an interval is not empty");
     end = interval->start + interval->duration;
-    std::vector<Event> events(interval->events.size());
-    interval->events.write_to(events.data());
     const Event* before = nullptr;
-    for (const auto& event : events) {
+    for (const auto& event : interval->events) {
       require(event.t < interval->duration, "events are within their interval");
       require(before == nullptr || before->t < event.t ||
                   (before->t == event.t && number_of(*before) < number_of(event)),
               "events are sorted, and those of a time are in the order in which they came");
       before = &event;
     }
-    count += events.size();
+    count += interval->events.size();
   }
   return count;
 }

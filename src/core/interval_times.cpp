@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/core/interval_times.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/core/interval_times.cpp"
+#include <hwy/foreach_target.h>
+// Must come after HWY_TARGET_INCLUDE.
+#include <hwy/highway.h>
+
+#include <cstddef>
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// An event is two words: its time, and in the lower half of the second its place.
+static_assert(sizeof(AbsoluteEvent) == 2 * sizeof(std::int64_t));
+static_assert(offsetof(AbsoluteEvent, x) == 8 && offsetof(AbsoluteEvent, y_p) == 10);
+static_assert(offsetof(Event, x) == 4 && offsetof(Event, y_p) == 6);
+
+bool count_times(Microseconds start, Microseconds latest, std::span<const AbsoluteEvent> events,
+                 Event* out) {
+  const hn::ScalableTag<std::int64_t> words;
+  const auto lanes = hn::Lanes(words);
+  const auto* in = reinterpret_cast<const std::int64_t*>(events.data());
+  auto steps = hn::Zero(words);  // negative if any is
+  std::int64_t step = 0;
+  const auto place_one = [&](std::size_t i) {
+    step |= events[i].t - latest;
+    latest = events[i].t;
+    out[i] = {static_cast<std::uint32_t>(latest - start), events[i].x, events[i].y_p};
+  };
+  std::size_t i = 0;
+  if (!events.empty()) place_one(i++);  // the others have one before them
+  for (; i + lanes <= events.size(); i += lanes) {
+    hn::Vec<decltype(words)> before, times, places;
+    hn::LoadInterleaved2(words, in + 2 * i - 2, before, places);
+    hn::LoadInterleaved2(words, in + 2 * i, times, places);
+    steps = hn::Or(steps, hn::Sub(times, before));
+    const auto counted = hn::And(hn::Sub(times, hn::Set(words, start)), hn::Set(words, 0xffffffff));
+    const auto event = hn::Or(counted, hn::ShiftLeft<32>(places));
+    hn::StoreU(event, words, reinterpret_cast<std::int64_t*>(out + i));
+  }
+  if (i > 0 && i < events.size()) latest = events[i - 1].t;
+  for (; i < events.size(); ++i) place_one(i);
+  return step >= 0 && hn::AllFalse(words, hn::Lt(steps, hn::Zero(words)));
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(count_times);
+
+bool count_times_from(Microseconds start, Microseconds latest,
+                      std::span<const AbsoluteEvent> events, Event* out) {
+  return HWY_DYNAMIC_DISPATCH(count_times)(start, latest, events, out);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE
