@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <sys/resource.h>
 
+#include <cmath>
 #include <numeric>
 
 #include "src/formats/numpy/npz_decoder.hpp"
@@ -17,11 +18,13 @@ using npz_file::Member;
 
 struct Read {
   std::vector<AbsoluteEvent> events;
+  SensorSize size;
   Corruption corruption;
 };
 
 Read all_of(RecordingDecoder& reader) {
   Read read;
+  read.size = reader.streams().front().size;
   while (const auto item = reader.next()) {
     const auto events = std::get<EventItem>(*item).events;
     read.events.insert(read.events.end(), events.begin(), events.end());
@@ -42,7 +45,9 @@ Read read(const Bytes& bytes, const TableSettings& settings = {}) {
   const auto pulled = make_npz_decoder(settings);
   EXPECT_TRUE(pulled->open(source));
   auto read = all_of(*pulled);
-  EXPECT_EQ(all_of(*pushed).events, read.events);
+  const auto other = all_of(*pushed);
+  EXPECT_EQ(other.events, read.events);
+  EXPECT_EQ(other.size, read.size);
   return read;
 }
 
@@ -139,6 +144,54 @@ TEST(Npz, WhatIsNoneIsRefused) {
   auto wide = columns_of_events(events_of(10));
   wide[0].second = npz_file::array("'<u2'", "(10, 2)", std::vector<std::uint16_t>(20));
   refused(archive(wide, true), "not an array of one column");
+}
+
+TEST(Npz, NumbersOfTheSensorSize) {
+  const auto size_of = [](const Member& width, const Member& height,
+                          const TableSettings& settings = {}) {
+    auto members = columns_of_events(events_of(10));
+    members.push_back(width);
+    members.push_back(height);
+    return read(archive(members, true), settings);
+  };
+  const auto floating = [](const std::string& name, double value) {
+    return Member{name, npz_file::array<double>("'<f8'", "()", {value})};
+  };
+  const auto in_array = [](const std::string& name, std::uint16_t value) {
+    return Member{name, column<std::uint16_t>("<u2", {value})};
+  };
+  const auto one = [](const std::string& name, std::int64_t value) {
+    return Member{name, npz_file::array<std::int64_t>("'<i8'", "()", {value})};
+  };
+  constexpr SensorSize size = {640, 480};
+  EXPECT_EQ(size_of(one("width.npy", 640), one("height.npy", 480)).size, size);
+  EXPECT_EQ(size_of(in_array("width.npy", 640), floating("height.npy", 480)).size, size);
+  EXPECT_EQ(size_of(one("a/width.npy", 65535), one("a/height.npy", 32768)).size,
+            (SensorSize{65535, 32768}));
+
+  // That of the settings comes first; events outside are counted.
+  const auto set =
+      size_of(one("width.npy", 640), one("height.npy", 480), {.size = SensorSize{320, 240}});
+  EXPECT_EQ(set.size, (SensorSize{320, 240}));
+  const auto small = size_of(one("width.npy", 9), one("height.npy", 480));
+  EXPECT_EQ(small.events.size(), 9U);
+  EXPECT_EQ(small.corruption.outside, 1U);
+
+  // One alone says nothing, and what is no size is corruption.
+  const auto none = size_of(one("width.npy", 640), one("other.npy", 480));
+  EXPECT_EQ(none.size, SensorSize{});
+  EXPECT_EQ(none.corruption.places, 0U);
+  const Member text = {"height.npy", bytes_of("not an array")};
+  for (const auto& height :
+       {one("height.npy", 0), one("height.npy", -1), one("height.npy", 32769),
+        floating("height.npy", std::nan("")), text,
+        Member{"height.npy", column<double>("<f8", {1, 2})},
+        Member{"height.npy", npz_file::array<std::int64_t>("'<i8'", "()", {})}}) {
+    const auto found = size_of(one("width.npy", 640), height);
+    EXPECT_EQ(found.size, SensorSize{});
+    EXPECT_EQ(found.events.size(), 10U);
+    EXPECT_EQ(found.corruption.first, "the arrays width and height are not a sensor size");
+  }
 }
 
 /// Memory stays small for any sizes stated in an archive.

@@ -100,6 +100,10 @@ struct Window {
 
 }  // namespace
 
+std::optional<std::int64_t> npy_integer(const NpyField& field, const std::uint8_t* element) {
+  return number_of(field, element);
+}
+
 NpyDecoder::NpyDecoder(const TableSettings& settings) : settings_(settings) {
   size_ = settings.size;
   validator_.set_size(size_);

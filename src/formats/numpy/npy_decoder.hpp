@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "src/formats/decoded.hpp"
@@ -10,6 +11,9 @@
 #include "src/formats/numpy/npy_header.hpp"
 
 namespace eventcamera {
+
+/// Returns the integer nearest to a number; nothing if that exceeds 64 bits.
+std::optional<std::int64_t> npy_integer(const NpyField& field, const std::uint8_t* element);
 
 /// Decodes NumPy files, versions 1.0 to 3.0: a structured array with fields t, x, y and p in any
 /// order, or rows of numbers whose columns are detected from the first rows. Numbers are integers

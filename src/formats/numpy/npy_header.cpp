@@ -255,9 +255,9 @@ NpyHeader read_npy_header(std::string_view dictionary) {
   }
   literal.expect_end();
   if ((!has_fields && !type) || !shape) Literal::fail();
-  if (shape->empty() || (has_fields && shape->size() > 1))
+  if (has_fields && shape->size() != 1)
     throw UnsupportedFormat("the NumPy array must have one dimension");
-  header.count = shape->front();
+  header.count = shape->empty() ? 1 : shape->front();
   if (type) make_columns(*type, by_columns, *shape, header);
   return header;
 }

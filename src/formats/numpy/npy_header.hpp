@@ -39,7 +39,7 @@ struct NpyHeader {
 
 /// Parses the dictionary of the header. Throws UnsupportedFormat unless it describes a
 /// one-dimensional structured array with fields t, x, y and p, or an array of numbers with one
-/// column, or up to 16 columns in rows.
+/// column, or up to 16 columns in rows. A number without dimensions is an array of one.
 NpyHeader read_npy_header(std::string_view dictionary);
 
 /// Reads the preamble before the array, in pieces of any size.

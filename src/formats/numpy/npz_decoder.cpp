@@ -129,11 +129,29 @@ std::string_view array_name(std::string_view name) {
   return name.substr(name.rfind('/') + 1);
 }
 
+/// Integer from 1 to `max` that is the only element of an array; 0 if the array is another.
+int extent_in(ZipArchive& archive, std::size_t index, int max) {
+  try {
+    auto [entry, header, bytes] = open_array(archive, index);
+    if (header.columns.size() != 1 || header.count != 1) return 0;
+    const auto had = bytes.size();
+    // Reads past the number, because the checksum is verified at the end.
+    bytes.resize(had + sizeof(std::uint64_t) + 1);
+    const auto count = entry.read(std::span(bytes).subspan(had));
+    if (!count || had + *count != header.element_bytes) return 0;
+    const auto extent = npy_integer(header.columns.front(), bytes.data()).value_or(0);
+    return extent > 0 && extent <= max ? static_cast<int>(extent) : 0;
+  } catch (const UnsupportedFormat&) {
+    return 0;
+  }
+}
+
 /// An open archive.
 class Archive {
  public:
   /// Throws UnsupportedFormat.
-  Archive(ByteSource& source, const TableSettings& settings) : archive_(source) {
+  Archive(ByteSource& source, TableSettings settings) : archive_(source) {
+    if (settings.size == SensorSize{}) settings.size = stated_size();
     if (!open_columns(settings)) open_first_array(settings);
   }
 
@@ -147,6 +165,7 @@ class Archive {
     else
       decoder_->decode(*bytes, out);
     corruption_ = decoder_->corruption();
+    if (size_unreadable_) corruption_.note(0, "the arrays width and height are not a sensor size");
     if (!bytes) corruption_.note(0, "the ZIP archive cannot be unpacked further");
     return true;
   }
@@ -155,6 +174,25 @@ class Archive {
   const Corruption& corruption() const { return corruption_; }
 
  private:
+  /// Size in the arrays width and height; 0x0 if it is missing or not one of a sensor.
+  SensorSize stated_size() {
+    constexpr SensorSize max = {65535, 32768};
+    const auto width = index_of("width");
+    const auto height = index_of("height");
+    if (!width || !height) return {};
+    const SensorSize size{extent_in(archive_, *width, max.width),
+                          extent_in(archive_, *height, max.height)};
+    size_unreadable_ = size.width == 0 || size.height == 0;
+    return size_unreadable_ ? SensorSize{} : size;
+  }
+
+  std::optional<std::size_t> index_of(std::string_view array) const {
+    const auto& names = archive_.names();
+    const auto found = std::ranges::find(names, array, array_name);
+    if (found == names.end()) return std::nullopt;
+    return static_cast<std::size_t>(found - names.begin());
+  }
+
   /// Opens arrays t, x, y and p. False unless all of them exist.
   bool open_columns(const TableSettings& settings) {
     std::array<std::optional<std::size_t>, 4> indices;
@@ -203,6 +241,7 @@ class Archive {
   std::unique_ptr<Elements> elements_;
   std::unique_ptr<NpyDecoder> decoder_;
   Corruption corruption_;
+  bool size_unreadable_ = false;
   bool ended_ = false;
 };
 
