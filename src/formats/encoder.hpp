@@ -39,11 +39,15 @@ class Encoder {
     return append_trigger(trigger, out);
   }
 
-  /// Appends the end of the file, preceded by the header if nothing was encoded.
-  void finish(std::vector<std::uint8_t>& out) {
+  /// Appends the end of the file, or the next piece of a long one, preceded by the header if
+  /// nothing was encoded. True if more pieces follow.
+  bool finish(std::vector<std::uint8_t>& out) {
     put_header(out);
-    append_end(out);
+    return append_end(out);
   }
+
+  /// Number of encoded events that only finish() writes.
+  virtual std::uint64_t pending() const { return 0; }
 
   /// Total pauses between events, in microseconds, that were removed because the format does not
   /// support them.
@@ -60,7 +64,7 @@ class Encoder {
   virtual bool append_trigger(const Trigger& /*trigger*/, std::vector<std::uint8_t>& /*out*/) {
     return false;
   }
-  virtual void append_end(std::vector<std::uint8_t>& /*out*/) {}
+  virtual bool append_end(std::vector<std::uint8_t>& /*out*/) { return false; }
 
  private:
   void put_header(std::vector<std::uint8_t>& out) {

@@ -2,9 +2,17 @@
 #include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
 #include <numeric>
 
 #include "src/formats/numpy/npz_decoder.hpp"
+#include "src/formats/numpy/npz_encoder.hpp"
+#include "src/formats/numpy/zip_archive.hpp"
+#include "src/formats/numpy/zip_writer.hpp"
+#include "src/formats/temporary_file.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/formats/table_events.hpp"
 
@@ -146,6 +154,79 @@ TEST(Npz, WhatIsNoneIsRefused) {
   refused(archive(wide, true), "not an array of one column");
 }
 
+/// Archive as an encoder writes it. Checks that its end comes in pieces.
+Bytes written(Encoder& encoder, std::span<const AbsoluteEvent> events, std::size_t at_once = 1000) {
+  constexpr std::size_t max_piece = 300'000;
+  Bytes bytes;
+  encoder.encode({}, bytes);
+  const auto header = bytes.size();
+  for (auto rest = events; !rest.empty(); rest = rest.subspan(std::min(at_once, rest.size())))
+    encoder.encode(rest.first(std::min(at_once, rest.size())), bytes);
+  EXPECT_EQ(bytes.size(), header);
+  EXPECT_EQ(encoder.pending(), events.size());
+  for (bool more = true; more;) {
+    const auto before = bytes.size();
+    more = encoder.finish(bytes);
+    EXPECT_LT(bytes.size() - before, max_piece);
+  }
+  EXPECT_EQ(encoder.pending(), 0U);
+  return bytes;
+}
+
+TEST(NpzEncoder, ComesBackWithTheSensorSize) {
+  auto all = sizes();
+  all.push_back({65535, 32768});
+  for (const auto size : all) {
+    for (const std::size_t count : {0, 1, 5000, 100'000}) {
+      const auto events = random_events(count, size, static_cast<unsigned>(size.width), -1000);
+      const auto bytes = written(*make_npz_encoder(size), events);
+      const auto found = read(bytes);
+      EXPECT_TRUE(found.events == events) << count;
+      EXPECT_EQ(found.size, size);
+      EXPECT_EQ(found.corruption.places + found.corruption.outside, 0U);
+      EXPECT_EQ(written(*make_npz_encoder(size), events, 77), bytes) << "it depends on the pieces";
+    }
+  }
+}
+
+TEST(NpzEncoder, IsNothingUntilItIsWhole) {
+  const auto bytes = written(*make_npz_encoder({640, 480}), events_of(20));
+  for (std::size_t size = 1; size < bytes.size(); ++size)
+    EXPECT_THROW(read(Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size))),
+                 UnsupportedFormat)
+        << size;
+}
+
+TEST(NpzEncoder, LeavesNoFiles) {
+  auto folder = (std::filesystem::temp_directory_path() / "npz-test-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  setenv("TMPDIR", folder.c_str(), 1);
+  const auto encoder = make_npz_encoder({640, 480});
+  EXPECT_TRUE(std::filesystem::is_empty(folder));
+  std::filesystem::remove(folder);
+  try {
+    make_npz_encoder({640, 480});
+    ADD_FAILURE() << "the folder is not there";
+  } catch (const TemporaryFileError& error) {
+    EXPECT_EQ(error.what(), "temporary file in " + folder + ": No such file or directory");
+  }
+  unsetenv("TMPDIR");
+}
+
+TEST(NpzEncoder, FailsOnAFullDisk) {
+  const auto events = events_of(20'000);
+  Bytes bytes;
+  const auto encoder = make_npz_encoder({640, 480});
+  rlimit before = {};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small = {.rlim_cur = 100'000, .rlim_max = before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  EXPECT_THROW(encoder->encode(events, bytes), TemporaryFileError);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+}
+
 TEST(Npz, NumbersOfTheSensorSize) {
   const auto size_of = [](const Member& width, const Member& height,
                           const TableSettings& settings = {}) {
@@ -194,12 +275,115 @@ TEST(Npz, NumbersOfTheSensorSize) {
   }
 }
 
+/// A flipped bit in the size is not another size.
+TEST(Npz, ChecksTheSensorSize) {
+  const auto bytes = written(*make_npz_encoder({640, 480}), events_of(20));
+  auto flipped = bytes;
+  const auto at = flipped.begin() + 30 + 9 + 20 + 128;
+  ASSERT_EQ(*at, 640 & 0xff);
+  *at ^= 1;
+  const auto found = read(flipped);
+  EXPECT_EQ(found.size, SensorSize{});
+  EXPECT_EQ(found.events.size(), 20U);
+  EXPECT_EQ(found.corruption.places, 1U);
+}
+
+/// File of zeros, with some bytes in between.
+class SparseBytes final : public ByteSource {
+ public:
+  void put(std::uint64_t position, Bytes bytes) { bytes_.emplace(position, std::move(bytes)); }
+
+  std::uint64_t size() const override {
+    const auto& [position, bytes] = *bytes_.rbegin();
+    return position + bytes.size();
+  }
+
+  std::optional<std::size_t> read(std::uint64_t position,
+                                  std::span<std::uint8_t> out) noexcept override {
+    const auto count = std::min<std::uint64_t>(out.size(), size() - std::min(size(), position));
+    std::ranges::fill(out.first(count), 0);
+    for (const auto& [begin, bytes] : bytes_) {
+      const auto first = std::max(begin, position);
+      const auto end = std::min(begin + bytes.size(), position + count);
+      for (auto at = first; at < end; ++at) out[at - position] = bytes[at - begin];
+    }
+    return count;
+  }
+
+  std::optional<std::span<const std::uint8_t>> piece(std::uint64_t) override { return {}; }
+
+ private:
+  std::map<std::uint64_t, Bytes> bytes_;
+};
+
+TEST(ZipWriter, WritesFilesOfAnySize) {
+  constexpr std::uint64_t large = 0xffffffff;
+  for (const std::uint64_t size : {std::uint64_t{5}, large - 1, large, 3 * large}) {
+    SparseBytes file;
+    ZipWriter writer;
+    Bytes bytes;
+    std::uint64_t end = 0;
+    const auto put = [&](std::uint64_t content) {
+      file.put(end, bytes);
+      end += bytes.size() + content;
+      bytes.clear();
+    };
+    const Bytes few = {1, 2, 3};
+    constexpr std::uint32_t checksum_of_few = 0x55bc801d;
+    for (const auto* const name : {"first", "last"}) {
+      writer.begin_file(name, few.size(), checksum_of_few, bytes);
+      bytes.insert(bytes.end(), few.begin(), few.end());
+      if (name == std::string("last")) continue;
+      writer.begin_file("zeros", size, 0, bytes);
+      put(size);
+    }
+    writer.finish(bytes);
+    put(0);
+
+    ZipArchive archive(file);
+    EXPECT_EQ(archive.names(), (std::vector<std::string>{"first", "zeros", "last"}));
+    for (const std::size_t index : {0, 2}) {
+      Bytes found(10);
+      auto entry = archive.open(index);
+      ASSERT_EQ(entry.read(found), few.size()) << index;
+      found.resize(few.size());
+      EXPECT_EQ(found, few);
+    }
+    Bytes found(10, 1);
+    auto entry = archive.open(1);
+    entry.read(found);
+    EXPECT_EQ(found.front(), 0);
+  }
+}
+
+/// KiB by which the memory of the process grows.
+template <class Work>
+long grown(const Work& work) {
+  rusage before = {};
+  rusage after = {};
+  getrusage(RUSAGE_SELF, &before);
+  work();
+  getrusage(RUSAGE_SELF, &after);
+  return after.ru_maxrss - before.ru_maxrss;
+}
+
+constexpr long grown_limit = 65536;
+
+TEST(NpzEncoder, TakesTheSameMemoryForAnyNumberOfEvents) {
+  const auto growth = grown([] {
+    const auto events = events_of(20'000);
+    const auto encoder = make_npz_encoder({640, 480});
+    Bytes bytes;
+    for (int i = 0; i < 1000; ++i) encoder->encode(events, bytes);
+    do bytes.clear();
+    while (encoder->finish(bytes));
+  });
+  EXPECT_LT(growth, grown_limit);
+}
+
 /// Memory stays small for any sizes stated in an archive.
 TEST(Npz, ClaimsTakeNoMemory) {
-  const auto grown = [](const Bytes& bytes) {
-    rusage before = {};
-    rusage after = {};
-    getrusage(RUSAGE_SELF, &before);
+  const auto read_whole = [](const Bytes& bytes) {
     try {
       MemoryBytes source(bytes);
       const auto reader = make_npz_decoder();
@@ -208,10 +392,7 @@ TEST(Npz, ClaimsTakeNoMemory) {
     } catch (const UnsupportedFormat&) {
       // May be refused.
     }
-    getrusage(RUSAGE_SELF, &after);
-    return after.ru_maxrss - before.ru_maxrss;  // KiB
   };
-  constexpr long limit = 65536;
 
   // End record of a missing directory of 2^32 files.
   Bytes claims = archive({{"t.npy", bytes_of("hello")}}, false);
@@ -234,7 +415,7 @@ TEST(Npz, ClaimsTakeNoMemory) {
     large.insert(large.begin() + static_cast<std::ptrdiff_t>(end), zip64.begin(), zip64.end());
     for (const auto at : {8U, 10U}) put(large, end + zip64.size() + at, 0xffff, 2);
     for (const auto at : {12U, 16U}) put(large, end + zip64.size() + at, 0xffffffff, 4);
-    EXPECT_LT(grown(large), limit) << files;
+    EXPECT_LT(grown([&] { read_whole(large); }), grown_limit) << files;
   }
 
   // Zeros, which compress to a thousandth of their size, are read in small pieces.

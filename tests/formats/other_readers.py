@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zipfile
 import zlib
 
 import h5py
@@ -134,6 +135,19 @@ class OtherReaders(TableTest):
             array = np.load(self.file)
             self.assertEqual(array.dtype.names, ('x', 'y', 't', 'p'))
             self.assert_equal(array, events)
+
+    def test_numpy_loads_our_npz(self):
+        for count in (0, 1, 100_000):
+            events = random_events(count, 1)
+            self.write('npz', events)
+            with zipfile.ZipFile(self.file) as archive:
+                self.assertIsNone(archive.testzip())
+            arrays = np.load(self.file)
+            self.assertEqual({name: array.dtype for name, array in arrays.items()},
+                             {'width': 'i8', 'height': 'i8', 't': 'i8', 'x': 'u2', 'y': 'u2', 'p': 'u1'})
+            self.assertEqual((arrays['width'].shape, arrays['width'], arrays['height']), ((), WIDTH, HEIGHT))
+            self.assert_equal(arrays, events)
+            self.assert_read('npz', events)
 
     def test_we_load_numpys_npy(self):
         events = random_events(30_000, 2)

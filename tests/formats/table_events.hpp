@@ -70,7 +70,7 @@ inline Bytes encoded(Encoder& encoder, std::span<const AbsoluteEvent> events,
     encoder.encode(part, bytes);
     events = events.subspan(part.size());
   }
-  encoder.finish(bytes);
+  while (encoder.finish(bytes)) continue;
   return bytes;
 }
 

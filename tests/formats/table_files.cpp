@@ -13,6 +13,7 @@
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npz_decoder.hpp"
+#include "src/formats/numpy/npz_encoder.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
 
@@ -46,6 +47,13 @@ void write_file(const std::string& kind, const std::string& file, const std::str
     encoder.finish(out);
     const auto patch = encoder.patch().value();
     std::memcpy(out.data() + patch.position, patch.bytes.data(), patch.bytes.size());
+    save(file, out.data(), out.size());
+    return;
+  }
+  if (kind == "npz") {
+    const auto encoder = make_npz_encoder(size);
+    encoder->encode(events, out);
+    while (encoder->finish(out)) continue;
     save(file, out.data(), out.size());
     return;
   }

@@ -9,6 +9,7 @@
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
+#include "src/formats/numpy/npz_encoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"
 #include "tests/formats/npz_file.hpp"
 #include "tests/fuzz/seed.hpp"
@@ -52,7 +53,9 @@ inline std::vector<Seed> npy_seeds() {
 }
 
 inline std::vector<Seed> npz_seeds() {
-  std::vector<Seed> seeds;
+  const SensorSize size = {640, 480};
+  std::vector<Seed> seeds = {
+      {"ours", recordings::encode(*make_npz_encoder(size), few_events(1, size, 20))}};
   const auto rows = npy_seeds().back().bytes;
   for (const bool is_compressed : {false, true}) {
     const std::string how = is_compressed ? "-packed" : "-stored";

@@ -122,14 +122,15 @@ void Aedat4Encoder::flush(std::vector<std::uint8_t>& out) {
   held_.clear();
 }
 
-void Aedat4Encoder::append_end(std::vector<std::uint8_t>& out) {
+bool Aedat4Encoder::append_end(std::vector<std::uint8_t>& out) {
   flush(out);
-  if (!settings_.table) return;
+  if (!settings_.table) return false;
   patch_.emplace(FilePatch{table_field_at_, std::vector<std::uint8_t>(sizeof position_)});
   std::memcpy(patch_->bytes.data(), &position_, sizeof position_);
   const auto at = out.size();
   compressor_->compress(aedat4_table_content(table_), out);
   position_ += out.size() - at;
+  return false;
 }
 
 void Aedat4Encoder::write_header(std::vector<std::uint8_t>& out) {

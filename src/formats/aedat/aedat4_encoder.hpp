@@ -61,7 +61,7 @@ class Aedat4Encoder final : public Encoder {
  private:
   /// Keeps events pending until there are enough for a packet.
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
-  void append_end(std::vector<std::uint8_t>& out) override;
+  bool append_end(std::vector<std::uint8_t>& out) override;
   void write_header(std::vector<std::uint8_t>& out);
   void write_events(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out);
   void write_packet(int stream, std::int64_t elements, Microseconds start, Microseconds end,

@@ -17,9 +17,7 @@ constexpr std::string_view before_count =
     "'fortran_order': False, 'shape': (";
 constexpr std::string_view after_count = ")}";
 constexpr std::size_t max_count = 20;
-constexpr std::size_t preamble = npy_magic.size() + 4;
-constexpr std::size_t header_bytes = 192;  // NumPy aligns the data to 64
-static_assert(preamble + before_count.size() + max_count + after_count.size() < header_bytes);
+constexpr std::size_t count_at = npy_magic.size() + 4 + before_count.size();
 
 /// Content of a tuple with one element, such as "50000,".
 std::string shape(std::uint64_t count) {
@@ -29,14 +27,8 @@ std::string shape(std::uint64_t count) {
 }
 
 std::string header_text() {
-  std::string header(npy_magic);
-  header += {'\x01', '\x00', static_cast<char>(header_bytes - preamble), '\x00'};
-  header += before_count;
-  header += shape(npy_unknown_count);
-  header += after_count;
-  header.resize(header_bytes - 1, ' ');
-  header += '\n';
-  return header;
+  return npy_preamble(std::string(before_count) + shape(npy_unknown_count) +
+                      std::string(after_count));
 }
 
 }  // namespace
@@ -60,7 +52,7 @@ void NpyEncoder::append(std::span<const AbsoluteEvent> events, std::vector<std::
 
 std::optional<FilePatch> NpyEncoder::patch() const {
   const auto text = shape(count_);
-  return FilePatch{preamble + before_count.size(), {text.begin(), text.end()}};
+  return FilePatch{count_at, {text.begin(), text.end()}};
 }
 
 }  // namespace eventcamera

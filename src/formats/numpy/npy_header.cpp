@@ -262,6 +262,19 @@ NpyHeader read_npy_header(std::string_view dictionary) {
   return header;
 }
 
+std::string npy_preamble(std::string_view dictionary) {
+  constexpr std::size_t before = npy_magic.size() + 4;
+  constexpr std::size_t alignment = 64;  // of the data, as by NumPy
+  const auto size = (before + dictionary.size()) / alignment * alignment + alignment;
+  std::string text(npy_magic);
+  text +=
+      {'\x01', '\x00', static_cast<char>(size - before), static_cast<char>((size - before) >> 8)};
+  text += dictionary;
+  text.resize(size - 1, ' ');
+  text += '\n';
+  return text;
+}
+
 std::optional<NpyHeader> NpyPreamble::take(std::span<const std::uint8_t>& bytes) {
   constexpr std::size_t max_header = 65536;
   constexpr std::size_t version_end = npy_magic.size() + 2;

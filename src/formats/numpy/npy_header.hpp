@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -41,6 +42,9 @@ struct NpyHeader {
 /// one-dimensional structured array with fields t, x, y and p, or an array of numbers with one
 /// column, or up to 16 columns in rows. A number without dimensions is an array of one.
 NpyHeader read_npy_header(std::string_view dictionary);
+
+/// Returns the preamble of a file with this dictionary.
+std::string npy_preamble(std::string_view dictionary);
 
 /// Reads the preamble before the array, in pieces of any size.
 class NpyPreamble {

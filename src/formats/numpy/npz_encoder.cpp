@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/numpy/npz_encoder.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "src/formats/numpy/npy_header.hpp"
+#include "src/formats/numpy/zip_writer.hpp"
+#include "src/formats/temporary_file.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+/// Bytes of a column that finish() appends at once.
+constexpr std::uint64_t piece_size = std::uint64_t{1} << 18;
+
+std::uint32_t checksum_of(const void* bytes, std::size_t size, std::uint32_t before = 0) {
+  return static_cast<std::uint32_t>(crc32_z(before, static_cast<const Bytef*>(bytes), size));
+}
+
+std::string preamble(std::string_view type, const std::string& shape) {
+  return npy_preamble("{'descr': '" + std::string(type) + "', 'fortran_order': False, 'shape': (" +
+                      shape + "), }");
+}
+
+/// Adds an array without dimensions.
+void add_number(std::string_view name, std::int64_t number, ZipWriter& archive,
+                std::vector<std::uint8_t>& out) {
+  auto content = preamble("<i8", "");
+  content.append(reinterpret_cast<const char*>(&number), sizeof number);
+  archive.begin_file(name, content.size(), checksum_of(content.data(), content.size()), out);
+  out.insert(out.end(), content.begin(), content.end());
+}
+
+/// Numbers of an array, until its place in the archive is known.
+class Column {
+ public:
+  Column(std::string_view name, std::string_view type) : name_(name), type_(type) {}
+
+  void append(std::span<const std::uint8_t> bytes) {
+    checksum_ = checksum_of(bytes.data(), bytes.size(), checksum_);
+    bytes_.append(bytes);
+  }
+
+  /// Adds the array of `count` numbers to the archive, without its content.
+  void begin(std::uint64_t count, ZipWriter& archive, std::vector<std::uint8_t>& out) const {
+    const auto start = preamble(type_, std::to_string(count) + ',');
+    const auto of_start = checksum_of(start.data(), start.size());
+    const auto of_all = crc32_combine(of_start, checksum_, static_cast<z_off_t>(bytes_.size()));
+    archive.begin_file(name_, start.size() + bytes_.size(), static_cast<std::uint32_t>(of_all),
+                       out);
+    out.insert(out.end(), start.begin(), start.end());
+  }
+
+  /// Appends the next piece of the content. False after the last.
+  bool read(std::vector<std::uint8_t>& out) {
+    const auto at = out.size();
+    out.resize(at + std::min(piece_size, bytes_.size() - read_));
+    const auto piece = std::span(out).subspan(at);
+    bytes_.read(read_, piece);
+    read_ += piece.size();
+    return read_ < bytes_.size();
+  }
+
+ private:
+  std::string_view name_;
+  std::string_view type_;
+  TemporaryFile bytes_;
+  std::uint32_t checksum_ = 0;
+  std::uint64_t read_ = 0;  ///< position in the file
+};
+
+class NpzEncoder final : public Encoder {
+ public:
+  /// `header` begins the archive.
+  NpzEncoder(std::string header, ZipWriter archive)
+      : Encoder(std::move(header)), archive_(std::move(archive)) {}
+
+  std::uint64_t pending() const override { return ended_ ? 0 : count_; }
+
+ private:
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& /*out*/) override {
+    if (events.empty()) return;
+    count_ += events.size();
+    const auto add = [&](Column& column, const auto& number_of) {
+      constexpr auto size = sizeof number_of(AbsoluteEvent());
+      numbers_.resize(events.size() * size);
+      auto* at = numbers_.data();
+      for (const auto& event : events) {
+        const auto number = number_of(event);
+        std::memcpy(at, &number, size);
+        at += size;
+      }
+      column.append(numbers_);
+    };
+    auto& [t, x, y, p] = columns_;
+    add(t, [](const AbsoluteEvent& event) { return event.t; });
+    add(x, [](const AbsoluteEvent& event) { return event.x; });
+    add(y, [](const AbsoluteEvent& event) { return static_cast<std::uint16_t>(event.y()); });
+    add(p, [](const AbsoluteEvent& event) { return event.polarity(); });
+  }
+
+  bool append_end(std::vector<std::uint8_t>& out) override {
+    if (next_ == columns_.size()) {
+      archive_.finish(out);
+      ended_ = true;
+      return false;
+    }
+    auto& column = columns_[next_];
+    if (!begun_) column.begin(count_, archive_, out);
+    begun_ = column.read(out);
+    if (!begun_) ++next_;
+    return true;
+  }
+
+  ZipWriter archive_;
+  std::uint64_t count_ = 0;
+  std::array<Column, 4> columns_ = {
+      {{"t.npy", "<i8"}, {"x.npy", "<u2"}, {"y.npy", "<u2"}, {"p.npy", "|u1"}}};
+  std::size_t next_ = 0;  ///< column to write
+  bool begun_ = false;    ///< a part of it is written
+  bool ended_ = false;
+  std::vector<std::uint8_t> numbers_;  ///< of one column, kept for its memory
+};
+
+}  // namespace
+
+std::unique_ptr<Encoder> make_npz_encoder(SensorSize size) {
+  ZipWriter archive;
+  std::vector<std::uint8_t> header;
+  add_number("width.npy", size.width, archive, header);
+  add_number("height.npy", size.height, archive, header);
+  return std::make_unique<NpzEncoder>(std::string(header.begin(), header.end()),
+                                      std::move(archive));
+}
+
+}  // namespace eventcamera

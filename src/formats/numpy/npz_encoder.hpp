@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <memory>
+
+#include "src/core/sensor_size.hpp"
+#include "src/formats/encoder.hpp"
+
+namespace eventcamera {
+
+/// Creates an encoder of NumPy archives: width and height of the sensor, and arrays t (int64,
+/// microseconds), x, y (uint16) and p (uint8, 1 = ON). An archive holds one array after the other,
+/// so until finish() the events are in temporary files, 13 bytes each.
+std::unique_ptr<Encoder> make_npz_encoder(SensorSize size);
+
+}  // namespace eventcamera
