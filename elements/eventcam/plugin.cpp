@@ -17,7 +17,7 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 #endif
 
 #ifdef HAVE_NPZ
-#define NPZ_ELEMENTS(X) X(eventnpzdec)
+#define NPZ_ELEMENTS(X) X(eventnpzdec) X(eventnpzenc)
 #else
 #define NPZ_ELEMENTS(X)
 #endif

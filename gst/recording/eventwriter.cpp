@@ -354,9 +354,11 @@ static void end_file(GstEventWriter* self) {
     GstFlowReturn result = push_header(self, GST_CLOCK_TIME_NONE);
     if (result != GST_FLOW_OK) return result;
     encode_triggers(self, eventcamera::Chunker::max_time);
-    priv.state->encoder->finish(priv.bytes);
+    for (bool more = true; more && result == GST_FLOW_OK;) {
+      more = priv.state->encoder->finish(priv.bytes);
+      result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
+    }
     warn_of_pauses(self, true);
-    result = push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
     auto patch = priv.state->encoder->patch();
     return result == GST_FLOW_OK && patch ? push_patch(self, *std::move(patch)) : result;
   });
@@ -370,6 +372,18 @@ static void start_over(GstEventWriter* self) {
     begin_file(self, state->info, OwnedCaps(gst_caps_ref(state->caps.get())));
     return GST_FLOW_OK;
   });
+}
+
+/// Warns of events that are lost without the end of the stream.
+static void warn_of_pending(GstEventWriter* self) {
+  const auto pending = priv_of(self).state->encoder->pending();
+  if (pending == 0) return;
+  const Report report{GST_STREAM_ERROR_ENCODE,
+                      "Lost " + std::to_string(pending) + " event" + (pending == 1 ? "" : "s") +
+                          ", and the file is incomplete, because the stream was stopped before its "
+                          "end. Send EOS first, as gst-launch-1.0 -e does."};
+  GST_WARNING_OBJECT(self, "%s", report.text.c_str());
+  post_message(self, GST_MESSAGE_WARNING, report, "the format is written at the end of the stream");
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
@@ -406,7 +420,10 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
       GST_ELEMENT_CLASS(gst_event_writer_parent_class)->change_state(element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     auto& priv = priv_of(GST_EVENT_WRITER(element));
-    if (priv.state) priv.writable.end_file();
+    if (priv.state) {
+      priv.writable.end_file();
+      warn_of_pending(GST_EVENT_WRITER(element));
+    }
     priv.state.reset();
     priv.bytes.clear();
   }

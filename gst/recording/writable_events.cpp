@@ -4,10 +4,13 @@
 #include <new>
 #include <stdexcept>
 
+#include "src/formats/temporary_file.hpp"
+
 using eventcamera::AbsoluteEvent;
 using eventcamera::Event;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
+using eventcamera::TemporaryFileError;
 
 static std::string text_of(SensorSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
@@ -131,5 +134,9 @@ Report WritableEvents::failure(const std::exception& error, const Report& otherw
   if (is_a<std::invalid_argument>(error))
     return {GST_STREAM_ERROR_FORMAT,
             std::string("This file format cannot hold the stream: ") + error.what() + "."};
+  if (is_a<TemporaryFileError>(error))
+    return {GST_RESOURCE_ERROR_WRITE,
+            std::string("Cannot keep events in a ") + error.what() +
+                ". Set the environment variable TMPDIR to a folder with enough space."};
   return otherwise;
 }

@@ -30,8 +30,9 @@ struct Format {
   std::string writer;
   std::string reader;
   std::string caps;
-  std::string end = {};    ///< invalid bytes at the end; by default the file is truncated
-  bool tells_size = true;  ///< the file states the sensor size
+  std::string end = {};     ///< invalid bytes at the end; by default the file is truncated
+  bool tells_size = true;   ///< the file states the sensor size
+  bool is_archive = false;  ///< written and read at the end of the stream
 };
 
 inline void PrintTo(const Format& format, std::ostream* out) {
@@ -47,7 +48,15 @@ inline const Format formats[] = {
     {"es", "eventesenc", "eventesdec", "application/x-es"},
     {"csv", "eventcsvenc format=metavision", "eventcsvdec", "application/x-event-csv", "no\n"},
     {"npy", "eventnpyenc", "eventnpydec", "application/x-npy", "", false},
+    {"npz", "eventnpzenc", "eventnpzdec", "application/x-npz", "", true, true},
 };
+
+/// Formats whose files are read up to where they are truncated.
+inline std::vector<Format> stream_formats() {
+  std::vector<Format> streams(std::begin(formats), std::end(formats));
+  std::erase_if(streams, [](const Format& format) { return format.is_archive; });
+  return streams;
+}
 
 inline const Format& format_of(std::string_view name) {
   return *std::ranges::find(formats, name, &Format::name);

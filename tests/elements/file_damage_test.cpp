@@ -9,6 +9,11 @@ using namespace event_files;
 
 INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats), name_of);
 
+/// A format that is read up to where a file is truncated.
+class EveryStream : public EveryFormat {};
+
+INSTANTIATE_TEST_SUITE_P(, EveryStream, testing::ValuesIn(stream_formats()), name_of);
+
 TEST_P(EveryFormat, SaysWhenItIsUnsupportedFormat) {
   for (const auto& file : {std::string("a,b\n"), std::string("no events at all, but words\n"),
                            std::string(100'000, '\0')}) {
@@ -33,7 +38,7 @@ TEST_P(EveryFormat, IsNoFileWithoutAByte) {
   }
 }
 
-TEST_P(EveryFormat, WarnsOnceOfCorruptionAndTellsWhere) {
+TEST_P(EveryStream, WarnsOnceOfCorruptionAndTellsWhere) {
   const auto events = some_events();
   auto file = file_of(format(), events);
   if (format().end.empty())
@@ -54,6 +59,16 @@ TEST_P(EveryFormat, WarnsOnceOfCorruptionAndTellsWhere) {
   ASSERT_GT(read.size(), events.size() - 40);
   EXPECT_TRUE(std::equal(read.begin(), read.end(), events.begin()));
   EXPECT_EQ(stat_of(h.element(), "corrupt-places"), 1U);
+}
+
+TEST(EventNpzDec, SaysWhenAnArchiveIsTruncated) {
+  const auto file = file_of(format_of("npz"), some_events());
+  for (const std::size_t size : {1UL, file.size() / 2, file.size() - 1}) {
+    Reader h(format_of("npz"));
+    h.read(file.substr(0, size));
+    EXPECT_TRUE(h.error().starts_with("Cannot read this file: "));
+    EXPECT_TRUE(pull_events(h).empty());
+  }
 }
 
 TEST_P(EveryFormat, SurvivesNoise) {

@@ -11,7 +11,6 @@
 #include "src/formats/evt/raw.hpp"
 #include "tests/elements/pipeline.hpp"
 #include "tests/formats/aedat_files.hpp"
-#include "tests/formats/npz_file.hpp"
 
 /// A recording of five seconds, in files of every format.
 namespace recording_files {
@@ -70,13 +69,12 @@ class Folder {
     }
     save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
     save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
-    // No element writes NumPy archives.
-    save("a.npz", npz_file::archive(npz_file::columns_of_events(events), true));
     for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
                                        {"a.es", "eventesenc ! filesink"},
                                        {"a.csv", "eventcsvenc ! filesink"},
                                        {"a.txt", "eventcsvenc format=rpg ! filesink"},
                                        {"a.npy", "eventnpyenc ! filesink"},
+                                       {"a.npz", "eventnpzenc ! filesink"},
                                        {"a.aedat4", "aedatmux ! filesink"},
                                        {"dsec.h5", "eventhdf5sink"},
                                        {"metavision.hdf5", "eventhdf5sink format=metavision"}}) {

@@ -210,7 +210,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpydec, "eventnpydec", GST_RANK_PRIMARY, event_
  * @short_description: reads NumPy archives of events
  *
  * Reads archives of numpy.savez() and numpy.savez_compressed(): arrays named t, x, y and p, or one
- * array as in eventnpydec, with the same properties. Upstream should support pull mode, as filesrc
+ * array as in eventnpydec, with the same properties. Numbers named width and height are the size of
+ * the sensor, in pixels, as eventnpzenc writes them. Upstream should support pull mode, as filesrc
  * does. In push mode the archive is collected in memory, up to 256 MiB, and read at its end.
  *
  * ## Example launch line

@@ -11,6 +11,9 @@
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
+#ifdef HAVE_NPZ
+#include "src/formats/numpy/npz_encoder.hpp"
+#endif
 #include "src/formats/text/csv_encoder.hpp"
 
 using eventcamera::EvtFormat;
@@ -230,3 +233,36 @@ static const EventFileFormat npy = {
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_writer_type(npy))
+
+#ifdef HAVE_NPZ
+/**
+ * SECTION:element-eventnpzenc
+ * @title: eventnpzenc
+ * @short_description: writes NumPy archives of events
+ *
+ * Writes events as a NumPy archive with the arrays t (int64, microseconds), x, y (uint16) and p
+ * (uint8, 1 = ON), and the numbers width and height of the sensor, in pixels. It is not compressed;
+ * its size is 13 bytes per event. The sink does not need to seek.
+ *
+ * An archive holds one array after the other, so until the end of the stream the events are kept in
+ * temporary files, in the folder of the environment variable TMPDIR, or else in `/var/tmp`. Without
+ * the end of the stream they are lost; if the pipeline is stopped earlier, a warning says how many.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventnpzenc ! filesink
+ * location=events.npz
+ * ]|
+ */
+static const EventFileFormat npz = {
+    .type_name = "GstEventNpzEnc",
+    .long_name = "NumPy archive writer",
+    .description =
+        "Writes events as a NumPy archive: t in microseconds, x and y in pixels, p, and the "
+        "sensor's width and height in pixels",
+    .caps = "application/x-npz",
+    .create = [](SensorSize size, int,
+                 const GstCaps*) { return eventcamera::make_npz_encoder(size); },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_writer_type(npz))
+#endif
