@@ -58,8 +58,8 @@ used() {
     try gst-inspect-1.0 $element
   done
   try gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc ! filesink location=ball.raw
-  for ending in dat es npy csv aedat4 hdf5 h5; do try event-convert ball.raw ball.$ending; done
-  for ending in raw dat es npy csv aedat4 hdf5 h5; do try gst-play-1.0 --no-interactive --videosink=fakesink ball.$ending; done
+  for ending in dat es npy npz csv aedat4 hdf5 h5; do try event-convert ball.raw ball.$ending; done
+  for ending in raw dat es npy npz csv aedat4 hdf5 h5; do try gst-play-1.0 --no-interactive --videosink=fakesink ball.$ending; done
   try event-calibrate --version
   for program in event-convert web-events rtsp-events virtual-camera; do try man --whatis $program; done
   try test -s /usr/share/doc/gsteventcamera-1.0/struct.Info.html
@@ -116,7 +116,7 @@ source /tmp/pages/scratch_folder.sh
 source /tmp/pages/run_lines.sh
 ln -s /usr/share/doc/gir1.2-gsteventcamera-1.0/examples pipelines
 run_lines /tmp/pages/README.md /tmp/pages/applications.md /tmp/pages/network.md
-for file in ball.npy out.raw out.h5 events.npy; do
+for file in ball.npz out.raw out.h5 events.npy; do
   [ -s $file ] || fail "$file is missing or empty"
 done
 ./pipelines/on_and_off.py

@@ -19,6 +19,6 @@ for ending in dat es csv; do event-convert drive.raw recording.$ending; done
 
 run_lines "$SOURCE/README.md" "$SOURCE"/docs/*.md "$SOURCE"/docs/elements/*.md
 [ $count -ge 60 ] || fail "found only $count lines"
-for file in events.webm ball.npy recording.h5 figures.json map.png maps.png out.raw events.npy received.raw; do
+for file in events.webm ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw; do
   [ -s $file ] || fail "$file is missing or empty"
 done

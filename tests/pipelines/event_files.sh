@@ -11,7 +11,7 @@ convert() {
 
 declare -A types=([raw]=application/x-prophesee-raw [dat]=application/x-prophesee-dat
   [es]=application/x-es [csv]=application/x-event-csv [txt]=application/x-event-csv [npy]=application/x-npy
-  [aedat4]=application/x-aedat [h5]=application/x-hdf5 [hdf5]=application/x-hdf5)
+  [npz]=application/x-npz [aedat4]=application/x-aedat [h5]=application/x-hdf5 [hdf5]=application/x-hdf5)
 
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=ball.raw
 
@@ -54,6 +54,11 @@ grep -q "kein Bällchen.dat: No such file" named || fail "the error says $(cat n
 # A sensor size that the file does not state.
 convert --width=500 --height=400 ball.npy sized.raw
 grep -aq "geometry 500x400" sized.raw || fail "the size is not the one that was set: $(grep -a geometry sized.raw)"
+
+# The size of the sensor comes back from a NumPy archive, which a pipe can hold.
+convert ball.npz npz.raw
+grep -aq "geometry 320x240" npz.raw || fail "the size is not that of the sensor: $(grep -a geometry npz.raw)"
+timeout 60 "$GST_LAUNCH" -q filesrc location=ball.raw ! evtdec ! eventnpzenc ! fdsink | cmp ball.npz - || fail "a pipe has another archive"
 
 # Text and NumPy of other tools.
 convert --format=esim ball.raw esim.csv
@@ -273,7 +278,6 @@ refused "region 100x80+250+60 is not within the sensor" --crop=100x80+250+60 bal
 refused "choose one of EVT2 EVT21 EVT2.1 EVT3 EVT4" ball.raw other.raw --format=EVT5
 refused "does not apply to .dat" ball.raw ball.dat --format=rpg
 refused "can only be read" ball.raw ball.aedat
-refused "can only be read" ball.raw ball.npz
 refused "choose one of auto seconds" --time-unit=hours ball.csv other.raw
 refused "must have each of t, x, y and p once" --column-order=xy ball.csv other.raw
 refused "only to reading text or NumPy" --time-unit=seconds ball.raw other.raw
@@ -293,7 +297,9 @@ refused "not an HDF5 file" words.h5 out.dat
   trap '' XFSZ
   ulimit -f 20
   refused "File too large" ball.raw large.h5
+  refused "File too large. Set the environment variable TMPDIR" ball.raw large.npz
 )
+TMPDIR=/nowhere refused "temporary file in /nowhere: No such file" ball.raw nowhere.npz
 refused "No such file" nowhere.raw out.dat
 refused "the same file" ball.raw ./ball.raw
 head -c 100001 ball.raw >short.raw
@@ -301,12 +307,17 @@ convert short.raw short.dat 2>warnings
 grep -q "Corrupt data at byte " warnings || fail "no warning about a truncated file"
 
 # Interrupted, it completes the file.
+has_begun() { # PROCESS FILE: it has written 10 kB to the file, or keeps them in a temporary one
+  local files
+  mapfile -t files < <(find "/proc/$1/fd" -lname "*/events-?????? (deleted)" 2>/dev/null)
+  stat -L -c %s "$2" "${files[@]}" 2>/dev/null | awk '$1 >= 10000 { begun = 1 } END { exit !begun }'
+}
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw
-for ending in raw npy aedat4 h5 hdf5; do
+for ending in raw npy npz aedat4 h5 hdf5; do
   echo "event-convert long.raw interrupted.$ending"
   "$BUILD/pipelines/event-convert" long.raw "interrupted.$ending" 2>interruption &
   converting=$!
-  while kill -0 $converting && [ "$(stat -c %s "interrupted.$ending.part" 2>/dev/null || echo 0)" -lt 10000 ]; do sleep 0.01; done
+  while kill -0 $converting && ! has_begun $converting "interrupted.$ending.part"; do sleep 0.01; done
   kill -INT $converting || true
   if wait $converting; then echo "it was already done"; else grep -q interrupted interruption; fi
   convert "interrupted.$ending" part.dat 2>warnings | tee count
