@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/wire/rtp_unpacker.hpp"
 
+#include <algorithm>
+
 #include "src/formats/evt/words.hpp"
 #include "src/formats/little_endian.hpp"
 
@@ -9,6 +11,12 @@ namespace {
 
 /// Number of consecutive late packets after which the sender is assumed to have restarted.
 constexpr int max_late_in_a_row = 16;
+
+/// Silence after which a sender is assumed to have ended, nanoseconds.
+constexpr std::uint64_t max_silence = 1'000'000'000;
+
+/// Number of second senders that are remembered.
+constexpr std::size_t max_second_senders = 16;
 
 }  // namespace
 
@@ -23,6 +31,8 @@ void RtpUnpacker::change(SensorSize sensor, RtpEventFormat format) {
 
 void RtpUnpacker::reset() {
   position_.reset();
+  previous_.reset();
+  second_senders_.clear();
   close_interval();
   is_discontinuous_ = true;
 }
@@ -42,8 +52,12 @@ bool RtpUnpacker::decode(const RtpPacket& packet) {
     is_valid = decode_events(packet.payload.subspan(RtpPayloadHeader::size));
   }
   // A late packet is behind the events of its interval.
-  if (is_valid && is_of_interval(packet) && packets_before(packet) >= 0)
+  if (is_valid && is_of_interval(packet) && position_->packets_before(packet) >= 0)
     is_valid = continues_interval();
+  if (is_valid && is_of_second_sender(packet)) {
+    ++statistics_.second_sender_packets;
+    is_valid = false;
+  }
   if (!is_valid) count_rejected();
   return is_valid;
 }
@@ -54,13 +68,30 @@ bool RtpUnpacker::continues_interval() const {
           events_.size() + decoded_.size() <= max_rtp_interval_events);
 }
 
-int RtpUnpacker::packets_before(const RtpPacket& packet) const {
-  return static_cast<std::int16_t>(packet.sequence_number - position_->next_sequence_number);
+bool RtpUnpacker::is_of_second_sender(const RtpPacket& packet) const {
+  if (!position_ || std::ranges::find(second_senders_, packet.ssrc) == second_senders_.end())
+    return false;
+  return packet.arrival != no_arrival && heard_ != no_arrival &&
+         packet.arrival < heard_ + max_silence;
+}
+
+void RtpUnpacker::change_sender(const RtpPacket& packet) {
+  const bool returns =
+      previous_ && previous_->ssrc == packet.ssrc && previous_->packets_before(packet) >= 0;
+  std::erase(second_senders_, packet.ssrc);
+  if (returns) {
+    if (second_senders_.size() == max_second_senders)
+      second_senders_.erase(second_senders_.begin());
+    second_senders_.push_back(position_->ssrc);
+  }
+  previous_ = position_;
+  is_discontinuous_ = true;
 }
 
 bool RtpUnpacker::is_late(const RtpPacket& packet) {
   const auto number = packet.sequence_number;
-  if (!position_ || packet.ssrc != position_->ssrc || packets_before(packet) >= 0) return false;
+  if (!position_ || packet.ssrc != position_->ssrc || position_->packets_before(packet) >= 0)
+    return false;
   late_in_a_row_ = number == next_late_ ? late_in_a_row_ + 1 : 1;
   next_late_ = static_cast<std::uint16_t>(number + 1);
   if (late_in_a_row_ < max_late_in_a_row) return true;
@@ -88,8 +119,11 @@ void RtpUnpacker::add(const RtpPacket& packet) {
 
 void RtpUnpacker::follow(const RtpPacket& packet) {
   late_in_a_row_ = 0;
-  if (!position_ || position_->ssrc != packet.ssrc) {
+  heard_ = packet.arrival;
+  if (!position_) {
     is_discontinuous_ = true;
+  } else if (position_->ssrc != packet.ssrc) {
+    change_sender(packet);
   } else {
     const auto packets =
         static_cast<std::uint16_t>(packet.sequence_number - position_->next_sequence_number);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -22,8 +23,10 @@ struct RtpPacket {
   std::uint16_t sequence_number;
   bool marker;  ///< last packet of its interval
   std::span<const std::uint8_t> payload;
-  std::uint64_t arrival = 0;  ///< on any clock; passed through
+  std::uint64_t arrival = 0;  ///< nanoseconds, on any clock; `no_arrival` if unknown
 };
+
+inline constexpr std::uint64_t no_arrival = std::numeric_limits<std::uint64_t>::max();
 
 /// An interval, with those of its events that arrived.
 struct RtpInterval {
@@ -36,18 +39,23 @@ struct RtpInterval {
 
 /// Counters of a receiver. Events sent - events = lost_events, once a later packet has arrived.
 struct RtpStatistics {
-  std::uint64_t packets = 0;           ///< valid and in order
-  std::uint64_t bytes = 0;             ///< their payloads
-  std::uint64_t events = 0;            ///< received
-  std::uint64_t lost_packets = 0;      ///< by sequence number
-  std::uint64_t lost_events = 0;       ///< by event number
-  std::uint64_t late_packets = 0;      ///< duplicate or out of order; dropped
-  std::uint64_t rejected_packets = 0;  ///< not of this format or sensor, or corrupt; dropped
+  std::uint64_t packets = 0;       ///< valid and in order
+  std::uint64_t bytes = 0;         ///< their payloads
+  std::uint64_t events = 0;        ///< received
+  std::uint64_t lost_packets = 0;  ///< by sequence number
+  std::uint64_t lost_events = 0;   ///< by event number
+  std::uint64_t late_packets = 0;  ///< duplicate or out of order; dropped
+  /// Not of this format, sensor or sender, or corrupt; dropped.
+  std::uint64_t rejected_packets = 0;
+  std::uint64_t second_sender_packets = 0;  ///< of these, only the sender is wrong
 };
 
 /// Decodes the payloads of RTP packets, and joins the packets of each interval. Drops packets that
 /// are not valid in every detail, and packets that are late, so that every interval and event is in
 /// the sender's order.
+///
+/// A new SSRC is followed at once: the sender restarted. If the SSRC before it continues, there are
+/// two senders, and the new one is rejected until the other has been silent for a second.
 class RtpUnpacker {
  public:
   RtpUnpacker(SensorSize sensor, RtpEventFormat format);
@@ -103,11 +111,18 @@ class RtpUnpacker {
     std::uint32_t ssrc;
     std::uint16_t next_sequence_number;
     std::uint32_t next_event;
+
+    /// Number of packets that are missing before this one; negative after the expected one.
+    int packets_before(const RtpPacket& packet) const {
+      return static_cast<std::int16_t>(packet.sequence_number - next_sequence_number);
+    }
   };
 
+  /// Whether a second sender sent the packet, and the first one is not silent.
+  bool is_of_second_sender(const RtpPacket& packet) const;
+  /// Makes the sender of the packet the current one.
+  void change_sender(const RtpPacket& packet);
   bool is_late(const RtpPacket& packet);
-  /// Number of packets that are missing before this one; negative after the expected one.
-  int packets_before(const RtpPacket& packet) const;
   /// Whether the decoded packet belongs to the current interval.
   bool is_of_interval(const RtpPacket& packet) const;
   /// Whether the decoded events may follow those of the current interval.
@@ -131,6 +146,9 @@ class RtpUnpacker {
   std::vector<Event> decoded_;            ///< of the current packet
 
   std::optional<Position> position_;
+  std::uint64_t heard_ = no_arrival;             ///< arrival of the last packet
+  std::optional<Position> previous_;             ///< in the stream of the sender before
+  std::vector<std::uint32_t> second_senders_{};  ///< SSRCs, oldest first
   std::uint16_t next_late_ = 0;  ///< sequence number that continues the last late packet
   int late_in_a_row_ = 0;
   std::optional<RtpPayloadHeader> interval_;  ///< header of the current interval's first packet

@@ -678,6 +678,24 @@ TEST(RtpEventDepay, StartsOverWithItsSender) {
   EXPECT_EQ(stat_of(h.element(), "lost-events"), 0U);
 }
 
+TEST(RtpEventDepay, WarnsOnceOfASecondSender) {
+  std::vector<Interval> intervals;
+  for (int i = 0; i < 20; ++i)
+    intervals.push_back({i * 10'000'000, 10'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  const auto first = packets_of(intervals, "ssrc=1 seqnum-offset=100");
+  const auto second = packets_of(intervals, "ssrc=2 seqnum-offset=95");
+  Depayloader h;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    h.take(first[i].get(), i * 10 * ms);
+    h.take(second[i].get(), i * 10 * ms + ms);
+  }
+  EXPECT_EQ(stat_of(h.element(), "packets"), 21U);  // the second could have been a restart
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 19U);
+  EXPECT_EQ(stat_of(h.element(), "late-packets"), 0U);
+  EXPECT_NE(h.warning().find("second sender"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
+}
+
 TEST(RtpEventDepay, ContinuesWithoutArrivalTimesWhenItsSenderStartsOver) {
   const std::vector<Interval> first = {
       {5'000'000'000, 10'000'000, {Event::at(1, 2, 500, Polarity::on)}},

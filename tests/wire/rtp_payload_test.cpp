@@ -172,6 +172,74 @@ TEST_P(EveryFormat, FollowsASenderThatRestarts) {
   }
 }
 
+/// Two streams of packets, from two senders, which arrive in turn every 10 ms.
+class TwoSenders {
+ public:
+  explicit TwoSenders(RtpEventFormat format)
+      : format_(format), first_(packets(1)), second_(packets(2)), receiver_(davis, format) {}
+
+  void take_first(std::size_t i) { take(first_[i], 1); }
+  void take_second(std::size_t i) { take(second_[i], 2); }
+  void wait(std::uint64_t time) { now_ += time; }
+
+  const RtpStatistics& statistics() const { return receiver_.unpacker.statistics(); }
+
+ private:
+  std::vector<Packet> packets(unsigned seed) const {
+    RtpPacker packer(davis, format_);
+    return packets_of(random_intervals(davis, 60, seed), packer, 536, 0);
+  }
+  void take(const Packet& packet, std::uint32_t ssrc) {
+    auto view = packet.view(ssrc);
+    view.arrival = now_ += 5'000'000;
+    receiver_.push(view);
+  }
+
+  RtpEventFormat format_;
+  std::vector<Packet> first_;
+  std::vector<Packet> second_;
+  Receiver receiver_;
+  std::uint64_t now_ = 0;
+};
+
+TEST_P(EveryFormat, KeepsTheFirstOfTwoSenders) {
+  TwoSenders senders(GetParam());
+  for (std::size_t i = 0; i < 50; ++i) {
+    senders.take_first(i);
+    senders.take_second(i);
+  }
+  // The second could have been the first, restarted.
+  EXPECT_EQ(senders.statistics().packets, 51U);
+  EXPECT_EQ(senders.statistics().rejected_packets, 49U);
+  EXPECT_EQ(senders.statistics().second_sender_packets, 49U);
+  EXPECT_EQ(senders.statistics().lost_packets, 0U);
+  EXPECT_EQ(senders.statistics().lost_events, 0U);
+}
+
+TEST_P(EveryFormat, FollowsTheSecondSenderWhenTheFirstIsSilent) {
+  TwoSenders senders(GetParam());
+  senders.take_first(0);
+  senders.take_second(0);
+  senders.take_first(1);
+  senders.wait(900'000'000);
+  senders.take_second(1);
+  EXPECT_EQ(senders.statistics().rejected_packets, 1U);
+  senders.wait(100'000'000);
+  for (std::size_t i = 2; i < 30; ++i) senders.take_second(i);
+  EXPECT_EQ(senders.statistics().rejected_packets, 1U);
+  EXPECT_EQ(senders.statistics().packets, 31U);
+}
+
+TEST_P(EveryFormat, FollowsARestartedSenderDespiteALatePacket) {
+  TwoSenders senders(GetParam());
+  senders.take_first(0);
+  senders.take_first(2);
+  senders.take_second(0);
+  senders.take_first(1);
+  for (std::size_t i = 1; i < 30; ++i) senders.take_second(i);
+  EXPECT_EQ(senders.statistics().rejected_packets, 0U);
+}
+
 TEST_P(EveryFormat, AFloodOfRandomPacketsDisturbsNothing) {
   const auto intervals = random_intervals(davis, 20, 8);
   RtpPacker packer(davis, GetParam());

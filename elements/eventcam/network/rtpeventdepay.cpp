@@ -17,13 +17,17 @@
  * After a loss, the buffer with the remaining events, or else the next one, is flagged DISCONT. An
  * invalid packet is dropped as a whole.
  *
+ * A new SSRC is followed at once: the sender restarted. If packets of the SSRC before it still
+ * arrive, there are two senders: the new one is rejected, with a warning, until the other has been
+ * silent for a second.
+ *
  * #GstRtpEventDepay:stats has these fields besides those of #GstRTPBaseDepayload, all #guint64:
  *
  * - `packets`, `bytes`: packets received, and the size of their payloads;
  * - `events`: events received;
  * - `lost-packets`, `lost-events`: sent after the first packet, but did not arrive in time;
  * - `late-packets`: duplicates, and packets that arrived out of order; dropped;
- * - `rejected-packets`: packets that are not of this format or sensor, or corrupt.
+ * - `rejected-packets`: packets that are not of this format, sensor or sender, or corrupt.
  *
  * ## Example launch lines
  * |[
@@ -98,6 +102,7 @@ struct Private {
   guint32 segment_seqnum = gst_util_seqnum_next();  ///< of upstream
   GstPadChainFunction chain = nullptr;              ///< of the base class
   bool was_processed = false;                       ///< the base class passed on the last packet
+  WarnOnce warn_of_second_sender{GST_CAT_DEFAULT};
   RepeatLevel rejected_level;
   RepeatLevel late_level;
 
@@ -175,7 +180,17 @@ static Report no_memory(const std::exception&) {
 static void log_rejected(GstRtpEventDepay* self, guint number) {
   const auto level = self->priv->rejected_level.next();
   GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
-                    "rejected packet number %u: corrupt, or of another sensor or format", number);
+                    "rejected packet number %u: corrupt, or of another sensor, format or sender",
+                    number);
+}
+
+static void warn_of_second_sender(GstRtpEventDepay* self, guint number) {
+  self->priv->warn_of_second_sender(
+      self,
+      {GST_RESOURCE_ERROR_BUSY,
+       "Rejected the packets of a second sender; stats counts them. Let each sender use a port of "
+       "its own, or separate them by rtpssrcdemux or rtpbin."},
+      "packet number " + std::to_string(number) + " has an SSRC beside the current one");
 }
 
 static void log_late(GstRtpEventDepay* self, guint number) {
@@ -239,6 +254,8 @@ static void update_statistics(GstRtpEventDepay* self, guint number) {
     GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u",
                      guint64{counted.lost_packets - before.lost_packets}, number);
   if (counted.rejected_packets > before.rejected_packets) log_rejected(self, number);
+  if (counted.second_sender_packets > before.second_sender_packets)
+    warn_of_second_sender(self, number);
   if (counted.late_packets > before.late_packets) log_late(self, number);
 }
 
@@ -377,6 +394,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     auto& priv = *GST_RTP_EVENT_DEPAY(element)->priv;
     priv.state.reset();
+    priv.warn_of_second_sender.reset();
     priv.rejected_level.reset();
     priv.late_level.reset();
     *priv.statistics.lock() = {};
