@@ -9,8 +9,8 @@ gboolean region_from_text(Region* region, const char* text) {
   return sscanf(text, "%5ux%5u+%5u+%5u%n", &region->width, &region->height, &region->x, &region->y,
                 &end) == 4 &&
          text[end] == '\0' && region->width > 0 && region->height > 0 &&
-         region->x + region->width <= GST_EVENT_CAMERA_MAX_WIDTH &&
-         region->y + region->height <= GST_EVENT_CAMERA_MAX_HEIGHT;
+         region->x + region->width <= GST_EVENT_CAMERA_MAX_SIDE &&
+         region->y + region->height <= GST_EVENT_CAMERA_MAX_SIDE;
 }
 
 /* Events of `in` within the region, or NULL if there are none. */

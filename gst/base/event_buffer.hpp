@@ -12,8 +12,10 @@
 #include "src/core/max_side.hpp"
 
 /// Caps fields of a frame or sensor of any size.
-#define SIZE_CAPS "width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ]"
-static_assert(eventcamera::max_side == 16384);
+#define SIZE_CAPS \
+  "width = (int) [ 1, " G_STRINGIFY(GST_EVENT_CAMERA_MAX_SIDE) " ], " \
+  "height = (int) [ 1, " G_STRINGIFY(GST_EVENT_CAMERA_MAX_SIDE) " ]"
+static_assert(GST_EVENT_CAMERA_MAX_SIDE == eventcamera::max_side);
 
 /// Caps of an event stream in memory format.
 #define EVENT_CAPS GST_EVENT_CAMERA_MEDIA_TYPE ", format = (string) XYTP, " SIZE_CAPS

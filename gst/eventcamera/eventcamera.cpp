@@ -32,8 +32,8 @@ gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps
       g_strcmp0(gst_structure_get_string(structure, "format"), "XYTP") != 0 ||
       !gst_structure_get_int(structure, "width", &found.width) ||
       !gst_structure_get_int(structure, "height", &found.height) || found.width < 1 ||
-      found.width > GST_EVENT_CAMERA_MAX_WIDTH || found.height < 1 ||
-      found.height > GST_EVENT_CAMERA_MAX_HEIGHT)
+      found.width > GST_EVENT_CAMERA_MAX_SIDE || found.height < 1 ||
+      found.height > GST_EVENT_CAMERA_MAX_SIDE)
     return FALSE;
   if (gst_structure_has_field(structure, "framerate") &&
       !gst_structure_get_fraction(structure, "framerate", &found.fps_n, &found.fps_d))

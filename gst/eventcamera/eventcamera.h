@@ -39,22 +39,13 @@ G_BEGIN_DECLS
 #define GST_EVENT_CAMERA_MEDIA_TYPE "application/x-event-camera"
 
 /**
- * GST_EVENT_CAMERA_MAX_WIDTH:
+ * GST_EVENT_CAMERA_MAX_SIDE:
  *
- * The maximum sensor width: x must fit into an event.
- *
- * Since: 0.1
- */
-#define GST_EVENT_CAMERA_MAX_WIDTH 65535
-
-/**
- * GST_EVENT_CAMERA_MAX_HEIGHT:
- *
- * The maximum sensor height: y must fit into an event.
+ * The maximum width and height of a sensor, in pixels.
  *
  * Since: 0.1
  */
-#define GST_EVENT_CAMERA_MAX_HEIGHT 32768
+#define GST_EVENT_CAMERA_MAX_SIDE 16384
 
 typedef struct _GstEventCameraEvent GstEventCameraEvent;
 typedef struct _GstEventCameraInfo GstEventCameraInfo;

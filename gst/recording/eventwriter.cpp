@@ -503,8 +503,8 @@ static void format_class_init(gpointer klass, gpointer data) {
   add_pad_template(
       element_class, "sink", GST_PAD_SINK,
       OwnedCaps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING, "XYTP",
-                                    "width", GST_TYPE_INT_RANGE, 1, format.max_width, "height",
-                                    GST_TYPE_INT_RANGE, 1, format.max_height, nullptr)));
+                                    "width", GST_TYPE_INT_RANGE, 1, format.max_side, "height",
+                                    GST_TYPE_INT_RANGE, 1, format.max_side, nullptr)));
   add_pad_template(element_class, "src", GST_PAD_SRC, format.caps);
   gst_element_class_set_static_metadata(element_class, format.long_name, "Codec/Encoder",
                                         format.description, EVENTSIM_AUTHORS);

@@ -28,9 +28,8 @@ struct EventFileFormat {
   const char* type_name;
   const char* long_name;
   const char* description;
-  const char* caps;  ///< output caps
-  int max_width = GST_EVENT_CAMERA_MAX_WIDTH;
-  int max_height = GST_EVENT_CAMERA_MAX_HEIGHT;
+  const char* caps;                          ///< output caps
+  int max_side = GST_EVENT_CAMERA_MAX_SIDE;  ///< of the sensor
   const Variants* variants = nullptr;
   bool has_words = false;  ///< has property mtu, which limits the words per buffer
 

@@ -29,13 +29,13 @@ void add_sensor_size(FormatProperties& properties) {
                                    "Width of the sensor in pixels, for files that do not state it; "
                                    "needs height. 0: that of the smallest known sensor that events "
                                    "fit into",
-                                   0, GST_EVENT_CAMERA_MAX_WIDTH, 0, flags));
+                                   0, GST_EVENT_CAMERA_MAX_SIDE, 0, flags));
   properties.add([](FormatSettings& settings) -> int& { return settings.sensor.height; },
                  g_param_spec_uint("height", "Height",
                                    "Height of the sensor in pixels, for files that do not state "
                                    "it; needs width. 0: that of the smallest known sensor that "
                                    "events fit into",
-                                   0, GST_EVENT_CAMERA_MAX_HEIGHT, 0, flags));
+                                   0, GST_EVENT_CAMERA_MAX_SIDE, 0, flags));
 }
 
 static GType time_unit_type() {

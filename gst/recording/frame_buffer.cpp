@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <new>
 
+#include "src/core/max_side.hpp"
+
 using eventcamera::Frame;
 using eventcamera::PixelFormat;
 
@@ -65,7 +67,6 @@ static void add_frame_meta(GstBuffer* buffer, const Frame& frame) {
 static void read_frame_meta(GstBuffer* buffer, Frame& frame) {
   register_frame_meta();
   constexpr gint64 max_distance = 3'600'000'000;
-  constexpr int max_offset = 32767;
   GstCustomMeta* const meta = gst_buffer_get_custom_meta(buffer, frame_meta);
   if (meta == nullptr) return;
   const GstStructure* const fields = gst_custom_meta_get_structure(meta);
@@ -78,14 +79,15 @@ static void read_frame_meta(GstBuffer* buffer, Frame& frame) {
   int x = 0;
   int y = 0;
   if (gst_structure_get_int(fields, "x", &x) && gst_structure_get_int(fields, "y", &y) && x >= 0 &&
-      x <= max_offset && y >= 0 && y <= max_offset) {
+      x < eventcamera::max_side && y >= 0 && y < eventcamera::max_side) {
     frame.x = x;
     frame.y = y;
   }
 }
 
 bool frame_video_info(const Frame& frame, GstVideoInfo* info) {
-  return gst_video_info_set_format(info, video_format(frame.format),
+  return frame.width <= eventcamera::max_side && frame.height <= eventcamera::max_side &&
+         gst_video_info_set_format(info, video_format(frame.format),
                                    static_cast<guint>(frame.width),
                                    static_cast<guint>(frame.height));
 }

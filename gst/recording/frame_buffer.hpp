@@ -3,12 +3,13 @@
 
 #include <gst/video/video.h>
 
+#include "gst/base/event_buffer.hpp"
 #include "src/formats/recording_decoder.hpp"
 
 /// Caps of the video frames of recordings.
-#define RECORDED_VIDEO_CAPS                                                                      \
-  "video/x-raw, format = (string) { GRAY8, GRAY16_LE, BGR, BGRA }, width = (int) [ 1, 32767 ], " \
-  "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"
+#define RECORDED_VIDEO_CAPS                                                    \
+  "video/x-raw, format = (string) { GRAY8, GRAY16_LE, BGR, BGRA }, " SIZE_CAPS \
+  ", framerate = (fraction) [ 0, max ]"
 
 /// Fills in the video info for frames like this one. False if they are too large.
 bool frame_video_info(const eventcamera::Frame& frame, GstVideoInfo* info);

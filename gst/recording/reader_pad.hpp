@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
 #include "src/formats/recording_reader.hpp"
 
@@ -77,9 +78,7 @@ class ReaderPad {
 };
 
 /// Caps of events read from a file, which have no framerate.
-#define FILE_EVENTS_CAPS                                                             \
-  "application/x-event-camera, format = (string) XYTP, width = (int) [ 1, 65535 ], " \
-  "height = (int) [ 1, 32768 ], framerate = (fraction) 0/1"
+#define FILE_EVENTS_CAPS EVENT_CAPS ", framerate = (fraction) 0/1"
 
 /// Sets the seqnum of `event`, if valid, and returns `event`.
 GstEvent* with_seqnum(GstEvent* event, guint32 seqnum);

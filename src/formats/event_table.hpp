@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "src/core/event.hpp"
+#include "src/core/max_side.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
 
@@ -53,10 +54,11 @@ struct TableSettings {
 /// than a previous one are kept, and both are counted.
 class RowValidator {
  public:
-  /// 0x0 means unknown: all coordinates that fit into an AbsoluteEvent are inside.
+  /// 0x0 means unknown: coordinates below max_side are inside.
   void set_size(SensorSize size) {
-    x_end_ = size.width > 0 ? static_cast<std::uint64_t>(std::min(size.width, max_x)) : max_x;
-    y_end_ = size.height > 0 ? static_cast<std::uint64_t>(std::min(size.height, max_y)) : max_y;
+    x_end_ = size.width > 0 ? static_cast<std::uint64_t>(std::min(size.width, max_side)) : max_side;
+    y_end_ =
+        size.height > 0 ? static_cast<std::uint64_t>(std::min(size.height, max_side)) : max_side;
   }
 
   void take(Microseconds t, std::int64_t x, std::int64_t y, bool on,
@@ -70,10 +72,7 @@ class RowValidator {
   }
 
  private:
-  static constexpr int max_x = 0x10000;
-  static constexpr int max_y = 0x8000;
-
-  std::uint64_t x_end_ = max_x, y_end_ = max_y;
+  std::uint64_t x_end_ = max_side, y_end_ = max_side;
 };
 
 }  // namespace eventcamera

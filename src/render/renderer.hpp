@@ -37,7 +37,7 @@ struct RenderSettings {
 /// Draws pictures of the events up to given times. Events and pictures must be in time order.
 class Renderer {
  public:
-  /// At most 65535 x 32768 pixels. Throws std::bad_alloc, as do configure() and add().
+  /// At most max_side x max_side pixels. Throws std::bad_alloc, as do configure() and add().
   Renderer(int width, int height, const RenderSettings& settings);
 
   void configure(const RenderSettings& settings);

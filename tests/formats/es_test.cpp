@@ -71,7 +71,7 @@ TEST(EventStream, IsWrittenByteByByte) {
                            AbsoluteEvent::at(0, 0, 5 + 126 + 127, Polarity::off)};
   EXPECT_EQ(recordings::encode(*encoder, events),
             file(1, {5 << 1 | 1, 0x3f, 0x01, 0, 0, 126 << 1, 0, 0, 239, 0, 0xff, 0, 0, 0, 239, 0}));
-  EXPECT_THROW(make_event_stream_encoder({65536, 1}), std::invalid_argument);
+  EXPECT_THROW(make_event_stream_encoder({16385, 1}), std::invalid_argument);
 }
 
 TEST(EventStream, CountsRowsFromTheTopWhereItIsTold) {

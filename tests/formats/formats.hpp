@@ -50,7 +50,7 @@ inline std::vector<Format> all() {
   }
   formats.push_back({"dat", 16384, 35 * minutes, [](SensorSize) { return make_dat_decoder(); },
                      make_dat_encoder});
-  formats.push_back({"es", 32768, 3 * minutes,
+  formats.push_back({"es", 16384, 3 * minutes,
                      [](SensorSize) { return make_event_stream_decoder(); },
                      [](SensorSize size) { return make_event_stream_encoder(size); }});
   return formats;

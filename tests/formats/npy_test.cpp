@@ -3,6 +3,7 @@
 #include <cstring>
 #include <memory>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
 #include "src/formats/numpy/npy_header.hpp"
@@ -172,8 +173,8 @@ TEST(Npy, WhatIsWrongIsSkippedAndCounted) {
   element(1ULL << 63, 1, 1);
   element(6, -1, 1);
   element(7, 70000, 1);
-  element(4, 1, 0x8000);
-  element(4, 1, 0x7fff);
+  element(4, 1, max_side);
+  element(4, 1, max_side - 1);
   {
     NpyDecoder decoder;
     EXPECT_EQ(decoded(decoder, bytes).size(), 2U);

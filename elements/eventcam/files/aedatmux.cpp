@@ -119,10 +119,7 @@ G_DEFINE_TYPE_WITH_CODE(GstAedatMux, gst_aedat_mux, GST_TYPE_AGGREGATOR,
 GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mux_get_type())
 #define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_aedat_mux_parent_class)
 
-#define EVENTS_CAPS                                        \
-  GST_EVENT_CAMERA_MEDIA_TYPE                              \
-  ", format = (string) XYTP, width = (int) [ 1, 32767 ], " \
-  "height = (int) [ 1, 32767 ], framerate = (fraction) [ 0, max ]"
+#define EVENTS_CAPS EVENT_CAPS ", framerate = (fraction) [ 0, max ]"
 
 /// First template, so that it is used by links without a pad name.
 static GstStaticPadTemplate any_template =

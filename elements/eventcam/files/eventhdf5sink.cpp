@@ -86,10 +86,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5sink, "eventhdf5sink", GST_RANK_NONE,
                             gst_event_hdf5_sink_get_type())
 
 static GstStaticPadTemplate sink_template =
-    GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-                            GST_STATIC_CAPS(GST_EVENT_CAMERA_MEDIA_TYPE
-                                            ", format = (string) XYTP, width = (int) [ 1, 32768 ], "
-                                            "height = (int) [ 1, 32768 ]"));
+    GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
 
 /* properties */
 

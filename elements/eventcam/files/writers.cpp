@@ -6,7 +6,6 @@
 #include "elements/eventcam/files/evtformat.hpp"
 #include "gst/base/types.hpp"
 #include "gst/recording/eventwriter.hpp"
-#include "src/core/max_side.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
@@ -87,8 +86,7 @@ static const EventFileFormat evt = {
     .long_name = "Prophesee RAW writer",
     .description = "Writes events as Prophesee RAW, or as EVT words",
     .caps = "application/x-prophesee-raw; " EVT_WORDS_CAPS,
-    .max_width = 2048,
-    .max_height = 2048,
+    .max_side = 2048,
     .variants = &evt_variants,
     .has_words = true,
     .create = make_evt,
@@ -117,8 +115,6 @@ static const EventFileFormat dat = {
     .long_name = "Prophesee DAT writer",
     .description = "Writes events as Prophesee DAT",
     .caps = "application/x-prophesee-dat",
-    .max_width = eventcamera::max_side,
-    .max_height = eventcamera::max_side,
     .create = [](SensorSize size, int,
                  const GstCaps*) { return eventcamera::make_dat_encoder(size); },
 };

@@ -15,6 +15,7 @@ constexpr std::size_t event_size = 8;
 constexpr std::int64_t max_packet = std::int64_t{64} << 20;
 /// Limits times to 2^60 microseconds.
 constexpr std::int32_t max_overflow = 1 << 29;
+/// Of a sensor of unknown size; more than any camera of this format had, so that corruption shows.
 constexpr int widest = 8192;
 /// Number of valid events that must follow an invalid one for it to be skipped alone.
 constexpr std::uint64_t events_behind = 4;

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/aedat/aedat4_flatbuffer.hpp"
 #include "src/formats/aedat/aedat4_info_node.hpp"
 #include "src/formats/chunker.hpp"
@@ -26,7 +27,6 @@ constexpr std::size_t packet_head = aedat4_packet_header + payload_head;
 
 constexpr std::size_t max_header = std::size_t{16} << 20;
 constexpr int max_unlisted_streams = 256;
-constexpr int widest = 32768;
 /// Elements returned at once; they fit into the L2 cache.
 constexpr std::size_t block = 4096;
 /// Searching a packet with a corrupt size for the next one repeats work. This bounds that work in
@@ -59,7 +59,7 @@ int row_at(const std::uint8_t* bytes) {
 
 /// Limit of valid coordinates; an unknown size gives the maximum.
 SensorSize limit_of(SensorSize size) {
-  return {size.width != 0 ? size.width : widest, size.height != 0 ? size.height : widest};
+  return {size.width != 0 ? size.width : max_side, size.height != 0 ? size.height : max_side};
 }
 
 /// True for the entries of older versions of DV, which state neither times nor counts.

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/aedat/aedat4.fbs.h"
 #include "src/formats/aedat/aedat4_compression.hpp"
 #include "src/formats/aedat/aedat4_info_node.hpp"
@@ -16,7 +17,6 @@ namespace eventcamera {
 namespace {
 
 constexpr std::size_t max_events = 4096;
-constexpr int max_side = 32767;
 
 bool is_side(int pixels) {
   return pixels > 0 && pixels <= max_side;
@@ -32,7 +32,7 @@ Aedat4Encoder::Aedat4Encoder(Aedat4Settings settings)
       compressor_(std::make_unique<Aedat4Compressor>(settings_.compression)),
       builder_(std::make_unique<Aedat4Builder>()) {
   if (!is_side(settings_.size.width) || !is_side(settings_.size.height))
-    throw std::invalid_argument("AEDAT4 supports sensors of 1x1 to 32767x32767 pixels");
+    throw std::invalid_argument("AEDAT4 supports sensors of 1x1 to 16384x16384 pixels");
 }
 
 Aedat4Encoder::~Aedat4Encoder() = default;

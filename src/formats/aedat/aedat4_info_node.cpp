@@ -8,12 +8,13 @@
 #include <pugixml.hpp>
 #include <sstream>
 
+#include "src/core/max_side.hpp"
+
 namespace eventcamera {
 
 namespace {
 
 constexpr std::size_t max_streams = 256;
-constexpr int max_side = 32767;
 
 /// Keeps text as it was written, and expands no entities but the five of XML.
 constexpr unsigned parse_options =

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/unit_stream_decoder.hpp"
 #include "src/formats/word_writer.hpp"
 
@@ -15,9 +16,6 @@ namespace {
 constexpr std::string_view magic = "Event Stream";
 constexpr std::uint8_t version = 2;
 constexpr std::size_t header_size = magic.size() + 3 + 1 + 4;
-
-/// y_p of an event has 15 bits for the row.
-constexpr int max_rows = 32768;
 
 enum Type : std::uint8_t { generic = 0, dvs = 1, atis = 2, amd = 3, colour = 4 };
 
@@ -41,7 +39,7 @@ template <int flag_bits>
 class EsEventDecoder final : public UnitDecoder {
  public:
   EsEventDecoder(SensorSize size, EsOrigin origin)
-      : bounds_(size, max_rows), rows_(size.height, origin) {}
+      : bounds_(size, max_side), rows_(size.height, origin) {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
@@ -128,7 +126,7 @@ class EsDecoder final : public UnitStreamDecoder {
 
   template <int flag_bits>
   void begin_events(SensorSize size) {
-    if (size.width == 0 || size.height == 0 || size.height > max_rows)
+    if (size.width == 0 || size.height == 0 || size.width > max_side || size.height > max_side)
       throw UnsupportedFormat("Event Stream with an impossible sensor size of " +
                               std::to_string(size.width) + "x" + std::to_string(size.height));
     begin(std::make_unique<EsEventDecoder<flag_bits>>(size, origin_), size);
@@ -201,8 +199,8 @@ std::unique_ptr<Decoder> make_event_stream_decoder(EsOrigin origin) {
 }
 
 std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size, EsOrigin origin) {
-  if (size.width < 1 || size.height < 1 || size.width > 65535 || size.height > max_rows)
-    throw std::invalid_argument("Event Streams support sensors of 1x1 to 65535x32768 pixels");
+  if (size.width < 1 || size.height < 1 || size.width > max_side || size.height > max_side)
+    throw std::invalid_argument("Event Streams support sensors of 1x1 to 16384x16384 pixels");
   return std::make_unique<EsEncoder>(size, origin);
 }
 

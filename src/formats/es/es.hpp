@@ -19,7 +19,7 @@ enum class EsOrigin : std::uint8_t { bottom_left, top_left };
 std::unique_ptr<Decoder> make_event_stream_decoder(EsOrigin origin = EsOrigin::bottom_left);
 
 /// Encodes DVS events. The format fills pauses with a byte per 127 microseconds. Throws
-/// std::invalid_argument for sensors of more than 65535x32768 pixels.
+/// std::invalid_argument for sensors of more than 16384x16384 pixels.
 std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size,
                                                    EsOrigin origin = EsOrigin::bottom_left);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
 
@@ -12,7 +13,6 @@ namespace eventcamera {
 namespace {
 
 constexpr std::uint64_t block_rows = 16384;
-constexpr int max_side = 65536;
 constexpr std::size_t columns = 4;  // t, x, y and p
 
 std::uint64_t block_end(std::uint64_t row, std::uint64_t rows) {

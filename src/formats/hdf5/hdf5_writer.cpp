@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_file.hpp"
 
@@ -421,10 +422,10 @@ void check(const Hdf5Writer::Settings& settings) {
   if (settings.format == Hdf5Format::v2e)
     throw std::invalid_argument("v2e's HDF5 layout can only be read");
   const bool ecf = settings.format == Hdf5Format::metavision;
-  const int max_side = ecf ? ecf_max_pixels : 32768;
-  if (width <= 0 || height <= 0 || width > max_side || height > max_side)
+  const int limit = ecf ? ecf_max_pixels : max_side;
+  if (width <= 0 || height <= 0 || width > limit || height > limit)
     throw std::invalid_argument("HDF5 files need a sensor size of at most " +
-                                std::to_string(max_side) + " pixels in a row or column");
+                                std::to_string(limit) + " pixels in a row or column");
 }
 
 }  // namespace

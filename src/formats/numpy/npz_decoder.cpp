@@ -5,6 +5,7 @@
 #include <array>
 #include <limits>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/zip_archive.hpp"
 
@@ -130,7 +131,7 @@ std::string_view array_name(std::string_view name) {
 }
 
 /// Integer from 1 to `max` that is the only element of an array; 0 if the array is another.
-int extent_in(ZipArchive& archive, std::size_t index, int max) {
+int extent_in(ZipArchive& archive, std::size_t index) {
   try {
     auto [entry, header, bytes] = open_array(archive, index);
     if (header.columns.size() != 1 || header.count != 1) return 0;
@@ -140,7 +141,7 @@ int extent_in(ZipArchive& archive, std::size_t index, int max) {
     const auto count = entry.read(std::span(bytes).subspan(had));
     if (!count || had + *count != header.element_bytes) return 0;
     const auto extent = npy_integer(header.columns.front(), bytes.data()).value_or(0);
-    return extent > 0 && extent <= max ? static_cast<int>(extent) : 0;
+    return extent > 0 && extent <= max_side ? static_cast<int>(extent) : 0;
   } catch (const UnsupportedFormat&) {
     return 0;
   }
@@ -176,12 +177,10 @@ class Archive {
  private:
   /// Size in the arrays width and height; 0x0 if it is missing or not one of a sensor.
   SensorSize stated_size() {
-    constexpr SensorSize max = {65535, 32768};
     const auto width = index_of("width");
     const auto height = index_of("height");
     if (!width || !height) return {};
-    const SensorSize size{extent_in(archive_, *width, max.width),
-                          extent_in(archive_, *height, max.height)};
+    const SensorSize size{extent_in(archive_, *width), extent_in(archive_, *height)};
     size_unreadable_ = size.width == 0 || size.height == 0;
     return size_unreadable_ ? SensorSize{} : size;
   }

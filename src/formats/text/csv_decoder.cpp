@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "src/core/max_side.hpp"
 #include "src/formats/text/decimal.hpp"
 
 namespace eventcamera {
@@ -42,7 +43,7 @@ bool is_comment(std::string_view line) {
 
 std::optional<int> read_extent(std::string_view text) {
   const auto number = read_decimal(trimmed(text), 0);
-  if (!number || number->has_fraction || number->value <= 0 || number->value > 65535)
+  if (!number || number->has_fraction || number->value <= 0 || number->value > max_side)
     return std::nullopt;
   return static_cast<int>(number->value);
 }
