@@ -241,13 +241,6 @@ void gst_event_aggregator_add_pads(GstEventAggregator* self) {
   }
 }
 
-void gst_event_aggregator_class_add_templates(GstEventAggregatorClass* klass,
-                                              std::initializer_list<GstStaticPadTemplate*> list) {
-  for (auto* pad_template : list)
-    gst_element_class_add_static_pad_template_with_gtype(GST_ELEMENT_CLASS(klass), pad_template,
-                                                         GST_TYPE_AGGREGATOR_PAD);
-}
-
 /// Iterates over linked sink pads only. A latency query is sent to the internal links of the source
 /// pad and fails if one of them fails; GstAggregator would then treat a live source as not live.
 static GstIterator* iterate_linked_pads(GstPad*, GstObject* element) {

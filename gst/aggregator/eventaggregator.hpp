@@ -3,12 +3,12 @@
 
 #include <gst/base/gstaggregator.h>
 
-#include <initializer_list>
 #include <memory>
 #include <optional>
 
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 
 /// Implementation of an element that combines event streams and video. Each subclass of
 /// GstEventAggregator owns one, which lives as long as the element.
@@ -105,9 +105,12 @@ Inside& inside_of(gpointer element) {
   return static_cast<Inside&>(gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(element)));
 }
 
-/// For class_init: adds pad templates with the pad type that GstAggregator requires.
-void gst_event_aggregator_class_add_templates(GstEventAggregatorClass* klass,
-                                              std::initializer_list<GstStaticPadTemplate*> list);
+/// For class_init: adds the template of an always pad.
+inline void add_aggregator_pad_template(GstEventAggregatorClass* klass, const char* name,
+                                        GstPadDirection direction, const char* caps) {
+  add_pad_template(GST_ELEMENT_CLASS(klass), name, direction, caps, GST_PAD_ALWAYS,
+                   GST_TYPE_AGGREGATOR_PAD);
+}
 
 /// Defines and registers the type of an element with an EventAggregator of class `Inside`, which
 /// must have a member `settings`. The type's class_init must follow.

@@ -5,15 +5,17 @@
 
 #include "gst/base/owned.hpp"
 
-/// For class_init: adds the template of a pad.
+/// For class_init: adds the template of a pad. GstAggregator needs pads of its own type.
 inline void add_pad_template(GstElementClass* klass, const char* name, GstPadDirection direction,
-                             const OwnedCaps& caps, GstPadPresence presence = GST_PAD_ALWAYS) {
-  gst_element_class_add_pad_template(klass,
-                                     gst_pad_template_new(name, direction, presence, caps.get()));
+                             const OwnedCaps& caps, GstPadPresence presence = GST_PAD_ALWAYS,
+                             GType type = GST_TYPE_PAD) {
+  gst_element_class_add_pad_template(
+      klass, gst_pad_template_new_with_gtype(name, direction, presence, caps.get(), type));
 }
 inline void add_pad_template(GstElementClass* klass, const char* name, GstPadDirection direction,
-                             const char* caps, GstPadPresence presence = GST_PAD_ALWAYS) {
-  add_pad_template(klass, name, direction, OwnedCaps(gst_caps_from_string(caps)), presence);
+                             const char* caps, GstPadPresence presence = GST_PAD_ALWAYS,
+                             GType type = GST_TYPE_PAD) {
+  add_pad_template(klass, name, direction, OwnedCaps(gst_caps_from_string(caps)), presence, type);
 }
 
 /// For class_init: adds the templates of the always pads "sink" and "src".

@@ -102,6 +102,8 @@ static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const RecordingFormat*>(data);
   static_cast<GstEventReaderClass*>(klass)->format = &format;
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  // A demuxer even of a single stream: its pad comes when the header has told the caps, and players
+  // find it as they find the demuxers of video files.
   const char* const name = format.has_many_streams ? "events_%u" : "src";
   add_pad_template(element_class, "sink", GST_PAD_SINK, format.caps);
   add_pad_template(element_class, name, GST_PAD_SRC, FILE_EVENTS_CAPS, GST_PAD_SOMETIMES);

@@ -14,6 +14,24 @@
 #include "src/formats/seek_points.hpp"
 #include "src/formats/unsupported_format.hpp"
 
+// Guide to this folder: from the bytes of a file to intervals of events, and back.
+//
+// recognition.cpp               which format a file has, from its first bytes
+// decoder.hpp                   bytes of one event format -> events and triggers (Decoded)
+//   unit_stream_decoder.cpp       a header and units of a few bytes, which a UnitDecoder reads:
+//                                 evt/, dat/, es/; time_base.hpp unwraps their times
+//   event_table.cpp               rows or columns of numbers: text/, numpy/, hdf5/;
+//                                 table_sample.cpp guesses what the columns mean
+// recording_decoder.hpp         bytes of any file -> items of several streams: aedat/, hdf5/, and
+//                                 with one_stream_decoder.cpp every Decoder
+// recording_reader.cpp          plays a recording: origin, duration, sensor size, seeks, counts
+//   sensor_sizes.hpp              the size of a sensor that the file does not state
+//   seek_points.hpp               where to resume reading
+//   chunker.cpp                   events -> intervals of equal length, sorted
+//   waiting_items.hpp             triggers and IMU samples that wait for their interval
+// encoder.hpp                   events -> bytes, in units by word_writer.hpp
+// corruption.hpp                what was wrong with the bytes, and where
+
 namespace eventcamera {
 
 /// Bytes at the end of a file that are read to find its last event; covers the disorder of events.

@@ -287,14 +287,10 @@ static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
 #define DRAWN_VIDEO_CAPS                                               \
   "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS ", " SIZE_CAPS \
   ", framerate = (fraction) [ 0, max ]"
-  static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
-      "video_sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(DRAWN_VIDEO_CAPS));
-  static GstStaticPadTemplate event_template = GST_STATIC_PAD_TEMPLATE(
-      "event_sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
-      "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(DRAWN_VIDEO_CAPS));
-  gst_event_aggregator_class_add_templates(GST_EVENT_AGGREGATOR_CLASS(klass),
-                                           {&video_template, &event_template, &src_template});
+  auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
+  add_aggregator_pad_template(aggregator, "video_sink", GST_PAD_SINK, DRAWN_VIDEO_CAPS);
+  add_aggregator_pad_template(aggregator, "event_sink", GST_PAD_SINK, EVENT_CAPS);
+  add_aggregator_pad_template(aggregator, "src", GST_PAD_SRC, DRAWN_VIDEO_CAPS);
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event overlay",
                                         "Filter/Editor/Video", "Draws events over video",
                                         EVENTSIM_AUTHORS);

@@ -564,15 +564,12 @@ static gboolean decide_allocation(GstAggregator*, GstQuery* query) {
 static void gst_event_render_class_init(GstEventRenderClass* klass) {
   install_properties(G_OBJECT_CLASS(klass));
 
-  static GstStaticPadTemplate sink_template =
-      GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-                              GST_STATIC_CAPS("video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS
-                                              ", " SIZE_CAPS ", framerate = (fraction) [ 0, max ], "
-                                              "pixel-aspect-ratio = (fraction) 1/1"));
-  gst_event_aggregator_class_add_templates(GST_EVENT_AGGREGATOR_CLASS(klass),
-                                           {&sink_template, &src_template});
+  auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
+  add_aggregator_pad_template(aggregator, "sink", GST_PAD_SINK, EVENT_CAPS);
+  add_aggregator_pad_template(aggregator, "src", GST_PAD_SRC,
+                              "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS ", " SIZE_CAPS
+                              ", framerate = (fraction) [ 0, max ], "
+                              "pixel-aspect-ratio = (fraction) 1/1");
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event renderer",
                                         "Codec/Decoder/Video", "Draws events as video",
                                         EVENTSIM_AUTHORS);

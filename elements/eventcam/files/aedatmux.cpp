@@ -43,6 +43,7 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
@@ -121,16 +122,7 @@ GST_ELEMENT_REGISTER_DEFINE(aedatmux, "aedatmux", GST_RANK_PRIMARY, gst_aedat_mu
 
 #define EVENTS_CAPS EVENT_CAPS ", framerate = (fraction) [ 0, max ]"
 
-/// First template, so that it is used by links without a pad name.
-static GstStaticPadTemplate any_template =
-    GST_STATIC_PAD_TEMPLATE("sink_%u", GST_PAD_SINK, GST_PAD_REQUEST,
-                            GST_STATIC_CAPS(EVENTS_CAPS "; " RECORDED_VIDEO_CAPS));
-static GstStaticPadTemplate events_template = GST_STATIC_PAD_TEMPLATE(
-    "events_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(EVENTS_CAPS));
-static GstStaticPadTemplate video_template = GST_STATIC_PAD_TEMPLATE(
-    "video_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS(RECORDED_VIDEO_CAPS));
-static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE(
-    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS("application/x-aedat, version = (int) 4"));
+constexpr const char* any_pad = "sink_%u";
 
 /* properties */
 
@@ -539,7 +531,7 @@ static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplat
                        kind.data());
     return nullptr;
   }
-  if (kind == any_template.name_template)
+  if (kind == any_pad)
     return PARENT_AGGREGATOR_CLASS->create_new_pad(aggregator, templ, wanted, caps);
   const auto is_of_kind = [&](const Pad& pad) { return GST_PAD_PAD_TEMPLATE(pad.get()) == templ; };
   if (std::ranges::any_of(pads_of(self), is_of_kind)) {
@@ -608,14 +600,15 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
       WritableEvents::stats_spec());
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
-  gst_element_class_add_static_pad_template_with_gtype(element_class, &any_template,
-                                                       GST_TYPE_AGGREGATOR_PAD);
-  gst_element_class_add_static_pad_template_with_gtype(element_class, &events_template,
-                                                       GST_TYPE_AGGREGATOR_PAD);
-  gst_element_class_add_static_pad_template_with_gtype(element_class, &video_template,
-                                                       GST_TYPE_AGGREGATOR_PAD);
-  gst_element_class_add_static_pad_template_with_gtype(element_class, &src_template,
-                                                       GST_TYPE_AGGREGATOR_PAD);
+  const auto add_sinks = [&](const char* name, const char* caps) {
+    add_pad_template(element_class, name, GST_PAD_SINK, caps, GST_PAD_REQUEST,
+                     GST_TYPE_AGGREGATOR_PAD);
+  };
+  add_sinks(any_pad, EVENTS_CAPS "; " RECORDED_VIDEO_CAPS);  // first: for links without a pad name
+  add_sinks("events_%u", EVENTS_CAPS);
+  add_sinks("video_%u", RECORDED_VIDEO_CAPS);
+  add_pad_template(element_class, "src", GST_PAD_SRC, "application/x-aedat, version = (int) 4",
+                   GST_PAD_ALWAYS, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata(element_class, "AEDAT 4 muxer", "Codec/Muxer",
                                         "Writes events and frames into AEDAT 4 files",
                                         EVENTSIM_AUTHORS);

@@ -28,6 +28,7 @@
 
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -84,9 +85,6 @@ G_DEFINE_TYPE_WITH_CODE(GstEventHdf5Sink, gst_event_hdf5_sink, GST_TYPE_BASE_SIN
                                                 "writer of HDF5 files of events"))
 GST_ELEMENT_REGISTER_DEFINE(eventhdf5sink, "eventhdf5sink", GST_RANK_NONE,
                             gst_event_hdf5_sink_get_type())
-
-static GstStaticPadTemplate sink_template =
-    GST_STATIC_PAD_TEMPLATE("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
 
 /* properties */
 
@@ -280,7 +278,7 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
       WritableEvents::stats_spec());
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
-  gst_element_class_add_static_pad_template(element_class, &sink_template);
+  add_pad_template(element_class, "sink", GST_PAD_SINK, EVENT_CAPS);
   gst_element_class_set_static_metadata(element_class, "HDF5 file sink", "Sink/File",
                                         "Writes events as HDF5: DSEC or Metavision",
                                         EVENTSIM_AUTHORS);

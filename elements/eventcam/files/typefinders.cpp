@@ -32,15 +32,16 @@ static void find_kind(GstTypeFind* find, gpointer media_type) {
 }
 
 /// Registers a typefinder that suggests caps of `media_type`.
-#define REGISTER(name, kind, media_type, extensions)                                           \
-  GST_TYPE_FIND_REGISTER_DEFINE(name, media_type, GST_RANK_PRIMARY, find_kind<FileKind::kind>, \
-                                extensions, nullptr, const_cast<char*>(media_type), nullptr)
+#define REGISTER(name, kind, media_type, extensions, rank)                                     \
+  GST_TYPE_FIND_REGISTER_DEFINE(name, media_type, rank, find_kind<FileKind::kind>, extensions, \
+                                nullptr, const_cast<char*>(media_type), nullptr)
 
-REGISTER(aedat, aedat, "application/x-aedat", "aedat,aedat4")
-REGISTER(eventcsv, csv, "application/x-event-csv", "csv,txt")
-REGISTER(eventstream, event_stream, "application/x-es", "es")
-REGISTER(hdf5, hdf5, "application/x-hdf5", "h5,hdf5")
-REGISTER(npy, npy, "application/x-npy", "npy")
-REGISTER(npz, npz, "application/x-npz", "npz")
-REGISTER(propheseedat, prophesee_dat, "application/x-prophesee-dat", "dat")
-REGISTER(propheseeraw, prophesee_raw, "application/x-prophesee-raw", "raw")
+REGISTER(aedat, aedat, "application/x-aedat", "aedat,aedat4", GST_RANK_PRIMARY)
+REGISTER(eventcsv, csv, "application/x-event-csv", "csv,txt",
+         GST_RANK_SECONDARY)  // after formats with a signature
+REGISTER(eventstream, event_stream, "application/x-es", "es", GST_RANK_PRIMARY)
+REGISTER(hdf5, hdf5, "application/x-hdf5", "h5,hdf5", GST_RANK_PRIMARY)
+REGISTER(npy, npy, "application/x-npy", "npy", GST_RANK_PRIMARY)
+REGISTER(npz, npz, "application/x-npz", "npz", GST_RANK_PRIMARY)
+REGISTER(propheseedat, prophesee_dat, "application/x-prophesee-dat", "dat", GST_RANK_PRIMARY)
+REGISTER(propheseeraw, prophesee_raw, "application/x-prophesee-raw", "raw", GST_RANK_PRIMARY)

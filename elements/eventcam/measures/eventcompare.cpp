@@ -258,14 +258,10 @@ static void gst_event_compare_class_init(GstEventCompareClass* klass) {
                         "PNG file of the events per pixel, of both streams and of their "
                         "difference, written at EOS or on stop");
 
-  static GstStaticPadTemplate reference_template = GST_STATIC_PAD_TEMPLATE(
-      "reference", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  static GstStaticPadTemplate candidate_template = GST_STATIC_PAD_TEMPLATE(
-      "candidate", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  static GstStaticPadTemplate src_template =
-      GST_STATIC_PAD_TEMPLATE("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS(EVENT_CAPS));
-  gst_event_aggregator_class_add_templates(
-      GST_EVENT_AGGREGATOR_CLASS(klass), {&reference_template, &candidate_template, &src_template});
+  auto* const aggregator = GST_EVENT_AGGREGATOR_CLASS(klass);
+  add_aggregator_pad_template(aggregator, "reference", GST_PAD_SINK, EVENT_CAPS);
+  add_aggregator_pad_template(aggregator, "candidate", GST_PAD_SINK, EVENT_CAPS);
+  add_aggregator_pad_template(aggregator, "src", GST_PAD_SRC, EVENT_CAPS);
   gst_element_class_set_static_metadata(
       GST_ELEMENT_CLASS(klass), "Event comparison", "Filter/Analyzer",
       "Measures the similarity of two event streams", EVENTSIM_AUTHORS);
