@@ -72,8 +72,8 @@ class Decoder {
   /// Sensor size, once the header is read or if known from elsewhere; 0x0 before.
   SensorSize size() const { return size_; }
 
-  /// Whether columns count from the right and rows from the bottom, for whoever knows the size to
-  /// turn them round.
+  /// Whether columns count from the right and rows from the bottom: whoever knows the size has to
+  /// mirror the events.
   bool is_mirrored() const { return is_mirrored_; }
 
   const Corruption& corruption() const { return corruption_; }

@@ -37,7 +37,7 @@ class TimeBase {
     return static_cast<std::int64_t>(time_ - last) >= 0;
   }
 
-  /// Small steps are shorter than this. There are none after a leap, for follow() to judge it.
+  /// Limit of small steps; 0 after a leap, which follow() judges by the next count.
   std::uint32_t small_step_end() const { return before_leap_ == time_ ? max_step + 1 : 0; }
 
   /// Small steps lead to `time`.
@@ -53,7 +53,7 @@ class TimeBase {
   }
 
  private:
-  /// Limit of small steps: two minutes of 28 bits, two seconds of 12.
+  /// Limit of small steps: two minutes for 28 bits, two seconds for 12.
   static constexpr std::uint32_t max_step = std::uint32_t{1} << (bits * 3 / 4);
   static constexpr std::uint32_t mask = ~std::uint32_t{0} >> (32 - bits);
 

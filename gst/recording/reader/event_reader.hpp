@@ -49,7 +49,7 @@ struct Restart {
   guint32 seqnum = GST_SEQNUM_INVALID;
 };
 
-/// Implementation of the element: connects a eventcamera::RecordingReader to pads, events, queries
+/// Implementation of the element: connects an eventcamera::RecordingReader to pads, events, queries
 /// and messages.
 class EventReader {
  public:
@@ -179,7 +179,7 @@ EventReader& event_reader_of(gpointer element);
 /// and then waits for the element's pads for ever. An application may lock the state for longer.
 void wait_until_added(GstElement* element);
 
-/// Report where nothing takes what is read.
+/// Report of source pads that no element is linked to.
 Report not_linked();
 
 /// Runs `work`; reports any exception. If the cause is a failed pull, returns its flow instead.

@@ -113,7 +113,7 @@ void Aedat2Decoder::end_header() {
   data_at_ = queue_.position();
 }
 
-/// False where that takes more bytes.
+/// False if more bytes are needed.
 bool Aedat2Decoder::find_camera() {
   if (limit_ == SensorSize{}) {
     if (!layout_ && !find_layout()) return false;
@@ -122,7 +122,7 @@ bool Aedat2Decoder::find_camera() {
   return true;
 }
 
-/// Tells the layout by the first addresses. False where that takes more bytes.
+/// Determines the layout from the first addresses. False if more bytes are needed.
 bool Aedat2Decoder::find_layout() {
   const auto wanted = record_size * layout_records;
   if (queue_.size() < wanted && !finished_) return false;
@@ -134,7 +134,7 @@ bool Aedat2Decoder::find_layout() {
   return true;
 }
 
-/// Takes the size that is told, or that all cameras of the layout have.
+/// Takes the stated size, or that of all cameras with this layout.
 void Aedat2Decoder::find_size() {
   constexpr SensorSize largest_davis{640, 480};
   if (size_ == SensorSize{}) size_ = assumed_;

@@ -41,7 +41,7 @@ std::optional<Item> AedatDecoder::next() {
   return reader_->next();
 }
 
-/// Creates the reader for the version in the first line. False if more bytes are needed.
+/// Creates the decoder of the version in the first line. False if more bytes are needed.
 bool AedatDecoder::find_version() {
   const std::string_view text(reinterpret_cast<const char*>(start_.data()),
                               std::min(start_.size(), magic_size));

@@ -58,7 +58,7 @@ struct CdTypes {
   std::uint32_t ignored;  ///< one bit per type
 };
 
-/// Base of the readers; the only state is the time.
+/// Base of the decoders; the only state is the time.
 template <CdTypes types>
 class CdDecoder : public UnitDecoder {
  public:
