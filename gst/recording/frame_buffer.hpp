@@ -16,7 +16,7 @@ bool frame_video_info(const eventcamera::Frame& frame, GstVideoInfo* info);
 
 /// Returns a new buffer with the pixels of a frame, without timestamps. Throws std::bad_alloc.
 ///
-/// What else a recording says of the frame is in a GstCustomMeta named GstEventCameraFrame: begin,
+/// The other metadata of the frame are in a GstCustomMeta named GstEventCameraFrame: begin,
 /// end, exposure-begin and exposure-end (gint64, microseconds after the PTS), and the position of
 /// its upper left corner on the sensor, x and y (gint).
 GstBuffer* frame_buffer(const eventcamera::Frame& frame, const GstVideoInfo* info);

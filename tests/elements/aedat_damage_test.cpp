@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What aedatdemux does with AEDAT files that are damaged, empty, or none.
+// aedatdemux with AEDAT files that are damaged or empty, and with files that are not AEDAT.
 #include <set>
 
 #include "tests/elements/aedat_player.hpp"

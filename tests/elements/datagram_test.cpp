@@ -157,7 +157,7 @@ class UdpReceiver {
     return port;
   }
 
-  /// Waits until so many have come.
+  /// Waits until this many have arrived.
   std::vector<AbsoluteEvent> events(std::size_t count) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::seconds(20), [&] { return events_.size() >= count; });

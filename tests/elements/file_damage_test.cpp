@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What readers of event files do with files that are damaged, empty, or none.
+// Readers of event files with files that are damaged or empty, or of another format.
 #include "tests/elements/event_files.hpp"
 
 namespace {

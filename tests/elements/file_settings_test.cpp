@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What files do not tell: sensor sizes, units, columns and the place of row 0.
+// What files do not state: sensor sizes, units, columns and the place of row 0.
 #include "tests/elements/event_files.hpp"
 
 namespace {
@@ -40,7 +40,7 @@ TEST(EventEs, CountsRowsFromWhereItIsTold) {
   EXPECT_EQ(events_in(format_of("es"), file), flipped);
 }
 
-/// Moves out of what its beginning fits into.
+/// Leaves the sensor that fits its beginning.
 Events growing_events() {
   Events events;
   for (int i = 0; i < 3000; ++i)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What writers of event files of every format write, leave out, and tell of.
+// What writers of event files of every format write, leave out and report.
 #include "tests/elements/event_files.hpp"
 
 namespace {

@@ -416,7 +416,7 @@ TEST_P(EitherOutput, IsFoundAnewAfterALoss) {
   gst_object_unref(lost.exchange(nullptr));
 }
 
-/// Ends the threads of all contexts, as it seems, while it exists.
+/// Pretends, while it exists, that the threads of all contexts have ended.
 class EndOfThreads {
  public:
   EndOfThreads() {

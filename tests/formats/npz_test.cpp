@@ -258,7 +258,7 @@ TEST(Npz, NumbersOfTheSensorSize) {
   EXPECT_EQ(small.events.size(), 9U);
   EXPECT_EQ(small.corruption.outside, 1U);
 
-  // One alone says nothing, and what is no size is corruption.
+  // One alone is ignored, and an impossible size is corruption.
   const auto none = size_of(one("width.npy", 640), one("other.npy", 480));
   EXPECT_EQ(none.size, SensorSize{});
   EXPECT_EQ(none.corruption.places, 0U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// tshark finds our RTP packets by our SDP, and has nothing to complain about in either.
+// tshark finds our RTP packets by our SDP, and reports no fault in either.
 #include <gst/app/gstappsink.h>
 #include <gst/sdp/gstsdpmessage.h>
 #include <gtest/gtest.h>
