@@ -25,12 +25,14 @@ bool count_times(Microseconds start, Microseconds latest, std::span<const Absolu
   const hn::ScalableTag<std::int64_t> words;
   const auto lanes = hn::Lanes(words);
   const auto* in = reinterpret_cast<const std::int64_t*>(events.data());
-  auto steps = hn::Zero(words);  // negative if any is
-  std::int64_t step = 0;
+  auto falls = hn::Zero(words);
+  bool falls_here = false;
   const auto place_one = [&](std::size_t i) {
-    step |= events[i].t - latest;
+    falls_here |= events[i].t < latest;
     latest = events[i].t;
-    out[i] = {static_cast<std::uint32_t>(latest - start), events[i].x, events[i].y_p};
+    // Unsigned, because the times of corrupt files may overflow.
+    const auto t = static_cast<std::uint64_t>(latest) - static_cast<std::uint64_t>(start);
+    out[i] = {static_cast<std::uint32_t>(t), events[i].x, events[i].y_p};
   };
   std::size_t i = 0;
   if (!events.empty()) place_one(i++);  // the others have one before them
@@ -38,14 +40,14 @@ bool count_times(Microseconds start, Microseconds latest, std::span<const Absolu
     hn::Vec<decltype(words)> before, times, places;
     hn::LoadInterleaved2(words, in + 2 * i - 2, before, places);
     hn::LoadInterleaved2(words, in + 2 * i, times, places);
-    steps = hn::Or(steps, hn::Sub(times, before));
+    falls = hn::Or(falls, hn::VecFromMask(words, hn::Lt(times, before)));
     const auto counted = hn::And(hn::Sub(times, hn::Set(words, start)), hn::Set(words, 0xffffffff));
     const auto event = hn::Or(counted, hn::ShiftLeft<32>(places));
     hn::StoreU(event, words, reinterpret_cast<std::int64_t*>(out + i));
   }
   if (i > 0 && i < events.size()) latest = events[i - 1].t;
   for (; i < events.size(); ++i) place_one(i);
-  return step >= 0 && hn::AllFalse(words, hn::Lt(steps, hn::Zero(words)));
+  return !falls_here && hn::AllTrue(words, hn::Eq(falls, hn::Zero(words)));
 }
 
 }  // namespace

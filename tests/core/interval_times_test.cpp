@@ -60,4 +60,17 @@ TEST(IntervalTimes, NoticeEveryFall) {
   });
 }
 
+TEST(IntervalTimes, AreComparedOverTheirWholeRange) {
+  constexpr auto far = Microseconds{3} << 61;
+  targets::for_each([](const char* target) {
+    for (std::size_t count = 3; count < 40; ++count) {
+      auto events = random_events(count);
+      events[count - 2].t = far;
+      events[count - 1].t = -far;  // further back than 64 bits can tell
+      std::vector<Event> out(count);
+      EXPECT_FALSE(count_times_from(start, start, events, out.data())) << target << ' ' << count;
+    }
+  });
+}
+
 }  // namespace
