@@ -51,16 +51,25 @@ TEST(Decimal, IsExact) {
            {".5", 6, 500'000, true},
            {"5.", 0, 5, true},
            {"0.003820001", 6, 3820, false},
-           {"0.0038195", 6, 3820, false},
+           {"0.0038195", 6, 3819, false},
+           {"0.000003", 6, 3, true},
+           {"2.999999999999999924e-06", 6, 3, false},  // 3e-6 as a double
+           {"2.9999999999999e-06", 6, 2, false},
+           {"1600000000.123456955", 6, 1600000000123457, false},  // ...457 as a double
+           {"1600000000.123456", 6, 1600000000123456, true},
+           {"-0.0000015", 6, -2, false},
+           {"-3.000000000000000076e-06", 6, -3, false},
            {"0.00381949999999999999999999", 6, 3819, false},
            {"1.000000000000000000e+00", 0, 1, true},
-           {"1.5E-6", 6, 2, false},
+           {"1.5E-6", 6, 1, false},
            {"1468939993.067416019", 6, 1468939993067416, false},
            {"9223372036854775807", 0, INT64_MAX, true},
            {"-9223372036854775807", 0, -INT64_MAX, true},
            {"9223372036854.775807", 6, INT64_MAX, true},
            {"123456", -3, 123, false},
-           {"123500", -3, 124, false},
+           {"123500", -3, 123, false},
+           {"123999", -3, 123, false},
+           {"-123001", -3, -124, false},
            {"0e999999999999", 6, 0, true},
            {"1e-999999999999", 6, 0, false},
            {"100000000000000000000000000000e-29", 0, 1, true},
@@ -115,7 +124,7 @@ TEST(Csv, OrderAndUnitAsSet) {
   settings.columns = *columns_of("txyp");
   settings.unit = TimeUnit::nanoseconds;
   EXPECT_EQ(read("10499 3 4 1\n10500 5 6 0\n", settings).events,
-            (Events{on(3, 4, 10), off(5, 6, 11)}));
+            (Events{on(3, 4, 10), off(5, 6, 10)}));
   settings.unit = TimeUnit::seconds;
   EXPECT_EQ(read("10 3 4 1\n", settings).events, (Events{on(3, 4, 10'000'000)}));
   settings = {.columns = *columns_of("-t-xyp"), .unit = {}, .size = {}};
@@ -128,7 +137,7 @@ TEST(Csv, OrderAndUnitAsSet) {
 TEST(Csv, UnitByTheNameOfTheColumn) {
   const Events expected = {on(3, 4, 10), off(5, 6, 12)};
   for (const auto* const text :
-       {"t_ns,x,y,p\n10000,3,4,1\n12000,5,6,0\n", "x y p Timestamp_NS\n3 4 1 9500\n5 6 0 12499\n",
+       {"t_ns,x,y,p\n10000,3,4,1\n12000,5,6,0\n", "x y p Timestamp_NS\n3 4 1 10999\n5 6 0 12000\n",
         "t_us,x,y,p\n10.0,3,4,1\n12.0,5,6,0\n", "time [us];x;y;p\n10;3;4;1\n12;5;6;0\n",
         "t(s),x,y,p\n0.00001,3,4,1\n0.000012,5,6,0\n", "time_ms,x,y,p\n0.01,3,4,1\n0.012,5,6,0\n",
         "t_\xc2\xb5s,x,y,p\n10,3,4,1\n12,5,6,0\n", "t (events),x,y,p\n10,3,4,1\n12,5,6,0\n"})
@@ -206,7 +215,7 @@ TEST(Csv, SecondsAreExact) {
   Events expected;
   for (int i = 0; i < 1000; ++i) {
     char line[64];
-    std::snprintf(line, sizeof line, "1468939993.%06d%03d %d 2 1\n", i * 991 % 1'000'000, i % 500,
+    std::snprintf(line, sizeof line, "1468939993.%06d%03d %d 2 1\n", i * 991 % 1'000'000, i % 1000,
                   i % 100);
     text += line;
     expected.push_back(on(i % 100, 2, 1'468'939'993'000'000 + i * 991 % 1'000'000));
@@ -215,7 +224,7 @@ TEST(Csv, SecondsAreExact) {
   const std::string fill(200, '#');
   EXPECT_EQ(read("0.0 1 1 1\n0.12345678949999 1 1 1\n0.1234565 1 1 1\n1 1 1 1\n2.5 1 1 0\n" + fill)
                 .events,
-            (Events{on(1, 1, 0), on(1, 1, 123457), on(1, 1, 123457), on(1, 1, 1'000'000),
+            (Events{on(1, 1, 0), on(1, 1, 123456), on(1, 1, 123456), on(1, 1, 1'000'000),
                     off(1, 1, 2'500'000)}));
 }
 

@@ -121,7 +121,7 @@ TEST(Npy, RowsOfNumbers) {
     EXPECT_EQ(decoder.corruption().places, 0U);
     expect_same_however_cut([] { return std::make_unique<NpyDecoder>(); }, bytes);
   }
-  const auto mirrored = rows_of<std::int32_t>("<i4", {1, 4, 3, 10'499, 0, 6, 5, 11'500});
+  const auto mirrored = rows_of<std::int32_t>("<i4", {1, 4, 3, 10'999, 0, 6, 5, 12'000});
   EXPECT_THROW(
       {
         NpyDecoder decoder;
@@ -148,7 +148,8 @@ TEST(Npy, UnitByTheNameOrTheNumbers) {
     return events.empty() ? -1 : events.front().t;
   };
   EXPECT_EQ(first_time("t", "<i8", std::int64_t{1500}, std::int64_t{2500}), 1500);
-  EXPECT_EQ(first_time("t_ns", "<i8", std::int64_t{1500}, std::int64_t{2500}), 2);
+  EXPECT_EQ(first_time("t_ns", "<i8", std::int64_t{1999}, std::int64_t{2500}), 1);
+  EXPECT_EQ(first_time("t_ns", "<i8", std::int64_t{-1001}, std::int64_t{2500}), -2);
   EXPECT_EQ(first_time("time_ms", "<u8", std::uint64_t{1500}, std::uint64_t{2500}), 1'500'000);
   EXPECT_EQ(first_time("ts", "<i8", std::int64_t{1'468'939'993'067'416'019},
                        std::int64_t{1'468'939'993'067'416'020}),

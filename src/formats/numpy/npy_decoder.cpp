@@ -38,17 +38,23 @@ double floating_of(const NpyField& field, const std::uint8_t* element) {
   return half_of(static_cast<std::uint16_t>(word));
 }
 
-/// Multiplies an integer by a power of ten and rounds to nearest; nothing if the result exceeds 64
-/// bits.
+/// Multiplies an integer by a power of ten and rounds down; nothing if the result exceeds 64 bits.
 std::optional<std::int64_t> scaled(std::int64_t number, int power) {
   for (; power > 0; --power)
     if (__builtin_mul_overflow(number, 10, &number)) return std::nullopt;
   std::int64_t divisor = 1;
   for (; power < 0; ++power) divisor *= 10;
-  return number / divisor + 2 * (number % divisor) / divisor;
+  return number / divisor - (number % divisor < 0 ? 1 : 0);
 }
 
-/// Multiplies the number in a field by a power of ten and rounds to nearest; nothing if the result
+/// Rounds down, except where a number of `digits` binary digits cannot be told from the integer
+/// above: 3e-6 s may be stored as slightly less.
+double rounded_down(double number, int digits) {
+  const double above = std::floor(number) + 1;
+  return above - number <= std::min(std::ldexp(std::abs(above), -digits), 0.5) ? above : above - 1;
+}
+
+/// Multiplies the number in a field by a power of ten and rounds down; nothing if the result
 /// exceeds 64 bits.
 std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t* element,
                                       int power = 0) {
@@ -67,7 +73,8 @@ std::optional<std::int64_t> number_of(const NpyField& field, const std::uint8_t*
   }
   constexpr double factors[] = {1e-3, 1, 1e3, 1e6};
   const double factor = factors[power / 3 + 1];
-  const double number = std::round(floating_of(field, element) * factor);
+  const int digits = field.bytes == 8 ? 52 : field.bytes == 4 ? 23 : 10;
+  const double number = rounded_down(floating_of(field, element) * factor, digits);
   if (!(std::abs(number) < 0x1p63)) return std::nullopt;  // also rejects NaN
   return static_cast<std::int64_t>(number);
 }

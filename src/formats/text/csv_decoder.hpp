@@ -23,7 +23,7 @@ namespace eventcamera {
 ///   by the numbers (TableSample);
 /// - the time unit, by the name of its column or by the numbers. Integer times in blank-separated
 ///   columns without names may be microseconds (DVS-Voltmeter) or nanoseconds (rpg_esim); an
-///   ambiguous file is refused. Finer digits are rounded to the nearest microsecond;
+///   ambiguous file is refused. Times are rounded down to microseconds;
 /// - the sensor size, by %geometry:W,H, by names such as x@W and y@H, or by a first line W H.
 ///
 /// Polarity is 0/1, -1/1 or false/true.

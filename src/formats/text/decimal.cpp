@@ -67,14 +67,21 @@ std::optional<Decimal> read_decimal(std::string_view text, int power) {
     if (digits > most / 10) return std::nullopt;
     digits *= 10;
   }
-  // Only the last division rounds; the truncation before it cannot turn a half into less.
-  for (; power < 0 && digits != 0; ++power) {
-    const auto last = digits % 10;
-    whole = whole && last == 0;
-    digits = digits / 10 + (power == -1 && last >= 5 ? 1 : 0);
+  // Cuts off digits, which are rest / scale.
+  auto rest = 0.0;
+  auto scale = 1.0;
+  for (; power < 0 && digits != 0; ++power, scale *= 10) {
+    rest += static_cast<double>(digits % 10) * scale;
+    digits /= 10;
   }
+  whole = whole && rest == 0;
+  if (digits >= most && !whole) return std::nullopt;
   if (digits > most) return std::nullopt;
-  const auto value = static_cast<std::int64_t>(digits);
+  const auto next = static_cast<double>(digits) + 1;
+  const bool is_next = scale - rest <= scale * std::min(next * 0x1p-53, 0.5);
+  const bool is_this = rest <= scale * std::min(static_cast<double>(digits) * 0x1p-53, 0.5);
+  const bool up = negative ? !whole && !is_this : is_next;
+  const auto value = static_cast<std::int64_t>(digits + (up ? 1 : 0));
   return Decimal{negative ? -value : value, whole, has_fraction};
 }
 
