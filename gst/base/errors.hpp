@@ -41,12 +41,13 @@ struct Report {
   std::string text;
 };
 
-/// Like GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, with code and text as values.
+/// Like GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, with code and text as values. Bytes of a file
+/// that are quoted in them and are not UTF-8 become U+FFFD.
 inline void post_message(gpointer element, GstMessageType type, const Report& report,
                          const std::string& cause, CallSite at = CallSite()) {
   gst_element_message_full(GST_ELEMENT(element), type, report.code.domain, report.code.code,
-                           g_strdup(report.text.c_str()), g_strdup(cause.c_str()), at.file,
-                           at.function, at.line);
+                           g_utf8_make_valid(report.text.c_str(), -1),
+                           g_utf8_make_valid(cause.c_str(), -1), at.file, at.function, at.line);
 }
 
 /// Log level of a condition that tends to repeat: WARNING the first time, then LOG.

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Readers of event files with files that are damaged or empty, or of another format.
+#include <tuple>
+
 #include "tests/elements/event_files.hpp"
 
 namespace {
@@ -86,6 +88,38 @@ TEST_P(EveryFormat, SurvivesNoise) {
       ASSERT_LT(event.x, width);
       ASSERT_LT(event.y(), height);
     }
+  }
+}
+
+/// Text and cause of the error that ends a file.
+std::string error_of(std::string_view file, const std::string& reader, const std::string& caps) {
+  Reader h(reader, caps);
+  push_segment(h.get(), GST_FORMAT_BYTES);
+  h.read(file);
+  const auto message = h.message(GST_MESSAGE_ERROR);
+  if (!message) return "";
+  GError* error = nullptr;
+  gchar* cause = nullptr;
+  gst_message_parse_error(message.get(), &error, &cause);
+  const std::string texts = error->message + std::string(cause);
+  g_error_free(error);
+  g_free(cause);
+  return texts;
+}
+
+TEST(FileReaders, QuoteTheBytesOfAFileInUtf8) {
+  const std::string raw = "% format EVT\xff;width=2;height=2\n% end\n";
+  const std::string order = "% format EVT21;endianness=\xfe;width=2;height=2\n% end\n";
+  const std::string version = "#!AER-DAT\xff.0\r\n";
+  const std::string camera = "#!AER-DAT2.0\r\n# AEChip: \xff\r\n#End Of ASCII Header\r\n";
+  for (const auto& [file, reader, caps] :
+       {std::tuple{raw, "evtdec", "application/x-prophesee-raw"},
+        {order, "evtdec", "application/x-prophesee-raw"},
+        {version, "aedatdemux", "application/x-aedat, version=2"},
+        {camera, "aedatdemux", "application/x-aedat, version=2"}}) {
+    const auto text = error_of(file, reader, caps);
+    EXPECT_NE(text.find("\xEF\xBF\xBD"), std::string::npos) << text;
+    EXPECT_TRUE(g_utf8_validate(text.data(), static_cast<gssize>(text.size()), nullptr)) << text;
   }
 }
 
