@@ -78,8 +78,9 @@ std::optional<Decimal> read_decimal(std::string_view text, int power) {
   if (digits >= most && !whole) return std::nullopt;
   if (digits > most) return std::nullopt;
   const auto next = static_cast<double>(digits) + 1;
-  const bool is_next = scale - rest <= scale * std::min(next * 0x1p-53, 0.5);
-  const bool is_this = rest <= scale * std::min(static_cast<double>(digits) * 0x1p-53, 0.5);
+  constexpr double most_unsure = 0.0005;  // three more digits are always believed
+  const bool is_next = scale - rest <= scale * std::min(next * 0x1p-53, most_unsure);
+  const bool is_this = rest <= scale * std::min(static_cast<double>(digits) * 0x1p-53, most_unsure);
   const bool up = negative ? !whole && !is_this : is_next;
   const auto value = static_cast<std::int64_t>(digits + (up ? 1 : 0));
   return Decimal{negative ? -value : value, whole, has_fraction};
