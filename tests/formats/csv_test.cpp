@@ -226,6 +226,11 @@ TEST(Csv, SecondsAreExact) {
                 .events,
             (Events{on(1, 1, 0), on(1, 1, 123456), on(1, 1, 123456), on(1, 1, 1'000'000),
                     off(1, 1, 2'500'000)}));
+  // A double that is just below its microsecond, printed with all its digits.
+  EXPECT_EQ(read("1.00000299999999995 1 1 1\n1.99999999999999978 1 1 1\n2.5 1 1 0\n" + fill).events,
+            (Events{on(1, 1, 1'000'003), on(1, 1, 2'000'000), off(1, 1, 2'500'000)}));
+  EXPECT_EQ(read("t_ns,x,y,p\n999,1,1,1\n1999,1,1,1\n2000,1,1,0\n" + fill).events,
+            (Events{on(1, 1, 0), on(1, 1, 1), off(1, 1, 2)}));
 }
 
 TEST(Csv, CorruptionIsSkippedAndCounted) {

@@ -412,13 +412,15 @@ const char* CsvDecoder::read_plain_line(const char* at, Row& row) const {
             const auto digits = read_digits(at);
             at += digits.count;
             if (digits.count == 8) at += read_digits(at).count;
-            value += (digits.value * powers_of_ten[8 - digits.count] + 50) / 100;
+            const auto fraction = digits.value * powers_of_ten[8 - digits.count];
+            if (fraction % 100 == 99) return nullptr;  // may be a whole microsecond in a double
+            value += fraction / 100;
           }
         } else if (power_ == 3) {
           if (value > 1'000'000'000'000) return nullptr;
           value *= 1000;
         } else if (power_ == -3) {
-          value = (value + 500) / 1000;
+          value /= 1000;
         }
       }
     }
