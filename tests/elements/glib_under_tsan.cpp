@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Makes the synchronization by GLib's locks and queues visible to ThreadSanitizer, which does not
-// see futexes. Linked into a test, these functions replace GLib's, and call them.
+// Makes the synchronization by GLib's locks and queues, and by GStreamer's buffer pools, visible to
+// ThreadSanitizer, which does not see futexes, nor atomics in libraries without it. Linked into a
+// test, these functions replace theirs, and call them.
 #include <dlfcn.h>
 #include <glib-object.h>
+#include <gst/gst.h>
 #include <sanitizer/tsan_interface.h>
 
 namespace {
 
-/// GLib's function of this name, which is replaced here.
+/// The library's function of this name, which is replaced here.
 template <class Function>
 Function* behind(Function*, const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
@@ -76,6 +78,21 @@ gpointer g_async_queue_timeout_pop(GAsyncQueue* queue, guint64 timeout) {
   gpointer data = real(queue, timeout);
   __tsan_acquire(queue);
   return data;
+}
+
+// A pool hands a buffer that was released last in one thread to another.
+void gst_mini_object_unref(GstMiniObject* object) {
+  BEHIND(gst_mini_object_unref);
+  __tsan_release(object);
+  real(object);
+}
+
+GstFlowReturn gst_buffer_pool_acquire_buffer(GstBufferPool* pool, GstBuffer** buffer,
+                                             GstBufferPoolAcquireParams* params) {
+  BEHIND(gst_buffer_pool_acquire_buffer);
+  const auto result = real(pool, buffer, params);
+  if (result == GST_FLOW_OK) __tsan_acquire(*buffer);
+  return result;
 }
 
 }  // extern "C"
