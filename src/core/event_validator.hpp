@@ -32,6 +32,9 @@ class EventValidator {
     return dropped;
   }
 
+  /// Forgets all times.
+  void restart() { *this = {width_, height_}; }
+
   /// Treats events before `time` as late from now on.
   void pass(Microseconds time) { earliest_ = std::max(earliest_, time); }
 

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
-#include <vector>
+#include <memory>
+#include <new>
 
 namespace eventcamera {
 
@@ -41,7 +43,7 @@ struct ImageView {
 ///
 /// Rows start on a cache line. At least 64 bytes and 16 pixels past the end of a row (and its
 /// margin) may be read and written, so that kernels can load and store whole vectors up to the end
-/// of any row. They are initially 0.
+/// of any row. They are initially 0. A page of memory is only taken when a pixel in it is written.
 template <class Pixel>
 class Image {
  public:
@@ -50,16 +52,26 @@ class Image {
   /// exist.
   Image(int width, int height, int margin = 0)
       : width_(width), height_(height), margin_(margin), stride_(padded_stride()) {
-    lines_.resize(static_cast<std::size_t>(height + 2 * margin) * (stride_ / line_size));
+    memory_.reset(static_cast<std::byte*>(std::calloc(1, size() + line_size)));
+    if (!memory_) throw std::bad_alloc();
+    bytes_ =
+        memory_.get() + line_size - reinterpret_cast<std::uintptr_t>(memory_.get()) % line_size;
   }
+  Image(const Image& other) : Image(other.width_, other.height_, other.margin_) {
+    if (other.bytes_ != nullptr) std::memcpy(bytes_, other.bytes_, size());
+  }
+  Image(Image&&) noexcept = default;
+  Image& operator=(const Image& other) { return *this = Image(other); }
+  Image& operator=(Image&&) noexcept = default;
+  ~Image() = default;
 
   int width() const { return width_; }
   int height() const { return height_; }
   int margin() const { return margin_; }
   /// Bytes from one row to the next.
   std::ptrdiff_t stride() const { return stride_; }
-  Pixel* row(int y) { return reinterpret_cast<Pixel*>(bytes() + offset(y)); }
-  const Pixel* row(int y) const { return reinterpret_cast<const Pixel*>(bytes() + offset(y)); }
+  Pixel* row(int y) { return reinterpret_cast<Pixel*>(bytes_ + offset(y)); }
+  const Pixel* row(int y) const { return reinterpret_cast<const Pixel*>(bytes_ + offset(y)); }
   Pixel& at(int x, int y) { return row(y)[x]; }
   const Pixel& at(int x, int y) const { return row(y)[x]; }
   ImageView<Pixel> view() const { return {row(0), stride_, width_, height_}; }
@@ -74,8 +86,8 @@ class Image {
 
  private:
   static constexpr std::ptrdiff_t line_size = 64;
-  struct alignas(line_size) Line {
-    std::byte bytes[line_size];
+  struct Free {
+    void operator()(std::byte* memory) const { std::free(memory); }
   };
 
   static std::ptrdiff_t whole_lines(std::ptrdiff_t bytes) {
@@ -91,15 +103,17 @@ class Image {
     const auto stride = left_margin() + whole_lines((width_ + margin_) * pixel + padding);
     return stride % page == 0 ? stride + line_size : stride;  // rows must not share a cache set
   }
+  std::size_t size() const {
+    return static_cast<std::size_t>(height_ + 2 * margin_) * static_cast<std::size_t>(stride_);
+  }
   std::ptrdiff_t offset(int y) const { return (y + margin_) * stride_ + left_margin(); }
-  std::byte* bytes() { return reinterpret_cast<std::byte*>(lines_.data()); }
-  const std::byte* bytes() const { return reinterpret_cast<const std::byte*>(lines_.data()); }
 
   int width_ = 0;
   int height_ = 0;
   int margin_ = 0;
   std::ptrdiff_t stride_ = 0;
-  std::vector<Line> lines_;
+  std::unique_ptr<std::byte, Free> memory_;
+  std::byte* bytes_ = nullptr;
 };
 
 }  // namespace eventcamera

@@ -8,11 +8,6 @@
 namespace eventcamera {
 namespace {
 
-template <class Pixel>
-void fill(Image<Pixel>& image, Pixel value) {
-  for (int y = 0; y < image.height(); ++y) std::fill_n(image.row(y), image.width(), value);
-}
-
 double pixels_of(const EventMap& map) {
   return static_cast<double>(map.width()) * static_cast<double>(map.height());
 }
@@ -36,22 +31,6 @@ Microseconds IntervalHistogram::quantile(double share) const {
   return middle_of(bin);
 }
 
-EventStatistics::EventStatistics(int width, int height)
-    : map_(width, height), last_(width, height) {
-  forget_times();
-}
-
-void EventStatistics::restart() {
-  fill(map_, std::uint32_t{0});
-  intervals_.clear();
-  on_ = 0;
-  off_ = 0;
-}
-
-void EventStatistics::forget_times() {
-  fill(last_, never);
-}
-
 StreamFigures EventStatistics::figures(Nanoseconds duration) const {
   StreamFigures figures;
   figures.events = on_ + off_;
@@ -62,13 +41,12 @@ StreamFigures EventStatistics::figures(Nanoseconds duration) const {
   if (duration <= 0) return figures;
 
   const double seconds = static_cast<double>(duration) * 1e-9;
-  const double mean = mean_of(map_);
-  double squares = 0;
-  for (int y = 0; y < map_.height(); ++y)
-    for (int x = 0; x < map_.width(); ++x) squares += std::pow(map_.at(x, y) - mean, 2);
+  const double pixels = pixels_of(map_);
+  const double mean = static_cast<double>(figures.events) / pixels;
+  const double variance = static_cast<double>(squares_) / pixels - mean * mean;
   figures.rate = static_cast<double>(figures.events) / seconds;
   figures.mean = mean / seconds;
-  figures.std_dev = std::sqrt(squares / pixels_of(map_)) / seconds;
+  figures.std_dev = std::sqrt(std::max(variance, 0.0)) / seconds;
   return figures;
 }
 

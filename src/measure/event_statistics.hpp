@@ -5,9 +5,12 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <utility>
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
+#include "src/measure/last_time.hpp"
 
 namespace eventcamera {
 
@@ -69,27 +72,43 @@ class IntervalHistogram {
   std::uint64_t count_ = 0;
 };
 
+/// Times of the last event of each pixel.
+class LastTimes {
+ public:
+  /// Throws std::bad_alloc.
+  LastTimes(int width, int height) : last_(width, height) {}
+
+  /// Takes an event, which must lie inside the sensor and not be earlier than the last one. Returns
+  /// the time since the last event of its pixel, if any.
+  std::optional<Microseconds> take(const AbsoluteEvent& event) {
+    const auto last = std::exchange(last_.at(event.x, event.y()), event.t);
+    return last.is_known() ? std::optional(event.t - last.value()) : std::nullopt;
+  }
+
+  /// Forgets all times, so that no interval spans a discontinuity.
+  void forget() { last_ = {last_.width(), last_.height()}; }
+
+ private:
+  Image<LastTime> last_;
+};
+
 /// Collects statistics of a stream. Memory depends on the sensor size, not on the length of the
 /// stream.
 class EventStatistics {
  public:
   /// Throws std::bad_alloc.
-  EventStatistics(int width, int height);
+  EventStatistics(int width, int height) : map_(width, height) {}
 
-  /// Adds an event, which must lie inside the sensor and not be earlier than the last one.
-  void add(const AbsoluteEvent& event) {
-    auto& last = last_.at(event.x, event.y());
-    if (last != never) intervals_.add(event.t - last);
-    last = event.t;
-    ++map_.at(event.x, event.y());
+  /// Adds an event, which must lie inside the sensor, and the time since the last event of its
+  /// pixel, if any.
+  void add(const AbsoluteEvent& event, std::optional<Microseconds> interval) {
+    if (interval) intervals_.add(*interval);
+    squares_ += 2 * std::uint64_t{map_.at(event.x, event.y())++} + 1;
     ++(event.polarity() == Polarity::on ? on_ : off_);
   }
 
-  /// Resets all counts. Pixels remember their last events, so that no interval is lost.
-  void restart();
-
-  /// Forgets the last events, so that no interval spans a discontinuity.
-  void forget_times();
+  /// Resets all counts.
+  void restart() { *this = {map_.width(), map_.height()}; }
 
   /// Returns the statistics since the last restart(), `duration` ago.
   StreamFigures figures(Nanoseconds duration) const;
@@ -97,11 +116,9 @@ class EventStatistics {
   const EventMap& map() const { return map_; }
 
  private:
-  static constexpr Microseconds never = INT64_MIN;
-
   EventMap map_;
-  Image<Microseconds> last_;
   IntervalHistogram intervals_;
+  std::uint64_t squares_ = 0;  ///< sum of the squared events of each pixel
   std::uint64_t on_ = 0;
   std::uint64_t off_ = 0;
 };

@@ -10,12 +10,9 @@ namespace {
 
 constexpr Microseconds max_distance = match_distances.back();
 constexpr Microseconds no_match = std::numeric_limits<Microseconds>::max();
-constexpr Microseconds never = std::numeric_limits<Microseconds>::min();
 
-/// no_match without an earlier event, because a difference to `never` would overflow.
-Microseconds distance_between(Microseconds earlier, Microseconds later) {
-  if (earlier == never) return no_match;
-  return later - earlier;
+Microseconds distance_between(LastTime earlier, Microseconds later) {
+  return earlier.is_known() ? later - earlier.value() : no_match;
 }
 
 }  // namespace
@@ -37,13 +34,8 @@ void RateCurve::join_bins() {
 }
 
 EventMatcher::EventMatcher(int width, int height) {
-  for (const auto role : both_roles) {
-    for (auto& pixels : streams_[role].pixels) {
-      pixels = Image<Pixel>(width, height, 1);
-      for (int y = -1; y <= height; ++y)
-        std::fill_n(&pixels.at(-1, y), width + 2, Pixel{.last = never, .waiting = 0});
-    }
-  }
+  for (const auto role : both_roles)
+    for (auto& pixels : streams_[role].pixels) pixels = Image<Pixel>(width, height, 1);
 }
 
 void EventMatcher::count(Stream& stream, Microseconds distance, Microseconds known_distance) {
@@ -75,7 +67,7 @@ void EventMatcher::add(StreamRole role, const AbsoluteEvent& event) {
   const auto polarity = static_cast<std::size_t>(event.polarity());
   auto& others = streams_[other(role)];
   auto& around = others.pixels[polarity];
-  auto last = never;
+  LastTime last;
   for (int y = event.y() - 1; y <= event.y() + 1; ++y) {
     for (int x = event.x - 1; x <= event.x + 1; ++x) {
       auto& pixel = around.at(x, y);
@@ -95,6 +87,7 @@ void EventMatcher::add(StreamRole role, const AbsoluteEvent& event) {
 StreamComparison::StreamComparison(int width, int height)
     : arriving_({.validator = EventValidator(width, height)},
                 {.validator = EventValidator(width, height)}),
+      last_times_(LastTimes(width, height), LastTimes(width, height)),
       statistics_(EventStatistics(width, height), EventStatistics(width, height)),
       matcher_(width, height) {}
 
@@ -151,7 +144,7 @@ void StreamComparison::take_until(Microseconds end) {
     const auto& event = due[role].front();
     due[role] = due[role].subspan(1);
     if (event.t < begin) continue;
-    statistics_[role].add(event);
+    statistics_[role].add(event, last_times_[role].take(event));
     matcher_.add(role, event);
     rates_.add(role, event.t);
   }

@@ -30,7 +30,7 @@ template <class Type>
 class PerRole {
  public:
   PerRole() = default;
-  PerRole(const Type& reference, const Type& candidate) : both_{reference, candidate} {}
+  PerRole(Type reference, Type candidate) : both_{std::move(reference), std::move(candidate)} {}
 
   Type& operator[](StreamRole role) { return both_[static_cast<std::size_t>(role)]; }
   const Type& operator[](StreamRole role) const { return both_[static_cast<std::size_t>(role)]; }
@@ -103,8 +103,8 @@ class EventMatcher {
   static constexpr std::size_t max_waiting = std::size_t{1} << 23;
 
   struct Pixel {
-    Microseconds last;  ///< time of the last event
-    Number waiting;     ///< latest waiting event at this pixel
+    LastTime last;
+    Number waiting;  ///< latest waiting event at this pixel
   };
   struct Waiting {
     Microseconds time;
@@ -169,6 +169,7 @@ class StreamComparison {
   void take_until(Microseconds end);
 
   PerRole<Arriving> arriving_;
+  PerRole<LastTimes> last_times_;
   PerRole<EventStatistics> statistics_;
   EventMatcher matcher_;
   RateCurve rates_;

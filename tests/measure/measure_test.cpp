@@ -151,25 +151,35 @@ TEST(IntervalHistogram, IsExactBelow64AndToAThirtySecondBeyond) {
   EXPECT_GT(intervals.quantile(1), INT64_MAX / 33 * 32);
 }
 
-TEST(EventStatistics, RestartsAndRemembersLastTimes) {
+TEST(LastTimes, AreForgotten) {
+  LastTimes times(3, 2);
+  const auto interval_at = [&times](Microseconds t) {
+    return times.take(AbsoluteEvent::at(2, 1, t, Polarity::on));
+  };
+  EXPECT_EQ(interval_at(-5), std::nullopt);
+  EXPECT_EQ(interval_at(0), 5);
+  EXPECT_EQ(interval_at(0), 0);
+  EXPECT_EQ(interval_at(30), 30);
+  EXPECT_EQ(times.take(AbsoluteEvent::at(1, 1, 40, Polarity::on)), std::nullopt);
+  times.forget();
+  EXPECT_EQ(interval_at(20), std::nullopt);
+}
+
+TEST(EventStatistics, Restarts) {
   EventStatistics statistics(3, 2);
-  statistics.add(AbsoluteEvent::at(2, 1, 100, Polarity::on));
+  statistics.add(AbsoluteEvent::at(2, 1, 100, Polarity::on), 7);
   statistics.restart();
-  statistics.add(AbsoluteEvent::at(2, 1, 130, Polarity::off));
-  auto figures = statistics.figures(1'000'000'000);
+  statistics.add(AbsoluteEvent::at(2, 1, 130, Polarity::off), 30);
+  const auto figures = statistics.figures(1'000'000'000);
   EXPECT_EQ(figures.events, 1U);
   EXPECT_EQ(figures.on_share, 0);
-  EXPECT_EQ(figures.intervals[2], 30);
+  EXPECT_EQ(figures.intervals[0], 30);
   EXPECT_EQ(statistics.map().at(2, 1), 1U);
-  statistics.restart();
-  statistics.forget_times();
-  statistics.add(AbsoluteEvent::at(2, 1, 90, Polarity::off));
-  EXPECT_EQ(statistics.figures(1'000'000'000).intervals[2], 0);
 }
 
 TEST(EventStatistics, HasNoRateWithoutTime) {
   EventStatistics statistics(1, 1);
-  statistics.add(AbsoluteEvent::at(0, 0, 1, Polarity::on));
+  statistics.add(AbsoluteEvent::at(0, 0, 1, Polarity::on), std::nullopt);
   const auto figures = statistics.figures(0);
   EXPECT_EQ(figures.events, 1U);
   EXPECT_EQ(figures.rate, 0);

@@ -46,6 +46,7 @@ GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 
 using eventcamera::EventStatistics;
 using eventcamera::EventValidator;
+using eventcamera::LastTimes;
 using eventcamera::Nanoseconds;
 
 namespace {
@@ -74,12 +75,14 @@ struct Measurement {
       : width(sensor_width),
         height(sensor_height),
         validator(width, height),
+        last_times(width, height),
         cumulative{.statistics = EventStatistics(width, height)},
         recent{.statistics = EventStatistics(width, height)} {}
 
   int width;
   int height;
   EventValidator validator;
+  LastTimes last_times;
   Part cumulative;
   Part recent;                       ///< since the last message
   std::optional<Nanoseconds> end{};  ///< in stream time
@@ -159,9 +162,8 @@ static void cover(GstEventStats* self, Nanoseconds start, Nanoseconds end) {
   if (measurement.end && start < *measurement.end - static_cast<Nanoseconds>(event_resolution)) {
     GST_DEBUG_OBJECT(self, "stream time goes back from %" GST_STIME_FORMAT " to %" GST_STIME_FORMAT,
                      GST_STIME_ARGS(*measurement.end), GST_STIME_ARGS(start));
-    measurement.validator = EventValidator(measurement.width, measurement.height);
-    for (auto* part : {&measurement.cumulative, &measurement.recent})
-      part->statistics.forget_times();
+    measurement.validator.restart();
+    measurement.last_times.forget();
     measurement.end.reset();
   }
   const Nanoseconds from = measurement.end.value_or(start);
@@ -190,8 +192,9 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
   const std::size_t skipped = measurement.validator.take(
       mapped.events(), start / 1000, [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
-        measurement.cumulative.statistics.add(event);
-        measurement.recent.statistics.add(event);
+        const auto interval = measurement.last_times.take(event);
+        measurement.cumulative.statistics.add(event, interval);
+        measurement.recent.statistics.add(event, interval);
       });
   if (skipped > 0) self->priv->faults.warn(self, EventFault::beyond_sensor, buffer);
 }
