@@ -30,6 +30,17 @@ Pixels pixels_of(const RenderSettings& settings, const PixelLayout& layout) {
   return pixels;
 }
 
+/// `side` pixels of a sensor in pixels of the picture.
+int reduced(int side, int reduction) {
+  return (side + reduction - 1) / reduction;
+}
+
+int reduction_of(int width, int height) {
+  int reduction = 1;
+  while (reduced(width, reduction) * reduced(height, reduction) > Renderer::max_pixels) ++reduction;
+  return reduction;
+}
+
 }  // namespace
 
 Renderer::Memory Renderer::make_memory(int width, int height, const RenderSettings& settings) {
@@ -46,12 +57,13 @@ Renderer::Memory Renderer::make_memory(int width, int height, const RenderSettin
 }
 
 Renderer::Renderer(int width, int height, const RenderSettings& settings)
-    : width_(width),
-      height_(height),
+    : reduction_(reduction_of(width, height)),
+      width_(reduced(width, reduction_)),
+      height_(reduced(height, reduction_)),
       settings_(settings),
-      memory_(make_memory(width, height, settings)),
+      memory_(make_memory(width_, height_, settings)),
       validator_(width, height),
-      row_(static_cast<std::size_t>(width)) {}
+      row_(static_cast<std::size_t>(width_)) {}
 
 void Renderer::configure(const RenderSettings& settings) {
   auto repainted = settings_;
@@ -62,15 +74,19 @@ void Renderer::configure(const RenderSettings& settings) {
 
 void Renderer::reset() {
   memory_ = make_memory(width_, height_, settings_);
-  validator_ = EventValidator(width_, height_);
+  validator_.restart();
   has_drawn_ = false;
 }
 
 std::size_t Renderer::add(std::span<const Event> events, Microseconds start) {
   return std::visit(
       [&](auto& memory) {
-        return validator_.take(events, start,
-                               [&memory](const AbsoluteEvent& event) { memory.add(event); });
+        return validator_.take(events, start, [&](const AbsoluteEvent& event) {
+          memory.add(reduction_ == 1
+                         ? event
+                         : AbsoluteEvent::at(event.x / reduction_, event.y() / reduction_, event.t,
+                                             event.polarity()));
+        });
       },
       memory_);
 }

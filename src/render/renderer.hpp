@@ -35,9 +35,15 @@ struct RenderSettings {
 };
 
 /// Draws pictures of the events up to given times. Events and pictures must be in time order.
+///
+/// A picture has a pixel for each of the sensor's. If these are more than max_pixels, as a hostile
+/// file may state, it has one for 2x2, 3x3, ... of them.
 class Renderer {
  public:
-  /// At most max_side x max_side pixels. Throws std::bad_alloc, as do configure() and add().
+  static constexpr int max_pixels = 1 << 23;  ///< of a picture; those of 4K video fit
+
+  /// For a sensor of at most max_side x max_side pixels. Throws std::bad_alloc, as do configure()
+  /// and add().
   Renderer(int width, int height, const RenderSettings& settings);
 
   void configure(const RenderSettings& settings);
@@ -46,7 +52,7 @@ class Renderer {
   void reset();
 
   /// Adds sorted events whose times are relative to `start`. An event that is not later than the
-  /// last picture is drawn in the next one; events outside the picture are skipped. Returns the
+  /// last picture is drawn in the next one; events outside the sensor are skipped. Returns the
   /// number of skipped events.
   std::size_t add(std::span<const Event> events, Microseconds start);
 
@@ -55,6 +61,7 @@ class Renderer {
   void draw(Microseconds start, Microseconds end, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride);
 
+  /// Size of the pictures.
   int width() const { return width_; }
   int height() const { return height_; }
 
@@ -64,6 +71,7 @@ class Renderer {
   static Memory make_memory(int width, int height, const RenderSettings& settings);
   void shade_row(int y, Microseconds time);
 
+  int reduction_;  ///< pixels of the sensor a side of a pixel of the picture
   int width_;
   int height_;
   RenderSettings settings_;

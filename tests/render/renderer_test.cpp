@@ -347,4 +347,25 @@ TEST(Shades, OfAScaleGrowBrighterWithTheMagnitude) {
   }
 }
 
+TEST(Renderer, DrawsAnEnormousSensorSmaller) {
+  Renderer renderer(16384, 16380, {});
+  EXPECT_EQ(renderer.width(), 2731);
+  EXPECT_EQ(renderer.height(), 2730);
+  const Event events[] = {
+      Event::at(0, 0, 1, Polarity::on), Event::at(16383, 16379, 2, Polarity::on),
+      Event::at(600, 1205, 3, Polarity::off), Event::at(0, 16380, 4, Polarity::on)};
+  EXPECT_EQ(renderer.add(events, 0), 1U);
+  const auto picture = draw(renderer, 0, 10);
+  const auto at = [&](int x, int y) {
+    return picture[static_cast<std::size_t>(y * (renderer.width() + 3) + x)];
+  };
+  const auto background = at(1, 1);
+  EXPECT_NE(at(0, 0), background);
+  EXPECT_EQ(at(2730, 2729), at(0, 0));
+  EXPECT_NE(at(100, 200), background);
+  EXPECT_NE(at(100, 200), at(0, 0));
+  EXPECT_EQ(at(0, 2729), background);
+  EXPECT_EQ(Renderer(3840, 2160, {}).width(), 3840);
+}
+
 }  // namespace

@@ -16,6 +16,9 @@
  * then overlap. #GstEventRender:event-count and #GstEventRender:area-event-count limit the window
  * by the number of events instead of by time.
  *
+ * Pictures have the size of the sensor. A sensor of more than 8 million pixels is drawn at half its
+ * size, or a third, and so on.
+ *
  * Pictures continue without events: through GAP events and, from a live source, by the clock. At
  * framerate 0/1 each buffer of events becomes one picture.
  *
@@ -135,7 +138,7 @@ class FrameTimes {
 
 /// State from caps to stop.
 struct State {
-  int width;
+  int width;  ///< of the sensor
   int height;
   Renderer renderer;
   std::optional<GstVideoInfo> video{};  ///< output format, once negotiated
@@ -392,8 +395,8 @@ GstFlowReturn EventRender::choose_caps(GstCaps* downstream, GstCaps** result) co
   if (!state_) return GST_AGGREGATOR_FLOW_NEED_DATA;
   GstCaps* ours = gst_pad_get_pad_template_caps(GST_AGGREGATOR_SRC_PAD(element()));
   ours = gst_caps_make_writable(ours);
-  gst_caps_set_simple(ours, "width", G_TYPE_INT, state_->width, "height", G_TYPE_INT,
-                      state_->height, nullptr);
+  gst_caps_set_simple(ours, "width", G_TYPE_INT, state_->renderer.width(), "height", G_TYPE_INT,
+                      state_->renderer.height(), nullptr);
   *result = gst_caps_intersect_full(downstream, ours, GST_CAPS_INTERSECT_FIRST);
   gst_caps_unref(ours);
   return gst_caps_is_empty(*result) ? GST_FLOW_NOT_NEGOTIATED : GST_FLOW_OK;
