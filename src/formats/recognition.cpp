@@ -62,8 +62,9 @@ std::optional<Recognised> by_text_header(Bytes bytes) {
   return std::nullopt;
 }
 
-/// True if CsvDecoder decodes every line as an event. An ambiguous time unit does not matter here;
-/// it is reported when the file is read.
+/// True if CsvDecoder decodes every line as an event, and the columns have names or there are some
+/// events. An ambiguous time unit does not matter here, nor do events outside a sensor; they are
+/// reported when the file is read.
 bool is_csv(Bytes bytes) {
   constexpr std::size_t max_bytes = 4096;
   constexpr std::size_t min_events = 3;
@@ -77,7 +78,8 @@ bool is_csv(Bytes bytes) {
   Decoded decoded;
   decoder.decode(bytes, decoded);
   decoder.finish(decoded);
-  return decoded.events.size() >= min_events && decoder.corruption().places == 0;
+  const auto events = decoded.events.size() + decoder.corruption().outside;
+  return (decoder.has_names() || events >= min_events) && decoder.corruption().places == 0;
 }
 
 /// Recognises HDF5 after a user block with any content, whose size is a power of two.

@@ -343,7 +343,8 @@ void RecordingReader::show(Stream& stream) {
   start_due_ = true;
   if (stream.info.kind != StreamKind::events) return;
   if (stream.info.size.width <= 0 || stream.info.size.height <= 0) {
-    stream.info.size = stream.used.sensor(stream.info.mirrored);
+    stream.extent = stream.used.extent(stream.used.within() / 1000);
+    stream.info.size = sensor_with(stream.extent, stream.info.mirrored);
     stream.size_from = SizeFrom::assumption;
   }
   start_chunker(stream);
@@ -435,14 +436,10 @@ void RecordingReader::take(const EventItem& item) {
   auto events = item.events;
   if (stream.size_from != SizeFrom::file &&
       std::ranges::any_of(events, is_outside(stream.info.size))) {
-    if (stream.size_from == SizeFrom::assumption) {
-      stream.used.include(events);
-      stream.info.size = stream.used.sensor(stream.info.mirrored);
-    } else {
-      within_.assign(events.begin(), events.end());
-      stream.outside += std::erase_if(within_, is_outside(stream.info.size));
-      events = within_;
-    }
+    if (stream.size_from == SizeFrom::assumption) grow(stream, events);
+    within_.assign(events.begin(), events.end());
+    stream.outside += std::erase_if(within_, is_outside(stream.info.size));
+    events = within_;
   }
   if (stream.info.mirrored) {
     const auto size = stream.info.size;
@@ -455,6 +452,14 @@ void RecordingReader::take(const EventItem& item) {
   if (clock_ == Clock::stream && !shift_ && interval_) set_shift(item.events.front().t);
   stream.chunker.push(events);
   next_stream_ = 0;
+}
+
+/// Lets an assumed size grow with the events, other than a few far out.
+void RecordingReader::grow(Stream& stream, std::span<const AbsoluteEvent> events) {
+  UsedPixels used;
+  used.include(events);
+  stream.extent = used.extent(std::max<std::size_t>(1, events.size() / 100), stream.extent);
+  stream.info.size = sensor_with(stream.extent, stream.info.mirrored);
 }
 
 void RecordingReader::take(const FrameItem& item) {

@@ -50,12 +50,13 @@ class RecordingReader {
     unsigned number = 0;                 ///< index among streams of its kind
     bool shown = false;                  ///< it has items, or may have some
     Microseconds position = 0;           ///< earliest start of its next item
-    std::uint64_t outside = 0;           ///< events outside a size set by the user
+    std::uint64_t outside = 0;           ///< events outside a size not stated in the file
     std::optional<Microseconds> first;   ///< earliest time in the surveyed part of the file
     std::optional<Microseconds> latest;  ///< latest time in it
     std::optional<Frame> first_frame;    ///< format only: its pixels are no longer valid
-    UsedPixels used = {};
-    bool is_sampled = false;  ///< `used` covers at least one interval
+    UsedPixels used = {};                ///< in the surveyed part
+    Extent extent = {};                  ///< of an assumed size
+    bool is_sampled = false;             ///< `used` covers at least one interval
     Chunker chunker;
   };
 
@@ -196,6 +197,7 @@ class RecordingReader {
   void show(Stream& stream);
   void start_chunker(Stream& stream);
   void take(const EventItem& item);
+  static void grow(Stream& stream, std::span<const AbsoluteEvent> events);
   void take(const FrameItem& item);
   void take(const TriggerItem& item);
   void take(const ImuItem& item);
@@ -239,7 +241,7 @@ class RecordingReader {
 
   std::optional<Interval> interval_;   ///< interval of the words being read
   std::optional<Microseconds> shift_;  ///< offset from the clock of words to that of the stream
-  std::vector<AbsoluteEvent> within_;  ///< events within a size set by the user
+  std::vector<AbsoluteEvent> within_;  ///< events within a size not stated in the file
   std::optional<Output> output_due_;   ///< a frame or a chunk
   WaitingItems<Trigger> triggers_;     ///< with times of the file
   WaitingItems<ImuSample> imu_samples_;

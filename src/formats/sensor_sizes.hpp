@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -25,24 +26,74 @@ inline constexpr SensorSize sensors[] = {{128, 128}, {240, 180}, {304, 240}, {32
 /// Sensors whose files may have mirrored events.
 inline constexpr SensorSize mirrored_sensors[] = {{240, 180}, {346, 260}, {640, 480}};
 
-/// Extent of the pixels with events, to guess a sensor size that the file does not state.
+/// The last of a sensor's columns and rows.
+struct Extent {
+  int x = 0;
+  int y = 0;
+};
+
+/// Returns the smallest sensor that reaches so far. Used for files that do not state its size.
+constexpr SensorSize sensor_with(Extent extent, bool mirrored) {
+  return mirrored ? sensor_with(extent.x, extent.y, mirrored_sensors)
+                  : sensor_with(extent.x, extent.y, sensors);
+}
+
+/// Columns and rows of events, to guess a sensor size that the file does not state.
+///
+/// The guess comes from most of the events, since a corrupt one may be anywhere: an event is a
+/// stray if no sensor is so large, or if it lies more than twice as far out as nearly all others.
 class UsedPixels {
  public:
+  static constexpr int max_guessed_side = 4096;
+
   void include(std::span<const AbsoluteEvent> events) {
+    columns_.resize(max_guessed_side);
+    rows_.resize(max_guessed_side);
     for (const auto& event : events) {
-      max_x_ = std::max<int>(max_x_, event.x);
-      max_y_ = std::max(max_y_, event.y());
+      if (event.x >= max_guessed_side || event.y() >= max_guessed_side) {
+        ++beyond_;
+        continue;
+      }
+      ++columns_[event.x];
+      ++rows_[static_cast<std::size_t>(event.y())];
+      ++within_;
     }
   }
 
-  SensorSize sensor(bool mirrored) const {
-    if (mirrored) return sensor_with(max_x_, max_y_, mirrored_sensors);
-    return sensor_with(max_x_, max_y_, sensors);
+  /// The last column and row with events, other than up to `strays` far out; at least `known`.
+  Extent extent(std::uint64_t strays, Extent known = {}) const {
+    return {last_used(columns_, strays, known.x), last_used(rows_, strays, known.y)};
+  }
+
+  std::uint64_t within() const { return within_; }
+
+  /// True if more than one, and more than 1 in 100, of the events and of `outside` others lie
+  /// beyond any sensor: they are no pixels.
+  bool are_implausible(std::uint64_t outside) const {
+    const auto beyond = beyond_ + outside;
+    return beyond > std::max<std::uint64_t>(1, (within_ + beyond) / 100);
   }
 
  private:
-  int max_x_ = 0;
-  int max_y_ = 0;
+  using Counts = std::vector<std::uint64_t>;
+
+  static int last_used(const Counts& counts, std::uint64_t strays, int known) {
+    const auto last_at = static_cast<int>(counts.size()) - 1;
+    const auto nearly_all = std::max(known, last_but(counts, last_at, strays));
+    return std::max(known, last_but(counts, std::min(last_at, 2 * nearly_all + 1), 0));
+  }
+
+  /// The last used of those up to `last`, but for `strays` events; 0 if there is none.
+  static int last_but(const Counts& counts, int last, std::uint64_t strays) {
+    for (std::uint64_t beyond = 0; last > 0; --last)
+      if ((beyond += counts[static_cast<std::size_t>(last)]) > strays) break;
+    return std::max(last, 0);
+  }
+
+  Counts columns_;
+  Counts rows_;
+  std::uint64_t within_ = 0;
+  std::uint64_t beyond_ = 0;
 };
 
 /// Predicate for events outside a sensor.

@@ -86,6 +86,27 @@ TEST(TableReaders, TakeTheSizeOfTheirProperties) {
   }
 }
 
+TEST(EventCsvDec, RefusesToGuessAnImpossibleSensor) {
+  // Coordinates in fixed point, as in some archives of rectified events.
+  auto events = some_events();
+  std::string text = "t,x,y,p\n";
+  for (auto& event : events) {
+    event = AbsoluteEvent::at(32 * event.x, 32 * event.y(), event.t, event.polarity());
+    for (const auto number : {event.t, Microseconds{event.x}, Microseconds{event.y()}})
+      text += std::to_string(number) + ",";
+    text += event.polarity() == Polarity::on ? "1\n" : "0\n";
+  }
+  const TemporaryFile file(text);
+  for (const std::string way : {"", "queue ! "}) {
+    Player guessed(file.source() + way + "eventcsvdec");
+    EXPECT_FALSE(guessed.play());
+    EXPECT_NE(guessed.error.find("set width and height"), std::string::npos) << guessed.error;
+    Player told(file.source() + way + "eventcsvdec width=16384 height=16384");
+    EXPECT_TRUE(told.play()) << told.error;
+    EXPECT_EQ(told.events, events);
+  }
+}
+
 TEST(EvtDec, LeavesOutEventsOutsideTheSensor) {
   auto file = file_of(format_of("evt2"), some_events());
   const std::string_view size = "height=240;width=320";

@@ -389,6 +389,56 @@ TEST(RecordingReader, GrowsAnAssumedSensorBeforeTheEventsThatNeedIt) {
   EXPECT_EQ(sizes.back(), (SensorSize{1280, 720}));
 }
 
+TEST(RecordingReader, GuessesTheSizeOfASensorFromMostEvents) {
+  constexpr int count = 8000;
+  // Some beyond any sensor, and others within one that no other event needs.
+  constexpr std::pair<int, int> strays[] = {{16000, 100}, {3, 16000}, {4000, 3000}, {900, 700}};
+  Events events;
+  for (int i = 0; i < count; ++i) {
+    events.push_back(AbsoluteEvent::at(i % 240, i % 180, Microseconds{1000} * i, Polarity::on));
+    if (i % 1000 != 500) continue;
+    const auto& [x, y] = strays[i / 1000 % std::size(strays)];
+    events.push_back(AbsoluteEvent::at(x, y, events.back().t, Polarity::off));
+  }
+  NpyEncoder encoder;
+  const auto bytes = recordings::encode(encoder, events);
+  const auto make_decoder = npy_file().make_decoder;
+  for (const std::size_t piece_size : {bytes.size(), std::size_t{4000}}) {
+    RecordingReader reader(make_decoder, chunk_length);
+    std::size_t read = 0;
+    const auto take_all = [&] {
+      while (const auto output = reader.next())
+        if (const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output))
+          read += chunk->events.size();
+    };
+    for (const auto piece : pieces::of(bytes, piece_size)) {
+      reader.push(piece);
+      take_all();
+    }
+    reader.finish();
+    take_all();
+    EXPECT_EQ(read, std::size_t{count}) << piece_size;
+    EXPECT_EQ(reader.counts().outside, 8U) << piece_size;
+    EXPECT_EQ(reader.streams().front().info.size, (SensorSize{240, 180})) << piece_size;
+  }
+}
+
+TEST(UsedPixels, AreImplausibleWhereMoreThanAFewLieBeyondAnySensor) {
+  const auto are_implausible = [](std::size_t within, std::size_t beyond, std::uint64_t outside) {
+    UsedPixels used;
+    used.include(Events(within, AbsoluteEvent::at(4095, 4095, 0, Polarity::on)));
+    used.include(Events(beyond, AbsoluteEvent::at(4096, 0, 0, Polarity::on)));
+    return used.are_implausible(outside);
+  };
+  EXPECT_FALSE(are_implausible(0, 0, 0));
+  EXPECT_FALSE(are_implausible(2, 1, 0));
+  EXPECT_FALSE(are_implausible(2, 0, 1));
+  EXPECT_TRUE(are_implausible(2, 2, 0));
+  EXPECT_TRUE(are_implausible(2, 1, 1));
+  EXPECT_FALSE(are_implausible(990, 10, 0));
+  EXPECT_TRUE(are_implausible(990, 10, 1));
+}
+
 TEST(RecordingReader, LeavesOutWhatLiesOutsideASizeThatIsSet) {
   const auto file = npy_file();
   RecordingReader reader(file.make_decoder, chunk_length);

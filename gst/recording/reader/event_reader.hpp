@@ -123,7 +123,7 @@ class EventReader {
   ReaderPad& pad_of(std::size_t stream);
   GstFlowReturn begin_output();
   void start_streams();
-  void find_size(std::size_t stream);
+  bool find_size(std::size_t stream);
   bool send_caps(std::size_t stream);
   GstFlowReturn refused_size(std::size_t stream);
   void send_segment(ReaderPad& pad);

@@ -119,10 +119,10 @@ GstFlowReturn EventReader::begin_output() {
   const auto& streams = recording_->streams();
   for (std::size_t i = 0; i < streams.size(); ++i) {
     if (!streams[i].shown) continue;
-    find_size(i);
-    if (!send_caps(i)) {
+    const bool has_size = find_size(i);
+    if (!has_size || !send_caps(i)) {
       output_due_ = true;
-      return pad_of(i).refusal();
+      return has_size ? pad_of(i).refusal() : GST_FLOW_ERROR;
     }
     send_segment(pad_of(i));
   }
@@ -185,13 +185,13 @@ void EventReader::start_streams() {
 }
 
 /// If the file does not state the sensor size, uses that of the properties, else the size in
-/// downstream's caps, else one that all events fit into.
-void EventReader::find_size(std::size_t index) {
+/// downstream's caps, else one that most events fit into. False if no sensor is so large.
+bool EventReader::find_size(std::size_t index) {
   const auto& stream = recording_->streams()[index];
-  if (stream.size_from != RecordingReader::SizeFrom::assumption) return;
+  if (stream.size_from != RecordingReader::SizeFrom::assumption) return true;
   if (const auto size = format_settings_.copy().sensor; size.width > 0 && size.height > 0) {
     recording_->set_size(index, size);
-    return;
+    return true;
   }
   GstPad* const pad = pad_of(index).get();
   const OwnedCaps templ(gst_pad_get_pad_template_caps(pad));
@@ -202,8 +202,19 @@ void EventReader::find_size(std::size_t index) {
     if (gst_structure_get_int(structure, "width", &size.width) &&
         gst_structure_get_int(structure, "height", &size.height)) {
       recording_->set_size(index, size);
-      return;
+      return true;
     }
+  }
+  const auto outside = recording_->counts().outside;
+  if (stream.used.are_implausible(outside)) {
+    const auto most = std::to_string(eventcamera::UsedPixels::max_guessed_side);
+    post_message(
+        element_, GST_MESSAGE_ERROR,
+        {GST_STREAM_ERROR_FORMAT,
+         "The file does not state its sensor size, and its events lie beyond " + most + "x" + most +
+             " pixels. If that is right, set width and height."},
+        "columns and rows may have fractions, or other columns may have been read for them");
+    return false;
   }
   const auto text =
       std::to_string(stream.info.size.width) + "x" + std::to_string(stream.info.size.height);
@@ -214,6 +225,7 @@ void EventReader::find_size(std::size_t index) {
                          "The file does not state its sensor size; assuming " + text +
                              " pixels. If events are in the wrong place, set width and height."},
                         "columns and rows of the file count from the far corner");
+  return true;
 }
 
 bool EventReader::send_caps(std::size_t index) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// What applications may ask: position, duration, counts; and warnings.
+#include <algorithm>
 #include <utility>
 
 #include "gst/base/latency.hpp"
@@ -68,10 +69,17 @@ void EventReader::warn_of_dropped() {
   GST_INFO_OBJECT(element_, "%" G_GUINT64_FORMAT " corrupt places, %" G_GUINT64_FORMAT " triggers",
                   guint64{counts.corrupt_places}, guint64{counts.triggers});
   if (untimely + counts.outside == 0) return;
+  const bool is_assumed = std::ranges::any_of(recording_->streams(), [](const auto& stream) {
+    return stream.outside > 0 &&
+           stream.size_from == eventcamera::RecordingReader::SizeFrom::assumption;
+  });
   post_message(element_, GST_MESSAGE_WARNING,
                {format_.has_many_streams ? GST_STREAM_ERROR_DEMUX : GST_STREAM_ERROR_DECODE,
                 text_of(counts.outside) + " events outside the sensor, and " + text_of(untimely) +
-                    " items with times out of order, were dropped."},
+                    " items with times out of order, were dropped." +
+                    (is_assumed ? " The file does not state its sensor size: if the sensor is "
+                                  "larger, set width and height."
+                                : "")},
                text_of(counts.late) + " late, " + text_of(counts.stray) + " at stray times");
 }
 

@@ -36,6 +36,9 @@ class CsvDecoder final : public Decoder {
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
 
+  /// True if the first line names the columns.
+  bool has_names() const { return has_names_; }
+
  private:
   static constexpr std::size_t max_columns = 16;
   using Fields = std::array<std::string_view, max_columns>;
