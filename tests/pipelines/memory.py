@@ -1,0 +1,125 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A file of n bytes costs no reader, player or statistic more than 300 MB + 50 n; two cost a comparison
+twice as much.
+
+The files are tiny, and state or suggest a sensor of up to 16384x16384 pixels, or expand to millions
+of events.
+"""
+
+import os
+import random
+import struct
+import subprocess
+import sys
+import tempfile
+
+import h5py
+import numpy
+
+LAUNCH = os.environ["GST_LAUNCH"]
+os.environ.pop("MALLOC_PERTURB_", None)  # else all memory is written when it is allocated
+LARGEST = 16384
+CHAINS = {
+    "player": "playbin uri=file://{0} video-sink=fakesink",
+    "decodebin": "filesrc location={0} ! decodebin ! videoconvert ! video/x-raw,format=I420 ! fakesink",
+    "decaying": "filesrc location={0} ! decodebin caps={1} ! eventrender mode=decay ! fakesink",
+    "statistics": "filesrc location={0} ! decodebin caps={1} ! eventstats ! fakesink",
+    "comparison": "eventcompare name=c ! fakesink filesrc location={0} ! decodebin caps={1} ! c.reference "
+    "filesrc location={0} ! decodebin caps={1} ! c.candidate",
+}
+EVENTS = "application/x-event-camera,format=XYTP"
+
+
+def scattered(side, count):
+    random.seed(1)
+    return [(100 * i, random.randrange(side), random.randrange(side), i % 2) for i in range(count)]
+
+
+def columns(events):
+    t, x, y, p = zip(*events)
+    return {"t": numpy.array(t, numpy.int64), "x": numpy.array(x, numpy.uint16),
+            "y": numpy.array(y, numpy.uint16), "p": numpy.array(p, numpy.uint8)}
+
+
+def table(events):
+    """A structured array with the fields of columns()."""
+    fields = columns(events)
+    out = numpy.zeros(len(events), [(name, field.dtype) for name, field in fields.items()])
+    for name, field in fields.items():
+        out[name] = field
+    return out
+
+
+def write_csv(path, events):
+    with open(path, "w") as file:
+        file.write("t,x,y,p\n")
+        file.writelines(f"{t},{x},{y},{p}\n" for t, x, y, p in events)
+
+
+def write_dat(path, events, side):
+    with open(path, "wb") as file:
+        file.write(f"% Version 2\n% Width {side}\n% Height {side}\n".encode() + b"\x0c\x08")
+        for t, x, y, p in events:
+            file.write(struct.pack("<II", t, x | y << 14 | p << 28))
+
+
+def write_hdf5(path, events, side):
+    """The layout of DSEC."""
+    with h5py.File(path, "w") as file:
+        file.attrs["width"] = file.attrs["height"] = side
+        for name, column in columns(events).items():
+            file.create_dataset(f"events/{name}", data=column, compression="gzip")
+
+
+def make_files():
+    """Writes the files to the current folder."""
+    few = [(1, 10, 10, 1), (2, 16000, 16000, 1), (3, 5, 5, 1)]
+    largest_guess = scattered(4096, 2000)
+    wide = scattered(LARGEST, 2000)
+    at_once = [(0, 5, 5, 1)] * 10_000_000
+    write_csv("few.csv", few)
+    write_csv("beyond.csv", [(1, 10, 10, 1), (2, 20000, 20000, 1), (3, 5, 5, 1)])
+    write_csv("guessed.csv", largest_guess)
+    numpy.save("few.npy", table(few))
+    numpy.save("guessed.npy", table(largest_guess))
+    numpy.savez("few.npz", **columns(few))
+    numpy.savez("guessed.npz", **columns(largest_guess))
+    numpy.savez("stated.npz", width=LARGEST, height=LARGEST, **columns(wide))
+    numpy.savez_compressed("at-once.npz", **columns(at_once))
+    write_dat("stated.dat", wide, LARGEST)
+    write_hdf5("stated.h5", wide, LARGEST)
+    write_hdf5("at-once.h5", at_once, 640)
+
+
+def peak_of(chain):
+    """Runs a pipeline. Returns its status and its largest memory in bytes."""
+    process = subprocess.Popen(["timeout", "120", LAUNCH, "-q", *chain.split()])
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, usage.ru_maxrss * 1024
+
+
+def main():
+    failed = []
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        # In another process, since the memory of a new one counts as that of its children.
+        if os.fork() == 0:
+            make_files()
+            os._exit(0)
+        if os.wait()[1] != 0:
+            sys.exit("the files were not written")
+        for name in sorted(os.listdir()):
+            size = os.path.getsize(name)
+            for chain, line in CHAINS.items():
+                bound = max(line.count("{0}"), 1) * (300e6 + 50 * size)
+                code, peak = peak_of(line.format(os.path.join(folder, name), EVENTS))
+                report = f"{name}, {size} bytes, {chain}: {peak / 1e6:.0f} of {bound / 1e6:.0f} MB"
+                print(report, flush=True)
+                if code != 0 or peak > bound:
+                    failed.append(f"{report}, status {code}")
+    sys.exit("\n".join(failed))
+
+
+main()
