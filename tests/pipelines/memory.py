@@ -119,7 +119,7 @@ def main():
                 print(report, flush=True)
                 if code != 0 or peak > bound:
                     failed.append(f"{report}, status {code}")
-    sys.exit("\n".join(failed))
+    sys.exit("\n".join(failed) or 0)
 
 
 main()
