@@ -2,22 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "src/core/image.hpp"
+#include "src/render/rgb_picture.hpp"
 
 namespace eventcamera {
-
-/// 24-bit RGB image.
-struct RgbPicture {
-  int width = 0;
-  int height = 0;
-  std::vector<std::uint8_t> pixels{};
-
-  /// Writes a PNG file. Throws std::runtime_error with the reason.
-  void write_png(const std::string& path) const;
-};
 
 /// Draws the event count per pixel, from black (none) to light yellow (99.5 % quantile of the
 /// pixels with events). Throws std::bad_alloc.

@@ -345,13 +345,14 @@ TEST(MapPicture, ShowsMoreEventsBrighterAndSaysWhatCannotBeWritten) {
   few.at(0, 0) = 1;
   many.at(2, 1) = 9;
   const auto alone = draw_map(few);
-  EXPECT_EQ(alone.pixels.size(), 3U * 3 * 2);
-  EXPECT_GT(alone.pixels[0], 200);
-  EXPECT_LT(alone.pixels[3], 10);
+  EXPECT_EQ(alone.width(), 3);
+  EXPECT_EQ(alone.height(), 2);
+  EXPECT_GT(alone.row(0)[0], 200);
+  EXPECT_LT(alone.row(0)[3], 10);
   const auto pair = draw_maps(few, many);
-  EXPECT_EQ(pair.width, 9);
+  EXPECT_EQ(pair.width(), 9);
   const auto colour = [&](int x, int y) {
-    const auto* at = &pair.pixels[static_cast<std::size_t>(3 * (y * 9 + x))];
+    const auto* at = pair.row(y) + std::ptrdiff_t{3} * x;
     return std::vector<int>(at, at + 3);
   };
   EXPECT_EQ(colour(7, 1), (std::vector{255, 255, 255}));

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace eventcamera {
+
+/// 24-bit RGB image, initially black.
+class RgbPicture {
+ public:
+  /// Throws std::bad_alloc.
+  RgbPicture(int width, int height)
+      : width_(width),
+        height_(height),
+        pixels_(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  /// Bytes of a row: red, green and blue of each pixel.
+  std::uint8_t* row(int y) { return pixels_.data() + offset(y); }
+  const std::uint8_t* row(int y) const { return pixels_.data() + offset(y); }
+
+  /// Writes a PNG file. Throws std::runtime_error with the reason.
+  void write_png(const std::string& path) const;
+
+ private:
+  std::size_t offset(int y) const {
+    return 3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
+  }
+
+  int width_;
+  int height_;
+  std::vector<std::uint8_t> pixels_;
+};
+
+}  // namespace eventcamera
