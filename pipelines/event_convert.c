@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "crop.h"
+#include "plugin.h"
 
 /* Prints text unchanged: names are bytes, messages are UTF-8. g_print() would replace characters
  * that the locale lacks. */
@@ -164,20 +165,6 @@ static gchar* help(void) {
   g_string_append_c(text, '\n');
   g_string_append(text, "\nExit status: 0 = converted, 1 = failed or interrupted, 2 = wrong usage");
   return g_string_free(text, FALSE);
-}
-
-/* False if GStreamer lacks the elements of this project. */
-static gboolean find_plugin(void) {
-  GstPlugin* plugin = gst_registry_find_plugin(gst_registry_get(), "eventcam");
-  if (plugin == NULL) {
-    PRINT_ERROR(
-        "GStreamer does not find the plugin eventcam. In a checkout, enter the development shell: "
-        "meson devenv -C build -w .\nOtherwise install it: the Debian package "
-        "gstreamer1.0-eventcam, or as root: meson install -C build\n");
-    return FALSE;
-  }
-  gst_object_unref(plugin);
-  return TRUE;
 }
 
 /* Format selected by a file's extension, or NULL. */
