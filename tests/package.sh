@@ -61,7 +61,7 @@ used() {
   for ending in dat es npy npz csv aedat4 hdf5 h5; do try event-convert ball.raw ball.$ending; done
   for ending in raw dat es npy npz csv aedat4 hdf5 h5; do try gst-play-1.0 --no-interactive --videosink=fakesink ball.$ending; done
   try event-calibrate --version
-  for program in event-convert web-events rtsp-events virtual-camera; do try man --whatis $program; done
+  for program in event-convert event-thumbnail web-events rtsp-events virtual-camera; do try man --whatis $program; done
   try test -s /usr/share/doc/gsteventcamera-1.0/struct.Info.html
   try pkg-config --exists --print-errors gsteventcamera-1.0
   try cc /usr/share/doc/libgsteventcamera-1.0-dev/examples/count_events.c -o count_events $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
@@ -71,7 +71,7 @@ used() {
     [ "$(gio info -a standard::content-type "${file%=*}" | sed -n 's/.*content-type: //p')" = "${file#*=}" ]
   done
   gio mime application/x-es | grep -q events-in-gnome-videos.desktop
-  try totem-video-thumbnailer -s 128 file:///tmp/ball.h5 thumbnail.png
+  try event-thumbnail --size=128 ball.h5 thumbnail.png
 }
 apt-get update -q
 apt-get install -q -y --no-install-recommends gcc libc6-dev man-db pkg-config gstreamer1.0-tools gstreamer1.0-plugins-base-apps \

@@ -95,21 +95,61 @@ ln -s /bin/true programs/totem
 [ "$(default_of application/x-es)" = events-in-gnome-videos.desktop ] || fail "$(default_of application/x-es) instead of Totem"
 [ "$(default_of application/x-prophesee-raw)" = events-in-terminal.desktop ] || fail "Totem, which ignores .raw files"
 
-# Thumbnails show events.
+# Thumbnails show events, and nothing else.
 thumbnailer=$data/thumbnailers/event-recordings.thumbnailer
+grep -qx 'TryExec=event-thumbnail' "$thumbnailer"
+draw_thumbnail() { # FILE: prints the numbers of its OFF, its ON and of all pixels
+  local line
+  line=$(sed -n 's/^Exec=//p' "$thumbnailer")
+  line=${line//%s/256}
+  line=${line//%i/$PWD/$1}
+  line=${line//%o/thumbnail.png}
+  echo "$line" >&2
+  eval "env -u DISPLAY PATH='$BUILD/pipelines:$PATH' timeout 60 $line"
+  "$GST_LAUNCH" -q filesrc location=thumbnail.png ! pngdec ! videoconvert ! video/x-raw,format=RGB ! filesink location=pixels
+  rm thumbnail.png
+  od -An -v -tu1 -w3 pixels | awk '
+    BEGIN { known["28 34 48"]; known["64 128 208"]; known["240 244 250"] }
+    { $1 = $1; ++count[$0] }
+    !($0 in known) { print "not a colour of events: " $0 >"/dev/stderr"; exit 1 }
+    END { print count["64 128 208"] + 0, count["240 244 250"] + 0, NR }'
+}
 for ending in raw dat es npy npz aedat4 h5; do
   type=$(gio info -a standard::content-type ball.$ending | sed -n 's/.*content-type: //p')
   grep -q "^MimeType=.*$type;" "$thumbnailer" || fail "no thumbnail of $type"
-  line=$(sed -n 's/^Exec=//p' "$thumbnailer")
-  line=${line//%s/128}
-  line=${line//%u/$(gio info ball.$ending | sed -n 's/^uri: //p')}
-  line=${line//%o/thumbnail.png}
-  echo "$line"
-  eval "env -u DISPLAY timeout 60 $line"
-  "$GST_LAUNCH" -q filesrc location=thumbnail.png ! pngdec ! videoconvert ! video/x-raw,format=GRAY8,width=128 ! filesink location=grey
-  [ "$(od -An -v -tu1 -w1 grey | sort -u | wc -l)" -gt 20 ] || fail "the thumbnail of ball.$ending is empty"
-  rm thumbnail.png
+  read -r off on all <<<"$(draw_thumbnail ball.$ending)"
+  [ "$off" -gt 500 ] && [ "$on" -gt 500 ] || fail "the thumbnail of ball.$ending has $off OFF and $on ON pixels"
 done
+
+# Not the frames of a camera that records both.
+"$GST_LAUNCH" -q videotestsrc num-buffers=20 ! video/x-raw,format=GRAY8 ! tee name=t \
+  t. ! queue ! eventsim-dvs ! application/x-event-camera ! mux. t. ! queue ! mux. aedatmux name=mux ! filesink location=frames.aedat4
+read -r off on all <<<"$(draw_thumbnail frames.aedat4)"
+[ "$off" -gt 0 ] && [ "$on" -gt 0 ] || fail "the thumbnail of frames.aedat4 has $off OFF and $on ON pixels"
+
+# Each event of a sparse recording, one an hour.
+{
+  echo t,x,y,p
+  for ((i = 0; i < 30; ++i)); do echo "$((i * 3600)),$((i % 6 * 200 + 37)),$((i / 6 * 140 + 51)),$((i % 2))"; done
+} >sparse.csv
+"$BUILD/pipelines/event-convert" --time-unit=seconds --width=1280 --height=720 sparse.csv sparse.raw
+[ "$(draw_thumbnail sparse.raw)" = "15 15 $((256 * 144))" ] || fail "the thumbnail of sparse.raw lacks events"
+
+# The moment that has most of them: a second in an hour.
+{
+  echo t,x,y,p
+  echo 0,127,127,1
+  for ((i = 0; i < 4096; ++i)); do echo "$((1800000000 + 100 * i)),$((i % 64)),$((i / 64)),0"; done
+  echo 3600000000,127,127,1
+} >moment.csv
+"$BUILD/pipelines/event-convert" --time-unit=microseconds --width=128 --height=128 moment.csv moment.raw
+read -r off on all <<<"$(draw_thumbnail moment.raw)"
+[ "$off $all" = "1311 $((128 * 128))" ] && [ "$on" -eq 0 ] || fail "the thumbnail of moment.raw has $off OFF, $on ON and $all pixels"
+
+# None of a recording without events, but a reason.
+head -c 100 ball.raw >header.raw
+! "$BUILD/pipelines/event-thumbnail" header.raw thumbnail.png 2>reason || fail "a thumbnail without events"
+grep -qx "header.raw: no events found" reason || fail "$(cat reason)"
 
 # Effects run as webcam applications run them.
 for effect in "$data"/gnome-video-effects/*.effect; do
