@@ -49,7 +49,8 @@ def size_of(caps):
     if not is_events:
         raise RuntimeError(f"The appsink receives {caps.get_structure(0).get_name()}, not events. Insert a"
                            " simulator (! eventsim-diff ! appsink name=events) or, for an event file, use:"
-                           ' decodebin caps="application/x-event-camera,format=XYTP" ! appsink name=events')
+                           ' decodebin caps="application/x-event-camera,format=XYTP" expose-all-streams=false'
+                           " ! appsink name=events")
     return info.width, info.height
 
 

@@ -161,6 +161,7 @@ TEST_P(Hdf5, IsEmptyWhereThereAreNoEvents) {
     Player player("filesrc location=" + in_quotes(path) + " ! " + way + "eventhdf5dec");
     EXPECT_TRUE(player.play()) << player.error;
     EXPECT_TRUE(player.events.empty());
+    EXPECT_EQ(player.warnings.size(), 1U);
   }
 }
 

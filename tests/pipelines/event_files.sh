@@ -195,6 +195,9 @@ done
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=framed.aedat4
 convert framed.aedat4 framed.csv 2>left-out
 grep -q ": left out: 40 frames$" left-out || fail "frames are left out: $(cat left-out)"
+timeout 60 "$GST_LAUNCH" -m filesrc location=framed.aedat4 ! decodebin caps="application/x-event-camera,format=XYTP" expose-all-streams=false ! eventstats ! fakesink >messages
+grep -q "cumulative=(boolean)true" messages || fail "the events of framed.aedat4 were not counted"
+if grep missing-plugin messages; then fail "decoders for frames are missing"; fi
 convert framed.aedat4 again.aedat4 2>left-out
 if grep "left out" left-out; then fail "frames are left out of an AEDAT 4 file"; fi
 for file in framed.aedat4 again.aedat4; do

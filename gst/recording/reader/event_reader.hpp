@@ -136,6 +136,7 @@ class EventReader {
   void log_dropped(guint64 outside, guint64 late, guint64 stray, GstClockTime position);
   void set_duration(GstClockTime duration);
   GstClockTime duration();
+  void warn_of_nothing();
   void warn_of_dropped();
 
   bool can_seek();

@@ -43,6 +43,7 @@ GstFlowReturn EventReader::pull() {
   if (result != nothing_ready) return result;
   result = output_due_ ? begin_output() : GST_FLOW_OK;
   if (recording_->at_end()) {
+    warn_of_nothing();
     warn_of_dropped();
     if (const auto length = recording_->duration()) set_duration(nanoseconds(*length));
   }
