@@ -26,6 +26,15 @@ TEST_P(EveryFormat, IsWrittenWithoutWhatLiesOutsideTheSensor) {
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
 }
 
+TEST_P(EveryFormat, EndsInAnErrorOnAFullDisk) {
+  Pipeline pipeline(
+      "videotestsrc pattern=snow num-buffers=20 ! "
+      "video/x-raw,format=GRAY8,width=64,height=48 ! eventsim-frame ! " +
+      format().writer + " ! filesink location=/dev/full");
+  EXPECT_FALSE(pipeline.play());
+  EXPECT_EQ(pipeline.error, "No space left on the resource.");
+}
+
 TEST_P(EveryFormat, TellsHowManyEventsCameTooLate) {
   Writer h(format());
   const auto push = [&](const std::vector<Microseconds>& times) {

@@ -323,7 +323,8 @@ TEST(Hdf5Sink, SaysWhatCannotBeWritten) {
   {
     Sink sink("eventhdf5sink location=/no/such/folder/out.h5");
     sink.caps(events_caps);
-    EXPECT_NE(sink.error().find("Cannot write /no/such/folder/out.h5"), std::string::npos);
+    EXPECT_NE(sink.error().find("Cannot write /no/such/folder/out.h5. Set location to"),
+              std::string::npos);
   }
   {
     Sink sink("eventhdf5sink format=metavision location=" + in_quotes(folder / "out.h5"));

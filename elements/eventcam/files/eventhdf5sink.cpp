@@ -121,8 +121,9 @@ static bool reported(GstEventHdf5Sink* self, const Work& work) {
         priv->state.writer.reset();
         priv->state.ended = true;
         return WritableEvents::failure(
-            error,
-            {GST_RESOURCE_ERROR_WRITE, "Cannot write " + priv->settings.copy().location + "."});
+            error, {GST_RESOURCE_ERROR_WRITE,
+                    "Cannot write " + priv->settings.copy().location +
+                        ". Set location to a writable folder on a disk with enough space."});
       },
       work);
 }
