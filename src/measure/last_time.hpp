@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <compare>
 #include <cstdint>
 
 #include "src/core/event.hpp"
@@ -18,7 +17,7 @@ class LastTime {
   constexpr bool is_known() const { return bits_ != 0; }
   constexpr Microseconds value() const { return static_cast<Microseconds>(bits_ ^ sign); }
 
-  friend constexpr auto operator<=>(const LastTime&, const LastTime&) = default;
+  friend constexpr bool operator<(LastTime a, LastTime b) { return a.bits_ < b.bits_; }
 
  private:
   static constexpr std::uint64_t sign = std::uint64_t{1} << 63;
