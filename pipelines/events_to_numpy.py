@@ -54,31 +54,31 @@ def size_of(caps):
     return info.width, info.height
 
 
-def collect(pipeline):
-    """All events of a pipeline."""
-    sink = sink_of(pipeline)
-    bus = pipeline.get_bus()
-    size = None
-    parts = []
-    pipeline.set_state(Gst.State.PLAYING)
-    while not sink.is_eos():
-        if sample := sink.try_pull_sample(Gst.SECOND // 10):
-            if size != (size := size_of(sample.get_caps())):
-                print(f"Events of a {size[0]}x{size[1]} sensor")
-            parts.append(events_of(sample.get_buffer()))
-        elif message := bus.pop_filtered(Gst.MessageType.ERROR):
-            error, cause = message.parse_error()
-            raise RuntimeError(f"{message.src.get_name()}: {error.message} {cause.splitlines()[-1]}")
-    return np.concatenate(parts) if parts else np.empty(0, EVENT)
-
-
-def main(launch, path=None):
+def samples(launch):
+    """Runs a pipeline and yields the samples that reach its appsink."""
     Gst.init(None)
     pipeline = Gst.parse_launch(launch)
     try:
-        events = collect(pipeline)
+        sink = sink_of(pipeline)
+        pipeline.set_state(Gst.State.PLAYING)
+        while not sink.is_eos():
+            if sample := sink.try_pull_sample(Gst.SECOND // 10):
+                yield sample
+            elif message := pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR):
+                error, cause = message.parse_error()
+                raise RuntimeError(f"{message.src.get_name()}: {error.message} {cause.splitlines()[-1]}")
     finally:
         pipeline.set_state(Gst.State.NULL)
+
+
+def main(launch, path=None):
+    size = None
+    parts = [np.empty(0, EVENT)]
+    for sample in samples(launch):
+        if size != (size := size_of(sample.get_caps())):
+            print(f"Events of a {size[0]}x{size[1]} sensor")
+        parts.append(events_of(sample.get_buffer()))
+    events = np.concatenate(parts)
     print(f"{len(events)} events, {np.count_nonzero(events['p'])} ON")
     if path:
         np.save(path, events)

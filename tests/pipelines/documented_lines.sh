@@ -6,19 +6,28 @@ source "$SOURCE/tests/pipelines/scratch_folder.sh"
 source "$SOURCE/tests/pipelines/run_lines.sh"
 export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
-cp "$SOURCE/pipelines/events_to_numpy.py" pipelines/
+cp "$SOURCE"/pipelines/{events_to_numpy,voxel_grids}.py pipelines/
 
 # The files that the lines read.
 eval "$GST_LAUNCH -q $ball ! x264enc ! mp4mux ! filesink location=drive.mp4"
 eval "$GST_LAUNCH -q filesrc location=drive.mp4 ! decodebin ! eventsim-dvs ! evtenc ! filesink location=drive.raw"
 eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-dvs ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=davis.aedat4"
 eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc format=esim ! filesink location=events.txt"
-for name in in recording real simulated; do cp drive.raw $name.raw; done
+for name in in recording real simulated left right; do cp drive.raw $name.raw; done
+mkdir videos recordings arrays
+cp drive.mp4 videos/first.mp4
+cp drive.mp4 "videos/second one.mp4"
+cp drive.raw recordings/first.raw
+cp drive.raw "recordings/second one.raw"
 for ending in dat es csv; do event-convert drive.raw recording.$ending; done
 /usr/bin/python3 -c 'import numpy; numpy.savez("events.npz", **{name: numpy.zeros(9, int) for name in "txyp"})'
 
 run_lines "$SOURCE/README.md" "$SOURCE"/docs/*.md "$SOURCE"/docs/elements/*.md
 [ $count -ge 60 ] || fail "found only $count lines"
-for file in events.webm ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw; do
-  [ -s $file ] || fail "$file is missing or empty"
+for file in events.webm ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
+  webcam.npz "videos/second one.h5" cropped.raw both.webm rate.png part.raw "arrays/second one.npz"; do
+  [ -s "$file" ] || fail "$file is missing or empty"
 done
+event-convert left.raw merged.npz 2>&1 | sed 's/ events.*//' >events
+event-convert merged.raw merged.npz 2>&1 | sed 's/ events.*//' >merged
+[ "$(cat merged)" = "$((2 * $(cat events)))" ] || fail "$(cat merged) events of twice $(cat events) are merged"

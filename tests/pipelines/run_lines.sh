@@ -19,6 +19,7 @@ run_lines() { # PAGE...
     line=${line//rtspsrc location=rtsp:\/\/camera\/stream ! decodebin/$ball}
     line=$(sed -E 's/num-buffers=(90|100|300)/num-buffers=40/; s/(videotestsrc pattern=ball) (!|foreground)/\1 num-buffers=40 \2/' <<<"$line")
     line=${line//autovideosink/fakesink}
+    line=${line/#python3 //usr/bin/python3 }
     line=${line//glimagesink/"'video/x-raw(memory:GLMemory)' ! fakesink"}
     line=${line// --device \/dev\/video0/ --port 0}
     line=${line//host=receiver/host=127.0.0.1}
@@ -27,6 +28,7 @@ run_lines() { # PAGE...
       *glupload*) line=${line/num-buffers=40/num-buffers=5} ;; # the renderer may be in software
       *rtspsrc*) line=${line/fakesink/fakesink num-buffers=10} ;;
       gst-play*) line="$line --no-interactive --videosink=fakesink" ;;
+      *--from=10\ --to=20*) line=${line/--from=10 --to=20/--from=0.1 --to=0.2} ;;
       event-calibrate*) # one and a half seconds are enough
         line=${line/--to 2 --measure-from 2 --measure-to 10/--to 0.3 --measure-from 0.3 --measure-to 1}
         line="${line/eventsim-dvs/\"eventsim-dvs response=log log-eps=0.02 denoise=0\"}"
@@ -54,12 +56,12 @@ run_lines() { # PAGE...
       while kill -0 $receiver && ! grep -q "$(printf ':%04X ' "$port")" /proc/net/udp; do sleep 0.1; done
       continue
     fi
-    eval "timeout --verbose 120 $line" >output 2>&1 </dev/null || ended_before_pause output || fail "$(cat output)"
+    timeout --verbose 120 bash -c "$line" >output 2>&1 </dev/null || ended_before_pause output || fail "$(cat output)"
     if [ -n "$receiver" ]; then
       wait $receiver || fail "$(cat received)"
       receiver=
     fi
-  done < <(awk '/^```/ { inside = !inside } inside && !seen[$0]++ && /^(gst-|ges-|event-|web-|rtsp-|\.\/pipelines\/events_)/' "$@")
+  done < <(awk '/^```/ { inside = !inside } inside && !seen[$0]++ && /^(gst-|ges-|event-|web-|rtsp-|\.\/pipelines\/(events_|voxel_)|for |\{ |python3 )/' "$@")
   for server in "${servers[@]}"; do
     kill "$server"
     wait "$server" || fail "a server ended with status $?"
