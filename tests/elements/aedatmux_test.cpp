@@ -4,6 +4,7 @@
 
 #include "tests/elements/aedat_recordings.hpp"
 #include "tests/elements/event_buffer.hpp"
+#include "tests/elements/pipeline.hpp"
 
 namespace {
 
@@ -101,6 +102,15 @@ TEST(AedatMux, WritesAnewAfterAFlush) {
   EXPECT_EQ(mux.push(600 * GST_MSECOND, {{0, 3, 4}, {7, 5, 6}}), GST_FLOW_OK);
   EXPECT_EQ(mux.end().events, (Events{AbsoluteEvent::at(3, 4, 600'000, Polarity::off),
                                       AbsoluteEvent::at(5, 6, 600'007, Polarity::off)}));
+}
+
+TEST(AedatMux, EndsInAnErrorOnAFullDisk) {
+  Pipeline pipeline(
+      "videotestsrc pattern=snow num-buffers=20 ! video/x-raw,format=GRAY8,width=64,height=48 ! "
+      "tee name=t ! queue ! eventsim-frame ! mux. t. ! queue ! aedatmux name=mux ! "
+      "filesink location=/dev/full");
+  EXPECT_FALSE(pipeline.play());
+  EXPECT_EQ(pipeline.error, "No space left on the resource.");
 }
 
 TEST(AedatMux, HasOnePadOfAKind) {

@@ -10,6 +10,8 @@
 #include <tuple>
 
 #include "tests/elements/element_lines.hpp"
+#include "tests/elements/event_buffer.hpp"
+#include "tests/elements/pipeline.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
 namespace {
@@ -86,6 +88,20 @@ TEST_P(Memory, DoesNotGrowFrameByFrame) {
   // Less than a pointer per frame, and what a driver may allocate late.
   const std::size_t once = is_on_gpu(element) ? 16384 : 2048;
   EXPECT_LE(Resources::now().heap, after_some.heap + static_cast<std::size_t>(frames) * 7 + once);
+}
+
+class OnTheCpu : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(, OnTheCpu, testing::ValuesIn(cpu_elements));
+
+TEST_P(OnTheCpu, TakesFramesOf64Megapixels) {
+  Player player(
+      "videotestsrc pattern=ball num-buffers=3 ! video/x-raw,format=GRAY8,width=8192,height=8192 "
+      "! " +
+      std::string(GetParam()) + " ! application/x-event-camera");
+  EXPECT_TRUE(player.play()) << player.error;
+  EXPECT_GT(player.events.size(), 1000U);
+  EXPECT_TRUE(std::ranges::any_of(
+      player.events, [](const auto& event) { return event.x > 4095 && event.y() > 4095; }));
 }
 
 class EveryElement : public testing::TestWithParam<std::string> {

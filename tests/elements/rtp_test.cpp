@@ -146,6 +146,25 @@ TEST_P(EveryFormat, GivesBackEveryBufferAndGap) {
   }
 }
 
+TEST_P(EveryFormat, GivesTheEventsOfAnIntervalThatTheEndCutsOff) {
+  Interval interval{0, 20'000'000, {}};
+  for (std::uint32_t t = 0; t < 2000; ++t)
+    interval.events.push_back(Event::at(static_cast<int>(t * 7 % 346), 9, 10 * t, Polarity::on));
+  const auto packets = packets_of({interval}, "format=" + std::string(GetParam()));
+  ASSERT_GT(packets.size(), 5U);
+  std::size_t sent = 0;
+  Depayloader h(GetParam());
+  for (std::size_t i = 0; i + 1 < packets.size(); ++i) {
+    h.take(packets[i].get());
+    sent += Fields(packets[i].get()).header.value().event_count;
+  }
+  end(h);
+  const auto events = absolute(Output(h).intervals);
+  auto expected = absolute({interval});
+  expected.resize(sent, expected.front());
+  EXPECT_TRUE(events == expected);
+}
+
 TEST_P(EveryFormat, KeepsTheTimesOfAllEvents) {
   Harness h("rtpeventpay format=" + std::string(GetParam()) + " ! rtpeventdepay");
   h.caps(davis_caps);

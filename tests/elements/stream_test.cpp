@@ -127,7 +127,7 @@ TEST_P(EveryElement, StandsBesideItsLikes) {
   const auto expected = intervals(h, 6);
   std::vector<std::thread> threads;
   std::atomic<int> equal = 0;
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < 16; ++i) {
     threads.emplace_back([&, i] {
       Harness other(std::string(GetParam()) + " n-threads=" + std::to_string(i % 3));
       other.caps(video(61, 43));
@@ -135,7 +135,7 @@ TEST_P(EveryElement, StandsBesideItsLikes) {
     });
   }
   for (auto& thread : threads) thread.join();
-  EXPECT_EQ(equal, 10);
+  EXPECT_EQ(equal, 16);
 }
 
 TEST_P(EveryElement, TakesPropertiesWhilePlaying) {
