@@ -225,11 +225,14 @@ TEST(Rtp, RtpBin) {
 
 const std::string key(60, 'a');
 
-std::string srtp_receiver(const std::string& port, const std::string& with) {
-  return "udpsrc port=" + port + " caps=\"application/x-srtp," + rtp_fields +
-         ",ssrc=(uint)1234,srtp-key=(buffer)" + with +
+std::string srtp_caps(const std::string& with) {
+  return "application/x-srtp," + rtp_fields + ",srtp-key=(buffer)" + with +
          ",srtp-cipher=aes-128-icm,srtp-auth=hmac-sha1-80,srtcp-cipher=aes-128-icm,"
-         "srtcp-auth=hmac-sha1-80\" ! srtpdec";
+         "srtcp-auth=hmac-sha1-80";
+}
+
+std::string srtp_receiver(const std::string& port, const std::string& with) {
+  return "udpsrc port=" + port + " caps=\"" + srtp_caps(with) + ",ssrc=(uint)1234\" ! srtpdec";
 }
 
 TEST(Rtp, Srtp) {
@@ -275,6 +278,28 @@ TEST(Rtp, AWrongSrtpKeyYieldsNoEvent) {
   sending.set(GST_STATE_PLAYING);
   send_counted(sending, [&] { return arrived.load(); });
   EXPECT_TRUE(receiver.events().empty());
+}
+
+TEST(Rtp, ARestartedSrtpSenderIsHeardByItsNewSsrc) {
+  const auto port = std::to_string(next_port());
+  Pipeline receiving("udpsrc port=" + port + " caps=\"application/x-srtp," + rtp_fields +
+                     "\" ! srtpdec name=decrypt ! " + sink);
+  g_signal_connect(receiving["decrypt"], "request-key",
+                   G_CALLBACK(+[](GstElement*, guint, gpointer) {
+                     return gst_caps_from_string(srtp_caps(key).c_str());
+                   }),
+                   nullptr);
+  Receiver receiver(receiving);
+  receiving.set(GST_STATE_PLAYING);
+  for (std::size_t starts = 1; starts <= 3; ++starts) {
+    Pipeline sending(source + " ! rtpeventpay name=pay ! srtpenc key=" + key +
+                     " ! udpsink host=127.0.0.1 port=" + port);
+    sending.set(GST_STATE_PLAYING);
+    Sender(sending).send(0, 10);
+    const auto sent = starts * 10 * events_per_buffer;
+    wait_until([&] { return receiver.events().size() == sent; });
+    EXPECT_EQ(receiver.events().size(), sent);
+  }
 }
 
 TEST(Rtp, EncryptedPacketsAreRejected) {
