@@ -15,7 +15,9 @@ using namespace rtp_packets;
 constexpr SensorSize davis{346, 260};
 
 /// Payload sizes of MTUs of 576, 1500 and 9000 bytes, and the minimum.
-constexpr std::size_t max_sizes[] = {RtpPacker::min_size, 576 - 40, 1500 - 40, 9000 - 40};
+// The last is more than an interval needs, and than any memory.
+constexpr std::size_t max_sizes[] = {RtpPacker::min_size, 576 - 40, 1500 - 40, 9000 - 40,
+                                     SIZE_MAX / 2};
 
 /// A receiver, and the intervals that it got.
 struct Receiver {
