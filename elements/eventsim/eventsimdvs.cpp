@@ -175,6 +175,13 @@ const Setting table[] = {
      &DvsSettings::hot_pixels, 0, 1},
     {"dead-pixels", "Dead pixels", "Fraction of pixels that never fire", &DvsSettings::dead_pixels,
      0, 1},
+    {"adaptation", "Adaptation",
+     "Growth of a pixel's contrast thresholds by each of its events, as a fraction of them; pixels "
+     "of real cameras saturate in this way at strong edges",
+     &DvsSettings::adaptation, 0, 10, controllable},
+    {"adaptation-time", "Adaptation time",
+     "Time in which the growth by one event is gone, at a constant rate (ns)",
+     &DvsSettings::adaptation_time, 1000, max_time, controllable},
     {"refractory-period", "Refractory period",
      "Time after an event during which the pixel cannot fire (ns)", &DvsSettings::refractory_period,
      0, max_time, controllable},

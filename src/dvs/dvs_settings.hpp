@@ -56,6 +56,9 @@ struct DvsSettings {
   double hot_pixels = 0;       ///< fraction of all pixels
   double dead_pixels = 0;      ///< fraction of all pixels
 
+  double adaptation = 0;                     ///< growth of the thresholds by an event, a fraction
+  Nanoseconds adaptation_time = 10'000'000;  ///< in which the growth by an event is gone
+
   Nanoseconds refractory_period = 0;
   RefractoryReset refractory_reset = RefractoryReset::level;
 

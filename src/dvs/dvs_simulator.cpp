@@ -52,6 +52,7 @@ class PixelSimulator final : public DvsSimulator {
     keep(frame, last_);
     finder_.reset();
     sub_interval_count_ = 0;
+    clock_ = 0;
     fired_.reset();
     if (readout_) readout_->reset();
     adopt(settings_);
@@ -99,6 +100,7 @@ class PixelSimulator final : public DvsSimulator {
 
   void finish(double duration, EventBuckets& events) {
     sub_interval_count_ += sub_intervals_.size();
+    clock_ += duration;
     if (!readout_) return;
     const bool is_limited = current_.max_rate > 0;
     sorted_.resize(unread_.size());
@@ -194,12 +196,15 @@ class PixelSimulator final : public DvsSimulator {
     filter_row({sub_interval, tables, responses_, luma_bits(current_),
                 current_.cutoff_frequency > 0, current_.shot_noise_rate > 0},
                luma, pixels, format().width, candidates);
-    const RowToSolve solved{current_, random_, sub_interval, tables, pixels, candidates, events};
+    const RowToSolve solved{current_, random_,    sub_interval, tables,
+                            pixels,   candidates, events,       clock_ + sub_interval.begin};
     switch (solver_for(current_)) {
       case Solver::pixels:
         return solve_pixels(solved);
       case Solver::lines:
         return solve_lines(solved);
+      case Solver::adaptive_lines:
+        return solve_adaptive_lines(solved);
       case Solver::row:
         return solve_row(solved, scratch.unsolved);
     }
@@ -272,6 +277,7 @@ class PixelSimulator final : public DvsSimulator {
   std::vector<SubInterval> sub_intervals_;  ///< of the current interval, in order of time
   std::vector<ShadeTables> tables_;         ///< one per duration of sub-intervals
   std::uint64_t sub_interval_count_ = 0;    ///< before this interval
+  double clock_ = 0;                        ///< its start, microseconds since the first frame
   IntervalEvents fired_;
   EventBuckets unread_;        ///< events that go to the readout
   std::vector<Event> sorted_;  ///< the same, sorted

@@ -80,7 +80,8 @@ PixelArray::PixelArray(int width, int height)
       negative_(width, height),
       leak_(width, height),
       refractory_left_(width, height),
-      noise_budget_(width, height) {}
+      noise_budget_(width, height),
+      growth_(width, height) {}
 
 PixelRow PixelArray::row(int y) {
   return {y,
@@ -92,7 +93,8 @@ PixelRow PixelArray::row(int y) {
           negative_.row(y),
           leak_.row(y),
           refractory_left_.row(y),
-          noise_budget_.row(y)};
+          noise_budget_.row(y),
+          growth_.row(y)};
 }
 
 void PixelArray::draw_traits(int y, const DvsSettings& settings, const Random& random) {
@@ -117,6 +119,7 @@ void PixelArray::settle(int y, const DvsSettings& settings, const Random& random
     pixels.reference[x] =
         static_cast<float>(pixels.target[x] - mismatch.leaked(number, traits, noise_rate));
     pixels.refractory_left[x] = 0;
+    if (pixels.growth[x].value != 0) pixels.growth[x] = {};
     pixels.noise_budget[x] = draw_noise_budget(random, number, Purpose::first_noise, 0);
   }
 }

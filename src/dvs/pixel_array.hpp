@@ -8,6 +8,7 @@
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
+#include "src/dvs/adaptation.hpp"
 #include "src/dvs/light_response.hpp"
 
 namespace eventcamera {
@@ -122,6 +123,7 @@ struct PixelRow {
   float* leak;                  ///< fall of the reference per microsecond
   float* refractory_left;       ///< microseconds until the pixel can fire again; 0 = now
   std::uint32_t* noise_budget;  ///< expected shot noise until the next noise event, 1/noise_unit
+  ThresholdGrowth* growth;      ///< as of the last event
 };
 
 class PixelArray {
@@ -147,6 +149,7 @@ class PixelArray {
   Image<float> leak_;
   Image<float> refractory_left_;
   Image<std::uint32_t> noise_budget_;
+  Image<ThresholdGrowth> growth_;
 };
 
 }  // namespace eventcamera

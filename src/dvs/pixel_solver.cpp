@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+
+#include "src/dvs/adaptation.hpp"
 
 namespace eventcamera {
 namespace {
@@ -32,6 +36,8 @@ class Pixel {
   Pixel(const RowToSolve& row, const Delays& delays, int x, const PixelLight& light)
       : settings_(row.settings),
         delays_(delays),
+        adaptation_(row.settings),
+        start_(row.start),
         random_(row.random),
         sub_interval_(row.sub_interval),
         pixels_(row.pixels),
@@ -47,6 +53,7 @@ class Pixel {
         ready_(pixels_.refractory_left[x]),
         released_(ready_),
         held_(settings_.refractory_reset == RefractoryReset::signal && ready_ > 0),
+        growth_(settings_.adaptation > 0 ? pixels_.growth[x] : ThresholdGrowth{}),
         noise_{light.expected_noise, static_cast<double>(pixels_.noise_budget[x])} {
     // A falling reference is equivalent to a rising signal.
     above_leak_.slope += leak_;
@@ -65,7 +72,9 @@ class Pixel {
         held_ = false;
       }
       const double noise = noise_.next(end_.t);
-      const auto crossing = crossings.first(reference_ - negative_, reference_ + positive_, now);
+      const auto crossing = settings_.adaptation > 0 ? first_crossing(crossings, now)
+                                                     : crossings.first(reference_ - negative_,
+                                                                       reference_ + positive_, now);
       if (noise <= (crossing ? crossing->point.t : end_.t)) {
         if (noise > now.t) now = at(noise);
         make_noise(now, noise);
@@ -93,13 +102,49 @@ class Pixel {
     fire(t, is_on ? Polarity::on : Polarity::off);
   }
 
+  /// First crossing of levels that approach the reference while the growth of the thresholds falls.
+  std::optional<Crossing> first_crossing(const Crossings& crossings, TrajectoryPoint from) const {
+    const double growth = adaptation_.at(start_ + from.t, growth_);
+    if (growth > 0) {
+      const TrajectoryPoint faded = at(std::min(from.t + growth / adaptation_.rate(), end_.t));
+      const auto on = crossing(positive_, growth, from, faded);
+      const auto off = crossing(-negative_, growth, from, faded);
+      if (on && (!off || on->point.t <= off->point.t)) return on;
+      if (off || faded.t == end_.t) return off;
+      from = faded;
+    }
+    return crossings.first(reference_ - negative_, reference_ + positive_, from);
+  }
+
+  /// First crossing of the level at `threshold` from the reference, negative for OFF, which grew by
+  /// `growth` at `from` and falls until `to`.
+  std::optional<Crossing> crossing(double threshold, double growth, TrajectoryPoint from,
+                                   TrajectoryPoint to) const {
+    if (std::isinf(threshold)) return std::nullopt;
+    // A falling level is equivalent to a rising signal.
+    const double rise = threshold * adaptation_.rate();
+    auto signal = above_leak_;
+    signal.slope += rise;
+    signal.offset -= rise * from.t;
+    const Crossings crossings(signal, {to.t, to.value + rise * (to.t - from.t)});
+    constexpr double never = std::numeric_limits<double>::infinity();
+    const double level = reference_ + threshold * (1 + growth);
+    auto found =
+        threshold > 0 ? crossings.first(-never, level, from) : crossings.first(level, never, from);
+    if (found) found->point.value -= rise * (found->point.t - from.t);
+    return found;
+  }
+
   void cross(const Crossing& crossing) {
-    reference_ += crossing.polarity == Polarity::on ? positive_ : -negative_;
+    const double threshold = crossing.polarity == Polarity::on ? positive_ : -negative_;
+    reference_ += threshold * (1 + adaptation_.at(start_ + crossing.point.t, growth_));
     if (crossing.point.t >= ready_) fire(crossing.point.t, crossing.polarity);
   }
 
   /// Emits an event and starts the refractory period.
   void fire(double crossed, Polarity polarity) {
+    if (adaptation_.is_on())
+      growth_ = {start_ + crossed, adaptation_.at(start_ + crossed, growth_) + adaptation_.step()};
     double t = crossed + delays_.latency;
     if (delays_.latency_jitter > 0) {
       const double jitter = random_.normal(number_, Random::Purpose::event, draw_++);
@@ -124,10 +169,13 @@ class Pixel {
     const double left = (held_ ? released_ : ready_) - end_.t;
     pixels_.refractory_left[x_] = static_cast<float>(std::max(0.0, left));
     pixels_.noise_budget[x_] = noise_.left();
+    if (settings_.adaptation > 0) pixels_.growth[x_] = growth_;
   }
 
   const DvsSettings& settings_;
   const Delays& delays_;
+  const Adaptation adaptation_;
+  double start_;  ///< of the sub-interval, microseconds since the first frame
   const Random& random_;
   const SubInterval& sub_interval_;
   const PixelRow& pixels_;
@@ -145,6 +193,7 @@ class Pixel {
   double ready_;     ///< earliest time of the next event
   double released_;  ///< end of the refractory period
   bool held_;        ///< in reset until released_
+  ThresholdGrowth growth_;
   ShotNoise noise_;
 };
 
@@ -196,12 +245,73 @@ void solve_lines(const RowToSolve& row) {
   }
 }
 
+void solve_adaptive_lines(const RowToSolve& row) {
+  const auto& [begin, duration, step, share, rise, number] = row.sub_interval;
+  const PixelRow& pixels = row.pixels;
+  const Adaptation adaptation(row.settings);
+  const double rate = adaptation.rate();
+  const double fading_time = 1 / rate;
+  const double gap = std::max(in_microseconds(row.settings.refractory_period), min_gap);
+  for (std::size_t i = 0; i < row.candidates.count; ++i) {
+    const int x = row.candidates.x[i];
+    const double first = row.candidates.last_target[i];
+    const double fall = pixels.leak[x] * duration + rise;
+    const double last = pixels.target[x] + fall;
+    const double slope = (last - first) / duration;
+    const double thresholds[] = {pixels.positive[x], -pixels.negative[x]};
+    const double inverse[] = {1 / thresholds[0], 1 / thresholds[1]};
+    double reference = pixels.reference[x];
+    double ready = pixels.refractory_left[x];
+    double growth = adaptation.at(row.start, pixels.growth[x]);
+    double t = 0;
+    int happened = 0;
+    for (; happened < max_events; ++happened) {
+      // The first crossing of either level.
+      double next = std::numeric_limits<double>::infinity();
+      double threshold = 0;
+      const double value = first + slope * t - reference;
+      const double left = duration - t;
+      const double fading = std::min(growth * fading_time, left);
+      for (const int level : {0, 1}) {
+        // In units of the threshold: by how much the signal is beyond the level without growth.
+        const double beyond = value * inverse[level] - 1;
+        const double speed = slope * inverse[level];
+        const double margin = rounding * std::abs(inverse[level]);
+        double wait = std::numeric_limits<double>::infinity();
+        if (beyond >= growth)
+          wait = 0;
+        else if (beyond + (speed + rate) * fading >= growth - margin)
+          wait = std::min((growth - beyond) / (speed + rate), fading);
+        else if (fading < left && beyond + speed * left >= -margin)
+          wait = std::min(-beyond / speed, left);
+        if (wait < next) {
+          next = wait;
+          threshold = thresholds[level];
+        }
+      }
+      if (threshold == 0) break;
+      growth = std::max(0.0, growth - rate * next);
+      t += next;
+      reference += threshold * (1 + growth);
+      if (t < ready) continue;
+      row.events.add(begin + t, x, pixels.y, threshold > 0 ? Polarity::on : Polarity::off);
+      growth += adaptation.step();
+      pixels.growth[x] = {row.start + t, growth};
+      ready = t + gap;
+    }
+    if (happened == max_events) reference = last;
+    pixels.reference[x] = static_cast<float>(reference - fall);
+    pixels.refractory_left[x] = static_cast<float>(std::max(0.0, ready - duration));
+  }
+}
+
 Solver solver_for(const DvsSettings& settings) {
   const bool has_side_effects = settings.pixel_latency > 0 || settings.pixel_latency_jitter > 0 ||
                                 settings.threshold_jitter > 0 ||
                                 settings.refractory_reset == RefractoryReset::signal;
   if (has_side_effects) return Solver::pixels;
   const bool has_lines = settings.cutoff_frequency == 0 && settings.shot_noise_rate == 0;
+  if (settings.adaptation > 0) return has_lines ? Solver::adaptive_lines : Solver::pixels;
   return has_lines ? Solver::lines : Solver::row;
 }
 

@@ -76,6 +76,7 @@ struct RowToSolve {
   const PixelRow& pixels;
   const Candidates& candidates;
   const BandEvents& events;
+  double start;  ///< of the sub-interval, microseconds since the first frame
 };
 
 /// Pixels that solve_row() has not finished: a column per variable, a row per pixel.
@@ -124,12 +125,15 @@ class UnsolvedPixels {
 void solve_pixels(const RowToSolve& row);
 
 /// Solvers: solve_pixels(), or a faster one for settings that allow it.
-enum class Solver { pixels, lines, row };
+enum class Solver { pixels, lines, adaptive_lines, row };
 Solver solver_for(const DvsSettings& settings);
 
 /// Like solve_pixels(), for signals that are straight lines, and events that are crossings without
 /// side effects except the refractory period.
 void solve_lines(const RowToSolve& row);
+
+/// Like solve_lines(), with adaptation.
+void solve_adaptive_lines(const RowToSolve& row);
 
 /// Like solve_pixels(), for events without side effects except the refractory period; many pixels
 /// at a time.

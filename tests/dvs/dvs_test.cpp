@@ -179,7 +179,7 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
   EventBuckets buckets;
   IntervalEvents events;
   events.begin(sub_interval.duration, 1, buckets);
-  solve(RowToSolve{settings, random, sub_interval, tables, pixels, candidates, {events, 0}});
+  solve(RowToSolve{settings, random, sub_interval, tables, pixels, candidates, {events, 0}, 0});
   Solved result;
   for (const auto& event : scene::copy(buckets))
     result.events[{event.x, 0}].push_back(
@@ -215,6 +215,13 @@ TEST(Solvers, AreEqualOnAllTargets) {
   for (const int width : {1, 3, 17, 500}) {
     ASSERT_EQ(solver_for(settings), Solver::lines);
     expect_equal(solved(settings, width, solve_lines), solved(settings, width, solve_pixels));
+    for (const double adaptation : {0.2, 2.0}) {
+      auto adaptive = settings;
+      adaptive.adaptation = adaptation;
+      ASSERT_EQ(solver_for(adaptive), Solver::adaptive_lines);
+      expect_equal(solved(adaptive, width, solve_adaptive_lines),
+                   solved(adaptive, width, solve_pixels));
+    }
     for (const double noise_hz : {0.0, 30.0}) {
       for (const double cutoff_frequency : {0.0, 3.0, 30.0, 3000.0}) {
         auto others = settings;
@@ -277,7 +284,14 @@ INSTANTIATE_TEST_SUITE_P(
                     .leak_rate = 9,
                     .refractory_period = 1'500'000,
                     .refractory_reset = RefractoryReset::signal},
-        DvsSettings{.refractory_period = 15'000'000, .refractory_reset = RefractoryReset::signal}));
+        DvsSettings{.refractory_period = 15'000'000, .refractory_reset = RefractoryReset::signal},
+        DvsSettings{.adaptation = 0.4}, DvsSettings{.leak_rate = 30, .adaptation = 1.5},
+        DvsSettings{.cutoff_frequency = 100, .adaptation = 0.3, .adaptation_time = 3'000'000},
+        DvsSettings{.cutoff_frequency = 15,
+                    .leak_rate = 9,
+                    .adaptation = 0.6,
+                    .refractory_period = 1'500'000,
+                    .refractory_reset = RefractoryReset::signal}));
 
 TEST_P(Reference, IsEqualled) {
   constexpr int width = 19;

@@ -96,8 +96,10 @@ class Esim {
 ///   input      L(t), a straight line from frame to frame
 ///   low pass   dV/dt = 2 pi f (I + d)/(1 + d) (L(t) - V), I of the later frame in 8 bits
 ///   leak       dR/dt = -rate C+
-///   events     ON where V - R >= C+, OFF where R - V >= C-
-///   afterwards R = R +- C (level), or R = V when the refractory period ends (signal)
+///   events     ON where V - R >= (1 + G) C+, OFF where R - V >= (1 + G) C-
+///   adaptation G grows by a with each event; dG/dt = -a / T down to 0
+///   afterwards R = R +- (1 + G) C, G before the event (level), or R = V when the refractory period
+///   ends (signal)
 class DvsPixel {
  public:
   DvsPixel(const DvsSettings& settings, double luma, double leaked)
@@ -120,15 +122,20 @@ class DvsPixel {
       signal_ = settings_.cutoff_frequency > 0 ? input_ + (signal_ - input_) * std::exp(-bandwidth)
                                                : input_;
       reference_ -= settings_.leak_rate / 1e6 * settings_.positive_threshold;
+      growth_ = std::max(
+          0.0, growth_ - settings_.adaptation / in_microseconds(settings_.adaptation_time));
       const bool is_refractory = now_ + 1 < ready_;
       if (settings_.refractory_reset == RefractoryReset::signal && is_refractory) {
         reference_ = signal_;
         continue;
       }
-      const bool is_on = signal_ - reference_ >= settings_.positive_threshold;
-      if (!is_on && reference_ - signal_ < settings_.negative_threshold) continue;
-      reference_ += is_on ? settings_.positive_threshold : -settings_.negative_threshold;
+      const double positive = (1 + growth_) * settings_.positive_threshold;
+      const double negative = (1 + growth_) * settings_.negative_threshold;
+      const bool is_on = signal_ - reference_ >= positive;
+      if (!is_on && reference_ - signal_ < negative) continue;
+      reference_ += is_on ? positive : -negative;
       if (is_refractory) continue;
+      growth_ += settings_.adaptation;
       events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off});
       ready_ = now_ + 1 + in_microseconds(settings_.refractory_period);
       if (settings_.refractory_reset == RefractoryReset::signal) reference_ = signal_;
@@ -156,6 +163,7 @@ class DvsPixel {
   double reference_ = 0;
   double now_ = 0;
   double ready_ = 0;
+  double growth_ = 0;
 };
 
 }  // namespace eventcamera::reference
