@@ -47,12 +47,13 @@ ROWS = {
     "sparse": "eventsim-sparse",
     "diff": "eventsim-diff",
     "`eventsim-dvs preset=esim`":
-        "eventsim-dvs preset=esim response=log log-eps=0.001 denoise=0 exposure-pulse=0",
+        "eventsim-dvs preset=esim response=log log-eps=0.001 denoise=0 adaptation=0 exposure-pulse=0",
     "`eventsim-dvs preset=v2e-noisy`":
-        "eventsim-dvs preset=v2e-noisy response=lin-log denoise=0 exposure-pulse=0",
+        "eventsim-dvs preset=v2e-noisy response=lin-log denoise=0 adaptation=0 exposure-pulse=0",
     "`eventsim-dvs`, `response=linear`": "eventsim-dvs upsampling=motion response=linear",
     "`eventsim-dvs`, `upsampling=linear`": "eventsim-dvs upsampling=linear",
     "`eventsim-dvs`, `denoise=0`": "eventsim-dvs upsampling=motion denoise=0",
+    "`eventsim-dvs`, `adaptation=0`": "eventsim-dvs upsampling=motion adaptation=0",
     "`eventsim-dvs`, `exposure-pulse=0`": "eventsim-dvs upsampling=motion exposure-pulse=0",
     "`eventsim-dvs`": "eventsim-dvs upsampling=motion",
 }
@@ -74,6 +75,8 @@ class Scene:
 SCENES = {
     "slider": Scene("slider-depth, a DAVIS240C on a slider, 240x180", "slider-depth", "images.txt",
                     "events-t-x-y-p.txt.gz", 2, 2),
+    "cradle": Scene("dark-cradle, a DAVIS346 before Newton's cradle in the dark, 346x260", "dark-cradle",
+                    "davis346.aedat4", "davis346.aedat4", 4, 8),
     "davis": Scene("a DAVIS346 in front of a workbench, 346x260", "events",
                    "davis346-frames-events-imu.aedat4", "davis346-frames-events-imu.aedat4", 1, 1),
 }
@@ -102,7 +105,7 @@ def measure(scene, data, progress):
     """The rows of a scene. With several intervals to calibrate on, the first only gives the pixels a
     history."""
     video, recorded = read(scene, data)
-    past = scene.calibrated - 1
+    past = min(scene.calibrated - 1, 1)
 
     def spans(delayed_video):
         times = [frame.time // 1000 for frame in delayed_video.frames]
