@@ -31,11 +31,33 @@ Microseconds IntervalHistogram::quantile(double share) const {
   return middle_of(bin);
 }
 
+double IntervalHistogram::distance_to(const IntervalHistogram& other) const {
+  if (count_ == 0 || other.count_ == 0) return 0;
+  const auto place_of = [](std::size_t bin) {
+    return std::log10(std::max(static_cast<double>(middle_of(bin)), 0.5));
+  };
+  double sum = 0;
+  std::uint64_t ours = 0;
+  std::uint64_t others = 0;
+  for (std::size_t bin = 0; bin + 1 < bin_count; ++bin) {
+    ours += bins_[bin];
+    others += other.bins_[bin];
+    if (ours == count_ && others == other.count_) break;
+    const double share = static_cast<double>(ours) / static_cast<double>(count_);
+    const double other_share = static_cast<double>(others) / static_cast<double>(other.count_);
+    sum += std::abs(share - other_share) * (place_of(bin + 1) - place_of(bin));
+  }
+  return sum;
+}
+
 StreamFigures EventStatistics::figures(Nanoseconds duration) const {
   StreamFigures figures;
   figures.events = on_ + off_;
-  if (figures.events > 0)
+  figures.active_share = static_cast<double>(active_) / pixels_of(map_);
+  if (figures.events > 0) {
     figures.on_share = static_cast<double>(on_) / static_cast<double>(figures.events);
+    figures.distinct_share = static_cast<double>(distinct_) / static_cast<double>(figures.events);
+  }
   for (std::size_t i = 0; i < interval_shares.size(); ++i)
     figures.intervals[i] = intervals_.quantile(interval_shares[i]);
   if (duration <= 0) return figures;

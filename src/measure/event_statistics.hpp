@@ -23,10 +23,12 @@ inline constexpr std::array interval_shares = {0.05, 0.25, 0.5, 0.75, 0.95};
 /// Summary statistics of a stream.
 struct StreamFigures {
   std::uint64_t events = 0;
-  double rate = 0;      ///< events per second
-  double on_share = 0;  ///< fraction of ON events
-  double mean = 0;      ///< over all pixels, events per pixel and second
-  double std_dev = 0;   ///< over all pixels, events per pixel and second
+  double rate = 0;            ///< events per second
+  double on_share = 0;        ///< fraction of ON events
+  double active_share = 0;    ///< fraction of pixels with events
+  double distinct_share = 0;  ///< distinct times per event; 1 if all differ
+  double mean = 0;            ///< over all pixels, events per pixel and second
+  double std_dev = 0;         ///< over all pixels, events per pixel and second
   /// Quantiles (interval_shares) of the time between successive events of a pixel.
   std::array<Microseconds, interval_shares.size()> intervals{};
 };
@@ -46,6 +48,11 @@ class IntervalHistogram {
   /// Returns the `share` quantile, `share` in [0, 1], as the middle of its bin; 0 without
   /// intervals.
   Microseconds quantile(double share) const;
+
+  /// Wasserstein distance to the logarithms of other intervals, in decades: how far the intervals
+  /// of one must be moved on average to become the other's. 0 if either has none. Intervals of 0
+  /// count as half a microsecond.
+  double distance_to(const IntervalHistogram& other) const;
 
   void clear() { *this = {}; }
 
@@ -99,11 +106,15 @@ class EventStatistics {
   /// Throws std::bad_alloc.
   EventStatistics(int width, int height) : map_(width, height) {}
 
-  /// Adds an event, which must lie inside the sensor, and the time since the last event of its
-  /// pixel, if any.
+  /// Adds an event, which must lie inside the sensor and not be earlier than the last one, and the
+  /// time since the last event of its pixel, if any.
   void add(const AbsoluteEvent& event, std::optional<Microseconds> interval) {
     if (interval) intervals_.add(*interval);
-    squares_ += 2 * std::uint64_t{map_.at(event.x, event.y())++} + 1;
+    const auto before = map_.at(event.x, event.y())++;
+    squares_ += 2 * std::uint64_t{before} + 1;
+    active_ += before == 0 ? 1 : 0;
+    distinct_ += last_ == event.t ? 0 : 1;
+    last_ = event.t;
     ++(event.polarity() == Polarity::on ? on_ : off_);
   }
 
@@ -114,11 +125,15 @@ class EventStatistics {
   StreamFigures figures(Nanoseconds duration) const;
 
   const EventMap& map() const { return map_; }
+  const IntervalHistogram& intervals() const { return intervals_; }
 
  private:
   EventMap map_;
   IntervalHistogram intervals_;
-  std::uint64_t squares_ = 0;  ///< sum of the squared events of each pixel
+  std::uint64_t squares_ = 0;   ///< sum of the squared events of each pixel
+  std::uint64_t active_ = 0;    ///< pixels with events
+  std::uint64_t distinct_ = 0;  ///< times
+  LastTime last_;
   std::uint64_t on_ = 0;
   std::uint64_t off_ = 0;
 };

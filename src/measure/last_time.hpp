@@ -17,6 +17,7 @@ class LastTime {
   constexpr bool is_known() const { return bits_ != 0; }
   constexpr Microseconds value() const { return static_cast<Microseconds>(bits_ ^ sign); }
 
+  friend constexpr bool operator==(LastTime a, LastTime b) { return a.bits_ == b.bits_; }
   friend constexpr bool operator<(LastTime a, LastTime b) { return a.bits_ < b.bits_; }
 
  private:

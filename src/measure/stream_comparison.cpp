@@ -2,6 +2,7 @@
 #include "src/measure/stream_comparison.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -31,6 +32,38 @@ void RateCurve::join_bins() {
     for (const auto role : both_roles) bins_[i][role] = bins_[2 * i][role] + bins_[2 * i + 1][role];
   bins_.resize(joined);
   length_ *= 2;
+}
+
+void RateCorrelation::extend_to(Microseconds end) {
+  constexpr Microseconds length = 1000;
+  if (end <= end_) return;
+  const Microseconds bins = (end - end_ + length - 1) / length;
+  if (has_bin_) add_bin(sums_, last_);
+  sums_.bins += static_cast<double>(bins - 1);
+  last_ = {};
+  has_bin_ = true;
+  end_ += bins * length;
+}
+
+void RateCorrelation::add_bin(Sums& sums, const PerRole<double>& bin) {
+  ++sums.bins;
+  sums.product += bin[StreamRole::reference] * bin[StreamRole::candidate];
+  for (const auto role : both_roles) {
+    sums.counts[role] += bin[role];
+    sums.squares[role] += bin[role] * bin[role];
+  }
+}
+
+double RateCorrelation::value() const {
+  auto sums = sums_;
+  if (has_bin_) add_bin(sums, last_);
+  const double reference = sums.counts[StreamRole::reference];
+  const double candidate = sums.counts[StreamRole::candidate];
+  const double variances =
+      (sums.bins * sums.squares[StreamRole::reference] - reference * reference) *
+      (sums.bins * sums.squares[StreamRole::candidate] - candidate * candidate);
+  if (!(variances > 0)) return 0;
+  return (sums.bins * sums.product - reference * candidate) / std::sqrt(variances);
 }
 
 EventMatcher::EventMatcher(int width, int height) {
@@ -125,7 +158,10 @@ std::size_t StreamComparison::add(StreamRole role, std::span<const Event> events
 
 void StreamComparison::take_until(Microseconds end) {
   const Microseconds begin = *start() / 1000;
-  if (!std::exchange(begun_, true)) rates_ = RateCurve(begin);
+  if (!std::exchange(begun_, true)) {
+    rates_ = RateCurve(begin);
+    rate_correlation_ = RateCorrelation(begin);
+  }
   PerRole<std::span<const AbsoluteEvent>> due;
   for (const auto role : both_roles) {
     const auto waiting =
@@ -147,6 +183,7 @@ void StreamComparison::take_until(Microseconds end) {
     statistics_[role].add(event, last_times_[role].take(event));
     matcher_.add(role, event);
     rates_.add(role, event.t);
+    rate_correlation_.add(role, event.t);
   }
   for (const auto role : both_roles) {
     // Not in every call, because a long buffer may be processed in many short pieces.
@@ -157,6 +194,7 @@ void StreamComparison::take_until(Microseconds end) {
     taken = 0;
   }
   rates_.extend_to(end);
+  rate_correlation_.extend_to(end);
   for (const auto role : both_roles) arriving_[role].validator.pass(end);
 }
 
@@ -173,6 +211,9 @@ ComparisonFigures StreamComparison::figures() const {
       figures.match_shares[role][i] =
           static_cast<double>(matched[i]) / static_cast<double>(stream.events);
   }
+  figures.rate_correlation = rate_correlation_.value();
+  figures.interval_distance = statistics_[StreamRole::reference].intervals().distance_to(
+      statistics_[StreamRole::candidate].intervals());
   figures.map_correlation = correlation(map(StreamRole::reference), map(StreamRole::candidate));
   return figures;
 }

@@ -73,6 +73,40 @@ class RateCurve {
   std::vector<Bin> bins_;
 };
 
+/// Pearson correlation of the event counts of both streams in bins of a millisecond, in constant
+/// memory.
+class RateCorrelation {
+ public:
+  explicit RateCorrelation(Microseconds start = 0) : end_(start) {}
+
+  /// Adds an event, which must not be before the start, nor in a bin before the last one.
+  void add(StreamRole role, Microseconds time) {
+    extend_to(time + 1);
+    ++last_[role];
+  }
+
+  /// Adds empty bins up to `end`.
+  void extend_to(Microseconds end);
+
+  /// 0 if the counts of one stream are constant.
+  double value() const;
+
+ private:
+  /// Of the counts in bins.
+  struct Sums {
+    double bins = 0;
+    double product = 0;
+    PerRole<double> counts;
+    PerRole<double> squares;
+  };
+  static void add_bin(Sums& sums, const PerRole<double>& bin);
+
+  Microseconds end_;  ///< of the last bin
+  Sums sums_;         ///< without the last bin
+  bool has_bin_ = false;
+  PerRole<double> last_;  ///< the last bin
+};
+
 /// Maximum distances in time of matching events, in increasing order.
 inline constexpr std::array<Microseconds, 3> match_distances = {1'000, 5'000, 10'000};
 
@@ -130,7 +164,9 @@ struct ComparisonFigures {
   Nanoseconds start = 0;  ///< start of the time covered by both streams
   Nanoseconds end = 0;
   PerRole<StreamFigures> streams;
-  double map_correlation = 0;  ///< correlation of the event counts per pixel
+  double map_correlation = 0;    ///< correlation of the event counts per pixel
+  double rate_correlation = 0;   ///< correlation of the event counts per millisecond
+  double interval_distance = 0;  ///< between the inter-event intervals, decades
   /// Fraction of events with a match in the other stream, per stream and match distance.
   PerRole<std::array<double, match_distances.size()>> match_shares;
 };
@@ -171,6 +207,7 @@ class StreamComparison {
   PerRole<Arriving> arriving_;
   PerRole<LastTimes> last_times_;
   PerRole<EventStatistics> statistics_;
+  RateCorrelation rate_correlation_;
   EventMatcher matcher_;
   RateCurve rates_;
   bool begun_ = false;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <random>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -104,6 +105,29 @@ double covariance_plainly(const std::vector<double>& a, const std::vector<double
   return sum / static_cast<double>(a.size());
 }
 
+/// Times between the successive events of a pixel, sorted.
+std::vector<Microseconds> intervals_plainly(const Stream& stream) {
+  std::map<std::pair<int, int>, Microseconds> last;
+  std::vector<Microseconds> intervals;
+  for (const auto& event : stream) {
+    const auto [place, first] = last.try_emplace({event.x, event.y()}, event.t);
+    if (!first) intervals.push_back(event.t - std::exchange(place->second, event.t));
+  }
+  std::ranges::sort(intervals);
+  return intervals;
+}
+
+/// Mean distance between quantiles, at every share that both have.
+double distance_plainly(const std::vector<Microseconds>& a, const std::vector<Microseconds>& b) {
+  double sum = 0;
+  const auto logarithm = [](Microseconds interval) {
+    return std::log10(std::max(static_cast<double>(interval), 0.5));
+  };
+  for (std::size_t i = 0; i < a.size() * b.size(); ++i)
+    sum += std::abs(logarithm(a[i / b.size()]) - logarithm(b[i / a.size()]));
+  return a.empty() || b.empty() ? 0 : sum / static_cast<double>(a.size() * b.size());
+}
+
 void expect_figures(const StreamFigures& figures, Extent extent, const Stream& stream,
                     double seconds) {
   const auto map = map_plainly(extent, stream);
@@ -116,13 +140,17 @@ void expect_figures(const StreamFigures& figures, Extent extent, const Stream& s
               stream.empty() ? 0 : static_cast<double>(on) / static_cast<double>(stream.size()),
               1e-12);
 
-  std::map<std::pair<int, int>, Microseconds> last;
-  std::vector<Microseconds> intervals;
-  for (const auto& event : stream) {
-    const auto [place, first] = last.try_emplace({event.x, event.y()}, event.t);
-    if (!first) intervals.push_back(event.t - std::exchange(place->second, event.t));
-  }
-  std::ranges::sort(intervals);
+  const auto active = std::ranges::count_if(map, [](double count) { return count > 0; });
+  EXPECT_NEAR(figures.active_share, static_cast<double>(active) / static_cast<double>(map.size()),
+              1e-12);
+  std::set<Microseconds> times;
+  for (const auto& event : stream) times.insert(event.t);
+  EXPECT_NEAR(
+      figures.distinct_share,
+      stream.empty() ? 0 : static_cast<double>(times.size()) / static_cast<double>(stream.size()),
+      1e-12);
+
+  const auto intervals = intervals_plainly(stream);
   for (std::size_t i = 0; i < interval_shares.size(); ++i) {
     const auto rank = static_cast<std::size_t>(
         std::ceil(interval_shares[i] * static_cast<double>(intervals.size())));
@@ -271,6 +299,11 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
   EXPECT_NEAR(figures.map_correlation,
               variances > 0 ? covariance_plainly(a, b) / std::sqrt(variances) : 0, 1e-9);
 
+  EXPECT_NEAR(
+      figures.interval_distance,
+      distance_plainly(intervals_plainly(covered_reference), intervals_plainly(covered_candidate)),
+      0.02);
+
   const auto expect_matches = [&](StreamRole role, const Stream& of, const Stream& among) {
     const auto counts = matched_plainly(of, among);
     for (std::size_t i = 0; i < counts.size(); ++i)
@@ -282,6 +315,18 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
   expect_matches(StreamRole::candidate, covered_candidate, covered_reference);
 
   const auto& curve = comparison.rates();
+  std::vector<double> rates_a;
+  std::vector<double> rates_b;
+  for (const auto& bin : curve.bins()) {
+    rates_a.push_back(static_cast<double>(bin[StreamRole::reference]));
+    rates_b.push_back(static_cast<double>(bin[StreamRole::candidate]));
+  }
+  const double rate_variances =
+      covariance_plainly(rates_a, rates_a) * covariance_plainly(rates_b, rates_b);
+  EXPECT_NEAR(
+      figures.rate_correlation,
+      rate_variances > 0 ? covariance_plainly(rates_a, rates_b) / std::sqrt(rate_variances) : 0,
+      1e-9);
   const auto whole = static_cast<std::size_t>((reference_end - start + 999) / 1000);
   EXPECT_GE(curve.bins().size(), whole);
   EXPECT_LE(curve.bins().size(), whole + 1);  // events at the end

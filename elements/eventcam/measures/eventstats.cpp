@@ -12,6 +12,9 @@
  * - `start`, `end` (#gint64): the time covered, in stream time (ns);
  * - `events` (#guint64), `rate` (#gdouble, events per second);
  * - `on-share` (#gdouble): the fraction of ON events;
+ * - `active-share` (#gdouble): the fraction of pixels with events;
+ * - `distinct-share` (#gdouble): distinct times per event; 1 if no two events have the same time,
+ *   and near 0 if a simulator puts many events at the times of few frames;
  * - `mean`, `std-dev` (#gdouble): over all pixels, events per pixel and second;
  * - `interval-p5`, `-p25`, `-p50`, `-p75`, `-p95` (#guint64, ns): percentiles of the time between
  *   successive events of a pixel, accurate to 3 %.

@@ -93,8 +93,9 @@ void write_json(const GstStructure* structure, const std::string& path) {
 void put_figures(GstStructure* structure, const StreamFigures& figures) {
   gst_structure_set(structure, "events", G_TYPE_UINT64, guint64{figures.events}, "rate",
                     G_TYPE_DOUBLE, figures.rate, "on-share", G_TYPE_DOUBLE, figures.on_share,
-                    "mean", G_TYPE_DOUBLE, figures.mean, "std-dev", G_TYPE_DOUBLE, figures.std_dev,
-                    nullptr);
+                    "active-share", G_TYPE_DOUBLE, figures.active_share, "distinct-share",
+                    G_TYPE_DOUBLE, figures.distinct_share, "mean", G_TYPE_DOUBLE, figures.mean,
+                    "std-dev", G_TYPE_DOUBLE, figures.std_dev, nullptr);
   for (std::size_t i = 0; i < interval_names.size(); ++i)
     gst_structure_set(structure, interval_names[i], G_TYPE_UINT64,
                       static_cast<guint64>(figures.intervals[i]) * GST_USECOND, nullptr);
