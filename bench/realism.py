@@ -168,13 +168,15 @@ def table(result):
     nearest = {field: min(off(row, field) for row in rows.values())
                for field in ("mean", "std-dev")}
     best_map = max(row["map-correlation"] for row in rows.values())
+    best_intervals = min(row["interval-distance"] for row in rows.values()
+                         if row["interval-distance"] > 0)
     best_share = {share: max(row[f"{share[0]}-matches"][share[1]] for row in rows.values())
                   for share in shares}
     lines = [
-        "| | C+ / C− | mean | std. dev. | map correlation"
+        "| | C+ / C− | mean | std. dev. | map correlation | interval distance"
         " | real events matched within 1, 5, 10 ms | simulated events matched |",
-        "|---|---|---|---|---|---|---|",
-        f"| real events | | {real['mean']:.3f} | {real['std-dev']:.3f} | | | |",
+        "|---|---|---|---|---|---|---|---|",
+        f"| real events | | {real['mean']:.3f} | {real['std-dev']:.3f} | | | | |",
     ]
     for name, row in rows.items():
         cells = [name, thresholds_of(row["element"])]
@@ -185,6 +187,8 @@ def table(result):
                 f"{value:.3f} ({100 * (value / real[field] - 1):+.0f} %)"))
         cells.append(bold_where(row["map-correlation"] == best_map,
                                 f"{row['map-correlation']:.3f}"))
+        cells.append(bold_where(row["interval-distance"] == best_intervals,
+                                f"{row['interval-distance']:.2f}"))
         for side in ("reference", "candidate"):
             values = []
             for within in ("within-1ms", "within-5ms", "within-10ms"):
