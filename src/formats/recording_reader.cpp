@@ -346,6 +346,7 @@ void RecordingReader::show(Stream& stream) {
     stream.extent = stream.used.extent(stream.used.within() / 1000);
     stream.info.size = sensor_with(stream.extent, stream.info.mirrored);
     stream.size_from = SizeFrom::assumption;
+    stream.is_implausible = stream.used.are_implausible(decoder_->corruption().outside);
   }
   start_chunker(stream);
 }

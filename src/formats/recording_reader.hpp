@@ -55,6 +55,7 @@ class RecordingReader {
     std::optional<Microseconds> latest;  ///< latest time in it
     std::optional<Frame> first_frame;    ///< format only: its pixels are no longer valid
     UsedPixels used = {};                ///< in the surveyed part
+    bool is_implausible = false;         ///< no sensor is so large as an assumed one had to be
     Extent extent = {};                  ///< of an assumed size
     bool is_sampled = false;             ///< `used` covers at least one interval
     Chunker chunker;

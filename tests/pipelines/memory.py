@@ -18,6 +18,7 @@ import h5py
 import numpy
 
 LAUNCH = os.environ["GST_LAUNCH"]
+THUMBNAIL = os.path.join(os.environ["BUILD"], "pipelines", "event-thumbnail")
 os.environ.pop("MALLOC_PERTURB_", None)  # else all memory is written when it is allocated
 LARGEST = 16384
 CHAINS = {
@@ -92,9 +93,9 @@ def make_files():
     write_hdf5("at-once.h5", at_once, 640)
 
 
-def peak_of(chain):
-    """Runs a pipeline. Returns its status and its largest memory in bytes."""
-    process = subprocess.Popen(["timeout", "120", LAUNCH, "-q", *chain.split()])
+def peak_of(command):
+    """Runs a program. Returns its status and its largest memory in bytes."""
+    process = subprocess.Popen(["timeout", "120", *command])
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     return process.returncode, usage.ru_maxrss * 1024
@@ -112,10 +113,14 @@ def main():
             sys.exit("the files were not written")
         for name in sorted(os.listdir()):
             size = os.path.getsize(name)
-            for chain, line in CHAINS.items():
-                bound = max(line.count("{0}"), 1) * (300e6 + 50 * size)
-                code, peak = peak_of(line.format(os.path.join(folder, name), EVENTS))
-                report = f"{name}, {size} bytes, {chain}: {peak / 1e6:.0f} of {bound / 1e6:.0f} MB"
+            path = os.path.join(folder, name)
+            commands = {chain: [LAUNCH, "-q", *line.format(path, EVENTS).split()]
+                        for chain, line in CHAINS.items()}
+            commands["thumbnail"] = [THUMBNAIL, path, path + ".png"]
+            for what, command in commands.items():
+                bound = max(" ".join(command).count("location="), 1) * (300e6 + 50 * size)
+                code, peak = peak_of(command)
+                report = f"{name}, {size} bytes, {what}: {peak / 1e6:.0f} of {bound / 1e6:.0f} MB"
                 print(report, flush=True)
                 if code != 0 or peak > bound:
                     failed.append(f"{report}, status {code}")

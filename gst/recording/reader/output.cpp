@@ -205,8 +205,7 @@ bool EventReader::find_size(std::size_t index) {
       return true;
     }
   }
-  const auto outside = recording_->counts().outside;
-  if (stream.used.are_implausible(outside)) {
+  if (stream.is_implausible) {
     const auto most = std::to_string(eventcamera::UsedPixels::max_guessed_side);
     post_message(
         element_, GST_MESSAGE_ERROR,
