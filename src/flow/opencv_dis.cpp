@@ -19,6 +19,7 @@ class OpenCvDisFlow final : public DenseFlow {
     dis_->setGradientDescentIterations(DisFlow::high.iterations);
     dis_->setFinestScale(1);
     dis_->setUseSpatialPropagation(false);
+    regularise(*dis_);
   }
 
   void push(const ImageView<std::uint8_t>& picture, ThreadPool& /*threads*/) override {

@@ -5,6 +5,7 @@
 
 #include "src/flow/dis/dis.hpp"
 #include "src/flow/opencv.hpp"
+#include "src/flow/opencv_dis.hpp"
 
 /// OpenCV's implementation of DIS with the parameters of ours, for images of at least 64x64 pixels.
 inline eventcamera::Image<eventcamera::Flow> opencv_dis(
@@ -16,12 +17,7 @@ inline eventcamera::Image<eventcamera::Flow> opencv_dis(
   dis->setGradientDescentIterations(quality.iterations);
   dis->setFinestScale(quality.finest_scale(from.width(), from.height()));
   dis->setUseSpatialPropagation(false);
-  // Since OpenCV 4.10 this is a parameter, with another default.
-  [](auto& settings) {
-    constexpr float epsilon = 0.001F;
-    if constexpr (requires { settings.setVariationalRefinementEpsilon(epsilon); })
-      settings.setVariationalRefinementEpsilon(epsilon);
-  }(*dis);
+  eventcamera::regularise(*dis);
   cv::Mat flow;
   // Contiguous rows, as it requires.
   dis->calc(opencv_picture(from.view()).clone(), opencv_picture(to.view()).clone(), flow);
