@@ -102,7 +102,7 @@ draw_thumbnail() { # FILE: prints the numbers of its OFF, its ON and of all pixe
   local line
   line=$(sed -n 's/^Exec=//p' "$thumbnailer")
   line=${line//%s/256}
-  line=${line//%i/$PWD/$1}
+  line=${line//%i/"$(printf %q "$PWD/$1")"}
   line=${line//%o/thumbnail.png}
   echo "$line" >&2
   eval "env -u DISPLAY PATH='$BUILD/pipelines:$PATH' timeout 60 $line"
