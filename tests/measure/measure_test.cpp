@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -71,18 +72,22 @@ class Feed {
   std::mt19937 random_;
 };
 
-MatchCounts matched_plainly(const Stream& of, const Stream& among) {
-  MatchCounts counts{};
+MatchFigures matches_plainly(const Stream& of, const Stream& among) {
+  MatchFigures figures;
+  if (of.empty()) return figures;
+  const auto events = static_cast<double>(of.size());
   for (const auto& event : of) {
-    for (std::size_t i = 0; i < counts.size(); ++i) {
-      counts[i] += std::ranges::any_of(among, [&](const AbsoluteEvent& match) {
-        return match.polarity() == event.polarity() && std::abs(match.x - event.x) <= 1 &&
-               std::abs(match.y() - event.y()) <= 1 &&
-               std::abs(match.t - event.t) <= match_distances[i];
-      });
-    }
+    Microseconds nearest = match_distances.back() + 1;
+    for (const auto& match : among)
+      if (match.polarity() == event.polarity() && std::abs(match.x - event.x) <= 1 &&
+          std::abs(match.y() - event.y()) <= 1)
+        nearest = std::min(nearest, std::abs(match.t - event.t));
+    for (std::size_t i = 0; i < match_distances.size(); ++i)
+      figures.shares[i] += nearest <= match_distances[i] ? 1 / events : 0;
+    figures.nearest_distance +=
+        static_cast<double>(std::min(nearest, match_distances.back())) / events;
   }
-  return counts;
+  return figures;
 }
 
 std::vector<double> map_plainly(Extent extent, const Stream& stream) {
@@ -103,6 +108,18 @@ double covariance_plainly(const std::vector<double>& a, const std::vector<double
   for (std::size_t i = 0; i < a.size(); ++i)
     sum += (a[i] - mean_plainly(a)) * (b[i] - mean_plainly(b));
   return sum / static_cast<double>(a.size());
+}
+
+double correlation_plainly(const std::vector<double>& a, const std::vector<double>& b) {
+  const double variances = covariance_plainly(a, a) * covariance_plainly(b, b);
+  return variances > 0 ? covariance_plainly(a, b) / std::sqrt(variances) : 0;
+}
+
+/// Number of events in each millisecond from `start`.
+std::vector<double> rates_plainly(const Stream& stream, Microseconds start, std::size_t bins) {
+  std::vector<double> rates(bins);
+  for (const auto& event : stream) ++rates[static_cast<std::size_t>((event.t - start) / 1000)];
+  return rates;
 }
 
 /// Times between the successive events of a pixel, sorted.
@@ -158,6 +175,35 @@ void expect_figures(const StreamFigures& figures, Extent extent, const Stream& s
     EXPECT_NEAR(static_cast<double>(figures.intervals[i]), static_cast<double>(expected),
                 static_cast<double>(expected) / 32);
   }
+}
+
+void expect_matches(const MatchFigures& figures, const MatchFigures& expected) {
+  for (std::size_t i = 0; i < match_distances.size(); ++i)
+    EXPECT_NEAR(figures.shares[i], expected.shares[i], 1e-9);
+  EXPECT_NEAR(figures.nearest_distance, expected.nearest_distance, 1e-6);
+}
+
+void expect_ceiling(const CeilingFigures& figures, Extent extent, const Stream& stream,
+                    Microseconds start, std::size_t bins) {
+  std::array<Stream, 2> halves;
+  std::mt19937 random;
+  for (const auto& event : stream) halves[random() % 2].push_back(event);
+  const auto& [a, b] = halves;
+  const auto of_wholes = [](double r) { return r < 0 ? 0 : 2 * r / (1 + r); };
+  EXPECT_NEAR(figures.map_correlation,
+              of_wholes(correlation_plainly(map_plainly(extent, a), map_plainly(extent, b))), 1e-9);
+  EXPECT_NEAR(
+      figures.rate_correlation,
+      of_wholes(correlation_plainly(rates_plainly(a, start, bins), rates_plainly(b, start, bins))),
+      1e-9);
+  EXPECT_NEAR(figures.interval_distance,
+              distance_plainly(intervals_plainly(a), intervals_plainly(b)), 0.02);
+  const auto first = matches_plainly(a, b);
+  const auto second = matches_plainly(b, a);
+  MatchFigures expected{.nearest_distance = (first.nearest_distance + second.nearest_distance) / 4};
+  for (std::size_t i = 0; i < match_distances.size(); ++i)
+    expected.shares[i] = 1 - std::pow(1 - (first.shares[i] + second.shares[i]) / 2, 2);
+  expect_matches(figures.matches, expected);
 }
 
 TEST(IntervalHistogram, IsExactBelow64AndToAThirtySecondBeyond) {
@@ -295,38 +341,25 @@ TEST_P(ComparisonTest, IsThatOfAllEventsAtOnce) {
 
   const auto a = map_plainly(scene.extent, covered_reference);
   const auto b = map_plainly(scene.extent, covered_candidate);
-  const double variances = covariance_plainly(a, a) * covariance_plainly(b, b);
-  EXPECT_NEAR(figures.map_correlation,
-              variances > 0 ? covariance_plainly(a, b) / std::sqrt(variances) : 0, 1e-9);
-
+  EXPECT_NEAR(figures.similarity.map_correlation, correlation_plainly(a, b), 1e-9);
   EXPECT_NEAR(
-      figures.interval_distance,
+      figures.similarity.interval_distance,
       distance_plainly(intervals_plainly(covered_reference), intervals_plainly(covered_candidate)),
       0.02);
 
-  const auto expect_matches = [&](StreamRole role, const Stream& of, const Stream& among) {
-    const auto counts = matched_plainly(of, among);
-    for (std::size_t i = 0; i < counts.size(); ++i)
-      EXPECT_NEAR(figures.match_shares[role][i],
-                  of.empty() ? 0 : static_cast<double>(counts[i]) / static_cast<double>(of.size()),
-                  1e-12);
-  };
-  expect_matches(StreamRole::reference, covered_reference, covered_candidate);
-  expect_matches(StreamRole::candidate, covered_candidate, covered_reference);
+  expect_matches(figures.similarity.matches[StreamRole::reference],
+                 matches_plainly(covered_reference, covered_candidate));
+  expect_matches(figures.similarity.matches[StreamRole::candidate],
+                 matches_plainly(covered_candidate, covered_reference));
 
   const auto& curve = comparison.rates();
-  std::vector<double> rates_a;
-  std::vector<double> rates_b;
-  for (const auto& bin : curve.bins()) {
-    rates_a.push_back(static_cast<double>(bin[StreamRole::reference]));
-    rates_b.push_back(static_cast<double>(bin[StreamRole::candidate]));
-  }
-  const double rate_variances =
-      covariance_plainly(rates_a, rates_a) * covariance_plainly(rates_b, rates_b);
-  EXPECT_NEAR(
-      figures.rate_correlation,
-      rate_variances > 0 ? covariance_plainly(rates_a, rates_b) / std::sqrt(rate_variances) : 0,
-      1e-9);
+  const auto bins = curve.bins().size();
+  EXPECT_NEAR(figures.similarity.rate_correlation,
+              correlation_plainly(rates_plainly(covered_reference, start, bins),
+                                  rates_plainly(covered_candidate, start, bins)),
+              1e-9);
+  expect_ceiling(figures.ceiling, scene.extent, covered_reference, start, bins);
+
   const auto whole = static_cast<std::size_t>((reference_end - start + 999) / 1000);
   EXPECT_GE(curve.bins().size(), whole);
   EXPECT_LE(curve.bins().size(), whole + 1);  // events at the end
@@ -381,7 +414,7 @@ TEST(Comparison, SurvivesEventsBeyondThePictureAndOutOfOrder) {
   const auto figures = comparison.figures();
   EXPECT_EQ(figures.streams[StreamRole::reference].events,
             figures.streams[StreamRole::candidate].events);
-  EXPECT_EQ(figures.match_shares[StreamRole::candidate][0], 1);
+  EXPECT_EQ(figures.similarity.matches[StreamRole::candidate].shares[0], 1);
 }
 
 TEST(MapPicture, ShowsMoreEventsBrighterAndSaysWhatCannotBeWritten) {

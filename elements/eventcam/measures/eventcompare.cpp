@@ -18,7 +18,12 @@
  * accurate to 0.02; 0 if either stream has none;
  * - `reference-matches`, `candidate-matches` (#GstStructure): the fractions of the events of each
  *   stream that have a match in the other, of the same polarity, at the same pixel or next to it
- *   (#gdouble, `within-1ms`, `within-5ms`, `within-10ms`);
+ *   (#gdouble, `within-1ms`, `within-5ms`, `within-10ms`), and `nearest-distance` (#guint64): the
+ * mean time to the nearest such event, in ns; 10 ms of those without one;
+ * - `noise-ceiling` (#GstStructure): `map-correlation`, `rate-correlation`, `interval-distance` and
+ *   `matches` of a second recording of the reference's scene, estimated from two halves of its
+ *   events, chosen by chance (split halves, Spearman-Brown); a good simulator can come out slightly
+ *   above, since a camera's events are more regular than chance;
  * - `rate-curve` (#GstStructure): event counts in bins of `bin` ns (#guint64), as two arrays,
  *   `reference` and `candidate`.
  *
@@ -34,7 +39,6 @@
  * ]|
  */
 #include <algorithm>
-#include <array>
 #include <optional>
 
 #include "elements/eventcam/measures/report.hpp"
@@ -103,10 +107,19 @@ void put_structure(GstStructure* structure, const char* field, GstStructure* val
   gst_structure_free(value);
 }
 
-GstStructure* matches_of(const std::array<double, 3>& shares) {
-  return gst_structure_new("matches", "within-1ms", G_TYPE_DOUBLE, shares[0], "within-5ms",
-                           G_TYPE_DOUBLE, shares[1], "within-10ms", G_TYPE_DOUBLE, shares[2],
-                           nullptr);
+GstStructure* matches_of(const eventcamera::MatchFigures& matches) {
+  return gst_structure_new("matches", "within-1ms", G_TYPE_DOUBLE, matches.shares[0], "within-5ms",
+                           G_TYPE_DOUBLE, matches.shares[1], "within-10ms", G_TYPE_DOUBLE,
+                           matches.shares[2], "nearest-distance", G_TYPE_UINT64,
+                           static_cast<guint64>(matches.nearest_distance * GST_USECOND), nullptr);
+}
+
+/// Sets the fields of a similarity, or of the ceiling of one.
+template <class Figures>
+void put_similarity(GstStructure* structure, const Figures& figures) {
+  gst_structure_set(structure, "map-correlation", G_TYPE_DOUBLE, figures.map_correlation,
+                    "rate-correlation", G_TYPE_DOUBLE, figures.rate_correlation,
+                    "interval-distance", G_TYPE_DOUBLE, figures.interval_distance, nullptr);
 }
 
 GstStructure* curve_of(const eventcamera::RateCurve& rates) {
@@ -137,13 +150,16 @@ GstStructure* structure_of(const StreamComparison& comparison) {
     put_figures(stream, figures.streams[role]);
     put_structure(structure, name_of(role), stream);
   }
-  gst_structure_set(structure, "map-correlation", G_TYPE_DOUBLE, figures.map_correlation,
-                    "rate-correlation", G_TYPE_DOUBLE, figures.rate_correlation,
-                    "interval-distance", G_TYPE_DOUBLE, figures.interval_distance, nullptr);
+  const auto& similarity = figures.similarity;
+  put_similarity(structure, similarity);
   put_structure(structure, "reference-matches",
-                matches_of(figures.match_shares[StreamRole::reference]));
+                matches_of(similarity.matches[StreamRole::reference]));
   put_structure(structure, "candidate-matches",
-                matches_of(figures.match_shares[StreamRole::candidate]));
+                matches_of(similarity.matches[StreamRole::candidate]));
+  GstStructure* ceiling = gst_structure_new_empty("noise-ceiling");
+  put_similarity(ceiling, figures.ceiling);
+  put_structure(ceiling, "matches", matches_of(figures.ceiling.matches));
+  put_structure(structure, "noise-ceiling", ceiling);
   put_structure(structure, "rate-curve", curve_of(comparison.rates()));
   return structure;
 }
