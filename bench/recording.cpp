@@ -68,7 +68,7 @@ std::size_t decode(const std::string& path) {
 }
 
 void play(const std::string& path) {
-  const std::string line = "filesrc location=" + path + " ! evtdec ! fakesink";
+  const std::string line = "filesrc location=\"" + path + "\" ! evtdec ! fakesink";
   GstElement* pipeline = gst_parse_launch(line.c_str(), nullptr);
   GstBus* bus = gst_element_get_bus(pipeline);
   gst_element_set_state(pipeline, GST_STATE_PLAYING);

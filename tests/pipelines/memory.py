@@ -8,6 +8,7 @@ of events.
 """
 
 import os
+import pathlib
 import random
 import struct
 import subprocess
@@ -21,15 +22,15 @@ LAUNCH = os.environ["GST_LAUNCH"]
 THUMBNAIL = os.path.join(os.environ["BUILD"], "pipelines", "event-thumbnail")
 os.environ.pop("MALLOC_PERTURB_", None)  # else all memory is written when it is allocated
 LARGEST = 16384
-CHAINS = {
-    "player": "playbin uri=file://{0} video-sink=fakesink",
-    "decodebin": "filesrc location={0} ! decodebin ! videoconvert ! video/x-raw,format=I420 ! fakesink",
-    "decaying": "filesrc location={0} ! decodebin caps={1} ! eventrender mode=decay ! fakesink",
-    "statistics": "filesrc location={0} ! decodebin caps={1} ! eventstats ! fakesink",
-    "comparison": "eventcompare name=c ! fakesink filesrc location={0} ! decodebin caps={1} ! c.reference "
-    "filesrc location={0} ! decodebin caps={1} ! c.candidate",
-}
 EVENTS = "application/x-event-camera,format=XYTP"
+CHAINS = {
+    "player": "playbin uri={uri} video-sink=fakesink",
+    "decodebin": "filesrc location={path} ! decodebin ! videoconvert ! video/x-raw,format=I420 ! fakesink",
+    "decaying": "filesrc location={path} ! decodebin caps={events} ! eventrender mode=decay ! fakesink",
+    "statistics": "filesrc location={path} ! decodebin caps={events} ! eventstats ! fakesink",
+    "comparison": "eventcompare name=c ! fakesink filesrc location={path} ! decodebin caps={events} ! c.reference "
+    "filesrc location={path} ! decodebin caps={events} ! c.candidate",
+}
 
 
 def scattered(side, count):
@@ -114,7 +115,9 @@ def main():
         for name in sorted(os.listdir()):
             size = os.path.getsize(name)
             path = os.path.join(folder, name)
-            commands = {chain: [LAUNCH, "-q", *line.format(path, EVENTS).split()]
+            uri = pathlib.Path(path).as_uri()
+            commands = {chain: [LAUNCH, "-q", *(word.format(path=path, uri=uri, events=EVENTS)
+                                          for word in line.split())]
                         for chain, line in CHAINS.items()}
             commands["thumbnail"] = [THUMBNAIL, path, path + ".png"]
             for what, command in commands.items():

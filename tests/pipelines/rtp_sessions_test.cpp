@@ -460,16 +460,19 @@ TEST_P(EveryNetwork, WhatIsLostIsCounted) {
 }
 
 TEST(Rtp, AReorderedStreamIsWholeAfterAJitterBuffer) {
+  std::atomic<guint64> passed = 0;
   Pipeline pipeline(source +
                     " ! rtpeventpay name=pay mtu=576 ! netsim name=net min-delay=1 max-delay=50 ! "
                     "rtpjitterbuffer latency=20000 faststart-min-packets=1 ! " +
                     sink);
   Receiver receiver(pipeline);
+  count_buffers(pipeline["net"], "src", passed);
   pipeline.set(GST_STATE_PLAYING);
   Sender sender(pipeline);
   // A jitter buffer starts with the first packet that it gets.
   sender.send(0, 1);
   wait_until_sent(pipeline, 1);
+  wait_until([&] { return passed == pipeline.stat("pay", "packets"); });
   g_object_set(pipeline["net"], "delay-probability", 0.2, nullptr);
   sender.send(1, buffers);
   receiver.wait_for(sent_events().size());
