@@ -16,8 +16,6 @@ import shutil
 import sys
 import tempfile
 from dataclasses import dataclass
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
 
 import matplotlib
 import numpy as np
@@ -25,14 +23,10 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-# A program, which import would not find.
-CALIBRATE = os.path.join(os.path.dirname(__file__), "..", "pipelines", "event-calibrate")
-loader = SourceFileLoader("event_calibrate", CALIBRATE)
-sys.modules[loader.name] = module_from_spec(spec_from_loader(loader.name, loader))
-loader.exec_module(sys.modules[loader.name])
-from event_calibrate import (  # noqa: E402
-    ON, Gst, Progress, Span, calibrate, compare, delayed, find_lag, read_recording, read_video,
-    refine_lag, simulate, until)
+sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
+from event_calibrate import Progress, calibrate, find_lag  # noqa: E402
+from event_streams import (  # noqa: E402
+    ON, Gst, Span, compare, delayed, read_mask, read_recording, read_video, simulate, until)
 from page import replace_tables  # noqa: E402
 
 # The name of each row, and its element.
@@ -47,15 +41,15 @@ ROWS = {
     "sparse": "eventsim-sparse",
     "diff": "eventsim-diff",
     "`eventsim-dvs preset=esim`":
-        "eventsim-dvs preset=esim response=log log-eps=0.001 denoise=0 adaptation=0 exposure-pulse=0",
+        "eventsim-dvs preset=esim response=log log-eps=0.001 denoise=0 adaptation=0 refractory-period=0 upsampling=linear exposure-pulse=0",
     "`eventsim-dvs preset=v2e-noisy`":
-        "eventsim-dvs preset=v2e-noisy response=lin-log denoise=0 adaptation=0 exposure-pulse=0",
-    "`eventsim-dvs`, `response=linear`": "eventsim-dvs upsampling=motion response=linear",
+        "eventsim-dvs preset=v2e-noisy response=lin-log denoise=0 adaptation=0 refractory-period=0 upsampling=linear exposure-pulse=0",
+    "`eventsim-dvs`, `response=linear`": "eventsim-dvs response=linear",
     "`eventsim-dvs`, `upsampling=linear`": "eventsim-dvs upsampling=linear",
-    "`eventsim-dvs`, `denoise=0`": "eventsim-dvs upsampling=motion denoise=0",
-    "`eventsim-dvs`, `adaptation=0`": "eventsim-dvs upsampling=motion adaptation=0",
-    "`eventsim-dvs`, `exposure-pulse=0`": "eventsim-dvs upsampling=motion exposure-pulse=0",
-    "`eventsim-dvs`": "eventsim-dvs upsampling=motion",
+    "`eventsim-dvs`, `upsampling=motion`": "eventsim-dvs upsampling=motion",
+    "`eventsim-dvs`, `denoise=0`": "eventsim-dvs denoise=0",
+    "`eventsim-dvs`, `exposure-pulse=0`": "eventsim-dvs exposure-pulse=0",
+    "`eventsim-dvs`": "eventsim-dvs",
 }
 CALIBRATED = "`eventsim-dvs`"
 
@@ -70,6 +64,7 @@ class Scene:
     recording: str
     calibrated: int  # frame intervals to calibrate on
     measured: int  # frame intervals after them to measure
+    mask: str = ""  # picture that is white where pixels of the camera can fire
 
 
 SCENES = {
@@ -77,6 +72,8 @@ SCENES = {
                     "events-t-x-y-p.txt.gz", 2, 2),
     "cradle": Scene("dark-cradle, a DAVIS346 before Newton's cradle in the dark, 346x260", "dark-cradle",
                     "davis346.aedat4", "davis346.aedat4", 4, 8),
+    "balloon": Scene("balloon, an event camera beside a frame camera at 160 frames per second, 957x856", "balloon",
+                     "images.txt", "events.raw", 10, 14, "reachable.png"),
     "davis": Scene("a DAVIS346 in front of a workbench, 346x260", "events",
                    "davis346-frames-events-imu.aedat4", "davis346-frames-events-imu.aedat4", 1, 1),
 }
@@ -98,7 +95,9 @@ def read(scene, data):
     video.frames = video.frames[:scene.calibrated + scene.measured + 1]
     with tempfile.TemporaryDirectory() as scratch:
         recorded = read_recording(unpacked(os.path.join(folder, scene.recording), scratch), video)
-    return video, recorded
+    if scene.mask:
+        video.mask = read_mask(os.path.join(folder, scene.mask), video)
+    return video, video.of_camera(recorded)
 
 
 def measure(scene, data, progress):
@@ -115,15 +114,8 @@ def measure(scene, data, progress):
 
     lag = 0.0
     if past > 0:
-        lag = find_lag(until(video, video.frames[scene.calibrated].time // 1000), recorded)
-        # With the most realistic simulator.
-        early = delayed(video, lag)
-        training, _ = spans(early)
-        early = until(early, training.end)
-        # Pulses depend on the frame times.
-        element = calibrate(early, recorded, training, ROWS[CALIBRATED] + " exposure-pulse=0",
-                            progress)
-        lag += refine_lag(early, recorded, training, element, progress)
+        training, _ = spans(video)
+        lag = find_lag(until(video, training.end), recorded, training, ROWS[CALIBRATED], progress)
     video = delayed(video, lag)
     training, test = spans(video)
     rows = {}

@@ -9,11 +9,12 @@
  * mismatch, leak, shot noise, hot and dead pixels, refractory period, latency, and the limits of
  * the readout. The time of an event is that of the pixel's threshold crossing, to the microsecond.
  *
- * A preset sets all of these; properties that are set explicitly, before or after the preset,
- * override it. Times are nanoseconds. Properties that gst-inspect-1.0 marks as controllable are
- * read at the time of each frame. Contrast thresholds are in units of the response: with log and
- * lin-log, a threshold of 0.2 is a change of light by 22 %; linear has the same range from black to
- * white as lin-log, ln(255) = 5.54, so 0.2 is 9.2 grey levels of 8-bit video.
+ * A preset sets all of these. A profile overrides some: a small file that event-calibrate fits to a
+ * camera. Properties that are set explicitly, before or after, override both. Times are
+ * nanoseconds. Properties that gst-inspect-1.0 marks as controllable are read at the time of each
+ * frame. Contrast thresholds are in units of the response: with log and lin-log, a threshold of 0.2
+ * is a change of light by 22 %; linear has the same range from black to white as lin-log, ln(255)
+ * = 5.54, so 0.2 is 9.2 grey levels of 8-bit video.
  *
  * If a static or dark scene fires because of a webcam's sensor noise, denoise removes the noise and
  * keeps the edges.
@@ -29,10 +30,13 @@
  * threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=ball.raw
  * ]|
  */
+#include <algorithm>
 #include <bitset>
-#include <utility>
+#include <stdexcept>
+#include <string>
 #include <variant>
 
+#include "elements/eventsim/camera_profile.hpp"
 #include "gst/base/types.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "src/dvs/dvs_settings.hpp"
@@ -210,18 +214,69 @@ const Setting table[] = {
      &DvsSettings::seed},
 };
 
+/// Settings that come from one source.
+struct Given {
+  DvsSettings settings;
+  std::bitset<std::size(table)> which;
+
+  void take(std::size_t i, const GValue* value) {
+    std::visit([&](auto member) { read_value(value, settings.*member); }, table[i].member);
+    which[i] = true;
+  }
+  void override(DvsSettings& others) const {
+    for (std::size_t i = 0; i < which.size(); ++i)
+      if (which[i])
+        std::visit([&](auto member) { others.*member = settings.*member; }, table[i].member);
+  }
+};
+
+/// Reads the settings in a camera profile. Throws std::runtime_error.
+Given read_profile(const std::string& path, GObjectClass* klass) {
+  Given given;
+  for (const auto& [name, text] : read_camera_profile(path, "eventsim-dvs")) {
+    const auto* setting = std::ranges::find(table, name, &Setting::name);
+    if (setting == std::end(table))
+      throw std::runtime_error("The camera profile \"" + path + "\" sets \"" + name +
+                               "\", which eventsim-dvs does not have.");
+    GParamSpec* spec = g_object_class_find_property(klass, setting->name);
+    GValue value = G_VALUE_INIT;
+    g_value_init(&value, spec->value_type);
+    const bool is_valid = !text.empty() && gst_value_deserialize(&value, text.c_str()) != FALSE &&
+                          g_param_value_validate(spec, &value) == FALSE;
+    if (is_valid) given.take(static_cast<std::size_t>(setting - table), &value);
+    g_value_unset(&value);
+    if (!is_valid)
+      throw std::runtime_error("The camera profile \"" + path + "\" sets " + name + "=" + text +
+                               ", which is no value of it; see gst-inspect-1.0 eventsim-dvs.");
+  }
+  return given;
+}
+
 /// User-settable values.
 struct Choice {
   DvsPreset preset = DvsPreset::ideal;
-  DvsSettings settings = eventcamera::settings_of(DvsPreset::ideal);
-  std::bitset<std::size(table)> overridden;  ///< settings that override the preset
+  std::string profile;
+  Given profiled;     ///< override the preset
+  std::string fault;  ///< why the profile could not be read, if so
+  Given overriding;   ///< override both
 
-  void take_preset(const GValue* value) {
-    read_value(value, preset);
-    const DvsSettings old = std::exchange(settings, eventcamera::settings_of(preset));
-    for (std::size_t i = 0; i < overridden.size(); ++i)
-      if (overridden[i])
-        std::visit([&](auto member) { settings.*member = old.*member; }, table[i].member);
+  DvsSettings settings() const {
+    auto settings = eventcamera::settings_of(preset);
+    profiled.override(settings);
+    overriding.override(settings);
+    return settings;
+  }
+
+  void take_profile(const GValue* value, GObjectClass* klass) {
+    read_value(value, profile);
+    profiled = {};
+    fault = {};
+    if (profile.empty()) return;
+    try {
+      profiled = read_profile(profile, klass);
+    } catch (const std::runtime_error& error) {
+      fault = error.what();
+    }
   }
 };
 
@@ -257,28 +312,40 @@ static void install_properties(GObjectClass* klass) {
   const Choice defaults;
   Properties<choice_of> properties(klass);
   properties.add(
-      [](Choice& choice, const GValue* value) { choice.take_preset(value); },
-      [](Choice& choice, GValue* value) { write_value(choice.preset, value); },
+      &Choice::preset,
       g_param_spec_enum("preset", "Preset",
                         "Camera model: sets all properties of the pixel, except those that are set "
                         "explicitly, before or after",
                         preset_type(), static_cast<int>(defaults.preset), property_flags));
+  properties.add(
+      [klass](Choice& choice, const GValue* value) { choice.take_profile(value, klass); },
+      [](Choice& choice, GValue* value) { write_value(choice.profile, value); },
+      g_param_spec_string(
+          "profile", "Camera profile",
+          "File of settings that event-calibrate fitted to a camera, which override "
+          "those of the preset, but not those that are set explicitly, before or "
+          "after",
+          "",
+          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                   GST_PARAM_MUTABLE_READY)));
   for (std::size_t i = 0; i < std::size(table); ++i) {
     const auto add = [&](auto member) {
-      properties.add(
-          [member, i](Choice& choice, const GValue* value) {
-            read_value(value, choice.settings.*member);
-            choice.overridden[i] = true;
-          },
-          [member](Choice& choice, GValue* value) { write_value(choice.settings.*member, value); },
-          spec_of(table[i], defaults.settings.*member));
+      properties.add([i](Choice& choice, const GValue* value) { choice.overriding.take(i, value); },
+                     [member](Choice& choice, GValue* value) {
+                       write_value(choice.settings().*member, value);
+                     },
+                     spec_of(table[i], defaults.settings().*member));
     };
     std::visit(add, table[i].member);
   }
 }
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
-  static_cast<DvsSimulator&>(simulator).set(choice_of(object).copy().settings);
+  static_cast<DvsSimulator&>(simulator).set(choice_of(object).copy().settings());
+}
+
+static std::string fault_of(GObject* object) {
+  return choice_of(object).copy().fault;
 }
 
 static const EventSimulatorMethod dvs = {
@@ -292,5 +359,6 @@ static const EventSimulatorMethod dvs = {
     .make_settings = []() -> std::shared_ptr<void> { return std::make_shared<Guarded<Choice>>(); },
     .install_properties = install_properties,
     .configure = configure,
+    .fault = fault_of,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_dvs, "eventsim-dvs", GST_RANK_NONE, event_simulator_type(dvs))

@@ -776,11 +776,16 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
 }
 
 static gboolean start(GstBaseTransform* transform) {
-  {
-    const auto qos = priv_of(GST_EVENT_SIMULATOR(transform)).qos.lock();
-    qos->start_over();
-    qos->reset_stats();
+  auto* self = GST_EVENT_SIMULATOR(transform);
+  if (const auto fault_of = method_of(self).fault) {
+    if (const auto fault = fault_of(G_OBJECT(self)); !fault.empty()) {
+      GST_ELEMENT_ERROR(self, RESOURCE, SETTINGS, ("%s", fault.c_str()), (nullptr));
+      return FALSE;
+    }
   }
+  const auto qos = priv_of(self).qos.lock();
+  qos->start_over();
+  qos->reset_stats();
   return TRUE;
 }
 

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "gst/base/properties.hpp"
 #include "gst/simulator/caps.hpp"
@@ -42,6 +43,8 @@ struct EventSimulatorMethod {
   std::shared_ptr<void> (*make_settings)() = nullptr;
   void (*install_properties)(GObjectClass* klass) = nullptr;
   void (*configure)(eventcamera::IntervalSimulator& simulator, GObject* object) = nullptr;
+  /// If set, returns why an element cannot start with its properties; empty if it can.
+  std::string (*fault)(GObject* object) = nullptr;
 };
 
 /// Name of the base class in the plugin that this library is linked to. Each plugin defines its

@@ -4,6 +4,12 @@
 #include <gst/controller/gstdirectcontrolbinding.h>
 #include <gst/controller/gstinterpolationcontrolsource.h>
 
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
 #include "src/render/palette.hpp"
 #include "tests/elements/harness.hpp"
 
@@ -83,7 +89,9 @@ TEST_P(EveryElement, DescribesItself) {
     const std::string owner = g_type_name(specs[i]->owner_type);
     const bool ours = owner.starts_with("GstEventSim") || owner.starts_with("GstGLEventSim");
     if (ours && (specs[i]->flags & G_PARAM_WRITABLE)) {
-      EXPECT_TRUE(specs[i]->flags & GST_PARAM_MUTABLE_PLAYING) << specs[i]->name;
+      const bool is_file = std::string(specs[i]->name) == "profile";
+      EXPECT_TRUE(specs[i]->flags & (is_file ? GST_PARAM_MUTABLE_READY : GST_PARAM_MUTABLE_PLAYING))
+          << specs[i]->name;
     }
   }
   g_free(specs);
@@ -158,6 +166,84 @@ TEST(Dvs, TakesWhatIsNotSetFromItsPreset) {
     EXPECT_EQ(reset, 1);
     EXPECT_EQ(seed, G_MAXUINT64);
   }
+}
+
+/// A camera profile in a temporary file.
+class ProfileFile {
+ public:
+  explicit ProfileFile(const std::string& text) { std::ofstream(path()) << text; }
+  ~ProfileFile() { std::filesystem::remove(path()); }
+  ProfileFile(const ProfileFile&) = delete;
+  ProfileFile& operator=(const ProfileFile&) = delete;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_ = std::filesystem::temp_directory_path() /
+                      ("profile-" + std::to_string(g_get_monotonic_time()));
+};
+
+TEST(Dvs, TakesFromAProfileWhatIsNotSet) {
+  gst_init(nullptr, nullptr);
+  const ProfileFile profile(
+      "# of a camera\n[eventsim-dvs]\nresponse=log\nlog-eps=0.02\nthreshold-sigma=0.04\n"
+      "leak-rate=3\nrefractory-period=5000\n");
+  std::array<int, 3> order = {0, 1, 2};
+  do {
+    Owned<GstElement> owned(gst_element_factory_make("eventsim-dvs", nullptr));
+    GstElement* element = owned.get();
+    for (const int step : order) {
+      if (step == 0) gst_util_set_object_arg(G_OBJECT(element), "preset", "v2e-noisy");
+      if (step == 1) g_object_set(element, "profile", profile.path().c_str(), nullptr);
+      if (step == 2) g_object_set(element, "threshold-sigma", 0.07, nullptr);
+    }
+    EXPECT_EQ(number(element, "threshold-sigma"), 0.07);
+    EXPECT_EQ(number(element, "log-eps"), 0.02);
+    EXPECT_EQ(number(element, "leak-rate"), 3);
+    EXPECT_EQ(number(element, "refractory-period"), 5000);
+    EXPECT_EQ(number(element, "shot-noise-rate"), 5);
+    g_object_set(element, "profile", nullptr, nullptr);
+    EXPECT_EQ(number(element, "leak-rate"), 0.1);
+  } while (std::ranges::next_permutation(order).found);
+}
+
+TEST(Dvs, DoesNotStartWithAProfileThatItCannotRead) {
+  gst_init(nullptr, nullptr);
+  const auto error_of = [](const std::string& path) {
+    Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
+    Owned<GstBus> bus(gst_bus_new());
+    gst_element_set_bus(element.get(), bus.get());
+    g_object_set(element.get(), "profile", path.c_str(), nullptr);
+    EXPECT_EQ(gst_element_set_state(element.get(), GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
+    GstMessage* message = gst_bus_pop_filtered(bus.get(), GST_MESSAGE_ERROR);
+    gst_element_set_state(element.get(), GST_STATE_NULL);
+    if (message == nullptr) return std::string();
+    GError* error = nullptr;
+    gst_message_parse_error(message, &error, nullptr);
+    std::string text = error->message;
+    g_error_free(error);
+    gst_message_unref(message);
+    return text;
+  };
+  const auto expect_words = [](const std::string& error, const std::string& words) {
+    EXPECT_NE(error.find(words), std::string::npos) << '"' << error << "\" does not say " << words;
+  };
+  expect_words(error_of("/nowhere/a.profile"), "\"/nowhere/a.profile\": No such file");
+  expect_words(error_of("/"), "event-calibrate --profile");
+  struct Case {
+    std::string text;
+    std::string words;
+  };
+  for (const auto& [text, words] : {
+           Case{"", "no group [eventsim-dvs]"},
+           Case{"log-eps=0.02\n", "Cannot read the camera profile"},
+           Case{"[eventsim-dvs]\ngain=2\n", "\"gain\", which eventsim-dvs does not have"},
+           Case{"[eventsim-dvs]\nlog-eps=7\n", "log-eps=7, which is no value"},
+           Case{"[eventsim-dvs]\nresponse=cube\n", "response=cube, which is no value"},
+           Case{"[eventsim-dvs]\nleak-rate=\n", "leak-rate=, which is no value"},
+           Case{"[eventsim-dvs]\n" + std::string(70'000, '#'), "64 KiB"},
+       })
+    expect_words(error_of(ProfileFile(text).path()), words);
 }
 
 TEST(Dvs, NamesItsPresetsAndTheirsAreInRange) {

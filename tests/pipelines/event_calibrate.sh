@@ -32,6 +32,16 @@ recovers 6.5 4.5 0.2 eventsim-dense
 recovers 8.5 12.5 0.12 eventsim-diff
 recovers 0.2 0.3 0.05 eventsim-dvs response=log log-eps=0.02
 
+# A profile simulates the same events as the settings that it holds.
+calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 denoise=0 refractory-period=0" --to 0.3 --profile camera.profile >found
+element=$(grep '^eventsim-dvs' found)
+for simulator in "eventsim-dvs profile=camera.profile" "$element"; do
+  # shellcheck disable=SC2086
+  "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! $simulator ! evtenc ! filesink location=simulated.raw
+  md5sum <simulated.raw >>sums
+done
+[ "$(sort -u sums | wc -l)" -eq 1 ] || fail "$(cat camera.profile) differs from $element"
+
 # Exposure pulses are found by their bursts of events.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000000 ! evtenc ! filesink location=recorded.raw
 calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02" --to 0.3 | tee found
@@ -74,6 +84,7 @@ refused() { # WORDS ARGUMENT...
   grep -q "$words" errors || fail "the error does not say \"$words\""
 }
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
+refused "only eventsim-dvs has profiles" scene.mkv recorded.raw --element eventsim-frame --profile frame.profile
 refused "nowhere.mkv" nowhere.mkv recorded.raw
 GST_PLUGIN_PATH= GST_PLUGIN_SYSTEM_PATH=/nowhere GST_REGISTRY=none.bin \
   refused "plugin eventcam.*meson devenv -C build -w \\." scene.mkv recorded.raw

@@ -1,0 +1,469 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Finds the contrast thresholds at which a simulator generates as many ON and OFF events from a
+video as a real camera recorded of the same scene; for eventsim-dvs also its response, upsampling,
+denoising, adaptation, refractory period and exposure pulses. Prints them, and how similar the two
+streams then are.
+
+    event-calibrate drive.mp4 drive.raw --element eventsim-dense --to 2
+
+VIDEO is anything that GStreamer decodes, or a text file of lines "seconds picture"; RECORDING is
+any event file that this project reads. Both need the same pixels and the same clock. --from and
+--to are in seconds after the first frame; the default is the time that both cover. --measure-from
+and --measure-to select another time for the comparison."""
+import argparse
+import functools
+import os
+import sys
+import time
+
+# First, since it says which packages are missing.
+from event_streams import (ON, GLib, Gst, Span, compare, counts, delayed, find_plugins, read_mask, read_recording,
+                           read_video, simulate, until)
+import numpy as np
+
+# Thresholds are found when the event counts are this close, relatively. Where none are, because frames
+# have whole grey levels, the search restarts at most MAX_ROUNDS times.
+PRECISION = 1e-3
+MAX_ROUNDS = 3
+MAX_TRIALS = 60
+# How fast event counts change with thresholds at first, in a log-log plot.
+USUAL_SLOPE = -1.5
+# Parts of the calibrated time for cross-validation.
+PARTS = 4
+# Values tried for eventsim-dvs: the offset of a logarithmic response, as a share of white; the
+# noise amplitude of a frame, in grey levels; the growth of the thresholds by an event; the refractory
+# period, in nanoseconds; and the exposure pulse, as a share of the threshold.
+LOG_OFFSETS = [0.001, 0.0018, 0.0025, 0.0035, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11, 0.16, 0.22, 0.32]
+COARSE_STEP = 2
+DENOISE = [0, 2, 4, 8, 12]
+ADAPTATION = [0, 0.05, 0.1, 0.2, 0.3, 0.4]
+REFRACTORY_PERIODS = [0, 300_000, 600_000, 1_000_000, 2_000_000]
+UPSAMPLING = ["linear", "motion"]
+PULSES = [0, 0.04, 0.08, 0.12, 0.16, 0.24]
+# The element whose settings a profile holds.
+PROFILED = "eventsim-dvs"
+
+
+class Progress:
+    """One line, overwritten, on a terminal; a line per step elsewhere."""
+
+    def __init__(self, quiet=False):
+        self.quiet = quiet
+        self.terminal = sys.stderr.isatty()
+
+    def tell(self, text):
+        if not self.quiet:
+            print(f"\r{text:<78}" if self.terminal else text, end="" if self.terminal else "\n",
+                  file=sys.stderr, flush=True)
+
+    def end(self):
+        if self.terminal and not self.quiet:
+            print(file=sys.stderr)
+
+
+def with_thresholds(element, thresholds):
+    positive, negative = thresholds
+    return f"{element} positive-threshold={positive:.6g} negative-threshold={negative:.6g}"
+
+
+def threshold_limits(element):
+    """The minimum, maximum and default of an element's thresholds."""
+    made = Gst.ElementFactory.make(element.split()[0])
+    if made is None:
+        raise RuntimeError(f"there is no element \"{element.split()[0]}\"")
+    spec = made.find_property("positive-threshold")
+    if spec is None:
+        raise RuntimeError(f"\"{element}\" has no thresholds")
+    return spec.minimum, spec.maximum, spec.default_value
+
+
+def find_thresholds(video, recorded, spans, element, progress, first=None):
+    """The thresholds at which the simulator generates as many ON and OFF events within the spans as the
+    recording has, by a search for both at once, from the values `first`: secant steps in a log-log plot
+    as long as they at least halve the error, else bisection."""
+    goal = sum(counts(span.of(recorded)) for span in spans)
+    if goal.min() == 0:
+        raise RuntimeError("the recording has no events, or events of only one polarity")
+    minimum, maximum, default = threshold_limits(element)
+    minimum = max(minimum, default / 100)
+    low = np.full(2, minimum)
+    high = np.full(2, min(maximum, default * 20))
+    thresholds = np.sqrt(low * high) if first is None else first
+    each, each_error = np.full(2, default), np.full(2, np.inf)
+    best, best_error = np.full(2, default), np.full(2, np.inf)
+    before, log_before = thresholds, None
+    rounds = 0
+    for trial in range(MAX_TRIALS):
+        closed = (high / low < 1 + PRECISION).all()
+        if closed:
+            thresholds = each.copy()
+        simulated = simulate(video, with_thresholds(element, thresholds))
+        made = sum(counts(span.of(simulated)) for span in spans)
+        log_ratio = np.log(np.maximum(made, 0.5) / goal)
+        error = np.abs(log_ratio)
+        progress.tell(f"{element}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
+                      f" {thresholds[1]:.4g}, {made[0] / goal[0]:.3f} of the ON and"
+                      f" {made[1] / goal[1]:.3f} of the OFF events")
+        each = np.where(error < each_error, thresholds, each)
+        each_error = np.minimum(error, each_error)
+        if error.sum() < best_error.sum():
+            best, best_error = thresholds, error
+        if error.max() < PRECISION:
+            break
+        if closed:
+            # The best threshold of each polarity need not be the best pair: an event of one polarity
+            # also resets the reference level for the other.
+            rounds += 1
+            if best_error.max() < 0.01 or rounds == MAX_ROUNDS:
+                break
+            low, high = np.maximum(best / 1.3, minimum), np.minimum(best * 1.3, maximum)
+            each, each_error = best, best_error
+            log_before = None
+        else:
+            more = made > goal
+            low, high = np.where(more, thresholds, low), np.where(more, high, thresholds)
+        slope, converging = np.full(2, USUAL_SLOPE), np.full(2, first is not None and trial == 0)
+        if log_before is not None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                slope = (log_ratio - log_before) / np.log(thresholds / before)
+            converging = (error < np.abs(log_before) / 2) & (slope > -6) & (slope < -0.3)
+            slope = np.where(converging, slope, USUAL_SLOPE)
+        before, log_before = thresholds, log_ratio
+        step = thresholds * np.exp(-log_ratio / slope)
+        thresholds = np.where(converging & (step > low) & (step < high), step, np.sqrt(low * high))
+    return best
+
+
+def likeness(figures):
+    """Similarity of two streams, from 0 to 1: the mean of the ratio of their variances over the pixels, the
+    map correlation, the recall and the precision (the shares of real and of simulated events with a
+    match, averaged over 1, 5 and 10 ms), and the ratio between the times from event to event."""
+    recall, precision = (np.mean([figures[f"{side}-matches"][f"within-{limit}ms"] for limit in (1, 5, 10)])
+                         for side in ("reference", "candidate"))
+    deviations = sorted(figures[side]["std-dev"] for side in ("reference", "candidate"))
+    return float(np.mean([(deviations[0] / deviations[1]) ** 2, figures["map-correlation"], recall, precision,
+                          10 ** -figures["interval-distance"]]))
+
+
+class Choices:
+    """Tries property values and rates them by cross-validation: by the likeness of a stream of which each
+    part was simulated with thresholds that fit the other parts."""
+
+    def __init__(self, video, recorded, span, element, progress):
+        self.video, self.recorded, self.span = video, recorded, span
+        self.element, self.progress = element, progress
+        self.made = Gst.ElementFactory.make(element.split()[0])
+        self.parts = parts_of(video, span)
+        self.rated = {}
+        self.thresholds = None  # of the last setting, close to those of the next
+        self.began = time.monotonic()
+        self.expected = 0
+
+    def is_free(self, name):
+        return (self.made is not None and self.made.find_property(name) is not None
+                and f"{name}=" not in self.element)
+
+    def with_properties(self, chosen):
+        if chosen.get("refractory-period") and self.is_free("refractory-reset"):
+            chosen = chosen | {"refractory-reset": "signal"}
+        elif chosen.get("refractory-period") == 0:
+            chosen = {name: value for name, value in chosen.items() if name != "refractory-period"}
+        return " ".join([self.element] + [f"{name}={value:g}" if isinstance(value, float)
+                                          else f"{name}={value}" for name, value in chosen.items()])
+
+    def rating(self, chosen):
+        element = self.with_properties(chosen)
+        if element not in self.rated:
+            simulated = np.concatenate([self.predicted(part, element) for part in self.parts])
+            self.rated[element] = likeness(compare(self.video, self.recorded, simulated, self.span))
+            self.tell_progress(f"{element}: likeness {self.rated[element]:.4f}")
+        return self.rated[element]
+
+    def predicted(self, part, element):
+        """The simulated events of a part, with the thresholds of the others; of the same, if it is the
+        only one."""
+        others = [other for other in self.parts if other is not part] or [part]
+        self.thresholds = find_thresholds(self.video, self.recorded, others, element, self.progress, self.thresholds)
+        return part.of(simulate(self.video, with_thresholds(element, self.thresholds)))
+
+    def calibrated(self, chosen):
+        """The element with thresholds that fit the whole span."""
+        element = self.with_properties(chosen)
+        self.thresholds = find_thresholds(self.video, self.recorded, self.parts, element, self.progress,
+                                          self.thresholds)
+        return with_thresholds(element, self.thresholds)
+
+    def best_response(self):
+        """The best response along motion; for a logarithm, with the best offset of a coarse grid."""
+        chosen = {"upsampling": "motion"} if self.is_free("upsampling") else {}
+        offsets = [{"log-eps": offset} for offset in LOG_OFFSETS[::COARSE_STEP]]
+        choices = [{}]
+        if self.is_free("response"):
+            choices = []
+            for response in self.made.find_property("response").enum_class.__enum_values__.values():
+                is_log = response.value_nick == "log" and self.is_free("log-eps")
+                choices += [{"response": response.value_nick} | offset for offset in (offsets if is_log else [{}])]
+        elif "response=log" in self.element.split() and self.is_free("log-eps"):
+            choices = offsets
+        if len(choices) == 1:
+            return chosen | choices[0]
+        self.expected += len(choices)
+        return max((chosen | choice for choice in choices), key=self.rating)
+
+    def climb(self, chosen, axes):
+        """Hill climbing: steps to neighbouring values while that makes the streams more similar."""
+        self.expected += 4 * len(axes)  # two passes
+        improved = True
+        while improved:
+            improved = False
+            for name, values in axes.items():
+                for step in (1, -1):
+                    while True:
+                        i = values.index(chosen[name]) + step
+                        if not 0 <= i < len(values):
+                            break
+                        other = chosen | {name: values[i]}
+                        if self.rating(other) <= self.rating(chosen):
+                            break
+                        chosen, improved = other, True
+        return chosen
+
+    def tell_progress(self, text):
+        done = len(self.rated)
+        left = max(self.expected - done, 1) * (time.monotonic() - self.began) / done
+        self.progress.tell(f"{text}; {done} settings, about {left // 60:.0f}:{left % 60:02.0f} left")
+
+
+def parts_of(video, span):
+    """A span cut at the frames closest to its quarters."""
+    inside = [frame.time // 1000 for frame in video.frames if span.start < frame.time // 1000 < span.end]
+    quarters = [span.start + (span.end - span.start) * i / PARTS for i in range(1, PARTS)]
+    cuts = sorted({min(inside, key=lambda time: abs(time - quarter)) for quarter in quarters if inside})
+    return [Span(start, end) for start, end in zip([span.start, *cuts], [*cuts, span.end])]
+
+
+def calibrate(video, recorded, span, element, progress):
+    """The element with calibrated thresholds; for eventsim-dvs also with a response and its offset,
+    denoising, adaptation, refractory period, upsampling, and exposure pulses if the recording shows
+    any."""
+    choices = Choices(video, recorded, span, element, progress)
+    axes = {"upsampling": UPSAMPLING} if choices.is_free("upsampling") else {}
+    chosen = choices.best_response()
+    if "log-eps" in chosen:
+        axes["log-eps"] = LOG_OFFSETS
+    for name, values in (("denoise", DENOISE), ("adaptation", ADAPTATION), ("refractory-period", REFRACTORY_PERIODS)):
+        if choices.is_free(name):
+            chosen[name], axes[name] = values[0], values
+    if choices.is_free("exposure-pulse") and choices.is_free("exposure-lead"):
+        lead = find_exposure_lead(video, recorded, span)
+        if lead is not None:
+            choices.calibrated(chosen)
+            threshold = choices.thresholds[0]
+            chosen |= {"exposure-lead": lead, "exposure-pulse": 0.0}
+            axes["exposure-pulse"] = [share * threshold for share in PULSES]
+    return choices.calibrated(choices.climb(chosen, axes))
+
+
+def find_exposure_lead(video, recorded, span):
+    """The time from the start of an exposure to the frame's timestamp, in nanoseconds, if the
+    recording shows it: a burst of ON events all over the sensor within a fraction of a
+    millisecond."""
+    times = np.array([frame.time for frame in video.frames]) // 1000
+    on = recorded["t"][(recorded["y_p"] & ON) != 0]
+    seen = [(frame, on[(on > before) & (on <= frame)])
+            for before, frame in zip(times, times[1:])
+            if before >= min(span.start, recorded["t"][0]) and frame <= span.end]
+    if not seen:
+        return None
+    width = 100
+    longest = max(frame - before for before, frame in zip(times, times[1:]))
+    leads = np.concatenate([frame - events for frame, events in seen])
+    counts, edges = np.histogram(leads, np.arange(0, longest + width, width))
+    burst = int(np.argmax(counts))
+    if counts[burst] < 50 * len(seen) or counts[burst] < 10 * np.median(counts):
+        return None
+    # The burst begins at its earliest events, which have the longest lead.
+    while burst + 1 < len(counts) and counts[burst + 1] > counts.max() / 4:
+        burst += 1
+    return int(edges[burst + 1]) * 1000
+
+
+def lag_of_polarities(video, recorded):
+    """The lag, in seconds, at which the polarities of a pixel's events between two frames agree best with
+    its change of brightness."""
+    times = np.array([frame.time for frame in video.frames]) / 1000
+    greys = [np.log(video.luma(frame).ravel() + 10) for frame in video.frames]
+    changes = [after - before for before, after in zip(greys, greys[1:])]
+    place = (recorded["y_p"] & 0x7FFF).astype(np.int64) * video.width + recorded["x"]
+    sign = np.where(recorded["y_p"] & ON, 1.0, -1.0)
+    spacing = np.median(np.diff(times))
+
+    def agreement(lag):
+        found = []
+        for change, start, end in zip(changes, times + lag, times[1:] + lag):
+            if start < recorded["t"][0] - spacing / 4 or end > recorded["t"][-1] + spacing / 4:
+                continue
+            first, last = np.searchsorted(recorded["t"], [start, end], side="right")
+            signs = np.bincount(place[first:last], sign[first:last], len(change))
+            if signs.std() > 0 and change.std() > 0:
+                found.append(np.corrcoef(signs, change)[0, 1])
+        return np.mean(found) if found else -1
+
+    lags = np.linspace(-spacing / 2, spacing / 2, 81)
+    return float(max(lags, key=agreement)) / 1e6
+
+
+def find_lag(video, recorded, span, element, progress):
+    """The lag: the time, in seconds, from a frame's timestamp, which may be the start of its exposure, to
+    the moment that it shows. The polarities alone overestimate it, since a pixel fires only once it has
+    changed by the contrast threshold; so a simulator corrects it. `span` is without lag."""
+    def late(lag):
+        return delayed(video, lag), Span(span.start + round(lag * 1e6), span.end + round(lag * 1e6))
+
+    lag = lag_of_polarities(video, recorded)
+    shown, over = late(lag)
+    choices = Choices(shown, recorded, over, element, progress)
+    fitted = choices.calibrated(choices.best_response())
+
+    @functools.cache
+    def likeness_at(lag):
+        shown, over = late(lag)
+        rating = likeness(compare(shown, recorded, simulate(shown, fitted), over))
+        progress.tell(f"frames {1000 * lag:.1f} ms late: likeness {rating:.4f}")
+        return rating
+
+    spacing = np.median(np.diff([frame.time for frame in video.frames])) / 1e9
+    for step in (spacing / 32, -spacing / 32):
+        while likeness_at(lag + step) > likeness_at(lag):
+            lag += step
+    return lag
+
+
+# the program
+
+
+def describe(name, figures):
+    shares = " ".join(
+        f"{figures[side + '-matches'][distance]:.3f}" for side in ("reference", "candidate")
+        for distance in ("within-1ms", "within-5ms", "within-10ms"))
+    real, ours = figures["reference"], figures["candidate"]
+    ceiling = figures["noise-ceiling"]
+    return "\n".join([
+        f"{name}",
+        f"  events           {real['events']:>12} recorded {ours['events']:>12} simulated",
+        f"  mean             {real['mean']:>12.4f} recorded {ours['mean']:>12.4f} simulated"
+        "   events per pixel and second",
+        f"  std. deviation   {real['std-dev']:>12.4f} recorded {ours['std-dev']:>12.4f}"
+        " simulated",
+        f"  share of ON      {real['on-share']:>12.3f} recorded {ours['on-share']:>12.3f}"
+        " simulated",
+        f"  map correlation  {figures['map-correlation']:>12.3f}   noise ceiling"
+        f" {ceiling['map-correlation']:.3f}",
+        f"  rate correlation {figures['rate-correlation']:>12.3f}   in bins of 1 ms; noise ceiling"
+        f" {ceiling['rate-correlation']:.3f}",
+        f"  interval distance{figures['interval-distance']:>12.3f}   decades",
+        f"  matches within 1, 5, 10 ms of the recorded, of the simulated: {shares}",
+        "  nearest match after "
+        + ", ".join(f"{figures[f'{side}-matches']['nearest-distance'] / 1e6:.2f} ms of the {name}"
+                    for side, name in (("reference", "recorded"), ("candidate", "simulated")))])
+
+
+def options():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("video")
+    parser.add_argument("recording")
+    parser.add_argument("--element", default="eventsim-dense",
+                        help="a simulator and its properties (default: eventsim-dense)")
+    for name, what in (("from", "start of the calibration"), ("to", "end of the calibration"),
+                       ("measure-from", "start of the comparison"),
+                       ("measure-to", "end of the comparison")):
+        parser.add_argument("--" + name, type=float, metavar="SECONDS", help=what)
+    parser.add_argument("--lag", default="0", metavar="SECONDS|find",
+                        help="time from the timestamp of a frame to the moment that it shows; \"find\""
+                        " estimates it (default: 0)")
+    parser.add_argument("--mask", metavar="PICTURE",
+                        help="a picture that is white where pixels of the camera can fire; events elsewhere"
+                        " are left out of both streams")
+    parser.add_argument("--profile", metavar="FILE",
+                        help="write the settings of eventsim-dvs, for its property profile")
+    parser.add_argument("--map", metavar="PNG", help="write a picture of the event counts per pixel")
+    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
+                        help="print the version and exit")
+    return parser.parse_args()
+
+
+def write_profile(path, element, video, recording):
+    """The settings of an eventsim-dvs that are not its defaults."""
+    made = Gst.parse_launch(element)
+    lines = [f"# Fitted by event-calibrate @VERSION@ to {os.path.basename(recording)} and {os.path.basename(video)}",
+             f"[{PROFILED}]"]
+    for spec in made.list_properties():
+        if spec.owner_type != made.__gtype__ or spec.name in ("preset", "profile", "seed"):
+            continue
+        value = made.get_property(spec.name)
+        if value != spec.default_value:
+            text = f"{value:.6g}" if isinstance(value, float) else getattr(value, "value_nick", value)
+            lines.append(f"{spec.name}={text}")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("\n".join(lines) + "\n")
+
+
+def span_of(video, recorded, lag, start, end):
+    """From `start` to `end` after the video's first frame; by default the time that both cover."""
+    latest_start = max(video.frames[0].time // 1000, int(recorded["t"][0]) - 1)
+    earliest_end = min(video.frames[-1].time // 1000, int(recorded["t"][-1]))
+    origin = video.origin // 1000
+    span = Span(latest_start if start is None else origin + round((start + lag) * 1e6),
+                earliest_end if end is None else origin + round((end + lag) * 1e6))
+    if span.end <= span.start:
+        raise RuntimeError("the video and the recording do not overlap in time")
+    return span
+
+
+def main():
+    Gst.init(None)
+    chosen = options()
+    find_plugins()
+    if chosen.profile and chosen.element.split()[:1] != [PROFILED]:
+        raise RuntimeError(f"only {PROFILED} has profiles; add --element {PROFILED}")
+    progress = Progress()
+    start = getattr(chosen, "from")
+    ends = [end for end in (chosen.to, chosen.measure_to) if end is not None]
+    progress.tell(f"reading {chosen.video}")
+    video = read_video(chosen.video, start or 0, max(ends) if len(ends) else float("inf"))
+    if len(video.frames) < 2:
+        raise RuntimeError(f"{chosen.video}: fewer than two frames")
+    progress.tell(f"reading {chosen.recording}")
+    if chosen.mask:
+        video.mask = read_mask(chosen.mask, video)
+    recorded = video.of_camera(read_recording(chosen.recording, video))
+    if len(recorded) == 0:
+        raise RuntimeError(f"{chosen.recording}: no events" + (" where the mask is white" if chosen.mask else ""))
+    progress.end()
+    if chosen.lag == "find":
+        span = span_of(video, recorded, 0, start, chosen.to)
+        lag = find_lag(until(video, span.end), recorded, span, chosen.element, progress)
+    else:
+        lag = float(chosen.lag)
+    video = delayed(video, lag)
+    span = span_of(video, recorded, lag, start, chosen.to)
+    element = calibrate(until(video, span.end), recorded, span, chosen.element, progress)
+    progress.end()
+    measured = span
+    if chosen.measure_from is not None or chosen.measure_to is not None:
+        measured = span_of(video, recorded, lag, chosen.measure_from, chosen.measure_to)
+    figures = compare(video, recorded, simulate(video, element), measured, chosen.map)
+    if chosen.profile:
+        write_profile(chosen.profile, element, chosen.video, chosen.recording)
+    if lag != 0:
+        print(f"Frames show the scene {lag * 1000:.1f} ms later than their timestamps.")
+    print(describe(element, figures))
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (RuntimeError, OSError, GLib.Error) as failure:
+        sys.exit(f"error: {failure}")

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Videos and recordings as NumPy arrays: reading them, simulating one from the other, and comparing two."""
+import json
+import os
+import sys
+import tempfile
+from dataclasses import dataclass, replace
+
+try:
+    import gi
+    import numpy as np
+
+    gi.require_version("Gst", "1.0")
+    gi.require_version("GstApp", "1.0")
+    gi.require_version("GstVideo", "1.0")
+    from gi.repository import GLib, Gst, GstApp, GstVideo  # noqa: F401
+except (ImportError, ValueError) as missing:
+    sys.exit(f"error: {missing}\nOn Debian, install: python3-gi python3-numpy gir1.2-gstreamer-1.0"
+             " gir1.2-gst-plugins-base-1.0")
+
+XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
+EVENT = np.dtype([("t", "<i8"), ("x", "<u2"), ("y_p", "<u2")])
+ON = 0x8000
+
+
+# Frames simulated before a span, so that pixels have a history.
+PAST_FRAMES = 5
+
+# Formats that simulators read without conversion, so the decoder's luma stays as it is.
+LUMA = "video/x-raw,format=(string){GRAY8,I420,YV12,NV12,NV21,Y42B,Y444,GRAY16_LE}"
+
+
+@dataclass
+class Frame:
+    time: int  # ns
+    buffer: Gst.Buffer
+
+
+@dataclass
+class Video:
+    caps: str
+    width: int
+    height: int
+    frames: list
+    origin: int = 0  # time of the video's first frame, which may not be in `frames`, ns
+    mask: np.ndarray = None  # by row and column: whether a pixel of the camera can fire
+
+    def of_camera(self, events):
+        """The events of pixels that the camera has."""
+        if self.mask is None:
+            return events
+        return events[self.mask[events["y_p"] & ~ON, events["x"]]]
+
+    def luma(self, frame):
+        info = GstVideo.VideoInfo.new_from_caps(Gst.Caps.from_string(self.caps))
+        depth = np.uint8 if info.finfo.depth[0] == 8 else np.dtype("<u2")
+        plane = np.frombuffer(frame.buffer.extract_dup(0, info.stride[0] * self.height), depth)
+        grey = plane.reshape(self.height, -1)[:, :self.width].astype(float)
+        return grey if info.finfo.depth[0] == 8 else grey / 257
+
+
+@dataclass
+class Span:
+    """The time (start, end], in microseconds."""
+
+    start: int
+    end: int
+
+    def of(self, events):
+        first, last = np.searchsorted(events["t"], [self.start, self.end], side="right")
+        return events[first:last]
+
+    @property
+    def seconds(self):
+        return (self.end - self.start) / 1e6
+
+
+# pipelines
+
+
+def run(launch, feeds=(), take=None):
+    """Plays a pipeline. Each feed is the name of an appsrc, its caps and its buffers; take(sample)
+    is called for every sample of the appsink `out`."""
+    pipeline = Gst.parse_launch(launch)
+    unsuitable = []
+    if decoder := pipeline.get_by_name("decoder"):
+        decoded = pipeline.get_by_name("decoded").get_static_pad("sink")
+        decoder.connect("no-more-pads", lambda _: decoded.is_linked() or unsuitable.append(True))
+    try:
+        for name, caps, _ in feeds:
+            pipeline.get_by_name(name).set_property("caps", Gst.Caps.from_string(caps))
+        pipeline.set_state(Gst.State.PLAYING)
+        for name, _, buffers in feeds:
+            source = pipeline.get_by_name(name)
+            for buffer in buffers:
+                source.push_buffer(buffer)
+            source.end_of_stream()
+        sink = pipeline.get_by_name("out")
+        bus = pipeline.get_bus()
+        while not sink.is_eos():
+            if sample := sink.try_pull_sample(Gst.SECOND // 5):
+                if take is not None:
+                    take(sample)
+            elif message := bus.pop_filtered(Gst.MessageType.ERROR):
+                error, _ = message.parse_error()
+                raise RuntimeError(f"{message.src.get_name()}: {error.message}")
+            elif unsuitable:
+                raise RuntimeError(f"no video or events in {launch.split(' ! ')[0]}")
+        if message := bus.pop_filtered(Gst.MessageType.ERROR):
+            raise RuntimeError(message.parse_error()[0].message)
+    finally:
+        pipeline.set_state(Gst.State.NULL)
+
+
+def quoted(path):
+    return '"' + path.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def buffer_of(data, time, duration=None):
+    buffer = Gst.Buffer.new_wrapped(data)
+    buffer.pts = time
+    if duration is not None:
+        buffer.duration = duration
+    return buffer
+
+
+def events_of(buffer):
+    """The events of a buffer, with 64-bit times."""
+    packed = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), XYTP)
+    events = np.empty(len(packed), EVENT)
+    events["t"] = buffer.pts // 1000 + packed["t"].astype("<i8")
+    events["x"] = packed["x"]
+    events["y_p"] = packed["y_p"]
+    return events
+
+
+def joined(parts):
+    return np.concatenate(parts) if parts else np.empty(0, EVENT)
+
+
+# reading
+
+
+def read_pictures(path, start, end):
+    """A text file of lines "seconds picture"; None if it is something else."""
+    entries = []
+    try:
+        with open(path, encoding="utf-8") as file:
+            for line in file:
+                if line.strip() and not line.startswith("#"):
+                    seconds, name = line.split(maxsplit=1)
+                    entries.append((round(float(seconds) * 1e9),
+                                    os.path.join(os.path.dirname(path), name.strip())))
+    except (UnicodeDecodeError, ValueError):
+        return None
+    times = [time for time, _ in entries]
+    start, end = (time + times[0] for time in (start, end))
+    first = max([i for i, time in enumerate(times) if time <= start], default=0)
+    first = max(first - PAST_FRAMES, 0)
+    last = min([i for i, time in enumerate(times) if time >= end], default=len(times) - 1)
+    video = None
+    for time, picture in entries[first:last + 1]:
+        part = decode(picture, 0, 0)
+        video = video or Video(part.caps, part.width, part.height, [], times[0])
+        if part.caps != video.caps:
+            raise RuntimeError(f"{picture} differs in size or format from the pictures before it")
+        video.frames.append(Frame(time, part.frames[0].buffer))
+    return video
+
+
+def decode(path, start, end):
+    """The frames of a time span, and a few before it."""
+    video = Video("", 0, 0, [])
+
+    def take(sample):
+        if not video.frames:
+            video.caps = sample.get_caps().to_string()
+            info = sample.get_caps().get_structure(0)
+            video.width, video.height = info.get_value("width"), info.get_value("height")
+            video.origin = sample.get_buffer().pts
+        buffer = sample.get_buffer()
+        if video.frames and video.frames[-1].time - video.origin >= end > 0:
+            return
+        if buffer.pts - video.origin <= start:
+            del video.frames[:-PAST_FRAMES]
+        # Decoders have few buffers and wait for them.
+        video.frames.append(Frame(buffer.pts, buffer.copy_deep()))
+
+    run(f"filesrc location={quoted(path)} ! decodebin name=decoder"
+        f"  decoder. ! videoconvert name=decoded ! {LUMA}"
+        " ! appsink name=out sync=false max-buffers=4", take=take)
+    if not video.frames:
+        raise RuntimeError(f"{path}: no video frames")
+    return video
+
+
+def read_video(path, start, end):
+    """The frames from a few before `start` to the first at or after `end`, in seconds after the
+    video's first frame."""
+    start, end = start * 1e9, end * 1e9
+    return read_pictures(path, start, end) or decode(path, start, end)
+
+
+def read_mask(path, video):
+    """Which pixels are white in a picture of the video's size."""
+    picture = decode(path, 0, 0)
+    if (picture.width, picture.height) != (video.width, video.height):
+        raise RuntimeError(f"{path} has {picture.width} x {picture.height} pixels, the video has"
+                           f" {video.width} x {video.height}")
+    return picture.luma(picture.frames[0]) >= 128
+
+
+def read_recording(path, video):
+    """All events of a file."""
+    parts = []
+
+    def take(sample):
+        info = sample.get_caps().get_structure(0)
+        width, height = info.get_value("width"), info.get_value("height")
+        if width > video.width or height > video.height:
+            raise RuntimeError(f"{path} has {width} x {height} pixels, the video has"
+                               f" {video.width} x {video.height}")
+        parts.append(events_of(sample.get_buffer()))
+
+    reader = "decodebin caps=application/x-event-camera name=decoder  decoder. ! identity"
+    if os.path.splitext(path)[1].lower() in (".csv", ".txt"):
+        # Text files do not store the sensor size.
+        reader = (f"eventcsvdec ! application/x-event-camera,width={video.width},height={video.height}"
+                  " ! identity")
+    run(f"filesrc location={quoted(path)} ! {reader} name=decoded ! application/x-event-camera"
+        " ! appsink name=out sync=false max-buffers=4", take=take)
+    return joined(parts)
+
+
+# simulating and comparing
+
+
+def simulate(video, element):
+    """The events that an element, with its properties, generates from a video."""
+    parts = []
+    buffers = []
+    # A lag may move frames before 0, but a PTS cannot be negative.
+    origin = -min(video.frames[0].time // 1000, 0)
+    for frame in video.frames:
+        # Buffer.copy() would only take another reference.
+        buffer = frame.buffer.copy_region(
+            Gst.BufferCopyFlags.MEMORY | Gst.BufferCopyFlags.META, 0, frame.buffer.get_size())
+        buffer.pts = frame.time + origin * 1000
+        buffers.append(buffer)
+    run(f"appsrc name=frames format=time ! {element} ! application/x-event-camera"
+        " ! appsink name=out sync=false", [("frames", video.caps, buffers)],
+        lambda sample: parts.append(events_of(sample.get_buffer())))
+    events = joined(parts)
+    events["t"] -= origin
+    return video.of_camera(events)
+
+
+def compare(video, recorded, simulated, span, picture=None):
+    """The figures of eventcompare over a time span."""
+    def buffers(events):
+        part = span.of(events)
+        packed = np.empty(len(part), XYTP)
+        packed["t"] = part["t"] - span.start
+        packed["x"], packed["y_p"] = part["x"], part["y_p"]
+        return [buffer_of(packed.tobytes(), span.start * 1000, (span.end - span.start) * 1000)]
+
+    caps = (f"application/x-event-camera,format=XYTP,width={video.width},height={video.height},"
+            "framerate=0/1")
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "figures.json")
+        drawn = f" map={quoted(picture)}" if picture else ""
+        run(f"eventcompare name=compare location={quoted(path)}{drawn}"
+            " ! appsink name=out sync=false"
+            "  appsrc name=recorded format=time ! compare.reference"
+            "  appsrc name=simulated format=time ! compare.candidate",
+            [("recorded", caps, buffers(recorded)), ("simulated", caps, buffers(simulated))])
+        with open(path, encoding="utf-8") as file:
+            return json.load(file)
+
+
+def counts(events):
+    on = np.count_nonzero(events["y_p"] & ON)
+    return np.array([on, len(events) - on], float)
+
+
+def until(video, end):
+    """A video up to the first frame at or after `end`, in microseconds."""
+    frames = [frame for i, frame in enumerate(video.frames)
+              if i == 0 or video.frames[i - 1].time < end * 1000]
+    return replace(video, frames=frames)
+
+
+def delayed(video, seconds):
+    return replace(video, frames=[Frame(frame.time + round(seconds * 1e9), frame.buffer)
+                                  for frame in video.frames])
+
+
+def find_plugins():
+    for plugin in ("eventcam", "eventsim"):
+        if not Gst.Registry.get().find_plugin(plugin):
+            raise RuntimeError(
+                f"GStreamer does not find the plugin {plugin}. In a checkout, enter the development shell:"
+                " meson devenv -C build -w .\nOtherwise install it: the Debian package"
+                f" gstreamer1.0-{plugin}, or as root: meson install -C build")
