@@ -4,7 +4,7 @@ import json
 import os
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 try:
     import gi
@@ -37,12 +37,9 @@ class Frame:
 
 
 @dataclass
-class Video:
-    caps: str
-    width: int
-    height: int
-    frames: list
-    origin: int = 0  # time of the video's first frame, which may not be in `frames`, ns
+class Sensor:
+    width: int = 0  # 0 = that of the first recording
+    height: int = 0
     mask: np.ndarray = None  # by row and column: whether a pixel of the camera can fire
 
     def of_camera(self, events):
@@ -50,6 +47,13 @@ class Video:
         if self.mask is None:
             return events
         return events[self.mask[events["y_p"] & ~ON, events["x"]]]
+
+
+@dataclass
+class Video(Sensor):
+    caps: str = ""
+    frames: list = field(default_factory=list)
+    origin: int = 0  # time of the video's first frame, which may not be in `frames`, ns
 
     def luma(self, frame):
         info = GstVideo.VideoInfo.new_from_caps(Gst.Caps.from_string(self.caps))
@@ -161,7 +165,7 @@ def read_pictures(path, start, end):
     video = None
     for time, picture in entries[first:last + 1]:
         part = decode(picture, 0, 0)
-        video = video or Video(part.caps, part.width, part.height, [], times[0])
+        video = video or Video(part.width, part.height, caps=part.caps, origin=times[0])
         if part.caps != video.caps:
             raise RuntimeError(f"{picture} differs in size or format from the pictures before it")
         video.frames.append(Frame(time, part.frames[0].buffer))
@@ -170,7 +174,7 @@ def read_pictures(path, start, end):
 
 def decode(path, start, end):
     """The frames of a time span, and a few before it."""
-    video = Video("", 0, 0, [])
+    video = Video()
 
     def take(sample):
         if not video.frames:
@@ -201,34 +205,39 @@ def read_video(path, start, end):
     return read_pictures(path, start, end) or decode(path, start, end)
 
 
-def read_mask(path, video):
-    """Which pixels are white in a picture of the video's size."""
+def read_mask(path, sensor):
+    """Which pixels are white in a picture of the sensor's size."""
     picture = decode(path, 0, 0)
-    if (picture.width, picture.height) != (video.width, video.height):
-        raise RuntimeError(f"{path} has {picture.width} x {picture.height} pixels, the video has"
-                           f" {video.width} x {video.height}")
+    if (picture.width, picture.height) != (sensor.width, sensor.height):
+        raise RuntimeError(f"{path} has {picture.width} x {picture.height} pixels, the sensor has"
+                           f" {sensor.width} x {sensor.height}")
     return picture.luma(picture.frames[0]) >= 128
 
 
-def read_recording(path, video):
+def read_recording(path, sensor):
     """All events of a file."""
     parts = []
 
     def take(sample):
         info = sample.get_caps().get_structure(0)
         width, height = info.get_value("width"), info.get_value("height")
-        if width > video.width or height > video.height:
-            raise RuntimeError(f"{path} has {width} x {height} pixels, the video has"
-                               f" {video.width} x {video.height}")
+        if sensor.width == 0:
+            sensor.width, sensor.height = width, height
+        if width > sensor.width or height > sensor.height:
+            raise RuntimeError(f"it has {width} x {height} pixels, more than the {sensor.width} x {sensor.height}"
+                               " that it is compared with")
         parts.append(events_of(sample.get_buffer()))
 
     reader = "decodebin caps=application/x-event-camera name=decoder  decoder. ! identity"
-    if os.path.splitext(path)[1].lower() in (".csv", ".txt"):
+    if os.path.splitext(path)[1].lower() in (".csv", ".txt") and sensor.width > 0:
         # Text files do not store the sensor size.
-        reader = (f"eventcsvdec ! application/x-event-camera,width={video.width},height={video.height}"
+        reader = (f"eventcsvdec ! application/x-event-camera,width={sensor.width},height={sensor.height}"
                   " ! identity")
-    run(f"filesrc location={quoted(path)} ! {reader} name=decoded ! application/x-event-camera"
-        " ! appsink name=out sync=false max-buffers=4", take=take)
+    try:
+        run(f"filesrc location={quoted(path)} ! {reader} name=decoded ! application/x-event-camera"
+            " ! appsink name=out sync=false max-buffers=4", take=take)
+    except RuntimeError as error:
+        raise RuntimeError(f"{path}: {error}") from error
     return joined(parts)
 
 
@@ -255,7 +264,7 @@ def simulate(video, element):
     return video.of_camera(events)
 
 
-def compare(video, recorded, simulated, span, picture=None):
+def compare(sensor, recorded, simulated, span, picture=None):
     """The figures of eventcompare over a time span."""
     def buffers(events):
         part = span.of(events)
@@ -264,7 +273,7 @@ def compare(video, recorded, simulated, span, picture=None):
         packed["x"], packed["y_p"] = part["x"], part["y_p"]
         return [buffer_of(packed.tobytes(), span.start * 1000, (span.end - span.start) * 1000)]
 
-    caps = (f"application/x-event-camera,format=XYTP,width={video.width},height={video.height},"
+    caps = (f"application/x-event-camera,format=XYTP,width={sensor.width},height={sensor.height},"
             "framerate=0/1")
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "figures.json")

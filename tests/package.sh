@@ -61,6 +61,7 @@ used() {
   for ending in dat es npy npz csv aedat4 hdf5 h5; do try event-convert ball.raw ball.$ending; done
   for ending in raw dat es npy npz csv aedat4 hdf5 h5; do try gst-play-1.0 --no-interactive --videosink=fakesink ball.$ending; done
   try event-calibrate --version
+  try event-realism --version
   for program in event-convert event-thumbnail web-events rtsp-events virtual-camera; do try man --whatis $program; done
   try test -s /usr/share/doc/gsteventcamera-1.0/struct.Info.html
   try pkg-config --exists --print-errors gsteventcamera-1.0

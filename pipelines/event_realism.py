@@ -1,0 +1,342 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Compares simulated events with those that a real camera recorded of the same scene, beside the noise
+ceiling: how similar a second recording by the same camera would be.
+
+    event-realism drive.raw ours.raw v2e.h5 esim.csv --html page.html
+
+All files are event files that this project reads, of the same pixels and with the same clock. --from and
+--to are in seconds after the first real event; the default is the time that all cover. Differences
+beyond the noise ceiling are marked with *."""
+import argparse
+import base64
+import html
+import os
+import sys
+from dataclasses import dataclass
+
+# First, since it says which packages are missing.
+from event_streams import (ON, GLib, Gst, Sensor, Span, compare, find_plugins, read_mask, read_recording, read_video,
+                           run)
+import numpy as np
+
+LIMITS = (1, 5, 10)  # of matches, ms
+# How far a figure may be beyond the ceiling, which is an estimate too.
+TOLERANCE = 0.05
+SPLITS = 20
+COLOURS = ["#808080", "#4080d0", "#d07020", "#309060", "#a050c0", "#c04060", "#60a0a0"]
+
+
+@dataclass
+class Stream:
+    name: str
+    events: np.ndarray
+    figures: dict = None  # of eventcompare, against the real stream
+
+
+@dataclass
+class Row:
+    """A figure of every stream, as text; whether it is beyond the ceiling."""
+
+    title: str
+    ceiling: str
+    cells: list
+    beyond: list
+
+
+def counts_per_pixel(sensor, events):
+    place = (events["y_p"] & ~np.uint16(ON)).astype(np.int64) * sensor.width + events["x"]
+    return np.bincount(place, minlength=sensor.width * sensor.height).reshape(sensor.height, sensor.width)
+
+
+def spread_by_chance(sensor, events):
+    """How much the mean and the standard deviation of two recordings would differ, as a share: twice the
+    root mean square of the differences between halves of the events, divided by the root of two, since a
+    whole has twice as many events as a half."""
+    random = np.random.default_rng(1)
+    differences = []
+    for _ in range(SPLITS):
+        half = random.random(len(events)) < 0.5
+        a, b = (counts_per_pixel(sensor, part) for part in (events[half], events[~half]))
+        differences.append([2 * (a.mean() - b.mean()) / (a.mean() + b.mean()),
+                            2 * (a.std() - b.std()) / (a.std() + b.std())])
+    return np.sqrt(2 * np.mean(np.square(differences), axis=0))
+
+
+def table_of(sensor, real, simulated):
+    """The rows of the table."""
+    first = simulated[0].figures
+    ceiling = first["noise-ceiling"]
+    rows = []
+    chances = spread_by_chance(sensor, real.events)
+    for (field, title), chance in zip((("mean", "events per pixel and second"), ("std-dev", "standard deviation")),
+                                      chances):
+        goal = first["reference"][field]
+        off = [stream.figures["candidate"][field] / goal - 1 for stream in simulated]
+        rows.append(Row(title, f"{goal:.4g} ±{100 * chance:.1f} %",
+                        [f"{stream.figures['candidate'][field]:.4g} ({100 * each:+.0f} %)"
+                         for stream, each in zip(simulated, off)],
+                        [abs(each) > chance for each in off]))
+    for field, title in (("on-share", "share of ON events"), ("active-share", "share of active pixels"),
+                         ("distinct-share", "distinct times per event")):
+        rows.append(Row(title, f"{first['reference'][field]:.3f}",
+                        [f"{stream.figures['candidate'][field]:.3f}" for stream in simulated],
+                        [False] * len(simulated)))
+    for field, title in (("map-correlation", "map correlation"), ("rate-correlation", "rate correlation, 1 ms")):
+        values = [stream.figures[field] for stream in simulated]
+        rows.append(Row(title, f"{ceiling[field]:.3f}", [f"{value:.3f}" for value in values],
+                        [value < ceiling[field] - TOLERANCE for value in values]))
+    values = [stream.figures["interval-distance"] for stream in simulated]
+    rows.append(Row("interval distance, decades", f"{ceiling['interval-distance']:.3f}",
+                    [f"{value:.3f}" for value in values],
+                    [value > ceiling["interval-distance"] + TOLERANCE for value in values]))
+    for side, title in (("reference", "real"), ("candidate", "simulated")):
+        for limit in LIMITS:
+            field = f"within-{limit}ms"
+            values = [stream.figures[f"{side}-matches"][field] for stream in simulated]
+            goal = ceiling["matches"][field]
+            rows.append(Row(f"{title} events matched within {limit} ms", f"{goal:.3f}",
+                            [f"{value:.3f}" for value in values], [value < goal - TOLERANCE for value in values]))
+        values = [stream.figures[f"{side}-matches"]["nearest-distance"] / 1e6 for stream in simulated]
+        goal = ceiling["matches"]["nearest-distance"] / 1e6
+        rows.append(Row(f"nearest match of {title} events, ms", f"{goal:.2f}", [f"{value:.2f}" for value in values],
+                        [value > goal * (1 + 2 * TOLERANCE) for value in values]))
+    return rows
+
+
+def print_table(real, simulated, rows):
+    lines = [["", f"{real.name}, ceiling"] + [stream.name for stream in simulated]]
+    lines += [[row.title, row.ceiling] + [cell + (" *" if beyond else "  ")
+                                          for cell, beyond in zip(row.cells, row.beyond)] for row in rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
+    for title, *cells in lines:
+        print("  ".join([title.ljust(widths[0])] + [cell.rjust(width) for cell, width in zip(cells, widths[1:])])
+              .rstrip())
+    print("* differs by more than a second recording of the same scene would")
+
+
+# the page
+
+
+def picture(counts, most):
+    """A map of events per pixel as a PNG in a data URI; the square root of the count is the brightness."""
+    grey = (255 * np.sqrt(np.minimum(counts / most, 1))).astype(np.uint8)
+    height, width = grey.shape
+    rows = np.zeros((height, (width + 3) // 4 * 4), np.uint8)  # GStreamer's strides
+    rows[:, :width] = grey
+    encoded = []
+    run("appsrc name=pixels ! pngenc ! appsink name=out sync=false",
+        [("pixels", f"video/x-raw,format=GRAY8,width={width},height={height},framerate=0/1",
+          [Gst.Buffer.new_wrapped(rows.tobytes())])],
+        lambda sample: encoded.append(sample.get_buffer().extract_dup(0, sample.get_buffer().get_size())))
+    return "data:image/png;base64," + base64.b64encode(encoded[0]).decode()
+
+
+def chart(title, x_title, y_title, curves, logarithmic=(False, False)):
+    """Curves as SVG: x and y of each stream. `logarithmic` says which of the axes are so, to the base 10; they
+    begin at the lowest value, the others at 0."""
+    points = []
+    for curve in curves:
+        curve = np.array(curve, float).reshape(2, -1)
+        curve = curve[:, (curve > 0).all(axis=0) | (not any(logarithmic))]
+        points.append(np.array([np.log10(axis) if is_log else axis for axis, is_log in zip(curve, logarithmic)]))
+    drawn = np.concatenate(points, axis=1)
+    if drawn.shape[1] == 0:
+        return ""
+    low = np.where(logarithmic, drawn.min(axis=1), 0)
+    size = drawn.max(axis=1) - low
+    size = np.where(size > 0, size, 1)
+    width, height, left, bottom = 540, 260, 90, 44
+
+    def place(curve):
+        x, y = (curve - low[:, None]) / size[:, None]
+        return " ".join(f"{left + a * width:.1f},{10 + (1 - b) * height:.1f}" for a, b in zip(x, y))
+
+    def number(axis, share):
+        value = low[axis] + share * size[axis]
+        return f"{10 ** value:.3g}" if logarithmic[axis] else f"{value:.3g}"
+
+    lines = [f'<polyline points="{place(curve)}" stroke="{COLOURS[i % len(COLOURS)]}"/>'
+             for i, curve in enumerate(points)]
+    marks = "".join(
+        f'<text x="{left + share * width:.0f}" y="{height + 28}" text-anchor="middle">'
+        f"{number(0, share)}</text>"
+        f'<text x="{left - 6}" y="{10 + (1 - share) * height + 4:.0f}" text-anchor="end">'
+        f"{number(1, share)}</text>" for share in (0, 0.25, 0.5, 0.75, 1))
+    return (f'<figure><figcaption>{title}</figcaption><svg viewBox="0 0 {left + width + 30} {height + 10 + bottom}">'
+            f'<rect x="{left}" y="10" width="{width}" height="{height}"/>{"".join(lines)}{marks}'
+            f'<text x="{left + width / 2}" y="{height + 46}" text-anchor="middle">{x_title}</text>'
+            f'<text x="14" y="{10 + height / 2}" text-anchor="middle" transform="rotate(-90 14 {10 + height / 2})">'
+            f"{y_title}</text></svg></figure>")
+
+
+def intervals_of(sensor, events):
+    """The times between successive events of a pixel, at least half a microsecond."""
+    place = (events["y_p"] & ~np.uint16(ON)).astype(np.int64) * sensor.width + events["x"]
+    order = np.argsort(place, kind="stable")
+    same = np.diff(place[order]) == 0
+    return np.maximum(np.diff(events["t"][order])[same], 0.5)
+
+
+def interval_curve(sensor, events):
+    """Share of the intervals in each tenth of a decade."""
+    share, edges = np.histogram(np.log10(intervals_of(sensor, events)), np.arange(-0.35, 7.05, 0.1))
+    return 10 ** ((edges[:-1] + edges[1:]) / 2), share / max(share.sum(), 1)
+
+
+def travels_of(video, span):
+    """How far the logarithm of each pixel rises, and falls, in the frames of a time span."""
+    greys = [np.log(video.luma(frame) + 1) for frame in video.frames
+             if span.start <= frame.time // 1000 <= span.end]
+    if len(greys) < 2:
+        raise RuntimeError("the video has fewer than two frames in the compared time")
+    changes = np.diff(greys, axis=0)
+    return np.maximum(changes, 0).sum(axis=0), np.maximum(-changes, 0).sum(axis=0)
+
+
+def response_curve(sensor, events, travels):
+    """Mean number of events of a pixel and polarity, by how far its signal travels."""
+    is_on = (events["y_p"] & ON) != 0
+    counts = np.concatenate([counts_per_pixel(sensor, events[part]).ravel() for part in (is_on, ~is_on)])
+    travel = np.concatenate([each.ravel() for each in travels])
+    edges = 2.0 ** np.arange(-8, 6)
+    bins = np.digitize(travel, edges)
+    return [(travel[bins == i].mean(), counts[bins == i].mean())
+            for i in range(1, len(edges)) if (bins == i).sum() >= 20]
+
+
+def charts_of(sensor, real, simulated, video, span):
+    streams = [real] + simulated
+    rates = []
+    for i, stream in enumerate(streams):
+        curve = (stream.figures or simulated[0].figures)["rate-curve"]
+        counts = np.array(curve["candidate" if i > 0 else "reference"], float)
+        rates.append((np.arange(len(counts)) * curve["bin"] / 1e9, counts / (curve["bin"] / 1e9)))
+    charts = [chart("Event rate", "seconds", "events per second", rates),
+              chart("Times between successive events of a pixel", "microseconds", "share",
+                    [interval_curve(sensor, stream.events) for stream in streams], (True, False))]
+    if video is not None:
+        travels = travels_of(video, span)
+        charts.append(chart("Response", "change of the logarithm of the light", "events per pixel and polarity",
+                            [np.transpose(response_curve(sensor, stream.events, travels)) for stream in streams],
+                            (True, True)))
+    else:
+        own = counts_per_pixel(sensor, real.events).ravel()
+        curves = [((0.5, max(own.max(), 1)), (0.5, max(own.max(), 1)))]
+        for stream in simulated:
+            theirs = counts_per_pixel(sensor, stream.events).ravel()
+            groups = [(theirs[chosen].mean(), own[chosen].mean()) for low in range(12)
+                      if (chosen := (theirs >= 2 ** low) & (theirs < 2 ** (low + 1))).sum() >= 20]
+            curves.append(np.transpose(groups) if groups else ((), ()))
+        charts.append(chart("Real events of the pixels with as many simulated ones", "simulated events of a pixel",
+                            "real events", curves, (True, True)))
+    return charts
+
+
+STYLE = """
+:root { color-scheme: light dark; font-family: sans-serif }
+body { max-width: 75rem; margin: 1.5rem auto; padding: 0 1rem }
+table { border-collapse: collapse } th, td { padding: .2rem .8rem; text-align: right } th:first-child { text-align: left }
+tr:nth-child(even) { background: #8882 } .beyond { color: light-dark(#b02020, #ff8080) }
+.maps, .charts { display: grid; gap: 1rem } figure { margin: 0 }
+.maps { grid-template-columns: repeat(auto-fill, minmax(18rem, 1fr)) }
+.charts { grid-template-columns: repeat(auto-fill, minmax(min(32rem, 100%), 1fr)) }
+img { width: 100%; image-rendering: pixelated } svg { width: 100% } svg text { font-size: 12px; fill: currentColor }
+svg rect { fill: none; stroke: #8888 } polyline { fill: none; stroke-width: 2 }
+"""
+
+
+def page_of(sensor, real, simulated, rows, charts):
+    streams = [real] + simulated
+    maps = [counts_per_pixel(sensor, stream.events) for stream in streams]
+    most = max(np.quantile(maps[0], 0.999), 1)
+    names = [html.escape(stream.name) for stream in streams]
+    header = "".join(f'<th style="border-bottom: 3px solid {COLOURS[i % len(COLOURS)]}">{name}</th>'
+                     for i, name in enumerate([f"{names[0]}, ceiling"] + names[1:]))
+    body = "".join(
+        f"<tr><th>{row.title}</th><td>{row.ceiling}</td>"
+        + "".join(f'<td class="beyond">{cell} *</td>' if beyond else f"<td>{cell}</td>"
+                  for cell, beyond in zip(row.cells, row.beyond)) + "</tr>" for row in rows)
+    figures = "".join(f'<figure><figcaption>{name}</figcaption><img alt="events per pixel" src="{picture(each, most)}">'
+                      "</figure>" for name, each in zip(names, maps))
+    return ('<!DOCTYPE html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+            f"<title>Realism of {', '.join(names[1:])}</title><style>{STYLE}</style><h1>Beside {names[0]}</h1>"
+            f"<table><tr><th></th>{header}</tr>{body}</table>"
+            "<p>* differs by more than a second recording of the same scene would.</p>"
+            f'<h2>Events per pixel</h2><div class="maps">{figures}</div><div class="charts">{"".join(charts)}</div>\n')
+
+
+# the program
+
+
+def options():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("real")
+    parser.add_argument("simulated", nargs="+")
+    parser.add_argument("--from", type=float, metavar="SECONDS", help="start of the comparison")
+    parser.add_argument("--to", type=float, metavar="SECONDS", help="end of the comparison")
+    parser.add_argument("--mask", metavar="PICTURE",
+                        help="a picture that is white where pixels of the camera can fire; events elsewhere"
+                        " are left out of all streams")
+    parser.add_argument("--video", metavar="VIDEO",
+                        help="the frames, for the page's response curve: a video, or a text file of lines"
+                        " \"seconds picture\"")
+    parser.add_argument("--html", metavar="PAGE", help="write a page with maps and curves")
+    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
+                        help="print the version and exit")
+    return parser.parse_args()
+
+
+def span_of(streams, start, end):
+    """From `start` to `end` after the first real event; by default the time that all streams cover."""
+    origin = int(streams[0].events["t"][0])
+    first = max(int(stream.events["t"][0]) for stream in streams) if start is None else origin + round(start * 1e6)
+    last = min(int(stream.events["t"][-1]) for stream in streams) if end is None else origin + round(end * 1e6)
+    if first >= last:
+        raise RuntimeError("the streams do not overlap in time: "
+                           + ", ".join(f"{stream.name} lasts from {stream.events['t'][0] / 1e6:.6f} to"
+                                       f" {stream.events['t'][-1] / 1e6:.6f} s" for stream in streams))
+    return Span(first - 1, last)
+
+
+def main():
+    Gst.init(None)
+    chosen = options()
+    find_plugins()
+    sensor = Sensor()
+    streams = []
+    for path in [chosen.real] + chosen.simulated:
+        streams.append(Stream(os.path.basename(path), read_recording(path, sensor)))
+        if len(streams) == 1 and chosen.mask:
+            sensor.mask = read_mask(chosen.mask, sensor)
+        streams[-1].events = sensor.of_camera(streams[-1].events)
+        if len(streams[-1].events) == 0:
+            raise RuntimeError(f"{path}: no events" + (" where the mask is white" if chosen.mask else ""))
+    span = span_of(streams, getattr(chosen, "from"), chosen.to)
+    for stream in streams:
+        stream.events = span.of(stream.events)
+    real, *simulated = streams
+    if len(real.events) == 0:
+        raise RuntimeError(f"{chosen.real}: no events in the compared time")
+    for stream in simulated:
+        stream.figures = compare(sensor, real.events, stream.events, span)
+    rows = table_of(sensor, real, simulated)
+    print_table(real, simulated, rows)
+    if chosen.html:
+        video = None
+        if chosen.video:
+            video = read_video(chosen.video, 0, float("inf"))
+            if (video.width, video.height) != (sensor.width, sensor.height):
+                raise RuntimeError(f"{chosen.video} has {video.width} x {video.height} pixels, the recording has"
+                                   f" {sensor.width} x {sensor.height}")
+        page = page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, video, span))
+        with open(chosen.html, "w", encoding="utf-8") as file:
+            file.write(page)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (RuntimeError, OSError, GLib.Error) as failure:
+        sys.exit(f"error: {failure}")

@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# event-realism tells a second recording of a scene from the events of another simulator.
+set -euo pipefail
+source "$SOURCE/tests/pipelines/scratch_folder.sh"
+
+"$GST_LAUNCH" -q videotestsrc pattern=zone-plate kx2=12 ky2=12 kt=5 num-buffers=16 ! video/x-raw,format=I420,width=161,height=90,framerate=25/1 ! matroskamux ! filesink location=scene.mkv
+simulate() { # FILE ENCODER ELEMENT...
+  local file=$1 encoder=$2
+  shift 2
+  "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! "$@" ! "$encoder" ! filesink location="$file"
+}
+for seed in 1 2; do simulate real$seed.raw evtenc eventsim-dvs shot-noise-rate=5 seed=$seed; done
+simulate dense.csv eventcsvenc eventsim-dense positive-threshold=5
+
+realism() {
+  echo "event-realism $*"
+  timeout 60 "$BUILD/pipelines/event-realism" "$@" 2>errors
+}
+realism real1.raw real1.raw real2.raw dense.csv --html page.html >table
+cat table
+column() { # NUMBER TITLE: the cell of a row, with its mark
+  sed -n "s/^$2  *//p" table | sed 's/ \*/*/g; s/ (/(/g; s/ ±/±/; s/ %/%/g' | awk -v column="$1" '{ print $column }'
+}
+[ "$(column 2 "map correlation")" = 1.000 ] || fail "a recording is unlike itself"
+[ "$(column 2 "real events matched within 1 ms")" = 1.000 ] || fail "a recording does not match itself"
+[ "$(column 2 "nearest match of real events, ms")" = 0.00 ] || fail "a recording is far from itself"
+[ "$(grep -c '^[a-z].* \*$' table)" -ge 10 ] || fail "dense interpolation is within the noise ceiling"
+for title in "standard deviation" "map correlation" "rate correlation, 1 ms" "interval distance, decades" \
+  "real events matched within 10 ms" "simulated events matched within 10 ms"; do
+  [[ $(column 3 "$title") != *\** ]] || fail "$title of a second recording is beyond the noise ceiling"
+  [[ $(column 4 "$title") == *\* ]] || fail "$title of dense interpolation is within the noise ceiling"
+  grep -qF "<th>$title</th>" page.html || fail "the page has no $title"
+done
+
+# The page needs no network.
+! grep -oE '(src|href)="(http|//)[^"]*' page.html || fail "the page refers to the network"
+[ "$(grep -o 'src="data:image/png;base64,[A-Za-z0-9+/]*' page.html | wc -l)" -eq 4 ] || fail "maps are missing"
+[ "$(grep -o '<svg' page.html | wc -l)" -eq 3 ] || fail "curves are missing"
+/usr/bin/python3 -c 'import sys; from html.parser import HTMLParser; HTMLParser().feed(open("page.html").read())'
+realism real1.raw real2.raw --video scene.mkv --from 0.1 --to 0.4 --html page.html >table
+grep -q "change of the logarithm of the light" page.html || fail "the page has no response to the light"
+
+# Events outside a mask do not count.
+printf 'P5 161 90 255\n' >none.pgm
+head -c $((161 * 90)) /dev/zero >>none.pgm
+"$GST_LAUNCH" -q filesrc location=none.pgm ! decodebin ! videoconvert ! pngenc ! filesink location=none.png
+"$GST_LAUNCH" -q videotestsrc num-buffers=4 ! video/x-raw,width=320,height=240 ! eventsim-dvs shot-noise-rate=100 ! evtenc ! filesink location=large.raw
+head -c 100 real1.raw >empty.raw
+awk -F, -v OFS=, 'NR > 1 { $1 += 100000000 } { print }' dense.csv >later.csv
+refused() { # WORDS ARGUMENT...
+  local words=$1
+  shift
+  if realism "$@"; then fail "it succeeded"; fi
+  cat errors
+  grep -q "$words" errors || fail "the error does not say \"$words\""
+  ! grep -q Traceback errors || fail "the error is a traceback"
+}
+refused "none.png\|no events where the mask is white" real1.raw real2.raw --mask none.png
+refused "large.raw: it has 320 x 240 pixels, more than" real1.raw large.raw
+refused "empty.raw: no events" real1.raw empty.raw
+refused "do not overlap in time" real1.raw later.csv
+refused "nowhere.raw" real1.raw nowhere.raw
+refused "page.html" real1.raw real2.raw --html nowhere/page.html
