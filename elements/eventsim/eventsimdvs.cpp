@@ -131,6 +131,12 @@ const Setting table[] = {
      "Invert the sRGB transfer function (IEC 61966-2-1) first, to recover the light that reached "
      "the camera; otherwise luma is used as light",
      &DvsSettings::linear_light},
+    {"exposure-compensation", "Exposure compensation",
+     "Divide out changes of the frame camera's automatic exposure, which an event camera does not "
+     "see: gains of 1 % to 25 % from one frame to the next (share of the light) that three "
+     "quarters of the image agree on. A lamp that lights all of it evenly and gradually looks the "
+     "same, and does not fire",
+     &DvsSettings::exposure_compensation},
     {"response", "Response", "Response of the photoreceptor to light", &DvsSettings::response, 0, 0,
      fixed, response_type},
     {"log-eps", "Offset of the logarithm",

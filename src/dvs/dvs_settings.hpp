@@ -34,8 +34,9 @@ enum class RefractoryReset {
 /// Parameters of a pixel array. Every stage except response and upsampling is off if its parameters
 /// are 0.
 struct DvsSettings {
-  double denoise = 0;         ///< maximum noise amplitude in the frames; white is 255
-  bool linear_light = false;  ///< undo the sRGB transfer function first
+  double denoise = 0;                  ///< maximum noise amplitude in the frames; white is 255
+  bool linear_light = false;           ///< undo the sRGB transfer function first
+  bool exposure_compensation = false;  ///< divide out the gain of the frame camera's exposure
   Response response = Response::lin_log;
   double log_eps = 1e-3;  ///< of Response::log; white is 1
 

@@ -10,6 +10,7 @@
 #include "src/core/luma.hpp"
 #include "src/core/thread_pool.hpp"
 #include "src/dvs/denoise.hpp"
+#include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/interval_events.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/readout.hpp"
@@ -29,8 +30,12 @@ bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
 }
 
 bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
-  return a.linear_light == b.linear_light && a.response == b.response && a.log_eps == b.log_eps;
+  return a.linear_light == b.linear_light && a.exposure_compensation == b.exposure_compensation &&
+         a.response == b.response && a.log_eps == b.log_eps;
 }
+
+/// Limit of the gain since the first frame, in case many estimates err in the same direction.
+constexpr double max_total_gain = 64;
 
 /// Event rate limit that no array reaches, events per second.
 constexpr double unlimited = 1e18;
@@ -55,6 +60,7 @@ class PixelSimulator final : public DvsSimulator {
     clock_ = 0;
     fired_.reset();
     if (readout_) readout_->reset();
+    if (gain_ != 1) responses_.clear();  // of another exposure
     adopt(settings_);
     settle();
   }
@@ -63,6 +69,7 @@ class PixelSimulator final : public DvsSimulator {
                 EventBuckets& events) override {
     keep(frame, now_);
     const double duration = begin(interval, events);
+    if (current_.exposure_compensation) compensate_exposure();
     if (current_.upsampling == Upsampling::motion)
       advance_along_motion(duration);
     else
@@ -86,6 +93,19 @@ class PixelSimulator final : public DvsSimulator {
       denoise(frame.as<Pixel>(), limit, threads(), kept);
     else
       kept.assign(frame.as<Pixel>());
+  }
+
+  /// Divides out the gain of the exposure from the last frame to this one.
+  void compensate_exposure() {
+    if (!exposure_gain_) exposure_gain_.emplace(format().bits, current_.linear_light);
+    const double gain = exposure_gain_->between(last_.view(), now_.view(), threads());
+    const double total = gain_ * gain;
+    if (gain == 1 || std::max(total, 1 / total) > max_total_gain) return;
+    gain_ = total;
+    responses_ = responses(current_, luma_bits(current_), gain_);
+    if (current_.upsampling == Upsampling::linear) return;
+    expose(last_, format().bits, current_.linear_light, gain, threads());
+    finder_.reset();  // knows it as it was
   }
 
   /// Returns the duration of the interval in microseconds.
@@ -152,7 +172,7 @@ class PixelSimulator final : public DvsSimulator {
     tables_.clear();
     for (const auto& sub_interval : sub_intervals_)
       if (tables_for(sub_interval) == tables_.end())
-        tables_.emplace_back(current_, sub_interval.duration);
+        tables_.emplace_back(current_, sub_interval.duration, gain_);
   }
 
   auto tables_for(const SubInterval& sub_interval) const {
@@ -194,7 +214,7 @@ class PixelSimulator final : public DvsSimulator {
     candidates.count = 0;
     const PixelRow pixels = pixels_.row(y);
     filter_row({sub_interval, tables, responses_, luma_bits(current_),
-                current_.cutoff_frequency > 0, current_.shot_noise_rate > 0},
+                current_.cutoff_frequency > 0, current_.shot_noise_rate > 0, gain_ != 1},
                luma, pixels, format().width, candidates);
     const RowToSolve solved{current_, random_,    sub_interval, tables,
                             pixels,   candidates, events,       clock_ + sub_interval.begin};
@@ -218,9 +238,13 @@ class PixelSimulator final : public DvsSimulator {
 
   void adopt(const DvsSettings& settings) {
     const bool is_first = responses_.empty();
-    if (is_first || !have_same_response(settings, current_) ||
-        settings.upsampling != current_.upsampling)
-      responses_ = responses(settings, luma_bits(settings));
+    const bool starts_over = is_first || !have_same_response(settings, current_);
+    if (starts_over) {
+      gain_ = 1;
+      exposure_gain_.reset();
+    }
+    if (starts_over || settings.upsampling != current_.upsampling)
+      responses_ = responses(settings, luma_bits(settings), gain_);
     random_ = Random(settings.seed);
     if (is_first || !have_same_traits(settings, current_) || current_.threshold_jitter > 0)
       for_each_row(threads(), format().height,
@@ -272,6 +296,8 @@ class PixelSimulator final : public DvsSimulator {
   PixelArray pixels_{format().width, format().height};
   DvsSettings current_;  ///< applied to the pixels
   Random random_{0};
+  std::optional<ExposureGain> exposure_gain_;
+  double gain_ = 1;               ///< of the exposure since the first frame
   std::vector<float> responses_;  ///< by luma value
   ExposurePulse pulse_;
   std::vector<SubInterval> sub_intervals_;  ///< of the current interval, in order of time

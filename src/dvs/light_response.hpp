@@ -20,7 +20,13 @@ inline double light_of(double luma, bool linear_light) {
   return luma <= 0.04045 ? luma / 12.92 : std::pow((luma + 0.055) / 1.055, 2.4);
 }
 
-/// Response of the photoreceptor to light in [0, 1].
+/// Inverse of light_of().
+inline double luma_of(double light, bool linear_light) {
+  if (!linear_light) return light;
+  return light <= 0.04045 / 12.92 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+}
+
+/// Response of the photoreceptor to light, white is 1.
 inline double response_of(double light, Response response, double log_eps) {
   constexpr double linear_up_to = 20;  // 8-bit grey levels, as in v2e
   if (response == Response::log) return std::log(log_eps + light);
@@ -29,12 +35,13 @@ inline double response_of(double light, Response response, double log_eps) {
   return x <= linear_up_to ? x * std::log(linear_up_to) / linear_up_to : std::log(x);
 }
 
-/// Responses to all luma values of a bit depth, 8 to 16.
-inline std::vector<float> responses(const DvsSettings& settings, int bits) {
+/// Responses to all luma values of a bit depth, 8 to 16, in a frame with `gain` times the exposure
+/// of the first one.
+inline std::vector<float> responses(const DvsSettings& settings, int bits, double gain) {
   std::vector<float> values(std::size_t{1} << bits);
   const auto white = static_cast<double>(values.size() - 1);
   for (std::size_t luma = 0; luma < values.size(); ++luma) {
-    const double light = light_of(static_cast<double>(luma) / white, settings.linear_light);
+    const double light = light_of(static_cast<double>(luma) / white, settings.linear_light) / gain;
     values[luma] = static_cast<float>(response_of(light, settings.response, settings.log_eps));
   }
   return values;
@@ -59,16 +66,19 @@ struct ShadeTables {
 
   double duration;  ///< microseconds
 
-  ShadeTables(const DvsSettings& settings, double microseconds) : duration(microseconds) {
+  /// Of a frame with `gain` times the exposure of the first one.
+  ShadeTables(const DvsSettings& settings, double microseconds, double gain)
+      : duration(microseconds) {
     constexpr double min_cutoff_hz = 1e-3;  // minutes; a lower one makes no difference
     constexpr double noise_at_white = 0.25;
     const double max_bandwidth =
         2 * std::numbers::pi * std::max(settings.cutoff_frequency, min_cutoff_hz) / 1e6;
     const double max_noise_rate = settings.shot_noise_rate / 1e6;
     for (std::size_t i = 0; i < shades; ++i) {
-      const double light = light_of(static_cast<double>(i) / 255, settings.linear_light);
+      const double light = light_of(static_cast<double>(i) / 255, settings.linear_light) / gain;
       // In (0, 1]; scales the bandwidth, and reduces the noise, relative to a dark pixel.
-      const double brightness = (light + settings.dark_light) / (1 + settings.dark_light);
+      const double brightness =
+          std::min(1.0, (light + settings.dark_light) / (1 + settings.dark_light));
       bandwidth[i] = max_bandwidth * brightness;
       const double k = bandwidth[i] * duration;
       exponent[i] = static_cast<float>(k);

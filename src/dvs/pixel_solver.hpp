@@ -50,6 +50,7 @@ struct RowFilter {
   int luma_bits;
   bool has_bandwidth;
   bool has_noise;
+  bool keeps_saturated;  ///< saturated pixels keep a higher target
 };
 
 /// Advances a row of pixels through a sub-interval: targets and signals of all pixels; references

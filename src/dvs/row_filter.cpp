@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/pixel_solver.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -35,6 +36,8 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
   const auto zero = hn::Zero(floats);
   const float* responses = row_filter.responses.data();
   const auto white = hn::Set(words, static_cast<std::int32_t>(row_filter.responses.size()) - 1);
+  const auto below_saturated =
+      hn::Set(words, saturated_luma(static_cast<int>(row_filter.responses.size()) - 1) - 1);
   const int shade_shift = row_filter.luma_bits - 8;
   const auto duration = hn::Set(floats, static_cast<float>(row_filter.sub_interval.duration));
   const auto share = hn::Set(floats, static_cast<float>(row_filter.sub_interval.share));
@@ -54,6 +57,10 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
     const auto shade = hn::ShiftRightSame(value, shade_shift);
     auto target = hn::GatherIndex(floats, responses, value);
     const auto last_target = hn::LoadU(floats, targets + x);
+    if (row_filter.keeps_saturated) {
+      const auto is_saturated = hn::RebindMask(floats, hn::Gt(value, below_saturated));
+      target = hn::IfThenElse(is_saturated, hn::Max(target, last_target), target);
+    }
     if (is_partial) target = hn::Add(last_target, hn::Mul(hn::Sub(target, last_target), share));
     // A rise of all signals is equivalent to a fall of all references.
     const auto leaked = hn::Add(hn::Mul(hn::LoadU(floats, leaks + x), duration), rise);

@@ -150,7 +150,7 @@ template <class Solve>
 Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
   const Random random(7);
   const SubInterval sub_interval{0, 40'000, 1, 1, 0.01, 3};
-  const ShadeTables tables(settings, sub_interval.duration);
+  const ShadeTables tables(settings, sub_interval.duration, 1);
   std::minstd_rand draw(5);
   std::uniform_real_distribution<float> level(0, 1.5F);
   PixelArray array(width, 1);

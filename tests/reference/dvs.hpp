@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "src/core/event.hpp"
@@ -35,6 +37,57 @@ Image<Pixel> denoised(const ImageView<Pixel>& frame, int limit) {
     }
   }
   return out;
+}
+
+/// Gain of the exposure from one frame to the next:
+///   usable   a pixel whose luma is above 16/255 and below 235/255 of white in both frames
+///   block    8x8 pixels, half of them usable: d = ln(sum of light now / sum of light before)
+///   region   one of 4x4, by equal numbers of blocks: m = median of d
+///   gain     g = exp(median of m), if there are 8 regions, 1.01 <= max(g, 1/g) <= 1.25, and 3/4 of
+///            the regions have |m - ln g| <= |ln g| / 2; 1 otherwise
+/// Light is that of DvsPixel; a median is the upper one of two.
+template <class Pixel>
+double exposure_gain(const ImageView<Pixel>& last, const ImageView<Pixel>& now, int bits,
+                     bool linear_light) {
+  const double white = (1 << bits) - 1;
+  const auto is_usable = [&](double luma) {
+    return 255 * luma > 16 * white && 255 * luma < 235 * white;
+  };
+  const auto light = [&](double luma) {
+    return linear_light ? std::pow((luma / white + 0.055) / 1.055, 2.4) : luma / white;
+  };
+  const auto median = [](std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+  };
+  const int columns = (now.width + 7) / 8;
+  const int rows = (now.height + 7) / 8;
+  std::map<std::pair<int, int>, std::vector<double>> regions;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      double before = 0;
+      double after = 0;
+      int usable = 0;
+      for (int y = 8 * row; y < std::min(8 * row + 8, now.height); ++y)
+        for (int x = 8 * column; x < std::min(8 * column + 8, now.width); ++x)
+          if (is_usable(last.row(y)[x]) && is_usable(now.row(y)[x])) {
+            before += light(last.row(y)[x]);
+            after += light(now.row(y)[x]);
+            ++usable;
+          }
+      if (usable >= 32)
+        regions[{4 * row / rows, 4 * column / columns}].push_back(std::log(after / before));
+    }
+  }
+  if (regions.size() < 8) return 1;
+  std::vector<double> medians;
+  for (const auto& [place, changes] : regions) medians.push_back(median(changes));
+  const double change = median(medians);
+  if (std::abs(change) < std::log(1.01) || std::abs(change) > std::log(1.25)) return 1;
+  double agreeing = 0;
+  for (const double other : medians)
+    agreeing += std::abs(other - change) <= std::abs(change) / 2 ? 1 : 0;
+  return agreeing >= 0.75 * static_cast<double>(medians.size()) ? std::exp(change) : 1;
 }
 
 struct TimedEvent {
@@ -91,15 +144,14 @@ class Esim {
 };
 
 /// One pixel without noise and mismatch, evaluated every microsecond.
-///   light      I = luma, or ((luma + 0.055)/1.055)^2.4
-///   response   log: ln(eps + I); lin-log: x ln(20)/20 or ln(x), x = 255 I; linear: ln(255) I
+///   light      I = luma / G, or ((luma + 0.055)/1.055)^2.4 / G, G the gain of the exposure
+///   saturated  a luma of 235/255 or more with G != 1 keeps the L of the frame before if that is
+///   more response   log: ln(eps + I); lin-log: x ln(20)/20 or ln(x), x = 255 I; linear: ln(255) I
 ///   input      L(t), a straight line from frame to frame
-///   low pass   dV/dt = 2 pi f (I + d)/(1 + d) (L(t) - V), I of the later frame in 8 bits
-///   leak       dR/dt = -rate C+
-///   events     ON where V - R >= (1 + G) C+, OFF where R - V >= (1 + G) C-
-///   adaptation G grows by a with each event; dG/dt = -a / T down to 0
-///   afterwards R = R +- (1 + G) C, G before the event (level), or R = V when the refractory period
-///   ends (signal)
+///   low pass   dV/dt = 2 pi f (I + d)/(1 + d) (L(t) - V), I of the later frame in 8 bits, I at
+///   most 1 leak       dR/dt = -rate C+ events     ON where V - R >= (1 + G) C+, OFF where R - V >=
+///   (1 + G) C- adaptation G grows by a with each event; dG/dt = -a / T down to 0 afterwards R = R
+///   +- (1 + G) C, G before the event (level), or R = V when the refractory period ends (signal)
 class DvsPixel {
  public:
   DvsPixel(const DvsSettings& settings, double luma, double leaked)
@@ -108,14 +160,16 @@ class DvsPixel {
   }
 
   /// Events until the next frame, `microseconds` later.
-  std::vector<TimedEvent> push(double luma, int microseconds) {
+  /// Its exposure is `gain` times that of the first frame.
+  std::vector<TimedEvent> push(double luma, int microseconds, double gain = 1) {
     std::vector<TimedEvent> events;
     const double last = input_;
-    const double next = response(light(luma));
+    double next = response(light(luma) / gain);
+    if (gain != 1 && 255 * luma >= 235) next = std::max(next, last);
     const double dark = settings_.dark_light;
     const double shade = std::min(std::floor(luma * 65535 / 256), 255.0) / 255;
     const double bandwidth = 2 * std::numbers::pi * settings_.cutoff_frequency / 1e6 *
-                             (light(shade) + dark) / (1 + dark);
+                             (std::min(light(shade) / gain, 1.0) + dark) / (1 + dark);
     // Sampled every microsecond, the line is exact to the resolution of events.
     for (int i = 1; i <= microseconds; ++i, ++now_) {
       input_ = last + (next - last) * i / microseconds;

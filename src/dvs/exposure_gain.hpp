@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "src/core/image.hpp"
+#include "src/core/thread_pool.hpp"
+
+namespace eventcamera {
+
+/// Luma from which on a pixel counts as saturated: the white of narrow-range video.
+inline int saturated_luma(int white) {
+  return static_cast<int>(std::ceil(white * 235 / 255.0));
+}
+
+/// Estimates how a frame camera's exposure changed the light in its frames, which an event camera
+/// would not see.
+///
+/// An exposure changes all light by the same factor; motion, a shadow or a lamp changes some places
+/// more than others. So the gain is the median of the gains of 4x4 regions, each of which is the
+/// median of its blocks of 8x8 pixels. It counts if at least eight regions have one, and three
+/// quarters of them agree with it. The reference implementation is `reference::exposure_gain()`.
+class ExposureGain {
+ public:
+  /// Smaller gains are within the error of the estimate, larger ones too sudden for an exposure.
+  static constexpr double min_gain = 1.01;
+  static constexpr double max_gain = 1.25;
+
+  /// For luma of 8 to 16 bits; light_of() tells its light.
+  ExposureGain(int bits, bool linear_light);
+
+  /// Returns the gain of the light from one frame to the next; 1 if there is none that counts. The
+  /// same for any number of threads.
+  double between(const ImageView<std::uint8_t>& last, const ImageView<std::uint8_t>& now,
+                 ThreadPool& threads);
+  double between(const ImageView<std::uint16_t>& last, const ImageView<std::uint16_t>& now,
+                 ThreadPool& threads);
+
+ private:
+  template <class Pixel>
+  double find(const ImageView<Pixel>& last, const ImageView<Pixel>& now, ThreadPool& threads);
+
+  std::vector<std::uint16_t> light_;  ///< by luma; 0 if too dark, or saturated
+  std::vector<double> gains_;         ///< logarithms, by block; NaN if unknown
+};
+
+/// Changes a frame to how it would look with `gain` times the exposure. Saturated pixels stay so.
+void expose(Image<std::uint8_t>& frame, int bits, bool linear_light, double gain,
+            ThreadPool& threads);
+void expose(Image<std::uint16_t>& frame, int bits, bool linear_light, double gain,
+            ThreadPool& threads);
+
+}  // namespace eventcamera

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The gain of an exposure equals its plain reference, follows a camera's automatic exposure and not
+// a lamp; eventsim-dvs then sees the scene as an event camera does.
+#include "src/dvs/exposure_gain.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "src/dvs/dvs_simulator.hpp"
+#include "src/dvs/light_response.hpp"
+#include "tests/core/targets.hpp"
+#include "tests/reference/dvs.hpp"
+#include "tests/simulate/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+constexpr int width = 200;
+constexpr int height = 120;
+
+/// Gain of each of nine frames since the first: x1.47 in five intervals, then constant.
+double ramp(int frame) {
+  return std::pow(1.47, std::min(frame, 5) / 5.0);
+}
+
+/// A frame of a camera: light of at most 1, times the exposure, clipped, and encoded.
+template <class Pixel>
+Image<Pixel> exposed(const Image<double>& light, double gain, int bits, bool linear_light) {
+  Image<Pixel> frame(light.width(), light.height());
+  const int white = (1 << bits) - 1;
+  for (int y = 0; y < light.height(); ++y)
+    for (int x = 0; x < light.width(); ++x)
+      frame.at(x, y) = static_cast<Pixel>(
+          std::lround(white * luma_of(std::min(1.0, gain * light.at(x, y)), linear_light)));
+  return frame;
+}
+
+/// A texture of light between `darkest` and `brightest`, moved by (left, top).
+Image<double> scene_of(int columns, int rows, double left, double top, double darkest,
+                       double brightest) {
+  const auto texture = scene::texture<std::uint16_t>(columns, rows, 16, left, top);
+  Image<double> light(columns, rows);
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x)
+      light.at(x, y) = darkest + (brightest - darkest) * texture.at(x, y) / 65535;
+  return light;
+}
+
+/// Copies a frame into rows with padding; the last row ends at the end of the memory.
+template <class Pixel>
+class Padded {
+ public:
+  explicit Padded(const Image<Pixel>& frame)
+      : stride_(frame.width() + 5),
+        memory_(static_cast<std::size_t>(stride_ * (frame.height() - 1) + frame.width())),
+        width_(frame.width()),
+        height_(frame.height()) {
+    for (int y = 0; y < height_; ++y)
+      std::copy_n(frame.row(y), width_, memory_.data() + static_cast<std::ptrdiff_t>(y) * stride_);
+  }
+  ImageView<Pixel> view() const {
+    return {memory_.data(), static_cast<std::ptrdiff_t>(stride_ * sizeof(Pixel)), width_, height_};
+  }
+
+ private:
+  int stride_;
+  std::vector<Pixel> memory_;
+  int width_;
+  int height_;
+};
+
+/// Returns how many of several gains counted.
+template <class Pixel>
+int hold_to_the_reference(int columns, int rows, int bits, bool linear_light) {
+  const auto light = [&](double moved) {
+    return scene_of(columns, rows, moved, 0.3 * moved, 0.02, 1);
+  };
+  int counted = 0;
+  for (const double true_gain : {0.7, 0.85, 0.99, 1.0, 1.03, 1.08, 1.2, 1.4}) {
+    const Padded last(exposed<Pixel>(light(0), 0.8, bits, linear_light));
+    const Padded now(exposed<Pixel>(light(1), 0.8 * true_gain, bits, linear_light));
+    const double expected = reference::exposure_gain(last.view(), now.view(), bits, linear_light);
+    for (const int most : {1, 2}) {
+      ThreadPool threads;
+      threads.set_threads(most);
+      ExposureGain gain(bits, linear_light);
+      EXPECT_NEAR(gain.between(last.view(), now.view(), threads), expected, 1e-4)
+          << columns << "x" << rows << ", " << bits << " bits, gain " << true_gain;
+    }
+    counted += expected != 1 ? 1 : 0;
+  }
+  return counted;
+}
+
+TEST(ExposureGain, EqualsTheReference) {
+  for (const bool linear_light : {false, true}) {
+    int counted = 0;
+    const std::pair<int, int> sizes[] = {{1, 1},   {3, 17},  {31, 8},   {33, 17},
+                                         {65, 40}, {97, 61}, {200, 121}};
+    for (const auto& [columns, rows] : sizes) {
+      counted += hold_to_the_reference<std::uint8_t>(columns, rows, 8, linear_light);
+      for (const int bits : {10, 16})
+        counted += hold_to_the_reference<std::uint16_t>(columns, rows, bits, linear_light);
+    }
+    EXPECT_GT(counted, 20);
+  }
+}
+
+TEST(ExposureGain, IsFoundInAMovingScene) {
+  ThreadPool threads;
+  for (const double gain : {0.9, 1.08}) {
+    const auto last = exposed<std::uint8_t>(scene_of(width, height, 0, 0, 0.1, 0.8), 1, 8, false);
+    const auto now = exposed<std::uint8_t>(scene_of(width, height, 2, 1, 0.1, 0.8), gain, 8, false);
+    EXPECT_NEAR(ExposureGain(8, false).between(last.view(), now.view(), threads), gain, 0.015);
+    EXPECT_EQ(ExposureGain(8, false).between(last.view(), last.view(), threads), 1);
+  }
+}
+
+/// Events of a video, by interval.
+template <class Pixel>
+std::vector<std::vector<Event>> play(const std::vector<Image<Pixel>>& frames, int bits,
+                                     const DvsSettings& settings, int threads = 2) {
+  auto simulator = make_dvs_simulator({frames[0].width(), frames[0].height(), bits});
+  simulator->set(settings);
+  Settings common;
+  common.threads = threads;
+  std::vector<std::vector<Event>> intervals;
+  Nanoseconds time = 0;
+  for (const auto& frame : frames) {
+    if (const auto* events = simulator->push(scene::luma(frame.view(), bits), time, common))
+      intervals.push_back(scene::copy(*events));
+    time += scene::frame_time;
+  }
+  return intervals;
+}
+
+double count(const std::vector<std::vector<Event>>& intervals) {
+  double sum = 0;
+  for (const auto& interval : intervals) sum += static_cast<double>(interval.size());
+  return sum;
+}
+
+/// Share of the pixels and polarities, weighted by events, in which two videos agree.
+double overlap(const std::vector<std::vector<Event>>& a, const std::vector<std::vector<Event>>& b) {
+  std::map<std::tuple<int, int, Polarity>, int> left;
+  for (const auto& interval : b)
+    for (const auto& event : interval) ++left[{event.x, event.y(), event.polarity()}];
+  double shared = 0;
+  for (const auto& interval : a)
+    for (const auto& event : interval)
+      shared += left[{event.x, event.y(), event.polarity()}]-- > 0 ? 1 : 0;
+  return 2 * shared / (count(a) + count(b));
+}
+
+/// A texture in motion, nine frames of it, with the exposure of each.
+template <class Pixel, class Gain>
+std::vector<Image<Pixel>> film(int bits, bool linear_light, const Gain& gain) {
+  std::vector<Image<Pixel>> frames;
+  frames.reserve(9);
+  for (int i = 0; i < 9; ++i)
+    frames.push_back(exposed<Pixel>(scene_of(width, height, 1.5 * i, 0.7 * i, 0.1, 0.66), gain(i),
+                                    bits, linear_light));
+  return frames;
+}
+
+template <class Pixel>
+void expect_events_of_the_scene(int bits, DvsSettings settings, double least) {
+  const auto constant = [](int) { return 1.0; };
+  const auto expected = play(film<Pixel>(bits, settings.linear_light, constant), bits, settings);
+  const auto frames = film<Pixel>(bits, settings.linear_light, ramp);
+  const double without = overlap(play(frames, bits, settings), expected);
+  settings.exposure_compensation = true;
+  const auto found = play(frames, bits, settings);
+  EXPECT_NEAR(count(found), count(expected), 0.03 * count(expected));
+  EXPECT_GT(overlap(found, expected), least);
+  EXPECT_LT(without, least - 0.1);
+  // A constant exposure changes nothing.
+  EXPECT_TRUE(play(film<Pixel>(bits, settings.linear_light, constant), bits, settings) == expected);
+}
+
+TEST(ExposureCompensation, SeesTheSceneWithoutTheExposure) {
+  for (const auto upsampling : {Upsampling::linear, Upsampling::motion}) {
+    for (const bool linear_light : {false, true}) {
+      const DvsSettings settings{.linear_light = linear_light,
+                                 .response = Response::log,
+                                 .upsampling = upsampling,
+                                 .cutoff_frequency = upsampling == Upsampling::linear ? 80.0 : 0};
+      expect_events_of_the_scene<std::uint8_t>(8, settings, 0.93);
+      expect_events_of_the_scene<std::uint16_t>(10, settings, 0.93);
+      expect_events_of_the_scene<std::uint16_t>(16, settings, 0.93);
+    }
+  }
+}
+
+TEST(ExposureCompensation, IsTheSameForAllThreadsAndTargets) {
+  const auto frames = film<std::uint8_t>(8, true, ramp);
+  const auto deep_frames = film<std::uint16_t>(12, true, ramp);
+  for (const auto upsampling : {Upsampling::linear, Upsampling::motion}) {
+    const DvsSettings settings{.denoise = 2,
+                               .linear_light = true,
+                               .exposure_compensation = true,
+                               .upsampling = upsampling,
+                               .cutoff_frequency = 100,
+                               .shot_noise_rate = 5};
+    const auto expected = play(frames, 8, settings, 1);
+    const auto deep = play(deep_frames, 12, settings, 1);
+    targets::for_each([&](const char* target) {
+      EXPECT_TRUE(play(frames, 8, settings) == expected) << target;
+      EXPECT_TRUE(play(deep_frames, 12, settings) == deep) << target;
+    });
+  }
+}
+
+TEST(ExposureCompensation, LeavesALampAlone) {
+  // A lamp at the left edge lights a room, in which a screen on the right has its own light. It is
+  // switched on between two frames.
+  const auto room = [](double lamp) {
+    auto light = scene_of(width, height, 0, 0, 0.1, 0.3);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width * 7 / 8; ++x)
+        light.at(x, y) *= 1 + lamp / (1 + std::pow(x / 60.0, 2));
+    return exposed<std::uint8_t>(light, 1, 8, false);
+  };
+  for (const double lamp : {0.3, 0.6, 2.0}) {
+    std::vector<Image<std::uint8_t>> frames;
+    frames.reserve(6);
+    for (int i = 0; i < 6; ++i) frames.push_back(room(i < 3 ? 0 : lamp));
+    const auto expected = play(frames, 8, {});
+    EXPECT_GT(count(expected), 500) << lamp;
+    EXPECT_TRUE(play(frames, 8, {.exposure_compensation = true}) == expected) << lamp;
+  }
+  // Brighter all over, but too suddenly for an exposure.
+  std::vector<Image<std::uint8_t>> frames;
+  for (const double light : {0.3, 0.3, 0.5})
+    frames.push_back(
+        exposed<std::uint8_t>(scene_of(width, height, 0, 0, 0.2, 0.9), light, 8, false));
+  EXPECT_TRUE(play(frames, 8, {.exposure_compensation = true}) == play(frames, 8, {}));
+}
+
+TEST(ExposureCompensation, KeepsSaturatedPixelsAsTheyWere) {
+  // A sky that is white at any exposure, and a line that becomes so.
+  const auto frame = [](double gain) {
+    auto light = scene_of(width, height, 0, 0, 0.1, 0.5);
+    for (int x = 0; x < width; ++x) {
+      for (int y = 0; y < 20; ++y) light.at(x, y) = 5;
+      if (x < 20) light.at(x, 40) = 0.8;
+    }
+    return exposed<std::uint8_t>(light, gain, 8, false);
+  };
+  for (const auto upsampling : {Upsampling::linear, Upsampling::motion}) {
+    std::vector<Image<std::uint8_t>> frames;
+    for (const int i : {0, 1, 2, 3, 4, 5, 6, 5, 4, 3, 2, 1, 0}) frames.push_back(frame(ramp(i)));
+    const DvsSettings settings{.upsampling = upsampling};
+    EXPECT_GT(count(play(frames, 8, settings)), width * (height - 20));
+    EXPECT_LT(count(play(frames, 8, {.exposure_compensation = true, .upsampling = upsampling})),
+              width * height / 100);
+  }
+}
+
+TEST(ExposureCompensation, EqualsTheReferenceOnEveryTarget) {
+  constexpr int columns = 77;
+  constexpr int rows = 65;
+  for (const double cutoff_frequency : {0.0, 200.0}) {
+    const DvsSettings settings{.linear_light = true,
+                               .exposure_compensation = true,
+                               .response = Response::log,
+                               .cutoff_frequency = cutoff_frequency};
+    std::vector<Image<std::uint16_t>> frames;
+    std::vector<reference::DvsPixel> pixels;  // in raster order
+    std::map<std::pair<int, int>, std::vector<reference::TimedEvent>> expected;
+    double gain = 1;
+    for (int i = 0; i < 7; ++i) {
+      const auto light = scene_of(columns, rows, 0.4 * i, 0.2 * i, 0.02, 1.4);
+      frames.push_back(exposed<std::uint16_t>(light, 0.6 * ramp(i), 12, true));
+      if (i > 0)
+        gain *= reference::exposure_gain(frames[frames.size() - 2].view(), frames.back().view(), 12,
+                                         true);
+      auto pixel = pixels.begin();
+      for (int y = 0; y < rows; ++y) {
+        for (int x = 0; x < columns; ++x) {
+          const double luma = frames.back().at(x, y) / 4095.0;
+          if (i == 0)
+            pixels.emplace_back(settings, luma, 0);
+          else
+            for (const auto& event : (pixel++)->push(luma, 2000, gain))
+              expected[{x, y}].push_back(event);
+        }
+      }
+    }
+    EXPECT_NEAR(gain, 1.47, 0.05);
+    targets::for_each([&](const char* target) {
+      auto simulator = make_dvs_simulator({columns, rows, 12});
+      simulator->set(settings);
+      std::map<std::pair<int, int>, std::vector<reference::TimedEvent>> found;
+      for (std::size_t i = 0; i < frames.size(); ++i) {
+        const auto time = static_cast<Nanoseconds>(i) * 2'000'000;
+        if (const auto* events = simulator->push(scene::luma(frames[i].view(), 12), time, {}))
+          for (const auto& event : scene::copy(*events))
+            found[{event.x, event.y()}].push_back({static_cast<double>(i - 1) * 2000 + event.t,
+                                                   event.x, event.y(), event.polarity()});
+      }
+      double all = 0;
+      double equal = 0;
+      for (const auto& [place, events] : expected) {
+        all += static_cast<double>(events.size());
+        const auto& ours = found[place];
+        for (std::size_t i = 0; i < std::min(events.size(), ours.size()); ++i)
+          equal += ours[i].polarity == events[i].polarity && std::abs(ours[i].t - events[i].t) <= 5
+                       ? 1
+                       : 0;
+      }
+      EXPECT_GT(all, 1000);
+      EXPECT_GT(equal, 0.97 * all) << target;
+    });
+  }
+}
+
+TEST(ExposureCompensation, StartsOverWithTheVideo) {
+  const DvsSettings settings{.exposure_compensation = true};
+  auto simulator = make_dvs_simulator({width, height, 8});
+  simulator->set(settings);
+  const auto frames = film<std::uint8_t>(8, false, ramp);
+  std::vector<std::vector<Event>> rounds[2];
+  for (auto& intervals : rounds) {
+    simulator->reset();
+    for (std::size_t i = 0; i < frames.size(); ++i)
+      if (const auto* events = simulator->push(scene::luma(frames[i]),
+                                               static_cast<Nanoseconds>(i) * scene::frame_time, {}))
+        intervals.push_back(scene::copy(*events));
+  }
+  EXPECT_TRUE(rounds[0] == rounds[1]);
+  // Without compensation the same picture is brighter than at first: other units, a new start.
+  simulator->set({});
+  const auto* events = simulator->push(scene::luma(frames.back()), 9 * scene::frame_time, {});
+  ASSERT_NE(events, nullptr);
+  EXPECT_EQ(events->size(), 0U);
+}
+
+}  // namespace
