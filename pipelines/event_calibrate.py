@@ -31,15 +31,16 @@ MAX_TRIALS = 60
 USUAL_SLOPE = -1.5
 # Parts of the calibrated time for cross-validation.
 PARTS = 4
-# Values tried for eventsim-dvs: the offset of a logarithmic response, as a share of white; the
-# noise amplitude of a frame, in grey levels; the growth of the thresholds by an event; the refractory
-# period, in nanoseconds; and the exposure pulse, as a share of the threshold.
+# Values tried for eventsim-dvs: the offset of a logarithmic response, as a share of white; stages of the
+# pixel, whose first value turns them off; and the exposure pulse, as a share of the threshold.
 LOG_OFFSETS = [0.001, 0.0018, 0.0025, 0.0035, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11, 0.16, 0.22, 0.32]
 COARSE_STEP = 2
-DENOISE = [0, 2, 4, 8, 12]
-ADAPTATION = [0, 0.05, 0.1, 0.2, 0.3, 0.4]
-REFRACTORY_PERIODS = [0, 300_000, 600_000, 1_000_000, 2_000_000]
 UPSAMPLING = ["linear", "motion"]
+STAGES = {
+    "denoise": [0, 2, 4, 8, 12],
+    "adaptation": [0, 0.05, 0.1, 0.2, 0.3, 0.4],
+    "refractory-period": [0, 300_000, 600_000, 1_000_000, 2_000_000],
+}
 PULSES = [0, 0.04, 0.08, 0.12, 0.16, 0.24]
 # The element whose settings a profile holds.
 PROFILED = "eventsim-dvs"
@@ -136,13 +137,13 @@ def find_thresholds(video, recorded, spans, element, progress, first=None):
 
 
 def likeness(figures):
-    """Similarity of two streams, from 0 to 1: the mean of the ratio of their variances over the pixels, the
-    map correlation, the recall and the precision (the shares of real and of simulated events with a
-    match, averaged over 1, 5 and 10 ms), and the ratio between the times from event to event."""
-    recall, precision = (np.mean([figures[f"{side}-matches"][f"within-{limit}ms"] for limit in (1, 5, 10)])
-                         for side in ("reference", "candidate"))
+    """Similarity of two streams, from 0 to 1: the mean of the map correlation, the shares of events with a match
+    within 1, 5 and 10 ms in the other stream, the ratio of the variances over the pixels, and the ratio between
+    the times from event to event."""
+    shares = [figures[f"{side}-matches"][f"within-{limit}ms"] for side in ("reference", "candidate")
+              for limit in (1, 5, 10)]
     deviations = sorted(figures[side]["std-dev"] for side in ("reference", "candidate"))
-    return float(np.mean([(deviations[0] / deviations[1]) ** 2, figures["map-correlation"], recall, precision,
+    return float(np.mean([figures["map-correlation"], *shares, (deviations[0] / deviations[1]) ** 2,
                           10 ** -figures["interval-distance"]]))
 
 
@@ -252,17 +253,18 @@ def calibrate(video, recorded, span, element, progress):
     chosen = choices.best_response()
     if "log-eps" in chosen:
         axes["log-eps"] = LOG_OFFSETS
-    for name, values in (("denoise", DENOISE), ("adaptation", ADAPTATION), ("refractory-period", REFRACTORY_PERIODS)):
-        if choices.is_free(name):
-            chosen[name], axes[name] = values[0], values
+    stages = {name: values for name, values in STAGES.items() if choices.is_free(name)}
     if choices.is_free("exposure-pulse") and choices.is_free("exposure-lead"):
         lead = find_exposure_lead(video, recorded, span)
         if lead is not None:
             choices.calibrated(chosen)
-            threshold = choices.thresholds[0]
-            chosen |= {"exposure-lead": lead, "exposure-pulse": 0.0}
-            axes["exposure-pulse"] = [share * threshold for share in PULSES]
-    return choices.calibrated(choices.climb(chosen, axes))
+            chosen |= {"exposure-lead": lead}
+            stages["exposure-pulse"] = [share * choices.thresholds[0] for share in PULSES]
+    if not axes | stages:
+        return choices.calibrated(chosen)
+    # From a pixel without these stages and from one with all of them, since they depend on each other.
+    starts = [chosen | {name: values[i] for name, values in stages.items()} for i in (0, 2)]
+    return choices.calibrated(max((choices.climb(start, axes | stages) for start in starts), key=choices.rating))
 
 
 def find_exposure_lead(video, recorded, span):

@@ -91,8 +91,13 @@ static GType preset_type() {
       {static_cast<int>(DvsPreset::v2e_clean), "v2e, clean: threshold mismatch only", "v2e-clean"},
       {static_cast<int>(DvsPreset::v2e_noisy), "v2e, noisy: dim light", "v2e-noisy"},
       {static_cast<int>(DvsPreset::icns), "IEBCS, the simulator of the ICNS", "icns"},
-      {static_cast<int>(DvsPreset::davis346), "iniVation DAVIS346", "davis346"},
+      {static_cast<int>(DvsPreset::davis240c), "iniVation DAVIS240C, fitted to a recording",
+       "davis240c"},
+      {static_cast<int>(DvsPreset::davis346), "iniVation DAVIS346, fitted to a recording",
+       "davis346"},
       {static_cast<int>(DvsPreset::gen4), "Prophesee Gen4, IMX636", "gen4"},
+      {static_cast<int>(DvsPreset::hs_ergb),
+       "Event camera of TimeLens' HS-ERGB, fitted to a recording", "hs-ergb"},
       {0, nullptr, nullptr},
   };
   return enum_type("GstEventSimDvsPreset", values);

@@ -82,8 +82,10 @@ enum class DvsPreset {
   v2e_clean,  ///< v2e, its model "clean"
   v2e_noisy,  ///< v2e, its model "noisy"
   icns,       ///< IEBCS, the simulator of the ICNS
+  davis240c,  ///< iniVation DAVIS240C
   davis346,   ///< iniVation DAVIS346
   gen4,       ///< Prophesee and Sony Gen4.1 (IMX636)
+  hs_ergb,    ///< the event camera of TimeLens' HS-ERGB data, a Prophesee Gen4
 };
 
 DvsSettings settings_of(DvsPreset preset);

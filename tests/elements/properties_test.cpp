@@ -250,8 +250,8 @@ TEST(Dvs, NamesItsPresetsAndTheirsAreInRange) {
   gst_init(nullptr, nullptr);
   Owned<GstElement> element(gst_element_factory_make("eventsim-dvs", nullptr));
   GObject* object = G_OBJECT(element.get());
-  for (const char* preset :
-       {"ideal", "esim", "v2e-clean", "v2e-noisy", "icns", "davis346", "gen4"}) {
+  for (const char* preset : {"ideal", "esim", "v2e-clean", "v2e-noisy", "icns", "davis240c",
+                             "davis346", "gen4", "hs-ergb"}) {
     gst_util_set_object_arg(object, "preset", preset);
     GValue value = G_VALUE_INIT;
     g_value_init(&value,

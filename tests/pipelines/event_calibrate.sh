@@ -30,10 +30,10 @@ recovers() { # POSITIVE NEGATIVE TOLERANCE ELEMENT...
 recovers 12.5 8.5 0.1 eventsim-frame
 recovers 6.5 4.5 0.2 eventsim-dense
 recovers 8.5 12.5 0.12 eventsim-diff
-recovers 0.2 0.3 0.05 eventsim-dvs response=log log-eps=0.02
+recovers 0.2 0.3 0.05 eventsim-dvs response=log log-eps=0.02 refractory-period=0
 
 # A profile simulates the same events as the settings that it holds.
-calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 denoise=0 refractory-period=0" --to 0.3 --profile camera.profile >found
+calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0.1" --to 0.3 --profile camera.profile >found
 element=$(grep '^eventsim-dvs' found)
 for simulator in "eventsim-dvs profile=camera.profile" "$element"; do
   # shellcheck disable=SC2086
@@ -44,7 +44,7 @@ done
 
 # Exposure pulses are found by their bursts of events.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000000 ! evtenc ! filesink location=recorded.raw
-calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02" --to 0.3 | tee found
+calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0" --to 0.3 | tee found
 read -r lead pulse < <(sed -n 's/.* exposure-lead=\([0-9]*\) exposure-pulse=\([0-9.]*\) .*/\1 \2/p' found)
 awk -v lead="${lead:-0}" -v pulse="${pulse:-0}" 'BEGIN { exit !(lead > 8.8e6 && lead < 9.2e6 && pulse > 0.02 && pulse < 0.045) }' ||
   fail "a pulse of ${pulse:-0}, ${lead:-0} ns before the frames"

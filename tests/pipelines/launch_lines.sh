@@ -31,7 +31,7 @@ for element in frame dense sparse diff dvs; do
 done
 
 # The physical pixel with each preset, and with motion.
-for preset in ideal esim v2e-clean v2e-noisy icns davis346 gen4; do
+for preset in ideal esim v2e-clean v2e-noisy icns davis240c davis346 gen4 hs-ergb; do
   launch videotestsrc pattern=ball num-buffers=10 ! eventsim-dvs preset=$preset threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=$preset.raw
   [ -s $preset.raw ] || fail "$preset: no events"
 done
