@@ -241,24 +241,34 @@ struct Given {
   }
 };
 
+/// An error in a camera profile: what is wrong with a setting.
+std::runtime_error error_in(const std::string& profile, const std::string& setting,
+                            const std::string& fault) {
+  return std::runtime_error("The camera profile \"" + profile + "\" sets " + setting + fault);
+}
+
+/// Takes a setting from text. Returns false if it has no such value.
+bool take_text(Given& given, const Setting& setting, const std::string& text, GObjectClass* klass) {
+  GParamSpec* spec = g_object_class_find_property(klass, setting.name);
+  GValue value = G_VALUE_INIT;
+  g_value_init(&value, spec->value_type);
+  const bool is_valid = !text.empty() && gst_value_deserialize(&value, text.c_str()) != FALSE &&
+                        g_param_value_validate(spec, &value) == FALSE;
+  if (is_valid) given.take(static_cast<std::size_t>(&setting - table), &value);
+  g_value_unset(&value);
+  return is_valid;
+}
+
 /// Reads the settings in a camera profile. Throws std::runtime_error.
 Given read_profile(const std::string& path, GObjectClass* klass) {
   Given given;
   for (const auto& [name, text] : read_camera_profile(path, "eventsim-dvs")) {
     const auto* setting = std::ranges::find(table, name, &Setting::name);
     if (setting == std::end(table))
-      throw std::runtime_error("The camera profile \"" + path + "\" sets \"" + name +
-                               "\", which eventsim-dvs does not have.");
-    GParamSpec* spec = g_object_class_find_property(klass, setting->name);
-    GValue value = G_VALUE_INIT;
-    g_value_init(&value, spec->value_type);
-    const bool is_valid = !text.empty() && gst_value_deserialize(&value, text.c_str()) != FALSE &&
-                          g_param_value_validate(spec, &value) == FALSE;
-    if (is_valid) given.take(static_cast<std::size_t>(setting - table), &value);
-    g_value_unset(&value);
-    if (!is_valid)
-      throw std::runtime_error("The camera profile \"" + path + "\" sets " + name + "=" + text +
-                               ", which is no value of it; see gst-inspect-1.0 eventsim-dvs.");
+      throw error_in(path, name, ", which eventsim-dvs does not have.");
+    if (!take_text(given, *setting, text, klass))
+      throw error_in(path, name,
+                     " to a value that it cannot have; see gst-inspect-1.0 eventsim-dvs.");
   }
   return given;
 }

@@ -237,10 +237,10 @@ TEST(Dvs, DoesNotStartWithAProfileThatItCannotRead) {
   for (const auto& [text, words] : {
            Case{"", "no group [eventsim-dvs]"},
            Case{"log-eps=0.02\n", "Cannot read the camera profile"},
-           Case{"[eventsim-dvs]\ngain=2\n", "\"gain\", which eventsim-dvs does not have"},
-           Case{"[eventsim-dvs]\nlog-eps=7\n", "log-eps=7, which is no value"},
-           Case{"[eventsim-dvs]\nresponse=cube\n", "response=cube, which is no value"},
-           Case{"[eventsim-dvs]\nleak-rate=\n", "leak-rate=, which is no value"},
+           Case{"[eventsim-dvs]\ngain=2\n", "sets gain, which eventsim-dvs does not have"},
+           Case{"[eventsim-dvs]\nlog-eps=7\n", "sets log-eps to a value that it cannot have"},
+           Case{"[eventsim-dvs]\nresponse=cube\n", "sets response to a value"},
+           Case{"[eventsim-dvs]\nleak-rate=\n", "sets leak-rate to a value"},
            Case{"[eventsim-dvs]\n" + std::string(70'000, '#'), "64 KiB"},
        })
     expect_words(error_of(ProfileFile(text).path()), words);
