@@ -45,7 +45,7 @@ class Row:
 
 
 def counts_per_pixel(sensor, events):
-    place = (events["y_p"] & ~np.uint16(ON)).astype(np.int64) * sensor.width + events["x"]
+    place = (events["y_p"] & (ON - 1)).astype(np.int64) * sensor.width + events["x"]
     return np.bincount(place, minlength=sensor.width * sensor.height).reshape(sensor.height, sensor.width)
 
 
@@ -172,7 +172,7 @@ def chart(title, x_title, y_title, curves, logarithmic=(False, False)):
 
 def intervals_of(sensor, events):
     """The times between successive events of a pixel, at least half a microsecond."""
-    place = (events["y_p"] & ~np.uint16(ON)).astype(np.int64) * sensor.width + events["x"]
+    place = (events["y_p"] & (ON - 1)).astype(np.int64) * sensor.width + events["x"]
     order = np.argsort(place, kind="stable")
     same = np.diff(place[order]) == 0
     return np.maximum(np.diff(events["t"][order])[same], 0.5)

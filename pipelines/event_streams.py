@@ -46,7 +46,7 @@ class Sensor:
         """The events of pixels that the camera has."""
         if self.mask is None:
             return events
-        return events[self.mask[events["y_p"] & ~ON, events["x"]]]
+        return events[self.mask[events["y_p"] & (ON - 1), events["x"]]]
 
 
 @dataclass
