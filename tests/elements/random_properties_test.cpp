@@ -3,6 +3,8 @@
 // them in another thread. ThreadSanitizer reports what is shared without a lock.
 #include <atomic>
 #include <cmath>
+#include <fstream>
+#include <string>
 #include <thread>
 
 #include "tests/elements/element_lines.hpp"
@@ -32,6 +34,13 @@ class Value {
   GValue value_ = G_VALUE_INIT;
 };
 
+/// Path of a camera profile.
+std::string profile() {
+  auto path = recording_files::Folder::path("camera.profile");
+  std::ofstream(path) << "[eventsim-dvs]\nlog-eps=0.05\nleak-rate=3\n";
+  return path;
+}
+
 /// Numbers are of every magnitude, and often an end of the range.
 void randomize(GParamSpec* spec, Random& random, GValue* value) {
   const double number =
@@ -55,10 +64,12 @@ void randomize(GParamSpec* spec, Random& random, GValue* value) {
       g_value_set_double(value, number);
       break;
     case G_TYPE_STRING:
-      if (spec->name != std::string_view("column-order"))  // the others are files to write
-        g_value_take_string(value, g_strdup(recording_files::Folder::path("set").c_str()));
-      else
+      if (spec->name == std::string_view("column-order"))
         g_value_set_static_string(value, random() % 2 == 0 ? "" : "txyp");
+      else if (spec->name == std::string_view("profile"))
+        g_value_take_string(value, g_strdup(random() % 2 == 0 ? "" : profile().c_str()));
+      else  // files to write
+        g_value_take_string(value, g_strdup(recording_files::Folder::path("set").c_str()));
       break;
     default:
       FAIL() << "no random value for the type of " << spec->name;
