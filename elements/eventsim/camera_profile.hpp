@@ -12,3 +12,6 @@ using ProfileEntries = std::vector<std::pair<std::string, std::string>>;
 /// file (as of GLib) of at most 64 KiB with a group of the element's name. Throws
 /// std::runtime_error, which names the file and the reason.
 ProfileEntries read_camera_profile(const std::string& path, const char* element);
+
+/// Does the same with the text of a profile. The error tells the reason only.
+ProfileEntries parse_camera_profile(const std::string& text, const char* element);

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tests/formats/formats.hpp"
@@ -81,6 +82,12 @@ void write(const std::filesystem::path& directory, const std::vector<Seed>& seed
   }
 }
 
+std::vector<Seed> camera_profile_seeds() {
+  constexpr std::string_view text =
+      "# of a camera\n[eventsim-dvs]\nresponse=log\nlog-eps=0.057\nname=a\\tb\n[other]\nx=1;2\n";
+  return {{"profile", {text.begin(), text.end()}}};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -99,6 +106,7 @@ int main(int argc, char** argv) {
     else
       append(seeds_of(format), files[format.name.starts_with("raw_") ? "raw" : format.name]);
   }
+  write(corpus / "camera_profile", camera_profile_seeds());
   write(corpus / "ecf", ecf_seeds());
   write(corpus / "hdf5_chunk", hdf5_chunk_seeds());
   write(corpus / "hdf5_filters", hdf5_filters_seeds());
