@@ -26,6 +26,18 @@ std::optional<EventInterval> interval_of(GstBuffer* buffer) {
   return EventInterval{start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)};
 }
 
+std::span<eventcamera::Label> labels_of(GstBuffer* buffer) {
+  const auto* meta = gst_buffer_get_event_camera_label_meta(buffer);
+  if (meta == nullptr) return {};
+  return {reinterpret_cast<eventcamera::Label*>(meta->labels), meta->n_labels};
+}
+
+void truncate_events(GstBuffer* buffer, gsize count) {
+  if (auto* meta = gst_buffer_get_event_camera_label_meta(buffer))
+    gst_event_camera_label_meta_truncate(meta, count);
+  gst_buffer_set_size(buffer, static_cast<gssize>(count * sizeof(GstEventCameraEvent)));
+}
+
 void EventFaults::warn(gpointer element, EventFault fault, GstBuffer* buffer) {
   static constexpr std::array reasons = {
       "a buffer has no PTS", "a buffer's PTS is more than 292 years",

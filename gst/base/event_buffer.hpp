@@ -9,6 +9,7 @@
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event.hpp"
+#include "src/core/label.hpp"
 #include "src/core/max_side.hpp"
 
 /// Caps fields of a frame or sensor of any size.
@@ -68,6 +69,12 @@ inline constexpr GstClockTime event_resolution = GST_USECOND;
 /// Interval of a buffer of events. Without a duration it ends at the last event; without a PTS
 /// there is none.
 std::optional<EventInterval> interval_of(GstBuffer* buffer);
+
+/// Labels of the events of a buffer; they may be changed if it is writable. Empty if it has none.
+std::span<eventcamera::Label> labels_of(GstBuffer* buffer);
+
+/// Cuts a writable buffer, which must not be mapped, to its first events and their labels.
+void truncate_events(GstBuffer* buffer, gsize count);
 
 /// Reason for skipping events of a buffer.
 enum class EventFault { no_pts, pts_too_large, partial_event, beyond_sensor, unsorted };

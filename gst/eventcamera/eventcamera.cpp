@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/eventcamera/eventcamera.h"
 
+#include <algorithm>
 #include <cstddef>
 
 #include "src/core/event.hpp"
+#include "src/core/label.hpp"
 
 static_assert(sizeof(GstEventCameraEvent) == sizeof(eventcamera::Event) &&
                   offsetof(GstEventCameraEvent, x) == offsetof(eventcamera::Event, x) &&
                   offsetof(GstEventCameraEvent, y_p) == offsetof(eventcamera::Event, y_p),
               "the core's events are passed to applications unchanged");
+static_assert(sizeof(GstEventCameraLabel) == sizeof(eventcamera::Label) &&
+                  offsetof(GstEventCameraLabel, cause) == offsetof(eventcamera::Label, cause) &&
+                  GST_EVENT_CAMERA_CAUSE_EXPOSURE_PULSE ==
+                      static_cast<int>(eventcamera::Cause::exposure_pulse),
+              "the core's labels are passed to applications unchanged");
 
 static GstEventCameraInfo* gst_event_camera_info_copy(const GstEventCameraInfo* info) {
   return static_cast<GstEventCameraInfo*>(g_memdup2(info, sizeof *info));
@@ -78,4 +85,89 @@ void gst_event_camera_unmap(GstEventCameraMap* map) {
   g_return_if_fail(map != nullptr);
   gst_buffer_unmap(map->buffer, &map->map);
   gst_buffer_unref(map->buffer);
+}
+
+GType gst_event_camera_label_meta_api_get_type() {
+  static const GType type = [] {
+    static const gchar* tags[] = {"events", nullptr};
+    return gst_meta_api_type_register("GstEventCameraLabelMetaAPI", tags);
+  }();
+  return type;
+}
+
+static gboolean init_labels(GstMeta* meta, gpointer, GstBuffer*) {
+  auto* labels = reinterpret_cast<GstEventCameraLabelMeta*>(meta);
+  labels->labels = nullptr;
+  labels->n_labels = 0;
+  return TRUE;
+}
+
+static void free_labels(GstMeta* meta, GstBuffer*) {
+  g_free(reinterpret_cast<GstEventCameraLabelMeta*>(meta)->labels);
+}
+
+/// Copies the labels of the events that are copied. A part that cuts an event has none.
+static gboolean copy_labels(GstBuffer* copy, GstMeta* meta, GstBuffer*, GQuark type,
+                            gpointer data) {
+  if (!GST_META_TRANSFORM_IS_COPY(type)) return FALSE;
+  const auto* labels = reinterpret_cast<const GstEventCameraLabelMeta*>(meta);
+  const auto* part = static_cast<const GstMetaTransformCopy*>(data);
+  gsize first = 0;
+  gsize count = labels->n_labels;
+  if (part->region) {
+    constexpr gsize event_size = sizeof(GstEventCameraEvent);
+    if (part->offset % event_size != 0 || part->size % event_size != 0) return TRUE;
+    first = part->offset / event_size;
+    if (first > count) return TRUE;
+    count = MIN(count - first, part->size / event_size);
+  }
+  return gst_buffer_add_event_camera_label_meta(copy, labels->labels + first, count) != nullptr;
+}
+
+const GstMetaInfo* gst_event_camera_label_meta_get_info() {
+  static const GstMetaInfo* const info =
+      gst_meta_register(GST_EVENT_CAMERA_LABEL_META_API_TYPE, "GstEventCameraLabelMeta",
+                        sizeof(GstEventCameraLabelMeta), init_labels, free_labels, copy_labels);
+  return info;
+}
+
+GstEventCameraLabelMeta* gst_buffer_add_event_camera_label_meta(GstBuffer* buffer,
+                                                                const GstEventCameraLabel* labels,
+                                                                gsize n_labels) {
+  g_return_val_if_fail(GST_IS_BUFFER(buffer), nullptr);
+  g_return_val_if_fail(gst_buffer_is_writable(buffer), nullptr);
+
+  GstEventCameraLabel* added = nullptr;
+  if (n_labels > 0) {
+    added = g_try_new0(GstEventCameraLabel, n_labels);
+    if (added == nullptr) return nullptr;
+    if (labels != nullptr) std::copy_n(labels, n_labels, added);
+  }
+  auto* meta = reinterpret_cast<GstEventCameraLabelMeta*>(
+      gst_buffer_add_meta(buffer, GST_EVENT_CAMERA_LABEL_META_INFO, nullptr));
+  meta->labels = added;
+  meta->n_labels = n_labels;
+  return meta;
+}
+
+GstEventCameraLabelMeta* gst_buffer_get_event_camera_label_meta(GstBuffer* buffer) {
+  g_return_val_if_fail(GST_IS_BUFFER(buffer), nullptr);
+
+  auto* meta = reinterpret_cast<GstEventCameraLabelMeta*>(
+      gst_buffer_get_meta(buffer, GST_EVENT_CAMERA_LABEL_META_API_TYPE));
+  const bool is_complete =
+      meta != nullptr &&
+      gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent) == meta->n_labels;
+  return is_complete ? meta : nullptr;
+}
+
+void gst_event_camera_label_meta_truncate(GstEventCameraLabelMeta* meta, gsize n_labels) {
+  g_return_if_fail(meta != nullptr);
+  g_return_if_fail(n_labels <= meta->n_labels);
+  meta->n_labels = n_labels;
+}
+
+GBytes* gst_event_camera_label_meta_get_bytes(const GstEventCameraLabelMeta* meta) {
+  g_return_val_if_fail(meta != nullptr, nullptr);
+  return g_bytes_new(meta->labels, meta->n_labels * sizeof(GstEventCameraLabel));
 }

@@ -18,6 +18,8 @@
  * In simulated streams, events of the same time are in raster order, and no pixel fires twice in a
  * microsecond. Readers of recordings keep every event of the file; events of the same time stay in
  * the order of the file, and a pixel may have several, of one or both polarities.
+ *
+ * Buffers may carry a #GstEventCameraLabelMeta: a #GstEventCameraLabel for each of their events.
  */
 #pragma once
 
@@ -50,6 +52,8 @@ G_BEGIN_DECLS
 typedef struct _GstEventCameraEvent GstEventCameraEvent;
 typedef struct _GstEventCameraInfo GstEventCameraInfo;
 typedef struct _GstEventCameraMap GstEventCameraMap;
+typedef struct _GstEventCameraLabel GstEventCameraLabel;
+typedef struct _GstEventCameraLabelMeta GstEventCameraLabelMeta;
 
 /**
  * GstEventCameraEvent:
@@ -189,5 +193,149 @@ gboolean gst_event_camera_map(GstEventCameraMap* map, GstBuffer* buffer);
  */
 GST_EVENT_CAMERA_API
 void gst_event_camera_unmap(GstEventCameraMap* map);
+
+/**
+ * GstEventCameraCause:
+ * @GST_EVENT_CAMERA_CAUSE_UNKNOWN: not known
+ * @GST_EVENT_CAMERA_CAUSE_LIGHT: a change of light
+ * @GST_EVENT_CAMERA_CAUSE_LEAK: the leak of the pixel's reference level
+ * @GST_EVENT_CAMERA_CAUSE_SHOT_NOISE: shot noise
+ * @GST_EVENT_CAMERA_CAUSE_HOT_PIXEL: the leak of a hot pixel
+ * @GST_EVENT_CAMERA_CAUSE_EXPOSURE_PULSE: the start or end of a frame's exposure, in cameras that
+ *     also capture frames
+ *
+ * What made a simulated pixel fire. Later versions may add causes.
+ *
+ * Since: 0.1
+ */
+typedef enum {
+  GST_EVENT_CAMERA_CAUSE_UNKNOWN = 0,
+  GST_EVENT_CAMERA_CAUSE_LIGHT = 1,
+  GST_EVENT_CAMERA_CAUSE_LEAK = 2,
+  GST_EVENT_CAMERA_CAUSE_SHOT_NOISE = 3,
+  GST_EVENT_CAMERA_CAUSE_HOT_PIXEL = 4,
+  GST_EVENT_CAMERA_CAUSE_EXPOSURE_PULSE = 5
+} GstEventCameraCause;
+
+/**
+ * GstEventCameraLabel:
+ * @object_class: class of the object that the pixel saw, in the numbering of the application; 0 if
+ *     unknown
+ * @cause: a #GstEventCameraCause
+ * @reserved: 0; readers ignore it
+ *
+ * Label of one event: 4 bytes, little-endian. Byte 0 and 1 are @object_class, byte 2 is @cause,
+ * byte 3 is @reserved.
+ *
+ * Since: 0.1
+ */
+struct _GstEventCameraLabel {
+  guint16 object_class;
+  guint8 cause;
+  guint8 reserved;
+};
+
+/**
+ * GstEventCameraLabelMeta:
+ * @meta: parent #GstMeta
+ * @labels: (array length=n_labels): label i is that of event i of the buffer
+ * @n_labels: the number of labels
+ *
+ * Labels of the events of a buffer of format XYTP. They are valid if there is one for each event,
+ * and are otherwise ignored.
+ *
+ * A copy of a buffer has a copy of its labels, and a copy of a part has the labels of the events in
+ * it. Elements that drop or reorder events do the same to the labels. The API has the tag `events`:
+ * elements that turn events into anything else drop it.
+ *
+ * Since: 0.1
+ */
+struct _GstEventCameraLabelMeta {
+  GstMeta meta;
+
+  GstEventCameraLabel* labels;
+  gsize n_labels;
+};
+
+#define GST_EVENT_CAMERA_LABEL_META_API_TYPE (gst_event_camera_label_meta_api_get_type())
+
+/**
+ * gst_event_camera_label_meta_api_get_type:
+ *
+ * Returns: the type of the API of #GstEventCameraLabelMeta
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GType gst_event_camera_label_meta_api_get_type(void);
+
+#define GST_EVENT_CAMERA_LABEL_META_INFO (gst_event_camera_label_meta_get_info())
+
+/**
+ * gst_event_camera_label_meta_get_info:
+ *
+ * Returns: (transfer none): the description of #GstEventCameraLabelMeta for gst_buffer_add_meta()
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+const GstMetaInfo* gst_event_camera_label_meta_get_info(void);
+
+/**
+ * gst_buffer_add_event_camera_label_meta:
+ * @buffer: a writable buffer of an event stream of format XYTP, without labels
+ * @labels: (nullable) (array length=n_labels): labels to copy; %NULL for zeros
+ * @n_labels: the number of events in the buffer
+ *
+ * Adds labels to a buffer. They may be written in place.
+ *
+ * Returns: (transfer none) (nullable): the labels, which belong to @buffer; %NULL if there is not
+ *     enough memory
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GstEventCameraLabelMeta* gst_buffer_add_event_camera_label_meta(GstBuffer* buffer,
+                                                                const GstEventCameraLabel* labels,
+                                                                gsize n_labels);
+
+/**
+ * gst_buffer_get_event_camera_label_meta:
+ * @buffer: a buffer of an event stream of format XYTP
+ *
+ * Returns: (transfer none) (nullable): the labels of its events, which belong to @buffer; %NULL if
+ *     it has none, or not one for each event
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GstEventCameraLabelMeta* gst_buffer_get_event_camera_label_meta(GstBuffer* buffer);
+
+/**
+ * gst_event_camera_label_meta_truncate:
+ * @meta: labels of a writable buffer
+ * @n_labels: the new number of labels, at most the present one
+ *
+ * Drops the last labels, those of events that are cut from the end of the buffer with
+ * gst_buffer_set_size().
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+void gst_event_camera_label_meta_truncate(GstEventCameraLabelMeta* meta, gsize n_labels);
+
+/**
+ * gst_event_camera_label_meta_get_bytes:
+ * @meta: labels
+ *
+ * Copies the labels for languages that read structures from bytes, 4 bytes each, in the layout of
+ * #GstEventCameraLabel.
+ *
+ * Returns: (transfer full): the labels
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GBytes* gst_event_camera_label_meta_get_bytes(const GstEventCameraLabelMeta* meta);
 
 G_END_DECLS
