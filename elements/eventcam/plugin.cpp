@@ -28,7 +28,7 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
   X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats)                             \
   X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
   X(eventdatagramdepay) X(eventdatagrampay)                                                \
-  X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)
+  X(eventnpydec) X(eventnpyenc) X(eventrefractory) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)
 // clang-format on
 #define TYPE_FINDERS(X) \
   X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(npz) X(propheseedat) X(propheseeraw)

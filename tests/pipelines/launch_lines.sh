@@ -90,6 +90,10 @@ grep -q '"map-correlation" : [0-9-]' compare.json || fail "no comparison was wri
 [ -s map.png ] && [ -s maps.png ] && [ -s candidate.raw ] || fail "a picture or the candidate is missing"
 launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null interval=0 ! fakesink
 
+# Filtered.
+launch filesrc location=candidate.raw ! evtdec ! eventrefractory refractory-period=10000000 ! evtenc ! filesink location=refractory.raw
+[ "$(stat -c %s refractory.raw)" -lt "$(stat -c %s candidate.raw)" ] || fail "no event was dropped"
+
 # Interrupted with -e, the file is complete.
 interrupt interrupted.mp4 10000 -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4
 launch filesrc location=interrupted.mp4 ! decodebin ! fakesink

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventrefractory
+ * @title: eventrefractory
+ * @short_description: gives pixels a refractory period
+ *
+ * Drops the events of each pixel that come within #GstEventRefractory:refractory-period of the last
+ * one that was kept, as a pixel with this refractory period would. This thins bursts, and limits
+ * the event rate of flickering and of hot pixels.
+ *
+ * The last event of each pixel is forgotten after a flush and where time goes back, and is kept
+ * through gaps, new segments and DISCONT.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventrefractory
+ * refractory-period=10000000 ! eventrender ! videoconvert ! autovideosink
+ * ]|
+ */
+#include "gst/filter/eventfilter.hpp"
+#include "src/filter/refractory_filter.hpp"
+
+using eventcamera::RefractoryFilter;
+
+DEFINE_EVENT_FILTER(GstEventRefractory, gst_event_refractory, EVENT_REFRACTORY,
+                    EventFilterOf<RefractoryFilter>, eventrefractory)
+
+static void gst_event_refractory_class_init(GstEventRefractoryClass* klass) {
+  using Settings = RefractoryFilter::Settings;
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  properties.add(
+      &Settings::refractory_period,
+      g_param_spec_uint64("refractory-period", "Refractory period",
+                          "Minimum time between two events of a pixel (ns; 0 = keep all events)", 0,
+                          RefractoryFilter::max_refractory_period, Settings().refractory_period,
+                          event_filter_property_flags));
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Refractory period", "Filter",
+                                        "Drops events of a pixel that follow another too soon",
+                                        EVENTSIM_AUTHORS);
+}

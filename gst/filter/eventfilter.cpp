@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/filter/eventfilter.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/pads.hpp"
+#include "gst/filter/buffer_events.hpp"
+#include "src/filter/valid_events.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_filter_debug);
+#define GST_CAT_DEFAULT event_filter_debug
+
+using eventcamera::LabelledEvents;
+using eventcamera::Microseconds;
+using eventcamera::SensorSize;
+
+namespace {
+
+/// Counts of events since the start.
+struct Counters {
+  guint64 received = 0;
+  guint64 dropped = 0;   ///< by the filter
+  guint64 rejected = 0;  ///< that are invalid
+};
+
+/// What is known of a stream.
+struct State {
+  SensorSize sensor{};
+  SensorSize output{};
+  /// Time of the last event.
+  Microseconds passed = std::numeric_limits<Microseconds>::min() / 2;
+};
+
+}  // namespace
+
+struct GstEventFilterPrivate {
+  std::unique_ptr<EventFilter> inside;
+  Guarded<Counters> counters;
+
+  // Accessed by the streaming thread only, or while there is none.
+  std::optional<State> state;
+  EventFaults faults{"filter", GST_CAT_DEFAULT};
+};
+
+G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventFilter, gst_event_filter, GST_TYPE_BASE_TRANSFORM,
+                                 G_ADD_PRIVATE(GstEventFilter)
+                                     GST_DEBUG_CATEGORY_INIT(event_filter_debug, "eventfilter", 0,
+                                                             "filters of events"))
+#define PARENT_TRANSFORM_CLASS GST_BASE_TRANSFORM_CLASS(gst_event_filter_parent_class)
+
+static GstEventFilterPrivate& priv_of(gpointer self) {
+  return *static_cast<GstEventFilterPrivate*>(
+      gst_event_filter_get_instance_private(GST_EVENT_FILTER(self)));
+}
+
+void gst_event_filter_set_inside(GstEventFilter* self, std::unique_ptr<EventFilter> inside) {
+  priv_of(self).inside = std::move(inside);
+}
+
+EventFilter& gst_event_filter_inside(GstEventFilter* self) {
+  return *priv_of(self).inside;
+}
+
+/// Runs `work`; reports any exception.
+template <class Work>
+static auto reported(gpointer self, const Work& work) {
+  return guarded(
+      self,
+      [](const std::exception& error) -> Report {
+        if (is_a<std::bad_alloc>(error))
+          return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                  "Not enough memory to filter the events; free memory, or lower the resolution."};
+        return {GST_STREAM_ERROR_FAILED, std::string("Cannot filter the events: ") + error.what()};
+      },
+      work);
+}
+
+/* events */
+
+/// Skips a buffer that cannot be filtered.
+static GstFlowReturn reject(gpointer self, EventFault fault, GstBuffer* buffer) {
+  auto& priv = priv_of(self);
+  priv.faults.warn(self, fault, buffer);
+  const auto events = gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent);
+  const auto counters = priv.counters.lock();
+  counters->received += events;
+  counters->rejected += events;
+  return GST_BASE_TRANSFORM_FLOW_DROPPED;
+}
+
+/// Returns the start of a buffer on the time axis of the stream, after forgetting the past if time
+/// goes back. Rounded timestamps may overlap by a microsecond; the buffer then counts as later.
+static Microseconds continued(gpointer self, LabelledEvents events, Microseconds start) {
+  auto& priv = priv_of(self);
+  auto& passed = priv.state->passed;
+  if (events.events.empty()) return start;
+  const Microseconds overlap = passed - (start + events.events.front().t);
+  if (overlap > 1) {
+    GST_DEBUG_OBJECT(self, "time goes back by %" G_GINT64_FORMAT " us: forgetting the past",
+                     gint64{overlap});
+    priv.inside->forget();
+  } else if (overlap == 1) {
+    ++start;
+  }
+  passed = start + events.events.back().t;
+  return start;
+}
+
+static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
+  auto& priv = priv_of(transform);
+  if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  if (!GST_BUFFER_PTS_IS_VALID(buffer)) return reject(transform, EventFault::no_pts, buffer);
+  const auto interval = interval_of(buffer);
+  if (!interval) return reject(transform, EventFault::pts_too_large, buffer);
+  if (gst_buffer_get_size(buffer) % sizeof(GstEventCameraEvent) != 0)
+    return reject(transform, EventFault::partial_event, buffer);
+
+  return reported(transform, [&] {
+    BufferEvents mapped(buffer);
+    const auto all = mapped.events();
+    const auto max_t = GST_BUFFER_DURATION_IS_VALID(buffer)
+                           ? (interval->end - interval->start) / GST_USECOND
+                           : GstClockTime{G_MAXUINT32};
+    eventcamera::InvalidEvents invalid;
+    const auto valid = eventcamera::keep_valid(
+        all, priv.state->sensor, static_cast<guint32>(std::min(max_t, GstClockTime{G_MAXUINT32})),
+        invalid);
+    const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
+    const auto kept = priv.inside->filter(valid, continued(transform, valid, start));
+    mapped.keep(kept.events.size());
+
+    const auto received = all.events.size();
+    const auto passed = kept.events.size();
+    {
+      const auto counters = priv.counters.lock();
+      counters->received += received;
+      counters->dropped += valid.events.size() - passed;
+      counters->rejected += received - valid.events.size();
+    }
+    if (invalid.outside > 0) priv.faults.warn(transform, EventFault::beyond_sensor, buffer);
+    if (invalid.unsorted > 0) priv.faults.warn(transform, EventFault::unsorted, buffer);
+    GST_LOG_OBJECT(transform,
+                   "%" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " events kept at %" GST_TIME_FORMAT,
+                   passed, received, GST_TIME_ARGS(interval->start));
+    return GST_FLOW_OK;
+  });
+}
+
+/// A buffer without events becomes a GAP.
+static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
+  const GstFlowReturn result = PARENT_TRANSFORM_CLASS->generate_output(transform, out);
+  if (result != GST_FLOW_OK || *out == nullptr || gst_buffer_get_size(*out) > 0) return result;
+  const OwnedBuffer empty(std::exchange(*out, nullptr));
+  GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(transform);
+  GstEvent* gap = gst_event_new_gap(GST_BUFFER_PTS(empty.get()), GST_BUFFER_DURATION(empty.get()));
+  return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
+}
+
+/// Copies nothing but the buffer's head: its memory is copied on write.
+static GstFlowReturn prepare_output_buffer(GstBaseTransform*, GstBuffer* in, GstBuffer** out) {
+  *out = gst_buffer_is_writable(in) ? in : gst_buffer_copy(in);
+  return GST_FLOW_OK;
+}
+
+static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
+  auto& priv = priv_of(transform);
+  if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && priv.state) {
+    priv.inside->forget();
+    priv.state->passed = State{}.passed;
+  }
+  return PARENT_TRANSFORM_CLASS->sink_event(transform, event);
+}
+
+/* negotiation, states */
+
+static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out) {
+  auto& priv = priv_of(transform);
+  GstEventCameraInfo from;
+  GstEventCameraInfo to;
+  if (!gst_event_camera_info_from_caps(&from, in) || !gst_event_camera_info_from_caps(&to, out))
+    return FALSE;
+  const SensorSize sensor{from.width, from.height};
+  const SensorSize output{to.width, to.height};
+  if (priv.state && priv.state->sensor == sensor && priv.state->output == output) return TRUE;
+  GST_DEBUG_OBJECT(transform, "%dx%d pixels in, %dx%d out", from.width, from.height, to.width,
+                   to.height);
+  priv.state.reset();
+  return reported(transform,
+                  [&] {
+                    priv.inside->start(sensor, output);
+                    priv.state = State{.sensor = sensor, .output = output};
+                  })
+             ? TRUE
+             : FALSE;
+}
+
+static gboolean start(GstBaseTransform* transform) {
+  *priv_of(transform).counters.lock() = {};
+  return TRUE;
+}
+
+static gboolean stop(GstBaseTransform* transform) {
+  auto& priv = priv_of(transform);
+  priv.inside->stop();
+  priv.state.reset();
+  priv.faults.reset();
+  return TRUE;
+}
+
+/* type */
+
+static void get_stats(GObject* object, GValue* value) {
+  const Counters counters = priv_of(object).counters.copy();
+  g_value_take_boxed(
+      value, gst_structure_new("application/x-event-filter-stats", "events", G_TYPE_UINT64,
+                               counters.received, "dropped-events", G_TYPE_UINT64, counters.dropped,
+                               "rejected-events", G_TYPE_UINT64, counters.rejected, nullptr));
+}
+
+static void finalize(GObject* object) {
+  std::destroy_at(&priv_of(object));
+  G_OBJECT_CLASS(gst_event_filter_parent_class)->finalize(object);
+}
+
+static void gst_event_filter_init(GstEventFilter* self) {
+  new (&priv_of(self)) GstEventFilterPrivate;
+  gst_base_transform_set_in_place(GST_BASE_TRANSFORM(self), TRUE);
+  gst_base_transform_set_gap_aware(GST_BASE_TRANSFORM(self), TRUE);
+}
+
+static void gst_event_filter_class_init(GstEventFilterClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+  install_property(
+      object_class, {nullptr, get_stats},
+      g_param_spec_boxed("stats", "Statistics",
+                         "Counts of events since the start: events that came in, dropped-events "
+                         "that the filter left out, rejected-events that were outside the sensor "
+                         "or out of order",
+                         GST_TYPE_STRUCTURE,
+                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  add_pad_templates(GST_ELEMENT_CLASS(klass), EVENT_CAPS, EVENT_CAPS);
+
+  GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
+  transform_class->start = start;
+  transform_class->stop = stop;
+  transform_class->set_caps = set_caps;
+  transform_class->sink_event = sink_event;
+  transform_class->prepare_output_buffer = prepare_output_buffer;
+  transform_class->generate_output = generate_output;
+  transform_class->transform_ip = transform_ip;
+}

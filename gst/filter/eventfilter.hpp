@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/base/gstbasetransform.h>
+
+#include <concepts>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "gst/base/authors.hpp"
+#include "gst/base/properties.hpp"
+#include "src/core/sensor_size.hpp"
+#include "src/filter/filter.hpp"
+
+/// Implementation of an element that filters events in place. Each subclass of GstEventFilter owns
+/// one, which lives as long as the element.
+///
+/// Called from the streaming thread only, or while there is none. Any call may throw.
+class EventFilter {
+ public:
+  virtual ~EventFilter() = default;
+
+  /// Begins a stream of a sensor of size `in`, after set_caps. `out` is the size in the caps of the
+  /// output, which the events that are kept have to fit into; it differs from `in` only if the
+  /// subclass overrides transform_caps.
+  virtual void start(eventcamera::SensorSize in, eventcamera::SensorSize out) = 0;
+  /// Drops all state.
+  virtual void stop() = 0;
+  /// Like the member function of eventcamera::Filter. May change x and y, too.
+  virtual eventcamera::LabelledEvents filter(eventcamera::LabelledEvents events,
+                                             eventcamera::Microseconds start) = 0;
+  /// Forgets the past, because of a flush or because time starts over.
+  virtual void forget() = 0;
+};
+
+/// An element's settings and an eventcamera::Filter, which is made from the sensor's size or from
+/// the sizes of input and output.
+template <eventcamera::Filter Core>
+class EventFilterOf : public EventFilter {
+ public:
+  using Settings = typename Core::Settings;
+
+  void start(eventcamera::SensorSize in, eventcamera::SensorSize out) override {
+    core_.reset();  // first, for its memory
+    if constexpr (std::constructible_from<Core, eventcamera::SensorSize, eventcamera::SensorSize>)
+      core_.emplace(in, out);
+    else
+      core_.emplace(in);
+  }
+  void stop() override { core_.reset(); }
+  eventcamera::LabelledEvents filter(eventcamera::LabelledEvents events,
+                                     eventcamera::Microseconds start) override {
+    return core_->filter(events, start, settings.copy());
+  }
+  void forget() override {
+    if constexpr (requires(Core core) { core.forget(); })
+      if (core_) core_->forget();
+  }
+
+  Guarded<Settings> settings;
+
+ protected:
+  std::optional<Core> core_;
+};
+
+/// Abstract base class of elements that filter events: a wrapper around an EventFilter.
+///
+/// Events outside the sensor, and those out of order, are dropped before. An interval without
+/// events left is a GAP. Filters forget the past after a flush and where time goes back. They keep
+/// it through gaps, new segments and DISCONT: what they remember has its time, and ages.
+#define GST_TYPE_EVENT_FILTER (gst_event_filter_get_type())
+G_DECLARE_DERIVABLE_TYPE(GstEventFilter, gst_event_filter, GST, EVENT_FILTER, GstBaseTransform)
+
+struct _GstEventFilterClass {
+  GstBaseTransformClass parent_class;
+};
+
+void gst_event_filter_set_inside(GstEventFilter* self, std::unique_ptr<EventFilter> inside);
+EventFilter& gst_event_filter_inside(GstEventFilter* self);
+
+/// Flags of properties of filters, which may change at any time.
+inline constexpr auto event_filter_property_flags = static_cast<GParamFlags>(
+    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
+
+/// Defines and registers the type of an element with an EventFilter of class `Inside`, which must
+/// have a member `settings`. The type's class_init must follow.
+#define DEFINE_EVENT_FILTER(Type, type, OBJECT, Inside, element)                             \
+  G_DECLARE_FINAL_TYPE(Type, type, GST, OBJECT, GstEventFilter)                              \
+  struct _##Type {                                                                           \
+    GstEventFilter parent;                                                                   \
+  };                                                                                         \
+  G_DEFINE_TYPE(Type, type, GST_TYPE_EVENT_FILTER)                                           \
+  GST_ELEMENT_REGISTER_DEFINE(element, #element, GST_RANK_NONE, type##_get_type())           \
+  /* A type takes no parentheses: NOLINTNEXTLINE(bugprone-macro-parentheses) */              \
+  static void type##_init(Type* self) {                                                      \
+    gst_event_filter_set_inside(GST_EVENT_FILTER(self), std::make_unique<Inside>());         \
+  }                                                                                          \
+  static auto& settings_of(GObject* object) {                                                \
+    return static_cast<Inside&>(gst_event_filter_inside(GST_EVENT_FILTER(object))).settings; \
+  }

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include "src/filter/filter.hpp"
+#include "src/filter/stamped_pixels.hpp"
+
+namespace eventcamera {
+
+/// Keeps of each pixel's events those that a pixel with this refractory period fires: an event that
+/// is at least the period later than the last one kept. 4 bytes per pixel.
+class RefractoryFilter {
+ public:
+  struct Settings {
+    Nanoseconds refractory_period = 1'000'000;  ///< 0 to max_refractory_period
+  };
+  static constexpr Nanoseconds max_refractory_period = 1'000'000'000'000;
+
+  explicit RefractoryFilter(SensorSize sensor) : last_kept_(sensor) {}
+
+  LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings) {
+    const auto period = static_cast<Stamp>((settings.refractory_period + 999) / 1000);
+    return last_kept_.keep_if(events, start, [period](const Event&, Stamp now, Stamp* last) {
+      const bool is_kept = now - *last >= period;
+      *last = is_kept ? now : *last;
+      return is_kept;
+    });
+  }
+
+  void forget() { last_kept_.forget(); }
+
+ private:
+  StampedPixels<Stamp> last_kept_;
+};
+static_assert(Filter<RefractoryFilter>);
+static_assert(RefractoryFilter::max_refractory_period / 1000 < Microseconds{max_stamp_age});
+
+}  // namespace eventcamera

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Filters of events: buffers, timestamps, flags, and what they forget.
+#include "src/core/event.hpp"
+#include "tests/elements/event_buffer.hpp"
+#include "tests/elements/harness.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Event;
+using eventcamera::Polarity;
+
+constexpr GstClockTime ms = GST_MSECOND;
+const std::string small_sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
+
+Event on(std::uint32_t t, int x = 1) {
+  return Event::at(x, 1, t, Polarity::on);
+}
+
+std::vector<std::uint32_t> times_of(const Buffer& buffer) {
+  std::vector<std::uint32_t> times;
+  if (buffer)
+    for (const auto& event : events_of(buffer.get())) times.push_back(event.t);
+  return times;
+}
+using Times = std::vector<std::uint32_t>;
+
+/// eventrefractory with a period of 10 ms, at which a pixel fires that it remembers.
+class FilterTest : public testing::Test {
+ protected:
+  FilterTest() { h.caps(small_sensor); }
+
+  /// Whether an event at `pts` passes.
+  bool passes(GstClockTime pts) {
+    EXPECT_EQ(h.push(buffer_of(pts, {on(0)}, 5 * ms)), GST_FLOW_OK);
+    return h.pull() != nullptr;
+  }
+
+  Harness h{"eventrefractory refractory-period=10000000"};
+};
+
+TEST_F(FilterTest, KeepsTimestampsFlagsAndEvents) {
+  GstBuffer* buffer = buffer_of(33 * ms, {on(0), on(5), on(10'004)}, 20 * ms);
+  GST_BUFFER_OFFSET(buffer) = 7;
+  h.push(buffer);
+  const auto out = h.pull();
+  EXPECT_EQ(times_of(out), (Times{0, 10'004}));
+  EXPECT_EQ(GST_BUFFER_PTS(out.get()), 33 * ms);
+  EXPECT_EQ(GST_BUFFER_DURATION(out.get()), 20 * ms);
+  EXPECT_EQ(stat_of(h.element(), "events"), 3U);
+  EXPECT_EQ(stat_of(h.element(), "dropped-events"), 1U);
+  EXPECT_EQ(stat_of(h.element(), "rejected-events"), 0U);
+}
+
+TEST_F(FilterTest, DoesNotWriteToBuffersOfOthers) {
+  const Buffer buffer(buffer_of(0, {on(0), on(5), on(6, 2)}, 20 * ms));
+  const auto before = bytes_of(buffer.get());
+  h.push(gst_buffer_ref(buffer.get()));
+  EXPECT_EQ(times_of(h.pull()), (Times{0, 6}));
+  EXPECT_EQ(bytes_of(buffer.get()), before);
+}
+
+TEST_F(FilterTest, WritesInPlace) {
+  GstBuffer* buffer = buffer_of(0, {on(0), on(5), on(6, 2)}, 20 * ms);
+  const GstMemory* memory = gst_buffer_peek_memory(buffer, 0);
+  h.push(buffer);
+  const auto out = h.pull();
+  EXPECT_EQ(out.get(), buffer);
+  EXPECT_EQ(gst_buffer_peek_memory(out.get(), 0), memory);
+}
+
+TEST_F(FilterTest, KeepsLabelsWithTheirEvents) {
+  const std::vector events = {on(0), on(5), on(6, 2)};
+  const GstEventCameraLabel labels[] = {{.object_class = 10, .cause = 1, .reserved = 0},
+                                        {.object_class = 11, .cause = 2, .reserved = 0},
+                                        {.object_class = 12, .cause = 3, .reserved = 0}};
+  for (const bool is_shared : {false, true}) {
+    GstBuffer* buffer = buffer_of(is_shared ? 20 * ms : 0, events, 20 * ms);
+    gst_buffer_add_event_camera_label_meta(buffer, labels, 3);
+    const Buffer other(is_shared ? gst_buffer_ref(buffer) : nullptr);
+    h.push(buffer);
+    const auto out = h.pull();
+    const GstEventCameraLabelMeta* kept = gst_buffer_get_event_camera_label_meta(out.get());
+    ASSERT_TRUE(kept);
+    ASSERT_EQ(kept->n_labels, 2U);
+    EXPECT_EQ(kept->labels[0].object_class, 10);
+    EXPECT_EQ(kept->labels[1].object_class, 12);
+    if (!other) continue;
+    EXPECT_EQ(gst_buffer_get_event_camera_label_meta(other.get())->n_labels, 3U);
+  }
+}
+
+TEST_F(FilterTest, TakesMemoryInPiecesAtAnyAddress) {
+  const std::vector events = {on(0), on(5), on(6, 2)};
+  GstBuffer* buffer = buffer_of(0, events, 20 * ms);
+  const std::string bytes = bytes_of(buffer);
+  gst_buffer_remove_all_memory(buffer);
+  for (const auto& [from, size] : {std::pair<gsize, gsize>{0, 3}, {3, 21}}) {
+    auto* memory = gst_allocator_alloc(nullptr, size + 1, nullptr);
+    GstMapInfo map;
+    gst_memory_map(memory, &map, GST_MAP_WRITE);
+    std::copy_n(bytes.data() + from, size, map.data + 1);
+    gst_memory_unmap(memory, &map);
+    gst_memory_resize(memory, 1, size);
+    gst_buffer_append_memory(buffer, memory);
+  }
+  h.push(buffer);
+  EXPECT_EQ(times_of(h.pull()), (Times{0, 6}));
+
+  auto* memory = gst_allocator_alloc(nullptr, bytes.size() + 1, nullptr);
+  GstMapInfo map;
+  gst_memory_map(memory, &map, GST_MAP_WRITE);
+  std::ranges::copy(bytes, map.data + 1);
+  gst_memory_unmap(memory, &map);
+  gst_memory_resize(memory, 1, bytes.size());
+  GstBuffer* odd = gst_buffer_new();
+  gst_buffer_append_memory(odd, memory);
+  GST_BUFFER_PTS(odd) = 20 * ms;
+  GST_BUFFER_DURATION(odd) = 20 * ms;
+  h.push(odd);
+  EXPECT_EQ(times_of(h.pull()), (Times{0, 6}));
+}
+
+TEST_F(FilterTest, MakesAGapOfABufferWithoutEvents) {
+  h.push(buffer_of(0, {on(0)}, 5 * ms));
+  ASSERT_TRUE(h.pull());
+  h.push(buffer_of(5 * ms, {on(0)}, 4 * ms));
+  EXPECT_FALSE(h.pull());
+  auto gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap_of(gap.get()).start, 5 * ms);
+  EXPECT_EQ(gap_of(gap.get()).duration, 4 * ms);
+  h.push(buffer_of(9 * ms, {}, 1 * ms));
+  gap = h.pull_event(GST_EVENT_GAP);
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap_of(gap.get()).start, 9 * ms);
+  // Nothing was lost: the next buffer is no discontinuity, unless that of the gap was.
+  h.push(buffer_of(10 * ms, {on(0)}, 5 * ms));
+  EXPECT_FALSE(GST_BUFFER_IS_DISCONT(h.pull().get()));
+  GstBuffer* discont = buffer_of(15 * ms, {on(0)}, 5 * ms);
+  GST_BUFFER_FLAG_SET(discont, GST_BUFFER_FLAG_DISCONT);
+  h.push(discont);
+  EXPECT_FALSE(h.pull());
+  h.push(buffer_of(20 * ms, {on(0)}, 5 * ms));
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(h.pull().get()));
+}
+
+TEST_F(FilterTest, RemembersThroughGapsSegmentsAndDiscont) {
+  EXPECT_TRUE(passes(0));
+  gst_harness_push_event(h.get(), gst_event_new_gap(5 * ms, 1 * ms));
+  EXPECT_FALSE(passes(6 * ms));
+  push_segment(h.get());
+  EXPECT_FALSE(passes(7 * ms));
+  GstBuffer* discont = buffer_of(8 * ms, {on(0)}, 1 * ms);
+  GST_BUFFER_FLAG_SET(discont, GST_BUFFER_FLAG_DISCONT);
+  h.push(discont);
+  EXPECT_FALSE(h.pull());
+  h.caps(small_sensor + ", framerate=100/1");
+  EXPECT_FALSE(passes(9 * ms));
+  EXPECT_TRUE(passes(10 * ms));
+}
+
+TEST_F(FilterTest, ForgetsAfterAFlush) {
+  EXPECT_TRUE(passes(0));
+  flush({h.get()});
+  push_segment(h.get());
+  EXPECT_TRUE(passes(5 * ms));
+}
+
+TEST_F(FilterTest, ForgetsWhereTimeGoesBack) {
+  EXPECT_TRUE(passes(100 * ms));
+  EXPECT_TRUE(passes(95 * ms));
+  EXPECT_FALSE(passes(99 * ms));
+  // Rounded timestamps may overlap by a microsecond.
+  EXPECT_FALSE(passes(99 * ms - 1));
+}
+
+TEST_F(FilterTest, ForgetsWhereTheSensorChangesAndWhereItStops) {
+  EXPECT_TRUE(passes(0));
+  h.caps("application/x-event-camera, format=XYTP, width=9, height=4");
+  EXPECT_TRUE(passes(5 * ms));
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  gst_element_set_state(h.element(), GST_STATE_PLAYING);
+  h.caps(small_sensor);
+  push_segment(h.get());
+  EXPECT_TRUE(passes(6 * ms));
+  EXPECT_EQ(stat_of(h.element(), "events"), 1U);
+}
+
+TEST_F(FilterTest, RejectsEventsThatAreInvalid) {
+  h.push(buffer_of(0, {on(0), on(1, 8), on(2, 2), on(1, 3), on(5001, 4)}, 5 * ms));
+  EXPECT_EQ(times_of(h.pull()), (Times{0, 2}));
+  EXPECT_EQ(stat_of(h.element(), "rejected-events"), 3U);
+  EXPECT_NE(h.warning().find("outside the sensor"), std::string::npos);
+  EXPECT_NE(h.warning().find("earlier than the previous one"), std::string::npos);
+}
+
+TEST_F(FilterTest, RejectsBuffersThatAreInvalid) {
+  EXPECT_EQ(h.push(buffer_of(GST_CLOCK_TIME_NONE, {on(0)}, 5 * ms)), GST_FLOW_OK);
+  EXPECT_NE(h.warning().find("no PTS"), std::string::npos);
+  GstBuffer* partial = buffer_of(0, {on(0)}, 5 * ms);
+  gst_buffer_set_size(partial, 7);
+  EXPECT_EQ(h.push(partial), GST_FLOW_OK);
+  EXPECT_NE(h.warning().find("not a multiple of 8"), std::string::npos);
+  EXPECT_FALSE(h.pull());
+  EXPECT_TRUE(passes(5 * ms));
+}
+
+TEST_F(FilterTest, TakesNewSettingsWhilePlaying) {
+  EXPECT_TRUE(passes(0));
+  g_object_set(h.element(), "refractory-period", guint64{20 * ms}, nullptr);
+  EXPECT_FALSE(passes(15 * ms));
+  g_object_set(h.element(), "refractory-period", guint64{10 * ms}, nullptr);
+  EXPECT_TRUE(passes(16 * ms));
+}
+
+}  // namespace
