@@ -27,8 +27,10 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
   AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X)                                       \
   X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats)                             \
   X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
+  X(eventantiflicker) X(eventdenoise) X(eventhotpixel) X(eventratecontrol)                 \
+  X(eventrefractory) X(eventtrail)                                                         \
   X(eventdatagramdepay) X(eventdatagrampay)                                                \
-  X(eventnpydec) X(eventnpyenc) X(eventrefractory) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)
+  X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)
 // clang-format on
 #define TYPE_FINDERS(X) \
   X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(npz) X(propheseedat) X(propheseeraw)

@@ -205,7 +205,7 @@ static gboolean start(GstBaseTransform* transform) {
 
 static gboolean stop(GstBaseTransform* transform) {
   auto& priv = priv_of(transform);
-  priv.inside->stop();
+  reported(transform, [&] { priv.inside->stop(); });
   priv.state.reset();
   priv.faults.reset();
   return TRUE;

@@ -34,12 +34,13 @@ class EventFilter {
   virtual void forget() = 0;
 };
 
-/// An element's settings and an eventcamera::Filter, which is made from the sensor's size or from
-/// the sizes of input and output.
-template <eventcamera::Filter Core>
+/// An element's settings, which are or contain those of an eventcamera::Filter, and the filter,
+/// which is made from the sensor's size or from the sizes of input and output.
+template <eventcamera::Filter Core,
+          std::derived_from<typename Core::Settings> SettingsType = typename Core::Settings>
 class EventFilterOf : public EventFilter {
  public:
-  using Settings = typename Core::Settings;
+  using Settings = SettingsType;
 
   void start(eventcamera::SensorSize in, eventcamera::SensorSize out) override {
     core_.reset();  // first, for its memory

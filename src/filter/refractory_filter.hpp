@@ -11,14 +11,13 @@ namespace eventcamera {
 class RefractoryFilter {
  public:
   struct Settings {
-    Nanoseconds refractory_period = 1'000'000;  ///< 0 to max_refractory_period
+    Nanoseconds refractory_period = 1'000'000;  ///< 0 to max_filter_time
   };
-  static constexpr Nanoseconds max_refractory_period = 1'000'000'000'000;
 
   explicit RefractoryFilter(SensorSize sensor) : last_kept_(sensor) {}
 
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings) {
-    const auto period = static_cast<Stamp>((settings.refractory_period + 999) / 1000);
+    const Stamp period = in_stamps(settings.refractory_period);
     return last_kept_.keep_if(events, start, [period](const Event&, Stamp now, Stamp* last) {
       const bool is_kept = now - *last >= period;
       *last = is_kept ? now : *last;
@@ -32,6 +31,5 @@ class RefractoryFilter {
   StampedPixels<Stamp> last_kept_;
 };
 static_assert(Filter<RefractoryFilter>);
-static_assert(RefractoryFilter::max_refractory_period / 1000 < Microseconds{max_stamp_age});
 
 }  // namespace eventcamera

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <concepts>
 #include <cstddef>
 #include <span>
@@ -13,22 +14,43 @@
 
 namespace eventcamera {
 
-/// A cell for each pixel, which holds stamps, and a margin of pixels that never fire. A cell of all
-/// zeros has seen no event. Cells other than Stamp have lower(amount).
+/// Whether pixels have a cell for all their events, or one for each polarity.
+enum class CellsPerPixel { one, one_per_polarity };
+
+/// Events to decide on, and the cells of all pixels.
+template <class Cell>
+struct StampedBatch {
+  std::span<const Event> events;
+  Stamp start;            ///< the stamp of an event is this + t, modulo 2^32
+  Cell* cells;            ///< of the pixel (0, 0)
+  std::ptrdiff_t stride;  ///< bytes from a cell to the one below
+  int rows_of_on;         ///< the cells of ON events are this many rows below
+  bool* is_kept;          ///< result, one for each event
+
+  Cell* at(const Event& event) const {
+    const std::ptrdiff_t row = event.y() + (event.y_p >> 15) * rows_of_on;
+    return reinterpret_cast<Cell*>(reinterpret_cast<std::byte*>(cells) + row * stride) + event.x;
+  }
+};
+
+/// Cells of pixels, which hold stamps, and a margin of pixels that never fire. A cell of all zeros
+/// has seen no event. Cells other than Stamp have lower(amount).
 template <class Cell>
 class StampedPixels {
  public:
-  explicit StampedPixels(SensorSize sensor, int margin = 0)
-      : cells_(sensor.width, sensor.height, margin) {}
+  explicit StampedPixels(SensorSize sensor, int margin = 0,
+                         CellsPerPixel cells = CellsPerPixel::one)
+      : rows_of_on_(cells == CellsPerPixel::one ? 0 : sensor.height + margin),
+        cells_(sensor.width, sensor.height + rows_of_on_, margin) {}
 
   /// Filters events: keep(event, now, cell) decides on each, in order.
   template <class Keep>
   LabelledEvents keep_if(LabelledEvents events, Microseconds start, const Keep& keep) {
     // Pixels of random events are not in the cache: load those of events to come.
     constexpr std::size_t distance = 16;
-    const Event* ahead = events.events.data();
-    const Event* const last = ahead + events.events.size() - 1;
-    ahead = events.events.size() > distance ? ahead + distance : last;
+    if (events.events.empty()) return events;
+    const Event* const last = &events.events.back();
+    const Event* ahead = &events.events[std::min(distance, events.events.size() - 1)];
     return events.keep_if([&](const Event& event) {
       prefetch(*ahead);
       ahead = std::min(ahead + 1, last);
@@ -36,34 +58,63 @@ class StampedPixels {
     });
   }
 
-  /// The cell of an event's pixel; the next row is stride() bytes further.
-  Cell* at(const Event& event) { return cells_.row(event.y()) + event.x; }
-  std::ptrdiff_t stride() const { return cells_.stride(); }
+  /// Filters events in batches: decide(batch) sets batch.is_kept of each.
+  template <class Decide>
+  LabelledEvents keep_batches(LabelledEvents events, Microseconds start, const Decide& decide) {
+    std::array<bool, 256> is_kept;
+    auto rest = events.events;
+    std::span<const Event> batch;
+    std::size_t done = 0;
+    return events.keep_if([&](const Event& first) {
+      if (done == batch.size()) {
+        const Stamp stamp = now(start + first.t);
+        batch = rest.first(batch_size(rest, stamp, is_kept.size()));
+        rest = rest.subspan(batch.size());
+        decide(StampedBatch<Cell>{batch, stamp - first.t, cells_.row(0), cells_.stride(),
+                                  rows_of_on_, is_kept.data()});
+        done = 0;
+      }
+      return is_kept[done++];
+    });
+  }
 
   void forget() {
-    for (int y = 0; y < cells_.height(); ++y) std::fill_n(cells_.row(y), cells_.width(), Cell{});
+    for_each([](Cell& cell) { cell = {}; });
     clock_ = {};
   }
 
  private:
-  Stamp now(Microseconds time) {
-    return clock_.at(time, [this](std::uint64_t amount) { lower(amount); });
+  Cell* at(const Event& event) {
+    return cells_.row(event.y() + (event.y_p >> 15) * rows_of_on_) + event.x;
   }
 
-  void lower(std::uint64_t amount) {
-    for (int y = 0; y < cells_.height(); ++y)
-      for (auto& cell : std::span(cells_.row(y), static_cast<std::size_t>(cells_.width())))
+  Stamp now(Microseconds time) {
+    return clock_.at(time, [this](std::uint64_t amount) {
+      for_each([amount](Cell& cell) {
         if constexpr (std::same_as<Cell, Stamp>)
           cell = lowered(cell, amount);
         else
           cell.lower(amount);
+      });
+    });
   }
 
-  void prefetch(const Event& event) {
-    for (int row = -cells_.margin(); row <= cells_.margin(); ++row)
-      __builtin_prefetch(cells_.row(event.y() + row) + event.x, 1);
+  /// Number of events, at most `max_size`, whose stamps go on from that of the first.
+  static std::size_t batch_size(std::span<const Event> events, Stamp first, std::size_t max_size) {
+    const auto size = std::min(events.size(), max_size);
+    const std::uint64_t last = first + std::uint64_t{events[size - 1].t} - events.front().t;
+    return last < std::uint64_t{1} << stamp_bits ? size : 1;
   }
 
+  template <class Change>
+  void for_each(const Change& change) {
+    for (int y = 0; y < cells_.height(); ++y)
+      std::for_each_n(cells_.row(y), cells_.width(), change);
+  }
+
+  void prefetch(const Event& event) { __builtin_prefetch(at(event), 1); }
+
+  int rows_of_on_;
   Image<Cell> cells_;
   StampClock clock_;
 };

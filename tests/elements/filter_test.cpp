@@ -1,5 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Filters of events: buffers, timestamps, flags, and what they forget.
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
 #include "src/core/event.hpp"
 #include "tests/elements/event_buffer.hpp"
 #include "tests/elements/harness.hpp"
@@ -212,6 +218,179 @@ TEST_F(FilterTest, TakesNewSettingsWhilePlaying) {
   EXPECT_FALSE(passes(15 * ms));
   g_object_set(h.element(), "refractory-period", guint64{10 * ms}, nullptr);
   EXPECT_TRUE(passes(16 * ms));
+}
+
+/// How many events pass of those of half a second.
+std::size_t count_passed(Harness& h, GstClockTime pts, const std::vector<Event>& events) {
+  EXPECT_EQ(h.push(buffer_of(pts, events, 500 * ms)), GST_FLOW_OK);
+  return times_of(h.pull()).size();
+}
+
+/// Three events of a pixel, 5 ms apart.
+const std::vector burst = {on(0), on(5000), on(10'000)};
+
+TEST(Trail, ForgetsBurstsWhereTimeGoesBack) {
+  Harness h("eventtrail mode=stc-keep-trail");
+  h.caps(small_sensor);
+  EXPECT_EQ(count_passed(h, 500 * ms, burst), 2U);
+  EXPECT_EQ(count_passed(h, 0, burst), 2U);
+  g_object_set(h.element(), "mode", 0, nullptr);
+  EXPECT_EQ(count_passed(h, 1000 * ms, burst), 1U);
+}
+
+TEST(Denoise, ForgetsNeighboursAfterAFlush) {
+  Harness h("eventdenoise method=baf");
+  h.caps(small_sensor);
+  EXPECT_EQ(count_passed(h, 0, {on(0, 1)}), 0U);
+  EXPECT_EQ(count_passed(h, 1 * ms, {on(0, 2)}), 1U);
+  flush({h.get()});
+  push_segment(h.get());
+  EXPECT_EQ(count_passed(h, 2 * ms, {on(0, 1)}), 0U);
+  // The default of each method applies at once.
+  EXPECT_EQ(count_passed(h, 22 * ms, {on(0, 2)}), 0U);
+  gst_util_set_object_arg(G_OBJECT(h.element()), "method", "stcf");
+  g_object_set(h.element(), "min-neighbours", 1, nullptr);
+  EXPECT_EQ(count_passed(h, 42 * ms, {on(0, 1)}), 1U);
+}
+
+TEST(AntiFlicker, ForgetsFlickerAfterAFlush) {
+  Harness h("eventantiflicker");
+  h.caps(small_sensor);
+  std::vector<Event> lamp;  // of 100 Hz
+  for (std::uint32_t t = 0; t < 400'000; t += 10'000) {
+    lamp.push_back(Event::at(0, 0, t, Polarity::on));
+    lamp.push_back(Event::at(0, 0, t + 5000, Polarity::off));
+  }
+  const auto first = count_passed(h, 0, lamp);
+  EXPECT_LT(first, 10U);
+  EXPECT_EQ(count_passed(h, 400 * ms, lamp), 0U);
+  flush({h.get()});
+  push_segment(h.get());
+  EXPECT_EQ(count_passed(h, 800 * ms, lamp), first);
+}
+
+TEST(RateControl, CountsWhatItDrops) {
+  Harness h("eventratecontrol max-rate=1000 reference-period=100000000");
+  h.caps(small_sensor);
+  std::vector<Event> flood;
+  for (std::uint32_t t = 0; t < 500'000; t += 100) flood.push_back(on(t));
+  const auto first = count_passed(h, 0, flood);
+  EXPECT_EQ(stat_of(h.element(), "dropped-events"), flood.size() - first);
+  // The beginning of the flood, which was not foreseen, is paid back.
+  EXPECT_GT(first, 510U);
+  EXPECT_NEAR(static_cast<double>(first + count_passed(h, 500 * ms, flood)), 1000, 10);
+  // A flush begins anew.
+  flush({h.get()});
+  push_segment(h.get());
+  EXPECT_EQ(count_passed(h, 1000 * ms, flood), first);
+}
+
+class HotPixelTest : public testing::Test {
+ protected:
+  ~HotPixelTest() override { std::filesystem::remove(file); }
+
+  std::string launch(const std::string& settings = "") const {
+    return "eventhotpixel location=" + in_quotes(file.string()) + settings;
+  }
+  void write(const std::string& text) const { std::ofstream(file) << text; }
+  std::string text() const {
+    std::stringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+  }
+
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() /
+      (std::string("hot_pixels_") + testing::UnitTest::GetInstance()->current_test_info()->name() +
+       ".txt");
+  /// A pixel that fires every 5 ms.
+  const std::vector<Event> hot = [] {
+    std::vector<Event> events;
+    for (std::uint32_t t = 0; t < 500'000; t += 5000) events.push_back(on(t));
+    return events;
+  }();
+};
+
+TEST_F(HotPixelTest, LearnsWritesAndKeepsThemThroughEverything) {
+  {
+    Harness h(launch());
+    h.caps(small_sensor);
+    EXPECT_EQ(count_passed(h, 0, hot), 100U);
+    EXPECT_EQ(count_passed(h, 500 * ms, hot), 100U);
+    EXPECT_EQ(count_passed(h, 1000 * ms, hot), 0U);
+    flush({h.get()});
+    push_segment(h.get());
+    EXPECT_EQ(count_passed(h, 0, hot), 0U);
+    gst_element_set_state(h.element(), GST_STATE_READY);
+  }
+  EXPECT_EQ(text(), "# Hot pixels: column and row\n1 1\n");
+  Harness h(launch(" learn=false"));
+  h.caps(small_sensor);
+  EXPECT_EQ(count_passed(h, 0, hot), 0U);
+  EXPECT_EQ(count_passed(h, 1500 * ms, {on(0, 2)}), 1U);
+}
+
+TEST_F(HotPixelTest, ReportsFilesThatItCannotRead) {
+  for (const char* text : {"1 1\nfive 5\n", ""}) {
+    if (*text != '\0')
+      write(text);
+    else
+      std::filesystem::remove(file);
+    Harness h(launch(" learn=false"));
+    h.caps(small_sensor);
+    push_segment(h.get());
+    EXPECT_NE(h.push(buffer_of(0, {on(0)}, ms)), GST_FLOW_OK);
+    const auto error = h.error();
+    EXPECT_NE(error.find(file.string()), std::string::npos) << error;
+  }
+}
+
+TEST_F(HotPixelTest, ReportsFilesThatItCannotWrite) {
+  Harness h("eventhotpixel location=/nowhere/at/all.txt");
+  h.caps(small_sensor);
+  EXPECT_EQ(count_passed(h, 0, hot), 100U);
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  EXPECT_NE(h.error().find("/nowhere/at/all.txt"), std::string::npos);
+}
+
+class AnyFilter : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Filters, AnyFilter,
+                         testing::Values("eventantiflicker", "eventdenoise", "eventhotpixel",
+                                         "eventratecontrol", "eventrefractory", "eventtrail"),
+                         [](const auto& element) { return std::string(element.param); });
+
+TEST_P(AnyFilter, TakesSettingsOfAnotherThreadWhilePlaying) {
+  Harness h(GetParam());
+  h.caps(small_sensor);
+  std::atomic<bool> is_done = false;
+  std::thread other([&] {
+    guint count = 0;
+    GParamSpec** specs = g_object_class_list_properties(G_OBJECT_GET_CLASS(h.element()), &count);
+    for (guint round = 0; !is_done; ++round)
+      for (guint i = 0; i < count; ++i) {
+        if ((specs[i]->flags & GST_PARAM_MUTABLE_PLAYING) == 0) continue;
+        GValue value = G_VALUE_INIT;
+        g_object_get_property(G_OBJECT(h.element()), "stats", &value);
+        g_value_unset(&value);
+        g_value_init(&value, specs[i]->value_type);
+        if (G_VALUE_HOLDS_BOOLEAN(&value))
+          g_value_set_boolean(&value, round % 2);
+        else if (G_VALUE_HOLDS_ENUM(&value))
+          g_value_set_enum(&value, static_cast<gint>(round % 3));
+        else
+          g_param_value_set_default(specs[i], &value);
+        g_object_set_property(G_OBJECT(h.element()), specs[i]->name, &value);
+        g_value_unset(&value);
+      }
+    g_free(specs);
+  });
+  for (GstClockTime i = 0; i < 300; ++i) {
+    EXPECT_EQ(h.push(buffer_of(i * ms, {on(0), on(10, 2), on(20)}, 1 * ms)), GST_FLOW_OK);
+    h.pull();
+  }
+  is_done = true;
+  other.join();
+  EXPECT_EQ(stat_of(h.element(), "events"), 900U);
 }
 
 }  // namespace

@@ -90,9 +90,16 @@ grep -q '"map-correlation" : [0-9-]' compare.json || fail "no comparison was wri
 [ -s map.png ] && [ -s maps.png ] && [ -s candidate.raw ] || fail "a picture or the candidate is missing"
 launch filesrc location=candidate.raw ! evtdec ! eventstats location=/dev/null interval=0 ! fakesink
 
-# Filtered.
-launch filesrc location=candidate.raw ! evtdec ! eventrefractory refractory-period=10000000 ! evtenc ! filesink location=refractory.raw
-[ "$(stat -c %s refractory.raw)" -lt "$(stat -c %s candidate.raw)" ] || fail "no event was dropped"
+# Filtered, with each filter: fewer events, but not none.
+for filter in eventdenoise "eventdenoise method=baf" "eventdenoise method=time-kernel" "eventdenoise method=dwf" \
+  "eventhotpixel location=hot.txt min-rate=0 learning-period=100000000" "eventratecontrol max-rate=1000" \
+  "eventrefractory refractory-period=10000000" eventtrail "eventtrail mode=stc-cut-trail" "eventtrail mode=stc-keep-trail"; do
+  # shellcheck disable=SC2086
+  launch filesrc location=candidate.raw ! evtdec ! $filter ! evtenc ! filesink location=filtered.raw
+  size=$(stat -c %s filtered.raw)
+  [ "$size" -gt 1000 ] && [ "$size" -lt "$(stat -c %s candidate.raw)" ] || fail "$filter: $size bytes"
+done
+launch filesrc location=candidate.raw ! evtdec ! eventhotpixel location=hot.txt learn=false ! eventantiflicker mode=band-pass ! fakesink
 
 # Interrupted with -e, the file is complete.
 interrupt interrupted.mp4 10000 -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventdenoise
+ * @title: eventdenoise
+ * @short_description: drops noise
+ *
+ * Drops events that have too little support by earlier events near them, with one of several
+ * published methods. Neighbours of a pixel are those around it, without itself.
+ *
+ * - `baf`, background activity filter: one of 8 neighbours fired within
+ *   #GstEventDenoise:correlation-time, 2 ms by default;
+ * - `stcf`, spatio-temporal correlation filter: #GstEventDenoise:min-neighbours of 8 did, within
+ *   25 ms by default;
+ * - `time-kernel`: each of 24 neighbours supports the event with 1 - Δt / τ, where Δt is the time
+ *   since its last event of equal polarity, and τ the correlation time, 32 ms by default; the sum
+ *   is at least #GstEventDenoise:threshold;
+ * - `dwf`, double window filter: at least one of the last 36 events that were kept, or of the last
+ * 36 that were dropped, is at most #GstEventDenoise:search-distance away.
+ *
+ * Compared in docs/filters.md. What pixels remember is forgotten after a flush, where time goes
+ * back, and if another method or #GstEventDenoise:match-polarity is set; it is kept through gaps,
+ * new segments and DISCONT.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventdenoise method=stcf ! eventrender !
+ * videoconvert ! autovideosink
+ * ]|
+ */
+#include "gst/base/types.hpp"
+#include "gst/filter/eventfilter.hpp"
+#include "src/filter/denoise_filter.hpp"
+
+using eventcamera::DenoiseFilter;
+using eventcamera::DenoiseMethod;
+
+DEFINE_EVENT_FILTER(GstEventDenoise, gst_event_denoise, EVENT_DENOISE, EventFilterOf<DenoiseFilter>,
+                    eventdenoise)
+
+static GType method_type() {
+  static const GEnumValue values[] = {
+      {static_cast<int>(DenoiseMethod::baf), "Background activity filter: one neighbour", "baf"},
+      {static_cast<int>(DenoiseMethod::stcf),
+       "Spatio-temporal correlation filter: several neighbours", "stcf"},
+      {static_cast<int>(DenoiseMethod::time_kernel),
+       "Time kernel: recent neighbours of equal polarity", "time-kernel"},
+      {static_cast<int>(DenoiseMethod::dwf), "Double window filter: near one of the last events",
+       "dwf"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventDenoiseMethod", values);
+}
+
+static void gst_event_denoise_class_init(GstEventDenoiseClass* klass) {
+  using Settings = DenoiseFilter::Settings;
+  constexpr auto flags = event_filter_property_flags;
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  properties.add(&Settings::method,
+                 g_param_spec_enum("method", "Method", "How noise is told from signal",
+                                   method_type(), static_cast<int>(Settings().method), flags));
+  properties.add(&Settings::correlation_time,
+                 g_param_spec_uint64("correlation-time", "Correlation time",
+                                     "Longest time between events that support each other (ns; "
+                                     "0 = the default of the method)",
+                                     0, DenoiseFilter::max_correlation_time,
+                                     Settings().correlation_time, flags));
+  properties.add(&Settings::min_neighbours,
+                 g_param_spec_uint("min-neighbours", "Minimum neighbours",
+                                   "Neighbours that must support an event (stcf)", 1, 8,
+                                   Settings().min_neighbours, flags));
+  properties.add(&Settings::match_polarity,
+                 g_param_spec_boolean("match-polarity", "Match polarity",
+                                      "Whether only events of equal polarity support each other "
+                                      "(baf, stcf)",
+                                      Settings().match_polarity ? TRUE : FALSE, flags));
+  properties.add(
+      &Settings::threshold,
+      g_param_spec_double("threshold", "Threshold", "Minimum support by neighbours (time-kernel)",
+                          0, 24, Settings().threshold, flags));
+  properties.add(&Settings::search_distance,
+                 g_param_spec_uint("search-distance", "Search distance",
+                                   "Maximum distance of a supporting event, across plus down "
+                                   "(pixels; dwf)",
+                                   0, 100, Settings().search_distance, flags));
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event denoiser", "Filter",
+                                        "Drops events that are noise", EVENTSIM_AUTHORS);
+}

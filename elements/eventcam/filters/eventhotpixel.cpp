@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventhotpixel
+ * @title: eventhotpixel
+ * @short_description: drops the events of hot pixels
+ *
+ * Drops the events of pixels that fire much more often than those around them. After every
+ * #GstEventHotPixel:learning-period, the hot pixels are those that fired at least
+ * #GstEventHotPixel:min-rate times a second, and #GstEventHotPixel:ratio times as often as the
+ * median of their 8 neighbours. In the first period nothing is dropped, unless
+ * #GstEventHotPixel:location is a file of hot pixels.
+ *
+ * With #GstEventHotPixel:location, the hot pixels are read from the file, if there is one, when the
+ * stream begins, and written to it when the element stops; without #GstEventHotPixel:learn, they
+ * are only read. It is a text file with the column and row of a pixel in each line. For a camera,
+ * learn once with the lens covered or in front of an even scene, and use that file from then on.
+ *
+ * Hot pixels belong to the sensor: they are kept through flushes, gaps, new segments, DISCONT and
+ * where time goes back. What was counted in the current period is forgotten after a flush and where
+ * time goes back.
+ *
+ * ## Example launch lines
+ * |[
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventhotpixel ! eventrender !
+ * videoconvert ! autovideosink gst-launch-1.0 filesrc location=recording.raw ! evtdec !
+ * eventhotpixel location=hot-pixels.txt learn=false ! eventrender ! videoconvert ! autovideosink
+ * ]|
+ */
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "gst/filter/eventfilter.hpp"
+#include "src/filter/hot_pixel_filter.hpp"
+
+using eventcamera::HotPixelFilter;
+using eventcamera::PixelPosition;
+
+namespace {
+
+/// User-settable values.
+struct Settings : HotPixelFilter::Settings {
+  std::string location;
+};
+
+struct FreeText {
+  void operator()(gchar* text) const { g_free(text); }
+};
+using OwnedText = std::unique_ptr<gchar, FreeText>;
+
+[[noreturn]] void fail(const std::string& what, const std::string& location, GError* error) {
+  const std::string cause = error->message;
+  g_error_free(error);
+  throw std::runtime_error("cannot " + what + " \"" + location + "\": " + cause);
+}
+
+std::vector<PixelPosition> read_hot_pixels(const std::string& location) {
+  gchar* text = nullptr;
+  gsize size = 0;
+  GError* error = nullptr;
+  if (!g_file_get_contents(location.c_str(), &text, &size, &error))
+    fail("read hot pixels from", location, error);
+  const OwnedText owned(text);
+  try {
+    return eventcamera::parse_pixel_list({text, size});
+  } catch (const std::invalid_argument& fault) {
+    throw std::runtime_error("cannot read hot pixels from \"" + location + "\": " + fault.what());
+  }
+}
+
+void write_hot_pixels(const std::string& location, const std::vector<PixelPosition>& pixels) {
+  const std::string text = eventcamera::pixel_list_text(pixels);
+  GError* error = nullptr;
+  if (!g_file_set_contents(location.c_str(), text.data(), static_cast<gssize>(text.size()), &error))
+    fail("write hot pixels to", location, error);
+}
+
+class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
+ public:
+  void start(eventcamera::SensorSize in, eventcamera::SensorSize out) override {
+    EventFilterOf::start(in, out);
+    const auto [location, learn] = file();
+    if (location.empty() || (learn && !std::filesystem::exists(location))) return;
+    core_->set_hot_pixels(read_hot_pixels(location));
+  }
+
+  void stop() override {
+    const auto [location, learn] = file();
+    if (core_ && learn && !location.empty()) write_hot_pixels(location, core_->hot_pixels());
+    EventFilterOf::stop();
+  }
+
+ private:
+  struct File {
+    std::string location;
+    bool learn;
+  };
+  File file() const {
+    const auto copy = settings.copy();
+    return {copy.location, copy.learn};
+  }
+};
+
+}  // namespace
+
+DEFINE_EVENT_FILTER(GstEventHotPixel, gst_event_hot_pixel, EVENT_HOT_PIXEL, HotPixels,
+                    eventhotpixel)
+
+static void gst_event_hot_pixel_class_init(GstEventHotPixelClass* klass) {
+  constexpr auto flags = event_filter_property_flags;
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  properties.add(
+      &Settings::location,
+      g_param_spec_string("location", "Location",
+                          "Text file of hot pixels, read at the start and, with learn, "
+                          "written on stop",
+                          nullptr,
+                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                   GST_PARAM_MUTABLE_READY)));
+  properties.add(&Settings::learn,
+                 g_param_spec_boolean("learn", "Learn",
+                                      "Whether to find hot pixels; else they are those of the file",
+                                      Settings().learn ? TRUE : FALSE, flags));
+  properties.add(&Settings::learning_period,
+                 g_param_spec_uint64("learning-period", "Learning period",
+                                     "Time after which hot pixels are found anew (ns)", GST_MSECOND,
+                                     3600 * GST_SECOND, Settings().learning_period, flags));
+  properties.add(&Settings::min_rate,
+                 g_param_spec_double("min-rate", "Minimum rate",
+                                     "Minimum event rate of a hot pixel (events/s)", 0, 1e6,
+                                     Settings().min_rate, flags));
+  properties.add(&Settings::ratio,
+                 g_param_spec_double("ratio", "Ratio",
+                                     "Minimum event rate of a hot pixel, as a multiple of the "
+                                     "median of its neighbours",
+                                     1, 1e6, Settings().ratio, flags));
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Hot pixel filter", "Filter",
+                                        "Drops the events of hot pixels", EVENTSIM_AUTHORS);
+}

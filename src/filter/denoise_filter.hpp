@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <optional>
+
+#include "src/filter/double_window.hpp"
+#include "src/filter/filter.hpp"
+#include "src/filter/stamped_pixels.hpp"
+
+namespace eventcamera {
+
+/// How noise is told from signal. The neighbours of a pixel are those around it, without itself.
+enum class DenoiseMethod {
+  /// Background activity filter (Delbruck 2008): one of 8 neighbours fired within the correlation
+  /// time.
+  baf,
+  /// Spatio-temporal correlation filter (Guo and Delbruck 2022): so many of them did.
+  stcf,
+  /// The time since the last event of equal polarity of each of 24 neighbours, from 1 for none
+  /// down to 0 for the correlation time, adds up to the threshold.
+  time_kernel,
+  /// Double window filter (Guo and Delbruck 2022), see DoubleWindow.
+  dwf,
+};
+
+/// Drops events that have too little support by earlier ones. All events support, those that are
+/// dropped, too. A pixel takes 4 bytes, twice as many if polarities have to match, and none with
+/// dwf.
+class DenoiseFilter {
+ public:
+  struct Settings {
+    DenoiseMethod method = DenoiseMethod::stcf;
+    /// At most max_correlation_time, 0 = the method's default.
+    Nanoseconds correlation_time = 0;
+    unsigned min_neighbours = 2;  ///< of stcf: 1 to 8
+    /// In baf and stcf: whether only events of equal polarity support each other.
+    bool match_polarity = false;
+    double threshold = 1;          ///< of time_kernel: 0 to 24
+    unsigned search_distance = 9;  ///< of dwf: pixels across plus pixels down
+  };
+
+  /// The sum of time_kernel takes 32 bits.
+  static constexpr Nanoseconds max_correlation_time = 50'000'000'000;
+
+  static Nanoseconds default_correlation_time(DenoiseMethod method);
+
+  explicit DenoiseFilter(SensorSize sensor) : sensor_(sensor) {}
+
+  LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings);
+
+  void forget();
+
+ private:
+  StampedPixels<Stamp>& pixels(int margin, bool match_polarity);
+
+  SensorSize sensor_;
+  int margin_ = 0;
+  bool match_polarity_ = false;
+  std::optional<StampedPixels<Stamp>> pixels_;  ///< made when first needed
+  DoubleWindow window_;
+};
+static_assert(Filter<DenoiseFilter>);
+
+}  // namespace eventcamera

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/filter/hot_pixel_filter.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace eventcamera {
+
+LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
+                                      const Settings& settings) {
+  const Microseconds period = settings.learning_period / 1000;
+  if (settings.learn && learning_end_ == never && !events.events.empty())
+    learning_end_ = start + events.events.front().t + period;
+  if (!settings.learn) learning_end_ = never;
+  return events.keep_if([&](const Event& event) {
+    const Microseconds time = start + event.t;
+    if (time >= learning_end_) [[unlikely]] {
+      // Periods without any event say nothing of hot pixels.
+      learn(settings);
+      learning_end_ += (1 + (time - learning_end_) / period) * period;
+    }
+    auto& pixel = pixels_.row(event.y())[event.x];
+    ++pixel;
+    return (pixel & hot_bit) == 0;
+  });
+}
+
+/// Median of the events of the pixels around one; the upper one at the border, where the number of
+/// pixels may be even.
+std::uint32_t HotPixelFilter::median_around(int x, int y) const {
+  std::array<std::uint32_t, 8> counts;
+  auto end = counts.begin();
+  for (int row = std::max(y - 1, 0); row <= std::min(y + 1, pixels_.height() - 1); ++row)
+    for (int column = std::max(x - 1, 0); column <= std::min(x + 1, pixels_.width() - 1); ++column)
+      if (row != y || column != x) *end++ = pixels_.at(column, row) & count_bits;
+  if (end == counts.begin()) return 0;
+  const auto middle = counts.begin() + (end - counts.begin()) / 2;
+  std::nth_element(counts.begin(), middle, end);
+  return *middle;
+}
+
+void HotPixelFilter::learn(const Settings& settings) {
+  const double min_count =
+      std::max(1.0, settings.min_rate * static_cast<double>(settings.learning_period) / 1e9);
+  std::vector<PixelPosition> hot;
+  for (int y = 0; y < pixels_.height(); ++y)
+    for (int x = 0; x < pixels_.width(); ++x) {
+      const std::uint32_t count = pixels_.at(x, y) & count_bits;
+      if (count >= min_count && count >= settings.ratio * median_around(x, y))
+        hot.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)});
+    }
+  clear_counts();
+  set_hot_pixels(std::move(hot));
+}
+
+void HotPixelFilter::clear_counts() {
+  for (int y = 0; y < pixels_.height(); ++y)
+    std::for_each_n(pixels_.row(y), pixels_.width(), [](auto& pixel) { pixel &= hot_bit; });
+}
+
+void HotPixelFilter::forget() {
+  clear_counts();
+  learning_end_ = never;
+}
+
+void HotPixelFilter::set_hot_pixels(std::vector<PixelPosition> pixels) {
+  for (const auto& pixel : hot_) pixels_.at(pixel.x, pixel.y) &= count_bits;
+  std::erase_if(pixels, [this](const PixelPosition& pixel) {
+    return pixel.x >= pixels_.width() || pixel.y >= pixels_.height();
+  });
+  hot_ = std::move(pixels);
+  for (const auto& pixel : hot_) pixels_.at(pixel.x, pixel.y) |= hot_bit;
+}
+
+}  // namespace eventcamera

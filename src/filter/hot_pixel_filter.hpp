@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "src/core/image.hpp"
+#include "src/core/sensor_size.hpp"
+#include "src/filter/filter.hpp"
+#include "src/filter/pixel_list.hpp"
+
+namespace eventcamera {
+
+/// Drops the events of hot pixels: those that fire at least at a minimum rate, and a number of
+/// times as often as the median of their neighbours, in the last learning period. 4 bytes per
+/// pixel.
+class HotPixelFilter {
+ public:
+  struct Settings {
+    bool learn = true;                            ///< else hot pixels stay as they are
+    Nanoseconds learning_period = 1'000'000'000;  ///< at least 1 us, rounded down to microseconds
+    double min_rate = 10;                         ///< events per second
+    double ratio = 5;                             ///< to the median of the neighbours
+  };
+
+  explicit HotPixelFilter(SensorSize sensor) : pixels_(sensor.width, sensor.height) {}
+
+  LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings);
+
+  /// Forgets how often pixels fired in the learning period that is under way. Hot pixels stay: they
+  /// are the sensor's.
+  void forget();
+
+  /// Hot pixels in raster order.
+  const std::vector<PixelPosition>& hot_pixels() const { return hot_; }
+  /// Replaces the hot pixels. Those outside the sensor are ignored.
+  void set_hot_pixels(std::vector<PixelPosition> pixels);
+
+ private:
+  static constexpr std::uint32_t hot_bit = std::uint32_t{1} << 31;
+  static constexpr std::uint32_t count_bits = hot_bit - 1;
+
+  void learn(const Settings& settings);
+  void clear_counts();
+  std::uint32_t median_around(int x, int y) const;
+
+  /// Events in the learning period, and whether the pixel is hot.
+  Image<std::uint32_t> pixels_;
+  std::vector<PixelPosition> hot_;
+  Microseconds learning_end_ = never;
+  static constexpr Microseconds never = std::numeric_limits<Microseconds>::max();
+};
+static_assert(Filter<HotPixelFilter>);
+
+}  // namespace eventcamera

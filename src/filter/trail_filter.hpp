@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include "src/filter/filter.hpp"
+#include "src/filter/stamped_pixels.hpp"
+
+namespace eventcamera {
+
+/// What to keep of a burst: successive events of a pixel, of one polarity and each less than the
+/// threshold after the one before.
+enum class TrailMode {
+  trail,           ///< the first event
+  stc_cut_trail,   ///< the second event
+  stc_keep_trail,  ///< all events but the first
+};
+
+/// The event trail filter of Prophesee's sensors (OpenEB, I_EventTrailFilterModule), per pixel. STC
+/// (spatio-temporal contrast) takes single events for noise. 4 bytes per pixel.
+class TrailFilter {
+ public:
+  struct Settings {
+    TrailMode mode = TrailMode::trail;
+    Nanoseconds threshold = 10'000'000;  ///< 0 to max_filter_time
+  };
+
+  explicit TrailFilter(SensorSize sensor) : last_(sensor) {}
+
+  LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings) {
+    const Stamp threshold = in_stamps(settings.threshold);
+    const bool keeps_first = settings.mode == TrailMode::trail;
+    const bool keeps_third = settings.mode == TrailMode::stc_keep_trail;
+    return last_.keep_if(events, start, [=](const Event& event, Stamp now, LastEvent* last) {
+      const bool is_on = event.polarity() == Polarity::on;
+      const bool follows = is_on == last->is_on() && now - last->stamp() < threshold;
+      const bool is_third = follows && last->follows();
+      *last = LastEvent(now, follows, is_on);
+      return follows != keeps_first && (keeps_third || !is_third);
+    });
+  }
+
+  void forget() { last_.forget(); }
+
+ private:
+  /// The last event of a pixel.
+  class LastEvent {
+   public:
+    LastEvent() = default;
+    LastEvent(Stamp stamp, bool follows, bool is_on)
+        : bits_(stamp << 2 | (follows ? 2U : 0U) | (is_on ? 1U : 0U)) {}
+
+    Stamp stamp() const { return bits_ >> 2; }
+    bool follows() const { return (bits_ & 2) != 0; }  ///< it was not the first of a burst
+    bool is_on() const { return (bits_ & 1) != 0; }
+    void lower(std::uint64_t amount) { bits_ = lowered(stamp(), amount) << 2 | (bits_ & 3); }
+
+   private:
+    std::uint32_t bits_ = 0;
+  };
+  static_assert(stamp_bits + 2 <= 32);
+
+  StampedPixels<LastEvent> last_;
+};
+static_assert(Filter<TrailFilter>);
+
+}  // namespace eventcamera
