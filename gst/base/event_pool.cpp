@@ -92,3 +92,25 @@ void event_pool_reserve(GstBuffer* buffer, gsize size) {
   }
   gst_buffer_set_size(buffer, static_cast<gssize>(size));
 }
+
+GstFlowReturn EventBuffers::acquire(gsize size, OwnedBuffer& buffer) {
+  if (!pool_) {
+    pool_.reset(event_pool_new());
+    GstStructure* config = gst_buffer_pool_get_config(pool_.get());
+    gst_buffer_pool_config_set_params(config, nullptr, 0, 0, 0);
+    if (!gst_buffer_pool_set_config(pool_.get(), config) ||
+        !gst_buffer_pool_set_active(pool_.get(), TRUE))
+      throw std::bad_alloc();
+  }
+  GstBuffer* acquired = nullptr;
+  const auto result = gst_buffer_pool_acquire_buffer(pool_.get(), &acquired, nullptr);
+  if (result != GST_FLOW_OK) return result;
+  buffer.reset(acquired);
+  event_pool_reserve(acquired, size);
+  return GST_FLOW_OK;
+}
+
+void EventBuffers::reset() {
+  if (pool_) gst_buffer_pool_set_active(pool_.get(), FALSE);
+  pool_.reset();
+}

@@ -3,6 +3,8 @@
 
 #include <gst/gst.h>
 
+#include "gst/base/owned.hpp"
+
 /// Makes a pool of event buffers, whose size varies between intervals. Acquired buffers are empty;
 /// event_pool_reserve() allocates the memory, which a buffer keeps when it returns to the pool.
 /// Memory is freed when no interval has needed as much for a while, or when too much is idle.
@@ -11,6 +13,24 @@ GstBufferPool* event_pool_new();
 /// Gives an empty buffer of such a pool `size` > 0 bytes to write. Throws std::bad_alloc. Not
 /// thread-safe.
 void event_pool_reserve(GstBuffer* buffer, gsize size);
+
+/// Event buffers of a stream, from a pool of its own. Not thread-safe.
+class EventBuffers {
+ public:
+  EventBuffers() = default;
+  ~EventBuffers() { reset(); }
+  EventBuffers(const EventBuffers&) = delete;
+  EventBuffers& operator=(const EventBuffers&) = delete;
+
+  /// Acquires a buffer of `size` > 0 bytes to write. Throws std::bad_alloc.
+  GstFlowReturn acquire(gsize size, OwnedBuffer& buffer);
+
+  /// Frees the pool, once its buffers are back.
+  void reset();
+
+ private:
+  OwnedBufferPool pool_;  ///< null before the first buffer
+};
 
 /// Name of the type in the plugin that this library is linked to. Each plugin defines its own.
 extern const char* const event_pool_type_name;

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/reader_pad.hpp"
 
-#include <new>
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
-#include "gst/base/event_pool.hpp"
 
 using eventcamera::SensorSize;
 
@@ -28,8 +26,7 @@ ReaderPad::~ReaderPad() {
 void ReaderPad::reset() {
   interrupt();
   started_ = false;
-  if (pool_) gst_buffer_pool_set_active(pool_.get(), FALSE);
-  pool_.reset();
+  buffers_.reset();
   size_ = {};
   video_.reset();
 }
@@ -116,21 +113,11 @@ GstFlowReturn ReaderPad::push(GstBuffer* buffer, GstClockTime pts) {
 
 GstFlowReturn ReaderPad::push(std::span<const eventcamera::Event> events, GstClockTime pts,
                               GstClockTime duration) {
-  if (!pool_) {
-    pool_.reset(event_pool_new());
-    GstStructure* config = gst_buffer_pool_get_config(pool_.get());
-    gst_buffer_pool_config_set_params(config, nullptr, 0, 0, 0);
-    if (!gst_buffer_pool_set_config(pool_.get(), config) ||
-        !gst_buffer_pool_set_active(pool_.get(), TRUE))
-      throw std::bad_alloc();
-  }
-  GstBuffer* acquired = nullptr;
-  const auto result = gst_buffer_pool_acquire_buffer(pool_.get(), &acquired, nullptr);
+  OwnedBuffer buffer;
+  const auto result = buffers_.acquire(events.size_bytes(), buffer);
   if (result != GST_FLOW_OK) return result;
-  OwnedBuffer buffer(acquired);
-  event_pool_reserve(acquired, events.size_bytes());
-  gst_buffer_fill(acquired, 0, events.data(), events.size_bytes());
-  GST_BUFFER_DURATION(acquired) = duration;
+  gst_buffer_fill(buffer.get(), 0, events.data(), events.size_bytes());
+  GST_BUFFER_DURATION(buffer.get()) = duration;
   return push(buffer.release(), pts);
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/event_pool.hpp"
 #include "gst/base/owned.hpp"
 #include "src/formats/recording_reader.hpp"
 
@@ -69,7 +70,7 @@ class ReaderPad {
   GstPad* pad_;
   std::string name_;
   GstDebugCategory* category_;
-  OwnedBufferPool pool_;  ///< of events, while the stream lasts
+  EventBuffers buffers_;  ///< while the stream lasts
   bool started_ = false;
   bool segment_due_ = true;
   bool discontinuous_ = true;

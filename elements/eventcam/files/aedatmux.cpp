@@ -39,6 +39,7 @@
 #include <utility>
 #include <vector>
 
+#include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
@@ -73,10 +74,7 @@ struct Settings {
 /// Maximum time that events wait to be written as a packet.
 constexpr Microseconds max_wait = 100'000;
 
-struct UnrefPad {
-  void operator()(GstAggregatorPad* pad) const { gst_object_unref(pad); }
-};
-using Pad = std::unique_ptr<GstAggregatorPad, UnrefPad>;
+using Pad = OwnedAggregatorPad;
 
 using Bytes = std::vector<guint8>;
 
@@ -140,15 +138,6 @@ static GType compression_type() {
 
 /* input */
 
-static std::vector<Pad> pads_of(GstAedatMux* self) {
-  std::vector<Pad> pads;
-  GST_OBJECT_LOCK(self);
-  for (const GList* list = GST_ELEMENT(self)->sinkpads; list != nullptr; list = list->next)
-    pads.emplace_back(GST_AGGREGATOR_PAD(gst_object_ref(list->data)));
-  GST_OBJECT_UNLOCK(self);
-  return pads;
-}
-
 enum class Kind { events, video, unknown };
 
 static Kind kind_of(const GstCaps* caps) {
@@ -182,7 +171,7 @@ static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
 /// come before a frame of the same time. Null if no pad has a buffer.
 static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   Pad earliest;
-  for (Pad& pad : pads_of(self)) {
+  for (Pad& pad : sink_pads(self)) {
     const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(pad.get()));
     if (!buffer) continue;
     const GstClockTime running = running_time(pad.get(), buffer.get());
@@ -237,7 +226,7 @@ static void send_segment(GstAedatMux* self, guint64 position) {
 /// stream.
 static gint64 shift_of(GstAedatMux* self) {
   Pad pad;
-  for (Pad& other : pads_of(self))
+  for (Pad& other : sink_pads(self))
     if (!pad || kind_of(other.get()) == Kind::events) pad = std::move(other);
   if (!pad) return 0;
   GST_OBJECT_LOCK(pad.get());
@@ -256,7 +245,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
     settings.size = {GST_VIDEO_INFO_WIDTH(&*state.video), GST_VIDEO_INFO_HEIGHT(&*state.video)};
   settings.source = state.source;
   settings.frames = std::ranges::any_of(
-      pads_of(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
+      sink_pads(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
   settings.table = can_seek_bytes(GST_AGGREGATOR_SRC_PAD(self));
   settings.compression = self->priv->settings.copy().compression;
   settings.triggers = state.triggers.has_value();
@@ -390,11 +379,11 @@ static bool is_at_end(const Pad& pad) {
 static bool is_known(GstAedatMux* self) {
   const State& state = self->priv->state;
   if (state.size != SensorSize{})
-    return std::ranges::all_of(pads_of(self), [](const Pad& pad) {
+    return std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
       return kind_of(pad.get()) != Kind::events || is_at_end(pad) ||
              OwnedBuffer(gst_aggregator_pad_peek_buffer(pad.get()));
     });
-  return state.video && std::ranges::all_of(pads_of(self), [](const Pad& pad) {
+  return state.video && std::ranges::all_of(sink_pads(self), [](const Pad& pad) {
            return kind_of(pad.get()) == Kind::video || is_at_end(pad);
          });
 }
@@ -402,7 +391,7 @@ static bool is_known(GstAedatMux* self) {
 /// Writes the header, the earliest buffer, or the end of the file. May throw.
 static GstFlowReturn write_some(GstAedatMux* self) {
   auto& encoder = self->priv->state.encoder;
-  const bool ended = std::ranges::all_of(pads_of(self), is_at_end);
+  const bool ended = std::ranges::all_of(sink_pads(self), is_at_end);
   if (!encoder) {
     if (!is_known(self)) {
       if (!ended) return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -441,7 +430,7 @@ static GstClockTime get_next_time(GstAggregator* aggregator) {
 static bool take_caps(GstAedatMux* self, GstAggregatorPad* pad, const GstCaps* caps) {
   State& state = self->priv->state;
   const Kind kind = kind_of(caps);
-  for (const Pad& other : pads_of(self)) {
+  for (const Pad& other : sink_pads(self)) {
     if (other.get() == pad || kind_of(other.get()) != kind) continue;
     GST_ELEMENT_ERROR(
         self, STREAM, MUX,
@@ -534,7 +523,7 @@ static GstAggregatorPad* create_new_pad(GstAggregator* aggregator, GstPadTemplat
   if (kind == any_pad)
     return PARENT_AGGREGATOR_CLASS->create_new_pad(aggregator, templ, wanted, caps);
   const auto is_of_kind = [&](const Pad& pad) { return GST_PAD_PAD_TEMPLATE(pad.get()) == templ; };
-  if (std::ranges::any_of(pads_of(self), is_of_kind)) {
+  if (std::ranges::any_of(sink_pads(self), is_of_kind)) {
     GST_WARNING_OBJECT(self, "pad %s already exists", kind.data());
     return nullptr;
   }
