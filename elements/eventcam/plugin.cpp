@@ -25,7 +25,7 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 // clang-format off
 #define ELEMENTS(X)                                                                        \
   AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X)                                       \
-  X(eventcompare) X(eventoverlay) X(eventrender) X(eventstats)                             \
+  X(eventcompare) X(eventmerge) X(eventoverlay) X(eventrender) X(eventstats)               \
   X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
   X(eventantiflicker) X(eventdenoise) X(eventhotpixel) X(eventratecontrol)                 \
   X(eventrefractory) X(eventtrail)                                                         \
@@ -35,5 +35,6 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 #define TYPE_FINDERS(X) \
   X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(npz) X(propheseedat) X(propheseeraw)
 
-EVENTSIM_PLUGIN(eventcam, "Event streams: read, write, draw, measure and send events", ELEMENTS,
-                TYPE_FINDERS)
+EVENTSIM_PLUGIN(eventcam,
+                "Event streams: read, write, filter, merge, draw, measure and send events",
+                ELEMENTS, TYPE_FINDERS)

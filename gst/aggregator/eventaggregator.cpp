@@ -24,7 +24,7 @@ G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventAggregator, gst_event_aggregator, GST_T
 EventAggregator::EventAggregator(GstAggregator* element, const Role& role)
     : element_(element),
       role_(role),
-      main_pad_(pad(role.main_pad)),
+      main_pad_(role.main_pad != nullptr ? pad(role.main_pad) : nullptr),
       faults_(role.verb, GST_CAT_DEFAULT) {}
 
 GstAggregatorPad* EventAggregator::pad(const char* name) const {
@@ -167,9 +167,9 @@ struct EventAggregatorFunctions {
   static gboolean src_event(GstAggregator* element, GstEvent* event) {
     if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
       const SeekRequest request(event);
-      for (const GList* pads = GST_ELEMENT(element)->sinkpads; pads != nullptr; pads = pads->next) {
-        if (would_seek(GST_AGGREGATOR_PAD(pads->data), request)) continue;
-        GST_WARNING_OBJECT(pads->data, "upstream would refuse: refused %" GST_PTR_FORMAT, event);
+      for (const auto& pad : sink_pads(element)) {
+        if (would_seek(pad.get(), request)) continue;
+        GST_WARNING_OBJECT(pad.get(), "upstream would refuse: refused %" GST_PTR_FORMAT, event);
         gst_event_unref(event);
         return FALSE;
       }
@@ -179,9 +179,13 @@ struct EventAggregatorFunctions {
   }
 
   static gboolean src_query(GstAggregator* element, GstQuery* query) {
-    if (GST_QUERY_TYPE(query) ==
-        GST_QUERY_SEEKING)  // GstAggregator would always answer that seeking is impossible
-      return gst_pad_peer_query(GST_PAD(of(element).main_pad_), query);
+    if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING) {
+      // GstAggregator would always answer that seeking is impossible.
+      GstAggregatorPad* const main = of(element).main_pad_;
+      if (main != nullptr) return gst_pad_peer_query(GST_PAD(main), query);
+      const auto pads = sink_pads(element);
+      return !pads.empty() && gst_pad_peer_query(GST_PAD(pads.front().get()), query) ? TRUE : FALSE;
+    }
     return PARENT_AGGREGATOR_CLASS->src_query(element, query);
   }
 
@@ -232,7 +236,8 @@ void gst_event_aggregator_add_pads(GstEventAggregator* self) {
            gst_element_class_get_pad_template_list(GST_ELEMENT_GET_CLASS(self));
        templates != nullptr; templates = templates->next) {
     auto* pad_template = GST_PAD_TEMPLATE(templates->data);
-    if (GST_PAD_TEMPLATE_DIRECTION(pad_template) == GST_PAD_SINK)
+    if (GST_PAD_TEMPLATE_DIRECTION(pad_template) == GST_PAD_SINK &&
+        GST_PAD_TEMPLATE_PRESENCE(pad_template) == GST_PAD_ALWAYS)
       gst_element_add_pad(
           GST_ELEMENT(self),
           GST_PAD(g_object_new(GST_TYPE_AGGREGATOR_PAD, "name",

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
@@ -14,14 +15,17 @@
 /// GstEventAggregator owns one, which lives as long as the element.
 ///
 /// One sink pad is the main pad: its segment is that of the output, and its upstream answers
-/// seeking queries. A seek is forwarded to all pads, or to none if one of them would refuse it.
+/// seeking queries. If pads are requested there is none; the subclass sets the segment, and
+/// upstream of the first pad answers. A seek is forwarded to all pads, or to none if one of them
+/// would refuse it.
 ///
 /// Called from the source pad's thread only, or while there is none.
 class EventAggregator {
  public:
   struct Role {
-    const char* verb;               ///< what the element does with events, for messages: "draw"
-    const char* main_pad = "sink";  ///< name of the main pad
+    const char* verb;  ///< what the element does with events, for messages: "draw"
+    /// Name of the main pad; null if pads are requested.
+    const char* main_pad = "sink";
     /// Output buffers are those of the main pad, with its caps.
     bool passes_main_pad = true;
   };
@@ -54,6 +58,7 @@ class EventAggregator {
   GstAggregator* element() const { return element_; }
   /// Returns a sink pad by name.
   GstAggregatorPad* pad(const char* name) const;
+  /// The main pad; null if pads are requested.
   GstAggregatorPad* main_pad() const { return main_pad_; }
 
   /// Warns about skipped events.
@@ -85,7 +90,7 @@ struct _GstEventAggregatorClass {
   GstAggregatorClass parent_class;
 };
 
-/// Adds a sink pad per template.
+/// Adds a sink pad per template of an always pad.
 void gst_event_aggregator_add_pads(GstEventAggregator* self);
 
 void gst_event_aggregator_set_inside(GstEventAggregator* self,

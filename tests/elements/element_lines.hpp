@@ -64,7 +64,7 @@ class Kind {
   const std::string& name() const { return name_; }
 
   /// Its pads, including those that appear on request or later, which get the number 0. Request
-  /// pads for both frames and events are left out: there is one for each.
+  /// pads for both frames and events are left out: there is one for each. eventmerge has two.
   std::vector<Pad> pads(GstPadDirection direction) const {
     std::vector<Pad> pads;
     for (const GList* item = gst_element_factory_get_static_pad_templates(factory_);
@@ -75,6 +75,8 @@ class Kind {
       if (const auto number = name.find("%u"); number != name.npos) name.replace(number, 2, "0");
       Pad pad{std::move(name), Owned<GstCaps>(gst_static_pad_template_get_caps(templ)),
               templ->presence};
+      if (name_ == "eventmerge" && pad.presence == GST_PAD_REQUEST)
+        pads.push_back({"sink_1", Owned<GstCaps>(gst_caps_ref(pad.caps.get())), pad.presence});
       if (pad.presence != GST_PAD_REQUEST || !pad.takes_frames() || !pad.takes_events())
         pads.push_back(std::move(pad));
     }

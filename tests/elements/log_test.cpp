@@ -88,6 +88,8 @@ constexpr Case cases[] = {
     {"eventstats", EVENTS "! eventstats ! fakesink"},
     {"eventcompare", EVENTS "! tee name=t ! queue ! compare.reference eventcompare name=compare ! "
                             "fakesink t. ! queue ! compare.candidate"},
+    {"eventmerge", EVENTS "! tee name=t ! queue ! merge. eventmerge name=merge ! fakesink t. ! "
+                          "queue ! merge."},
     {"eventrender", EVENTS "! eventrender ! fakesink"},
     {"eventoverlay",
      EVENTS "! overlay.event_sink eventoverlay name=overlay ! fakesink videotestsrc "

@@ -93,6 +93,7 @@ std::vector<GParamSpec*> writable_properties_of(GstElement* element) {
         "GstObject",         "GstBaseTransform",    "GstAggregator",        "GstBaseSink",
         "GstRTPBasePayload", "GstRTPBaseDepayload", "GstEventDatagramDepay"};
     return (spec->flags & G_PARAM_WRITABLE) == 0 ||
+           spec->name == std::string_view("min-streams") ||  // waits for streams that never come
            std::ranges::find(excluded, g_type_name(spec->owner_type)) != std::end(excluded);
   });
   return properties;

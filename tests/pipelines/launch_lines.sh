@@ -101,6 +101,11 @@ for filter in eventdenoise "eventdenoise method=baf" "eventdenoise method=time-k
 done
 launch filesrc location=candidate.raw ! evtdec ! eventhotpixel location=hot.txt learn=false ! eventantiflicker mode=band-pass ! fakesink
 
+# Merged: two recordings, and two live streams side by side.
+launch eventmerge name=m ! evtenc ! filesink location=both.raw  filesrc location=candidate.raw ! evtdec ! m.  filesrc location=refractory.raw ! evtdec ! m.
+[ "$(stat -c %s both.raw)" -gt "$(stat -c %s candidate.raw)" ] || fail "the merged recording is not larger"
+launch eventmerge name=m sink_1::xpos=320 ! eventrender ! fakesink sync=true  videotestsrc is-live=true pattern=ball num-buffers=20 ! eventsim-diff ! queue ! m.  videotestsrc is-live=true pattern=snow num-buffers=20 ! eventsim-frame ! queue ! m.
+
 # Interrupted with -e, the file is complete.
 interrupt interrupted.mp4 10000 -e videotestsrc is-live=true ! eventsim-frame ! videoconvert ! x264enc tune=zerolatency ! mp4mux ! filesink buffer-mode=unbuffered location=interrupted.mp4
 launch filesrc location=interrupted.mp4 ! decodebin ! fakesink

@@ -1,0 +1,510 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventmerge
+ * @title: eventmerge
+ * @short_description: merges event streams
+ *
+ * Merges the events of two or more streams into one, in order of time. Sensors lie over each other,
+ * or side by side with the pad properties `xpos` and `ypos`; the output is as large as they need,
+ * or as the caps downstream say.
+ *
+ * Streams are merged by their timestamps, which do not change: recordings of two cameras with one
+ * clock stay synchronized. The output has the segment of the stream that starts first. Events of
+ * one microsecond are in the order of the pads. Labels stay with their events.
+ *
+ * Readers of recordings are linked to the pads in any order: name the pads, as in `m.sink_1`, to
+ * place their sensors. The output starts once #GstEventMerge:min-streams streams are linked, and an
+ * interval is sent once every stream has reached its end, or has ended.
+ *
+ * Streams from live sources are waited for no longer than the latency, to which
+ * #GstAggregator:latency adds, and need a queue before each pad. Later events are dropped, and
+ * counted in the property `stats`, as are events outside of their sensor or not sorted.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 eventmerge name=m ! evtenc ! filesink location=both.raw  filesrc location=a.raw !
+ * evtdec ! m.  filesrc location=b.raw ! evtdec ! m.
+ * gst-launch-1.0 eventmerge name=m sink_1::xpos=346 ! eventrender ! videoconvert ! autovideosink
+ * filesrc location=left.raw ! evtdec ! m.sink_0  filesrc location=right.raw ! evtdec ! m.sink_1
+ * gst-launch-1.0 eventmerge name=m ! eventrender ! videoconvert ! autovideosink  videotestsrc
+ * is-live=true pattern=ball ! eventsim-diff ! queue ! m.  videotestsrc is-live=true pattern=snow !
+ * eventsim-frame ! queue ! m.
+ * ]|
+ */
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "elements/eventcam/filters/eventmerge_pad.hpp"
+#include "gst/aggregator/eventaggregator.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_pool.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/eventcamera/eventcamera.h"
+
+GST_DEBUG_CATEGORY_STATIC(event_merge_debug);
+#define GST_CAT_DEFAULT event_merge_debug
+
+using eventcamera::EventMerger;
+using eventcamera::LabelledEvents;
+using eventcamera::max_side;
+using eventcamera::MergedInterval;
+using eventcamera::MergeInput;
+using eventcamera::Microseconds;
+using eventcamera::SensorSize;
+
+namespace {
+
+/// Maximum latency that the length of intervals adds.
+constexpr GstClockTime max_latency = GST_SECOND;
+
+struct Settings {
+  guint min_streams = 2;
+};
+
+/// Property `stats`.
+struct Counts {
+  guint64 events = 0;    ///< merged
+  guint64 late = 0;      ///< dropped, because earlier than those already sent
+  guint64 rejected = 0;  ///< dropped, because outside of their sensor, or not sorted
+};
+
+GstEventMergePadPrivate& stream_of(const OwnedAggregatorPad& pad) {
+  return *GST_EVENT_MERGE_PAD(pad.get())->priv;
+}
+
+/// The pads of an element by number, so that the order does not depend on when they are linked.
+std::vector<OwnedAggregatorPad> numbered_pads(gpointer element) {
+  auto pads = sink_pads(element);
+  std::ranges::sort(pads, {}, [](const OwnedAggregatorPad& pad) {
+    const std::string name = GST_OBJECT_NAME(pad.get());
+    return std::pair(name.size(), name);
+  });
+  return pads;
+}
+
+class EventMerge final : public EventAggregator {
+ public:
+  explicit EventMerge(GstAggregator* element)
+      : EventAggregator(element, {.verb = "merge", .main_pad = nullptr, .passes_main_pad = false}) {
+  }
+
+  void stop() override;
+  void flush() override;
+  bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
+  GstFlowReturn aggregate(bool timed_out) override;
+  GstClockTime next_time() override;
+
+  GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result);
+  GstStructure* stats() const;
+
+  Guarded<Settings> settings;
+  /// Positions of released pads, by name, for pads that are requested again: a launch line requests
+  /// a pad, sets its position, and releases it until the stream to link is there.
+  Guarded<std::map<std::string, SensorPosition>> released;
+
+ private:
+  bool load(const OwnedAggregatorPad& pad);
+  bool load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer, Microseconds length);
+  void raise_latency(GstClockTime needed);
+  void count(const MergedInterval& interval);
+  void choose_segment();
+  GstFlowReturn push(const MergedInterval& interval, EventMerger::Inputs inputs);
+  GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
+
+  Guarded<Counts> counts_;
+
+  // Accessed by the source pad's thread only, or while there is none.
+  EventMerger merger_;
+  EventBuffers buffers_;
+  GstClockTime latency_ = 0;
+  bool segment_chosen_ = false;
+  bool segment_sent_ = false;
+  WarnOnce warn_of_late_{GST_CAT_DEFAULT};
+};
+
+/* input */
+
+/// A live stream arrives so much later than the interval that it covers starts.
+void EventMerge::raise_latency(GstClockTime needed) {
+  needed = std::min(needed, max_latency);
+  if (needed <= latency_) return;
+  latency_ = needed;
+  GST_DEBUG_OBJECT(element(), "latency %" GST_TIME_FORMAT ", the longest interval",
+                   GST_TIME_ARGS(latency_));
+  gst_aggregator_set_latency(element(), latency_, latency_);
+}
+
+/// Loads the events of a queued buffer. Returns false if it is not one of events. May throw.
+bool EventMerge::load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer,
+                             Microseconds length) {
+  auto& stream = stream_of(pad);
+  const MappedEvents mapped(buffer);
+  if (!mapped) {
+    warn(EventFault::partial_event, buffer);
+    return false;
+  }
+  GST_LOG_OBJECT(pad.get(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                 mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
+  const auto invalid = stream.input.load(mapped.events(), labels_of(buffer), stream.sensor, length);
+  stream.loaded.reset(gst_buffer_ref(buffer));
+  if (invalid.outside > 0) warn(EventFault::beyond_sensor, buffer);
+  if (invalid.unsorted > 0) warn(EventFault::unsorted, buffer);
+  counts_.lock()->rejected += invalid.outside + invalid.unsorted;
+  if (!mapped.events().empty()) raise_latency(static_cast<GstClockTime>(length) * GST_USECOND);
+  return true;
+}
+
+/// Loads the next queued interval of a pad, unless that is done. Returns false if there is none.
+/// May throw.
+bool EventMerge::load(const OwnedAggregatorPad& pad) {
+  auto& stream = stream_of(pad);
+  while (const OwnedBuffer buffer{gst_aggregator_pad_peek_buffer(pad.get())}) {
+    if (const auto interval = interval_of(buffer.get())) {
+      const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
+      const auto end = static_cast<Microseconds>(interval->end / GST_USECOND);
+      if (stream.loaded == buffer || load_events(pad, buffer.get(), end - start)) {
+        stream.input.place(start, static_cast<int>(stream.placed.x),
+                           static_cast<int>(stream.placed.y));
+        return true;
+      }
+    } else {
+      warn(GST_BUFFER_PTS_IS_VALID(buffer.get()) ? EventFault::pts_too_large : EventFault::no_pts,
+           buffer.get());
+    }
+    gst_aggregator_pad_drop_buffer(pad.get());
+  }
+  stream.input.unload();
+  stream.loaded.reset();
+  return false;
+}
+
+/* output */
+
+/// Chooses the segment of the stream that starts first, up to the end of the one that ends last.
+void EventMerge::choose_segment() {
+  std::optional<GstSegment> chosen;
+  GstClockTime stop = 0;
+  for (const auto& pad : numbered_pads(element())) {
+    const GstSegment segment = segment_of(pad.get());
+    stop = std::max(stop, segment.stop);  // none is the maximum
+    if (!chosen || segment.start < chosen->start) chosen = segment;
+  }
+  chosen->stop = stop;
+  gst_aggregator_update_segment(element(), &*chosen);
+}
+
+void EventMerge::count(const MergedInterval& interval) {
+  {
+    const auto counts = counts_.lock();
+    counts->events += interval.events;
+    counts->late += interval.late;
+  }
+  if (interval.late > 0)
+    warn_of_late_(element(),
+                  {GST_STREAM_ERROR_FAILED,
+                   "Left out events that arrived too late. Increase the property latency."},
+                  std::to_string(interval.late) + " events are earlier than " +
+                      std::to_string(interval.start) + " us, up to which events were sent");
+}
+
+GstFlowReturn EventMerge::push_gap(GstClockTime start, GstClockTime duration) {
+  if (duration == 0) return GST_FLOW_OK;
+  GST_LOG_OBJECT(element(), "no events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
+                 GST_TIME_ARGS(start), GST_TIME_ARGS(duration));
+  if (segment_sent_) {
+    GstPad* const src = GST_AGGREGATOR_SRC_PAD(element());
+    return gst_pad_push_event(src, gst_event_new_gap(start, duration))
+               ? GST_FLOW_OK
+               : gst_pad_get_last_flow_return(src);
+  }
+  // GstAggregator sends the segment with a buffer only.
+  OwnedBuffer empty(gst_buffer_new());
+  GST_BUFFER_PTS(empty.get()) = start;
+  GST_BUFFER_DURATION(empty.get()) = duration;
+  GST_BUFFER_FLAG_SET(empty.get(), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
+  segment_sent_ = true;
+  return gst_aggregator_finish_buffer(element(), empty.release());
+}
+
+/// Pushes the events of an interval. May throw.
+GstFlowReturn EventMerge::push(const MergedInterval& interval, EventMerger::Inputs inputs) {
+  if (!gst_pad_has_current_caps(GST_AGGREGATOR_SRC_PAD(element()))) return GST_FLOW_OK;
+  const auto start = static_cast<GstClockTime>(interval.start) * GST_USECOND;
+  const auto duration = static_cast<GstClockTime>(interval.end - interval.start) * GST_USECOND;
+  if (interval.events == 0) return push_gap(start, duration);
+  const gsize size = interval.events * sizeof(eventcamera::Event);
+  OwnedBuffer buffer;
+  const GstFlowReturn result = buffers_.acquire(size, buffer);
+  if (result != GST_FLOW_OK) return result;
+  LabelledEvents events;
+  if (interval.labelled) {
+    if (gst_buffer_add_event_camera_label_meta(buffer.get(), nullptr, interval.events) == nullptr)
+      throw std::bad_alloc();
+    events.labels = labels_of(buffer.get());
+  }
+  GstMapInfo map;
+  if (!gst_buffer_map(buffer.get(), &map, GST_MAP_WRITE)) throw std::bad_alloc();
+  events.events = {reinterpret_cast<eventcamera::Event*>(map.data), interval.events};
+  EventMerger::merge(inputs, interval, events);
+  gst_buffer_unmap(buffer.get(), &map);
+  GST_BUFFER_PTS(buffer.get()) = start;
+  GST_BUFFER_DURATION(buffer.get()) = duration;
+  if (!std::exchange(segment_sent_, true))
+    GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
+  GST_LOG_OBJECT(element(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, interval.events,
+                 GST_TIME_ARGS(start));
+  return gst_aggregator_finish_buffer(element(), buffer.release());
+}
+
+GstFlowReturn EventMerge::aggregate(bool timed_out) {
+  const auto pads = numbered_pads(element());
+  std::vector<MergeInput*> inputs;
+  bool waiting = false;
+  for (const auto& pad : pads) {
+    auto& stream = stream_of(pad);
+    if (stream.sensor != SensorSize{} && stream.placed != stream.position.copy()) {
+      gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
+      return GST_FLOW_OK;
+    }
+    if (load(pad))
+      inputs.push_back(&stream.input);
+    else if (!gst_aggregator_pad_is_eos(pad.get()))
+      waiting = true;
+  }
+  if (inputs.empty() && !waiting) return GST_FLOW_EOS;
+  if (!segment_chosen_ && pads.size() < settings.copy().min_streams) waiting = true;
+  if (inputs.empty() || (waiting && !timed_out)) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (!std::exchange(segment_chosen_, true)) choose_segment();
+  const auto interval = merger_.next(inputs);
+  count(interval);
+  const GstFlowReturn result = push(interval, inputs);
+  for (const auto& pad : pads) {
+    auto& stream = stream_of(pad);
+    if (!stream.input.is_loaded() || stream.input.end() > interval.end) continue;
+    stream.input.unload();
+    stream.loaded.reset();
+    gst_aggregator_pad_drop_buffer(pad.get());
+  }
+  return result;
+}
+
+/// Live streams are waited for until the end of the shortest interval that is known.
+GstClockTime EventMerge::next_time() {
+  GstClockTime next = GST_CLOCK_TIME_NONE;
+  for (const auto& pad : numbered_pads(element())) {
+    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(pad.get()));
+    const auto interval = buffer ? interval_of(buffer.get()) : std::nullopt;
+    if (!buffer) continue;
+    const auto start = interval ? running_time(pad.get(), interval->start) : std::nullopt;
+    next = std::min(next, start ? *start + (interval->end - interval->start) : 0);
+  }
+  return next;
+}
+
+/* negotiation, states */
+
+bool EventMerge::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return false;
+  GST_EVENT_MERGE_PAD(pad)->priv->sensor = {info.width, info.height};
+  gst_pad_mark_reconfigure(GST_AGGREGATOR_SRC_PAD(element()));
+  return true;
+}
+
+/// Places the sensors. The output has at least the size that they need.
+GstFlowReturn EventMerge::choose_caps(GstCaps* downstream, GstCaps** result) {
+  SensorSize needed;
+  for (const auto& pad : numbered_pads(element())) {
+    auto& stream = stream_of(pad);
+    if (stream.sensor == SensorSize{}) continue;
+    stream.placed = stream.position.copy();
+    needed.width = std::max(needed.width, static_cast<int>(stream.placed.x) + stream.sensor.width);
+    needed.height =
+        std::max(needed.height, static_cast<int>(stream.placed.y) + stream.sensor.height);
+  }
+  if (needed == SensorSize{}) return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const auto text = std::to_string(needed.width) + " x " + std::to_string(needed.height);
+  if (std::max(needed.width, needed.height) > max_side) {
+    GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                      ("Cannot merge: the output would have %s pixels, more than %d a side. Lower "
+                       "xpos and ypos of the pads.",
+                       text.c_str(), max_side),
+                      ("xpos + width or ypos + height of a pad is too large"));
+    return GST_FLOW_NOT_NEGOTIATED;
+  }
+  GST_DEBUG_OBJECT(element(), "the sensors need %s pixels", text.c_str());
+  const auto at_least = [](int size) {
+    GValue range = G_VALUE_INIT;
+    g_value_init(&range, GST_TYPE_INT_RANGE);
+    gst_value_set_int_range(&range, size, max_side);
+    return range;
+  };
+  const OwnedCaps ours(event_caps(needed.width, needed.height));
+  GstStructure* const structure = gst_caps_get_structure(ours.get(), 0);
+  if (needed.width < max_side) {
+    GValue width = at_least(needed.width);
+    gst_structure_take_value(structure, "width", &width);
+  }
+  if (needed.height < max_side) {
+    GValue height = at_least(needed.height);
+    gst_structure_take_value(structure, "height", &height);
+  }
+  *result = gst_caps_intersect_full(downstream, ours.get(), GST_CAPS_INTERSECT_FIRST);
+  if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
+  GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
+                    ("Cannot merge: the sensors need %s pixels, and downstream does not take that "
+                     "size. Do not set a smaller one downstream.",
+                     text.c_str()),
+                    ("downstream takes %" GST_PTR_FORMAT, downstream));
+  return GST_FLOW_NOT_NEGOTIATED;
+}
+
+void EventMerge::flush() {
+  for (const auto& pad : numbered_pads(element())) {
+    stream_of(pad).input.unload();
+    stream_of(pad).loaded.reset();
+  }
+  merger_.restart();
+  segment_chosen_ = false;
+  segment_sent_ = false;
+}
+
+void EventMerge::stop() {
+  flush();
+  for (const auto& pad : numbered_pads(element())) stream_of(pad).sensor = {};
+  buffers_.reset();
+  latency_ = 0;
+  warn_of_late_.reset();
+  *counts_.lock() = {};
+}
+
+GstStructure* EventMerge::stats() const {
+  const Counts counts = counts_.copy();
+  return gst_structure_new("application/x-event-merge-stats", "events", G_TYPE_UINT64,
+                           counts.events, "late-events", G_TYPE_UINT64, counts.late,
+                           "rejected-events", G_TYPE_UINT64, counts.rejected, nullptr);
+}
+
+}  // namespace
+
+/* type */
+
+G_DECLARE_FINAL_TYPE(GstEventMerge, gst_event_merge, GST, EVENT_MERGE, GstEventAggregator)
+
+struct _GstEventMerge {
+  GstEventAggregator parent;
+};
+
+static guint children_count(GstChildProxy* self) {
+  return static_cast<guint>(numbered_pads(self).size());
+}
+
+static GObject* child_by_index(GstChildProxy* self, guint index) {
+  auto pads = numbered_pads(self);
+  return index < pads.size() ? G_OBJECT(pads[index].release()) : nullptr;
+}
+
+/// Pads as children, so that a launch line can set their properties.
+static void child_proxy_init(gpointer interface, gpointer) {
+  auto* const child_proxy = static_cast<GstChildProxyInterface*>(interface);
+  child_proxy->get_children_count = children_count;
+  child_proxy->get_child_by_index = child_by_index;
+}
+
+G_DEFINE_TYPE_WITH_CODE(GstEventMerge, gst_event_merge, GST_TYPE_EVENT_AGGREGATOR,
+                        GST_DEBUG_CATEGORY_INIT(event_merge_debug, "eventmerge", 0,
+                                                "merged event streams");
+                        G_IMPLEMENT_INTERFACE(GST_TYPE_CHILD_PROXY, child_proxy_init))
+GST_ELEMENT_REGISTER_DEFINE(eventmerge, "eventmerge", GST_RANK_NONE, gst_event_merge_get_type())
+#define PARENT_ELEMENT_CLASS GST_ELEMENT_CLASS(gst_event_merge_parent_class)
+#define PARENT_AGGREGATOR_CLASS GST_AGGREGATOR_CLASS(gst_event_merge_parent_class)
+
+static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template, const gchar* name,
+                               const GstCaps* caps) {
+  GstPad* const pad = PARENT_ELEMENT_CLASS->request_new_pad(element, pad_template, name, caps);
+  if (pad == nullptr) return nullptr;
+  const auto position =
+      inside_of<EventMerge>(element).released.lock()->extract(GST_OBJECT_NAME(pad));
+  if (position) *GST_EVENT_MERGE_PAD(pad)->priv->position.lock() = position.mapped();
+  gst_child_proxy_child_added(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
+  return pad;
+}
+
+static void release_pad(GstElement* element, GstPad* pad) {
+  (*inside_of<EventMerge>(element).released.lock())[GST_OBJECT_NAME(pad)] =
+      GST_EVENT_MERGE_PAD(pad)->priv->position.copy();
+  gst_child_proxy_child_removed(GST_CHILD_PROXY(element), G_OBJECT(pad), GST_OBJECT_NAME(pad));
+  PARENT_ELEMENT_CLASS->release_pad(element, pad);
+}
+
+/// Duration of the longest stream.
+static gboolean answer_duration(GstElement* element, GstQuery* query) {
+  gint64 longest = -1;
+  for (const auto& pad : numbered_pads(element)) {
+    gint64 duration = -1;
+    if (gst_pad_peer_query_duration(GST_PAD(pad.get()), GST_FORMAT_TIME, &duration))
+      longest = std::max(longest, duration);
+  }
+  if (longest < 0) return FALSE;
+  gst_query_set_duration(query, GST_FORMAT_TIME, longest);
+  return TRUE;
+}
+
+static gboolean src_query(GstAggregator* aggregator, GstQuery* query) {
+  GstFormat format = GST_FORMAT_UNDEFINED;
+  if (GST_QUERY_TYPE(query) == GST_QUERY_DURATION)
+    gst_query_parse_duration(query, &format, nullptr);
+  return format == GST_FORMAT_TIME ? answer_duration(GST_ELEMENT(aggregator), query)
+                                   : PARENT_AGGREGATOR_CLASS->src_query(aggregator, query);
+}
+
+static Guarded<Settings>& settings_of(GObject* object) {
+  return inside_of<EventMerge>(object).settings;
+}
+
+static void gst_event_merge_init(GstEventMerge* self) {
+  gst_event_aggregator_make<EventMerge>(GST_EVENT_AGGREGATOR(self));
+}
+
+static void gst_event_merge_class_init(GstEventMergeClass* klass) {
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  properties.add(
+      &Settings::min_streams,
+      g_param_spec_uint("min-streams", "Minimum streams",
+                        "Number of streams that are waited for before the output starts; live "
+                        "sources are waited for no longer than the latency",
+                        1, G_MAXUINT, Settings().min_streams,
+                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                 GST_PARAM_MUTABLE_READY)));
+  properties.add_read_only(
+      +[](GObject* object, GValue* value) {
+        g_value_take_boxed(value, inside_of<EventMerge>(object).stats());
+      },
+      g_param_spec_boxed("stats", "Statistics",
+                         "Counts: events (merged), late-events (dropped, because they arrived too "
+                         "late) and rejected-events (dropped, because they are outside of their "
+                         "sensor, or not sorted)",
+                         GST_TYPE_STRUCTURE,
+                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  add_pad_template(element_class, "sink_%u", GST_PAD_SINK, EVENT_CAPS, GST_PAD_REQUEST,
+                   GST_TYPE_EVENT_MERGE_PAD);
+  add_aggregator_pad_template(GST_EVENT_AGGREGATOR_CLASS(klass), "src", GST_PAD_SRC, EVENT_CAPS);
+  gst_element_class_set_static_metadata(element_class, "Event merger", "Generic",
+                                        "Merges event streams into one", EVENTSIM_AUTHORS);
+  element_class->request_new_pad = request_new_pad;
+  element_class->release_pad = release_pad;
+  gst_type_mark_as_plugin_api(GST_TYPE_EVENT_MERGE_PAD, static_cast<GstPluginAPIFlags>(0));
+
+  GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
+  aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
+    return inside_of<EventMerge>(element).choose_caps(caps, result);
+  };
+  aggregator_class->src_query = src_query;
+}

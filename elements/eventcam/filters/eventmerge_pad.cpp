@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "elements/eventcam/filters/eventmerge_pad.hpp"
+
+#include "gst/base/properties.hpp"
+#include "src/core/max_side.hpp"
+
+G_DEFINE_TYPE(GstEventMergePad, gst_event_merge_pad, GST_TYPE_AGGREGATOR_PAD)
+
+static Guarded<SensorPosition>& position_of(GObject* object) {
+  return GST_EVENT_MERGE_PAD(object)->priv->position;
+}
+
+static void finalize(GObject* object) {
+  delete GST_EVENT_MERGE_PAD(object)->priv;
+  G_OBJECT_CLASS(gst_event_merge_pad_parent_class)->finalize(object);
+}
+
+static void gst_event_merge_pad_init(GstEventMergePad* self) {
+  self->priv = new GstEventMergePadPrivate;
+}
+
+static void gst_event_merge_pad_class_init(GstEventMergePadClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                  GST_PARAM_MUTABLE_PLAYING);
+  Properties<position_of> properties(object_class);
+  properties.add(&SensorPosition::x,
+                 g_param_spec_uint("xpos", "X position",
+                                   "Column of the output where this sensor starts (pixels)", 0,
+                                   eventcamera::max_side - 1, 0, flags));
+  properties.add(
+      &SensorPosition::y,
+      g_param_spec_uint("ypos", "Y position", "Row of the output where this sensor starts (pixels)",
+                        0, eventcamera::max_side - 1, 0, flags));
+}

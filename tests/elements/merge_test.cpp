@@ -1,0 +1,451 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// eventmerge: which events come out, when and where, and intervals that follow each other.
+#include <gst/app/gstappsrc.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "src/core/label.hpp"
+#include "tests/elements/pipeline.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::AbsoluteEvent;
+using eventcamera::Event;
+using eventcamera::Microseconds;
+using eventcamera::Polarity;
+
+constexpr GstClockTime ms = GST_MSECOND;
+constexpr const char* small = "application/x-event-camera, format=XYTP, width=8, height=4";
+
+using Events = std::vector<AbsoluteEvent>;
+
+Event on(int x, int y, std::uint32_t t) {
+  return Event::at(x, y, t, Polarity::on);
+}
+AbsoluteEvent on_at(int x, int y, Microseconds t) {
+  return AbsoluteEvent::at(x, y, t, Polarity::on);
+}
+
+/// Output of a merger, checked as it arrives: sorted events within intervals that follow each
+/// other.
+class MergedOutput {
+ public:
+  void take_interval(GstClockTime start, GstClockTime duration) {
+    EXPECT_TRUE(!GST_CLOCK_TIME_IS_VALID(end_) || start >= end_);
+    end_ = start + duration;
+  }
+  void take(GstBuffer* buffer) {
+    take_interval(GST_BUFFER_PTS(buffer), GST_BUFFER_DURATION(buffer));
+    for (const auto& event : events_of(buffer))
+      EXPECT_LE(event.t * GST_USECOND, GST_BUFFER_DURATION(buffer));
+    append_events(buffer, events);
+    EXPECT_TRUE(std::ranges::is_sorted(events, {}, &AbsoluteEvent::t));
+  }
+
+  Events events;
+
+ private:
+  GstClockTime end_ = GST_CLOCK_TIME_NONE;
+};
+
+class MergeTest : public testing::Test {
+ protected:
+  MergeTest() : inputs_("eventmerge", "sink_0", "sink_1") {}
+
+  void begin(const std::string& first = small, const std::string& second = small) {
+    gst_harness_set_src_caps_str(a(), first.c_str());
+    gst_harness_set_src_caps_str(b(), second.c_str());
+  }
+
+  GstHarness* a() { return inputs_.first.get(); }
+  GstHarness* b() { return inputs_.second.get(); }
+  GstElement* element() { return inputs_.element.get(); }
+
+  static void push(GstHarness* to, GstClockTime pts, const std::vector<Event>& events,
+                   GstClockTime duration = 10 * ms) {
+    EXPECT_EQ(gst_harness_push(to, buffer_of(pts, events, duration)), GST_FLOW_OK);
+  }
+  static void push_gap(GstHarness* to, GstClockTime pts, GstClockTime duration = 10 * ms) {
+    EXPECT_TRUE(gst_harness_push_event(to, gst_event_new_gap(pts, duration)));
+  }
+  static void end(GstHarness* input) { gst_harness_push_event(input, gst_event_new_eos()); }
+  void place_second(guint x, guint y) {
+    const GstPad* const pad = gst_element_get_static_pad(element(), "sink_1");
+    g_object_set(const_cast<GstPad*>(pad), "xpos", x, "ypos", y, nullptr);
+    gst_object_unref(const_cast<GstPad*>(pad));
+  }
+
+  /// Events up to the end, once the inputs have ended.
+  Events rest() {
+    GstBuffer* last = nullptr;
+    EXPECT_TRUE(gst_harness_pull_until_eos(a(), &last));
+    while (last != nullptr) {
+      output_.take(last);
+      gst_buffer_unref(last);
+      EXPECT_TRUE(gst_harness_pull_until_eos(a(), &last));
+    }
+    return output_.events;
+  }
+
+  /// Caps of the next buffer, whose events are added to the output.
+  std::string next_size() {
+    const Buffer buffer(gst_harness_pull(a()));
+    EXPECT_TRUE(buffer);
+    if (buffer) output_.take(buffer.get());
+    const Owned<GstCaps> caps(gst_pad_get_current_caps(a()->sinkpad));
+    int width = 0;
+    int height = 0;
+    gst_structure_get(gst_caps_get_structure(caps.get(), 0), "width", G_TYPE_INT, &width, "height",
+                      G_TYPE_INT, &height, nullptr);
+    return std::to_string(width) + "x" + std::to_string(height);
+  }
+
+  TwoInputs inputs_;
+  MergedOutput output_;
+};
+
+TEST_F(MergeTest, SortsByTimeThenByPad) {
+  begin();
+  push(a(), 0, {on(1, 0, 0), on(2, 0, 5), on(3, 0, 7)});
+  push(b(), 0, {on(4, 0, 0), on(5, 0, 6), on(6, 0, 7)});
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(1, 0, 0), on_at(4, 0, 0), on_at(2, 0, 5), on_at(5, 0, 6),
+                            on_at(3, 0, 7), on_at(6, 0, 7)}));
+  EXPECT_EQ(stat_of(element(), "events"), 6U);
+}
+
+TEST_F(MergeTest, JoinsIntervalsThatAreCutDifferently) {
+  begin();
+  push(a(), 0, {on(1, 0, 9'999)});
+  push(b(), 3 * ms, {on(2, 0, 0), on(3, 0, 8'000)}, 9 * ms);
+  push(a(), 10 * ms, {on(4, 0, 500), on(5, 0, 4'000)});
+  push(b(), 12 * ms, {on(6, 0, 1'000)}, 9 * ms);
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(2, 0, 3'000), on_at(1, 0, 9'999), on_at(4, 0, 10'500),
+                            on_at(3, 0, 11'000), on_at(6, 0, 13'000), on_at(5, 0, 14'000)}));
+}
+
+TEST_F(MergeTest, KeepsTimesThatAreNoWholeMicroseconds) {
+  begin();
+  push(a(), 1'999, {on(1, 0, 0), on(2, 0, 10)}, 10'001);
+  push(b(), 2'500, {on(3, 0, 9)}, 9'900);
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(1, 0, 1), on_at(2, 0, 11), on_at(3, 0, 11)}));
+}
+
+TEST_F(MergeTest, PutsSensorsSideBySide) {
+  place_second(8, 1);
+  begin();
+  push(a(), 0, {on(7, 3, 1)});
+  push(b(), 0, {on(0, 0, 2), on(7, 3, 3)});
+  EXPECT_EQ(next_size(), "16x5");
+  EXPECT_EQ(output_.events, (Events{on_at(7, 3, 1), on_at(8, 1, 2), on_at(15, 4, 3)}));
+  place_second(0, 0);
+  push(a(), 10 * ms, {on(7, 3, 1)});
+  push(b(), 10 * ms, {on(0, 0, 2)});
+  EXPECT_EQ(next_size(), "8x4");
+  EXPECT_EQ(output_.events.back(), on_at(0, 0, 10'002));
+}
+
+TEST_F(MergeTest, HasTheSizeThatDownstreamSets) {
+  gst_harness_set_sink_caps_str(a(), "application/x-event-camera, width=20, height=30");
+  begin();
+  push(a(), 0, {on(7, 3, 1)});
+  push(b(), 0, {});
+  EXPECT_EQ(next_size(), "20x30");
+}
+
+TEST_F(MergeTest, RefusesASizeThatIsTooSmall) {
+  gst_harness_set_sink_caps_str(a(), "application/x-event-camera, width=4, height=4");
+  begin();
+  push(a(), 0, {on(7, 3, 1)});
+  push(b(), 0, {});
+  const Owned<GstMessage> error(
+      gst_bus_timed_pop_filtered(inputs_.bus.get(), 10 * GST_SECOND, GST_MESSAGE_ERROR));
+  ASSERT_TRUE(error);
+  EXPECT_NE(text_of(error.get()).find("the sensors need 8 x 4 pixels"), std::string::npos);
+}
+
+TEST_F(MergeTest, RefusesASensorOfMoreThanTheMaximum) {
+  place_second(16'380, 0);
+  begin();
+  push(a(), 0, {on(7, 3, 1)});
+  push(b(), 0, {});
+  const Owned<GstMessage> error(
+      gst_bus_timed_pop_filtered(inputs_.bus.get(), 10 * GST_SECOND, GST_MESSAGE_ERROR));
+  ASSERT_TRUE(error);
+  EXPECT_NE(text_of(error.get()).find("16388 x 4 pixels"), std::string::npos);
+}
+
+TEST_F(MergeTest, GoesOnPastTheEndOfOneStream) {
+  begin();
+  push(a(), 0, {on(1, 0, 1)});
+  push(b(), 0, {on(2, 0, 2)});
+  end(a());
+  push(b(), 10 * ms, {on(3, 0, 3)});
+  push(b(), 20 * ms, {on(4, 0, 4)});
+  end(b());
+  EXPECT_EQ(rest(),
+            (Events{on_at(1, 0, 1), on_at(2, 0, 2), on_at(3, 0, 10'003), on_at(4, 0, 20'004)}));
+}
+
+TEST_F(MergeTest, GoesOnWithoutAStreamThatEndsBeforeItBegins) {
+  gst_harness_set_src_caps_str(a(), small);
+  end(b());
+  push(a(), 0, {on(1, 0, 1)});
+  end(a());
+  EXPECT_EQ(rest(), Events{on_at(1, 0, 1)});
+}
+
+TEST_F(MergeTest, SendsGapsWhereNoStreamHasEvents) {
+  begin();
+  push(a(), 0, {on(1, 0, 1)});
+  push_gap(b(), 0);
+  push_gap(a(), 10 * ms);
+  push_gap(b(), 10 * ms, 20 * ms);
+  push(a(), 20 * ms, {on(2, 0, 1)});
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(1, 0, 1), on_at(2, 0, 20'001)}));
+  std::vector<std::pair<GstClockTime, GstClockTime>> gaps;
+  while (const Owned<GstEvent> event{gst_harness_try_pull_event(a())}) {
+    if (GST_EVENT_TYPE(event.get()) != GST_EVENT_GAP) continue;
+    const auto gap = gap_of(event.get());
+    gaps.emplace_back(gap.start, gap.duration);
+  }
+  EXPECT_EQ(gaps, (std::vector<std::pair<GstClockTime, GstClockTime>>{{10 * ms, 10 * ms}}));
+}
+
+TEST_F(MergeTest, BeginsWithAnEmptyIntervalIfNothingHappens) {
+  begin();
+  push_gap(a(), 0);
+  push_gap(b(), 0);
+  const Buffer buffer(gst_harness_pull(a()));
+  ASSERT_TRUE(buffer);
+  EXPECT_EQ(gst_buffer_get_size(buffer.get()), 0U);
+  EXPECT_EQ(GST_BUFFER_DURATION(buffer.get()), 10 * ms);
+}
+
+TEST_F(MergeTest, FollowsCapsThatChange) {
+  begin();
+  push(a(), 0, {on(7, 3, 1)});
+  push(b(), 0, {on(7, 3, 2)});
+  EXPECT_EQ(next_size(), "8x4");
+  gst_harness_set_src_caps_str(b(), "application/x-event-camera, format=XYTP, width=9, height=40");
+  push(a(), 10 * ms, {on(7, 3, 1)});
+  push(b(), 10 * ms, {on(8, 39, 2)});
+  EXPECT_EQ(next_size(), "9x40");
+  EXPECT_EQ(output_.events.back(), on_at(8, 39, 10'002));
+  EXPECT_EQ(stat_of(element(), "rejected-events"), 0U);
+}
+
+TEST_F(MergeTest, DropsWhatHasNoTimeOrIsOutsideOrUnsorted) {
+  begin();
+  push(a(), GST_CLOCK_TIME_NONE, {on(1, 0, 1)});
+  push(b(), 0, {on(2, 0, 2)});
+  push(a(), 0, {on(8, 0, 1), on(1, 0, 3), on(1, 0, 2), on(1, 0, 10'001)});
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(2, 0, 2), on_at(1, 0, 3)}));
+  EXPECT_EQ(stat_of(element(), "rejected-events"), 3U);
+  int warnings = 0;
+  while (inputs_.message(GST_MESSAGE_WARNING)) ++warnings;
+  EXPECT_EQ(warnings, 3);
+}
+
+TEST_F(MergeTest, DropsIntervalsThatGoBack) {
+  begin();
+  push(a(), 0, {on(1, 0, 1)});
+  push(b(), 0, {on(2, 0, 2)});
+  push(a(), 5 * ms, {on(3, 0, 4'000), on(3, 0, 6'000)});
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(1, 0, 1), on_at(2, 0, 2), on_at(3, 0, 11'000)}));
+  EXPECT_EQ(stat_of(element(), "late-events"), 1U);
+}
+
+TEST_F(MergeTest, StartsOverAfterAFlush) {
+  begin();
+  push(a(), 50 * ms, {on(1, 0, 1)});
+  flush({a(), b()});
+  for (auto* h : {a(), b()}) push_segment(h);
+  push(a(), 0, {on(2, 0, 5)});
+  push(b(), 0, {on(3, 0, 6)});
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(2, 0, 5), on_at(3, 0, 6)}));
+}
+
+/// Two recordings, of which the second one starts earlier.
+TEST_F(MergeTest, MergesByTimestamps) {
+  begin();
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.start = 20 * ms;
+  gst_harness_push_event(a(), gst_event_new_segment(&segment));
+  segment.start = 10 * ms;
+  segment.stop = 40 * ms;
+  gst_harness_push_event(b(), gst_event_new_segment(&segment));
+  push(a(), 20 * ms, {on(1, 0, 1)});
+  push(b(), 10 * ms, {on(2, 0, 3)}, 20 * ms);
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(2, 0, 10'003), on_at(1, 0, 20'001)}));
+  const Owned<GstEvent> event(gst_pad_get_sticky_event(a()->sinkpad, GST_EVENT_SEGMENT, 0));
+  gst_event_copy_segment(event.get(), &segment);
+  EXPECT_EQ(segment.start, 10 * ms);
+  EXPECT_EQ(segment.stop, GST_CLOCK_TIME_NONE);
+}
+
+TEST_F(MergeTest, KeepsLabels) {
+  begin();
+  GstBuffer* const labelled = buffer_of(0, {on(1, 0, 1), on(2, 0, 3)}, 10 * ms);
+  const GstEventCameraLabel labels[] = {{7, GST_EVENT_CAMERA_CAUSE_LIGHT, 0},
+                                        {0, GST_EVENT_CAMERA_CAUSE_LEAK, 0}};
+  gst_buffer_add_event_camera_label_meta(labelled, labels, 2);
+  gst_harness_push(a(), labelled);
+  push(b(), 0, {on(3, 0, 2)});
+  const Buffer buffer(gst_harness_pull(a()));
+  ASSERT_TRUE(buffer);
+  const auto* meta = gst_buffer_get_event_camera_label_meta(buffer.get());
+  ASSERT_NE(meta, nullptr);
+  ASSERT_EQ(meta->n_labels, 3U);
+  EXPECT_EQ(meta->labels[0].object_class, 7);
+  EXPECT_EQ(meta->labels[0].cause, GST_EVENT_CAMERA_CAUSE_LIGHT);
+  EXPECT_EQ(meta->labels[1].cause, GST_EVENT_CAMERA_CAUSE_UNKNOWN);
+  EXPECT_EQ(meta->labels[2].cause, GST_EVENT_CAMERA_CAUSE_LEAK);
+}
+
+/* pipelines */
+
+/// Two recordings, and their events.
+struct Recordings {
+  Recordings() {
+    write(a, "ball");
+    write(b, "bar");
+  }
+
+  static void write(const TemporaryFile& file, const std::string& pattern) {
+    Pipeline pipeline("videotestsrc num-buffers=30 pattern=" + pattern +
+                      (pattern == "bar" ? " horizontal-speed=2" : "") +
+                      " ! video/x-raw, width=64, height=48 ! eventsim-sparse ! evtenc" +
+                      file.sink());
+    EXPECT_TRUE(pipeline.play()) << pipeline.error;
+  }
+  static Events read(const TemporaryFile& file) {
+    Player player(file.source() + "evtdec");
+    EXPECT_TRUE(player.play()) << player.error;
+    return player.events;
+  }
+
+  TemporaryFile a;
+  TemporaryFile b;
+};
+
+auto order_of(const AbsoluteEvent& event) {
+  return std::tuple(event.t, event.x, event.y_p);
+}
+Events sorted(Events events) {
+  std::ranges::sort(events, {}, order_of);
+  return events;
+}
+
+TEST(Merge, WritesTwoRecordingsIntoOne) {
+  const Recordings recordings;
+  const TemporaryFile both;
+  Pipeline pipeline("eventmerge name=m ! evtenc" + both.sink() + "  " + recordings.a.source() +
+                    "evtdec ! m.  " + recordings.b.source() +
+                    "evtdec buffer-duration=7000000 ! m.");
+  ASSERT_TRUE(pipeline.play()) << pipeline.error;
+  EXPECT_TRUE(pipeline.warnings.empty());
+  auto expected = Recordings::read(recordings.a);
+  const auto second = Recordings::read(recordings.b);
+  ASSERT_GT(expected.size(), 100U);
+  ASSERT_GT(second.size(), 100U);
+  expected.insert(expected.end(), second.begin(), second.end());
+  const auto merged = Recordings::read(both);
+  EXPECT_TRUE(std::ranges::is_sorted(merged, {}, &AbsoluteEvent::t));
+  EXPECT_EQ(sorted(merged), sorted(expected));
+}
+
+TEST(Merge, SeeksInAllRecordings) {
+  const Recordings recordings;
+  Player player("eventmerge name=m sink_1::xpos=64  " + recordings.a.source() +
+                "evtdec ! m.sink_0  " + recordings.b.source() + "evtdec ! m.sink_1  m.");
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  EXPECT_GT(player.duration(), 900 * ms);
+  ASSERT_TRUE(player.seek(500 * ms, 700 * ms));
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  ASSERT_TRUE(player.play()) << player.error;
+  // The recordings start with their first events.
+  const auto first = Recordings::read(recordings.a).front().t;
+  Events expected;
+  const auto expect = [&](const Events& events, int offset) {
+    for (auto event : events) {
+      event.x = static_cast<std::uint16_t>(event.x + offset);
+      if (event.t >= first + 500'000 && event.t < first + 700'000) expected.push_back(event);
+    }
+  };
+  expect(Recordings::read(recordings.a), 0);
+  expect(Recordings::read(recordings.b), 64);
+  ASSERT_GT(expected.size(), 100U);
+  EXPECT_EQ(sorted(player.events), sorted(expected));
+}
+
+TEST(Merge, WaitsForTheSecondStream) {
+  const Owned<GstHarness> first(gst_harness_new_with_padnames("eventmerge", "sink_0", "src"));
+  gst_harness_set_live(first.get(), FALSE);
+  gst_harness_set_src_caps_str(first.get(), small);
+  gst_harness_push(first.get(), buffer_of(0, {on(1, 0, 1)}, 10 * ms));
+  g_usleep(100'000);
+  EXPECT_EQ(gst_harness_buffers_in_queue(first.get()), 0U);
+  const Owned<GstHarness> second(gst_harness_new_with_element(first->element, "sink_1", nullptr));
+  gst_harness_set_live(second.get(), FALSE);
+  gst_harness_set_src_caps_str(second.get(), small);
+  gst_harness_push(second.get(), buffer_of(0, {on(2, 0, 0)}, 10 * ms));
+  const Buffer buffer(gst_harness_pull(first.get()));
+  ASSERT_TRUE(buffer);
+  EXPECT_EQ(events_of(buffer.get()).size(), 2U);
+}
+
+TEST(Merge, MergesLiveStreams) {
+  Player player(
+      "videotestsrc is-live=true pattern=ball num-buffers=15 ! video/x-raw, width=64, height=48, "
+      "framerate=50/1 ! eventsim-frame ! queue ! eventmerge name=m sink_1::ypos=48  videotestsrc "
+      "is-live=true pattern=ball num-buffers=10 ! video/x-raw, width=64, height=48, "
+      "framerate=30/1 ! eventsim-frame ! queue ! m.sink_1  m.");
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_TRUE(player.warnings.empty()) << player.warnings.front();
+  EXPECT_EQ(player.events.size(), player.stat("m", "events"));
+  EXPECT_TRUE(std::ranges::is_sorted(player.events, {}, &AbsoluteEvent::t));
+  EXPECT_TRUE(std::ranges::any_of(player.events, [](const auto& e) { return e.y() < 48; }));
+  EXPECT_TRUE(std::ranges::any_of(player.events, [](const auto& e) { return e.y() >= 48; }));
+}
+
+/// The live stream goes on without the other one, whose events are then too late.
+TEST(Merge, GoesOnWithoutALateLiveStream) {
+  Player player(
+      "videotestsrc is-live=true pattern=ball ! video/x-raw, width=64, height=48, "
+      "framerate=50/1 ! eventsim-frame ! queue ! m.sink_0  appsrc name=late is-live=true "
+      "format=time "
+      "caps=\"application/x-event-camera, format=XYTP, width=8, height=4\" ! queue ! m.sink_1  "
+      "eventmerge "
+      "name=m");
+  player.set(GST_STATE_PLAYING);
+  const auto wait_until = [&](const auto& done) {
+    for (int i = 0; i < 1000 && !done(); ++i) g_usleep(10'000);
+    return done();
+  };
+  ASSERT_TRUE(wait_until([&] { return player.stat("m", "events") > 100; }));
+  gst_app_src_push_buffer(GST_APP_SRC(player["late"]), buffer_of(0, {on(1, 1, 1)}, 10 * ms));
+  EXPECT_TRUE(wait_until([&] { return player.stat("m", "late-events") == 1; }));
+  const auto before = player.stat("m", "events");
+  EXPECT_TRUE(wait_until([&] { return player.stat("m", "events") > before; }));
+}
+
+}  // namespace
