@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Finds the contrast thresholds at which a simulator generates as many ON and OFF events from a
 video as a real camera recorded of the same scene; for eventsim-dvs also its response, upsampling,
-denoising, adaptation, refractory period and exposure pulses. Prints them, and how similar the two
-streams then are.
+denoising, adaptation, threshold jitter, refractory period and exposure pulses. Prints them, and how
+similar the two streams then are. Both streams are compared where the frames are not overexposed.
 
     event-calibrate drive.mp4 drive.raw --element eventsim-dense --to 2
 
@@ -16,32 +16,46 @@ import functools
 import os
 import sys
 import time
+from dataclasses import dataclass, field
 
 # First, since it says which packages are missing.
 from event_streams import (ON, GLib, Gst, Span, compare, counts, delayed, find_plugins, read_mask, read_recording,
                            read_video, simulate, until)
 import numpy as np
 
-# Thresholds are found when the event counts are this close, relatively. Where none are, because frames
-# have whole grey levels, the search restarts at most MAX_ROUNDS times.
+# Thresholds are found when the event counts are this close, relatively; those that only rate other
+# properties, when they are roughly. Where none are, because frames have whole grey levels, the search
+# restarts at most MAX_ROUNDS times.
 PRECISION = 1e-3
+ROUGH_PRECISION = 1e-2
 MAX_ROUNDS = 3
 MAX_TRIALS = 60
 # How fast event counts change with thresholds at first, in a log-log plot.
 USUAL_SLOPE = -1.5
 # Parts of the calibrated time for cross-validation.
 PARTS = 4
-# Values tried for eventsim-dvs: the offset of a logarithmic response, as a share of white; stages of the
-# pixel, whose first value turns them off; and the exposure pulse, as a share of the threshold.
-LOG_OFFSETS = [0.001, 0.0018, 0.0025, 0.0035, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11, 0.16, 0.22, 0.32]
-COARSE_STEP = 2
+# Values tried for eventsim-dvs: the response, with the offset of a logarithmic one as a share of white; and stages
+# of the pixel, whose first value turns them off.
+RESPONSE = {
+    "log-eps": [0.001, 0.0018, 0.0025, 0.0035, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11, 0.16,
+                0.22, 0.32],
+    "response": ["linear", "log", "lin-log"],
+    "linear-light": ["false", "true"],
+}
+FIRST_RESPONSE = {"log-eps": 0.02, "response": "log", "linear-light": "false"}
 UPSAMPLING = ["linear", "motion"]
 STAGES = {
     "denoise": [0, 2, 4, 8, 12],
     "adaptation": [0, 0.05, 0.1, 0.2, 0.3, 0.4],
     "refractory-period": [0, 300_000, 600_000, 1_000_000, 2_000_000],
 }
-PULSES = [0, 0.04, 0.08, 0.12, 0.16, 0.24]
+# Those in units of the response, as shares of the mean threshold.
+RELATIVE_STAGES = {
+    "threshold-jitter": [0, 0.1, 0.2, 0.3, 0.4],
+    "exposure-pulse": [0, 0.04, 0.08, 0.12, 0.16, 0.24],
+}
+# A stage of the pixel that gains less is turned off.
+MIN_GAIN = 0.002
 # The element whose settings a profile holds.
 PROFILED = "eventsim-dvs"
 
@@ -63,9 +77,20 @@ class Progress:
             print(file=sys.stderr)
 
 
-def with_thresholds(element, thresholds):
-    positive, negative = thresholds
-    return f"{element} positive-threshold={positive:.6g} negative-threshold={negative:.6g}"
+@dataclass
+class Setting:
+    """An element with its properties, but for its thresholds and those that are shares of their mean."""
+
+    element: str
+    shares: dict = field(default_factory=dict)
+
+    def __str__(self):
+        return " ".join([self.element] + [f"{name}={share:g}*threshold" for name, share in self.shares.items()])
+
+    def with_thresholds(self, thresholds):
+        values = {name: share * np.mean(thresholds) for name, share in self.shares.items()}
+        values |= {"positive-threshold": thresholds[0], "negative-threshold": thresholds[1]}
+        return " ".join([self.element] + [f"{name}={value:.6g}" for name, value in values.items()])
 
 
 def threshold_limits(element):
@@ -79,14 +104,14 @@ def threshold_limits(element):
     return spec.minimum, spec.maximum, spec.default_value
 
 
-def find_thresholds(video, recorded, spans, element, progress, first=None):
+def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None, precision=PRECISION):
     """The thresholds at which the simulator generates as many ON and OFF events within the spans as the
     recording has, by a search for both at once, from the values `first`: secant steps in a log-log plot
     as long as they at least halve the error, else bisection."""
     goal = sum(counts(span.of(recorded)) for span in spans)
     if goal.min() == 0:
         raise RuntimeError("the recording has no events, or events of only one polarity")
-    minimum, maximum, default = threshold_limits(element)
+    minimum, maximum, default = threshold_limits(setting.element)
     minimum = max(minimum, default / 100)
     low = np.full(2, minimum)
     high = np.full(2, min(maximum, default * 20))
@@ -96,21 +121,21 @@ def find_thresholds(video, recorded, spans, element, progress, first=None):
     before, log_before = thresholds, None
     rounds = 0
     for trial in range(MAX_TRIALS):
-        closed = (high / low < 1 + PRECISION).all()
+        closed = (high / low < 1 + precision).all()
         if closed:
             thresholds = each.copy()
-        simulated = simulate(video, with_thresholds(element, thresholds))
+        simulated = simulated_by(setting.with_thresholds(thresholds))
         made = sum(counts(span.of(simulated)) for span in spans)
         log_ratio = np.log(np.maximum(made, 0.5) / goal)
         error = np.abs(log_ratio)
-        progress.tell(f"{element}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
+        progress.tell(f"{setting}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
                       f" {thresholds[1]:.4g}, {made[0] / goal[0]:.3f} of the ON and"
                       f" {made[1] / goal[1]:.3f} of the OFF events")
         each = np.where(error < each_error, thresholds, each)
         each_error = np.minimum(error, each_error)
         if error.sum() < best_error.sum():
             best, best_error = thresholds, error
-        if error.max() < PRECISION:
+        if error.max() < precision:
             break
         if closed:
             # The best threshold of each polarity need not be the best pair: an event of one polarity
@@ -156,6 +181,8 @@ class Choices:
         self.element, self.progress = element, progress
         self.made = Gst.ElementFactory.make(element.split()[0])
         self.parts = parts_of(video, span)
+        # The last stream of a search for thresholds is the one that is rated.
+        self.simulated_by = functools.lru_cache(maxsize=4)(functools.partial(simulate, video))
         self.rated = {}
         self.thresholds = None  # of the last setting, close to those of the next
         self.began = time.monotonic()
@@ -165,55 +192,66 @@ class Choices:
         return (self.made is not None and self.made.find_property(name) is not None
                 and f"{name}=" not in self.element)
 
-    def with_properties(self, chosen):
-        if chosen.get("refractory-period") and self.is_free("refractory-reset"):
-            chosen = chosen | {"refractory-reset": "signal"}
-        elif chosen.get("refractory-period") == 0:
-            chosen = {name: value for name, value in chosen.items() if name != "refractory-period"}
-        return " ".join([self.element] + [f"{name}={value:g}" if isinstance(value, float)
-                                          else f"{name}={value}" for name, value in chosen.items()])
+    def setting(self, chosen):
+        chosen = dict(chosen)
+        if chosen.get("response", "log") != "log":
+            chosen.pop("log-eps", None)
+        if chosen.get("linear-light") == "false":
+            del chosen["linear-light"]
+        if chosen.get("refractory-period") == 0:
+            del chosen["refractory-period"]
+        elif "refractory-period" in chosen and self.is_free("refractory-reset"):
+            chosen["refractory-reset"] = "signal"
+        shares = {name: chosen.pop(name) for name in RELATIVE_STAGES if name in chosen}
+        values = [f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"
+                  for name, value in chosen.items()]
+        return Setting(" ".join([self.element, *values]), shares)
 
     def rating(self, chosen):
-        element = self.with_properties(chosen)
-        if element not in self.rated:
-            simulated = np.concatenate([self.predicted(part, element) for part in self.parts])
-            self.rated[element] = likeness(compare(self.video, self.recorded, simulated, self.span))
-            self.tell_progress(f"{element}: likeness {self.rated[element]:.4f}")
-        return self.rated[element]
+        """The likeness by cross-validation."""
+        return self.rated_by(chosen, self.parts)
 
-    def predicted(self, part, element):
+    def rough_rating(self, chosen):
+        """The likeness of a stream with thresholds that fit the same time."""
+        return self.rated_by(chosen, [self.span])
+
+    def rated_by(self, chosen, parts):
+        setting = self.setting(chosen)
+        key = str(setting), len(parts)
+        if key not in self.rated:
+            simulated = np.concatenate([self.predicted(part, parts, setting) for part in parts])
+            self.rated[key] = likeness(compare(self.video, self.recorded, simulated, self.span))
+            self.tell_progress(f"{setting}: likeness {self.rated[key]:.4f}")
+        return self.rated[key]
+
+    def predicted(self, part, parts, setting):
         """The simulated events of a part, with the thresholds of the others; of the same, if it is the
         only one."""
-        others = [other for other in self.parts if other is not part] or [part]
-        self.thresholds = find_thresholds(self.video, self.recorded, others, element, self.progress, self.thresholds)
-        return part.of(simulate(self.video, with_thresholds(element, self.thresholds)))
+        others = [other for other in parts if other is not part] or [part]
+        self.thresholds = find_thresholds(self.simulated_by, self.recorded, others, setting, self.progress,
+                                          self.thresholds, ROUGH_PRECISION)
+        return part.of(self.simulated_by(setting.with_thresholds(self.thresholds)))
 
     def calibrated(self, chosen):
         """The element with thresholds that fit the whole span."""
-        element = self.with_properties(chosen)
-        self.thresholds = find_thresholds(self.video, self.recorded, self.parts, element, self.progress,
+        setting = self.setting(chosen)
+        self.thresholds = find_thresholds(self.simulated_by, self.recorded, self.parts, setting, self.progress,
                                           self.thresholds)
-        return with_thresholds(element, self.thresholds)
+        return setting.with_thresholds(self.thresholds)
 
     def best_response(self):
-        """The best response along motion; for a logarithm, with the best offset of a coarse grid."""
-        chosen = {"upsampling": "motion"} if self.is_free("upsampling") else {}
-        offsets = [{"log-eps": offset} for offset in LOG_OFFSETS[::COARSE_STEP]]
-        choices = [{}]
-        if self.is_free("response"):
-            choices = []
-            for response in self.made.find_property("response").enum_class.__enum_values__.values():
-                is_log = response.value_nick == "log" and self.is_free("log-eps")
-                choices += [{"response": response.value_nick} | offset for offset in (offsets if is_log else [{}])]
-        elif "response=log" in self.element.split() and self.is_free("log-eps"):
-            choices = offsets
-        if len(choices) == 1:
-            return chosen | choices[0]
-        self.expected += len(choices)
-        return max((chosen | choice for choice in choices), key=self.rating)
+        """The best response along motion, and the values of what may be chosen of it."""
+        axes = {name: values for name, values in RESPONSE.items() if self.is_free(name)}
+        if "response" not in axes and "response=log" not in self.element.split():
+            axes.pop("log-eps", None)
+        start = {"upsampling": "motion"} if self.is_free("upsampling") else {}
+        start |= {name: FIRST_RESPONSE[name] for name in axes}
+        starts = [start | {"linear-light": light} for light in axes.get("linear-light", [])] or [start]
+        climbed = [self.climb(start, axes, self.rough_rating) for start in starts]
+        return max(climbed, key=self.rough_rating) if len(climbed) > 1 else climbed[0], axes
 
-    def climb(self, chosen, axes):
-        """Hill climbing: steps to neighbouring values while that makes the streams more similar."""
+    def climb(self, chosen, axes, rating):
+        """Hill climbing: steps to neighbouring values while that improves the rating."""
         self.expected += 4 * len(axes)  # two passes
         improved = True
         while improved:
@@ -225,9 +263,17 @@ class Choices:
                         if not 0 <= i < len(values):
                             break
                         other = chosen | {name: values[i]}
-                        if self.rating(other) <= self.rating(chosen):
+                        if rating(other) <= rating(chosen):
                             break
                         chosen, improved = other, True
+        return chosen
+
+    def pruned(self, chosen, stages):
+        """Without the stages that gain nothing."""
+        for name, values in stages.items():
+            without = chosen | {name: values[0]}
+            if self.rating(without) > self.rating(chosen) - MIN_GAIN:
+                chosen = without
         return chosen
 
     def tell_progress(self, text):
@@ -246,25 +292,32 @@ def parts_of(video, span):
 
 def calibrate(video, recorded, span, element, progress):
     """The element with calibrated thresholds; for eventsim-dvs also with a response and its offset,
-    denoising, adaptation, refractory period, upsampling, and exposure pulses if the recording shows
-    any."""
+    denoising, adaptation, threshold jitter, refractory period, upsampling, and exposure pulses if the
+    recording shows any."""
     choices = Choices(video, recorded, span, element, progress)
-    axes = {"upsampling": UPSAMPLING} if choices.is_free("upsampling") else {}
-    chosen = choices.best_response()
-    if "log-eps" in chosen:
-        axes["log-eps"] = LOG_OFFSETS
-    stages = {name: values for name, values in STAGES.items() if choices.is_free(name)}
-    if choices.is_free("exposure-pulse") and choices.is_free("exposure-lead"):
-        lead = find_exposure_lead(video, recorded, span)
-        if lead is not None:
-            choices.calibrated(chosen)
+    chosen, axes = choices.best_response()
+    if choices.is_free("upsampling"):
+        axes["upsampling"] = UPSAMPLING
+    stages = {name: values for name, values in (STAGES | RELATIVE_STAGES).items() if choices.is_free(name)}
+    if "exposure-pulse" in stages:
+        lead = find_exposure_lead(video, recorded, span) if choices.is_free("exposure-lead") else None
+        if lead is None:
+            del stages["exposure-pulse"]
+        else:
             chosen |= {"exposure-lead": lead}
-            stages["exposure-pulse"] = [share * choices.thresholds[0] for share in PULSES]
     if not axes | stages:
         return choices.calibrated(chosen)
     # From a pixel without these stages and from one with all of them, since they depend on each other.
     starts = [chosen | {name: values[i] for name, values in stages.items()} for i in (0, 2)]
-    return choices.calibrated(max((choices.climb(start, axes | stages) for start in starts), key=choices.rating))
+    climbed = (choices.climb(start, axes | stages, choices.rating) for start in starts)
+    return choices.calibrated(choices.pruned(max(climbed, key=choices.rating), stages))
+
+
+def fit_thresholds(video, recorded, span, element, progress):
+    """The element with thresholds that fit, and otherwise as it is."""
+    setting = Setting(element)
+    simulated_by = functools.partial(simulate, video)
+    return setting.with_thresholds(find_thresholds(simulated_by, recorded, [span], setting, progress))
 
 
 def find_exposure_lead(video, recorded, span):
@@ -325,13 +378,13 @@ def find_lag(video, recorded, span, element, progress):
 
     lag = lag_of_polarities(video, recorded)
     shown, over = late(lag)
-    choices = Choices(shown, recorded, over, element, progress)
-    fitted = choices.calibrated(choices.best_response())
+    choices = Choices(shown, shown.visible(recorded), over, element, progress)
+    fitted = choices.calibrated(choices.best_response()[0])
 
     @functools.cache
     def likeness_at(lag):
         shown, over = late(lag)
-        rating = likeness(compare(shown, recorded, simulate(shown, fitted), over))
+        rating = likeness(compare(shown, shown.visible(recorded), simulate(shown, fitted), over))
         progress.tell(f"frames {1000 * lag:.1f} ms late: likeness {rating:.4f}")
         return rating
 
@@ -451,16 +504,21 @@ def main():
         lag = float(chosen.lag)
     video = delayed(video, lag)
     span = span_of(video, recorded, lag, start, chosen.to)
-    element = calibrate(until(video, span.end), recorded, span, chosen.element, progress)
-    progress.end()
     measured = span
     if chosen.measure_from is not None or chosen.measure_to is not None:
         measured = span_of(video, recorded, lag, chosen.measure_from, chosen.measure_to)
+    visible = video.visible(recorded)
+    hidden = 1 - len(measured.of(visible)) / max(len(measured.of(recorded)), 1)
+    recorded = visible
+    element = calibrate(until(video, span.end), recorded, span, chosen.element, progress)
+    progress.end()
     figures = compare(video, recorded, simulate(video, element), measured, chosen.map)
     if chosen.profile:
         write_profile(chosen.profile, element, chosen.video, chosen.recording)
     if lag != 0:
         print(f"Frames show the scene {lag * 1000:.1f} ms later than their timestamps.")
+    if hidden >= 0.005:
+        print(f"{100 * hidden:.0f} % of the recorded events are left out: the frames are overexposed there.")
     print(describe(element, figures))
 
 

@@ -26,6 +26,9 @@ ON = 0x8000
 # Frames simulated before a span, so that pixels have a history.
 PAST_FRAMES = 5
 
+# Grey levels below white from which on a pixel counts as overexposed, of 255.
+WHITE_MARGIN = 5
+
 # Formats that simulators read without conversion, so the decoder's luma stays as it is.
 LUMA = "video/x-raw,format=(string){GRAY8,I420,YV12,NV12,NV21,Y42B,Y444,GRAY16_LE}"
 
@@ -34,6 +37,7 @@ LUMA = "video/x-raw,format=(string){GRAY8,I420,YV12,NV12,NV21,Y42B,Y444,GRAY16_L
 class Frame:
     time: int  # ns
     buffer: Gst.Buffer
+    overexposed: np.ndarray = None  # by row and column; None until needed
 
 
 @dataclass
@@ -55,12 +59,35 @@ class Video(Sensor):
     frames: list = field(default_factory=list)
     origin: int = 0  # time of the video's first frame, which may not be in `frames`, ns
 
+    @property
+    def info(self):
+        return GstVideo.VideoInfo.new_from_caps(Gst.Caps.from_string(self.caps))
+
     def luma(self, frame):
-        info = GstVideo.VideoInfo.new_from_caps(Gst.Caps.from_string(self.caps))
+        """The luma of a frame, by row and column; 255 is the maximum of its format."""
+        info = self.info
         depth = np.uint8 if info.finfo.depth[0] == 8 else np.dtype("<u2")
         plane = np.frombuffer(frame.buffer.extract_dup(0, info.stride[0] * self.height), depth)
         grey = plane.reshape(self.height, -1)[:, :self.width].astype(float)
         return grey if info.finfo.depth[0] == 8 else grey / 257
+
+    def overexposed(self, frame):
+        """Which pixels of a frame are white, by row and column."""
+        if frame.overexposed is None:
+            is_narrow = self.info.colorimetry.range.value_nick == "16-235"
+            frame.overexposed = self.luma(frame) >= (235 if is_narrow else 255) - WHITE_MARGIN
+        return frame.overexposed
+
+    def visible(self, events):
+        """The events that frames can show: all but those of pixels that are white in the frames before and
+        after them."""
+        cuts = np.searchsorted(events["t"], [frame.time // 1000 for frame in self.frames], side="right")
+        parts = [events[:cuts[0]]]
+        for before, after, first, last in zip(self.frames, self.frames[1:], cuts, cuts[1:]):
+            white = self.overexposed(before) & self.overexposed(after)
+            part = events[first:last]
+            parts.append(part[~white[part["y_p"] & (ON - 1), part["x"]]])
+        return np.concatenate([*parts, events[cuts[-1]:]])
 
 
 @dataclass
@@ -245,7 +272,7 @@ def read_recording(path, sensor):
 
 
 def simulate(video, element):
-    """The events that an element, with its properties, generates from a video."""
+    """The events that an element, with its properties, generates from a video where its frames can show them."""
     parts = []
     buffers = []
     # A lag may move frames before 0, but a PTS cannot be negative.
@@ -261,7 +288,7 @@ def simulate(video, element):
         lambda sample: parts.append(events_of(sample.get_buffer())))
     events = joined(parts)
     events["t"] -= origin
-    return video.of_camera(events)
+    return video.visible(video.of_camera(events))
 
 
 def compare(sensor, recorded, simulated, span, picture=None):
@@ -300,8 +327,7 @@ def until(video, end):
 
 
 def delayed(video, seconds):
-    return replace(video, frames=[Frame(frame.time + round(seconds * 1e9), frame.buffer)
-                                  for frame in video.frames])
+    return replace(video, frames=[replace(frame, time=frame.time + round(seconds * 1e9)) for frame in video.frames])
 
 
 def find_plugins():

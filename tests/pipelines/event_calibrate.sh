@@ -45,7 +45,7 @@ done
 # Exposure pulses are found by their bursts of events.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000000 ! evtenc ! filesink location=recorded.raw
 calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0" --to 0.3 | tee found
-read -r lead pulse < <(sed -n 's/.* exposure-lead=\([0-9]*\) exposure-pulse=\([0-9.]*\) .*/\1 \2/p' found)
+read -r lead pulse < <(sed -n 's/.* exposure-lead=\([0-9]*\).* exposure-pulse=\([0-9.]*\) .*/\1 \2/p' found)
 awk -v lead="${lead:-0}" -v pulse="${pulse:-0}" 'BEGIN { exit !(lead > 8.8e6 && lead < 9.2e6 && pulse > 0.02 && pulse < 0.045) }' ||
   fail "a pulse of ${pulse:-0}, ${lead:-0} ns before the frames"
 
@@ -74,6 +74,14 @@ done >>half.pgm
 timeout 60 "$GST_LAUNCH" -q filesrc location=half.pgm ! decodebin ! videoconvert ! pngenc ! filesink location=half.png
 calibrate pictures.txt half.csv --element eventsim-dense --lag 0 --to 0.5 --mask half.png | tee found
 awk '/map correlation/ { exit !($3 > 0.9) }' found || fail "events outside the mask are compared"
+
+# Where the video is overexposed, events of the recording are left out.
+"$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-frame positive-threshold=12.5 negative-threshold=8.5 ! evtenc ! filesink location=recorded.raw
+"$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! videobalance brightness=0.4 ! matroskamux ! filesink location=bright.mkv
+calibrate bright.mkv recorded.raw --element eventsim-frame --to 0.3 | tee found
+hidden=$(sed -n 's/^\([0-9]*\) % of the recorded events are left out: the frames are overexposed there\.$/\1/p' found)
+[ "${hidden:-0}" -gt 10 ] || fail "${hidden:-0} % of the events are where the video is overexposed"
+awk '/map correlation/ { exit !($3 > 0.9) }' found || fail "events are compared where the video is overexposed"
 
 # Errors say what is wrong.
 refused() { # WORDS ARGUMENT...
