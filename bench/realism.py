@@ -24,7 +24,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
-from event_calibrate import Progress, calibrate, find_lag  # noqa: E402
+from event_calibrate import Progress, calibrate, find_lag, fit_thresholds  # noqa: E402
 from event_streams import (  # noqa: E402
     ON, Gst, Span, compare, delayed, read_mask, read_recording, read_video, simulate, until)
 from page import replace_tables  # noqa: E402
@@ -40,18 +40,17 @@ ROWS = {
     "dense, `farneback`, `blend`": "eventsim-dense flow=farneback interpolation=blend",
     "sparse": "eventsim-sparse",
     "diff": "eventsim-diff",
-    "`eventsim-dvs preset=esim`":
-        "eventsim-dvs preset=esim response=log log-eps=0.001 denoise=0 adaptation=0 refractory-period=0 upsampling=linear exposure-pulse=0",
-    "`eventsim-dvs preset=v2e-noisy`":
-        "eventsim-dvs preset=v2e-noisy response=lin-log denoise=0 adaptation=0 refractory-period=0 upsampling=linear exposure-pulse=0",
-    "`eventsim-dvs`, `response=linear`": "eventsim-dvs response=linear",
-    "`eventsim-dvs`, `upsampling=linear`": "eventsim-dvs upsampling=linear",
-    "`eventsim-dvs`, `upsampling=motion`": "eventsim-dvs upsampling=motion",
-    "`eventsim-dvs`, `denoise=0`": "eventsim-dvs denoise=0",
-    "`eventsim-dvs`, `exposure-pulse=0`": "eventsim-dvs exposure-pulse=0",
     "`eventsim-dvs`": "eventsim-dvs",
 }
+# Of these, only the thresholds are fitted.
+PRESETS = {f"`{element}`": element for element in ("eventsim-dvs preset=esim", "eventsim-dvs preset=v2e-noisy")}
 CALIBRATED = "`eventsim-dvs`"
+# What each stage of the calibrated element contributes: the same without it, with thresholds that fit again.
+WITHOUT = {
+    f"{CALIBRATED}, `{change}`": change
+    for change in ("response=linear", "upsampling=linear", "upsampling=motion", "denoise=0", "adaptation=0",
+                   "threshold-jitter=0", "exposure-pulse=0")
+}
 
 
 @dataclass
@@ -116,30 +115,33 @@ def measure(scene, data, progress):
     if past > 0:
         training, _ = spans(video)
         lag = find_lag(until(video, training.end), recorded, training, ROWS[CALIBRATED], progress)
-    video = delayed(video, lag)
-    training, test = spans(video)
-    rows = {}
-    for name, element in ROWS.items():
-        element = calibrate(until(video, training.end), recorded, training, element, progress)
-        rows[name] = measured(video, recorded, test, element)
-        progress.tell(f"{name}: {element}")
+
+    def measured(video, element, fit):
+        """A row of the table, of an element that was fitted to the first intervals."""
+        training, test = spans(video)
+        visible = video.visible(recorded)
+        element = fit(until(video, training.end), visible, training, element, progress)
+        progress.tell(f"measured: {element}")
+        return {"element": element} | compare(video, visible, simulate(video, element), test)
+
+    on_time = delayed(video, lag)
+    rows = {name: measured(on_time, element, calibrate) for name, element in ROWS.items()}
+    rows |= {name: measured(on_time, element, fit_thresholds) for name, element in PRESETS.items()}
+    calibrated = rows[CALIBRATED]["element"]
+    for name, change in WITHOUT.items():
+        if change not in calibrated.split():
+            rows[name] = measured(on_time, f"{calibrated} {change}", fit_thresholds)
     if lag != 0:
-        punctual = delayed(video, -lag)
-        training, test = spans(punctual)
-        element = calibrate(until(punctual, training.end), recorded, training, ROWS[CALIBRATED],
-                            progress)
-        rows["`eventsim-dvs`, lag ignored"] = measured(punctual, recorded, test, element)
+        rows[f"{CALIBRATED}, lag ignored"] = measured(video, calibrated, fit_thresholds)
     progress.end()
+    _, test = spans(on_time)
+    hidden = 1 - len(test.of(on_time.visible(recorded))) / len(test.of(recorded))
     return {"title": scene.title, "lag": lag, "calibrated": scene.calibrated,
-            "measured": scene.measured, "rows": rows}
-
-
-def measured(video, recorded, span, element):
-    return {"element": element} | compare(video, recorded, simulate(video, element), span)
+            "measured": scene.measured, "overexposed": hidden, "rows": rows}
 
 
 def thresholds_of(element):
-    values = re.findall(r"(?:positive|negative)-threshold=([0-9.e+-]+)", element)
+    values = re.findall(r"(?:positive|negative)-threshold=([0-9.e+-]+)", element)[-2:]
     return " / ".join(f"{float(value):.3g}" for value in values)
 
 
@@ -191,8 +193,8 @@ def table(result):
     calibrated = rows[CALIBRATED]["element"]
     lag = f"{1000 * result['lag']:.1f} ms" if result["lag"] != 0 else "not estimated"
     lines += ["", f"Frame intervals: {result['calibrated']} for calibration, the next"
-              f" {result['measured']} for measurement. Frame lag: {lag}. Calibrated element:"
-              f" `{calibrated}`.", ""]
+              f" {result['measured']} for measurement. Frame lag: {lag}. Events where the frames are overexposed:"
+              f" {100 * result['overexposed']:.0f} %. Calibrated element: `{calibrated}`.", ""]
     return "\n".join([f"### {result['title'][0].upper()}{result['title'][1:]}", ""] + lines)
 
 
@@ -273,7 +275,7 @@ def main():
         plot(os.path.join(sys.argv[1], "realism-figures.png"), results["slider"]["rows"])
         # The licence of the other recording allows measuring only.
         draw(os.path.join(sys.argv[1], "realism.png"), SCENES["davis"], data,
-             {name: results["davis"]["rows"][name]["element"] for name in ROWS})
+             {name: row["element"] for name, row in results["davis"]["rows"].items()})
 
 
 if __name__ == "__main__":
