@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/tensor/window_queue.hpp"
+
+#include <algorithm>
+
+namespace eventcamera {
+namespace {
+
+constexpr Nanoseconds microsecond = 1000;
+
+}  // namespace
+
+void WindowQueue::reset() {
+  validator_.restart();
+  events_.clear();
+  first_ = returned_ = 0;
+  start_.reset();
+  reached_.reset();
+  intervals_.clear();
+}
+
+/// Moves events seldom enough that each is moved about once.
+void WindowQueue::drop_returned() {
+  if (first_ < events_.size() - first_) return;
+  events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(first_));
+  for (auto& interval : intervals_) interval.last -= first_;
+  returned_ -= std::min(returned_, first_);
+  first_ = 0;
+}
+
+WindowQueue::Skipped WindowQueue::add(std::span<const Event> events, Microseconds base,
+                                      Nanoseconds start, Nanoseconds end) {
+  drop_returned();
+  const auto clipped = std::ranges::find_if(
+      events, [&](const Event& event) { return base + event.t >= start / microsecond; });
+  events = events.subspan(static_cast<std::size_t>(clipped - events.begin()));
+  const std::size_t before = events_.size();
+  const auto fitting = events.first(std::min(events.size(), max_events - (before - first_)));
+  events_.resize(before + fitting.size());
+  auto out = events_.begin() + static_cast<std::ptrdiff_t>(before);
+  Skipped skipped;
+  // In a local, because the events written might alias members.
+  auto validator = validator_;
+  skipped.outside =
+      validator.take(fitting, base, [&](const AbsoluteEvent& event) { *out++ = event; });
+  validator_ = validator;
+  skipped.excess = events.size() - fitting.size();
+  events_.erase(out, events_.end());
+
+  if (!start_) start_ = start;
+  Nanoseconds reached = std::max(reached_.value_or(end), end);
+  if (!events_.empty()) reached = std::max(reached, events_.back().t * microsecond);
+  reached_ = reached;
+  if (settings_.events == 0 && settings_.duration == 0)
+    intervals_.push_back({start, end, events_.size()});
+  return skipped;
+}
+
+/// Index of the first event, in the next window or later, that is not before `time`.
+std::size_t WindowQueue::index_at(Nanoseconds time) const {
+  const auto from = events_.begin() + static_cast<std::ptrdiff_t>(first_);
+  const auto at =
+      std::ranges::lower_bound(from, events_.end(), time / microsecond, {}, &AbsoluteEvent::t);
+  return static_cast<std::size_t>(at - events_.begin());
+}
+
+WindowQueue::Window WindowQueue::window(Nanoseconds start, Nanoseconds end, std::size_t last) {
+  returned_ = std::max(returned_, last);
+  return {start, end, std::span(events_).subspan(first_, last - first_)};
+}
+
+std::optional<WindowQueue::Window> WindowQueue::next_by_time() {
+  if (!start_ || *reached_ - *start_ < settings_.duration) return std::nullopt;
+  const Nanoseconds start = *start_;
+  const Nanoseconds end = start + settings_.duration;
+  const auto found = window(start, end, index_at(end));
+  validator_.pass(end / microsecond);
+  start_ = start + settings_.hop(settings_.duration);
+  first_ = index_at(*start_);
+  return found;
+}
+
+std::optional<WindowQueue::Window> WindowQueue::next_by_count() {
+  if (events_.size() - first_ < settings_.events) return std::nullopt;
+  const std::size_t last = first_ + settings_.events;
+  const auto found =
+      window(events_[first_].t * microsecond, events_[last - 1].t * microsecond, last);
+  first_ += settings_.hop(settings_.events);
+  return found;
+}
+
+std::optional<WindowQueue::Window> WindowQueue::next_by_intervals() {
+  if (intervals_.size() < settings_.intervals) return std::nullopt;
+  const auto& last = intervals_[settings_.intervals - 1];
+  const auto found = window(intervals_.front().start, last.end, last.last);
+  for (std::size_t i = settings_.hop(settings_.intervals); i > 0; --i) {
+    first_ = intervals_.front().last;
+    intervals_.pop_front();
+  }
+  return found;
+}
+
+std::optional<WindowQueue::Window> WindowQueue::next() {
+  if (settings_.events > 0) return next_by_count();
+  return settings_.duration > 0 ? next_by_time() : next_by_intervals();
+}
+
+std::optional<WindowQueue::Window> WindowQueue::finish() {
+  if (returned_ == events_.size()) return std::nullopt;
+  if (settings_.events > 0)
+    return window(events_[first_].t * microsecond, events_.back().t * microsecond, events_.size());
+  const Nanoseconds start = settings_.duration > 0 ? *start_ : intervals_.front().start;
+  return window(start, *reached_, events_.size());
+}
+
+}  // namespace eventcamera
