@@ -85,6 +85,13 @@ std::vector<GParamSpec*> properties_of(GstElement* element) {
   return properties;
 }
 
+/// Lengths of windows, which at random may be hours: a pipeline would wait for the first one.
+bool is_window_length(const GParamSpec* spec) {
+  constexpr std::string_view lengths[] = {"accumulation-time", "event-count", "frame-count"};
+  return g_type_name(spec->owner_type) == std::string_view("GstEventTensor") &&
+         std::ranges::find(lengths, spec->name) != std::end(lengths);
+}
+
 /// Without those of GStreamer's base classes, and those that a payloader must share.
 std::vector<GParamSpec*> writable_properties_of(GstElement* element) {
   auto properties = properties_of(element);
@@ -92,7 +99,7 @@ std::vector<GParamSpec*> writable_properties_of(GstElement* element) {
     constexpr std::string_view excluded[] = {
         "GstObject",         "GstBaseTransform",    "GstAggregator",        "GstBaseSink",
         "GstRTPBasePayload", "GstRTPBaseDepayload", "GstEventDatagramDepay"};
-    return (spec->flags & G_PARAM_WRITABLE) == 0 ||
+    return (spec->flags & G_PARAM_WRITABLE) == 0 || is_window_length(spec) ||
            spec->name == std::string_view("min-streams") ||  // waits for streams that never come
            std::ranges::find(excluded, g_type_name(spec->owner_type)) != std::end(excluded);
   });

@@ -1,0 +1,567 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventtensor
+ * @title: eventtensor
+ * @short_description: turns windows of events into tensors
+ *
+ * Cuts an event stream into windows and outputs a tensor of each, for networks:
+ * `other/tensors, format=static, num_tensors=1`, as NNStreamer defines them. The dimensions, the
+ * innermost first, are width:height:channels:1, so a buffer is an array
+ * [1][channels][height][width] in C. With GStreamer 1.26 or newer, a GstTensorMeta named
+ * `event-tensor` describes the same.
+ *
+ * A window is as long as #GstEventTensor:event-count events if that is not 0, else as
+ * #GstEventTensor:accumulation-time if that is not 0, else as #GstEventTensor:frame-count buffers
+ * of the source, such as the intervals between frames. The next window repeats the share
+ * #GstEventTensor:overlap of it.
+ *
+ * - Windows by time follow each other without gaps, events or not; the first begins with the first
+ *   buffer, or at the start of the segment. They hold the events with start ≤ t < end.
+ * - Windows by count last from their first to their last event, in microseconds.
+ * - Windows of buffers last from the start of the first to the end of the last; a GAP is a buffer
+ *   without events.
+ *
+ * PTS and duration of a tensor are those of its window. At EOS the events that were in no window
+ * make a last, shorter one; its duration ends with the stream.
+ *
+ * - `voxel-grid`: each event adds its polarity, +1 or -1, to the two nearest of
+ *   #GstEventTensor:bins instants, in proportion to their closeness. The first instant is the time
+ *   of the first event of the window, the last one that of the last event (Zhu et al., CVPR 2019;
+ *   E2VID).
+ * - `histogram`: the number of OFF (channel 0) and of ON events (channel 1) of each pixel.
+ * - `time-surface`: a value that decays with the age of the last OFF (channel 0) and the last ON
+ *   event (channel 1) at the end of the window, from 1; 0 where there was none (Lagorce et al.,
+ *   TPAMI 2017). Events of earlier windows count, too.
+ * - `event-frame`: ON minus OFF events.
+ *
+ * #GstEventTensor:normalization follows. In tensors of #GstEventTensor:data-type `uint8`, signed
+ * representations have their 0 at 128. A step is an event without normalization, 1/127 of the
+ * maximum, or 1/255 of it if it has no sign, with `max`, and 1/32 of the standard deviation around
+ * 128 with `mean-std`; 255 is 1 in a time surface. Values are rounded and clamped.
+ *
+ * Tensors have at most 1 GiB, windows at most 16777216 events; further ones are skipped.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventtensor
+ * representation=voxel-grid accumulation-time=50000000 ! filesink location=voxels.f32
+ * ]|
+ */
+#include <gst/gst.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "elements/eventcam/tensor/tensor_meta.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/event_pool.hpp"
+#include "gst/base/latency.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
+#include "src/tensor/event_tensor.hpp"
+#include "src/tensor/window_queue.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);
+#define GST_CAT_DEFAULT event_tensor_debug
+
+using eventcamera::Decay;
+using eventcamera::ElementType;
+using eventcamera::EventTensor;
+using eventcamera::Microseconds;
+using eventcamera::Nanoseconds;
+using eventcamera::Normalization;
+using eventcamera::Representation;
+using eventcamera::TensorSettings;
+using eventcamera::WindowQueue;
+using eventcamera::WindowSettings;
+
+namespace {
+
+/// Maximum gap between buffers that windows by time continue through; no interval is longer.
+constexpr GstClockTime max_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
+
+/// Times beyond this are not used: the ends of windows would not fit into 64 bits.
+constexpr GstClockTime max_time = GstClockTime{1} << 62;
+
+constexpr gsize max_tensor_bytes = gsize{1} << 30;
+
+constexpr guint max_frame_count = 10'000;
+
+/// User-settable values, copied at caps.
+struct Settings {
+  Representation representation = Representation::voxel_grid;
+  guint bins = 5;
+  Decay decay = Decay::exponential;
+  GstClockTime time_constant = 50 * GST_MSECOND;
+  Normalization normalization = Normalization::none;
+  ElementType type = ElementType::float32;
+  guint event_count = 0;
+  GstClockTime accumulation_time = 0;
+  guint frame_count = 1;
+  gdouble overlap = 0;
+};
+
+TensorSettings tensor_settings(const Settings& settings) {
+  return {.representation = settings.representation,
+          .bins = static_cast<int>(settings.bins),
+          .decay = settings.decay,
+          .time_constant =
+              static_cast<Microseconds>(std::max(settings.time_constant / 1000, GstClockTime{1})),
+          .normalization = settings.normalization,
+          .type = settings.type};
+}
+
+WindowSettings window_settings(const Settings& settings) {
+  return {.events = settings.event_count,
+          .duration = static_cast<Nanoseconds>(settings.accumulation_time),
+          .intervals = settings.frame_count,
+          .overlap = settings.overlap};
+}
+
+/// State from caps to stop.
+struct State {
+  State(const GstEventCameraInfo& input, const Settings& settings)
+      : info(input),
+        tensor_of(tensor_settings(settings)),
+        windows_of(window_settings(settings)),
+        tensor(input.width, input.height, tensor_of),
+        windows(input.width, input.height, windows_of) {}
+
+  GstEventCameraInfo info;
+  TensorSettings tensor_of;
+  WindowSettings windows_of;
+  EventTensor tensor;
+  WindowQueue windows;
+};
+
+struct Private {
+  Guarded<Settings> settings;
+  Guarded<GstClockTime> latency;
+  GstPad* sink = nullptr;
+  GstPad* src = nullptr;
+
+  // Accessed under the stream lock of the sink pad, or while nothing streams.
+  std::optional<State> state;
+  EventBuffers buffers;
+  GstSegment segment{};
+  bool discontinuous = true;  ///< the next tensor is discontinuous
+  EventFaults faults{"use", GST_CAT_DEFAULT};
+  WarnOnce warn_of_excess{GST_CAT_DEFAULT};
+};
+
+}  // namespace
+
+G_DECLARE_FINAL_TYPE(GstEventTensor, gst_event_tensor, GST, EVENT_TENSOR, GstElement)
+
+struct _GstEventTensor {
+  GstElement parent;
+  Private* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstEventTensor, gst_event_tensor, GST_TYPE_ELEMENT,
+                        GST_DEBUG_CATEGORY_INIT(event_tensor_debug, "eventtensor", 0,
+                                                "windows of events as tensors"))
+GST_ELEMENT_REGISTER_DEFINE(eventtensor, "eventtensor", GST_RANK_NONE, gst_event_tensor_get_type())
+
+static Guarded<Settings>& settings_of(GObject* object) {
+  return GST_EVENT_TENSOR(object)->priv->settings;
+}
+
+static const Report no_memory{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+                              "Not enough memory for a tensor; lower bins, the resolution or the "
+                              "length of windows."};
+
+/* tensors */
+
+static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window& window) {
+  auto& priv = *self->priv;
+  auto& tensor = priv.state->tensor;
+  OwnedBuffer buffer;
+  const GstFlowReturn result = priv.buffers.acquire(tensor.bytes(), buffer);
+  if (result != GST_FLOW_OK) return result;
+  GstBuffer* const acquired = buffer.get();
+  GstMapInfo map;
+  if (gst_buffer_map(acquired, &map, GST_MAP_WRITE) == FALSE) throw std::bad_alloc();
+  tensor.write(window.events, window.end / static_cast<Nanoseconds>(GST_USECOND),
+               reinterpret_cast<std::byte*>(map.data));
+  gst_buffer_unmap(acquired, &map);
+  GST_BUFFER_PTS(acquired) = static_cast<GstClockTime>(window.start);
+  GST_BUFFER_DTS(acquired) = GST_CLOCK_TIME_NONE;
+  GST_BUFFER_DURATION(acquired) = static_cast<GstClockTime>(window.end - window.start);
+  GST_BUFFER_FLAG_UNSET(acquired, GST_BUFFER_FLAG_DISCONT);
+  if (std::exchange(priv.discontinuous, false))
+    GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
+  add_tensor_meta(acquired, tensor.shape(), priv.state->tensor_of);
+  GST_LOG_OBJECT(
+      self, "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+      window.events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(window.start)),
+      GST_TIME_ARGS(static_cast<GstClockTime>(window.end)));
+  return gst_pad_push(priv.src, buffer.release());
+}
+
+/// Ends the current windows: pushes the last tensor and forgets all events.
+static GstFlowReturn drain(GstEventTensor* self) {
+  auto& priv = *self->priv;
+  if (!priv.state) return GST_FLOW_OK;
+  const GstFlowReturn result = guarded(self, no_memory, [&] {
+    const auto window = priv.state->windows.finish();
+    return window ? push_tensor(self, *window) : GST_FLOW_OK;
+  });
+  priv.state->windows.reset();
+  priv.state->tensor.reset();
+  priv.discontinuous = true;
+  return result;
+}
+
+/// Ends the current windows if an interval is too far from the last one.
+static GstFlowReturn approach(GstEventTensor* self, const EventInterval& interval) {
+  const auto last = self->priv->state->windows.reached();
+  if (!last) return GST_FLOW_OK;
+  const auto reached = static_cast<GstClockTime>(*last);
+  const bool returns = interval.start + event_resolution < reached;
+  const bool leaps = interval.start > reached + max_gap;
+  if (!returns && !leaps) return GST_FLOW_OK;
+  GST_DEBUG_OBJECT(self, "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
+                   returns ? "goes back" : "leaps", GST_TIME_ARGS(reached),
+                   GST_TIME_ARGS(interval.start));
+  return drain(self);
+}
+
+/// Adds an interval, and pushes the tensors of the windows that it completes. May throw.
+static GstFlowReturn add(GstEventTensor* self, std::span<const eventcamera::Event> events,
+                         Microseconds base, const EventInterval& interval, GstBuffer* buffer) {
+  auto& priv = *self->priv;
+  const GstClockTime start = std::max(interval.start, priv.segment.start);
+  if (interval.end < start || (interval.end == start && interval.start < start)) return GST_FLOW_OK;
+  const GstFlowReturn result = approach(self, {start, interval.end});
+  if (result != GST_FLOW_OK) return result;
+  const auto skipped = priv.state->windows.add(events, base, static_cast<Nanoseconds>(start),
+                                               static_cast<Nanoseconds>(interval.end));
+  if (skipped.outside > 0) priv.faults.warn(self, EventFault::beyond_sensor, buffer);
+  if (skipped.excess > 0)
+    priv.warn_of_excess(
+        self,
+        {GST_STREAM_ERROR_FAILED, "Cannot use all events: there are more than " +
+                                      std::to_string(WindowQueue::max_events) +
+                                      " in a window; skipping the rest. Shorten the windows."},
+        std::to_string(skipped.excess) + " events skipped");
+  while (const auto window = priv.state->windows.next()) {
+    const GstFlowReturn pushed = push_tensor(self, *window);
+    if (pushed != GST_FLOW_OK) return pushed;
+  }
+  return GST_FLOW_OK;
+}
+
+/* data */
+
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+  auto* self = GST_EVENT_TENSOR(parent);
+  auto& priv = *self->priv;
+  const OwnedBuffer buffer(taken);
+  if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  const auto interval = interval_of(taken);
+  if (!interval || interval->end > max_time) {
+    priv.faults.warn(self, interval ? EventFault::pts_too_large : EventFault::no_pts, taken);
+    return GST_FLOW_OK;
+  }
+  const MappedEvents mapped(taken);
+  if (!mapped) {
+    priv.faults.warn(self, EventFault::partial_event, taken);
+    return GST_FLOW_OK;
+  }
+  GST_LOG_OBJECT(priv.sink, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
+                 mapped.events().size(), GST_TIME_ARGS(interval->start));
+  return guarded(self, no_memory,
+                 [&] { return add(self, mapped.events(), mapped.start(), *interval, taken); });
+}
+
+/// Returns true if tensors take the place of the gap.
+static bool take_gap(GstEventTensor* self, GstEvent* event) {
+  auto& priv = *self->priv;
+  GstClockTime start = 0;
+  GstClockTime duration = 0;
+  gst_event_parse_gap(event, &start, &duration);
+  if (!priv.state || priv.state->windows_of.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
+      start > max_time || duration > max_time - start)
+    return false;
+  guarded(self, no_memory, [&] { return add(self, {}, 0, {start, start + duration}, nullptr); });
+  return true;
+}
+
+/* negotiation */
+
+/// Framerate of the tensors: 0/1 if it varies or is not a fraction of integers.
+static std::pair<gint, gint> framerate_of(const State& state) {
+  const auto& windows = state.windows_of;
+  gint n = 0;
+  gint d = 1;
+  if (windows.events > 0) return {n, d};
+  const auto hop = windows.duration > 0 ? windows.hop(windows.duration)
+                                        : static_cast<Nanoseconds>(windows.hop(windows.intervals));
+  if (hop > G_MAXINT) return {n, d};
+  const gboolean fits = windows.duration > 0
+                            ? gst_util_fraction_multiply(static_cast<gint>(GST_SECOND), 1, 1,
+                                                         static_cast<gint>(hop), &n, &d)
+                            : gst_util_fraction_multiply(state.info.fps_n, state.info.fps_d, 1,
+                                                         static_cast<gint>(hop), &n, &d);
+  return fits ? std::pair(n, d) : std::pair(0, 1);
+}
+
+/// Time from the start of a window to its end, as far as it is known.
+static GstClockTime latency_of(const State& state) {
+  const auto& windows = state.windows_of;
+  if (windows.events > 0) return 0;
+  if (windows.duration > 0) return static_cast<GstClockTime>(windows.duration);
+  if (state.info.fps_n <= 0) return 0;
+  return gst_util_uint64_scale((windows.intervals - 1) * GST_SECOND,
+                               static_cast<guint64>(state.info.fps_d),
+                               static_cast<guint64>(state.info.fps_n));
+}
+
+static const GEnumValue* data_types() {
+  static const GEnumValue values[] = {
+      {static_cast<gint>(ElementType::float32), "32-bit floating point", "float32"},
+      {static_cast<gint>(ElementType::float16), "16-bit floating point", "float16"},
+      {static_cast<gint>(ElementType::uint8), "unsigned bytes", "uint8"},
+      {0, nullptr, nullptr}};
+  return values;
+}
+
+static OwnedCaps caps_of(const State& state) {
+  const auto& shape = state.tensor.shape();
+  const auto dimensions = std::to_string(shape.width) + ":" + std::to_string(shape.height) + ":" +
+                          std::to_string(shape.channels) + ":1";
+  const auto [fps_n, fps_d] = framerate_of(state);
+  return OwnedCaps(gst_caps_new_simple(
+      "other/tensors", "format", G_TYPE_STRING, "static", "num_tensors", G_TYPE_INT, 1,
+      "dimensions", G_TYPE_STRING, dimensions.c_str(), "types", G_TYPE_STRING,
+      data_types()[static_cast<int>(state.tensor_of.type)].value_nick, "framerate",
+      GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
+}
+
+/// Starts over for a sensor. May throw.
+static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
+  auto& priv = *self->priv;
+  const Settings settings = priv.settings.copy();
+  priv.state.reset();
+  const auto tensor_of = tensor_settings(settings);
+  const auto bytes = eventcamera::TensorShape(info.width, info.height, tensor_of).elements() *
+                     size_of(tensor_of.type);
+  if (bytes > max_tensor_bytes) {
+    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
+                      ("Cannot make tensors of more than 1 GiB; lower bins or the resolution."),
+                      ("%dx%d pixels and %u bins make %" G_GSIZE_FORMAT " bytes", info.width,
+                       info.height, settings.bins, bytes));
+    return false;
+  }
+  priv.state.emplace(info, settings);
+  return true;
+}
+
+static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
+  auto& priv = *self->priv;
+  GstCaps* caps = nullptr;
+  gst_event_parse_caps(event, &caps);
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
+  drain(self);
+  if (!guarded(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
+  *priv.latency.lock() = latency_of(*priv.state);
+  const OwnedCaps out = caps_of(*priv.state);
+  GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
+                   out.get());
+  const gboolean taken = gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
+  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+  return taken;
+}
+
+static void take_segment(GstEventTensor* self, GstEvent* event) {
+  auto& segment = self->priv->segment;
+  GstSegment next;
+  gst_event_copy_segment(event, &next);
+  const bool continues = next.format == segment.format && next.rate == segment.rate &&
+                         next.base == segment.base && next.start == segment.start &&
+                         next.time == segment.time;
+  if (!continues) drain(self);
+  segment = next;
+}
+
+static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
+  auto* self = GST_EVENT_TENSOR(parent);
+  auto& priv = *self->priv;
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_CAPS: {
+      const gboolean taken = take_caps(self, event);
+      gst_event_unref(event);
+      return taken;
+    }
+    case GST_EVENT_GAP:
+      if (take_gap(self, event)) {
+        gst_event_unref(event);
+        return TRUE;
+      }
+      break;
+    case GST_EVENT_SEGMENT:
+      take_segment(self, event);
+      break;
+    case GST_EVENT_EOS:
+      drain(self);
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
+      if (priv.state) {
+        priv.state->windows.reset();
+        priv.state->tensor.reset();
+      }
+      priv.discontinuous = true;
+      break;
+    default:
+      break;
+  }
+  return gst_pad_event_default(pad, parent, event);
+}
+
+static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  auto& priv = *GST_EVENT_TENSOR(parent)->priv;
+  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(GST_CAT_DEFAULT, priv.sink, query, priv.latency.copy());
+  return gst_pad_query_default(pad, parent, query);
+}
+
+/* states */
+
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  auto& priv = *GST_EVENT_TENSOR(element)->priv;
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS(gst_event_tensor_parent_class)->change_state(element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv.buffers.reset();
+    priv.state.reset();
+    gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
+    priv.discontinuous = true;
+    priv.faults.reset();
+    priv.warn_of_excess.reset();
+    *priv.latency.lock() = 0;
+  }
+  return result;
+}
+
+/* type */
+
+static GType representation_type() {
+  static const GEnumValue values[] = {
+      {static_cast<gint>(Representation::voxel_grid),
+       "polarities, shared out to the two nearest of several instants", "voxel-grid"},
+      {static_cast<gint>(Representation::histogram), "numbers of OFF and of ON events",
+       "histogram"},
+      {static_cast<gint>(Representation::time_surface),
+       "decayed age of the last OFF and the last ON event", "time-surface"},
+      {static_cast<gint>(Representation::event_frame), "ON minus OFF events", "event-frame"},
+      {0, nullptr, nullptr}};
+  return enum_type("GstEventTensorRepresentation", values);
+}
+
+static GType decay_type() {
+  static const GEnumValue values[] = {
+      {static_cast<gint>(Decay::exponential), "exp(-age / time-constant)", "exponential"},
+      {static_cast<gint>(Decay::linear), "1 - age / time-constant, at least 0", "linear"},
+      {0, nullptr, nullptr}};
+  return enum_type("GstEventTensorDecay", values);
+}
+
+static GType normalization_type() {
+  static const GEnumValue values[] = {
+      {static_cast<gint>(Normalization::none), "as counted", "none"},
+      {static_cast<gint>(Normalization::mean_std),
+       "nonzero values get the mean 0 and the standard deviation 1, as for E2VID", "mean-std"},
+      {static_cast<gint>(Normalization::max), "the largest magnitude becomes 1", "max"},
+      {0, nullptr, nullptr}};
+  return enum_type("GstEventTensorNormalization", values);
+}
+
+static void install_properties(GObjectClass* klass) {
+  const auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                              GST_PARAM_MUTABLE_READY);
+  const auto number_of = [](auto value) { return static_cast<gint>(value); };
+  Properties<settings_of> properties(klass);
+  properties.add(
+      &Settings::representation,
+      g_param_spec_enum("representation", "Representation", "What a tensor shows",
+                        representation_type(), number_of(Settings().representation), flags));
+  properties.add(&Settings::bins,
+                 g_param_spec_uint("bins", "Bins", "Channels of a voxel grid", 1,
+                                   GST_EVENT_CAMERA_MAX_BINS, Settings().bins, flags));
+  properties.add(&Settings::decay,
+                 g_param_spec_enum("decay", "Decay", "How the values of a time surface decrease",
+                                   decay_type(), number_of(Settings().decay), flags));
+  properties.add(&Settings::time_constant,
+                 g_param_spec_uint64("time-constant", "Time constant",
+                                     "Time constant of the decay of a time surface (ns)",
+                                     GST_USECOND, max_time, Settings().time_constant, flags));
+  properties.add(
+      &Settings::normalization,
+      g_param_spec_enum("normalization", "Normalization", "How the values of a tensor are scaled",
+                        normalization_type(), number_of(Settings().normalization), flags));
+  properties.add(&Settings::type,
+                 g_param_spec_enum("data-type", "Data type", "Type of the numbers in a tensor",
+                                   enum_type("GstEventTensorDataType", data_types()),
+                                   number_of(Settings().type), flags));
+  properties.add(&Settings::event_count,
+                 g_param_spec_uint("event-count", "Event count",
+                                   "Number of events in a window (0 = not limited by count)", 0,
+                                   static_cast<guint>(WindowQueue::max_events),
+                                   Settings().event_count, flags));
+  properties.add(
+      &Settings::accumulation_time,
+      g_param_spec_uint64("accumulation-time", "Accumulation time",
+                          "Length of a window without event-count (ns; 0 = frame-count buffers)", 0,
+                          max_gap, Settings().accumulation_time, flags));
+  properties.add(&Settings::frame_count,
+                 g_param_spec_uint("frame-count", "Frame count",
+                                   "Number of buffers in a window without event-count and "
+                                   "accumulation-time, such as intervals between frames",
+                                   1, max_frame_count, Settings().frame_count, flags));
+  properties.add(
+      &Settings::overlap,
+      g_param_spec_double("overlap", "Overlap", "Share of a window that the next one repeats", 0,
+                          0.99, Settings().overlap, flags));
+}
+
+static void finalize(GObject* object) {
+  delete GST_EVENT_TENSOR(object)->priv;
+  G_OBJECT_CLASS(gst_event_tensor_parent_class)->finalize(object);
+}
+
+static void gst_event_tensor_init(GstEventTensor* self) {
+  self->priv = new Private;
+  auto& priv = *self->priv;
+  gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
+  priv.sink = add_pad(GST_ELEMENT(self), "sink");
+  gst_pad_set_chain_function(priv.sink, chain);
+  gst_pad_set_event_function(priv.sink, sink_event);
+  priv.src = add_pad(GST_ELEMENT(self), "src");
+  gst_pad_set_query_function(priv.src, src_query);
+  gst_pad_use_fixed_caps(priv.src);
+}
+
+static void gst_event_tensor_class_init(GstEventTensorClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+  install_properties(object_class);
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  element_class->change_state = change_state;
+  add_pad_templates(element_class, EVENT_CAPS,
+                    "other/tensors, format = (string) static, num_tensors = (int) 1, "
+                    "types = (string) { float32, float16, uint8 }, "
+                    "framerate = (fraction) [ 0, max ]");
+  gst_element_class_set_static_metadata(element_class, "Event tensors", "Converter",
+                                        "Turns windows of events into tensors", EVENTSIM_AUTHORS);
+}
