@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
+#include <span>
+#include <vector>
 
 #include "src/core/event.hpp"
 #include "src/core/label.hpp"
+#include "src/tensor/event_tensor.hpp"
 
 static_assert(sizeof(GstEventCameraEvent) == sizeof(eventcamera::Event) &&
                   offsetof(GstEventCameraEvent, x) == offsetof(eventcamera::Event, x) &&
@@ -170,4 +174,63 @@ void gst_event_camera_label_meta_truncate(GstEventCameraLabelMeta* meta, gsize n
 GBytes* gst_event_camera_label_meta_get_bytes(const GstEventCameraLabelMeta* meta) {
   g_return_val_if_fail(meta != nullptr, nullptr);
   return g_bytes_new(meta->labels, meta->n_labels * sizeof(GstEventCameraLabel));
+}
+
+gboolean gst_event_camera_unpack(GstBuffer* buffer, gpointer events, gsize n_events) {
+  g_return_val_if_fail(GST_IS_BUFFER(buffer), FALSE);
+
+  GstEventCameraMap map;
+  if (!gst_event_camera_map(&map, buffer)) return FALSE;
+  const bool fits = map.n_events == n_events;
+  if (fits) {
+    const auto start = static_cast<gint64>(map.start);
+    std::transform(map.events, map.events + n_events,
+                   static_cast<GstEventCameraAbsoluteEvent*>(events),
+                   [start](const GstEventCameraEvent& event) {
+                     return GstEventCameraAbsoluteEvent{start + event.t,
+                                                        event.x,
+                                                        static_cast<guint16>(event.y_p & 0x7fff),
+                                                        static_cast<guint8>(event.y_p >> 15),
+                                                        {}};
+                   });
+  }
+  gst_event_camera_unmap(&map);
+  return fits ? TRUE : FALSE;
+}
+
+/// Times beyond this, in either direction, are errors: 142 years.
+static constexpr gint64 max_time = gint64{1} << 52;
+
+/// Converts to the core's events. False if one is outside the sensor or earlier than the last one.
+static bool take_events(std::span<const GstEventCameraAbsoluteEvent> events, guint width,
+                        guint height, std::vector<eventcamera::AbsoluteEvent>& out) {
+  out.reserve(events.size());
+  gint64 last = -max_time;
+  for (const auto& event : events) {
+    if (event.x >= width || event.y >= height || event.t < last || event.t > max_time) return false;
+    last = event.t;
+    out.emplace_back(event.t, event.x, static_cast<guint16>(event.y | (event.p != 0 ? 0x8000 : 0)));
+  }
+  return true;
+}
+
+gboolean gst_event_camera_voxel_grid(gconstpointer events, gsize n_events, guint width,
+                                     guint height, guint bins, gpointer grid) {
+  g_return_val_if_fail(width > 0 && width <= GST_EVENT_CAMERA_MAX_SIDE, FALSE);
+  g_return_val_if_fail(height > 0 && height <= GST_EVENT_CAMERA_MAX_SIDE, FALSE);
+  g_return_val_if_fail(bins > 0 && bins <= GST_EVENT_CAMERA_MAX_BINS, FALSE);
+
+  try {
+    std::vector<eventcamera::AbsoluteEvent> sorted;
+    if (!take_events({static_cast<const GstEventCameraAbsoluteEvent*>(events), n_events}, width,
+                     height, sorted))
+      return FALSE;
+    eventcamera::EventTensor(static_cast<int>(width), static_cast<int>(height),
+                             {.bins = static_cast<int>(bins)})
+        .write(sorted, 0, static_cast<std::byte*>(grid));
+    return TRUE;
+  } catch (const std::exception& error) {
+    g_warning("%s", error.what());
+    return FALSE;
+  }
 }

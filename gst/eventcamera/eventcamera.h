@@ -338,4 +338,75 @@ void gst_event_camera_label_meta_truncate(GstEventCameraLabelMeta* meta, gsize n
 GST_EVENT_CAMERA_API
 GBytes* gst_event_camera_label_meta_get_bytes(const GstEventCameraLabelMeta* meta);
 
+typedef struct _GstEventCameraAbsoluteEvent GstEventCameraAbsoluteEvent;
+
+/**
+ * GstEventCameraAbsoluteEvent:
+ * @t: microseconds, of the whole stream: floor(PTS / 1000) + t of the event
+ * @x: column, from the left
+ * @y: row, from the top
+ * @p: the polarity: 1 = ON (brighter), 0 = OFF
+ *
+ * One event in an array that does not belong to a buffer: 16 bytes, the last 3 of which are not
+ * used.
+ *
+ * Since: 0.1
+ */
+struct _GstEventCameraAbsoluteEvent {
+  gint64 t;
+  guint16 x;
+  guint16 y;
+  guint8 p;
+
+  /*< private >*/
+  guint8 _gst_reserved[3];
+};
+
+/**
+ * gst_event_camera_unpack:
+ * @buffer: a buffer of an event stream of format XYTP, with a PTS
+ * @events: address of an array of #GstEventCameraAbsoluteEvent
+ * @n_events: its length; the buffer has as many events, of 8 bytes each
+ *
+ * Writes the events of a buffer to memory that does not belong to GStreamer, such as that of a
+ * NumPy array.
+ *
+ * Returns: %FALSE if @buffer cannot be mapped, has no PTS, or does not have @n_events events
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+gboolean gst_event_camera_unpack(GstBuffer* buffer, gpointer events, gsize n_events);
+
+/**
+ * GST_EVENT_CAMERA_MAX_BINS:
+ *
+ * The maximum number of bins of a voxel grid.
+ *
+ * Since: 0.1
+ */
+#define GST_EVENT_CAMERA_MAX_BINS 256
+
+/**
+ * gst_event_camera_voxel_grid:
+ * @events: address of an array of #GstEventCameraAbsoluteEvent, sorted by time
+ * @n_events: its length
+ * @width: of the sensor, in pixels
+ * @height: of the sensor, in pixels
+ * @bins: number of instants, at most %GST_EVENT_CAMERA_MAX_BINS
+ * @grid: address of @bins x @height x @width 32-bit floating-point numbers
+ *
+ * Writes the voxel grid of events, the same as the element `eventtensor` makes of a window: each
+ * event adds its polarity, +1 or -1, to the two nearest of @bins instants, in proportion to their
+ * closeness. The first instant is the time of the first event, the last one that of the last event.
+ *
+ * Returns: %FALSE if an event is outside the sensor or earlier than the one before it; @grid is
+ * then unspecified
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+gboolean gst_event_camera_voxel_grid(gconstpointer events, gsize n_events, guint width,
+                                     guint height, guint bins, gpointer grid);
+
 G_END_DECLS
