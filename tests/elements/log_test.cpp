@@ -91,6 +91,7 @@ constexpr Case cases[] = {
     {"eventmerge", EVENTS "! tee name=t ! queue ! merge. eventmerge name=merge ! fakesink t. ! "
                           "queue ! merge."},
     {"eventrender", EVENTS "! eventrender ! fakesink"},
+    {"eventtensor", EVENTS "! eventtensor ! fakesink"},
     {"eventoverlay",
      EVENTS "! overlay.event_sink eventoverlay name=overlay ! fakesink videotestsrc "
             "num-buffers=4 ! video/x-raw,width=320,height=240,framerate=25/1 ! "

@@ -46,6 +46,22 @@ std::vector<Seed> chunker_seeds() {
   return seeds;
 }
 
+/// For tensor_fuzz: windows of each kind, and tensors of each representation, of a few intervals.
+std::vector<Seed> tensor_seeds() {
+  std::vector<Seed> seeds;
+  for (const std::uint8_t kind : {0, 1, 2, 3}) {
+    const auto by_count = static_cast<std::uint8_t>(kind == 1 ? 3 : 0);
+    const auto by_time = static_cast<std::uint8_t>(kind == 2 ? 5 : 0);
+    Seed seed{"kind-" + std::to_string(kind), {by_count, by_time, kind, 50, kind, kind}};
+    for (std::uint8_t i = 0; i < 24; ++i)
+      seed.bytes.insert(seed.bytes.end(), {static_cast<std::uint8_t>(10 * i), 1, 2, 0, i,
+                                           static_cast<std::uint8_t>(i % 16), i,
+                                           static_cast<std::uint8_t>(i % 6 == 5 ? 7 : 0)});
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
 /// For rtp_fuzz: streams of both formats.
 std::vector<Seed> rtp_seeds() {
   constexpr SensorSize size{640, 480};
@@ -113,6 +129,7 @@ int main(int argc, char** argv) {
   write(corpus / "chunker", chunker_seeds());
   write(corpus / "datagram", datagram_seeds());
   write(corpus / "rtp", rtp_seeds());
+  write(corpus / "tensor", tensor_seeds());
 
   // Typefinders may see any of them.
   std::vector<Seed> all;

@@ -76,6 +76,13 @@ for mode in accumulate decay time-surface count; do
 done
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-frame ! eventrender palette=viridis ! videoconvert ! x264enc ! mp4mux ! filesink location=rendered.mp4
 [ -s rendered.mp4 ] || fail "no rendered video was written"
+# As tensors of every kind.
+for representation in voxel-grid histogram time-surface event-frame; do
+  for windows in "" accumulation-time=50000000 "event-count=20000 overlap=0.5" frame-count=3; do
+    # shellcheck disable=SC2086
+    launch videotestsrc is-live=true pattern=ball num-buffers=10 ! eventsim-diff ! eventtensor representation=$representation $windows ! other/tensors,format=static ! fakesink sync=true
+  done
+done
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! eventsim-diff ! eventrender event-count=5000 ! video/x-raw,framerate=50/1 ! fakesink sync=true
 launch videotestsrc is-live=true pattern=black num-buffers=20 ! eventsim-diff ! eventrender ! fakesink sync=true
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventrender ! video/x-raw,framerate=0/1 ! fakesink

@@ -57,6 +57,9 @@ for mode in accumulate decay time-surface count; do
   check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender mode=$mode ! videoconvert ! fakesink
 done
 check eventmerge name=merge ! identity error-after=2 ! fakesink  videotestsrc num-buffers=8 ! eventsim-frame ! merge.  videotestsrc num-buffers=8 ! eventsim-diff ! merge.
+for representation in voxel-grid time-surface; do
+  check videotestsrc num-buffers=8 ! eventsim-frame ! eventtensor representation=$representation data-type=float16 accumulation-time=50000000 overlap=0.5 ! fakesink
+done
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! fakesink  t. ! queue ! eventsim-frame ! overlay.event_sink
 for element in frame dense sparse diff; do
   check videotestsrc num-buffers=8 ! video/x-raw,width=64,height=48 ! glupload ! gleventsim-$element ! fakesink
