@@ -68,6 +68,7 @@ used() {
   try cc /usr/share/doc/libgsteventcamera-1.0-dev/examples/count_events.c -o count_events $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)
   try ./count_events "videotestsrc pattern=ball num-buffers=10 ! eventsim-diff ! appsink name=events"
   try python3 -c 'import gi; gi.require_version("GstEventCamera", "1.0"); from gi.repository import Gst, GstEventCamera; Gst.init(None); print(GstEventCamera.Info)'
+  try python3 -c 'import gst_eventcamera as ec; events = ec.read("ball.raw"); assert ec.voxel_grid(events).any(); ec.write("again.npz", events)'
   for file in ball.raw=application/x-prophesee-raw ball.h5=application/x-event-hdf5; do
     [ "$(gio info -a standard::content-type "${file%=*}" | sed -n 's/.*content-type: //p')" = "${file#*=}" ]
   done

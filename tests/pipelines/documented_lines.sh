@@ -6,7 +6,7 @@ source "$SOURCE/tests/pipelines/scratch_folder.sh"
 source "$SOURCE/tests/pipelines/run_lines.sh"
 export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
-cp "$SOURCE"/pipelines/{events_to_numpy,voxel_grids}.py pipelines/
+cp -r "$SOURCE"/pipelines/{events_to_numpy.py,voxel_grids.py,examples} pipelines/
 
 # The files that the lines read.
 eval "$GST_LAUNCH -q $ball ! x264enc ! mp4mux ! filesink location=drive.mp4"
@@ -23,6 +23,11 @@ for ending in dat es csv; do event-convert drive.raw recording.$ending; done
 /usr/bin/python3 -c 'import numpy; numpy.savez("events.npz", **{name: numpy.zeros(9, int) for name in "txyp"})'
 
 run_lines "$SOURCE/README.md" "$SOURCE"/docs/*.md "$SOURCE"/docs/elements/*.md
+for page in README.md docs/learning.md; do
+  sed -n '/^```python$/,/^```$/p' "$SOURCE/$page" | sed '/^```/d; s/v4l2src/videotestsrc is-live=true pattern=ball/' >block.py
+  echo "Python of $page"
+  timeout 120 /usr/bin/python3 block.py >output 2>&1 || fail "$(cat output)"
+done
 [ $count -ge 60 ] || fail "found only $count lines"
 for file in events.webm ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
   webcam.npz "videos/second one.h5" cropped.raw both.webm rate.png part.raw "arrays/second one.npz"; do

@@ -37,11 +37,13 @@ if [ ! -f "$GI_TYPELIB_PATH/GstEventCamera-1.0.typelib" ]; then
   echo "built without introspection: Python example skipped"
   exit 77
 fi
-"$SOURCE/pipelines/events_to_numpy.py" "$line" "$work/events.npy" | tee "$work/python"
-grep -q "^$counted events" "$work/python"
-checks_pipelines "$SOURCE/pipelines/events_to_numpy.py"
-refused "No such file or directory: '/nowhere/events.npy'" "$SOURCE/pipelines/events_to_numpy.py" "$line" /nowhere/events.npy
-GI_TYPELIB_PATH=/nowhere refused "install:.* gir1.2-gsteventcamera-1.0" "$SOURCE/pipelines/events_to_numpy.py" "$line"
+events_to_numpy=$SOURCE/pipelines/events_to_numpy.py
+"$events_to_numpy" "${line% ! appsink*}" "$work/events.npy" | tee "$work/python"
+grep -q "^$counted events of a 320x240 sensor" "$work/python"
+refused "can't handle caps application/x-event-camera" "$events_to_numpy" "videotestsrc num-buffers=3" "$work/none.npy"
+refused 'no element "eventdim"' "$events_to_numpy" "videotestsrc ! eventdim" "$work/none.npy"
+refused 'No such file "/nowhere"' "$events_to_numpy" "filesrc location=/nowhere ! evtdec" "$work/none.npy"
+refused "No such file or directory: '/nowhere/events.npy'" "$events_to_numpy" "${line% ! appsink*}" /nowhere/events.npy
 /usr/bin/python3 - "$work/events.npy" <<'PYTHON'
 import sys
 import numpy as np
@@ -50,6 +52,14 @@ assert (np.diff(events["t"]) >= 0).all(), "not sorted"
 assert events["x"].max() < 320 and events["y"].max() < 240, "beyond the sensor"
 assert 0.3 < events["p"].mean() < 0.7, "polarities are unequal"
 PYTHON
+
+# PyTorch's workers read recordings and make voxel grids; the loss decreases.
+for name in first second; do
+  "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=30 ! video/x-raw,width=64,height=48,framerate=30/1 ! \
+    eventsim-diff ! application/x-event-camera ! evtenc ! filesink location="$work/$name.raw"
+done
+"$SOURCE/pipelines/examples/train_on_events.py" "$work/first.raw" "$work/second.raw" | tee "$work/training"
+awk '$1 == "epoch" { if (NR > 1 && ($6 + 0 >= last || $3 < 60)) exit 1; last = $6 } END { exit NR != 3 }' "$work/training"
 
 # Labels are written and read from Python.
 /usr/bin/python3 - <<'PYTHON'

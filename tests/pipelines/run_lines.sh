@@ -61,7 +61,7 @@ run_lines() { # PAGE...
       wait $receiver || fail "$(cat received)"
       receiver=
     fi
-  done < <(awk '/^```/ { inside = !inside } inside && !seen[$0]++ && /^(gst-|ges-|event-|web-|rtsp-|\.\/pipelines\/(events_|voxel_)|for |\{ |python3 )/' "$@")
+  done < <(awk '/^```/ { open = !open; inside = open && $0 == "```" } inside && !seen[$0]++ && /^(gst-|ges-|event-|web-|rtsp-|\.\/pipelines\/(events_|examples\/|voxel_)|for |\{ |python3 )/' "$@")
   for server in "${servers[@]}"; do
     kill "$server"
     wait "$server" || fail "a server ended with status $?"

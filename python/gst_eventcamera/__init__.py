@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Events of event cameras as NumPy arrays: read, simulated, live, as voxel grids, and written.
+
+    import gst_eventcamera as ec
+
+    events = ec.read("recording.raw")
+    for chunk in ec.stream("recording.raw", window=0.033): ...
+    for chunk in ec.simulate("drive.mp4", "eventsim-dvs preset=davis346 seed=7"): ...
+    for chunk in ec.live("v4l2src ! eventsim-diff"): ...
+    voxels = ec.voxel_grid(chunk, bins=5)
+    ec.write("out.aedat4", events, width=346, height=260)
+
+Events are structured arrays with the fields t (int64, microseconds), x, y (uint16) and p (bool, True = ON).
+Failures of pipelines are raised as PipelineError with the text of the element that failed.
+"""
+from .events import EVENT, Events
+from .pipeline import PipelineError
+from .recordings import Stream, read, stream, write
+from .sources import live, simulate
+from .tensors import tensors, voxel_grid
+
+__all__ = ["EVENT", "Events", "PipelineError", "Stream", "live", "read", "simulate", "stream", "tensors",
+           "voxel_grid", "write"]

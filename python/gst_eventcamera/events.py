@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Arrays of events."""
+from __future__ import annotations
+
+from typing import Any, Optional
+
+import numpy as np
+
+# The layout of GstEventCameraAbsoluteEvent.
+EVENT = np.dtype({"names": ["t", "x", "y", "p"], "formats": ["<i8", "<u2", "<u2", "?"],
+                  "offsets": [0, 8, 10, 12], "itemsize": 16})
+
+
+class Events(np.ndarray):
+    """A one-dimensional array of events, sorted by time, with the fields t (int64, microseconds), x and y
+    (uint16, from the top left) and p (bool, True = ON).
+
+    width, height: of the sensor, in pixels; 0 if not known.
+    start, end: of the time that the events are from, in seconds. A slice keeps those of the whole.
+    cause, object_class: labels of the events, uint8 and uint16 of the same shape, where an element has
+    labelled them (GstEventCameraLabel); else None.
+    """
+
+    width: int
+    height: int
+    start: float
+    end: float
+    cause: Optional[np.ndarray]
+    object_class: Optional[np.ndarray]
+
+    def __new__(cls, count: int, width: int = 0, height: int = 0, start: float = 0, end: float = 0) -> Events:
+        events = super().__new__(cls, (count,), EVENT)
+        events.width, events.height, events.start, events.end = width, height, start, end
+        return events
+
+    def __array_finalize__(self, source: Any) -> None:
+        self.width = getattr(source, "width", 0)
+        self.height = getattr(source, "height", 0)
+        self.start = getattr(source, "start", 0.0)
+        self.end = getattr(source, "end", 0.0)
+        self.cause = self.object_class = None
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, str):
+            return self.view(np.ndarray)[index]
+        part = super().__getitem__(index)
+        if self.cause is not None and self.object_class is not None and isinstance(part, Events):
+            part.cause, part.object_class = self.cause[index], self.object_class[index]
+        return part
+
+    def between(self, start: float, end: float) -> Events:
+        """The events with start <= t < end, in seconds; a view, found by binary search."""
+        bounds = np.searchsorted(self["t"], [round(start * 1e6), round(end * 1e6)])
+        part = self[bounds[0]:bounds[1]]
+        part.start, part.end = start, end
+        return part
+
+
+def joined(parts: list[Events], width: int, height: int, start: float, end: float) -> Events:
+    """One array of all parts; the part itself if there is one."""
+    if len(parts) == 1:
+        events = parts[0]
+        events.start, events.end = start, end
+        return events
+    events = Events(sum(len(part) for part in parts), width, height, start, end)
+    if parts:
+        np.concatenate(parts, out=events)
+        if all(part.cause is not None for part in parts):
+            events.cause = np.concatenate([part.cause for part in parts])
+            events.object_class = np.concatenate([part.object_class for part in parts])
+    return events
+
+
+def packed_events(events: np.ndarray) -> np.ndarray:
+    """A contiguous array of EVENT; the array itself if it is one. Fields are taken by name."""
+    if events.dtype == EVENT and events.flags.c_contiguous:
+        return events
+    packed = np.empty(len(events), EVENT)
+    for name in EVENT.names or ():
+        packed[name] = events[name]
+    return packed

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Running GStreamer pipelines, with failures as exceptions."""
+from __future__ import annotations
+
+import os
+from typing import Callable, Iterator, Optional
+
+import gi
+import numpy as np
+
+try:
+    for namespace in ("Gst", "GstApp", "GstEventCamera"):
+        gi.require_version(namespace, "1.0")
+except ValueError as missing:
+    raise ImportError(f"{missing}; on Debian, install: gir1.2-gst-plugins-base-1.0 gir1.2-gsteventcamera-1.0") from None
+from gi.repository import GLib, Gst, GstApp, GstEventCamera  # noqa: E402, F401
+
+from .events import Events  # noqa: E402
+
+Gst.init(None)
+
+EVENT_CAPS = "application/x-event-camera,format=(string)XYTP"
+EVENT_SIZE = 8  # bytes of an event in a buffer
+LABEL = np.dtype([("object_class", "<u2"), ("cause", "u1"), ("reserved", "u1")])
+
+# Python handles Ctrl-C only between calls, so none waits longer.
+MAX_WAIT = Gst.SECOND // 10
+
+
+class PipelineError(RuntimeError):
+    """A pipeline failed; the text is that of the element: what failed, on what, what to do."""
+
+
+def quoted(path: str | os.PathLike[str]) -> str:
+    """A path as the value of a property in a pipeline description."""
+    return '"' + os.fspath(path).replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _error_of(message: Gst.Message) -> PipelineError:
+    error, cause = message.parse_error()
+    detail = cause.splitlines()[-1] if cause else ""
+    return PipelineError(f"{message.src.get_name()}: {error.message} ({detail})")
+
+
+class Pipeline:
+    """A pipeline whose output reaches its appsink named `out`. A context manager: leaving it stops the
+    pipeline."""
+
+    def __init__(self, description: str) -> None:
+        try:
+            self._pipeline = Gst.parse_launch(description)
+        except GLib.Error as error:
+            raise PipelineError(error.message) from None
+        self._bus = self._pipeline.get_bus()
+        self._sink = self._pipeline.get_by_name("out")
+
+    def __enter__(self) -> Pipeline:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pipeline.set_state(Gst.State.NULL)
+
+    def element(self, name: str) -> Gst.Element:
+        return self._pipeline.get_by_name(name)
+
+    def on_element(self, configure: Callable[[Gst.Element], None]) -> None:
+        """Calls configure() for each element that a decodebin adds."""
+        self._pipeline.connect("deep-element-added", lambda _, __, element: configure(element))
+
+    def gaps_as_buffers(self) -> None:
+        """Intervals without events reach the appsink as empty buffers, too."""
+        pad = self._sink.get_static_pad("sink")
+
+        def replace(_: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
+            event = info.get_event()
+            if event.type != Gst.EventType.GAP:
+                return Gst.PadProbeReturn.OK
+            buffer = Gst.Buffer.new()
+            buffer.pts, buffer.duration = event.parse_gap()
+            pad.chain(buffer)
+            return Gst.PadProbeReturn.DROP
+
+        pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, replace)
+
+    def raise_error(self) -> None:
+        """Raises what an element has reported, if anything; forgets all other messages."""
+        if message := self._bus.pop_filtered(Gst.MessageType.ERROR):
+            raise _error_of(message)
+
+    def set_state(self, state: Gst.State) -> None:
+        """Returns when it is reached; at once for PLAYING."""
+        change = self._pipeline.set_state(state)
+        while change == Gst.StateChangeReturn.ASYNC and state != Gst.State.PLAYING:
+            change = self._pipeline.get_state(MAX_WAIT)[0]
+            self.raise_error()
+        self.raise_error()
+        if change == Gst.StateChangeReturn.FAILURE:
+            raise PipelineError("the pipeline does not start")
+
+    def seek(self, start: float, end: Optional[float]) -> None:
+        """To `start` seconds of stream time, exactly. The pipeline must be paused."""
+        stop = Gst.SeekType.NONE if end is None else Gst.SeekType.SET
+        if not self._pipeline.seek(1, Gst.Format.TIME, Gst.SeekFlags.FLUSH | Gst.SeekFlags.ACCURATE,
+                                   Gst.SeekType.SET, round(start * 1e9), stop, round((end or 0) * 1e9)):
+            raise PipelineError("the source cannot seek")
+        self.set_state(Gst.State.PAUSED)
+
+    def duration(self) -> float:
+        """In seconds; the pipeline must be paused."""
+        known, duration = self._pipeline.query_duration(Gst.Format.TIME)
+        if not known:
+            raise PipelineError("the source does not tell its duration")
+        return duration / 1e9
+
+    def caps(self) -> Gst.Caps:
+        """Of the output; the pipeline must be paused."""
+        return self._sink.get_static_pad("sink").get_current_caps()
+
+    def samples(self) -> Iterator[Gst.Sample]:
+        """Plays to the end."""
+        self.set_state(Gst.State.PLAYING)
+        while not self._sink.is_eos():
+            if sample := self._sink.try_pull_sample(MAX_WAIT):
+                yield sample
+            else:
+                self.raise_error()
+        self.raise_error()
+
+    def wait(self) -> None:
+        """Returns at the end of a playing pipeline that has no appsink."""
+        message = None
+        while not message:
+            message = self._bus.timed_pop_filtered(MAX_WAIT, Gst.MessageType.EOS | Gst.MessageType.ERROR)
+        if message.type == Gst.MessageType.ERROR:
+            raise _error_of(message)
+
+
+def sensor_size(caps: Gst.Caps) -> tuple[int, int]:
+    """Width and height of the sensor."""
+    is_events, info = GstEventCamera.Info.from_caps(caps)
+    if not is_events:
+        raise PipelineError(f"{caps.get_structure(0).get_name()} is not a stream of events")
+    return info.width, info.height
+
+
+def events_of(sample: Gst.Sample) -> Events:
+    """The events of a buffer, written to the array in one pass."""
+    buffer = sample.get_buffer()
+    start = buffer.pts / 1e9
+    duration = 0 if buffer.duration == Gst.CLOCK_TIME_NONE else buffer.duration / 1e9
+    count = buffer.get_size() // EVENT_SIZE
+    events = Events(count, *sensor_size(sample.get_caps()), start, start + duration)
+    if count > 0 and not GstEventCamera.unpack(buffer, events.ctypes.data, count):
+        raise PipelineError("a buffer of events cannot be read")
+    if labels := GstEventCamera.buffer_get_event_camera_label_meta(buffer) if count > 0 else None:
+        fields = np.frombuffer(labels.get_bytes().get_data(), LABEL)
+        events.cause, events.object_class = fields["cause"], fields["object_class"]
+    return events

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Recordings of events: read, played window by window, and written."""
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from typing import Iterator, Optional, overload
+
+import numpy as np
+
+from .events import EVENT, Events, joined
+from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, quoted, sensor_size
+from .sources import SINK
+
+# Elements that write a file, by its extension.
+WRITERS = {
+    ".raw": "evtenc ! filesink name=file",
+    ".dat": "eventdatenc ! filesink name=file",
+    ".es": "eventesenc ! filesink name=file",
+    ".csv": "eventcsvenc ! filesink name=file",
+    ".txt": "eventcsvenc format=rpg ! filesink name=file",
+    ".npy": "eventnpyenc ! filesink name=file",
+    ".npz": "eventnpzenc ! filesink name=file",
+    ".aedat4": "aedatmux ! filesink name=file",
+    ".h5": "eventhdf5sink name=file",
+    ".hdf5": "eventhdf5sink name=file format=metavision",
+}
+
+# Microseconds of the buffers that are written.
+BUFFER = 10_000
+XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
+
+
+@dataclasses.dataclass(frozen=True)
+class Stream:
+    """Windows of a recording, in order: iterate over it, take its len(), index it, or slice it.
+
+    window: length of a window in seconds, from 1e-6 to 10, in whole microseconds.
+    start, end: the part of the recording in seconds from its first event, end exclusive; None = to its end.
+
+    Iterating yields an Events array a window, empty where nothing happened; only one is in memory. The
+    window that the recording ends in is the last one. Indexing and slices seek in the file. Raises
+    PipelineError if the file cannot be read."""
+
+    path: str
+    window: float = 0.033
+    start: float = 0.0
+    end: Optional[float] = None
+
+    def __post_init__(self) -> None:
+        if not 1e-6 <= self.window <= 10:
+            raise ValueError(f"window is {self.window} s; it must be from 1e-6 to 10 s")
+
+    @property
+    def width(self) -> int:
+        """Of the sensor, in pixels."""
+        return self._properties()[0]
+
+    @property
+    def height(self) -> int:
+        """Of the sensor, in pixels."""
+        return self._properties()[1]
+
+    @property
+    def duration(self) -> float:
+        """Of the part, in seconds."""
+        whole = self._properties()[2]
+        return max(0.0, min(whole, math.inf if self.end is None else self.end) - self.start)
+
+    def between(self, start: float, end: Optional[float] = None) -> Stream:
+        """The part from `start` to `end`, in seconds after the start of this one."""
+        limit = math.inf if self.end is None else self.end
+        last = min(limit, math.inf if end is None else self.start + end)
+        return dataclasses.replace(self, start=self.start + start, end=None if last == math.inf else last)
+
+    def _windows(self, seconds: float) -> int:
+        """The number of windows that begin within so many seconds."""
+        return -(-round(seconds * 1e6) // round(self.window * 1e6))
+
+    def __len__(self) -> int:
+        return self._windows(self.duration)
+
+    @overload
+    def __getitem__(self, index: int) -> Events: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Stream: ...
+
+    def __getitem__(self, index: int | slice) -> Events | Stream:
+        if isinstance(index, slice):
+            first, last, step = index.indices(len(self))
+            if step != 1:
+                raise ValueError("a slice of a stream has no step")
+            return self.between(first * self.window, max(first, last) * self.window)
+        first = index + len(self) if index < 0 else index
+        if not 0 <= first < len(self):
+            raise IndexError(f"window {index} of {len(self)}")
+        return next(iter(self.between(first * self.window, (first + 1) * self.window)))
+
+    def __iter__(self) -> Iterator[Events]:
+        window = round(self.window * 1e6)
+        with self._open() as pipeline:
+            if self.start > 0 or self.end is not None:
+                pipeline.set_state(Gst.State.PAUSED)
+                pipeline.seek(self.start, self.end)
+            origin: Optional[int] = None
+            index = 0
+            parts: list[Events] = []
+            size = (0, 0)
+
+            limit = math.inf if self.end is None else self._windows(self.end - self.start)
+
+            def complete(last: float) -> Iterator[Events]:
+                """The windows before number `last`."""
+                nonlocal index
+                while index < min(last, limit):
+                    start = (origin or 0) + index * window
+                    yield joined(parts[:], *size, start / 1e6, (start + window) / 1e6)
+                    parts.clear()
+                    index += 1
+
+            for sample in pipeline.samples():
+                events = events_of(sample)
+                size = events.width, events.height
+                first = round(events.start * 1e6)
+                origin = first if origin is None else origin
+                yield from complete((first - origin) // window)
+                if index >= limit:
+                    return
+                if len(events) > 0:
+                    parts.append(events)
+                else:
+                    yield from complete((round(events.end * 1e6) - origin) // window)
+            if parts:
+                yield from complete(index + 1)
+
+    def _open(self) -> Pipeline:
+        pipeline = Pipeline(f"filesrc location={quoted(self.path)} ! decodebin caps={EVENT_CAPS}"
+                            f" expose-all-streams=false ! {EVENT_CAPS} ! {SINK}")
+        pipeline.on_element(self._configure)
+        pipeline.gaps_as_buffers()
+        return pipeline
+
+    def _configure(self, element: Gst.Element) -> None:
+        if element.find_property("buffer-duration"):
+            element.set_property("buffer-duration", round(self.window * 1e6) * 1000)
+
+    def _properties(self) -> tuple[int, int, float]:
+        """Width, height and duration of the recording."""
+        with self._open() as pipeline:
+            pipeline.set_state(Gst.State.PAUSED)
+            return (*sensor_size(pipeline.caps()), pipeline.duration())
+
+
+def stream(path: str | os.PathLike[str], window: float = 0.033) -> Stream:
+    """The windows of a recording, of `window` seconds each, from a file of any format that GStreamer plays.
+
+    ec.stream(path)[30:60] and ec.stream(path).between(1.0, 2.0) are parts of it."""
+    return Stream(os.fspath(path), window)
+
+
+def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = None) -> Events:
+    """All events of a recording, or those with start <= time < end, in seconds from its first event.
+
+    Shape (events,), 16 bytes each; times are those of the file. Raises PipelineError if the file cannot be
+    read or has no events to read."""
+    part = Stream(os.fspath(path), window=1, start=start, end=end)
+    chunks = list(part)
+    if not chunks:
+        return Events(0, part.width, part.height)
+    return joined(chunks, chunks[0].width, chunks[0].height, chunks[0].start, chunks[-1].end)
+
+
+def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, height: int = 0) -> None:
+    """Writes events to a file, whose extension selects the format: .raw (EVT3), .dat, .es, .csv, .txt, .npy,
+    .npz, .aedat4, .h5 (DSEC) or .hdf5 (Metavision).
+
+    events: an array with the fields t (microseconds, at least 0, sorted), x, y and p; shape (events,).
+    width, height: of the sensor, in pixels; may be left out for Events of a known sensor.
+
+    Raises ValueError for events that are not sorted or outside the sensor, or an unknown extension, and
+    PipelineError if the file cannot be written."""
+    extension = os.path.splitext(path)[1].lower()
+    if extension not in WRITERS:
+        raise ValueError(f"{os.fspath(path)}: the extension must be one of {' '.join(WRITERS)}")
+    width, height = width or getattr(events, "width", 0), height or getattr(events, "height", 0)
+    if width < 1 or height < 1:
+        raise ValueError("give the width and height of the sensor")
+    _check(events, width, height)
+    with Pipeline(f"appsrc name=in format=time block=true max-bytes=16777216 ! {WRITERS[extension]}") as pipeline:
+        pipeline.element("file").set_property("location", os.fspath(path))
+        source = pipeline.element("in")
+        source.set_property("caps", Gst.Caps.from_string(
+            f"{EVENT_CAPS},width={width},height={height},framerate=0/1"))
+        pipeline.set_state(Gst.State.PLAYING)
+        for buffer in _buffers(events):
+            if source.push_buffer(buffer) != Gst.FlowReturn.OK:
+                pipeline.raise_error()
+                raise PipelineError(f"{os.fspath(path)} cannot be written")
+        source.end_of_stream()
+        pipeline.wait()
+
+
+def _check(events: np.ndarray, width: int, height: int) -> None:
+    t = events["t"]
+    if len(events) > 0 and (t[0] < 0 or np.any(t[1:] < t[:-1])):
+        raise ValueError("events must be sorted by time, from 0 on")
+    if len(events) > 0 and (np.max(events["x"]) >= width or np.max(events["y"]) >= height):
+        raise ValueError(f"there are events outside the sensor of {width}x{height} pixels")
+
+
+def _buffers(events: np.ndarray) -> Iterator[Gst.Buffer]:
+    """The events in buffers of a grid, those without events left out."""
+    t = np.asarray(events["t"])
+    cuts = np.flatnonzero(t[1:] // BUFFER != t[:-1] // BUFFER) + 1
+    for part in np.split(np.asarray(events), cuts) if len(events) > 0 else []:
+        start = int(part["t"][0]) // BUFFER * BUFFER
+        packed = np.empty(len(part), XYTP)
+        packed["t"] = part["t"] - start
+        packed["x"] = part["x"]
+        packed["y_p"] = part["y"] | np.where(part["p"], 0x8000, 0).astype("<u2")
+        buffer = Gst.Buffer.new_wrapped(packed.tobytes())
+        buffer.pts, buffer.duration = start * 1000, BUFFER * 1000
+        yield buffer

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Events of simulators and of cameras."""
+from __future__ import annotations
+
+import os
+from typing import Iterator
+
+from .events import Events
+from .pipeline import EVENT_CAPS, Pipeline, events_of, quoted
+
+SINK = "appsink name=out sync=false max-buffers=4"
+
+# What simulators read without conversion, so that a decoder's luma stays as it is.
+LUMA = "video/x-raw,format=(string){GRAY8,I420,YV12,NV12,NV21,Y42B,Y444,GRAY16_LE}"
+
+
+def _chunks(description: str) -> Iterator[Events]:
+    with Pipeline(f"{description} ! {EVENT_CAPS} ! {SINK}") as pipeline:
+        pipeline.gaps_as_buffers()
+        for sample in pipeline.samples():
+            yield events_of(sample)
+
+
+def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs denoise=8") -> Iterator[Events]:
+    """Yields the events that an event camera would have seen, one array for each two frames of a video.
+
+    video: a file that GStreamer plays.
+    simulator: an element and its properties, such as "eventsim-dvs preset=davis346 seed=7"; further
+        elements may follow it, such as "eventsim-dvs ! eventdenoise".
+
+    Only the current array is in memory. Raises PipelineError if the file cannot be read or an element or
+    property does not exist."""
+    return _chunks(f"filesrc location={quoted(video)} ! decodebin ! videoconvert ! {LUMA} ! {simulator}")
+
+
+def live(pipeline: str) -> Iterator[Events]:
+    """Yields the events at the end of a pipeline, such as "v4l2src ! eventsim-diff", an array a buffer.
+
+    Leaving the loop, by break, an exception or Ctrl-C, stops the pipeline. It waits while the loop is busy,
+    except for a live source, which drops what is not taken in time. Raises PipelineError."""
+    return _chunks(pipeline)

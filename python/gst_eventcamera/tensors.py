@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Events as tensors, computed by the core of the element eventtensor."""
+from __future__ import annotations
+
+from typing import Iterator
+
+import numpy as np
+
+from .events import packed_events
+from .pipeline import Gst, GstEventCamera, Pipeline
+from .sources import SINK
+
+
+def voxel_grid(events: np.ndarray, bins: int = 5, width: int = 0, height: int = 0) -> np.ndarray:
+    """The voxel grid of events: each adds its polarity, +1 or -1, to the two nearest of `bins` instants, from
+    the time of the first event to that of the last one, in proportion to their closeness.
+
+    events: an array with the fields t, x, y and p, sorted by t; shape (events,).
+    bins: 1 to 256.
+    width, height: of the sensor, in pixels; may be left out for Events of a known sensor.
+
+    Returns float32 of shape (bins, height, width), the same as eventtensor makes of a window of these
+    events. Raises ValueError for events that are not sorted or outside the sensor."""
+    width, height = width or getattr(events, "width", 0), height or getattr(events, "height", 0)
+    if width < 1 or height < 1 or not 1 <= bins <= GstEventCamera.MAX_BINS:
+        raise ValueError(f"no voxel grid of {bins} bins, {height} rows and {width} columns")
+    packed = packed_events(events)
+    grid = np.empty((bins, height, width), np.float32)
+    if not GstEventCamera.voxel_grid(packed.ctypes.data, len(packed), width, height, bins, grid.ctypes.data):
+        raise ValueError(f"events are not sorted by time or outside the sensor of {width}x{height} pixels")
+    return grid
+
+
+def tensors(pipeline: str) -> Iterator[np.ndarray]:
+    """Yields the tensors at the end of a pipeline, such as
+    "filesrc location=recording.raw ! evtdec ! eventtensor representation=histogram accumulation-time=50000000".
+
+    Arrays of shape (channels, height, width), of type float32, float16 or uint8. Raises PipelineError."""
+    with Pipeline(f"{pipeline} ! other/tensors,format=(string)static,num_tensors=1 ! {SINK}") as running:
+        for sample in running.samples():
+            fields = sample.get_caps().get_structure(0)
+            shape = [int(side) for side in fields.get_string("dimensions").split(":")]
+            buffer: Gst.Buffer = sample.get_buffer()
+            values = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), fields.get_string("types"))
+            yield values.reshape(shape[2::-1])

@@ -1,0 +1,239 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The Python package gst_eventcamera: reading, streaming, seeking, simulating, writing, tensors, failures."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import tracemalloc
+import unittest
+
+if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamera-1.0.typelib")):
+    print("built without introspection: no Python")
+    sys.exit(77)
+
+import gst_eventcamera as ec
+import numpy as np
+from gst_eventcamera import pipeline as internals
+from gst_eventcamera.pipeline import Gst, GstEventCamera
+
+FOLDER = tempfile.TemporaryDirectory()
+WIDTH, HEIGHT = 346, 260
+EXTENSIONS = ["raw", "dat", "es", "csv", "npz", "aedat4", "h5", "hdf5"]
+
+
+def path_of(name):
+    return os.path.join(FOLDER.name, name)
+
+
+def random_events(count, microseconds, seed=1, pixels=(WIDTH, HEIGHT)):
+    """Sorted, from 0 on, with a silence from 0.4 to 0.6 of the time."""
+    random = np.random.default_rng(seed)
+    events = ec.Events(count, *pixels)
+    t = np.sort(random.integers(0, microseconds, count))
+    t[0] = 0
+    silent = (t > 0.4 * microseconds) & (t < 0.6 * microseconds)
+    events["t"] = np.sort(np.where(silent, t // 4, t))
+    events["x"] = random.integers(0, pixels[0], count)
+    events["y"] = random.integers(0, pixels[1], count)
+    events["p"] = random.integers(0, 2, count)
+    return events
+
+
+def same(a, b):
+    return len(a) == len(b) and all(np.array_equal(a[name], b[name]) for name in "txyp")
+
+
+def plain_voxel_grid(events, bins):
+    """As E2VID defines it, in double precision."""
+    grid = np.zeros((bins, HEIGHT, WIDTH))
+    span = max(events["t"][-1] - events["t"][0], 1)
+    at = (bins - 1) * (events["t"] - events["t"][0]) / span
+    for b in range(bins):
+        share = np.maximum(0, 1 - np.abs(b - at)) * np.where(events["p"], 1, -1)
+        np.add.at(grid[b], (events["y"], events["x"]), share)
+    return grid
+
+
+class Recordings(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.events = random_events(30_000, 2_000_000)
+        cls.path = path_of("a recording.raw")
+        ec.write(cls.path, cls.events)
+
+    def test_every_format_comes_back(self):
+        for extension in EXTENSIONS:
+            with self.subTest(extension):
+                path = path_of(f"events.{extension}")
+                ec.write(path, self.events, width=WIDTH, height=HEIGHT)
+                read = ec.read(path)
+                self.assertEqual(sorted(read["t"]), sorted(self.events["t"]))
+                self.assertEqual(read["p"].sum(), self.events["p"].sum())
+                if extension != "csv":  # text has no size
+                    self.assertGreaterEqual(read.width, WIDTH)
+
+    def test_reads_exactly(self):
+        read = ec.read(self.path)
+        self.assertTrue(same(read, self.events))
+        self.assertEqual((read.width, read.height), (WIDTH, HEIGHT))
+        self.assertEqual(read.dtype.names, ("t", "x", "y", "p"))
+        self.assertEqual([read[name].dtype for name in "txyp"], [np.int64, np.uint16, np.uint16, bool])
+        self.assertIs(type(read["t"]), np.ndarray)
+
+    def test_reads_a_part(self):
+        self.assertTrue(same(ec.read(self.path, 0.25, 0.5), self.events.between(0.25, 0.5)))
+        self.assertTrue(same(ec.read(self.path, start=1.7), self.events.between(1.7, 9)))
+
+    def test_windows_partition_the_recording(self):
+        stream = ec.stream(self.path, window=0.03)
+        windows = list(stream)
+        self.assertEqual(len(windows), len(stream))
+        self.assertEqual((stream.width, stream.height), (WIDTH, HEIGHT))
+        self.assertTrue(same(np.concatenate(windows), self.events))
+        for i, window in enumerate(windows):
+            self.assertAlmostEqual(window.start, i * 0.03)
+            self.assertTrue(same(window, self.events.between(i * 0.03, (i + 1) * 0.03)), i)
+        self.assertTrue(any(len(window) == 0 for window in windows))
+
+    def test_slices_and_seeks(self):
+        stream = ec.stream(self.path, window=0.05)
+        windows = list(stream)
+        self.assertTrue(same(stream[7], windows[7]))
+        self.assertTrue(same(stream[-1], windows[-1]))
+        part = stream[8:15]
+        self.assertEqual(len(part), 7)
+        self.assertTrue(all(same(a, b) for a, b in zip(part, windows[8:15], strict=True)))
+        self.assertTrue(all(same(a, b) for a, b in zip(part[2:4], windows[10:12], strict=True)))
+        self.assertTrue(same(np.concatenate(list(stream.between(1.5))), self.events.between(1.5, 9)))
+        with self.assertRaises(IndexError):
+            stream[len(stream)]
+
+    def test_streams_in_constant_memory(self):
+        path = path_of("long.raw")
+        ec.write(path, random_events(500_000, 5_000_000))
+        tracemalloc.start()
+        count = sum(len(window) for window in ec.stream(path, window=0.02))
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        self.assertEqual(count, 500_000)
+        self.assertLess(peak, 1_000_000)  # all events take 8 MB
+
+    def test_knows_labels(self):
+        buffer = Gst.Buffer.new_wrapped(bytes(3 * 8))
+        buffer.pts = buffer.duration = 0
+        labels = [GstEventCamera.Label() for _ in range(3)]
+        labels[1].object_class, labels[1].cause = 300, GstEventCamera.Cause.LEAK
+        GstEventCamera.buffer_add_event_camera_label_meta(buffer, labels)
+        caps = Gst.Caps.from_string("application/x-event-camera,format=XYTP,width=4,height=4,framerate=0/1")
+        events = internals.events_of(Gst.Sample.new(buffer, caps, None, None))
+        self.assertEqual(list(events.object_class), [0, 300, 0])
+        self.assertEqual(list(events[1:].cause), [int(GstEventCamera.Cause.LEAK), 0])
+        self.assertIsNone(self.events.cause)
+
+
+class Simulators(unittest.TestCase):
+    def test_simulates_a_video(self):
+        video = path_of("ball.mkv")
+        subprocess.run([os.environ["GST_LAUNCH"], "-q", "videotestsrc", "pattern=ball", "num-buffers=20", "!",
+                        "video/x-raw,format=GRAY8,framerate=25/1", "!", "matroskamux", "!",
+                        "filesink", "location=" + video], check=True)
+        chunks = list(ec.simulate(video, "eventsim-dvs seed=7"))
+        self.assertEqual(len(chunks), 19)
+        self.assertAlmostEqual(chunks[3].start, 3 * 0.04, places=2)
+        again = list(ec.simulate(video, "eventsim-dvs seed=7"))
+        self.assertTrue(all(same(a, b) for a, b in zip(chunks, again, strict=True)))
+
+    def test_an_interval_without_events_is_a_chunk(self):
+        chunks = list(ec.live("videotestsrc pattern=black num-buffers=4 ! eventsim-frame"))
+        self.assertEqual([len(chunk) for chunk in chunks], [0, 0, 0])
+
+    def test_leaving_the_loop_stops_the_pipeline(self):
+        before = threading.active_count(), len(os.listdir("/proc/self/task"))
+        for _ in range(3):
+            for _ in ec.live("videotestsrc is-live=true pattern=ball ! eventsim-frame"):
+                break
+        self.assertLessEqual(len(os.listdir("/proc/self/task")), before[1] + 4)  # pools of threads stay
+
+    def test_interrupts(self):
+        program = subprocess.Popen(
+            [sys.executable, "-c", "import gst_eventcamera as ec\n"
+             "for chunk in ec.live('videotestsrc is-live=true pattern=ball ! eventsim-frame'):\n"
+             "    print(len(chunk), flush=True)"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        program.stdout.readline()
+        program.send_signal(signal.SIGINT)
+        _, errors = program.communicate(timeout=30)
+        self.assertIn("KeyboardInterrupt", errors)
+
+
+class Tensors(unittest.TestCase):
+    def test_a_voxel_grid_is_that_of_e2vid(self):
+        events = random_events(20_000, 300_000)
+        for bins in (1, 2, 5):
+            grid = ec.voxel_grid(events, bins)
+            self.assertEqual((grid.shape, grid.dtype), ((bins, HEIGHT, WIDTH), np.float32))
+            np.testing.assert_allclose(grid, plain_voxel_grid(events, bins), atol=1e-5)
+
+    def test_a_voxel_grid_is_that_of_the_element(self):
+        path = path_of("voxels.raw")
+        ec.write(path, random_events(5000, 500_000, seed=3))
+        grids = [ec.voxel_grid(window, 5) for window in ec.stream(path, window=0.1)]
+        tensors = list(ec.tensors(f"filesrc location={internals.quoted(path)} ! evtdec"
+                                  " ! eventtensor bins=5 accumulation-time=100000000"))
+        self.assertEqual(len(grids), len(tensors))
+        for grid, tensor in zip(grids, tensors):
+            self.assertTrue(np.array_equal(grid, tensor))
+
+    def test_every_type_arrives(self):
+        line = "videotestsrc pattern=ball num-buffers=4 ! eventsim-frame ! eventtensor representation=histogram"
+        exact = list(ec.tensors(line))
+        self.assertEqual((exact[0].shape, exact[0].dtype), ((2, 240, 320), np.float32))
+        for kind in ("float16", "uint8"):
+            for tensor, other in zip(ec.tensors(f"{line} data-type={kind}"), exact, strict=True):
+                self.assertEqual(tensor.dtype, kind)
+                self.assertTrue(np.array_equal(tensor.astype(np.float32), other))
+
+    def test_other_orders_of_fields_are_understood(self):
+        events = random_events(100, 1000)
+        tonic = np.empty(100, [("x", np.int16), ("y", np.int16), ("t", np.int64), ("p", bool)])
+        for name in "txyp":
+            tonic[name] = events[name]
+        self.assertTrue(np.array_equal(ec.voxel_grid(tonic, 3, WIDTH, HEIGHT), ec.voxel_grid(events, 3)))
+
+
+class Failures(unittest.TestCase):
+    def expect(self, error, text, work):
+        with self.assertRaises(error) as caught:
+            work()
+        self.assertIn(text, str(caught.exception))
+
+    def test_are_exceptions_with_the_text_of_the_element(self):
+        self.expect(ec.PipelineError, 'No such file "/nowhere"', lambda: ec.read("/nowhere"))
+        self.expect(ec.PipelineError, 'no element "nothing"', lambda: list(ec.live("videotestsrc ! nothing")))
+        self.expect(ec.PipelineError, "can't handle caps application/x-event-camera",
+                    lambda: list(ec.live("videotestsrc num-buffers=3")))
+        self.expect(ec.PipelineError, "Could not open file", lambda: ec.write("/nowhere/out.raw", random_events(9, 9)))
+        self.expect(ec.PipelineError, "2048x2048 pixels",
+                    lambda: ec.write(path_of("wide.raw"), random_events(9, 9, pixels=(3000, 9))))
+
+    def test_tell_what_to_install(self):
+        missing = subprocess.run([sys.executable, "-c", "import gst_eventcamera"], capture_output=True, text=True,
+                                 env=os.environ | {"GI_TYPELIB_PATH": "/nowhere"})
+        self.assertRegex(missing.stderr, "ImportError: .*install: .*gir1.2-gsteventcamera-1.0")
+
+    def test_of_arguments_are_value_errors(self):
+        events = random_events(100, 1000)
+        self.expect(ValueError, "extension", lambda: ec.write(path_of("x.mp4"), events))
+        self.expect(ValueError, "sorted", lambda: ec.write(path_of("x.raw"), events[::-1]))
+        self.expect(ValueError, "outside", lambda: ec.write(path_of("x.raw"), events, 10, 10))
+        self.expect(ValueError, "sorted", lambda: ec.voxel_grid(events[::-1]))
+        self.expect(ValueError, "outside", lambda: ec.voxel_grid(events, 5, 10, 10))
+        self.expect(ValueError, "257 bins", lambda: ec.voxel_grid(events, 257))
+        self.expect(ValueError, "window", lambda: ec.stream("x", window=0))
+
+
+unittest.main()
