@@ -4,7 +4,12 @@
 // write.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <span>
+
 #include "bench/codec_timing.hpp"
+#include "src/formats/ros/bag_decoder.hpp"
+#include "src/formats/ros/mcap_encoder.hpp"
 #include "tests/formats/formats.hpp"
 #include "tests/formats/recordings.hpp"
 
@@ -79,11 +84,58 @@ void register_all(const Recording& recording) {
   }
 }
 
+/// MCAP files with EVT3 words, pushed as from a file source.
+void register_mcap(const Recording& recording, BagCompression compression, const char* name) {
+  const auto write = [&recording, compression](std::vector<std::uint8_t>& bytes) {
+    bytes.clear();
+    const auto encoder = make_mcap_encoder({size, BagEvents::evt3, compression});
+    encoder->encode(recording.events, bytes);
+    encoder->finish(bytes);
+  };
+  const auto add = [&](const char* what, auto&& body) {
+    benchmark::RegisterBenchmark((recording.name + "/" + name + "/" + what).c_str(), body)
+        ->Unit(benchmark::kMillisecond);
+  };
+  add("read", [&recording, write](benchmark::State& state) {
+    constexpr std::size_t max_piece = std::size_t{1} << 20;
+    std::vector<std::uint8_t> bytes;
+    write(bytes);
+    std::size_t decoded = 0;
+    bench::measure(state, recording.events, [&] {
+      BagDecoder decoder("");
+      decoded = 0;
+      const auto take = [&] {
+        while (const auto item = decoder.next())
+          decoded += std::get<EventItem>(*item).events.size();
+      };
+      for (std::span<const std::uint8_t> rest = bytes; !rest.empty();) {
+        const auto piece = rest.first(std::min(max_piece, rest.size()));
+        rest = rest.subspan(piece.size());
+        decoder.push(piece);
+        take();
+      }
+      decoder.finish();
+      take();
+    });
+    if (decoded != recording.events.size()) state.SkipWithError("events are missing");
+  });
+  add("write", [&recording, write](benchmark::State& state) {
+    std::vector<std::uint8_t> bytes;
+    bench::measure(state, recording.events, [&] { write(bytes); });
+    state.counters["bytes/event"] =
+        static_cast<double>(bytes.size()) / static_cast<double>(recording.events.size());
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   const Recording recordings[] = {noise(), edges()};
   for (const auto& recording : recordings) register_all(recording);
+  const auto& with_edges = recordings[1];
+  register_mcap(with_edges, BagCompression::none, "mcap");
+  register_mcap(with_edges, BagCompression::lz4, "mcap-lz4");
+  register_mcap(with_edges, BagCompression::zstd, "mcap-zstd");
   benchmark::RunSpecifiedBenchmarks();
 }

@@ -16,7 +16,7 @@ fail() {
 without() { # FEATURE...
   echo "Without $*"
   local feature options=()
-  for feature in eventsim opencv eventsimgl eventcam aedat hdf5 npz; do
+  for feature in eventsim opencv eventsimgl eventcam aedat hdf5 npz ros; do
     case " $* " in
       *" $feature "*) options+=("-D$feature=disabled") ;;
       *) options+=("-D$feature=auto") ;;
@@ -52,6 +52,7 @@ if grep -q opencv-dis "$scratch/eventsim-dense"; then fail "flow=opencv-dis is t
 without eventsim aedat
 without eventsim hdf5
 without eventsim npz
+without eventsim ros
 without eventcam # finds OpenCV, although it is not in the prefix
 [ "$(plugins)" = "./eventsim/libgsteventsim.so ./eventsimgl/libgsteventsimgl.so " ] || fail "built $(plugins)"
 

@@ -23,7 +23,8 @@
 //   event_table.cpp               rows or columns of numbers: text/, numpy/, hdf5/;
 //                                 table_sample.cpp guesses what the columns mean
 // recording_decoder.hpp         bytes of any file -> items of several streams: aedat/, hdf5/, and
-//                                 with one_stream_decoder.cpp every Decoder
+//                                 with one_stream_decoder.cpp every Decoder; ros/: messages of a
+//                                 BagFile, a stream per topic
 // recording_reader.cpp          plays a recording: origin, duration, sensor size, seeks, counts
 //   sensor_sizes.hpp              the size of a sensor that the file does not state
 //   seek_points.hpp               where to resume reading

@@ -29,6 +29,14 @@ bool is_npz(Bytes bytes) {
          has_at(name_begin + name_size - ending.size(), ending, bytes);
 }
 
+/// True for an SQLite database whose first page has the tables of a bag.
+bool is_rosbag2(Bytes bytes) {
+  if (!has_at(0, {"SQLite format 3\0", 16}, bytes)) return false;
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return text.find("CREATE TABLE topics(") != std::string_view::npos &&
+         text.find("CREATE TABLE messages(") != std::string_view::npos;
+}
+
 constexpr std::string_view hdf5_magic("\x89HDF\r\n\x1a\n", 8);
 
 /// Recognises formats with a signature.
@@ -42,6 +50,9 @@ std::optional<Recognised> by_magic(Bytes bytes) {
   if (has_at(0, "\x93NUMPY", bytes)) return Recognised{FileKind::npy};
   if (is_npz(bytes)) return Recognised{FileKind::npz};
   if (has_at(0, hdf5_magic, bytes)) return Recognised{FileKind::hdf5};
+  if (has_at(0, {"\x89MCAP0\r\n", 8}, bytes)) return Recognised{FileKind::mcap};
+  if (has_at(0, "#ROSBAG V2.0\n", bytes)) return Recognised{FileKind::rosbag};
+  if (is_rosbag2(bytes)) return Recognised{FileKind::rosbag2_db3};
   return std::nullopt;
 }
 

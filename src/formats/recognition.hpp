@@ -14,10 +14,13 @@ enum class FileKind : std::uint8_t {
   csv,
   event_stream,
   hdf5,
+  mcap,
   npy,
   npz,
   prophesee_dat,
   prophesee_raw,
+  rosbag,
+  rosbag2_db3,
 };
 
 struct Recognised {

@@ -147,6 +147,10 @@ class RecordingDecoder {
   /// True if the file states that a stream has no items.
   virtual bool is_empty(std::size_t /*stream*/) const { return false; }
 
+  /// What the file has and the decoder does not read, for users, such as "topics /a, /b"; empty if
+  /// there is nothing that another setting would read.
+  virtual std::string left_out() const { return {}; }
+
   /// Name of the format for users; empty if it adds nothing to the media type.
   virtual std::string format_name() const { return {}; }
 

@@ -141,6 +141,9 @@ class RecordingReader {
 
   std::string format_name() const { return decoder_->format_name(); }
 
+  /// What the file has and is not read; see RecordingDecoder.
+  std::string left_out() const { return decoder_->left_out(); }
+
   /// Time in the file that output times count from; valid after a Start.
   Microseconds origin() const { return origin_; }
 

@@ -32,6 +32,11 @@ TEST(Recognition, KnowsFilesByTheirFirstBytes) {
   EXPECT_EQ(recognise("\x93NUMPY"), Recognised{FileKind::npy});
   EXPECT_EQ(recognise(npz), Recognised{FileKind::npz});
   EXPECT_EQ(recognise(hdf5), Recognised{FileKind::hdf5});
+  EXPECT_EQ(recognise("\x89MCAP0\r\n"), Recognised{FileKind::mcap});
+  EXPECT_EQ(recognise("#ROSBAG V2.0\n"), Recognised{FileKind::rosbag});
+  EXPECT_EQ(recognise("SQLite format 3\0..CREATE TABLE messages(id..CREATE TABLE topics(id"sv),
+            Recognised{FileKind::rosbag2_db3});
+  EXPECT_EQ(recognise("SQLite format 3\0..CREATE TABLE songs(id"sv), std::nullopt);
   EXPECT_EQ(recognise("% evt 3.0\n"), Recognised{FileKind::prophesee_raw});
   EXPECT_EQ(recognise("% date 1\n% format EVT4;height=1;width=1\n"),
             Recognised{FileKind::prophesee_raw});
@@ -65,8 +70,8 @@ TEST(Recognition, FindsTheSameWhereOneKindIsWanted) {
     const std::span bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
     const auto found = eventcamera::recognise(bytes);
     for (const auto kind :
-         {FileKind::aedat, FileKind::csv, FileKind::event_stream, FileKind::hdf5, FileKind::npy,
-          FileKind::npz, FileKind::prophesee_dat, FileKind::prophesee_raw}) {
+         {FileKind::aedat, FileKind::csv, FileKind::event_stream, FileKind::hdf5, FileKind::mcap,
+          FileKind::npy, FileKind::npz, FileKind::prophesee_dat, FileKind::prophesee_raw}) {
       const auto wanted = eventcamera::recognise(bytes, kind);
       if (found && found->kind == kind)
         EXPECT_EQ(wanted, found) << text;

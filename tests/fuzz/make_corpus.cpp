@@ -11,6 +11,7 @@
 #include "tests/formats/formats.hpp"
 #include "tests/formats/recordings.hpp"
 #include "tests/fuzz/aedat_seeds.hpp"
+#include "tests/fuzz/bag_seeds.hpp"
 #include "tests/fuzz/datagram_seeds.hpp"
 #include "tests/fuzz/table_seeds.hpp"
 #include "tests/wire/rtp_packets.hpp"
@@ -115,7 +116,7 @@ int main(int argc, char** argv) {
   std::map<std::string, std::vector<Seed>> files = {
       {"aedat2", aedat2_seeds()}, {"aedat3", aedat3_seeds()}, {"aedat4", aedat4_seeds()},
       {"csv", csv_seeds()},       {"hdf5", hdf5_seeds()},     {"npy", npy_seeds()},
-      {"npz", npz_seeds()}};
+      {"npz", npz_seeds()},       {"bag", bag_seeds()}};
   for (const auto& format : formats::all()) {
     if (format.name.starts_with("evt"))
       write(corpus / format.name, seeds_of(format));

@@ -1,138 +1,22 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/aedat/aedat4_compression.hpp"
 
-#include <lz4frame.h>
-#include <lz4hc.h>
-#include <zstd.h>
-#include <zstd_errors.h>
-
-#include <algorithm>
-#include <new>
-#include <stdexcept>
-
-#include "src/formats/little_endian.hpp"
-
 namespace eventcamera {
 
-namespace {
-
-constexpr std::size_t first_content = std::size_t{256} << 10;
-constexpr std::uint32_t lz4_magic = 0x184D2204;
-constexpr std::uint32_t zstd_magic = 0xFD2FB528;
-constexpr int zstd_high_level = 9;
-
-bool is_lz4(Aedat4Compression compression) {
-  return compression == Aedat4Compression::lz4 || compression == Aedat4Compression::lz4_high;
-}
-
-}  // namespace
-
-bool begins_compressed(Aedat4Compression compression, std::span<const std::uint8_t> bytes) {
-  return bytes.size() >= 4 && little_endian<std::uint32_t>(bytes.data()) ==
-                                  (is_lz4(compression) ? lz4_magic : zstd_magic);
-}
-
-void Aedat4CompressionDeleter::operator()(LZ4F_dctx_s* context) const {
-  LZ4F_freeDecompressionContext(context);
-}
-
-void Aedat4CompressionDeleter::operator()(ZSTD_DCtx_s* context) const {
-  ZSTD_freeDCtx(context);
-}
-
-void Aedat4CompressionDeleter::operator()(ZSTD_CCtx_s* context) const {
-  ZSTD_freeCCtx(context);
-}
-
-std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress(
-    Aedat4Compression compression, std::span<const std::uint8_t> payload, std::size_t limit) {
-  return is_lz4(compression) ? decompress_lz4(payload, limit) : decompress_zstd(payload, limit);
-}
-
-std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress_lz4(
-    std::span<const std::uint8_t> payload, std::size_t limit) {
-  if (!lz4_) {
-    LZ4F_dctx* context = nullptr;
-    if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0)
-      throw std::bad_alloc();
-    lz4_.reset(context);
-  }
-  LZ4F_resetDecompressionContext(lz4_.get());
-  std::size_t used = 0;
-  std::size_t filled = 0;
-  while (true) {
-    if (filled == content_.size() && !grow(limit)) return std::nullopt;
-    auto to = content_.size() - filled;
-    auto from = payload.size() - used;
-    const auto result = LZ4F_decompress(lz4_.get(), content_.data() + filled, &to,
-                                        payload.data() + used, &from, nullptr);
-    if (LZ4F_isError(result) != 0) return std::nullopt;
-    used += from;
-    filled += to;
-    if (filled > limit) return std::nullopt;
-    if (result == 0) return Content{{content_.data(), filled}, used};
-    if (from == 0 && to == 0) return std::nullopt;  // the payload is truncated
-  }
-}
-
-std::optional<Aedat4Decompressor::Content> Aedat4Decompressor::decompress_zstd(
-    std::span<const std::uint8_t> payload, std::size_t limit) {
-  const auto used = ZSTD_findFrameCompressedSize(payload.data(), payload.size());
-  if (ZSTD_isError(used) != 0) return std::nullopt;
-  if (!zstd_) zstd_.reset(ZSTD_createDCtx());
-  if (!zstd_) throw std::bad_alloc();
-  if (content_.empty()) grow(limit);
-  // Decompresses in one call, so that the output serves as window: the streaming decoder would
-  // allocate a window of the size stated in the frame. Starts over if the output is too small.
-  while (true) {
-    const auto size =
-        ZSTD_decompressDCtx(zstd_.get(), content_.data(), content_.size(), payload.data(), used);
-    if (ZSTD_isError(size) == 0) {
-      if (size > limit) return std::nullopt;
-      return Content{{content_.data(), size}, used};
-    }
-    if (ZSTD_getErrorCode(size) != ZSTD_error_dstSize_tooSmall || !grow(limit)) return std::nullopt;
-  }
-}
-
-bool Aedat4Decompressor::grow(std::size_t limit) {
-  if (content_.size() >= limit) return false;
-  content_.resize(std::min(limit, std::max(first_content, 2 * content_.size())));
-  return true;
-}
-
-Aedat4Compressor::Aedat4Compressor(Aedat4Compression compression) : compression_(compression) {
-  if (compression != Aedat4Compression::zstd && compression != Aedat4Compression::zstd_high) return;
-  zstd_.reset(ZSTD_createCCtx());
-  if (!zstd_) throw std::bad_alloc();
-  ZSTD_CCtx_setParameter(
-      zstd_.get(), ZSTD_c_compressionLevel,
-      compression == Aedat4Compression::zstd ? ZSTD_CLEVEL_DEFAULT : zstd_high_level);
+Aedat4Compressor::Aedat4Compressor(Aedat4Compression compression) {
+  if (compression == Aedat4Compression::none) return;
+  const bool is_high =
+      compression == Aedat4Compression::lz4_high || compression == Aedat4Compression::zstd_high;
+  compressor_.emplace(codec_of(compression),
+                      is_high ? FrameCompressor::Level::high : FrameCompressor::Level::standard);
 }
 
 void Aedat4Compressor::compress(std::span<const std::uint8_t> content,
                                 std::vector<std::uint8_t>& out) {
-  const auto at = out.size();
-  std::size_t size = 0;
-  if (compression_ == Aedat4Compression::none) {
+  if (compressor_)
+    compressor_->compress(content, out);
+  else
     out.insert(out.end(), content.begin(), content.end());
-    return;
-  }
-  if (is_lz4(compression_)) {
-    LZ4F_preferences_t preferences{};
-    preferences.compressionLevel =
-        compression_ == Aedat4Compression::lz4_high ? LZ4HC_CLEVEL_DEFAULT : 0;
-    out.resize(at + LZ4F_compressFrameBound(content.size(), &preferences));
-    size = LZ4F_compressFrame(out.data() + at, out.size() - at, content.data(), content.size(),
-                              &preferences);
-    if (LZ4F_isError(size) != 0) throw std::runtime_error(LZ4F_getErrorName(size));
-  } else {
-    out.resize(at + ZSTD_compressBound(content.size()));
-    size = ZSTD_compress2(zstd_.get(), out.data() + at, out.size() - at, content.data(),
-                          content.size());
-    if (ZSTD_isError(size) != 0) throw std::runtime_error(ZSTD_getErrorName(size));
-  }
-  out.resize(at + size);
 }
 
 }  // namespace eventcamera

@@ -2,49 +2,21 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "src/formats/aedat/aedat4.hpp"
-
-struct LZ4F_dctx_s;
-struct ZSTD_DCtx_s;
-struct ZSTD_CCtx_s;
+#include "src/formats/compression/compressed_frames.hpp"
 
 namespace eventcamera {
 
-/// Frees contexts of lz4 and zstd.
-struct Aedat4CompressionDeleter {
-  void operator()(LZ4F_dctx_s* context) const;
-  void operator()(ZSTD_DCtx_s* context) const;
-  void operator()(ZSTD_CCtx_s* context) const;
-};
-
-/// Decompresses packets. Memory grows with the actual output, not with sizes stated in the data.
-class Aedat4Decompressor {
- public:
-  struct Content {
-    std::span<const std::uint8_t> bytes;  ///< valid until the next call
-    std::size_t used;                     ///< number of bytes of the payload consumed
-  };
-
-  /// Returns the content of the compressed frame at the front of `payload`; nothing if it is
-  /// corrupt or larger than `limit`. `compression` must not be `none`.
-  std::optional<Content> decompress(Aedat4Compression compression,
-                                    std::span<const std::uint8_t> payload,
-                                    std::size_t limit = aedat4_largest_packet);
-
- private:
-  std::optional<Content> decompress_lz4(std::span<const std::uint8_t> payload, std::size_t limit);
-  std::optional<Content> decompress_zstd(std::span<const std::uint8_t> payload, std::size_t limit);
-  bool grow(std::size_t limit);
-
-  std::unique_ptr<LZ4F_dctx_s, Aedat4CompressionDeleter> lz4_;
-  std::unique_ptr<ZSTD_DCtx_s, Aedat4CompressionDeleter> zstd_;
-  std::vector<std::uint8_t> content_;
-};
+/// Codec of compressed packets; `compression` must not be `none`.
+constexpr FrameCodec codec_of(Aedat4Compression compression) {
+  const bool is_lz4 =
+      compression == Aedat4Compression::lz4 || compression == Aedat4Compression::lz4_high;
+  return is_lz4 ? FrameCodec::lz4 : FrameCodec::zstd;
+}
 
 /// Compresses packets.
 class Aedat4Compressor {
@@ -55,11 +27,7 @@ class Aedat4Compressor {
   void compress(std::span<const std::uint8_t> content, std::vector<std::uint8_t>& out);
 
  private:
-  Aedat4Compression compression_;
-  std::unique_ptr<ZSTD_CCtx_s, Aedat4CompressionDeleter> zstd_;
+  std::optional<FrameCompressor> compressor_;  ///< none: packets are stored as they are
 };
-
-/// True if `bytes` start like a frame of `compression`, which must not be `none`.
-bool begins_compressed(Aedat4Compression compression, std::span<const std::uint8_t> bytes);
 
 }  // namespace eventcamera

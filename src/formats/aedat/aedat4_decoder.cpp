@@ -232,7 +232,7 @@ Aedat4Decoder::Place Aedat4Decoder::place_at(std::size_t offset) {
     if (begins_packet(bytes)) return Place::packet;
     const auto* const identifier = bytes.data() + identifier_at;
     if (std::equal(identifier, identifier + identifier_size, "FTAB")) return Place::table;
-    if (compression_ != Aedat4Compression::none && begins_compressed(compression_, bytes))
+    if (compression_ != Aedat4Compression::none && begins_frame(codec_of(compression_), bytes))
       return Place::table;
   }
   return table_at_ == queue_.position() + offset ? Place::table : Place::noise;
@@ -244,7 +244,7 @@ bool Aedat4Decoder::begins_packet(std::span<const std::uint8_t> bytes) const {
   if (size < payload_head || size > aedat4_largest_packet) return false;
   if (listed_ ? !stream_of(id) : id < 0 || id >= max_unlisted_streams) return false;
   const auto payload = bytes.subspan(aedat4_packet_header);
-  if (compression_ != Aedat4Compression::none) return begins_compressed(compression_, payload);
+  if (compression_ != Aedat4Compression::none) return begins_frame(codec_of(compression_), payload);
   if (little_endian<std::uint32_t>(payload.data()) > size - size_prefix) return false;
   const auto identifier = payload.subspan(identifier_at, identifier_size);
   return std::all_of(identifier.begin(), identifier.end(), [](std::uint8_t c) {
@@ -293,8 +293,8 @@ bool Aedat4Decoder::read_packet() {
   std::span<const std::uint8_t> content;
   std::size_t used = 0;
   if (compression_ != Aedat4Compression::none) {
-    const auto decompressed =
-        decompressor_.decompress(compression_, bytes.subspan(aedat4_packet_header, size));
+    const auto decompressed = decompressor_.decompress(
+        codec_of(compression_), bytes.subspan(aedat4_packet_header, size), aedat4_largest_packet);
     if (decompressed) {
       content = decompressed->bytes;
       used = decompressed->used;

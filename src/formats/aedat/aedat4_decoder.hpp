@@ -115,7 +115,7 @@ class Aedat4Decoder final : public RecordingDecoder {
   Aedat4Compression compression_ = Aedat4Compression::none;
   std::vector<StreamInfo> streams_;
   std::vector<Microseconds> newest_;  ///< time of the latest event, by stream
-  Aedat4Decompressor decompressor_;
+  FrameDecompressor decompressor_;
 
   std::size_t packet_ = 0;  ///< size of the packet being returned
   Elements elements_;

@@ -26,11 +26,11 @@ std::optional<std::vector<Aedat4TableEntry>> read_aedat4_table(std::span<const s
                                                                Aedat4Compression compression,
                                                                std::uint64_t packets_at) {
   if (bytes.size() > max_table) return std::nullopt;
-  Aedat4Decompressor decompressor;
+  FrameDecompressor decompressor;
   auto content = bytes;
-  if (compression != Aedat4Compression::none && begins_compressed(compression, bytes)) {
-    const auto decompressed =
-        decompressor.decompress(compression, bytes, std::min(max_table, max_growth * bytes.size()));
+  if (compression != Aedat4Compression::none && begins_frame(codec_of(compression), bytes)) {
+    const auto decompressed = decompressor.decompress(
+        codec_of(compression), bytes, std::min(max_table, max_growth * bytes.size()));
     if (!decompressed) return std::nullopt;
     content = decompressed->bytes;
   }

@@ -49,6 +49,14 @@ class Evt3Words {
   std::uint64_t steps_to(std::uint64_t time) const { return (time >> 12) - high_; }
   static constexpr std::uint64_t max_steps = (GapLimiter::max_gap >> 12) + 2;
 
+  /// Lets the next write(), at `time`, state time and row, so that readers can begin there. Writes
+  /// no TIME_HIGH for a pause of more than `max_pause` microseconds.
+  void begin_packet(std::uint64_t time, std::uint64_t max_pause) {
+    const auto high = time >> 12;
+    high_ = high - high_ > max_pause >> 12 ? high - 1 : high_ - 1;
+    low_ = y_ = none;
+  }
+
   /// Writes the first event, at `time`, or the first few as a vector; returns their number. Events
   /// are Event or AbsoluteEvent, sorted, and within the sensor.
   template <class AnyEvent>

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "src/formats/little_endian.hpp"
+
+namespace eventcamera {
+
+/// Reads little-endian fields one after the other. Past the end everything is 0 or empty, and
+/// failed() is true.
+class ByteCursor {
+ public:
+  explicit ByteCursor(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+
+  bool failed() const { return failed_; }
+
+  /// Number of bytes read.
+  std::size_t position() const { return position_; }
+
+  std::span<const std::uint8_t> rest() const { return bytes_.subspan(position_); }
+
+  template <class Number>
+  Number number() {
+    const auto field = bytes(sizeof(Number));
+    return field.empty() ? Number{} : little_endian<Number>(field.data());
+  }
+
+  std::span<const std::uint8_t> bytes(std::uint64_t count) {
+    if (failed_ || count > bytes_.size() - position_) {
+      failed_ = true;
+      return {};
+    }
+    const auto field = bytes_.subspan(position_, static_cast<std::size_t>(count));
+    position_ += field.size();
+    return field;
+  }
+
+  /// Bytes that their number precedes.
+  template <class Size>
+  std::span<const std::uint8_t> sized_bytes() {
+    return bytes(number<Size>());
+  }
+
+  /// Text that its size, 32 bits, precedes.
+  std::string_view text() {
+    const auto field = sized_bytes<std::uint32_t>();
+    return {reinterpret_cast<const char*>(field.data()), field.size()};
+  }
+
+  /// Goes to the next multiple of `alignment`, a power of two.
+  void align(std::size_t alignment) { bytes((alignment - position_ % alignment) % alignment); }
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+  std::size_t position_ = 0;
+  bool failed_ = false;
+};
+
+}  // namespace eventcamera

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+struct LZ4F_dctx_s;
+struct ZSTD_DCtx_s;
+struct ZSTD_CCtx_s;
+
+namespace eventcamera {
+
+/// Compressed formats that state where they end: LZ4 frames and Zstandard frames.
+enum class FrameCodec : std::uint8_t { lz4, zstd };
+
+/// Frees contexts of lz4 and zstd.
+struct CompressionDeleter {
+  void operator()(LZ4F_dctx_s* context) const;
+  void operator()(ZSTD_DCtx_s* context) const;
+  void operator()(ZSTD_CCtx_s* context) const;
+};
+
+/// Decompresses frames. Memory grows with the actual output, not with sizes stated in the data.
+class FrameDecompressor {
+ public:
+  struct Content {
+    std::span<const std::uint8_t> bytes;  ///< valid until the next call
+    std::size_t used;                     ///< number of bytes of the payload consumed
+  };
+
+  /// Returns the content of the compressed frame at the front of `payload`; nothing if it is
+  /// corrupt or larger than `limit`.
+  std::optional<Content> decompress(FrameCodec codec, std::span<const std::uint8_t> payload,
+                                    std::size_t limit);
+
+ private:
+  std::optional<Content> decompress_lz4(std::span<const std::uint8_t> payload, std::size_t limit);
+  std::optional<Content> decompress_zstd(std::span<const std::uint8_t> payload, std::size_t limit);
+  bool grow(std::size_t limit);
+
+  std::unique_ptr<LZ4F_dctx_s, CompressionDeleter> lz4_;
+  std::unique_ptr<ZSTD_DCtx_s, CompressionDeleter> zstd_;
+  std::vector<std::uint8_t> content_;
+};
+
+/// Compresses frames.
+class FrameCompressor {
+ public:
+  /// Compression levels.
+  enum class Level : std::uint8_t { standard, high };
+
+  explicit FrameCompressor(FrameCodec codec, Level level = Level::standard);
+
+  /// Appends the compressed `content` to `out`.
+  void compress(std::span<const std::uint8_t> content, std::vector<std::uint8_t>& out);
+
+ private:
+  FrameCodec codec_;
+  Level level_;
+  std::unique_ptr<ZSTD_CCtx_s, CompressionDeleter> zstd_;
+};
+
+/// True if `bytes` start like a frame of `codec`.
+bool begins_frame(FrameCodec codec, std::span<const std::uint8_t> bytes);
+
+}  // namespace eventcamera

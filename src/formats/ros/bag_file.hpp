@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "src/core/event.hpp"
+#include "src/formats/byte_source.hpp"
+#include "src/formats/corruption.hpp"
+#include "src/formats/ros/message_cursor.hpp"
+#include "src/formats/seek_points.hpp"
+
+namespace eventcamera {
+
+/// A topic of a bag.
+struct BagTopic {
+  std::string name;
+  std::string type;                               ///< as in ROS 1: package/Type
+  std::optional<RosSerialization> serialization;  ///< none: unknown
+};
+
+/// A message of a topic.
+struct BagMessage {
+  std::size_t topic;    ///< as BagFile::TakeTopic returned it
+  Microseconds logged;  ///< when it was recorded
+  std::span<const std::uint8_t> bytes;
+  std::uint64_t position;  ///< offset in the file, or of its chunk
+};
+
+/// Reads the messages of a bag, in the order of the file.
+///
+/// Bytes are passed in pieces, as to a RecordingDecoder; the split does not affect the result.
+class BagFile {
+ public:
+  /// Called with every topic before its first message; returns a number for its messages, or
+  /// nothing if they are not to be returned.
+  using TakeTopic = std::function<std::optional<std::size_t>(const BagTopic&)>;
+
+  virtual ~BagFile() = default;
+  BagFile(const BagFile&) = delete;
+  BagFile& operator=(const BagFile&) = delete;
+
+  virtual void push(std::span<const std::uint8_t> piece) = 0;
+  virtual void finish() = 0;
+
+  /// Gives access to all bytes; `source` must outlive this object. True if messages are read from
+  /// it directly and no bytes must be pushed.
+  virtual bool open(ByteSource& source) = 0;
+
+  /// Returns the next message, valid until the next call; nothing if more bytes are needed. Throws
+  /// UnsupportedFormat.
+  virtual std::optional<BagMessage> next() = 0;
+
+  /// Where to restart to get every message that was recorded at `logged` or later; nothing before
+  /// the header is read.
+  virtual std::optional<SeekPoint> seek_point_before(Microseconds logged) const = 0;
+
+  virtual void restart(const SeekPoint& seek_point) = 0;
+
+  /// Time of the last message, if the file states it.
+  virtual std::optional<Microseconds> last_logged() const = 0;
+
+  /// Corruption of the file, to which decoders add that of its messages.
+  Corruption& corruption() { return corruption_; }
+
+ protected:
+  explicit BagFile(TakeTopic take_topic) : take_topic_(std::move(take_topic)) {}
+
+  std::optional<std::size_t> take(const BagTopic& topic) { return take_topic_(topic); }
+
+  Corruption corruption_;
+
+ private:
+  TakeTopic take_topic_;
+};
+
+/// Name of a message type without the folder that ROS 2 adds: package/Type of package/msg/Type.
+inline std::string ros1_type(std::string type) {
+  constexpr std::string_view folder = "/msg/";
+  if (const auto at = type.find(folder); at != std::string::npos)
+    type.replace(at, folder.size(), "/");
+  return type;
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "src/formats/compression/compressed_frames.hpp"
+#include "src/formats/ros/bag_file.hpp"
+
+namespace eventcamera {
+
+class SqliteDatabase;
+class SqliteRows;
+
+/// Reads bags of ROS 2 that are SQLite databases (github.com/ros2/rosbag2,
+/// rosbag2_storage_sqlite3): the tables topics and messages, whose rows are in the order of their
+/// recording. A pushed file is collected in memory, up to 256 MiB, and read at its end, because
+/// databases need random access. The position of a seek point is the ID of a message.
+class Db3File final : public BagFile {
+ public:
+  explicit Db3File(TakeTopic take_topic);
+  ~Db3File() override;
+  Db3File(const Db3File&) = delete;
+  Db3File& operator=(const Db3File&) = delete;
+
+  void push(std::span<const std::uint8_t> piece) override;
+  void finish() override;
+  bool open(ByteSource& source) override;
+  std::optional<BagMessage> next() override;
+  std::optional<SeekPoint> seek_point_before(Microseconds logged) const override;
+  void restart(const SeekPoint& seek_point) override;
+  std::optional<Microseconds> last_logged() const override { return last_logged_; }
+
+ private:
+  void read_topics();
+  std::optional<std::span<const std::uint8_t>> content_of(std::span<const std::uint8_t> data);
+
+  std::vector<std::uint8_t> collected_;    ///< in push mode
+  std::unique_ptr<ByteSource> own_bytes_;  ///< the same, at the end
+  std::unique_ptr<SqliteDatabase> database_;
+  std::unique_ptr<SqliteRows> messages_;  ///< those not yet read
+  bool is_opened_ = false;                ///< with random access
+  std::map<std::int64_t, std::optional<std::size_t>> topics_;
+  std::optional<Microseconds> last_logged_;
+  std::int64_t first_id_ = 0;
+  std::int64_t last_id_ = 0;
+  FrameDecompressor decompressor_;
+};
+
+}  // namespace eventcamera

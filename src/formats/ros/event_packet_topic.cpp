@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include <algorithm>
+#include <string>
+#include <string_view>
+
+#include "src/formats/evt/words.hpp"
+#include "src/formats/ros/topics.hpp"
+#include "src/formats/sensor_sizes.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+/// Field of event_camera_msgs/EventPacket (github.com/ros-event-camera/event_camera_msgs).
+struct EventPacket {
+  std::uint64_t stamp;  ///< ROS time of the first event, nanoseconds
+  std::uint32_t height;
+  std::uint32_t width;
+  std::uint64_t sequence;
+  std::uint64_t time_base;  ///< sensor time, nanoseconds; of no meaning with words
+  std::string_view encoding;
+  bool is_big_endian;
+  std::span<const std::uint8_t> events;
+
+  explicit EventPacket(MessageCursor& fields)
+      : stamp(fields.header_stamp()),
+        height(fields.number<std::uint32_t>()),
+        width(fields.number<std::uint32_t>()),
+        sequence(fields.number<std::uint64_t>()),
+        time_base(fields.number<std::uint64_t>()),
+        encoding(fields.text()),
+        is_big_endian(fields.boolean()),
+        events(fields.bytes()) {}
+};
+
+/// Nanoseconds to microseconds, rounded down. Times are unsigned, because overflow must be
+/// well-defined for any file.
+constexpr Microseconds microseconds(std::uint64_t nanoseconds) {
+  const auto time = static_cast<std::int64_t>(nanoseconds);
+  return time / 1000 - (time % 1000 < 0 ? 1 : 0);
+}
+
+/// Words of a Prophesee sensor. Packets continue each other, and each may begin within the words of
+/// an event.
+class EvtPackets {
+ public:
+  EvtPackets(EvtFormat format, Microseconds clock_range, SensorSize size, Corruption& corruption)
+      : format_(format),
+        clock_range_(clock_range),
+        words_(make_evt_unit_decoder(format, size)),
+        batch_(corruption) {}
+
+  void begin(const EventPacket& packet, std::uint64_t position, bool continues) {
+    if (!continues) words_->restore({});
+    if (continues && packet.stamp - stamp_ > max_pause && states_time(packet.events)) forget_time();
+    stamp_ = packet.stamp;
+    rest_ = packet.events;
+    position_ = position;
+    shift_.reset();
+  }
+
+  /// `offset` of the clocks is set with the first event, and then kept.
+  bool next(Decoded& out, std::optional<std::uint64_t>& offset) {
+    batch_.open(out);
+    batch_.start = rest_.data();
+    batch_.start_position = position_;
+    const auto* const read = words_->read(rest_.data(), rest_.data() + rest_.size(), batch_);
+    batch_.close();
+    const auto count = static_cast<std::size_t>(read - rest_.data());
+    rest_ = rest_.subspan(count);
+    if (!out.events.empty() || !out.triggers.empty()) shift(out, offset);
+    return count > 0;
+  }
+
+ private:
+  /// Turns times of the sensor into those of ROS. The sensor's clock wraps; the stamp tells how
+  /// often.
+  void shift(Decoded& out, std::optional<std::uint64_t>& offset) {
+    if (!shift_) {
+      const auto first = out.events.empty() ? out.triggers.front().t
+                         : out.triggers.empty()
+                             ? out.events.front().t
+                             : std::min(out.events.front().t, out.triggers.front().t);
+      const auto first_nanoseconds = static_cast<std::uint64_t>(first) * 1000;
+      if (!offset) offset = stamp_ - first_nanoseconds;
+      const auto late = microseconds(stamp_ - first_nanoseconds - *offset);
+      const auto half = late < 0 ? -clock_range_ / 2 : clock_range_ / 2;
+      shift_ = microseconds(*offset) + (late + half) / clock_range_ * clock_range_;
+    }
+    for (auto& event : out.events) event.t += *shift_;
+    for (auto& trigger : out.triggers) trigger.t += *shift_;
+  }
+
+  /// Pauses that the clock of EVT3 words may not follow, nanoseconds.
+  static constexpr std::uint64_t max_pause = 2'000'000'000;
+
+  /// True if EVT3 words begin with a time.
+  bool states_time(std::span<const std::uint8_t> words) const {
+    return format_ == EvtFormat::evt3 && words.size() >= 2 && words[1] >> 4 == 0x8;
+  }
+
+  /// Lets the next time be any, and keeps the rest of the state.
+  void forget_time() {
+    constexpr std::uint64_t time_known = 1;
+    words_->restore({0, words_->state().rest & ~time_known});
+  }
+
+  EvtFormat format_;
+  Microseconds clock_range_;  ///< wrap period of the words' clock
+  std::unique_ptr<UnitDecoder> words_;
+  Batch batch_;
+  std::uint64_t stamp_ = 0;
+  std::span<const std::uint8_t> rest_;
+  std::uint64_t position_ = 0;
+  std::optional<Microseconds> shift_;  ///< of this packet, once its first time is known
+};
+
+/// Events of 64 bits, encoding mono: nanoseconds after the time base in bits 0 to 31, x in 32 to
+/// 47, y in 48 to 62, polarity in 63.
+class MonoPackets {
+ public:
+  MonoPackets(SensorSize size, Corruption& corruption) : size_(size), corruption_(corruption) {}
+
+  void begin(const EventPacket& packet, std::uint64_t position) {
+    packet_stamp_ = packet.stamp;
+    time_base_ = packet.time_base;
+    rest_ = packet.events;
+    if (rest_.size() % sizeof(std::uint64_t) != 0)
+      corruption_.note(position, "an event packet ends within an event");
+  }
+
+  bool next(Decoded& out, std::optional<std::uint64_t>& offset) {
+    constexpr std::size_t max_events = 4096;
+    if (!offset) offset = packet_stamp_ - time_base_;
+    const auto count = std::min(rest_.size() / sizeof(std::uint64_t), max_events);
+    const auto base = time_base_ + *offset;
+    out.events.resize(count);
+    auto* to = out.events.data();
+    for (const auto* from = rest_.data(); from != rest_.data() + 8 * count; from += 8) {
+      const auto word = little_endian<std::uint64_t>(from);
+      *to++ = {microseconds(base + (word & 0xffffffff)), static_cast<std::uint16_t>(word >> 32),
+               static_cast<std::uint16_t>(word >> 48)};
+    }
+    if (size_ != SensorSize{}) corruption_.outside += std::erase_if(out.events, is_outside(size_));
+    rest_ = rest_.subspan(8 * count);
+    return count > 0;
+  }
+
+ private:
+  SensorSize size_;
+  Corruption& corruption_;
+  std::uint64_t packet_stamp_ = 0;
+  std::uint64_t time_base_ = 0;
+  std::span<const std::uint8_t> rest_;
+};
+
+class EventPacketDecoder final : public TopicDecoder {
+ public:
+  EventPacketDecoder(BagTopic topic, Corruption& corruption)
+      : TopicDecoder(corruption), topic_(std::move(topic)) {}
+
+  void begin(const BagMessage& message) override {
+    is_decoding_ = false;
+    MessageCursor fields(message.bytes, *topic_.serialization);
+    EventPacket packet(fields);
+    if (fields.failed()) {
+      corruption_.note(message.position, "an event packet with missing bytes");
+      return;
+    }
+    take_size(packet.width, packet.height);
+    if (encoding_.empty()) choose(packet);
+    if (packet.encoding != encoding_ || packet.is_big_endian) {
+      corruption_.note(message.position, "an event packet of another encoding");
+      return;
+    }
+    // Some recorders leave it out.
+    if (packet.stamp == 0) packet.stamp = static_cast<std::uint64_t>(message.logged) * 1000;
+    const bool restarted = sequence_ && packet.sequence <= *sequence_;
+    const bool continues = sequence_ && packet.sequence == *sequence_ + 1;
+    if (sequence_ && packet.sequence > *sequence_ + 1)
+      corruption_.note(message.position, "event packets are missing");
+    // A camera that was started again counts and measures time from the start.
+    if (restarted) offset_.reset();
+    sequence_ = packet.sequence;
+    is_decoding_ = true;
+    if (evt_)
+      evt_->begin(packet, message.position, continues);
+    else
+      mono_->begin(packet, message.position);
+  }
+
+  bool next() override {
+    decoded_.events.clear();
+    decoded_.triggers.clear();
+    if (!is_decoding_) return false;
+    return evt_ ? evt_->next(decoded_, offset_) : mono_->next(decoded_, offset_);
+  }
+
+  void restart() override {
+    is_decoding_ = false;
+    sequence_.reset();
+  }
+
+  std::optional<std::uint64_t> clock_offset() const override { return offset_; }
+  void set_clock_offset(std::uint64_t offset) override { offset_ = offset; }
+
+ private:
+  /// Chooses the decoder from the first packet.
+  void choose(const EventPacket& packet) {
+    struct Words {
+      std::string_view encoding;
+      EvtFormat format;
+      int clock_bits;
+    };
+    constexpr Words words[] = {{"evt3", EvtFormat::evt3, 24},
+                               {"evt2", EvtFormat::evt2, 34},
+                               {"evt21", EvtFormat::evt21, 34}};
+    const auto* const found = std::ranges::find(words, packet.encoding, &Words::encoding);
+    if (found != std::end(words)) {
+      if (size_.width > max_evt_side || size_.height > max_evt_side) size_ = {};
+      evt_.emplace(found->format, Microseconds{1} << found->clock_bits, size_, corruption_);
+    } else if (packet.encoding == "mono" && !packet.is_big_endian) {
+      mono_.emplace(size_, corruption_);
+    } else {
+      constexpr std::size_t max_name = 32;
+      throw UnsupportedFormat("the events of topic " + topic_.name + " have the encoding \"" +
+                              std::string(packet.encoding.substr(0, max_name)) +
+                              (packet.is_big_endian ? "\", big-endian" : "\"") +
+                              "; evt2, evt21, evt3 and mono can be read");
+    }
+    encoding_ = packet.encoding;
+  }
+
+  BagTopic topic_;
+  std::string encoding_;  ///< of the first packet
+  std::optional<EvtPackets> evt_;
+  std::optional<MonoPackets> mono_;
+  std::optional<std::uint64_t> offset_;
+  std::optional<std::uint64_t> sequence_;  ///< of the last packet
+  bool is_decoding_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<TopicDecoder> make_event_packet_decoder(const BagTopic& topic,
+                                                        Corruption& corruption) {
+  return std::make_unique<EventPacketDecoder>(topic, corruption);
+}
+
+}  // namespace eventcamera

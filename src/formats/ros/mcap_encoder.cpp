@@ -1,0 +1,420 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/ros/mcap_encoder.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "src/formats/compression/compressed_frames.hpp"
+#include "src/formats/evt/evt3_words.hpp"
+#include "src/formats/evt/words.hpp"
+#include "src/formats/ros/mcap_records.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+constexpr std::string_view topic = "/event_camera/events";
+constexpr std::string_view frame = "event_camera";
+constexpr std::string_view schema_name = "event_camera_msgs/msg/EventPacket";
+/// Definition of the message and of those within it, separated as ROS 2 does.
+constexpr std::string_view schema_text =
+    "std_msgs/Header header\n"
+    "uint32 height\n"
+    "uint32 width\n"
+    "uint64 seq\n"
+    "uint64 time_base\n"
+    "string encoding\n"
+    "bool is_bigendian\n"
+    "uint8[] events\n"
+    "================================================================================\n"
+    "MSG: std_msgs/Header\n"
+    "builtin_interfaces/Time stamp\n"
+    "string frame_id\n"
+    "================================================================================\n"
+    "MSG: builtin_interfaces/Time\n"
+    "int32 sec\n"
+    "uint32 nanosec\n";
+
+constexpr std::uint16_t schema_id = 1;
+constexpr std::uint16_t channel_id = 0;
+
+/// Limits of a packet: time in microseconds, and size of its events in bytes.
+constexpr Microseconds max_packet_time = 10'000;
+constexpr std::size_t max_packet_bytes = std::size_t{1} << 15;
+/// Limits of a chunk.
+constexpr Microseconds max_chunk_time = 1'000'000;
+constexpr std::size_t max_chunk_bytes = std::size_t{1} << 20;
+/// Longest pause that EVT3 words fill, so that readers that do not use the stamps count the wraps
+/// of the clock: 10 minutes, which take 300 kB.
+constexpr std::uint64_t max_filled_pause = 600'000'000;
+
+/// Appends little-endian fields.
+class Fields {
+ public:
+  explicit Fields(std::vector<std::uint8_t>& out) : out_(out) {}
+
+  template <class Number>
+  void put(Number number) {
+    const auto at = out_.size();
+    out_.resize(at + sizeof number);
+    std::memcpy(out_.data() + at, &number, sizeof number);
+  }
+
+  void put(McapOpcode opcode) { put(static_cast<std::uint8_t>(opcode)); }
+
+  /// Text after its size, 32 bits.
+  void put(std::string_view text) {
+    put(static_cast<std::uint32_t>(text.size()));
+    out_.insert(out_.end(), text.begin(), text.end());
+  }
+
+  void align(std::size_t start, std::size_t alignment) {
+    while ((out_.size() - start) % alignment != 0) out_.push_back(0);
+  }
+
+ private:
+  std::vector<std::uint8_t>& out_;
+};
+
+/// Appends a record, whose content `put` appends.
+template <class Put>
+void put_record(McapOpcode opcode, std::vector<std::uint8_t>& out, const Put& put) {
+  Fields fields(out);
+  fields.put(opcode);
+  const auto size_at = out.size();
+  fields.put(std::uint64_t{0});
+  put(fields);
+  const std::uint64_t size = out.size() - size_at - sizeof size;
+  std::memcpy(out.data() + size_at, &size, sizeof size);
+}
+
+void put_schema(std::vector<std::uint8_t>& out) {
+  put_record(McapOpcode::schema, out, [](Fields& fields) {
+    fields.put(schema_id);
+    fields.put(schema_name);
+    fields.put(std::string_view("ros2msg"));
+    fields.put(schema_text);
+  });
+}
+
+void put_channel(std::vector<std::uint8_t>& out) {
+  put_record(McapOpcode::channel, out, [](Fields& fields) {
+    fields.put(channel_id);
+    fields.put(schema_id);
+    fields.put(topic);
+    fields.put(std::string_view("cdr"));
+    fields.put(std::uint32_t{0});  // metadata
+  });
+}
+
+/// Magic, header, schema and channel.
+std::string file_start() {
+  std::vector<std::uint8_t> bytes(mcap_magic.begin(), mcap_magic.end());
+  put_record(McapOpcode::header, bytes, [](Fields& fields) {
+    fields.put(std::string_view("ros2"));
+    fields.put(std::string_view("gst-eventsim"));
+  });
+  put_schema(bytes);
+  put_channel(bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+std::uint64_t nanoseconds(Microseconds t) {
+  return static_cast<std::uint64_t>(t) * 1000;
+}
+
+/// Size of a packet's encoding in the message, with its zero.
+constexpr std::string_view name_of(BagEvents events) {
+  return events == BagEvents::evt3 ? std::string_view("evt3\0", 5) : std::string_view("mono\0", 5);
+}
+
+class McapEncoder final : public Encoder {
+ public:
+  McapEncoder(const McapSettings& settings, const std::string& start)
+      : Encoder(start), settings_(settings), position_(start.size()), words_(settings.size.width) {
+    if (settings.compression != BagCompression::none)
+      compressor_.emplace(settings.compression == BagCompression::lz4 ? FrameCodec::lz4
+                                                                      : FrameCodec::zstd);
+  }
+
+  std::uint64_t pending() const override { return events_in_chunk_; }
+
+ private:
+  /// Entry of the index.
+  struct Chunk {
+    Microseconds first;
+    Microseconds last;
+    std::uint64_t position;
+    std::uint64_t size;        ///< of the record
+    std::uint64_t index_size;  ///< of the message index that follows
+    std::uint64_t stored_size;
+    std::uint64_t content_size;
+  };
+
+  struct Message {
+    Microseconds t;
+    std::uint64_t offset;  ///< in the chunk
+  };
+
+  void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override {
+    while (!events.empty()) {
+      begin_or_continue(events.front().t, out);
+      const auto end = packet_start_ + max_packet_time;
+      auto few = events.first(std::min(events.size(), events_at_once));
+      if (few.back().t >= end)
+        few = few.first(static_cast<std::size_t>(
+            std::ranges::partition_point(few, [&](const auto& event) { return event.t < end; }) -
+            few.begin()));
+      settings_.events == BagEvents::evt3 ? append_evt3(few) : append_mono(few);
+      events_in_chunk_ += few.size();
+      events = events.subspan(few.size());
+    }
+  }
+
+  bool append_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) override {
+    if (settings_.events != BagEvents::evt3) return false;
+    begin_or_continue(trigger.t, out);
+    WordWriter<std::uint16_t> words(chunk_);
+    words.reserve(packet_words(trigger.t));
+    words_.write_trigger(trigger, static_cast<std::uint64_t>(trigger.t), words);
+    return true;
+  }
+
+  bool append_end(std::vector<std::uint8_t>& out) override {
+    end_chunk(out);
+    const auto before = out.size();
+    put_record(McapOpcode::data_end, out, [](Fields& fields) { fields.put(std::uint32_t{0}); });
+    put_summary(position_ + out.size() - before, out);
+    return false;
+  }
+
+  void append_evt3(std::span<const AbsoluteEvent> events) {
+    WordWriter<std::uint16_t> words(chunk_);
+    words.reserve(packet_words(events.front().t) + events.size() * Evt3Words::max_words);
+    while (!events.empty())
+      events =
+          events.subspan(words_.write(events, static_cast<std::uint64_t>(events.front().t), words));
+  }
+
+  /// Words for the times of a packet, most of them for a pause before it.
+  std::size_t packet_words(Microseconds t) const {
+    return std::min(words_.steps_to(static_cast<std::uint64_t>(t)), max_filled_pause >> 12) +
+           (max_packet_time >> 12) + 2 + Evt3Words::max_words;
+  }
+
+  void append_mono(std::span<const AbsoluteEvent> events) {
+    WordWriter<std::uint64_t> words(chunk_);
+    words.reserve(events.size());
+    for (const auto& event : events)
+      words.put(std::uint64_t{event.y_p} << 48 | std::uint64_t{event.x} << 32 |
+                static_cast<std::uint64_t>(event.t - packet_start_) * 1000);
+  }
+
+  /// Begins another packet, and another chunk, if the next event or trigger does not fit.
+  void begin_or_continue(Microseconds t, std::vector<std::uint8_t>& out) {
+    if (packet_at_ && t - packet_start_ < max_packet_time &&
+        chunk_.size() - events_at_ < max_packet_bytes)
+      return;
+    end_packet();
+    if (!messages_.empty() &&
+        (chunk_.size() >= max_chunk_bytes || t - messages_.front().t >= max_chunk_time))
+      end_chunk(out);
+    begin_packet(t);
+  }
+
+  /// Begins a message with a packet; end_packet() completes its sizes.
+  void begin_packet(Microseconds t) {
+    packet_at_ = chunk_.size();
+    packet_start_ = t;
+    messages_.push_back({t, *packet_at_});
+    const auto time = nanoseconds(t);
+    Fields fields(chunk_);
+    fields.put(McapOpcode::message);
+    fields.put(std::uint64_t{0});
+    fields.put(channel_id);
+    fields.put(static_cast<std::uint32_t>(sequence_));
+    fields.put(time);
+    fields.put(time);
+    fields.put(std::uint32_t{0x0100});  // little-endian CDR
+    const auto start = chunk_.size();
+    fields.put(static_cast<std::uint32_t>(time / 1'000'000'000));
+    fields.put(static_cast<std::uint32_t>(time % 1'000'000'000));
+    fields.put(std::string_view(frame.data(), frame.size() + 1));
+    fields.align(start, 4);
+    fields.put(static_cast<std::uint32_t>(settings_.size.height));
+    fields.put(static_cast<std::uint32_t>(settings_.size.width));
+    fields.align(start, 8);
+    fields.put(std::uint64_t{sequence_++});
+    fields.put(settings_.events == BagEvents::mono ? time : 0);
+    fields.put(name_of(settings_.events));
+    fields.put(std::uint8_t{0});  // little-endian
+    fields.align(start, 4);
+    fields.put(std::uint32_t{0});
+    events_at_ = chunk_.size();
+    words_.begin_packet(static_cast<std::uint64_t>(t), max_filled_pause);
+  }
+
+  void end_packet() {
+    if (!packet_at_) return;
+    const std::uint64_t record = chunk_.size() - *packet_at_ - mcap_record_header;
+    const auto events = static_cast<std::uint32_t>(chunk_.size() - events_at_);
+    std::memcpy(chunk_.data() + *packet_at_ + 1, &record, sizeof record);
+    std::memcpy(chunk_.data() + events_at_ - sizeof events, &events, sizeof events);
+    packet_at_.reset();
+  }
+
+  void end_chunk(std::vector<std::uint8_t>& out) {
+    end_packet();
+    if (messages_.empty()) return;
+    const auto before = out.size();
+    Chunk chunk{messages_.front().t, messages_.back().t, position_, 0, 0, 0, chunk_.size()};
+    put_record(McapOpcode::chunk, out, [&](Fields& fields) {
+      fields.put(nanoseconds(chunk.first));
+      fields.put(nanoseconds(chunk.last));
+      fields.put(chunk.content_size);
+      fields.put(static_cast<std::uint32_t>(crc32_z(0, chunk_.data(), chunk_.size())));
+      fields.put(compression());
+      fields.put(std::uint64_t{0});
+      const auto content_at = out.size();
+      if (compressor_)
+        compressor_->compress(chunk_, out);
+      else
+        out.insert(out.end(), chunk_.begin(), chunk_.end());
+      chunk.stored_size = out.size() - content_at;
+      std::memcpy(out.data() + content_at - sizeof chunk.stored_size, &chunk.stored_size,
+                  sizeof chunk.stored_size);
+    });
+    chunk.size = out.size() - before;
+    put_record(McapOpcode::message_index, out, [&](Fields& fields) {
+      fields.put(channel_id);
+      fields.put(static_cast<std::uint32_t>(messages_.size() * 2 * sizeof(std::uint64_t)));
+      for (const auto& message : messages_) {
+        fields.put(nanoseconds(message.t));
+        fields.put(message.offset);
+      }
+    });
+    chunk.index_size = out.size() - before - chunk.size;
+    position_ += out.size() - before;
+    chunks_.push_back(chunk);
+    message_count_ += messages_.size();
+    messages_.clear();
+    chunk_.clear();
+    events_in_chunk_ = 0;
+  }
+
+  std::string_view compression() const {
+    constexpr std::string_view names[] = {"", "lz4", "zstd"};
+    return names[static_cast<std::size_t>(settings_.compression)];
+  }
+
+  /// Appends summary and footer. `summary_at` is the position of the former.
+  void put_summary(std::uint64_t summary_at, std::vector<std::uint8_t>& out) const {
+    struct Group {
+      McapOpcode opcode;
+      std::uint64_t start;
+      std::uint64_t size;
+    };
+    const auto first = out.size();
+    std::vector<Group> groups;
+    const auto put_group = [&](McapOpcode opcode, const auto& put) {
+      const auto before = out.size();
+      put();
+      if (out.size() > before)
+        groups.push_back({opcode, summary_at + before - first, out.size() - before});
+    };
+    put_group(McapOpcode::schema, [&] { put_schema(out); });
+    put_group(McapOpcode::channel, [&] { put_channel(out); });
+    put_group(McapOpcode::statistics, [&] { put_statistics(out); });
+    put_group(McapOpcode::chunk_index, [&] {
+      for (const auto& chunk : chunks_) put_chunk_index(chunk, out);
+    });
+    const auto offsets_at = summary_at + out.size() - first;
+    for (const auto& group : groups)
+      put_record(McapOpcode::summary_offset, out, [&](Fields& fields) {
+        fields.put(group.opcode);
+        fields.put(group.start);
+        fields.put(group.size);
+      });
+    // The checksum covers the summary and the footer up to it.
+    std::uint32_t checksum = 0;
+    put_record(McapOpcode::footer, out, [&](Fields& fields) {
+      fields.put(summary_at);
+      fields.put(offsets_at);
+      fields.put(checksum);
+    });
+    const std::uint64_t footer_size = mcap_footer;
+    std::memcpy(out.data() + out.size() - mcap_footer - sizeof footer_size, &footer_size,
+                sizeof footer_size);
+    checksum = static_cast<std::uint32_t>(
+        crc32_z(0, out.data() + first, out.size() - first - sizeof checksum));
+    std::memcpy(out.data() + out.size() - sizeof checksum, &checksum, sizeof checksum);
+    out.insert(out.end(), mcap_magic.begin(), mcap_magic.end());
+  }
+
+  void put_statistics(std::vector<std::uint8_t>& out) const {
+    put_record(McapOpcode::statistics, out, [&](Fields& fields) {
+      fields.put(message_count_);
+      fields.put(std::uint16_t{1});  // schemas
+      fields.put(std::uint32_t{1});  // channels
+      fields.put(std::uint32_t{0});  // attachments
+      fields.put(std::uint32_t{0});  // metadata
+      fields.put(static_cast<std::uint32_t>(chunks_.size()));
+      fields.put(chunks_.empty() ? 0 : nanoseconds(chunks_.front().first));
+      fields.put(chunks_.empty() ? 0 : nanoseconds(chunks_.back().last));
+      fields.put(static_cast<std::uint32_t>(sizeof channel_id + sizeof message_count_));
+      fields.put(channel_id);
+      fields.put(message_count_);
+    });
+  }
+
+  void put_chunk_index(const Chunk& chunk, std::vector<std::uint8_t>& out) const {
+    put_record(McapOpcode::chunk_index, out, [&](Fields& fields) {
+      fields.put(nanoseconds(chunk.first));
+      fields.put(nanoseconds(chunk.last));
+      fields.put(chunk.position);
+      fields.put(chunk.size);
+      fields.put(static_cast<std::uint32_t>(sizeof channel_id + sizeof chunk.position));
+      fields.put(channel_id);
+      fields.put(chunk.position + chunk.size);
+      fields.put(chunk.index_size);
+      fields.put(compression());
+      fields.put(chunk.stored_size);
+      fields.put(chunk.content_size);
+    });
+  }
+
+  McapSettings settings_;
+  std::uint64_t position_;  ///< of the next chunk in the file
+  std::optional<FrameCompressor> compressor_;
+
+  std::vector<std::uint8_t> chunk_;  ///< records of the chunk being written
+  std::vector<Message> messages_;    ///< those of the chunk
+  std::uint64_t events_in_chunk_ = 0;
+  std::optional<std::size_t> packet_at_;  ///< message being written, in the chunk
+  std::size_t events_at_ = 0;             ///< its events
+  Microseconds packet_start_ = 0;         ///< time of the first
+  Evt3Words words_;
+
+  std::uint64_t sequence_ = 0;
+  std::uint64_t message_count_ = 0;
+  std::vector<Chunk> chunks_;
+};
+
+}  // namespace
+
+std::unique_ptr<Encoder> make_mcap_encoder(const McapSettings& settings) {
+  if (settings.events == BagEvents::evt3 &&
+      std::max(settings.size.width, settings.size.height) > max_evt_side)
+    throw std::invalid_argument("EVT3 words support sensors of 1x1 to 2048x2048 pixels");
+  return std::make_unique<McapEncoder>(settings, file_start());
+}
+
+}  // namespace eventcamera

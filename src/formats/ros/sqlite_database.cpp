@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/formats/ros/sqlite_database.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+
+#include "src/formats/unsupported_format.hpp"
+
+namespace eventcamera {
+
+namespace {
+
+/// Limit of a value in the database, bytes.
+constexpr int max_value = 1 << 27;
+/// Steps of SQLite's virtual machine after which a query is given up, if they found no row.
+constexpr int max_steps = 1'000'000;
+
+/// A file of SQLite's, read from a source of bytes.
+struct SourceFile {
+  sqlite3_file base;  // must be first
+  ByteSource* bytes;
+};
+
+/// Source of the database that this thread is opening.
+thread_local ByteSource* opening = nullptr;
+
+int read(sqlite3_file* file, void* to, int count, sqlite3_int64 position) {
+  const std::span out(static_cast<std::uint8_t*>(to), static_cast<std::size_t>(count));
+  const auto read =
+      reinterpret_cast<SourceFile*>(file)->bytes->read(static_cast<std::uint64_t>(position), out);
+  if (!read) return SQLITE_IOERR_READ;
+  std::ranges::fill(out.subspan(*read), 0);
+  return *read == out.size() ? SQLITE_OK : SQLITE_IOERR_SHORT_READ;
+}
+
+int size_of(sqlite3_file* file, sqlite3_int64* size) {
+  *size = static_cast<sqlite3_int64>(reinterpret_cast<SourceFile*>(file)->bytes->size());
+  return SQLITE_OK;
+}
+
+int is_unlocked(sqlite3_file*, int* result) {
+  *result = 0;
+  return SQLITE_OK;
+}
+
+const sqlite3_io_methods methods = {
+    .iVersion = 1,
+    .xClose = [](sqlite3_file*) { return SQLITE_OK; },
+    .xRead = read,
+    .xWrite = [](sqlite3_file*, const void*, int, sqlite3_int64) { return SQLITE_READONLY; },
+    .xTruncate = [](sqlite3_file*, sqlite3_int64) { return SQLITE_READONLY; },
+    .xSync = [](sqlite3_file*, int) { return SQLITE_OK; },
+    .xFileSize = size_of,
+    .xLock = [](sqlite3_file*, int) { return SQLITE_OK; },
+    .xUnlock = [](sqlite3_file*, int) { return SQLITE_OK; },
+    .xCheckReservedLock = is_unlocked,
+    .xFileControl = [](sqlite3_file*, int, void*) { return SQLITE_NOTFOUND; },
+    .xSectorSize = [](sqlite3_file*) { return 4096; },
+    .xDeviceCharacteristics = [](sqlite3_file*) { return SQLITE_IOCAP_IMMUTABLE; },
+    .xShmMap = nullptr,
+    .xShmLock = nullptr,
+    .xShmBarrier = nullptr,
+    .xShmUnmap = nullptr,
+    .xFetch = nullptr,
+    .xUnfetch = nullptr,
+};
+
+int open_file(sqlite3_vfs*, const char*, sqlite3_file* file, int flags, int* out_flags) {
+  file->pMethods = nullptr;
+  if (opening == nullptr || (flags & SQLITE_OPEN_MAIN_DB) == 0) return SQLITE_CANTOPEN;
+  auto& opened = *reinterpret_cast<SourceFile*>(file);
+  opened.base.pMethods = &methods;
+  opened.bytes = opening;
+  if (out_flags != nullptr) *out_flags = flags;
+  return SQLITE_OK;
+}
+
+/// Name of SQLite's file system whose only file is `opening`.
+const char* file_system() {
+  static sqlite3_vfs system = [] {
+    sqlite3_initialize();
+    auto made = *sqlite3_vfs_find(nullptr);  // its clock and random numbers
+    made.iVersion = 1;
+    made.szOsFile = sizeof(SourceFile);
+    made.pNext = nullptr;
+    made.zName = "gst-eventsim-bytes";
+    made.xOpen = open_file;
+    made.xDelete = [](sqlite3_vfs*, const char*, int) { return SQLITE_READONLY; };
+    made.xAccess = [](sqlite3_vfs*, const char*, int, int* result) {
+      *result = 0;
+      return SQLITE_OK;
+    };
+    made.xFullPathname = [](sqlite3_vfs*, const char* name, int size, char* out) {
+      sqlite3_snprintf(size, out, "%s", name);
+      return SQLITE_OK;
+    };
+    return made;
+  }();
+  static const int registered = sqlite3_vfs_register(&system, 0);
+  return registered == SQLITE_OK ? system.zName : nullptr;
+}
+
+/// Lets queries read tables, and nothing else.
+int authorize(void*, int action, const char*, const char*, const char*, const char*) {
+  return action == SQLITE_SELECT || action == SQLITE_READ ? SQLITE_OK : SQLITE_DENY;
+}
+
+}  // namespace
+
+SqliteDatabase::SqliteDatabase(ByteSource& bytes) {
+  const auto* const system = file_system();
+  sqlite3* opened = nullptr;
+  opening = &bytes;
+  // Immutable: no journal is looked for.
+  const auto result = sqlite3_open_v2(
+      "file:bag?immutable=1", &opened,
+      SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_PRIVATECACHE,
+      system);
+  database_.reset(opened);
+  if (result == SQLITE_OK) {
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+    sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+    sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, max_value);
+    sqlite3_set_authorizer(opened, authorize, nullptr);
+    sqlite3_progress_handler(
+        opened, max_steps, [](void*) { return 1; }, nullptr);
+    sqlite3_table_column_metadata(opened, nullptr, "messages", nullptr, nullptr, nullptr, nullptr,
+                                  nullptr, nullptr);  // opens the file
+  }
+  opening = nullptr;
+  if (opened == nullptr) throw std::bad_alloc();
+  if (result != SQLITE_OK || sqlite3_errcode(opened) == SQLITE_NOTADB)
+    throw UnsupportedFormat("this SQLite database is corrupt or cut short");
+}
+
+bool SqliteDatabase::has_table(std::string_view name) const {
+  auto rows = query("SELECT type, name FROM sqlite_schema");
+  while (rows.next())
+    if (rows.text(0) == "table" && rows.text(1) == name) return true;
+  return false;
+}
+
+SqliteRows SqliteDatabase::query(const char* text, std::int64_t parameter) const {
+  SqliteRows rows;
+  sqlite3_stmt* statement = nullptr;
+  rows.failed_ = sqlite3_prepare_v2(database_.get(), text, -1, &statement, nullptr) != SQLITE_OK;
+  rows.statement_.reset(statement);
+  if (!rows.failed_ && sqlite3_bind_parameter_count(statement) > 0)
+    sqlite3_bind_int64(statement, 1, parameter);
+  return rows;
+}
+
+bool SqliteRows::next() {
+  if (failed_ || !statement_) return false;
+  const auto result = sqlite3_step(statement_.get());
+  failed_ = result != SQLITE_ROW && result != SQLITE_DONE;
+  if (result != SQLITE_ROW) statement_.reset();
+  return result == SQLITE_ROW;
+}
+
+std::int64_t SqliteRows::integer(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+std::string SqliteRows::text(int column) const {
+  const auto bytes = blob(column);
+  return {bytes.begin(), bytes.end()};
+}
+
+std::span<const std::uint8_t> SqliteRows::blob(int column) const {
+  const auto* const bytes =
+      static_cast<const std::uint8_t*>(sqlite3_column_blob(statement_.get(), column));
+  const auto count = sqlite3_column_bytes(statement_.get(), column);
+  if (bytes == nullptr) return {};
+  return {bytes, static_cast<std::size_t>(count)};
+}
+
+}  // namespace eventcamera

@@ -1,0 +1,363 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Writes bags of ROS from the specifications of their formats, without this project's code:
+  bag_files.py DIRECTORY
+The events are in events.bin (int64 t, uint16 x, y, p), the frames in frames.bin (int64 t, uint8
+value of all pixels).
+
+mcap.dev/spec; wiki.ros.org/Bags/Format/2.0; github.com/ros2/rosbag2 (rosbag2_storage_sqlite3)."""
+import bz2
+import sqlite3
+import struct
+import sys
+import zlib
+from pathlib import Path
+
+import lz4.frame
+import zstandard
+
+WIDTH, HEIGHT = 346, 260
+IMAGE_WIDTH, IMAGE_HEIGHT = 86, 65
+START = 1_700_000_000_123_456  # microseconds since 1970
+SENSOR_START = 77_777_777  # clock of the sensor at START
+DELAY = 3_000  # microseconds until a message is recorded
+PER_PACKET = 97
+EVENT_TYPES = {"packet": "event_camera_msgs/EventPacket", "array": "dvs_msgs/EventArray",
+               "prophesee": "prophesee_event_msgs/EventArray"}
+IMAGE_TYPE = "sensor_msgs/Image"
+
+
+def made_events():
+    state, t, events = 1, START, []
+    for _ in range(6000):
+        state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
+        t += (state >> 33) % 8000
+        events.append((t, (state >> 20) % WIDTH, (state >> 40) % HEIGHT, (state >> 50) & 1))
+    return events
+
+
+EVENTS = made_events()
+FRAMES = [(START + i * 500_000, i + 1) for i in range(40)]
+
+
+class Cdr:
+    """XCDR1, little-endian: fields at multiples of their size after the encapsulation."""
+
+    def __init__(self):
+        self.bytes = b""
+
+    def put(self, code, *values):
+        for value in values:
+            size = struct.calcsize("<" + code)
+            self.bytes += bytes(-len(self.bytes) % size) + struct.pack("<" + code, value)
+
+    def text(self, text):
+        self.put("I", len(text) + 1)
+        self.bytes += text.encode() + b"\0"
+
+    def array(self, content):
+        self.put("I", len(content))
+        self.bytes += content
+
+    def header(self, t):
+        self.put("I", t // 1_000_000, t % 1_000_000 * 1000)
+        self.text("camera")
+
+    def message(self):
+        return b"\0\1\0\0" + self.bytes
+
+
+class Ros1:
+    """Fields without padding."""
+
+    def __init__(self):
+        self.bytes = b""
+
+    def put(self, code, *values):
+        for value in values:
+            self.bytes += struct.pack("<" + code, value)
+
+    def text(self, text):
+        self.array(text.encode())
+
+    def array(self, content):
+        self.bytes += struct.pack("<I", len(content)) + content
+
+    def header(self, t):
+        self.put("I", 0, t // 1_000_000, t % 1_000_000 * 1000)
+        self.text("camera")
+
+    def message(self):
+        return self.bytes
+
+
+class Evt3:
+    """Words of a camera that states only what changes, through all packets."""
+
+    def __init__(self):
+        self.high = self.low = self.y = None
+
+    def words(self, events):
+        words = []
+        for t, x, y, p in events:
+            t = t - START + SENSOR_START
+            while self.high != t >> 12:
+                self.high = t >> 12 if self.high is None else self.high + 1
+                words.append(0x8000 | self.high & 0xFFF)
+                self.low = None
+            if self.low != t & 0xFFF:
+                self.low = t & 0xFFF
+                words.append(0x6000 | self.low)
+            if self.y != y:
+                self.y = y
+                words.append(y)
+            words.append(0x2000 | p << 11 | x)
+        return struct.pack(f"<{len(words)}H", *words)
+
+
+def packet_of(fields, events, number, encoding, evt3):
+    t = events[0][0]
+    fields.header(t)
+    fields.put("I", HEIGHT, WIDTH)
+    fields.put("Q", number, (t - START + SENSOR_START) * 1000)
+    fields.text(encoding)
+    fields.put("B", 0)
+    if encoding == "evt3":
+        fields.array(evt3.words(events))
+    else:
+        fields.array(b"".join(struct.pack("<Q", p << 63 | y << 48 | x << 32 | (at - t) * 1000 + at % 7)
+                              for at, x, y, p in events))
+
+
+def array_of(fields, events):
+    fields.header(events[0][0])
+    fields.put("I", HEIGHT, WIDTH, len(events))
+    for t, x, y, p in events:
+        fields.put("H", x, y)
+        fields.put("I", t // 1_000_000, t % 1_000_000 * 1000 + 999)
+        fields.put("B", p)
+
+
+def image_of(fields, t, value, encoding):
+    fields.header(t)
+    fields.put("I", IMAGE_HEIGHT, IMAGE_WIDTH)
+    fields.text(encoding)
+    fields.put("B", 0)
+    pixel = bytes([value]) if encoding == "mono8" else bytes([value, 0, 99])
+    fields.put("I", IMAGE_WIDTH * len(pixel) + 2)
+    fields.array((pixel * IMAGE_WIDTH + b"\0\0") * IMAGE_HEIGHT)
+
+
+def messages(serialization, kind, encoding="evt3", image="mono8"):
+    """[(topic, time of recording in microseconds, bytes)], by that time."""
+    evt3, all_messages = Evt3(), []
+    for number, first in enumerate(range(0, len(EVENTS), PER_PACKET)):
+        events, fields = EVENTS[first:first + PER_PACKET], serialization()
+        if kind == "packet":
+            packet_of(fields, events, 1000 + number, encoding, evt3)
+        else:
+            array_of(fields, events)
+        all_messages.append(("/camera/events", events[0][0] + DELAY, fields.message()))
+    for t, value in FRAMES:
+        fields = serialization()
+        image_of(fields, t, value, image)
+        all_messages.append(("/camera/image", t + DELAY, fields.message()))
+        all_messages.append(("/rosout", t + DELAY, b"\0\1\0\0other"))
+        if t == START:
+            continue
+        fields = serialization()
+        array_of(fields, EVENTS[:1])
+        all_messages.append(("/second/events", t + DELAY, fields.message()))
+    return sorted(all_messages, key=lambda message: message[1])
+
+
+def topics_of(kind):
+    return {"/rosout": "rcl_interfaces/Log", "/camera/events": EVENT_TYPES[kind], "/camera/image": IMAGE_TYPE,
+            "/second/events": EVENT_TYPES["array"]}
+
+
+def sized(text):
+    return struct.pack("<I", len(text)) + (text.encode() if isinstance(text, str) else text)
+
+
+# MCAP
+
+def record(opcode, content):
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+COMPRESS = {"": bytes, "lz4": lz4.frame.compress, "zstd": lambda content: zstandard.compress(content)}
+
+
+def write_mcap(path, all_messages, topics, compression="", chunked=True, summary=True, ros1=False):
+    """Writes two channels for each topic's type: the schemas are within the chunks, as they come."""
+    magic = b"\x89MCAP0\r\n"
+    out = magic + record(1, sized("ros1" if ros1 else "ros2") + sized("test"))
+    heads = {}
+    for number, (name, kind) in enumerate(topics.items()):
+        kind = kind if ros1 else kind.replace("/", "/msg/")
+        schema = record(3, struct.pack("<H", number + 1) + sized(kind) + sized("ros1msg" if ros1 else "ros2msg") + sized(""))
+        metadata = sized(sized("offered_qos_profiles") + sized(""))
+        heads[name] = number + 10, schema, record(4, struct.pack("<HH", number + 10, number + 1) + sized(name)
+                                                  + sized("ros1" if ros1 else "cdr") + metadata)
+    known, chunk, index, chunk_indexes, counts = set(), b"", {}, b"", {}
+    first, last = 2**63, 0
+
+    def end_chunk():
+        nonlocal out, chunk, index, chunk_indexes
+        if not chunk:
+            return
+        stored, at = COMPRESS[compression](chunk), len(out)
+        times = [time for entries in index.values() for time, _ in entries]
+        out += record(6, struct.pack("<QQQI", min(times), max(times), len(chunk), zlib.crc32(chunk))
+                      + sized(compression) + struct.pack("<Q", len(stored)) + stored)
+        size, offsets = len(out) - at, b""
+        for channel, entries in index.items():
+            offsets += struct.pack("<HQ", channel, len(out))
+            out += record(7, struct.pack("<H", channel)
+                          + sized(b"".join(struct.pack("<QQ", *entry) for entry in entries)))
+        chunk_indexes += record(8, struct.pack("<QQQQ", min(times), max(times), at, size) + sized(offsets)
+                                + struct.pack("<Q", len(out) - at - size) + sized(compression)
+                                + struct.pack("<QQ", len(stored), len(chunk)))
+        chunk, index = b"", {}
+
+    for sequence, (name, time, content) in enumerate(all_messages):
+        channel, schema, head = heads[name]
+        time *= 1000
+        first, last = min(first, time), max(last, time)
+        counts[channel] = counts.get(channel, 0) + 1
+        new = b"" if name in known else schema + head
+        known.add(name)
+        message = record(5, struct.pack("<HIQQ", channel, sequence, time, time) + content)
+        if not chunked:
+            out += new + message
+            continue
+        chunk += new
+        index.setdefault(channel, []).append((time, len(chunk)))
+        chunk += message
+        if len(chunk) > 20_000:
+            end_chunk()
+    end_chunk()
+    out += record(0x0C, sized("notes") + sized(b""))
+    out += record(0x0F, struct.pack("<I", 0))
+    if summary:
+        at = len(out)
+        out += b"".join(schema + head for _, schema, head in heads.values())
+        out += record(0x0B, struct.pack("<QHIIIIQQ", len(all_messages), len(heads), len(heads), 0, 1, 0, first, last)
+                      + sized(b"".join(struct.pack("<HQ", *count) for count in counts.items())))
+        out += chunk_indexes + record(2, struct.pack("<QQI", at, 0, 0)) + magic
+    else:
+        out += record(2, struct.pack("<QQI", 0, 0, 0)) + magic
+    path.write_bytes(out)
+
+
+# ROS 1, version 2.0
+
+def bag_record(data, **fields):
+    header = b"".join(sized(name.encode() + b"=" + value) for name, value in fields.items())
+    return sized(header) + sized(data)
+
+
+def bag_time(microseconds):
+    return struct.pack("<II", microseconds // 1_000_000, microseconds % 1_000_000 * 1000)
+
+
+BAG_COMPRESS = {"none": bytes, "bz2": bz2.compress, "lz4": lambda content: lz4.frame.compress(
+    content, block_size=lz4.frame.BLOCKSIZE_MAX4MB, block_linked=False, content_checksum=True, store_size=False)}
+
+
+def write_bag(path, all_messages, topics, compression="none", index=True):
+    magic, infos = b"#ROSBAG V2.0\n", b""
+    connections = {}
+    for number, (name, kind) in enumerate(topics.items()):
+        fields = [("topic", name), ("type", kind), ("md5sum", "*"), ("message_definition", "")]
+        data = b"".join(sized(f"{field}={value}") for field, value in fields)
+        connections[name] = bag_record(data, conn=struct.pack("<I", number), topic=name.encode(), op=b"\7")
+    numbers = {name: struct.pack("<I", number) for number, name in enumerate(topics)}
+    chunks, known, chunk, entries, times = b"", set(), b"", {}, []
+    chunk_count, start = 0, len(magic) + 4096
+
+    def end_chunk():
+        nonlocal chunks, chunk, infos, chunk_count
+        if not chunk:
+            return
+        at = start + len(chunks)
+        chunk_count += 1
+        chunks += bag_record(BAG_COMPRESS[compression](chunk), compression=compression.encode(), op=b"\5",
+                             size=struct.pack("<I", len(chunk)))
+        for name, some in entries.items():
+            data = b"".join(bag_time(t) + struct.pack("<I", offset) for t, offset in some)
+            chunks += bag_record(data, ver=struct.pack("<I", 1), conn=numbers[name], op=b"\4",
+                                 count=struct.pack("<I", len(some)))
+        counts = b"".join(numbers[name] + struct.pack("<I", len(some)) for name, some in entries.items())
+        infos += bag_record(counts, ver=struct.pack("<I", 1), chunk_pos=struct.pack("<Q", at), op=b"\6",
+                            start_time=bag_time(min(times)), end_time=bag_time(max(times)),
+                            count=struct.pack("<I", len(entries)))
+        chunk = b""
+        entries.clear()
+        times.clear()
+
+    for name, t, content in all_messages:
+        if name not in known:
+            chunk += connections[name]
+            known.add(name)
+        entries.setdefault(name, []).append((t, len(chunk)))
+        times.append(t)
+        chunk += bag_record(content, op=b"\2", conn=numbers[name], time=bag_time(t))
+        if len(chunk) > 20_000:
+            end_chunk()
+    end_chunk()
+    index_at = start + len(chunks) if index else 0
+    fields = {"op": b"\3", "index_pos": struct.pack("<Q", index_at), "conn_count": struct.pack("<I", len(topics)),
+              "chunk_count": struct.pack("<I", chunk_count)}
+    header_size = len(bag_record(b"", **fields))
+    out = magic + bag_record(b" " * (4096 - header_size), **fields) + chunks
+    path.write_bytes(out + (b"".join(connections.values()) + infos if index else b""))
+
+
+# ROS 2 with SQLite
+
+def write_db3(path, all_messages, topics):
+    path.unlink(missing_ok=True)
+    database = sqlite3.connect(path)
+    database.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
+                     "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)")
+    database.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, "
+                     "timestamp INTEGER NOT NULL, data BLOB NOT NULL)")
+    database.execute("CREATE INDEX timestamp_idx ON messages (timestamp ASC)")
+    for number, (name, kind) in enumerate(topics.items()):
+        database.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')", (number + 1, name, kind.replace("/", "/msg/")))
+    numbers = {name: number + 1 for number, name in enumerate(topics)}
+    for name, t, content in all_messages:
+        database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", (numbers[name], t * 1000, content))
+    database.commit()
+    database.close()
+
+
+def main():
+    folder = Path(sys.argv[1])
+    with open(folder / "events.bin", "wb") as file:
+        for event in EVENTS:
+            file.write(struct.pack("<qHHH", *event))
+    with open(folder / "frames.bin", "wb") as file:
+        for frame in FRAMES:
+            file.write(struct.pack("<qB", *frame))
+    for name, kind, encoding, image in [("evt3", "packet", "evt3", "mono8"), ("mono", "packet", "mono", "rgb8"),
+                                        ("array", "array", "", "mono8"), ("prophesee", "prophesee", "", "mono8")]:
+        cdr, topics = messages(Cdr, kind, encoding, image), topics_of(kind)
+        write_mcap(folder / f"{name}.mcap", cdr, topics)
+        if name == "evt3":
+            for compression in "lz4", "zstd":
+                write_mcap(folder / f"{name}-{compression}.mcap", cdr, topics, compression)
+            write_mcap(folder / f"{name}-no-index.mcap", cdr, topics, "lz4", summary=False)
+            write_mcap(folder / f"{name}-no-chunks.mcap", cdr, topics, chunked=False)
+        ros1 = messages(Ros1, kind, encoding, image)
+        write_mcap(folder / f"{name}-ros1.mcap", ros1, topics, "zstd", ros1=True)
+        write_bag(folder / f"{name}.bag", ros1, topics)
+        write_db3(folder / f"{name}.db3", cdr, topics)
+    write_bag(folder / "prophesee-bz2.bag", ros1, topics, "bz2")
+    write_bag(folder / "prophesee-lz4.bag", ros1, topics, "lz4")
+    write_bag(folder / "prophesee-no-index.bag", ros1, topics, "lz4", index=False)
+
+
+main()

@@ -1,0 +1,425 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Bags of ROS: files that a script writes from the specifications have the events and frames that
+// it says; written files are read back equal; seeks are exact; corrupt and cut files lose only the
+// corrupt parts.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <string>
+
+#include "src/formats/little_endian.hpp"
+#include "src/formats/ros/bag_decoder.hpp"
+#include "src/formats/ros/mcap_encoder.hpp"
+#include "tests/formats/pieces.hpp"
+#include "tests/formats/random_events.hpp"
+
+namespace {
+
+using namespace eventcamera;
+using Bytes = std::vector<std::uint8_t>;
+
+struct Picture {
+  Microseconds t;
+  std::uint8_t value;  ///< of the first and the last pixel
+
+  friend bool operator==(const Picture&, const Picture&) = default;
+};
+
+/// Complete output of a decoder.
+struct Contents {
+  std::vector<AbsoluteEvent> events;
+  std::vector<Picture> frames;
+  std::vector<Trigger> triggers;
+};
+
+void take(RecordingDecoder& decoder, Contents& out) {
+  while (const auto item = decoder.next()) {
+    if (const auto* events = std::get_if<EventItem>(&*item)) {
+      out.events.insert(out.events.end(), events->events.begin(), events->events.end());
+    } else if (const auto* picture = std::get_if<FrameItem>(&*item)) {
+      const auto& frame = picture->frame;
+      const auto* const last = frame.pixels + (frame.height - 1) * frame.stride +
+                               (frame.width - 1) * bytes_per_pixel(frame.format);
+      const int red = frame.format == PixelFormat::bgr ? 2 : 0;
+      ASSERT_EQ(frame.pixels[red], last[red]);
+      out.frames.push_back({frame.t, last[red]});
+    } else if (const auto* triggers = std::get_if<TriggerItem>(&*item)) {
+      out.triggers.insert(out.triggers.end(), triggers->triggers.begin(), triggers->triggers.end());
+    }
+  }
+}
+
+/// Pushes bytes in pieces, which are invalid once they have been read.
+void push(RecordingDecoder& decoder, std::span<const std::uint8_t> bytes, Contents& out,
+          std::size_t piece = std::size_t{1} << 20) {
+  for (const auto part : pieces::of(bytes, piece)) {
+    const auto copy = std::make_unique<std::uint8_t[]>(part.size());
+    std::copy(part.begin(), part.end(), copy.get());
+    decoder.push({copy.get(), part.size()});
+    take(decoder, out);
+  }
+  decoder.finish();
+  take(decoder, out);
+}
+
+Contents decoded(RecordingDecoder& decoder, std::span<const std::uint8_t> bytes,
+                 std::size_t piece = std::size_t{1} << 20) {
+  Contents contents;
+  push(decoder, bytes, contents, piece);
+  return contents;
+}
+
+Bytes bytes_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+template <class Number>
+Number take_number(std::span<const std::uint8_t>& bytes) {
+  const auto number = little_endian<Number>(bytes.data());
+  bytes = bytes.subspan(sizeof number);
+  return number;
+}
+
+/// The files of bag_files.py.
+class Bags : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder = std::filesystem::temp_directory_path() / ("bags-" + std::to_string(getpid()));
+    std::filesystem::create_directory(folder);
+    const auto command = std::string("/usr/bin/python3 " BAG_FILES " ") + folder.string();
+    ASSERT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
+    const auto event_bytes = bytes_of(folder / "events.bin");
+    for (std::span<const std::uint8_t> rest = event_bytes; !rest.empty();) {
+      const auto t = take_number<std::int64_t>(rest);
+      const auto x = take_number<std::uint16_t>(rest);
+      const auto y = take_number<std::uint16_t>(rest);
+      const auto p = take_number<std::uint16_t>(rest);
+      expected.events.push_back(AbsoluteEvent::at(x, y, t, static_cast<Polarity>(p)));
+    }
+    const auto frame_bytes = bytes_of(folder / "frames.bin");
+    for (std::span<const std::uint8_t> rest = frame_bytes; !rest.empty();) {
+      const auto t = take_number<std::int64_t>(rest);
+      expected.frames.push_back({t, take_number<std::uint8_t>(rest)});
+    }
+    ASSERT_EQ(expected.events.size(), 6000U);
+  }
+
+  static void TearDownTestSuite() { std::filesystem::remove_all(folder); }
+
+  /// The names of all bags.
+  static std::vector<std::string> names() {
+    std::vector<std::string> found;
+    for (const auto& file : std::filesystem::directory_iterator(folder))
+      if (file.path().extension() != ".bin") found.push_back(file.path().filename());
+    return found;
+  }
+
+  static inline std::filesystem::path folder;
+  static inline Contents expected;
+};
+
+TEST_F(Bags, HaveTheirEventsAndFrames) {
+  ASSERT_GE(names().size(), 12U);
+  for (const auto& name : names()) {
+    SCOPED_TRACE(name);
+    const auto bytes = bytes_of(folder / name);
+    for (const bool pulled : {false, true}) {
+      MemoryBytes source(bytes);
+      const auto decoder = std::make_unique<BagDecoder>("");
+      if (pulled) decoder->open(source);
+      const auto contents = decoded(*decoder, bytes, pulled ? bytes.size() : 77'777);
+      EXPECT_EQ(contents.events, expected.events);
+      EXPECT_EQ(contents.frames, expected.frames);
+      EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+      ASSERT_EQ(decoder->streams().size(), 2U);
+      for (const auto& stream : decoder->streams())
+        EXPECT_EQ(stream.size, stream.kind == StreamKind::events ? (SensorSize{346, 260})
+                                                                 : (SensorSize{86, 65}));
+      EXPECT_EQ(decoder->left_out(), "topics /second/events");
+    }
+  }
+}
+
+TEST_F(Bags, HaveTheTopicsThatAreChosen) {
+  const std::string name = "evt3-lz4.mcap";
+  const auto bytes = bytes_of(folder / name);
+  auto decoder = std::make_unique<BagDecoder>("/second/events");
+  auto contents = decoded(*decoder, bytes);
+  EXPECT_EQ(contents.events.size(), 39U);
+  EXPECT_TRUE(contents.frames.empty());
+  decoder = std::make_unique<BagDecoder>("/camera/events, /second/events");
+  contents = decoded(*decoder, bytes);
+  EXPECT_EQ(contents.events.size(), 6039U);
+  EXPECT_EQ(decoder->streams().size(), 2U);
+  try {
+    decoder = std::make_unique<BagDecoder>("/none");
+    contents = decoded(*decoder, bytes);
+    ADD_FAILURE() << "a topic that is not there was read";
+  } catch (const UnsupportedFormat& error) {
+    EXPECT_NE(std::string(error.what()).find("/none"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("/camera/events"), std::string::npos);
+  }
+}
+
+/// What there is from `t` on.
+Contents from(Microseconds t, const Contents& all) {
+  Contents part;
+  for (const auto& event : all.events)
+    if (event.t >= t) part.events.push_back(event);
+  for (const auto& frame : all.frames)
+    if (frame.t >= t) part.frames.push_back(frame);
+  return part;
+}
+
+TEST_F(Bags, SeekExactly) {
+  const auto first = expected.events.front().t;
+  const auto length = expected.events.back().t - first;
+  for (const auto& name : names()) {
+    SCOPED_TRACE(name);
+    const auto bytes = bytes_of(folder / name);
+    const bool is_database = name.ends_with(".db3");
+    const bool has_index = name.find("-no-") == std::string::npos;
+    for (const bool pulled : {false, true}) {
+      if (is_database && !pulled) continue;  // it is pushed again as a whole
+      MemoryBytes source(bytes);
+      const auto decoder = std::make_unique<BagDecoder>("");
+      if (pulled) decoder->open(source);
+      decoded(*decoder, bytes);
+      const auto start = decoder->seek_point_before(std::numeric_limits<Microseconds>::min());
+      ASSERT_TRUE(start);
+      for (const auto t :
+           {first, first + 1, first + length / 3, first + length / 2, first + length}) {
+        const auto point = decoder->seek_point_before(t);
+        ASSERT_TRUE(point);
+        if (pulled && has_index && t > first + length / 4) {
+          EXPECT_GT(point->position, start->position);
+        }
+        decoder->restart(*point);
+        Contents contents;
+        push(*decoder,
+             is_database
+                 ? Bytes{}
+                 : Bytes(bytes.begin() + static_cast<std::ptrdiff_t>(point->position), bytes.end()),
+             contents);
+        const auto want = from(t, expected);
+        const auto got = from(t, contents);
+        EXPECT_EQ(got.events, want.events);
+        EXPECT_EQ(got.frames, want.frames);
+      }
+    }
+  }
+}
+
+TEST_F(Bags, StateTheirLastTime) {
+  for (const auto& name : names()) {
+    if (name.find("-no-") != std::string::npos) continue;
+    SCOPED_TRACE(name);
+    const auto bytes = bytes_of(folder / name);
+    MemoryBytes source(bytes);
+    const auto decoder = std::make_unique<BagDecoder>("");
+    decoder->open(source);
+    decoded(*decoder, bytes);
+    EXPECT_EQ(decoder->last_time(), expected.events.back().t);
+  }
+}
+
+/// Events that are in both, of sorted ones without two alike.
+std::size_t common(const std::vector<AbsoluteEvent>& a, const std::vector<AbsoluteEvent>& b) {
+  std::size_t count = 0;
+  auto at = a.begin();
+  for (const auto& event : b) {
+    const auto found = std::find(at, a.end(), event);
+    if (found == a.end()) continue;
+    at = found + 1;
+    ++count;
+  }
+  return count;
+}
+
+TEST_F(Bags, AreReadUpToWhereTheyAreCut) {
+  for (const auto& name : names()) {
+    if (name.ends_with(".db3")) continue;
+    SCOPED_TRACE(name);
+    auto bytes = bytes_of(folder / name);
+    bytes.resize(bytes.size() / 2);
+    for (const bool pulled : {false, true}) {
+      MemoryBytes source(bytes);
+      BagDecoder decoder("");
+      if (pulled) decoder.open(source);
+      const auto contents = decoded(decoder, bytes);
+      EXPECT_GT(contents.events.size(), 2000U);
+      EXPECT_TRUE(std::ranges::equal(contents.events,
+                                     std::span(expected.events).first(contents.events.size())));
+      EXPECT_EQ(decoder.corruption().places, 1U);
+      EXPECT_NE(decoder.corruption().first.find("the file ends within a"), std::string::npos)
+          << decoder.corruption().first;
+    }
+  }
+}
+
+TEST_F(Bags, LoseOnlyWhatIsCorrupt) {
+  for (const auto& name : names()) {
+    if (name.ends_with(".db3")) continue;
+    SCOPED_TRACE(name);
+    auto bytes = bytes_of(folder / name);
+    std::ranges::fill(std::span(bytes).subspan(bytes.size() / 3, 500), 0xa5);
+    BagDecoder decoder("");
+    const auto contents = decoded(decoder, bytes);
+    EXPECT_GT(common(expected.events, contents.events), 4000U);
+    // Bags of ROS 1 have no checksums.
+    if (name.ends_with(".mcap") && name.find("-no-chunks") == std::string::npos) {
+      EXPECT_GE(decoder.corruption().places, 1U);
+    }
+    EXPECT_LE(decoder.corruption().places, 100U);
+  }
+}
+
+TEST_F(Bags, OfDatabasesSurviveCorruptPages) {
+  const auto bytes = bytes_of(folder / "evt3.db3");
+  std::size_t noticed = 0;
+  for (std::size_t i = 0; i < 40; ++i) {
+    auto corrupt = bytes;
+    const auto at = i * bytes.size() / 40;
+    std::ranges::fill(std::span(corrupt).subspan(at, std::min<std::size_t>(700, bytes.size() - at)),
+                      static_cast<std::uint8_t>(i * 37));
+    if (i % 4 == 0) corrupt.resize(bytes.size() - at);
+    MemoryBytes source(corrupt);
+    BagDecoder decoder("");
+    try {
+      decoder.open(source);
+      Contents contents;
+      push(decoder, {}, contents);
+      EXPECT_LE(contents.events.size(), expected.events.size());
+      noticed += decoder.corruption().places > 0 ? 1 : 0;
+    } catch (const UnsupportedFormat& error) {
+      EXPECT_STRNE(error.what(), "");
+      ++noticed;
+    }
+  }
+  EXPECT_GT(noticed, 10U);
+}
+
+TEST_F(Bags, AreRefusedWithAReason) {
+  const auto refusal = [](const Bytes& bytes) -> std::string {
+    BagDecoder decoder("");
+    try {
+      decoded(decoder, bytes);
+    } catch (const UnsupportedFormat& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_EQ(refusal({}), "this is not a bag of ROS");
+  EXPECT_EQ(refusal(Bytes(100, 'x')), "this is not a bag of ROS");
+  const auto bytes = bytes_of(folder / "evt3-no-chunks.mcap");
+  auto other = bytes;
+  for (auto at = other.begin();;) {
+    const std::string_view encoding("evt3");
+    at = std::search(at, other.end(), encoding.begin(), encoding.end());
+    if (at == other.end()) break;
+    std::copy_n("evt9", 4, at);
+  }
+  EXPECT_EQ(refusal(other),
+            "the events of topic /camera/events have the encoding \"evt9\"; evt2, evt21, evt3 and "
+            "mono can be read");
+}
+
+Bytes encoded(const McapSettings& settings, std::span<const AbsoluteEvent> events,
+              std::size_t piece = 1000) {
+  const auto encoder = make_mcap_encoder(settings);
+  Bytes bytes;
+  while (!events.empty()) {
+    const auto count = std::min(piece, events.size());
+    encoder->encode(events.first(count), bytes);
+    events = events.subspan(count);
+  }
+  encoder->finish(bytes);
+  return bytes;
+}
+
+constexpr SensorSize hd{1280, 720};
+
+TEST(Mcap, ReadsBackWhatItWrites) {
+  constexpr Microseconds hour = 3'600'000'000;
+  unsigned seed = 1;
+  for (const auto format : {BagEvents::evt3, BagEvents::mono}) {
+    for (const auto compression :
+         {BagCompression::none, BagCompression::lz4, BagCompression::zstd}) {
+      for (const Microseconds start : {Microseconds{0}, Microseconds{1'700'000'000'000'000}}) {
+        for (const Microseconds pause : {Microseconds{1000}, Microseconds{60'000'000}, 2 * hour}) {
+          const auto events = random_events::make(hd, 20'000, seed++, start, {pause});
+          const auto bytes = encoded({hd, format, compression}, events, 1 + seed * 37);
+          MemoryBytes source(bytes);
+          const auto decoder = std::make_unique<BagDecoder>("");
+          decoder->open(source);
+          const auto contents = decoded(*decoder, bytes);
+          EXPECT_EQ(contents.events, events);
+          EXPECT_EQ(decoder->corruption().places, 0U) << decoder->corruption().first;
+          EXPECT_EQ(decoder->streams().front().size, hd);
+          EXPECT_EQ(decoder->last_time(), events.back().t);
+        }
+      }
+    }
+  }
+}
+
+TEST(Mcap, KeepsTriggersWithEvt3) {
+  const auto events = random_events::make(hd, 20'000, 5, 1000, {1000});
+  const auto encoder = make_mcap_encoder({.size = hd});
+  Bytes bytes;
+  std::vector<Trigger> triggers;
+  for (std::size_t i = 0; i < events.size(); i += 1000) {
+    triggers.push_back({events[i].t, static_cast<std::uint16_t>(i / 1000 % 16), i % 2000 == 0});
+    EXPECT_TRUE(encoder->encode_trigger(triggers.back(), bytes));
+    encoder->encode(std::span(events).subspan(i, 1000), bytes);
+  }
+  EXPECT_GT(encoder->pending(), 0U);
+  encoder->finish(bytes);
+  EXPECT_EQ(encoder->pending(), 0U);
+  const auto decoder = std::make_unique<BagDecoder>("");
+  const auto contents = decoded(*decoder, bytes);
+  EXPECT_EQ(contents.events, events);
+  EXPECT_EQ(contents.triggers, triggers);
+  EXPECT_FALSE(make_mcap_encoder({hd, BagEvents::mono})->encode_trigger(triggers[0], bytes));
+}
+
+TEST(Mcap, IsAsSpecified) {
+  const auto path = std::filesystem::temp_directory_path() / ("mcap-" + std::to_string(getpid()));
+  const auto save = [](const std::filesystem::path& file, const Bytes& bytes) {
+    std::ofstream(file, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+  };
+  auto events = random_events::make({346, 260}, 30'000, 7, 1'700'000'000'000'000, {3'000'000});
+  // Vectors of EVT3 words.
+  for (int x = 64; x < 90; ++x)
+    events.push_back(AbsoluteEvent::at(x, 9, events.back().t, Polarity::on));
+  Bytes expected;
+  for (const auto& event : events) {
+    const std::uint16_t rest[] = {event.x, static_cast<std::uint16_t>(event.y()),
+                                  static_cast<std::uint16_t>(event.polarity())};
+    const auto* const t = reinterpret_cast<const std::uint8_t*>(&event.t);
+    const auto* const others = reinterpret_cast<const std::uint8_t*>(rest);
+    expected.insert(expected.end(), t, t + sizeof event.t);
+    expected.insert(expected.end(), others, others + sizeof rest);
+  }
+  save(path.string() + ".bin", expected);
+  for (const auto format : {BagEvents::evt3, BagEvents::mono})
+    for (const auto compression :
+         {BagCompression::none, BagCompression::lz4, BagCompression::zstd}) {
+      save(path.string() + ".mcap", encoded({{346, 260}, format, compression}, events));
+      const auto command =
+          "/usr/bin/python3 " BAG_CHECK " " + path.string() + ".mcap " + path.string() + ".bin";
+      EXPECT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
+    }
+  std::filesystem::remove(path.string() + ".mcap");
+  std::filesystem::remove(path.string() + ".bin");
+}
+
+}  // namespace

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Bags of ROS 1, written from their specification: wiki.ros.org/Bags/Format/2.0.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/core/event.hpp"
+#include "src/core/sensor_size.hpp"
+
+namespace eventcamera::rosbags {
+
+using Text = std::string;
+
+template <class Number>
+Text binary(Number number) {
+  return {reinterpret_cast<const char*>(&number), sizeof number};
+}
+
+inline Text sized(const Text& text) {
+  return binary(static_cast<std::uint32_t>(text.size())) + text;
+}
+
+inline Text record(std::initializer_list<std::pair<const char*, Text>> fields, const Text& data) {
+  Text header;
+  for (const auto& [name, value] : fields) header += sized(Text(name) + "=" + value);
+  return sized(header) + sized(data);
+}
+
+inline Text time(Microseconds t) {
+  return binary(static_cast<std::uint32_t>(t / 1'000'000)) +
+         binary(static_cast<std::uint32_t>(t % 1'000'000 * 1000));
+}
+
+inline Text event_array(SensorSize size, std::span<const AbsoluteEvent> events) {
+  Text message = binary(std::uint32_t{0}) + time(events.front().t) + sized("camera") +
+                 binary(size.height) + binary(size.width) +
+                 binary(static_cast<std::uint32_t>(events.size()));
+  for (const auto& event : events)
+    message += binary(event.x) + binary(static_cast<std::uint16_t>(event.y())) + time(event.t) +
+               static_cast<char>(event.polarity());
+  return message;
+}
+
+/// A bag with the topic /dvs/events of dvs_msgs/EventArray: a chunk per message of up to
+/// `per_message` events, and an index.
+inline std::vector<std::uint8_t> of_events(SensorSize size, std::span<const AbsoluteEvent> events,
+                                           std::size_t per_message) {
+  const Text magic = "#ROSBAG V2.0\n";
+  const Text number = binary(std::uint32_t{0});
+  const Text connection = record({{"op", "\x07"}, {"conn", number}, {"topic", "/dvs/events"}},
+                                 sized("topic=/dvs/events") + sized("type=dvs_msgs/EventArray") +
+                                     sized("md5sum=*") + sized("message_definition="));
+  constexpr std::size_t first_record = 4096;
+  Text chunks;
+  Text infos;
+  std::uint32_t count = 0;
+  for (; !events.empty(); ++count) {
+    const auto some = events.first(std::min(per_message, events.size()));
+    events = events.subspan(some.size());
+    const auto t = time(some.back().t);
+    const Text head = count == 0 ? connection : Text();
+    const Text content =
+        head + record({{"op", "\x02"}, {"conn", number}, {"time", t}}, event_array(size, some));
+    infos +=
+        record({{"op", "\x06"},
+                {"ver", binary(std::uint32_t{1})},
+                {"chunk_pos", binary(std::uint64_t{magic.size() + first_record + chunks.size()})},
+                {"start_time", t},
+                {"end_time", t},
+                {"count", binary(std::uint32_t{1})}},
+               number + binary(std::uint32_t{1}));
+    chunks += record({{"op", "\x05"},
+                      {"compression", "none"},
+                      {"size", binary(static_cast<std::uint32_t>(content.size()))}},
+                     content);
+    chunks += record({{"op", "\x04"},
+                      {"ver", binary(std::uint32_t{1})},
+                      {"conn", number},
+                      {"count", binary(std::uint32_t{1})}},
+                     t + binary(static_cast<std::uint32_t>(head.size())));
+  }
+  const auto bag = [&](std::size_t padding) {
+    return record(
+        {{"op", "\x03"},
+         {"index_pos", binary(std::uint64_t{magic.size() + first_record + chunks.size()})},
+         {"conn_count", binary(std::uint32_t{1})},
+         {"chunk_count", binary(count)}},
+        Text(padding, ' '));
+  };
+  const Text file = magic + bag(first_record - bag(0).size()) + chunks + connection + infos;
+  return {file.begin(), file.end()};
+}
+
+}  // namespace eventcamera::rosbags

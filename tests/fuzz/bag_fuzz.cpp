@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Bags: pushed in pieces, and with random access.
+#include <limits>
+#include <memory>
+
+#include "src/formats/ros/bag_decoder.hpp"
+#include "tests/fuzz/fuzz_decoder.hpp"
+#include "tests/fuzz/item_sums.hpp"
+
+namespace {
+
+using namespace fuzz;
+
+/// Seeks to the time of the last event, and reads the rest.
+void seek(RecordingDecoder& reader, std::span<const std::uint8_t> bytes, Microseconds t) {
+  const auto point = reader.seek_point_before(t);
+  if (!point) return;
+  reader.restart(*point);
+  if (point->position < bytes.size())
+    reader.push(bytes.subspan(static_cast<std::size_t>(point->position)));
+  Sums sums;
+  take(reader, sums);
+  reader.finish();
+  take(reader, sums);
+}
+
+Sums sums_of(std::span<const std::uint8_t> bytes, Pieces pieces) {
+  const auto reader = std::make_unique<BagDecoder>("");
+  Sums sums;
+  try {
+    in_pieces(bytes, pieces, [&](auto piece) {
+      reader->push(piece);
+      take(*reader, sums);
+    });
+    reader->finish();
+    take(*reader, sums);
+  } catch (const UnsupportedFormat&) {
+    sums.rest.add(std::uint64_t{1});
+    return sums;
+  }
+  sums.rest.add(reader->corruption());
+  sums.rest.add(reader->streams().size());
+  return sums;
+}
+
+void read_with_index(std::span<const std::uint8_t> bytes) {
+  const auto reader = std::make_unique<BagDecoder>("");
+  MemoryBytes source({bytes.begin(), bytes.end()});
+  Sums sums;
+  try {
+    const bool reads_itself = reader->open(source);
+    if (!reads_itself) {
+      reader->push(bytes);
+      take(*reader, sums);
+      reader->finish();
+    }
+    take(*reader, sums);
+    const auto last = reader->last_time();
+    if (reads_itself) bytes = {};
+    seek(*reader, bytes, last.value_or(1'000'000));
+    seek(*reader, bytes, std::numeric_limits<Microseconds>::min());
+  } catch (const UnsupportedFormat&) {
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::span bytes(data, size);
+  require_same_however_cut(bytes, [&](Pieces pieces) { return sums_of(bytes, pieces); });
+  read_with_index(bytes);
+  return 0;
+}
