@@ -38,14 +38,17 @@ static const Reader readers[] = {
     {"application/x-npz", "eventnpzdec name=reader"},
     {"application/x-aedat", "aedatdemux name=reader reader.events_0"},
     {"application/x-hdf5", "eventhdf5dec name=reader"},
+    {"application/x-mcap", "eventmcapdec name=reader reader.events_0"},
+    {"application/x-rosbag", "eventbagdec name=reader reader.events_0"},
+    {"application/x-rosbag2-db3", "eventbagdec name=reader reader.events_0"},
 };
 
 typedef struct {
   const char* extension;
   const char* description;
   const char* media_type;
-  const char* writer; /* an element name=writer; NULL if the format is read-only */
-  const char* option; /* writer property that can be set by an option, or NULL */
+  const char* writer;  /* an element name=writer; NULL if the format is read-only */
+  const char* options; /* writer properties that options can set, or NULL */
 } Format;
 
 static const Format formats[] = {
@@ -62,13 +65,17 @@ static const Format formats[] = {
      NULL},
     {".npz", "NumPy archive, with the size of the sensor", "application/x-npz",
      "eventnpzenc name=writer ! filesink name=out", NULL},
-    {".aedat4", "AEDAT 4; from AEDAT 4 with its frames, triggers and IMU samples",
+    {".aedat4", "AEDAT 4; with the frames, triggers and IMU samples of other recordings",
      "application/x-aedat", "aedatmux name=writer ! filesink name=out", "compression"},
     {".aedat", "AEDAT 2.0 and 3.1, read only", "application/x-aedat", NULL, NULL},
     {".h5", "HDF5, written in the layout of DSEC", "application/x-hdf5",
      "eventhdf5sink name=writer", "compression"},
     {".hdf5", "HDF5, written in the layout of Metavision", "application/x-hdf5",
      "eventhdf5sink name=writer format=metavision", NULL},
+    {".mcap", "MCAP, a bag of ROS 2", "application/x-mcap",
+     "eventmcapenc name=writer ! filesink name=out", "format compression"},
+    {".bag", "bag of ROS 1, read only", "application/x-rosbag", NULL, NULL},
+    {".db3", "bag of ROS 2 with SQLite, read only", "application/x-rosbag2-db3", NULL, NULL},
 };
 
 typedef struct {
@@ -101,7 +108,7 @@ static const GOptionEntry options[] = {
     {"format", 'f', 0, G_OPTION_ARG_STRING, &properties[0].value,
      "Encoding of a .raw file, or dialect of a .csv or .txt file", "NAME"},
     {"compression", 'c', 0, G_OPTION_ARG_STRING, &properties[1].value,
-     "Compression of an .aedat4 or .h5 file", "NAME"},
+     "Compression of an .aedat4, .h5 or .mcap file", "NAME"},
     {"time-unit", 'u', 0, G_OPTION_ARG_STRING, &properties[2].value,
      "Time unit of a text or NumPy file that is read", "NAME"},
     {"column-order", 'o', 0, G_OPTION_ARG_STRING, &properties[3].value,
@@ -158,6 +165,8 @@ static gchar* help(void) {
   append_names(text, ".csv and .txt", "eventcsvenc", "format");
   append_names(text, ".aedat4", "aedatmux", "compression");
   append_names(text, ".h5", "eventhdf5sink", "compression");
+  append_names(text, ".mcap", "eventmcapenc", "format");
+  append_names(text, ".mcap", "eventmcapenc", "compression");
   append_names(text, "text and NumPy", "eventcsvdec", "time-unit");
   g_string_append(text, "  --extension, all:");
   for (gsize i = 0; i < G_N_ELEMENTS(formats); ++i)
@@ -237,7 +246,7 @@ static gboolean options_apply(const Format* format) {
   for (gsize i = 0; i < G_N_ELEMENTS(properties); ++i) {
     const Option* option = &properties[i];
     if (option->value == NULL || option->inputs != NULL) continue;
-    if (g_strcmp0(format->option, option->name) == 0) continue;
+    if (format->options != NULL && strstr(format->options, option->name) != NULL) continue;
     PRINT_ERROR("--%s does not apply to %s files\n", option->name, format->extension);
     return FALSE;
   }
@@ -312,7 +321,7 @@ static void set_location(GstElement* pipeline, const char* name, const char* pat
   gst_object_unref(element);
 }
 
-/* Links the first video stream of an AEDAT 4 file to a writer that takes it. Runs in the streaming
+/* Links the first video stream of a file to a writer that takes it. Runs in the streaming
  * thread, before data flows. */
 static void link_frames(GstElement* reader, GstPad* pad, gpointer writer) {
   GstObject* pipeline = gst_element_get_parent(reader);
@@ -558,8 +567,8 @@ static GstElement* make_pipeline(const char* in, const Reader* from, const char*
                     events, NULL);
   gst_object_unref(pad);
   /* Frames are not cropped, so they would not match the events. */
-  if (crop_text == NULL && strcmp(from->media_type, "application/x-aedat") == 0 &&
-      strcmp(to->media_type, from->media_type) == 0)
+  if (crop_text == NULL && strstr(from->element, "reader.events_0") != NULL &&
+      strcmp(to->media_type, "application/x-aedat") == 0)
     convert_frames(pipeline, queue);
   gst_object_unref(queue);
   return pipeline;

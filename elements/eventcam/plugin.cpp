@@ -22,18 +22,25 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 #define NPZ_ELEMENTS(X)
 #endif
 
+#ifdef HAVE_ROS
+#define ROS_ELEMENTS(X) X(eventbagdec) X(eventmcapdec) X(eventmcapenc)
+#else
+#define ROS_ELEMENTS(X)
+#endif
+
 // clang-format off
 #define ELEMENTS(X)                                                                        \
-  AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X)                                       \
+  AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X) ROS_ELEMENTS(X)                       \
   X(eventcompare) X(eventmerge) X(eventoverlay) X(eventrender) X(eventstats)               \
   X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
   X(eventantiflicker) X(eventdenoise) X(eventhotpixel) X(eventratecontrol)                 \
   X(eventrefractory) X(eventtensor) X(eventtrail)                                          \
   X(eventdatagramdepay) X(eventdatagrampay)                                                \
   X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)
+#define TYPE_FINDERS(X)                                                                    \
+  X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(mcap) X(npy) X(npz) X(propheseedat)        \
+  X(propheseeraw) X(rosbag) X(rosbag2)
 // clang-format on
-#define TYPE_FINDERS(X) \
-  X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(npy) X(npz) X(propheseedat) X(propheseeraw)
 
 EVENTSIM_PLUGIN(eventcam,
                 "Event streams: read, write, filter, merge, draw, measure and send events",

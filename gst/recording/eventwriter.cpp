@@ -58,6 +58,7 @@ struct GstEventWriterPrivate {
       : writable(self, GST_CAT_DEFAULT, GST_STREAM_ERROR_ENCODE) {}
 
   std::atomic<int> variant = 0;
+  std::atomic<int> compression = 0;
   std::atomic<guint> mtu = G_MAXUINT;
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
@@ -107,7 +108,8 @@ static void begin_file(GstEventWriter* self, const GstEventCameraInfo& info, Own
   auto& priv = priv_of(self);
   priv.bytes.clear();
   priv.writable.begin_file({info.width, info.height});
-  auto encoder = format_of(self).create({info.width, info.height}, priv.variant, caps.get());
+  auto encoder = format_of(self).create({info.width, info.height}, {priv.variant, priv.compression},
+                                        caps.get());
   encoder->encode({}, priv.bytes);
   OwnedBuffer header;
   if (!priv.bytes.empty()) {
@@ -436,8 +438,9 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 static void constructed(GObject* object) {
   auto* element = GST_ELEMENT(object);
   auto& priv = priv_of(GST_EVENT_WRITER(object));
-  if (const auto* variants = format_of(GST_EVENT_WRITER(object)).variants)
-    priv.variant = variants->default_value;
+  const auto& format = format_of(GST_EVENT_WRITER(object));
+  if (format.variants != nullptr) priv.variant = format.variants->default_value;
+  if (format.compressions != nullptr) priv.compression = format.compressions->default_value;
   priv.sink = add_pad(element, "sink");
   gst_pad_set_chain_function(priv.sink, chain);
   gst_pad_set_event_function(priv.sink, sink_event);
@@ -463,22 +466,32 @@ static void gst_event_writer_class_init(GstEventWriterClass* klass) {
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_WRITER, static_cast<GstPluginAPIFlags>(0));
 }
 
+/// Installs the enum property that is stored in `choice`.
+template <std::atomic<int> GstEventWriterPrivate::*choice>
+static void install_choice(GObjectClass* klass, const EventFileFormat::Variants& variants) {
+  install_property(
+      klass,
+      {[](GObject* object, const GValue* value) {
+         priv_of(GST_EVENT_WRITER(object)).*choice = g_value_get_enum(value);
+       },
+       [](GObject* object, GValue* value) {
+         g_value_set_enum(value, priv_of(GST_EVENT_WRITER(object)).*choice);
+       }},
+      g_param_spec_enum(variants.property, variants.nick, variants.blurb, variants.type(),
+                        variants.default_value,
+                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                 GST_PARAM_MUTABLE_READY)));
+}
+
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const EventFileFormat*>(data);
   GST_EVENT_WRITER_CLASS(klass)->format = &format;
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
-  if (const auto* variants = format.variants)
-    install_property(object_class,
-                     {[](GObject* object, const GValue* value) {
-                        priv_of(GST_EVENT_WRITER(object)).variant = g_value_get_enum(value);
-                      },
-                      [](GObject* object, GValue* value) {
-                        g_value_set_enum(value, priv_of(GST_EVENT_WRITER(object)).variant);
-                      }},
-                     g_param_spec_enum(variants->property, variants->nick, variants->blurb,
-                                       variants->type(), variants->default_value,
-                                       static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_READY)));
+  if (format.variants != nullptr)
+    install_choice<&GstEventWriterPrivate::variant>(object_class, *format.variants);
+  if (format.compressions != nullptr)
+    install_choice<&GstEventWriterPrivate::compression>(object_class, *format.compressions);
   if (format.has_words)
     install_property(
         object_class,

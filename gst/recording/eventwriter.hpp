@@ -31,10 +31,17 @@ struct EventFileFormat {
   const char* caps;                          ///< output caps
   int max_side = GST_EVENT_CAMERA_MAX_SIDE;  ///< of the sensor
   const Variants* variants = nullptr;
+  const Variants* compressions = nullptr;
   bool has_words = false;  ///< has property mtu, which limits the words per buffer
 
+  /// Values of the properties of `variants` and `compressions`.
+  struct Choice {
+    int variant = 0;
+    int compression = 0;
+  };
+
   /// Creates the encoder for a stream with these output caps. May throw.
-  std::unique_ptr<eventcamera::Encoder> (*create)(eventcamera::SensorSize size, int variant,
+  std::unique_ptr<eventcamera::Encoder> (*create)(eventcamera::SensorSize size, Choice choice,
                                                   const GstCaps* caps);
   /// Fixates the caps (not empty) that the member `caps` and downstream have in common. Takes
   /// ownership of them and returns fixed caps. Null if they are always fixed.

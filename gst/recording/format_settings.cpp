@@ -38,6 +38,15 @@ void add_sensor_size(FormatProperties& properties) {
                                    0, GST_EVENT_CAMERA_MAX_SIDE, 0, flags));
 }
 
+void add_topics(FormatProperties& properties) {
+  properties.add(
+      &FormatSettings::topics,
+      g_param_spec_string("topics", "Topics",
+                          "Topics of events and images to read, separated by commas; empty = the "
+                          "first topic of events in the file, and all of images",
+                          "", flags));
+}
+
 static GType time_unit_type() {
   static const GEnumValue units[] = {
       {0, "As stated in the file, or detected from its first rows", "auto"},

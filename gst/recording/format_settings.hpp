@@ -13,6 +13,7 @@ struct FormatSettings {
   int variant = 0;                 ///< format-specific enum
   int time_unit = 0;               ///< 0: detect, else TimeUnit + 1
   std::string column_order;        ///< empty: detect
+  std::string topics;              ///< of a bag, separated by commas; empty: the usual ones
 
   /// Time unit and columns of a table. Throws UnsupportedFormat.
   eventcamera::TableSettings table() const;
@@ -25,6 +26,9 @@ using FormatProperties = Properties<format_settings_of>;
 
 /// Adds `width` and `height`, for formats whose files may not state the sensor size.
 void add_sensor_size(FormatProperties& properties);
+
+/// Adds `topics`, for bags.
+void add_topics(FormatProperties& properties);
 
 /// Adds `width`, `height`, `time-unit` and `column-order`, for tables.
 void add_table_properties(FormatProperties& properties);

@@ -11,6 +11,7 @@
 #include "src/formats/evt/raw.hpp"
 #include "tests/elements/pipeline.hpp"
 #include "tests/formats/aedat_files.hpp"
+#include "tests/formats/rosbags.hpp"
 
 /// A recording of five seconds, in files of every format.
 namespace recording_files {
@@ -69,6 +70,7 @@ class Folder {
     }
     save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
     save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
+    save("ros1.bag", eventcamera::rosbags::of_events(sensor, events, 1000));
     for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
                                        {"a.es", "eventesenc ! filesink"},
                                        {"a.csv", "eventcsvenc ! filesink"},
@@ -76,6 +78,7 @@ class Folder {
                                        {"a.npy", "eventnpyenc ! filesink"},
                                        {"a.npz", "eventnpzenc ! filesink"},
                                        {"a.aedat4", "aedatmux ! filesink"},
+                                       {"a.mcap", "eventmcapenc ! filesink"},
                                        {"dsec.h5", "eventhdf5sink"},
                                        {"metavision.hdf5", "eventhdf5sink format=metavision"}}) {
       Pipeline pipeline("filesrc location=" + in_quotes(path_ / "evt3.raw") + " ! evtdec ! " +
@@ -109,7 +112,8 @@ inline constexpr File files[] = {
     {"a.npy", "eventnpydec"},       {"a.npz", "eventnpzdec"},
     {"aedat2.aedat", "aedatdemux"}, {"a.aedat4", "aedatdemux"},
     {"aedat3.aedat", "aedatdemux"}, {"metavision.hdf5", "eventhdf5dec"},
-    {"dsec.h5", "eventhdf5dec"},
+    {"dsec.h5", "eventhdf5dec"},    {"a.mcap", "eventmcapdec"},
+    {"ros1.bag", "eventbagdec"},
 };
 
 /// Part of a test's name.

@@ -20,7 +20,7 @@ update-desktop-database -q "$data/applications"
 
 # Types of recordings, and of other files with their extensions.
 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! evtenc ! filesink location=ball.raw
-for ending in dat es npy npz aedat4 h5 hdf5; do "$BUILD/pipelines/event-convert" ball.raw ball.$ending; done
+for ending in dat es npy npz aedat4 h5 hdf5 mcap; do "$BUILD/pipelines/event-convert" ball.raw ball.$ending; done
 cp ball.dat "without an extension"
 /usr/bin/python3 - <<'PYTHON'
 import h5py
@@ -65,6 +65,7 @@ application/x-es ball.es
 application/x-event-npy ball.npy
 application/x-event-npz ball.npz
 application/x-aedat ball.aedat4
+application/x-mcap ball.mcap
 application/x-event-hdf5 ball.h5
 application/x-event-hdf5 ball.hdf5
 application/x-event-hdf5 dsec.h5
@@ -87,7 +88,7 @@ ln -s "$(command -v gst-play-1.0)" "$(command -v gio)" programs/
 default_of() { # TYPE
   PATH=$work/programs gio mime "$1" | sed -n '1s/.*: //p'
 }
-for ending in raw dat es npy npz aedat4 h5; do
+for ending in raw dat es npy npz aedat4 h5 mcap; do
   type=$(gio info -a standard::content-type ball.$ending | sed -n 's/.*content-type: //p')
   [ "$(default_of "$type")" = events-in-terminal.desktop ] || fail "$type is opened by $(default_of "$type")"
 done
@@ -114,7 +115,7 @@ draw_thumbnail() { # FILE: prints the numbers of its OFF, its ON and of all pixe
     !($0 in known) { print "not a colour of events: " $0 >"/dev/stderr"; exit 1 }
     END { print count["64 128 208"] + 0, count["240 244 250"] + 0, NR }'
 }
-for ending in raw dat es npy npz aedat4 h5; do
+for ending in raw dat es npy npz aedat4 h5 mcap; do
   type=$(gio info -a standard::content-type ball.$ending | sed -n 's/.*content-type: //p')
   grep -q "^MimeType=.*$type;" "$thumbnailer" || fail "no thumbnail of $type"
   read -r off on all <<<"$(draw_thumbnail ball.$ending)"

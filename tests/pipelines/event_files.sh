@@ -11,7 +11,8 @@ convert() {
 
 declare -A types=([raw]=application/x-prophesee-raw [dat]=application/x-prophesee-dat
   [es]=application/x-es [csv]=application/x-event-csv [txt]=application/x-event-csv [npy]=application/x-npy
-  [npz]=application/x-npz [aedat4]=application/x-aedat [h5]=application/x-hdf5 [hdf5]=application/x-hdf5)
+  [npz]=application/x-npz [aedat4]=application/x-aedat [h5]=application/x-hdf5 [hdf5]=application/x-hdf5
+  [mcap]=application/x-mcap)
 
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=60 ! eventsim-diff ! evtenc format=EVT3 ! filesink location=ball.raw
 
@@ -316,7 +317,7 @@ has_begun() { # PROCESS FILE: it has written 10 kB to the file, or keeps them in
   stat -L -c %s "$2" "${files[@]}" 2>/dev/null | awk '$1 >= 10000 { begun = 1 } END { exit !begun }'
 }
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=snow num-buffers=150 ! eventsim-frame ! evtenc ! filesink location=long.raw
-for ending in raw npy npz aedat4 h5 hdf5; do
+for ending in raw npy npz aedat4 h5 hdf5 mcap; do
   echo "event-convert long.raw interrupted.$ending"
   "$BUILD/pipelines/event-convert" long.raw "interrupted.$ending" 2>interruption &
   converting=$!

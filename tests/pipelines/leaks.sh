@@ -23,7 +23,7 @@ done
 # Event files, written and read, completely and partly.
 work=$(mktemp -d)
 trap 'rm -rf "$log" "$work"' EXIT
-for pair in evtenc:evtdec eventdatenc:eventdatdec eventesenc:eventesdec eventcsvenc:eventcsvdec eventnpyenc:eventnpydec eventnpzenc:eventnpzdec; do
+for pair in evtenc:evtdec eventdatenc:eventdatdec eventesenc:eventesdec eventcsvenc:eventcsvdec eventnpyenc:eventnpydec eventnpzenc:eventnpzdec eventmcapenc:eventmcapdec; do
   file=$work/${pair%:*}
   check videotestsrc num-buffers=8 ! eventsim-frame ! "${pair%:*}" ! filesink location="$file"
   check filesrc location="$file" ! "${pair#*:}" ! fakesink

@@ -18,6 +18,9 @@
 #ifdef HAVE_NPZ
 #include "src/formats/numpy/npz_decoder.hpp"
 #endif
+#ifdef HAVE_ROS
+#include "src/formats/ros/bag_decoder.hpp"
+#endif
 
 using eventcamera::Decoder;
 using eventcamera::OneStreamDecoder;
@@ -314,4 +317,80 @@ static const RecordingFormat aedat = {
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(aedatdemux, "aedatdemux", GST_RANK_PRIMARY, event_reader_type(aedat))
+#endif
+
+#ifdef HAVE_ROS
+/**
+ * SECTION:element-eventmcapdec
+ * @title: eventmcapdec
+ * @short_description: reads MCAP files, bags of ROS 2
+ *
+ * Reads events and images from MCAP files of ROS 2 and ROS 1, without ROS: messages
+ * event_camera_msgs/EventPacket (with encodings evt3, evt2, evt21 and mono), dvs_msgs/EventArray
+ * and prophesee_event_msgs/EventArray as events, sensor_msgs/Image as video. Chunks may be
+ * compressed with LZ4 or Zstandard.
+ *
+ * The first topic of events in the file is read, and all of images; a message names the others,
+ * which #GstEventMcapDec:topics selects.
+ *
+ * PTS are the stamps of the messages' headers. Packets have the clock of the camera: their first
+ * stamp tells the time of its start, so that intervals between events are exact. Triggers are sent
+ * with the events, for writers that store them.
+ *
+ * An index makes seeks fast and the duration exact. Files without one, and files that were cut, are
+ * read up to their end.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=walk.mcap ! eventmcapdec name=d  d.events_0 ! queue !
+ * eventrender ! videoconvert ! autovideosink
+ * ]|
+ */
+static std::unique_ptr<RecordingDecoder> make_bag_decoder(const GstCaps* /*caps*/,
+                                                          const FormatSettings& settings) {
+  return std::make_unique<eventcamera::BagDecoder>(settings.topics);
+}
+
+static const RecordingFormat mcap = {
+    .type_name = "GstEventMcapDec",
+    .long_name = "MCAP demuxer",
+    .description = "Reads events and images from MCAP files, bags of ROS 2",
+    .caps = "application/x-mcap",
+    .has_many_streams = true,
+    .has_triggers = true,
+    .add_properties = add_topics,
+    .make_decoder = make_bag_decoder,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventmcapdec, "eventmcapdec", GST_RANK_PRIMARY, event_reader_type(mcap))
+
+/**
+ * SECTION:element-eventbagdec
+ * @title: eventbagdec
+ * @short_description: reads bags of ROS 1, and of ROS 2 with SQLite
+ *
+ * Reads events and images from bags of ROS 1 (`.bag`, version 2.0, with chunks compressed with
+ * bzip2 or LZ4 or not at all), and from those of ROS 2 that are SQLite databases (`.db3`), without
+ * ROS. It reads the same messages as eventmcapdec, and chooses topics in the same way.
+ *
+ * PTS are the stamps of the messages' headers. Databases need random access, so upstream should
+ * support pull mode, as filesrc does; in push mode a database is collected in memory, up to 256
+ * MiB, and read at its end. A bag that was not closed has no index, and is read all the same.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=walk.bag ! eventbagdec name=d  d.events_0 ! queue ! eventrender !
+ * videoconvert ! autovideosink
+ * ]|
+ */
+static const RecordingFormat bag = {
+    .type_name = "GstEventBagDec",
+    .long_name = "ROS bag demuxer",
+    .description = "Reads events and images from bags of ROS",
+    .caps = "application/x-rosbag; application/x-rosbag2-db3",
+    .has_many_streams = true,
+    .has_triggers = true,
+    .add_properties = add_topics,
+    .make_decoder = make_bag_decoder,
+};
+GST_ELEMENT_REGISTER_DEFINE(eventbagdec, "eventbagdec", GST_RANK_PRIMARY, event_reader_type(bag))
 #endif

@@ -41,7 +41,10 @@ REGISTER(eventcsv, csv, "application/x-event-csv", "csv,txt",
          GST_RANK_SECONDARY)  // after formats with a signature
 REGISTER(eventstream, event_stream, "application/x-es", "es", GST_RANK_PRIMARY)
 REGISTER(hdf5, hdf5, "application/x-hdf5", "h5,hdf5", GST_RANK_PRIMARY)
+REGISTER(mcap, mcap, "application/x-mcap", "mcap", GST_RANK_PRIMARY)
 REGISTER(npy, npy, "application/x-npy", "npy", GST_RANK_PRIMARY)
 REGISTER(npz, npz, "application/x-npz", "npz", GST_RANK_PRIMARY)
 REGISTER(propheseedat, prophesee_dat, "application/x-prophesee-dat", "dat", GST_RANK_PRIMARY)
 REGISTER(propheseeraw, prophesee_raw, "application/x-prophesee-raw", "raw", GST_RANK_PRIMARY)
+REGISTER(rosbag, rosbag, "application/x-rosbag", "bag", GST_RANK_PRIMARY)
+REGISTER(rosbag2, rosbag2_db3, "application/x-rosbag2-db3", "db3", GST_RANK_PRIMARY)

@@ -14,6 +14,9 @@
 #include "src/formats/numpy/npz_encoder.hpp"
 #endif
 #include "src/formats/text/csv_encoder.hpp"
+#ifdef HAVE_ROS
+#include "src/formats/ros/mcap_encoder.hpp"
+#endif
 
 using eventcamera::EvtFormat;
 using eventcamera::SensorSize;
@@ -57,11 +60,12 @@ static const char* evt_name(int format) {
   return nullptr;
 }
 
-static std::unique_ptr<eventcamera::Encoder> make_evt(SensorSize size, int variant,
+static std::unique_ptr<eventcamera::Encoder> make_evt(SensorSize size,
+                                                      EventFileFormat::Choice choice,
                                                       const GstCaps* caps) {
   const auto* words = gst_structure_get_string(gst_caps_get_structure(caps, 0), "format");
   if (const auto format = evt_format_named(words)) return make_evt_encoder(*format, size);
-  return make_prophesee_raw_encoder(static_cast<EvtFormat>(variant), size);
+  return make_prophesee_raw_encoder(static_cast<EvtFormat>(choice.variant), size);
 }
 
 /// For words without a header, prefers the format of the property, else any that downstream
@@ -115,7 +119,7 @@ static const EventFileFormat dat = {
     .long_name = "Prophesee DAT writer",
     .description = "Writes events as Prophesee DAT",
     .caps = "application/x-prophesee-dat",
-    .create = [](SensorSize size, int,
+    .create = [](SensorSize size, EventFileFormat::Choice,
                  const GstCaps*) { return eventcamera::make_dat_encoder(size); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventdatenc, "eventdatenc", GST_RANK_PRIMARY, event_writer_type(dat))
@@ -150,9 +154,9 @@ static const EventFileFormat event_stream = {
     .caps = "application/x-es",
     .variants = &es_variants,
     .create =
-        [](SensorSize size, int variant, const GstCaps*) {
+        [](SensorSize size, EventFileFormat::Choice choice, const GstCaps*) {
           return eventcamera::make_event_stream_encoder(
-              size, static_cast<eventcamera::EsOrigin>(variant));
+              size, static_cast<eventcamera::EsOrigin>(choice.variant));
         },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
@@ -196,9 +200,9 @@ static const EventFileFormat csv = {
     .description = "Writes events as lines of text",
     .caps = "application/x-event-csv",
     .variants = &csv_variants,
-    .create = [](SensorSize size, int variant,
+    .create = [](SensorSize size, EventFileFormat::Choice choice,
                  const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
-      const auto& named = eventcamera::csv_formats()[static_cast<std::size_t>(variant)];
+      const auto& named = eventcamera::csv_formats()[static_cast<std::size_t>(choice.variant)];
       return std::make_unique<eventcamera::CsvEncoder>(named.format, size);
     },
 };
@@ -224,7 +228,8 @@ static const EventFileFormat npy = {
     .long_name = "NumPy writer",
     .description = "Writes events as NumPy",
     .caps = "application/x-npy",
-    .create = [](SensorSize, int, const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
+    .create = [](SensorSize, EventFileFormat::Choice,
+                 const GstCaps*) -> std::unique_ptr<eventcamera::Encoder> {
       return std::make_unique<eventcamera::NpyEncoder>();
     },
 };
@@ -257,8 +262,76 @@ static const EventFileFormat npz = {
         "Writes events as a NumPy archive: t in microseconds, x and y in pixels, p, and the "
         "sensor's width and height in pixels",
     .caps = "application/x-npz",
-    .create = [](SensorSize size, int,
+    .create = [](SensorSize size, EventFileFormat::Choice,
                  const GstCaps*) { return eventcamera::make_npz_encoder(size); },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventnpzenc, "eventnpzenc", GST_RANK_PRIMARY, event_writer_type(npz))
+#endif
+
+#ifdef HAVE_ROS
+/**
+ * SECTION:element-eventmcapenc
+ * @title: eventmcapenc
+ * @short_description: writes MCAP files, bags of ROS 2
+ *
+ * Writes events as an MCAP file of ROS 2: messages event_camera_msgs/EventPacket in the topic
+ * `/event_camera/events`, with an index, for rosbag2, Foxglove and the tools of event_camera_msgs.
+ * ROS is not needed. The times of the messages are the PTS; a packet holds up to 10 ms and can be
+ * decoded without those before it. Triggers that arrive with the events are written with
+ * #GstEventMcapEnc:format evt3.
+ *
+ * The sink does not need to seek. The index is written at the end of the stream; without it, the
+ * events of the last second are lost, and all others can be read.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 videotestsrc num-buffers=90 ! eventsim-diff ! eventmcapenc ! filesink
+ * location=events.mcap
+ * ]|
+ */
+static const GEnumValue bag_events[] = {
+    {static_cast<int>(eventcamera::BagEvents::evt3), "EVT3 words, the most compact", "evt3"},
+    {static_cast<int>(eventcamera::BagEvents::mono), "64 bits an event, sensors of any size",
+     "mono"},
+    {0, nullptr, nullptr},
+};
+
+static const GEnumValue bag_compressions[] = {
+    {static_cast<int>(eventcamera::BagCompression::none), "No compression", "none"},
+    {static_cast<int>(eventcamera::BagCompression::lz4), "LZ4, fast", "lz4"},
+    {static_cast<int>(eventcamera::BagCompression::zstd), "Zstandard, smaller", "zstd"},
+    {0, nullptr, nullptr},
+};
+
+static const EventFileFormat::Variants mcap_variants = {
+    .property = "format",
+    .nick = "Format",
+    .blurb = "Encoding of the events in the messages; read when the stream begins",
+    .type = [] { return enum_type("GstEventBagFormat", bag_events); },
+    .default_value = static_cast<int>(eventcamera::BagEvents::evt3),
+};
+
+static const EventFileFormat::Variants mcap_compressions = {
+    .property = "compression",
+    .nick = "Compression",
+    .blurb = "Compression of the file; read when the stream begins",
+    .type = [] { return enum_type("GstEventBagCompression", bag_compressions); },
+    .default_value = static_cast<int>(eventcamera::BagCompression::none),
+};
+
+static const EventFileFormat mcap = {
+    .type_name = "GstEventMcapEnc",
+    .long_name = "MCAP writer",
+    .description = "Writes events as MCAP, a bag of ROS 2",
+    .caps = "application/x-mcap",
+    .variants = &mcap_variants,
+    .compressions = &mcap_compressions,
+    .create =
+        [](SensorSize size, EventFileFormat::Choice choice, const GstCaps*) {
+          return eventcamera::make_mcap_encoder(
+              {size, static_cast<eventcamera::BagEvents>(choice.variant),
+               static_cast<eventcamera::BagCompression>(choice.compression)});
+        },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventmcapenc, "eventmcapenc", GST_RANK_PRIMARY, event_writer_type(mcap))
 #endif

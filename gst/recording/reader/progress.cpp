@@ -49,7 +49,7 @@ void EventReader::note_progress() {
 GstStructure* EventReader::stats() {
   const auto counts = shared_.lock()->counts;
   GstStructure* const stats = gst_structure_new(
-      format_.has_many_streams ? "application/x-aedat-demux-stats"
+      format_.has_many_streams ? "application/x-event-demux-stats"
                                : "application/x-event-decoder-stats",
       "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64, counts.triggers,
       "corrupt-places", G_TYPE_UINT64, counts.corrupt_places, "outside-events", G_TYPE_UINT64,
@@ -59,6 +59,17 @@ GstStructure* EventReader::stats() {
     gst_structure_set(stats, "frames", G_TYPE_UINT64, counts.frames, "imu-samples", G_TYPE_UINT64,
                       counts.imu_samples, nullptr);
   return stats;
+}
+
+/// Posts what another setting would read.
+void EventReader::tell_left_out() {
+  const auto left_out = recording_->left_out();
+  if (left_out.empty() || left_out == told_left_out_) return;
+  told_left_out_ = left_out;
+  post_message(element_, GST_MESSAGE_INFO,
+               {GST_STREAM_ERROR_DEMUX,
+                "The file also has " + left_out + ", which are not read. Set topics to read them."},
+               recording_->format_name());
 }
 
 /// Posts a warning at the end of a file without events and frames.
