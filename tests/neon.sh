@@ -9,7 +9,7 @@ build="build-neon"
 root=${XDG_CACHE_HOME:-$HOME/.cache}/gst-eventsim/arm64-root
 suite=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release)
 packages=(libgstreamer-plugins-base1.0-dev libgtest-dev libhwy-dev libjson-glib-dev libopencv-video-dev
-  libpng-dev zlib1g-dev)
+  libpng-dev libyaml-dev zlib1g-dev)
 contents="$suite ${packages[*]}"
 tests=(denoise dense_flow dvs luma lucas_kanade reference render)
 # The equations; the largest pictures take minutes on the emulator.

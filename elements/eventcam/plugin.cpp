@@ -34,6 +34,7 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
   X(eventcompare) X(eventmerge) X(eventoverlay) X(eventrender) X(eventstats)               \
   X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
   X(eventantiflicker) X(eventdenoise) X(eventhotpixel) X(eventratecontrol)                 \
+  X(eventcrop) X(eventflip) X(eventmask) X(eventpolarity) X(eventscale) X(eventundistort)  \
   X(eventrefractory) X(eventtensor) X(eventtrail)                                          \
   X(eventdatagramdepay) X(eventdatagrampay)                                                \
   X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)

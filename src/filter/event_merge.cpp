@@ -91,7 +91,7 @@ MergedInterval EventMerger::next(Inputs inputs) {
 }
 
 void EventMerger::merge(Inputs inputs, const MergedInterval& interval, LabelledEvents out) {
-  for (std::size_t written = 0; written < out.events.size();) {
+  for (std::size_t written = 0;;) {
     // The next event, and the time of the next one of another input.
     MergeInput* first = nullptr;
     Microseconds other = interval.end + 1;
@@ -105,6 +105,7 @@ void EventMerger::merge(Inputs inputs, const MergedInterval& interval, LabelledE
         other = std::min(other, time);
       }
     }
+    if (first == nullptr) return;
     // All events of one microsecond of an input precede those of the inputs after it.
     const auto until =
         std::min(std::max(other, first->next_time() + 1), first->end_of_part(interval.end)) -

@@ -114,6 +114,7 @@ class Kind {
   /// What must be set before it starts.
   std::string settings() const {
     if (name_ == "eventdatagramdepay") return " width=64 height=48";
+    if (name_ == "eventmask" || name_ == "eventundistort") return {};  // files to read
     const Owned<GstElement> element(gst_element_factory_create(factory_, nullptr));
     if (g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), "location") == nullptr)
       return {};

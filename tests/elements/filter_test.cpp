@@ -355,8 +355,10 @@ TEST_F(HotPixelTest, ReportsFilesThatItCannotWrite) {
 
 class AnyFilter : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Filters, AnyFilter,
-                         testing::Values("eventantiflicker", "eventdenoise", "eventhotpixel",
-                                         "eventratecontrol", "eventrefractory", "eventtrail"),
+                         testing::Values("eventantiflicker", "eventcrop", "eventdenoise",
+                                         "eventflip", "eventhotpixel", "eventpolarity",
+                                         "eventscale", "eventratecontrol", "eventrefractory",
+                                         "eventtrail"),
                          [](const auto& element) { return std::string(element.param); });
 
 TEST_P(AnyFilter, TakesSettingsOfAnotherThreadWhilePlaying) {
@@ -376,7 +378,8 @@ TEST_P(AnyFilter, TakesSettingsOfAnotherThreadWhilePlaying) {
         if (G_VALUE_HOLDS_BOOLEAN(&value))
           g_value_set_boolean(&value, round % 2);
         else if (G_VALUE_HOLDS_ENUM(&value))
-          g_value_set_enum(&value, static_cast<gint>(round % 3));
+          g_value_set_enum(
+              &value, static_cast<gint>(round % G_PARAM_SPEC_ENUM(specs[i])->enum_class->n_values));
         else
           g_param_value_set_default(specs[i], &value);
         g_object_set_property(G_OBJECT(h.element()), specs[i]->name, &value);

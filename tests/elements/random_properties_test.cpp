@@ -97,8 +97,10 @@ std::vector<GParamSpec*> writable_properties_of(GstElement* element) {
   auto properties = properties_of(element);
   std::erase_if(properties, [](const GParamSpec* spec) {
     constexpr std::string_view excluded[] = {
-        "GstObject",         "GstBaseTransform",    "GstAggregator",        "GstBaseSink",
-        "GstRTPBasePayload", "GstRTPBaseDepayload", "GstEventDatagramDepay"};
+        "GstObject",         "GstBaseTransform",    "GstAggregator",         "GstBaseSink",
+        "GstRTPBasePayload", "GstRTPBaseDepayload", "GstEventDatagramDepay", "GstEventMask",
+        "GstEventUndistort",  // read files
+        "GstEventCrop"};      // may leave nothing
     return (spec->flags & G_PARAM_WRITABLE) == 0 || is_window_length(spec) ||
            spec->name == std::string_view("min-streams") ||  // waits for streams that never come
            std::ranges::find(excluded, g_type_name(spec->owner_type)) != std::end(excluded);

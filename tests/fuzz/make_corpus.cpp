@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Writes the seed corpora for fuzzing: make_corpus DIRECTORY
+#include <png.h>
+
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -105,6 +107,38 @@ std::vector<Seed> camera_profile_seeds() {
   return {{"profile", {text.begin(), text.end()}}};
 }
 
+std::vector<Seed> calibration_seeds() {
+  constexpr std::string_view opencv =
+      "%YAML:1.0\n---\nimage_width: 6\nimage_height: 4\ncamera_matrix: !!opencv-matrix\n   rows: "
+      "3\n"
+      "   cols: 3\n   dt: d\n   data: [ 5., 0., 3., 0., 5., 2., 0., 0., 1. ]\n"
+      "distortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n"
+      "   data: [ -2.1e-01, 0.1, 0., 1.e-03, 0. ]\n";
+  constexpr std::string_view ros =
+      "camera_matrix:\n  data: [5, 0, 3, 0, 5, 2, 0, 0, 1]\ndistortion_model: equidistant\n"
+      "distortion_coefficients:\n  data: [0.1, 0.01, 0, 0]\n";
+  return {{"opencv", {opencv.begin(), opencv.end()}}, {"ros", {ros.begin(), ros.end()}}};
+}
+
+/// Pictures of 8 x 4 pixels, in grey and with transparency.
+std::vector<Seed> mask_seeds() {
+  std::vector<Seed> seeds;
+  for (const unsigned format : {PNG_FORMAT_GRAY, PNG_FORMAT_RGBA}) {
+    png_image image{};
+    image.version = PNG_IMAGE_VERSION;
+    image.width = 8;
+    image.height = 4;
+    image.format = format;
+    const std::vector<png_byte> pixels(PNG_IMAGE_SIZE(image), 200);
+    png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+    Seed seed{"picture-" + std::to_string(format), std::vector<std::uint8_t>(size)};
+    png_image_write_to_memory(&image, seed.bytes.data(), &size, 0, pixels.data(), 0, nullptr);
+    seed.bytes.resize(size);
+    seeds.push_back(std::move(seed));
+  }
+  return seeds;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -123,7 +157,9 @@ int main(int argc, char** argv) {
     else
       append(seeds_of(format), files[format.name.starts_with("raw_") ? "raw" : format.name]);
   }
+  write(corpus / "calibration", calibration_seeds());
   write(corpus / "camera_profile", camera_profile_seeds());
+  write(corpus / "mask", mask_seeds());
   write(corpus / "ecf", ecf_seeds());
   write(corpus / "hdf5_chunk", hdf5_chunk_seeds());
   write(corpus / "hdf5_filters", hdf5_filters_seeds());

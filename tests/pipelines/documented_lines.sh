@@ -13,7 +13,22 @@ eval "$GST_LAUNCH -q $ball ! x264enc ! mp4mux ! filesink location=drive.mp4"
 eval "$GST_LAUNCH -q filesrc location=drive.mp4 ! decodebin ! eventsim-dvs ! evtenc ! filesink location=drive.raw"
 eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-dvs ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=davis.aedat4"
 eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc format=esim ! filesink location=events.txt"
-for name in in recording real simulated left right; do cp drive.raw $name.raw; done
+for name in in recording real simulated left right a b hd; do cp drive.raw $name.raw; done
+eval "$GST_LAUNCH -q videotestsrc pattern=white num-buffers=1 ! video/x-raw,width=320,height=240 ! pngenc ! filesink location=mask.png"
+cat >camera.yaml <<CALIBRATION
+%YAML:1.0
+---
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 300., 0., 160., 0., 300., 120., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 5
+   cols: 1
+   dt: d
+   data: [ -0.2, 0.05, 0., 0., 0. ]
+CALIBRATION
 mkdir videos recordings arrays
 cp drive.mp4 videos/first.mp4
 cp drive.mp4 "videos/second one.mp4"
@@ -30,7 +45,7 @@ for page in README.md docs/learning.md; do
 done
 [ $count -ge 60 ] || fail "found only $count lines"
 for file in events.webm ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
-  webcam.npz "videos/second one.h5" cropped.raw both.webm rate.png part.raw "arrays/second one.npz"; do
+  webcam.npz "videos/second one.h5" cropped.raw beside.raw quarter.raw turned.raw flat.raw both.raw both.webm rate.png part.raw "arrays/second one.npz"; do
   [ -s "$file" ] || fail "$file is missing or empty"
 done
 event-convert left.raw merged.npz 2>&1 | sed 's/ events.*//' >events

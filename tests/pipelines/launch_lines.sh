@@ -108,6 +108,11 @@ for filter in eventdenoise "eventdenoise method=baf" "eventdenoise method=time-k
 done
 launch filesrc location=candidate.raw ! evtdec ! eventhotpixel location=hot.txt learn=false ! eventantiflicker mode=band-pass ! fakesink
 
+# Cropped, turned and scaled.
+launch filesrc location=candidate.raw ! evtdec ! eventcrop left=100 ! eventflip video-direction=90r ! eventscale ! application/x-event-camera,width=80,height=60 ! eventpolarity keep=on ! eventcsvenc ! filesink location=scaled.csv
+awk -F, 'NR > 1 && ($2 >= 80 || $3 >= 60 || $4 != 1) { exit 1 }' scaled.csv || fail "events are outside of the scaled sensor, or OFF"
+[ "$(wc -l <scaled.csv)" -gt 1000 ] || fail "events are missing"
+
 # Merged: two recordings, and two live streams side by side.
 launch eventmerge name=m ! evtenc ! filesink location=both.raw  filesrc location=candidate.raw ! evtdec ! m.  filesrc location=refractory.raw ! evtdec ! m.
 [ "$(stat -c %s both.raw)" -gt "$(stat -c %s candidate.raw)" ] || fail "the merged recording is not larger"

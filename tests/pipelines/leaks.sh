@@ -86,7 +86,7 @@ check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! aedatmux
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-frame ! eventrender ! fakesink
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! identity error-after=2 ! fakesink  t. ! queue ! eventsim-frame ! overlay.event_sink
-for element in eventantiflicker eventdenoise eventhotpixel eventratecontrol eventrefractory eventtrail; do
+for element in eventantiflicker eventcrop eventdenoise eventflip eventhotpixel eventmask eventpolarity eventratecontrol eventrefractory eventscale eventtrail eventundistort; do
   check videotestsrc num-buffers=8 ! eventsim-frame ! $element ! fakesink
 done
 check videotestsrc num-buffers=8 ! eventsim-frame ! fakesink

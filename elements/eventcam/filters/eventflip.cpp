@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventflip
+ * @title: eventflip
+ * @short_description: flips and rotates the sensor
+ *
+ * Flips or rotates the sensor in one of eight ways, like videoflip, and changes its size in the
+ * caps if columns become rows. Other applications may know it as a #GstVideoDirection. The methods
+ * `auto` and `custom` leave events as they are.
+ *
+ * Events keep their order; those of one microsecond are therefore no longer in raster order.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventflip video-direction=90r !
+ * eventrender ! videoconvert ! autovideosink
+ * ]|
+ */
+#include <gst/video/video.h>
+
+#include "gst/filter/changed_caps.hpp"
+#include "gst/filter/eventfilter.hpp"
+#include "src/filter/flip_filter.hpp"
+
+using eventcamera::FlipFilter;
+using eventcamera::LabelledEvents;
+using eventcamera::Microseconds;
+using eventcamera::Orientation;
+using eventcamera::SensorSize;
+
+namespace {
+
+Orientation orientation_of(GstVideoOrientationMethod method) {
+  switch (method) {
+    case GST_VIDEO_ORIENTATION_90R:
+      return {.transpose = true, .mirror_x = true};
+    case GST_VIDEO_ORIENTATION_180:
+      return {.mirror_x = true, .mirror_y = true};
+    case GST_VIDEO_ORIENTATION_90L:
+      return {.transpose = true, .mirror_y = true};
+    case GST_VIDEO_ORIENTATION_HORIZ:
+      return {.mirror_x = true};
+    case GST_VIDEO_ORIENTATION_VERT:
+      return {.mirror_y = true};
+    case GST_VIDEO_ORIENTATION_UL_LR:
+      return {.transpose = true};
+    case GST_VIDEO_ORIENTATION_UR_LL:
+      return {.transpose = true, .mirror_x = true, .mirror_y = true};
+    default:
+      return {};
+  }
+}
+
+class Flip final : public EventFilter {
+ public:
+  void start(SensorSize in, SensorSize out) override {
+    const Orientation orientation = orientation_of(settings.copy());
+    // Set while the caps were negotiated: the next buffer has others.
+    fits_ = orientation.size(in) == out;
+    core_.emplace(in, orientation);
+  }
+  void stop() override { core_.reset(); }
+  LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
+    return fits_ ? core_->filter(events) : LabelledEvents{};
+  }
+  void forget() override {}
+
+  Guarded<GstVideoOrientationMethod> settings;
+
+ private:
+  std::optional<FlipFilter> core_;
+  bool fits_ = true;
+};
+
+}  // namespace
+
+G_DECLARE_FINAL_TYPE(GstEventFlip, gst_event_flip, GST, EVENT_FLIP, GstEventFilter)
+
+struct _GstEventFlip {
+  GstEventFilter parent;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstEventFlip, gst_event_flip, GST_TYPE_EVENT_FILTER,
+                        G_IMPLEMENT_INTERFACE(GST_TYPE_VIDEO_DIRECTION, nullptr))
+GST_ELEMENT_REGISTER_DEFINE(eventflip, "eventflip", GST_RANK_NONE, gst_event_flip_get_type())
+
+static Guarded<GstVideoOrientationMethod>& method_of(gpointer object) {
+  return static_cast<Flip&>(gst_event_filter_inside(GST_EVENT_FILTER(object))).settings;
+}
+
+static void set_method(GObject* object, guint, const GValue* value, GParamSpec*) {
+  *method_of(object).lock() = static_cast<GstVideoOrientationMethod>(g_value_get_enum(value));
+  gst_base_transform_reconfigure_src(GST_BASE_TRANSFORM(object));
+}
+
+static void get_method(GObject* object, guint, GValue* value, GParamSpec*) {
+  g_value_set_enum(value, method_of(object).copy());
+}
+
+static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection, GstCaps* caps,
+                               GstCaps* filter) {
+  const bool transpose = orientation_of(method_of(transform).copy()).transpose;
+  return changed_caps(caps, filter, [transpose](GstStructure* structure) {
+    const GValue* width = gst_structure_get_value(structure, "width");
+    const GValue* height = gst_structure_get_value(structure, "height");
+    if (!transpose || width == nullptr || height == nullptr) return true;
+    GValue rows = G_VALUE_INIT;
+    g_value_init(&rows, G_VALUE_TYPE(width));
+    g_value_copy(width, &rows);
+    gst_structure_set_value(structure, "width", height);
+    gst_structure_take_value(structure, "height", &rows);
+    return true;
+  });
+}
+
+static void gst_event_flip_init(GstEventFlip* self) {
+  gst_event_filter_set_inside(GST_EVENT_FILTER(self), std::make_unique<Flip>());
+}
+
+static void gst_event_flip_class_init(GstEventFlipClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->set_property = set_method;
+  object_class->get_property = get_method;
+  constexpr guint number = 1;
+  g_object_class_override_property(object_class, number, "video-direction");
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event flip", "Filter",
+                                        "Flips and rotates the sensor", EVENTSIM_AUTHORS);
+  GST_BASE_TRANSFORM_CLASS(klass)->transform_caps = transform_caps;
+}

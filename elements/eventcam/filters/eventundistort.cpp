@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-eventundistort
+ * @title: eventundistort
+ * @short_description: undoes the distortion of a lens
+ *
+ * Moves each event to the pixel where a camera without distortion would see it, with the same focal
+ * length and principal point. Events that leave the picture are dropped, and counted as
+ * `dropped-events` of the property `stats`.
+ *
+ * The calibration is a YAML file, as OpenCV's FileStorage writes it: `camera_matrix` and
+ * `distortion_coefficients`, optionally `image_width`, `image_height` and `fisheye_model`; or as
+ * ROS's camera_calibration writes it, with the `distortion_model` plumb_bob or equidistant. Without
+ * a file all events pass.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventundistort location=camera.yaml !
+ * eventrender ! videoconvert ! autovideosink
+ * ]|
+ */
+#include <array>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+#include "gst/filter/eventfilter.hpp"
+#include "src/filter/camera_calibration.hpp"
+#include "src/filter/undistort_filter.hpp"
+
+using eventcamera::CameraCalibration;
+using eventcamera::LabelledEvents;
+using eventcamera::Microseconds;
+using eventcamera::SensorSize;
+using eventcamera::UndistortFilter;
+
+namespace {
+
+struct Settings {
+  std::string location;
+};
+
+/// Maximum size of a calibration file, bytes.
+constexpr std::size_t max_file_size = 1 << 20;
+
+std::string text_of(SensorSize size) {
+  return std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels";
+}
+
+CameraCalibration read_calibration(const std::string& location, SensorSize sensor) {
+  const auto fail = [&](const std::string& cause) {
+    throw std::runtime_error("cannot use the calibration \"" + location + "\": " + cause);
+  };
+  std::ifstream file(location, std::ios::binary);
+  if (!file) fail("cannot open the file");
+  std::string text(max_file_size + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > max_file_size) fail("it has more than 1 MiB");
+  CameraCalibration calibration;
+  try {
+    calibration = eventcamera::parse_calibration(text);
+  } catch (const std::invalid_argument& error) {
+    fail(error.what());
+  }
+  if (calibration.size != SensorSize{} && calibration.size != sensor)
+    fail("it is for " + text_of(calibration.size) + ", but the sensor has " + text_of(sensor));
+  return calibration;
+}
+
+class Undistort final : public EventFilter {
+ public:
+  void start(SensorSize in, SensorSize /*out*/) override {
+    core_.reset();
+    if (const auto location = settings.copy().location; !location.empty())
+      core_.emplace(in, read_calibration(location, in));
+  }
+  void stop() override { core_.reset(); }
+  LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
+    return core_ ? core_->filter(events) : events;
+  }
+  void forget() override {}
+
+  Guarded<Settings> settings;
+
+ private:
+  std::optional<UndistortFilter> core_;
+};
+
+}  // namespace
+
+DEFINE_EVENT_FILTER(GstEventUndistort, gst_event_undistort, EVENT_UNDISTORT, Undistort,
+                    eventundistort)
+
+static void gst_event_undistort_class_init(GstEventUndistortClass* klass) {
+  Properties<settings_of> properties(G_OBJECT_CLASS(klass));
+  properties.add(
+      &Settings::location,
+      g_param_spec_string("location", "Location",
+                          "YAML file with the calibration of the camera, read when a "
+                          "stream begins",
+                          nullptr,
+                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                   GST_PARAM_MUTABLE_READY)));
+  gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event undistortion", "Filter",
+                                        "Undoes the distortion of a lens", EVENTSIM_AUTHORS);
+}

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/filter/pixel_mask.hpp"
+
+#include <png.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace eventcamera {
+namespace {
+
+/// A picture that libpng reads; it frees what it holds.
+struct PngImage : png_image {
+  PngImage() : png_image{} { version = PNG_IMAGE_VERSION; }
+  ~PngImage() { png_image_free(this); }
+  PngImage(const PngImage&) = delete;
+  PngImage& operator=(const PngImage&) = delete;
+};
+
+std::string size_text(std::uint32_t width, std::uint32_t height) {
+  return std::to_string(width) + " x " + std::to_string(height) + " pixels";
+}
+
+}  // namespace
+
+PixelMask::PixelMask(SensorSize sensor)
+    : width_(static_cast<std::size_t>(sensor.width)),
+      words_((width_ * static_cast<std::size_t>(sensor.height) + 63) / 64) {}
+
+PixelMask PixelMask::read_png(std::FILE* file, SensorSize sensor) {
+  PngImage image;
+  if (png_image_begin_read_from_stdio(&image, file) == 0) throw std::runtime_error(image.message);
+  const auto width = static_cast<std::uint32_t>(sensor.width);
+  const auto height = static_cast<std::uint32_t>(sensor.height);
+  if (image.width != width || image.height != height)
+    throw std::runtime_error("it has " + size_text(image.width, image.height) +
+                             ", but the sensor has " + size_text(width, height));
+  image.format = PNG_FORMAT_GRAY;
+  std::vector<png_byte> pixels(PNG_IMAGE_SIZE(image));
+  constexpr png_color black = {0, 0, 0};
+  if (png_image_finish_read(&image, &black, pixels.data(), 0, nullptr) == 0)
+    throw std::runtime_error(image.message);
+  PixelMask mask(sensor);
+  for (int y = 0; y < sensor.height; ++y)
+    for (int x = 0; x < sensor.width; ++x)
+      if (pixels[mask.index(x, y)] >= 128) mask.keep(x, y);
+  return mask;
+}
+
+}  // namespace eventcamera

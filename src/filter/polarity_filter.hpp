@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "src/core/label.hpp"
+#include "src/core/sensor_size.hpp"
+
+namespace eventcamera {
+
+/// Keeps the events of one polarity, and exchanges ON and OFF of those kept.
+class PolarityFilter {
+ public:
+  enum class Kept { both, on, off };
+
+  struct Settings {
+    Kept keep = Kept::both;
+    bool invert = false;
+  };
+
+  explicit PolarityFilter(SensorSize /*sensor*/) {}
+
+  LabelledEvents filter(LabelledEvents events, Microseconds /*start*/,
+                        const Settings& settings) const {
+    const std::uint16_t inverted = settings.invert ? 0x8000 : 0;
+    if (settings.keep == Kept::both) {
+      for (auto& event : events.events) event.y_p ^= inverted;
+      return events;
+    }
+    const auto kept = settings.keep == Kept::on ? Polarity::on : Polarity::off;
+    return events.keep_if([=](Event& event) {
+      const bool is_kept = event.polarity() == kept;
+      event.y_p ^= inverted;
+      return is_kept;
+    });
+  }
+};
+
+}  // namespace eventcamera

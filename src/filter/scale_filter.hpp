@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "src/core/label.hpp"
+#include "src/core/sensor_size.hpp"
+
+namespace eventcamera {
+
+/// Scales a sensor. Events of one polarity that fall on one pixel of the output in one microsecond
+/// become one. Events of a sensor that keeps its size pass unchanged. Optionally only one of so
+/// many events of a polarity at a pixel of the output is kept. 8 bytes per pixel of the output.
+class ScaleFilter {
+ public:
+  struct Settings {
+    /// Number of events that become one, the last of them; 1 to max_min_events.
+    unsigned min_events = 1;
+  };
+  static constexpr unsigned max_min_events = 65535;
+
+  /// Throws std::bad_alloc.
+  ScaleFilter(SensorSize in, SensorSize out);
+
+  LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings);
+
+  /// Forgets the events that are counted.
+  void forget();
+
+ private:
+  /// Number of a microsecond with events, from 1; 0 is none.
+  using Moment = std::uint16_t;
+
+  struct Cell {
+    Moment last_kept = 0;     ///< that of the last event kept
+    std::uint16_t count = 0;  ///< events since
+  };
+
+  struct Row {
+    std::uint32_t first;  ///< index of its first pixel
+    std::uint16_t y;
+  };
+
+  /// Pixel of the output and polarity.
+  std::size_t index(const Event& event) const {
+    return (rows_[static_cast<std::size_t>(event.y())].first + columns_[event.x]) * 2U +
+           (event.y_p >> 15U);
+  }
+  bool is_same_size_;
+  std::vector<std::uint16_t> columns_;  ///< of the output, by column of the input
+  std::vector<Row> rows_;
+  std::vector<Cell> cells_;  ///< by pixel and polarity
+  Moment moment_ = 0;        ///< of the last event
+  Microseconds time_ = std::numeric_limits<Microseconds>::min() / 2;
+};
+
+}  // namespace eventcamera

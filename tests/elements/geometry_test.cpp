@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Elements that move events: sizes in caps, negotiation, and files.
+#include <png.h>
+
+#include "src/core/event.hpp"
+#include "tests/elements/pipeline.hpp"
+
+namespace {
+
+using namespace harness;
+using eventcamera::Event;
+using eventcamera::Polarity;
+
+constexpr GstClockTime ms = GST_MSECOND;
+const std::string sensor = "application/x-event-camera, format=XYTP, width=8, height=4";
+
+Event on(int x, int y, std::uint32_t t = 0) {
+  return Event::at(x, y, t, Polarity::on);
+}
+
+using Pixels = std::vector<std::pair<int, int>>;
+
+Pixels pixels_of(const Buffer& buffer) {
+  Pixels pixels;
+  if (buffer)
+    for (const auto& event : events_of(buffer.get()))
+      pixels.emplace_back(event.x, gst_event_camera_event_get_y(&event));
+  return pixels;
+}
+
+/// "WIDTHxHEIGHT" of the caps that the element sends.
+std::string size_of(const Harness& h) {
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(h->sinkpad));
+  if (!caps) return "none";
+  int width = 0;
+  int height = 0;
+  gst_structure_get(gst_caps_get_structure(caps.get(), 0), "width", G_TYPE_INT, &width, "height",
+                    G_TYPE_INT, &height, nullptr);
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
+/// Pushes events of 1 ms at the next millisecond, and returns where they come out.
+Pixels passed(Harness& h, const std::vector<Event>& events) {
+  static GstClockTime pts = 0;
+  EXPECT_EQ(h.push(buffer_of(pts += ms, events, ms)), GST_FLOW_OK);
+  return pixels_of(h.pull());
+}
+
+/// Caps that the element asks upstream for, if downstream wants these.
+std::string wanted(const std::string& launch, const std::string& downstream) {
+  Harness h(launch);
+  gst_harness_set_sink_caps_str(h.get(), ("application/x-event-camera, " + downstream).c_str());
+  const Owned<GstCaps> caps(gst_pad_peer_query_caps(h->srcpad, nullptr));
+  const Owned<GstCaps> simple(gst_caps_simplify(gst_caps_copy(caps.get())));
+  gchar* text = gst_caps_to_string(simple.get());
+  std::string result = text;
+  g_free(text);
+  return result;
+}
+
+TEST(Crop, ChangesTheSize) {
+  Harness h("eventcrop left=1 right=2 top=1 bottom=1");
+  h.caps(sensor);
+  EXPECT_EQ(passed(h, {on(0, 1), on(1, 1), on(5, 2), on(6, 2), on(5, 3)}),
+            (Pixels{{0, 0}, {4, 1}}));
+  EXPECT_EQ(size_of(h), "5x2");
+  EXPECT_EQ(stat_of(h.element(), "dropped-events"), 3U);
+}
+
+TEST(Crop, AsksUpstreamForTheSizeThatDownstreamWants) {
+  const auto caps = wanted("eventcrop left=100 bottom=7", "width=20, height=30");
+  EXPECT_NE(caps.find("width=(int)120, height=(int)37"), std::string::npos) << caps;
+  const auto ranges = wanted("eventcrop left=100 bottom=7", "width=[10,20], height=[1,16384]");
+  EXPECT_NE(ranges.find("width=(int)[ 110, 120 ], height=(int)[ 8, 16384 ]"), std::string::npos)
+      << ranges;
+}
+
+TEST(Crop, FollowsChanges) {
+  Harness h("eventcrop left=4");
+  h.caps(sensor);
+  EXPECT_EQ(passed(h, {on(4, 1)}), (Pixels{{0, 1}}));
+  EXPECT_EQ(size_of(h), "4x4");
+  g_object_set(h.element(), "left", 1U, "top", 1U, nullptr);
+  EXPECT_EQ(passed(h, {on(4, 1)}), (Pixels{{3, 0}}));
+  EXPECT_EQ(size_of(h), "7x3");
+  h.caps("application/x-event-camera, format=XYTP, width=20, height=20");
+  EXPECT_EQ(passed(h, {on(19, 19)}), (Pixels{{18, 18}}));
+  EXPECT_EQ(size_of(h), "19x19");
+}
+
+TEST(Crop, SaysThatNothingWouldBeLeft) {
+  Harness h("eventcrop left=4 right=4");
+  h.caps(sensor);
+  EXPECT_NE(h.push(buffer_of(0, {on(1, 1)}, ms)), GST_FLOW_OK);
+  EXPECT_NE(h.error().find("leaves nothing of 8 x 4 pixels"), std::string::npos);
+}
+
+TEST(Flip, HasTheDirectionsOfVideoflip) {
+  // Where the pixel (1, 0) of 8x4 goes.
+  const std::tuple<const char*, std::pair<int, int>, const char*> directions[] = {
+      {"identity", {1, 0}, "8x4"}, {"90r", {3, 1}, "4x8"},   {"180", {6, 3}, "8x4"},
+      {"90l", {0, 6}, "4x8"},      {"horiz", {6, 0}, "8x4"}, {"vert", {1, 3}, "8x4"},
+      {"ul-lr", {0, 1}, "4x8"},    {"ur-ll", {3, 6}, "4x8"}};
+  for (const auto& [direction, pixel, size] : directions) {
+    Harness h(std::string("eventflip video-direction=") + direction);
+    h.caps(sensor);
+    EXPECT_EQ(passed(h, {on(1, 0)}), Pixels{pixel}) << direction;
+    EXPECT_EQ(size_of(h), size) << direction;
+    EXPECT_TRUE(GST_IS_VIDEO_DIRECTION(h.element()));
+  }
+}
+
+/// What videoflip does to a picture.
+TEST(Flip, MovesPixelsAsVideoflipDoes) {
+  for (int direction = GST_VIDEO_ORIENTATION_IDENTITY; direction <= GST_VIDEO_ORIENTATION_UR_LL;
+       ++direction) {
+    Harness h("eventflip video-direction=" + std::to_string(direction));
+    h.caps(sensor);
+    const auto pixels = passed(h, {on(1, 0)});
+    Harness video("videoflip video-direction=" + std::to_string(direction));
+    video.caps("video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1", "video/x-raw");
+    video.push(video.frame(0, [](int x, int y) { return x == 1 && y == 0 ? 255 : 0; }));
+    const auto out = video.pull();
+    ASSERT_TRUE(out);
+    const Owned<GstCaps> caps(gst_pad_get_current_caps(video->sinkpad));
+    GstVideoInfo info;
+    gst_video_info_from_caps(&info, caps.get());
+    const auto place = bytes_of(out.get()).find('\xff');
+    const auto stride = static_cast<std::size_t>(GST_VIDEO_INFO_PLANE_STRIDE(&info, 0));
+    EXPECT_EQ(pixels,
+              (Pixels{{static_cast<int>(place % stride), static_cast<int>(place / stride)}}))
+        << direction;
+  }
+}
+
+TEST(Flip, FollowsChanges) {
+  Harness h("eventflip");
+  h.caps(sensor);
+  EXPECT_EQ(passed(h, {on(1, 0)}), (Pixels{{1, 0}}));
+  gst_util_set_object_arg(G_OBJECT(h.element()), "video-direction", "90r");
+  EXPECT_EQ(passed(h, {on(1, 0)}), (Pixels{{3, 1}}));
+  EXPECT_EQ(size_of(h), "4x8");
+  EXPECT_NE(wanted("eventflip video-direction=90l", "width=20, height=30")
+                .find("width=(int)30, height=(int)20"),
+            std::string::npos);
+}
+
+TEST(Scale, HasTheSizeOfTheCapsDownstream) {
+  Harness h("eventscale");
+  h.caps(sensor, "application/x-event-camera, width=4, height=2");
+  EXPECT_EQ(passed(h, {on(0, 0), on(1, 1), on(2, 3), on(3, 2, 1), on(3, 2, 1)}),
+            (Pixels{{0, 0}, {1, 1}, {1, 1}}));
+  EXPECT_EQ(size_of(h), "4x2");
+}
+
+TEST(Scale, PassesEventsOfTheSameSize) {
+  Harness h("eventscale");
+  h.caps(sensor);
+  EXPECT_EQ(passed(h, {on(7, 3), on(7, 3)}), (Pixels{{7, 3}, {7, 3}}));
+  EXPECT_EQ(size_of(h), "8x4");
+  g_object_set(h.element(), "min-events", 2U, nullptr);
+  EXPECT_EQ(passed(h, {on(7, 3, 0), on(7, 3, 1)}), (Pixels{{7, 3}}));
+}
+
+TEST(Scale, KeepsTheShapeWhereOneSideIsFree) {
+  const std::pair<const char*, const char*> sizes[] = {{"width=4", "4x2"},
+                                                       {"height=8", "16x8"},
+                                                       {"width=[1,6], height=[1,3]", "6x3"},
+                                                       {"width=[1,16384]", "8x4"}};
+  for (const auto& [downstream, size] : sizes) {
+    Harness h("eventscale");
+    h.caps(sensor, std::string("application/x-event-camera, ") + downstream);
+    passed(h, {on(0, 0)});
+    EXPECT_EQ(size_of(h), size) << downstream;
+  }
+}
+
+TEST(Scale, TakesEverySizeUpstream) {
+  const auto caps = wanted("eventscale", "width=20, height=30");
+  EXPECT_NE(caps.find("width=(int)[ 1, 16384 ], height=(int)[ 1, 16384 ]"), std::string::npos)
+      << caps;
+}
+
+TEST(Scale, CountsEvents) {
+  Harness h("eventscale min-events=3");
+  h.caps(sensor, "application/x-event-camera, width=1, height=1");
+  EXPECT_EQ(passed(h, {on(0, 0, 0), on(7, 3, 1)}), Pixels{});
+  EXPECT_EQ(passed(h, {on(1, 1, 0), on(1, 1, 1)}), (Pixels{{0, 0}}));
+  flush({h.get()});
+  push_segment(h.get());
+  EXPECT_EQ(passed(h, {on(1, 1, 0), on(1, 1, 1)}), Pixels{});
+}
+
+TEST(Polarity, IsKeptAndInverted) {
+  Harness h("eventpolarity keep=off invert=true");
+  h.caps(sensor);
+  h.push(buffer_of(0, {on(1, 1), Event::at(2, 2, 0, Polarity::off)}, ms));
+  const auto out = h.pull();
+  ASSERT_EQ(pixels_of(out), (Pixels{{2, 2}}));
+  EXPECT_TRUE(gst_event_camera_event_is_on(events_of(out.get()).data()));
+}
+
+/// A file of the name of the test.
+class FileTest : public testing::Test {
+ protected:
+  std::string location() const { return " location=" + in_quotes(file.path()); }
+  void write(const std::string& text) const {
+    std::ofstream(file.path(), std::ios::binary) << text;
+  }
+  void write_mask(int width, int height, const std::vector<png_byte>& grey) const {
+    png_image image{};
+    image.version = PNG_IMAGE_VERSION;
+    image.width = static_cast<png_uint_32>(width);
+    image.height = static_cast<png_uint_32>(height);
+    image.format = PNG_FORMAT_GRAY;
+    png_image_write_to_file(&image, file.path().c_str(), 0, grey.data(), 0, nullptr);
+  }
+
+  /// The error of an element that cannot use the file.
+  static std::string error_of(const std::string& launch) {
+    Harness h(launch);
+    h.caps(sensor);
+    EXPECT_NE(h.push(buffer_of(0, {on(1, 1)}, ms)), GST_FLOW_OK);
+    return h.error();
+  }
+
+  TemporaryFile file;
+};
+
+TEST_F(FileTest, MasksPixels) {
+  std::vector<png_byte> grey(32, 255);
+  grey[8 + 2] = 0;
+  write_mask(8, 4, grey);
+  Harness h("eventmask" + location());
+  h.caps(sensor);
+  EXPECT_EQ(passed(h, {on(1, 1), on(2, 1), on(3, 1)}), (Pixels{{1, 1}, {3, 1}}));
+}
+
+TEST_F(FileTest, MaskOfAnotherSizeIsAnError) {
+  write_mask(4, 8, std::vector<png_byte>(32, 255));
+  const auto error = error_of("eventmask" + location());
+  EXPECT_NE(error.find("4 x 8 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
+  EXPECT_NE(error.find(file.path()), std::string::npos) << error;
+}
+
+TEST_F(FileTest, MaskThatIsNoPictureIsAnError) {
+  write("no picture");
+  EXPECT_NE(error_of("eventmask" + location()).find("cannot read the mask"), std::string::npos);
+  EXPECT_NE(error_of("eventmask location=/nowhere/at/all.png").find("No such file"),
+            std::string::npos);
+}
+
+/// Focal length 10, principal point (4, 2).
+std::string calibration(const std::string& k1, const std::string& more = "") {
+  return "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   "
+         "data: "
+         "[ 10., 0., 4., 0., 10., 2., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   "
+         "rows: 5\n   cols: 1\n   dt: d\n   data: [ " +
+         k1 + ", 0., 0., 0., 0. ]\n" + more;
+}
+
+TEST_F(FileTest, UndistortsAndCounts) {
+  write(calibration("-2."));
+  Harness h("eventundistort" + location());
+  h.caps(sensor);
+  // 0.2 = r (1 - 2 r^2) at r = 0.2279 and 0.4 at none: pixels 2 and 4 from the centre.
+  EXPECT_EQ(passed(h, {on(4, 2), on(6, 2), on(0, 2)}), (Pixels{{4, 2}, {6, 2}}));
+  EXPECT_EQ(stat_of(h.element(), "dropped-events"), 1U);
+}
+
+TEST_F(FileTest, CalibrationOfAnotherSizeIsAnError) {
+  write(calibration("0.", "image_width: 346\nimage_height: 260\n"));
+  const auto error = error_of("eventundistort" + location());
+  EXPECT_NE(error.find("346 x 260 pixels, but the sensor has 8 x 4"), std::string::npos) << error;
+  write("camera: [");
+  EXPECT_NE(error_of("eventundistort" + location()).find("line"), std::string::npos);
+  EXPECT_NE(error_of("eventundistort location=/nowhere/at/all.yaml").find("/nowhere"),
+            std::string::npos);
+}
+
+TEST(Geometry, CombinesInOneLine) {
+  Player player(
+      "videotestsrc num-buffers=5 pattern=ball ! video/x-raw, width=640, height=480 ! "
+      "eventsim-frame "
+      "! eventcrop left=100 ! eventflip video-direction=90r ! eventscale ! "
+      "application/x-event-camera,width=320,height=240");
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_GT(player.events.size(), 100U);
+  for (const auto& event : player.events) {
+    ASSERT_LT(event.x, 320);
+    ASSERT_LT(event.y(), 240);
+  }
+}
+
+}  // namespace
