@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <exception>
 #include <span>
 #include <vector>
@@ -176,24 +177,27 @@ GBytes* gst_event_camera_label_meta_get_bytes(const GstEventCameraLabelMeta* met
   return g_bytes_new(meta->labels, meta->n_labels * sizeof(GstEventCameraLabel));
 }
 
+/// Writes an event as two words of 8 bytes: bits 32 to 62 of an event are x and y, bit 63 is the
+/// polarity.
+static void unpack(const GstEventCameraEvent& event, gint64 start,
+                   GstEventCameraAbsoluteEvent& out) {
+  guint64 bits = 0;
+  std::memcpy(&bits, &event, sizeof bits);
+  const guint64 place_and_polarity = (bits >> 32 & 0x7fffffffU) | bits >> 63 << 32;
+  out.t = start + event.t;
+  std::memcpy(reinterpret_cast<std::byte*>(&out) + offsetof(GstEventCameraAbsoluteEvent, x),
+              &place_and_polarity, sizeof place_and_polarity);
+}
+
 gboolean gst_event_camera_unpack(GstBuffer* buffer, gpointer events, gsize n_events) {
   g_return_val_if_fail(GST_IS_BUFFER(buffer), FALSE);
 
   GstEventCameraMap map;
   if (!gst_event_camera_map(&map, buffer)) return FALSE;
   const bool fits = map.n_events == n_events;
-  if (fits) {
-    const auto start = static_cast<gint64>(map.start);
-    std::transform(map.events, map.events + n_events,
-                   static_cast<GstEventCameraAbsoluteEvent*>(events),
-                   [start](const GstEventCameraEvent& event) {
-                     return GstEventCameraAbsoluteEvent{start + event.t,
-                                                        event.x,
-                                                        static_cast<guint16>(event.y_p & 0x7fff),
-                                                        static_cast<guint8>(event.y_p >> 15),
-                                                        {}};
-                   });
-  }
+  auto* const out = static_cast<GstEventCameraAbsoluteEvent*>(events);
+  for (gsize i = 0; fits && i < n_events; ++i)
+    unpack(map.events[i], static_cast<gint64>(map.start), out[i]);
   gst_event_camera_unmap(&map);
   return fits ? TRUE : FALSE;
 }
