@@ -23,6 +23,7 @@ WRITERS = {
     ".npy": "eventnpyenc ! filesink name=file",
     ".npz": "eventnpzenc ! filesink name=file",
     ".aedat4": "aedatmux ! filesink name=file",
+    ".mcap": "eventmcapenc ! filesink name=file",
     ".h5": "eventhdf5sink name=file",
     ".hdf5": "eventhdf5sink name=file format=metavision",
 }
@@ -174,7 +175,7 @@ def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = 
 
 def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, height: int = 0) -> None:
     """Writes events to a file, whose extension selects the format: .raw (EVT3), .dat, .es, .csv, .txt, .npy,
-    .npz, .aedat4, .h5 (DSEC) or .hdf5 (Metavision).
+    .npz, .aedat4, .mcap (ROS 2), .h5 (DSEC) or .hdf5 (Metavision).
 
     events: an array with the fields t (microseconds, at least 0, sorted), x, y and p; shape (events,).
     width, height: of the sensor, in pixels; may be left out for Events of a known sensor.

@@ -231,7 +231,9 @@ TEST_F(Tensor, DescribesItselfInAMeta) {
   const GstTensor* const tensor = gst_tensor_meta_get(meta, 0);
   EXPECT_EQ(tensor->data_type, GST_TENSOR_DATA_TYPE_FLOAT16);
   EXPECT_EQ(tensor->dims_order, GST_TENSOR_DIM_ORDER_ROW_MAJOR);
-  EXPECT_EQ(std::vector<gsize>(tensor->dims, tensor->dims + tensor->num_dims),
+  gsize count = 0;
+  const gsize* const dimensions = gst_tensor_get_dims(const_cast<GstTensor*>(tensor), &count);
+  EXPECT_EQ(std::vector<gsize>(dimensions, dimensions + count),
             (std::vector<gsize>{1, 2, height, width}));
   EXPECT_TRUE(bytes_of(tensor->data) == bytes_of(buffer.get()));
 }

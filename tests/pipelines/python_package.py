@@ -22,7 +22,7 @@ from gst_eventcamera.pipeline import Gst, GstEventCamera
 
 FOLDER = tempfile.TemporaryDirectory()
 WIDTH, HEIGHT = 346, 260
-EXTENSIONS = ["raw", "dat", "es", "csv", "npz", "aedat4", "h5", "hdf5"]
+EXTENSIONS = ["raw", "dat", "es", "csv", "npz", "aedat4", "mcap", "h5", "hdf5"]
 
 
 def path_of(name):
