@@ -34,15 +34,17 @@ MAX_TRIALS = 60
 USUAL_SLOPE = -1.5
 # Parts of the calibrated time for cross-validation.
 PARTS = 4
-# Values tried for eventsim-dvs: the response, with the offset of a logarithmic one as a share of white; and stages
-# of the pixel, whose first value turns them off.
+# Values tried for eventsim-dvs: the response to the frames, with the offset of a logarithmic one as a share of white;
+# and stages of the pixel, whose first value turns them off.
 RESPONSE = {
     "log-eps": [0.001, 0.0018, 0.0025, 0.0035, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.11, 0.16,
                 0.22, 0.32],
     "response": ["linear", "log", "lin-log"],
     "linear-light": ["false", "true"],
+    "exposure-compensation": ["false", "true"],
 }
-FIRST_RESPONSE = {"log-eps": 0.02, "response": "log", "linear-light": "false"}
+# Compensation of an exposure that does not change makes no difference, and the exposure may change later.
+FIRST_RESPONSE = {"log-eps": 0.02, "response": "log", "linear-light": "false", "exposure-compensation": "true"}
 UPSAMPLING = ["linear", "motion"]
 STAGES = {
     "denoise": [0, 2, 4, 8, 12],
@@ -196,8 +198,9 @@ class Choices:
         chosen = dict(chosen)
         if chosen.get("response", "log") != "log":
             chosen.pop("log-eps", None)
-        if chosen.get("linear-light") == "false":
-            del chosen["linear-light"]
+        for name in ("linear-light", "exposure-compensation"):
+            if chosen.get(name) == "false":
+                del chosen[name]
         if chosen.get("refractory-period") == 0:
             del chosen["refractory-period"]
         elif "refractory-period" in chosen and self.is_free("refractory-reset"):
