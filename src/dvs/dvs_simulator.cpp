@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -12,11 +13,12 @@
 #include "src/dvs/denoise.hpp"
 #include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/interval_events.hpp"
+#include "src/dvs/motion_tiles.hpp"
+#include "src/dvs/moving_light.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/readout.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
-#include "src/simulate/interpolation.hpp"
 
 namespace eventcamera {
 namespace {
@@ -44,7 +46,17 @@ constexpr double unlimited = 1e18;
 struct alignas(64) Scratch {
   Candidates candidates;
   UnsolvedPixels unsolved;
-  std::vector<std::uint16_t> luma;  ///< a row, padded for vectors
+  std::vector<std::uint16_t> luma;    ///< a row, padded for vectors
+  std::vector<std::uint16_t> moving;  ///< a row of a tile for each blended frame, padded
+};
+
+/// Elements from one row of Scratch::moving to the next.
+constexpr int moving_stride = MotionTiles::width + max_lanes;
+
+/// An interval in a number of steps.
+struct Plan {
+  std::vector<SubInterval> sub_intervals;  ///< in order of time
+  std::vector<const ShadeTables*> tables;  ///< of each of them
 };
 
 template <class Pixel>
@@ -102,6 +114,7 @@ class PixelSimulator final : public DvsSimulator {
     const double total = gain_ * gain;
     if (gain == 1 || std::max(total, 1 / total) > max_total_gain) return;
     gain_ = total;
+    tables_.clear();
     responses_ = responses(current_, luma_bits(current_), gain_);
     if (current_.upsampling == Upsampling::linear) return;
     expose(last_, format().bits, current_.linear_light, gain, threads());
@@ -119,7 +132,7 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   void finish(double duration, EventBuckets& events) {
-    sub_interval_count_ += sub_intervals_.size();
+    sub_interval_count_ += longest_plan_;
     clock_ += duration;
     if (!readout_) return;
     const bool is_limited = current_.max_rate > 0;
@@ -132,51 +145,118 @@ class PixelSimulator final : public DvsSimulator {
   /// Advances all pixels with linear interpolation.
   void advance_straight(double duration, bool is_exposed) {
     finder_.reset();  // its last frame is outdated
-    plan(duration, 1, is_exposed);
+    begin_plans(duration, 1, is_exposed);
+    make_plan(1);
     const bool is_widened = luma_bits(current_) != format().bits;
     for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
       for (int y = rows.first; y < rows.last; ++y) {
         const void* luma = now_.row(y);
         if (is_widened) {
-          widen_row(now_.row(y), format().width, scratch.luma.data());
+          widen(now_.row(y), format().width, scratch.luma.data());
           luma = scratch.luma.data();
         }
-        for (const auto& sub_interval : sub_intervals_)
-          advance_row(luma, y, sub_interval, scratch, events);
+        const Run run{y, 0, format().width};
+        for (std::size_t i = 0; i < plans_[1].sub_intervals.size(); ++i)
+          advance_run({luma, luma}, run, plans_[1], i, scratch, events);
       }
     });
   }
 
   void advance_along_motion(double duration) {
     const auto flow = find_flow();
-    const int steps = std::clamp(steps_of(flow), 1, current_.max_interpolated_frames + 1);
-    plan(duration, steps, true);
-    const Warp<Pixel> warp{last_.view(), now_.view(), steps};
+    const int max_steps = current_.max_interpolated_frames + 1;
+    tiles_.measure(last_.view(), now_.view(), flow, max_steps, threads());
+    begin_plans(duration, max_steps, true);
+    for (int row = 0; row < tiles_.rows(); ++row)
+      for (int column = 0; column < tiles_.columns(); ++column)
+        make_plan(tiles_.at(column, row).steps);
     for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
-      for (const auto& sub_interval : sub_intervals_) {
-        for (int y = rows.first; y < rows.last; ++y) {
-          if (sub_interval.step < steps)
-            interpolate_row(warp, flow, y, sub_interval.step, scratch.luma.data());
-          else
-            widen_row(now_.row(y), format().width, scratch.luma.data());
-          advance_row(scratch.luma.data(), y, sub_interval, scratch, events);
+      scratch.moving.resize(static_cast<std::size_t>(max_steps) * moving_stride);
+      for (int top = rows.first; top < rows.last; top += MotionTiles::height) {
+        const int bottom = std::min(top + MotionTiles::height, rows.last);
+        const auto tile_at = [&](int x) {
+          return tiles_.at(x / MotionTiles::width, top / MotionTiles::height);
+        };
+        for (int left = 0; left < format().width;) {
+          const auto tile = tile_at(left);
+          int right = left + MotionTiles::width;
+          while (tile.steps == 1 && right < format().width && tile_at(right).steps == 1)
+            right += MotionTiles::width;
+          right = std::min(right, format().width);
+          for (int y = top; y < bottom; ++y)
+            advance_moving({y, left, right}, tile, flow, scratch, events);
+          left = right;
         }
       }
     });
   }
 
-  /// Prepares the sub-intervals and tables of the next interval, which all pixels share.
-  void plan(double duration, int steps, bool is_exposed) {
-    divide_interval(duration, steps, pulse_.next(current_, duration, is_exposed),
-                    sub_interval_count_, sub_intervals_);
-    tables_.clear();
-    for (const auto& sub_interval : sub_intervals_)
-      if (tables_for(sub_interval) == tables_.end())
-        tables_.emplace_back(current_, sub_interval.duration, gain_);
+  /// Advances a run of a tile through the interval.
+  void advance_moving(const Run& run, const MotionTiles::Tile& tile, const ImageView<Flow>& flow,
+                      Scratch& scratch, const BandEvents& events) {
+    const void* now = scratch.luma.data();
+    widen(now_.row(run.y) + run.first, run.width(), scratch.luma.data());
+    const bool has_bandwidth = current_.cutoff_frequency > 0;
+    if (tile.steps > 1) {
+      if (!has_bandwidth && gain_ == 1 &&
+          rest_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now},
+                   pixels_.row(run.y), run))
+        return;
+      move_light(Warp<Pixel>{last_.view(), now_.view(), tile.steps}, flow, run,
+                 scratch.moving.data(), moving_stride);
+    }
+    const Plan& plan = plans_[static_cast<std::size_t>(tile.steps)];
+    for (std::size_t i = 0; i < plan.sub_intervals.size(); ++i) {
+      const int step = plan.sub_intervals[i].step;
+      const void* luma = step < tile.steps
+                             ? scratch.moving.data() + std::ptrdiff_t{step - 1} * moving_stride
+                             : now;
+      advance_run({luma, has_bandwidth ? luma : now}, run, plan, i, scratch, events);
+    }
   }
 
-  auto tables_for(const SubInterval& sub_interval) const {
-    return std::ranges::find(tables_, sub_interval.duration, &ShadeTables::duration);
+  LightRange range_of(const MotionTiles::Tile& tile) const {
+    const auto response = [this](int luma) {
+      const int white = static_cast<int>(responses_.size()) - 1;
+      return responses_[static_cast<std::size_t>(std::min(luma * widening(current_), white))];
+    };
+    return {response(tile.darkest), response(tile.brightest), max_rise_, max_fall_};
+  }
+
+  /// Prepares plans of up to `max_steps` steps for the next interval.
+  void begin_plans(double duration, int max_steps, bool is_exposed) {
+    edges_ = pulse_.next(current_, duration, is_exposed);
+    whole_ = {0, duration, 1, 1, 0, sub_interval_count_};
+    max_rise_ = max_fall_ = 0;
+    for (const auto& edge : edges_) {
+      max_rise_ += std::max(0.0F, static_cast<float>(edge.rise));
+      max_fall_ -= std::min(0.0F, static_cast<float>(edge.rise));
+    }
+    constexpr std::size_t max_tables = 1000;  // of varying frame times
+    if (tables_.size() > max_tables) tables_.clear();
+    whole_tables_ = tables_of(duration);
+    longest_plan_ = 0;
+    plans_.resize(static_cast<std::size_t>(max_steps) + 1);
+    for (auto& plan : plans_) plan.sub_intervals.clear();
+    make_plan(1);
+    for (const auto& sub_interval : plans_[1].sub_intervals) whole_.rise += sub_interval.rise;
+  }
+
+  void make_plan(int steps) {
+    auto& plan = plans_[static_cast<std::size_t>(steps)];
+    if (!plan.sub_intervals.empty()) return;
+    divide_interval(whole_.duration, steps, edges_, sub_interval_count_, plan.sub_intervals);
+    plan.tables.clear();
+    for (const auto& sub_interval : plan.sub_intervals)
+      plan.tables.push_back(tables_of(sub_interval.duration));
+    longest_plan_ = std::max(longest_plan_, plan.sub_intervals.size());
+  }
+
+  const ShadeTables* tables_of(double duration) {
+    const bool are_needed = current_.cutoff_frequency > 0 || current_.shot_noise_rate > 0;
+    const auto [place, is_new] =
+        tables_.try_emplace(are_needed ? duration : 1, current_, duration, gain_);
+    return &place->second;
   }
 
   ImageView<Flow> find_flow() {
@@ -188,34 +268,26 @@ class PixelSimulator final : public DvsSimulator {
     return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), changed, threads());
   }
 
-  /// Returns the number of steps needed for motions of at most one pixel per step.
-  int steps_of(const ImageView<Flow>& flow) {
-    const int bands = band_count(format().height);
-    max_squares_.assign(static_cast<std::size_t>(bands), 0);
-    threads().for_each(bands, [&](int band, int) {
-      const BandRows rows(band, format().height);
-      float max_square = 0;
-      for (int y = rows.first; y < rows.last; ++y) {
-        const Flow* row = flow.row(y);
-        for (int x = 0; x < flow.width; ++x)
-          max_square = std::max(max_square, row[x].x * row[x].x + row[x].y * row[x].y);
-      }
-      max_squares_[static_cast<std::size_t>(band)] = max_square;
-    });
-    const float max_square = *std::max_element(max_squares_.begin(), max_squares_.end());
-    return static_cast<int>(
-        std::ceil(std::sqrt(std::min<double>(max_square, max_side * max_side))));
+  RowFilter filter_of(const SubInterval& sub_interval, const ShadeTables& tables) const {
+    return {sub_interval,
+            tables,
+            responses_,
+            luma_bits(current_),
+            current_.cutoff_frequency > 0,
+            current_.shot_noise_rate > 0,
+            gain_ != 1};
   }
 
-  void advance_row(const void* luma, int y, const SubInterval& sub_interval, Scratch& scratch,
-                   const BandEvents& events) {
-    const ShadeTables& tables = *tables_for(sub_interval);
+  /// Advances a run of pixels through sub-interval i of a plan.
+  void advance_run(const RunLuma& luma, const Run& run, const Plan& plan, std::size_t i,
+                   Scratch& scratch, const BandEvents& events) {
+    const SubInterval& sub_interval = plan.sub_intervals[i];
+    const ShadeTables& tables = *plan.tables[i];
     auto& candidates = scratch.candidates;
     candidates.count = 0;
-    const PixelRow pixels = pixels_.row(y);
-    filter_row({sub_interval, tables, responses_, luma_bits(current_),
-                current_.cutoff_frequency > 0, current_.shot_noise_rate > 0, gain_ != 1},
-               luma, pixels, format().width, candidates);
+    const PixelRow pixels = pixels_.row(run.y);
+    filter_run(filter_of(sub_interval, tables), luma, pixels, run, candidates);
+    if (candidates.count == 0) return;
     const RowToSolve solved{current_, random_,    sub_interval, tables,
                             pixels,   candidates, events,       clock_ + sub_interval.begin};
     switch (solver_for(current_)) {
@@ -236,6 +308,11 @@ class PixelSimulator final : public DvsSimulator {
     return is_widened ? 16 : format().bits;
   }
 
+  /// Factor from the luma of frames to that.
+  int widening(const DvsSettings& settings) const {
+    return luma_bits(settings) == format().bits ? 1 : 257;
+  }
+
   void adopt(const DvsSettings& settings) {
     const bool is_first = responses_.empty();
     const bool starts_over = is_first || !have_same_response(settings, current_);
@@ -245,6 +322,7 @@ class PixelSimulator final : public DvsSimulator {
     }
     if (starts_over || settings.upsampling != current_.upsampling)
       responses_ = responses(settings, luma_bits(settings), gain_);
+    tables_.clear();
     random_ = Random(settings.seed);
     if (is_first || !have_same_traits(settings, current_) || current_.threshold_jitter > 0)
       for_each_row(threads(), format().height,
@@ -269,13 +347,12 @@ class PixelSimulator final : public DvsSimulator {
   /// Settles the pixels as if the last frame had been shown for a long time.
   void settle() {
     pulse_.reset();
-    const int widening = luma_bits(current_) == format().bits ? 1 : 257;
     const int white = static_cast<int>(responses_.size()) - 1;
     for_each_row(threads(), format().height, [&](int y) {
       float* target = pixels_.row(y).target;
       for (int x = 0; x < format().width; ++x)
-        target[x] =
-            responses_[static_cast<std::size_t>(std::min(last_.at(x, y) * widening, white))];
+        target[x] = responses_[static_cast<std::size_t>(
+            std::min(last_.at(x, y) * widening(current_), white))];
       pixels_.settle(y, current_, random_);
     });
   }
@@ -300,10 +377,16 @@ class PixelSimulator final : public DvsSimulator {
   double gain_ = 1;               ///< of the exposure since the first frame
   std::vector<float> responses_;  ///< by luma value
   ExposurePulse pulse_;
-  std::vector<SubInterval> sub_intervals_;  ///< of the current interval, in order of time
-  std::vector<ShadeTables> tables_;         ///< one per duration of sub-intervals
-  std::uint64_t sub_interval_count_ = 0;    ///< before this interval
-  double clock_ = 0;                        ///< its start, microseconds since the first frame
+  std::vector<PulseEdge> edges_;  ///< of pulses within the current interval
+  SubInterval whole_{};           ///< the current interval
+  const ShadeTables* whole_tables_ = nullptr;
+  float max_rise_ = 0;  ///< of pulses within it
+  float max_fall_ = 0;
+  std::map<double, ShadeTables> tables_;  ///< by duration, microseconds
+  std::vector<Plan> plans_;               ///< by number of steps
+  std::size_t longest_plan_ = 0;          ///< sub-intervals
+  std::uint64_t sub_interval_count_ = 0;  ///< before this interval
+  double clock_ = 0;                      ///< its start, microseconds since the first frame
   IntervalEvents fired_;
   EventBuckets unread_;        ///< events that go to the readout
   std::vector<Event> sorted_;  ///< the same, sorted
@@ -313,7 +396,7 @@ class PixelSimulator final : public DvsSimulator {
   std::optional<RegionOfInterestFlow> finder_;
   Grey8 last_grey_;
   Grey8 grey_;
-  std::vector<float> max_squares_;  ///< maximum squared length of the flow, by band
+  MotionTiles tiles_;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "src/dvs/interval_events.hpp"
 #include "src/dvs/light_response.hpp"
+#include "src/dvs/moving_light.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/shot_noise.hpp"
 #include "src/dvs/sub_intervals.hpp"
@@ -42,7 +43,7 @@ struct Candidates {
   }
 };
 
-/// Parameters of filter_row(), shared by all pixels in a sub-interval.
+/// Parameters of filter_run(), shared by all pixels in a sub-interval.
 struct RowFilter {
   const SubInterval& sub_interval;
   const ShadeTables& tables;
@@ -53,12 +54,33 @@ struct RowFilter {
   bool keeps_saturated;  ///< saturated pixels keep a higher target
 };
 
-/// Advances a row of pixels through a sub-interval: targets and signals of all pixels; references
+/// Luma of a run of pixels, from the first of them on: std::uint8_t if it has 8 bits, std::uint16_t
+/// otherwise.
+struct RunLuma {
+  const void* target;  ///< towards which the light moves
+  const void* shade;   ///< that bandwidth and noise depend on
+};
+
+/// Advances a run of pixels through a sub-interval: targets and signals of all pixels; references
 /// and noise budgets of those that cannot fire, which are most. The others become `candidates`. The
-/// decision has a margin for float rounding, and is the same on every processor. Luma values are
-/// std::uint8_t if they have 8 bits, std::uint16_t otherwise.
-void filter_row(const RowFilter& row_filter, const void* luma, const PixelRow& pixels, int width,
-                Candidates& candidates);
+/// decision has a margin for float rounding, and is the same on every processor. A run that does
+/// not end with the row must be a multiple of max_lanes pixels wide.
+void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
+                const Run& run, Candidates& candidates);
+
+/// What light does at most during an interval, in units of the response.
+struct LightRange {
+  float darkest;
+  float brightest;
+  float max_rise;  ///< of all signals, beyond the light
+  float max_fall;
+};
+
+/// Advances a run of pixels without bandwidth through a whole interval, for which `row_filter` and
+/// `luma` are, if none of them can fire in it, whatever the light does within its range. Otherwise
+/// returns false, and leaves them as they are.
+bool rest_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+              const PixelRow& pixels, const Run& run);
 
 /// Maximum number of events of a pixel in one sub-interval, including those lost in its refractory
 /// period; then its reference is set to its signal. A change from black to white is 35 events at

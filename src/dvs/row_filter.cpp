@@ -25,8 +25,8 @@ hn::Vec<Words> load_luma(const Pixel* luma) {
 }
 
 template <class Pixel>
-void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixels, int width,
-            Candidates& candidates) {
+void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
+            const Run& run, Candidates& candidates) {
   const ShadeTables& tables = row_filter.tables;
   const bool is_partial = static_cast<float>(row_filter.sub_interval.share) < 1;
   const Floats floats;
@@ -35,6 +35,8 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const auto zero = hn::Zero(floats);
   const float* responses = row_filter.responses.data();
+  const auto* lumas = static_cast<const Pixel*>(luma.target);
+  const auto* shades = static_cast<const Pixel*>(luma.shade);
   const auto white = hn::Set(words, static_cast<std::int32_t>(row_filter.responses.size()) - 1);
   const auto below_saturated =
       hn::Set(words, saturated_luma(static_cast<int>(row_filter.responses.size()) - 1) - 1);
@@ -51,10 +53,10 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
   const float* refractory_lefts = pixels.refractory_left;
   std::uint32_t* noise_budgets = pixels.noise_budget;
 
-  for (int x = 0; x < width; x += lanes) {
-    const int count = std::min(lanes, width - x);
-    const auto value = hn::Min(load_luma(luma + x), white);
-    const auto shade = hn::ShiftRightSame(value, shade_shift);
+  for (int x = run.first; x < run.last; x += lanes, lumas += lanes, shades += lanes) {
+    const int count = std::min(lanes, run.last - x);
+    const auto value = hn::Min(load_luma(lumas), white);
+    const auto shade = hn::ShiftRightSame(hn::Min(load_luma(shades), white), shade_shift);
     auto target = hn::GatherIndex(floats, responses, value);
     const auto last_target = hn::LoadU(floats, targets + x);
     if (row_filter.keeps_saturated) {
@@ -127,12 +129,77 @@ void filter(const RowFilter& row_filter, const Pixel* luma, const PixelRow& pixe
   }
 }
 
-void filter_luma(const RowFilter& row_filter, const void* luma, const PixelRow& pixels, int width,
-                 Candidates& candidates) {
+void filter_luma(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
+                 const Run& run, Candidates& candidates) {
   if (row_filter.luma_bits == 8)
-    filter(row_filter, static_cast<const std::uint8_t*>(luma), pixels, width, candidates);
+    filter<std::uint8_t>(row_filter, luma, pixels, run, candidates);
   else
-    filter(row_filter, static_cast<const std::uint16_t*>(luma), pixels, width, candidates);
+    filter<std::uint16_t>(row_filter, luma, pixels, run, candidates);
+}
+
+template <class Pixel>
+bool rest(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+          const PixelRow& pixels, const Run& run) {
+  const Floats floats;
+  const Words words;
+  const Counts counts;
+  const int lanes = static_cast<int>(hn::Lanes(floats));
+  const auto duration = hn::Set(floats, static_cast<float>(row_filter.sub_interval.duration));
+  const auto rise = hn::Set(floats, static_cast<float>(row_filter.sub_interval.rise));
+  const auto highest = hn::Set(floats, range.brightest);
+  const auto lowest = hn::Set(floats, range.darkest);
+  const auto margin = hn::Set(floats, rounding);
+  const auto max_rise = hn::Set(floats, range.max_rise);
+  const auto max_fall = hn::Set(floats, range.max_fall);
+  const auto white = hn::Set(words, static_cast<std::int32_t>(row_filter.responses.size()) - 1);
+  const auto noise_at = [&](int x) {
+    const auto* shades = static_cast<const Pixel*>(luma.shade) + (x - run.first);
+    const auto shade =
+        hn::ShiftRightSame(hn::Min(load_luma(shades), white), row_filter.luma_bits - 8);
+    return hn::GatherIndex(counts, row_filter.tables.noise.data(), shade);
+  };
+
+  auto may_fire = hn::FirstN(floats, 0);
+  for (int x = run.first; x < run.last; x += lanes) {
+    const auto last_target = hn::LoadU(floats, pixels.target + x);
+    const auto reference = hn::LoadU(floats, pixels.reference + x);
+    const auto leaked = hn::Mul(hn::LoadU(floats, pixels.leak + x), duration);
+    const auto top = hn::Add(hn::Add(hn::Max(last_target, highest), leaked), max_rise);
+    const auto bottom = hn::Sub(hn::Min(last_target, lowest), max_fall);
+    const auto fires = hn::Or(
+        hn::Ge(hn::Add(hn::Sub(top, reference), margin), hn::LoadU(floats, pixels.positive + x)),
+        hn::Ge(hn::Add(hn::Sub(reference, bottom), margin),
+               hn::LoadU(floats, pixels.negative + x)));
+    const auto is_refractory =
+        hn::Gt(hn::LoadU(floats, pixels.refractory_left + x), hn::Zero(floats));
+    may_fire = hn::Or(may_fire, hn::Or(fires, is_refractory));
+    if (row_filter.has_noise) {
+      const auto budget = hn::LoadU(counts, pixels.noise_budget + x);
+      may_fire = hn::Or(may_fire, hn::RebindMask(floats, hn::Not(hn::Gt(budget, noise_at(x)))));
+    }
+  }
+  if (!hn::AllFalse(floats, may_fire)) return false;
+
+  for (int x = run.first; x < run.last; x += lanes) {
+    const auto value =
+        hn::Min(load_luma(static_cast<const Pixel*>(luma.target) + (x - run.first)), white);
+    const auto target = hn::GatherIndex(floats, row_filter.responses.data(), value);
+    const auto leaked = hn::Add(hn::Mul(hn::LoadU(floats, pixels.leak + x), duration), rise);
+    hn::StoreU(target, floats, pixels.target + x);
+    hn::StoreU(target, floats, pixels.signal + x);
+    hn::StoreU(hn::Sub(hn::LoadU(floats, pixels.reference + x), leaked), floats,
+               pixels.reference + x);
+    if (row_filter.has_noise)
+      hn::StoreU(hn::Sub(hn::LoadU(counts, pixels.noise_budget + x), noise_at(x)), counts,
+                 pixels.noise_budget + x);
+  }
+  return true;
+}
+
+bool rest_luma(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+               const PixelRow& pixels, const Run& run) {
+  return row_filter.luma_bits == 8 ? rest<std::uint8_t>(row_filter, range, luma, pixels, run)
+                                   : rest<std::uint16_t>(row_filter, range, luma, pixels, run);
 }
 
 }  // namespace
@@ -143,10 +210,16 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(filter_luma);
+HWY_EXPORT(rest_luma);
 
-void filter_row(const RowFilter& row_filter, const void* luma, const PixelRow& pixels, int width,
-                Candidates& candidates) {
-  HWY_DYNAMIC_DISPATCH(filter_luma)(row_filter, luma, pixels, width, candidates);
+void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
+                const Run& run, Candidates& candidates) {
+  HWY_DYNAMIC_DISPATCH(filter_luma)(row_filter, luma, pixels, run, candidates);
+}
+
+bool rest_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+              const PixelRow& pixels, const Run& run) {
+  return HWY_DYNAMIC_DISPATCH(rest_luma)(row_filter, range, luma, pixels, run);
 }
 
 }  // namespace eventcamera

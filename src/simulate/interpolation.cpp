@@ -357,24 +357,6 @@ void fire_band_blend(const InterpolatedInterval<std::uint8_t>& interval, int ban
     fire_row<Interpolation::blend>(interval, last, y, band, first_steps, events);
 }
 
-void interpolate_row_8(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
-                       std::uint16_t* out) {
-  const Words words;
-  const hn::Rebind<std::uint16_t, Words> shades;
-  const Sampler last(warp.last);
-  const Sampler now(warp.now);
-  for (int x = 0; x < flow.width; x += static_cast<int>(hn::Lanes(words))) {
-    const MovingPixels pixels(flow, x, y, warp.steps);
-    const auto sum =
-        blend(pixels.ahead(last, -j), pixels.ahead(now, warp.steps - j), j, warp.steps);
-    // From 1/2^20 of a grey level to 1/257 of one.
-    const auto grey = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 1 << 7)));
-    const auto value =
-        hn::ShiftRight<12>(hn::Add(hn::Mul(grey, hn::Set(words, 257)), hn::Set(words, 1 << 11)));
-    hn::StoreU(hn::DemoteTo(shades, value), shades, out + x);
-  }
-}
-
 }  // namespace
 }  // namespace eventcamera::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -385,7 +367,6 @@ namespace eventcamera {
 HWY_EXPORT(pair_rows);
 HWY_EXPORT(fire_band_forward);
 HWY_EXPORT(fire_band_blend);
-HWY_EXPORT(interpolate_row_8);
 
 namespace {
 
@@ -453,28 +434,6 @@ void InterpolationKernel::fire(const InterpolatedInterval<std::uint16_t>& interv
     else
       fire_band_16<Interpolation::blend>(interval, band, events);
   });
-}
-
-void interpolate_row(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
-                     std::uint16_t* out) {
-  HWY_DYNAMIC_DISPATCH(interpolate_row_8)(warp, flow, y, j, out);
-}
-
-void interpolate_row(const Warp<std::uint16_t>& warp, const ImageView<Flow>& flow, int y, int j,
-                     std::uint16_t* out) {
-  for (int x = 0; x < flow.width; ++x) {
-    const Flow& here = flow.row(y)[x];
-    out[x] = warp.at<Interpolation::blend>(x, y, motion_per_step(here.x, warp.steps),
-                                           motion_per_step(here.y, warp.steps), j);
-  }
-}
-
-void widen_row(const std::uint8_t* luma, int width, std::uint16_t* out) {
-  for (int x = 0; x < width; ++x) out[x] = static_cast<std::uint16_t>(luma[x] * 257);
-}
-
-void widen_row(const std::uint16_t* luma, int width, std::uint16_t* out) {
-  std::copy_n(luma, width, out);
 }
 
 }  // namespace eventcamera

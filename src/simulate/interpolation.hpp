@@ -42,16 +42,4 @@ class InterpolationKernel {
   Image<std::uint16_t> last_pairs_;  ///< the last frame, each pixel paired with the one below it
 };
 
-/// Writes a row of the blended frame of step j = 1 ... steps - 1. 8-bit frames (which must be views
-/// of Images) are widened to 16 bits, which keeps more shades in dark areas; deeper frames keep
-/// their depth. `out` must have 16 elements past the end of the row.
-void interpolate_row(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, int y, int j,
-                     std::uint16_t* out);
-void interpolate_row(const Warp<std::uint16_t>& warp, const ImageView<Flow>& flow, int y, int j,
-                     std::uint16_t* out);
-
-/// Converts a row of a frame to the depth of interpolate_row().
-void widen_row(const std::uint8_t* luma, int width, std::uint16_t* out);
-void widen_row(const std::uint16_t* luma, int width, std::uint16_t* out);
-
 }  // namespace eventcamera

@@ -10,11 +10,13 @@
 #include <numbers>
 #include <optional>
 #include <random>
+#include <set>
 
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/trajectory.hpp"
+#include "src/flow/dense_flow.hpp"
 #include "tests/core/targets.hpp"
 #include "tests/reference/dvs.hpp"
 #include "tests/simulate/scene.hpp"
@@ -781,6 +783,72 @@ TEST(Dvs, FollowsMotion) {
   Playback still({40, 30, 8}, DvsSettings{.upsampling = Upsampling::motion});
   stand(still, scene::texture<std::uint8_t>(40, 30, 8, 1, 2), 3, 40'000'000);
   EXPECT_TRUE(still.events.empty());
+}
+
+class AlongMotion : public testing::TestWithParam<DvsSettings> {};
+INSTANTIATE_TEST_SUITE_P(
+    , AlongMotion,
+    testing::Values(DvsSettings{}, DvsSettings{.response = Response::log, .log_eps = 0.05},
+                    DvsSettings{.response = Response::linear, .leak_rate = 7, .adaptation = 0.3},
+                    DvsSettings{.cutoff_frequency = 100, .leak_rate = 9},
+                    DvsSettings{.positive_threshold = 0.5,
+                                .negative_threshold = 0.7,
+                                .leak_rate = 30,
+                                .refractory_period = 900'000}));
+
+TEST_P(AlongMotion, EqualsTheReference) {
+  constexpr int width = 110;
+  constexpr int height = 45;
+  constexpr int microseconds = 8'400;  // a whole number per step, up to 8 of them
+  auto settings = GetParam();
+  settings.upsampling = Upsampling::motion;
+  settings.max_interpolated_frames = 7;
+  const Random random(settings.seed);
+  const Mismatch mismatch(settings, random);
+  Playback playback({width, height, 8}, settings);
+  std::vector<reference::DvsPixel> pixels;
+  std::vector<TimedEvent> expected;
+  std::set<int> steps_seen;
+  Image<std::uint8_t> last;
+  const auto finder = make_dense_flow(FlowMethod::dis_lq);
+  ThreadPool threads;
+  for (int i = 0; i < 3; ++i) {
+    // A square crosses a texture that hardly moves, and an area that is flat.
+    auto frame = scene::texture<std::uint8_t>(width, height, 8, 0.7 * i, 0.4 * i);
+    const auto square = scene::square(width, height, 15 + 9 * i, 8 + 2 * i, 24, 220, 0);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        if (x >= 80) frame.at(x, y) = 120;
+        if (square.at(x, y) > 0) frame.at(x, y) = square.at(x, y);
+      }
+    }
+    playback.push(frame, 8, i * 1000LL * microseconds);
+    Image<Flow> flow(width, height);
+    if (i > 0) flow.assign(finder->find(last.view(), frame.view(), threads));
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const auto number = static_cast<std::size_t>(y * width + x);
+        if (i == 0) {
+          pixels.emplace_back(settings, frame.at(x, y) / 255.0,
+                              mismatch.leaked(number, mismatch.of(number), 0));
+          continue;
+        }
+        const int steps = reference::steps_of_tile(flow, x, y, 8);
+        steps_seen.insert(steps);
+        for (int j = 1; j <= steps; ++j) {
+          const double luma =
+              j < steps ? reference::moving_luma(last, frame, flow.at(x, y), x, y, j, steps)
+                        : frame.at(x, y);
+          for (const auto& event : pixels[number].push(luma / 255, microseconds / steps))
+            expected.push_back({event.t, x, y, event.polarity});
+        }
+      }
+    }
+    last = frame;
+  }
+  EXPECT_GT(steps_seen.size(), 4U);
+  ASSERT_GT(expected.size(), 1500U);
+  expect_near(playback.events, expected, 0.002, 0.97, 5);
 }
 
 TEST(Dvs, TakesSettingsFromFrameToFrame) {

@@ -11,6 +11,7 @@
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/dvs/dvs_settings.hpp"
+#include "src/flow/dense_flow.hpp"
 
 /// Reference equations of the physical pixel, implemented literally, in double precision and in
 /// order of time.
@@ -88,6 +89,49 @@ double exposure_gain(const ImageView<Pixel>& last, const ImageView<Pixel>& now, 
   for (const double other : medians)
     agreeing += std::abs(other - change) <= std::abs(change) / 2 ? 1 : 0;
   return agreeing >= 0.75 * static_cast<double>(medians.size()) ? std::exp(change) : 1;
+}
+
+/// Upsampling along the flow F: a tile of 32x8 pixels is divided into steps by its longest motion
+/// along an axis,
+///   n = max over the tile of ceil(max(|F.x|, |F.y|)), in 1 ... max; NaN counts as 0.
+inline int steps_of_tile(const Image<Flow>& flow, int x, int y, int max) {
+  double steps = 1;
+  for (int v = y / 8 * 8; v < std::min(y / 8 * 8 + 8, flow.height()); ++v)
+    for (int u = x / 32 * 32; u < std::min(x / 32 * 32 + 32, flow.width()); ++u)
+      for (const double motion : {flow.at(u, v).x, flow.at(u, v).y})
+        if (!std::isnan(motion)) steps = std::max(steps, std::ceil(std::abs(motion)));
+  return static_cast<int>(std::min<double>(steps, max));
+}
+
+/// Luma of a pixel at step j of n, a = j/n, in grey levels of the frames:
+///   (1 - a) I(x - a F) + a J(x + (1 - a) F)
+/// I, J bilinear with a replicated border; F/n is rounded to 1/65536 of a pixel, positions are to
+/// 1/64, a as a weight to 1/256. NaN counts as 0.
+template <class Pixel>
+double moving_luma(const Image<Pixel>& earlier, const Image<Pixel>& later, const Flow& flow, int x,
+                   int y, int j, int n) {
+  const auto per_step = [&](double motion) {
+    const double clamped = std::isnan(motion) ? 0 : std::clamp(motion, -16384.0, 16384.0);
+    return std::nearbyint(clamped * 65536 / n) / 65536;
+  };
+  const auto sample = [&](const Image<Pixel>& frame, double steps) {
+    const auto place = [&](int from, double motion, int end) {
+      return std::clamp(std::floor((from + steps * per_step(motion)) * 64 + 0.5) / 64, 0.0,
+                        end - 1.0);
+    };
+    const double u = place(x, flow.x, frame.width());
+    const double v = place(y, flow.y, frame.height());
+    const int left = static_cast<int>(u);
+    const int top = static_cast<int>(v);
+    const int right = std::min(left + 1, frame.width() - 1);
+    const int bottom = std::min(top + 1, frame.height() - 1);
+    const auto row = [&](int line) {
+      return frame.at(left, line) * (1 - (u - left)) + frame.at(right, line) * (u - left);
+    };
+    return row(top) * (1 - (v - top)) + row(bottom) * (v - top);
+  };
+  const double weight = std::floor(256.0 * j / n + 0.5) / 256;
+  return (1 - weight) * sample(earlier, -j) + weight * sample(later, n - j);
 }
 
 struct TimedEvent {

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/dvs/motion_tiles.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "src/core/max_side.hpp"
+
+namespace eventcamera {
+namespace {
+
+/// Longest motion for which the luma on the way is worth looking up, in pixels.
+constexpr float far = 64;
+
+/// Range that holds the flow of a tile, and 0, along one axis.
+struct FlowRange {
+  float min = 0;
+  float max = 0;
+
+  float longest() const { return std::max(max, -min); }
+};
+
+struct FlowRanges {
+  FlowRange x;
+  FlowRange y;
+
+  /// NaN counts as 0.
+  FlowRanges(const ImageView<Flow>& flow, const Box& tile) {
+    std::array<float, 2 * MotionTiles::width> lowest{};
+    std::array<float, 2 * MotionTiles::width> highest{};
+    const auto count = 2 * static_cast<std::size_t>(tile.width());
+    for (int row = tile.top; row < tile.bottom; ++row) {
+      const float* values = &flow.row(row)[tile.left].x;
+      for (std::size_t i = 0; i < count; ++i) {
+        lowest[i] = values[i] < lowest[i] ? values[i] : lowest[i];
+        highest[i] = values[i] > highest[i] ? values[i] : highest[i];
+      }
+    }
+    for (std::size_t i = 0; i < count; i += 2) {
+      x = {std::min(x.min, lowest[i]), std::max(x.max, highest[i])};
+      y = {std::min(y.min, lowest[i + 1]), std::max(y.max, highest[i + 1])};
+    }
+  }
+
+  float longest() const { return std::max(x.longest(), y.longest()); }
+};
+
+}  // namespace
+
+template <class Pixel>
+void MotionTiles::Cells::measure(const ImageView<Pixel>& frame, ThreadPool& threads) {
+  const int columns = (frame.width + side - 1) / side;
+  const int rows = (frame.height + side - 1) / side;
+  if (darkest.width() != columns || darkest.height() != rows) {
+    darkest = Image<std::uint16_t>(columns, rows);
+    brightest = Image<std::uint16_t>(columns, rows);
+  }
+  threads.for_each(rows, [&](int row, int) {
+    constexpr int columns_at_once = 8 * side;
+    for (int left = 0; left < frame.width; left += columns_at_once) {
+      const int count = std::min(columns_at_once, frame.width - left);
+      std::array<Pixel, columns_at_once> low;
+      std::array<Pixel, columns_at_once> high;
+      low.fill(std::numeric_limits<Pixel>::max());
+      high.fill(0);
+      for (int y = row * side; y < std::min((row + 1) * side, frame.height); ++y) {
+        const Pixel* luma = frame.row(y) + left;
+        for (std::size_t x = 0; x < static_cast<std::size_t>(count); ++x) {
+          low[x] = std::min(low[x], luma[x]);
+          high[x] = std::max(high[x], luma[x]);
+        }
+      }
+      for (int x = 0; x < count; x += side) {
+        const auto first = static_cast<std::ptrdiff_t>(x);
+        darkest.at((left + x) / side, row) =
+            *std::min_element(low.begin() + first, low.begin() + first + side);
+        brightest.at((left + x) / side, row) =
+            *std::max_element(high.begin() + first, high.begin() + first + side);
+      }
+    }
+  });
+}
+
+void MotionTiles::Cells::add_range_of(const Box& box, Tile& tile) const {
+  const auto cell = [](int pixel, int cells) { return std::clamp(pixel / side, 0, cells - 1); };
+  const int right = cell(box.right - 1, darkest.width());
+  const int bottom = cell(box.bottom - 1, darkest.height());
+  for (int y = cell(box.top, darkest.height()); y <= bottom; ++y) {
+    for (int x = cell(box.left, darkest.width()); x <= right; ++x) {
+      tile.darkest = std::min<int>(tile.darkest, darkest.at(x, y));
+      tile.brightest = std::max<int>(tile.brightest, brightest.at(x, y));
+    }
+  }
+}
+
+template <class Pixel>
+void MotionTiles::measure(const ImageView<Pixel>& last, const ImageView<Pixel>& now,
+                          const ImageView<Flow>& flow, int max_steps, ThreadPool& threads) {
+  columns_ = (flow.width + width - 1) / width;
+  rows_ = (flow.height + height - 1) / height;
+  tiles_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  last_.measure(last, threads);
+  now_.measure(now, threads);
+  threads.for_each(rows_, [&](int row, int) {
+    for (int column = 0; column < columns_; ++column) {
+      const Box box{column * width, row * height, std::min((column + 1) * width, flow.width),
+                    std::min((row + 1) * height, flow.height)};
+      const FlowRanges ranges(flow, box);
+      const auto longest = std::min(ranges.longest(), static_cast<float>(max_side));
+      auto& tile = tiles_[static_cast<std::size_t>(row * columns_ + column)];
+      tile = {std::clamp(static_cast<int>(std::ceil(longest)), 1, max_steps),
+              std::numeric_limits<Pixel>::max(), 0};
+      if (longest > far) {
+        std::swap(tile.darkest, tile.brightest);
+        continue;
+      }
+      // Samples reach a pixel further, and are rounded.
+      const auto up = [](float flow_here) { return static_cast<int>(std::ceil(flow_here)) + 2; };
+      last_.add_range_of({box.left - up(ranges.x.max), box.top - up(ranges.y.max),
+                          box.right + up(-ranges.x.min), box.bottom + up(-ranges.y.min)},
+                         tile);
+      now_.add_range_of({box.left - up(-ranges.x.min), box.top - up(-ranges.y.min),
+                         box.right + up(ranges.x.max), box.bottom + up(ranges.y.max)},
+                        tile);
+    }
+  });
+}
+
+template void MotionTiles::measure(const ImageView<std::uint8_t>&, const ImageView<std::uint8_t>&,
+                                   const ImageView<Flow>&, int, ThreadPool&);
+template void MotionTiles::measure(const ImageView<std::uint16_t>&, const ImageView<std::uint16_t>&,
+                                   const ImageView<Flow>&, int, ThreadPool&);
+
+}  // namespace eventcamera

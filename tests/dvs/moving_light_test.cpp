@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Compares the light of moving pixels to its definition.
+#include "src/dvs/moving_light.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "src/dvs/motion_tiles.hpp"
+#include "tests/core/targets.hpp"
+#include "tests/reference/dvs.hpp"
+#include "tests/simulate/scene.hpp"
+
+namespace {
+
+using namespace eventcamera;
+
+/// Smooth flow of up to about `longest` pixels, with a few pixels that move elsewhere.
+Image<Flow> flow_of(int width, int height, float longest) {
+  Image<Flow> flow(width, height);
+  std::minstd_rand random(3);
+  std::uniform_real_distribution<float> anywhere(-2 * longest, 2 * longest);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto u = static_cast<float>(x);
+      const auto v = static_cast<float>(y);
+      flow.at(x, y) = {longest * std::sin(0.05F * u - 0.1F * v), longest * std::cos(0.07F * u)};
+      if (random() % 50 == 0) flow.at(x, y) = {anywhere(random), anywhere(random)};
+    }
+  }
+  flow.at(width / 2, height / 2) = {std::numeric_limits<float>::quiet_NaN(), 1e30F};
+  return flow;
+}
+
+/// Moves rows as a whole and in two runs.
+template <class Pixel, class Check>
+void move_rows(const Warp<Pixel>& warp, const Image<Flow>& flow, const Check& check) {
+  constexpr int middle = 16;
+  const int width = flow.width();
+  const std::ptrdiff_t stride = width + 8;
+  std::vector<std::uint16_t> luma(static_cast<std::size_t>(stride * warp.steps));
+  for (int y = 0; y < flow.height(); ++y) {
+    for (const int end : {middle, width}) {
+      const Run run{y, end == middle ? 0 : std::min(middle, width), std::min(end, width)};
+      if (run.width() <= 0) continue;
+      move_light(warp, flow.view(), run, luma.data(), stride);
+      for (int j = 1; j < warp.steps; ++j)
+        for (int x = run.first; x < run.last; ++x)
+          check(x, y, j, luma[static_cast<std::size_t>((j - 1) * stride + x - run.first)]);
+    }
+  }
+}
+
+TEST(MovingLight, IsItsDefinitionOnAllTargets) {
+  struct Case {
+    int width, height;
+    float longest;
+  };
+  for (const auto& [width, height, longest] :
+       {Case{1, 1, 1}, Case{3, 5, 2}, Case{17, 9, 40}, Case{61, 33, 0.4F}, Case{90, 40, 6},
+        Case{130, 20, 30}}) {
+    const auto last = scene::texture<std::uint8_t>(width, height, 8, 3, 1);
+    const auto now = scene::noise<std::uint8_t>(width, height, 8, 5);
+    const auto flow = flow_of(width, height, longest);
+    for (const int steps : {2, 3, 11, 32}) {
+      targets::for_each([&](const char* target) {
+        SCOPED_TRACE(std::string(target) + " " + std::to_string(width) + " " +
+                     std::to_string(steps));
+        move_rows(Warp<std::uint8_t>{last.view(), now.view(), steps}, flow,
+                  [&](int x, int y, int j, int luma) {
+                    const double expected =
+                        reference::moving_luma(last, now, flow.at(x, y), x, y, j, steps);
+                    // Rounded to 1/4096 of a grey level first.
+                    ASSERT_NEAR(luma, 257 * expected, 0.54) << x << " " << y << " " << j;
+                  });
+      });
+    }
+  }
+}
+
+TEST(MovingLight, KeepsTheDepthOfDeepFrames) {
+  const auto last = scene::texture<std::uint16_t>(50, 20, 12, 3, 1);
+  const auto now = scene::texture<std::uint16_t>(50, 20, 12, 5, 2);
+  const auto flow = flow_of(50, 20, 4);
+  move_rows(Warp<std::uint16_t>{last.view(), now.view(), 5}, flow,
+            [&](int x, int y, int j, int luma) {
+              const double expected = reference::moving_luma(last, now, flow.at(x, y), x, y, j, 5);
+              ASSERT_NEAR(luma, expected, 0.51) << x << " " << y << " " << j;
+            });
+}
+
+template <class Pixel>
+void check_tiles(int width, int height, int bits, float longest) {
+  constexpr int max_steps = 20;
+  const auto last = scene::texture<Pixel>(width, height, bits, 3, 1);
+  const auto now = scene::texture<Pixel>(width, height, bits, 5, -2);
+  const auto flow = flow_of(width, height, longest);
+  ThreadPool threads;
+  threads.set_threads(2);
+  MotionTiles tiles;
+  tiles.measure(last.view(), now.view(), flow.view(), max_steps, threads);
+  ASSERT_EQ(tiles.columns(), (width + MotionTiles::width - 1) / MotionTiles::width);
+  ASSERT_EQ(tiles.rows(), (height + MotionTiles::height - 1) / MotionTiles::height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto& tile = tiles.at(x / MotionTiles::width, y / MotionTiles::height);
+      const int steps = reference::steps_of_tile(flow, x, y, max_steps);
+      ASSERT_EQ(tile.steps, steps);
+      for (int j = 0; j <= steps; ++j) {
+        const double luma = reference::moving_luma(last, now, flow.at(x, y), x, y, j, steps);
+        ASSERT_GE(luma, tile.darkest - 1e-9) << x << " " << y << " " << j;
+        ASSERT_LE(luma, tile.brightest + 1e-9) << x << " " << y << " " << j;
+      }
+    }
+  }
+}
+
+TEST(MotionTiles, HoldTheLightOnTheWay) {
+  check_tiles<std::uint8_t>(1, 1, 8, 1);
+  check_tiles<std::uint8_t>(70, 45, 8, 0.01F);
+  check_tiles<std::uint8_t>(131, 45, 8, 7);
+  check_tiles<std::uint8_t>(90, 37, 8, 40);
+  check_tiles<std::uint16_t>(67, 30, 12, 5);
+}
+
+TEST(MotionTiles, AreNarrowWhereLittleChanges) {
+  const auto flat = scene::flat<std::uint8_t>(64, 16, 90);
+  auto now = flat;
+  now.at(63, 0) = 200;
+  Image<Flow> flow(64, 16);
+  ThreadPool threads;
+  threads.set_threads(1);
+  MotionTiles tiles;
+  tiles.measure(flat.view(), now.view(), flow.view(), 8, threads);
+  EXPECT_EQ(tiles.at(0, 0).darkest, 90);
+  EXPECT_EQ(tiles.at(0, 0).brightest, 90);
+  EXPECT_EQ(tiles.at(1, 0).brightest, 200);
+  EXPECT_EQ(tiles.at(1, 1).steps, 1);
+}
+
+}  // namespace
