@@ -297,6 +297,25 @@ class OtherReaders(TableTest):
                 file.create_dataset('events', data=table.astype(kind), **options)
             self.assert_read('hdf5', events)
 
+    def test_we_read_columns_of_raw_events(self):
+        events = random_events(30_000, 21)
+        with h5py.File(self.file, 'w') as file:
+            for name in 'txyp':
+                file['raw_events/' + name] = events[name].astype('i8')
+        self.assert_read('hdf5', events)
+
+    def test_we_read_mvsecs(self):
+        events = random_events(30_000, 22)
+        events = {**events, 'x': events['x'] % 346, 'y': events['y'] % 260, 't': events['t'] + 1_500_000_000_000_000}
+        table = np.stack([events['x'], events['y'], events['t'] / 1e6, np.where(events['p'] > 0, 1, -1)], axis=1)
+        for options in ({}, {'chunks': (1000, 4), 'compression': 'gzip'}):
+            with h5py.File(self.file, 'w') as file:
+                file.create_dataset('davis/left/events', data=table.astype('f8'), **options)
+            self.assert_read('hdf5', events)
+        with h5py.File(self.file, 'w') as file:
+            file['davis/left/events'] = table.astype('f4')
+        self.assertIn('fractional numbers', self.refused())
+
     def test_our_ecf_by_its_description(self):
         for seed, last in ((10, 20_000_000), (11, 3000), (12, 5 * 3600 * 1_000_000)):
             events = random_events(60_000, seed, last)

@@ -243,8 +243,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
  * @title: eventhdf5dec
  * @short_description: reads HDF5 files of events
  *
- * Reads the events of HDF5 files from DSEC, Metavision (compressed with ECF) and v2e. They are
- * output in buffers of #GstEventReader:buffer-duration, with triggers for writers that store them.
+ * Reads the events of HDF5 files from DSEC, TUM-VIE, MVSEC (of its left camera), Metavision
+ * (compressed with ECF) and v2e, and of those with columns in `/raw_events`. They are output in
+ * buffers of #GstEventReader:buffer-duration, with triggers for writers that store them.
  *
  * HDF5 files need random access, so upstream should support pull mode, as filesrc does. In push
  * mode the file is collected in memory, up to 256 MiB, and read at its end.
@@ -261,7 +262,7 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpzdec, "eventnpzdec", GST_RANK_PRIMARY, event_
 static const RecordingFormat hdf5 = {
     .type_name = "GstEventHdf5Dec",
     .long_name = "HDF5 reader",
-    .description = "Reads HDF5 files of events: DSEC, Metavision, v2e",
+    .description = "Reads HDF5 files of events: DSEC, TUM-VIE, MVSEC, Metavision, v2e",
     .caps = "application/x-hdf5",
     .has_triggers = true,
     .add_properties = add_sensor_size,

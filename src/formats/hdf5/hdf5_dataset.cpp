@@ -2,8 +2,11 @@
 #include "src/formats/hdf5/hdf5_dataset.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <new>
 
 #include "src/formats/hdf5/ecf.hpp"
@@ -195,6 +198,26 @@ void Hdf5Dataset::widen(const std::uint8_t* element, const Number& number,
   }
 }
 
+bool Hdf5Dataset::take_fractions(std::size_t seconds_column) {
+  if (H5Tequal(type_.get(), H5T_IEEE_F64LE) <= 0) return false;
+  seconds_column_ = seconds_column;
+  numbers_ = {{.offset = 0, .bytes = sizeof(double)}};
+  return true;
+}
+
+/// Turns numbers that were read as the bits of fractions into integers. Impossible ones become the
+/// least integer.
+void Hdf5Dataset::round_fractions(std::span<std::int64_t> numbers) const {
+  constexpr double max = 4e18;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto fraction = std::bit_cast<double>(numbers[i]);
+    const auto number =
+        i % columns() == *seconds_column_ ? std::floor(fraction * 1e6 + 0.5) : fraction;
+    numbers[i] = std::abs(number) < max ? static_cast<std::int64_t>(number)
+                                        : std::numeric_limits<std::int64_t>::min();
+  }
+}
+
 bool Hdf5Dataset::read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out) {
   std::vector<std::uint8_t> bytes;
   if (!read_elements(first, count, bytes)) return false;
@@ -216,6 +239,7 @@ bool Hdf5Dataset::read(std::uint64_t first, std::uint64_t count, std::vector<std
         widen<std::uint64_t>(bytes.data() + number.offset, number, to);
     }
   }
+  if (seconds_column_) round_fractions(out);
   return true;
 }
 

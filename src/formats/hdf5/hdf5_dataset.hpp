@@ -27,7 +27,7 @@ class Hdf5Dataset {
   std::uint64_t rows() const { return rows_; }
   std::uint64_t claimed_rows() const { return extent_.empty() ? 1 : extent_[0]; }
   std::uint64_t columns() const { return extent_.size() < 2 ? 1 : extent_[1]; }
-  bool is_integers() const { return !numbers_.empty(); }
+  bool is_integers() const { return !numbers_.empty() && !seconds_column_; }
   bool is_unsigned_32() const {
     return is_integers() && numbers_[0].bytes == 4 && !numbers_[0].is_signed;
   }
@@ -35,6 +35,10 @@ class Hdf5Dataset {
   /// Selects the members of a compound type to read. Throws UnsupportedFormat if one is missing or
   /// not an integer.
   void choose(std::span<const char* const> members);
+
+  /// Reads numbers of 64-bit floating point, of which those in one column are seconds and are
+  /// read as microseconds; fractions of others are cut off. False if the dataset has others.
+  bool take_fractions(std::size_t seconds_column);
 
   /// Reads rows, with all columns or the chosen members. False if the file is corrupt there.
   bool read(std::uint64_t first, std::uint64_t count, std::vector<std::int64_t>& out);
@@ -71,6 +75,7 @@ class Hdf5Dataset {
   static std::optional<Number> number_of(hid_t type);
   template <class Unsigned>
   void widen(const std::uint8_t* element, const Number& number, std::span<std::int64_t> out) const;
+  void round_fractions(std::span<std::int64_t> numbers) const;
   void check_chunks();
   void check_storage(hid_t file);
 
@@ -81,8 +86,9 @@ class Hdf5Dataset {
 
   std::string path_;
   Hdf5Handle dataset_, type_, creation_;
-  std::size_t type_bytes_ = 0;   ///< size of an element
-  std::vector<Number> numbers_;  ///< numbers to read of each element
+  std::size_t type_bytes_ = 0;                 ///< size of an element
+  std::optional<std::size_t> seconds_column_;  ///< of fractional numbers
+  std::vector<Number> numbers_;                ///< numbers to read of each element
   std::vector<hsize_t> extent_;
   std::uint64_t rows_ = 0;
   std::uint64_t file_bytes_ = 0;

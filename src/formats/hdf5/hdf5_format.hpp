@@ -7,9 +7,10 @@ namespace eventcamera {
 
 /// Format of an HDF5 file of events.
 enum class Hdf5Format : std::uint8_t {
-  dsec,        ///< /events/{t,x,y,p}, /ms_to_idx, /t_offset
+  dsec,        ///< /events/{t,x,y,p} or /raw_events/{t,x,y,p}, /ms_to_idx, /t_offset
   v2e,         ///< /events, rows of t, x, y, p
   metavision,  ///< /CD/events and /EXT_TRIGGER/events, compressed with ECF
+  mvsec,       ///< /davis/left/events, rows of x, y, t in seconds, p
 };
 
 }  // namespace eventcamera

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <string>
 
 #include "src/core/max_side.hpp"
 #include "src/formats/hdf5/ecf.hpp"
@@ -106,7 +107,7 @@ class NumberTable : public Hdf5Table {
     std::vector<std::int64_t> numbers;
     Microseconds t = 0;
     if (row >= rows_ || !t_dataset().read(row, 1, numbers) ||
-        __builtin_add_overflow(numbers[0], offset_ + lap_of(row), &t))
+        __builtin_add_overflow(numbers[t_column()], offset_ + lap_of(row), &t))
       return std::nullopt;
     return t;
   }
@@ -116,6 +117,7 @@ class NumberTable : public Hdf5Table {
   static constexpr Microseconds half_lap = lap / 2;
 
   virtual Hdf5Dataset& t_dataset() = 0;
+  virtual std::size_t t_column() const { return 0; }  ///< in the rows of t_dataset()
 
   /// Reads t_, x_, y_ and p_. Returns the dataset that could not be read, or nullptr.
   virtual const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) = 0;
@@ -136,16 +138,17 @@ class NumberTable : public Hdf5Table {
   std::int64_t last_ = 0;
 };
 
+/// Columns in a group of any name: the DSEC layout, and others without its index.
 class DsecTable final : public NumberTable {
  public:
-  explicit DsecTable(hid_t file)
+  DsecTable(hid_t file, const std::string& group)
       : NumberTable(Hdf5Format::dsec),
-        columns_{{Hdf5Dataset(file, "events/t"), Hdf5Dataset(file, "events/x"),
-                  Hdf5Dataset(file, "events/y"), Hdf5Dataset(file, "events/p")}} {
+        columns_{{Hdf5Dataset(file, group + "/t"), Hdf5Dataset(file, group + "/x"),
+                  Hdf5Dataset(file, group + "/y"), Hdf5Dataset(file, group + "/p")}} {
     rows_ = columns_[0].rows();
     for (auto& column : columns_) {
       if (column.rank() != 1 || !column.is_integers())
-        throw UnsupportedFormat("HDF5 group /events must hold columns of integers");
+        throw UnsupportedFormat("HDF5 group /" + group + " must hold columns of integers");
       column.require_filters();
       rows_ = std::min(rows_, column.rows());
       claimed_rows_ = std::max(claimed_rows_, column.claimed_rows());
@@ -169,7 +172,7 @@ class DsecTable final : public NumberTable {
     }
     size_ = size_of_attributes(file);
     if (size_ == SensorSize{}) {
-      const Hdf5Handle events(H5Gopen2(file, "events", H5P_DEFAULT), H5Gclose);
+      const Hdf5Handle events(H5Gopen2(file, group.c_str(), H5P_DEFAULT), H5Gclose);
       size_ = size_of_attributes(events.get());
     }
   }
@@ -231,12 +234,16 @@ class DsecTable final : public NumberTable {
   std::optional<Hdf5Dataset> index_;          ///< first event at or after each millisecond
 };
 
-/// The v2e layout, and the uncompressed Metavision layout.
+/// Columns of rows, by their place: t, x, y and p.
+using ColumnOrder = std::array<std::size_t, columns>;
+
+/// The v2e layout, the uncompressed Metavision layout, and that of MVSEC.
 class RowTable final : public NumberTable {
  public:
-  /// `events` has columns t, x, y and p, with 32 bits if `wraps`.
-  RowTable(Hdf5Format format, Hdf5Dataset events, SensorSize size, bool wraps)
-      : NumberTable(format), events_(std::move(events)) {
+  /// Times have 32 bits if `wraps`.
+  RowTable(Hdf5Format format, Hdf5Dataset events, SensorSize size, bool wraps,
+           ColumnOrder order = {0, 1, 2, 3})
+      : NumberTable(format), events_(std::move(events)), order_(order) {
     events_.require_filters();
     size_ = size;
     rows_ = events_.rows();
@@ -246,6 +253,7 @@ class RowTable final : public NumberTable {
 
  protected:
   Hdf5Dataset& t_dataset() override { return events_; }
+  std::size_t t_column() const override { return order_[0]; }
 
   const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) override {
     if (!events_.read(row, count, numbers_)) return &events_;
@@ -253,7 +261,7 @@ class RowTable final : public NumberTable {
     for (std::size_t column = 0; column < columns; ++column) {
       separate[column]->resize(count);
       for (std::size_t i = 0; i < count; ++i)
-        (*separate[column])[i] = numbers_[i * columns + column];
+        (*separate[column])[i] = numbers_[i * columns + order_[column]];
     }
     return nullptr;
   }
@@ -262,6 +270,7 @@ class RowTable final : public NumberTable {
 
  private:
   Hdf5Dataset events_;
+  ColumnOrder order_;
   std::vector<std::int64_t> numbers_;
 };
 
@@ -348,6 +357,18 @@ std::unique_ptr<Hdf5Table> open_v2e(hid_t file) {
   return std::make_unique<RowTable>(Hdf5Format::v2e, std::move(events), size, wraps);
 }
 
+/// MVSEC (A. Z. Zhu et al., "The Multi Vehicle Stereo Event Camera Dataset", 2018): rows of
+/// fractional numbers x, y, t in seconds and p, 1 or -1, of a DAVIS 346B.
+std::unique_ptr<Hdf5Table> open_mvsec(hid_t file) {
+  constexpr std::size_t time_column = 2;
+  Hdf5Dataset events(file, "davis/left/events");
+  if (events.rank() != 2 || events.columns() != columns || !events.take_fractions(time_column))
+    throw UnsupportedFormat(
+        "HDF5 dataset /davis/left/events must hold rows of four fractional numbers x, y, t and p");
+  return std::make_unique<RowTable>(Hdf5Format::mvsec, std::move(events), SensorSize{346, 260},
+                                    false, ColumnOrder{time_column, 0, 1, 3});
+}
+
 std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
   Hdf5Dataset events(file, "CD/events");
   if (events.rank() != 1) throw UnsupportedFormat("HDF5 dataset /CD/events must hold rows");
@@ -363,11 +384,14 @@ std::unique_ptr<Hdf5Table> open_metavision(hid_t file) {
 
 std::unique_ptr<Hdf5Table> Hdf5Table::open(hid_t file) {
   if (Hdf5Dataset::exists(file, "CD/events", H5O_TYPE_DATASET)) return open_metavision(file);
-  if (Hdf5Dataset::exists(file, "events/t", H5O_TYPE_DATASET))
-    return std::make_unique<DsecTable>(file);
+  for (const char* const group : {"events", "raw_events"})
+    if (Hdf5Dataset::exists(file, std::string(group) + "/t", H5O_TYPE_DATASET))
+      return std::make_unique<DsecTable>(file, group);
+  if (Hdf5Dataset::exists(file, "davis/left/events", H5O_TYPE_DATASET)) return open_mvsec(file);
   if (Hdf5Dataset::exists(file, "events", H5O_TYPE_DATASET)) return open_v2e(file);
   throw UnsupportedFormat(
-      "none of the known HDF5 layouts: /events/t (DSEC), /events (v2e), /CD/events (Metavision)");
+      "none of the known HDF5 layouts: /events/t (DSEC, TUM-VIE), /raw_events/t, /events (v2e), "
+      "/CD/events (Metavision), /davis/left/events (MVSEC)");
 }
 
 Hdf5Triggers::Hdf5Triggers(hid_t file) : dataset_(file, "EXT_TRIGGER/events") {

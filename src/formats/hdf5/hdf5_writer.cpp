@@ -419,8 +419,8 @@ std::unique_ptr<Hdf5Writer::Layout> make_layout(hid_t file, const Hdf5Writer::Se
 
 void check(const Hdf5Writer::Settings& settings) {
   const auto [width, height] = settings.size;
-  if (settings.format == Hdf5Format::v2e)
-    throw std::invalid_argument("v2e's HDF5 layout can only be read");
+  if (settings.format != Hdf5Format::dsec && settings.format != Hdf5Format::metavision)
+    throw std::invalid_argument("this HDF5 layout can only be read");
   const bool ecf = settings.format == Hdf5Format::metavision;
   const int limit = ecf ? ecf_max_pixels : max_side;
   if (width <= 0 || height <= 0 || width > limit || height > limit)
