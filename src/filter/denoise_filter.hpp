@@ -35,7 +35,7 @@ class DenoiseFilter {
     unsigned min_neighbours = 2;  ///< of stcf: 1 to 8
     /// In baf and stcf: whether only events of equal polarity support each other.
     bool match_polarity = false;
-    double threshold = 1;          ///< of time_kernel: 0 to 24
+    double threshold = 3;          ///< of time_kernel: 0 to 24
     unsigned search_distance = 9;  ///< of dwf: pixels across plus pixels down
   };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 namespace eventcamera {
@@ -13,15 +14,30 @@ LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
   if (settings.learn && learning_end_ == never && !events.events.empty())
     learning_end_ = start + events.events.front().t + period;
   if (!settings.learn) learning_end_ = never;
-  return events.keep_if([&](const Event& event) {
+  const auto min_count = static_cast<std::uint32_t>(std::clamp(
+      std::ceil(settings.min_rate * static_cast<double>(period) / 1e6), 1.0, double{count_bits}));
+  const auto pixel_of = [origin = reinterpret_cast<std::byte*>(pixels_.row(0)),
+                         stride = pixels_.stride()](const Event& event) {
+    return reinterpret_cast<std::uint32_t*>(origin + event.y() * stride) + event.x;
+  };
+  // Pixels of random events are not in the cache: load those of events to come.
+  constexpr std::size_t distance = 16;
+  if (events.events.empty()) return events;
+  const Event* const last = &events.events.back();
+  const Event* ahead = &events.events[std::min(distance, events.events.size() - 1)];
+  return events.keep_if([=, this, end = learning_end_](const Event& event) mutable {
+    __builtin_prefetch(pixel_of(*ahead), 1);
+    ahead = std::min(ahead + 1, last);
     const Microseconds time = start + event.t;
-    if (time >= learning_end_) [[unlikely]] {
-      // Periods without any event say nothing of hot pixels.
+    if (time >= end) [[unlikely]] {
       learn(settings);
+      // Periods without any event say nothing of hot pixels.
       learning_end_ += (1 + (time - learning_end_) / period) * period;
+      end = learning_end_;
     }
-    auto& pixel = pixels_.row(event.y())[event.x];
-    ++pixel;
+    const std::uint32_t pixel = ++*pixel_of(event);
+    if ((pixel & count_bits) == min_count) [[unlikely]]
+      frequent_.push_back({event.x, static_cast<std::uint16_t>(event.y())});
     return (pixel & hot_bit) == 0;
   });
 }
@@ -41,20 +57,17 @@ std::uint32_t HotPixelFilter::median_around(int x, int y) const {
 }
 
 void HotPixelFilter::learn(const Settings& settings) {
-  const double min_count =
-      std::max(1.0, settings.min_rate * static_cast<double>(settings.learning_period) / 1e9);
   std::vector<PixelPosition> hot;
-  for (int y = 0; y < pixels_.height(); ++y)
-    for (int x = 0; x < pixels_.width(); ++x) {
-      const std::uint32_t count = pixels_.at(x, y) & count_bits;
-      if (count >= min_count && count >= settings.ratio * median_around(x, y))
-        hot.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)});
-    }
+  for (const auto& [x, y] : frequent_)
+    if ((pixels_.at(x, y) & count_bits) >= settings.ratio * median_around(x, y))
+      hot.push_back({x, y});
+  std::ranges::sort(hot, {}, [](const auto& pixel) { return std::pair(pixel.y, pixel.x); });
   clear_counts();
   set_hot_pixels(std::move(hot));
 }
 
 void HotPixelFilter::clear_counts() {
+  frequent_.clear();
   for (int y = 0; y < pixels_.height(); ++y)
     std::for_each_n(pixels_.row(y), pixels_.width(), [](auto& pixel) { pixel &= hot_bit; });
 }

@@ -47,6 +47,7 @@ class HotPixelFilter {
 
   /// Events in the learning period, and whether the pixel is hot.
   Image<std::uint32_t> pixels_;
+  std::vector<PixelPosition> frequent_;  ///< that fired at the minimum rate or more
   std::vector<PixelPosition> hot_;
   Microseconds learning_end_ = never;
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::max();

@@ -63,10 +63,13 @@ class Neighbours {
 template <int radius, class Value>
 HWY_INLINE void find_support(const StampedBatch<Stamp>& batch, Stamp correlation_time,
                              std::uint32_t needed, const Value& value) {
-  constexpr std::size_t distance = 16;
+  // Few enough that what is loaded early stays in the cache.
+  constexpr std::size_t distance = radius == 1 ? 16 : 4;
   const typename Neighbours<radius>::Lanes lanes;
   const Neighbours<radius> neighbours(batch.stride);
   const std::size_t size = batch.events.size();
+  for (std::size_t i = 0; i < std::min(distance, size); ++i)
+    neighbours.prefetch(batch.at(batch.events[i]));
   for (std::size_t i = 0; i < size; ++i) {
     neighbours.prefetch(batch.at(batch.events[std::min(i + distance, size - 1)]));
     const Event event = batch.events[i];

@@ -46,35 +46,36 @@ class StampedPixels {
   /// Filters events: keep(event, now, cell) decides on each, in order.
   template <class Keep>
   LabelledEvents keep_if(LabelledEvents events, Microseconds start, const Keep& keep) {
-    // Pixels of random events are not in the cache: load those of events to come.
-    constexpr std::size_t distance = 16;
-    if (events.events.empty()) return events;
-    const Event* const last = &events.events.back();
-    const Event* ahead = &events.events[std::min(distance, events.events.size() - 1)];
-    return events.keep_if([&](const Event& event) {
-      prefetch(*ahead);
-      ahead = std::min(ahead + 1, last);
-      return keep(event, now(start + event.t), at(event));
+    return keep_batches(events, start, [&](const StampedBatch<Cell>& batch) {
+      // Pixels of random events are not in the cache: load them all at first.
+      std::array<Cell*, max_batch_size> cells;
+      const std::size_t size = batch.events.size();
+      for (std::size_t i = 0; i < size; ++i) {
+        cells[i] = batch.at(batch.events[i]);
+        __builtin_prefetch(cells[i], 1);
+      }
+      for (std::size_t i = 0; i < size; ++i)
+        batch.is_kept[i] = keep(batch.events[i], batch.start + batch.events[i].t, cells[i]);
     });
   }
 
   /// Filters events in batches: decide(batch) sets batch.is_kept of each.
   template <class Decide>
   LabelledEvents keep_batches(LabelledEvents events, Microseconds start, const Decide& decide) {
-    std::array<bool, 256> is_kept;
+    std::array<bool, max_batch_size> is_kept;
     auto rest = events.events;
-    std::span<const Event> batch;
-    std::size_t done = 0;
+    std::size_t next = 0;
+    std::size_t size = 0;
     return events.keep_if([&](const Event& first) {
-      if (done == batch.size()) {
+      if (next == size) {
         const Stamp stamp = now(start + first.t);
-        batch = rest.first(batch_size(rest, stamp, is_kept.size()));
-        rest = rest.subspan(batch.size());
-        decide(StampedBatch<Cell>{batch, stamp - first.t, cells_.row(0), cells_.stride(),
+        size = batch_size(rest, stamp);
+        decide(StampedBatch<Cell>{rest.first(size), stamp - first.t, cells_.row(0), cells_.stride(),
                                   rows_of_on_, is_kept.data()});
-        done = 0;
+        rest = rest.subspan(size);
+        next = 0;
       }
-      return is_kept[done++];
+      return is_kept[next++];
     });
   }
 
@@ -84,9 +85,7 @@ class StampedPixels {
   }
 
  private:
-  Cell* at(const Event& event) {
-    return cells_.row(event.y() + (event.y_p >> 15) * rows_of_on_) + event.x;
-  }
+  static constexpr std::size_t max_batch_size = 128;
 
   Stamp now(Microseconds time) {
     return clock_.at(time, [this](std::uint64_t amount) {
@@ -99,9 +98,9 @@ class StampedPixels {
     });
   }
 
-  /// Number of events, at most `max_size`, whose stamps go on from that of the first.
-  static std::size_t batch_size(std::span<const Event> events, Stamp first, std::size_t max_size) {
-    const auto size = std::min(events.size(), max_size);
+  /// Number of events of a batch, whose stamps go on from that of the first.
+  static std::size_t batch_size(std::span<const Event> events, Stamp first) {
+    const auto size = std::min(events.size(), max_batch_size);
     const std::uint64_t last = first + std::uint64_t{events[size - 1].t} - events.front().t;
     return last < std::uint64_t{1} << stamp_bits ? size : 1;
   }
@@ -111,8 +110,6 @@ class StampedPixels {
     for (int y = 0; y < cells_.height(); ++y)
       std::for_each_n(cells_.row(y), cells_.width(), change);
   }
-
-  void prefetch(const Event& event) { __builtin_prefetch(at(event), 1); }
 
   int rows_of_on_;
   Image<Cell> cells_;

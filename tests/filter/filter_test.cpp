@@ -79,12 +79,13 @@ TEST(Trail, KeepsPartsOfBursts) {
   using eventcamera::TrailMode;
   using reference::BurstPart;
   for (const Microseconds threshold : {1, 1000, 10'000, 100'000})
-    for (const auto& [mode, part] : {std::pair{TrailMode::trail, BurstPart::first},
-                                     {TrailMode::stc_cut_trail, BurstPart::second},
-                                     {TrailMode::stc_keep_trail, BurstPart::all_but_first}})
-      expect_same<eventcamera::TrailFilter>(
-          {.mode = mode, .threshold = threshold * 1000},
-          [&](const Events& events) { return reference::trail(events, part, threshold); });
+    for (const auto& [mode, which] : {std::pair{TrailMode::trail, BurstPart::first},
+                                      {TrailMode::stc_cut_trail, BurstPart::second},
+                                      {TrailMode::stc_keep_trail, BurstPart::all_but_first}})
+      expect_same<eventcamera::TrailFilter>({.mode = mode, .threshold = threshold * 1000},
+                                            [threshold, part = which](const Events& events) {
+                                              return reference::trail(events, part, threshold);
+                                            });
 }
 
 TEST(Denoise, KeepsEventsWithNeighbours) {

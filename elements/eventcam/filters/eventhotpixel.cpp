@@ -21,9 +21,10 @@
  *
  * ## Example launch lines
  * |[
- * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventhotpixel ! eventrender !
- * videoconvert ! autovideosink gst-launch-1.0 filesrc location=recording.raw ! evtdec !
- * eventhotpixel location=hot-pixels.txt learn=false ! eventrender ! videoconvert ! autovideosink
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventhotpixel location=hot-pixels.txt
+ * ! eventrender ! videoconvert ! autovideosink
+ * gst-launch-1.0 filesrc location=recording.raw ! evtdec ! eventhotpixel learn=false
+ * location=hot-pixels.txt ! eventrender ! videoconvert ! autovideosink
  * ]|
  */
 #include <filesystem>
