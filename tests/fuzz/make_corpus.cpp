@@ -65,6 +65,26 @@ std::vector<Seed> tensor_seeds() {
   return seeds;
 }
 
+/// For filter_fuzz: bursts of a pixel, and of its neighbours.
+std::vector<Seed> filter_seeds() {
+  std::vector<Seed> seeds;
+  for (const std::uint8_t neighbours : {1, 3}) {
+    Seed seed{"neighbours-" + std::to_string(neighbours), {}};
+    for (std::uint8_t i = 0; i < 40; ++i)
+      seed.bytes.insert(seed.bytes.end(),
+                        {static_cast<std::uint8_t>(5 + i % neighbours),
+                         static_cast<std::uint8_t>(i / 8 % 2 == 0 ? 4 : 0x84),
+                         static_cast<std::uint8_t>(i % 16 == 15 ? 0xe0 : 0), 0xe8, 3, 0, 0});
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
+std::vector<Seed> pixel_list_seeds() {
+  const std::string text = "# Hot pixels\n1 2\n\n 300, 16383\r\n";
+  return {{"list", {text.begin(), text.end()}}};
+}
+
 /// For rtp_fuzz: streams of both formats.
 std::vector<Seed> rtp_seeds() {
   constexpr SensorSize size{640, 480};
@@ -165,6 +185,8 @@ int main(int argc, char** argv) {
   write(corpus / "hdf5_filters", hdf5_filters_seeds());
   write(corpus / "chunker", chunker_seeds());
   write(corpus / "datagram", datagram_seeds());
+  write(corpus / "filter", filter_seeds());
+  write(corpus / "pixel_list", pixel_list_seeds());
   write(corpus / "rtp", rtp_seeds());
   write(corpus / "tensor", tensor_seeds());
 
