@@ -20,8 +20,9 @@ inline double seconds_now() {
 }
 
 /// Time of a memcpy of these events in seconds, minimum of several runs.
-inline double memcpy_seconds(const std::vector<eventcamera::AbsoluteEvent>& events) {
-  std::vector<eventcamera::AbsoluteEvent> copy(events.size());
+template <class AnyEvent>
+double memcpy_seconds(const std::vector<AnyEvent>& events) {
+  std::vector<AnyEvent> copy(events.size());
   double best = 1;
   for (int i = 0; i < 20; ++i) {
     const double start = seconds_now();

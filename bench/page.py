@@ -9,7 +9,7 @@ def replace_tables(path, source, text):
     with open(path, encoding="utf-8") as file:
         page = file.read()
     begin, end = f"<!-- tables of {source} -->\n", "<!-- end of the tables -->\n"
-    between = re.compile(re.escape(begin) + ".*" + re.escape(end), re.DOTALL)
+    between = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
     if not between.search(page):
         sys.exit(f"{path}: no marker '{begin.strip()}'; add it where the tables belong")
     with open(path, "w", encoding="utf-8") as file:

@@ -45,7 +45,7 @@ for page in README.md docs/learning.md; do
 done
 [ $count -ge 60 ] || fail "found only $count lines"
 for file in events.webm ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
-  webcam.npz "videos/second one.h5" cropped.raw beside.raw quarter.raw turned.raw flat.raw both.raw both.webm rate.png part.raw "arrays/second one.npz"; do
+  webcam.npz "videos/second one.h5" filtered.raw cropped.raw beside.raw quarter.raw turned.raw flat.raw both.raw both.webm rate.png part.raw "arrays/second one.npz"; do
   [ -s "$file" ] || fail "$file is missing or empty"
 done
 event-convert left.raw merged.npz 2>&1 | sed 's/ events.*//' >events
