@@ -11,7 +11,8 @@ ScaleFilter::ScaleFilter(SensorSize in, SensorSize out)
     : is_same_size_(in == out),
       columns_(static_cast<std::size_t>(in.width)),
       rows_(static_cast<std::size_t>(in.height)),
-      cells_(2 * static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height)) {
+      last_kept_(2 * static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height)),
+      counts_(last_kept_.size()) {
   for (int x = 0; x < in.width; ++x)
     columns_[static_cast<std::size_t>(x)] =
         static_cast<std::uint16_t>(std::int64_t{x} * out.width / in.width);
@@ -22,34 +23,45 @@ ScaleFilter::ScaleFilter(SensorSize in, SensorSize out)
 }
 
 void ScaleFilter::forget() {
-  std::ranges::fill(cells_, Cell{});
+  std::ranges::fill(last_kept_, Moment{0});
+  std::ranges::fill(counts_, std::uint16_t{0});
   moment_ = 0;
   time_ = std::numeric_limits<Microseconds>::min() / 2;
 }
 
 LabelledEvents ScaleFilter::filter(LabelledEvents events, Microseconds start,
                                    const Settings& settings) {
-  if (is_same_size_ && settings.min_events <= 1) return events;
+  if (settings.min_events > 1) return filter<true>(events, start, settings.min_events);
+  return is_same_size_ ? events : filter<false>(events, start, 1);
+}
+
+template <bool counts>
+LabelledEvents ScaleFilter::filter(LabelledEvents events, Microseconds start, unsigned min_events) {
   Microseconds previous = time_ - start;
   Moment moment = moment_;  // a local variable, which no store can change
   const auto prefetch = [this](const Event& event) {
-    __builtin_prefetch(&cells_[index(event)], 1);
+    __builtin_prefetch(&last_kept_[index(event)], 1);
+    if constexpr (counts) __builtin_prefetch(&counts_[index(event)], 1);
   };
   const auto kept = keep_if_prefetched(events, prefetch, [&](Event& event) {
     moment = static_cast<Moment>(moment + (event.t != previous ? 1 : 0));
     previous = event.t;
     if (moment == 0) {
-      for (auto& cell : cells_) cell.last_kept = 0;
+      std::ranges::fill(last_kept_, Moment{0});
       moment = 1;
     }
-    auto& cell = cells_[index(event)];
-    const unsigned count = cell.count + 1U;
-    const bool is_due = count >= settings.min_events;
-    const bool is_kept = static_cast<int>(is_due) & static_cast<int>(cell.last_kept != moment);
-    cell = {is_kept ? moment : cell.last_kept, static_cast<std::uint16_t>(is_due ? 0 : count)};
+    const auto place = index(event);
+    bool is_due = true;
+    if constexpr (counts) {
+      const unsigned count = counts_[place] + 1U;
+      is_due = count >= min_events;
+      counts_[place] = static_cast<std::uint16_t>(is_due ? 0 : count);
+    }
+    auto& last_kept = last_kept_[place];
+    const bool is_kept = (static_cast<int>(is_due) & static_cast<int>(last_kept != moment)) != 0;
+    last_kept = is_kept ? moment : last_kept;
     const auto& row = rows_[static_cast<std::size_t>(event.y())];
-    event.x = columns_[event.x];
-    event.y_p = static_cast<std::uint16_t>(row.y | (event.y_p & 0x8000U));
+    event = {event.t, columns_[event.x], static_cast<std::uint16_t>(row.y | (event.y_p & 0x8000U))};
     return is_kept;
   });
   moment_ = moment;

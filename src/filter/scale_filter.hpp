@@ -34,11 +34,6 @@ class ScaleFilter {
   /// Number of a microsecond with events, from 1; 0 is none.
   using Moment = std::uint16_t;
 
-  struct Cell {
-    Moment last_kept = 0;     ///< that of the last event kept
-    std::uint16_t count = 0;  ///< events since
-  };
-
   struct Row {
     std::uint32_t first;  ///< index of its first pixel
     std::uint16_t y;
@@ -49,11 +44,15 @@ class ScaleFilter {
     return (rows_[static_cast<std::size_t>(event.y())].first + columns_[event.x]) * 2U +
            (event.y_p >> 15U);
   }
+  template <bool counts>
+  LabelledEvents filter(LabelledEvents events, Microseconds start, unsigned min_events);
+
   bool is_same_size_;
   std::vector<std::uint16_t> columns_;  ///< of the output, by column of the input
   std::vector<Row> rows_;
-  std::vector<Cell> cells_;  ///< by pixel and polarity
-  Moment moment_ = 0;        ///< of the last event
+  std::vector<Moment> last_kept_;      ///< that of the last event kept, by pixel and polarity
+  std::vector<std::uint16_t> counts_;  ///< events since
+  Moment moment_ = 0;                  ///< of the last event
   Microseconds time_ = std::numeric_limits<Microseconds>::min() / 2;
 };
 
