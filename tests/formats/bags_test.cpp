@@ -305,6 +305,19 @@ TEST_F(Bags, OfDatabasesSurviveCorruptPages) {
   EXPECT_GT(noticed, 10U);
 }
 
+TEST_F(Bags, HaveTheSensorSizeOfTheirFirstPacket) {
+  auto bytes = bytes_of(folder / "evt3-no-chunks.mcap");
+  const std::uint32_t size[] = {260, 346};
+  const std::span<const std::uint8_t> stated(reinterpret_cast<const std::uint8_t*>(size),
+                                             sizeof size);
+  const auto found = std::ranges::search(bytes, stated);
+  ASSERT_FALSE(found.empty());
+  std::ranges::fill(found, 0);
+  BagDecoder decoder("/camera/events");
+  EXPECT_EQ(decoded(decoder, bytes).events, expected.events);
+  EXPECT_EQ(decoder.streams().front().size, SensorSize{});
+}
+
 TEST_F(Bags, AreRefusedWithAReason) {
   const auto refusal = [](const Bytes& bytes) -> std::string {
     BagDecoder decoder("");

@@ -167,8 +167,10 @@ class EventPacketDecoder final : public TopicDecoder {
       corruption_.note(message.position, "an event packet with missing bytes");
       return;
     }
-    take_size(packet.width, packet.height);
-    if (encoding_.empty()) choose(packet);
+    if (encoding_.empty()) {
+      take_size(packet.width, packet.height);
+      choose(packet);
+    }
     if (packet.encoding != encoding_ || packet.is_big_endian) {
       corruption_.note(message.position, "an event packet of another encoding");
       return;
@@ -205,7 +207,7 @@ class EventPacketDecoder final : public TopicDecoder {
   void set_clock_offset(std::uint64_t offset) override { offset_ = offset; }
 
  private:
-  /// Chooses the decoder from the first packet.
+  /// Chooses the decoder from the first packet, whose sensor size holds for all.
   void choose(const EventPacket& packet) {
     struct Words {
       std::string_view encoding;
