@@ -143,7 +143,7 @@ std::vector<Seed> calibration_seeds() {
 /// Pictures of 8 x 4 pixels, in grey and with transparency.
 std::vector<Seed> mask_seeds() {
   std::vector<Seed> seeds;
-  for (const unsigned format : {PNG_FORMAT_GRAY, PNG_FORMAT_RGBA}) {
+  for (const unsigned format : {unsigned{PNG_FORMAT_GRAY}, unsigned{PNG_FORMAT_RGBA}}) {
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
     image.width = 8;
