@@ -14,6 +14,13 @@ from page import replace_tables, run_on
 # Names of the benchmarks: in the table, and bytes per pixel.
 FILTERS = {
     "validation": ("validation of all events, before any filter", "0"),
+    "crop": ("`eventcrop`, to a quarter", "0"),
+    "rotation": ("`eventflip video-direction=90r`", "0"),
+    "polarity": ("`eventpolarity keep=on`", "0"),
+    "mask": ("`eventmask`", "1/8"),
+    "scale": ("`eventscale`, to a quarter", "8 of the output"),
+    "scale-counted": ("`eventscale min-events=4`, to a quarter", "8 of the output"),
+    "undistortion": ("`eventundistort`", "4"),
     "refractory": ("`eventrefractory`", "4"),
     "hot-pixel": ("`eventhotpixel`", "4"),
     "trail": ("`eventtrail`", "4"),

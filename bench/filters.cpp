@@ -12,12 +12,18 @@
 #include <vector>
 
 #include "bench/codec_timing.hpp"
+#include "src/filter/crop_filter.hpp"
 #include "src/filter/denoise_filter.hpp"
 #include "src/filter/flicker_filter.hpp"
+#include "src/filter/flip_filter.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
+#include "src/filter/pixel_mask.hpp"
+#include "src/filter/polarity_filter.hpp"
 #include "src/filter/rate_filter.hpp"
 #include "src/filter/refractory_filter.hpp"
+#include "src/filter/scale_filter.hpp"
 #include "src/filter/trail_filter.hpp"
+#include "src/filter/undistort_filter.hpp"
 #include "src/filter/valid_events.hpp"
 #include "src/formats/evt/raw.hpp"
 #include "tests/formats/recordings.hpp"
@@ -119,8 +125,70 @@ struct Validation {
   SensorSize sensor_size;
 };
 
+/// Size of the output of filters that change it: a quarter of the sensor.
+constexpr SensorSize quarter{sensor.width / 2, sensor.height / 2};
+
+struct Crop : CropFilter {
+  explicit Crop(SensorSize size) : CropFilter(size, quarter) {}
+};
+
+struct Scale : ScaleFilter {
+  explicit Scale(SensorSize size) : ScaleFilter(size, quarter) {}
+};
+
+struct Rotation {
+  struct Settings {};
+
+  explicit Rotation(SensorSize size) : flip(size, {.transpose = true, .mirror_x = true}) {}
+  LabelledEvents filter(LabelledEvents events, Microseconds, const Settings&) const {
+    return flip.filter(events);
+  }
+
+  FlipFilter flip;
+};
+
+/// Drops the pixels of one column in eight.
+struct Mask {
+  struct Settings {};
+
+  explicit Mask(SensorSize size) : mask(size) {
+    for (int y = 0; y < size.height; ++y)
+      for (int x = 0; x < size.width; ++x)
+        if (x % 8 != 0) mask.keep(x, y);
+  }
+  LabelledEvents filter(LabelledEvents events, Microseconds, const Settings&) const {
+    return mask.filter(events);
+  }
+
+  PixelMask mask;
+};
+
+/// Of a wide-angle lens.
+struct Undistort {
+  struct Settings {};
+
+  explicit Undistort(SensorSize size)
+      : undistort(size, {.fx = 900,
+                         .fy = 900,
+                         .cx = size.width / 2.0,
+                         .cy = size.height / 2.0,
+                         .distortion = {-0.3, 0.1, 0, 0, 0}}) {}
+  LabelledEvents filter(LabelledEvents events, Microseconds, const Settings&) const {
+    return undistort.filter(events);
+  }
+
+  UndistortFilter undistort;
+};
+
 void register_all(const Stream& stream) {
   register_filter<Validation>("validation", stream, {});
+  register_filter<Crop>("crop", stream, {.left = 320, .right = 320, .top = 180, .bottom = 180});
+  register_filter<Rotation>("rotation", stream, {});
+  register_filter<PolarityFilter>("polarity", stream, {.keep = PolarityFilter::Kept::on});
+  register_filter<Mask>("mask", stream, {});
+  register_filter<Scale>("scale", stream, {});
+  register_filter<Scale>("scale-counted", stream, {.min_events = 4});
+  register_filter<Undistort>("undistortion", stream, {});
   register_filter<RefractoryFilter>("refractory", stream, {});
   register_filter<HotPixelFilter>("hot-pixel", stream, {});
   register_filter<TrailFilter>("trail", stream, {});
