@@ -22,7 +22,7 @@ START = 1_700_000_000_123_456  # microseconds since 1970
 SENSOR_START = 77_777_777  # clock of the sensor at START
 DELAY = 3_000  # microseconds until a message is recorded
 PER_PACKET = 97
-EVENT_TYPES = {"packet": "event_camera_msgs/EventPacket", "array": "dvs_msgs/EventArray",
+EVENT_TYPES = {"packet": "event_camera_msgs/EventPacket", "old": "event_array_msgs/EventArray", "array": "dvs_msgs/EventArray",
                "prophesee": "prophesee_event_msgs/EventArray"}
 IMAGE_TYPE = "sensor_msgs/Image"
 
@@ -355,6 +355,8 @@ def main():
         write_mcap(folder / f"{name}-ros1.mcap", ros1, topics, "zstd", ros1=True)
         write_bag(folder / f"{name}.bag", ros1, topics)
         write_db3(folder / f"{name}.db3", cdr, topics)
+        if name == "mono":
+            write_db3(folder / "mono-old.db3", cdr, topics_of("old"))
     write_bag(folder / "prophesee-bz2.bag", ros1, topics, "bz2")
     write_bag(folder / "prophesee-lz4.bag", ros1, topics, "lz4")
     write_bag(folder / "prophesee-no-index.bag", ros1, topics, "lz4", index=False)

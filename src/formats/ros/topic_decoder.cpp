@@ -17,6 +17,7 @@ struct MessageType {
 };
 constexpr MessageType message_types[] = {
     {"event_camera_msgs/EventPacket", StreamKind::events, make_event_packet_decoder},
+    {"event_array_msgs/EventArray", StreamKind::events, make_event_packet_decoder},
     {"dvs_msgs/EventArray", StreamKind::events, make_event_array_decoder},
     {"prophesee_event_msgs/EventArray", StreamKind::events, make_event_array_decoder},
     {"sensor_msgs/Image", StreamKind::frames, make_image_decoder},

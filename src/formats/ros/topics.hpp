@@ -8,7 +8,7 @@
 
 namespace eventcamera {
 
-/// event_camera_msgs/EventPacket: encoded events.
+/// event_camera_msgs/EventPacket, formerly event_array_msgs/EventArray: encoded events.
 std::unique_ptr<TopicDecoder> make_event_packet_decoder(const BagTopic& topic,
                                                         Corruption& corruption);
 
