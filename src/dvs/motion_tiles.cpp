@@ -28,8 +28,8 @@ struct FlowRanges {
 
   /// NaN counts as 0.
   FlowRanges(const ImageView<Flow>& flow, const Box& tile) {
-    std::array<float, 2 * MotionTiles::width> lowest{};
-    std::array<float, 2 * MotionTiles::width> highest{};
+    std::array<float, std::size_t{2} * MotionTiles::width> lowest{};
+    std::array<float, std::size_t{2} * MotionTiles::width> highest{};
     const auto count = 2 * static_cast<std::size_t>(tile.width());
     for (int row = tile.top; row < tile.bottom; ++row) {
       const float* values = &flow.row(row)[tile.left].x;
@@ -104,12 +104,13 @@ void MotionTiles::measure(const ImageView<Pixel>& last, const ImageView<Pixel>& 
   last_.measure(last, threads);
   now_.measure(now, threads);
   threads.for_each(rows_, [&](int row, int) {
+    auto* tiles = tiles_.data() + std::ptrdiff_t{row} * columns_;
     for (int column = 0; column < columns_; ++column) {
       const Box box{column * width, row * height, std::min((column + 1) * width, flow.width),
                     std::min((row + 1) * height, flow.height)};
       const FlowRanges ranges(flow, box);
       const auto longest = std::min(ranges.longest(), static_cast<float>(max_side));
-      auto& tile = tiles_[static_cast<std::size_t>(row * columns_ + column)];
+      auto& tile = tiles[column];
       tile = {std::clamp(static_cast<int>(std::ceil(longest)), 1, max_steps),
               std::numeric_limits<Pixel>::max(), 0};
       if (longest > far) {

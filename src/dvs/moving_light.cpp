@@ -92,7 +92,7 @@ void blend_block(const Warp<std::uint8_t>& warp, int left, int y, const BlockMot
 
 #else
 
-using Bytes = hn::FixedTag<std::uint8_t, 2 * block>;
+using Bytes = hn::FixedTag<std::uint8_t, std::size_t{2} * block>;
 using Shorts = hn::FixedTag<std::int16_t, block>;
 using Shades = hn::FixedTag<std::uint16_t, block>;
 using Words = hn::FixedTag<std::int32_t, block / 2>;
@@ -128,7 +128,6 @@ class Sampler {
     const Shorts shorts;
     const auto zero = hn::Zero(shorts);
     const auto fraction = hn::Set(shorts, 63);
-    const auto whole = hn::Set(shorts, 64);
     // Vectors are relative to the pixel (first_x, first_y).
     const int to_x = left + motions.x.first_pixel(k);
     const int to_y = y + motions.y.first_pixel(k);

@@ -40,6 +40,7 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
   const auto white = hn::Set(words, static_cast<std::int32_t>(row_filter.responses.size()) - 1);
   const auto below_saturated =
       hn::Set(words, saturated_luma(static_cast<int>(row_filter.responses.size()) - 1) - 1);
+  const bool needs_shade = row_filter.has_bandwidth || row_filter.has_noise;
   const int shade_shift = row_filter.luma_bits - 8;
   const auto duration = hn::Set(floats, static_cast<float>(row_filter.sub_interval.duration));
   const auto share = hn::Set(floats, static_cast<float>(row_filter.sub_interval.share));
@@ -56,7 +57,10 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
   for (int x = run.first; x < run.last; x += lanes, lumas += lanes, shades += lanes) {
     const int count = std::min(lanes, run.last - x);
     const auto value = hn::Min(load_luma(lumas), white);
-    const auto shade = hn::ShiftRightSame(hn::Min(load_luma(shades), white), shade_shift);
+    auto shade = hn::Zero(words);
+    if (needs_shade)
+      shade = hn::ShiftRightSame(shades == lumas ? value : hn::Min(load_luma(shades), white),
+                                 shade_shift);
     auto target = hn::GatherIndex(floats, responses, value);
     const auto last_target = hn::LoadU(floats, targets + x);
     if (row_filter.keeps_saturated) {
