@@ -376,6 +376,7 @@ static const EventSimulatorMethod dvs = {
         "Turns video into events: simulates the pixels of an event camera and their "
         "noise",
     .threshold = std::nullopt,
+    .labels = true,
     .create = in_system_memory<eventcamera::make_dvs_simulator>,
     .make_settings = []() -> std::shared_ptr<void> { return std::make_shared<Guarded<Choice>>(); },
     .install_properties = install_properties,

@@ -2,6 +2,7 @@
 #include "gst/base/event_buffer.hpp"
 
 #include <algorithm>
+#include <new>
 
 static GstClockTime time_of_last_event(GstBuffer* buffer) {
   const gsize size = gst_buffer_get_size(buffer);
@@ -26,10 +27,20 @@ std::optional<EventInterval> interval_of(GstBuffer* buffer) {
   return EventInterval{start, start + std::min(duration, GstClockTime{G_MAXINT64} - start)};
 }
 
+static std::span<eventcamera::Label> labels_in(const GstEventCameraLabelMeta* meta) {
+  return {reinterpret_cast<eventcamera::Label*>(meta->labels), meta->n_labels};
+}
+
 std::span<eventcamera::Label> labels_of(GstBuffer* buffer) {
   const auto* meta = gst_buffer_get_event_camera_label_meta(buffer);
   if (meta == nullptr) return {};
-  return {reinterpret_cast<eventcamera::Label*>(meta->labels), meta->n_labels};
+  return labels_in(meta);
+}
+
+std::span<eventcamera::Label> add_labels(GstBuffer* buffer, gsize events) {
+  const auto* meta = gst_buffer_add_event_camera_label_meta(buffer, nullptr, events);
+  if (meta == nullptr) throw std::bad_alloc();
+  return labels_in(meta);
 }
 
 void truncate_events(GstBuffer* buffer, gsize count) {

@@ -73,6 +73,9 @@ std::optional<EventInterval> interval_of(GstBuffer* buffer);
 /// Labels of the events of a buffer; they may be changed if it is writable. Empty if it has none.
 std::span<eventcamera::Label> labels_of(GstBuffer* buffer);
 
+/// Adds labels to a writable buffer without any, one for each of its events. Throws std::bad_alloc.
+std::span<eventcamera::Label> add_labels(GstBuffer* buffer, gsize events);
+
 /// Cuts a writable buffer, which must not be mapped, to its first events and their labels.
 void truncate_events(GstBuffer* buffer, gsize count);
 

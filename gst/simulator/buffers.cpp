@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <new>
 
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/event_pool.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "gst/simulator/caps.hpp"
 
+using eventcamera::Event;
 using eventcamera::EventBuckets;
-using eventcamera::ThreadPool;
+using eventcamera::IntervalSimulator;
 
 /* negotiation */
 
@@ -75,15 +77,18 @@ void event_simulator_class_install_buffers(GstBaseTransformClass* klass) {
 /* intervals */
 
 GstFlowReturn event_simulator_write_events(GstBaseTransform* transform, const EventBuckets& events,
-                                           ThreadPool& threads, GstBuffer* in, OwnedBuffer& out) {
+                                           IntervalSimulator& simulator, GstBuffer* in,
+                                           OwnedBuffer& out) {
   GstBuffer* prepared = nullptr;
   const GstFlowReturn result = base_class()->prepare_output_buffer(transform, in, &prepared);
   if (result != GST_FLOW_OK) return result;
   out.reset(prepared);
   GstMapInfo map;
-  event_pool_reserve(prepared, events.size() * sizeof(eventcamera::Event));
+  event_pool_reserve(prepared, events.size() * sizeof(Event));
   if (!gst_buffer_map(prepared, &map, GST_MAP_WRITE)) throw std::bad_alloc();
-  events.write_to(reinterpret_cast<eventcamera::Event*>(map.data), threads);
+  const std::span written(reinterpret_cast<Event*>(map.data), events.size());
+  events.write_to(written.data(), simulator.threads());
+  if (simulator.has_labels()) simulator.label({written, add_labels(prepared, written.size())});
   gst_buffer_unmap(prepared, &map);
   return GST_FLOW_OK;
 }

@@ -5,16 +5,16 @@
 
 #include "gst/base/owned.hpp"
 #include "src/core/event_buckets.hpp"
-#include "src/core/thread_pool.hpp"
+#include "src/simulate/simulator.hpp"
 
 /// For class_init: installs the virtual functions for input and output buffers.
 void event_simulator_class_install_buffers(GstBaseTransformClass* klass);
 
-/// Writes the events of an interval, at least one, to a new buffer. `in` is the frame that ends the
-/// interval. Throws std::bad_alloc.
+/// Writes the events of an interval of `simulator`, at least one, and their labels to a new buffer.
+/// `in` is the frame that ends the interval. Throws std::bad_alloc.
 GstFlowReturn event_simulator_write_events(GstBaseTransform* transform,
                                            const eventcamera::EventBuckets& events,
-                                           eventcamera::ThreadPool& threads, GstBuffer* in,
+                                           eventcamera::IntervalSimulator& simulator, GstBuffer* in,
                                            OwnedBuffer& out);
 
 /// Makes a buffer to draw the events of an interval in, with the metas of `in` that remain valid.

@@ -157,6 +157,15 @@ static void install_interpolated_frames(GObjectClass* klass) {
                         0, max_interpolated_frames, default_interpolated_frames, property_flags));
 }
 
+static void install_label(GObjectClass* klass) {
+  Properties<settings_of>(klass).add(
+      [](Settings& settings) -> bool& { return settings.simulation.labels; },
+      g_param_spec_boolean("label", "Label",
+                           "Label each event with its cause: light, leak, shot noise, hot pixel or "
+                           "exposure pulse. Events drawn as video have no labels",
+                           FALSE, property_flags));
+}
+
 static void install_base_properties(GObjectClass* klass) {
   Properties<settings_of> properties(klass);
   properties.add([](Settings& settings) -> int& { return settings.simulation.threads; },
@@ -303,9 +312,8 @@ void event_simulator_push_interval(GObject* element, Interval interval,
   auto& flow = priv_of(self).stream.flow;
   OwnedBuffer out;
   if (events->size() > 0)
-    flow =
-        event_simulator_write_events(GST_BASE_TRANSFORM(self), *events,
-                                     priv_of(self).state->simulator().threads(), frame.get(), out);
+    flow = event_simulator_write_events(GST_BASE_TRANSFORM(self), *events,
+                                        priv_of(self).state->simulator(), frame.get(), out);
   frame.reset();  // upstream may need it while downstream blocks
   end_work(self, end, began);
   learn_latency(self, start, end);
@@ -591,7 +599,8 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
   auto& stream = priv_of(self).stream;
   auto& state = *priv_of(self).state;
   sync_controlled_properties(self, GST_BUFFER_PTS(in.get()));
-  const Settings settings = priv_of(self).settings.copy();
+  Settings settings = priv_of(self).settings.copy();
+  if (state.draws) settings.simulation.labels = false;
 
   check_interlacing(self, in.get());
   if (!check_time(self, in.get()) || !begin_work(self, in.get())) return;
@@ -685,8 +694,7 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   }
   const OwnedBuffer in(gst_buffer_new());
   OwnedBuffer out;
-  flow =
-      event_simulator_write_events(transform, *events, state.simulator().threads(), in.get(), out);
+  flow = event_simulator_write_events(transform, *events, state.simulator(), in.get(), out);
   if (flow == GST_FLOW_OK)
     flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
                        static_cast<GstClockTime>(end - start));
@@ -862,6 +870,7 @@ static void method_class_init(gpointer klass, gpointer row) {
   method.video.install_pads(GST_ELEMENT_CLASS(klass));
   if (method.threshold) install_thresholds(object_class, *method.threshold);
   if (method.interpolates) install_interpolated_frames(object_class);
+  if (method.labels) install_label(object_class);
   if (method.install_properties != nullptr) method.install_properties(object_class);
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), method.long_name,
                                         "Filter/Effect/Converter/Video", method.description,

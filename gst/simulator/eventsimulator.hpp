@@ -31,6 +31,7 @@ struct EventSimulatorMethod {
   /// does not have these properties.
   std::optional<double> threshold;
   bool interpolates = false;  ///< has the property interpolated-frames
+  bool labels = false;        ///< has the property label
 
   /// Creates the simulator of an element for frames of this format. May throw.
   std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);

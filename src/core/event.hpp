@@ -48,10 +48,14 @@ inline std::span<const Event> events_until(std::span<const Event> events, Micros
   return events.first(static_cast<std::size_t>(first_after - events.begin()));
 }
 
+/// Bits of a coordinate. Simulators carry the cause of an event in the other bits (label.hpp).
+inline constexpr unsigned coordinate_bits = 0x3fff;
+
 /// Order of simulated events: by time, then in raster order.
 inline bool is_before(const Event& a, const Event& b) {
   const auto place = [](const Event& event) {
-    return std::uint64_t{event.t} << 32 | static_cast<std::uint32_t>(event.y()) << 16 | event.x;
+    return std::uint64_t{event.t} << 32 | (event.y_p & coordinate_bits) << 16 |
+           (event.x & coordinate_bits);
   };
   return place(a) < place(b);
 }

@@ -6,11 +6,35 @@
 #include <span>
 
 #include "src/core/event.hpp"
+#include "src/core/max_side.hpp"
 
 namespace eventcamera {
 
-/// What made a simulated pixel fire.
+/// What made a simulated pixel fire (docs/methods.md, Causes of events).
 enum class Cause : std::uint8_t { unknown, light, leak, shot_noise, hot_pixel, exposure_pulse };
+
+static_assert(max_side <= int{coordinate_bits} + 1);
+
+/// An event with its cause in the spare bits of its coordinates, as simulators carry it until
+/// events are written. is_before() ignores these bits.
+constexpr Event with_cause(Event event, Cause cause) {
+  const auto bits = static_cast<unsigned>(cause);
+  event.x = static_cast<std::uint16_t>(event.x | (bits & 3) << 14);
+  event.y_p = static_cast<std::uint16_t>(event.y_p | (bits & 4) << 12);
+  return event;
+}
+
+/// The cause that with_cause() added.
+constexpr Cause cause_of(const Event& event) {
+  return static_cast<Cause>((event.x >> 14 & 3) | (event.y_p >> 12 & 4));
+}
+
+/// The event before with_cause().
+constexpr Event without_cause(Event event) {
+  event.x &= coordinate_bits;
+  event.y_p &= coordinate_bits | 0x8000;
+  return event;
+}
 
 /// Label of an event, in the layout of GstEventCameraLabel.
 struct Label {
@@ -49,5 +73,14 @@ struct LabelledEvents {
     return {events.first(kept), labels.first(kept)};
   }
 };
+
+/// Moves the causes of events from with_cause() to their labels.
+inline void separate_causes(const LabelledEvents& labelled) {
+  for (std::size_t i = 0; i < labelled.events.size(); ++i) {
+    auto& event = labelled.events[i];
+    labelled.labels[i] = {.cause = cause_of(event)};
+    event = without_cause(event);
+  }
+}
 
 }  // namespace eventcamera

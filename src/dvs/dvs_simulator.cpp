@@ -73,6 +73,7 @@ class PixelSimulator final : public DvsSimulator {
     fired_.reset();
     if (readout_) readout_->reset();
     if (gain_ != 1) responses_.clear();  // of another exposure
+    keep_causes();
     adopt(settings_);
     settle();
   }
@@ -97,6 +98,8 @@ class PixelSimulator final : public DvsSimulator {
     finish(duration, events);
     return true;
   }
+
+  void label(const LabelledEvents& events) override { separate_causes(events); }
 
   void keep(const LumaView& frame, Image<Pixel>& kept) {
     const int white = (1 << format().bits) - 1;
@@ -123,12 +126,22 @@ class PixelSimulator final : public DvsSimulator {
 
   /// Returns the duration of the interval in microseconds.
   double begin(const StepTimes& interval, EventBuckets& events) {
+    keep_causes();
     if (settings_ != current_) change_to(settings_);
     if (current_.max_rate > 0 && !readout_) readout_.emplace(format().width, format().height);
     const double duration = in_microseconds(interval.duration());
     fired_.begin(duration, band_count(format().height), readout_ ? unread_ : events);
     scratch_.resize(static_cast<std::size_t>(threads().threads()));
     return duration;
+  }
+
+  /// Begins or ends to find causes.
+  void keep_causes() {
+    if (has_labels() == pixels_.keeps_causes()) return;
+    pixels_.keep_causes(has_labels());
+    if (has_labels()) return;
+    fired_.drop_causes();
+    if (readout_) readout_->drop_causes();
   }
 
   void finish(double duration, EventBuckets& events) {

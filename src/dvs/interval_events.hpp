@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "src/core/event_buckets.hpp"
+#include "src/core/label.hpp"
 
 namespace eventcamera {
 
@@ -13,7 +14,7 @@ namespace eventcamera {
 class IntervalEvents {
  public:
   /// Begins an interval of `duration` microseconds with the deferred events of the last one. Events
-  /// are written to `events`.
+  /// are written to `events`, with_cause().
   void begin(double duration, int bands, EventBuckets& events) {
     duration_ = duration;
     events_ = &events;
@@ -21,22 +22,29 @@ class IntervalEvents {
     deferred_.resize(static_cast<std::size_t>(bands));
     for (int band = 0; band < bands; ++band) {
       due_.swap(deferred_[static_cast<std::size_t>(band)]);
-      for (const auto& [t, event] : due_) add(band, t, event.x, event.y(), event.polarity());
+      for (const auto& [t, event] : due_) add(band, t, event);
       due_.clear();
     }
+  }
+
+  /// Drops the causes of the deferred events.
+  void drop_causes() {
+    for (auto& band : deferred_)
+      for (auto& deferred : band) deferred.event = without_cause(deferred.event);
   }
 
   /// Drops the deferred events.
   void reset() { deferred_.clear(); }
 
-  /// Adds an event `t` microseconds after the start of the interval. Different bands may be added
-  /// from different threads.
-  void add(int band, double t, int x, int y, Polarity polarity) {
-    if (t > duration_)
-      deferred_[static_cast<std::size_t>(band)].push_back(
-          {t - duration_, Event::at(x, y, 0, polarity)});
-    else
-      events_->add(band, Event::at(x, y, static_cast<std::uint32_t>(t), polarity));
+  /// Adds an event `t` microseconds after the start of the interval, instead of its own time.
+  /// Different bands may be added from different threads.
+  void add(int band, double t, Event event) {
+    if (t > duration_) {
+      deferred_[static_cast<std::size_t>(band)].push_back({t - duration_, event});
+      return;
+    }
+    event.t = static_cast<std::uint32_t>(t);
+    events_->add(band, event);
   }
 
  private:
@@ -57,7 +65,9 @@ struct BandEvents {
   IntervalEvents& events;
   int band;
 
-  void add(double t, int x, int y, Polarity polarity) const { events.add(band, t, x, y, polarity); }
+  void add(double t, int x, int y, Polarity polarity, Cause cause) const {
+    events.add(band, t, with_cause(Event::at(x, y, 0, polarity), cause));
+  }
 };
 
 }  // namespace eventcamera

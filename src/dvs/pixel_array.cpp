@@ -40,12 +40,19 @@ double Mismatch::next_threshold(std::uint64_t pixel, Polarity polarity,
                  mean);
 }
 
+double Mismatch::defect_of(std::uint64_t pixel) const {
+  return settings_.dead_pixels + settings_.hot_pixels > 0 ? random_.uniform(pixel, Purpose::defect)
+                                                          : 1;
+}
+
+bool Mismatch::is_hot(std::uint64_t pixel) const {
+  const double defect = defect_of(pixel);
+  return defect >= settings_.dead_pixels && defect < settings_.dead_pixels + settings_.hot_pixels;
+}
+
 PixelTraits Mismatch::of(std::uint64_t pixel) const {
   constexpr double never = std::numeric_limits<double>::infinity();
-  const double defect = settings_.dead_pixels + settings_.hot_pixels > 0
-                            ? random_.uniform(pixel, Purpose::defect)
-                            : 1;
-  if (defect < settings_.dead_pixels) return {never, never, 0};
+  if (defect_of(pixel) < settings_.dead_pixels) return {never, never, 0};
 
   const double positive = fixed_threshold(pixel, Polarity::on);
   const double negative = fixed_threshold(pixel, Polarity::off);
@@ -55,7 +62,7 @@ PixelTraits Mismatch::of(std::uint64_t pixel) const {
     const double spread = settings_.leak_spread * std::numbers::ln10;
     leak_rate *= std::exp(spread * random_.normal(pixel, Purpose::leak) - spread * spread / 2);
   }
-  if (defect < settings_.dead_pixels + settings_.hot_pixels)
+  if (is_hot(pixel))
     leak_rate +=
         min_hot_hz * std::pow(max_hot_hz / min_hot_hz, random_.uniform(pixel, Purpose::heat));
   return {positive, negative, leak_rate * positive / 1e6};
@@ -94,7 +101,16 @@ PixelRow PixelArray::row(int y) {
           leak_.row(y),
           refractory_left_.row(y),
           noise_budget_.row(y),
-          growth_.row(y)};
+          growth_.row(y),
+          last_cause_ ? last_cause_->row(y) : nullptr};
+}
+
+void PixelArray::keep_causes(bool are_kept) {
+  last_cause_.reset();
+  if (!are_kept) return;
+  last_cause_.emplace(width(), growth_.height());
+  for (int y = 0; y < last_cause_->height(); ++y)
+    std::fill_n(last_cause_->row(y), width(), Cause::unknown);
 }
 
 void PixelArray::draw_traits(int y, const DvsSettings& settings, const Random& random) {

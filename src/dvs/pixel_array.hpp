@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
+#include "src/core/label.hpp"
 #include "src/dvs/adaptation.hpp"
 #include "src/dvs/light_response.hpp"
 
@@ -95,6 +97,7 @@ class Mismatch {
       : settings_(settings), random_(random) {}
 
   PixelTraits of(std::uint64_t pixel) const;
+  bool is_hot(std::uint64_t pixel) const;
 
   /// Threshold after event `counter`, if thresholds vary between events.
   double next_threshold(std::uint64_t pixel, Polarity polarity, std::uint64_t counter) const;
@@ -104,6 +107,7 @@ class Mismatch {
   double leaked(std::uint64_t pixel, const PixelTraits& traits, double noise_rate) const;
 
  private:
+  double defect_of(std::uint64_t pixel) const;
   double fixed_threshold(std::uint64_t pixel, Polarity polarity) const;
 
   const DvsSettings& settings_;
@@ -124,6 +128,7 @@ struct PixelRow {
   float* refractory_left;       ///< microseconds until the pixel can fire again; 0 = now
   std::uint32_t* noise_budget;  ///< expected shot noise until the next noise event, 1/noise_unit
   ThresholdGrowth* growth;      ///< as of the last event
+  Cause* last_cause;            ///< of the last event; null if events have no labels
 };
 
 class PixelArray {
@@ -132,6 +137,10 @@ class PixelArray {
 
   int width() const { return target_.width(); }
   PixelRow row(int y);
+
+  /// Begins or ends to keep the causes of events, for labels.
+  void keep_causes(bool are_kept);
+  bool keeps_causes() const { return last_cause_.has_value(); }
 
   /// Draws the thresholds and leak of a row of pixels.
   void draw_traits(int y, const DvsSettings& settings, const Random& random);
@@ -150,6 +159,7 @@ class PixelArray {
   Image<float> refractory_left_;
   Image<std::uint32_t> noise_budget_;
   Image<ThresholdGrowth> growth_;
+  std::optional<Image<Cause>> last_cause_;
 };
 
 }  // namespace eventcamera

@@ -34,7 +34,8 @@ struct PixelLight {
 class Pixel {
  public:
   Pixel(const RowToSolve& row, const Delays& delays, int x, const PixelLight& light)
-      : settings_(row.settings),
+      : row_(row),
+        settings_(row.settings),
         delays_(delays),
         adaptation_(row.settings),
         start_(row.start),
@@ -44,7 +45,6 @@ class Pixel {
         x_(x),
         number_(pixels_.first_number + static_cast<std::uint64_t>(x)),
         draw_(sub_interval_.number * draws_per_sub_interval),
-        events_(row.events),
         above_leak_(light.signal),
         reference_(pixels_.reference[x]),
         positive_(pixels_.positive[x]),
@@ -99,7 +99,8 @@ class Pixel {
     if (t < ready_) return;
     reference_ = now.value;
     const bool is_on = random_.coin(number_, Random::Purpose::event, draw_++);
-    fire(t, is_on ? Polarity::on : Polarity::off);
+    fire(t, is_on ? Polarity::on : Polarity::off,
+         row_.has_labels() ? Cause::shot_noise : Cause::unknown);
   }
 
   /// First crossing of levels that approach the reference while the growth of the thresholds falls.
@@ -137,12 +138,20 @@ class Pixel {
 
   void cross(const Crossing& crossing) {
     const double threshold = crossing.polarity == Polarity::on ? positive_ : -negative_;
-    reference_ += threshold * (1 + adaptation_.at(start_ + crossing.point.t, growth_));
-    if (crossing.point.t >= ready_) fire(crossing.point.t, crossing.polarity);
+    const double growth = adaptation_.at(start_ + crossing.point.t, growth_);
+    reference_ += threshold * (1 + growth);
+    if (crossing.point.t < ready_) return;
+    auto cause = Cause::unknown;
+    if (row_.has_labels()) {
+      const double fall = growth > 0 ? std::abs(threshold) * adaptation_.rate() : 0;
+      const double light = above_leak_.slope_at(crossing.point.t) - leak_;
+      cause = row_.cause_of_crossing(x_, crossing.polarity, light, fall);
+    }
+    fire(crossing.point.t, crossing.polarity, cause);
   }
 
   /// Emits an event and starts the refractory period.
-  void fire(double crossed, Polarity polarity) {
+  void fire(double crossed, Polarity polarity, Cause cause) {
     if (adaptation_.is_on())
       growth_ = {start_ + crossed, adaptation_.at(start_ + crossed, growth_) + adaptation_.step()};
     double t = crossed + delays_.latency;
@@ -150,7 +159,7 @@ class Pixel {
       const double jitter = random_.normal(number_, Random::Purpose::event, draw_++);
       t = std::max(crossed, t + delays_.latency_jitter * jitter);
     }
-    if (!std::isinf(positive_)) events_.add(sub_interval_.begin + t, x_, pixels_.y, polarity);
+    if (!std::isinf(positive_)) row_.add_event(x_, t, polarity, cause);
     released_ = t + delays_.refractory_period;
     ready_ = std::max(released_, t + min_gap);
     held_ = settings_.refractory_reset == RefractoryReset::signal;
@@ -172,6 +181,7 @@ class Pixel {
     if (settings_.adaptation > 0) pixels_.growth[x_] = growth_;
   }
 
+  const RowToSolve& row_;
   const DvsSettings& settings_;
   const Delays& delays_;
   const Adaptation adaptation_;
@@ -182,7 +192,6 @@ class Pixel {
   int x_;
   std::uint64_t number_;
   std::uint64_t draw_;
-  const BandEvents& events_;
 
   Trajectory above_leak_;  ///< the signal relative to a reference without leak
   TrajectoryPoint end_{};
@@ -236,7 +245,11 @@ void solve_lines(const RowToSolve& row) {
       reference = level;
       const double t = change == 0 ? 0 : std::clamp((level - first) / change, 0.0, 1.0) * duration;
       if (t < ready) continue;
-      row.events.add(begin + t, x, pixels.y, rises ? Polarity::on : Polarity::off);
+      const auto polarity = rises ? Polarity::on : Polarity::off;
+      auto cause = Cause::unknown;
+      if (row.has_labels())
+        cause = row.cause_of_crossing(x, polarity, (change - fall) / duration, 0);
+      row.add_event(x, t, polarity, cause);
       ready = t + gap;
     }
     if (happened == max_events) reference = first + change;
@@ -294,7 +307,12 @@ void solve_adaptive_lines(const RowToSolve& row) {
       t += next;
       reference += threshold * (1 + growth);
       if (t < ready) continue;
-      row.events.add(begin + t, x, pixels.y, threshold > 0 ? Polarity::on : Polarity::off);
+      const auto polarity = threshold > 0 ? Polarity::on : Polarity::off;
+      auto cause = Cause::unknown;
+      if (row.has_labels())
+        cause = row.cause_of_crossing(x, polarity, slope - fall / duration,
+                                      growth > 0 ? std::abs(threshold) * rate : 0);
+      row.add_event(x, t, polarity, cause);
       growth += adaptation.step();
       pixels.growth[x] = {row.start + t, growth};
       ready = t + gap;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -100,6 +101,29 @@ struct RowToSolve {
   const Candidates& candidates;
   const BandEvents& events;
   double start;  ///< of the sub-interval, microseconds since the first frame
+
+  bool has_labels() const { return pixels.last_cause != nullptr; }
+
+  /// Cause of a crossing by pixel x, whose threshold is falling at `fall`, in light to which its
+  /// signal answers with the slope `light`; both per microsecond (docs/methods.md).
+  Cause cause_of_crossing(int x, Polarity polarity, double light, double fall) const {
+    const double sign = polarity == Polarity::on ? 1 : -1;
+    const double leak = sign * pixels.leak[x];
+    const double pulse = sign * (sub_interval.rise / sub_interval.duration);
+    const double fastest = std::max({0.0, sign * light, leak, pulse, fall});
+    if (fastest <= sign * light || fastest == 0) return Cause::light;
+    if (fastest == pulse) return Cause::exposure_pulse;
+    if (fastest == fall) return pixels.last_cause[x];
+    const auto number = pixels.first_number + static_cast<std::uint64_t>(x);
+    return Mismatch(settings, random).is_hot(number) ? Cause::hot_pixel : Cause::leak;
+  }
+
+  /// Adds an event of pixel x, `t` microseconds after the start of the sub-interval. The cause is
+  /// unknown unless events have labels.
+  void add_event(int x, double t, Polarity polarity, Cause cause) const {
+    if (has_labels()) pixels.last_cause[x] = cause;
+    events.add(sub_interval.begin + t, x, pixels.y, polarity, cause);
+  }
 };
 
 /// Pixels that solve_row() has not finished: a column per variable, a row per pixel.

@@ -57,10 +57,11 @@ void Readout::admit(const Event& event) {
     free_ = waiting_[static_cast<std::size_t>(place)].next;
   }
   waiting_[static_cast<std::size_t>(place)] = {event, none};
-  auto& row = rows_[static_cast<std::size_t>(event.y())];
+  const int y = without_cause(event).y();
+  auto& row = rows_[static_cast<std::size_t>(y)];
   if (row.count++ == 0) {
     row.first = place;
-    row_queue_[(queue_first_ + queue_count_++) % row_queue_.size()] = event.y();
+    row_queue_[(queue_first_ + queue_count_++) % row_queue_.size()] = y;
   } else {
     waiting_[static_cast<std::size_t>(row.last)].next = place;
   }

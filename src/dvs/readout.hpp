@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "src/core/event_buckets.hpp"
+#include "src/core/label.hpp"
 
 namespace eventcamera {
 
@@ -16,11 +17,16 @@ class Readout {
  public:
   Readout(int width, int height);
 
+  /// Drops the causes of the waiting events.
+  void drop_causes() {
+    for (auto& waiting : waiting_) waiting.event = without_cause(waiting.event);
+  }
+
   /// Drops the waiting events.
   void reset();
 
-  /// Admits the sorted events of an interval of `duration` microseconds, and fills `out` with those
-  /// read out within it; the others wait for the next interval.
+  /// Admits the sorted events of an interval of `duration` microseconds, with_cause(), and fills
+  /// `out` with those read out within it; the others wait for the next interval.
   void pass(std::span<const Event> in, double duration, double events_per_second,
             EventBuckets& out);
 
@@ -41,7 +47,8 @@ class Readout {
   void serve(int row, std::uint32_t t, std::vector<Event>& out);
 
   std::uint8_t& waits(const Event& event) {
-    return waits_[static_cast<std::size_t>(event.y()) * static_cast<std::size_t>(width_) + event.x];
+    const Event pixel = without_cause(event);
+    return waits_[static_cast<std::size_t>(pixel.y()) * static_cast<std::size_t>(width_) + pixel.x];
   }
 
   int width_;

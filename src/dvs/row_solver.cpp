@@ -342,7 +342,7 @@ class RowSolver {
       if (is_set(noise_bits))
         make_noise(i + lane, times[lane], is_set(fire_bits));
       else
-        add_event(x_of(i + lane), times[lane], is_set(on_bits));
+        cross(i + lane, times[lane], is_set(on_bits));
     }
     for (auto bits = bits_of(doubles, hn::And(within, hn::Not(happens))); bits != 0;
          bits &= bits - 1)
@@ -381,10 +381,28 @@ class RowSolver {
   }
   int x_of(std::size_t i) { return row_.candidates.x[index_of(i)]; }
 
-  void add_event(int x, double t, bool is_on) {
-    row_.events.add(row_.sub_interval.begin + t, x, row_.pixels.y,
-                    is_on ? Polarity::on : Polarity::off);
+  /// Adds the event of a crossing by a pixel whose columns still are those before it.
+  void cross(std::size_t i, double t, bool is_on) {
+    const int x = x_of(i);
+    const auto polarity = is_on ? Polarity::on : Polarity::off;
+    auto cause = Cause::unknown;
+    if (row_.has_labels()) {
+      const double light = slope_at(i, t) - fall_of(x);
+      cause = row_.cause_of_crossing(x, polarity, light, 0);
+    }
+    row_.add_event(x, t, polarity, cause);
   }
+
+  /// Slope of a signal relative to its reference, at a time after that of its columns.
+  double slope_at(std::size_t i, double t) {
+    const auto at = [&](Column column) { return unsolved_.column(column)[i]; };
+    const double lag = at(Column::value) - at(Column::offset) - at(Column::slope) * at(Column::t);
+    const double lag_left = lag * decay(at(Column::bandwidth) * (t - at(Column::t)));
+    return at(Column::sign) * (at(Column::slope) - at(Column::bandwidth) * lag_left);
+  }
+
+  /// Fall of the reference per microsecond.
+  double fall_of(int x) const { return row_.pixels.leak[x] + row_.sub_interval.rise / duration_; }
 
   void make_noise(std::size_t i, double t, bool fires) {
     const auto index = index_of(i);
@@ -396,17 +414,18 @@ class RowSolver {
     unsolved_.column(Column::next_noise)[i] = noise.next(duration_);
     if (!fires) return;
     const bool is_on = row_.random.coin(number, Random::Purpose::event, draw++);
-    if (!std::isinf(row_.pixels.positive[x])) add_event(x, t, is_on);
+    if (!std::isinf(row_.pixels.positive[x]))
+      row_.add_event(x, t, is_on ? Polarity::on : Polarity::off,
+                     row_.has_labels() ? Cause::shot_noise : Cause::unknown);
   }
 
   void store(std::size_t i) {
     const auto index = index_of(i);
     const int x = row_.candidates.x[index];
     const auto& pixels = row_.pixels;
-    const double fall = pixels.leak[x] + row_.sub_interval.rise / duration_;
     const double reference =
         unsolved_.column(Column::sign)[i] * unsolved_.column(Column::reference)[i];
-    pixels.reference[x] = static_cast<float>(reference - fall * duration_);
+    pixels.reference[x] = static_cast<float>(reference - fall_of(x) * duration_);
     pixels.refractory_left[x] =
         static_cast<float>(std::max(0.0, unsolved_.column(Column::ready)[i] - duration_));
     pixels.noise_budget[x] = unsolved_.noise[index].left();

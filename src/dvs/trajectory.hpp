@@ -43,6 +43,10 @@ struct Trajectory {
     return lag == 0 ? straight : straight + lag * decay(bandwidth * t);
   }
 
+  double slope_at(double t) const {
+    return lag == 0 ? slope : slope - bandwidth * lag * decay(bandwidth * t);
+  }
+
   /// A straight line from one value to another.
   static Trajectory line(double from, double to, double duration) {
     return {.offset = from, .slope = (to - from) / duration};

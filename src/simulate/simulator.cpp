@@ -7,6 +7,7 @@ namespace eventcamera {
 
 std::optional<StepTimes> IntervalSimulator::steps_to(Nanoseconds time, const Settings& settings) {
   threads_.set_threads(settings.threads);
+  labels_ = settings.labels;
   if (!last_time_) return std::nullopt;
   assert(time > *last_time_ && time - *last_time_ <= max_interval);
   return StepTimes(time - *last_time_, settings.interpolated_frames + 1);
@@ -19,6 +20,7 @@ const EventBuckets* IntervalSimulator::hold_until(Nanoseconds time, const Settin
   last_time_ = time;
   if (duration <= 0 || duration > max_interval) return nullptr;
   threads_.set_threads(settings.threads);
+  labels_ = settings.labels;
   return hold(StepTimes(duration, 1), settings, events_) ? &events_ : nullptr;
 }
 

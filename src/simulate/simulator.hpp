@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "src/core/event_buckets.hpp"
+#include "src/core/label.hpp"
 #include "src/core/luma.hpp"
 #include "src/core/thread_pool.hpp"
 
@@ -17,6 +18,7 @@ struct Settings {
   double negative_threshold = 20;  ///< C-, 8-bit grey levels, a magnitude; a fall must exceed it
   int interpolated_frames = 10;    ///< n, between two frames; 0 or more
   int threads = 0;                 ///< thread limit for one frame; 0 = one per processor
+  bool labels = false;             ///< label the events, if the simulator can
 };
 
 /// C+ and C- in the grey levels of a frame, integers like its pixel differences.
@@ -72,6 +74,12 @@ class IntervalSimulator {
   /// without any change (noise), valid until the next call; nullptr if the simulator has none.
   const EventBuckets* hold_until(Nanoseconds time, const Settings& settings = {});
 
+  /// True if the events of the last interval have labels, which label() writes.
+  bool has_labels() const { return labels_; }
+
+  /// Writes the labels of all events of the last interval, which EventBuckets::write_to() wrote.
+  virtual void label(const LabelledEvents&) {}
+
   /// Forgets all frames; the next one is a first frame.
   void reset();
 
@@ -96,6 +104,7 @@ class IntervalSimulator {
  private:
   LumaFormat format_;
   ThreadPool threads_;
+  bool labels_ = false;
 };
 
 /// Simulates the events between frames, on the CPU, in one call per frame. The same frames, times

@@ -18,6 +18,7 @@
 #include "src/dvs/trajectory.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/dvs/playback.hpp"
 #include "tests/reference/dvs.hpp"
 #include "tests/simulate/scene.hpp"
 
@@ -36,19 +37,9 @@ namespace {
 
 using namespace eventcamera;
 
-using reference::TimedEvent;  // `t` is relative to the first frame
-
-using Pixels = std::map<std::pair<int, int>, std::vector<TimedEvent>>;
-
-Pixels by_pixel(const std::vector<TimedEvent>& events) {
-  Pixels pixels;
-  for (const auto& event : events) pixels[{event.x, event.y}].push_back(event);
-  return pixels;
-}
-
 /// Expects the same number of events, up to a fraction `tolerance` (or one event), and a fraction
-/// of at least `equal_share` with the expected polarity and a time that differs by at most
-/// `precision` microseconds.
+/// of at least `equal_share` with the expected polarity and cause and a time that differs by at
+/// most `precision` microseconds.
 void expect_near(const std::vector<TimedEvent>& found, const std::vector<TimedEvent>& expected,
                  double tolerance, double equal_share, double precision) {
   const auto count = static_cast<double>(expected.size());
@@ -58,44 +49,11 @@ void expect_near(const std::vector<TimedEvent>& found, const std::vector<TimedEv
   for (const auto& [place, events] : by_pixel(expected)) {
     const auto& ours = found_pixels[place];
     for (std::size_t i = 0; i < std::min(events.size(), ours.size()); ++i)
-      equal +=
-          ours[i].polarity == events[i].polarity && std::abs(ours[i].t - events[i].t) <= precision;
+      equal += ours[i].polarity == events[i].polarity && ours[i].cause == events[i].cause &&
+               std::abs(ours[i].t - events[i].t) <= precision;
   }
   EXPECT_GT(equal, equal_share * count);
 }
-
-/// Pushes frames to a simulator and collects its events.
-class Playback {
- public:
-  Playback(const LumaFormat& format, const DvsSettings& settings, int threads = 2)
-      : simulator_(make_dvs_simulator(format)) {
-    simulator_->set(settings);
-    common_.threads = threads;
-  }
-
-  template <class Pixel>
-  void push(const Image<Pixel>& frame, int bits, Nanoseconds time) {
-    const auto last = simulator_->last_time();
-    const auto* made = simulator_->push(scene::luma(frame.view(), bits), time, common_);
-    if (made == nullptr) return;
-    const auto interval = scene::copy(*made);
-    EXPECT_TRUE(scene::sorted(interval));
-    for (const auto& event : interval) {
-      EXPECT_LE(event.t, (time - *last) / 1000);
-      events.push_back(
-          {static_cast<double>(*last) / 1000 + event.t, event.x, event.y(), event.polarity()});
-    }
-  }
-
-  void set(const DvsSettings& settings) { simulator_->set(settings); }
-  DvsSimulator& simulator() { return *simulator_; }
-
-  std::vector<TimedEvent> events;
-
- private:
-  std::unique_ptr<DvsSimulator> simulator_;
-  Settings common_;
-};
 
 TEST(Decay, IsTheExponentialFunction) {
   for (double x = 0; x < 690; x += 0.0137 * (1 + x / 10))
@@ -156,6 +114,7 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
   std::minstd_rand draw(5);
   std::uniform_real_distribution<float> level(0, 1.5F);
   PixelArray array(width, 1);
+  array.keep_causes(true);
   const auto pixels = array.row(0);
   std::generate_n(pixels.target, width, [&] { return level(draw); });
   array.draw_traits(0, settings, random);
@@ -183,9 +142,11 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
   events.begin(sub_interval.duration, 1, buckets);
   solve(RowToSolve{settings, random, sub_interval, tables, pixels, candidates, {events, 0}, 0});
   Solved result;
-  for (const auto& event : scene::copy(buckets))
-    result.events[{event.x, 0}].push_back(
-        {static_cast<double>(event.t), event.x, 0, event.polarity()});
+  for (const auto& event : scene::copy(buckets)) {
+    const int x = without_cause(event).x;
+    result.events[{x, 0}].push_back(
+        {static_cast<double>(event.t), x, 0, event.polarity(), cause_of(event)});
+  }
   for (const float* row : {pixels.reference, pixels.refractory_left})
     result.state.insert(result.state.end(), row, row + width);
   result.noise_budgets.assign(pixels.noise_budget, pixels.noise_budget + width);
@@ -201,6 +162,7 @@ void expect_equal(const Solved& found, const Solved& expected) {
     for (std::size_t i = 0; i < events.size(); ++i) {
       EXPECT_NEAR(ours[i].t, events[i].t, 1) << place.first;
       EXPECT_EQ(ours[i].polarity, events[i].polarity) << place.first;
+      EXPECT_EQ(ours[i].cause, events[i].cause) << place.first;
     }
   }
   for (std::size_t i = 0; i < expected.state.size(); ++i)
@@ -263,16 +225,6 @@ TEST(Dvs, EqualsTheRuleOfEsim) {
 
 constexpr double second = 1e6;
 
-Image<std::uint8_t> flat(int width, int height, int grey) {
-  return scene::flat<std::uint8_t>(width, height, grey);
-}
-
-/// Repeats the same image for `frames` frames.
-void stand(Playback& playback, const Image<std::uint8_t>& picture, int frames,
-           Nanoseconds frame_time) {
-  for (int i = 0; i <= frames; ++i) playback.push(picture, 8, i * frame_time);
-}
-
 class Reference : public testing::TestWithParam<DvsSettings> {};
 INSTANTIATE_TEST_SUITE_P(
     , Reference,
@@ -299,7 +251,7 @@ TEST_P(Reference, IsEqualled) {
   constexpr int width = 19;
   constexpr int height = 3;
   const auto settings = GetParam();
-  Playback playback({width, height, 16}, settings);
+  Playback playback({width, height, 16}, settings, {.threads = 2, .labels = true});
   const Random random(settings.seed);
   const Mismatch mismatch(settings, random);
   std::vector<reference::DvsPixel> pixels;
@@ -316,7 +268,7 @@ TEST_P(Reference, IsEqualled) {
           continue;
         }
         for (const auto& event : pixels[pixel].push(luma, 40'000))
-          expected.push_back({event.t, x, y, event.polarity});
+          expected.push_back({event.t, x, y, event.polarity, event.cause});
       }
     }
   }
@@ -463,27 +415,6 @@ TEST(Dvs, GivesRampsTheirExactTimes) {
       ASSERT_NEAR(events[i].t + 0.5, 40'000 * 0.2 * (static_cast<double>(i) + 1) / std::log(255),
                   0.51);
   }
-}
-
-DvsSettings everything() {
-  return {.denoise = 4,
-          .response = Response::log,
-          .cutoff_frequency = 60,
-          .threshold_sigma = 0.03,
-          .threshold_jitter = 0.02,
-          .leak_rate = 3,
-          .leak_spread = 0.2,
-          .shot_noise_rate = 8,
-          .hot_pixels = 0.01,
-          .dead_pixels = 0.02,
-          .refractory_period = 400'000,
-          .refractory_reset = RefractoryReset::signal,
-          .exposure_pulse = 0.05,
-          .exposure_lead = 9'000'000,
-          .pixel_latency = 300'000,
-          .pixel_latency_jitter = 100'000,
-          .max_rate = 2e7,
-          .seed = 11};
 }
 
 /// All events of a short video whose rows have `padding` bytes past their end.

@@ -10,6 +10,7 @@
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
+#include "src/core/label.hpp"
 #include "src/dvs/dvs_settings.hpp"
 #include "src/flow/dense_flow.hpp"
 
@@ -139,6 +140,7 @@ struct TimedEvent {
   int x;
   int y;
   Polarity polarity;
+  Cause cause = Cause::unknown;
 };
 
 /// ESIM's rule (Rebecq et al., CoRL 2018): L = ln(eps + I/255) changes linearly from a at t0 to b
@@ -196,6 +198,9 @@ class Esim {
 ///   most 1 leak       dR/dt = -rate C+ events     ON where V - R >= (1 + G) C+, OFF where R - V >=
 ///   (1 + G) C- adaptation G grows by a with each event; dG/dt = -a / T down to 0 afterwards R = R
 ///   +- (1 + G) C, G before the event (level), or R = V when the refractory period ends (signal)
+///   cause      what moves V - R fastest towards the threshold as it is crossed: light dV/dt, the
+///   leak -dR/dt, or the fall of the threshold, which has the cause of the last event; light if
+///   none
 class DvsPixel {
  public:
   DvsPixel(const DvsSettings& settings, double luma, double leaked)
@@ -216,10 +221,13 @@ class DvsPixel {
                              (std::min(light(shade) / gain, 1.0) + dark) / (1 + dark);
     // Sampled every microsecond, the line is exact to the resolution of events.
     for (int i = 1; i <= microseconds; ++i, ++now_) {
+      const double last_signal = signal_;
       input_ = last + (next - last) * i / microseconds;
       signal_ = settings_.cutoff_frequency > 0 ? input_ + (signal_ - input_) * std::exp(-bandwidth)
                                                : input_;
-      reference_ -= settings_.leak_rate / 1e6 * settings_.positive_threshold;
+      const double leak = settings_.leak_rate / 1e6 * settings_.positive_threshold;
+      reference_ -= leak;
+      const double last_growth = growth_;
       growth_ = std::max(
           0.0, growth_ - settings_.adaptation / in_microseconds(settings_.adaptation_time));
       const bool is_refractory = now_ + 1 < ready_;
@@ -233,8 +241,18 @@ class DvsPixel {
       if (!is_on && reference_ - signal_ < negative) continue;
       reference_ += is_on ? positive : -negative;
       if (is_refractory) continue;
+      const double by_light = std::max(0.0, is_on ? signal_ - last_signal : last_signal - signal_);
+      const double by_leak = is_on ? leak : 0;
+      const double by_fall = growth_ > 0
+                                 ? (last_growth - growth_) * (is_on ? settings_.positive_threshold
+                                                                    : settings_.negative_threshold)
+                                 : 0;
+      if (by_leak > by_light && by_leak >= by_fall)
+        last_cause_ = Cause::leak;
+      else if (by_light >= by_fall)
+        last_cause_ = Cause::light;
       growth_ += settings_.adaptation;
-      events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off});
+      events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off, last_cause_});
       ready_ = now_ + 1 + in_microseconds(settings_.refractory_period);
       if (settings_.refractory_reset == RefractoryReset::signal) reference_ = signal_;
     }
@@ -259,6 +277,7 @@ class DvsPixel {
   double input_;
   double signal_;
   double reference_ = 0;
+  Cause last_cause_ = Cause::unknown;
   double now_ = 0;
   double ready_ = 0;
   double growth_ = 0;
