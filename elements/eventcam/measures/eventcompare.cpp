@@ -25,7 +25,13 @@
  *   events, chosen by chance (split halves, Spearman-Brown); a good simulator can come out slightly
  *   above, since a camera's events are more regular than chance;
  * - `rate-curve` (#GstStructure): event counts in bins of `bin` ns (#guint64), as two arrays,
- *   `reference` and `candidate`.
+ *   `reference` and `candidate`;
+ * - `classification` (#GstStructure), if the events of both are labelled (#GstEventSimDvs:label):
+ *   how well a filter from the reference to the candidate tells light from noise.
+ *   `true-positives`, `false-positives`, `true-negatives`, `false-negatives` (#guint64): light that
+ *   is kept, noise that is kept, noise that is dropped, light that is dropped;
+ *   `true-positive-rate` (recall), `false-positive-rate` and `precision` (#gdouble). Events of
+ *   unknown cause do not count.
  *
  * The same is written to #GstEventCompare:location as JSON. #GstEventCompare:map shows the events
  * per pixel of the reference, of the candidate and of their difference, blue if the candidate has
@@ -36,6 +42,11 @@
  * gst-launch-1.0 eventcompare name=compare location=figures.json ! fakesink  filesrc
  * location=real.raw ! evtdec ! compare.reference  filesrc location=drive.mp4 ! decodebin !
  * eventsim-dense ! compare.candidate
+ * ]|
+ * |[
+ * gst-launch-1.0 -m eventcompare name=compare ! fakesink  videotestsrc pattern=ball
+ * num-buffers=100 ! eventsim-dvs preset=davis346 label=true ! tee name=t ! queue !
+ * compare.reference  t. ! queue ! compare.candidate
  * ]|
  */
 #include <algorithm>
@@ -53,6 +64,8 @@ GST_DEBUG_CATEGORY_STATIC(event_compare_debug);
 #define GST_CAT_DEFAULT event_compare_debug
 
 using eventcamera::both_roles;
+using eventcamera::CauseCounts;
+using eventcamera::Classification;
 using eventcamera::PerRole;
 using eventcamera::StreamComparison;
 using eventcamera::StreamRole;
@@ -78,7 +91,7 @@ class EventCompare final : public EventAggregator {
 
   bool start() override { return can_report(element(), settings.copy()); }
   void stop() override;
-  void flush() override { comparison_.reset(); }
+  void flush() override { forget(); }
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
 
@@ -86,6 +99,8 @@ class EventCompare final : public EventAggregator {
 
  private:
   bool is_over(StreamRole role) const;
+  bool waits_for_reference() const;
+  void forget();
   bool begin();
   void compare(StreamRole role, GstBuffer* buffer);
   GstFlowReturn take_next();
@@ -96,6 +111,7 @@ class EventCompare final : public EventAggregator {
   // Accessed by the source pad's thread only, or while there is none.
   PerRole<std::optional<Sensor>> sensors_;
   std::optional<StreamComparison> comparison_;  // set once both sensors are known
+  PerRole<CauseCounts> causes_;                 // of the labelled events in it
   bool concluded_ = true;                       // no events since the last report
 };
 
@@ -140,7 +156,18 @@ GstStructure* curve_of(const eventcamera::RateCurve& rates) {
   return curve;
 }
 
-GstStructure* structure_of(const StreamComparison& comparison) {
+GstStructure* structure_of(const Classification& classification) {
+  return gst_structure_new("classification", "true-positives", G_TYPE_UINT64,
+                           guint64{classification.true_positives}, "false-positives", G_TYPE_UINT64,
+                           guint64{classification.false_positives}, "true-negatives", G_TYPE_UINT64,
+                           guint64{classification.true_negatives}, "false-negatives", G_TYPE_UINT64,
+                           guint64{classification.false_negatives}, "true-positive-rate",
+                           G_TYPE_DOUBLE, classification.true_positive_rate, "false-positive-rate",
+                           G_TYPE_DOUBLE, classification.false_positive_rate, "precision",
+                           G_TYPE_DOUBLE, classification.precision, nullptr);
+}
+
+GstStructure* structure_of(const StreamComparison& comparison, const PerRole<CauseCounts>& causes) {
   const auto figures = comparison.figures();
   GstStructure* structure =
       gst_structure_new("eventcompare", "start", G_TYPE_INT64, gint64{figures.start}, "end",
@@ -148,6 +175,7 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   for (const auto role : both_roles) {
     GstStructure* stream = gst_structure_new_empty(name_of(role));
     put_figures(stream, figures.streams[role]);
+    put_causes(stream, causes[role]);
     put_structure(structure, name_of(role), stream);
   }
   const auto& similarity = figures.similarity;
@@ -161,6 +189,11 @@ GstStructure* structure_of(const StreamComparison& comparison) {
   put_structure(ceiling, "matches", matches_of(figures.ceiling.matches));
   put_structure(structure, "noise-ceiling", ceiling);
   put_structure(structure, "rate-curve", curve_of(comparison.rates()));
+  const auto& reference = causes[StreamRole::reference];
+  const auto& candidate = causes[StreamRole::candidate];
+  if (reference.all() > 0 && candidate.all() > 0)
+    put_structure(structure, "classification",
+                  structure_of(Classification::of(reference, candidate)));
   return structure;
 }
 
@@ -171,7 +204,7 @@ void EventCompare::conclude() {
   const auto& comparison = comparison_ ? *comparison_ : nothing;
   GST_DEBUG_OBJECT(element(), "concluding%s",
                    comparison_ ? "" : ": the caps of one of the streams never came");
-  report(element(), settings.copy(), structure_of(comparison), [&] {
+  report(element(), settings.copy(), structure_of(comparison, causes_), [&] {
     return eventcamera::draw_maps(comparison.map(StreamRole::reference),
                                   comparison.map(StreamRole::candidate));
   });
@@ -194,11 +227,23 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   const auto skipped =
       comparison_->add(role, mapped.events(), stream_time(segment, interval->start),
                        stream_time(segment, interval->end));
+  causes_[role].add(labels_of(buffer));
   if (skipped > 0) warn(EventFault::beyond_sensor, buffer);
+}
+
+void EventCompare::forget() {
+  comparison_.reset();
+  causes_ = {};
 }
 
 bool EventCompare::is_over(StreamRole role) const {
   return gst_aggregator_pad_is_eos(pads_[role]) && !gst_aggregator_pad_has_buffer(pads_[role]);
+}
+
+/// True if the reference does not cover all that has been read of the candidate yet.
+bool EventCompare::waits_for_reference() const {
+  return comparison_ && comparison_->behind() == StreamRole::reference &&
+         !is_over(StreamRole::reference);
 }
 
 /// Starts the comparison once both sensors are known. Returns true if it is running. May throw.
@@ -234,7 +279,7 @@ GstFlowReturn EventCompare::take_next() {
 }
 
 GstFlowReturn EventCompare::aggregate(bool) {
-  if (is_over(StreamRole::candidate)) {
+  if (is_over(StreamRole::candidate) && !waits_for_reference()) {
     conclude();
     return GST_FLOW_EOS;
   }
@@ -258,14 +303,14 @@ bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
   const Sensor next{info.width, info.height};
-  if (sensor != next) comparison_.reset();
+  if (sensor != next) forget();
   sensor = next;
   return true;
 }
 
 void EventCompare::stop() {
   if (comparison_ && !concluded_) conclude();
-  comparison_.reset();
+  forget();
   sensors_ = {};
 }
 

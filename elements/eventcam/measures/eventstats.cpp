@@ -17,7 +17,11 @@
  *   and near 0 if a simulator puts many events at the times of few frames;
  * - `mean`, `std-dev` (#gdouble): over all pixels, events per pixel and second;
  * - `interval-p5`, `-p25`, `-p50`, `-p75`, `-p95` (#guint64, ns): percentiles of the time between
- *   successive events of a pixel, accurate to 3 %.
+ *   successive events of a pixel, accurate to 3 %;
+ * - if events are labelled (#GstEventSimDvs:label): `light-events`, `leak-events`,
+ *   `shot-noise-events`, `hot-pixel-events`, `exposure-pulse-events` and `unknown-events`
+ *   (#guint64), by cause. After a denoiser, light events are its true positives, and those of other
+ *   known causes its false positives.
  *
  * At EOS or on stop (Ctrl-C), the statistics of the whole stream are written to
  * #GstEventStats:location as JSON, and an image of the events per pixel to #GstEventStats:map.
@@ -25,6 +29,10 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 -m filesrc location=recording.raw ! evtdec ! eventstats map=map.png ! fakesink
+ * ]|
+ * |[
+ * gst-launch-1.0 -m videotestsrc pattern=ball num-buffers=100 ! eventsim-dvs preset=davis346
+ * label=true ! eventstats ! fakesink
  * ]|
  */
 #include <gst/base/gstbasetransform.h>
@@ -47,6 +55,7 @@
 GST_DEBUG_CATEGORY_STATIC(event_stats_debug);
 #define GST_CAT_DEFAULT event_stats_debug
 
+using eventcamera::CauseCounts;
 using eventcamera::EventStatistics;
 using eventcamera::EventValidator;
 using eventcamera::LastTimes;
@@ -62,11 +71,13 @@ struct Settings : ReportFiles {
 /// Statistics of a part of the stream.
 struct Part {
   EventStatistics statistics;
+  CauseCounts causes{};
   std::optional<Nanoseconds> start{};  ///< in stream time
   Nanoseconds covered = 0;
 
   void restart() {
     statistics.restart();
+    causes = {};
     start.reset();
     covered = 0;
   }
@@ -127,6 +138,7 @@ static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulati
       "eventstats", "cumulative", G_TYPE_BOOLEAN, cumulative ? TRUE : FALSE, "start", G_TYPE_INT64,
       gint64{start}, "end", G_TYPE_INT64, gint64{end}, nullptr);
   put_figures(structure, part.statistics.figures(part.covered));
+  put_causes(structure, part.causes);
   return structure;
 }
 
@@ -199,6 +211,8 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
         measurement.cumulative.statistics.add(event, interval);
         measurement.recent.statistics.add(event, interval);
       });
+  for (auto* part : {&measurement.cumulative, &measurement.recent})
+    part->causes.add(labels_of(buffer));
   if (skipped > 0) self->priv->faults.warn(self, EventFault::beyond_sensor, buffer);
 }
 

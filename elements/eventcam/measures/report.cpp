@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
+using eventcamera::CauseCounts;
 using eventcamera::interval_shares;
 using eventcamera::StreamFigures;
 
@@ -99,6 +100,17 @@ void put_figures(GstStructure* structure, const StreamFigures& figures) {
   for (std::size_t i = 0; i < interval_names.size(); ++i)
     gst_structure_set(structure, interval_names[i], G_TYPE_UINT64,
                       static_cast<guint64>(figures.intervals[i]) * GST_USECOND, nullptr);
+}
+
+void put_causes(GstStructure* structure, const CauseCounts& causes) {
+  static constexpr std::array names = {"unknown-events",   "light-events",
+                                       "leak-events",      "shot-noise-events",
+                                       "hot-pixel-events", "exposure-pulse-events"};
+  static_assert(names.size() == CauseCounts::causes.size());
+  if (causes.all() == 0) return;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    gst_structure_set(structure, names[i], G_TYPE_UINT64, guint64{causes[CauseCounts::causes[i]]},
+                      nullptr);
 }
 
 eventcamera::Nanoseconds stream_time(const GstSegment& segment, GstClockTime time) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "gst/base/properties.hpp"
+#include "src/measure/cause_counts.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/map_picture.hpp"
 #include "src/simulate/simulator.hpp"
@@ -34,6 +35,9 @@ eventcamera::Nanoseconds stream_time(const GstSegment& segment, GstClockTime tim
 
 /// Sets the fields for the statistics of one stream.
 void put_figures(GstStructure* structure, const eventcamera::StreamFigures& figures);
+
+/// Sets the fields of labelled events by cause; none if no event has a label.
+void put_causes(GstStructure* structure, const eventcamera::CauseCounts& causes);
 
 /// Checks that the folders of these files exist. Posts an error and returns false if not.
 bool can_report(gpointer element, const ReportFiles& files);
