@@ -316,7 +316,9 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
     GstFlowReturn result = GST_FLOW_OK;
     const bool encoded = priv.writable.take(taken, [&](const auto& events) {
       if (result == GST_FLOW_OK) result = push_header(self, start);
-      if (result == GST_FLOW_OK) result = encode_all(self, events, start);
+      if (result != GST_FLOW_OK) return;
+      priv.state->encoder->label(priv.writable.labels());
+      result = encode_all(self, events, start);
     });
     if (!encoded) return GST_FLOW_ERROR;
     warn_of_pauses(self, false);

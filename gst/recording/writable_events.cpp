@@ -8,6 +8,7 @@
 
 using eventcamera::AbsoluteEvent;
 using eventcamera::Event;
+using eventcamera::Label;
 using eventcamera::Microseconds;
 using eventcamera::SensorSize;
 using eventcamera::TemporaryFileError;
@@ -55,8 +56,10 @@ void WritableEvents::report_buffer(GstBuffer* buffer) const {
 }
 
 std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> events,
-                                                    Microseconds start) {
+                                                    Microseconds start,
+                                                    std::span<const Label> labels) {
   picked_.clear();
+  picked_labels_.clear();
   std::size_t before_last_left_out = 0;
   for (const auto& event : events) {
     const AbsoluteEvent absolute{start + event.t, event.x, event.y_p};
@@ -68,6 +71,8 @@ std::span<const AbsoluteEvent> WritableEvents::pick(std::span<const Event> event
     }
     latest_ = absolute.t;
     picked_.push_back(absolute);
+    if (!labels.empty())
+      picked_labels_.push_back(labels[static_cast<std::size_t>(&event - events.data())]);
   }
   if (picked_.size() < events.size())
     GST_CAT_LOG_OBJECT(category_, element_,

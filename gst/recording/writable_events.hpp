@@ -53,18 +53,24 @@ class WritableEvents {
     }
     GST_CAT_LOG_OBJECT(category_, element_, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,
                        mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-    for (auto left = mapped.events(); !left.empty();) {
-      const auto few = left.first(std::min(left.size(), block));
-      left = left.subspan(few.size());
-      write(pick(few, mapped.start()));
+    const auto labels = labels_of(buffer);
+    for (std::size_t done = 0; done < mapped.events().size(); done += block) {
+      const auto size = std::min(mapped.events().size() - done, block);
+      const auto few = mapped.events().subspan(done, size);
+      write(pick(few, mapped.start(), labels.empty() ? labels : labels.subspan(done, size)));
     }
     return true;
   }
 
   /// Returns the writable ones of `events`, whose times are relative to `start`. Valid until the
-  /// next call.
+  /// next call. `labels` has one for each event, or none.
   std::span<const eventcamera::AbsoluteEvent> pick(std::span<const eventcamera::Event> events,
-                                                   eventcamera::Microseconds start);
+                                                   eventcamera::Microseconds start,
+                                                   std::span<const eventcamera::Label> labels = {});
+
+  /// Labels of the events that pick() returned, or that `write` gets from take(): one for each, or
+  /// none.
+  std::span<const eventcamera::Label> labels() const { return picked_labels_; }
 
   void end_file();
 
@@ -98,6 +104,7 @@ class WritableEvents {
   eventcamera::SensorSize sensor_;
   eventcamera::Microseconds latest_ = 0;  ///< latest time written
   std::vector<eventcamera::AbsoluteEvent> picked_;
+  std::vector<eventcamera::Label> picked_labels_;
   LeftOut earlier_;
   LeftOut outside_;
   Guarded<Written> written_;

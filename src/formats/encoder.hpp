@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "src/core/event.hpp"
+#include "src/core/label.hpp"
 
 namespace eventcamera {
 
@@ -31,6 +32,10 @@ class Encoder {
     put_header(out);
     append(events, out);
   }
+
+  /// Takes the labels of the next events, one for each; formats without labels ignore them. Events
+  /// without labels have empty ones.
+  virtual void label(std::span<const Label> /*labels*/) {}
 
   /// Appends an encoded trigger, which is not earlier than anything before it. False if the format
   /// has no triggers.

@@ -299,6 +299,24 @@ TEST(Csv, AHeaderAloneIsARecordingWithoutEventsAndAnEmptyFileIsNone) {
   }
 }
 
+std::vector<std::optional<EventColumn>> columns_in(const CsvFormat& format) {
+  std::vector<std::optional<EventColumn>> columns(format.order.begin(), format.order.end());
+  if (format.labels) columns.resize(6);
+  return columns;
+}
+
+TEST(Csv, HasTheLabelsOfEvents) {
+  CsvEncoder encoder({.labels = true}, {640, 480});
+  std::vector<std::uint8_t> bytes;
+  const std::vector<Label> labels = {{300, Cause::leak}, {0, Cause::light}};
+  encoder.encode(Events{on(1, 2, 3)}, bytes);  // without
+  encoder.label(labels);
+  encoder.encode(Events{on(4, 5, 6)}, bytes);
+  encoder.encode(Events{on(7, 8, 9)}, bytes);
+  EXPECT_EQ(std::string(bytes.begin(), bytes.end()),
+            "t,x,y,p,cause,class\n3,1,2,1,0,0\n6,4,5,1,2,300\n9,7,8,1,1,0\n");
+}
+
 TEST(Csv, EveryFormatComesBack) {
   for (const auto& [name, description, format] : csv_formats()) {
     SCOPED_TRACE(name);
@@ -310,7 +328,7 @@ TEST(Csv, EveryFormatComesBack) {
       // Bursts and silences make these ambiguous.
       if (name == "esim" || name == "dvs-voltmeter") settings.unit = format.unit;
       // With a sensor of a few pixels, times and coordinates are indistinguishable.
-      if (size.width < 100) settings.columns = {format.order.begin(), format.order.end()};
+      if (size.width < 100) settings.columns = columns_in(format);
       CsvDecoder decoder(settings);
       EXPECT_TRUE(decoded(decoder, bytes) == events) << size.width;
       EXPECT_EQ(decoder.corruption().places, 0U);
@@ -347,7 +365,7 @@ TEST(Csv, TimesBelowZeroComeBack) {
     CsvEncoder encoder(format, {640, 480});
     TableSettings settings;
     settings.unit = format.unit;
-    settings.columns = {format.order.begin(), format.order.end()};
+    settings.columns = columns_in(format);
     CsvDecoder decoder(settings);
     EXPECT_EQ(decoded(decoder, encoded(encoder, events)), events) << name;
   }

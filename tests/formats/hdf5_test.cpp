@@ -102,6 +102,49 @@ TEST_F(Hdf5, ComesBack) {
   }
 }
 
+/// All numbers of a dataset.
+std::vector<std::uint16_t> numbers_in(const std::filesystem::path& file, const char* dataset) {
+  const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  const hid_t data = H5Dopen2(opened, dataset, H5P_DEFAULT);
+  EXPECT_GE(data, 0) << dataset;
+  const hid_t space = H5Dget_space(data);
+  std::vector<std::uint16_t> numbers(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+  EXPECT_GE(H5Dread(data, H5T_NATIVE_UINT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data()), 0);
+  H5Sclose(space);
+  H5Dclose(data);
+  H5Fclose(opened);
+  return numbers;
+}
+
+TEST_F(Hdf5, LabelsAreDatasets) {
+  const auto events = std::vector(random_events(100'000, {640, 480}, 3));
+  std::vector<Label> labels;
+  for (std::size_t i = 0; i < events.size(); ++i)
+    labels.push_back({static_cast<std::uint16_t>(i), static_cast<Cause>(i % 6)});
+  for (const auto& settings : all_settings({640, 480})) {
+    auto writer = std::make_unique<Hdf5Writer>(path(), settings);
+    // Every third part has no labels.
+    std::vector<std::uint16_t> causes;
+    std::vector<std::uint16_t> classes;
+    for (std::size_t i = 0; i < events.size(); i += 777) {
+      const auto size = std::min<std::size_t>(777, events.size() - i);
+      const bool is_labelled = i / 777 % 3 != 0;
+      if (is_labelled) writer->label(std::span(labels).subspan(i, size));
+      writer->append(std::span(events).subspan(i, size));
+      for (std::size_t j = i; j < i + size; ++j) {
+        causes.push_back(is_labelled ? static_cast<std::uint16_t>(labels[j].cause) : 0);
+        classes.push_back(is_labelled ? labels[j].object_class : 0);
+      }
+    }
+    writer.reset();
+    Hdf5Decoder reader(path());
+    EXPECT_TRUE(read_all(reader) == events);
+    if (settings.format != Hdf5Format::dsec) continue;
+    EXPECT_TRUE(numbers_in(path(), "events/cause") == causes);
+    EXPECT_TRUE(numbers_in(path(), "events/class") == classes);
+  }
+}
+
 TEST_F(Hdf5, NoEventsComeBack) {
   for (const auto& settings : all_settings({640, 480})) {
     Hdf5Decoder reader(write({}, settings));

@@ -89,6 +89,20 @@ launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventrender ! 
 launch videotestsrc pattern=ball num-buffers=30 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink  t. ! queue ! eventsim-diff ! overlay.event_sink
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! videoconvert ! fakesink sync=true  t. ! queue ! eventsim-diff ! overlay.event_sink
 
+# Labels: what a denoiser keeps, by cause, and the recipes of them.
+launch videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs preset=davis346 label=true ! eventdenoise ! eventstats location=causes.json ! fakesink
+grep -q '"light-events" : [1-9]' causes.json || fail "no light: $(cat causes.json)"
+grep -q '"shot-noise-events" : ' causes.json || fail "no causes: $(cat causes.json)"
+launch eventcompare name=compare location=classes.json ! fakesink  videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs preset=davis346 label=true ! tee name=t  t. ! queue ! compare.reference  t. ! queue ! eventdenoise ! compare.candidate
+grep -q '"true-positives" : [1-9]' classes.json || fail "no true positives: $(cat classes.json)"
+launch videotestsrc pattern=ball num-buffers=30 ! eventsim-dvs preset=davis346 label=true ! eventnpzenc ! filesink location=labelled.npz
+/usr/bin/python3 - <<'PYTHON'
+import numpy as np
+events = np.load("labelled.npz")
+assert len(events["cause"]) == len(events["class"]) == len(events["t"]) > 1000
+assert set(np.unique(events["cause"])) <= {1, 2, 3, 4, 5}, np.unique(events["cause"])
+PYTHON
+
 # Measured, and compared with another simulator.
 launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! eventstats location=stats.json map=map.png ! eventrender ! fakesink
 launch videotestsrc is-live=true pattern=ball num-buffers=20 ! tee name=t  t. ! queue ! eventsim-dense ! compare.reference  t. ! queue ! eventsim-diff ! compare.candidate  eventcompare name=compare location=compare.json map=maps.png ! evtenc ! filesink location=candidate.raw

@@ -195,6 +195,7 @@ static GstFlowReturn render(GstBaseSink* sink, GstBuffer* buffer) {
   const bool written = reported(self, [&] {
     return self->priv->writable.take(buffer, [&](const auto& events) {
       state.begun |= !events.empty();
+      state.writer->label(self->priv->writable.labels());
       state.writer->append(events);
     });
   });

@@ -167,7 +167,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventesenc, "eventesenc", GST_RANK_PRIMARY,
  * @title: eventcsvenc
  * @short_description: writes text files of events
  *
- * Writes one line per event, in the #GstEventCsvEnc:format of the tool that will read it.
+ * Writes one line per event, in the #GstEventCsvEnc:format of the tool that will read it. The
+ * format `labels` adds the cause and the class of labelled events.
  *
  * ## Example launch line
  * |[
@@ -242,8 +243,9 @@ GST_ELEMENT_REGISTER_DEFINE(eventnpyenc, "eventnpyenc", GST_RANK_PRIMARY, event_
  * @short_description: writes NumPy archives of events
  *
  * Writes events as a NumPy archive with the arrays t (int64, microseconds), x, y (uint16) and p
- * (uint8, 1 = ON), and the numbers width and height of the sensor, in pixels. It is not compressed;
- * its size is 13 bytes per event. The sink does not need to seek.
+ * (uint8, 1 = ON), and the numbers width and height of the sensor, in pixels. If events are
+ * labelled, also cause (uint8) and class (uint16), as in GstEventCameraLabel. It is not compressed;
+ * its size is 13 bytes per event, and 16 with labels. The sink does not need to seek.
  *
  * An archive holds one array after the other, so until the end of the stream the events are kept in
  * temporary files, in the folder of the environment variable TMPDIR, or else in `/var/tmp`. Without

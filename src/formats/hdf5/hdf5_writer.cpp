@@ -29,6 +29,7 @@ class Hdf5Writer::Layout {
   virtual ~Layout() = default;
   virtual void append(std::span<const AbsoluteEvent> events) = 0;
   virtual bool append(std::span<const Trigger> triggers) = 0;
+  virtual void label(std::span<const Label> /*labels*/) {}
 
   /// Hands all rows to the library.
   virtual void flush() = 0;
@@ -195,7 +196,19 @@ class DsecLayout final : public Hdf5Writer::Layout {
 
   bool append(std::span<const Trigger> /*triggers*/) override { return false; }
 
+  void label(std::span<const Label> labels) override {
+    if (labels.empty()) return;
+    if (!labels_) labels_.emplace(group_.get(), compression_);
+    labels_->complete(t_.count());
+    for (const auto& label : labels) labels_->put(label);
+  }
+
   void flush() override {
+    if (labels_) {
+      labels_->complete(t_.count());
+      labels_->cause.flush();
+      labels_->object_class.flush();
+    }
     p_.flush();
     x_.flush();
     y_.flush();
@@ -247,6 +260,25 @@ class DsecLayout final : public Hdf5Writer::Layout {
 
   using Times = BufferedDataset<std::uint64_t>;
 
+  struct Labels {
+    Labels(hid_t group, Compression compression)
+        : cause(group, "cause", H5T_STD_U8LE, H5T_NATIVE_UINT8, chunk, compression),
+          object_class(group, "class", H5T_STD_U16LE, H5T_NATIVE_UINT16, chunk, compression) {}
+
+    void put(const Label& label) {
+      cause.put(static_cast<std::uint8_t>(label.cause));
+      object_class.put(label.object_class);
+    }
+
+    /// Adds empty labels for events without.
+    void complete(hsize_t events) {
+      while (cause.count() < events) put({});
+    }
+
+    BufferedDataset<std::uint8_t> cause;
+    BufferedDataset<std::uint16_t> object_class;
+  };
+
   hid_t file_;
   Compression compression_;
   Hdf5Handle group_;
@@ -254,6 +286,7 @@ class DsecLayout final : public Hdf5Writer::Layout {
   BufferedDataset<std::uint16_t> x_, y_;
   Times t_;                               ///< relative to the first event
   BufferedDataset<std::uint64_t> index_;  ///< first event at or after each millisecond
+  std::optional<Labels> labels_;
   std::optional<Microseconds> first_;
   bool has_offset_ = false;
   bool wide_ = false;
@@ -463,6 +496,12 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   layout_->append(events);
   file_->output.check();
   if (Clock::now() - committed_ >= commit_interval) commit();
+}
+
+void Hdf5Writer::label(std::span<const Label> labels) {
+  const Hdf5Session session;
+  file_->output.check();
+  layout_->label(labels);
 }
 
 bool Hdf5Writer::append(std::span<const Trigger> triggers) {

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "src/core/event.hpp"
+#include "src/core/label.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/formats/hdf5/hdf5_format.hpp"
 
@@ -39,6 +40,10 @@ class Hdf5Writer {
   /// Events must be sorted by time and within the sensor. Commits, too, if the last commit is a
   /// second ago.
   void append(std::span<const AbsoluteEvent> events);
+
+  /// Takes the labels of the next events, one for each, before these are appended. The DSEC layout
+  /// stores them as events/cause and events/class, 0 for events without; the other has none.
+  void label(std::span<const Label> labels);
 
   /// False for the DSEC layout, which has no triggers.
   bool append(std::span<const Trigger> triggers);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstring>
+#include <deque>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -82,33 +83,67 @@ class NpzEncoder final : public Encoder {
  public:
   /// `header` begins the archive.
   NpzEncoder(std::string header, ZipWriter archive)
-      : Encoder(std::move(header)), archive_(std::move(archive)) {}
+      : Encoder(std::move(header)), archive_(std::move(archive)) {
+    columns_.emplace_back("t.npy", "<i8");
+    columns_.emplace_back("x.npy", "<u2");
+    columns_.emplace_back("y.npy", "<u2");
+    columns_.emplace_back("p.npy", "|u1");
+  }
 
   std::uint64_t pending() const override { return ended_ ? 0 : count_; }
 
+  void label(std::span<const Label> labels) override {
+    if (labels.empty()) return;
+    if (columns_.size() == event_columns) {
+      columns_.emplace_back("cause.npy", "|u1");
+      columns_.emplace_back("class.npy", "<u2");
+    }
+    complete_labels();
+    add_labels(labels);
+  }
+
  private:
+  static constexpr std::size_t event_columns = 4;
+
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& /*out*/) override {
     if (events.empty()) return;
     count_ += events.size();
-    const auto add = [&](Column& column, const auto& number_of) {
-      constexpr auto size = sizeof number_of(AbsoluteEvent());
-      numbers_.resize(events.size() * size);
-      auto* at = numbers_.data();
-      for (const auto& event : events) {
-        const auto number = number_of(event);
-        std::memcpy(at, &number, size);
-        at += size;
-      }
-      column.append(numbers_);
-    };
-    auto& [t, x, y, p] = columns_;
-    add(t, [](const AbsoluteEvent& event) { return event.t; });
-    add(x, [](const AbsoluteEvent& event) { return event.x; });
-    add(y, [](const AbsoluteEvent& event) { return static_cast<std::uint16_t>(event.y()); });
-    add(p, [](const AbsoluteEvent& event) { return event.polarity(); });
+    add(columns_[0], events, [](const AbsoluteEvent& event) { return event.t; });
+    add(columns_[1], events, [](const AbsoluteEvent& event) { return event.x; });
+    add(columns_[2], events,
+        [](const AbsoluteEvent& event) { return static_cast<std::uint16_t>(event.y()); });
+    add(columns_[3], events, [](const AbsoluteEvent& event) { return event.polarity(); });
+  }
+
+  /// Appends a number of each item.
+  template <class Item, class NumberOf>
+  void add(Column& column, std::span<const Item> items, const NumberOf& number_of) {
+    constexpr auto size = sizeof number_of(items.front());
+    numbers_.resize(items.size() * size);
+    auto* at = numbers_.data();
+    for (const auto& item : items) {
+      const auto number = number_of(item);
+      std::memcpy(at, &number, size);
+      at += size;
+    }
+    column.append(numbers_);
+  }
+
+  void add_labels(std::span<const Label> labels) {
+    add(columns_[4], labels, [](const Label& label) { return label.cause; });
+    add(columns_[5], labels, [](const Label& label) { return label.object_class; });
+    labels_ += labels.size();
+  }
+
+  /// Adds empty labels for the events without.
+  void complete_labels() {
+    constexpr std::array<Label, 4096> empty = {};
+    while (columns_.size() > event_columns && labels_ < count_)
+      add_labels(std::span(empty).first(std::min<std::uint64_t>(empty.size(), count_ - labels_)));
   }
 
   bool append_end(std::vector<std::uint8_t>& out) override {
+    complete_labels();
     if (next_ == columns_.size()) {
       archive_.finish(out);
       ended_ = true;
@@ -123,8 +158,8 @@ class NpzEncoder final : public Encoder {
 
   ZipWriter archive_;
   std::uint64_t count_ = 0;
-  std::array<Column, 4> columns_ = {
-      {{"t.npy", "<i8"}, {"x.npy", "<u2"}, {"y.npy", "<u2"}, {"p.npy", "|u1"}}};
+  std::uint64_t labels_ = 0;
+  std::deque<Column> columns_;
   std::size_t next_ = 0;  ///< column to write
   bool begun_ = false;    ///< a part of it is written
   bool ended_ = false;

@@ -21,6 +21,9 @@ constexpr NamedCsvFormat formats[] = {
     {"names",
      "t,x,y,p in microseconds below a line of names",
      {txyp, ',', microseconds, Header::names, false, false}},
+    {"labels",
+     "t,x,y,p,cause,class in microseconds below a line of names",
+     {.order = txyp, .labels = true}},
     {"metavision",
      "x,y,p,t in microseconds below a line %geometry:W,H",
      {xypt, ',', microseconds, Header::geometry, false, false}},
@@ -68,6 +71,8 @@ std::string header_text(const CsvFormat& format, SensorSize size) {
     if (!names.empty()) names += format.separator;
     names += names_of[static_cast<std::size_t>(column)];
   }
+  if (format.labels)
+    names += std::string(1, format.separator) + "cause" + format.separator + "class";
   switch (format.header) {
     case Header::none:
       return {};
@@ -113,7 +118,11 @@ char* CsvEncoder::write(char* at, Microseconds t) const {
   return at + 6;
 }
 
-char* CsvEncoder::write(char* at, const AbsoluteEvent& event) const {
+void CsvEncoder::label(std::span<const Label> labels) {
+  if (format_.labels) labels_.insert(labels_.end(), labels.begin(), labels.end());
+}
+
+char* CsvEncoder::write(char* at, const AbsoluteEvent& event) {
   for (const auto column : format_.order) {
     switch (column) {
       case Column::t:
@@ -136,6 +145,17 @@ char* CsvEncoder::write(char* at, const AbsoluteEvent& event) const {
         }
         break;
     }
+    *at++ = format_.separator;
+  }
+  if (format_.labels) {
+    Label label;
+    if (!labels_.empty()) {
+      label = labels_.front();
+      labels_.pop_front();
+    }
+    at = write_number(at, static_cast<unsigned>(label.cause));
+    *at++ = format_.separator;
+    at = write_number(at, label.object_class);
     *at++ = format_.separator;
   }
   --at;

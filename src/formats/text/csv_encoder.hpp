@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <string_view>
 
@@ -31,6 +32,7 @@ struct CsvFormat {
   Header header = Header::names;
   bool minus_one = false;        ///< OFF is -1, else 0
   bool carriage_return = false;  ///< lines end with CR LF
+  bool labels = false;           ///< with the columns cause and class of labels
 };
 
 struct NamedCsvFormat {
@@ -47,12 +49,15 @@ class CsvEncoder final : public Encoder {
  public:
   CsvEncoder(const CsvFormat& format, SensorSize size);
 
+  void label(std::span<const Label> labels) override;
+
  private:
   void append(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) override;
   char* write(char* at, Microseconds t) const;
-  char* write(char* at, const AbsoluteEvent& event) const;
+  char* write(char* at, const AbsoluteEvent& event);
 
   CsvFormat format_;
+  std::deque<Label> labels_;  ///< of the next events
 };
 
 }  // namespace eventcamera
