@@ -20,6 +20,7 @@ WIDTH, HEIGHT = 346, 260
 IMAGE_WIDTH, IMAGE_HEIGHT = 86, 65
 START = 1_700_000_000_123_456  # microseconds since 1970
 SENSOR_START = 77_777_777  # clock of the sensor at START
+DRIFT = 20_000  # microseconds in which the clock of the sensor falls behind by one
 DELAY = 3_000  # microseconds until a message is recorded
 PER_PACKET = 97
 EVENT_TYPES = {"packet": "event_camera_msgs/EventPacket", "old": "event_array_msgs/EventArray", "array": "dvs_msgs/EventArray",
@@ -115,11 +116,11 @@ class Evt3:
         return struct.pack(f"<{len(words)}H", *words)
 
 
-def packet_of(fields, events, number, encoding, evt3):
+def packet_of(fields, events, number, encoding, evt3, restart):
     t = events[0][0]
-    fields.header(t)
+    fields.header(t if restart else t + (t - START) // DRIFT)
     fields.put("I", HEIGHT, WIDTH)
-    fields.put("Q", number, (t - START + SENSOR_START) * 1000)
+    fields.put("Q", number, (t - restart if restart and t >= restart else t - START + SENSOR_START) * 1000)
     fields.text(encoding)
     fields.put("B", 0)
     if encoding == "evt3":
@@ -148,13 +149,15 @@ def image_of(fields, t, value, encoding):
     fields.array((pixel * IMAGE_WIDTH + b"\0\0") * IMAGE_HEIGHT)
 
 
-def messages(serialization, kind, encoding="evt3", image="mono8"):
-    """[(topic, time of recording in microseconds, bytes)], by that time."""
+def messages(serialization, kind, encoding="evt3", image="mono8", restart=0):
+    """[(topic, time of recording in microseconds, bytes)], by that time. restart: the packet with which the
+    camera, which does not drift then, counts from 0 again; 0: none."""
     evt3, all_messages = Evt3(), []
     for number, first in enumerate(range(0, len(EVENTS), PER_PACKET)):
         events, fields = EVENTS[first:first + PER_PACKET], serialization()
         if kind == "packet":
-            packet_of(fields, events, 1000 + number, encoding, evt3)
+            count = number - restart if restart and number >= restart else 1000 + number
+            packet_of(fields, events, count, encoding, evt3, restart and EVENTS[restart * PER_PACKET][0])
         else:
             array_of(fields, events)
         all_messages.append(("/camera/events", events[0][0] + DELAY, fields.message()))
@@ -356,6 +359,7 @@ def main():
         write_bag(folder / f"{name}.bag", ros1, topics)
         write_db3(folder / f"{name}.db3", cdr, topics)
         if name == "mono":
+            write_mcap(folder / "mono-restarted.mcap", messages(Cdr, kind, encoding, image, restart=30), topics)
             write_db3(folder / "mono-old.db3", cdr, topics_of("old"))
     write_bag(folder / "prophesee-bz2.bag", ros1, topics, "bz2")
     write_bag(folder / "prophesee-lz4.bag", ros1, topics, "lz4")

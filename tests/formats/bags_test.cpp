@@ -17,6 +17,7 @@
 #include "src/formats/ros/mcap_encoder.hpp"
 #include "tests/formats/pieces.hpp"
 #include "tests/formats/random_events.hpp"
+#include "tests/formats/rosbags.hpp"
 
 namespace {
 
@@ -305,6 +306,21 @@ TEST_F(Bags, OfDatabasesSurviveCorruptPages) {
   EXPECT_GT(noticed, 10U);
 }
 
+/// SQLite counts its steps from the first row of a query.
+TEST(Databases, OfManyMessagesAreReadWhole) {
+  constexpr SensorSize size{346, 260};
+  const auto events = random_events::make(size, 200'000, 3, 1'700'000'000'000'000, {1000});
+  const auto bytes = rosbags::db3_of_events(size, events, 1);
+  MemoryBytes source(bytes);
+  BagDecoder decoder("");
+  decoder.open(source);
+  Contents contents;
+  push(decoder, {}, contents);
+  EXPECT_EQ(contents.events, events);
+  EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+  EXPECT_EQ(decoder.last_time(), events.back().t);
+}
+
 TEST_F(Bags, HaveTheSensorSizeOfTheirFirstPacket) {
   auto bytes = bytes_of(folder / "evt3-no-chunks.mcap");
   const std::uint32_t size[] = {260, 346};
@@ -316,6 +332,29 @@ TEST_F(Bags, HaveTheSensorSizeOfTheirFirstPacket) {
   BagDecoder decoder("/camera/events");
   EXPECT_EQ(decoded(decoder, bytes).events, expected.events);
   EXPECT_EQ(decoder.streams().front().size, SensorSize{});
+}
+
+TEST_F(Bags, KeepNoOverlongNames) {
+  const rosbags::Text name(2000, 'a');
+  const auto mcap_record = [](char opcode, const rosbags::Text& content) {
+    return opcode + rosbags::binary(std::uint64_t{content.size()}) + content;
+  };
+  const auto number = rosbags::binary(std::uint16_t{999});
+  const auto records = mcap_record(3, number + rosbags::sized(name)) +
+                       mcap_record(4, number + number + rosbags::sized(name) +
+                                          rosbags::sized("cdr") + rosbags::sized(""));
+  auto bytes = bytes_of(folder / "evt3-no-chunks.mcap");
+  bytes.insert(bytes.begin() + 8, records.begin(), records.end());
+  BagDecoder decoder("");
+  EXPECT_EQ(decoded(decoder, bytes).events, expected.events);
+  EXPECT_EQ(decoder.corruption().places, 2U);
+  try {
+    BagDecoder none("/none");
+    decoded(none, bytes);
+    ADD_FAILURE() << "a topic that is not there was read";
+  } catch (const UnsupportedFormat& error) {
+    EXPECT_EQ(std::string(error.what()).find(name), std::string::npos);
+  }
 }
 
 TEST_F(Bags, AreRefusedWithAReason) {

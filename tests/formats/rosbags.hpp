@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Bags of ROS 1, written from their specification: wiki.ros.org/Bags/Format/2.0.
+// Bags of ROS 1 and of ROS 2 with SQLite, written from their specifications:
+// wiki.ros.org/Bags/Format/2.0, github.com/ros2/rosbag2 (rosbag2_storage_sqlite3).
 #pragma once
+
+#include <sqlite3.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -93,6 +96,81 @@ inline std::vector<std::uint8_t> of_events(SensorSize size, std::span<const Abso
   };
   const Text file = magic + bag(first_record - bag(0).size()) + chunks + connection + infos;
   return {file.begin(), file.end()};
+}
+
+/// XCDR1, little-endian: fields at multiples of their size after the encapsulation.
+class Cdr {
+ public:
+  template <class Number>
+  void put(Number number) {
+    fields_.resize((fields_.size() + sizeof number - 1) / sizeof number * sizeof number);
+    fields_ += binary(number);
+  }
+  void text(const Text& text) {
+    put(static_cast<std::uint32_t>(text.size() + 1));
+    fields_ += text + '\0';
+  }
+  void time(Microseconds t) {
+    put(static_cast<std::uint32_t>(t / 1'000'000));
+    put(static_cast<std::uint32_t>(t % 1'000'000 * 1000));
+  }
+  Text message() const { return Text("\0\1\0\0", 4) + fields_; }
+
+ private:
+  Text fields_;
+};
+
+inline Text cdr_event_array(SensorSize size, std::span<const AbsoluteEvent> events) {
+  Cdr fields;
+  fields.time(events.front().t);
+  fields.text("camera");
+  fields.put(static_cast<std::uint32_t>(size.height));
+  fields.put(static_cast<std::uint32_t>(size.width));
+  fields.put(static_cast<std::uint32_t>(events.size()));
+  for (const auto& event : events) {
+    fields.put(event.x);
+    fields.put(static_cast<std::uint16_t>(event.y()));
+    fields.time(event.t);
+    fields.put(static_cast<std::uint8_t>(event.polarity()));
+  }
+  return fields.message();
+}
+
+/// A .db3 with the topic /dvs/events of dvs_msgs/msg/EventArray: a row per message of up to
+/// `per_message` events.
+inline std::vector<std::uint8_t> db3_of_events(SensorSize size,
+                                               std::span<const AbsoluteEvent> events,
+                                               std::size_t per_message) {
+  sqlite3* database = nullptr;
+  sqlite3_open(":memory:", &database);
+  sqlite3_exec(database,
+               "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
+               " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"
+               "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL,"
+               " timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
+               "INSERT INTO topics VALUES (1, '/dvs/events', 'dvs_msgs/msg/EventArray', 'cdr', '');"
+               "BEGIN",
+               nullptr, nullptr, nullptr);
+  sqlite3_stmt* row = nullptr;
+  sqlite3_prepare_v2(database, "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, ?, ?)",
+                     -1, &row, nullptr);
+  while (!events.empty()) {
+    const auto some = events.first(std::min(per_message, events.size()));
+    events = events.subspan(some.size());
+    const auto message = cdr_event_array(size, some);
+    sqlite3_bind_int64(row, 1, some.back().t * 1000);
+    sqlite3_bind_blob(row, 2, message.data(), static_cast<int>(message.size()), SQLITE_STATIC);
+    sqlite3_step(row);
+    sqlite3_reset(row);
+  }
+  sqlite3_finalize(row);
+  sqlite3_exec(database, "COMMIT", nullptr, nullptr, nullptr);
+  sqlite3_int64 count = 0;
+  auto* const bytes = sqlite3_serialize(database, "main", &count, 0);
+  const std::vector<std::uint8_t> file(bytes, bytes + count);
+  sqlite3_free(bytes);
+  sqlite3_close(database);
+  return file;
 }
 
 }  // namespace eventcamera::rosbags

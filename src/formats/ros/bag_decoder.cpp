@@ -107,6 +107,8 @@ std::optional<std::size_t> BagDecoder::take_topic(const BagTopic& topic) {
   streams_.push_back(
       {.id = static_cast<int>(streams_.size()), .kind = kind, .size = {}, .source = topic.name});
   topics_.push_back(make_topic_decoder(topic, file_->corruption()));
+  const auto offset = clock_offsets_.find(topic.name);
+  if (offset != clock_offsets_.end()) topics_.back()->set_clock_offset(offset->second);
   return streams_.size() - 1;
 }
 
@@ -200,6 +202,9 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
   std::string names;
   for (const auto& stream : streams_) names += stream.source + ",";
   BagDecoder tail(names);
+  for (std::size_t i = 0; i < streams_.size(); ++i)
+    if (const auto offset = topics_[i]->clock_offset())
+      tail.clock_offsets_[streams_[i].source] = *offset;
   const bool reads_itself = tail.open(*source_);
   const auto start = tail.file_->seek_point_before(*logged);
   if (!start) return std::nullopt;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -50,9 +52,10 @@ class BagDecoder final : public RecordingDecoder {
   std::unique_ptr<BagFile> file_;    ///< null until then
   ByteSource* source_ = nullptr;     ///< set by open()
   std::vector<StreamInfo> streams_;
-  std::vector<std::unique_ptr<TopicDecoder>> topics_;  ///< one a stream
-  std::vector<std::string> unread_;                    ///< names of topics with events or images
-  std::vector<std::string> others_;                    ///< names of all other topics
+  std::vector<std::unique_ptr<TopicDecoder>> topics_;   ///< one a stream
+  std::map<std::string, std::uint64_t> clock_offsets_;  ///< that topics begin with, by name
+  std::vector<std::string> unread_;                     ///< names of topics with events or images
+  std::vector<std::string> others_;                     ///< names of all other topics
 
   std::optional<std::size_t> decoding_;  ///< topic of the message being decoded
   bool events_due_ = false;              ///< its decoder has events to be returned

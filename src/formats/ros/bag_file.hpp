@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -72,7 +73,15 @@ class BagFile {
  protected:
   explicit BagFile(TakeTopic take_topic) : take_topic_(std::move(take_topic)) {}
 
-  std::optional<std::size_t> take(const BagTopic& topic) { return take_topic_(topic); }
+  /// Limit of the name of a topic or type, bytes.
+  static constexpr std::size_t max_name = 1024;
+
+  /// `position`: of the record or row that states the topic.
+  std::optional<std::size_t> take(const BagTopic& topic, std::uint64_t position) {
+    if (std::max(topic.name.size(), topic.type.size()) <= max_name) return take_topic_(topic);
+    corruption_.note(position, "a topic with an overlong name");
+    return std::nullopt;
+  }
 
   Corruption corruption_;
 

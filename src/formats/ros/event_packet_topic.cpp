@@ -40,6 +40,14 @@ constexpr Microseconds microseconds(std::uint64_t nanoseconds) {
   return time / 1000 - (time % 1000 < 0 ? 1 : 0);
 }
 
+/// What the clocks of the sensor and of ROS may drift apart in a recording, less than half of the
+/// wrap period of EVT3. If they are further apart after a seek, the camera was started again.
+constexpr Microseconds max_drift = 4'000'000;
+
+bool is_drift(Microseconds late) {
+  return late > -max_drift && late < max_drift;
+}
+
 /// Words of a Prophesee sensor. Packets continue each other, and each may begin within the words of
 /// an event.
 class EvtPackets {
@@ -50,8 +58,10 @@ class EvtPackets {
         words_(make_evt_unit_decoder(format, size)),
         batch_(corruption) {}
 
-  void begin(const EventPacket& packet, std::uint64_t position, bool continues) {
+  /// `continues`: the packet before was decoded. `resumes`: it is the first after a seek.
+  void begin(const EventPacket& packet, std::uint64_t position, bool continues, bool resumes) {
     if (!continues) words_->restore({});
+    resumes_ = resumes;
     if (continues && packet.stamp - stamp_ > max_pause && states_time(packet.events)) forget_time();
     stamp_ = packet.stamp;
     rest_ = packet.events;
@@ -85,7 +95,12 @@ class EvtPackets {
       if (!offset) offset = stamp_ - first_nanoseconds;
       const auto late = microseconds(stamp_ - first_nanoseconds - *offset);
       const auto half = late < 0 ? -clock_range_ / 2 : clock_range_ / 2;
-      shift_ = microseconds(*offset) + (late + half) / clock_range_ * clock_range_;
+      auto wraps = (late + half) / clock_range_ * clock_range_;
+      if (resumes_ && !is_drift(late - wraps)) {
+        offset = stamp_ - first_nanoseconds;
+        wraps = 0;
+      }
+      shift_ = microseconds(*offset) + wraps;
     }
     for (auto& event : out.events) event.t += *shift_;
     for (auto& trigger : out.triggers) trigger.t += *shift_;
@@ -110,6 +125,7 @@ class EvtPackets {
   std::unique_ptr<UnitDecoder> words_;
   Batch batch_;
   std::uint64_t stamp_ = 0;
+  bool resumes_ = false;
   std::span<const std::uint8_t> rest_;
   std::uint64_t position_ = 0;
   std::optional<Microseconds> shift_;  ///< of this packet, once its first time is known
@@ -121,7 +137,9 @@ class MonoPackets {
  public:
   MonoPackets(SensorSize size, Corruption& corruption) : size_(size), corruption_(corruption) {}
 
-  void begin(const EventPacket& packet, std::uint64_t position) {
+  /// `resumes`: the packet is the first after a seek.
+  void begin(const EventPacket& packet, std::uint64_t position, bool resumes) {
+    resumes_ = resumes;
     packet_stamp_ = packet.stamp;
     time_base_ = packet.time_base;
     rest_ = packet.events;
@@ -131,7 +149,8 @@ class MonoPackets {
 
   bool next(Decoded& out, std::optional<std::uint64_t>& offset) {
     constexpr std::size_t max_events = 4096;
-    if (!offset) offset = packet_stamp_ - time_base_;
+    const auto stated = packet_stamp_ - time_base_;
+    if (!offset || (resumes_ && !is_drift(microseconds(stated - *offset)))) offset = stated;
     const auto count = std::min(rest_.size() / sizeof(std::uint64_t), max_events);
     const auto base = time_base_ + *offset;
     out.events.resize(count);
@@ -150,6 +169,7 @@ class MonoPackets {
   SensorSize size_;
   Corruption& corruption_;
   std::uint64_t packet_stamp_ = 0;
+  bool resumes_ = false;
   std::uint64_t time_base_ = 0;
   std::span<const std::uint8_t> rest_;
 };
@@ -183,12 +203,13 @@ class EventPacketDecoder final : public TopicDecoder {
       corruption_.note(message.position, "event packets are missing");
     // A camera that was started again counts and measures time from the start.
     if (restarted) offset_.reset();
+    const bool resumes = !sequence_;
     sequence_ = packet.sequence;
     is_decoding_ = true;
     if (evt_)
-      evt_->begin(packet, message.position, continues);
+      evt_->begin(packet, message.position, continues, resumes);
     else
-      mono_->begin(packet, message.position);
+      mono_->begin(packet, message.position, resumes);
   }
 
   bool next() override {

@@ -87,11 +87,12 @@ void McapFile::read_index(ByteSource& source) {
   std::vector<ChunkIndex::Chunk> chunks;
   ByteCursor records(bytes);
   while (!records.rest().empty()) {
+    const auto record_at = summary_at + records.position();
     const auto opcode = static_cast<McapOpcode>(records.number<std::uint8_t>());
     ByteCursor content(records.sized_bytes<std::uint64_t>());
     if (records.failed()) return;
-    if (opcode == McapOpcode::schema) take_schema(content);
-    if (opcode == McapOpcode::channel) take_channel(content);
+    if (opcode == McapOpcode::schema) take_schema(content, record_at);
+    if (opcode == McapOpcode::channel) take_channel(content, record_at);
     if (opcode != McapOpcode::chunk_index) continue;
     content.number<std::uint64_t>();  // first time
     const auto last = microseconds(content.number<std::uint64_t>());
@@ -134,10 +135,10 @@ std::optional<BagMessage> McapFile::take_record(Bytes record, std::uint64_t posi
   const ByteCursor content(record.subspan(mcap_record_header));
   switch (static_cast<McapOpcode>(record[0])) {
     case McapOpcode::schema:
-      take_schema(content);
+      take_schema(content, position);
       break;
     case McapOpcode::channel:
-      take_channel(content);
+      take_channel(content, position);
       break;
     case McapOpcode::message:
       return message_of(content, position);
@@ -147,13 +148,16 @@ std::optional<BagMessage> McapFile::take_record(Bytes record, std::uint64_t posi
   return std::nullopt;
 }
 
-void McapFile::take_schema(ByteCursor content) {
+void McapFile::take_schema(ByteCursor content, std::uint64_t position) {
   const auto id = content.number<std::uint16_t>();
   const auto name = content.text();
-  if (!content.failed() && schemas_.size() < max_topics) schemas_.try_emplace(id, name);
+  if (name.size() > max_name)
+    corruption_.note(position, "a type with an overlong name");
+  else if (!content.failed() && schemas_.size() < max_topics)
+    schemas_.try_emplace(id, name);
 }
 
-void McapFile::take_channel(ByteCursor content) {
+void McapFile::take_channel(ByteCursor content, std::uint64_t position) {
   const auto id = content.number<std::uint16_t>();
   const auto schema = schemas_.find(content.number<std::uint16_t>());
   const auto name = content.text();
@@ -163,7 +167,7 @@ void McapFile::take_channel(ByteCursor content) {
   if (schema != schemas_.end()) topic.type = ros1_type(schema->second);
   if (encoding == "cdr") topic.serialization = RosSerialization::cdr;
   if (encoding == "ros1") topic.serialization = RosSerialization::ros1;
-  channels_[id] = take(topic);
+  channels_[id] = take(topic, position);
 }
 
 std::optional<BagMessage> McapFile::message_of(ByteCursor content, std::uint64_t position) {

@@ -24,8 +24,8 @@ class McapFile final : public ChunkedBagFile {
   std::optional<BagMessage> take_record(Bytes record, std::uint64_t position) override;
   std::optional<Bytes> records_of(Bytes chunk, std::uint64_t position, bool is_cut) override;
 
-  void take_schema(ByteCursor content);
-  void take_channel(ByteCursor content);
+  void take_schema(ByteCursor content, std::uint64_t position);
+  void take_channel(ByteCursor content, std::uint64_t position);
   std::optional<BagMessage> message_of(ByteCursor content, std::uint64_t position);
 
   std::map<std::uint16_t, std::string> schemas_;                  ///< names of the types

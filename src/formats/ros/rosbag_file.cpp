@@ -167,7 +167,8 @@ std::optional<BagMessage> RosbagFile::take_record(Bytes bytes, std::uint64_t pos
     const HeaderFields of_connection(record.data);
     connections_[*connection] =
         take({std::string(record.header.value("topic")),
-              ros1_type(std::string(of_connection.value("type"))), RosSerialization::ros1});
+              ros1_type(std::string(of_connection.value("type"))), RosSerialization::ros1},
+             position);
     return std::nullopt;
   }
   const auto logged = record.header.time("time");

@@ -13,8 +13,10 @@ namespace {
 
 /// Limit of a value in the database, bytes.
 constexpr int max_value = 1 << 27;
-/// Steps of SQLite's virtual machine after which a query is given up, if they found no row.
-constexpr int max_steps = 1'000'000;
+/// Steps of SQLite's virtual machine between two looks at how long a query takes.
+constexpr int steps_between_looks = 10'000;
+/// Looks after which a query is given up, if they found no row.
+constexpr int max_looks = 100;
 
 /// A file of SQLite's, read from a source of bytes.
 struct SourceFile {
@@ -124,7 +126,8 @@ SqliteDatabase::SqliteDatabase(ByteSource& bytes) {
     sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, max_value);
     sqlite3_set_authorizer(opened, authorize, nullptr);
     sqlite3_progress_handler(
-        opened, max_steps, [](void*) { return 1; }, nullptr);
+        opened, steps_between_looks,
+        [](void* looks) { return ++*static_cast<int*>(looks) > max_looks ? 1 : 0; }, &looks_);
     sqlite3_table_column_metadata(opened, nullptr, "messages", nullptr, nullptr, nullptr, nullptr,
                                   nullptr, nullptr);  // opens the file
   }
@@ -134,15 +137,17 @@ SqliteDatabase::SqliteDatabase(ByteSource& bytes) {
     throw UnsupportedFormat("this SQLite database is corrupt or cut short");
 }
 
-bool SqliteDatabase::has_table(std::string_view name) const {
+bool SqliteDatabase::has_table(std::string_view name) {
   auto rows = query("SELECT type, name FROM sqlite_schema");
   while (rows.next())
     if (rows.text(0) == "table" && rows.text(1) == name) return true;
   return false;
 }
 
-SqliteRows SqliteDatabase::query(const char* text, std::int64_t parameter) const {
+SqliteRows SqliteDatabase::query(const char* text, std::int64_t parameter) {
   SqliteRows rows;
+  rows.looks_ = &looks_;
+  looks_ = 0;
   sqlite3_stmt* statement = nullptr;
   rows.failed_ = sqlite3_prepare_v2(database_.get(), text, -1, &statement, nullptr) != SQLITE_OK;
   rows.statement_.reset(statement);
@@ -153,6 +158,7 @@ SqliteRows SqliteDatabase::query(const char* text, std::int64_t parameter) const
 
 bool SqliteRows::next() {
   if (failed_ || !statement_) return false;
+  *looks_ = 0;
   const auto result = sqlite3_step(statement_.get());
   failed_ = result != SQLITE_ROW && result != SQLITE_DONE;
   if (result != SQLITE_ROW) statement_.reset();

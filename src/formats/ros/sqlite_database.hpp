@@ -14,7 +14,7 @@
 
 namespace eventcamera {
 
-/// Rows of a query.
+/// Rows of a query, valid as long as the database.
 class SqliteRows {
  public:
   SqliteRows() = default;
@@ -37,27 +37,31 @@ class SqliteRows {
   };
 
   std::unique_ptr<sqlite3_stmt, Deleter> statement_;
+  int* looks_ = nullptr;  ///< those of the database
   bool failed_ = false;
 };
 
 /// Reads an SQLite database from any source of bytes. The file may be hostile: its views, triggers
-/// and functions are not run, and queries that take too long fail.
+/// and functions are not run, and queries that take too long to find a row fail.
 class SqliteDatabase {
  public:
   /// `bytes` must outlive this object. Throws UnsupportedFormat if it is no database.
   explicit SqliteDatabase(ByteSource& bytes);
+  SqliteDatabase(const SqliteDatabase&) = delete;
+  SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
   /// True if there is a table, and not a view, of this name.
-  bool has_table(std::string_view name) const;
+  bool has_table(std::string_view name);
 
   /// Rows of a query with one parameter. They fail at once if the columns are not there.
-  SqliteRows query(const char* text, std::int64_t parameter = 0) const;
+  SqliteRows query(const char* text, std::int64_t parameter = 0);
 
  private:
   struct Deleter {
     void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
   };
 
+  int looks_ = 0;  ///< at the query that is running, since its last row
   std::unique_ptr<sqlite3, Deleter> database_;
 };
 

@@ -38,7 +38,7 @@ class TopicDecoder {
   SensorSize size() const { return size_; }
 
   /// Offset from the clock of the sensor to that of ROS, nanoseconds; nothing if they are the same,
-  /// or before the first message.
+  /// or before the first message. It is kept until the camera is started again.
   virtual std::optional<std::uint64_t> clock_offset() const { return std::nullopt; }
   virtual void set_clock_offset(std::uint64_t /*offset*/) {}
 
