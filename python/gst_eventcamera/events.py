@@ -48,6 +48,27 @@ class Events(np.ndarray):
             part.cause, part.object_class = self.cause[index], self.object_class[index]
         return part
 
+    def copy(self, order: Any = "C") -> Events:
+        events = super().copy(order)
+        if self.cause is not None and self.object_class is not None:
+            events.cause, events.object_class = self.cause.copy(), self.object_class.copy()
+        return events
+
+    def __copy__(self) -> Events:
+        return self.copy()
+
+    def __deepcopy__(self, _: Any) -> Events:
+        return self.copy()
+
+    def __reduce__(self) -> Any:
+        create, arguments, state = super().__reduce__()
+        return create, arguments, (state, self.__dict__)
+
+    def __setstate__(self, state: Any) -> None:
+        array, attributes = state
+        super().__setstate__(array)
+        self.__dict__.update(attributes)
+
     def between(self, start: float, end: float) -> Events:
         """The events with start <= t < end, in seconds; a view, found by binary search."""
         bounds = np.searchsorted(self["t"], [round(start * 1e6), round(end * 1e6)])

@@ -82,9 +82,10 @@ class Pipeline:
 
         pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, replace)
 
-    def raise_error(self) -> None:
-        """Raises what an element has reported, if anything; forgets all other messages."""
-        if message := self._bus.pop_filtered(Gst.MessageType.ERROR):
+    def raise_error(self, wait: int = 0) -> None:
+        """Raises what an element has reported, or reports within `wait` nanoseconds, if anything; forgets all
+        other messages."""
+        if message := self._bus.timed_pop_filtered(wait, Gst.MessageType.ERROR):
             raise _error_of(message)
 
     def set_state(self, state: Gst.State) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import os
 from typing import Iterator, Optional, overload
@@ -30,6 +31,9 @@ WRITERS = {
 
 # Microseconds of the buffers that are written.
 BUFFER = 10_000
+# Bytes that may wait to be written, and nanoseconds between two looks at them.
+MAX_QUEUED = 1 << 24
+LOOK = Gst.MSECOND
 XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
 
 
@@ -56,17 +60,17 @@ class Stream:
     @property
     def width(self) -> int:
         """Of the sensor, in pixels."""
-        return self._properties()[0]
+        return self._properties[0]
 
     @property
     def height(self) -> int:
         """Of the sensor, in pixels."""
-        return self._properties()[1]
+        return self._properties[1]
 
     @property
     def duration(self) -> float:
         """Of the part, in seconds."""
-        whole = self._properties()[2]
+        whole = self._properties[2]
         return max(0.0, min(whole, math.inf if self.end is None else self.end) - self.start)
 
     def between(self, start: float, end: Optional[float] = None) -> Stream:
@@ -147,8 +151,9 @@ class Stream:
         if element.find_property("buffer-duration"):
             element.set_property("buffer-duration", round(self.window * 1e6) * 1000)
 
+    @functools.cached_property
     def _properties(self) -> tuple[int, int, float]:
-        """Width, height and duration of the recording."""
+        """Width, height and duration of the recording, read once."""
         with self._open() as pipeline:
             pipeline.set_state(Gst.State.PAUSED)
             return (*sensor_size(pipeline.caps()), pipeline.duration())
@@ -189,13 +194,15 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
     if width < 1 or height < 1:
         raise ValueError("give the width and height of the sensor")
     _check(events, width, height)
-    with Pipeline(f"appsrc name=in format=time block=true max-bytes=16777216 ! {WRITERS[extension]}") as pipeline:
+    with Pipeline(f"appsrc name=in format=time ! {WRITERS[extension]}") as pipeline:
         pipeline.element("file").set_property("location", os.fspath(path))
         source = pipeline.element("in")
         source.set_property("caps", Gst.Caps.from_string(
             f"{EVENT_CAPS},width={width},height={height},framerate=0/1"))
         pipeline.set_state(Gst.State.PLAYING)
         for buffer in _buffers(events):
+            while source.get_property("current-level-bytes") > MAX_QUEUED:
+                pipeline.raise_error(wait=LOOK)
             if source.push_buffer(buffer) != Gst.FlowReturn.OK:
                 pipeline.raise_error()
                 raise PipelineError(f"{os.fspath(path)} cannot be written")

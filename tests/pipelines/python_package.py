@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The Python package gst_eventcamera: reading, streaming, seeking, simulating, writing, tensors, failures."""
 
+import copy
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -10,6 +12,7 @@ import tempfile
 import threading
 import tracemalloc
 import unittest
+import unittest.mock
 
 if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamera-1.0.typelib")):
     print("built without introspection: no Python")
@@ -112,6 +115,14 @@ class Recordings(unittest.TestCase):
         with self.assertRaises(IndexError):
             stream[len(stream)]
 
+    def test_learns_the_duration_once(self):
+        stream = ec.stream(self.path, window=0.05)
+        with unittest.mock.patch.object(internals.Pipeline, "duration", autospec=True,
+                                        side_effect=internals.Pipeline.duration) as duration:
+            for i in (0, 3, -1):
+                self.assertGreater(len(stream[i]), 0)
+        self.assertEqual(duration.call_count, 1)
+
     def test_streams_in_constant_memory(self):
         path = path_of("long.raw")
         ec.write(path, random_events(500_000, 5_000_000))
@@ -133,6 +144,21 @@ class Recordings(unittest.TestCase):
         self.assertEqual(list(events.object_class), [0, 300, 0])
         self.assertEqual(list(events[1:].cause), [int(GstEventCamera.Cause.LEAK), 0])
         self.assertIsNone(self.events.cause)
+
+    def test_copies_are_complete(self):
+        events = random_events(100, 1000)
+        events.start, events.end = 1.0, 2.0
+        events.cause = np.arange(100, dtype=np.uint8)
+        events.object_class = np.arange(100, dtype=np.uint16)
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            sent = pool.apply(copy.copy, (events,))
+        for other in (sent, copy.copy(events), copy.deepcopy(events), events.copy()):
+            self.assertIsNot(other, events)
+            self.assertTrue(same(other, events))
+            self.assertEqual((other.width, other.height, other.start, other.end), (WIDTH, HEIGHT, 1.0, 2.0))
+            self.assertTrue(np.array_equal(other.cause, events.cause))
+            self.assertTrue(np.array_equal(other.object_class, events.object_class))
+            self.assertFalse(np.shares_memory(other.cause, events.cause))
 
 
 class Simulators(unittest.TestCase):
@@ -220,6 +246,13 @@ class Failures(unittest.TestCase):
         self.expect(ec.PipelineError, "2048x2048 pixels",
                     lambda: ec.write(path_of("wide.raw"), random_events(9, 9, pixels=(3000, 9))))
 
+    def test_of_writing_many_events_are_exceptions(self):
+        full = path_of("full.raw")
+        os.symlink("/dev/full", full)
+        self.expect(ec.PipelineError, "No space left", lambda: ec.write(full, random_events(3_000_000, 3_000_000)))
+        self.expect(ec.PipelineError, "2048x2048 pixels",
+                    lambda: ec.write(path_of("wide.raw"), random_events(3_000_000, 3_000_000, pixels=(3000, 9))))
+
     def test_tell_what_to_install(self):
         missing = subprocess.run([sys.executable, "-c", "import gst_eventcamera"], capture_output=True, text=True,
                                  env=os.environ | {"GI_TYPELIB_PATH": "/nowhere"})
@@ -236,4 +269,5 @@ class Failures(unittest.TestCase):
         self.expect(ValueError, "window", lambda: ec.stream("x", window=0))
 
 
-unittest.main()
+if __name__ == "__main__":  # not in the processes of a pool
+    unittest.main()
