@@ -27,9 +27,10 @@ PixelMask::PixelMask(SensorSize sensor)
     : width_(static_cast<std::size_t>(sensor.width)),
       words_((width_ * static_cast<std::size_t>(sensor.height) + 63) / 64) {}
 
-PixelMask PixelMask::read_png(std::FILE* file, SensorSize sensor) {
+PixelMask PixelMask::parse_png(std::string_view png, SensorSize sensor) {
   PngImage image;
-  if (png_image_begin_read_from_stdio(&image, file) == 0) throw std::runtime_error(image.message);
+  if (png_image_begin_read_from_memory(&image, png.data(), png.size()) == 0)
+    throw std::runtime_error(image.message);
   const auto width = static_cast<std::uint32_t>(sensor.width);
   const auto height = static_cast<std::uint32_t>(sensor.height);
   if (image.width != width || image.height != height)

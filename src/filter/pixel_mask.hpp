@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
+#include <string_view>
 #include <vector>
 
 #include "src/core/label.hpp"
@@ -18,7 +18,7 @@ class PixelMask {
 
   /// Keeps the pixels that a PNG picture of the sensor's size shows brighter than mid-grey, in
   /// front of black. Throws std::runtime_error if it is none, or has another size.
-  static PixelMask read_png(std::FILE* file, SensorSize sensor);
+  static PixelMask parse_png(std::string_view png, SensorSize sensor);
 
   void keep(int x, int y) {
     const auto place = index(x, y);

@@ -345,6 +345,24 @@ TEST_F(HotPixelTest, ReportsFilesThatItCannotRead) {
   }
 }
 
+TEST_F(HotPixelTest, LeavesFilesThatItCannotReadAsTheyAre) {
+  write("1 1\nfive 5\n");
+  Harness h(launch(" learn=true"));
+  h.caps(small_sensor);
+  EXPECT_NE(h.push(buffer_of(0, {on(0)}, ms)), GST_FLOW_OK);
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  EXPECT_EQ(text(), "1 1\nfive 5\n");
+}
+
+TEST_F(HotPixelTest, LeavesFilesAsTheyAreUnlessItFindsOthers) {
+  write("# mine\n1 1\n");
+  Harness h(launch(" learn=true"));
+  h.caps(small_sensor);
+  EXPECT_EQ(count_passed(h, 0, hot), 0U);
+  gst_element_set_state(h.element(), GST_STATE_READY);
+  EXPECT_EQ(text(), "# mine\n1 1\n");
+}
+
 TEST_F(HotPixelTest, ReportsFilesThatItCannotWrite) {
   Harness h("eventhotpixel location=/nowhere/at/all.txt");
   h.caps(small_sensor);

@@ -28,11 +28,13 @@
  * ]|
  */
 #include <filesystem>
-#include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "gst/filter/eventfilter.hpp"
+#include "gst/filter/named_file.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
 
 using eventcamera::HotPixelFilter;
@@ -45,50 +47,42 @@ struct Settings : HotPixelFilter::Settings {
   std::string location;
 };
 
-struct FreeText {
-  void operator()(gchar* text) const { g_free(text); }
-};
-using OwnedText = std::unique_ptr<gchar, FreeText>;
-
-[[noreturn]] void fail(const std::string& what, const std::string& location, GError* error) {
-  const std::string cause = error->message;
-  g_error_free(error);
-  throw std::runtime_error("cannot " + what + " \"" + location + "\": " + cause);
-}
+/// Maximum size of a file, bytes: several million hot pixels.
+constexpr std::size_t max_file_size = std::size_t{64} << 20;
 
 std::vector<PixelPosition> read_hot_pixels(const std::string& location) {
-  gchar* text = nullptr;
-  gsize size = 0;
-  GError* error = nullptr;
-  if (!g_file_get_contents(location.c_str(), &text, &size, &error))
-    fail("read hot pixels from", location, error);
-  const OwnedText owned(text);
-  try {
-    return eventcamera::parse_pixel_list({text, size});
-  } catch (const std::invalid_argument& fault) {
-    throw std::runtime_error("cannot read hot pixels from \"" + location + "\": " + fault.what());
-  }
+  return read_named_file("the hot pixels", location, max_file_size, eventcamera::parse_pixel_list);
 }
 
 void write_hot_pixels(const std::string& location, const std::vector<PixelPosition>& pixels) {
   const std::string text = eventcamera::pixel_list_text(pixels);
   GError* error = nullptr;
-  if (!g_file_set_contents(location.c_str(), text.data(), static_cast<gssize>(text.size()), &error))
-    fail("write hot pixels to", location, error);
+  if (g_file_set_contents(location.c_str(), text.data(), static_cast<gssize>(text.size()), &error))
+    return;
+  const std::string cause = error->message;
+  g_error_free(error);
+  throw std::runtime_error("cannot write the hot pixels \"" + location + "\": " + cause);
 }
 
 class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
  public:
   void start(eventcamera::SensorSize in, eventcamera::SensorSize out) override {
-    EventFilterOf::start(in, out);
+    core_.reset();
     const auto [location, learn] = file();
-    if (location.empty() || (learn && !std::filesystem::exists(location))) return;
-    core_->set_hot_pixels(read_hot_pixels(location));
+    std::vector<PixelPosition> pixels;
+    if (!location.empty() && !(learn && !std::filesystem::exists(location)))
+      pixels = read_hot_pixels(location);
+    // After the file: one that cannot be read must not be replaced on stop.
+    EventFilterOf::start(in, out);
+    core_->set_hot_pixels(std::move(pixels));
+    read_ = core_->hot_pixels();
   }
 
   void stop() override {
     const auto [location, learn] = file();
-    if (core_ && learn && !location.empty()) write_hot_pixels(location, core_->hot_pixels());
+    if (core_ && learn && !location.empty() &&
+        (core_->hot_pixels() != read_ || !std::filesystem::exists(location)))
+      write_hot_pixels(location, core_->hot_pixels());
     EventFilterOf::stop();
   }
 
@@ -101,6 +95,8 @@ class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {
     const auto copy = settings.copy();
     return {copy.location, copy.learn};
   }
+
+  std::vector<PixelPosition> read_;  ///< hot pixels of the file
 };
 
 }  // namespace
@@ -115,7 +111,7 @@ static void gst_event_hot_pixel_class_init(GstEventHotPixelClass* klass) {
       &Settings::location,
       g_param_spec_string("location", "Location",
                           "Text file of hot pixels, read at the start and, with learn, "
-                          "written on stop",
+                          "written on stop if others were found",
                           nullptr,
                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                                    GST_PARAM_MUTABLE_READY)));

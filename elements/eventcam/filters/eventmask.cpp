@@ -13,12 +13,11 @@
  * eventrender ! videoconvert ! autovideosink
  * ]|
  */
-#include <cerrno>
-#include <cstring>
-#include <stdexcept>
+#include <cstddef>
 #include <string>
 
 #include "gst/filter/eventfilter.hpp"
+#include "gst/filter/named_file.hpp"
 #include "src/filter/pixel_mask.hpp"
 
 using eventcamera::LabelledEvents;
@@ -32,22 +31,12 @@ struct Settings {
   std::string location;
 };
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
+/// Maximum size of a picture, bytes.
+constexpr std::size_t max_file_size = std::size_t{64} << 20;
 
 PixelMask read_mask(const std::string& location, SensorSize sensor) {
-  const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(location.c_str(), "rb"));
-  const auto fail = [&](const char* cause) {
-    throw std::runtime_error("cannot read the mask \"" + location + "\": " + cause);
-  };
-  if (!file) fail(std::strerror(errno));
-  try {
-    return PixelMask::read_png(file.get(), sensor);
-  } catch (const std::runtime_error& error) {
-    fail(error.what());
-    throw;
-  }
+  return read_named_file("the mask", location, max_file_size,
+                         [&](const std::string& png) { return PixelMask::parse_png(png, sensor); });
 }
 
 class Mask final : public EventFilter {

@@ -19,12 +19,12 @@
  * eventrender ! videoconvert ! autovideosink
  * ]|
  */
-#include <array>
-#include <fstream>
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 
 #include "gst/filter/eventfilter.hpp"
+#include "gst/filter/named_file.hpp"
 #include "src/filter/camera_calibration.hpp"
 #include "src/filter/undistort_filter.hpp"
 
@@ -48,24 +48,13 @@ std::string text_of(SensorSize size) {
 }
 
 CameraCalibration read_calibration(const std::string& location, SensorSize sensor) {
-  const auto fail = [&](const std::string& cause) {
-    throw std::runtime_error("cannot use the calibration \"" + location + "\": " + cause);
-  };
-  std::ifstream file(location, std::ios::binary);
-  if (!file) fail("cannot open the file");
-  std::string text(max_file_size + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > max_file_size) fail("it has more than 1 MiB");
-  CameraCalibration calibration;
-  try {
-    calibration = eventcamera::parse_calibration(text);
-  } catch (const std::invalid_argument& error) {
-    fail(error.what());
-  }
-  if (calibration.size != SensorSize{} && calibration.size != sensor)
-    fail("it is for " + text_of(calibration.size) + ", but the sensor has " + text_of(sensor));
-  return calibration;
+  return read_named_file("the calibration", location, max_file_size, [&](const std::string& yaml) {
+    const auto calibration = eventcamera::parse_calibration(yaml);
+    if (calibration.size != SensorSize{} && calibration.size != sensor)
+      throw std::invalid_argument("it is for " + text_of(calibration.size) +
+                                  ", but the sensor has " + text_of(sensor));
+    return calibration;
+  });
 }
 
 class Undistort final : public EventFilter {

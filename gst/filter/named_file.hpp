@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <exception>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+/// Reads a file of at most `max_size` bytes. Throws std::system_error if it cannot be read,
+/// std::length_error if it is larger.
+std::string read_bytes(const std::string& location, std::size_t max_size);
+
+/// Returns parse(bytes) of the file that a property `location` names. An exception becomes a
+/// std::runtime_error that says that `what` cannot be read from there, and why.
+template <class Parse>
+auto read_named_file(const std::string& what, const std::string& location, std::size_t max_size,
+                     const Parse& parse) {
+  try {
+    return parse(read_bytes(location, max_size));
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw std::runtime_error("cannot read " + what + " \"" + location + "\": " + error.what());
+  }
+}
