@@ -145,6 +145,24 @@ TEST(Flip, FollowsChanges) {
             std::string::npos);
 }
 
+/// From each direction to each other one, with and without a change of size.
+TEST(Flip, FollowsEveryChange) {
+  const auto directed = [](Harness& h, int direction) {
+    g_object_set(h.element(), "video-direction", direction, nullptr);
+    const auto pixels = passed(h, {on(1, 0)});
+    return std::pair(pixels, size_of(h));
+  };
+  for (int from = GST_VIDEO_ORIENTATION_IDENTITY; from <= GST_VIDEO_ORIENTATION_UR_LL; ++from)
+    for (int to = GST_VIDEO_ORIENTATION_IDENTITY; to <= GST_VIDEO_ORIENTATION_UR_LL; ++to) {
+      Harness fresh("eventflip");
+      fresh.caps(sensor);
+      Harness h("eventflip");
+      h.caps(sensor);
+      directed(h, from);
+      EXPECT_EQ(directed(h, to), directed(fresh, to)) << from << " to " << to;
+    }
+}
+
 TEST(Scale, HasTheSizeOfTheCapsDownstream) {
   Harness h("eventscale");
   h.caps(sensor, "application/x-event-camera, width=4, height=2");

@@ -51,25 +51,30 @@ Orientation orientation_of(GstVideoOrientationMethod method) {
   }
 }
 
+struct Settings {
+  GstVideoOrientationMethod direction = GST_VIDEO_ORIENTATION_IDENTITY;
+};
+
 class Flip final : public EventFilter {
  public:
   void start(SensorSize in, SensorSize out) override {
-    const Orientation orientation = orientation_of(settings.copy());
-    // Set while the caps were negotiated: the next buffer has others.
-    fits_ = orientation.size(in) == out;
-    core_.emplace(in, orientation);
+    in_ = in;
+    out_ = out;
   }
-  void stop() override { core_.reset(); }
+  void stop() override {}
   LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
-    return fits_ ? core_->filter(events) : LabelledEvents{};
+    const Orientation orientation = orientation_of(settings.copy().direction);
+    // Set after the caps were negotiated: the next buffer has others.
+    if (orientation.size(in_) != out_) return {};
+    return FlipFilter(in_, orientation).filter(events);
   }
   void forget() override {}
 
-  Guarded<GstVideoOrientationMethod> settings;
+  Guarded<Settings> settings;
 
  private:
-  std::optional<FlipFilter> core_;
-  bool fits_ = true;
+  SensorSize in_;
+  SensorSize out_;
 };
 
 }  // namespace
@@ -84,22 +89,14 @@ G_DEFINE_TYPE_WITH_CODE(GstEventFlip, gst_event_flip, GST_TYPE_EVENT_FILTER,
                         G_IMPLEMENT_INTERFACE(GST_TYPE_VIDEO_DIRECTION, nullptr))
 GST_ELEMENT_REGISTER_DEFINE(eventflip, "eventflip", GST_RANK_NONE, gst_event_flip_get_type())
 
-static Guarded<GstVideoOrientationMethod>& method_of(gpointer object) {
-  return static_cast<Flip&>(gst_event_filter_inside(GST_EVENT_FILTER(object))).settings;
-}
-
-static void set_method(GObject* object, guint, const GValue* value, GParamSpec*) {
-  *method_of(object).lock() = static_cast<GstVideoOrientationMethod>(g_value_get_enum(value));
-  gst_base_transform_reconfigure_src(GST_BASE_TRANSFORM(object));
-}
-
-static void get_method(GObject* object, guint, GValue* value, GParamSpec*) {
-  g_value_set_enum(value, method_of(object).copy());
+static Guarded<Settings>& settings_of(GObject* object) {
+  return filter_inside<Flip>(object).settings;
 }
 
 static GstCaps* transform_caps(GstBaseTransform* transform, GstPadDirection, GstCaps* caps,
                                GstCaps* filter) {
-  const bool transpose = orientation_of(method_of(transform).copy()).transpose;
+  const bool transpose =
+      orientation_of(settings_of(G_OBJECT(transform)).copy().direction).transpose;
   return changed_caps(caps, filter, [transpose](GstStructure* structure) {
     const GValue* width = gst_structure_get_value(structure, "width");
     const GValue* height = gst_structure_get_value(structure, "height");
@@ -119,10 +116,16 @@ static void gst_event_flip_init(GstEventFlip* self) {
 
 static void gst_event_flip_class_init(GstEventFlipClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  object_class->set_property = set_method;
-  object_class->get_property = get_method;
-  constexpr guint number = 1;
-  g_object_class_override_property(object_class, number, "video-direction");
+  Properties<settings_of> properties(object_class);
+  // Implements the property of GstVideoDirection, which does not say that it may change at any
+  // time.
+  properties.add(&Settings::direction,
+                 g_param_spec_enum("video-direction", "Direction", "How to flip or rotate",
+                                   GST_TYPE_VIDEO_ORIENTATION_METHOD, Settings().direction,
+                                   event_filter_property_flags));
+  object_class->notify = [](GObject* object, GParamSpec*) {
+    gst_base_transform_reconfigure_src(GST_BASE_TRANSFORM(object));
+  };
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event flip", "Filter",
                                         "Flips and rotates the sensor", EVENTSIM_AUTHORS);
   GST_BASE_TRANSFORM_CLASS(klass)->transform_caps = transform_caps;
