@@ -5,6 +5,7 @@
 #include <string>
 
 #include "gst/base/errors.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/seek_request.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
@@ -127,20 +128,7 @@ struct EventAggregatorFunctions {
   static bool take_segment(EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
     const GstSegment* segment = nullptr;
     gst_event_parse_segment(event, &segment);
-    if (segment->format != GST_FORMAT_TIME) {
-      GST_ELEMENT_ERROR(self.element_, STREAM, FORMAT,
-                        ("Cannot %s %s: this stream has no timestamps. Insert a reader of event "
-                         "files upstream, such as decodebin " ASK_FOR_EVENTS ".",
-                         self.role_.verb, gst_format_get_name(segment->format)),
-                        ("segment %" GST_SEGMENT_FORMAT, segment));
-      return false;
-    }
-    if (segment->rate < 0) {
-      GST_ELEMENT_ERROR(self.element_, STREAM, FAILED,
-                        ("Cannot %s events backwards; play at a positive rate.", self.role_.verb),
-                        ("segment %" GST_SEGMENT_FORMAT, segment));
-      return false;
-    }
+    if (!plays_events(self.element_, *segment, self.role_.verb)) return false;
     GST_DEBUG_OBJECT(pad, "%" GST_SEGMENT_FORMAT, segment);
     if (pad == self.main_pad_) {
       self.take_segment(*segment);

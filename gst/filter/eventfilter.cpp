@@ -8,6 +8,7 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/filter/buffer_events.hpp"
 #include "src/filter/valid_events.hpp"
 
@@ -168,8 +169,16 @@ static GstFlowReturn prepare_output_buffer(GstBaseTransform*, GstBuffer* in, Gst
 
 static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto& priv = priv_of(transform);
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
+    const GstSegment* segment = nullptr;
+    gst_event_parse_segment(event, &segment);
+    if (!plays_events(transform, *segment, "filter")) {
+      gst_event_unref(event);
+      return FALSE;
+    }
+  }
   if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && priv.state) {
-    priv.inside->forget();
+    reported(transform, [&] { priv.inside->forget(); });
     priv.state->passed = State{}.passed;
   }
   return PARENT_TRANSFORM_CLASS->sink_event(transform, event);

@@ -14,6 +14,7 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
@@ -660,14 +661,10 @@ static void start_timeline(GstEventSimulator* self) {
 static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
-  if (segment->rate < 0) {
-    if (std::exchange(priv_of(self).stream.backwards, true)) return false;  // repeated segment
-    GST_ELEMENT_ERROR(self, STREAM, FAILED,
-                      ("Cannot simulate events backwards. Play at a positive rate."),
-                      ("the segment has rate %g", segment->rate));
-    return false;
-  }
-  priv_of(self).stream.backwards = false;
+  auto& backwards = priv_of(self).stream.backwards;
+  if (segment->rate < 0 && backwards) return false;  // repeated segment
+  backwards = segment->rate < 0;
+  if (!plays_events(self, *segment, "simulate")) return false;
   const GstSegment& current = GST_BASE_TRANSFORM(self)->segment;
   if (current.format != segment->format || current.rate != segment->rate ||
       current.base != segment->base || current.start != segment->start ||

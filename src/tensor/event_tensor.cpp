@@ -87,6 +87,13 @@ ByteScale scale_of(const TensorSettings& settings) {
 
 }  // namespace
 
+std::size_t EventTensor::memory(const TensorShape& shape, const TensorSettings& settings) {
+  std::size_t bytes = size_of(settings.type);
+  if (settings.type != ElementType::float32) bytes += sizeof(float);
+  if (settings.representation == Representation::time_surface) bytes += sizeof(Microseconds);
+  return shape.elements() * bytes;
+}
+
 EventTensor::EventTensor(int width, int height, const TensorSettings& settings)
     : settings_(settings), shape_(width, height, settings) {
   if (settings.type != ElementType::float32) values_.resize(shape_.elements());

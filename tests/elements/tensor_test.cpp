@@ -203,7 +203,46 @@ TEST_F(Tensor, RefusesToBeHuge) {
       h->get(),
       "application/x-event-camera, format=XYTP, width=16384, height=16384, framerate=100/1");
   EXPECT_NE(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_OK);
-  EXPECT_EQ(h->error(), "Cannot make tensors of more than 1 GiB; lower bins or the resolution.");
+  EXPECT_EQ(h->error(),
+            "Cannot make tensors that take more than 1 GiB; lower bins or the resolution.");
+}
+
+/// What a time surface is made from counts, too: 13 bytes for each number.
+TEST_F(Tensor, RefusesToNeedHugeMemory) {
+  h.emplace("eventtensor representation=time-surface data-type=uint8");
+  gst_harness_set_src_caps_str(
+      h->get(),
+      "application/x-event-camera, format=XYTP, width=8192, height=8192, framerate=100/1");
+  EXPECT_NE(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_OK);
+  EXPECT_NE(h->error().find("1 GiB"), std::string::npos);
+}
+
+TEST_F(Tensor, RefusesToRunBackwards) {
+  begin("");
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.rate = -1;
+  segment.stop = GST_SECOND;
+  gst_harness_push_event(h->get(), gst_event_new_segment(&segment));
+  EXPECT_EQ(h->error(), "Cannot make tensors of events backwards; play at a positive rate.");
+  EXPECT_EQ(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_ERROR);
+}
+
+TEST_F(Tensor, HasWindowsOfAMicrosecondOrMore) {
+  begin("accumulation-time=1 representation=event-frame");
+  EXPECT_EQ(h->push(buffer_of(0, {}, 10 * GST_USECOND)), GST_FLOW_OK);
+  EXPECT_EQ(gst_harness_buffers_received(h->get()), 10U);
+}
+
+/// The result of tensors in place of a GAP.
+TEST_F(Tensor, ReturnsWhatDownstreamSaidOfAGap) {
+  begin("accumulation-time=10000000");
+  push_columns(0, 0);
+  gst_pad_set_active((*h)->sinkpad, FALSE);
+  EXPECT_FALSE(gst_harness_push_event(h->get(), gst_event_new_gap(10 * ms, 10 * ms)));
+  gst_pad_set_active((*h)->sinkpad, TRUE);
+  EXPECT_EQ(h->push(buffer_of(20 * ms, column(0), 10 * ms)), GST_FLOW_FLUSHING);
+  EXPECT_EQ(h->push(buffer_of(20 * ms, column(0), 10 * ms)), GST_FLOW_OK);
 }
 
 TEST_F(Tensor, WarnsOfEventsOutsideTheSensor) {

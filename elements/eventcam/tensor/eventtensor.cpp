@@ -39,7 +39,8 @@
  * maximum, or 1/255 of it if it has no sign, with `max`, and 1/32 of the standard deviation around
  * 128 with `mean-std`; 255 is 1 in a time surface. Values are rounded and clamped.
  *
- * Tensors have at most 1 GiB, windows at most 16777216 events; further ones are skipped.
+ * A tensor, with the numbers from which it is made, takes at most 1 GiB. Windows have at most
+ * 16777216 events; further ones are skipped.
  *
  * ## Example launch line
  * |[
@@ -63,6 +64,7 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "src/tensor/event_tensor.hpp"
@@ -90,6 +92,7 @@ constexpr GstClockTime max_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
 /// Times beyond this are not used: the ends of windows would not fit into 64 bits.
 constexpr GstClockTime max_time = GstClockTime{1} << 62;
 
+/// Maximum memory of a tensor and of what it is made from.
 constexpr gsize max_tensor_bytes = gsize{1} << 30;
 
 constexpr guint max_frame_count = 10'000;
@@ -119,8 +122,10 @@ TensorSettings tensor_settings(const Settings& settings) {
 }
 
 WindowSettings window_settings(const Settings& settings) {
+  const auto accumulation_time =
+      settings.accumulation_time > 0 ? std::max(settings.accumulation_time, event_resolution) : 0;
   return {.events = settings.event_count,
-          .duration = static_cast<Nanoseconds>(settings.accumulation_time),
+          .duration = static_cast<Nanoseconds>(accumulation_time),
           .intervals = settings.frame_count,
           .overlap = settings.overlap};
 }
@@ -151,7 +156,8 @@ struct Private {
   std::optional<State> state;
   EventBuffers buffers;
   GstSegment segment{};
-  bool discontinuous = true;  ///< the next tensor is discontinuous
+  GstFlowReturn gap_result = GST_FLOW_OK;  ///< of the last GAP, for the next buffer
+  bool discontinuous = true;               ///< the next tensor is discontinuous
   EventFaults faults{"use", GST_CAT_DEFAULT};
   WarnOnce warn_of_excess{GST_CAT_DEFAULT};
 };
@@ -266,6 +272,8 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto& priv = *self->priv;
   const OwnedBuffer buffer(taken);
   if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  const auto gap_result = std::exchange(priv.gap_result, GST_FLOW_OK);
+  if (gap_result != GST_FLOW_OK) return gap_result;
   const auto interval = interval_of(taken);
   if (!interval || interval->end > max_time) {
     priv.faults.warn(self, interval ? EventFault::pts_too_large : EventFault::no_pts, taken);
@@ -282,7 +290,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
                  [&] { return add(self, mapped.events(), mapped.start(), *interval, taken); });
 }
 
-/// Returns true if tensors take the place of the gap.
+/// Returns true if tensors take the place of the gap. The next buffer gets the result.
 static bool take_gap(GstEventTensor* self, GstEvent* event) {
   auto& priv = *self->priv;
   GstClockTime start = 0;
@@ -291,7 +299,9 @@ static bool take_gap(GstEventTensor* self, GstEvent* event) {
   if (!priv.state || priv.state->windows_of.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_time || duration > max_time - start)
     return false;
-  guarded(self, no_memory, [&] { return add(self, {}, 0, {start, start + duration}, nullptr); });
+  priv.gap_result = guarded(self, no_memory, [&] {
+    return add(self, {}, 0, {start, start + duration}, nullptr);
+  });
   return true;
 }
 
@@ -352,13 +362,13 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   const Settings settings = priv.settings.copy();
   priv.state.reset();
   const auto tensor_of = tensor_settings(settings);
-  const auto bytes = eventcamera::TensorShape(info.width, info.height, tensor_of).elements() *
-                     size_of(tensor_of.type);
+  const auto bytes = EventTensor::memory({info.width, info.height, tensor_of}, tensor_of);
   if (bytes > max_tensor_bytes) {
-    GST_ELEMENT_ERROR(self, STREAM, FORMAT,
-                      ("Cannot make tensors of more than 1 GiB; lower bins or the resolution."),
-                      ("%dx%d pixels and %u bins make %" G_GSIZE_FORMAT " bytes", info.width,
-                       info.height, settings.bins, bytes));
+    GST_ELEMENT_ERROR(
+        self, STREAM, FORMAT,
+        ("Cannot make tensors that take more than 1 GiB; lower bins or the resolution."),
+        ("%dx%d pixels and %u bins make %" G_GSIZE_FORMAT " bytes", info.width, info.height,
+         settings.bins, bytes));
     return false;
   }
   priv.state.emplace(info, settings);
@@ -382,15 +392,18 @@ static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
   return taken;
 }
 
-static void take_segment(GstEventTensor* self, GstEvent* event) {
+/// Returns false if the segment cannot be used.
+static bool take_segment(GstEventTensor* self, GstEvent* event) {
   auto& segment = self->priv->segment;
   GstSegment next;
   gst_event_copy_segment(event, &next);
+  if (!plays_events(self, next, "make tensors of")) return false;
   const bool continues = next.format == segment.format && next.rate == segment.rate &&
                          next.base == segment.base && next.start == segment.start &&
                          next.time == segment.time;
   if (!continues) drain(self);
   segment = next;
+  return true;
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
@@ -405,17 +418,21 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_GAP:
       if (take_gap(self, event)) {
         gst_event_unref(event);
-        return TRUE;
+        return priv.gap_result == GST_FLOW_OK ? TRUE : FALSE;
       }
       break;
     case GST_EVENT_SEGMENT:
-      take_segment(self, event);
+      if (!take_segment(self, event)) {
+        gst_event_unref(event);
+        return FALSE;
+      }
       break;
     case GST_EVENT_EOS:
       drain(self);
       break;
     case GST_EVENT_FLUSH_STOP:
       gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
+      priv.gap_result = GST_FLOW_OK;
       if (priv.state) {
         priv.state->windows.reset();
         priv.state->tensor.reset();
@@ -445,6 +462,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
     priv.buffers.reset();
     priv.state.reset();
     gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
+    priv.gap_result = GST_FLOW_OK;
     priv.discontinuous = true;
     priv.faults.reset();
     priv.warn_of_excess.reset();
@@ -518,11 +536,12 @@ static void install_properties(GObjectClass* klass) {
                                    "Number of events in a window (0 = not limited by count)", 0,
                                    static_cast<guint>(WindowQueue::max_events),
                                    Settings().event_count, flags));
-  properties.add(
-      &Settings::accumulation_time,
-      g_param_spec_uint64("accumulation-time", "Accumulation time",
-                          "Length of a window without event-count (ns; 0 = frame-count buffers)", 0,
-                          max_gap, Settings().accumulation_time, flags));
+  properties.add(&Settings::accumulation_time,
+                 g_param_spec_uint64(
+                     "accumulation-time", "Accumulation time",
+                     "Length of a window without event-count (ns, at least 1000; 0 = frame-count "
+                     "buffers)",
+                     0, max_gap, Settings().accumulation_time, flags));
   properties.add(&Settings::frame_count,
                  g_param_spec_uint("frame-count", "Frame count",
                                    "Number of buffers in a window without event-count and "
