@@ -34,6 +34,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -112,7 +113,7 @@ class EventMerge final : public EventAggregator {
   bool load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer, Microseconds length);
   void raise_latency(GstClockTime needed);
   void count(const MergedInterval& interval);
-  void choose_segment();
+  void choose_segment(std::span<const OwnedAggregatorPad> pads);
   GstFlowReturn push(const MergedInterval& interval, EventMerger::Inputs inputs);
   GstFlowReturn push_gap(GstClockTime start, GstClockTime duration);
 
@@ -186,16 +187,17 @@ bool EventMerge::load(const OwnedAggregatorPad& pad) {
 /* output */
 
 /// Chooses the segment of the stream that starts first, up to the end of the one that ends last.
-void EventMerge::choose_segment() {
-  std::optional<GstSegment> chosen;
-  GstClockTime stop = 0;
-  for (const auto& pad : numbered_pads(element())) {
+/// There must be a stream.
+void EventMerge::choose_segment(std::span<const OwnedAggregatorPad> pads) {
+  GstSegment chosen = segment_of(pads.front().get());
+  GstClockTime stop = chosen.stop;
+  for (const auto& pad : pads.subspan(1)) {
     const GstSegment segment = segment_of(pad.get());
     stop = std::max(stop, segment.stop);  // none is the maximum
-    if (!chosen || segment.start < chosen->start) chosen = segment;
+    if (segment.start < chosen.start) chosen = segment;
   }
-  chosen->stop = stop;
-  gst_aggregator_update_segment(element(), &*chosen);
+  chosen.stop = stop;
+  gst_aggregator_update_segment(element(), &chosen);
 }
 
 void EventMerge::count(const MergedInterval& interval) {
@@ -279,7 +281,7 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
   if (inputs.empty() && !waiting) return GST_FLOW_EOS;
   if (!segment_chosen_ && pads.size() < settings.copy().min_streams) waiting = true;
   if (inputs.empty() || (waiting && !timed_out)) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  if (!std::exchange(segment_chosen_, true)) choose_segment();
+  if (!std::exchange(segment_chosen_, true)) choose_segment(pads);
   const auto interval = merger_.next(inputs);
   count(interval);
   const GstFlowReturn result = push(interval, inputs);
@@ -379,6 +381,7 @@ void EventMerge::stop() {
   for (const auto& pad : numbered_pads(element())) stream_of(pad).sensor = {};
   buffers_.reset();
   latency_ = 0;
+  gst_aggregator_set_latency(element(), latency_, latency_);
   warn_of_late_.reset();
   *counts_.lock() = {};
 }
