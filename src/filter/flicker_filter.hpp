@@ -29,10 +29,10 @@ class FlickerFilter {
   struct Settings {
     FlickerMode mode = FlickerMode::band_stop;
     unsigned min_frequency = 50;   ///< Hz, at least 1
-    unsigned max_frequency = 520;  ///< Hz, at least min_frequency
+    unsigned max_frequency = 520;  ///< Hz; a lower one than min_frequency counts as that
     double duty_cycle = 0.5;       ///< share of ON phases, between 0 and 1
     unsigned start_threshold = 6;  ///< 1 to max_threshold
-    unsigned stop_threshold = 4;   ///< 1 to start_threshold
+    unsigned stop_threshold = 4;   ///< from 1; a higher one than start_threshold counts as that
   };
 
   explicit FlickerFilter(SensorSize sensor) : pixels_(sensor) {}
@@ -40,19 +40,19 @@ class FlickerFilter {
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings) {
     const Phase off(settings, 1 - settings.duty_cycle);
     const Phase on(settings, settings.duty_cycle);
-    const auto longest = static_cast<Stamp>(1e6 / settings.min_frequency);
+    const auto max_length = static_cast<Stamp>(1e6 / settings.min_frequency);
+    const auto stop_threshold = std::min(settings.stop_threshold, settings.start_threshold);
     const bool keeps_flicker = settings.mode == FlickerMode::band_pass;
     return pixels_.keep_if(events, start, [&](const Event& event, Stamp now, Pixel* pixel) {
       const bool is_on = event.polarity() == Polarity::on;
       const Stamp length = now - pixel->began;
-      if (length > longest) {
+      if (length > max_length) {
         *pixel = {.began = now, .count = 0, .is_on = is_on, .flickers = false};
       } else if (is_on != pixel->is_on) {
         const bool fits = (pixel->is_on ? on : off).fits(length);
         const unsigned count = fits ? std::min(pixel->count + 1U, max_threshold)
                                     : std::max(pixel->count, std::uint8_t{1}) - 1U;
-        const unsigned needed =
-            pixel->flickers ? settings.stop_threshold : settings.start_threshold;
+        const unsigned needed = pixel->flickers ? stop_threshold : settings.start_threshold;
         *pixel = {.began = now,
                   .count = static_cast<std::uint8_t>(count),
                   .is_on = is_on,
@@ -69,13 +69,14 @@ class FlickerFilter {
   class Phase {
    public:
     Phase(const Settings& settings, double share)
-        : shortest_(static_cast<Stamp>(share * 1e6 / settings.max_frequency)),
-          longest_(static_cast<Stamp>(share * 1e6 / settings.min_frequency)) {}
-    bool fits(Stamp length) const { return length >= shortest_ && length <= longest_; }
+        : min_(static_cast<Stamp>(share * 1e6 /
+                                  std::max(settings.max_frequency, settings.min_frequency))),
+          max_(static_cast<Stamp>(share * 1e6 / settings.min_frequency)) {}
+    bool fits(Stamp length) const { return length >= min_ && length <= max_; }
 
    private:
-    Stamp shortest_;
-    Stamp longest_;
+    Stamp min_;
+    Stamp max_;
   };
 
   struct Pixel {

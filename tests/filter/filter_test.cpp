@@ -168,6 +168,20 @@ TEST(Flicker, KeepsTheSameEventsAsTheReference) {
   }
 }
 
+TEST(Flicker, TakesAnEmptyBandAndInvertedThresholdsAsTheNearestValid) {
+  const auto kept = [](const eventcamera::FlickerFilter::Settings& settings) {
+    eventcamera::FlickerFilter core(sensor);
+    return filtered(core, lamp(100, 0.5, 1'000'000), settings, 100);
+  };
+  const auto valid =
+      kept({.min_frequency = 100, .max_frequency = 100, .start_threshold = 2, .stop_threshold = 2});
+  EXPECT_LT(valid.size(), 200U);
+  EXPECT_TRUE(
+      kept(
+          {.min_frequency = 100, .max_frequency = 90, .start_threshold = 2, .stop_threshold = 7}) ==
+      valid);
+}
+
 TEST(Flicker, DropsALampInTheBand) {
   const auto kept = [](double frequency, double duty_cycle) {
     const Events events = lamp(frequency, duty_cycle, 1'000'000);

@@ -59,8 +59,9 @@ static void gst_event_anti_flicker_class_init(GstEventAntiFlickerClass* klass) {
                                    max_frequency, Settings().min_frequency, flags));
   properties.add(&Settings::max_frequency,
                  g_param_spec_uint("max-frequency", "Maximum frequency",
-                                   "Upper end of the band of flicker (Hz)", min_frequency,
-                                   max_frequency, Settings().max_frequency, flags));
+                                   "Upper end of the band of flicker (Hz); a lower one than "
+                                   "min-frequency counts as that",
+                                   min_frequency, max_frequency, Settings().max_frequency, flags));
   properties.add(&Settings::duty_cycle,
                  g_param_spec_double("duty-cycle", "Duty cycle",
                                      "Share of a period from the first ON event to the first OFF "
@@ -71,10 +72,12 @@ static void gst_event_anti_flicker_class_init(GstEventAntiFlickerClass* klass) {
       g_param_spec_uint("start-threshold", "Start threshold",
                         "Count of phases at which a pixel begins to flicker", 1,
                         FlickerFilter::max_threshold, Settings().start_threshold, flags));
-  properties.add(&Settings::stop_threshold,
-                 g_param_spec_uint("stop-threshold", "Stop threshold",
-                                   "Count of phases below which a pixel no longer flickers", 1,
-                                   FlickerFilter::max_threshold, Settings().stop_threshold, flags));
+  properties.add(
+      &Settings::stop_threshold,
+      g_param_spec_uint("stop-threshold", "Stop threshold",
+                        "Count of phases below which a pixel no longer flickers; a higher "
+                        "one than start-threshold counts as that",
+                        1, FlickerFilter::max_threshold, Settings().stop_threshold, flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Anti-flicker filter", "Filter",
                                         "Drops the events of flickering lamps", EVENTSIM_AUTHORS);
 }
