@@ -4,6 +4,7 @@
 #include <yaml.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -93,9 +94,12 @@ Entries entries_of(std::string_view yaml) {
 }
 
 double number(const std::string& text, const std::string& name) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0' || !std::isfinite(value))
+  // Not strtod(), whose decimal separator is the locale's.
+  std::string_view digits = text;
+  if (digits.starts_with('+')) digits.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value))
     throw std::invalid_argument(name + " has \"" + text + "\" in place of a number");
   return value;
 }
@@ -217,13 +221,13 @@ CameraCalibration parse_calibration(std::string_view yaml) {
         "camera_matrix is not that of a camera: focal lengths must be positive, without skew");
   calibration.lens = lens_of(entries);
   const auto distortion = matrix(entries, {"distortion_coefficients", "dist_coeffs", "D"});
-  const std::size_t most = calibration.lens == CameraCalibration::Lens::fisheye ? 4 : 5;
+  const std::size_t max_count = calibration.lens == CameraCalibration::Lens::fisheye ? 4 : 5;
   for (std::size_t i = 0; i < distortion.size(); ++i) {
-    if (i < most)
+    if (i < max_count)
       calibration.distortion.at(i) = distortion[i];
     else if (distortion[i] != 0)
-      throw std::invalid_argument("distortion_coefficients has more than " + std::to_string(most) +
-                                  " that are not 0");
+      throw std::invalid_argument("distortion_coefficients has more than " +
+                                  std::to_string(max_count) + " that are not 0");
   }
   calibration.size = {side(entries, "image_width"), side(entries, "image_height")};
   return calibration;
