@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Filters of arbitrary valid streams. Seven bytes are an event, or end a buffer: x, y and polarity,
-// time after the last one. The same events are kept of one buffer and of many, in order.
+// time after the last one. The same events are kept of one buffer and of many, in order; those that
+// are moved fit into the output, and merged streams have all events, in order.
+#include <array>
 #include <vector>
 
+#include "src/filter/crop_filter.hpp"
 #include "src/filter/denoise_filter.hpp"
+#include "src/filter/event_merge.hpp"
 #include "src/filter/flicker_filter.hpp"
+#include "src/filter/flip_filter.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
 #include "src/filter/rate_filter.hpp"
 #include "src/filter/refractory_filter.hpp"
+#include "src/filter/scale_filter.hpp"
 #include "src/filter/trail_filter.hpp"
 #include "src/formats/little_endian.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
@@ -67,6 +73,70 @@ void check(const std::vector<Buffer>& buffers, const typename Core::Settings& se
   require(next == kept.size(), "what is kept is part of the stream, in order");
 }
 
+/// Filters that move events, which then have to fit into the output.
+template <class Filter>
+void check_moved(const std::vector<Buffer>& buffers, SensorSize out, const Filter& filter) {
+  for (auto [start, events] : buffers)
+    for (const auto& event : filter(LabelledEvents{events, {}}, start).events)
+      require(event.x < out.width && event.y() < out.height, "events are inside the output");
+}
+
+void check_geometry(const std::vector<Buffer>& buffers) {
+  for (const bool transpose : {false, true})
+    for (const bool mirror : {false, true}) {
+      const Orientation orientation{
+          .transpose = transpose, .mirror_x = mirror, .mirror_y = !mirror};
+      check_moved(buffers, orientation.size(sensor), [&](LabelledEvents events, Microseconds) {
+        return FlipFilter(sensor, orientation).filter(events);
+      });
+    }
+  constexpr SensorSize region{13, 5};
+  check_moved(buffers, region, [&](LabelledEvents events, Microseconds start) {
+    return CropFilter(sensor, region).filter(events, start, {.left = 1, .top = 3});
+  });
+  for (const SensorSize size : {SensorSize{5, 4}, SensorSize{40, 30}})
+    for (const unsigned min_events : {1U, 3U}) {
+      ScaleFilter scale(sensor, size);
+      check_moved(buffers, size, [&](LabelledEvents events, Microseconds start) {
+        return scale.filter(events, start, {.min_events = min_events});
+      });
+    }
+}
+
+/// Merges the ON with the OFF events.
+void check_merged(const std::vector<Buffer>& buffers) {
+  EventMerger merger;
+  std::array<MergeInput, 2> inputs;
+  Microseconds last = 0;
+  for (const auto& [start, events] : buffers) {
+    std::array<std::vector<Event>, 2> parts;
+    for (const auto& event : events)
+      parts[event.polarity() == Polarity::on ? 1 : 0].push_back(event);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      inputs[i].load(parts[i], {}, sensor, events.back().t);
+      inputs[i].place(start, 0, 0);
+    }
+    std::size_t merged = 0;
+    for (;;) {
+      std::vector<MergeInput*> loaded;
+      for (auto& input : inputs)
+        if (input.is_loaded()) loaded.push_back(&input);
+      if (loaded.empty()) break;
+      const auto interval = merger.next(loaded);
+      std::vector<Event> out(interval.events);
+      EventMerger::merge(loaded, interval, {out, {}});
+      for (const auto& event : out) {
+        require(interval.start + event.t >= last, "merged events are sorted");
+        last = interval.start + event.t;
+      }
+      merged += out.size();
+      for (auto* input : loaded)
+        if (input->end() <= interval.end) input->unload();
+    }
+    require(merged == events.size(), "all events are merged");
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -82,5 +152,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
        {DenoiseMethod::baf, DenoiseMethod::stcf, DenoiseMethod::time_kernel, DenoiseMethod::dwf})
     for (const bool match_polarity : {false, true})
       check<DenoiseFilter>(buffers, {.method = method, .match_polarity = match_polarity});
+  check_geometry(buffers);
+  check_merged(buffers);
   return 0;
 }
