@@ -17,14 +17,14 @@ int nearest(const DoubleWindow::Window& signal, const DoubleWindow::Window& nois
   const hn::CappedTag<std::int16_t, 16> lanes;
   const auto at_x = hn::Set(lanes, static_cast<std::int16_t>(x));
   const auto at_y = hn::Set(lanes, static_cast<std::int16_t>(y));
-  auto least = hn::Set(lanes, INT16_MAX);
+  auto min = hn::Set(lanes, INT16_MAX);
   for (const auto* window : {&signal, &noise})
     for (std::size_t i = 0; i < window->x.size(); i += hn::Lanes(lanes)) {
       const auto across = hn::Abs(hn::Sub(hn::LoadU(lanes, window->x.data() + i), at_x));
       const auto down = hn::Abs(hn::Sub(hn::LoadU(lanes, window->y.data() + i), at_y));
-      least = hn::Min(least, hn::SaturatedAdd(across, down));
+      min = hn::Min(min, hn::SaturatedAdd(across, down));
     }
-  return hn::GetLane(hn::MinOfLanes(lanes, least));
+  return hn::GetLane(hn::MinOfLanes(lanes, min));
 }
 
 }  // namespace

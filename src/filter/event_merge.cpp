@@ -6,7 +6,7 @@
 namespace eventcamera {
 namespace {
 
-/// Longest interval, whose times fit into the 32 bits of an event.
+/// Maximum length of an interval, whose times fit into the 32 bits of an event.
 constexpr Microseconds max_length = max_interval / 1000;
 
 /// Pauses up to this are rounding errors of the inputs' times.

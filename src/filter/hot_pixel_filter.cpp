@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "src/filter/prefetched.hpp"
+
 namespace eventcamera {
 
 LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
@@ -20,14 +22,9 @@ LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
                          stride = pixels_.stride()](const Event& event) {
     return reinterpret_cast<std::uint32_t*>(origin + event.y() * stride) + event.x;
   };
-  // Pixels of random events are not in the cache: load those of events to come.
-  constexpr std::size_t distance = 16;
-  if (events.events.empty()) return events;
-  const Event* const last = &events.events.back();
-  const Event* ahead = &events.events[std::min(distance, events.events.size() - 1)];
-  return events.keep_if([=, this, end = learning_end_](const Event& event) mutable {
-    __builtin_prefetch(pixel_of(*ahead), 1);
-    ahead = std::min(ahead + 1, last);
+  const auto prefetch = [pixel_of](const Event& event) { __builtin_prefetch(pixel_of(event), 1); };
+  Microseconds end = learning_end_;
+  return keep_if_prefetched(events, prefetch, [&](const Event& event) {
     const Microseconds time = start + event.t;
     if (time >= end) [[unlikely]] {
       learn(settings);

@@ -17,8 +17,8 @@ void find_neighbour_support(const StampedBatch<Stamp>& batch, Stamp correlation_
 
 inline constexpr int kernel_radius = 2;
 
-/// Keeps an event if the rests of the correlation time since the last events of 24 neighbours add
-/// up to `needed`; the sum must fit into 31 bits. Cells need a margin of kernel_radius.
+/// Keeps an event if what is left of the correlation time since the last events of 24 neighbours
+/// adds up to `needed`; the sum must fit into 31 bits. Cells need a margin of kernel_radius.
 void find_kernel_support(const StampedBatch<Stamp>& batch, Stamp correlation_time,
                          std::uint32_t needed);
 

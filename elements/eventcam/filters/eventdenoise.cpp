@@ -60,7 +60,7 @@ static void gst_event_denoise_class_init(GstEventDenoiseClass* klass) {
                                    method_type(), static_cast<int>(Settings().method), flags));
   properties.add(&Settings::correlation_time,
                  g_param_spec_uint64("correlation-time", "Correlation time",
-                                     "Longest time between events that support each other (ns; "
+                                     "Maximum time between events that support each other (ns; "
                                      "0 = the default of the method)",
                                      0, DenoiseFilter::max_correlation_time,
                                      Settings().correlation_time, flags));

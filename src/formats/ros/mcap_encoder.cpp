@@ -52,7 +52,7 @@ constexpr std::size_t max_packet_bytes = std::size_t{1} << 15;
 /// Limits of a chunk.
 constexpr Microseconds max_chunk_time = 1'000'000;
 constexpr std::size_t max_chunk_bytes = std::size_t{1} << 20;
-/// Longest pause that EVT3 words fill, so that readers that do not use the stamps count the wraps
+/// Maximum pause that EVT3 words fill, so that readers that do not use the stamps count the wraps
 /// of the clock: 10 minutes, which take 300 kB.
 constexpr std::uint64_t max_filled_pause = 600'000'000;
 
