@@ -11,9 +11,10 @@
  * #GstEventHotPixel:location is a file of hot pixels.
  *
  * With #GstEventHotPixel:location, the hot pixels are read from the file, if there is one, when the
- * stream begins, and written to it when the element stops; without #GstEventHotPixel:learn, they
- * are only read. It is a text file with the column and row of a pixel in each line. For a camera,
- * learn once with the lens covered or in front of an even scene, and use that file from then on.
+ * stream begins, and written to it when the element stops, if others were found; without
+ * #GstEventHotPixel:learn, they are only read. It is a text file with the column and row of a pixel
+ * in each line. For a camera, learn once with the lens covered or in front of an even scene, and
+ * use that file from then on.
  *
  * Hot pixels belong to the sensor: they are kept through flushes, gaps, new segments, DISCONT and
  * where time goes back. What was counted in the current period is forgotten after a flush and where
