@@ -16,7 +16,7 @@ fail() {
 without() { # FEATURE...
   echo "Without $*"
   local feature options=()
-  for feature in eventsim opencv eventsimgl eventcam aedat hdf5 npz ros; do
+  for feature in eventsim opencv eventsimgl eventcam aedat hdf5 npz ros analytics; do
     case " $* " in
       *" $feature "*) options+=("-D$feature=disabled") ;;
       *) options+=("-D$feature=auto") ;;
@@ -53,6 +53,7 @@ without eventsim aedat
 without eventsim hdf5
 without eventsim npz
 without eventsim ros
+without eventsim analytics
 without eventcam # finds OpenCV, although it is not in the prefix
 [ "$(plugins)" = "./eventsim/libgsteventsim.so ./eventsimgl/libgsteventsimgl.so " ] || fail "built $(plugins)"
 
