@@ -321,8 +321,8 @@ static void set_location(GstElement* pipeline, const char* name, const char* pat
   gst_object_unref(element);
 }
 
-/* Links the first video stream of a file to a writer that takes it. Runs in the streaming
- * thread, before data flows. */
+/* Links the first video stream of a file to a writer that takes it: one that begins before the
+ * header is written. Runs in the streaming thread, before data of the stream flows. */
 static void link_frames(GstElement* reader, GstPad* pad, gpointer writer) {
   GstObject* pipeline = gst_element_get_parent(reader);
   GstElement* queue;
@@ -331,11 +331,14 @@ static void link_frames(GstElement* reader, GstPad* pad, gpointer writer) {
   if (strcmp(name, "video_0") == 0) {
     queue = gst_element_factory_make("queue", NULL);
     gst_bin_add(GST_BIN(pipeline), queue);
-    gst_element_link_pads(queue, "src", GST_ELEMENT(writer), "video_0");
-    sink = gst_element_get_static_pad(queue, "sink");
-    gst_pad_link(pad, sink);
-    gst_object_unref(sink);
-    gst_element_sync_state_with_parent(queue);
+    if (gst_element_link_pads(queue, "src", GST_ELEMENT(writer), "video_0")) {
+      sink = gst_element_get_static_pad(queue, "sink");
+      gst_pad_link(pad, sink);
+      gst_object_unref(sink);
+      gst_element_sync_state_with_parent(queue);
+    } else {
+      gst_bin_remove(GST_BIN(pipeline), queue);
+    }
   }
   g_free(name);
   gst_object_unref(pipeline);
