@@ -71,6 +71,7 @@ class Folder {
     save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
     save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
     save("ros1.bag", eventcamera::rosbags::of_events(sensor, events, 1000));
+    save("ros2.db3", eventcamera::rosbags::db3_of_events(sensor, events, 1000));
     for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
                                        {"a.es", "eventesenc ! filesink"},
                                        {"a.csv", "eventcsvenc ! filesink"},
@@ -113,7 +114,7 @@ inline constexpr File files[] = {
     {"aedat2.aedat", "aedatdemux"}, {"a.aedat4", "aedatdemux"},
     {"aedat3.aedat", "aedatdemux"}, {"metavision.hdf5", "eventhdf5dec"},
     {"dsec.h5", "eventhdf5dec"},    {"a.mcap", "eventmcapdec"},
-    {"ros1.bag", "eventbagdec"},
+    {"ros1.bag", "eventbagdec"},    {"ros2.db3", "eventbagdec"},
 };
 
 /// Part of a test's name.

@@ -48,6 +48,10 @@ with h5py.File("columns.h5", "w") as file:
 with h5py.File("v2e.h5", "w") as file:
     file.create_dataset("events", shape=(0, 4), maxshape=(None, 4), dtype="uint32", compression="gzip")
 PYTHON
+/usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
+mv evt3.bag bag.bag
+mv evt3.db3 bag.db3
+cp bag.db3 "a bag without an extension"
 echo 'export const a = 1;' >script.es
 printf 'IIU\0\010\0\0\0 a photo' >photo.raw
 printf '\1\2\3\4 other words' >words.raw
@@ -66,6 +70,9 @@ application/x-event-npy ball.npy
 application/x-event-npz ball.npz
 application/x-aedat ball.aedat4
 application/x-mcap ball.mcap
+application/x-rosbag bag.bag
+application/x-rosbag2-db3 bag.db3
+application/x-rosbag2-db3 a bag without an extension
 application/x-event-hdf5 ball.h5
 application/x-event-hdf5 ball.hdf5
 application/x-event-hdf5 dsec.h5

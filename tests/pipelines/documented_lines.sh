@@ -3,6 +3,7 @@
 # Runs the command lines of README.md and docs/.
 set -eu
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
+source "$SOURCE/tests/pipelines/pixel_files.sh"
 source "$SOURCE/tests/pipelines/run_lines.sh"
 export PATH=$BUILD/pipelines:$PATH
 mkdir pipelines
@@ -14,21 +15,7 @@ eval "$GST_LAUNCH -q filesrc location=drive.mp4 ! decodebin ! eventsim-dvs ! evt
 eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-dvs ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=davis.aedat4"
 eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc format=esim ! filesink location=events.txt"
 for name in in recording real simulated left right a b hd; do cp drive.raw $name.raw; done
-eval "$GST_LAUNCH -q videotestsrc pattern=white num-buffers=1 ! video/x-raw,width=320,height=240 ! pngenc ! filesink location=mask.png"
-cat >camera.yaml <<CALIBRATION
-%YAML:1.0
----
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [ 300., 0., 160., 0., 300., 120., 0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 5
-   cols: 1
-   dt: d
-   data: [ -0.2, 0.05, 0., 0., 0. ]
-CALIBRATION
+make_pixel_files .
 mkdir videos recordings arrays
 cp drive.mp4 videos/first.mp4
 cp drive.mp4 "videos/second one.mp4"

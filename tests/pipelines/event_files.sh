@@ -192,6 +192,20 @@ for file in picture.png video.mp4 sound.wav words.txt numbers.txt comments.m "$S
   fi
 done
 
+# Bags of recorders, with the same events and images in every file.
+/usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
+for bag in evt3.mcap:x-mcap evt3.bag:x-rosbag evt3.db3:x-rosbag2-db3; do
+  file=${bag%:*}
+  gst-typefind-1.0 "$file" | grep -q " - application/${bag#*:}" || fail "$file is not recognised"
+  convert "$file" "$file.aedat4" 2>left-out
+  if grep "left out" left-out; then fail "frames of $file are left out"; fi
+  convert "$file.aedat4" "$file.csv"
+  cmp evt3.mcap.csv "$file.csv" || fail "$file has other events"
+  timeout 60 gst-play-1.0 -q --no-interactive --videosink=fakesink "$file" >played 2>&1 || fail "gst-play-1.0: $(cat played)"
+  if grep ERROR played; then fail "gst-play-1.0 $file"; fi
+done
+[ "$(wc -l <evt3.mcap.csv)" = 6001 ] || fail "evt3.mcap has $(wc -l <evt3.mcap.csv) lines"
+
 # Frames come along where they can; what is left out is said.
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=framed.aedat4
 convert framed.aedat4 framed.csv 2>left-out

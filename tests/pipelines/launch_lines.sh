@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Lines that a user would type, run by gst-launch-1.0.
 set -eu
+source "$SOURCE/tests/pipelines/pixel_files.sh"
 source "$SOURCE/tests/pipelines/scratch_folder.sh"
 
 launch() {
@@ -126,6 +127,25 @@ launch filesrc location=candidate.raw ! evtdec ! eventhotpixel location=hot.txt 
 launch filesrc location=candidate.raw ! evtdec ! eventcrop left=100 ! eventflip video-direction=90r ! eventscale ! application/x-event-camera,width=80,height=60 ! eventpolarity keep=on ! eventcsvenc ! filesink location=scaled.csv
 awk -F, 'NR > 1 && ($2 >= 80 || $3 >= 60 || $4 != 1) { exit 1 }' scaled.csv || fail "events are outside of the scaled sensor, or OFF"
 [ "$(wc -l <scaled.csv)" -gt 1000 ] || fail "events are missing"
+
+# Masked and undistorted.
+make_pixel_files .
+launch filesrc location=candidate.raw ! evtdec ! eventmask location=mask.png ! eventcsvenc ! filesink location=masked.csv
+awk -F, 'NR > 1 && $2 < 160 { exit 1 }' masked.csv || fail "events are in the masked half"
+launch filesrc location=candidate.raw ! evtdec ! eventundistort location=camera.yaml ! eventcsvenc ! filesink location=undistorted.csv
+for file in masked undistorted; do [ "$(wc -l <$file.csv)" -gt 1000 ] || fail "$file.csv lacks events"; done
+
+# Bags of ROS: written, and those of recorders read, with their images.
+launch filesrc location=candidate.raw ! evtdec ! eventmcapenc ! filesink location=candidate.mcap
+launch filesrc location=candidate.raw ! evtdec ! eventcsvenc ! filesink location=candidate.csv
+launch filesrc location=candidate.mcap ! eventmcapdec ! eventcsvenc ! filesink location=from-mcap.csv
+cmp candidate.csv from-mcap.csv || fail "a bag has other events"
+/usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
+for file in evt3.mcap evt3.bag evt3.db3; do
+  launch filesrc location=$file ! eventbagdec name=d  d.events_0 ! queue ! eventcsvenc ! filesink location=$file.csv  d.video_0 ! queue ! filesink location=images
+  [ "$(wc -l <$file.csv)" = 6001 ] || fail "$file: $(wc -l <$file.csv) lines"
+  [ "$(stat -c %s images)" = $((40 * 88 * 65)) ] || fail "$file: images of $(stat -c %s images) bytes"
+done
 
 # Merged: two recordings, and two live streams side by side.
 launch eventmerge name=m ! evtenc ! filesink location=both.raw  filesrc location=candidate.raw ! evtdec ! m.  filesrc location=refractory.raw ! evtdec ! m.

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Pipelines leak no GStreamer objects.
 set -eu
+source "$SOURCE/tests/pipelines/pixel_files.sh"
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 export GST_TRACERS=leaks GST_DEBUG=GST_TRACER:7 GST_DEBUG_NO_COLOR=1 GST_DEBUG_FILE=$log
@@ -86,9 +87,21 @@ check filesrc location="$aedat" ! aedatdemux ! identity error-after=2 ! aedatmux
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventrender ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-frame ! eventrender ! fakesink
 check videotestsrc num-buffers=8 ! tee name=t  t. ! queue ! videoconvert ! eventoverlay name=overlay ! identity error-after=2 ! fakesink  t. ! queue ! eventsim-frame ! overlay.event_sink
-for element in eventantiflicker eventcrop eventdenoise eventflip eventhotpixel eventmask eventpolarity eventratecontrol eventrefractory eventscale eventtrail eventundistort; do
-  check videotestsrc num-buffers=8 ! eventsim-frame ! $element ! fakesink
+make_pixel_files "$work"
+for filter in eventantiflicker eventcrop eventdenoise eventflip eventhotpixel "eventmask location=$work/mask.png" eventpolarity eventratecontrol eventrefractory eventscale eventtrail "eventundistort location=$work/camera.yaml" "eventundistort location=/nowhere"; do
+  # shellcheck disable=SC2086
+  check videotestsrc num-buffers=8 ! eventsim-frame ! $filter ! fakesink
 done
+# Bags of events and images.
+/usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" "$work"
+for file in "$work"/evt3.{mcap,bag,db3}; do
+  for way in identity queue; do
+    check filesrc location="$file" ! $way ! eventbagdec name=d  d.events_0 ! queue ! fakesink  d.video_0 ! queue ! fakesink
+  done
+  check filesrc location="$file" ! eventbagdec ! fakesink num-buffers=1
+  check filesrc location="$file" ! decodebin caps=application/x-event-camera ! fakesink
+done
+check filesrc location="$0" ! eventbagdec ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! identity error-after=4 ! eventsim-dense ! fakesink
