@@ -91,7 +91,7 @@ MergedInterval EventMerger::next(Inputs inputs) {
 }
 
 void EventMerger::merge(Inputs inputs, const MergedInterval& interval, LabelledEvents out) {
-  for (std::size_t written = 0;;) {
+  for (std::size_t written = 0; written < interval.events;) {
     // The next event, and the time of the next one of another input.
     MergeInput* first = nullptr;
     Microseconds other = interval.end + 1;

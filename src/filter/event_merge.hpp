@@ -32,6 +32,9 @@ class MergeInput {
 
   Microseconds start() const { return start_; }
   Microseconds end() const { return start_ + length_; }
+  /// True if nothing is left after an interval of the merged stream that ends at `time`. One that
+  /// is an instant may still have events.
+  bool is_merged(Microseconds time) const { return end() <= time && next_ == events_.size(); }
 
  private:
   friend class EventMerger;
@@ -77,8 +80,8 @@ class EventMerger {
 
   /// Returns the next interval, up to the earliest end of the inputs, of which there must be one;
   /// all must be loaded. An interval without events ends where the next event or interval starts,
-  /// if that is needed for times of 32 bits, or nothing is known before. Unload the inputs that end
-  /// with it afterwards.
+  /// if that is needed for times of 32 bits, or nothing is known before. Unload the inputs that are
+  /// merged afterwards.
   MergedInterval next(Inputs inputs);
 
   /// Writes the events of that interval, relative to its start, and their labels if it is labelled.

@@ -221,6 +221,16 @@ TEST_F(MergeTest, SendsGapsWhereNoStreamHasEvents) {
   EXPECT_EQ(gaps, (std::vector<std::pair<GstClockTime, GstClockTime>>{{10 * ms, 10 * ms}}));
 }
 
+TEST_F(MergeTest, KeepsTheEventsOfAnInstant) {
+  begin();
+  push(a(), 0, {on(1, 0, 1)});
+  push_gap(b(), 0);
+  push(a(), 20 * ms, {on(2, 0, 0)}, 0);
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(1, 0, 1), on_at(2, 0, 20'000)}));
+}
+
 TEST_F(MergeTest, BeginsWithAnEmptyIntervalIfNothingHappens) {
   begin();
   push_gap(a(), 0);

@@ -81,7 +81,7 @@ Stream merged(std::vector<Source>& sources) {
                         interval.labelled ? labels[i] : Label{}});
     }
     for (auto* input : inputs)
-      if (input->end() <= interval.end) input->unload();
+      if (input->is_merged(interval.end)) input->unload();
   }
 }
 

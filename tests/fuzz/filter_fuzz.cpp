@@ -131,7 +131,7 @@ void check_merged(const std::vector<Buffer>& buffers) {
       }
       merged += out.size();
       for (auto* input : loaded)
-        if (input->end() <= interval.end) input->unload();
+        if (input->is_merged(interval.end)) input->unload();
     }
     require(merged == events.size(), "all events are merged");
   }

@@ -287,7 +287,7 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
   const GstFlowReturn result = push(interval, inputs);
   for (const auto& pad : pads) {
     auto& stream = stream_of(pad);
-    if (!stream.input.is_loaded() || stream.input.end() > interval.end) continue;
+    if (!stream.input.is_loaded() || !stream.input.is_merged(interval.end)) continue;
     stream.input.unload();
     stream.loaded.reset();
     gst_aggregator_pad_drop_buffer(pad.get());
