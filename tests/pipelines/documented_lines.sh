@@ -16,6 +16,8 @@ eval "$GST_LAUNCH -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,form
 eval "$GST_LAUNCH -q filesrc location=drive.raw ! evtdec ! eventcsvenc format=esim ! filesink location=events.txt"
 for name in in recording real simulated left right a b hd; do cp drive.raw $name.raw; done
 make_pixel_files .
+/usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
+for ending in bag mcap; do mv evt3.$ending walk.$ending; done
 mkdir videos recordings arrays
 cp drive.mp4 videos/first.mp4
 cp drive.mp4 "videos/second one.mp4"
