@@ -129,7 +129,7 @@ def measure(scene, data, progress):
     rows |= {name: measured(on_time, element, fit_thresholds) for name, element in PRESETS.items()}
     calibrated = rows[CALIBRATED]["element"]
     for name, change in WITHOUT.items():
-        if change not in calibrated.split():
+        if change not in calibrated.split() and f" {change.split('=')[0]}=" in calibrated:
             rows[name] = measured(on_time, f"{calibrated} {change}", fit_thresholds)
     if lag != 0:
         rows[f"{CALIBRATED}, lag ignored"] = measured(video, calibrated, fit_thresholds)
