@@ -41,6 +41,13 @@ std::string profile() {
   return path;
 }
 
+/// Path of a list of hot pixels, which eventhotpixel reads and may write.
+std::string hot_pixels() {
+  auto path = recording_files::Folder::path("hot.pixels");
+  std::ofstream(path) << "# Hot pixels: column and row\n3 4\n";
+  return path;
+}
+
 /// Numbers are of every magnitude, and often an end of the range.
 void randomize(GParamSpec* spec, Random& random, GValue* value) {
   const double number =
@@ -71,6 +78,8 @@ void randomize(GParamSpec* spec, Random& random, GValue* value) {
                                   random() % 2 == 0 ? "" : "/event_camera/events,/dvs/events");
       else if (spec->name == std::string_view("profile"))
         g_value_take_string(value, g_strdup(random() % 2 == 0 ? "" : profile().c_str()));
+      else if (spec->owner_type == g_type_from_name("GstEventHotPixel"))
+        g_value_take_string(value, g_strdup(hot_pixels().c_str()));
       else  // files to write
         g_value_take_string(value, g_strdup(recording_files::Folder::path("set").c_str()));
       break;
