@@ -58,12 +58,13 @@ TEST(MovingLight, IsItsDefinitionOnAllTargets) {
     int width, height;
     float longest;
   };
-  for (const auto& [width, height, longest] :
-       {Case{1, 1, 1}, Case{3, 5, 2}, Case{17, 9, 40}, Case{61, 33, 0.4F}, Case{90, 40, 6},
-        Case{130, 20, 30}}) {
+  for (const Case& size : {Case{1, 1, 1}, Case{3, 5, 2}, Case{17, 9, 40}, Case{61, 33, 0.4F},
+                           Case{90, 40, 6}, Case{130, 20, 30}}) {
+    const int width = size.width;
+    const int height = size.height;
     const auto last = scene::texture<std::uint8_t>(width, height, 8, 3, 1);
     const auto now = scene::noise<std::uint8_t>(width, height, 8, 5);
-    const auto flow = flow_of(width, height, longest);
+    const auto flow = flow_of(width, height, size.longest);
     for (const int steps : {2, 3, 11, 32}) {
       targets::for_each([&](const char* target) {
         SCOPED_TRACE(std::string(target) + " " + std::to_string(width) + " " +

@@ -326,9 +326,9 @@ TEST_F(Bags, HaveTheSensorSizeOfTheirFirstPacket) {
   const std::uint32_t size[] = {260, 346};
   const std::span<const std::uint8_t> stated(reinterpret_cast<const std::uint8_t*>(size),
                                              sizeof size);
-  const auto found = std::ranges::search(bytes, stated);
-  ASSERT_FALSE(found.empty());
-  std::ranges::fill(found, 0);
+  const auto found = std::search(bytes.begin(), bytes.end(), stated.begin(), stated.end());
+  ASSERT_NE(found, bytes.end());
+  std::fill_n(found, stated.size(), std::uint8_t{0});
   BagDecoder decoder("/camera/events");
   EXPECT_EQ(decoded(decoder, bytes).events, expected.events);
   EXPECT_EQ(decoder.streams().front().size, SensorSize{});
