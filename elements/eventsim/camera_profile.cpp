@@ -3,25 +3,14 @@
 
 #include <glib.h>
 
-#include <cerrno>
-#include <fstream>
 #include <memory>
 #include <stdexcept>
+
+#include "gst/base/named_file.hpp"
 
 namespace {
 
 constexpr std::size_t max_size = std::size_t{64} << 10;
-
-/// Throws std::runtime_error with the reason.
-std::string text_of(const std::string& path) {
-  std::string text(max_size + 1, '\0');
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(text.data(), static_cast<std::streamsize>(text.size())) && !file.eof())
-    throw std::runtime_error(g_strerror(errno));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > max_size) throw std::runtime_error("it is larger than 64 KiB");
-  return text;
-}
 
 struct Free {
   void operator()(GKeyFile* file) const { g_key_file_unref(file); }
@@ -51,7 +40,7 @@ ProfileEntries parse_camera_profile(const std::string& text, const char* element
 
 ProfileEntries read_camera_profile(const std::string& path, const char* element) {
   try {
-    return parse_camera_profile(text_of(path), element);
+    return parse_camera_profile(read_bytes(path, max_size), element);
   } catch (const std::runtime_error& reason) {
     throw std::runtime_error("Cannot read the camera profile \"" + path + "\": " + reason.what() +
                              ". Write one with event-calibrate --profile.");

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <string>
+
 namespace eventcamera {
 
 /// Sensor size in pixels.
@@ -10,5 +12,10 @@ struct SensorSize {
 
   friend constexpr bool operator==(const SensorSize&, const SensorSize&) = default;
 };
+
+/// The size in messages: "640 x 480 pixels".
+inline std::string in_pixels(const SensorSize& size) {
+  return std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels";
+}
 
 }  // namespace eventcamera

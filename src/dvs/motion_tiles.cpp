@@ -7,45 +7,13 @@
 #include <limits>
 
 #include "src/core/max_side.hpp"
+#include "src/flow/flow_range.hpp"
 
 namespace eventcamera {
 namespace {
 
 /// Longest motion for which the luma on the way is worth looking up, in pixels.
 constexpr float far = 64;
-
-/// Range that holds the flow of a tile, and 0, along one axis.
-struct FlowRange {
-  float min = 0;
-  float max = 0;
-
-  float longest() const { return std::max(max, -min); }
-};
-
-struct FlowRanges {
-  FlowRange x;
-  FlowRange y;
-
-  /// NaN counts as 0.
-  FlowRanges(const ImageView<Flow>& flow, const Box& tile) {
-    std::array<float, std::size_t{2} * MotionTiles::width> lowest{};
-    std::array<float, std::size_t{2} * MotionTiles::width> highest{};
-    const auto count = 2 * static_cast<std::size_t>(tile.width());
-    for (int row = tile.top; row < tile.bottom; ++row) {
-      const float* values = &flow.row(row)[tile.left].x;
-      for (std::size_t i = 0; i < count; ++i) {
-        lowest[i] = values[i] < lowest[i] ? values[i] : lowest[i];
-        highest[i] = values[i] > highest[i] ? values[i] : highest[i];
-      }
-    }
-    for (std::size_t i = 0; i < count; i += 2) {
-      x = {std::min(x.min, lowest[i]), std::max(x.max, highest[i])};
-      y = {std::min(y.min, lowest[i + 1]), std::max(y.max, highest[i + 1])};
-    }
-  }
-
-  float longest() const { return std::max(x.longest(), y.longest()); }
-};
 
 }  // namespace
 
@@ -108,8 +76,8 @@ void MotionTiles::measure(const ImageView<Pixel>& last, const ImageView<Pixel>& 
     for (int column = 0; column < columns_; ++column) {
       const Box box{column * width, row * height, std::min((column + 1) * width, flow.width),
                     std::min((row + 1) * height, flow.height)};
-      const FlowRanges ranges(flow, box);
-      const auto longest = std::min(ranges.longest(), static_cast<float>(max_side));
+      const auto range = flow_range(flow, box);
+      const auto longest = std::min(range.longest(), static_cast<float>(max_side));
       auto& tile = tiles[column];
       tile = {std::clamp(static_cast<int>(std::ceil(longest)), 1, max_steps),
               std::numeric_limits<Pixel>::max(), 0};
@@ -119,11 +87,11 @@ void MotionTiles::measure(const ImageView<Pixel>& last, const ImageView<Pixel>& 
       }
       // Samples reach a pixel further, and are rounded.
       const auto up = [](float flow_here) { return static_cast<int>(std::ceil(flow_here)) + 2; };
-      last_.add_range_of({box.left - up(ranges.x.max), box.top - up(ranges.y.max),
-                          box.right + up(-ranges.x.min), box.bottom + up(-ranges.y.min)},
+      last_.add_range_of({box.left - up(range.x.max), box.top - up(range.y.max),
+                          box.right + up(-range.x.min), box.bottom + up(-range.y.min)},
                          tile);
-      now_.add_range_of({box.left - up(-ranges.x.min), box.top - up(-ranges.y.min),
-                         box.right + up(ranges.x.max), box.bottom + up(ranges.y.max)},
+      now_.add_range_of({box.left - up(-range.x.min), box.top - up(-range.y.min),
+                         box.right + up(range.x.max), box.bottom + up(range.y.max)},
                         tile);
     }
   });

@@ -17,10 +17,6 @@ struct PngImage : png_image {
   PngImage& operator=(const PngImage&) = delete;
 };
 
-std::string size_text(std::uint32_t width, std::uint32_t height) {
-  return std::to_string(width) + " x " + std::to_string(height) + " pixels";
-}
-
 }  // namespace
 
 PixelMask::PixelMask(SensorSize sensor)
@@ -31,11 +27,10 @@ PixelMask PixelMask::parse_png(std::string_view png, SensorSize sensor) {
   PngImage image;
   if (png_image_begin_read_from_memory(&image, png.data(), png.size()) == 0)
     throw std::runtime_error(image.message);
-  const auto width = static_cast<std::uint32_t>(sensor.width);
-  const auto height = static_cast<std::uint32_t>(sensor.height);
-  if (image.width != width || image.height != height)
-    throw std::runtime_error("it has " + size_text(image.width, image.height) +
-                             ", but the sensor has " + size_text(width, height));
+  const SensorSize size{static_cast<int>(image.width), static_cast<int>(image.height)};
+  if (size != sensor)
+    throw std::runtime_error("it has " + in_pixels(size) + ", but the sensor has " +
+                             in_pixels(sensor));
   image.format = PNG_FORMAT_GRAY;
   std::vector<png_byte> pixels(PNG_IMAGE_SIZE(image));
   constexpr png_color black = {0, 0, 0};

@@ -16,4 +16,10 @@ Number little_endian(const std::uint8_t* bytes) {
   return number;
 }
 
+/// Writes a little-endian number at any alignment.
+template <class Number>
+void put_little_endian(Number number, std::uint8_t* bytes) {
+  std::memcpy(bytes, &number, sizeof number);
+}
+
 }  // namespace eventcamera

@@ -5,19 +5,15 @@
 #include <string_view>
 
 #include "src/formats/little_endian.hpp"
+#include "src/formats/magic.hpp"
 #include "src/formats/prophesee_header.hpp"
+#include "src/formats/ros/bag_magic.hpp"
 #include "src/formats/text/csv_decoder.hpp"
 
 namespace eventcamera {
 namespace {
 
 using Bytes = std::span<const std::uint8_t>;
-
-bool has_at(std::size_t at, std::string_view magic, Bytes bytes) {
-  return bytes.size() >= at && bytes.size() - at >= magic.size() &&
-         std::ranges::equal(bytes.subspan(at, magic.size()), magic, {},
-                            [](std::uint8_t byte) { return static_cast<char>(byte); });
-}
 
 /// True for a ZIP archive whose first file is a NumPy array.
 bool is_npz(Bytes bytes) {
@@ -31,7 +27,7 @@ bool is_npz(Bytes bytes) {
 
 /// True for an SQLite database whose first page has the tables of a bag.
 bool is_rosbag2(Bytes bytes) {
-  if (!has_at(0, {"SQLite format 3\0", 16}, bytes)) return false;
+  if (!has_at(0, sqlite_magic, bytes)) return false;
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   return text.find("CREATE TABLE topics(") != std::string_view::npos &&
          text.find("CREATE TABLE messages(") != std::string_view::npos;
@@ -50,8 +46,8 @@ std::optional<Recognised> by_magic(Bytes bytes) {
   if (has_at(0, "\x93NUMPY", bytes)) return Recognised{FileKind::npy};
   if (is_npz(bytes)) return Recognised{FileKind::npz};
   if (has_at(0, hdf5_magic, bytes)) return Recognised{FileKind::hdf5};
-  if (has_at(0, {"\x89MCAP0\r\n", 8}, bytes)) return Recognised{FileKind::mcap};
-  if (has_at(0, "#ROSBAG V2.0\n", bytes)) return Recognised{FileKind::rosbag};
+  if (has_at(0, mcap_magic, bytes)) return Recognised{FileKind::mcap};
+  if (has_at(0, rosbag_magic, bytes)) return Recognised{FileKind::rosbag};
   if (is_rosbag2(bytes)) return Recognised{FileKind::rosbag2_db3};
   return std::nullopt;
 }

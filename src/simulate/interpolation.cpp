@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 
+#include "src/flow/flow_range.hpp"
+
 #ifndef EVENTCAMERA_BEGIN_STEPS
 #define EVENTCAMERA_BEGIN_STEPS
 namespace eventcamera {
@@ -268,46 +270,14 @@ void fire_row(const InterpolatedInterval<std::uint8_t>& interval, const LastSamp
   }
 }
 
-/// Range that holds the flows of a tile, and 0.
-struct FlowRange {
-  float min[2];  ///< x, y
-  float max[2];
-};
-
-FlowRange flow_range(const ImageView<Flow>& flow, const Box& tile) {
-  const Floats floats;
-  const int lanes = static_cast<int>(hn::Lanes(floats));
-  const int count = 2 * tile.width();
-  auto lowest = hn::Zero(floats);
-  auto highest = hn::Zero(floats);
-  FlowRange range{};
-  for (int y = tile.top; y < tile.bottom; ++y) {
-    const float* row = &flow.row(y)[tile.left].x;
-    for (int i = 0; i < count; i += lanes) {
-      const auto here = HWY_LIKELY(i + lanes <= count) ? hn::LoadU(floats, row + i)
-                                                       : load_first(floats, row + i, count - i);
-      // NaN counts as 0.
-      const auto number = hn::IfThenElseZero(hn::Eq(here, here), here);
-      lowest = hn::Min(lowest, number);
-      highest = hn::Max(highest, number);
-    }
-  }
-  HWY_ALIGN float lane[hn::MaxLanes(Floats())];
-  hn::Store(lowest, floats, lane);
-  for (int i = 0; i < lanes; ++i) range.min[i % 2] = std::min(range.min[i % 2], lane[i]);
-  hn::Store(highest, floats, lane);
-  for (int i = 0; i < lanes; ++i) range.max[i % 2] = std::max(range.max[i % 2], lane[i]);
-  return range;
-}
-
 /// First step of forward interpolation to evaluate in a tile, see FirstSteps.
 int first_step(const InterpolatedInterval<std::uint8_t>& interval,
                const GradientBound& gradient_bound, const Box& tile) {
   const int steps = interval.steps.count();
   const auto range = flow_range(interval.flow, tile);
   const auto motion = [steps](float flow) { return std::int64_t{motion_per_step(flow, steps)}; };
-  std::int64_t dx = std::max(motion(range.max[0]), -motion(range.min[0]));
-  std::int64_t dy = std::max(motion(range.max[1]), -motion(range.min[1]));
+  std::int64_t dx = std::max(motion(range.x.max), -motion(range.x.min));
+  std::int64_t dy = std::max(motion(range.y.max), -motion(range.y.min));
   // Positions are rounded to 1/64 of a pixel: a pixel that moves by less than half of that samples
   // itself.
   if (std::max(dx, dy) * (steps - 1) < 512) return steps;
@@ -319,8 +289,8 @@ int first_step(const InterpolatedInterval<std::uint8_t>& interval,
   const auto reach = [&](float flow) {
     return static_cast<int>(((motion(flow) + 1024) * steps >> 16) + 1);
   };
-  const Box reached{tile.left - reach(range.max[0]), tile.top - reach(range.max[1]),
-                    tile.right + reach(-range.min[0]), tile.bottom + reach(-range.min[1])};
+  const Box reached{tile.left - reach(range.x.max), tile.top - reach(range.y.max),
+                    tile.right + reach(-range.x.min), tile.bottom + reach(-range.y.min)};
   if (reached.width() > tile_width + 2 * far || reached.height() > tile_height + 2 * far) return 1;
   const auto bound = gradient_bound.within(reached);
   const std::int64_t threshold =

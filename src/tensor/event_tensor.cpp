@@ -18,6 +18,11 @@ std::size_t pixel_of(const AbsoluteEvent& event, const TensorShape& shape) {
   return static_cast<std::size_t>(event.y()) * static_cast<std::size_t>(shape.width) + event.x;
 }
 
+/// Of the channel of its polarity.
+std::size_t cell_of(const AbsoluteEvent& event, const TensorShape& shape) {
+  return (event.polarity() == Polarity::on ? shape.plane() : 0) + pixel_of(event, shape);
+}
+
 float sign_of(const AbsoluteEvent& event) {
   return event.polarity() == Polarity::on ? 1.0F : -1.0F;
 }
@@ -53,9 +58,7 @@ void add_voxels(std::span<const AbsoluteEvent> events, const TensorShape& shape,
 
 void count_polarities(std::span<const AbsoluteEvent> events, const TensorShape& shape,
                       float* counts) {
-  const std::size_t plane = shape.plane();
-  for (const auto& event : events)
-    counts[(event.polarity() == Polarity::on ? plane : 0) + pixel_of(event, shape)] += 1;
+  for (const auto& event : events) counts[cell_of(event, shape)] += 1;
 }
 
 void sum_polarities(std::span<const AbsoluteEvent> events, const TensorShape& shape, float* sums) {
@@ -108,9 +111,7 @@ void EventTensor::reset() {
 void EventTensor::represent(std::span<const AbsoluteEvent> events, Microseconds end,
                             std::span<float> values) {
   if (settings_.representation == Representation::time_surface) {
-    for (const auto& event : events)
-      latest_[(event.polarity() == Polarity::on ? shape_.plane() : 0) + pixel_of(event, shape_)] =
-          event.t;
+    for (const auto& event : events) latest_[cell_of(event, shape_)] = event.t;
     std::ranges::transform(latest_, values.begin(), [&](Microseconds time) {
       return time == never ? 0 : decayed(end - time, settings_);
     });

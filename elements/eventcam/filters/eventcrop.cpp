@@ -41,8 +41,7 @@ class Crop final : public EventFilterOf<CropFilter> {
     if (cut_columns(now) >= in.width || cut_rows(now) >= in.height)
       throw std::runtime_error("cropping " + std::to_string(cut_columns(now)) + " columns and " +
                                std::to_string(cut_rows(now)) + " rows leaves nothing of " +
-                               std::to_string(in.width) + " x " + std::to_string(in.height) +
-                               " pixels");
+                               in_pixels(in));
     EventFilterOf::start(in, out);
   }
 };

@@ -34,8 +34,8 @@
 #include <utility>
 #include <vector>
 
+#include "gst/base/named_file.hpp"
 #include "gst/filter/eventfilter.hpp"
-#include "gst/filter/named_file.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
 
 using eventcamera::HotPixelFilter;

@@ -16,8 +16,8 @@
 #include <cstddef>
 #include <string>
 
+#include "gst/base/named_file.hpp"
 #include "gst/filter/eventfilter.hpp"
-#include "gst/filter/named_file.hpp"
 #include "src/filter/pixel_mask.hpp"
 
 using eventcamera::LabelledEvents;

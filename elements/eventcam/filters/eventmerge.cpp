@@ -244,11 +244,7 @@ GstFlowReturn EventMerge::push(const MergedInterval& interval, EventMerger::Inpu
   const GstFlowReturn result = buffers_.acquire(size, buffer);
   if (result != GST_FLOW_OK) return result;
   LabelledEvents events;
-  if (interval.labelled) {
-    if (gst_buffer_add_event_camera_label_meta(buffer.get(), nullptr, interval.events) == nullptr)
-      throw std::bad_alloc();
-    events.labels = labels_of(buffer.get());
-  }
+  if (interval.labelled) events.labels = add_labels(buffer.get(), interval.events);
   GstMapInfo map;
   if (!gst_buffer_map(buffer.get(), &map, GST_MAP_WRITE)) throw std::bad_alloc();
   events.events = {reinterpret_cast<eventcamera::Event*>(map.data), interval.events};
@@ -330,16 +326,16 @@ GstFlowReturn EventMerge::choose_caps(GstCaps* downstream, GstCaps** result) {
         std::max(needed.height, static_cast<int>(stream.placed.y) + stream.sensor.height);
   }
   if (needed == SensorSize{}) return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const auto text = std::to_string(needed.width) + " x " + std::to_string(needed.height);
+  const auto text = in_pixels(needed);
   if (std::max(needed.width, needed.height) > max_side) {
     GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                      ("Cannot merge: the output would have %s pixels, more than %d a side. Lower "
+                      ("Cannot merge: the output would have %s, more than %d a side. Lower "
                        "xpos and ypos of the pads.",
                        text.c_str(), max_side),
                       ("xpos + width or ypos + height of a pad is too large"));
     return GST_FLOW_NOT_NEGOTIATED;
   }
-  GST_DEBUG_OBJECT(element(), "the sensors need %s pixels", text.c_str());
+  GST_DEBUG_OBJECT(element(), "the sensors need %s", text.c_str());
   const auto at_least = [](int size) {
     GValue range = G_VALUE_INIT;
     g_value_init(&range, GST_TYPE_INT_RANGE);
@@ -359,7 +355,7 @@ GstFlowReturn EventMerge::choose_caps(GstCaps* downstream, GstCaps** result) {
   *result = gst_caps_intersect_full(downstream, ours.get(), GST_CAPS_INTERSECT_FIRST);
   if (!gst_caps_is_empty(*result)) return GST_FLOW_OK;
   GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                    ("Cannot merge: the sensors need %s pixels, and downstream does not take that "
+                    ("Cannot merge: the sensors need %s, and downstream does not take that "
                      "size. Do not set a smaller one downstream.",
                      text.c_str()),
                     ("downstream takes %" GST_PTR_FORMAT, downstream));

@@ -23,8 +23,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "gst/base/named_file.hpp"
 #include "gst/filter/eventfilter.hpp"
-#include "gst/filter/named_file.hpp"
 #include "src/filter/camera_calibration.hpp"
 #include "src/filter/undistort_filter.hpp"
 
@@ -43,16 +43,12 @@ struct Settings {
 /// Maximum size of a calibration file, bytes.
 constexpr std::size_t max_file_size = 1 << 20;
 
-std::string text_of(SensorSize size) {
-  return std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels";
-}
-
 CameraCalibration read_calibration(const std::string& location, SensorSize sensor) {
   return read_named_file("the calibration", location, max_file_size, [&](const std::string& yaml) {
     const auto calibration = eventcamera::parse_calibration(yaml);
     if (calibration.size != SensorSize{} && calibration.size != sensor)
-      throw std::invalid_argument("it is for " + text_of(calibration.size) +
-                                  ", but the sensor has " + text_of(sensor));
+      throw std::invalid_argument("it is for " + in_pixels(calibration.size) +
+                                  ", but the sensor has " + in_pixels(sensor));
     return calibration;
   });
 }

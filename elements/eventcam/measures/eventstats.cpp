@@ -49,6 +49,7 @@
 #include "gst/base/pads.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event_validator.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/map_picture.hpp"
 
@@ -161,9 +162,9 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
 /// Starts measuring a sensor of this size.
 static bool measure(GstEventStats* self, int width, int height) {
   const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
-                      "Not enough memory to count the events of " + std::to_string(width) + " x " +
-                          std::to_string(height) +
-                          " pixels; free memory, or lower the resolution."};
+                      "Not enough memory to count the events of " +
+                          eventcamera::in_pixels({width, height}) +
+                          "; free memory, or lower the resolution."};
   GST_DEBUG_OBJECT(self, "counting the events of %dx%d pixels", width, height);
   return guarded(self, report, [&] { self->priv->measurement.emplace(width, height); });
 }

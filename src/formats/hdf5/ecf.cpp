@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <cstring>
 
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_appender.hpp"
+#include "src/formats/byte_cursor.hpp"
 
 namespace eventcamera {
 
@@ -15,44 +15,6 @@ namespace {
 constexpr std::uint32_t all_packed = 2;  // y, x and p of an event are packed together
 constexpr std::uint32_t xp_packed = 1;   // x and p are packed together
 constexpr std::size_t header_bytes = 12;
-
-class Writer {
- public:
-  explicit Writer(std::vector<std::uint8_t>& out) : out_(out) {}
-
-  template <class Number>
-  void put(Number number) {
-    const auto end = out_.size();
-    out_.resize(end + sizeof number);
-    std::memcpy(out_.data() + end, &number, sizeof number);
-  }
-
- private:
-  std::vector<std::uint8_t>& out_;
-};
-
-/// Reads numbers from the front. Past the end they are 0 and ended() is true.
-class Reader {
- public:
-  explicit Reader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
-
-  template <class Number>
-  Number take() {
-    if (rest_.size() < sizeof(Number)) {
-      ended_ = true;
-      rest_ = {};
-      return 0;
-    }
-    const auto number = little_endian<Number>(rest_.data());
-    rest_ = rest_.subspan(sizeof(Number));
-    return number;
-  }
-  bool ended() const { return ended_; }
-
- private:
-  std::span<const std::uint8_t> rest_;
-  bool ended_ = false;
-};
 
 /// Number of consecutive events from `first` on with the same value.
 template <class Value>
@@ -66,7 +28,7 @@ int polarity_bit(const AbsoluteEvent& event) {
   return event.y_p >> 15;
 }
 
-void put_times(std::span<const AbsoluteEvent> events, Writer& writer) {
+void put_times(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   auto last = static_cast<std::uint64_t>(events.front().t);
   for (std::size_t i = 0; i < events.size();) {
     auto gap = static_cast<std::uint64_t>(events[i].t) - last;
@@ -85,20 +47,20 @@ void put_times(std::span<const AbsoluteEvent> events, Writer& writer) {
   }
 }
 
-bool take_times(Reader& reader, std::span<AbsoluteEvent> events) {
-  auto t = reader.take<std::uint64_t>();
+bool take_times(ByteCursor& reader, std::span<AbsoluteEvent> events) {
+  auto t = reader.number<std::uint64_t>();
   for (std::size_t i = 0; i < events.size();) {
-    auto byte = reader.take<std::uint8_t>();
+    auto byte = reader.number<std::uint8_t>();
     std::uint64_t gap = 0;
     for (unsigned shift = 0; byte >= 0xf0; shift += 4) {
       if (shift >= 64) return false;
       gap |= static_cast<std::uint64_t>(byte & 15) << shift;
-      byte = reader.take<std::uint8_t>();
+      byte = reader.number<std::uint8_t>();
     }
     t += gap + (byte >> 4);
     std::size_t count = byte & 15;
-    if (count == 15) count = reader.take<std::uint16_t>();
-    if (reader.ended() || count > events.size() - i) return false;
+    if (count == 15) count = reader.number<std::uint16_t>();
+    if (reader.failed() || count > events.size() - i) return false;
     for (auto& event : events.subspan(i, count)) event.t = static_cast<Microseconds>(t);
     i += count;
   }
@@ -108,7 +70,7 @@ bool take_times(Reader& reader, std::span<AbsoluteEvent> events) {
 /// Writes runs of equal values: Word has the value in its upper bits and the count in the lower
 /// ones; if all of the latter are set, the count follows.
 template <class Word, unsigned count_mask, class Value>
-void put_runs(std::span<const AbsoluteEvent> events, Writer& writer, const Value& value) {
+void put_runs(std::span<const AbsoluteEvent> events, ByteAppender& writer, const Value& value) {
   for (std::size_t i = 0; i < events.size();) {
     const auto count = run(events, i, value);
     const auto bits = static_cast<unsigned>(value(events[i]));
@@ -120,12 +82,12 @@ void put_runs(std::span<const AbsoluteEvent> events, Writer& writer, const Value
 }
 
 template <class Word, unsigned count_mask, class SetValue>
-bool take_runs(Reader& reader, std::span<AbsoluteEvent> events, const SetValue& set_value) {
+bool take_runs(ByteCursor& reader, std::span<AbsoluteEvent> events, const SetValue& set_value) {
   for (std::size_t i = 0; i < events.size();) {
-    const unsigned word = reader.take<Word>();
+    const unsigned word = reader.number<Word>();
     std::size_t count = word & count_mask;
-    if (count == count_mask) count = reader.take<std::uint16_t>();
-    if (reader.ended() || count > events.size() - i) return false;
+    if (count == count_mask) count = reader.number<std::uint16_t>();
+    if (reader.failed() || count > events.size() - i) return false;
     const auto value = static_cast<std::uint16_t>(word / (count_mask + 1));
     for (auto& event : events.subspan(i, count)) set_value(event, value);
     i += count;
@@ -133,26 +95,26 @@ bool take_runs(Reader& reader, std::span<AbsoluteEvent> events, const SetValue& 
   return true;
 }
 
-void put_rows(std::span<const AbsoluteEvent> events, Writer& writer) {
+void put_rows(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   put_runs<std::uint16_t, 31>(events, writer, [](const AbsoluteEvent& event) { return event.y(); });
 }
 
-bool take_rows(Reader& reader, std::span<AbsoluteEvent> events) {
+bool take_rows(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   return take_runs<std::uint16_t, 31>(reader, events,
                                       [](AbsoluteEvent& event, std::uint16_t y) { event.y_p = y; });
 }
 
-void put_polarities(std::span<const AbsoluteEvent> events, Writer& writer) {
+void put_polarities(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   put_runs<std::uint8_t, 127>(events, writer, polarity_bit);
 }
 
-bool take_polarities(Reader& reader, std::span<AbsoluteEvent> events) {
+bool take_polarities(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   return take_runs<std::uint8_t, 127>(reader, events, [](AbsoluteEvent& event, std::uint16_t on) {
     event.y_p |= static_cast<std::uint16_t>(on << 15);
   });
 }
 
-void put_columns(std::span<const AbsoluteEvent> events, Writer& writer) {
+void put_columns(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   for (std::size_t i = 0; i < events.size();) {
     const unsigned x = events[i++].x;
     unsigned mask = 0;
@@ -165,10 +127,10 @@ void put_columns(std::span<const AbsoluteEvent> events, Writer& writer) {
   }
 }
 
-bool take_columns(Reader& reader, std::span<AbsoluteEvent> events) {
+bool take_columns(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size();) {
-    const auto word = reader.take<std::uint16_t>();
-    if (reader.ended()) return false;
+    const auto word = reader.number<std::uint16_t>();
+    if (reader.failed()) return false;
     const unsigned x = word >> 5;
     events[i++].x = static_cast<std::uint16_t>(x);
     // The last mask of other writers may extend past the last event.
@@ -188,7 +150,7 @@ std::array<std::uint32_t, 4> group(std::span<const AbsoluteEvent> events, std::s
   return numbers;
 }
 
-void put_all_packed(std::span<const AbsoluteEvent> events, Writer& writer) {
+void put_all_packed(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
     const auto v = group(events, i, [](const AbsoluteEvent& event) {
       return event.y() << 12 | event.x << 1 | polarity_bit(event);
@@ -199,12 +161,12 @@ void put_all_packed(std::span<const AbsoluteEvent> events, Writer& writer) {
   }
 }
 
-bool take_all_packed(Reader& reader, std::span<AbsoluteEvent> events) {
+bool take_all_packed(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
-    const auto w0 = reader.take<std::uint32_t>();
-    const auto w1 = reader.take<std::uint32_t>();
-    const auto w2 = reader.take<std::uint32_t>();
-    if (reader.ended()) return false;
+    const auto w0 = reader.number<std::uint32_t>();
+    const auto w1 = reader.number<std::uint32_t>();
+    const auto w2 = reader.number<std::uint32_t>();
+    if (reader.failed()) return false;
     const std::array<std::uint32_t, 4> v = {w0 >> 8, (w0 & 0xff) | w1 >> 16 << 8,
                                             (w1 & 0xffff) | w2 >> 24 << 16, w2 & 0xffffff};
     for (std::size_t j = 0; j < 4 && i + j < events.size(); ++j) {
@@ -215,7 +177,7 @@ bool take_all_packed(Reader& reader, std::span<AbsoluteEvent> events) {
   return true;
 }
 
-void put_xp_packed(std::span<const AbsoluteEvent> events, Writer& writer) {
+void put_xp_packed(std::span<const AbsoluteEvent> events, ByteAppender& writer) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
     const auto v = group(
         events, i, [](const AbsoluteEvent& event) { return event.x << 1 | polarity_bit(event); });
@@ -225,12 +187,12 @@ void put_xp_packed(std::span<const AbsoluteEvent> events, Writer& writer) {
   }
 }
 
-bool take_xp_packed(Reader& reader, std::span<AbsoluteEvent> events) {
+bool take_xp_packed(ByteCursor& reader, std::span<AbsoluteEvent> events) {
   for (std::size_t i = 0; i < events.size(); i += 4) {
-    const unsigned h0 = reader.take<std::uint16_t>();
-    const unsigned h1 = reader.take<std::uint16_t>();
-    const unsigned h2 = reader.take<std::uint16_t>();
-    if (reader.ended()) return false;
+    const unsigned h0 = reader.number<std::uint16_t>();
+    const unsigned h1 = reader.number<std::uint16_t>();
+    const unsigned h2 = reader.number<std::uint16_t>();
+    if (reader.failed()) return false;
     const std::array<unsigned, 4> v = {h0 >> 4, (h0 & 0xf) | h1 >> 8 << 4,
                                        (h1 & 0xff) | h2 >> 12 << 8, h2 & 0xfff};
     for (std::size_t j = 0; j < 4 && i + j < events.size(); ++j) {
@@ -264,7 +226,7 @@ std::uint32_t packing(std::span<const AbsoluteEvent> events) {
 
 void encode_ecf(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>& out) {
   assert(events.size() <= ecf_max_events);
-  Writer writer(out);
+  ByteAppender writer(out);
   if (events.empty()) {
     writer.put<std::uint32_t>(0);
     writer.put<std::uint64_t>(0);
@@ -289,8 +251,8 @@ void encode_ecf(std::span<const AbsoluteEvent> events, std::vector<std::uint8_t>
 
 bool decode_ecf(std::span<const std::uint8_t> chunk, std::vector<AbsoluteEvent>& out) {
   if (chunk.size() < header_bytes) return false;
-  Reader reader(chunk);
-  const auto head = reader.take<std::uint32_t>();
+  ByteCursor reader(chunk);
+  const auto head = reader.number<std::uint32_t>();
   const std::size_t count = head >> 2;
   if (count > ecf_max_events) return false;
   const auto begin = out.size();

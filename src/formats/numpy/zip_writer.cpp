@@ -3,8 +3,9 @@
 #include "src/formats/numpy/zip_writer.hpp"
 
 #include <cstddef>
-#include <cstring>
 #include <utility>
+
+#include "src/formats/byte_appender.hpp"
 
 namespace eventcamera {
 
@@ -27,12 +28,8 @@ std::uint32_t small(std::uint64_t number) {
 
 template <class... Numbers>
 void put(std::vector<std::uint8_t>& out, Numbers... numbers) {
-  const auto put_one = [&](auto number) {
-    const auto at = out.size();
-    out.resize(at + sizeof number);
-    std::memcpy(out.data() + at, &number, sizeof number);
-  };
-  (put_one(numbers), ...);
+  ByteAppender fields(out);
+  (fields.put(numbers), ...);
 }
 
 void put_text(std::vector<std::uint8_t>& out, std::string_view text) {

@@ -7,9 +7,10 @@
 #include <utility>
 
 #include "src/formats/chunker.hpp"
+#include "src/formats/magic.hpp"
+#include "src/formats/ros/bag_magic.hpp"
 #include "src/formats/ros/db3_file.hpp"
 #include "src/formats/ros/mcap_file.hpp"
-#include "src/formats/ros/mcap_records.hpp"
 #include "src/formats/ros/rosbag_file.hpp"
 
 namespace eventcamera {
@@ -34,7 +35,7 @@ std::unique_ptr<BagFile> make_file(BagFile::TakeTopic take_topic) {
 constexpr Format formats[] = {
     {mcap_magic, "MCAP", make_file<McapFile>},
     {rosbag_magic, "ROS bag 2.0", make_file<RosbagFile>},
-    {{"SQLite format 3\0", 16}, "ROS 2 bag with SQLite", make_file<Db3File>},
+    {sqlite_magic, "ROS 2 bag with SQLite", make_file<Db3File>},
 };
 
 /// Bytes that tell the format.
@@ -62,11 +63,8 @@ BagDecoder::BagDecoder(std::string topics) {
 
 /// Throws UnsupportedFormat if `start` does not tell the format.
 void BagDecoder::choose_format(std::span<const std::uint8_t> start) {
-  const auto* const found = std::ranges::find_if(formats, [&](const Format& format) {
-    return start.size() >= format.magic.size() &&
-           std::equal(format.magic.begin(), format.magic.end(), start.begin(),
-                      [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
-  });
+  const auto* const found = std::ranges::find_if(
+      formats, [&](const Format& format) { return has_at(0, format.magic, start); });
   if (found == std::end(formats)) throw UnsupportedFormat("this is not a bag of ROS");
   format_name_ = found->name;
   file_ = found->make([this](const BagTopic& topic) { return take_topic(topic); });

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "src/formats/magic.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
@@ -49,9 +50,7 @@ bool ChunkedBagFile::read_magic() {
     if (finished_) throw UnsupportedFormat("the file ends within its first bytes");
     return false;
   }
-  if (!std::equal(magic_.begin(), magic_.end(), start.begin(),
-                  [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; }))
-    throw UnsupportedFormat("it does not begin as a bag does");
+  if (!has_at(0, magic_, start)) throw UnsupportedFormat("it does not begin as a bag does");
   queue_.consume(magic_.size());
   magic_read_ = true;
   index_.reached(queue_.position());

@@ -4,7 +4,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <cstring>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -12,9 +11,11 @@
 #include <string_view>
 #include <vector>
 
+#include "src/formats/byte_appender.hpp"
 #include "src/formats/compression/compressed_frames.hpp"
 #include "src/formats/evt/evt3_words.hpp"
 #include "src/formats/evt/words.hpp"
+#include "src/formats/ros/bag_magic.hpp"
 #include "src/formats/ros/mcap_records.hpp"
 
 namespace eventcamera {
@@ -56,48 +57,20 @@ constexpr std::size_t max_chunk_bytes = std::size_t{1} << 20;
 /// of the clock: 10 minutes, which take 300 kB.
 constexpr std::uint64_t max_filled_pause = 600'000'000;
 
-/// Appends little-endian fields.
-class Fields {
- public:
-  explicit Fields(std::vector<std::uint8_t>& out) : out_(out) {}
-
-  template <class Number>
-  void put(Number number) {
-    const auto at = out_.size();
-    out_.resize(at + sizeof number);
-    std::memcpy(out_.data() + at, &number, sizeof number);
-  }
-
-  void put(McapOpcode opcode) { put(static_cast<std::uint8_t>(opcode)); }
-
-  /// Text after its size, 32 bits.
-  void put(std::string_view text) {
-    put(static_cast<std::uint32_t>(text.size()));
-    out_.insert(out_.end(), text.begin(), text.end());
-  }
-
-  void align(std::size_t start, std::size_t alignment) {
-    while ((out_.size() - start) % alignment != 0) out_.push_back(0);
-  }
-
- private:
-  std::vector<std::uint8_t>& out_;
-};
-
 /// Appends a record, whose content `put` appends.
 template <class Put>
 void put_record(McapOpcode opcode, std::vector<std::uint8_t>& out, const Put& put) {
-  Fields fields(out);
+  ByteAppender fields(out);
   fields.put(opcode);
   const auto size_at = out.size();
   fields.put(std::uint64_t{0});
   put(fields);
   const std::uint64_t size = out.size() - size_at - sizeof size;
-  std::memcpy(out.data() + size_at, &size, sizeof size);
+  put_little_endian(size, out.data() + size_at);
 }
 
 void put_schema(std::vector<std::uint8_t>& out) {
-  put_record(McapOpcode::schema, out, [](Fields& fields) {
+  put_record(McapOpcode::schema, out, [](ByteAppender& fields) {
     fields.put(schema_id);
     fields.put(schema_name);
     fields.put(std::string_view("ros2msg"));
@@ -106,7 +79,7 @@ void put_schema(std::vector<std::uint8_t>& out) {
 }
 
 void put_channel(std::vector<std::uint8_t>& out) {
-  put_record(McapOpcode::channel, out, [](Fields& fields) {
+  put_record(McapOpcode::channel, out, [](ByteAppender& fields) {
     fields.put(channel_id);
     fields.put(schema_id);
     fields.put(topic);
@@ -118,7 +91,7 @@ void put_channel(std::vector<std::uint8_t>& out) {
 /// Magic, header, schema and channel.
 std::string file_start() {
   std::vector<std::uint8_t> bytes(mcap_magic.begin(), mcap_magic.end());
-  put_record(McapOpcode::header, bytes, [](Fields& fields) {
+  put_record(McapOpcode::header, bytes, [](ByteAppender& fields) {
     fields.put(std::string_view("ros2"));
     fields.put(std::string_view("gst-eventsim"));
   });
@@ -191,7 +164,8 @@ class McapEncoder final : public Encoder {
   bool append_end(std::vector<std::uint8_t>& out) override {
     end_chunk(out);
     const auto before = out.size();
-    put_record(McapOpcode::data_end, out, [](Fields& fields) { fields.put(std::uint32_t{0}); });
+    put_record(McapOpcode::data_end, out,
+               [](ByteAppender& fields) { fields.put(std::uint32_t{0}); });
     put_summary(position_ + out.size() - before, out);
     return false;
   }
@@ -236,7 +210,7 @@ class McapEncoder final : public Encoder {
     packet_start_ = t;
     messages_.push_back({t, *packet_at_});
     const auto time = nanoseconds(t);
-    Fields fields(chunk_);
+    ByteAppender fields(chunk_);
     fields.put(McapOpcode::message);
     fields.put(std::uint64_t{0});
     fields.put(channel_id);
@@ -266,8 +240,8 @@ class McapEncoder final : public Encoder {
     if (!packet_at_) return;
     const std::uint64_t record = chunk_.size() - *packet_at_ - mcap_record_header;
     const auto events = static_cast<std::uint32_t>(chunk_.size() - events_at_);
-    std::memcpy(chunk_.data() + *packet_at_ + 1, &record, sizeof record);
-    std::memcpy(chunk_.data() + events_at_ - sizeof events, &events, sizeof events);
+    put_little_endian(record, chunk_.data() + *packet_at_ + 1);
+    put_little_endian(events, chunk_.data() + events_at_ - sizeof events);
     packet_at_.reset();
   }
 
@@ -276,7 +250,7 @@ class McapEncoder final : public Encoder {
     if (messages_.empty()) return;
     const auto before = out.size();
     Chunk chunk{messages_.front().t, messages_.back().t, position_, 0, 0, 0, chunk_.size()};
-    put_record(McapOpcode::chunk, out, [&](Fields& fields) {
+    put_record(McapOpcode::chunk, out, [&](ByteAppender& fields) {
       fields.put(nanoseconds(chunk.first));
       fields.put(nanoseconds(chunk.last));
       fields.put(chunk.content_size);
@@ -289,11 +263,10 @@ class McapEncoder final : public Encoder {
       else
         out.insert(out.end(), chunk_.begin(), chunk_.end());
       chunk.stored_size = out.size() - content_at;
-      std::memcpy(out.data() + content_at - sizeof chunk.stored_size, &chunk.stored_size,
-                  sizeof chunk.stored_size);
+      put_little_endian(chunk.stored_size, out.data() + content_at - sizeof chunk.stored_size);
     });
     chunk.size = out.size() - before;
-    put_record(McapOpcode::message_index, out, [&](Fields& fields) {
+    put_record(McapOpcode::message_index, out, [&](ByteAppender& fields) {
       fields.put(channel_id);
       fields.put(static_cast<std::uint32_t>(messages_.size() * 2 * sizeof(std::uint64_t)));
       for (const auto& message : messages_) {
@@ -338,29 +311,28 @@ class McapEncoder final : public Encoder {
     });
     const auto offsets_at = summary_at + out.size() - first;
     for (const auto& group : groups)
-      put_record(McapOpcode::summary_offset, out, [&](Fields& fields) {
+      put_record(McapOpcode::summary_offset, out, [&](ByteAppender& fields) {
         fields.put(group.opcode);
         fields.put(group.start);
         fields.put(group.size);
       });
     // The checksum covers the summary and the footer up to it.
     std::uint32_t checksum = 0;
-    put_record(McapOpcode::footer, out, [&](Fields& fields) {
+    put_record(McapOpcode::footer, out, [&](ByteAppender& fields) {
       fields.put(summary_at);
       fields.put(offsets_at);
       fields.put(checksum);
     });
     const std::uint64_t footer_size = mcap_footer;
-    std::memcpy(out.data() + out.size() - mcap_footer - sizeof footer_size, &footer_size,
-                sizeof footer_size);
+    put_little_endian(footer_size, out.data() + out.size() - mcap_footer - sizeof footer_size);
     checksum = static_cast<std::uint32_t>(
         crc32_z(0, out.data() + first, out.size() - first - sizeof checksum));
-    std::memcpy(out.data() + out.size() - sizeof checksum, &checksum, sizeof checksum);
+    put_little_endian(checksum, out.data() + out.size() - sizeof checksum);
     out.insert(out.end(), mcap_magic.begin(), mcap_magic.end());
   }
 
   void put_statistics(std::vector<std::uint8_t>& out) const {
-    put_record(McapOpcode::statistics, out, [&](Fields& fields) {
+    put_record(McapOpcode::statistics, out, [&](ByteAppender& fields) {
       fields.put(message_count_);
       fields.put(std::uint16_t{1});  // schemas
       fields.put(std::uint32_t{1});  // channels
@@ -376,7 +348,7 @@ class McapEncoder final : public Encoder {
   }
 
   void put_chunk_index(const Chunk& chunk, std::vector<std::uint8_t>& out) const {
-    put_record(McapOpcode::chunk_index, out, [&](Fields& fields) {
+    put_record(McapOpcode::chunk_index, out, [&](ByteAppender& fields) {
       fields.put(nanoseconds(chunk.first));
       fields.put(nanoseconds(chunk.last));
       fields.put(chunk.position);

@@ -7,6 +7,7 @@
 #include <array>
 #include <utility>
 
+#include "src/formats/ros/bag_magic.hpp"
 #include "src/formats/ros/mcap_records.hpp"
 
 namespace eventcamera {

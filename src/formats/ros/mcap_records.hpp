@@ -4,12 +4,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
 
 namespace eventcamera {
-
-/// First and last bytes of a file.
-inline constexpr std::string_view mcap_magic("\x89MCAP0\r\n", 8);
 
 /// First byte of a record. Its size, 64 bits, and its content follow.
 enum class McapOpcode : std::uint8_t {

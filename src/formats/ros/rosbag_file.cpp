@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "src/formats/byte_cursor.hpp"
+#include "src/formats/ros/bag_magic.hpp"
 
 namespace eventcamera {
 

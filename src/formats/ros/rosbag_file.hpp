@@ -12,9 +12,6 @@
 
 namespace eventcamera {
 
-/// First bytes of a file.
-inline constexpr std::string_view rosbag_magic = "#ROSBAG V2.0\n";
-
 /// Reads bags of ROS 1, version 2.0: wiki.ros.org/Bags/Format/2.0.
 class RosbagFile final : public ChunkedBagFile {
  public:

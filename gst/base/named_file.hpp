@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-/// Reads a file of at most `max_size` bytes. Throws std::system_error if it cannot be read,
-/// std::length_error if it is larger.
+/// Reads a file of at most `max_size` bytes, a multiple of 1024. Throws std::runtime_error with the
+/// reason if it cannot be read or is larger.
 std::string read_bytes(const std::string& location, std::size_t max_size);
 
 /// Returns parse(bytes) of the file that a property `location` names. An exception becomes a

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "gst/filter/named_file.hpp"
+#include "gst/base/named_file.hpp"
 
 #include <array>
 #include <cerrno>
@@ -23,7 +23,7 @@ std::string read_bytes(const std::string& location, std::size_t max_size) {
   while (const std::size_t size = std::fread(chunk.data(), 1, chunk.size(), file.get())) {
     bytes.append(chunk.data(), size);
     if (bytes.size() > max_size)
-      throw std::length_error("it has more than " + std::to_string(max_size) + " bytes");
+      throw std::runtime_error("it is larger than " + std::to_string(max_size >> 10) + " KiB");
   }
   if (std::ferror(file.get()) != 0) throw std::system_error(errno, std::generic_category());
   return bytes;

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <algorithm>
+
+#include "src/core/image.hpp"
+#include "src/flow/dense_flow.hpp"
+
+namespace eventcamera {
+
+/// Range that holds the flow of a part of a frame, and 0, in pixels.
+struct FlowRange {
+  /// Along one axis.
+  struct Axis {
+    float min;
+    float max;
+
+    float longest() const { return std::max(max, -min); }
+  };
+  Axis x;
+  Axis y;
+
+  float longest() const { return std::max(x.longest(), y.longest()); }
+};
+
+/// Returns the range of the flow in a box within the frame. NaN counts as 0.
+FlowRange flow_range(const ImageView<Flow>& flow, const Box& box);
+
+}  // namespace eventcamera
