@@ -21,6 +21,14 @@
  *
  * The same video, settings and seed give the same events for any number of threads.
  *
+ * With #GstEventSimDvs:label, events carry their cause. The pad `label_sink` takes images of
+ * classes, such as a renderer's segmentation, in the size of the video: events then carry cause and
+ * class, which is that of their pixel in the image in force at their time, the last one that is not
+ * later. Images and frames are matched by their timestamps. The video waits for the image of each
+ * frame, so if one source feeds both pads, a queue belongs before each. Where images are missing,
+ * as in a GAP or after their end, the last one stays in force; before the first one, the class is
+ * 0. Images without a timestamp are skipped with a warning; a different size is an error.
+ *
  * ## Example launch lines
  * |[
  * gst-launch-1.0 v4l2src ! eventsim-dvs preset=davis346 ! videoconvert ! autovideosink
@@ -28,6 +36,11 @@
  * |[
  * gst-launch-1.0 videotestsrc pattern=ball num-buffers=100 ! eventsim-dvs preset=v2e-noisy
  * threshold-sigma=0.03 seed=7 ! evtenc format=EVT3 ! filesink location=ball.raw
+ * ]|
+ * |[
+ * gst-launch-1.0 eventsim-dvs name=dvs ! eventnpzenc ! filesink location=classes.npz  videotestsrc
+ * pattern=ball num-buffers=100 ! dvs.sink  videotestsrc pattern=ball num-buffers=100 !
+ * video/x-raw,format=GRAY8 ! dvs.label_sink
  * ]|
  */
 #include <algorithm>

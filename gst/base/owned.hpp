@@ -11,8 +11,10 @@ struct Unref {
   void operator()(GstBuffer* buffer) const { gst_buffer_unref(buffer); }
   void operator()(GstBufferPool* pool) const { gst_object_unref(pool); }
   void operator()(GstCaps* caps) const { gst_caps_unref(caps); }
+  void operator()(GstPad* pad) const { gst_object_unref(pad); }
 };
 
 using OwnedBuffer = std::unique_ptr<GstBuffer, Unref>;
 using OwnedBufferPool = std::unique_ptr<GstBufferPool, Unref>;
 using OwnedCaps = std::unique_ptr<GstCaps, Unref>;
+using OwnedPad = std::unique_ptr<GstPad, Unref>;

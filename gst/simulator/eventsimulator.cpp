@@ -14,6 +14,7 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
@@ -21,6 +22,8 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/simulator/buffers.hpp"
 #include "gst/simulator/caps.hpp"
+#include "gst/simulator/class_images.hpp"
+#include "gst/simulator/companion_pad.hpp"
 #include "gst/simulator/frame_clock.hpp"
 #include "gst/simulator/qos.hpp"
 #include "src/simulate/learnt_latency.hpp"
@@ -93,6 +96,7 @@ struct GstEventSimulatorPrivate {
 
   Guarded<SimulatorQos> qos;
   Guarded<Latency> latency;  // make no calls while holding its lock
+  CompanionPad class_images{"class images", GST_CAT_DEFAULT};
 
   // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
   std::optional<State> state;
@@ -163,7 +167,8 @@ static void install_label(GObjectClass* klass) {
       [](Settings& settings) -> bool& { return settings.simulation.labels; },
       g_param_spec_boolean("label", "Label",
                            "Label each event with its cause: light, leak, shot noise, hot pixel or "
-                           "exposure pulse. Events drawn as video have no labels",
+                           "exposure pulse. Implied by the pad label_sink, which adds classes. "
+                           "Events drawn as video have no labels",
                            FALSE, property_flags));
 }
 
@@ -295,6 +300,32 @@ static GstFlowReturn push_buffer(GstEventSimulator* self, OwnedBuffer out, GstCl
   return gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out.release());
 }
 
+/// Gives the events of an interval their classes, if a source of class images is linked. May throw.
+static GstFlowReturn set_classes(GstEventSimulator* self, GstBuffer* out, Nanoseconds start,
+                                 Nanoseconds end) {
+  auto& class_images = priv_of(self).class_images;
+  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
+  const auto from = running_time_of(segment, static_cast<GstClockTime>(start));
+  const auto until = running_time_of(segment, static_cast<GstClockTime>(end));
+  if (!class_images.is_linked() || !from || !until) return GST_FLOW_OK;
+  const auto images = class_images.items(*from, *until);
+  if (!images) return GST_FLOW_FLUSHING;
+  GST_BUFFER_PTS(out) = static_cast<GstClockTime>(start);
+  set_classes(out, segment, priv_of(self).state->video, *images);
+  return GST_FLOW_OK;
+}
+
+/// Writes the events of an interval, and their labels, to a new buffer. `frame` ends it. May throw.
+static GstFlowReturn write_events(GstEventSimulator* self, const EventBuckets& events,
+                                  GstBuffer* frame, Nanoseconds start, Nanoseconds end,
+                                  OwnedBuffer& out) {
+  auto& simulator = priv_of(self).state->simulator();
+  const GstFlowReturn result =
+      event_simulator_write_events(GST_BASE_TRANSFORM(self), events, simulator, frame, out);
+  if (result != GST_FLOW_OK || !simulator.has_labels()) return result;
+  return set_classes(self, out.get(), start, end);
+}
+
 void event_simulator_push_interval(GObject* element, Interval interval,
                                    const EventBuckets* events) {
   auto* self = GST_EVENT_SIMULATOR(element);
@@ -312,9 +343,7 @@ void event_simulator_push_interval(GObject* element, Interval interval,
 
   auto& flow = priv_of(self).stream.flow;
   OwnedBuffer out;
-  if (events->size() > 0)
-    flow = event_simulator_write_events(GST_BASE_TRANSFORM(self), *events,
-                                        priv_of(self).state->simulator(), frame.get(), out);
+  if (events->size() > 0) flow = write_events(self, *events, frame.get(), start, end, out);
   frame.reset();  // upstream may need it while downstream blocks
   end_work(self, end, began);
   learn_latency(self, start, end);
@@ -595,19 +624,29 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
   return result;
 }
 
+/// Settings for the interval that ends at `end`, up to which the class images advance.
+static Settings begin_interval(GstEventSimulator* self, Nanoseconds end) {
+  auto& class_images = priv_of(self).class_images;
+  if (const auto time =
+          running_time_of(GST_BASE_TRANSFORM(self)->segment, static_cast<GstClockTime>(end)))
+    class_images.advance(*time);
+  configure(self);
+  Settings settings = priv_of(self).settings.copy();
+  if (class_images.pad()) settings.simulation.labels = true;
+  if (priv_of(self).state->draws) settings.simulation.labels = false;
+  return settings;
+}
+
 /// Processes a frame and outputs the interval that it ends, if any. May throw.
 static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
   auto& stream = priv_of(self).stream;
   auto& state = *priv_of(self).state;
   sync_controlled_properties(self, GST_BUFFER_PTS(in.get()));
-  Settings settings = priv_of(self).settings.copy();
-  if (state.draws) settings.simulation.labels = false;
-
   check_interlacing(self, in.get());
   if (!check_time(self, in.get()) || !begin_work(self, in.get())) return;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in.get()));
   const auto start = state.simulator().last_time();
-  configure(self);
+  const Settings settings = begin_interval(self, end);
   if (state.draws) {
     stream.handed_out_until = end;
     stream.flow = draw_frame(self, settings, end, std::move(in));
@@ -654,6 +693,7 @@ static void start_timeline(GstEventSimulator* self) {
   if (state) state->frames->drop();
   priv_of(self).stream.flow = GST_FLOW_OK;
   start_over(self);
+  priv_of(self).class_images.begin();
   priv_of(self).stream.clock.start_over();
   priv_of(self).qos.lock()->start_over();
 }
@@ -676,13 +716,11 @@ static bool take_segment(GstEventSimulator* self, GstEvent* event) {
 /// Holds the last frame until `end` and pushes the events of that time, or a GAP if there are none.
 /// May throw.
 static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum) {
-  auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
   const Nanoseconds start = *state.simulator().last_time();
   sync_controlled_properties(self, static_cast<GstClockTime>(end));
-  configure(self);
   const EventBuckets* events =
-      state.simulator().hold_until(end, priv_of(self).settings.copy().simulation);
+      state.simulator().hold_until(end, begin_interval(self, end).simulation);
   priv_of(self).stream.handed_out_until = end;
   auto& flow = priv_of(self).stream.flow;
   if (events == nullptr || events->size() == 0) {
@@ -691,7 +729,7 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   }
   const OwnedBuffer in(gst_buffer_new());
   OwnedBuffer out;
-  flow = event_simulator_write_events(transform, *events, state.simulator(), in.get(), out);
+  flow = write_events(self, *events, in.get(), start, end, out);
   if (flow == GST_FLOW_OK)
     flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
                        static_cast<GstClockTime>(end - start));
@@ -737,8 +775,17 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       }
       break;
     case GST_EVENT_STREAM_START:
-    case GST_EVENT_FLUSH_STOP:
       start_timeline(self);
+      break;
+    case GST_EVENT_FLUSH_START:
+      priv_of(self).class_images.set_flushing(true);
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      priv_of(self).class_images.set_flushing(false);
+      start_timeline(self);
+      break;
+    case GST_EVENT_EOS:
+      priv_of(self).class_images.end();
       break;
     default:
       break;
@@ -764,6 +811,8 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
       gst_event_unref(event);
       return FALSE;
     }
+    if (const OwnedPad pad = priv_of(GST_EVENT_SIMULATOR(transform)).class_images.pad())
+      gst_pad_push_event(pad.get(), gst_event_ref(event));
   }
   return PARENT_TRANSFORM_CLASS->src_event(transform, event);
 }
@@ -778,6 +827,23 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
 
   const GstClockTime latency = priv_of(GST_EVENT_SIMULATOR(transform)).latency.lock()->total();
   return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query, latency);
+}
+
+static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template, const gchar*,
+                               const GstCaps*) {
+  return priv_of(GST_EVENT_SIMULATOR(element)).class_images.add_to(element, pad_template);
+}
+
+static void release_pad(GstElement* element, GstPad* pad) {
+  priv_of(GST_EVENT_SIMULATOR(element)).class_images.remove_from(element, pad);
+}
+
+/// Ends the waiting of threads before their pads are deactivated.
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange change) {
+  auto& class_images = priv_of(GST_EVENT_SIMULATOR(element)).class_images;
+  if (change == GST_STATE_CHANGE_READY_TO_PAUSED) class_images.start();
+  if (change == GST_STATE_CHANGE_PAUSED_TO_READY) class_images.stop();
+  return GST_ELEMENT_CLASS(parent_class)->change_state(element, change);
 }
 
 static gboolean start(GstBaseTransform* transform) {
@@ -834,6 +900,11 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   install_base_properties(object_class);
   install_qos_properties(object_class);
 
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  element_class->request_new_pad = request_new_pad;
+  element_class->release_pad = release_pad;
+  element_class->change_state = change_state;
+
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);
   transform_class->transform_caps = transform_caps;
   transform_class->fixate_caps = fixate_caps;
@@ -867,7 +938,11 @@ static void method_class_init(gpointer klass, gpointer row) {
   method.video.install_pads(GST_ELEMENT_CLASS(klass));
   if (method.threshold) install_thresholds(object_class, *method.threshold);
   if (method.interpolates) install_interpolated_frames(object_class);
-  if (method.labels) install_label(object_class);
+  if (method.labels) {
+    install_label(object_class);
+    add_pad_template(GST_ELEMENT_CLASS(klass), "label_sink", GST_PAD_SINK, CLASS_IMAGE_CAPS,
+                     GST_PAD_REQUEST);
+  }
   if (method.install_properties != nullptr) method.install_properties(object_class);
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), method.long_name,
                                         "Filter/Effect/Converter/Video", method.description,

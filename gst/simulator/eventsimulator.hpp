@@ -31,7 +31,7 @@ struct EventSimulatorMethod {
   /// does not have these properties.
   std::optional<double> threshold;
   bool interpolates = false;  ///< has the property interpolated-frames
-  bool labels = false;        ///< has the property label
+  bool labels = false;        ///< has the property label and the pad label_sink
 
   /// Creates the simulator of an element for frames of this format. May throw.
   std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/simulator/class_images.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <string>
+
+#include "gst/base/event_buffer.hpp"
+#include "gst/base/video_frame.hpp"
+#include "gst/simulator/video_simulator.hpp"
+
+using eventcamera::Event;
+using eventcamera::ImageView;
+using eventcamera::Label;
+using eventcamera::Nanoseconds;
+
+namespace {
+
+/// A part of the events, and their labels.
+struct Part {
+  std::span<const Event> events;
+  std::span<Label> labels;
+
+  /// Splits off the events before microsecond `t`.
+  Part before(Nanoseconds t) {
+    const auto is_before = [](const Event& event, Nanoseconds time) { return event.t < time; };
+    const auto end = std::lower_bound(events.begin(), events.end(), t, is_before);
+    const auto count = static_cast<std::size_t>(end - events.begin());
+    const Part part{events.first(count), labels.first(count)};
+    *this = {events.subspan(count), labels.subspan(count)};
+    return part;
+  }
+
+  template <class Pixel>
+  void set(const ImageView<Pixel>& classes) const {
+    for (std::size_t i = 0; i < events.size(); ++i)
+      labels[i].object_class = classes.row(events[i].y())[events[i].x];
+  }
+};
+
+std::string size_of(const GstVideoInfo& video) {
+  return std::to_string(GST_VIDEO_INFO_WIDTH(&video)) + "x" +
+         std::to_string(GST_VIDEO_INFO_HEIGHT(&video));
+}
+
+/// Format of an image, which must have the size of the video.
+GstVideoInfo format_of(const CompanionPad::Item& image, const GstVideoInfo& video) {
+  GstVideoInfo format;
+  const bool is_known = gst_video_info_from_caps(&format, image.caps.get()) != FALSE;
+  if (!is_known || size_of(format) != size_of(video))
+    throw VideoSimulatorError({GST_CORE_ERROR_NEGOTIATION,
+                               "The class images have " + (is_known ? size_of(format) : "unknown") +
+                                   " pixels, and the video " + size_of(video) +
+                                   ". Scale them with videoscale method=nearest-neighbour."},
+                              "caps of label_sink");
+  return format;
+}
+
+void set_classes(const Part& part, const CompanionPad::Item& image, const GstVideoInfo& video) {
+  const GstVideoInfo format = format_of(image, video);
+  const VideoFrame mapped(format, image.buffer.get(), GST_MAP_READ);
+  if (!mapped)
+    throw VideoSimulatorError(
+        {GST_RESOURCE_ERROR_FAILED,
+         "Cannot read a class image: " + mapped.fault() + ". Check the element upstream."},
+        mapped.fault());
+  const auto view = [&](const auto* pixels) {
+    return ImageView{pixels, mapped.stride(), GST_VIDEO_INFO_WIDTH(&format),
+                     GST_VIDEO_INFO_HEIGHT(&format)};
+  };
+  if (GST_VIDEO_INFO_FORMAT(&format) == GST_VIDEO_FORMAT_GRAY8)
+    part.set(view(reinterpret_cast<const guint8*>(mapped.data())));
+  else
+    part.set(view(reinterpret_cast<const guint16*>(mapped.data())));
+}
+
+}  // namespace
+
+void set_classes(GstBuffer* events, const GstSegment& segment, const GstVideoInfo& video,
+                 const std::vector<CompanionPad::Item>& images) {
+  const MappedEvents mapped(events);
+  const GstClockTime start = GST_BUFFER_PTS(events);
+  const auto running_start = running_time_of(segment, start);
+  if (!mapped || !running_start) return;
+  const auto microsecond_of = [&](const CompanionPad::Item& image) {
+    const auto delay =
+        static_cast<Nanoseconds>(static_cast<double>(image.time - *running_start) * segment.rate);
+    return (static_cast<Nanoseconds>(start % GST_USECOND) + delay) / Nanoseconds{GST_USECOND};
+  };
+  Part rest{mapped.events(), labels_of(events)};
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (i == 0) rest.before(microsecond_of(images[i]));  // they have no class
+    const auto end = i + 1 < images.size() ? microsecond_of(images[i + 1])
+                                           : std::numeric_limits<Nanoseconds>::max();
+    if (const Part part = rest.before(end); !part.events.empty())
+      set_classes(part, images[i], video);
+  }
+}
