@@ -16,6 +16,7 @@
 #include "tests/fuzz/bag_seeds.hpp"
 #include "tests/fuzz/datagram_seeds.hpp"
 #include "tests/fuzz/table_seeds.hpp"
+#include "tests/fuzz/word_scanner_seeds.hpp"
 #include "tests/wire/rtp_packets.hpp"
 
 namespace {
@@ -189,6 +190,7 @@ int main(int argc, char** argv) {
   write(corpus / "pixel_list", pixel_list_seeds());
   write(corpus / "rtp", rtp_seeds());
   write(corpus / "tensor", tensor_seeds());
+  write(corpus / "word_scanner", word_scanner_seeds());
 
   // Typefinders may see any of them.
   std::vector<Seed> all;

@@ -6,57 +6,13 @@
 #include <stdexcept>
 #include <utility>
 
+#include "src/formats/evt/cd_words.hpp"
 #include "src/formats/evt/words.hpp"
 #include "src/formats/time_base.hpp"
 #include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
 namespace {
-
-/// Word of EVT2 or EVT4, or upper half of a word of EVT2.1.
-struct CdWord {
-  std::uint32_t bits;
-
-  /// `time` is truncated to its low bits.
-  static constexpr CdWord at(std::uint32_t type, std::uint64_t time, std::uint32_t x,
-                             std::uint32_t y) {
-    return {type << 28 | (static_cast<std::uint32_t>(time) & 63) << 22 | (x & 0x7ff) << 11 |
-            (y & 0x7ff)};
-  }
-  /// `count` is in units of 64 microseconds.
-  static constexpr CdWord time_high(std::uint32_t type, std::uint64_t count) {
-    return {type << 28 | (static_cast<std::uint32_t>(count) & 0x0fffffff)};
-  }
-
-  constexpr std::uint32_t type() const { return bits >> 28; }
-  constexpr std::uint32_t count() const { return bits & 0x0fffffff; }
-  constexpr std::uint32_t time_low() const { return bits >> 22 & 63; }
-  constexpr std::uint32_t x() const { return bits >> 11 & 0x7ff; }
-  constexpr std::uint32_t y() const { return bits & 0x7ff; }
-
-  /// `time` is that of the last TIME_HIGH. The polarity is the lowest bit of the type.
-  constexpr AbsoluteEvent event(std::uint64_t time) const {
-    return {static_cast<Microseconds>(time + time_low()), static_cast<std::uint16_t>(x()),
-            static_cast<std::uint16_t>(y() | (type() & 1) << 15)};
-  }
-
-  static constexpr CdWord of_trigger(std::uint32_t type, std::uint64_t time,
-                                     const Trigger& trigger) {
-    return {at(type, time, 0, 0).bits | (trigger.id & 31U) << 8 | (trigger.rising ? 1U : 0U)};
-  }
-
-  constexpr Trigger trigger(std::uint64_t time) const {
-    return {static_cast<Microseconds>(time + time_low()),
-            static_cast<std::uint16_t>(bits >> 8 & 31), (bits & 1) != 0};
-  }
-};
-
-/// Types of words without events.
-struct CdTypes {
-  std::uint32_t time_high;
-  std::uint32_t trigger;
-  std::uint32_t ignored;  ///< one bit per type
-};
 
 /// Base of the decoders; the only state is the time.
 template <CdTypes types>
@@ -209,13 +165,7 @@ struct Evt2 {
 
   static constexpr bool has_steady_time = false;
 
-  enum Type : std::uint32_t { cd_off, cd_on, imu = 0xd, others = 0xe, continued = 0xf };
-
-  /// Events before the first TIME_HIGH are ignored.
-  static constexpr CdTypes types{
-      .time_high = 0x8,
-      .trigger = 0xa,
-      .ignored = 1U << cd_off | 1U << cd_on | 1U << imu | 1U << others | 1U << continued};
+  static constexpr CdTypes types = evt2::types;
 
   static constexpr Word word(CdWord word) { return word.bits; }
 
@@ -245,7 +195,7 @@ class Evt2Decoder final : public CdDecoder<Evt2::types> {
     std::uint64_t outside = 0;
     for (; from != end; from += 4) {
       const CdWord word{little_endian<std::uint32_t>(from)};
-      const bool is_event = word.type() <= Evt2::cd_on;
+      const bool is_event = word.type() <= evt2::cd_on;
       const bool is_time =
           word.type() == Evt2::types.time_high && word.count() - count < small_step_end;
       if (!(is_event || is_time)) [[unlikely]] {
@@ -272,16 +222,13 @@ class Evt2Decoder final : public CdDecoder<Evt2::types> {
   }
 };
 
-constexpr CdTypes evt21_types{
-    .time_high = 0x8, .trigger = 0xa, .ignored = 1U << Evt2::others | 1U << Evt2::continued};
-
 /// 64-bit words: the upper half as in EVT2, the lower half a mask. They are little-endian or, in
 /// the legacy order of Gen4.1 and IMX636 cameras, the upper half first, each half little-endian.
 template <EvtFormat format>
 struct Evt21 {
   using Word = std::uint64_t;
 
-  static constexpr CdTypes types = evt21_types;
+  static constexpr CdTypes types = evt21::types;
   static constexpr bool has_steady_time = false;
 
   static constexpr Word in_order(Word word) {
@@ -303,10 +250,10 @@ struct Evt21 {
 };
 
 template <EvtFormat format>
-class Evt21Decoder final : public CdDecoder<evt21_types> {
+class Evt21Decoder final : public CdDecoder<evt21::types> {
  public:
   explicit Evt21Decoder(SensorSize size)
-      : CdDecoder<evt21_types>(size, "EVT2.1 word of unknown type") {}
+      : CdDecoder<evt21::types>(size, "EVT2.1 word of unknown type") {}
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
@@ -316,7 +263,7 @@ class Evt21Decoder final : public CdDecoder<evt21_types> {
     for (; to - from >= 8 && event < full; from += 8) {
       const auto bits = Evt21<format>::in_order(little_endian<std::uint64_t>(from));
       const CdWord upper{static_cast<std::uint32_t>(bits >> 32)};
-      if (upper.type() <= Evt2::cd_on)
+      if (upper.type() <= evt2::cd_on)
         event = read_masked(upper, static_cast<std::uint32_t>(bits), event, outside);
       else
         read_other(upper, from, 8, batch);
@@ -334,18 +281,7 @@ struct Evt4 {
   /// OpenEB's robust decoder drops events after a pause without TIME_HIGH.
   static constexpr bool has_steady_time = true;
 
-  enum Type : std::uint32_t {
-    others = 0x6,
-    continued = 0x7,
-    cd_off = 0xa,
-    cd_on = 0xb,
-    cd_vec_off = 0xc,
-    cd_vec_on = 0xd,
-    padding = 0xf,
-  };
-
-  static constexpr CdTypes types{
-      .time_high = 0xe, .trigger = 0x9, .ignored = 1U << others | 1U << continued | 1U << padding};
+  static constexpr CdTypes types = evt4::types;
 
   static constexpr Word word(CdWord word) { return word.bits; }
 
@@ -358,11 +294,11 @@ struct Evt4 {
     // A vector takes two words, like two events. OpenEB's robust decoder drops vectors with any of
     // the 32 pixels outside the sensor.
     if (masked.count > 2 && masked.base + 32 <= width) {
-      words.put(CdWord::at(cd_vec_off + on, time, masked.base, y).bits);
+      words.put(CdWord::at(evt4::cd_vec_off + on, time, masked.base, y).bits);
       words.put(masked.mask);
     } else {
       for (const auto& event : events.first(masked.count))
-        words.put(CdWord::at(cd_off + on, time, event.x, y).bits);
+        words.put(CdWord::at(evt4::cd_off + on, time, event.x, y).bits);
     }
     return masked.count;
   }
@@ -380,8 +316,8 @@ class Evt4Decoder final : public CdDecoder<Evt4::types> {
     for (; to - from >= 4 && event < full; from += 4) {
       const CdWord word{little_endian<std::uint32_t>(from)};
       switch (word.type()) {
-        case Evt4::cd_off:
-        case Evt4::cd_on:
+        case evt4::cd_off:
+        case evt4::cd_on:
           if (time_.known()) {
             const bool inside = bounds_.contain(word.x(), word.y());
             *event = word.event(time_.time());
@@ -389,8 +325,8 @@ class Evt4Decoder final : public CdDecoder<Evt4::types> {
             outside += static_cast<std::uint64_t>(!inside);
           }
           continue;
-        case Evt4::cd_vec_off:
-        case Evt4::cd_vec_on:
+        case evt4::cd_vec_off:
+        case evt4::cd_vec_on:
           // Both words of a vector are one unit.
           if (to - from < 8) break;
           from += 4;
