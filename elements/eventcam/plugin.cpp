@@ -37,7 +37,7 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
   X(eventcrop) X(eventflip) X(eventmask) X(eventpolarity) X(eventscale) X(eventundistort)  \
   X(eventrefractory) X(eventtensor) X(eventtrail)                                          \
   X(eventdatagramdepay) X(eventdatagrampay)                                                \
-  X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(rtpeventdepay) X(rtpeventpay)
+  X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(evtparse) X(rtpeventdepay) X(rtpeventpay)
 #define TYPE_FINDERS(X)                                                                    \
   X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(mcap) X(npy) X(npz) X(propheseedat)        \
   X(propheseeraw) X(rosbag) X(rosbag2)

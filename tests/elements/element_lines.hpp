@@ -114,6 +114,7 @@ class Kind {
   /// What must be set before it starts.
   std::string settings() const {
     if (name_ == "eventdatagramdepay") return " width=64 height=48";
+    if (name_ == "evtparse") return " format=EVT3 width=64 height=48";
     if (name_ == "eventmask" || name_ == "eventundistort") return {};  // files to read
     const Owned<GstElement> element(gst_element_factory_create(factory_, nullptr));
     if (g_object_class_find_property(G_OBJECT_GET_CLASS(element.get()), "location") == nullptr)
@@ -126,6 +127,8 @@ class Kind {
                        std::string(frame_caps);
     const auto events = video + " ! eventsim-frame ! " + event_caps;
     if (name_.ends_with("depay")) return events + " ! " + name_.substr(0, name_.size() - 5) + "pay";
+    if (name_ == "evtparse")
+      return events + " ! evtenc ! application/x-event-camera, format=(string)EVT3";
     if (pad.takes_frames()) return video;
     if (pad.takes_events()) return events;
     const auto* const file =

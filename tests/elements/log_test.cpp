@@ -83,6 +83,7 @@ class EveryElement : public testing::TestWithParam<Case> {};
 constexpr Case cases[] = {
     {"eventwriter", EVENTS "! evtenc ! fakesink"},
     {"eventreader", EVENTS "! evtenc ! evtdec ! fakesink"},
+    {"evtparse", EVENTS "! evtenc ! application/x-event-camera,format=EVT3 ! evtparse ! fakesink"},
     {"eventhdf5sink", EVENTS "! eventhdf5sink location="},
     {"aedatmux", EVENTS "! aedatmux ! fakesink"},
     {"eventstats", EVENTS "! eventstats ! fakesink"},

@@ -112,6 +112,7 @@ std::vector<GParamSpec*> writable_properties_of(GstElement* element) {
         "GstObject",         "GstBaseTransform",    "GstAggregator",         "GstBaseSink",
         "GstRTPBasePayload", "GstRTPBaseDepayload", "GstEventDatagramDepay", "GstEventMask",
         "GstEventUndistort",  // read files
+        "GstEvtParse",        // has to match its input
         "GstEventCrop"};      // may leave nothing
     return (spec->flags & G_PARAM_WRITABLE) == 0 || is_window_length(spec) ||
            spec->name == std::string_view("min-streams") ||  // waits for streams that never come

@@ -179,7 +179,7 @@ INSTANTIATE_TEST_SUITE_P(, EveryFormat, testing::ValuesIn(formats),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 TEST_P(EveryFormat, ReadsPaddedTransfers) {
-  const auto sent = some_events(20'000, 1'000'000);
+  const auto sent = some_events(8'000, 1'000'000);
   Camera camera(format);
   Reader reader(format, Framing::padded);
   for (const auto& events : in_transfers(sent))
@@ -235,7 +235,7 @@ TEST_P(EveryFormat, SkipsZerosAfterALostEndMarker) {
 }
 
 TEST_P(EveryFormat, CountsLostTransfers) {
-  const auto sent = some_events(20'000, 1'000'000);
+  const auto sent = some_events(8'000, 1'000'000);
   const auto transfers = in_transfers(sent);
   Camera camera(format);
   Reader reader(format, Framing::padded);
@@ -260,7 +260,7 @@ TEST_P(EveryFormat, CountsLostTransfers) {
 }
 
 TEST_P(EveryFormat, DropsTransfersThatComeAgain) {
-  const auto sent = some_events(20'000, 1'000'000);
+  const auto sent = some_events(8'000, 1'000'000);
   Camera camera(format);
   Reader reader(format, Framing::padded);
   std::size_t again = 0;
@@ -281,7 +281,7 @@ TEST_P(EveryFormat, DropsTransfersThatComeAgain) {
 
 /// A transfer that ends early shows the words of an earlier one past its end.
 TEST_P(EveryFormat, DropsOldWordsPastATornTransfer) {
-  const auto sent = some_events(20'000, 1'000'000);
+  const auto sent = some_events(8'000, 1'000'000);
   Camera camera(format);
   Reader reader(format, Framing::padded);
   Bytes buffer(8192);
@@ -304,7 +304,7 @@ TEST_P(EveryFormat, DropsOldWordsPastATornTransfer) {
 }
 
 TEST_P(EveryFormat, FindsWordsAgainAfterLostBytes) {
-  const auto sent = some_events(20'000, 1'000'000);
+  const auto sent = some_events(8'000, 1'000'000);
   const auto bytes = Camera(format).transfer_of(sent);
   Random random(7);
   Reader reader(format, Framing::loose);
@@ -322,7 +322,7 @@ TEST_P(EveryFormat, FindsWordsAgainAfterLostBytes) {
   // Bytes lost between two times, in whole words, cannot be told from none in EVT3, where they may
   // include a row or a time.
   EXPECT_LT(wrong, sent.size() / 100);
-  EXPECT_GT(reader.counts().gaps, 5U);
+  EXPECT_GT(reader.counts().gaps, 2U);
   EXPECT_LE(reader.counts().bytes + reader.counts().lost_bytes, bytes.size());
 }
 
@@ -342,7 +342,7 @@ TEST_P(EveryFormat, KeepsTheTimeAcrossWraps) {
   // EVT3 wraps after 16 s, the others after 4.7 h.
   const Microseconds wrap =
       format.format == EvtFormat::evt3 ? Microseconds{1} << 24 : Microseconds{1} << 34;
-  const auto sent = some_events(20'000, wrap - 300'000);
+  const auto sent = some_events(8'000, wrap - 300'000);
   Camera camera(format);
   Reader reader(format, Framing::padded);
   for (const auto& events : in_transfers(sent))
@@ -395,7 +395,7 @@ TEST_P(EveryFormat, FollowsACameraThatStartsOver) {
 
 /// A flipped bit costs what is between the times beside it, or the rest of a transfer.
 TEST_P(EveryFormat, SurvivesFlippedBits) {
-  const auto sent = some_events(20'000, 1'000'000);
+  const auto sent = some_events(8'000, 1'000'000);
   const auto bytes = Camera(format).transfer_of(sent);
   Random random(5);
   for (const auto framing : {Framing::loose, Framing::padded}) {

@@ -18,6 +18,14 @@ for name in in recording real simulated left right a b hd; do cp drive.raw $name
 make_pixel_files .
 /usr/bin/python3 "$SOURCE/tests/formats/bag_files.py" .
 for ending in bag mcap; do mv evt3.$ending walk.$ending; done
+for words in EVT2 EVT3; do
+  eval "$GST_LAUNCH -q $ball,width=320,height=320 ! eventsim-dvs ! evtenc ! application/x-event-camera,format=$words ! filesink location=camera.${words,,}"
+done
+{
+  cat camera.evt3
+  printf '\x19\xe0'
+} >camera.grey
+truncate -s $((4096 * 391)) camera.grey
 mkdir videos recordings arrays
 cp drive.mp4 videos/first.mp4
 cp drive.mp4 "videos/second one.mp4"

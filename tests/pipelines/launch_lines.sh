@@ -177,6 +177,27 @@ for writer in "evtenc format=EVT3" "evtenc format=EVT4" eventdatenc eventesenc "
   $joined && [ "$(stat -c %s joined.xytp)" -gt 8000 ] || fail "a client of $writer got no events"
 done
 
+# What cameras send: buffers of V4L2, a serial line, and a socket that a client joins late.
+for words in EVT2 EVT21 EVT3 EVT4; do
+  launch videotestsrc pattern=ball num-buffers=30 ! eventsim-diff ! evtenc ! application/x-event-camera,format=$words ! filesink location=line.$words
+  launch filesrc location=line.$words blocksize=1000 ! evtparse format=$words width=320 height=240 ! evtdec ! eventcsvenc ! filesink location=line.csv
+  launch filesrc location=line.$words ! application/x-event-camera,format=$words,width=320,height=240 ! evtdec ! eventcsvenc ! filesink location=words.csv
+  cmp line.csv words.csv
+done
+{ cat line.EVT3 && printf '\x19\xe0'; } >line.grey
+truncate -s $((4096 * 391)) line.grey
+launch filesrc location=line.grey blocksize=$((4096 * 391)) ! video/x-raw,format=GRAY8,width=4096,height=391,framerate=0/1 ! evtparse format=EVT3 width=320 height=240 ! evtdec ! filesink location=line.xytp
+[ -s line.xytp ] || fail "no events came out of a padded buffer"
+timeout 60 "$GST_LAUNCH" -q videotestsrc is-live=true pattern=ball ! eventsim-diff ! evtenc ! application/x-event-camera,format=EVT3 ! tcpserversink host=127.0.0.1 port=$port &
+serving=$!
+for _ in $(seq 20); do
+  sleep 1
+  timeout 20 "$GST_LAUNCH" -q tcpclientsrc host=127.0.0.1 port=$port do-timestamp=true num-buffers=30 ! evtparse format=EVT3 width=320 height=240 ! evtdec ! filesink location=joined.xytp && break
+done
+kill $serving
+wait $serving || true
+[ -s joined.xytp ] || fail "a client of words without a header got no events"
+
 # Datagrams of other tools, without a network.
 for format in spif spif-timestamps t64-x16-y16-on8 t32-x16-y15-on1 es jaer; do
   launch videotestsrc pattern=ball num-buffers=20 ! eventsim-diff ! eventdatagrampay format=$format ! eventdatagramdepay format=$format width=320 height=240 ! eventrender ! videoconvert ! fakesink

@@ -79,6 +79,8 @@ for format in spif jaer; do
   check videotestsrc num-buffers=8 ! eventsim-frame ! $pay ! identity error-after=2 ! $depay ! fakesink
 done
 check videotestsrc num-buffers=8 ! eventsim-frame ! eventdatagrampay ! eventdatagramdepay format=es width=20 height=20 ! fakesink
+check videotestsrc num-buffers=8 ! eventsim-frame ! evtenc ! application/x-event-camera,format=EVT3 ! evtparse ! evtdec ! fakesink
+check videotestsrc num-buffers=8 ! video/x-raw,format=GRAY8 ! evtparse format=EVT3 width=320 height=240 ! fakesink
 # Errors in mid-stream.
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay ! rtpeventdepay ! identity error-after=2 ! fakesink
 check videotestsrc num-buffers=8 ! eventsim-frame ! rtpeventpay mtu=30 ! fakesink

@@ -2,6 +2,7 @@
 # Sourced after scratch_folder.sh: runs the command lines of pages, each once, with test pictures instead of
 # cameras and without windows.
 ball="videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=I420,framerate=25/1"
+grey="filesrc location=camera.grey blocksize=$((4096 * 391)) ! video/x-raw,format=GRAY8,width=4096,height=391,framerate=0/1"
 count=0 # of the lines so far
 servers=()
 trap 'kill "${servers[@]}" 2>/dev/null || true; rm -rf "$work"' EXIT
@@ -15,6 +16,9 @@ ended_before_pause() {
 run_lines() { # PAGE...
   local line port receiver= served=
   while IFS= read -r line; do
+    line=${line//v4l2src device=\/dev\/video0 ! video\/x-raw,format=GRAY8,width=4096,height=391/$grey}
+    line=${line//filesrc location=\/dev\/ttyACM0/filesrc location=camera.evt2}
+    line=${line//tcpclientsrc host=camera port=3333 do-timestamp=true/filesrc location=camera.evt3}
     line=${line//v4l2src/$ball}
     line=${line//rtspsrc location=rtsp:\/\/camera\/stream ! decodebin/$ball}
     line=$(sed -E 's/num-buffers=(90|100|300)/num-buffers=40/; s/(videotestsrc pattern=ball) (!|foreground)/\1 num-buffers=40 \2/' <<<"$line")

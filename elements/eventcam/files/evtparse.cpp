@@ -1,0 +1,592 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/**
+ * SECTION:element-evtparse
+ * @title: evtparse
+ * @short_description: finds the words of a live event camera
+ *
+ * Turns what an event camera sends into EVT words for evtdec: the padded GRAY8 buffers of
+ * Prophesee's V4L2 drivers, and the bytes of a serial line or a socket. The size of the sensor is
+ * #GstEvtParse:width and #GstEvtParse:height, the format of its words #GstEvtParse:format, unless
+ * the input's caps tell it: their field `format` may be EVT2, EVT21, EVT3 or EVT4, or one of the
+ * drivers' fourccs, PSEE (EVT2), PSE1 (EVT2.1 of the legacy byte order), PSE2 (EVT2.1) or PSE3
+ * (EVT3).
+ *
+ * In a V4L2 buffer, words end at a marker, and the bytes past it are ignored. Other bytes may begin
+ * anywhere; where some are missing, the next words are found by their times. Words are passed on
+ * only if they are valid between two times that continue the camera's clock. All others are
+ * counted as lost, and the next buffer is flagged DISCONT.
+ *
+ * A buffer's PTS is the camera's time, unwrapped, so that events keep their distances. The segment
+ * maps it to running time: the camera's clock is read off the transfers that are least delayed, and
+ * a new segment corrects the mapping when it is off by more than 1 ms. For clocks that drift apart
+ * by up to 300 ppm, running times are within 2 ms of those transfers. Sources without timestamps,
+ * such as filesrc, begin at running time 0, and the camera's clock alone tells the rest;
+ * `do-timestamp=true` of tcpclientsrc adds them.
+ *
+ * An event waits in the camera until its transfer is complete. Live sinks wait for the longest of
+ * the transfers so far, and at least for #GstEvtParse:latency.
+ *
+ * ## Example launch lines
+ * |[
+ * gst-launch-1.0 v4l2src device=/dev/video0 ! video/x-raw,format=GRAY8,width=4096,height=391 !
+ * evtparse format=EVT3 width=320 height=320 ! evtdec ! eventrender ! videoconvert ! autovideosink
+ * gst-launch-1.0 filesrc location=/dev/ttyACM0 blocksize=1024 ! evtparse format=EVT2 width=320
+ * height=320 ! evtdec ! eventrender ! videoconvert ! autovideosink sync=false
+ * gst-launch-1.0 tcpclientsrc host=camera port=3333 do-timestamp=true ! evtparse format=EVT3
+ * width=1280 height=720 ! evtdec ! eventrender ! videoconvert ! autovideosink
+ * ]|
+ */
+#include <gst/gst.h>
+#include <gst/video/video.h>
+
+#include <algorithm>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "elements/eventcam/files/evtformat.hpp"
+#include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
+#include "gst/base/errors.hpp"
+#include "gst/base/guarded.hpp"
+#include "gst/base/latency.hpp"
+#include "gst/base/owned.hpp"
+#include "gst/base/pads.hpp"
+#include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
+#include "gst/eventcamera/eventcamera.h"
+#include "src/formats/evt/word_scanner.hpp"
+#include "src/wire/arrival_clock.hpp"
+
+GST_DEBUG_CATEGORY_STATIC(evt_parse_debug);
+#define GST_CAT_DEFAULT evt_parse_debug
+
+using eventcamera::ArrivalClock;
+using eventcamera::EvtFormat;
+using eventcamera::Framing;
+using eventcamera::Microseconds;
+using eventcamera::WordScanner;
+
+namespace {
+
+constexpr int max_side = 2048;
+
+/// Value of `format`: that of the caps.
+constexpr int format_of_caps = -1;
+
+const GEnumValue word_formats[] = {
+    {format_of_caps, "That of the caps", "auto"},
+    {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
+    {static_cast<int>(EvtFormat::evt21), "64-bit words, up to 32 events each", "EVT21"},
+    {static_cast<int>(EvtFormat::evt21_legacy), "EVT21 with the upper half first", "EVT21-legacy"},
+    {static_cast<int>(EvtFormat::evt3), "16-bit words", "EVT3"},
+    {static_cast<int>(EvtFormat::evt4), "32-bit words, vectors of events", "EVT4"},
+    {0, nullptr, nullptr},
+};
+
+/// Formats of V4L2, as Prophesee's drivers name them; upstream Linux has none. With GREY, which is
+/// GRAY8 here, the camera has to be asked.
+struct FourCC {
+  const char* code;
+  EvtFormat format;
+};
+constexpr FourCC fourccs[] = {
+    {"PSEE", EvtFormat::evt2},
+    {"PSE1", EvtFormat::evt21_legacy},
+    {"PSE2", EvtFormat::evt21},
+    {"PSE3", EvtFormat::evt3},
+};
+
+/// User-settable values.
+struct Settings {
+  int format = format_of_caps;
+  int width = 0;
+  int height = 0;
+  GstClockTime latency = 10 * GST_MSECOND;
+};
+
+/// What the input's caps tell.
+struct Input {
+  std::optional<EvtFormat> format;
+  eventcamera::SensorSize sensor;
+  Framing framing = Framing::loose;
+};
+
+struct Stats {
+  WordScanner::Counts words;
+  guint64 buffers = 0;
+  guint64 lost_buffers = 0;
+  gint64 clock_offset = 0;
+  double clock_drift = 0;
+  guint64 clock_corrections = 0;
+  GstClockTime longest_transfer = 0;
+};
+
+void add(WordScanner::Counts& sum, const WordScanner::Counts& before,
+         const WordScanner::Counts& after) {
+  sum.bytes += after.bytes - before.bytes;
+  sum.events += after.events - before.events;
+  sum.lost_bytes += after.lost_bytes - before.lost_bytes;
+  sum.lost_events += after.lost_events - before.lost_events;
+  sum.gaps += after.gaps - before.gaps;
+}
+
+/// State of the stream, from its first buffer to stop.
+struct State {
+  std::unique_ptr<WordScanner> scanner;
+  Framing framing = Framing::loose;
+  std::vector<WordScanner::Piece> pieces{};
+  std::vector<guint8> rows{};  ///< of a buffer with padded rows
+  ArrivalClock clock{};
+  std::optional<GstSegment> segment{};  ///< of the output
+  bool is_mapping_new = false;
+  GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
+  guint64 last_offset = GST_BUFFER_OFFSET_NONE;
+};
+
+struct Private {
+  Guarded<Settings> settings;
+  Guarded<Stats> stats;
+  GstPad* sink = nullptr;
+  GstPad* src = nullptr;
+
+  // Accessed by the streaming thread only, or while there is none.
+  std::optional<Input> input;  ///< of the last caps
+  GstSegment upstream = {};
+  guint32 segment_seqnum = GST_SEQNUM_INVALID;
+  std::optional<State> state;
+  WarnOnce warn_of_no_words{GST_CAT_DEFAULT};
+  RepeatLevel loss_level;
+};
+
+}  // namespace
+
+#define GST_TYPE_EVT_PARSE (gst_evt_parse_get_type())
+G_DECLARE_FINAL_TYPE(GstEvtParse, gst_evt_parse, GST, EVT_PARSE, GstElement)
+
+struct _GstEvtParse {
+  GstElement parent;
+  Private* priv;
+};
+
+G_DEFINE_TYPE_WITH_CODE(GstEvtParse, gst_evt_parse, GST_TYPE_ELEMENT,
+                        GST_DEBUG_CATEGORY_INIT(evt_parse_debug, "evtparse", 0,
+                                                "words of live event cameras"))
+GST_ELEMENT_REGISTER_DEFINE(evtparse, "evtparse", GST_RANK_NONE, GST_TYPE_EVT_PARSE)
+
+static Guarded<Settings>& settings_of(GObject* object) {
+  return GST_EVT_PARSE(object)->priv->settings;
+}
+
+/* negotiation */
+
+static std::optional<EvtFormat> format_named(const char* name) {
+  const auto* const found = std::ranges::find_if(
+      fourccs, [&](const FourCC& fourcc) { return g_strcmp0(fourcc.code, name) == 0; });
+  return found != std::end(fourccs) ? found->format : evt_format_named(name);
+}
+
+static Input input_of(const GstCaps* caps) {
+  const GstStructure* const structure = gst_caps_get_structure(caps, 0);
+  const char* const format = gst_structure_get_string(structure, "format");
+  Input input;
+  if (gst_structure_has_name(structure, "video/x-raw") && g_strcmp0(format, "GRAY8") == 0)
+    return {.format = {}, .sensor = {}, .framing = Framing::padded};
+  input.format = format_named(format);
+  if (input.format && evt_format_named(format) == std::nullopt) input.framing = Framing::padded;
+  gst_structure_get_int(structure, "width", &input.sensor.width);
+  gst_structure_get_int(structure, "height", &input.sensor.height);
+  return input;
+}
+
+/// Begins a stream. False, after an error, if its words are unknown.
+static bool start_stream(GstEvtParse* self) {
+  auto& priv = *self->priv;
+  const auto settings = priv.settings.copy();
+  const auto input = priv.input.value_or(Input{});
+  auto format = input.format;
+  if (settings.format != format_of_caps) format = static_cast<EvtFormat>(settings.format);
+  auto sensor = input.sensor;
+  if (settings.width > 0 && settings.height > 0) sensor = {settings.width, settings.height};
+  if (!format || sensor.width < 1 || sensor.height < 1 || sensor.width > max_side ||
+      sensor.height > max_side) {
+    GST_ELEMENT_ERROR(
+        self, RESOURCE, SETTINGS,
+        ("Cannot read this camera: its caps do not tell the format of its words and "
+         "the size of its sensor. Set format, width and height."),
+        ("format=%d width=%d height=%d", settings.format, sensor.width, sensor.height));
+    return false;
+  }
+  const auto report = Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."};
+  return guarded(self, report, [&] {
+    // The legacy order of EVT21 ends here.
+    const auto words = *format == EvtFormat::evt21_legacy ? EvtFormat::evt21 : *format;
+    const auto* const name =
+        std::ranges::find(word_formats, static_cast<int>(words), &GEnumValue::value)->value_nick;
+    priv.state.emplace(State{.scanner = make_word_scanner(*format, sensor, input.framing),
+                             .framing = input.framing});
+    const OwnedCaps caps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING,
+                                             name, "width", G_TYPE_INT, sensor.width, "height",
+                                             G_TYPE_INT, sensor.height, "framerate",
+                                             GST_TYPE_FRACTION, 0, 1, nullptr));
+    GST_DEBUG_OBJECT(self, "reading %s as %" GST_PTR_FORMAT,
+                     input.framing == Framing::padded ? "padded buffers" : "loose bytes",
+                     caps.get());
+    gst_pad_push_event(priv.src, gst_event_new_caps(caps.get()));
+  });
+}
+
+/* output */
+
+static GstClockTime nanoseconds(Microseconds t) {
+  return static_cast<GstClockTime>(t) * GST_USECOND;
+}
+
+/// Maps the camera's times from `start` on to running time. What happened before running time 0, as
+/// in a first transfer, is late: the next piece corrects the mapping.
+static void push_segment(GstEvtParse* self, GstClockTime start) {
+  auto& priv = *self->priv;
+  auto& state = *priv.state;
+  GstSegment next;
+  gst_segment_init(&next, GST_FORMAT_TIME);
+  next.start = next.position = next.time = start;
+  state.is_mapping_new = false;
+  if (const auto offset = state.clock.offset()) {
+    const auto running = static_cast<GstClockTimeDiff>(start) + *offset;
+    next.base = static_cast<GstClockTime>(std::max<GstClockTimeDiff>(running, 0));
+    state.is_mapping_new = running < 0;
+  } else if (state.segment) {
+    next.base =
+        gst_segment_to_running_time(&*state.segment, GST_FORMAT_TIME, state.segment->position);
+  }
+  GST_DEBUG_OBJECT(self, "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(start), GST_TIME_ARGS(next.base));
+  {
+    const auto stats = priv.stats.lock();
+    stats->clock_offset = static_cast<gint64>(next.base) - static_cast<gint64>(start);
+    stats->clock_corrections += state.segment ? 1 : 0;
+  }
+  state.segment = next;
+  GstEvent* const event = gst_event_new_segment(&next);
+  if (priv.segment_seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(event, priv.segment_seqnum);
+  gst_pad_push_event(priv.src, event);
+}
+
+static GstBuffer* buffer_of(WordScanner::Piece&& piece) {
+  auto words = std::make_unique<std::vector<guint8>>(std::move(piece.words));
+  auto* const memory = words.get();
+  GstBuffer* const buffer = gst_buffer_new_wrapped_full(
+      GST_MEMORY_FLAG_READONLY, memory->data(), memory->size(), 0, memory->size(), words.release(),
+      [](gpointer data) {
+        const std::unique_ptr<std::vector<guint8>> owned(static_cast<std::vector<guint8>*>(data));
+      });
+  GST_BUFFER_PTS(buffer) = nanoseconds(piece.start);
+  GST_BUFFER_DURATION(buffer) = nanoseconds(piece.end - piece.start);
+  if (piece.is_discontinuous) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+  return buffer;
+}
+
+/// Pushes the pieces of a transfer. May throw.
+static GstFlowReturn push_pieces(GstEvtParse* self) {
+  auto& priv = *self->priv;
+  auto& state = *priv.state;
+  GstFlowReturn result = GST_FLOW_OK;
+  for (auto& piece : state.pieces) {
+    if (result != GST_FLOW_OK) break;
+    const auto start = nanoseconds(piece.start);
+    if (!state.segment || state.is_mapping_new || start < state.segment->position)
+      push_segment(self, start);
+    state.segment->position = std::max(state.segment->position, nanoseconds(piece.end));
+    GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " bytes of events at %" GST_TIME_FORMAT,
+                   piece.words.size(), GST_TIME_ARGS(start));
+    result = gst_pad_push(priv.src, buffer_of(std::move(piece)));
+  }
+  state.pieces.clear();
+  return result;
+}
+
+/* data */
+
+/// The running time at which a buffer arrived, if it has a time.
+static GstClockTime arrival_of(const Private& priv, GstBuffer* buffer) {
+  const auto pts = GST_BUFFER_PTS(buffer);
+  // Sources of bytes stamp with running time.
+  if (priv.upstream.format != GST_FORMAT_TIME) return pts;
+  return gst_segment_to_running_time(&priv.upstream, GST_FORMAT_TIME, pts);
+}
+
+/// Number of buffers that the driver dropped before this one.
+static guint64 lost_before(State& state, GstBuffer* buffer) {
+  if (state.framing != Framing::padded) return 0;
+  const auto offset = GST_BUFFER_OFFSET(buffer);
+  const auto last = std::exchange(state.last_offset, offset);
+  if (offset == GST_BUFFER_OFFSET_NONE || last == GST_BUFFER_OFFSET_NONE || offset <= last)
+    return 0;
+  return offset - last - 1;
+}
+
+/// The bytes of a buffer, without the padding of its rows.
+static std::span<const guint8> bytes_of(State& state, GstBuffer* buffer,
+                                        std::span<const guint8> bytes) {
+  const GstVideoMeta* const meta = gst_buffer_get_video_meta(buffer);
+  if (meta == nullptr || meta->n_planes != 1 || meta->stride[0] <= static_cast<gint>(meta->width))
+    return bytes;
+  const auto stride = static_cast<gsize>(meta->stride[0]);
+  state.rows.clear();
+  gsize at = meta->offset[0];
+  for (guint y = 0; y < meta->height && at < bytes.size(); ++y, at += stride) {
+    const auto row = bytes.subspan(at, std::min<gsize>(meta->width, bytes.size() - at));
+    state.rows.insert(state.rows.end(), row.begin(), row.end());
+  }
+  return state.rows;
+}
+
+static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, guint64 buffers) {
+  constexpr guint64 max_skipped = 1U << 16;
+  auto& priv = *self->priv;
+  const auto& counts = priv.state->scanner->counts();
+  if (buffers > 0 || counts.lost_bytes != before.lost_bytes)
+    GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, priv.loss_level.next(), self,
+                      "lost %" G_GUINT64_FORMAT " buffers, and %" G_GUINT64_FORMAT
+                      " bytes with %" G_GUINT64_FORMAT " events",
+                      buffers, guint64{counts.lost_bytes - before.lost_bytes},
+                      guint64{counts.lost_events - before.lost_events});
+  if (counts.lost_bytes > std::max<guint64>(counts.bytes, max_skipped))
+    priv.warn_of_no_words(self,
+                          {GST_STREAM_ERROR_DECODE,
+                           "Most of what the camera sends are no words of this format. Set format, "
+                           "width and height to those of the camera."},
+                          std::to_string(counts.lost_bytes) + " bytes are not valid");
+}
+
+/// Widens the latency to that of the longest transfer.
+static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
+  auto& priv = *self->priv;
+  const auto& state = *priv.state;
+  const auto offset = state.clock.offset();
+  // The first may hold what the camera kept before the start.
+  if (!offset || !state.segment || state.pieces.empty() || !GST_CLOCK_TIME_IS_VALID(arrival))
+    return;
+  const auto first = static_cast<gint64>(nanoseconds(state.pieces.front().start)) + *offset;
+  const auto length = std::clamp<gint64>(static_cast<gint64>(arrival) - first, 0, GST_SECOND);
+  const auto least = priv.settings.copy().latency;
+  bool has_grown = false;
+  {
+    const auto stats = priv.stats.lock();
+    const auto longest = static_cast<GstClockTime>(length);
+    has_grown = longest > std::max(least, stats->longest_transfer);
+    // In steps, so that sinks adapt seldom.
+    if (has_grown) stats->longest_transfer = longest + longest / 8;
+  }
+  if (!has_grown) return;
+  GST_DEBUG_OBJECT(self, "a transfer takes %" GST_TIME_FORMAT, GST_TIME_ARGS(length));
+  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
+}
+
+/// May throw.
+static GstFlowReturn take_transfer(GstEvtParse* self, GstBuffer* buffer,
+                                   std::span<const guint8> bytes) {
+  auto& priv = *self->priv;
+  auto& state = *priv.state;
+  const auto before = state.scanner->counts();
+  const auto lost = lost_before(state, buffer);
+  const auto arrival = arrival_of(priv, buffer);
+  const auto last_arrival = std::exchange(state.last_arrival, arrival);
+  WordScanner::Transfer transfer{.bytes = bytes_of(state, buffer, bytes),
+                                 .is_discontinuous = GST_BUFFER_IS_DISCONT(buffer) || lost > 0,
+                                 .elapsed = {}};
+  if (GST_CLOCK_TIME_IS_VALID(arrival) && GST_CLOCK_TIME_IS_VALID(last_arrival) &&
+      arrival >= last_arrival)
+    transfer.elapsed = static_cast<Microseconds>((arrival - last_arrival) / GST_USECOND);
+  state.scanner->scan(transfer, state.pieces);
+  if (!state.pieces.empty() && GST_CLOCK_TIME_IS_VALID(arrival)) {
+    const bool after_gap = std::ranges::any_of(state.pieces, &WordScanner::Piece::is_discontinuous);
+    state.is_mapping_new |= state.clock.arrive(
+        state.pieces.back().end, static_cast<eventcamera::Nanoseconds>(arrival), after_gap);
+  }
+  {
+    const auto stats = priv.stats.lock();
+    add(stats->words, before, state.scanner->counts());
+    stats->clock_drift = state.clock.drift();
+    ++stats->buffers;
+    stats->lost_buffers += lost;
+  }
+  note_losses(self, before, lost);
+  note_transfer(self, arrival);
+  return push_pieces(self);
+}
+
+template <class Work>
+static GstFlowReturn reported(GstEvtParse* self, const Work& work) {
+  return guarded(
+      self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."}, work);
+}
+
+static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
+  auto* self = GST_EVT_PARSE(parent);
+  const OwnedBuffer buffer(taken);
+  if (!self->priv->state && !start_stream(self)) return GST_FLOW_ERROR;
+  const MappedBytes bytes(GST_ELEMENT(self), OwnedBuffer(gst_buffer_ref(taken)));
+  if (!bytes.is_mapped()) return GST_FLOW_ERROR;
+  return reported(self, [&] { return take_transfer(self, taken, bytes.get()); });
+}
+
+/// Pushes the last words before the stream ends or changes.
+static void end_stream(GstEvtParse* self) {
+  auto& priv = *self->priv;
+  if (!priv.state) return;
+  reported(self, [&] {
+    auto& scanner = *priv.state->scanner;
+    const auto before = scanner.counts();
+    scanner.finish(priv.state->pieces);
+    add(priv.stats.lock()->words, before, scanner.counts());
+    return push_pieces(self);
+  });
+}
+
+static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
+  auto* self = GST_EVT_PARSE(parent);
+  auto& priv = *self->priv;
+  switch (GST_EVENT_TYPE(event)) {
+    case GST_EVENT_STREAM_START:
+      end_stream(self);  // into the stream that ends here
+      priv.state.reset();
+      break;
+    case GST_EVENT_CAPS: {
+      GstCaps* caps = nullptr;
+      gst_event_parse_caps(event, &caps);
+      end_stream(self);
+      priv.state.reset();
+      priv.input = input_of(caps);
+      gst_event_unref(event);
+      return start_stream(self);
+    }
+    case GST_EVENT_SEGMENT:
+      gst_event_copy_segment(event, &priv.upstream);
+      priv.segment_seqnum = gst_event_get_seqnum(event);
+      gst_event_unref(event);
+      return TRUE;
+    case GST_EVENT_GAP:
+      gst_event_unref(event);  // the camera's words tell its times
+      return TRUE;
+    case GST_EVENT_EOS:
+      end_stream(self);
+      break;
+    case GST_EVENT_FLUSH_STOP:
+      priv.state.reset();
+      break;
+    default:
+      break;
+  }
+  return gst_pad_event_default(pad, parent, event);
+}
+
+static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
+  auto& priv = *GST_EVT_PARSE(parent)->priv;
+  if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
+    return answer_latency(
+        GST_CAT_DEFAULT, priv.sink, query,
+        std::max(priv.settings.copy().latency, priv.stats.copy().longest_transfer));
+  return gst_pad_query_default(pad, parent, query);
+}
+
+/* states */
+
+static GstStateChangeReturn change_state(GstElement* element, GstStateChange transition) {
+  auto& priv = *GST_EVT_PARSE(element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) *priv.stats.lock() = {};
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS(gst_evt_parse_parent_class)->change_state(element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
+    priv.state.reset();
+    priv.input.reset();
+    gst_segment_init(&priv.upstream, GST_FORMAT_UNDEFINED);
+    priv.segment_seqnum = GST_SEQNUM_INVALID;
+    priv.warn_of_no_words.reset();
+    priv.loss_level.reset();
+  }
+  return result;
+}
+
+/* type */
+
+static void finalize(GObject* object) {
+  delete GST_EVT_PARSE(object)->priv;
+  G_OBJECT_CLASS(gst_evt_parse_parent_class)->finalize(object);
+}
+
+static void gst_evt_parse_init(GstEvtParse* self) {
+  self->priv = new Private;
+  auto& priv = *self->priv;
+  gst_segment_init(&priv.upstream, GST_FORMAT_UNDEFINED);
+  priv.sink = add_pad(GST_ELEMENT(self), "sink");
+  gst_pad_set_chain_function(priv.sink, chain);
+  gst_pad_set_event_function(priv.sink, sink_event);
+  priv.src = add_pad(GST_ELEMENT(self), "src");
+  gst_pad_set_query_function(priv.src, src_query);
+  gst_pad_use_fixed_caps(priv.src);
+}
+
+static GstStructure* structure_of(const Stats& stats) {
+  return gst_structure_new(
+      "application/x-event-parser-stats", "buffers", G_TYPE_UINT64, stats.buffers, "bytes",
+      G_TYPE_UINT64, guint64{stats.words.bytes}, "events", G_TYPE_UINT64,
+      guint64{stats.words.events}, "lost-buffers", G_TYPE_UINT64, stats.lost_buffers, "lost-bytes",
+      G_TYPE_UINT64, guint64{stats.words.lost_bytes}, "lost-events", G_TYPE_UINT64,
+      guint64{stats.words.lost_events}, "gaps", G_TYPE_UINT64, guint64{stats.words.gaps},
+      "clock-offset", G_TYPE_INT64, stats.clock_offset, "clock-drift", G_TYPE_DOUBLE,
+      stats.clock_drift, "clock-corrections", G_TYPE_UINT64, stats.clock_corrections, nullptr);
+}
+
+static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
+  GObjectClass* object_class = G_OBJECT_CLASS(klass);
+  object_class->finalize = finalize;
+
+  Properties<settings_of> properties(object_class);
+  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
+                                                  GST_PARAM_MUTABLE_READY);
+  properties.add(
+      &Settings::format,
+      g_param_spec_enum("format", "Format", "Format of the camera's words",
+                        enum_type("GstEvtParseFormat", word_formats), format_of_caps, flags));
+  properties.add(
+      &Settings::width,
+      g_param_spec_uint("width", "Width", "Width of the sensor (pixels); 0 = that of the caps", 0,
+                        max_side, 0, flags));
+  properties.add(
+      &Settings::height,
+      g_param_spec_uint("height", "Height", "Height of the sensor (pixels); 0 = that of the caps",
+                        0, max_side, 0, flags));
+  properties.add(
+      &Settings::latency,
+      g_param_spec_uint64("latency", "Latency",
+                          "Least time that live sinks wait for an event; they wait longer if a "
+                          "transfer takes longer (ns)",
+                          0, GST_SECOND, Settings().latency, flags));
+  properties.add_read_only(
+      [](GObject* object, GValue* value) {
+        g_value_take_boxed(value, structure_of(GST_EVT_PARSE(object)->priv->stats.copy()));
+      },
+      g_param_spec_boxed(
+          "stats", "Statistics",
+          "Counts since the start: buffers received; bytes and events passed on; lost-buffers, "
+          "which the driver dropped; lost-bytes, which are not valid here, and lost-events in "
+          "them; "
+          "gaps in the output. The mapping of the camera's clock: clock-offset (int64, ns), "
+          "running "
+          "time minus the camera's; clock-drift (double, ppm), by which the camera's clock is "
+          "slow; "
+          "clock-corrections, the number of changes of the offset",
+          GST_TYPE_STRUCTURE, static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+
+  GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
+  element_class->change_state = change_state;
+  add_pad_templates(element_class, "ANY", EVT_WORDS_CAPS);
+  gst_element_class_set_static_metadata(
+      element_class, "EVT word parser", "Codec/Parser",
+      "Finds the words of a live event camera in V4L2 buffers or loose bytes", EVENTSIM_AUTHORS);
+}
