@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Filters events of 1280x720 pixels on one core: million events per second, and the time as a
-// multiple of that of a memcpy of the events in the same run. Names are FILTER/STREAM.
+// Filters events of 1280x720 pixels on one core: million events per second at the best of several
+// runs, and the time as a multiple of that of a memcpy of the events. Names are FILTER/STREAM.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -90,7 +91,7 @@ void register_filter(const std::string& name, const Stream& stream,
     Microseconds start = 0;
     std::vector<Event> scratch;
     double kept = 0;
-    double seconds = 0;
+    double seconds = 1;
     for (auto _ : state) {
       scratch = stream.events;
       kept = 0;
@@ -101,10 +102,9 @@ void register_filter(const std::string& name, const Stream& stream,
             core.filter({std::span(scratch).subspan(done, size), {}}, start, settings);
         kept += static_cast<double>(left.events.size());
       }
-      seconds += bench::seconds_now() - begin;
+      seconds = std::min(seconds, bench::seconds_now() - begin);
       start += stream.duration;
     }
-    seconds /= static_cast<double>(state.iterations());
     const auto size = static_cast<double>(stream.events.size());
     state.counters["Mevents/s"] = size / seconds / 1e6;
     state.counters["memcpys"] = seconds / bench::memcpy_seconds(stream.events);

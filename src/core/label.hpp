@@ -55,22 +55,19 @@ struct LabelledEvents {
   /// and returns them. `keep` is called once for each event, in order, and may change it.
   template <class Keep>
   LabelledEvents keep_if(Keep keep) const {
+    // In local variables, which no store can change.
+    Event* const event = events.data();
+    Label* const label = labels.empty() ? nullptr : labels.data();
+    const std::size_t size = events.size();
     std::size_t kept = 0;
-    const auto compact = [&](auto keep_label) {
-      for (std::size_t i = 0; i < events.size(); ++i) {
-        Event event = events[i];
-        const bool is_kept = keep(event);
-        events[kept] = event;
-        keep_label(i);
-        kept += is_kept ? 1 : 0;
-      }
-    };
-    if (labels.empty()) {
-      compact([](std::size_t) {});
-      return {events.first(kept), {}};
+    for (std::size_t i = 0; i < size; ++i) {
+      Event next = event[i];
+      const bool is_kept = keep(next);  // in one place only, where compilers inline it
+      event[kept] = next;
+      if (label != nullptr) label[kept] = label[i];
+      kept += static_cast<std::size_t>(is_kept);
     }
-    compact([&](std::size_t i) { labels[kept] = labels[i]; });
-    return {events.first(kept), labels.first(kept)};
+    return {events.first(kept), labels.first(label != nullptr ? kept : 0)};
   }
 };
 

@@ -47,8 +47,8 @@ LabelledEvents DenoiseFilter::filter(LabelledEvents events, Microseconds start,
 StampedPixels<Stamp>& DenoiseFilter::pixels(int margin, bool match_polarity) {
   if (!pixels_ || margin != margin_ || match_polarity != match_polarity_) {
     pixels_.reset();  // first, for its memory
-    pixels_ = std::make_unique<StampedPixels<Stamp>>(
-        sensor_, margin, match_polarity ? CellsPerPixel::one_per_polarity : CellsPerPixel::one);
+    pixels_.emplace(sensor_, margin,
+                    match_polarity ? CellsPerPixel::one_per_polarity : CellsPerPixel::one);
     margin_ = margin;
     match_polarity_ = match_polarity;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <memory>
+#include <optional>
 
 #include "src/filter/double_window.hpp"
 #include "src/filter/filter.hpp"
@@ -56,7 +56,7 @@ class DenoiseFilter {
   SensorSize sensor_;
   int margin_ = 0;
   bool match_polarity_ = false;
-  std::unique_ptr<StampedPixels<Stamp>> pixels_;  ///< made when first needed
+  std::optional<StampedPixels<Stamp>> pixels_;  ///< made when first needed
   DoubleWindow window_;
 };
 static_assert(Filter<DenoiseFilter>);

@@ -42,8 +42,9 @@ class FlickerFilter {
     const Phase on(settings, settings.duty_cycle);
     const auto max_length = static_cast<Stamp>(1e6 / settings.min_frequency);
     const auto stop_threshold = std::min(settings.stop_threshold, settings.start_threshold);
+    const unsigned start_threshold = settings.start_threshold;
     const bool keeps_flicker = settings.mode == FlickerMode::band_pass;
-    return pixels_.keep_if(events, start, [&](const Event& event, Stamp now, Pixel* pixel) {
+    return pixels_.keep_if(events, start, [=](const Event& event, Stamp now, Pixel* pixel) {
       const bool is_on = event.polarity() == Polarity::on;
       const Stamp length = now - pixel->began;
       if (length > max_length) {
@@ -52,7 +53,7 @@ class FlickerFilter {
         const bool fits = (pixel->is_on ? on : off).fits(length);
         const unsigned count = fits ? std::min(pixel->count + 1U, max_threshold)
                                     : std::max(pixel->count, std::uint8_t{1}) - 1U;
-        const unsigned needed = pixel->flickers ? stop_threshold : settings.start_threshold;
+        const unsigned needed = pixel->flickers ? stop_threshold : start_threshold;
         *pixel = {.began = now,
                   .count = static_cast<std::uint8_t>(count),
                   .is_on = is_on,

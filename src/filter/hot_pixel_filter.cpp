@@ -65,8 +65,8 @@ void HotPixelFilter::learn(const Settings& settings) {
 
 void HotPixelFilter::clear_counts() {
   frequent_.clear();
-  for (int y = 0; y < pixels_.height(); ++y)
-    std::for_each_n(pixels_.row(y), pixels_.width(), [](auto& pixel) { pixel &= hot_bit; });
+  for (int y = 0; y < pixels_.height(); ++y) std::fill_n(pixels_.row(y), pixels_.width(), 0U);
+  for (const auto& pixel : hot_) pixels_.at(pixel.x, pixel.y) = hot_bit;
 }
 
 void HotPixelFilter::forget() {

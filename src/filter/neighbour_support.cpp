@@ -66,15 +66,15 @@ HWY_INLINE void find_support(const StampedBatch<Stamp>& batch, Stamp correlation
   // Few enough that what is loaded early stays in the cache.
   constexpr std::size_t distance = radius == 1 ? 16 : 4;
   const typename Neighbours<radius>::Lanes lanes;
-  const Neighbours<radius> neighbours(batch.stride);
+  const Neighbours<radius> neighbours(batch.cells.stride);
   const std::size_t size = batch.events.size();
   for (std::size_t i = 0; i < std::min(distance, size); ++i)
-    neighbours.prefetch(batch.at(batch.events[i]));
+    neighbours.prefetch(batch.cells.at(batch.events[i]));
   for (std::size_t i = 0; i < size; ++i) {
-    neighbours.prefetch(batch.at(batch.events[std::min(i + distance, size - 1)]));
+    neighbours.prefetch(batch.cells.at(batch.events[std::min(i + distance, size - 1)]));
     const Event event = batch.events[i];
     const Stamp now = batch.start + event.t;
-    Stamp* const cell = batch.at(event);
+    Stamp* const cell = batch.cells.at(event);
     // Negative for a stamp of 0, never.
     const auto minus_age = hn::Set(lanes, static_cast<std::int32_t>(correlation_time - now));
     const auto sum = neighbours.sum(

@@ -27,11 +27,11 @@ class PolarityFilter {
       for (auto& event : events.events) event.y_p ^= inverted;
       return events;
     }
-    const auto kept = settings.keep == Kept::on ? Polarity::on : Polarity::off;
+    const int kept = settings.keep == Kept::on ? 1 : 0;
     return events.keep_if([=](Event& event) {
-      const bool is_kept = event.polarity() == kept;
+      const int polarity = event.y_p >> 15;
       event.y_p ^= inverted;
-      return is_kept;
+      return polarity == kept;
     });
   }
 };

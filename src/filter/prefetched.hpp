@@ -11,15 +11,13 @@ namespace eventcamera {
 /// LabelledEvents::keep_if() for a filter that looks something up for each event: calls
 /// prefetch(event), early enough to load it into the cache, where that of random pixels is not.
 template <class Prefetch, class Keep>
-LabelledEvents keep_if_prefetched(LabelledEvents events, const Prefetch& prefetch,
-                                  const Keep& keep) {
-  constexpr std::size_t distance = 16;
-  if (events.events.empty()) return events;
-  const Event* const last = events.events.data() + events.events.size() - 1;
-  const Event* ahead = events.events.data() + std::min(distance, events.events.size() - 1);
-  return events.keep_if([&](Event& event) {
-    prefetch(*ahead);
-    ahead = std::min(ahead + 1, last);
+LabelledEvents keep_if_prefetched(LabelledEvents events, Prefetch prefetch, Keep keep) {
+  constexpr std::size_t distance = 32;
+  const Event* const data = events.events.data();
+  const std::size_t last = std::max<std::size_t>(events.events.size(), 1) - 1;
+  // What the loop needs is captured by value: writing events cannot change it.
+  return events.keep_if([=, next = distance](Event& event) mutable {
+    prefetch(data[std::min(next++, last)]);
     return keep(event);
   });
 }

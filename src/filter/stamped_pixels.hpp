@@ -10,6 +10,7 @@
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
 #include "src/core/sensor_size.hpp"
+#include "src/filter/prefetched.hpp"
 #include "src/filter/stamp_clock.hpp"
 
 namespace eventcamera {
@@ -17,20 +18,26 @@ namespace eventcamera {
 /// Whether pixels have a cell for all their events, or one for each polarity.
 enum class CellsPerPixel { one, one_per_polarity };
 
-/// Events to decide on, and the cells of all pixels.
+/// Where the cells of pixels are.
 template <class Cell>
-struct StampedBatch {
-  std::span<const Event> events;
-  Stamp start;            ///< the stamp of an event is this + t, modulo 2^32
-  Cell* cells;            ///< of the pixel (0, 0)
+struct StampedCells {
+  Cell* first;            ///< of the pixel (0, 0)
   std::ptrdiff_t stride;  ///< bytes from a cell to the one below
   int rows_of_on;         ///< the cells of ON events are this many rows below
-  bool* is_kept;          ///< result, one for each event
 
   Cell* at(const Event& event) const {
     const std::ptrdiff_t row = event.y() + (event.y_p >> 15) * rows_of_on;
-    return reinterpret_cast<Cell*>(reinterpret_cast<std::byte*>(cells) + row * stride) + event.x;
+    return reinterpret_cast<Cell*>(reinterpret_cast<std::byte*>(first) + row * stride) + event.x;
   }
+};
+
+/// Events to decide on.
+template <class Cell>
+struct StampedBatch {
+  std::span<const Event> events;
+  Stamp start;  ///< the stamp of an event is this + t, modulo 2^32
+  StampedCells<Cell> cells;
+  bool* is_kept;  ///< result, one for each event
 };
 
 /// Cells of pixels, which hold stamps, and a margin of pixels that never fire. A cell of all zeros
@@ -45,18 +52,23 @@ class StampedPixels {
 
   /// Filters events: keep(event, now, cell) decides on each, in order.
   template <class Keep>
-  LabelledEvents keep_if(LabelledEvents events, Microseconds start, const Keep& keep) {
-    return keep_batches(events, start, [&](const StampedBatch<Cell>& batch) {
-      // Pixels of random events are not in the cache: load them all at first.
-      std::array<Cell*, max_batch_size> cells;
-      const std::size_t size = batch.events.size();
-      for (std::size_t i = 0; i < size; ++i) {
-        cells[i] = batch.at(batch.events[i]);
-        __builtin_prefetch(cells[i], 1);
-      }
-      for (std::size_t i = 0; i < size; ++i)
-        batch.is_kept[i] = keep(batch.events[i], batch.start + batch.events[i].t, cells[i]);
-    });
+  LabelledEvents keep_if(LabelledEvents events, Microseconds start, Keep keep) {
+    if (events.events.empty()) return events;
+    const auto stamp_of = [this, start](const Event& event) {
+      return std::int64_t{now(start + event.t)};
+    };
+    const auto cells = this->cells();
+    const auto& first = events.events.front();
+    return keep_if_prefetched(
+        events, [cells](const Event& event) { __builtin_prefetch(cells.at(event), 1); },
+        [=, origin = stamp_of(first) - first.t](const Event& event) mutable {
+          std::int64_t stamp = origin + event.t;
+          if (stamp >> stamp_bits != 0) [[unlikely]] {
+            stamp = stamp_of(event);
+            origin = stamp - event.t;
+          }
+          return keep(event, static_cast<Stamp>(stamp), cells.at(event));
+        });
   }
 
   /// Filters events in batches: decide(batch) sets batch.is_kept of each.
@@ -64,18 +76,17 @@ class StampedPixels {
   LabelledEvents keep_batches(LabelledEvents events, Microseconds start, const Decide& decide) {
     std::array<bool, max_batch_size> is_kept;
     auto rest = events.events;
-    std::size_t next = 0;
-    std::size_t size = 0;
-    return events.keep_if([&](const Event& first) {
-      if (next == size) {
+    return events.keep_if([=, this, &decide, decided = is_kept.data(), next = is_kept.data(),
+                           end = is_kept.data()](const Event& first) mutable {
+      if (next == end) {
         const Stamp stamp = now(start + first.t);
-        size = batch_size(rest, stamp);
-        decide(StampedBatch<Cell>{rest.first(size), stamp - first.t, cells_.row(0), cells_.stride(),
-                                  rows_of_on_, is_kept.data()});
+        const std::size_t size = batch_size(rest, stamp);
+        decide(StampedBatch<Cell>{rest.first(size), stamp - first.t, cells(), decided});
         rest = rest.subspan(size);
-        next = 0;
+        next = decided;
+        end = decided + size;
       }
-      return is_kept[next++];
+      return *next++;
     });
   }
 
@@ -86,6 +97,8 @@ class StampedPixels {
 
  private:
   static constexpr std::size_t max_batch_size = 128;
+
+  StampedCells<Cell> cells() { return {cells_.row(0), cells_.stride(), rows_of_on_}; }
 
   Stamp now(Microseconds time) {
     return clock_.at(time, [this](std::uint64_t amount) {

@@ -28,13 +28,14 @@ class TrailFilter {
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings) {
     const Stamp threshold = in_stamps(settings.threshold);
     const bool keeps_first = settings.mode == TrailMode::trail;
-    const bool keeps_third = settings.mode == TrailMode::stc_keep_trail;
+    const bool keeps_others = settings.mode != TrailMode::stc_cut_trail;
     return last_.keep_if(events, start, [=](const Event& event, Stamp now, LastEvent* last) {
       const bool is_on = event.polarity() == Polarity::on;
-      const bool follows = is_on == last->is_on() && now - last->stamp() < threshold;
-      const bool is_third = follows && last->follows();
+      // Random polarities would mislead branches.
+      const bool follows = ((is_on == last->is_on()) & (now - last->stamp() < threshold)) != 0;
+      const bool is_second = (follows & !last->follows()) != 0;
       *last = LastEvent(now, follows, is_on);
-      return follows != keeps_first && (keeps_third || !is_third);
+      return ((follows != keeps_first) & (keeps_others | is_second)) != 0;
     });
   }
 
