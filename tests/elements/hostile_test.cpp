@@ -185,7 +185,9 @@ INSTANTIATE_TEST_SUITE_P(, EveryConsumer, testing::ValuesIn(consumers()), elemen
 TEST_P(EveryConsumer, SurvivesHostileBuffers) {
   Consumer consumer{Kind(GetParam())};
   BufferMaker maker;
-  for (int streams = repetitions(250, 2'500); streams > 0; --streams)
+  // Without a GPU, its emulator compiles the shaders anew for each.
+  const int usual = GetParam().starts_with("gl") ? 25 : 250;
+  for (int streams = repetitions(usual, 2'500); streams > 0; --streams)
     ASSERT_NE(consumer.play(maker, true), GST_MESSAGE_UNKNOWN) << "neither EOS nor error";
   EXPECT_EQ(consumer.play(maker, false), GST_MESSAGE_EOS);
 }
