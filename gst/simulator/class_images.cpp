@@ -11,7 +11,6 @@
 #include "gst/simulator/video_simulator.hpp"
 
 using eventcamera::Event;
-using eventcamera::ImageView;
 using eventcamera::Label;
 using eventcamera::Nanoseconds;
 
@@ -32,10 +31,13 @@ struct Part {
     return part;
   }
 
+  /// Sets the classes from an image that has all of the pixels.
   template <class Pixel>
-  void set(const ImageView<Pixel>& classes) const {
-    for (std::size_t i = 0; i < events.size(); ++i)
-      labels[i].object_class = classes.row(events[i].y())[events[i].x];
+  void set(const VideoFrame& image) const {
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const std::byte* row = image.data() + events[i].y() * image.stride();
+      labels[i].object_class = reinterpret_cast<const Pixel*>(row)[events[i].x];
+    }
   }
 };
 
@@ -65,14 +67,10 @@ void set_classes(const Part& part, const CompanionPad::Item& image, const GstVid
         {GST_RESOURCE_ERROR_FAILED,
          "Cannot read a class image: " + mapped.fault() + ". Check the element upstream."},
         mapped.fault());
-  const auto view = [&](const auto* pixels) {
-    return ImageView{pixels, mapped.stride(), GST_VIDEO_INFO_WIDTH(&format),
-                     GST_VIDEO_INFO_HEIGHT(&format)};
-  };
   if (GST_VIDEO_INFO_FORMAT(&format) == GST_VIDEO_FORMAT_GRAY8)
-    part.set(view(reinterpret_cast<const guint8*>(mapped.data())));
+    part.set<guint8>(mapped);
   else
-    part.set(view(reinterpret_cast<const guint16*>(mapped.data())));
+    part.set<guint16>(mapped);
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ namespace {
 using namespace harness;
 
 constexpr GstClockTime ms = GST_MSECOND;
-constexpr int width = 32;
-constexpr int height = 16;
+constexpr gsize width = 32;
+constexpr gsize height = 16;
 
 class ClassImages : public testing::Test {
  protected:
@@ -41,7 +41,7 @@ class ClassImages : public testing::Test {
   GstFlowReturn push_image(GstClockTime pts, int first) {
     std::vector<Pixel> pixels(width * height);
     for (std::size_t i = 0; i < pixels.size(); ++i)
-      pixels[i] = static_cast<Pixel>(first + static_cast<int>(i) % width);
+      pixels[i] = static_cast<Pixel>(first + static_cast<int>(i % width));
     const gsize size = pixels.size() * sizeof(Pixel);
     GstBuffer* buffer = gst_buffer_new_allocate(nullptr, size, nullptr);
     gst_buffer_fill(buffer, 0, pixels.data(), size);
@@ -268,7 +268,7 @@ TEST(ClassImagesInPipelines, AreSeekedWithTheVideo) {
 /// Lines of a CSV file of labelled events: the numbers of each.
 std::vector<std::vector<int>> rows_of(const std::string& launch, const std::string& branch = "") {
   // The class is the place: 1 + x + 64 y.
-  std::vector<guint16> places(64 * 48);
+  std::vector<guint16> places(std::size_t{64} * 48);
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = static_cast<guint16>(i + 1);
   const TemporaryFile file;
   Pipeline pipeline("eventsim-dvs name=dvs preset=davis346 shot-noise-rate=20 ! " + launch +
