@@ -11,6 +11,12 @@
  *
  * For scenes in which everything moves, such as those of a moving camera.
  *
+ * The pad `flow_sink` takes optical flow that is known, such as a renderer's, instead of finding
+ * it: a tensor of NNStreamer for each frame, of the dimensions 2:width:height:1 and type float32,
+ * which holds x and y of each pixel's motion to the next frame, in pixels. A tensor has the
+ * timestamp of its frame. Where one is missing, or has another duration than the interval because
+ * frames were skipped, the flow is found as without the pad.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 filesrc location=drive.mp4 ! decodebin ! eventsim-dense flow=dis-hq ! videoconvert
@@ -58,6 +64,7 @@ static const EventSimulatorMethod dense = {
     .description = "Turns video into events: interpolates frames with dense optical flow",
     .threshold = 2,
     .interpolates = true,
+    .takes_flow = true,
     .create = in_system_memory<eventcamera::make_dense_simulator>,
     .make_settings = Settings::make,
     .install_properties = install_properties,

@@ -29,6 +29,12 @@
  * as in a GAP or after their end, the last one stays in force; before the first one, the class is
  * 0. Images without a timestamp are skipped with a warning; a different size is an error.
  *
+ * The pad `flow_sink` takes optical flow that is known, such as a renderer's, instead of finding
+ * it, with upsampling=motion: a tensor of NNStreamer for each frame, of the dimensions
+ * 2:width:height:1 and type float32, which holds x and y of each pixel's motion to the next frame,
+ * in pixels. A tensor has the timestamp of its frame. Where one is missing, or has another duration
+ * than the interval because frames were skipped, the flow is found as without the pad.
+ *
  * ## Example launch lines
  * |[
  * gst-launch-1.0 v4l2src ! eventsim-dvs preset=davis346 ! videoconvert ! autovideosink
@@ -390,6 +396,7 @@ static const EventSimulatorMethod dvs = {
         "noise",
     .threshold = std::nullopt,
     .labels = true,
+    .takes_flow = true,
     .create = in_system_memory<eventcamera::make_dvs_simulator>,
     .make_settings = []() -> std::shared_ptr<void> { return std::make_shared<Guarded<Choice>>(); },
     .install_properties = install_properties,

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "gst/base/errors.hpp"
+#include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
 #include "src/core/event.hpp"
 
@@ -71,7 +72,7 @@ class CompanionPad {
   static constexpr Nanoseconds forever = std::numeric_limits<Nanoseconds>::max() / 2;
   static constexpr Nanoseconds never = -forever;
   /// Times closer than this are equal, since streams round them differently.
-  static constexpr Nanoseconds resolution = 1000;
+  static constexpr auto resolution = Nanoseconds{event_resolution};
   /// Limit of the buffers between two frames.
   static constexpr std::size_t max_items = 256;
 

@@ -4,6 +4,8 @@
 #include <gst/video/video.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdlib>
 #include <new>
 #include <optional>
 #include <string>
@@ -24,6 +26,7 @@
 #include "gst/simulator/caps.hpp"
 #include "gst/simulator/class_images.hpp"
 #include "gst/simulator/companion_pad.hpp"
+#include "gst/simulator/flow_tensor.hpp"
 #include "gst/simulator/frame_clock.hpp"
 #include "gst/simulator/qos.hpp"
 #include "src/simulate/learnt_latency.hpp"
@@ -58,7 +61,8 @@ struct Settings {
 struct State {
   GstVideoInfo video;  ///< input format
   std::unique_ptr<VideoSimulator> frames;
-  bool draws = false;  ///< the output is video, not events
+  bool draws = false;                            ///< the output is video, not events
+  eventcamera::Image<eventcamera::Flow> flow{};  ///< that was given, if any
 
   IntervalSimulator& simulator() const { return frames->simulator(); }
 };
@@ -84,6 +88,7 @@ struct Stream {
   FrameClock clock;                             ///< for frames without a PTS
   WarnOnce warn_of_times{GST_CAT_DEFAULT};
   WarnOnce warn_of_no_pts{GST_CAT_DEFAULT};
+  WarnOnce warn_of_no_flow{GST_CAT_DEFAULT};
   WarnOnce warn_of_interlacing{GST_CAT_DEFAULT};
   WarnOnce warn_of_drawn_input{GST_CAT_DEFAULT};
 };
@@ -97,6 +102,7 @@ struct GstEventSimulatorPrivate {
   Guarded<SimulatorQos> qos;
   Guarded<Latency> latency;  // make no calls while holding its lock
   CompanionPad class_images{"class images", GST_CAT_DEFAULT};
+  CompanionPad flow_tensors{"flow tensors", GST_CAT_DEFAULT};
 
   // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
   std::optional<State> state;
@@ -117,6 +123,10 @@ static const EventSimulatorMethod& method_of(GstEventSimulator* self) {
 
 void* event_simulator_settings(GObject* object) {
   return priv_of(GST_EVENT_SIMULATOR(object)).method_settings.get();
+}
+
+static std::array<CompanionPad*, 2> companions_of(GstEventSimulator* self) {
+  return {&priv_of(self).class_images, &priv_of(self).flow_tensors};
 }
 
 /// Passes the settings of the method to the simulator.
@@ -624,17 +634,52 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
   return result;
 }
 
-/// Settings for the interval that ends at `end`, up to which the class images advance.
+/// Settings for the interval that ends at `end`, up to which class images and flow advance.
 static Settings begin_interval(GstEventSimulator* self, Nanoseconds end) {
-  auto& class_images = priv_of(self).class_images;
   if (const auto time =
           running_time_of(GST_BASE_TRANSFORM(self)->segment, static_cast<GstClockTime>(end)))
-    class_images.advance(*time);
+    for (auto* companion : companions_of(self)) companion->advance(*time);
   configure(self);
   Settings settings = priv_of(self).settings.copy();
-  if (class_images.pad()) settings.simulation.labels = true;
+  if (priv_of(self).class_images.pad()) settings.simulation.labels = true;
   if (priv_of(self).state->draws) settings.simulation.labels = false;
   return settings;
+}
+
+/// True if a tensor is the flow of an interval: it starts with it, and ends with it if it has a
+/// duration, which it would not after frames were skipped.
+static bool is_flow_of(const CompanionPad::Item& tensor, Nanoseconds running_start,
+                       Nanoseconds duration) {
+  if (std::abs(tensor.time - running_start) >= Nanoseconds{event_resolution}) return false;
+  const GstClockTime own = GST_BUFFER_DURATION(tensor.buffer.get());
+  return !GST_CLOCK_TIME_IS_VALID(own) || (own < static_cast<GstClockTime>(duration) * 3 / 2 &&
+                                           own > static_cast<GstClockTime>(duration) / 2);
+}
+
+/// Gives the simulator the flow of an interval, if it needs one and a source is linked. False if
+/// the stream is flushing. May throw.
+static bool give_flow(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
+  auto& tensors = priv_of(self).flow_tensors;
+  auto& state = *priv_of(self).state;
+  const auto time =
+      running_time_of(GST_BASE_TRANSFORM(self)->segment, static_cast<GstClockTime>(start));
+  if (!time || !tensors.is_linked() || !state.simulator().needs_flow()) return true;
+  const auto found = tensors.items(*time, *time);
+  if (!found) return false;
+  if (found->empty() || !is_flow_of(found->back(), *time, end - start)) {
+    priv_of(self).stream.warn_of_no_flow(
+        self,
+        {GST_STREAM_ERROR_FORMAT,
+         "The optical flow of a frame is missing: finding it here. Send the flow to the next frame "
+         "with the timestamp and the duration of each frame."},
+        "no matching buffer on flow_sink");
+    return true;
+  }
+  const auto [width, height, bits] = FrameLuma::format_of(state.video);
+  if (state.flow.width() != width) state.flow = {width, height};
+  copy_flow(found->back(), state.flow);
+  state.simulator().give_flow(state.flow.view());
+  return true;
 }
 
 /// Processes a frame and outputs the interval that it ends, if any. May throw.
@@ -647,6 +692,10 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in.get()));
   const auto start = state.simulator().last_time();
   const Settings settings = begin_interval(self, end);
+  if (start && !give_flow(self, *start, end)) {
+    stream.flow = GST_FLOW_FLUSHING;
+    return;
+  }
   if (state.draws) {
     stream.handed_out_until = end;
     stream.flow = draw_frame(self, settings, end, std::move(in));
@@ -693,7 +742,7 @@ static void start_timeline(GstEventSimulator* self) {
   if (state) state->frames->drop();
   priv_of(self).stream.flow = GST_FLOW_OK;
   start_over(self);
-  priv_of(self).class_images.begin();
+  for (auto* companion : companions_of(self)) companion->begin();
   priv_of(self).stream.clock.start_over();
   priv_of(self).qos.lock()->start_over();
 }
@@ -778,14 +827,14 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       start_timeline(self);
       break;
     case GST_EVENT_FLUSH_START:
-      priv_of(self).class_images.set_flushing(true);
+      for (auto* companion : companions_of(self)) companion->set_flushing(true);
       break;
     case GST_EVENT_FLUSH_STOP:
-      priv_of(self).class_images.set_flushing(false);
+      for (auto* companion : companions_of(self)) companion->set_flushing(false);
       start_timeline(self);
       break;
     case GST_EVENT_EOS:
-      priv_of(self).class_images.end();
+      for (auto* companion : companions_of(self)) companion->end();
       break;
     default:
       break;
@@ -811,8 +860,9 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
       gst_event_unref(event);
       return FALSE;
     }
-    if (const OwnedPad pad = priv_of(GST_EVENT_SIMULATOR(transform)).class_images.pad())
-      gst_pad_push_event(pad.get(), gst_event_ref(event));
+    for (auto* companion : companions_of(GST_EVENT_SIMULATOR(transform)))
+      if (const OwnedPad pad = companion->pad())
+        gst_pad_push_event(pad.get(), gst_event_ref(event));
   }
   return PARENT_TRANSFORM_CLASS->src_event(transform, event);
 }
@@ -831,18 +881,23 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
 
 static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template, const gchar*,
                                const GstCaps*) {
-  return priv_of(GST_EVENT_SIMULATOR(element)).class_images.add_to(element, pad_template);
+  auto& priv = priv_of(GST_EVENT_SIMULATOR(element));
+  const bool is_of_labels =
+      g_strcmp0(GST_PAD_TEMPLATE_NAME_TEMPLATE(pad_template), "label_sink") == 0;
+  return (is_of_labels ? priv.class_images : priv.flow_tensors).add_to(element, pad_template);
 }
 
 static void release_pad(GstElement* element, GstPad* pad) {
-  priv_of(GST_EVENT_SIMULATOR(element)).class_images.remove_from(element, pad);
+  for (auto* companion : companions_of(GST_EVENT_SIMULATOR(element)))
+    if (companion->pad().get() == pad) companion->remove_from(element, pad);
 }
 
 /// Ends the waiting of threads before their pads are deactivated.
 static GstStateChangeReturn change_state(GstElement* element, GstStateChange change) {
-  auto& class_images = priv_of(GST_EVENT_SIMULATOR(element)).class_images;
-  if (change == GST_STATE_CHANGE_READY_TO_PAUSED) class_images.start();
-  if (change == GST_STATE_CHANGE_PAUSED_TO_READY) class_images.stop();
+  for (auto* companion : companions_of(GST_EVENT_SIMULATOR(element))) {
+    if (change == GST_STATE_CHANGE_READY_TO_PAUSED) companion->start();
+    if (change == GST_STATE_CHANGE_PAUSED_TO_READY) companion->stop();
+  }
   return GST_ELEMENT_CLASS(parent_class)->change_state(element, change);
 }
 
@@ -943,6 +998,9 @@ static void method_class_init(gpointer klass, gpointer row) {
     add_pad_template(GST_ELEMENT_CLASS(klass), "label_sink", GST_PAD_SINK, CLASS_IMAGE_CAPS,
                      GST_PAD_REQUEST);
   }
+  if (method.takes_flow)
+    add_pad_template(GST_ELEMENT_CLASS(klass), "flow_sink", GST_PAD_SINK, FLOW_TENSOR_CAPS,
+                     GST_PAD_REQUEST);
   if (method.install_properties != nullptr) method.install_properties(object_class);
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), method.long_name,
                                         "Filter/Effect/Converter/Video", method.description,

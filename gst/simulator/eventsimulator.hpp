@@ -32,6 +32,7 @@ struct EventSimulatorMethod {
   std::optional<double> threshold;
   bool interpolates = false;  ///< has the property interpolated-frames
   bool labels = false;        ///< has the property label and the pad label_sink
+  bool takes_flow = false;    ///< has the pad flow_sink
 
   /// Creates the simulator of an element for frames of this format. May throw.
   std::unique_ptr<VideoSimulator> (*create)(GObject* element, const GstVideoInfo& video);

@@ -65,6 +65,8 @@ class PixelSimulator final : public DvsSimulator {
   explicit PixelSimulator(const LumaFormat& format) : DvsSimulator(format) {}
 
  private:
+  bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
+
   void start(const LumaView& frame) override {
     keep(frame, last_);
     finder_.reset();
@@ -274,6 +276,10 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   ImageView<Flow> find_flow() {
+    if (given_flow_) {
+      finder_.reset();  // its last frame is outdated
+      return *given_flow_;
+    }
     if (!finder_) finder_.emplace(FlowMethod::dis_lq, format().width, format().height);
     const auto luma = [this](const Image<Pixel>& frame) {
       return LumaView{format(), frame.view().data, frame.stride()};

@@ -22,6 +22,8 @@ class InterpolatingSimulator final : public DenseSimulator {
         now_(format.width, format.height) {}
 
  private:
+  bool needs_flow() const override { return true; }
+
   void start(const LumaView& frame) override {
     last_.assign(frame.as<Pixel>());
     finder_.reset();
@@ -43,6 +45,10 @@ class InterpolatingSimulator final : public DenseSimulator {
   /// Only pixels that changed by more than a threshold can fire, so flow is needed only around
   /// them.
   ImageView<Flow> find_flow(const Thresholds& thresholds) {
+    if (given_flow_) {
+      finder_.reset();  // its last frame is outdated
+      return *given_flow_;
+    }
     if (!finder_ || finder_->method() != flow_)
       finder_.emplace(flow_, format().width, format().height);
     const auto luma = [this](const Image<Pixel>& frame) {

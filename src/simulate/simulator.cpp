@@ -36,6 +36,7 @@ const EventBuckets* Simulator::push(const LumaView& frame, Nanoseconds time,
     simulate(frame, *steps, settings, events_);
   else
     start(frame);
+  given_flow_.reset();
   last_time_ = time;
   return steps ? &events_ : nullptr;
 }

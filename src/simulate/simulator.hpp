@@ -9,6 +9,7 @@
 #include "src/core/label.hpp"
 #include "src/core/luma.hpp"
 #include "src/core/thread_pool.hpp"
+#include "src/flow/dense_flow.hpp"
 
 namespace eventcamera {
 
@@ -80,6 +81,12 @@ class IntervalSimulator {
   /// Writes the labels of all events of the last interval, which EventBuckets::write_to() wrote.
   virtual void label(const LabelledEvents&) {}
 
+  /// True if the simulator will find the optical flow of the next interval, unless it is given.
+  virtual bool needs_flow() const { return false; }
+
+  /// Gives the flow up to the next frame, a view of an Image that is valid until it is pushed.
+  void give_flow(const ImageView<Flow>& flow) { given_flow_ = flow; }
+
   /// Forgets all frames; the next one is a first frame.
   void reset();
 
@@ -99,6 +106,7 @@ class IntervalSimulator {
   virtual bool hold(const StepTimes&, const Settings&, EventBuckets&) { return false; }
 
   std::optional<Nanoseconds> last_time_;
+  std::optional<ImageView<Flow>> given_flow_;  ///< of the next interval
   EventBuckets events_;
 
  private:

@@ -122,6 +122,14 @@ class Kind {
     return " location=" + in_quotes(recording_files::Folder::path(name_ + ".location"));
   }
 
+  /// Tensors of any numbers, x and y of each pixel of the frames.
+  static std::string flow(int frames) {
+    return "videotestsrc num-buffers=" + std::to_string(frames) +
+           " ! video/x-raw, format=GRAY8, width=512, height=48, framerate=100/1 ! capssetter "
+           "join=false replace=true caps=\""
+           "other/tensors, format=static, num_tensors=1, types=float32, dimensions=2:64:48:1\"";
+  }
+
   std::string source(const Pad& pad, int frames) const {
     const auto video = "videotestsrc pattern=ball num-buffers=" + std::to_string(frames) + " ! " +
                        std::string(frame_caps);
@@ -131,6 +139,7 @@ class Kind {
       return events + " ! evtenc ! application/x-event-camera, format=(string)EVT3";
     if (pad.takes_frames()) return video;
     if (pad.takes_events()) return events;
+    if (pad.name == "flow_sink") return flow(frames);
     const auto* const file =
         std::ranges::find(recording_files::files, name_, &recording_files::File::reader);
     if (file == std::end(recording_files::files)) g_error("no file for %s", name_.c_str());
