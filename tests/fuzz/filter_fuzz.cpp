@@ -5,16 +5,19 @@
 #include <array>
 #include <vector>
 
+#include "src/filter/camera_calibration.hpp"
 #include "src/filter/crop_filter.hpp"
 #include "src/filter/denoise_filter.hpp"
 #include "src/filter/event_merge.hpp"
 #include "src/filter/flicker_filter.hpp"
 #include "src/filter/flip_filter.hpp"
 #include "src/filter/hot_pixel_filter.hpp"
+#include "src/filter/pixel_mask.hpp"
 #include "src/filter/rate_filter.hpp"
 #include "src/filter/refractory_filter.hpp"
 #include "src/filter/scale_filter.hpp"
 #include "src/filter/trail_filter.hpp"
+#include "src/filter/undistort_filter.hpp"
 #include "src/formats/little_endian.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
@@ -103,6 +106,43 @@ void check_geometry(const std::vector<Buffer>& buffers) {
     }
 }
 
+/// A camera with a lens as the bytes say, however odd.
+CameraCalibration calibration_of(CameraCalibration::Lens lens,
+                                 std::span<const std::uint8_t> bytes) {
+  const auto number = [&](std::size_t i) { return i < bytes.size() ? bytes[i] / 16.0 : 0; };
+  CameraCalibration calibration{
+      .lens = lens, .fx = number(0) + 0.1, .fy = number(1) + 0.1, .cx = number(2), .cy = number(3)};
+  for (std::size_t i = 0; i < calibration.distortion.size(); ++i)
+    calibration.distortion[i] = number(4 + i) - 8;
+  return calibration;
+}
+
+void check_undistorted(const std::vector<Buffer>& buffers, std::span<const std::uint8_t> bytes) {
+  for (const auto lens : {CameraCalibration::Lens::plumb_bob, CameraCalibration::Lens::fisheye}) {
+    const UndistortFilter filter(sensor, calibration_of(lens, bytes));
+    check_moved(buffers, sensor,
+                [&](LabelledEvents events, Microseconds) { return filter.filter(events); });
+  }
+}
+
+/// Masks the pixels whose byte is odd.
+void check_masked(const std::vector<Buffer>& buffers, std::span<const std::uint8_t> bytes) {
+  const auto is_masked = [&](int x, int y) {
+    const auto i = static_cast<std::size_t>(y * sensor.width + x);
+    return i < bytes.size() && bytes[i] % 2 != 0;
+  };
+  PixelMask mask(sensor);
+  for (int y = 0; y < sensor.height; ++y)
+    for (int x = 0; x < sensor.width; ++x)
+      if (!is_masked(x, y)) mask.keep(x, y);
+  for (auto [start, events] : buffers) {
+    auto expected = events;
+    std::erase_if(expected, [&](const Event& event) { return is_masked(event.x, event.y()); });
+    const auto kept = mask.filter({events, {}}).events;
+    require(std::ranges::equal(kept, expected), "the mask keeps what it does not cover");
+  }
+}
+
 /// Merges the ON with the OFF events.
 void check_merged(const std::vector<Buffer>& buffers) {
   EventMerger merger;
@@ -153,6 +193,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const bool match_polarity : {false, true})
       check<DenoiseFilter>(buffers, {.method = method, .match_polarity = match_polarity});
   check_geometry(buffers);
+  check_undistorted(buffers, {data, size});
+  check_masked(buffers, {data, size});
   check_merged(buffers);
   return 0;
 }
