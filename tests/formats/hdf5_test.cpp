@@ -325,6 +325,17 @@ TEST_F(Hdf5, CommitsDoNotChangeTheFile) {
   }
 }
 
+TEST_F(Hdf5, WithoutCommitsTheSameEventsMakeTheSameBytes) {
+  const auto events = random_events(200'000, {640, 480}, 24, 1'000'000);
+  for (auto settings : all_settings({640, 480})) {
+    settings.commit_interval = {};
+    const auto first = contents(write(events, settings));
+    // HDF5 stores times in whole seconds.
+    std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+    EXPECT_TRUE(contents(write(events, settings)) == first);
+  }
+}
+
 TEST_F(Hdf5, WhatIsNoFileOfEventsIsRefused) {
   EXPECT_THROW(Hdf5Decoder reader(path("missing.h5")), std::runtime_error);
   std::ofstream(path("text.h5")) << "t,x,y,p\n";

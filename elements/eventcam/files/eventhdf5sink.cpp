@@ -9,9 +9,9 @@
  * property `stats` counts them.
  *
  * The file is complete at the end of the stream, or when the pipeline is stopped. If the process is
- * killed, all but the events of the last second can be read. A flushing seek truncates the file and
- * starts over. Events that are earlier than those already written, or outside the sensor, are
- * dropped; a warning says how many.
+ * killed, all but the events of the last `commit-interval` can be read. A flushing seek truncates
+ * the file and starts over. Events that are earlier than those already written, or outside the
+ * sensor, are dropped; a warning says how many.
  *
  * ## Example launch line
  * |[
@@ -21,6 +21,7 @@
  */
 #include <gst/base/gstbasesink.h>
 
+#include <chrono>
 #include <memory>
 #include <span>
 #include <string>
@@ -50,6 +51,7 @@ struct Settings {
   std::string location;
   Hdf5Format format = Hdf5Format::dsec;
   Hdf5Writer::Compression compression = Hdf5Writer::Compression::gzip;
+  GstClockTime commit_interval = GST_SECOND;
 };
 
 /// State of the file, from caps to stop.
@@ -146,10 +148,11 @@ static bool begin_file(GstEventHdf5Sink* self, const GstEventCameraInfo& info) {
   priv->state = State();  // close first: HDF5 treats two open files of the same name as one
   priv->state.info = info;
   priv->writable.begin_file({info.width, info.height});
-  const auto [location, format, compression] = priv->settings.copy();
+  const auto [location, format, compression, commit_interval] = priv->settings.copy();
   GST_DEBUG_OBJECT(self, "writing the events of %dx%d pixels to %s", info.width, info.height,
                    location.c_str());
-  const Hdf5Writer::Settings settings{format, compression, {info.width, info.height}};
+  const Hdf5Writer::Settings settings{
+      format, compression, {info.width, info.height}, std::chrono::nanoseconds(commit_interval)};
   return reported(self, [&, &path = location] {
     priv->state.writer = std::make_unique<Hdf5Writer>(path, settings);
   });
@@ -273,6 +276,13 @@ static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
                         "Compression of format=dsec: gzip for small files, none for speed. "
                         "format=metavision ignores it, since it always uses ECF",
                         compression_type(), static_cast<int>(defaults.compression), flags));
+  properties.add(
+      &Settings::commit_interval,
+      g_param_spec_uint64("commit-interval", "Commit interval",
+                          "Time between two states of the file that survive if the process is "
+                          "killed (ns of the clock; 0 = none before the end, and the same events "
+                          "in the same buffers make the same bytes)",
+                          0, G_MAXINT64, defaults.commit_interval, flags));
   properties.add_read_only(
       +[](GObject* object, GValue* value) {
         g_value_take_boxed(value, GST_EVENT_HDF5_SINK(object)->priv->writable.stats());

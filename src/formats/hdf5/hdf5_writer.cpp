@@ -48,9 +48,6 @@ void check(bool done) {
   if (!done) throw std::runtime_error("the HDF5 library failed to write the file");
 }
 
-/// Time between two commits.
-constexpr std::chrono::seconds commit_interval{1};
-
 /// Microseconds since the first event of the recording.
 Microseconds since(Microseconds first, Microseconds t) {
   Microseconds passed = 0;
@@ -65,6 +62,13 @@ Hdf5Handle make_group(hid_t file, const char* name) {
   return group;
 }
 
+/// Properties of a dataset, which does not tell when it was written.
+Hdf5Handle make_creation() {
+  Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  check(H5Pset_obj_track_times(creation.get(), false) >= 0);
+  return creation;
+}
+
 /// Dataset with rows appended.
 class GrowingDataset {
  public:
@@ -75,7 +79,7 @@ class GrowingDataset {
     constexpr hsize_t no_limit = H5S_UNLIMITED;
     constexpr unsigned quickest = 1;  // higher levels hardly make events smaller
     const Hdf5Handle space(H5Screate_simple(1, &none, &no_limit), H5Sclose);
-    const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+    const auto creation = make_creation();
     check(H5Pset_chunk(creation.get(), 1, &chunk) >= 0);
     if (compression == Compression::gzip)
       check(H5Pset_shuffle(creation.get()) >= 0 && H5Pset_deflate(creation.get(), quickest) >= 0);
@@ -234,8 +238,9 @@ class DsecLayout final : public Hdf5Writer::Layout {
 
   void write_offset(Microseconds first) {
     const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    const auto creation = make_creation();
     const Hdf5Handle offset(H5Dcreate2(file_, "t_offset", H5T_STD_I64LE, space.get(), H5P_DEFAULT,
-                                       H5P_DEFAULT, H5P_DEFAULT),
+                                       creation.get(), H5P_DEFAULT),
                             H5Dclose);
     check(H5Dwrite(offset.get(), H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &first) >= 0);
     has_offset_ = true;
@@ -464,7 +469,7 @@ void check(const Hdf5Writer::Settings& settings) {
 }  // namespace
 
 Hdf5Writer::Hdf5Writer(const std::filesystem::path& path, const Settings& settings)
-    : size_(settings.size) {
+    : size_(settings.size), commit_interval_(settings.commit_interval) {
   const Hdf5Session session;
   check(settings);
   file_ = std::make_unique<File>(path);
@@ -495,7 +500,7 @@ void Hdf5Writer::append(std::span<const AbsoluteEvent> events) {
   }
   layout_->append(events);
   file_->output.check();
-  if (Clock::now() - committed_ >= commit_interval) commit();
+  if (commit_interval_.count() > 0 && Clock::now() - committed_ >= commit_interval_) commit();
 }
 
 void Hdf5Writer::label(std::span<const Label> labels) {

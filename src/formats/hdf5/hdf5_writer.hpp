@@ -17,7 +17,8 @@ namespace eventcamera {
 /// Writes events to an HDF5 file. All functions throw std::runtime_error if the file cannot be
 /// written, and std::invalid_argument if the layout does not support the data.
 ///
-/// Events appended before a commit() can be read even if the process is killed later.
+/// Events appended before a commit() can be read even if the process is killed later. Without
+/// commits, the same calls write the same bytes.
 class Hdf5Writer {
  public:
   enum class Compression : std::uint8_t { none, gzip };
@@ -26,6 +27,7 @@ class Hdf5Writer {
     Hdf5Format format = Hdf5Format::dsec;         ///< dsec or metavision
     Compression compression = Compression::gzip;  ///< for DSEC; Metavision always uses ECF
     SensorSize size;
+    std::chrono::nanoseconds commit_interval = std::chrono::seconds{1};  ///< 0 = never
   };
 
   class Layout;
@@ -37,8 +39,8 @@ class Hdf5Writer {
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
 
-  /// Events must be sorted by time and within the sensor. Commits, too, if the last commit is a
-  /// second ago.
+  /// Events must be sorted by time and within the sensor. Commits, too, if the last commit was
+  /// `commit_interval` ago.
   void append(std::span<const AbsoluteEvent> events);
 
   /// Takes the labels of the next events, one for each, before these are appended. The DSEC layout
@@ -56,6 +58,7 @@ class Hdf5Writer {
   struct File;
 
   SensorSize size_;
+  std::chrono::nanoseconds commit_interval_;
   std::unique_ptr<File> file_;
   std::unique_ptr<Layout> layout_;
   Microseconds latest_ = INT64_MIN;
