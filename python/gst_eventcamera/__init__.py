@@ -9,15 +9,18 @@
     for chunk in ec.live("v4l2src ! eventsim-diff"): ...
     voxels = ec.voxel_grid(chunk, bins=5)
     ec.write("out.aedat4", events, width=346, height=260)
+    for video in ec.Dataset("recipe.yaml"): ...
 
 Events are structured arrays with the fields t (int64, microseconds), x, y (uint16) and p (bool, True = ON).
 Failures of pipelines are raised as PipelineError with the text of the element that failed.
 """
+from .dataset import Dataset, DatasetVideo
 from .events import EVENT, Events
 from .pipeline import PipelineError
+from .recipe import Recipe, RecipeError
 from .recordings import Stream, read, stream, write
 from .sources import live, simulate
 from .tensors import tensors, voxel_grid
 
-__all__ = ["EVENT", "Events", "PipelineError", "Stream", "live", "read", "simulate", "stream", "tensors",
-           "voxel_grid", "write"]
+__all__ = ["Dataset", "DatasetVideo", "EVENT", "Events", "PipelineError", "Recipe", "RecipeError", "Stream", "live",
+           "read", "simulate", "stream", "tensors", "voxel_grid", "write"]

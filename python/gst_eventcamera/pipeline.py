@@ -28,7 +28,13 @@ MAX_WAIT = Gst.SECOND // 10
 
 
 class PipelineError(RuntimeError):
-    """A pipeline failed; the text is that of the element: what failed, on what, what to do."""
+    """A pipeline failed; the text is that of the element: what failed, on what, what to do.
+
+    element: the name of the element, empty if the pipeline could not be made."""
+
+    def __init__(self, text: str, element: str = "") -> None:
+        super().__init__(text)
+        self.element = element
 
 
 def quoted(path: str | os.PathLike[str]) -> str:
@@ -39,7 +45,8 @@ def quoted(path: str | os.PathLike[str]) -> str:
 def _error_of(message: Gst.Message) -> PipelineError:
     error, cause = message.parse_error()
     detail = cause.splitlines()[-1] if cause else ""
-    return PipelineError(f"{message.src.get_name()}: {error.message} ({detail})")
+    element = message.src.get_name()
+    return PipelineError(f"{element}: {error.message} ({detail})", element)
 
 
 class Pipeline:
@@ -53,6 +60,7 @@ class Pipeline:
             raise PipelineError(error.message) from None
         self._bus = self._pipeline.get_bus()
         self._sink = self._pipeline.get_by_name("out")
+        self._ended = False
 
     def __enter__(self) -> Pipeline:
         return self
@@ -84,9 +92,11 @@ class Pipeline:
 
     def raise_error(self, wait: int = 0) -> None:
         """Raises what an element has reported, or reports within `wait` nanoseconds, if anything; forgets all
-        other messages."""
-        if message := self._bus.timed_pop_filtered(wait, Gst.MessageType.ERROR):
+        other messages but that of the end."""
+        message = self._bus.timed_pop_filtered(wait, Gst.MessageType.ERROR | Gst.MessageType.EOS)
+        if message and message.type == Gst.MessageType.ERROR:
             raise _error_of(message)
+        self._ended |= message is not None
 
     def set_state(self, state: Gst.State) -> None:
         """Returns when it is reached; at once for PLAYING."""
@@ -117,23 +127,21 @@ class Pipeline:
         """Of the output; the pipeline must be paused."""
         return self._sink.get_static_pad("sink").get_current_caps()
 
-    def samples(self) -> Iterator[Gst.Sample]:
-        """Plays to the end."""
+    def samples(self, sink: str = "out") -> Iterator[Gst.Sample]:
+        """Plays to the end; of the appsink of this name."""
+        source = self.element(sink)
         self.set_state(Gst.State.PLAYING)
-        while not self._sink.is_eos():
-            if sample := self._sink.try_pull_sample(MAX_WAIT):
+        while not source.is_eos():
+            if sample := source.try_pull_sample(MAX_WAIT):
                 yield sample
             else:
                 self.raise_error()
         self.raise_error()
 
     def wait(self) -> None:
-        """Returns at the end of a playing pipeline that has no appsink."""
-        message = None
-        while not message:
-            message = self._bus.timed_pop_filtered(MAX_WAIT, Gst.MessageType.EOS | Gst.MessageType.ERROR)
-        if message.type == Gst.MessageType.ERROR:
-            raise _error_of(message)
+        """Returns when all sinks of a playing pipeline have reached the end."""
+        while not self._ended:
+            self.raise_error(MAX_WAIT)
 
 
 def sensor_size(caps: Gst.Caps) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from typing import Iterator, Optional, overload
 
 import numpy as np
 
-from .events import EVENT, Events, joined
+from .events import Events, joined
 from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, quoted, sensor_size
 from .sources import SINK
 

@@ -10,6 +10,8 @@ from .events import packed_events
 from .pipeline import Gst, GstEventCamera, Pipeline
 from .sources import SINK
 
+TENSOR_CAPS = "other/tensors,format=(string)static,num_tensors=1"
+
 
 def voxel_grid(events: np.ndarray, bins: int = 5, width: int = 0, height: int = 0) -> np.ndarray:
     """The voxel grid of events: each adds its polarity, +1 or -1, to the two nearest of `bins` instants, from
@@ -36,10 +38,14 @@ def tensors(pipeline: str) -> Iterator[np.ndarray]:
     "filesrc location=recording.raw ! evtdec ! eventtensor representation=histogram accumulation-time=50000000".
 
     Arrays of shape (channels, height, width), of type float32, float16 or uint8. Raises PipelineError."""
-    with Pipeline(f"{pipeline} ! other/tensors,format=(string)static,num_tensors=1 ! {SINK}") as running:
+    with Pipeline(f"{pipeline} ! {TENSOR_CAPS} ! {SINK}") as running:
         for sample in running.samples():
-            fields = sample.get_caps().get_structure(0)
-            shape = [int(side) for side in fields.get_string("dimensions").split(":")]
-            buffer: Gst.Buffer = sample.get_buffer()
-            values = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), fields.get_string("types"))
-            yield values.reshape(shape[2::-1])
+            yield tensor_of(sample)
+
+
+def tensor_of(sample: Gst.Sample) -> np.ndarray:
+    fields = sample.get_caps().get_structure(0)
+    shape = [int(side) for side in fields.get_string("dimensions").split(":")]
+    buffer: Gst.Buffer = sample.get_buffer()
+    values = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), fields.get_string("types"))
+    return values.reshape(shape[2::-1])

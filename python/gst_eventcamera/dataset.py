@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Data sets made from recipes on the fly."""
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import os
+import re
+import tempfile
+from typing import Iterator, Mapping, Optional, Sequence, overload
+
+import numpy as np
+
+from .events import Events
+from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, quoted
+from .recipe import PICTURES, TENSORS, Recipe, Value, Window, is_picture, property_limits
+from .sources import LUMA, SINK
+from .tensors import TENSOR_CAPS, tensor_of
+
+
+@dataclasses.dataclass(frozen=True)
+class DatasetVideo:
+    """A video of a data set. Iterating over it simulates it, and yields what the recipe's output holds: an
+    Events array for each two frames, or tensors of shape (channels, height, width). Raises PipelineError.
+
+    name: its path below the first folder of the pattern that has a wildcard, without extension.
+    path: of the file, or of the folder of pictures."""
+
+    recipe: Recipe
+    name: str
+    path: str
+
+    @functools.cached_property
+    def parameters(self) -> Mapping[str, Value]:
+        """Drawn from the recipe's seed and the name of the video."""
+        return self.recipe.drawn(self.name)
+
+    @property
+    def line(self) -> str:
+        """The elements from frames to events."""
+        return self.recipe.line(self.parameters)
+
+    @property
+    def split(self) -> str:
+        """The part of the data set that it belongs to, such as "train"; empty if the recipe has no split."""
+        return self.recipe.part_of(self.name)
+
+    def __iter__(self) -> Iterator[Events] | Iterator[np.ndarray]:
+        if self.recipe.output == TENSORS:
+            with self.playing(f"eventtensor {self.recipe.tensors} ! {TENSOR_CAPS} ! {SINK}") as pipeline:
+                yield from map(tensor_of, pipeline.samples())
+        else:
+            yield from self.events()
+
+    def events(self) -> Iterator[Events]:
+        """An array for each two frames, whatever the recipe's output is."""
+        with self.playing(SINK) as pipeline:
+            pipeline.gaps_as_buffers()
+            yield from map(events_of, pipeline.samples())
+
+    @contextlib.contextmanager
+    def playing(self, rest: str, threads: int = 0) -> Iterator[Pipeline]:
+        """A pipeline in which the elements `rest` take the events. Its element `decoded` gets the frames.
+
+        threads: of the simulator, 0 = one per processor; the events do not depend on it."""
+        recipe = self.recipe
+        line = self.line
+        if threads > 0 and "n-threads" in property_limits(recipe.simulator):
+            line = recipe.line({**self.parameters, "n-threads": threads})
+        with contextlib.ExitStack() as stack:
+            if recipe.window:
+                source = "appsrc name=window format=time"
+            elif os.path.isdir(self.path):
+                source = _numbered_pictures(self.path, stack.enter_context(tempfile.TemporaryDirectory()), recipe)
+            else:
+                source = f"filesrc location={quoted(self.path)} ! decodebin"
+            pipeline = stack.enter_context(Pipeline(
+                f"{source} ! videoconvert name=decoded ! {LUMA} ! {line} ! {EVENT_CAPS} ! {rest}"))
+            if recipe.window:
+                _feed(pipeline, _moving_window(self.path, recipe.window), recipe)
+            yield pipeline
+
+
+class Dataset(Sequence[DatasetVideo]):
+    """The videos of a recipe, by name. Nothing is stored: iterating over one of them simulates it, with the
+    same events as event-dataset writes.
+
+    split: only those of this part, such as "train".
+
+    Raises RecipeError if the recipe has an error or no video is found."""
+
+    def __init__(self, recipe: str | os.PathLike[str] | Recipe, split: Optional[str] = None) -> None:
+        self.recipe = recipe if isinstance(recipe, Recipe) else Recipe.load(recipe)
+        if split is not None and split not in self.recipe.split:
+            raise ValueError(f"the recipe has no part {split!r}")
+        videos = [DatasetVideo(self.recipe, name, path) for name, path in self.recipe.inputs().items()]
+        self._videos = [video for video in videos if split in (None, video.split)]
+
+    def __len__(self) -> int:
+        return len(self._videos)
+
+    @overload
+    def __getitem__(self, index: int) -> DatasetVideo: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[DatasetVideo]: ...
+
+    def __getitem__(self, index: int | slice) -> DatasetVideo | list[DatasetVideo]:
+        return self._videos[index]
+
+
+def pictures_of(folder: str) -> list[str]:
+    """The paths of the pictures of a folder; numbers in their names count as numbers, so 2 comes before 10."""
+    names = filter(is_picture, os.listdir(folder))
+    in_order = sorted(names, key=lambda name: [(int(part), "") if part.isdecimal() else (0, part)
+                                               for part in re.split(r"(\d+)", name)])
+    return [os.path.join(folder, name) for name in in_order]
+
+
+def _framerate(recipe: Recipe) -> str:
+    """As a field of caps."""
+    assert recipe.framerate
+    return f"framerate={recipe.framerate.numerator}/{recipe.framerate.denominator}"
+
+
+def _numbered_pictures(path: str, folder: str, recipe: Recipe) -> str:
+    """A source of the pictures of a folder, by links of the names that multifilesrc reads."""
+    if not recipe.framerate:
+        raise PipelineError(f"{path} is a folder of pictures, and the recipe has no framerate")
+    pictures = pictures_of(path)
+    kinds = {PICTURES[os.path.splitext(picture)[1].lower()] for picture in pictures}
+    if len(kinds) != 1:
+        raise PipelineError(f"{path} has pictures of different formats")
+    for number, picture in enumerate(pictures):
+        os.symlink(os.path.abspath(picture), os.path.join(folder, f"{number:08}"))
+    numbered = quoted(folder.replace("%", "%%") + "/%08d")
+    return f"multifilesrc location={numbered} caps=\"{kinds.pop()},{_framerate(recipe)}\" ! decodebin"
+
+
+def _moving_window(path: str, window: Window) -> Iterator[np.ndarray]:
+    """The window in each of its places on a picture, which is scaled and cropped to hold them all."""
+    width, height = window.width + window.distance, window.height + window.distance
+    with Pipeline(f"filesrc location={quoted(path)} ! decodebin ! videoconvert"
+                  f" ! aspectratiocrop aspect-ratio={width}/{height} ! videoscale"
+                  f" ! video/x-raw,format=GRAY8,width={width},height={height},pixel-aspect-ratio=1/1 ! {SINK}"
+                  ) as pipeline:
+        buffer = next(pipeline.samples()).get_buffer()
+        rows = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), np.uint8).reshape(height, -1)
+    for left, top in window.corners():
+        yield rows[top:top + window.height, left:left + window.width]
+
+
+def _feed(pipeline: Pipeline, frames: Iterator[np.ndarray], recipe: Recipe) -> None:
+    """Gives the pipeline a frame whenever it asks for one."""
+    assert recipe.window and recipe.framerate
+    width, height, duration = recipe.window.width, recipe.window.height, Gst.SECOND / recipe.framerate
+    numbered = enumerate(frames)
+
+    def push(source: Gst.Element, _: int) -> None:
+        number, frame = next(numbered, (0, None))
+        if frame is None:
+            source.end_of_stream()
+            return
+        rows = np.pad(frame, ((0, 0), (0, -width % 4)))  # as GStreamer pads them
+        buffer = Gst.Buffer.new_wrapped(rows.tobytes())
+        buffer.pts, buffer.duration = round(number * duration), round(duration)
+        source.push_buffer(buffer)
+
+    source = pipeline.element("window")
+    source.set_property("caps", Gst.Caps.from_string(
+        f"video/x-raw,format=GRAY8,width={width},height={height},{_framerate(recipe)}"))
+    source.connect("need-data", push)

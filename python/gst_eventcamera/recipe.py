@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Recipes of data sets: which videos, which simulator, and parameters that are drawn for each video."""
+from __future__ import annotations
+
+import dataclasses
+import glob
+import hashlib
+import math
+import os
+import re
+import statistics
+from fractions import Fraction
+from typing import Any, Iterator, Mapping, Optional
+
+import yaml
+
+from .pipeline import Gst, Pipeline, PipelineError, quoted
+from .recordings import WRITERS
+
+Value = float | int | str | bool
+
+MAX_RECIPE = 1 << 20  # bytes
+MAX_SEED = 2**64 - 1
+MAX_DRAWS = 1000
+PICTURES = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png"}
+TENSORS = "tensors"
+OUTPUTS = sorted(extension[1:] for extension in WRITERS) + [TENSORS]
+KEYS = {"seed", "videos", "framerate", "window", "frames", "simulator", "parameters", "filters", "output", "tensors",
+        "split", "group", "min-frames"}
+DISTRIBUTIONS = {"uniform": "[minimum, maximum]", "log-uniform": "[minimum, maximum], both above 0",
+                 "normal": "[mean, standard deviation]", "choice": "a list of values"}
+
+
+class RecipeError(ValueError):
+    """A recipe has an error; the text says where, what, and what is allowed."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Refuses keys that are given twice."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        names = [key.value for key, _ in node.value]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise RecipeError(f"line {node.start_mark.line + 1}: {min(map(str, twice))} is given twice")
+        return super().construct_mapping(node, deep)
+
+
+def uniform_number(*key: str | int) -> float:
+    """A number between 0 and 1, both excluded, that is the hash of the key."""
+    digest = hashlib.sha256("\0".join(map(str, key)).encode()).digest()
+    return (int.from_bytes(digest[:8], "big") // 2**11 + 0.5) / 2**53
+
+
+def rounded(value: float) -> float:
+    """To six significant digits, so that the last bits of a machine's logarithm make no difference."""
+    return float(f"{value:.6g}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Distribution:
+    """What a parameter is drawn from, relative to the value of another one if that is named."""
+
+    kind: str
+    values: tuple[Value, ...]
+    relative_to: Optional[str] = None
+
+    def at(self, share: float) -> Value:
+        """The value that this share of all draws is below; of a choice, the one there."""
+        if self.kind == "choice":
+            return self.values[int(share * len(self.values))]
+        first, second = (float(value) for value in self.values)
+        if self.kind == "uniform":
+            return first + (second - first) * share
+        if self.kind == "log-uniform":
+            return math.exp(math.log(first) + (math.log(second) - math.log(first)) * share)
+        return statistics.NormalDist(first, second).inv_cdf(share) if second > 0 else first
+
+
+@dataclasses.dataclass(frozen=True)
+class Window:
+    """A window that moves over a picture: right, down, left and up again, a pixel each frame."""
+
+    width: int
+    height: int
+    distance: int
+
+    def corners(self) -> Iterator[tuple[int, int]]:
+        """The left and upper edge of the window in each frame."""
+        end = self.distance
+        yield from ((i, 0) for i in range(end))
+        yield from ((end, i) for i in range(end))
+        yield from ((end - i, end) for i in range(end))
+        yield from ((0, end - i) for i in range(end + 1))
+
+
+@dataclasses.dataclass(frozen=True)
+class Recipe:
+    """A recipe, checked; Recipe.load() reads one. Raises RecipeError."""
+
+    path: str
+    seed: int
+    videos: tuple[str, ...]
+    simulator: str
+    output: str
+    framerate: Optional[Fraction] = None
+    window: Optional[Window] = None
+    frames: str = ""
+    parameters: Mapping[str, Value | Distribution] = dataclasses.field(default_factory=dict)
+    filters: str = ""
+    tensors: str = ""
+    split: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    group: str = ""
+    min_frames: int = 2
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Recipe:
+        try:
+            with open(path, "rb") as file:
+                text = file.read(MAX_RECIPE + 1)
+            if len(text) > MAX_RECIPE:
+                raise RecipeError("too long for a recipe")
+            return _checked(os.path.abspath(path), yaml.load(text, _Loader))
+        except (OSError, UnicodeError, RecursionError, ValueError, yaml.YAMLError) as error:
+            raise RecipeError(f"{os.fspath(path)}: {_text_of(error)}") from None
+
+    def inputs(self) -> dict[str, str]:
+        """The path of each video or folder of pictures, by its name: the path from the first folder of the
+        pattern that has a wildcard, without extension. Sorted by name."""
+        found: dict[str, str] = {}
+        for pattern in self.videos:
+            base = _fixed_folder(pattern)
+            folder = os.path.join(os.path.dirname(self.path), base)
+            matches = glob.glob(os.path.relpath(pattern, base or "."), root_dir=folder, recursive=True)
+            for match in sorted(matches):
+                path = os.path.join(folder, match)
+                if os.path.isdir(path) and not any(map(is_picture, os.listdir(path))):
+                    continue
+                name = match if os.path.isdir(path) else os.path.splitext(match)[0]
+                _check_name(name)
+                if found.setdefault(name, path) != path:
+                    raise RecipeError(f"videos: {found[name]} and {path} have the same name, {name}; rename one")
+        if not found:
+            raise RecipeError(f"videos: no file matches {' or '.join(self.videos)}")
+        return dict(sorted(found.items()))
+
+    def drawn(self, name: str) -> dict[str, Value]:
+        """The parameters of a video. The same for the same seed and name, whatever else the recipe has."""
+        drawn: dict[str, Value] = {}
+        limits = property_limits(self.simulator)
+        for parameter in _in_order(self.parameters):
+            value = self.parameters[parameter]
+            drawn[parameter] = value if not isinstance(value, Distribution) else self._draw(
+                name, parameter, value, drawn, limits)
+        if "seed" in limits and "seed" not in drawn and not re.search(r"\bseed=", self.simulator):
+            drawn["seed"] = int(uniform_number(self.seed, name, "seed") * 2**53)
+        return drawn
+
+    def _draw(self, name: str, parameter: str, distribution: Distribution, drawn: Mapping[str, Value],
+              limits: Mapping[str, tuple[float, float]]) -> Value:
+        """Draws again what is outside the limits of the property, which a normal distribution may be."""
+        low, high = limits[parameter]
+        for attempt in range(MAX_DRAWS):
+            value = distribution.at(uniform_number(self.seed, name, parameter, attempt))
+            if distribution.relative_to:
+                value = float(value) * float(drawn[distribution.relative_to])
+            elif distribution.kind == "choice":
+                return value
+            value = int(rounded(float(value))) if isinstance(low, int) else rounded(float(value))
+            if low <= value <= high:
+                return value
+        raise RecipeError(f"parameters: {parameter} is hardly ever within {low:g} to {high:g}")
+
+    def line(self, parameters: Mapping[str, Value]) -> str:
+        """The elements from frames to events, as gst-launch-1.0 takes them."""
+        values = [f"{name}={_written(value)}" for name, value in parameters.items()]
+        return " ! ".join(filter(None, [self.frames, " ".join([self.simulator, *values]), self.filters]))
+
+    def part_of(self, name: str) -> str:
+        """The part of the data set that a video belongs to, such as "train"; empty without split."""
+        match = re.search(self.group, name) if self.group else None
+        share = uniform_number(self.seed, match.group() if match else name, "split")
+        part = ""
+        for part, size in self.split.items():
+            share -= size
+            if share < 0:
+                break
+        return part
+
+
+def is_picture(name: str) -> bool:
+    return os.path.splitext(name)[1].lower() in PICTURES
+
+
+def property_limits(simulator: str) -> dict[str, tuple[float, float]]:
+    """The minimum and maximum of each property of the first element, integers if it takes only these;
+    infinite for those that have none."""
+    element = Gst.ElementFactory.make(simulator.split()[0])
+    if element is None:
+        raise RecipeError(f"simulator: there is no element \"{simulator.split()[0]}\"")
+    return {spec.name: (getattr(spec, "minimum", -math.inf), getattr(spec, "maximum", math.inf))
+            for spec in element.list_properties()}
+
+
+def _written(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return quoted(value) if isinstance(value, str) else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _text_of(error: Exception) -> str:
+    return " ".join(str(error).split()) if not isinstance(error, OSError) else str(error.strerror)
+
+
+def _fixed_folder(pattern: str) -> str:
+    """The folders of a pattern before the first that has a wildcard."""
+    folders = os.path.dirname(pattern).split("/")
+    fixed = next((i for i, folder in enumerate(folders) if glob.has_magic(folder)), len(folders))
+    return "/".join(folders[:fixed]) or ("/" if pattern.startswith("/") else "")
+
+
+def _check_name(name: str) -> None:
+    if re.search(r"[\x00-\x1f{}]|^/|(^|/)\.\.?(/|$)", name) or not name.isprintable():
+        raise RecipeError(f"videos: {name!r} has braces, control characters or dots that file names of a data set"
+                          " cannot have; rename it")
+
+
+def _in_order(parameters: Mapping[str, Value | Distribution]) -> list[str]:
+    """Those that others are relative to come first."""
+    return sorted(parameters, key=lambda name: (getattr(parameters[name], "relative_to", None) is not None, name))
+
+
+def _checked(path: str, recipe: Any) -> Recipe:
+    if not isinstance(recipe, dict):
+        raise RecipeError("not a recipe: give keys and values, such as \"seed: 1\"")
+    _expect_keys("", recipe, KEYS)
+    videos = recipe.get("videos")
+    patterns = [videos] if isinstance(videos, str) else videos
+    if not isinstance(patterns, list) or not patterns or not all(isinstance(one, str) and one for one in patterns):
+        raise RecipeError("videos: give a pattern such as \"videos/**/*.mp4\", or a list of patterns")
+    seed = recipe.get("seed", 0)
+    _expect_number("seed", seed, 0, MAX_SEED, whole=True)
+    min_frames = recipe.get("min-frames", 2)
+    _expect_number("min-frames", min_frames, 2, 10**9, whole=True)
+    texts = {key: _text(recipe, key) for key in ("simulator", "frames", "filters", "output", "tensors", "group")}
+    output = texts["output"].removeprefix(".") or "h5"
+    if output not in OUTPUTS:
+        raise RecipeError(f"output: {output} is none of {', '.join(OUTPUTS)}")
+    if texts["tensors"] and output != TENSORS:
+        raise RecipeError("tensors: only for output: tensors")
+    if not texts["simulator"]:
+        raise RecipeError("simulator: give an element and its properties, such as \"eventsim-dvs preset=davis346\"")
+    if "!" in texts["simulator"]:
+        raise RecipeError("simulator: give one element; others belong to frames, before it, or filters, after it")
+    checked = Recipe(path, seed, tuple(patterns), texts["simulator"], output, _framerate(recipe), _window(recipe),
+                     texts["frames"], _parameters(recipe, texts["simulator"]), texts["filters"], texts["tensors"],
+                     _split(recipe), texts["group"], min_frames)
+    if checked.window and not checked.framerate:
+        raise RecipeError("window: give a framerate, too")
+    if checked.group and not checked.split:
+        raise RecipeError("group: only with split")
+    try:
+        re.compile(checked.group)
+    except re.error as error:
+        raise RecipeError(f"group: {error}") from None
+    _check_elements(checked)
+    return checked
+
+
+def _expect_keys(where: str, given: Mapping[Any, Any], known: set[str]) -> None:
+    if unknown := [key for key in given if key not in known]:
+        raise RecipeError(f"{where}unknown key {unknown[0]}; known are {', '.join(sorted(known))}")
+
+
+def _expect_number(where: str, value: Any, low: float, high: float, whole: bool = False) -> None:
+    kinds: tuple[type, ...] = (int,) if whole else (int, float)
+    if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
+        raise RecipeError(f"{where}: {value!r} is not a {'whole ' if whole else ''}number from {low:g} to {high:g}")
+
+
+def _text(recipe: Mapping[str, Any], key: str) -> str:
+    value = recipe.get(key, "")
+    if not isinstance(value, str):
+        raise RecipeError(f"{key}: {value!r} is not text")
+    return value.strip()
+
+
+def _framerate(recipe: Mapping[str, Any]) -> Optional[Fraction]:
+    if "framerate" not in recipe:
+        return None
+    try:
+        framerate = Fraction(str(recipe["framerate"]))
+    except (ValueError, ZeroDivisionError):
+        framerate = Fraction(0)
+    if not 0 < framerate <= 1_000_000 or framerate.denominator >= 2**31 or framerate.numerator >= 2**31:
+        raise RecipeError(f"framerate: {recipe['framerate']!r} is not frames per second, such as 30 or 30000/1001")
+    return framerate
+
+
+def _window(recipe: Mapping[str, Any]) -> Optional[Window]:
+    given = recipe.get("window")
+    if given is None:
+        return None
+    keys = {"width", "height", "distance"}
+    if not isinstance(given, dict) or set(given) != keys:
+        raise RecipeError("window: give width, height and distance, in pixels")
+    for key in sorted(keys):
+        _expect_number(f"window: {key}", given[key], 1, 4096, whole=True)
+    return Window(**given)
+
+
+def _parameters(recipe: Mapping[str, Any], simulator: str) -> dict[str, Value | Distribution]:
+    given = recipe.get("parameters", {})
+    if not isinstance(given, dict):
+        raise RecipeError("parameters: give names of properties and their values")
+    limits = property_limits(simulator)
+    parameters: dict[str, Value | Distribution] = {}
+    for name, value in given.items():
+        where = f"parameters: {name}"
+        if name not in limits:
+            raise RecipeError(f"{where}: {simulator.split()[0]} has no such property")
+        if re.search(rf"(?<!\S){re.escape(name)}=", simulator):
+            raise RecipeError(f"{where}: is also set by simulator")
+        if isinstance(value, dict):
+            parameters[name] = _distribution(where, value, limits[name])
+        elif isinstance(value, (int, float, str, bool)):
+            if not isinstance(value, (bool, str)):
+                _expect_number(where, value, *limits[name])
+            parameters[name] = value
+        else:
+            raise RecipeError(f"{where}: {value!r} is neither a value nor a distribution")
+    for name, value in parameters.items():
+        other = parameters.get(value.relative_to, "") if isinstance(value, Distribution) and value.relative_to else 1
+        if isinstance(other, (str, bool)) or getattr(other, "relative_to", None) or (
+                isinstance(other, Distribution) and other.kind == "choice" and
+                any(isinstance(one, (str, bool)) for one in other.values)):
+            raise RecipeError(f"parameters: {name}: relative-to needs a parameter that is a number and not relative")
+    return parameters
+
+
+def _distribution(where: str, given: Mapping[Any, Any], limits: tuple[float, float]) -> Distribution:
+    _expect_keys(f"{where}: ", given, set(DISTRIBUTIONS) | {"relative-to"})
+    kinds = [key for key in given if key in DISTRIBUTIONS]
+    if len(kinds) != 1:
+        raise RecipeError(f"{where}: give one of {', '.join(DISTRIBUTIONS)}")
+    kind, values = kinds[0], given[kinds[0]]
+    relative_to = given.get("relative-to")
+    needs = RecipeError(f"{where}: {kind} needs {DISTRIBUTIONS[kind]}, not {values!r}")
+    if not isinstance(values, list) or not values or not all(isinstance(one, (int, float, str)) for one in values):
+        raise needs
+    numbers = [one for one in values if isinstance(one, (int, float)) and not isinstance(one, bool)]
+    if not all(map(math.isfinite, numbers)):
+        raise needs
+    if kind != "choice" and (len(numbers) != 2 or len(values) != 2):
+        raise needs
+    if kind in ("uniform", "log-uniform") and numbers[0] > numbers[1]:
+        raise needs
+    if (kind == "log-uniform" and numbers[0] <= 0) or (kind == "normal" and numbers[1] < 0):
+        raise needs
+    if relative_to is not None and (not isinstance(relative_to, str) or len(numbers) != len(values)):
+        raise RecipeError(f"{where}: relative-to needs the name of a parameter, and numbers to multiply it with")
+    bounded = numbers[:1] if kind == "normal" else numbers
+    if relative_to is None and not all(limits[0] <= number <= limits[1] for number in bounded):
+        raise RecipeError(f"{where}: {values} is not within the property's {limits[0]:g} to {limits[1]:g}")
+    return Distribution(kind, tuple(values), relative_to)
+
+
+def _split(recipe: Mapping[str, Any]) -> dict[str, float]:
+    given = recipe.get("split", {})
+    if not isinstance(given, dict):
+        raise RecipeError("split: give parts and their shares, such as {train: 0.8, validation: 0.1, test: 0.1}")
+    for part, share in given.items():
+        if not isinstance(part, str) or not re.fullmatch(r"[A-Za-z0-9_-]+", part):
+            raise RecipeError(f"split: {part!r} is no name of letters, digits, - and _")
+        _expect_number(f"split: {part}", share, 0, 1)
+    if given and abs(sum(given.values()) - 1) > 1e-6:
+        raise RecipeError(f"split: the shares add up to {sum(given.values()):g}, not 1")
+    return given
+
+
+def _check_elements(recipe: Recipe) -> None:
+    """All elements and properties exist, and values can be read."""
+    drawn = recipe.drawn("")
+    lines = [recipe.line(drawn)] + [recipe.line({**drawn, name: value}) for name, given in recipe.parameters.items()
+                                    if isinstance(given, Distribution) and given.kind == "choice"
+                                    for value in given.values]
+    if recipe.tensors:
+        lines.append(f"eventtensor {recipe.tensors}")
+    try:
+        for line in lines:
+            Pipeline(f"fakesrc ! {line} ! fakesink")
+    except PipelineError as error:
+        raise RecipeError(str(error)) from None
