@@ -62,7 +62,8 @@ used() {
   for ending in raw dat es npy npz csv aedat4 hdf5 h5; do try gst-play-1.0 --no-interactive --videosink=fakesink ball.$ending; done
   try event-calibrate --version
   try event-realism --version
-  for program in event-convert event-thumbnail web-events rtsp-events virtual-camera; do try man --whatis $program; done
+  try event-dataset --version
+  for program in event-convert event-dataset event-thumbnail web-events rtsp-events virtual-camera; do try man --whatis $program; done
   try test -s /usr/share/doc/gsteventcamera-1.0/struct.Info.html
   try pkg-config --exists --print-errors gsteventcamera-1.0
   try cc /usr/share/doc/libgsteventcamera-1.0-dev/examples/count_events.c -o count_events $(pkg-config --cflags --libs gsteventcamera-1.0 gstreamer-app-1.0)

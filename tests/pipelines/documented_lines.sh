@@ -34,15 +34,18 @@ cp drive.raw "recordings/second one.raw"
 for ending in dat es csv; do event-convert drive.raw recording.$ending; done
 /usr/bin/python3 -c 'import numpy; numpy.savez("events.npz", **{name: numpy.zeros(9, int) for name in "txyp"})'
 
+# The first recipe of the page.
+sed -n '/^```yaml$/,/^```$/p' "$SOURCE/docs/data-sets.md" | sed '1d; /^```$/q' | sed '/^```/d' >recipe.yaml
 run_lines "$SOURCE/README.md" "$SOURCE"/docs/*.md "$SOURCE"/docs/elements/*.md
-for page in README.md docs/learning.md; do
+for page in README.md docs/learning.md docs/data-sets.md; do
   sed -n '/^```python$/,/^```$/p' "$SOURCE/$page" | sed '/^```/d; s/v4l2src/videotestsrc is-live=true pattern=ball/' >block.py
   echo "Python of $page"
   timeout 120 /usr/bin/python3 block.py >output 2>&1 || fail "$(cat output)"
 done
 [ $count -ge 60 ] || fail "found only $count lines"
 for file in events.webm ball.npz recording.h5 figures.json map.png maps.png out.raw events.npy received.raw \
-  webcam.npz "videos/second one.h5" filtered.raw cropped.raw beside.raw quarter.raw turned.raw flat.raw both.raw both.webm rate.png part.raw "arrays/second one.npz"; do
+  webcam.npz "videos/second one.h5" filtered.raw cropped.raw beside.raw quarter.raw turned.raw flat.raw both.raw both.webm rate.png part.raw "arrays/second one.npz" \
+  recipe/manifest.json "recipe/data/second one.npy"; do
   [ -s "$file" ] || fail "$file is missing or empty"
 done
 event-convert left.raw merged.npz 2>&1 | sed 's/ events.*//' >events

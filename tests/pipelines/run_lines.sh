@@ -27,6 +27,7 @@ run_lines() { # PAGE...
     line=${line//glimagesink/"'video/x-raw(memory:GLMemory)' ! fakesink"}
     line=${line// --device \/dev\/video0/ --port 0}
     line=${line//host=receiver/host=127.0.0.1}
+    line=${line// --profile slurm/}
     line=${line//server:8554/127.0.0.1:${served:-}}
     case $line in
       *glupload*) line=${line/num-buffers=40/num-buffers=5} ;; # the renderer may be in software

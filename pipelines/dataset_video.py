@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Simulates one video of a data set, and records what it was made from: hashes, parameters, figures, versions."""
+import contextlib
+import hashlib
+import json
+import os
+import struct
+import tempfile
+import zlib
+
+import gst_eventcamera as ec
+import numpy as np
+from gst_eventcamera.dataset import pictures_of
+from gst_eventcamera.pipeline import Gst, events_of
+from gst_eventcamera.recipe import TENSORS
+from gst_eventcamera.recordings import WRITERS
+from gst_eventcamera.sources import SINK
+from gst_eventcamera.tensors import TENSOR_CAPS, tensor_of
+
+# What must be the same whenever the same events are written.
+SAME_BYTES = {"h5": "commit-interval=0", "hdf5": "commit-interval=0"}
+PREVIEW_SIDE = 160  # pixels
+MAX_KEPT = 16  # arrays of events
+# A video that lasts so much less than its file says, in seconds and as a share, was cut off.
+CUT_OFF = 1.0, 0.1
+# Intervals between frames may differ so much from their median; containers round times to milliseconds.
+STEADY = 0.25
+
+
+class Refused(Exception):
+    """A video cannot be simulated, and trying again makes no difference."""
+
+
+class Frames:
+    """What is to know of the frames of a video, from their times and flags."""
+
+    def __init__(self):
+        self.times = []
+        self.corrupted = 0
+
+    def watch(self, pad):
+        def look(_, info):
+            buffer = info.get_buffer()
+            self.times.append(buffer.pts)
+            self.corrupted += bool(buffer.get_flags() & Gst.BufferFlags.CORRUPTED)
+            return Gst.PadProbeReturn.OK
+
+        pad.add_probe(Gst.PadProbeType.BUFFER, look)
+
+    def check(self, min_frames, duration):
+        """The duration is that of the file, in seconds, 0 if not known."""
+        count = len(self.times)
+        if self.corrupted > 0:
+            raise Refused(f"corrupt: {self.corrupted} of {count} frames are damaged")
+        if count < min_frames:
+            raise Refused(f"too short: {count} frames of at least {min_frames}")
+        missing = duration - (self.times[-1] - self.times[0]) / 1e9
+        if missing > CUT_OFF[0] and missing > CUT_OFF[1] * duration:
+            raise Refused(f"corrupt: its frames end {missing:.1f} s before the {duration:.1f} s of the file")
+
+    def warnings(self):
+        intervals = np.diff(np.array(self.times, np.int64)) / 1e6
+        if np.ptp(intervals) > 2 * STEADY * np.median(intervals):
+            return [f"variable framerate: its frames are {intervals.min():.0f} to {intervals.max():.0f} ms apart;"
+                    " the times of the events follow them"]
+        return []
+
+
+class NpyFile:
+    """A NumPy file of an array that grows along its first axis."""
+
+    def __init__(self, path):
+        self._file = open(path, "wb")
+        self._first = None
+        self._count = 0
+
+    def append(self, tensor):
+        if self._first is None:
+            self._first = tensor
+            self._write_header()
+        if (tensor.shape, tensor.dtype) != (self._first.shape, self._first.dtype):
+            raise Refused(f"its tensors change from {self._first.shape} to {tensor.shape}")
+        self._file.write(tensor.tobytes())
+        self._count += 1
+
+    def _write_header(self):
+        # NumPy leaves room for larger numbers in the first axis.
+        np.lib.format.write_array_header_1_0(self._file, {
+            "descr": np.lib.format.dtype_to_descr(self._first.dtype), "fortran_order": False,
+            "shape": (self._count, *self._first.shape)})
+
+    def close(self):
+        if self._first is None:
+            raise Refused("too short: it has no tensor")
+        self._file.seek(0)
+        self._write_header()
+        self._file.close()
+
+
+class Figures:
+    """Counts of a stream of events, and a few of its arrays, evenly spread."""
+
+    def __init__(self):
+        self.events = self.on = self.chunks = 0
+        self.max_rate = 0.0
+        self.start = self.end = None
+        self._kept, self._spacing = [], 1
+
+    def take(self, chunk):
+        if self.chunks % self._spacing == 0:
+            self._kept.append(chunk)
+        if len(self._kept) > MAX_KEPT:
+            del self._kept[1::2]
+            self._spacing *= 2
+        self.chunks += 1
+        self.events += len(chunk)
+        self.on += int(np.count_nonzero(chunk["p"]))
+        self.start = chunk.start if self.start is None else self.start
+        self.end = chunk.end
+        if chunk.end > chunk.start:
+            self.max_rate = max(self.max_rate, len(chunk) / (chunk.end - chunk.start))
+
+    def busiest(self):
+        """Of the arrays that are kept."""
+        return max(self._kept, key=len)
+
+    def described(self, frames):
+        duration = self.end - self.start if self.end is not None else 0
+        return {"width": self._kept[0].width, "height": self._kept[0].height, "frames": frames,
+                "duration": round(duration, 6), "events": self.events, "on-events": self.on,
+                "mean-rate": round(self.events / duration) if duration > 0 else 0, "max-rate": round(self.max_rate)}
+
+
+def hash_of(path):
+    """SHA-256 of a file; of a folder of pictures, that of the list that sha256sum prints of them."""
+    if os.path.isdir(path):
+        lines = "".join(f"{hash_of(picture)}  {os.path.basename(picture)}\n" for picture in pictures_of(path))
+        return hashlib.sha256(lines.encode()).hexdigest()
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def state_of(path):
+    """Tells without reading a file whether it may have changed: its sizes and times."""
+    files = pictures_of(path) if os.path.isdir(path) else [path]
+    found = [os.stat(file) for file in files]
+    return [len(found), sum(one.st_size for one in found), max((one.st_mtime_ns for one in found), default=0)]
+
+
+def making_of(video):
+    """What determines the output, besides the input."""
+    recipe = video.recipe
+    making = {"line": video.line, "output": recipe.output}
+    if recipe.output == TENSORS:
+        making["tensors"] = recipe.tensors
+    if recipe.framerate:
+        making["framerate"] = str(recipe.framerate)
+    if recipe.window:
+        making["window"] = [recipe.window.width, recipe.window.height, recipe.window.distance]
+    return making
+
+
+def extension_of(recipe):
+    return "npy" if recipe.output == TENSORS else recipe.output
+
+
+def path_in(output, folder, name, extension):
+    """Of a file of a data set, whose folders are made."""
+    path = os.path.join(output, folder, f"{name}.{extension}")
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    return path
+
+
+def record_of(video, output, keep=True):
+    """Simulates a video, and returns its record. The file of events is complete or not there, whenever the
+    process is killed; without `keep`, only its hash is."""
+    record = {"name": video.name, "state": state_of(video.path),
+              "input": {"path": os.path.relpath(video.path, os.path.dirname(video.recipe.path)),
+                        "sha256": hash_of(video.path)},
+              "making": making_of(video), "parameters": dict(video.parameters), "split": video.split}
+    unfinished = os.path.join(output, "unfinished")
+    os.makedirs(unfinished, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=unfinished) as folder:
+        path = os.path.join(folder, "events")
+        try:
+            figures, picture, warnings, decoders = simulate(video, path)
+        except Refused as reason:
+            return record | {"refused": str(reason)}
+        except ec.PipelineError as failure:
+            if failure.element == "file":  # such as a full disk
+                raise
+            return record | {"refused": f"corrupt or not supported: {failure}"}
+        written = {"path": f"data/{video.name}.{extension_of(video.recipe)}", "size": os.path.getsize(path),
+                   "sha256": hash_of(path)}
+        if keep:
+            with open(path_in(output, "previews", video.name, "png"), "wb") as file:
+                file.write(picture)
+            os.replace(path, path_in(output, "data", video.name, extension_of(video.recipe)))
+    return record | {"written": written, "figures": figures, "warnings": warnings,
+                     "versions": versions() | {"decoders": decoders}}
+
+
+def write_record(path, record):
+    """The whole record or none."""
+    with tempfile.NamedTemporaryFile("w", dir=os.path.dirname(path), delete=False, encoding="utf-8") as file:
+        json.dump(record, file, indent=1, sort_keys=True)
+    os.chmod(file.name, 0o644)
+    os.replace(file.name, path)
+
+
+def simulate(video, path):
+    """Writes the events, or tensors, of a video. Returns figures, a picture, warnings, and the decoders."""
+    frames, figures, decoders = Frames(), Figures(), set()
+    is_tensors = video.recipe.output == TENSORS
+    writer = f"eventtensor {video.recipe.tensors} ! {TENSOR_CAPS} ! appsink name=tensors sync=false async=false"
+    if not is_tensors:
+        writer = f"{WRITERS['.' + video.recipe.output]} {SAME_BYTES.get(video.recipe.output, '')} async=false"
+
+    def note(element):
+        factory = element.get_factory()
+        if factory and "Decoder" in factory.get_metadata("klass"):
+            decoders.add(f"{factory.get_name()} {factory.get_plugin().get_version()}")
+
+    # One thread, since there is a job for each processor.
+    with video.playing(f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}", threads=1) as pipeline:
+        pipeline.on_element(note)
+        pipeline.gaps_as_buffers()
+        frames.watch(pipeline.element("decoded").get_static_pad("sink"))
+        array = None
+        if is_tensors:
+            array = NpyFile(path)
+        else:
+            pipeline.element("file").set_property("location", path)
+        for sample in pipeline.samples():
+            figures.take(events_of(sample))
+            while array and (tensor := pipeline.element("tensors").try_pull_sample(0)):
+                array.append(tensor_of(tensor))
+        for tensor in pipeline.samples("tensors") if array else ():
+            array.append(tensor_of(tensor))
+        pipeline.wait()
+        duration = 0.0
+        with contextlib.suppress(ec.PipelineError):
+            duration = pipeline.duration()
+    frames.check(video.recipe.min_frames, duration)
+    if figures.chunks == 0:
+        raise Refused("too short: nothing is left of it after the filters")
+    if array:
+        array.close()
+    return figures.described(len(frames.times)), png_of(figures.busiest()), frames.warnings(), sorted(decoders)
+
+
+def versions():
+    plugin = Gst.Registry.get().find_plugin("eventsim")
+    return {"eventsim": plugin.get_version() if plugin else "", "gstreamer": Gst.version_string()}
+
+
+def png_of(events):
+    """A picture of events: ON blue, OFF red, on white; as PNG."""
+    side = max(-(-events.width // PREVIEW_SIDE), -(-events.height // PREVIEW_SIDE), 1)
+    width, height = -(-events.width // side), -(-events.height // side)
+    place = (events["y"] // side).astype(np.int64) * width + events["x"] // side
+    on, off = (np.bincount(place[events["p"] == polarity], minlength=width * height) for polarity in (True, False))
+    # A cell is in full colour with an event per column of it.
+    on, off = (np.minimum(count / side, 1).reshape(height, width) for count in (on, off))
+    colours = 1 - np.stack([on, np.maximum(on, off), off], axis=-1)
+    rows = np.round(colours * 255).astype(np.uint8).reshape(height, -1)
+    packed = zlib.compress(np.pad(rows, ((0, 0), (1, 0))).tobytes())  # each row begins with its filter, none
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+            + chunk(b"IDAT", packed) + chunk(b"IEND", b""))

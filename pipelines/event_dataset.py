@@ -1,0 +1,324 @@
+#!/usr/bin/python3 -B
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Makes a data set of events from videos or folders of pictures, as a recipe says:
+
+    event-dataset recipe.yaml
+    event-dataset verify recipe.yaml
+
+The folder beside the recipe, of its name, gets the events, a manifest of all hashes, lists of the parts,
+statistics and a page of pictures. A second call makes only what is missing or has changed. "verify" makes
+the events again, keeps none, and compares their hashes with those of the manifest."""
+import argparse
+import fcntl
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+
+try:
+    import gst_eventcamera as ec
+    from dataset_report import write_reports
+    from dataset_video import extension_of, hash_of, making_of, path_in, record_of, state_of, write_record
+    from gst_eventcamera.recipe import uniform_number
+except ImportError as missing:
+    sys.exit(f"error: {missing}\nOn Debian, install: python3-gst-eventcamera python3-yaml")
+
+HERE = os.path.dirname(os.path.realpath(__file__))
+STEP = re.compile(r"^(\d+) of (\d+) steps")
+MAX_TOLD = 20  # lines about videos of a kind
+
+
+class Progress:
+    """One line, overwritten, on a terminal; a line per tenth of the videos elsewhere."""
+
+    def __init__(self, count):
+        self._count = count
+        self._began = time.monotonic()
+        self._told = 0
+        self._terminal = sys.stderr.isatty()
+
+    def tell(self, done):
+        done = min(done, self._count)
+        if not self._terminal and done * 10 // self._count == self._told:
+            return
+        self._told = done * 10 // self._count
+        left = (self._count - done) * (time.monotonic() - self._began) / max(done, 1)
+        text = (f"{done} of {self._count} videos, about {left // 3600:.0f}:{left // 60 % 60:02.0f}:{left % 60:02.0f}"
+                " left")
+        print(f"\r{text:<78}" if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr,
+              flush=True)
+
+    def end(self):
+        if self._terminal:
+            print(file=sys.stderr)
+
+
+def options():
+    parser = argparse.ArgumentParser(
+        prog="event-dataset", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("words", nargs="+", metavar="[verify] RECIPE", help="a file of YAML")
+    parser.add_argument("-o", "--output", metavar="FOLDER",
+                        help="folder of the data set (default: that of the recipe's name, beside it)")
+    parser.add_argument("--cores", type=int, default=os.cpu_count(), metavar="N",
+                        help="videos at a time on this machine (default: one for each processor)")
+    parser.add_argument("--retries", type=int, default=2, metavar="N",
+                        help="how often a job that failed is tried again (default: %(default)s)")
+    parser.add_argument("--profile", metavar="PROFILE",
+                        help="Snakemake profile: \"slurm\" runs the jobs on a Slurm cluster; others are a folder, or"
+                        " a name that Snakemake knows")
+    parser.add_argument("--part", type=part_of_all, default=(1, 1), metavar="K/N",
+                        help="make only the K-th of N parts, such as 3/100, for data sets of more than 10,000 videos")
+    parser.add_argument("--manifest", metavar="FILE",
+                        help="the manifest that verify compares with (default: that of the folder)")
+    parser.add_argument("--video", nargs=2, metavar=("NAME", "FILE"), help="make one video only, as the jobs do")
+    parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
+                        help="print the version and exit")
+    chosen = parser.parse_args()
+    chosen.verify = chosen.words[0] == "verify" and len(chosen.words) > 1
+    if len(chosen.words) != 1 + chosen.verify:
+        parser.error(f"give one recipe, not {' '.join(chosen.words)}")
+    if chosen.cores < 1 or chosen.retries < 0:
+        parser.error("--cores is at least 1, and --retries at least 0")
+    chosen.recipe = chosen.words[-1]
+    chosen.output = os.path.abspath(chosen.output or os.path.splitext(chosen.recipe)[0])
+    return chosen
+
+
+def part_of_all(text):
+    match = re.fullmatch(r"(\d+)/(\d+)", text)
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
+        raise argparse.ArgumentTypeError(f"{text} is not a part such as 3/100")
+    return int(match[1]), int(match[2])
+
+
+# records
+
+
+def read_json(path):
+    """None if there is no such file, or not whole."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            return json.load(file)
+    except (FileNotFoundError, ValueError):
+        return None
+
+
+def reason_to_make(video, record, output):
+    """Why a video has to be made; empty if it need not."""
+    if not record or "written" not in record:
+        return "missing"
+    try:
+        written = os.path.getsize(os.path.join(output, record["written"]["path"]))
+    except FileNotFoundError:
+        return "missing"
+    if written != record["written"]["size"]:
+        return "its events are not those that were written"
+    if record["making"] != making_of(video):
+        return "the recipe has changed"
+    if record["state"] != state_of(video.path) and record["input"]["sha256"] != hash_of(video.path):
+        return "the input has changed since the manifest"
+    return ""
+
+
+def stale_videos(videos, records, output):
+    """The videos that have to be made, without their records; says which have changed."""
+    stale = []
+    for video in videos:
+        reason = reason_to_make(video, records[video.name], output)
+        if not reason:
+            continue
+        stale.append(video)
+        if reason != "missing":
+            print(f"{video.name}: {reason}; making it again", file=sys.stderr)
+        for path in (path_in(output, "records", video.name, "json"),
+                     path_in(output, "data", video.name, extension_of(video.recipe))):
+            if os.path.exists(path):
+                os.remove(path)
+    return stale
+
+
+# the workflow
+
+
+def locked(output, part):
+    """Refuses to work beside another process; returns what keeps others away until it is closed."""
+    lock = open(os.path.join(output, ".lock-{}-of-{}".format(*part)), "w", encoding="utf-8")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise RuntimeError(f"another event-dataset works in {output}") from None
+    return lock
+
+
+def profile_folder(profile):
+    """Our own profiles by their names; Snakemake finds others."""
+    own = os.path.join(HERE, profile)
+    return own if os.path.isfile(os.path.join(own, "config.yaml")) and os.sep not in profile else profile
+
+
+def make(chosen, videos, lock):
+    """Runs a job for each video. Those that fail leave no record."""
+    output, command = chosen.output, [os.path.realpath(__file__)]
+    jobs = os.path.join(output, ".jobs-{}-of-{}.json".format(*chosen.part))
+    with open(jobs, "w", encoding="utf-8") as file:
+        json.dump({video.name: os.path.abspath(video.path) for video in videos}, file)
+    command += ["verify"] * chosen.verify + [os.path.abspath(chosen.recipe), "--output", output]
+    where = ["--cores", str(chosen.cores)]
+    if chosen.profile:
+        where = ["--profile", profile_folder(chosen.profile)]
+    snakemake = subprocess.Popen(
+        ["snakemake", "--snakefile", os.path.join(HERE, "dataset.smk"), "--directory", output, *where,
+         "--nolock", "--keep-going", "--rerun-incomplete", "--retries", str(chosen.retries), "--nocolor",
+         "--rerun-triggers", "mtime", "--drop-metadata", "--scheduler", "greedy",
+         "--config", f"jobs={jobs}", f"records={records_folder(chosen)}", f"command={shlex.join(command)}"],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=[lock.fileno()])
+    progress = Progress(len(videos))
+    try:
+        with open(os.path.join(output, "snakemake.log"), "w", encoding="utf-8") as log:
+            for line in snakemake.stdout:
+                log.write(line)
+                log.flush()
+                if step := STEP.match(line):
+                    progress.tell(int(step[1]))
+    finally:
+        progress.end()
+        snakemake.wait()  # it ends its jobs at Ctrl-C
+    return snakemake.returncode
+
+
+def records_folder(chosen):
+    return "verified" if chosen.verify else "records"
+
+
+def failure_of(output, name):
+    """The last line that a job wrote."""
+    try:
+        with open(os.path.join(output, "logs", f"{name}.log"), encoding="utf-8", errors="replace") as file:
+            lines = file.read().strip().splitlines()
+    except FileNotFoundError:
+        lines = []
+    return lines[-1] if lines else "its job did not start or was killed; see snakemake.log"
+
+
+def tell(kind, lines):
+    for line in lines[:MAX_TOLD]:
+        print(f"{kind}: {line}")
+    if len(lines) > MAX_TOLD:
+        print(f"{kind}: and {len(lines) - MAX_TOLD} more")
+
+
+def records_of(chosen, videos):
+    return {video.name: read_json(os.path.join(chosen.output, records_folder(chosen), f"{video.name}.json"))
+            for video in videos}
+
+
+# the commands
+
+
+def make_one(chosen, recipe):
+    name, path = chosen.video
+    video = ec.DatasetVideo(recipe, name, path)
+    record = record_of(video, chosen.output, keep=not chosen.verify)
+    write_record(path_in(chosen.output, records_folder(chosen), name, "json"), record)
+
+
+def selected(chosen, videos):
+    number, count = chosen.part
+    return [video for video in videos if int(uniform_number(video.name, "part") * count) == number - 1]
+
+
+def make_all(chosen, recipe):
+    """The exit status."""
+    videos = list(ec.Dataset(recipe))
+    os.makedirs(chosen.output, exist_ok=True)
+    with locked(chosen.output, chosen.part) as lock:
+        if chosen.part == (1, 1):
+            shutil.rmtree(os.path.join(chosen.output, "unfinished"), ignore_errors=True)
+        mine = selected(chosen, videos)
+        stale = stale_videos(mine, records_of(chosen, mine), chosen.output)
+        status = make(chosen, stale, lock) if stale else 0
+        records = records_of(chosen, videos)
+        write_reports(chosen.output, recipe, videos, records)
+    refused = [f"{name}: {record['refused']}" for name, record in records.items() if record and "refused" in record]
+    failed = [video.name for video in stale if not records[video.name]]
+    tell("warning", [f"{name}: {warning}" for name, record in records.items() if record
+                     for warning in record.get("warnings", ())])
+    tell("refused", refused)
+    tell("failed", [f"{name}: {failure_of(chosen.output, name)}" for name in failed])
+    made = sum(1 for video in stale if records[video.name] and "written" in records[video.name])
+    absent = sum(1 for record in records.values() if not record) - len(failed)
+    print(f"{len(videos)} videos: {made} made, {len(mine) - len(stale)} unchanged, {len(refused)} refused,"
+          f" {len(failed)} failed, {absent} not made yet; {chosen.output}")
+    if status != 0 and not failed:
+        raise RuntimeError(f"Snakemake ended with status {status}; see {chosen.output}/snakemake.log")
+    return 1 if refused or failed else 0
+
+
+def verify_all(chosen, recipe):
+    """The exit status."""
+    manifest = read_json(chosen.manifest or os.path.join(chosen.output, "manifest.json"))
+    if not manifest or not isinstance(manifest.get("videos"), list):
+        raise RuntimeError(f"{chosen.manifest or chosen.output}: no manifest; make the data set first, or give one"
+                           " with --manifest")
+    expected = {one["name"]: one for one in manifest["videos"]}
+    videos = selected(chosen, ec.Dataset(recipe))
+    present = [video for video in videos if video.name in expected]
+    os.makedirs(chosen.output, exist_ok=True)
+    with locked(chosen.output, chosen.part) as lock:
+        shutil.rmtree(os.path.join(chosen.output, "verified"), ignore_errors=True)
+        if present:
+            make(chosen, present, lock)
+        records = records_of(chosen, present)
+    differences = [f"{name}: not among the videos" for name in expected
+                   if chosen.part == (1, 1) and name not in records]
+    differences += [f"{video.name}: not in the manifest" for video in videos
+                    if video.name not in expected and video.name not in manifest.get("refused", {})]
+    for name, record in records.items():
+        difference = difference_of(expected[name], record) if record else failure_of(chosen.output, name)
+        if difference:
+            differences.append(f"{name}: {difference}")
+    tell("different", differences)
+    print(f"{len(present)} videos of the manifest compared, {len(differences)} differences")
+    return 1 if differences else 0
+
+
+def difference_of(expected, record):
+    """What differs first, from input to output; empty if nothing does."""
+    if expected["input"]["sha256"] != record["input"]["sha256"]:
+        return "the input has changed since the manifest"
+    if expected["making"] != record["making"]:
+        return f"made by \"{record['making']['line']}\" instead of \"{expected['making']['line']}\""
+    if "refused" in record:
+        return record["refused"]
+    if expected["written"]["sha256"] == record["written"]["sha256"]:
+        return ""
+    if expected["versions"] != record["versions"]:
+        return f"other events, by {record['versions']} instead of {expected['versions']}"
+    return "other events, by the same versions"
+
+
+def main():
+    chosen = options()
+    recipe = ec.Recipe.load(chosen.recipe)
+    if chosen.video:
+        make_one(chosen, recipe)
+        return 0
+    if not shutil.which("snakemake"):
+        raise RuntimeError("Snakemake is missing; on Debian, install: snakemake")
+    return verify_all(chosen, recipe) if chosen.verify else make_all(chosen, recipe)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except ec.RecipeError as failure:
+        print(f"error: {failure}", file=sys.stderr)
+        sys.exit(2)
+    except (RuntimeError, OSError) as failure:
+        sys.exit(f"error: {failure}")
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the same command goes on from here")

@@ -1,0 +1,356 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""event-dataset and ec.Dataset: data sets from recipes, made, continued, verified, and on the fly."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamera-1.0.typelib")):
+    print("built without introspection: no Python")
+    sys.exit(77)
+sys.path.insert(0, os.path.join(os.environ["BUILD"], "pipelines"))
+
+import gst_eventcamera as ec
+import numpy as np
+from dataset_video import hash_of, record_of
+from gst_eventcamera.recipe import OUTPUTS, Distribution, uniform_number
+
+FOLDER = tempfile.TemporaryDirectory()
+PROGRAM = os.path.join(os.environ["BUILD"], "pipelines", "event-dataset")
+RECIPE = """
+seed: 7
+videos: "videos/**/*.mkv"
+simulator: eventsim-dvs preset=davis346
+parameters:
+  positive-threshold: {normal: [0.2, 0.03]}
+  negative-threshold: {uniform: [0.8, 1.2], relative-to: positive-threshold}
+filters: eventdenoise
+output: npz
+split: {train: 0.6, test: 0.4}
+"""
+
+
+def path_of(name):
+    path = os.path.join(FOLDER.name, name)
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    return path
+
+
+def launch(line):
+    subprocess.run(f"{os.environ['GST_LAUNCH']} -q {line}", shell=True, check=True)
+
+
+def make_video(name, frames=8, more=""):
+    path = path_of(name)
+    launch(f"videotestsrc pattern=ball num-buffers={frames} ! video/x-raw,format=I420,width=64,height=48,framerate=25/1"
+           f" {more} ! avenc_ffv1 ! matroskamux ! filesink {shlex.quote('location=' + path)}")
+    return path
+
+
+def recipe_of(folder, text=RECIPE):
+    path = path_of(f"{folder}/recipe.yaml")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+    return path
+
+
+def event_dataset(*words, status=0):
+    """What it prints."""
+    done = subprocess.run([PROGRAM, *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=300)
+    assert done.returncode == status, f"status {done.returncode} of {words}:\n{done.stdout}"
+    return done.stdout
+
+
+def load(folder, name):
+    with open(path_of(f"{folder}/recipe/{name}"), encoding="utf-8") as file:
+        return json.load(file)
+
+
+def hashes(folder):
+    return {one["name"]: one["written"]["sha256"] for one in load(folder, "manifest.json")["videos"]}
+
+
+class DataSets(unittest.TestCase):
+    def test_are_made_continued_and_verified(self):
+        folder = "a päth's/set"
+        for name in ("walk/two words", "run/three's", "run/four"):
+            make_video(f"{folder}/videos/{name}.mkv")
+        recipe = recipe_of(folder)
+        printed = event_dataset(recipe)
+        self.assertIn("3 videos: 3 made, 0 unchanged, 0 refused, 0 failed", printed)
+        self.assertRegex(printed, r"\d of 3 videos, about 0:00:\d\d left")
+        made = hashes(folder)
+        self.assertEqual(sorted(made), ["run/four", "run/three's", "walk/two words"])
+        for one in load(folder, "manifest.json")["videos"]:
+            self.assertEqual(one["input"]["sha256"], hash_of(path_of(f"{folder}/{one['input']['path']}")))
+            self.assertEqual(one["written"]["sha256"], hash_of(path_of(f"{folder}/recipe/{one['written']['path']}")))
+            self.assertEqual(one["figures"]["frames"], 8)
+        self.check_reports(folder, made)
+        self.check_on_the_fly(folder, recipe)
+
+        self.assertIn("0 made, 3 unchanged", event_dataset(recipe))
+        make_video(f"{folder}/videos/run/four.mkv", frames=9)
+        os.remove(path_of(f"{folder}/recipe/data/walk/two words.npz"))
+        printed = event_dataset(recipe)
+        self.assertIn("run/four: the input has changed since the manifest", printed)
+        self.assertIn("2 made, 1 unchanged", printed)
+        again = hashes(folder)
+        self.assertNotEqual(again.pop("run/four"), made.pop("run/four"))
+        self.assertEqual(again, made)
+
+        self.assertIn("3 videos of the manifest compared, 0 differences", event_dataset("verify", recipe))
+        manifest = load(folder, "manifest.json")
+        manifest["videos"][0]["written"]["sha256"] = "0" * 64
+        manifest["videos"][1]["input"]["sha256"] = "0" * 64
+        with open(path_of(f"{folder}/other.json"), "w", encoding="utf-8") as file:
+            json.dump(manifest, file)
+        printed = event_dataset("verify", recipe, "--manifest", path_of(f"{folder}/other.json"), status=1)
+        self.assertIn("run/four: other events, by the same versions", printed)
+        self.assertIn("run/three's: the input has changed since the manifest", printed)
+
+    def check_reports(self, folder, made):
+        parts = {}
+        for part in ("train", "test"):
+            with open(path_of(f"{folder}/recipe/{part}.txt"), encoding="utf-8") as file:
+                parts[part] = file.read().splitlines()
+        self.assertEqual(sorted(parts["train"] + parts["test"]), sorted(f"data/{name}.npz" for name in made))
+        statistics = load(folder, "statistics.json")
+        self.assertEqual(statistics["all"]["videos"], 3)
+        self.assertEqual(statistics["all"]["frames"], 24)
+        with open(path_of(f"{folder}/recipe/preview.html"), encoding="utf-8") as file:
+            page = file.read()
+        self.assertEqual(page.count("<img"), 3)
+        self.assertNotIn("//", page)  # no address of another machine
+        self.assertIn('src="previews/walk/two%20words.png"', page)
+        picture = path_of(f"{folder}/recipe/previews/run/four.png")
+        launch(f"filesrc {shlex.quote('location=' + picture)} ! pngdec ! fakesink")
+
+    def check_on_the_fly(self, folder, recipe):
+        dataset = ec.Dataset(recipe)
+        self.assertEqual([video.name for video in dataset], sorted(hashes(folder)))
+        for video in dataset:
+            events = np.concatenate(list(video))
+            with np.load(path_of(f"{folder}/recipe/data/{video.name}.npz")) as stored:
+                for field in "txyp":
+                    self.assertTrue(np.array_equal(stored[field], events[field]))
+        names = {part: [video.name for video in ec.Dataset(recipe, part)] for part in ("train", "test")}
+        self.assertEqual(sorted(names["train"] + names["test"]), sorted(hashes(folder)))
+        with self.assertRaises(ValueError):
+            ec.Dataset(recipe, "validation")
+
+    def test_report_what_cannot_be_used(self):
+        make_video("bad/videos/good.mkv")
+        make_video("bad/videos/short.mkv", frames=1)
+        make_video("bad/videos/uneven.mkv", more="! identity drop-probability=0.4")
+        with open(make_video("bad/videos/whole.mkv", frames=100), "rb") as file:
+            whole = file.read()
+        os.remove(path_of("bad/videos/whole.mkv"))
+        with open(path_of("bad/videos/cut.mkv"), "wb") as file:
+            file.write(whole[:len(whole) // 3])
+        with open(path_of("bad/videos/noise.mkv"), "wb") as file:
+            file.write(bytes(range(256)) * 40)
+        printed = event_dataset(recipe_of("bad"), status=1)
+        self.assertIn("refused: short: too short: 1 frames of at least 2", printed)
+        self.assertRegex(printed, "refused: cut: corrupt: its frames end 2.* s before the 4.0 s of the file")
+        self.assertRegex(printed, "refused: noise: corrupt or not supported: .*type")
+        self.assertRegex(printed, "warning: uneven: variable framerate: its frames are 40 to (80|120|160) ms apart")
+        self.assertIn("5 videos: 2 made, 0 unchanged, 3 refused, 0 failed", printed)
+        self.assertEqual(sorted(hashes("bad")), ["good", "uneven"])
+        self.assertEqual(sorted(load("bad", "manifest.json")["refused"]), ["cut", "noise", "short"])
+
+    def test_go_on_after_a_kill(self):
+        for number in range(4):
+            make_video(f"killed/videos/{number}.mkv")
+        recipe = recipe_of("killed")
+        first = path_of("killed/recipe/records/0.json")
+        program = subprocess.Popen([PROGRAM, recipe, "--cores", "1"], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL, start_new_session=True)
+        while not os.path.exists(first):
+            self.assertIsNone(program.poll())
+            time.sleep(0.02)
+        os.killpg(program.pid, signal.SIGKILL)
+        program.wait()
+        before = os.stat(first).st_mtime_ns
+        missing = sum(not os.path.exists(path_of(f"killed/recipe/records/{number}.json")) for number in range(4))
+        self.assertGreater(missing, 0)
+        self.assertIn(f"4 videos: {missing} made, {4 - missing} unchanged", event_dataset(recipe))
+        self.assertEqual(os.stat(first).st_mtime_ns, before)
+        self.assertEqual(len(hashes("killed")), 4)
+        self.assertEqual(os.listdir(path_of("killed/recipe/unfinished")), [])
+
+    def test_report_failures_without_losing_the_rest(self):
+        for name in ("one", "two"):
+            make_video(f"failing/videos/{name}.mkv")
+        os.makedirs(path_of("failing/recipe/previews/one.png"))
+        printed = event_dataset(recipe_of("failing"), "--retries", "0", status=1)
+        self.assertRegex(printed, "failed: one: .*Is a directory")
+        self.assertIn("1 made, 0 unchanged, 0 refused, 1 failed", printed)
+        os.rmdir(path_of("failing/recipe/previews/one.png"))
+        self.assertIn("1 made, 1 unchanged", event_dataset(path_of("failing/recipe.yaml"), "--part", "1/1"))
+
+    def test_are_made_in_parts(self):
+        for number in range(4):
+            make_video(f"parts/videos/{number}.mkv", frames=3)
+        recipe = recipe_of("parts")
+        self.assertRegex(event_dataset(recipe, "--part", "1/2"), "[1-3] not made yet")
+        self.assertIn(" 0 not made yet", event_dataset(recipe, "--part", "2/2"))
+        self.assertEqual(len(hashes("parts")), 4)
+
+
+class Outputs(unittest.TestCase):
+    def records(self, text):
+        path = recipe_of("outputs", text)
+        make_video("outputs/videos/ball.mkv", frames=12)
+        video = ec.Dataset(path)[0]
+        return video, [record_of(video, path_of("outputs/made/")) for _ in range(2)]
+
+    def test_are_the_same_bytes_each_time(self):
+        for output in OUTPUTS:
+            with self.subTest(output):
+                video, records = self.records(RECIPE.replace("npz", output))
+                self.assertEqual(records[0]["written"]["sha256"], records[1]["written"]["sha256"])
+                events = sum(len(chunk) for chunk in video.events())
+                self.assertEqual(records[0]["figures"]["events"], events)
+                self.assertGreater(events, 500)
+                if output not in ("tensors", "csv", "txt"):
+                    self.assertEqual(len(ec.read(path_of(f"outputs/made/data/ball.{output}"))), events)
+
+    def test_of_tensors_are_those_on_the_fly(self):
+        video, _ = self.records(RECIPE.replace("npz", "tensors\ntensors: bins=3 frame-count=2 data-type=float16"))
+        stored = np.load(path_of("outputs/made/data/ball.npy"))
+        self.assertEqual((stored.shape, stored.dtype), ((6, 3, 48, 64), np.float16))
+        self.assertTrue(np.array_equal(stored, np.stack(list(video))))
+
+    def test_of_pictures_and_moving_windows(self):
+        folder = path_of("pictures/films/first/")
+        launch("videotestsrc pattern=ball num-buffers=11 ! video/x-raw,width=66,height=50 ! jpegenc"
+               f" ! multifilesink location={folder}%d.jpg")  # 2.jpg comes before 10.jpg
+        text = "simulator: eventsim-dvs\noutput: npz\nframerate: 30000/1001\n"
+        film = ec.Dataset(recipe_of("pictures", text + "videos: films/*"))[0]
+        chunks = list(film)
+        self.assertEqual((film.name, len(chunks)), ("first", 10))
+        self.assertAlmostEqual(chunks[-1].end, 10 * 1.001 / 30, places=5)
+        self.assertLess(max(map(len, chunks)), 2 * min(map(len, chunks)))  # no jumps
+
+        text += "window: {width: 30, height: 20, distance: 9}\nvideos: films/first/1.jpg"
+        window = ec.Dataset(recipe_of("pictures", text))[0]
+        record = record_of(window, path_of("pictures/made"))
+        self.assertEqual([record["figures"][key] for key in ("width", "height", "frames")], [30, 20, 37])
+        there = np.concatenate(list(window))
+        self.assertGreater(len(there), 100)
+
+
+class Recipes(unittest.TestCase):
+    def expect(self, error, text):
+        with self.assertRaises(ec.RecipeError) as caught:
+            ec.Dataset(recipe_of("recipes", text))
+        self.assertIn(error, str(caught.exception))
+
+    def test_are_checked(self):
+        make_video("recipes/videos/ball.mkv", frames=2)
+        base = "videos: videos/*\nsimulator: eventsim-dvs\n"
+        self.expect("unknown key vidoes; known are", base + "vidoes: a")
+        self.expect("line 1: seed is given twice", "seed: 1\nseed: 2")
+        self.expect("not a recipe", "- 1")
+        self.expect("not a recipe", "")
+        self.expect("mapping values are not allowed", "a: b: c")
+        self.expect("videos: give a pattern", "simulator: eventsim-dvs")
+        self.expect("videos: no file matches nothing/*", base.replace("videos/", "nothing/"))
+        self.expect("simulator: give an element", "videos: videos/*")
+        self.expect('no element "eventsim-dvd"', base.replace("dvs", "dvd"))
+        self.expect("simulator: give one element", base.replace("dvs", "dvs ! eventdenoise"))
+        self.expect('no property "colour"', base.replace("dvs", "dvs colour=red"))
+        self.expect('no element "eventdim"', base + "filters: eventdim")
+        self.expect('no property "bin"', base + "output: tensors\ntensors: bin=5")
+        self.expect("seed: -1 is not a whole number from 0 to", base + "seed: -1")
+        self.expect("seed: True is not a whole number", base + "seed: true")
+        self.expect("output: avi is none of aedat4, csv", base + "output: avi")
+        self.expect("tensors: only for output: tensors", base + "tensors: bins=5")
+        self.expect("framerate: '30/0' is not frames per second", base + "framerate: 30/0")
+        self.expect("window: give width, height and distance", base + "framerate: 9\nwindow: {width: 3}")
+        self.expect("window: give a framerate", base + "window: {width: 3, height: 3, distance: 3}")
+        self.expect("split: the shares add up to 0.9", base + "split: {train: 0.9}")
+        self.expect("split: '../x' is no name", base + "split: {../x: 1}")
+        self.expect("group: missing )", base + "split: {train: 1}\ngroup: (")
+        self.expect("min-frames: 1 is not a whole number from 2", base + "min-frames: 1")
+        for error, value in {
+            "eventsim-dvs has no such property": "threshold: 1",
+            "99 is not a number from 0.001 to 10": "positive-threshold: 99",
+            "normal needs [mean, standard deviation], not [0.2]": "positive-threshold: {normal: [0.2]}",
+            "normal needs [mean, standard deviation], not [0.2, -1]": "positive-threshold: {normal: [0.2, -1]}",
+            "uniform needs [minimum, maximum], not [0.3, 0.2]": "positive-threshold: {uniform: [0.3, 0.2]}",
+            "log-uniform needs [minimum, maximum], both above 0": "leak-rate: {log-uniform: [0, 1]}",
+            "is not within the property's 0.001 to 10": "positive-threshold: {uniform: [0.1, 20]}",
+            "unknown key gauss": "positive-threshold: {gauss: [1, 2]}",
+            "give one of uniform": "positive-threshold: {}",
+            "neither a value nor a distribution": "positive-threshold: [1, 2]",
+            'could not set property "preset"': "preset: {choice: [gen4, gen5]}",
+            "relative-to needs a parameter": "positive-threshold: {uniform: [1, 2], relative-to: leak-rate}",
+            "hardly ever within 0.001 to 10":
+                "leak-rate: 9000\n  positive-threshold: {uniform: [1, 2], relative-to: leak-rate}",
+        }.items():
+            self.expect(error, base + f"parameters:\n  {value}")
+        self.expect("uniform needs", base + "parameters:\n  leak-rate: {uniform: [.nan, .inf]}")
+        self.expect("is also set by simulator", base.replace("dvs", "dvs seed=1") + "parameters: {seed: 2}")
+        shutil.copy(path_of("recipes/videos/ball.mkv"), path_of("recipes/videos/ball.mp4"))
+        self.expect("have the same name, ball; rename one", base)
+        os.rename(path_of("recipes/videos/ball.mp4"), path_of("recipes/videos/{ball}.mp4"))
+        self.expect("rename it", base)
+        self.assertIn("output: avi is none of",
+                      event_dataset(recipe_of("recipes", base + "output: avi"), status=2))
+
+    def test_of_the_documentation_are_right(self):
+        with open(os.path.join(os.environ["SOURCE"], "docs", "data-sets.md"), encoding="utf-8") as file:
+            texts = re.findall(r"^```yaml\n(.*?)^```", file.read(), re.MULTILINE | re.DOTALL)
+        self.assertEqual(len(texts), 4)
+        for text in texts:
+            ec.Recipe.load(recipe_of("documented", text))
+
+    def test_draw_the_same_everywhere(self):
+        for name in ("a", "b", "c"):
+            make_video(f"draws/videos/{name}.mkv", frames=2)
+        text = RECIPE + "group: '^.'\n"
+        drawn = {video.name: dict(video.parameters) for video in ec.Dataset(recipe_of("draws", text))}
+        self.assertEqual(drawn["a"], {"positive-threshold": 0.242983, "negative-threshold": 0.275159,
+                                      "seed": 2363029605827867})
+        subset = ec.Dataset(recipe_of("draws", text.replace("**/*", "**/[bc]")))
+        self.assertEqual({video.name: dict(video.parameters) for video in subset}, {k: drawn[k] for k in "bc"})
+        self.assertEqual(len({str(one) for one in drawn.values()}), 3)
+        for one in drawn.values():
+            self.assertTrue(0.8 <= one["negative-threshold"] / one["positive-threshold"] <= 1.2)
+        whole = ec.Dataset(recipe_of("draws", text.replace("parameters:", "parameters:\n"
+                           "  preset: {choice: [gen4, davis346]}\n  refractory-period: {uniform: [1000, 9000]}")
+                           .replace(" preset=davis346", "")))[0].parameters
+        self.assertIn(whole["preset"], ("gen4", "davis346"))
+        self.assertIs(type(whole["refractory-period"]), int)
+        self.assertEqual(whole["seed"], drawn["a"]["seed"])
+        # Videos of a group stay together; shares are as asked for.
+        recipe = ec.Recipe.load(recipe_of("draws", RECIPE + "group: 'g\\d+'\n"))
+        self.assertEqual(len({recipe.part_of(f"x_g07_{number}") for number in range(20)}), 1)
+        parts = [recipe.part_of(f"g{number}") for number in range(1000)]
+        self.assertAlmostEqual(parts.count("train") / 1000, 0.6, delta=0.05)
+
+    def test_distributions(self):
+        shares = [uniform_number("key", i) for i in range(2000)]
+        self.assertAlmostEqual(np.mean(shares), 0.5, delta=0.03)
+        normal = [Distribution("normal", (0.2, 0.03)).at(share) for share in shares]
+        self.assertAlmostEqual(np.mean(normal), 0.2, delta=0.003)
+        self.assertAlmostEqual(np.std(normal), 0.03, delta=0.003)
+        logarithmic = [Distribution("log-uniform", (0.01, 1)).at(share) for share in shares]
+        self.assertAlmostEqual(np.median(logarithmic), 0.1, delta=0.02)
+        chosen = [Distribution("choice", ("a", "b")).at(share) for share in shares]
+        self.assertAlmostEqual(chosen.count("a") / 2000, 0.5, delta=0.05)
+        self.assertEqual(Distribution("normal", (3, 0)).at(0.7), 3)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
