@@ -76,7 +76,9 @@ class DatasetVideo:
             else:
                 source = f"filesrc location={quoted(self.path)} ! decodebin"
             pipeline = stack.enter_context(Pipeline(
-                f"{source} ! videoconvert name=decoded ! {LUMA} ! {line} ! {EVENT_CAPS} ! {rest}"))
+                # The line may begin and end with caps, which need an element between them and others.
+                f"{source} ! videoconvert name=decoded ! {LUMA} ! identity ! {line} ! identity ! {EVENT_CAPS}"
+                f" ! {rest}"))
             if recipe.window:
                 _feed(pipeline, _moving_window(self.path, recipe.window), recipe)
             yield pipeline

@@ -230,6 +230,12 @@ class Outputs(unittest.TestCase):
         self.assertEqual((stored.shape, stored.dtype), ((6, 3, 48, 64), np.float16))
         self.assertTrue(np.array_equal(stored, np.stack(list(video))))
 
+    def test_of_lines_that_begin_and_end_with_caps(self):
+        frames = "frames: video/x-raw,width=64 ! videoscale ! video/x-raw,width=40,height=30\n"
+        text = RECIPE.replace("eventdenoise", "eventscale ! application/x-event-camera,width=20,height=15") + frames
+        _, records = self.records(text)
+        self.assertEqual([records[0]["figures"][key] for key in ("width", "height")], [20, 15])
+
     def test_of_pictures_and_moving_windows(self):
         folder = path_of("pictures/films/first/")
         launch("videotestsrc pattern=ball num-buffers=11 ! video/x-raw,width=66,height=50 ! jpegenc"
