@@ -26,7 +26,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "pipelines"))
 from event_calibrate import Progress, calibrate, find_lag, fit_thresholds  # noqa: E402
 from event_streams import (  # noqa: E402
-    ON, Gst, Span, compare, delayed, read_mask, read_recording, read_video, simulate, until)
+    Gst, Span, compare, delayed, read_mask, read_recording, read_video, simulate, until)
 from page import replace_tables  # noqa: E402
 
 # The name of each row, and its element.
@@ -242,10 +242,9 @@ def draw(path, scene, data, elements):
             axis.imshow(tile, cmap="gray", vmin=0, vmax=255)
             continue
         kinds = np.zeros((video.height, video.width), np.uint8)
-        rows_of = tile["y_p"] & 0x7FFF
-        on = (tile["y_p"] & ON) != 0
-        kinds[rows_of[~on], tile["x"][~on]] |= 1
-        kinds[rows_of[on], tile["x"][on]] |= 2
+        on = tile["p"]
+        kinds[tile["y"][~on], tile["x"][~on]] |= 1
+        kinds[tile["y"][on], tile["x"][on]] |= 2
         axis.imshow(colours[kinds])
     figure.tight_layout()
     figure.savefig(path)

@@ -9,6 +9,8 @@ import threading
 
 from gi.repository import GLib, Gst
 
+from plugins import find_plugins
+
 SCENE = "videotestsrc is-live=true pattern=ball"
 # By default v4l2src selects the largest frames, which many cameras deliver only a few times a second.
 CAMERA = ("v4l2src name=camera ! video/x-raw,width=[1,640],height=[1,480];"
@@ -34,12 +36,7 @@ def option_parser(program, description, address, port):
 def find_elements(names, packages):
     """Raises RuntimeError if GStreamer lacks a plugin of this project or one of these elements, which
     the Debian `packages` contain."""
-    for plugin in ("eventcam", "eventsim"):
-        if not Gst.Registry.get().find_plugin(plugin):
-            raise RuntimeError(
-                f"GStreamer does not find the plugin {plugin}. In a checkout, enter the development shell:"
-                " meson devenv -C build -w .\nOtherwise install it: the Debian package"
-                f" gstreamer1.0-{plugin}, or as root: meson install -C build")
+    find_plugins()
     if missing := [name for name in names if not Gst.ElementFactory.find(name)]:
         raise RuntimeError(f"GStreamer has no {', '.join(missing)}; on Debian, install: {packages}")
 

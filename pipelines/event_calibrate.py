@@ -19,9 +19,10 @@ import time
 from dataclasses import dataclass, field
 
 # First, since it says which packages are missing.
-from event_streams import (ON, GLib, Gst, Span, compare, counts, delayed, find_plugins, read_mask, read_recording,
-                           read_video, simulate, until)
+from event_streams import (GLib, Gst, Span, compare, counts, delayed, read_mask, read_recording, read_video,
+                           simulate, until)
 import numpy as np
+from plugins import find_plugins
 
 # Thresholds are found when the event counts are this close, relatively; those that only rate other
 # properties, when they are roughly. Where none are, because frames have whole grey levels, the search
@@ -328,7 +329,7 @@ def find_exposure_lead(video, recorded, span):
     recording shows it: a burst of ON events all over the sensor within a fraction of a
     millisecond."""
     times = np.array([frame.time for frame in video.frames]) // 1000
-    on = recorded["t"][(recorded["y_p"] & ON) != 0]
+    on = recorded["t"][recorded["p"]]
     seen = [(frame, on[(on > before) & (on <= frame)])
             for before, frame in zip(times, times[1:])
             if before >= min(span.start, recorded["t"][0]) and frame <= span.end]
@@ -353,8 +354,8 @@ def lag_of_polarities(video, recorded):
     times = np.array([frame.time for frame in video.frames]) / 1000
     greys = [np.log(video.luma(frame).ravel() + 10) for frame in video.frames]
     changes = [after - before for before, after in zip(greys, greys[1:])]
-    place = (recorded["y_p"] & 0x7FFF).astype(np.int64) * video.width + recorded["x"]
-    sign = np.where(recorded["y_p"] & ON, 1.0, -1.0)
+    place = recorded["y"].astype(np.int64) * video.width + recorded["x"]
+    sign = np.where(recorded["p"], 1.0, -1.0)
     spacing = np.median(np.diff(times))
 
     def agreement(lag):

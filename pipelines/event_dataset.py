@@ -24,6 +24,7 @@ try:
     from dataset_report import write_reports
     from dataset_video import extension_of, hash_of, making_of, path_in, record_of, state_of, write_record
     from gst_eventcamera.recipe import uniform_number
+    from plugins import find_plugins
 except ImportError as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gst-eventcamera python3-yaml")
 
@@ -303,6 +304,7 @@ def difference_of(expected, record):
 
 def main():
     chosen = options()
+    find_plugins()
     recipe = ec.Recipe.load(chosen.recipe)
     if chosen.video:
         make_one(chosen, recipe)

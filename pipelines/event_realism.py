@@ -16,9 +16,9 @@ import sys
 from dataclasses import dataclass
 
 # First, since it says which packages are missing.
-from event_streams import (ON, GLib, Gst, Sensor, Span, compare, find_plugins, read_mask, read_recording, read_video,
-                           run)
+from event_streams import GLib, Gst, Sensor, Span, compare, read_mask, read_recording, read_video, samples_of
 import numpy as np
+from plugins import find_plugins
 
 LIMITS = (1, 5, 10)  # of matches, ms
 # How far a figure may be beyond the ceiling, which is an estimate too.
@@ -45,7 +45,7 @@ class Row:
 
 
 def counts_per_pixel(sensor, events):
-    place = (events["y_p"] & (ON - 1)).astype(np.int64) * sensor.width + events["x"]
+    place = events["y"].astype(np.int64) * sensor.width + events["x"]
     return np.bincount(place, minlength=sensor.width * sensor.height).reshape(sensor.height, sensor.width)
 
 
@@ -124,12 +124,11 @@ def picture(counts, most):
     height, width = grey.shape
     rows = np.zeros((height, (width + 3) // 4 * 4), np.uint8)  # GStreamer's strides
     rows[:, :width] = grey
-    encoded = []
-    run("appsrc name=pixels ! pngenc ! appsink name=out sync=false",
-        [("pixels", f"video/x-raw,format=GRAY8,width={width},height={height},framerate=0/1",
-          [Gst.Buffer.new_wrapped(rows.tobytes())])],
-        lambda sample: encoded.append(sample.get_buffer().extract_dup(0, sample.get_buffer().get_size())))
-    return "data:image/png;base64," + base64.b64encode(encoded[0]).decode()
+    pixels = ("pixels", f"video/x-raw,format=GRAY8,width={width},height={height},framerate=0/1",
+              [Gst.Buffer.new_wrapped(rows.tobytes())])
+    encoded, = [sample.get_buffer().extract_dup(0, sample.get_buffer().get_size())
+                for sample in samples_of("appsrc name=pixels ! pngenc ! appsink name=out sync=false", [pixels])]
+    return "data:image/png;base64," + base64.b64encode(encoded).decode()
 
 
 def chart(title, x_title, y_title, curves, logarithmic=(False, False)):
@@ -172,7 +171,7 @@ def chart(title, x_title, y_title, curves, logarithmic=(False, False)):
 
 def intervals_of(sensor, events):
     """The times between successive events of a pixel, at least half a microsecond."""
-    place = (events["y_p"] & (ON - 1)).astype(np.int64) * sensor.width + events["x"]
+    place = events["y"].astype(np.int64) * sensor.width + events["x"]
     order = np.argsort(place, kind="stable")
     same = np.diff(place[order]) == 0
     return np.maximum(np.diff(events["t"][order])[same], 0.5)
@@ -196,7 +195,7 @@ def travels_of(video, span):
 
 def response_curve(sensor, events, travels):
     """Mean number of events of a pixel and polarity, by how far its signal travels."""
-    is_on = (events["y_p"] & ON) != 0
+    is_on = events["p"]
     counts = np.concatenate([counts_per_pixel(sensor, events[part]).ravel() for part in (is_on, ~is_on)])
     travel = np.concatenate([each.ravel() for each in travels])
     edges = 2.0 ** np.arange(-8, 6)

@@ -8,29 +8,23 @@ from dataclasses import dataclass, field, replace
 
 try:
     import gi
+    import gst_eventcamera as ec
     import numpy as np
 
-    gi.require_version("Gst", "1.0")
-    gi.require_version("GstApp", "1.0")
     gi.require_version("GstVideo", "1.0")
-    from gi.repository import GLib, Gst, GstApp, GstVideo  # noqa: F401
+    from gi.repository import GLib, GstVideo  # noqa: F401
+    from gst_eventcamera.events import joined
+    from gst_eventcamera.pipeline import Gst, Pipeline, events_of, quoted
+    from gst_eventcamera.recordings import buffer_of
+    from gst_eventcamera.sources import LUMA, SINK
 except (ImportError, ValueError) as missing:
-    sys.exit(f"error: {missing}\nOn Debian, install: python3-gi python3-numpy gir1.2-gstreamer-1.0"
-             " gir1.2-gst-plugins-base-1.0")
-
-XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
-EVENT = np.dtype([("t", "<i8"), ("x", "<u2"), ("y_p", "<u2")])
-ON = 0x8000
-
+    sys.exit(f"error: {missing}\nOn Debian, install: python3-gst-eventcamera")
 
 # Frames simulated before a span, so that pixels have a history.
 PAST_FRAMES = 5
 
 # Grey levels below white from which on a pixel counts as overexposed, of 255.
 WHITE_MARGIN = 5
-
-# Formats that simulators read without conversion, so the decoder's luma stays as it is.
-LUMA = "video/x-raw,format=(string){GRAY8,I420,YV12,NV12,NV21,Y42B,Y444,GRAY16_LE}"
 
 
 @dataclass
@@ -50,7 +44,7 @@ class Sensor:
         """The events of pixels that the camera has."""
         if self.mask is None:
             return events
-        return events[self.mask[events["y_p"] & (ON - 1), events["x"]]]
+        return events[self.mask[events["y"], events["x"]]]
 
 
 @dataclass
@@ -86,7 +80,7 @@ class Video(Sensor):
         for before, after, first, last in zip(self.frames, self.frames[1:], cuts, cuts[1:]):
             white = self.overexposed(before) & self.overexposed(after)
             part = events[first:last]
-            parts.append(part[~white[part["y_p"] & (ON - 1), part["x"]]])
+            parts.append(part[~white[part["y"], part["x"]]])
         return np.concatenate([*parts, events[cuts[-1]:]])
 
 
@@ -109,64 +103,18 @@ class Span:
 # pipelines
 
 
-def run(launch, feeds=(), take=None):
-    """Plays a pipeline. Each feed is the name of an appsrc, its caps and its buffers; take(sample)
-    is called for every sample of the appsink `out`."""
-    pipeline = Gst.parse_launch(launch)
-    unsuitable = []
-    if decoder := pipeline.get_by_name("decoder"):
-        decoded = pipeline.get_by_name("decoded").get_static_pad("sink")
-        decoder.connect("no-more-pads", lambda _: decoded.is_linked() or unsuitable.append(True))
-    try:
+def samples_of(description, feeds=()):
+    """Plays a pipeline, and yields what its appsink `out` gets. Each feed is the name of an appsrc, its caps and
+    its buffers."""
+    with Pipeline(description) as pipeline:
         for name, caps, _ in feeds:
-            pipeline.get_by_name(name).set_property("caps", Gst.Caps.from_string(caps))
+            pipeline.element(name).set_property("caps", Gst.Caps.from_string(caps))
         pipeline.set_state(Gst.State.PLAYING)
         for name, _, buffers in feeds:
-            source = pipeline.get_by_name(name)
             for buffer in buffers:
-                source.push_buffer(buffer)
-            source.end_of_stream()
-        sink = pipeline.get_by_name("out")
-        bus = pipeline.get_bus()
-        while not sink.is_eos():
-            if sample := sink.try_pull_sample(Gst.SECOND // 5):
-                if take is not None:
-                    take(sample)
-            elif message := bus.pop_filtered(Gst.MessageType.ERROR):
-                error, _ = message.parse_error()
-                raise RuntimeError(f"{message.src.get_name()}: {error.message}")
-            elif unsuitable:
-                raise RuntimeError(f"no video or events in {launch.split(' ! ')[0]}")
-        if message := bus.pop_filtered(Gst.MessageType.ERROR):
-            raise RuntimeError(message.parse_error()[0].message)
-    finally:
-        pipeline.set_state(Gst.State.NULL)
-
-
-def quoted(path):
-    return '"' + path.replace("\\", "\\\\").replace('"', '\\"') + '"'
-
-
-def buffer_of(data, time, duration=None):
-    buffer = Gst.Buffer.new_wrapped(data)
-    buffer.pts = time
-    if duration is not None:
-        buffer.duration = duration
-    return buffer
-
-
-def events_of(buffer):
-    """The events of a buffer, with 64-bit times."""
-    packed = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), XYTP)
-    events = np.empty(len(packed), EVENT)
-    events["t"] = buffer.pts // 1000 + packed["t"].astype("<i8")
-    events["x"] = packed["x"]
-    events["y_p"] = packed["y_p"]
-    return events
-
-
-def joined(parts):
-    return np.concatenate(parts) if parts else np.empty(0, EVENT)
+                pipeline.element(name).push_buffer(buffer)
+            pipeline.element(name).end_of_stream()
+        yield from pipeline.samples()
 
 
 # reading
@@ -202,24 +150,19 @@ def read_pictures(path, start, end):
 def decode(path, start, end):
     """The frames of a time span, and a few before it."""
     video = Video()
-
-    def take(sample):
+    for sample in samples_of(f"filesrc location={quoted(path)} ! decodebin ! videoconvert ! {LUMA} ! {SINK}"):
+        buffer = sample.get_buffer()
         if not video.frames:
             video.caps = sample.get_caps().to_string()
             info = sample.get_caps().get_structure(0)
             video.width, video.height = info.get_value("width"), info.get_value("height")
-            video.origin = sample.get_buffer().pts
-        buffer = sample.get_buffer()
-        if video.frames and video.frames[-1].time - video.origin >= end > 0:
-            return
+            video.origin = buffer.pts
+        elif video.frames[-1].time - video.origin >= end > 0:
+            break
         if buffer.pts - video.origin <= start:
             del video.frames[:-PAST_FRAMES]
         # Decoders have few buffers and wait for them.
         video.frames.append(Frame(buffer.pts, buffer.copy_deep()))
-
-    run(f"filesrc location={quoted(path)} ! decodebin name=decoder"
-        f"  decoder. ! videoconvert name=decoded ! {LUMA}"
-        " ! appsink name=out sync=false max-buffers=4", take=take)
     if not video.frames:
         raise RuntimeError(f"{path}: no video frames")
     return video
@@ -243,29 +186,23 @@ def read_mask(path, sensor):
 
 def read_recording(path, sensor):
     """All events of a file."""
-    parts = []
-
-    def take(sample):
-        info = sample.get_caps().get_structure(0)
-        width, height = info.get_value("width"), info.get_value("height")
-        if sensor.width == 0:
-            sensor.width, sensor.height = width, height
-        if width > sensor.width or height > sensor.height:
-            raise RuntimeError(f"it has {width} x {height} pixels, more than the {sensor.width} x {sensor.height}"
-                               " that it is compared with")
-        parts.append(events_of(sample.get_buffer()))
-
-    reader = "decodebin caps=application/x-event-camera name=decoder  decoder. ! identity"
-    if os.path.splitext(path)[1].lower() in (".csv", ".txt") and sensor.width > 0:
-        # Text files do not store the sensor size.
-        reader = (f"eventcsvdec ! application/x-event-camera,width={sensor.width},height={sensor.height}"
-                  " ! identity")
     try:
-        run(f"filesrc location={quoted(path)} ! {reader} name=decoded ! application/x-event-camera"
-            " ! appsink name=out sync=false max-buffers=4", take=take)
-    except RuntimeError as error:
+        if os.path.splitext(path)[1].lower() in (".csv", ".txt") and sensor.width > 0:
+            # Text files do not store the sensor size.
+            chunks = list(ec.live(f"filesrc location={quoted(path)} ! eventcsvdec"
+                                  f" ! application/x-event-camera,width={sensor.width},height={sensor.height}"
+                                  " ! identity"))
+            events = joined(chunks, sensor.width, sensor.height, 0, 0)
+        else:
+            events = ec.read(path)
+    except ec.PipelineError as error:
         raise RuntimeError(f"{path}: {error}") from error
-    return joined(parts)
+    if sensor.width == 0:
+        sensor.width, sensor.height = events.width, events.height
+    if events.width > sensor.width or events.height > sensor.height:
+        raise RuntimeError(f"{path}: it has {events.width} x {events.height} pixels, more than the {sensor.width} x"
+                           f" {sensor.height} that it is compared with")
+    return events
 
 
 # simulating and comparing
@@ -273,7 +210,6 @@ def read_recording(path, sensor):
 
 def simulate(video, element):
     """The events that an element, with its properties, generates from a video where its frames can show them."""
-    parts = []
     buffers = []
     # A lag may move frames before 0, but a PTS cannot be negative.
     origin = -min(video.frames[0].time // 1000, 0)
@@ -283,39 +219,34 @@ def simulate(video, element):
             Gst.BufferCopyFlags.MEMORY | Gst.BufferCopyFlags.META, 0, frame.buffer.get_size())
         buffer.pts = frame.time + origin * 1000
         buffers.append(buffer)
-    run(f"appsrc name=frames format=time ! {element} ! application/x-event-camera"
-        " ! appsink name=out sync=false", [("frames", video.caps, buffers)],
-        lambda sample: parts.append(events_of(sample.get_buffer())))
-    events = joined(parts)
+    parts = map(events_of, samples_of(
+        f"appsrc name=frames format=time ! {element} ! application/x-event-camera ! appsink name=out sync=false",
+        [("frames", video.caps, buffers)]))
+    events = joined(list(parts), video.width, video.height, 0, 0)
     events["t"] -= origin
     return video.visible(video.of_camera(events))
 
 
 def compare(sensor, recorded, simulated, span, picture=None):
     """The figures of eventcompare over a time span."""
-    def buffers(events):
-        part = span.of(events)
-        packed = np.empty(len(part), XYTP)
-        packed["t"] = part["t"] - span.start
-        packed["x"], packed["y_p"] = part["x"], part["y_p"]
-        return [buffer_of(packed.tobytes(), span.start * 1000, (span.end - span.start) * 1000)]
-
     caps = (f"application/x-event-camera,format=XYTP,width={sensor.width},height={sensor.height},"
             "framerate=0/1")
+    feeds = [(name, caps, [buffer_of(span.of(events), span.start, span.end - span.start)])
+             for name, events in (("recorded", recorded), ("simulated", simulated))]
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "figures.json")
         drawn = f" map={quoted(picture)}" if picture else ""
-        run(f"eventcompare name=compare location={quoted(path)}{drawn}"
-            " ! appsink name=out sync=false"
-            "  appsrc name=recorded format=time ! compare.reference"
-            "  appsrc name=simulated format=time ! compare.candidate",
-            [("recorded", caps, buffers(recorded)), ("simulated", caps, buffers(simulated))])
+        for _ in samples_of(f"eventcompare name=compare location={quoted(path)}{drawn}"
+                            " ! appsink name=out sync=false"
+                            "  appsrc name=recorded format=time ! compare.reference"
+                            "  appsrc name=simulated format=time ! compare.candidate", feeds):
+            pass
         with open(path, encoding="utf-8") as file:
             return json.load(file)
 
 
 def counts(events):
-    on = np.count_nonzero(events["y_p"] & ON)
+    on = np.count_nonzero(events["p"])
     return np.array([on, len(events) - on], float)
 
 
@@ -328,12 +259,3 @@ def until(video, end):
 
 def delayed(video, seconds):
     return replace(video, frames=[replace(frame, time=frame.time + round(seconds * 1e9)) for frame in video.frames])
-
-
-def find_plugins():
-    for plugin in ("eventcam", "eventsim"):
-        if not Gst.Registry.get().find_plugin(plugin):
-            raise RuntimeError(
-                f"GStreamer does not find the plugin {plugin}. In a checkout, enter the development shell:"
-                " meson devenv -C build -w .\nOtherwise install it: the Debian package"
-                f" gstreamer1.0-{plugin}, or as root: meson install -C build")

@@ -223,11 +223,15 @@ def _buffers(events: np.ndarray) -> Iterator[Gst.Buffer]:
     t = np.asarray(events["t"])
     cuts = np.flatnonzero(t[1:] // BUFFER != t[:-1] // BUFFER) + 1
     for part in np.split(np.asarray(events), cuts) if len(events) > 0 else []:
-        start = int(part["t"][0]) // BUFFER * BUFFER
-        packed = np.empty(len(part), XYTP)
-        packed["t"] = part["t"] - start
-        packed["x"] = part["x"]
-        packed["y_p"] = part["y"] | np.where(part["p"], 0x8000, 0).astype("<u2")
-        buffer = Gst.Buffer.new_wrapped(packed.tobytes())
-        buffer.pts, buffer.duration = start * 1000, BUFFER * 1000
-        yield buffer
+        yield buffer_of(part, int(part["t"][0]) // BUFFER * BUFFER, BUFFER)
+
+
+def buffer_of(events: np.ndarray, start: int, duration: int) -> Gst.Buffer:
+    """A buffer of a stream that covers so many microseconds from `start` on, with the events of this time."""
+    packed = np.empty(len(events), XYTP)
+    packed["t"] = events["t"] - start
+    packed["x"] = events["x"]
+    packed["y_p"] = events["y"] | np.where(events["p"], 0x8000, 0).astype("<u2")
+    buffer = Gst.Buffer.new_wrapped(packed.tobytes())
+    buffer.pts, buffer.duration = start * 1000, duration * 1000
+    return buffer
