@@ -333,9 +333,9 @@ class Recipes(unittest.TestCase):
         self.assertEqual(len({str(one) for one in drawn.values()}), 3)
         for one in drawn.values():
             self.assertTrue(0.8 <= one["negative-threshold"] / one["positive-threshold"] <= 1.2)
-        whole = ec.Dataset(recipe_of("draws", text.replace("parameters:", "parameters:\n"
-                           "  preset: {choice: [gen4, davis346]}\n  refractory-period: {uniform: [1000, 9000]}")
-                           .replace(" preset=davis346", "")))[0].parameters
+        more = "parameters:\n  preset: {choice: [gen4, davis346]}\n  refractory-period: {uniform: [1000, 9000]}"
+        more = text.replace(" preset=davis346", "").replace("parameters:", more)
+        whole = ec.Dataset(recipe_of("draws", more))[0].parameters
         self.assertIn(whole["preset"], ("gen4", "davis346"))
         self.assertIs(type(whole["refractory-period"]), int)
         self.assertEqual(whole["seed"], drawn["a"]["seed"])
