@@ -32,14 +32,14 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 #define ELEMENTS(X)                                                                        \
   AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X) ROS_ELEMENTS(X)                       \
   X(eventcompare) X(eventmerge) X(eventoverlay) X(eventrender) X(eventstats)               \
-  X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
+  X(eventatisdec) X(eventcsvdec) X(eventcsvenc) X(eventdatdec) X(eventdatenc) X(eventesdec) X(eventesenc)  \
   X(eventantiflicker) X(eventdenoise) X(eventhotpixel) X(eventratecontrol)                 \
   X(eventcrop) X(eventflip) X(eventmask) X(eventpolarity) X(eventscale) X(eventundistort)  \
   X(eventrefractory) X(eventtensor) X(eventtrail)                                          \
   X(eventdatagramdepay) X(eventdatagrampay)                                                \
   X(eventnpydec) X(eventnpyenc) X(evtdec) X(evtenc) X(evtparse) X(rtpeventdepay) X(rtpeventpay)
 #define TYPE_FINDERS(X)                                                                    \
-  X(aedat) X(eventcsv) X(eventstream) X(hdf5) X(mcap) X(npy) X(npz) X(propheseedat)        \
+  X(aedat) X(atisbin) X(eventcsv) X(eventstream) X(hdf5) X(mcap) X(npy) X(npz) X(propheseedat)        \
   X(propheseeraw) X(rosbag) X(rosbag2)
 // clang-format on
 

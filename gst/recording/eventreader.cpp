@@ -92,7 +92,8 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
                          "Counts since the start or the last seek: events, triggers, frames and "
                          "imu-samples read; corrupt-places where bytes were skipped; and what was "
                          "dropped: outside-events, outside the sensor; late-items, after their "
-                         "buffer was sent; stray-items, at an impossible time",
+                         "buffer was sent; stray-items, at an impossible time. skipped-items "
+                         "are no changes of a pixel: exposures and colours of an Event Stream",
                          GST_TYPE_STRUCTURE,
                          static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_READER, static_cast<GstPluginAPIFlags>(0));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "src/formats/atis/atis_bin.hpp"
 #include "src/formats/little_endian.hpp"
 #include "src/formats/magic.hpp"
 #include "src/formats/prophesee_header.hpp"
@@ -109,6 +110,7 @@ std::optional<Recognised> recognise(Bytes start, std::optional<FileKind> wanted)
   } catch (const UnsupportedFormat&) {
     // Not a text of events, but possibly a user block.
   }
+  if (!after_block && is_atis_bin(start)) return Recognised{FileKind::atis_bin, 0, false};
   return after_block;
 }
 

@@ -11,6 +11,7 @@ namespace eventcamera {
 /// Kinds of files, each with its own reader.
 enum class FileKind : std::uint8_t {
   aedat,
+  atis_bin,
   csv,
   event_stream,
   hdf5,

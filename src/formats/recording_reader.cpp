@@ -574,6 +574,7 @@ RecordingReader::Counts RecordingReader::counts() const {
   const auto& corruption = decoder_->corruption();
   counts.corrupt_places = corruption.places - before_.places;
   counts.outside = corruption.outside - before_.outside;
+  counts.skipped = corruption.skipped - before_.skipped;
   for (const auto& stream : streams_) {
     counts.outside += stream.outside;
     if (!begun_) continue;

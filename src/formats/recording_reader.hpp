@@ -161,6 +161,7 @@ class RecordingReader {
     std::uint64_t imu_samples = 0;
     std::uint64_t corrupt_places = 0;
     std::uint64_t outside = 0;  ///< events outside the sensor
+    std::uint64_t skipped = 0;  ///< what is no change of a pixel
     std::uint64_t late = 0;     ///< events and frames of an interval already returned
     std::uint64_t stray = 0;    ///< events and frames with an erroneous time
   };

@@ -51,6 +51,7 @@ class Batch {
   }
 
   void outside(std::uint64_t events) { corruption_.outside += events; }
+  void skipped(std::uint64_t items) { corruption_.skipped += items; }
 
   AbsoluteEvent* end = nullptr;         ///< end of the events
   const std::uint8_t* start = nullptr;  ///< start of the bytes

@@ -108,7 +108,7 @@ TEST(AedatDemux, SaysWhereTheTableIsWrong) {
 TEST(AedatDemux, SaysWhereSomethingIsNotAedat) {
   const Bytes png{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
   Bytes old;
-  aedat_files::add(old, "#!AER-DAT1.0\r\n#\r\n");
+  aedat_files::add(old, "#!AER-DAT1.1\r\n#\r\n");
   Bytes half = aedat4(steady_events(1'000, 10));
   half.resize(40);
   for (const auto& bytes : {png, old, half, Bytes{}, Bytes{'#'}}) {

@@ -135,6 +135,8 @@ class Kind {
                        std::string(frame_caps);
     const auto events = video + " ! eventsim-frame ! " + event_caps;
     if (name_.ends_with("depay")) return events + " ! " + name_.substr(0, name_.size() - 5) + "pay";
+    if (name_ == "eventatisdec")
+      return "filesrc location=" + in_quotes(recording_files::Folder::path("atis.bin"));
     if (name_ == "evtparse")
       return events + " ! evtenc ! application/x-event-camera, format=(string)EVT3";
     if (pad.takes_frames()) return video;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -70,6 +71,7 @@ class Folder {
     }
     save("aedat2.aedat", eventcamera::aedat_files::aedat2_davis(events, sensor, "DAVIS346"));
     save("aedat3.aedat", eventcamera::aedat_files::aedat3(events, "DAVIS346", 4096));
+    save("atis.bin", atis_bin(events));
     save("ros1.bag", eventcamera::rosbags::of_events(sensor, events, 1000));
     save("ros2.db3", eventcamera::rosbags::db3_of_events(sensor, events, 1000));
     for (const auto& [name, writer] : {std::pair{"a.dat", "eventdatenc ! filesink"},
@@ -86,6 +88,21 @@ class Folder {
                         writer + " location=" + in_quotes(path_ / name));
       EXPECT_TRUE(pipeline.play()) << pipeline.error;
     }
+  }
+
+  /// Those of 240 columns and rows; others do not fit.
+  static Bytes atis_bin(std::span<const AbsoluteEvent> events) {
+    Bytes bytes;
+    for (const auto& event : events) {
+      if (event.x >= 240 || event.y() >= 240) continue;
+      const auto t = event.t - beginning;
+      const int polarity = event.polarity() == Polarity::on ? 0x80 : 0;
+      bytes.insert(bytes.end(),
+                   {static_cast<std::uint8_t>(event.x), static_cast<std::uint8_t>(event.y()),
+                    static_cast<std::uint8_t>(t >> 16 | polarity),
+                    static_cast<std::uint8_t>(t >> 8), static_cast<std::uint8_t>(t)});
+    }
+    return bytes;
   }
 
   void save(const std::string& name, const Bytes& bytes) const {

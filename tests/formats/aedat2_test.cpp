@@ -32,6 +32,31 @@ TEST(Aedat2, Dvs128) {
   pieces::expect_events<Aedat2Decoder>(bytes, events, dvs128);
 }
 
+TEST(Aedat1, Dvs128) {
+  const auto events = random_events::make(dvs128, 30'000, 3, 5, {hour});
+  const auto bytes = aedat_files::aedat1(events);
+  for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}, std::size_t{0}}) {
+    Aedat2Decoder decoder({}, Aedat2Version::one);
+    EXPECT_TRUE(decoded(decoder, bytes, piece).events == events);
+    EXPECT_EQ(decoder.size(), dvs128);
+    EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+    EXPECT_EQ(decoder.corruption().outside, 0U);
+  }
+}
+
+TEST(Aedat1, RecordsAsTheFormatHasThem) {
+  Bytes bytes;
+  aedat_files::add(bytes, "#!AER-DAT1.0\r\n");
+  // Column 118, row 125: OFF; and an external event.
+  for (const std::uint8_t byte :
+       {0x02, 0x13, 0x00, 0x00, 0x01, 0x02, 0x80, 0x00, 0x00, 0x00, 0x01, 0x03})
+    bytes.push_back(byte);
+  Aedat2Decoder decoder({}, Aedat2Version::one);
+  const auto out = decoded(decoder, bytes);
+  EXPECT_EQ(out.events, (std::vector{AbsoluteEvent::at(118, 125, 0x102, Polarity::off)}));
+  EXPECT_EQ(out.triggers, (std::vector<Trigger>{{0x103, 0, true}}));
+}
+
 TEST(Aedat2, AddressesAsTheFormatHasThem) {
   auto bytes = aedat_files::aedat2_header("Davis240C");
   aedat_files::add_record(bytes, 7U << 22 | 3U << 12 | 1U << 11, 1000);

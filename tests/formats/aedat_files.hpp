@@ -105,6 +105,20 @@ inline Bytes aedat2_dvs128(std::span<const AbsoluteEvent> events) {
   return bytes;
 }
 
+// AEDAT 1.0
+
+inline Bytes aedat1(std::span<const AbsoluteEvent> events) {
+  Bytes bytes;
+  add(bytes, "#!AER-DAT1.0\r\n# This is a raw AE data file - do not edit\r\n");
+  for (const auto& event : events) {
+    const auto address = dvs128_address(event);
+    bytes.push_back(static_cast<std::uint8_t>(address >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(address));
+    add_big(bytes, static_cast<std::uint32_t>(event.t));
+  }
+  return bytes;
+}
+
 // AEDAT 3.1
 
 inline Bytes aedat3_header(std::string_view source) {

@@ -22,6 +22,7 @@ inline std::vector<Seed> aedat2_seeds() {
           {"dvs128", aedat_files::aedat2_dvs128(few_events(2, dvs128, 40))},
           {"v2e", aedat_files::aedat2_v2e(few_events(3, davis, 40), davis)},
           {"matlab", aedat_files::aedat2_of_matlab(few_events(4, dvs128, 40))},
+          {"first", aedat_files::aedat1(few_events(5, dvs128, 40))},
           {"empty", aedat_files::aedat2_header("")}};
 }
 

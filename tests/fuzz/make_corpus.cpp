@@ -50,6 +50,18 @@ std::vector<Seed> chunker_seeds() {
   return seeds;
 }
 
+/// For atis_fuzz: events in order, an overflow, and a wrap.
+std::vector<Seed> atis_seeds() {
+  Seed seed{"events", {}};
+  for (std::uint8_t i = 0; i < 60; ++i) {
+    const auto row = static_cast<std::uint8_t>(i == 30 ? 240 : i % 34);
+    seed.bytes.insert(seed.bytes.end(), {static_cast<std::uint8_t>(7 * i % 34), row,
+                                         static_cast<std::uint8_t>(i % 50 << 1 | i << 7),
+                                         static_cast<std::uint8_t>(9 * i), i});
+  }
+  return {seed};
+}
+
 /// For tensor_fuzz: windows of each kind, and tensors of each representation, of a few intervals.
 std::vector<Seed> tensor_seeds() {
   std::vector<Seed> seeds;
@@ -178,6 +190,7 @@ int main(int argc, char** argv) {
     else
       append(seeds_of(format), files[format.name.starts_with("raw_") ? "raw" : format.name]);
   }
+  write(corpus / "atis", atis_seeds());
   write(corpus / "calibration", calibration_seeds());
   write(corpus / "camera_profile", camera_profile_seeds());
   write(corpus / "mask", mask_seeds());

@@ -25,6 +25,18 @@ for ending in "${!types[@]}"; do
   cmp ball.csv "back of $ending.csv" || fail "ball.$ending has other events"
 done
 
+# Formats that are only read, written from their descriptions.
+/usr/bin/python3 "$SOURCE/tests/formats/small_files.py" .
+for name in n-mnist.bin first.aedat atis.es colour.es; do
+  convert $name small.csv
+  cmp $name.lines small.csv || fail "$name has other events"
+  convert --from=0.1 --to=0.2 $name part.csv
+  first=$(sed -n 2p $name.lines | cut -d, -f1)
+  awk -F, -v from=$((first + 100000)) -v to=$((first + 200000)) 'NR == 1 || ($1 >= from && $1 < to)' $name.lines >part.lines
+  cmp part.lines part.csv || fail "a part of $name has other events"
+done
+gst-typefind-1.0 n-mnist.bin | grep -q " - application/x-atis-bin" || fail "n-mnist.bin is not recognised"
+
 # From each format to each.
 for in in "${!types[@]}"; do
   for out in "${!types[@]}"; do

@@ -3,6 +3,7 @@
 #include "elements/eventcam/files/es_origin.hpp"
 #include "elements/eventcam/files/evtformat.hpp"
 #include "gst/recording/eventreader.hpp"
+#include "src/formats/atis/atis_bin.hpp"
 #include "src/formats/dat/dat.hpp"
 #include "src/formats/es/es.hpp"
 #include "src/formats/evt/raw.hpp"
@@ -115,8 +116,10 @@ GST_ELEMENT_REGISTER_DEFINE(eventdatdec, "eventdatdec", GST_RANK_PRIMARY, event_
  * @title: eventesdec
  * @short_description: reads Event Stream files
  *
- * Reads Event Stream 2.0 files with DVS events, or with ATIS events (change events only).
- * Events are output in buffers of #GstEventReader:buffer-duration.
+ * Reads Event Stream 2.0 files with DVS events; with ATIS events, without exposures; and with
+ * colour events, as ON events without colours. `stats` counts what is skipped. Generic events have
+ * no pixel, so their files are refused. Events are output in buffers of
+ * #GstEventReader:buffer-duration.
  *
  * Tools disagree about the position of row 0. If the picture is upside down, as with files of
  * faery, set #GstEventEsDec:origin to `top-left`.
@@ -147,6 +150,36 @@ static const RecordingFormat es = {
     },
 };
 GST_ELEMENT_REGISTER_DEFINE(eventesdec, "eventesdec", GST_RANK_PRIMARY, event_reader_type(es))
+
+/**
+ * SECTION:element-eventatisdec
+ * @title: eventatisdec
+ * @short_description: reads the .bin files of N-MNIST and N-Caltech101
+ *
+ * Reads the `.bin` files of N-MNIST and N-Caltech101, which were recorded with an ATIS: five bytes
+ * an event. They have no signature, so files are recognised by the order of their times, and those
+ * with less than 300 events are not. The sensor size is that of #GstEventAtisDec:width and
+ * #GstEventAtisDec:height, or else that of downstream's caps, or else that of the smallest known
+ * sensor that contains the events. N-MNIST has 34x34 pixels.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 filesrc location=00002.bin ! eventatisdec width=34 height=34 ! evtenc ! filesink
+ * location=two.raw
+ * ]|
+ */
+static const RecordingFormat atis = {
+    .type_name = "GstEventAtisDec",
+    .long_name = "N-MNIST reader",
+    .description = "Reads the .bin files of N-MNIST and N-Caltech101",
+    .caps = "application/x-atis-bin",
+    .add_properties = add_sensor_size,
+    .make_decoder = [](const GstCaps*,
+                       const FormatSettings& settings) -> std::unique_ptr<RecordingDecoder> {
+      return decoded_by(eventcamera::make_atis_bin_decoder(settings.sensor));
+    },
+};
+GST_ELEMENT_REGISTER_DEFINE(eventatisdec, "eventatisdec", GST_RANK_PRIMARY, event_reader_type(atis))
 
 /**
  * SECTION:element-eventcsvdec
@@ -278,8 +311,8 @@ GST_ELEMENT_REGISTER_DEFINE(eventhdf5dec, "eventhdf5dec", GST_RANK_PRIMARY, even
  * @title: aedatdemux
  * @short_description: reads AEDAT, the files of DAVIS and DVS cameras
  *
- * Splits an AEDAT 4 file into its event streams and video streams. AEDAT 2.0 and 3.1 are read as
- * one event stream. Triggers and IMU samples are sent with the events of `events_0`, for writers
+ * Splits an AEDAT 4 file into its event streams and video streams. AEDAT 1.0, 2.0 and 3.1 are read
+ * as one event stream. Triggers and IMU samples are sent with the events of `events_0`, for writers
  * that store them.
  *
  * PTS are the times of the file, so rewriting a file preserves its times. The segments of all
@@ -308,7 +341,7 @@ static const RecordingFormat aedat = {
     .type_name = "GstAedatDemux",
     .long_name = "AEDAT demuxer",
     .description = "Reads events and frames from AEDAT files",
-    .caps = "application/x-aedat, version = (int) { 2, 3, 4 }",
+    .caps = "application/x-aedat, version = (int) { 1, 2, 3, 4 }",
     .has_many_streams = true,
     .has_triggers = true,
     .add_properties = add_sensor_size,

@@ -37,6 +37,8 @@ static void find_kind(GstTypeFind* find, gpointer media_type) {
                                 nullptr, const_cast<char*>(media_type), nullptr)
 
 REGISTER(aedat, aedat, "application/x-aedat", "aedat,aedat4", GST_RANK_PRIMARY)
+// Without the extension .bin: it would do where the content does not.
+REGISTER(atisbin, atis_bin, "application/x-atis-bin", nullptr, GST_RANK_SECONDARY)
 REGISTER(eventcsv, csv, "application/x-event-csv", "csv,txt",
          GST_RANK_SECONDARY)  // after formats with a signature
 REGISTER(eventstream, event_stream, "application/x-es", "es", GST_RANK_PRIMARY)

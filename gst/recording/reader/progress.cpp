@@ -54,7 +54,7 @@ GstStructure* EventReader::stats() {
       "events", G_TYPE_UINT64, counts.events, "triggers", G_TYPE_UINT64, counts.triggers,
       "corrupt-places", G_TYPE_UINT64, counts.corrupt_places, "outside-events", G_TYPE_UINT64,
       counts.outside, "late-items", G_TYPE_UINT64, counts.late, "stray-items", G_TYPE_UINT64,
-      counts.stray, nullptr);
+      counts.stray, "skipped-items", G_TYPE_UINT64, counts.skipped, nullptr);
   if (format_.has_many_streams)
     gst_structure_set(stats, "frames", G_TYPE_UINT64, counts.frames, "imu-samples", G_TYPE_UINT64,
                       counts.imu_samples, nullptr);

@@ -9,8 +9,6 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::size_t record_size = 8;
-
 /// Number of records that determine the layout of addresses.
 constexpr std::size_t layout_records = 1024;
 
@@ -61,6 +59,15 @@ std::optional<SensorSize> size_in(std::string_view line) {
 
 }  // namespace
 
+Aedat2Decoder::Aedat2Decoder(SensorSize assumed, Aedat2Version version)
+    : assumed_(assumed),
+      address_size_(version == Aedat2Version::one ? 2 : 4),
+      record_size_(address_size_ + 4),
+      header_(version == Aedat2Version::one ? "#!AER-DAT1.0" : "#!AER-DAT2.0",
+              "#End Of ASCII Header") {
+  if (version == Aedat2Version::one) layout_ = dvs128_layout;
+}
+
 void Aedat2Decoder::decode(std::span<const std::uint8_t> bytes, Decoded& out) {
   queue_.push(bytes);
   if (header_read_ || read_header()) read_records(out);
@@ -71,12 +78,12 @@ void Aedat2Decoder::finish(Decoded& out) {
   finished_ = true;
   if (!header_read_ && !read_header()) {
     if (header_.in_first_line()) throw header_.wrong_magic();
-    if (header_.in_line()) corruption_.note(queue_.position(), "truncated AEDAT 2.0 header");
+    if (header_.in_line()) corruption_.note(queue_.position(), "truncated AEDAT header");
     end_header();
   }
   read_records(out);
   if (queue_.size() > 0 && !scanning_)
-    corruption_.note(queue_.position(), "truncated AEDAT 2.0 record");
+    corruption_.note(queue_.position(), "truncated AEDAT record");
 }
 
 bool Aedat2Decoder::read_header() {
@@ -124,11 +131,11 @@ bool Aedat2Decoder::find_camera() {
 
 /// Determines the layout from the first addresses. False if more bytes are needed.
 bool Aedat2Decoder::find_layout() {
-  const auto wanted = record_size * layout_records;
+  const auto wanted = record_size_ * layout_records;
   if (queue_.size() < wanted && !finished_) return false;
   const auto bytes = queue_.peek(std::min(queue_.size(), wanted));
   std::vector<std::uint32_t> addresses;
-  for (std::size_t i = 0; i + record_size <= std::min(bytes.size(), wanted); i += record_size)
+  for (std::size_t i = 0; i + record_size_ <= std::min(bytes.size(), wanted); i += record_size_)
     addresses.push_back(record_at(bytes.data() + i).address);
   layout_ = aedat2_layout_of(addresses, of_v2e_);
   return true;
@@ -147,56 +154,56 @@ void Aedat2Decoder::find_size() {
 void Aedat2Decoder::read_records(Decoded& out) {
   if (!find_camera()) return;
   while (!scanning_ || scan()) {
-    const auto bytes = queue_.peek(record_size);
-    const auto count = bytes.size() / record_size;
+    const auto bytes = queue_.peek(record_size_);
+    const auto count = bytes.size() / record_size_;
     std::size_t i = 0;
     for (; i < count; ++i) {
-      const auto record = record_at(bytes.data() + i * record_size);
+      const auto record = record_at(bytes.data() + i * record_size_);
       if (!within_sensor(record.address) || far(record.t)) break;
       append(record, out);
     }
-    queue_.consume(i * record_size);
+    queue_.consume(i * record_size_);
     if (count == 0 || (i < count && !read_odd_record(out))) return;
   }
 }
 
 /// Handles a record with an odd address or time. False if more bytes are needed.
 bool Aedat2Decoder::read_odd_record(Decoded& out) {
-  const auto wanted = record_size * (1 + records_behind);
+  const auto wanted = record_size_ * (1 + records_behind);
   if (queue_.size() < wanted && !finished_) return false;
   const auto bytes = queue_.peek(std::min(queue_.size(), wanted));
-  const auto behind = std::min(wanted, bytes.size()) / record_size - 1;
+  const auto behind = std::min(wanted, bytes.size()) / record_size_ - 1;
   const auto record = record_at(bytes.data());
   bool sound_behind = true;
   for (std::size_t i = 1; i <= behind; ++i)
-    sound_behind &= within_sensor(record_at(bytes.data() + i * record_size).address);
+    sound_behind &= within_sensor(record_at(bytes.data() + i * record_size_).address);
   const bool within = within_sensor(record.address);
   if (!sound_behind) {
-    corruption_.note(queue_.position(), "no AEDAT 2.0 records here");
+    corruption_.note(queue_.position(), "no AEDAT records here");
     queue_.consume(1);
     scanning_ = true;
     return true;
   }
   if (!within)
     ++corruption_.outside;
-  else if (behind > 0 && !far(record_at(bytes.data() + record_size).t))
+  else if (behind > 0 && !far(record_at(bytes.data() + record_size_).t))
     corruption_.note(queue_.position(), "timestamp far from those around it");
   else
     append(record, out);
-  queue_.consume(record_size);
+  queue_.consume(record_size_);
   return true;
 }
 
 /// Skips to the next valid records. False if more bytes are needed.
 bool Aedat2Decoder::scan() {
-  constexpr auto wanted = record_size * sound_records;
+  const auto wanted = record_size_ * sound_records;
   while (true) {
     const auto bytes = queue_.peek(wanted);
     if (bytes.empty()) return false;
     std::optional<std::int32_t> before;
     bool sound = true;
     for (std::size_t i = 0; i < sound_records && sound; ++i) {
-      const auto record = record_at(bytes.data() + i * record_size);
+      const auto record = record_at(bytes.data() + i * record_size_);
       const auto step = std::int64_t{record.t} - before.value_or(record.t);
       sound = within_sensor(record.address) && step >= 0 && step < large_step;
       before = record.t;
@@ -251,8 +258,10 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
                    : AbsoluteEvent::at(size_.width - 1 - x, size_.height - 1 - y, t, polarity));
 }
 
-Aedat2Decoder::Record Aedat2Decoder::record_at(const std::uint8_t* bytes) {
-  return {big_endian(bytes), static_cast<std::int32_t>(big_endian(bytes + 4))};
+Aedat2Decoder::Record Aedat2Decoder::record_at(const std::uint8_t* bytes) const {
+  const bool is_short = address_size_ == 2;
+  return {is_short ? std::uint32_t{bytes[0]} << 8 | bytes[1] : big_endian(bytes),
+          static_cast<std::int32_t>(big_endian(bytes + address_size_))};
 }
 
 }  // namespace eventcamera

@@ -15,14 +15,19 @@
 
 namespace eventcamera {
 
-/// Decodes AEDAT 2.0 of DAVIS cameras, the DVS128 and v2e. Skips frames and IMU samples.
+/// Versions of AEDAT whose records are an address and a time: 1.0 has addresses of 16 bits, of a
+/// DVS128.
+enum class Aedat2Version : std::uint8_t { one, two };
+
+/// Decodes AEDAT 2.0 of DAVIS cameras, the DVS128 and v2e, and AEDAT 1.0. Skips frames and IMU
+/// samples.
 ///
 /// If the header names no camera, the first addresses determine their layout. A sensor size that
 /// neither the header nor the user states stays 0x0, and then events are mirrored.
 class Aedat2Decoder final : public Decoder {
  public:
   /// `assumed` is the sensor size to use if the header states neither that nor the camera.
-  explicit Aedat2Decoder(SensorSize assumed = {}) : assumed_(assumed) {}
+  explicit Aedat2Decoder(SensorSize assumed = {}, Aedat2Version version = Aedat2Version::two);
 
   void decode(std::span<const std::uint8_t> bytes, Decoded& out) override;
   void finish(Decoded& out) override;
@@ -49,13 +54,15 @@ class Aedat2Decoder final : public Decoder {
   bool far(std::int32_t t) const;
   Microseconds unwrapped(std::int32_t t) const;
   void append(const Record& record, Decoded& out);
-  static Record record_at(const std::uint8_t* bytes);
+  Record record_at(const std::uint8_t* bytes) const;
 
   const SensorSize assumed_;
+  const std::size_t address_size_;  ///< in bytes
+  const std::size_t record_size_;
   ByteQueue queue_;
   bool finished_ = false;
 
-  AedatHeader header_{"#!AER-DAT2.0", "#End Of ASCII Header"};
+  AedatHeader header_;
   bool of_v2e_ = false;
   bool header_read_ = false;
   std::uint64_t data_at_ = 0;

@@ -57,9 +57,12 @@ bool AedatDecoder::find_version() {
     reader_ = std::make_unique<OneStreamDecoder>(std::make_unique<Aedat3Decoder>());
   else if (version == "2.0")
     reader_ = std::make_unique<OneStreamDecoder>(std::make_unique<Aedat2Decoder>(assumed_));
+  else if (version == "1.0")
+    reader_ = std::make_unique<OneStreamDecoder>(
+        std::make_unique<Aedat2Decoder>(assumed_, Aedat2Version::one));
   else
     throw UnsupportedFormat("this is AEDAT " + std::string(version) +
-                            "; only versions 4.0, 3.1 and 2.0 are supported");
+                            "; only versions 4.0, 3.1, 2.0 and 1.0 are supported");
   version_ = version;
   if (source_ != nullptr) reader_->open(*source_);
   reader_->push(start_);

@@ -53,6 +53,7 @@ class EsEventDecoder final : public UnitDecoder {
     const auto rows = rows_;
     auto t = t_;
     std::uint64_t outside = 0;
+    std::uint64_t exposures = 0;
     while (from < to && event < full) {
       const std::uint32_t byte = *from;
       const auto step = byte >> flag_bits;
@@ -73,10 +74,55 @@ class EsEventDecoder final : public UnitDecoder {
                 static_cast<std::uint16_t>(row | ((byte & on) != 0 ? 0x8000 : 0))};
       event += is_change & inside;
       outside += static_cast<std::uint64_t>(is_change & ~inside);
+      exposures += static_cast<std::uint64_t>(1 - is_change);
     }
     t_ = t;
     batch.end = event;
     batch.outside(outside);
+    batch.skipped(exposures);
+    return from;
+  }
+
+  State state() const override { return {static_cast<Microseconds>(t_), 0}; }
+  void restore(const State& state) override { t_ = static_cast<std::uint64_t>(state.clock); }
+
+ private:
+  Bounds bounds_;
+  Rows rows_;
+  std::uint64_t t_ = 0;
+};
+
+/// An event is a byte with the microseconds since the last event, x and y with 16 bits each, and
+/// red, green and blue. The two largest numbers are a byte alone. A change of colour has no
+/// polarity: it is ON, and its colour is skipped.
+class EsColourDecoder final : public UnitDecoder {
+ public:
+  EsColourDecoder(SensorSize size, EsOrigin origin)
+      : bounds_(size, max_side), rows_(size.height, origin) {}
+
+  const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
+                           Batch& batch) override {
+    constexpr std::uint8_t reset = 0xfe;
+    constexpr std::uint8_t overflow = 0xff;
+    constexpr std::ptrdiff_t event_size = 8;
+    while (from < to && batch.end < batch.full()) {
+      if (*from >= reset) {
+        if (*from == overflow) t_ += reset;
+        ++from;
+        continue;
+      }
+      if (to - from < event_size) break;
+      t_ += *from;
+      const auto x = little_endian<std::uint16_t>(from + 1);
+      const auto row = static_cast<std::uint32_t>(rows_(little_endian<std::uint16_t>(from + 3)));
+      from += event_size;
+      if (!bounds_.contain(x, row)) {
+        batch.outside(1);
+        continue;
+      }
+      *batch.end++ = {static_cast<Microseconds>(t_), x, static_cast<std::uint16_t>(row | 0x8000)};
+      batch.skipped(1);
+    }
     return from;
   }
 
@@ -108,15 +154,16 @@ class EsDecoder final : public UnitStreamDecoder {
                           little_endian<std::uint16_t>(at + 6)};
     switch (at[3]) {
       case dvs:
-        begin_events<1>(size);
+        begin_events<EsEventDecoder<1>>(size);
         break;
       case atis:
-        begin_events<2>(size);
+        begin_events<EsEventDecoder<2>>(size);
         break;
       case generic:
         throw UnsupportedFormat("unsupported Event Stream of generic events: they have no pixel");
       case colour:
-        throw UnsupportedFormat("unsupported Event Stream of colour events: they have no polarity");
+        begin_events<EsColourDecoder>(size);
+        break;
       case amd:
       default:
         throw UnsupportedFormat("unsupported Event Stream type " + std::to_string(at[3]));
@@ -124,12 +171,12 @@ class EsDecoder final : public UnitStreamDecoder {
     return header_size;
   }
 
-  template <int flag_bits>
+  template <class EventDecoder>
   void begin_events(SensorSize size) {
     if (size.width == 0 || size.height == 0 || size.width > max_side || size.height > max_side)
       throw UnsupportedFormat("Event Stream with an impossible sensor size of " +
                               std::to_string(size.width) + "x" + std::to_string(size.height));
-    begin(std::make_unique<EsEventDecoder<flag_bits>>(size, origin_), size);
+    begin(std::make_unique<EventDecoder>(size, origin_), size);
   }
 
   EsOrigin origin_;

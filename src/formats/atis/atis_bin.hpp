@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "src/core/sensor_size.hpp"
+#include "src/formats/decoder.hpp"
+
+namespace eventcamera {
+
+/// Decodes the `.bin` files of N-MNIST and N-Caltech101, recorded with an ATIS: five bytes an
+/// event, without a header. A size of 0x0 means unknown.
+std::unique_ptr<Decoder> make_atis_bin_decoder(SensorSize size);
+
+/// True if bytes at the start of a file are such events. There is no signature: many events have to
+/// be in order of time, from its beginning on, at various pixels.
+bool is_atis_bin(std::span<const std::uint8_t> bytes);
+
+}  // namespace eventcamera
