@@ -28,7 +28,7 @@ class DiffSimulator final : public Simulator {
         split_(gl, "split", shaders::split),
         land_(gl, "land", shaders::land),
         mark_(gl, "mark", shaders::mark),
-        tracker_(gl, format),
+        tracker_(gl, format, 1),
         strongest_(gl),
         frames_{{gl, format}, {gl, format}},
         on_(gl, format),

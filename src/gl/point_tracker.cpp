@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <iterator>
+#include <vector>
 
 #include "src/gl/shaders.hpp"
 
@@ -19,27 +20,41 @@ Groups groups_of(const LumaFormat& format) {
   return {gl::groups_of(64, format.width), format.height};
 }
 
+/// The size of the next coarser level.
+LumaFormat half_of(const LumaFormat& format) {
+  return {(format.width + 1) / 2, (format.height + 1) / 2, format.bits};
+}
+
 }  // namespace
 
 Pyramid::Pyramid(const Context& gl, const LumaFormat& format) {
-  int width = format.width;
-  int height = format.height;
+  LumaFormat level = format;
   do {
-    levels_.emplace_back(gl, width, height);
-    width = (width + 1) / 2;
-    height = (height + 1) / 2;
-  } while (levels_.size() < max_levels && std::min(width, height) > min_side);
+    levels_.emplace_back(gl, level.width, level.height);
+    level = half_of(level);
+  } while (levels_.size() < max_levels && std::min(level.width, level.height) > min_side);
 }
 
-PointTracker::PointTracker(const Context& gl, const LumaFormat& format)
+PointTracker::PointTracker(const Context& gl, const LumaFormat& format, int block_side)
     : format_(format),
+      block_side_(block_side),
       halve_(gl, "halve", shaders::halve),
       slope_(gl, "slope", shaders::slope),
       points_(gl, "points", shaders::points),
+      gather_(gl, "gather", shaders::gather),
+      descend_(gl, "descend", shaders::descend),
       search_(gl, "search", shaders::search),
+      spread_(gl, "spread", shaders::spread),
       motion_(gl, "motion", shaders::motion),
       slopes_(gl) {
   slopes_.reserve(pixel_count(format) * 4);
+  // Points that are blocks themselves are searched for where they are stored.
+  LumaFormat level = format;
+  const std::size_t coarser_levels = block_side == 1 ? max_levels - 1 : max_levels;
+  for (std::size_t i = 0; i < coarser_levels; ++i) {
+    level = half_of(level);
+    blocks_.emplace_back(gl).reserve(pixel_count(level) * 8);
+  }
 }
 
 void PointTracker::build(const Pyramid& pyramid) const {
@@ -65,15 +80,33 @@ void PointTracker::to_motion(const Buffer& points, int steps, const GreyFrame& f
 }
 
 void PointTracker::track(const Pyramid& from, const Pyramid& to, const Buffer& points) const {
+  // The blocks of each level, from the finest on.
+  std::vector<const Buffer*> blocks;
+  if (block_side_ == 1) blocks.push_back(&points);
+  const Buffer* finer = &points;
+  LumaFormat finer_format = format_;
+  for (auto coarser = blocks_.begin(); blocks.size() < from.levels().size(); ++coarser) {
+    gather_.run(groups_of(half_of(finer_format)), {finer, &*coarser},
+                {finer_format.width, finer_format.height});
+    finer = blocks.emplace_back(&*coarser);
+    finer_format = half_of(finer_format);
+  }
+  const Buffer* coarser = nullptr;
   auto target = to.levels().rbegin();
-  int number = static_cast<int>(from.levels().size());
   for (auto level = from.levels().rbegin(); level != from.levels().rend(); ++level, ++target) {
     const auto& [format, picture] = *level;
+    const auto of_blocks = block_side_ == 1 ? format : half_of(format);
+    const Buffer& here = *blocks.back();
+    blocks.pop_back();
+    if (coarser != nullptr) descend_.run(groups_of(of_blocks), {coarser, &here}, {of_blocks.width});
     slope_.run(groups_of(format), {&picture.buffer(), &slopes_}, {format.width, format.height});
-    search_.run(groups_of(format_),
-                {&picture.buffer(), &slopes_, &target->picture.buffer(), &points},
-                {format_.width, --number, format.width, format.height});
+    search_.run(groups_of(of_blocks),
+                {&picture.buffer(), &slopes_, &target->picture.buffer(), &here},
+                {format.width, format.height, block_side_, blocks.empty() ? 1 : 0});
+    coarser = &here;
   }
+  if (block_side_ == 2)
+    spread_.run(groups_of(format_), {coarser, &points}, {format_.width, format_.height});
 }
 
 }  // namespace eventcamera::gl

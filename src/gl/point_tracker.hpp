@@ -34,7 +34,7 @@ class Pyramid {
 /// step, two integers; the first word is `none` if the pixel is not a point.
 class PointTracker {
  public:
-  PointTracker(const Context& gl, const LumaFormat& format);
+  PointTracker(const Context& gl, const LumaFormat& format, int block_side);
 
   /// Computes the levels above 0.
   void build(const Pyramid& pyramid) const;
@@ -51,12 +51,17 @@ class PointTracker {
 
  private:
   LumaFormat format_;
+  int block_side_;
   Kernel halve_;
   Kernel slope_;
   Kernel points_;
+  Kernel gather_;
+  Kernel descend_;
   Kernel search_;
+  Kernel spread_;
   Kernel motion_;
   Buffer slopes_;
+  std::list<Buffer> blocks_;  ///< of each level where they are not points, like points
 };
 
 }  // namespace eventcamera::gl

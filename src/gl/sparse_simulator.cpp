@@ -19,7 +19,7 @@ class SparseSimulator final : public Simulator {
         changed_(gl, "changed", shaders::changed),
         reach_(gl, "reach", shaders::reach),
         paint_(gl, "paint", shaders::paint),
-        tracker_(gl, format),
+        tracker_(gl, format, 2),
         points_(gl),
         winners_(gl),
         frames_{{gl, format}, {gl, format}},

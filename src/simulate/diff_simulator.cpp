@@ -31,7 +31,7 @@ struct Part {
   Kept last;
   Kept now;
   Image<std::uint8_t> picture;  ///< `now` as an 8-bit image, 0 for pixels not kept
-  PointTracker tracker;
+  PointTracker tracker{1};
 
   /// Makes `now` the last difference frame, and starts a new one with empty bands.
   void begin_next() {

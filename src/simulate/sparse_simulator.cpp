@@ -170,7 +170,7 @@ class SparseSimulator final : public Simulator {
   }
 
   Image<Pixel> last_;
-  PointTracker tracker_;
+  PointTracker tracker_{2};
   Grey8 grey_;
   EventBuckets changes_;
   std::vector<Point> changed_;

@@ -205,46 +205,49 @@ TEST_P(EveryApi, TracksPointsAsTheCpuDoes) {
   const LumaFormat format{width, height, 8};
   const auto from = scene::texture<std::uint8_t>(width, height, 8, 0, 0);
   const auto to = scene::texture<std::uint8_t>(width, height, 8, 2.3, -1.6);
-  const gl::PointTracker tracker(context, format);
-  const gl::Pyramid pyramids[] = {{context, format}, {context, format}};
-  for (const auto& [pyramid, picture] : {std::pair{&pyramids[0], &from}, {&pyramids[1], &to}}) {
-    upload(*picture, pyramid->picture());
-    tracker.build(*pyramid);
-  }
-  struct {
-    float x;
-    float y;
-  } tracks[width * height];
-  gl::Buffer points(context, GL_DYNAMIC_READ);
-  points.reserve(sizeof tracks);
-  tracker.find_points(pyramids[0], points);
-  tracker.track(pyramids[0], pyramids[1], points);
-  points.read(std::as_writable_bytes(std::span(tracks)));
+  for (const int block_side : {1, 2}) {
+    SCOPED_TRACE(block_side);
+    const gl::PointTracker tracker(context, format, block_side);
+    const gl::Pyramid pyramids[] = {{context, format}, {context, format}};
+    for (const auto& [pyramid, picture] : {std::pair{&pyramids[0], &from}, {&pyramids[1], &to}}) {
+      upload(*picture, pyramid->picture());
+      tracker.build(*pyramid);
+    }
+    struct {
+      float x;
+      float y;
+    } tracks[width * height];
+    gl::Buffer points(context, GL_DYNAMIC_READ);
+    points.reserve(sizeof tracks);
+    tracker.find_points(pyramids[0], points);
+    tracker.track(pyramids[0], pyramids[1], points);
+    points.read(std::as_writable_bytes(std::span(tracks)));
 
-  PointTracker reference;
-  ThreadPool threads;
-  reference.push(from.view(), threads);
-  reference.push(to.view(), threads);
-  std::vector<Point> places;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      if (from.at(x, y) != 0) places.push_back({x, y});
-  const auto expected = reference.track(places, threads);
-  double sum = 0;
-  int differences = 0;
-  int found = 0;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const auto& track = tracks[places[i].y * width + places[i].x];
-    const bool is_found = std::bit_cast<std::uint32_t>(track.x) != 0x7fffffff;
-    differences += is_found != expected[i].found;
-    if (!is_found || !expected[i].found) continue;
-    ++found;
-    sum += std::hypot(track.x - expected[i].flow.x, track.y - expected[i].flow.y);
+    PointTracker reference(block_side);
+    ThreadPool threads;
+    reference.push(from.view(), threads);
+    reference.push(to.view(), threads);
+    std::vector<Point> places;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        if (from.at(x, y) != 0) places.push_back({x, y});
+    const auto expected = reference.track(places, threads);
+    double sum = 0;
+    int differences = 0;
+    int found = 0;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const auto& track = tracks[places[i].y * width + places[i].x];
+      const bool is_found = std::bit_cast<std::uint32_t>(track.x) != 0x7fffffff;
+      differences += is_found != expected[i].found;
+      if (!is_found || !expected[i].found) continue;
+      ++found;
+      sum += std::hypot(track.x - expected[i].flow.x, track.y - expected[i].flow.y);
+    }
+    EXPECT_GT(found, 5'000);
+    EXPECT_LE(differences, static_cast<int>(places.size()) / 200);
+    EXPECT_LE(sum / found, 0.02);
+    RecordProperty("mean_difference_" + std::to_string(block_side), std::to_string(sum / found));
   }
-  EXPECT_GT(found, 5'000);
-  EXPECT_LE(differences, static_cast<int>(places.size()) / 200);
-  EXPECT_LE(sum / found, 0.02);
-  RecordProperty("mean_difference", std::to_string(sum / found));
 }
 
 TEST(Context, NamesWhatIsMissing) {

@@ -42,19 +42,23 @@ std::vector<Picture> frames_of(const LumaFormat& format) {
 
 class Tracks : public EveryApi {
  protected:
-  /// The GPU's tracks of points, at pixels that are not 0, from one picture to the next.
-  std::vector<Track> track(const Picture& from, const Picture& to,
-                           const std::vector<Point>& points) {
+  /// The GPU's tracks of points from one picture to the next.
+  std::vector<Track> track(const Picture& from, const Picture& to, const std::vector<Point>& points,
+                           int block_side) {
     const LumaFormat format{from.width(), from.height(), 8};
-    const gl::PointTracker tracker(context, format);
+    const gl::PointTracker tracker(context, format, block_side);
     const gl::Pyramid pyramids[] = {{context, format}, {context, format}};
     upload(from, pyramids[0].picture());
     upload(to, pyramids[1].picture());
     for (const auto& pyramid : pyramids) tracker.build(pyramid);
+    Picture is_point(from.width(), from.height());
+    for (const auto& [x, y] : points) is_point.at(x, y) = 1;
+    const gl::Pyramid marks(context, format);
+    upload(is_point, marks.picture());
     std::vector<Flow> flows(gl::pixel_count(format));
     gl::Buffer buffer(context, GL_DYNAMIC_READ);
     buffer.reserve(flows.size() * sizeof(Flow));
-    tracker.find_points(pyramids[0], buffer);
+    tracker.find_points(marks, buffer);
     tracker.track(pyramids[0], pyramids[1], buffer);
     buffer.read(std::as_writable_bytes(std::span(flows)));
     std::vector<Track> tracks;
@@ -92,7 +96,7 @@ TEST_P(Tracks, GiveTheEventsOfTheSparseReference) {
     const auto& now = frames[2];
     const auto points =
         reference::changed(last, now, std::min(thresholds.positive, thresholds.negative));
-    const auto tracks = track(last, now, points);
+    const auto tracks = track(last, now, points, 2);
     EXPECT_TRUE(std::ranges::any_of(tracks, &Track::found) || format.width < 15);
     EXPECT_EQ(events_of(*gl::make_sparse_simulator(context, format), frames),
               reference::sparse(last, now, std::span<const Point>(points),
@@ -108,7 +112,7 @@ TEST_P(Tracks, GiveTheEventsOfTheDifferenceReference) {
     const auto follow = [&](int sign) {
       const auto from = reference::part_of(before, sign, 8);
       reference::Tracked tracked{reference::points_of(from), {}};
-      tracked.tracks = track(from, reference::part_of(now, sign, 8), tracked.points);
+      tracked.tracks = track(from, reference::part_of(now, sign, 8), tracked.points, 1);
       EXPECT_TRUE(std::ranges::any_of(tracked.tracks, &Track::found) || format.width < 15);
       return tracked;
     };

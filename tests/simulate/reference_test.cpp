@@ -145,7 +145,7 @@ class Equality : public testing::TestWithParam<Case> {
     const auto points =
         reference::changed(last, now, std::min(thresholds.positive, thresholds.negative));
     ThreadPool threads;
-    PointTracker tracker;
+    PointTracker tracker(2);
     tracker.push(grey8(last, format.bits).view(), threads);
     tracker.push(grey8(now, format.bits).view(), threads);
     check(*make_sparse_simulator(format),
@@ -162,7 +162,7 @@ class Equality : public testing::TestWithParam<Case> {
       const auto from = reference::part_of(before, sign, format.bits);
       const auto to = reference::part_of(now, sign, format.bits);
       ThreadPool threads;
-      PointTracker tracker;
+      PointTracker tracker(1);
       tracker.push(from.view(), threads);
       tracker.push(to.view(), threads);
       reference::Tracked tracked{reference::points_of(from), {}};

@@ -2,39 +2,66 @@
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 
 #include <algorithm>
-#include <array>
-#include <optional>
+#include <bit>
 #include <utility>
-
-#include "src/flow/lucas_kanade/texture.hpp"
 
 namespace eventcamera {
 namespace {
 
-/// Position of a point of a block on a pyramid level, along one axis.
-class Place {
- public:
-  Place(int position, std::size_t level) : position_(position), level_(static_cast<int>(level)) {}
-
-  /// In 1/8 of a pixel.
-  int fraction() const { return (position_ & mask(level_)) << (top_level - level_); }
-  int tile() const { return position_ >> level_ >> bits_of_tile; }
-  int within_tile() const { return position_ >> level_ & mask(bits_of_tile); }
-  /// Tile and fraction combined; has the same range on every level.
-  int group() const { return tile() << level_ | (position_ & mask(level_)); }
-
- private:
-  static constexpr int top_level = Pyramid::max_levels - 1;
-  static constexpr int bits_of_tile = 4;
-  static_assert(1 << bits_of_tile == Tile::side && 1 << top_level == Tile::fractions);
-
-  static int mask(int bits) { return (1 << bits) - 1; }
-
-  int position_;
-  int level_;
-};
+/// Bit i is bit 2i or bit 2i + 1 of a word.
+std::uint64_t join_pairs(std::uint64_t bits) {
+  bits = (bits | bits >> 1) & 0x5555555555555555U;
+  bits = (bits | bits >> 1) & 0x3333333333333333U;
+  bits = (bits | bits >> 2) & 0x0f0f0f0f0f0f0f0fU;
+  bits = (bits | bits >> 4) & 0x00ff00ff00ff00ffU;
+  bits = (bits | bits >> 8) & 0x0000ffff0000ffffU;
+  return (bits | bits >> 16) & 0x00000000ffffffffU;
+}
 
 }  // namespace
+
+void PointTracker::Blocks::clear() {
+  for (int y = 0; y < region_side; ++y) {
+    if (rows_[static_cast<std::size_t>(y)] == 0) continue;
+    rows_[static_cast<std::size_t>(y)] = 0;
+    std::fill_n(&track(0, y), region_side, Track{});
+  }
+}
+
+Track PointTracker::Blocks::between(int x, int y) const {
+  const int column = x / 2;
+  const int row = y / 2;
+  const auto& own = track(column, row);
+  Flow flow = own.flow;
+  const auto approach = [&](int beside, int below) {
+    if (beside < 0 || beside >= region_side || below < 0 || below >= region_side) return;
+    const auto& other = track(beside, below);
+    if (!other.found) return;
+    const auto part = [](float from, float to) {
+      constexpr float max_difference = 0.5F;
+      return std::clamp(to - from, -max_difference, max_difference) / 4;
+    };
+    flow = {flow.x + part(own.flow.x, other.flow.x), flow.y + part(own.flow.y, other.flow.y)};
+  };
+  approach(x % 2 == 0 ? column - 1 : column + 1, row);
+  approach(column, y % 2 == 0 ? row - 1 : row + 1);
+  return {flow, own.found};
+}
+
+void PointTracker::Blocks::add_coarser(const Blocks& finer) {
+  for (std::size_t y = 0; y < rows_.size() / 2; ++y)
+    rows_[y] |= join_pairs(finer.rows_[2 * y] | finer.rows_[2 * y + 1]);
+}
+
+int PointTracker::Blocks::first_row() const {
+  const auto is_used = [](std::uint64_t row) { return row != 0; };
+  return static_cast<int>(std::find_if(rows_.begin(), rows_.end(), is_used) - rows_.begin());
+}
+
+int PointTracker::Blocks::last_row() const {
+  const auto is_used = [](std::uint64_t row) { return row != 0; };
+  return static_cast<int>(rows_.rend() - std::find_if(rows_.rbegin(), rows_.rend(), is_used)) - 1;
+}
 
 void PointTracker::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   std::swap(last_, next_);
@@ -46,16 +73,13 @@ std::span<const Track> PointTracker::track(std::span<const Point> points, Thread
   if (points.empty()) return tracks_;
   const auto& picture = last_.levels()[0];
   find_rows(points, picture.height());
-  constexpr std::size_t most = std::size_t{block_side} * block_side;
-  constexpr int around = Tile::before + Tile::after;
-  while (static_cast<int>(blocks_.size()) < threads.threads())
-    blocks_.push_back({std::vector<std::uint32_t>(most), std::vector<std::uint32_t>(most),
-                       ScharrGradients(block_side + around, block_side + around)});
-  const int across = (picture.width() + block_side - 1) / block_side;
-  const int down = (picture.height() + block_side - 1) / block_side;
+  const int side = block_side_ * region_side;
+  while (static_cast<int>(regions_.size()) < threads.threads()) regions_.emplace_back(side);
+  const int across = (picture.width() + side - 1) / side;
+  const int down = (picture.height() + side - 1) / side;
   threads.for_each(across * down, [&](int i, int thread) {
-    follow(points, i % across * block_side, i / across * block_side,
-           blocks_[static_cast<std::size_t>(thread)]);
+    follow(points, i % across * side, i / across * side,
+           regions_[static_cast<std::size_t>(thread)]);
   });
   return tracks_;
 }
@@ -67,95 +91,82 @@ void PointTracker::find_rows(std::span<const Point> points, int height) {
   rows_.resize(static_cast<std::size_t>(height) + 1, points.size());
 }
 
-void PointTracker::follow(std::span<const Point> points, int left, int top, Block& block) {
-  block.points.clear();
-  const int bottom = std::min(top + block_side, static_cast<int>(rows_.size()) - 1);
+void PointTracker::follow(std::span<const Point> points, int left, int top, Region& region) {
+  auto& finest = region.levels[0];
+  finest.clear();
+  const int side = block_side_ * region_side;
+  std::array<std::span<const Point>, std::size_t{max_block_side} * region_side> rows;
+  const int bottom = std::min(top + side, static_cast<int>(rows_.size()) - 1);
+  bool any = false;
   for (int y = top; y < bottom; ++y) {
-    const auto row =
-        points.subspan(rows_[static_cast<std::size_t>(y)],
-                       rows_[static_cast<std::size_t>(y) + 1] - rows_[static_cast<std::size_t>(y)]);
-    const auto first = std::lower_bound(row.begin(), row.end(), left,
-                                        [](const Point& p, int x) { return p.x < x; });
-    for (auto it = first; it != row.end() && it->x < left + block_side; ++it) {
-      const auto index = static_cast<std::uint32_t>(&*it - points.data());
-      block.points.push_back(index);
-      tracks_[index] = {};
-    }
+    const auto first = rows_[static_cast<std::size_t>(y)];
+    const auto row = points.subspan(first, rows_[static_cast<std::size_t>(y) + 1] - first);
+    const auto at = [](const Point& p, int x) { return p.x < x; };
+    const auto begin = std::lower_bound(row.begin(), row.end(), left, at);
+    const auto end = std::lower_bound(begin, row.end(), left + side, at);
+    rows[static_cast<std::size_t>(y - top)] = {begin, end};
+    any |= begin != end;
+    for (auto it = begin; it != end; ++it)
+      finest.add((it->x - left) / block_side_, (y - top) / block_side_);
   }
-  if (block.points.empty()) return;
-  constexpr std::size_t many = block_side;  // with fewer points, the test costs more than it saves
-  if (block.points.size() >= many) drop_flat(points, left, top, block);
-  if (block.points.empty()) return;
-  block.ordered.resize(block.points.size());
-  const int first_row = points[block.points.front()].y;
-  const int last_row = points[block.points.back()].y;
-  for (std::size_t level = last_.levels().size(); level-- > 0;) {
-    block.gradients.compute(
-        last_.levels()[level],
-        {(left >> level) - Tile::before, (first_row >> level) - Tile::before,
-         ((left + block_side) >> level) + Tile::after, (last_row >> level) + 1 + Tile::after});
-    search(points, level, left, top, block);
+  if (!any) return;
+  const auto level_count = last_.levels().size();
+  for (std::size_t level = 1; level < level_count; ++level) {
+    region.levels[level].clear();
+    region.levels[level].add_coarser(region.levels[level - 1]);
+  }
+  for (std::size_t level = level_count; level-- > 0;) search(level, left, top, region);
+  for (int y = top; y < bottom; ++y) {
+    for (const auto& point : rows[static_cast<std::size_t>(y - top)])
+      tracks_[static_cast<std::size_t>(&point - points.data())] =
+          block_side_ == 1 ? finest.track(point.x - left, y - top)
+                           : finest.between(point.x - left, y - top);
   }
 }
 
-void PointTracker::drop_flat(std::span<const Point> points, int left, int top, Block& block) {
-  constexpr std::size_t tiles_across = block_side / Tile::side;
-  const auto& picture = last_.levels()[0];
-  const int first_tile = points[block.points.front()].y / Tile::side * Tile::side;
-  const int last_tile = points[block.points.back()].y / Tile::side * Tile::side;
-  block.gradients.compute(
-      picture, {left - Tile::before, first_tile - Tile::before, left + block_side + Tile::after,
-                last_tile + Tile::side + Tile::after});
-  std::array<std::optional<TilePixels>, tiles_across * tiles_across> tiles;
-  std::erase_if(block.points, [&](std::uint32_t index) {
-    const auto [x, y] = points[index];
-    const auto row = static_cast<std::size_t>((y - top) / Tile::side);
-    const auto column = static_cast<std::size_t>((x - left) / Tile::side);
-    auto& textured = tiles[row * tiles_across + column];
-    if (!textured)
-      textured = textured_pixels(block.gradients,
-                                 {x / Tile::side * Tile::side, y / Tile::side * Tile::side, 0, 0});
-    const auto pixels = (*textured)[static_cast<std::size_t>(y % Tile::side)];
-    return (pixels >> x % Tile::side & 1) == 0;
-  });
+void PointTracker::search(std::size_t level, int left, int top, Region& region) const {
+  const auto& blocks = region.levels[level];
+  const int side = region_side >> level;
+  left >>= level;
+  top >>= level;
+  const int first_row = blocks.first_row();
+  const int last_row = blocks.last_row();
+  region.gradients.compute(
+      last_.levels()[level],
+      {left - Tile::before, top + block_side_ * first_row - Tile::before,
+       left + block_side_ * side + Tile::after, top + block_side_ * last_row + 1 + Tile::after});
+  const int apart = blocks_apart();
+  const int tile_side = apart * Tile::side;
+  for (int y = first_row / tile_side * tile_side; y <= last_row; y += tile_side)
+    for (int x = 0; x < side; x += tile_side)
+      for (int below = 0; below < apart; ++below)
+        for (int beside = 0; beside < apart; ++beside)
+          search_tile_at(level, left, top, x + beside, y + below, region);
 }
 
-void PointTracker::search(std::span<const Point> points, std::size_t level, int left, int top,
-                          Block& block) {
-  const auto group = [&](const Point& point) {
-    constexpr int groups_across = 1 << (Pyramid::max_levels - 1);
-    return static_cast<std::size_t>(Place(point.y - top, level).group() * groups_across +
-                                    Place(point.x - left, level).group());
-  };
-  std::array<std::uint32_t, tiles_a_block> ends{};
-  for (const auto index : block.points) ++ends[group(points[index])];
-  std::uint32_t sum = 0;
-  for (auto& end : ends) sum += std::exchange(end, sum);
-  for (const auto index : block.points) block.ordered[ends[group(points[index])]++] = index;
-
-  std::uint32_t first = 0;
-  for (const auto end : ends) {
-    const auto in_tile = std::span<const std::uint32_t>(block.ordered).subspan(first, end - first);
-    first = end;
-    if (in_tile.empty()) continue;
-    const Place x(points[in_tile[0]].x - left, level);
-    const Place y(points[in_tile[0]].y - top, level);
-    const Tile tile{(left >> level) + x.tile() * Tile::side, (top >> level) + y.tile() * Tile::side,
-                    x.fraction(), y.fraction()};
-    std::array<Search, std::size_t{Tile::side} * Tile::side> searches;
-    for (std::size_t i = 0; i < in_tile.size(); ++i) {
-      const auto& point = points[in_tile[i]];
-      const auto& flow = tracks_[in_tile[i]].flow;
-      searches[i] = {Place(point.x - left, level).within_tile(),
-                     Place(point.y - top, level).within_tile(),
-                     {2 * flow.x, 2 * flow.y},
-                     false};
+void PointTracker::search_tile_at(std::size_t level, int left, int top, int x, int y,
+                                  Region& region) const {
+  auto& blocks = region.levels[level];
+  const auto* coarser = level + 1 < last_.levels().size() ? &region.levels[level + 1] : nullptr;
+  const int apart = blocks_apart();
+  const unsigned row_of_tile = apart == 1 ? 0x00ff : 0x5555;
+  std::array<Search, Tile::block_count> searches;
+  std::size_t count = 0;
+  for (int row = 0; row < Tile::side; ++row) {
+    const int block_y = y + apart * row;
+    for (auto bits = blocks.row(block_y) >> x & row_of_tile; bits != 0; bits &= bits - 1) {
+      const int column = std::countr_zero(bits) / apart;
+      const int block_x = x + apart * column;
+      const Flow flow = coarser != nullptr ? coarser->track(block_x / 2, block_y / 2).flow : Flow{};
+      searches[count++] = {column, row, {2 * flow.x, 2 * flow.y}, false};
     }
-    search_tile(last_.levels()[level], block.gradients, next_.levels()[level], tile,
-                std::span(searches).first(in_tile.size()));
-    for (std::size_t i = 0; i < in_tile.size(); ++i)
-      tracks_[in_tile[i]] = {searches[i].flow, searches[i].found};
   }
+  if (count == 0) return;
+  const auto found = std::span(searches).first(count);
+  search_tile(last_.levels()[level], region.gradients, next_.levels()[level],
+              {left + block_side_ * x, top + block_side_ * y}, found);
+  for (const auto& search : found)
+    blocks.track(x + apart * search.x, y + apart * search.y) = {search.flow, search.found};
 }
 
 }  // namespace eventcamera

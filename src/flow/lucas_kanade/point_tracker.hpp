@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -22,10 +23,22 @@ struct Track {
   bool found = false;  ///< false: the point was lost
 };
 
-/// Pyramidal Lucas-Kanade from the last image to the next, each point independently: windows of
-/// 15x15 pixels on 4 levels, as in the paper's code. 8-bit images, all of the same size.
+/// Pyramidal Lucas-Kanade from the last image to the next, on 4 levels. 8-bit images, all of the
+/// same size.
+///
+/// Blocks of 2x2 pixels, or single pixels, are tracked, with a window of 16x16 pixels. The search
+/// for a block starts at twice the flow of the block of the coarser level that contains it; a block
+/// that is lost there passes on the flow that its search started from.
+///
+/// A point has the flow of its block. If that is 2x2 pixels, it adds a quarter of the difference to
+/// the flow of the block on the left or right, and of the one above or below, whichever is nearer
+/// to the point. These differences are clipped to half a pixel, and 0 if that block is not tracked,
+/// was lost, or is in another one of the regions of 128x128 pixels into which images are divided.
 class PointTracker {
  public:
+  /// `block_side` is 1 or 2. Blocks of 2x2 pixels take a quarter of the time.
+  explicit PointTracker(int block_side) : block_side_(block_side) {}
+
   /// Makes `picture` the image tracked to, and the previous one the image tracked from.
   void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
@@ -35,28 +48,65 @@ class PointTracker {
   std::span<const Track> track(std::span<const Point> points, ThreadPool& threads);
 
  private:
-  /// Side of a block of pixels tracked together: on the coarsest level, one tile per sub-pixel
-  /// offset; on finer levels, more tiles and fewer offsets.
-  static constexpr int block_side = Tile::side << (Pyramid::max_levels - 1);
-  static constexpr int tiles_a_block = 1 << 2 * (Pyramid::max_levels - 1);
+  /// Side of a region tracked together, in blocks of the finest level.
+  static constexpr int region_side = Tile::side << (Pyramid::max_levels - 1);
+  static constexpr int max_block_side = 2;
 
-  struct Block {
-    std::vector<std::uint32_t> points;
-    std::vector<std::uint32_t> ordered;  ///< the same by their tiles on a level
-    ScharrGradients gradients;           ///< of a level, in the windows of the points
+  /// Blocks of a region on one level.
+  class Blocks {
+   public:
+    Blocks() : tracks_(std::size_t{region_side} * region_side) {}
+
+    /// Removes all blocks.
+    void clear();
+    void add(int x, int y) { rows_[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x; }
+    /// Adds the blocks that contain those of the next finer level.
+    void add_coarser(const Blocks& finer);
+    /// Blocks of a row: bit x.
+    std::uint64_t row(int y) const { return rows_[static_cast<std::size_t>(y)]; }
+    /// First and last row with blocks; there must be one.
+    int first_row() const;
+    int last_row() const;
+
+    /// Track of a pixel of the region, interpolated between blocks, which are 2x2 pixels.
+    Track between(int x, int y) const;
+
+    Track& track(int x, int y) { return tracks_[index(x, y)]; }
+    const Track& track(int x, int y) const { return tracks_[index(x, y)]; }
+
+   private:
+    static_assert(region_side == 64);
+    static std::size_t index(int x, int y) {
+      return static_cast<std::size_t>(y) * region_side + static_cast<std::size_t>(x);
+    }
+
+    std::array<std::uint64_t, region_side> rows_{};  ///< bit x of row y
+    std::vector<Track> tracks_;                      ///< not found where there is no block
+  };
+
+  /// Memory of one thread.
+  struct Region {
+    explicit Region(int side)
+        : gradients(side + Tile::before + Tile::after, side + Tile::before + Tile::after) {}
+
+    std::array<Blocks, Pyramid::max_levels> levels;
+    ScharrGradients gradients;
   };
 
   void find_rows(std::span<const Point> points, int height);
-  void follow(std::span<const Point> points, int left, int top, Block& block);
-  /// Drops the points that the search on the finest level would lose for lack of texture, before
-  /// they are tracked on the coarser levels.
-  void drop_flat(std::span<const Point> points, int left, int top, Block& block);
-  void search(std::span<const Point> points, std::size_t level, int left, int top, Block& block);
+  void follow(std::span<const Point> points, int left, int top, Region& region);
+  void search(std::size_t level, int left, int top, Region& region) const;
+  /// Searches for the blocks of a tile whose first one is (x, y) of its region.
+  void search_tile_at(std::size_t level, int left, int top, int x, int y, Region& region) const;
 
+  /// Blocks from one of a tile to the next.
+  int blocks_apart() const { return Tile::width / Tile::side / block_side_; }
+
+  int block_side_;  ///< pixels
   Pyramid last_;
   Pyramid next_;
   std::vector<std::size_t> rows_;  ///< index of the first point of each row
-  std::vector<Block> blocks_;      ///< one per thread
+  std::vector<Region> regions_;    ///< one per thread
   std::vector<Track> tracks_;
 };
 

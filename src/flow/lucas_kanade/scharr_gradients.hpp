@@ -21,6 +21,10 @@ class ScharrGradients {
   /// Row y of the image.
   const std::int16_t* x(int y) const { return x_.row(y - box_.top) - box_.left; }
   const std::int16_t* y(int y) const { return y_.row(y - box_.top) - box_.left; }
+  /// Elements from one row to the next.
+  std::ptrdiff_t stride() const {
+    return x_.stride() / static_cast<std::ptrdiff_t>(sizeof(std::int16_t));
+  }
 
   static constexpr int margin = 8;
 

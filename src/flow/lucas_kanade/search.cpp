@@ -11,7 +11,6 @@
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/search.cpp"
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
-#include "src/flow/lucas_kanade/byte_windows-inl.hpp"
 #include "src/flow/lucas_kanade/window_sums-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -25,115 +24,70 @@ using Sums = hn::Repartition<std::int32_t, Values>;
 using Value = hn::Vec<Values>;
 using Sum = hn::Vec<Sums>;
 
-/// One lane per point.
+/// One lane per block.
 using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
 
-/// A window row is processed as 16 values; the last one has weight 0.
-constexpr int row_values = 16;
-constexpr int max_moves = 10;
+constexpr int max_moves = 11;
 constexpr float min_move = 0.03F;
 /// Two successive moves that cancel to within this distance oscillate: the search ends halfway.
 constexpr float turning_back = 0.01F;
-/// Scale from products of a gradient and a grey value (in 1/4 of a grey level) to the same units.
-constexpr float mismatch_product = slope_product * 8;
+/// Minimum eigenvalue of the mean gradient matrix (structure tensor) for a block to be trackable.
+constexpr float min_texture = 1.6e-4F;
+/// Scale from gradient products (gradients are in 1/32 of a grey level) to the units of
+/// min_texture.
+constexpr float slope_product = 1.0F / (1 << 20);
+/// Scale from products of a gradient and a grey value to the same units.
+constexpr float mismatch_product = slope_product * 32;
+/// Positions at which a search needs sums: upper left, upper right, lower left, lower right.
+constexpr int corners = 4;
+
+/// Smaller eigenvalue of the mean gradient matrix over a window, from its sums.
+template <class Floats, class Value = hn::Vec<Floats>>
+HWY_INLINE Value least_eigenvalue(Floats floats, Value xx, Value xy, Value yy) {
+  const auto difference = hn::Sub(xx, yy);
+  const auto root = hn::Sqrt(
+      hn::Add(hn::Mul(difference, difference), hn::Mul(hn::Set(floats, 4.0F), hn::Mul(xy, xy))));
+  return hn::Div(hn::Sub(hn::Add(xx, yy), root),
+                 hn::Set(floats, static_cast<float>(2 * Tile::window * Tile::window)));
+}
+
+/// Sums over a window of the products of both gradients and the pixels of the other image.
+struct GradientSums {
+  std::int32_t x;
+  std::int32_t y;
+};
+
+#if HWY_TARGET != HWY_SCALAR
+/// In each 128-bit block, lane c is the sum of the lanes of that block of sum c.
+template <class Lanes, class Value = hn::Vec<Lanes>>
+HWY_INLINE Value add_lanes(Lanes lanes, Value sum0, Value sum1, Value sum2, Value sum3) {
+  const hn::Repartition<std::int64_t, Lanes> pairs;
+  const auto add_pairs = [&](Value a, Value b) {
+    return hn::BitCast(pairs,
+                       hn::Add(hn::InterleaveLower(lanes, a, b), hn::InterleaveUpper(lanes, a, b)));
+  };
+  const auto low = add_pairs(sum0, sum1);
+  const auto high = add_pairs(sum2, sum3);
+  return hn::Add(hn::BitCast(lanes, hn::InterleaveLower(pairs, low, high)),
+                 hn::BitCast(lanes, hn::InterleaveUpper(pairs, low, high)));
+}
+#endif
 
 /// Calls body(row) for each row of a window, unrolled so that values carried from row to row stay
 /// in registers.
 template <class Body>
 HWY_INLINE void for_each_row(const Body& body) {
-  static_assert(window % 5 == 0);
-  for (int row = 0; row < window; row += 5) {
+  static_assert(Tile::window % 4 == 0);
+  for (int row = 0; row < Tile::window; row += 4) {
     body(row);
     body(row + 1);
     body(row + 2);
     body(row + 3);
-    body(row + 4);
   }
 }
 
-/// The part of the first image covered by the windows of a tile's points, resampled bilinearly at
-/// the sub-pixel offset that the points share.
-class Patch {
- public:
-  static constexpr int stride = window_columns;
-
-  /// Covers points in rows first_row ... last_row of the tile.
-  Patch(const Image<std::uint8_t>& picture, const ScharrGradients& gradients, const Tile& tile,
-        int first_row, int last_row)
-      : left_(tile.left - Tile::before),
-        top_(tile.top + first_row - Tile::before),
-        first_row_(first_row),
-        rows_(last_row - first_row + 1) {
-    const int rows = last_row - first_row + window;
-    const int x = left_;
-    const int y = top_;
-    const Values values;
-    const auto load_grey = [&](int row, int column) {
-      const auto* at = picture.row(y + row) + x + column;
-      return hn::ShiftLeft<2>(hn::PromoteTo(values, hn::LoadU(Bytes(), at)));
-    };
-    const auto load_x = [&](int row, int column) {
-      return hn::LoadU(values, gradients.x(y + row) + x + column);
-    };
-    const auto load_y = [&](int row, int column) {
-      return hn::LoadU(values, gradients.y(y + row) + x + column);
-    };
-    interpolate(tile, rows, load_grey, grey_);
-    interpolate(tile, rows, load_x, slope_x_);
-    interpolate(tile, rows, load_y, slope_y_);
-  }
-
-  /// Position of the first value.
-  int left() const { return left_; }
-  int top() const { return top_; }
-  /// Rows of points.
-  int rows() const { return rows_; }
-  /// Index of the first value of a point's window; its rows are `stride` values apart.
-  int index(int x, int y) const { return (y - first_row_) * stride + x; }
-  /// Index of a point among the pixels of the tile from the first row of points on.
-  int pixel(int x, int y) const { return (y - first_row_) * Tile::side + x; }
-  const std::int16_t* grey() const { return grey_; }
-  const std::int16_t* slope_x() const { return slope_x_; }
-  const std::int16_t* slope_y() const { return slope_y_; }
-
- private:
-  static constexpr int max_values = (Tile::side + window) * stride;
-
-  template <class Load>
-  static void interpolate(const Tile& tile, int rows, const Load& load, std::int16_t* out) {
-    const Values values;
-    const int lanes = static_cast<int>(hn::Lanes(values));
-    constexpr int fraction = (1 << 15) / Tile::fractions;
-    const auto right = hn::Set(values, static_cast<std::int16_t>(tile.right * fraction));
-    const auto down = hn::Set(values, static_cast<std::int16_t>(tile.down * fraction));
-    const auto between = [](Value a, Value b, Value part) {
-      return hn::Add(a, hn::MulFixedPoint15(hn::Sub(b, a), part));
-    };
-    for (int column = 0; column < stride; column += lanes) {
-      const auto across = [&](int row) {
-        return between(load(row, column), load(row, column + 1), right);
-      };
-      auto upper = across(0);
-      for (int row = 0; row < rows; ++row) {
-        const auto lower = across(row + 1);
-        hn::Store(between(upper, lower, down), values, out + std::ptrdiff_t{row} * stride + column);
-        upper = lower;
-      }
-    }
-  }
-
-  HWY_ALIGN std::int16_t grey_[max_values];
-  HWY_ALIGN std::int16_t slope_x_[max_values];
-  HWY_ALIGN std::int16_t slope_y_[max_values];
-  int left_;
-  int top_;
-  int first_row_;
-  int rows_;
-};
-
-/// Lane-wise sum of the products of two columns of vectors. 32 bits hold 15 of the largest
-/// products.
+/// Lane-wise sum of the products of two columns of vectors.
 template <class Factors = Values>
 class ProductSum {
  public:
@@ -173,10 +127,9 @@ using BothValues = hn::FixedTag<std::int16_t, 32>;
 using Both = hn::Vec<BothValues>;
 using BothSum = ProductSum<BothValues>;
 
-HWY_INLINE Both load_slopes(const std::int16_t* x, const std::int16_t* y, Value weight) {
+HWY_INLINE Both load_slopes(const std::int16_t* x, const std::int16_t* y) {
   const Values values;
-  return hn::And(hn::Combine(BothValues(), hn::LoadU(values, y), hn::LoadU(values, x)),
-                 hn::Combine(BothValues(), weight, weight));
+  return hn::Combine(BothValues(), hn::LoadU(values, y), hn::LoadU(values, x));
 }
 
 HWY_INLINE Both load_pixels(const std::uint8_t* at) {
@@ -194,9 +147,8 @@ struct Both {
   Value y;
 };
 
-HWY_INLINE Both load_slopes(const std::int16_t* x, const std::int16_t* y, Value weight) {
-  const Values values;
-  return {hn::And(hn::LoadU(values, x), weight), hn::And(hn::LoadU(values, y), weight)};
+HWY_INLINE Both load_slopes(const std::int16_t* x, const std::int16_t* y) {
+  return {hn::LoadU(Values(), x), hn::LoadU(Values(), y)};
 }
 
 HWY_INLINE Value load_pixels(const std::uint8_t* at) {
@@ -220,16 +172,29 @@ HWY_INLINE void store_both_parts(const BothSum& sum0, const BothSum& sum1, const
 }
 #endif
 
-/// Sums of the windows of all pixels of a tile, moved by displacements where many points search.
+/// The windows of a tile's blocks in the first image.
+struct Windows {
+  const Image<std::uint8_t>& grey;
+  const ScharrGradients& gradients;
+  int left;  ///< first pixel of the first window
+  int top;
+  int first_row;  ///< of blocks
+  int rows;
+
+  /// Index of a block's window in sums over all of them.
+  int index(const Search& search) const { return (search.y - first_row) * Tile::side + search.x; }
+};
+
+/// Sums of the windows of all blocks of a tile, moved by displacements where several blocks search.
 ///
 /// Displacements are in whole pixels, and have an index of their own if they are near the start of
 /// the tile's first search. A search needs the sums at four corners: its displacement, and those
 /// one pixel to the right, one below, and both.
 class SharedSums {
  public:
-  SharedSums(const Image<std::uint8_t>& to, const Patch& patch, const Flow& start)
+  SharedSums(const Image<std::uint8_t>& to, const Windows& windows, const Flow& start)
       : to_(to),
-        patch_(patch),
+        windows_(windows),
         first_x_(std::floor(start.x) - before),
         first_y_(std::floor(start.y) - before) {}
 
@@ -245,24 +210,27 @@ class SharedSums {
     return hn::ConvertTo(Ints(), hn::IfThenElse(near, at, hn::Set(floats, far)));
   }
 
-  /// Computes the sums of displacements at which enough of the points search. False if there are
+  /// Computes the sums of displacements at which enough of the blocks search. False if there are
   /// none.
-  bool share(std::span<const std::int32_t> points, const std::int32_t* displacement) {
-    if (points.size() < enough) return false;
+  bool share(std::span<const std::int32_t> blocks, const std::int32_t* displacement) {
+    if (blocks.size() < enough) return false;
     bool any = false;
-    for (const auto i : points)
+    for (const auto i : blocks)
       if (++searches_[displacement[i]] == enough && displacement[i] != far)
         any |= compute(displacement[i]);
-    for (const auto i : points) searches_[displacement[i]] = 0;
+    for (const auto i : blocks) searches_[displacement[i]] = 0;
     return any;
   }
 
   bool has(std::int32_t displacement) const { return corners_[displacement][0] != none; }
 
-  /// The sums of a pixel at corner c of a displacement that it has.
-  const GradientSums& at(std::int32_t displacement, int c, int pixel) const {
-    return sums_[corners_[displacement][c] - 1][pixel];
+  /// The sums of a window at corner c of a displacement that it has.
+  const GradientSums& at(std::int32_t displacement, int c, int window) const {
+    return sums_[corners_[displacement][c] - 1][window];
   }
+
+  /// Number of searches at one displacement that take longer than the sums of all windows.
+  static constexpr int enough = 5;
 
  private:
   static constexpr int side = 32;  ///< of the square of displacements that have an index
@@ -270,8 +238,6 @@ class SharedSums {
       side / 2.0F;  ///< pixels of the square on either side of the start
   static constexpr std::int32_t far = side * side - 1;  ///< index of all other displacements
   static constexpr int max_sums = 64;                   ///< maximum number of corners with sums
-  /// Number of searches at one displacement that take longer than the sums of all pixels.
-  static constexpr int enough = 18;
   static constexpr std::uint8_t none = 0;
 
   /// Returns false if there is no memory left for them, or a window leaves the image.
@@ -291,79 +257,68 @@ class SharedSums {
   }
 
   int left(std::int32_t displacement) const {
-    return patch_.left() + static_cast<int>(first_x_) + displacement % side;
+    return windows_.left + static_cast<int>(first_x_) + displacement % side;
   }
   int top(std::int32_t displacement) const {
-    return patch_.top() + static_cast<int>(first_y_) + displacement / side;
+    return windows_.top + static_cast<int>(first_y_) + displacement / side;
   }
 
   /// True if the rows of the windows at all corners are within the image.
   bool all_within(std::int32_t displacement) const {
+    constexpr int lower_corner = 1;
     return top(displacement) >= -to_.margin() &&
-           top(displacement) + patch_.rows() + window <= to_.height() + to_.margin();
+           top(displacement) + 2 * (windows_.rows - 1) + Tile::window + lower_corner <=
+               to_.height() + to_.margin();
   }
 
   HWY_NOINLINE void sum(std::int32_t displacement, GradientSums* out) const {
-    const Columns columns;
-    const hn::Rebind<std::int16_t, Columns> slopes;
-    const hn::Rebind<std::uint8_t, Columns> bytes;
-    const int x = left(displacement);
-    const int y = top(displacement);
+    const auto* pixels = to_.row(top(displacement)) + left(displacement);
+    const auto* slope_x = windows_.gradients.x(windows_.top) + windows_.left;
+    const auto* slope_y = windows_.gradients.y(windows_.top) + windows_.left;
     sum_windows<2>(
-        patch_.rows(),
+        windows_.rows,
         [&](int row, int column) {
-          const int at = row * Patch::stride + column;
-          const auto pixels =
-              hn::PromoteTo(columns, hn::LoadU(bytes, to_.row(y + row) + x + column));
-          const auto dx = hn::PromoteTo(columns, hn::Load(slopes, patch_.slope_x() + at));
-          const auto dy = hn::PromoteTo(columns, hn::Load(slopes, patch_.slope_y() + at));
-          return std::array<Column, 2>{hn::Mul(dx, pixels), hn::Mul(dy, pixels)};
+          const auto* there = pixels + row * to_.stride() + column;
+          const auto at = row * windows_.gradients.stride() + column;
+          return std::array<Pair, 2>{pair_products(slope_x + at, there),
+                                     pair_products(slope_y + at, there)};
         },
         [&](int row, int column, const auto& left, const auto& right) {
-          hn::StoreInterleaved2(hn::Add(left[0], right[0]), hn::Add(left[1], right[1]), columns,
+          hn::StoreInterleaved2(hn::Add(left[0], right[0]), hn::Add(left[1], right[1]), Pairs(),
                                 &out[row * Tile::side + column].x);
         });
   }
 
   const Image<std::uint8_t>& to_;
-  const Patch& patch_;
+  const Windows& windows_;
   float first_x_;  ///< displacement of index 0
   float first_y_;
   int count_ = 0;
-  std::uint16_t searches_[side * side] = {};  ///< all 0 between calls of share()
+  std::uint8_t searches_[side * side] = {};  ///< all 0 between calls of share()
   /// Number of the sums at a displacement, counted from 1.
   std::uint8_t numbers_[side * side] = {};
   std::uint8_t corners_[side * side][corners] = {};
-  HWY_ALIGN GradientSums sums_[max_sums][tile_pixels];
+  HWY_ALIGN GradientSums sums_[max_sums][Tile::block_count];
 };
 
-/// Searches for the points of a tile, one lane per point.
-class Points {
+/// Searches for the blocks of a tile, one lane per block.
+class Blocks {
  public:
-  Points(const Image<std::uint8_t>& to, const Tile& tile, std::span<const Search> searches,
-         const Patch& patch)
-      : to_(to),
-        patch_(patch),
-        count_(static_cast<int>(searches.size())),
-        right_(static_cast<float>(tile.right) / Tile::fractions),
-        down_(static_cast<float>(tile.down) / Tile::fractions) {
+  Blocks(const Image<std::uint8_t>& to, const Tile& tile, std::span<const Search> searches,
+         const Windows& windows)
+      : to_(to), windows_(windows), count_(static_cast<int>(searches.size())) {
     for (int i = 0; i < count_; ++i) {
       const auto& search = searches[static_cast<std::size_t>(i)];
-      window_[i] = patch.index(search.x, search.y);
-      pixel_[i] = patch.pixel(search.x, search.y);
-      left_[i] = static_cast<float>(tile.left + search.x - Tile::before);
-      top_[i] = static_cast<float>(tile.top + search.y - Tile::before);
+      window_[i] = windows.index(search);
+      left_[i] = static_cast<float>(windows.left + 2 * search.x);
+      top_[i] = static_cast<float>(tile.top - Tile::before + 2 * search.y);
       flow_x_[i] = search.flow.x;
       flow_y_[i] = search.flow.y;
       before_x_[i] = before_y_[i] = 0;
       cell_x_[i] = cell_y_[i] = std::numeric_limits<float>::max();
     }
-    if (count_ < share_from) {
-      for (int i = 0; i < count_; ++i) sum_window(i);
-    } else {
-      sum_all_windows();
-      shared_.emplace(to, patch, searches.front().flow);
-    }
+    if (count_ >= SharedSums::enough) shared_.emplace(to, windows, searches.front().flow);
+    sum_windows_here();
     const Floats floats;
     const int lanes = static_cast<int>(hn::Lanes(floats));
     for (int i = 0; i < count_; i += lanes) {
@@ -410,85 +365,44 @@ class Points {
   void store(std::span<Search> searches) const {
     for (int i = 0; i < count_; ++i) {
       auto& search = searches[static_cast<std::size_t>(i)];
-      search.flow = {flow_x_[i], flow_y_[i]};
-      const float x = left_[i] + std::floor(right_ + flow_x_[i]);
-      const float y = top_[i] + std::floor(down_ + flow_y_[i]);
-      search.found = followed_[i] != 0 && x >= -window && y >= -window &&
+      const float x = left_[i] + std::floor(flow_x_[i]);
+      const float y = top_[i] + std::floor(flow_y_[i]);
+      search.found = followed_[i] != 0 && x >= -Tile::window && y >= -Tile::window &&
                      x < static_cast<float>(to_.width()) && y < static_cast<float>(to_.height());
+      if (search.found) search.flow = {flow_x_[i], flow_y_[i]};
     }
   }
 
  private:
-  static constexpr int capacity = tile_pixels;
-  /// Number of points that take longer one by one than the sums of all pixels.
-  static constexpr int share_from = 12;
+  static constexpr int capacity = Tile::block_count;
 
-  /// Computes the sums over a point's window that stay constant during its search.
-  void sum_window(int i) {
-    const Values values;
-    const int lanes = static_cast<int>(hn::Lanes(values));
-    std::int64_t sums[8] = {};
-    for (int column = 0; column < row_values; column += lanes) {
-      const int begin = window_[i] + column;
-      const auto within = weights(column);
-      ProductSum xx;
-      ProductSum xy;
-      ProductSum yy;
-      ProductSum grey_x;
-      ProductSum grey_y;
-      for_each_row([&](int row) {
-        const int at = begin + row * Patch::stride;
-        const auto dx = hn::And(hn::LoadU(values, patch_.slope_x() + at), within);
-        const auto dy = hn::And(hn::LoadU(values, patch_.slope_y() + at), within);
-        const auto grey = hn::LoadU(values, patch_.grey() + at);
-        xx.add(dx, dx);
-        xy.add(dx, dy);
-        yy.add(dy, dy);
-        grey_x.add(dx, grey);
-        grey_y.add(dy, grey);
-      });
-      HWY_ALIGN std::int32_t part[2 * parts * 4];
-      store_parts(xx, xy, yy, yy, part);
-      store_parts(grey_x, grey_y, grey_x, grey_y, part + 4 * parts);
-      for (int k = 0; k < 4; ++k) {
-        for (std::ptrdiff_t p = 0; p < parts; ++p) {
-          sums[k] += part[4 * p + k];
-          sums[4 + k] += part[4 * (parts + p) + k];
-        }
-      }
-    }
-    xx_[i] = static_cast<float>(sums[0]);
-    xy_[i] = static_cast<float>(sums[1]);
-    yy_[i] = static_cast<float>(sums[2]);
-    here_x_[i] = static_cast<std::int32_t>(sums[4]);
-    here_y_[i] = static_cast<std::int32_t>(sums[5]);
-  }
-
-  /// The same for all points, from the sums of all pixels of the tile.
-  void sum_all_windows() {
-    const Columns columns;
-    const hn::Rebind<std::int16_t, Columns> values;
+  /// Computes the sums over the blocks' windows that stay constant during their searches.
+  void sum_windows_here() {
     enum { xx, yy, grey_x, grey_y, xy, xy_right };
     HWY_ALIGN std::int32_t sums[6][capacity];
+    const auto* grey = windows_.grey.row(windows_.top) + windows_.left;
+    const auto* slope_x = windows_.gradients.x(windows_.top) + windows_.left;
+    const auto* slope_y = windows_.gradients.y(windows_.top) + windows_.left;
     sum_windows<5>(
-        patch_.rows(),
+        windows_.rows,
         [&](int row, int column) {
-          const int at = row * Patch::stride + column;
-          const auto dx = hn::PromoteTo(columns, hn::Load(values, patch_.slope_x() + at));
-          const auto dy = hn::PromoteTo(columns, hn::Load(values, patch_.slope_y() + at));
-          const auto grey = hn::PromoteTo(columns, hn::Load(values, patch_.grey() + at));
-          return std::array<Column, 5>{hn::Mul(dx, dx), hn::Mul(dy, dy), hn::Mul(dx, grey),
-                                       hn::Mul(dy, grey), hn::Mul(dx, dy)};
+          const auto* here = grey + row * windows_.grey.stride() + column;
+          const auto* dx = slope_x + row * windows_.gradients.stride() + column;
+          const auto* dy = slope_y + row * windows_.gradients.stride() + column;
+          return std::array<Pair, 5>{pair_products(dx, dx), pair_products(dy, dy),
+                                     pair_products(dx, here), pair_products(dy, here),
+                                     pair_products(dx, dy)};
         },
         [&](int row, int column, const auto& left, const auto& right) {
+          const Pairs pairs;
           const int at = row * Tile::side + column;
           for (std::size_t k = 0; k < xy; ++k)
-            hn::Store(hn::Add(left[k], right[k]), columns, sums[k] + at);
-          hn::Store(left[xy], columns, sums[xy] + at);
-          hn::Store(right[xy], columns, sums[xy_right] + at);
+            hn::Store(hn::Add(left[k], right[k]), pairs, sums[k] + at);
+          hn::Store(left[xy], pairs, sums[xy] + at);
+          hn::Store(right[xy], pairs, sums[xy_right] + at);
         });
     for (int i = 0; i < count_; ++i) {
-      const int at = pixel_[i];
+      const int at = window_[i];
       // Gradients are at most 4080, so squares need 32 bits without a sign, and products 33 with
       // it.
       xx_[i] = static_cast<float>(static_cast<std::uint32_t>(sums[xx][at]));
@@ -499,20 +413,13 @@ class Points {
     }
   }
 
-  /// Mask of a window row: all bits set, except in the last of the 16 values.
-  static Value weights(int column) {
-    HWY_ALIGN static constexpr std::int16_t weight[row_values] = {-1, -1, -1, -1, -1, -1, -1, -1,
-                                                                  -1, -1, -1, -1, -1, -1, -1, 0};
-    return hn::Load(Values(), weight + column);
-  }
-
-  /// Gets the sums of gradient * there of points that entered another pixel.
+  /// Gets the sums of gradient * there of blocks that entered another pixel.
   void look() {
     if (shared_) {
       take_shared();
       if (shared_->share(moved(), displacement_)) take_shared();
     }
-    look_alone();
+    for (const auto i : moved()) look(i);
     moved_count_ = 0;
   }
 
@@ -520,7 +427,7 @@ class Points {
     return std::span(moved_).first(static_cast<std::size_t>(moved_count_));
   }
 
-  /// Takes points whose displacement has shared sums out of moved_, and copies their sums.
+  /// Takes blocks whose displacement has shared sums out of moved_, and copies their sums.
   void take_shared() {
     std::int32_t taken[capacity];
     int taken_count = 0;
@@ -535,21 +442,8 @@ class Points {
     moved_count_ = left;
     for (int k = 0; k < taken_count; ++k) {
       const int i = taken[k];
-      for (int c = 0; c < corners; ++c) there_[c][i] = shared_->at(displacement_[i], c, pixel_[i]);
+      for (int c = 0; c < corners; ++c) there_[c][i] = shared_->at(displacement_[i], c, window_[i]);
     }
-  }
-
-  /// Computes the sums of each point in moved_.
-  void look_alone() {
-#if HWY_MAX_BYTES == 64
-    if (shared_ && moved_count_ > 0 && ByteWindows::supported()) {
-      if (!byte_windows_)
-        byte_windows_.emplace(patch_.slope_x(), patch_.slope_y(), patch_.rows() + window - 1);
-      byte_windows_->sum(moved(), pixel_, to_, at_, there_);
-      return;
-    }
-#endif
-    for (const auto i : moved()) look(i);
   }
 
   /// Computes the sums of gradient * there with the window at each of the four pixels around its
@@ -562,16 +456,19 @@ class Points {
     BothSum upper_right;
     BothSum lower_left;
     BothSum lower_right;
-    for (int column = 0; column < row_values; column += lanes) {
-      const auto weight = weights(column);
-      const auto* slope_x = patch_.slope_x() + window_[i] + column;
-      const auto* slope_y = patch_.slope_y() + window_[i] + column;
+    const int block_x = 2 * (window_[i] % Tile::side);
+    const int block_y = 2 * (window_[i] / Tile::side);
+    for (int column = 0; column < Tile::window; column += lanes) {
+      const auto begin = windows_.left + block_x + column;
+      const auto* slope_x = windows_.gradients.x(windows_.top + block_y) + begin;
+      const auto* slope_y = windows_.gradients.y(windows_.top + block_y) + begin;
       const auto* pixels = to_.row(0) + at_[i] + column;
       auto left = load_pixels(pixels);
       auto right = load_pixels(pixels + 1);
-      for_each_row([&](int row) {
-        const int at = row * Patch::stride;
-        const auto slopes = load_slopes(slope_x + at, slope_y + at, weight);
+      for_each_row([&](int) {
+        const auto slopes = load_slopes(slope_x, slope_y);
+        slope_x += windows_.gradients.stride();
+        slope_y += windows_.gradients.stride();
         upper_left.add(slopes, left);
         upper_right.add(slopes, right);
         pixels += stride;
@@ -593,16 +490,16 @@ class Points {
     }
   }
 
-  /// Stores the pixels that points are in, queues points that entered another pixel in moved_, and
-  /// deactivates points that left the image.
+  /// Stores the pixels that blocks are in, queues blocks that entered another pixel in moved_, and
+  /// deactivates blocks that left the image.
   template <class Mask>
   void locate(int i, Mask active, hn::Vec<Floats> flow_x, hn::Vec<Floats> flow_y) {
     const Floats floats;
-    const auto cell_x = hn::Floor(hn::Add(flow_x, hn::Set(floats, right_)));
-    const auto cell_y = hn::Floor(hn::Add(flow_y, hn::Set(floats, down_)));
+    const auto cell_x = hn::Floor(flow_x);
+    const auto cell_y = hn::Floor(flow_y);
     const auto x = hn::Add(cell_x, hn::Load(floats, left_ + i));
     const auto y = hn::Add(cell_y, hn::Load(floats, top_ + i));
-    const auto least = hn::Set(floats, -static_cast<float>(window));
+    const auto least = hn::Set(floats, -static_cast<float>(Tile::window));
     const auto inside = hn::And(
         hn::And(hn::Ge(x, least), hn::Lt(x, hn::Set(floats, static_cast<float>(to_.width())))),
         hn::And(hn::Ge(y, least), hn::Lt(y, hn::Set(floats, static_cast<float>(to_.height())))));
@@ -624,17 +521,15 @@ class Points {
     moved_count_ += static_cast<int>(hn::CountTrue(floats, moved));
   }
 
-  /// Moves a vector of points by one Gauss-Newton step.
+  /// Moves a vector of blocks by one Gauss-Newton step.
   template <class Mask>
   void move(int i, Mask active, bool has_before) {
     const Floats floats;
     const Ints ints;
     const auto flow_x = hn::Load(floats, flow_x_ + i);
     const auto flow_y = hn::Load(floats, flow_y_ + i);
-    const auto beyond_x =
-        hn::Sub(hn::Add(flow_x, hn::Set(floats, right_)), hn::Load(floats, cell_x_ + i));
-    const auto beyond_y =
-        hn::Sub(hn::Add(flow_y, hn::Set(floats, down_)), hn::Load(floats, cell_y_ + i));
+    const auto beyond_x = hn::Sub(flow_x, hn::Load(floats, cell_x_ + i));
+    const auto beyond_y = hn::Sub(flow_y, hn::Load(floats, cell_y_ + i));
     // Sums of gradient * (there - here).
     hn::Vec<Floats> mismatch_x[corners];
     hn::Vec<Floats> mismatch_y[corners];
@@ -643,18 +538,18 @@ class Points {
       hn::Vec<Ints> there_y;
       hn::LoadInterleaved2(ints, &there_[c][i].x, there_x, there_y);
       const auto subtract = [&](auto there, const std::int32_t* here) {
-        return hn::ConvertTo(floats, hn::Sub(hn::ShiftLeft<2>(there), hn::Load(ints, here + i)));
+        return hn::ConvertTo(floats, hn::Sub(there, hn::Load(ints, here + i)));
       };
       mismatch_x[c] = subtract(there_x, here_x_);
       mismatch_y[c] = subtract(there_y, here_y_);
     }
-    const auto bilinear = [&](const auto& corners) {
+    const auto bilinear = [&](const auto& at) {
       const auto between = [](auto a, auto b, auto part) {
         return hn::Add(a, hn::Mul(hn::Sub(b, a), part));
       };
-      return hn::Mul(between(between(corners[0], corners[1], beyond_x),
-                             between(corners[2], corners[3], beyond_x), beyond_y),
-                     hn::Set(floats, mismatch_product));
+      return hn::Mul(
+          between(between(at[0], at[1], beyond_x), between(at[2], at[3], beyond_x), beyond_y),
+          hn::Set(floats, mismatch_product));
     };
     const auto x = bilinear(mismatch_x);
     const auto y = bilinear(mismatch_y);
@@ -688,17 +583,11 @@ class Points {
   }
 
   const Image<std::uint8_t>& to_;
-  const Patch& patch_;
-  std::optional<SharedSums> shared_;  ///< if there are many points
-#if HWY_MAX_BYTES == 64
-  std::optional<ByteWindows> byte_windows_;  ///< made once many points are summed one by one
-#endif
+  const Windows& windows_;
+  std::optional<SharedSums> shared_;  ///< if there are several blocks
   int count_;
-  float right_;
-  float down_;
   int moved_count_ = 0;
-  int window_[capacity];  ///< index of its first value in the patch
-  int pixel_[capacity];   ///< its index among the pixels of the patch
+  int window_[capacity];  ///< index of its window
   HWY_ALIGN float left_[capacity];
   HWY_ALIGN float top_[capacity];
   HWY_ALIGN float flow_x_[capacity];
@@ -725,12 +614,14 @@ class Points {
 
 void search_all(const Image<std::uint8_t>& from, const ScharrGradients& gradients,
                 const Image<std::uint8_t>& to, const Tile& tile, std::span<Search> searches) {
-  const auto [first, last] = std::minmax_element(
-      searches.begin(), searches.end(), [](const auto& a, const auto& b) { return a.y < b.y; });
-  const Patch patch(from, gradients, tile, first->y, last->y);
-  Points points(to, tile, searches, patch);
-  points.search();
-  points.store(searches);
+  const int first = searches.front().y;
+  const int last = searches.back().y;
+  const Windows windows{
+      from,  gradients,       tile.left - Tile::before, tile.top + 2 * first - Tile::before,
+      first, last - first + 1};
+  Blocks blocks(to, tile, searches, windows);
+  blocks.search();
+  blocks.store(searches);
 }
 
 }  // namespace

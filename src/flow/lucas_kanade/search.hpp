@@ -8,38 +8,40 @@
 
 namespace eventcamera {
 
-/// 16x16 pixels of a level. Points of a tile that share a sub-pixel offset are searched for
-/// together.
+/// 8x8 blocks of a level, whose first pixels are two pixels apart: blocks of 2x2 pixels, or every
+/// second one of each row and column of pixels. A block is searched for with a window of 16x16
+/// pixels around it.
 struct Tile {
-  static constexpr int side = 16;
-  static constexpr int fractions = 8;  ///< points lie at multiples of 1/8 of a pixel
-  /// Pixels of a window on either side of the point's pixel.
+  static constexpr int side = 8;          ///< blocks
+  static constexpr int width = 2 * side;  ///< pixels
+  static constexpr int block_count = side * side;
+  static constexpr int window = 16;
+  /// Pixels of a window before and after the first pixel of its block.
   static constexpr int before = 7;
   static constexpr int after = 8;
 
-  int left;
+  int left;  ///< first pixel
   int top;
-  int right;  ///< offset of every point from its pixel, in 1/8
-  int down;
 };
 
-/// Search for a point of a tile on the same level of another image.
+/// Search for a block of a tile on the same level of another image.
 struct Search {
-  int x;  ///< its pixel, within the tile
+  int x;  ///< its place among the blocks of the tile
   int y;
-  Flow flow;   ///< in: start of the search; out: its result
+  Flow flow;   ///< in: start of the search; out: its result, if found
   bool found;  ///< out: false if the window has too little texture or left the image
 };
 
-/// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): moves a window of 15x15 pixels
-/// towards the minimum of its squared difference, at most 10 times, until a move is shorter than
-/// 0.03 pixels or undoes the last one. Needs the gradients of `from` in all windows. At most one
-/// search per pixel of the tile.
+/// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): moves a window towards the
+/// minimum of its squared difference, at most 11 times, until a move is shorter than 0.03 pixels or
+/// undoes the last one. Needs the gradients of `from` in all windows. At most one search per block,
+/// in raster order.
 ///
 /// The window sum that determines a move is bilinear in the window's position, so it is
 /// interpolated between the integer sums at the four pixels around it. The window is summed once
 /// per pixel that a search visits, not once per move, and results are the same on every processor.
-/// Where many points have moved alike, the windows of all pixels of the tile are summed together.
+/// Where several blocks have moved alike, the windows of all blocks of the tile are summed
+/// together.
 void search_tile(const Image<std::uint8_t>& from, const ScharrGradients& gradients,
                  const Image<std::uint8_t>& to, const Tile& tile, std::span<Search> searches);
 
