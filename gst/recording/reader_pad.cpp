@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/recording/reader_pad.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
@@ -111,12 +112,14 @@ GstFlowReturn ReaderPad::push(GstBuffer* buffer, GstClockTime pts) {
   return gst_pad_push(pad_, buffer);
 }
 
-GstFlowReturn ReaderPad::push(std::span<const eventcamera::Event> events, GstClockTime pts,
+GstFlowReturn ReaderPad::push(std::span<const eventcamera::Event> events,
+                              std::span<const eventcamera::Label> labels, GstClockTime pts,
                               GstClockTime duration) {
   OwnedBuffer buffer;
   const auto result = buffers_.acquire(events.size_bytes(), buffer);
   if (result != GST_FLOW_OK) return result;
   gst_buffer_fill(buffer.get(), 0, events.data(), events.size_bytes());
+  if (!labels.empty()) std::ranges::copy(labels, add_labels(buffer.get(), events.size()).begin());
   GST_BUFFER_DURATION(buffer.get()) = duration;
   return push(buffer.release(), pts);
 }

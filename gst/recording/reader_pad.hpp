@@ -56,8 +56,9 @@ class ReaderPad {
   void need_segment(bool due) { segment_due_ = due; }
 
   GstFlowReturn push(GstBuffer* buffer, GstClockTime pts);
-  /// Pushes events, at least one. Throws std::bad_alloc.
-  GstFlowReturn push(std::span<const eventcamera::Event> events, GstClockTime pts,
+  /// Pushes events, at least one, and their labels, if there are any. Throws std::bad_alloc.
+  GstFlowReturn push(std::span<const eventcamera::Event> events,
+                     std::span<const eventcamera::Label> labels, GstClockTime pts,
                      GstClockTime duration);
   GstFlowReturn push_gap(GstClockTime pts, GstClockTime duration);
 

@@ -76,16 +76,21 @@ inline void sort_within_spans(std::span<Event> events, int span_bits) {
   }
 }
 
-/// Event with a 64-bit time.
+/// What made a simulated pixel fire (docs/methods.md, Causes of events).
+enum class Cause : std::uint8_t { unknown, light, leak, shot_noise, hot_pixel, exposure_pulse };
+
+/// Event with a 64-bit time. Its label takes the space that alignment leaves.
 struct AbsoluteEvent {
   Microseconds t;
-  std::uint16_t x;    ///< column, from the left
-  std::uint16_t y_p;  ///< row from the top in bits 0-14; bit 15 is the polarity, 1 = ON
+  std::uint16_t x;             ///< column, from the left
+  std::uint16_t y_p;           ///< row from the top in bits 0-14; bit 15 is the polarity, 1 = ON
+  std::uint16_t object_class;  ///< in labelled streams only, like `cause`
+  Cause cause;
 
   /// Leaves the members uninitialized: a vector grows at no cost, and decoders write in place.
   AbsoluteEvent() {}  // NOLINT(*-member-init,*-use-equals-default)
   constexpr AbsoluteEvent(Microseconds time, std::uint16_t column, std::uint16_t row_and_polarity)
-      : t(time), x(column), y_p(row_and_polarity) {}
+      : t(time), x(column), y_p(row_and_polarity), object_class(0), cause(Cause::unknown) {}
 
   static constexpr AbsoluteEvent at(int x, int y, Microseconds t, Polarity polarity) {
     const auto event = Event::at(x, y, 0, polarity);
@@ -94,8 +99,12 @@ struct AbsoluteEvent {
   constexpr int y() const { return y_p & 0x7fff; }
   constexpr Polarity polarity() const { return (y_p & 0x8000) != 0 ? Polarity::on : Polarity::off; }
 
-  friend constexpr bool operator==(const AbsoluteEvent&, const AbsoluteEvent&) = default;
+  /// Compares without the labels.
+  friend constexpr bool operator==(const AbsoluteEvent& a, const AbsoluteEvent& b) {
+    return a.t == b.t && a.x == b.x && a.y_p == b.y_p;
+  }
 };
+static_assert(sizeof(AbsoluteEvent) == 16);
 
 /// Edge on a trigger input of a camera.
 struct Trigger {

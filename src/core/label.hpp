@@ -10,9 +10,6 @@
 
 namespace eventcamera {
 
-/// What made a simulated pixel fire (docs/methods.md, Causes of events).
-enum class Cause : std::uint8_t { unknown, light, leak, shot_noise, hot_pixel, exposure_pulse };
-
 static_assert(max_side <= int{coordinate_bits} + 1);
 
 /// An event with its cause in the spare bits of its coordinates, as simulators carry it until
@@ -45,6 +42,11 @@ struct Label {
   friend constexpr bool operator==(const Label&, const Label&) = default;
 };
 static_assert(sizeof(Label) == 4);
+
+/// Label that an event of a labelled stream carries.
+constexpr Label label_of(const AbsoluteEvent& event) {
+  return {.object_class = event.object_class, .cause = event.cause};
+}
 
 /// Sorted events of an interval and, if they are labelled, a label for each.
 struct LabelledEvents {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "src/core/interval_times.hpp"
@@ -39,6 +41,7 @@ std::size_t Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
   if (!count_times_from(cell.start, latest_, events, block.data()))
     return 0;  // the cell is not left empty: place() keeps the first event
   cell.events.insert(cell.events.end(), block.begin(), block.begin() + events.size());
+  if (keeps_labels_) std::ranges::transform(events, std::back_inserter(cell.labels), label_of);
   latest_ = events.back().t;
   waiting_ += events.size();
   return events.size();
@@ -75,6 +78,7 @@ void Chunker::keep(const AbsoluteEvent& event) {
   const auto t = static_cast<std::uint32_t>(event.t - cell.start);
   cell.is_sorted &= cell.events.empty() || t >= cell.events.back().t;
   cell.events.push_back({t, event.x, event.y_p});
+  if (keeps_labels_) cell.labels.push_back(label_of(event));
   ++waiting_;
   latest_ = std::max(latest_, event.t);
 }
@@ -105,7 +109,7 @@ Chunker::Cell& Chunker::cell_of(Microseconds t) {
   while (after != cells_.begin() && std::prev(after)->start > t) --after;
   if (after != cells_.begin() && t < std::prev(after)->end) return *std::prev(after);
   const auto on_grid = grid_before(t);
-  const auto made = cells_.insert(after, {std::max(on_grid, start_), on_grid + length_, {}});
+  const auto made = cells_.insert(after, {std::max(on_grid, start_), on_grid + length_, {}, {}});
   if (!spare_.empty()) {
     made->events = std::move(spare_.back());
     made->events.clear();
@@ -141,17 +145,26 @@ Microseconds Chunker::middle() {
 }
 
 void Chunker::sort(Cell& cell) {
-  if (!std::exchange(cell.is_sorted, true)) std::ranges::stable_sort(cell.events, {}, &Event::t);
+  if (std::exchange(cell.is_sorted, true)) return;
+  if (!cell.labels.empty()) {
+    std::vector<std::size_t> order(cell.labels.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return cell.events[i].t; });
+    const auto labels = std::exchange(cell.labels, {});
+    for (const auto i : order) cell.labels.push_back(labels[i]);
+  }
+  std::ranges::stable_sort(cell.events, {}, &Event::t);
 }
 
 Chunker::Interval Chunker::hand_out(Microseconds end) {
-  Interval interval{start_, end - start_, {}};
+  Interval interval{start_, end - start_, {}, {}};
   start_ = end;
   if (cells_.empty() || cells_.front().start >= end) return interval;
   if (returned_.capacity() > 0) spare_.push_back(std::move(returned_));
   auto& cell = cells_.front();
   sort(cell);
   returned_ = std::move(cell.events);
+  returned_labels_ = std::move(cell.labels);
   const auto later = std::ranges::partition_point(
       returned_, [&](const Event& event) { return cell.start + event.t < end; });
   if (later == returned_.end()) {
@@ -160,10 +173,16 @@ Chunker::Interval Chunker::hand_out(Microseconds end) {
     cell.events.assign(later, returned_.end());
     for (auto& event : cell.events) event.t -= static_cast<std::uint32_t>(end - cell.start);
     cell.start = end;
+    if (!returned_labels_.empty()) {
+      const auto later_label = returned_labels_.begin() + (later - returned_.begin());
+      cell.labels.assign(later_label, returned_labels_.end());
+      returned_labels_.erase(later_label, returned_labels_.end());
+    }
     returned_.erase(later, returned_.end());
   }
   waiting_ -= returned_.size();
   interval.events = returned_;
+  interval.labels = returned_labels_;
   return interval;
 }
 

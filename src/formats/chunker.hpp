@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "src/core/event.hpp"
+#include "src/core/label.hpp"
 
 namespace eventcamera {
 
@@ -33,6 +33,7 @@ class Chunker {
     Microseconds duration;
     /// Sorted, with times from the start; valid until next(). None: a silence, of any length.
     std::span<const Event> events;
+    std::span<const Label> labels;  ///< as many as events, or none
   };
 
   struct Dropped {
@@ -45,6 +46,9 @@ class Chunker {
 
   /// The first interval begins at `start`; earlier events are ignored.
   Chunker(Microseconds length, Microseconds start);
+
+  /// Whether the next events carry labels, which are then returned with them.
+  void keep_labels(bool kept) { keeps_labels_ = kept; }
 
   void push(std::span<const AbsoluteEvent> events);
 
@@ -74,6 +78,7 @@ class Chunker {
     Microseconds start;         ///< its events count from here
     Microseconds end;           ///< on the grid
     std::vector<Event> events;  ///< in the order in which they came
+    std::vector<Label> labels;  ///< of the events, if they have any
     bool is_sorted = true;
   };
 
@@ -90,14 +95,16 @@ class Chunker {
   Microseconds length_;
   std::optional<Microseconds> first_;
   bool given_start_ = false;
+  bool keeps_labels_ = false;
   Microseconds start_ = never;    ///< start of the next interval, once first_ is known
   Microseconds latest_ = never;   ///< latest time of kept events
   Microseconds reached_ = never;  ///< nothing earlier will follow
   bool finished_ = false;
 
-  std::deque<Cell> cells_;                 ///< those with events, in order of time
-  std::size_t waiting_ = 0;                ///< events in them
-  std::vector<Event> returned_;            ///< by the last next()
+  std::deque<Cell> cells_;       ///< those with events, in order of time
+  std::size_t waiting_ = 0;      ///< events in them
+  std::vector<Event> returned_;  ///< by the last next()
+  std::vector<Label> returned_labels_;
   std::vector<std::vector<Event>> spare_;  ///< memory for further cells
   std::vector<AbsoluteEvent> ahead_;       ///< far ahead of latest_: not yet trusted
   Dropped dropped_;

@@ -77,6 +77,9 @@ class Decoder {
   /// mirror the events.
   bool is_mirrored() const { return is_mirrored_; }
 
+  /// Whether events carry labels; known once the first are decoded.
+  bool has_labels() const { return has_labels_; }
+
   const Corruption& corruption() const { return corruption_; }
 
  protected:
@@ -84,6 +87,7 @@ class Decoder {
 
   SensorSize size_;
   bool is_mirrored_ = false;
+  bool has_labels_ = false;
   Corruption corruption_;
   SeekPoints seek_points_;
 };

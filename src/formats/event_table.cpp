@@ -13,11 +13,23 @@ std::optional<EventColumn> column_with(std::string_view word) {
     EventColumn column;
   };
   static constexpr Name names[] = {
-      {"t", EventColumn::t},         {"ts", EventColumn::t},         {"time", EventColumn::t},
-      {"timestamp", EventColumn::t}, {"timestamps", EventColumn::t}, {"x", EventColumn::x},
-      {"xs", EventColumn::x},        {"y", EventColumn::y},          {"ys", EventColumn::y},
-      {"p", EventColumn::p},         {"ps", EventColumn::p},         {"pol", EventColumn::p},
-      {"polarity", EventColumn::p},  {"polarities", EventColumn::p}, {"on", EventColumn::p},
+      {"t", EventColumn::t},
+      {"ts", EventColumn::t},
+      {"time", EventColumn::t},
+      {"timestamp", EventColumn::t},
+      {"timestamps", EventColumn::t},
+      {"x", EventColumn::x},
+      {"xs", EventColumn::x},
+      {"y", EventColumn::y},
+      {"ys", EventColumn::y},
+      {"p", EventColumn::p},
+      {"ps", EventColumn::p},
+      {"pol", EventColumn::p},
+      {"polarity", EventColumn::p},
+      {"polarities", EventColumn::p},
+      {"on", EventColumn::p},
+      {"cause", EventColumn::cause},
+      {"class", EventColumn::object_class},
   };
   const auto* const found = std::ranges::find(names, word, &Name::name);
   if (found == std::end(names)) return std::nullopt;

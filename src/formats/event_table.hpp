@@ -9,14 +9,18 @@
 #include <string_view>
 #include <vector>
 
-#include "src/core/event.hpp"
+#include "src/core/label.hpp"
 #include "src/core/max_side.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/formats/corruption.hpp"
 
 namespace eventcamera {
 
-enum class EventColumn : std::uint8_t { t, x, y, p };
+/// Columns of a table of events: those of every event, and those of its label.
+enum class EventColumn : std::uint8_t { t, x, y, p, cause, object_class };
+
+constexpr std::size_t event_columns = 4;  ///< without labels
+constexpr std::size_t all_columns = 6;
 
 enum class TimeUnit : std::uint8_t { seconds, milliseconds, microseconds, nanoseconds };
 
@@ -43,6 +47,14 @@ using Columns = std::vector<std::optional<EventColumn>>;
 /// p occurs exactly once.
 std::optional<Columns> columns_of(std::string_view letters);
 
+/// Label from the numbers of its columns; 0 is unknown, and so is what a label cannot hold.
+inline Label label_from(std::int64_t cause, std::int64_t object_class) {
+  const bool is_cause = cause >= 0 && cause <= UINT8_MAX;
+  const bool is_class = object_class >= 0 && object_class <= UINT16_MAX;
+  return {.object_class = static_cast<std::uint16_t>(is_class ? object_class : 0),
+          .cause = static_cast<Cause>(is_cause ? cause : 0)};
+}
+
 /// Known properties of a table; the others are detected from its header and first rows.
 struct TableSettings {
   Columns columns = {};
@@ -63,12 +75,19 @@ class RowValidator {
 
   void take(Microseconds t, std::int64_t x, std::int64_t y, bool on,
             std::vector<AbsoluteEvent>& out, Corruption& corruption) {
+    take(t, x, y, on, {}, out, corruption);
+  }
+
+  void take(Microseconds t, std::int64_t x, std::int64_t y, bool on, const Label& label,
+            std::vector<AbsoluteEvent>& out, Corruption& corruption) {
     if (static_cast<std::uint64_t>(x) >= x_end_ || static_cast<std::uint64_t>(y) >= y_end_) {
       ++corruption.outside;
       return;
     }
     out.push_back(
         {t, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y | (on ? 0x8000 : 0))});
+    out.back().object_class = label.object_class;
+    out.back().cause = label.cause;
   }
 
  private:

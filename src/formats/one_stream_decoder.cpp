@@ -30,6 +30,7 @@ std::optional<Item> OneStreamDecoder::next() {
     }
     streams_.front().size = decoder_->size();
     streams_.front().mirrored = decoder_->is_mirrored();
+    streams_.front().labelled = decoder_->has_labels();
     events_due_ = triggers_due_ = true;
   }
 }

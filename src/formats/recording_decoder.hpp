@@ -33,6 +33,7 @@ struct StreamInfo {
   std::string source;  ///< name of the camera
   /// Columns count from the right and rows from the bottom, as the size that turns them is unknown.
   bool mirrored = false;
+  bool labelled = false;  ///< its events carry labels
 };
 
 /// Pixel format of a frame; the values are those of AEDAT4.

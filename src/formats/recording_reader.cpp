@@ -122,6 +122,7 @@ void RecordingReader::learn_streams() {
       throw std::runtime_error("the file changed while it was read: its streams are different now");
     // Some formats state the size only after their first bytes.
     streams_[i].info.mirrored = known[i].mirrored;
+    streams_[i].info.labelled = known[i].labelled;
     if (streams_[i].size_from == SizeFrom::file && known[i].size != SensorSize{})
       streams_[i].info.size = known[i].size;
   }
@@ -445,12 +446,16 @@ void RecordingReader::take(const EventItem& item) {
   if (stream.info.mirrored) {
     const auto size = stream.info.size;
     if (events.data() != within_.data()) within_.assign(events.begin(), events.end());
-    for (auto& event : within_)
-      event = AbsoluteEvent::at(size.width - 1 - event.x, size.height - 1 - event.y(), event.t,
-                                event.polarity());
+    for (auto& event : within_) {
+      const auto turned =
+          Event::at(size.width - 1 - event.x, size.height - 1 - event.y(), 0, event.polarity());
+      event.x = turned.x;
+      event.y_p = turned.y_p;
+    }
     events = within_;
   }
   if (clock_ == Clock::stream && !shift_ && interval_) set_shift(item.events.front().t);
+  stream.chunker.keep_labels(stream.info.labelled);
   stream.chunker.push(events);
   next_stream_ = 0;
 }
@@ -508,7 +513,7 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
       if (!stream.shown) continue;
       while (const auto interval = stream.chunker.next()) {
         Chunk chunk{next_stream_, interval->start - origin_ + shift_.value_or(0),
-                    interval->duration, interval->events};
+                    interval->duration, interval->events, interval->labels};
         cut_at_stop(chunk);
         if (!advance(stream, chunk.start, chunk.start + chunk.duration)) continue;
         counts_.events += chunk.events.size();
@@ -533,6 +538,7 @@ void RecordingReader::cut_at_stop(Chunk& chunk) const {
   const auto end = std::ranges::partition_point(
       chunk.events, [&](const Event& event) { return event.t < chunk.duration; });
   chunk.events = {chunk.events.begin(), end};
+  if (!chunk.labels.empty()) chunk.labels = chunk.labels.first(chunk.events.size());
 }
 
 /// Treats event streams that lag far behind the newest item as silent.

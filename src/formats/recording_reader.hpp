@@ -69,7 +69,8 @@ class RecordingReader {
     std::size_t stream;
     Microseconds start;
     Microseconds duration;
-    std::span<const Event> events;  ///< none: a gap, in a stream of any kind
+    std::span<const Event> events;       ///< none: a gap, in a stream of any kind
+    std::span<const Label> labels = {};  ///< of the events, or none
   };
 
   /// A frame and its time since the origin.

@@ -29,6 +29,9 @@ bool fits(double value, EventColumn column) {
       return is_within(value, 0, 0x8000);
     case EventColumn::p:
       return is_within(value, -1, 2);
+    case EventColumn::cause:
+    case EventColumn::object_class:
+      return true;  // an event without a label is an event
   }
   return false;
 }

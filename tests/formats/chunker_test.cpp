@@ -250,4 +250,32 @@ TEST(Chunker, HandsOutWhatIsReachedAtOnce) {
   EXPECT_EQ(silence->duration, 20'000);
 }
 
+TEST(Chunker, KeepsLabelsWithTheirEvents) {
+  // Out of order, and so many that intervals are cut in two.
+  std::mt19937 random(5);
+  std::vector<AbsoluteEvent> events;
+  constexpr std::size_t count = Chunker::max_events + 100'000;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto& event = events.emplace_back(
+        at(static_cast<Microseconds>(i / 600) + static_cast<Microseconds>(random() % 500)));
+    event.x = static_cast<std::uint16_t>(random() % 1000);
+    event.object_class = static_cast<std::uint16_t>(event.x + 7);
+    event.cause = Cause::leak;
+  }
+  Chunker chunker(length);
+  chunker.keep_labels(true);
+  chunker.push(events);
+  chunker.finish();
+  std::size_t labelled = 0;
+  while (const auto interval = chunker.next()) {
+    ASSERT_EQ(interval->labels.size(), interval->events.size());
+    for (std::size_t i = 0; i < interval->events.size(); ++i) {
+      const auto expected = static_cast<std::uint16_t>(interval->events[i].x + 7);
+      ASSERT_EQ(interval->labels[i], (Label{.object_class = expected, .cause = Cause::leak}));
+    }
+    labelled += interval->labels.size();
+  }
+  EXPECT_EQ(labelled, count);
+}
+
 }  // namespace

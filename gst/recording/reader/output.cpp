@@ -46,7 +46,7 @@ GstFlowReturn EventReader::push(const RecordingReader::Chunk& chunk) {
                  "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  chunk.events.size(), GST_TIME_ARGS(pts), GST_TIME_ARGS(duration));
   if (chunk.events.empty()) return combined(pad, pad.push_gap(pts, duration));
-  return combined(pad, pad.push(chunk.events, pts, duration));
+  return combined(pad, pad.push(chunk.events, chunk.labels, pts, duration));
 }
 
 GstFlowReturn EventReader::push(const RecordingReader::TimedFrame& item) {

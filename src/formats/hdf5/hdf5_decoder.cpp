@@ -89,6 +89,7 @@ Hdf5Decoder::Hdf5Decoder(File file) : file_(std::make_unique<File>(std::move(fil
   table_ = Hdf5Table::open(id);
   format_ = table_->format();
   size_ = table_->size();
+  has_labels_ = table_->has_labels();
   if (format_ == Hdf5Format::metavision) triggers_ = Hdf5Triggers::open(id);
   validator_.set_size(size_);
   if (table_->rows() < table_->claimed_rows())
@@ -175,13 +176,13 @@ class Hdf5Items final : public RecordingDecoder {
 
   void finish() override {
     file_ = std::make_unique<Hdf5Decoder>(std::make_unique<MemoryBytes>(std::move(collected_)));
-    tell_size();
+    describe();
   }
 
   bool open(ByteSource& source) override {
     file_ = std::make_unique<Hdf5Decoder>(source);
     opened_ = true;
-    tell_size();
+    describe();
     return true;
   }
 
@@ -231,7 +232,10 @@ class Hdf5Items final : public RecordingDecoder {
  private:
   static constexpr std::size_t read_at_once = std::size_t{1} << 14;
 
-  void tell_size() { streams_.front().size = file_->size(); }
+  void describe() {
+    streams_.front().size = file_->size();
+    streams_.front().labelled = file_->has_labels();
+  }
 
   std::vector<std::uint8_t> collected_;
   std::unique_ptr<Hdf5Decoder> file_;  ///< set once the file can be read

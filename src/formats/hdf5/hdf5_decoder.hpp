@@ -36,6 +36,9 @@ class Hdf5Decoder {
   /// Sensor size; 0x0 if not stated in the file.
   SensorSize size() const { return size_; }
 
+  /// True if events carry labels.
+  bool has_labels() const { return has_labels_; }
+
   /// Number of events.
   std::uint64_t count() const;
 
@@ -62,6 +65,7 @@ class Hdf5Decoder {
   std::unique_ptr<File> file_;
   Hdf5Format format_ = Hdf5Format::dsec;
   SensorSize size_;
+  bool has_labels_ = false;
   std::unique_ptr<Hdf5Table> table_;
   std::unique_ptr<Hdf5Triggers> triggers_;
   RowValidator validator_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 #include <string>
 
 #include "src/core/max_side.hpp"
@@ -90,7 +91,8 @@ class NumberTable : public Hdf5Table {
         note(corruption, t_dataset(), row, "timestamp out of range");
         continue;
       }
-      validator.take(t, x_[i], y_[i], p_[i] > 0, out, corruption);
+      const auto label = has_labels_ ? label_from(cause_[i], object_class_[i]) : Label{};
+      validator.take(t, x_[i], y_[i], p_[i] > 0, label, out, corruption);
     }
     return end;
   }
@@ -119,7 +121,8 @@ class NumberTable : public Hdf5Table {
   virtual Hdf5Dataset& t_dataset() = 0;
   virtual std::size_t t_column() const { return 0; }  ///< in the rows of t_dataset()
 
-  /// Reads t_, x_, y_ and p_. Returns the dataset that could not be read, or nullptr.
+  /// Reads t_, x_, y_ and p_, and the labels, if there are any. Returns the dataset that could not
+  /// be read, or nullptr.
   virtual const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) = 0;
 
   /// First row after the chunk of this row.
@@ -130,7 +133,7 @@ class NumberTable : public Hdf5Table {
 
   Microseconds offset_ = 0;
   bool wraps_ = false;  ///< times have 32 bits and wrap after 71 minutes
-  std::vector<std::int64_t> t_, x_, y_, p_;
+  std::vector<std::int64_t> t_, x_, y_, p_, cause_, object_class_;
 
  private:
   std::uint64_t next_row_ = 0;
@@ -141,10 +144,9 @@ class NumberTable : public Hdf5Table {
 /// Columns in a group of any name: the DSEC layout, and others without its index.
 class DsecTable final : public NumberTable {
  public:
-  DsecTable(hid_t file, const std::string& group)
-      : NumberTable(Hdf5Format::dsec),
-        columns_{{Hdf5Dataset(file, group + "/t"), Hdf5Dataset(file, group + "/x"),
-                  Hdf5Dataset(file, group + "/y"), Hdf5Dataset(file, group + "/p")}} {
+  DsecTable(hid_t file, const std::string& group) : NumberTable(Hdf5Format::dsec) {
+    for (const char* const name : {"/t", "/x", "/y", "/p"})
+      columns_.emplace_back(file, group + name);
     rows_ = columns_[0].rows();
     for (auto& column : columns_) {
       if (column.rank() != 1 || !column.is_integers())
@@ -153,6 +155,7 @@ class DsecTable final : public NumberTable {
       rows_ = std::min(rows_, column.rows());
       claimed_rows_ = std::max(claimed_rows_, column.claimed_rows());
     }
+    open_labels(file, group);
     wraps_ = columns_[0].is_unsigned_32();
     if (Hdf5Dataset::exists(file, "t_offset", H5O_TYPE_DATASET)) {
       Hdf5Dataset offset(file, "t_offset");
@@ -195,7 +198,7 @@ class DsecTable final : public NumberTable {
   Hdf5Dataset& t_dataset() override { return columns_[0]; }
 
   const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) override {
-    std::vector<std::int64_t>* const numbers[] = {&t_, &x_, &y_, &p_};
+    std::vector<std::int64_t>* const numbers[] = {&t_, &x_, &y_, &p_, &cause_, &object_class_};
     for (std::size_t i = 0; i < columns_.size(); ++i)
       if (!columns_[i].read(row, count, *numbers[i])) return &columns_[i];
     return nullptr;
@@ -223,6 +226,19 @@ class DsecTable final : public NumberTable {
   }
 
  private:
+  /// Opens the columns cause and class, if both are there and have a number for each event.
+  void open_labels(hid_t file, const std::string& group) {
+    std::vector<Hdf5Dataset> labels;
+    for (const char* const name : {"/cause", "/class"}) {
+      if (!Hdf5Dataset::exists(file, group + name, H5O_TYPE_DATASET)) return;
+      auto& column = labels.emplace_back(file, group + name);
+      if (column.rank() != 1 || !column.is_integers() || column.rows() < rows_) return;
+      column.require_filters();
+    }
+    std::ranges::move(labels, std::back_inserter(columns_));
+    has_labels_ = true;
+  }
+
   std::optional<std::uint64_t> indexed(std::uint64_t milliseconds) {
     std::vector<std::int64_t> row;
     if (milliseconds >= index_->rows() || !index_->read(milliseconds, 1, row) || row[0] < 0)
@@ -230,8 +246,8 @@ class DsecTable final : public NumberTable {
     return static_cast<std::uint64_t>(row[0]);
   }
 
-  std::array<Hdf5Dataset, columns> columns_;  ///< t, x, y, p
-  std::optional<Hdf5Dataset> index_;          ///< first event at or after each millisecond
+  std::vector<Hdf5Dataset> columns_;  ///< t, x, y and p, and those of labels
+  std::optional<Hdf5Dataset> index_;  ///< first event at or after each millisecond
 };
 
 /// Columns of rows, by their place: t, x, y and p.

@@ -27,6 +27,7 @@ class Hdf5Table {
 
   Hdf5Format format() const { return format_; }
   SensorSize size() const { return size_; }
+  bool has_labels() const { return has_labels_; }
   std::uint64_t rows() const { return rows_; }
   std::uint64_t claimed_rows() const { return claimed_rows_; }
 
@@ -45,6 +46,7 @@ class Hdf5Table {
 
   Hdf5Format format_;
   SensorSize size_;
+  bool has_labels_ = false;
   std::uint64_t rows_ = 0, claimed_rows_ = 0;
 };
 

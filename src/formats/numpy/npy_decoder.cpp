@@ -143,7 +143,8 @@ void NpyDecoder::read_sample(Decoded& out) {
 
 void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
   const bool has_names = header_->columns.empty();
-  const auto fields = has_names ? std::span<const NpyField>(header_->fields) : header_->columns;
+  const auto fields = has_names ? std::span<const NpyField>(header_->fields).first(event_columns)
+                                : header_->columns;
   TableSample sample;
   for (; !elements.empty(); elements = elements.subspan(header_->element_bytes)) {
     TableSample::Row row;
@@ -168,8 +169,11 @@ void NpyDecoder::find_layout(std::span<const std::uint8_t> elements) {
         "the time unit of the NumPy array is ambiguous; set "
         "time-unit");
   power_ = power_of(*unit);
-  plain_ = power_ == 0 && header_->element_bytes >= sizeof(std::uint64_t) &&
-           std::ranges::all_of(header_->fields, [](const NpyField& field) {
+  const std::span<const NpyField> all(header_->fields);
+  has_labels_ = std::ranges::any_of(all.subspan(event_columns),
+                                    [](const NpyField& field) { return field.bytes > 0; });
+  plain_ = power_ == 0 && header_->element_bytes >= sizeof(std::uint64_t) && !has_labels_ &&
+           std::ranges::all_of(all.first(event_columns), [](const NpyField& field) {
              // Unsigned 64-bit numbers may not fit.
              return field.kind != NpyField::Kind::floating &&
                     (!field.big_endian || field.bytes == 1) &&
@@ -235,6 +239,7 @@ void NpyDecoder::decode_tail(ByteSource& source, Decoded& out) const {
   tail.layout_known_ = true;
   tail.power_ = power_;
   tail.plain_ = plain_;
+  tail.has_labels_ = has_labels_;
   tail.left_ = last;
   tail.decode(bytes, out);
 }
@@ -257,13 +262,18 @@ void NpyDecoder::read_elements(const std::uint8_t* bytes, std::uint64_t count, D
                       corruption_);
     return;
   }
+  const auto label_number = [&](EventColumn column) {
+    return field(column).bytes > 0 ? number_of(field(column), bytes).value_or(0) : 0;
+  };
   for (; bytes < end; bytes += size, position_ += size) {
     const auto t = number_of(t_field, bytes, power_);
     const auto x = number_of(x_field, bytes);
     const auto y = number_of(y_field, bytes);
     const auto p = number_of(p_field, bytes);
     if (t && x && y && p) {
-      validator_.take(*t, *x, *y, *p > 0, out.events, corruption_);
+      const auto label =
+          label_from(label_number(EventColumn::cause), label_number(EventColumn::object_class));
+      validator_.take(*t, *x, *y, *p > 0, label, out.events, corruption_);
     } else {
       corruption_.note(position_, "number out of range");
     }

@@ -134,7 +134,7 @@ std::optional<NpyField> number_of(const Type& type, std::uint32_t offset) {
 
 /// Parses fields: [('x', '<u2'), ('y', '<u2', (3,)), ('', '|V4'), (('title', 'p'), '|u1')].
 void read_fields(Literal& literal, NpyHeader& header) {
-  std::array<bool, 4> known{};
+  std::array<bool, all_columns> known{};
   literal.expect('[');
   while (!literal.take(']')) {
     literal.expect('(');
@@ -171,10 +171,11 @@ void read_fields(Literal& literal, NpyHeader& header) {
     if (const auto column = column_named(name)) {
       const auto index = static_cast<std::size_t>(column->column);
       const auto number = one ? number_of(type, header.element_bytes) : std::nullopt;
-      if (!number || known[index])
+      const bool is_label = column->column > EventColumn::p;
+      if ((!number || known[index]) && !is_label)
         throw UnsupportedFormat("NumPy field '" + std::string(name) +
                                 "' is not a number of 8 to 64 bits");
-      header.fields[index] = *number;
+      if (number) header.fields[index] = *number;
       if (column->column == EventColumn::t) header.unit = column->unit;
       known[index] = true;
     }
@@ -186,7 +187,7 @@ void read_fields(Literal& literal, NpyHeader& header) {
       break;
     }
   }
-  for (const bool is_known : known)
+  for (const bool is_known : std::span(known).first(event_columns))
     if (!is_known) throw UnsupportedFormat("no fields t, x, y and p in the NumPy array");
 }
 

@@ -31,9 +31,10 @@ struct NpyField {
 
 /// Description of the array of events in the header of a NumPy file.
 struct NpyHeader {
-  std::array<NpyField, 4> fields;  ///< by EventColumn, if there are no `columns`
-  std::optional<TimeUnit> unit;    ///< time unit, if the name of the field states it
-  std::vector<NpyField> columns;   ///< columns of an array of plain numbers, without names
+  /// By EventColumn, if there are no `columns`. Labels have 0 bytes if there are none.
+  std::array<NpyField, all_columns> fields;
+  std::optional<TimeUnit> unit;   ///< time unit, if the name of the field states it
+  std::vector<NpyField> columns;  ///< columns of an array of plain numbers, without names
   std::uint32_t element_bytes = 0;
   std::uint64_t count = 0;
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <limits>
 
 #include "src/core/max_side.hpp"
@@ -72,7 +73,7 @@ class WholeArray final : public Elements {
   std::vector<std::uint8_t> block_;
 };
 
-/// Joins four arrays of one column each to elements of t, x, y and p.
+/// Joins arrays of one column each to elements of t, x, y and p, or of these and labels.
 class JoinedColumns final : public Elements {
  public:
   explicit JoinedColumns(std::vector<ArrayFile> arrays) : arrays_(std::move(arrays)) {
@@ -172,6 +173,7 @@ class Archive {
   }
 
   SensorSize size() const { return decoder_->size(); }
+  bool has_labels() const { return decoder_->has_labels(); }
   const Corruption& corruption() const { return corruption_; }
 
  private:
@@ -194,7 +196,7 @@ class Archive {
 
   /// Opens arrays t, x, y and p. False unless all of them exist.
   bool open_columns(const TableSettings& settings) {
-    std::array<std::optional<std::size_t>, 4> indices;
+    std::array<std::optional<std::size_t>, all_columns> indices;
     std::optional<TimeUnit> unit;
     for (std::size_t i = 0; i < archive_.names().size(); ++i) {
       const auto name = column_named(array_name(archive_.names()[i]));
@@ -205,17 +207,35 @@ class Archive {
       if (name->column == EventColumn::t) unit = name->unit;
     }
     std::vector<ArrayFile> arrays;
-    for (const auto& index : indices) {
+    for (const auto& index : std::span(indices).first(event_columns)) {
       if (!index) return false;
       arrays.push_back(open_array(archive_, *index));
       if (arrays.back().header.columns.size() != 1)
         throw UnsupportedFormat(archive_.names()[*index] +
                                 " in the NumPy archive is not an array of one column");
     }
+    add_labels(std::span(indices).subspan(event_columns), arrays);
     auto joined = std::make_unique<JoinedColumns>(std::move(arrays));
     decoder_ = std::make_unique<NpyDecoder>(joined->header(unit), settings);
     elements_ = std::move(joined);
     return true;
+  }
+
+  /// Opens the arrays cause and class, if both are there and have a number for each event.
+  void add_labels(std::span<const std::optional<std::size_t>> indices,
+                  std::vector<ArrayFile>& arrays) {
+    std::vector<ArrayFile> labels;
+    for (const auto& index : indices) {
+      if (!index) return;
+      try {
+        labels.push_back(open_array(archive_, *index));
+      } catch (const UnsupportedFormat&) {
+        return;
+      }
+      const auto& header = labels.back().header;
+      if (header.columns.size() != 1 || header.count < arrays.front().header.count) return;
+    }
+    std::ranges::move(labels, std::back_inserter(arrays));
   }
 
   void open_first_array(const TableSettings& settings) {
@@ -272,6 +292,7 @@ class NpzDecoder final : public RecordingDecoder {
       decoded_.events.clear();
       if (!archive_ || !archive_->read(decoded_)) return std::nullopt;
     } while (decoded_.events.empty());
+    streams_.front().labelled = archive_->has_labels();
     return EventItem{0, decoded_.events};
   }
 

@@ -222,7 +222,9 @@ void CsvDecoder::read_head() {
   validator_.set_size(size_);
   find_columns(sample);
   find_unit(sample);
-  plain_ = columns_.size() == 4;
+  has_labels_ =
+      std::ranges::any_of(columns_, [](auto column) { return column && *column > EventColumn::p; });
+  plain_ = columns_.size() == event_columns && !has_labels_;
 }
 
 /// Returns true for header lines before the first event, and evaluates them.
@@ -262,9 +264,9 @@ bool CsvDecoder::read_header_line(std::string_view line) {
     }
   }
   if (size.width > 0 && size.height > 0) size_ = size;
-  const auto known =
-      std::ranges::count_if(columns_, [](auto column) { return column.has_value(); });
-  if (known < 4 && settings_.columns.empty())
+  const auto known = std::ranges::count_if(
+      columns_, [](auto column) { return column && *column <= EventColumn::p; });
+  if (known < static_cast<std::ptrdiff_t>(event_columns) && settings_.columns.empty())
     throw UnsupportedFormat("no columns t, x, y and p in the first line");
   return true;
 }
@@ -283,6 +285,11 @@ std::optional<CsvDecoder::Row> CsvDecoder::read_row(
       continue;
     }
     const auto number = read_decimal(fields[i], *columns[i] == EventColumn::t ? power : 0);
+    if (*columns[i] > EventColumn::p) {  // a label, which may be missing
+      auto& label = *columns[i] == EventColumn::cause ? row.cause : row.object_class;
+      label = number && number->whole ? number->value : 0;
+      continue;
+    }
     if (!number) return std::nullopt;
     if (*columns[i] == EventColumn::t) {
       row.t = *number;
@@ -449,7 +456,8 @@ void CsvDecoder::read_line(std::string_view line, Decoded& out) {
     corruption_.note(position_, "line without an event");
     return;
   }
-  validator_.take(row->t.value, row->x, row->y, row->on, out.events, corruption_);
+  validator_.take(row->t.value, row->x, row->y, row->on, label_from(row->cause, row->object_class),
+                  out.events, corruption_);
 }
 
 }  // namespace eventcamera

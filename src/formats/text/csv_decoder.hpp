@@ -19,8 +19,8 @@ namespace eventcamera {
 /// # or % are comments; empty lines are ignored.
 ///
 /// Properties not given in the settings are detected from the header and the first 256 lines:
-/// - the columns, by a line of names, which may include further columns that are ignored, or
-///   by the numbers (TableSample);
+/// - the columns, by a line of names, which may include those of labels, cause and class, and
+///   further ones that are ignored, or by the numbers (TableSample);
 /// - the time unit, by the name of its column or by the numbers. Integer times in blank-separated
 ///   columns without names may be microseconds (DVS-Voltmeter) or nanoseconds (rpg_esim); an
 ///   ambiguous file is refused. Times are rounded down to microseconds;
@@ -48,6 +48,8 @@ class CsvDecoder final : public Decoder {
     std::int64_t x = 0;
     std::int64_t y = 0;
     bool on = false;
+    std::int64_t cause = 0;
+    std::int64_t object_class = 0;
   };
 
   static std::size_t split(std::string_view line, Fields& fields);

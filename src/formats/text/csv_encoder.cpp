@@ -144,6 +144,9 @@ char* CsvEncoder::write(char* at, const AbsoluteEvent& event) {
           *at++ = '0';
         }
         break;
+      case Column::cause:
+      case Column::object_class:
+        break;  // never in the order: they follow the others
     }
     *at++ = format_.separator;
   }
