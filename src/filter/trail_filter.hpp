@@ -27,15 +27,17 @@ class TrailFilter {
 
   LabelledEvents filter(LabelledEvents events, Microseconds start, const Settings& settings) {
     const Stamp threshold = in_stamps(settings.threshold);
-    const bool keeps_first = settings.mode == TrailMode::trail;
-    const bool keeps_others = settings.mode != TrailMode::stc_cut_trail;
+    // Value of `follows` of the events to keep, and whether all of these or only the second.
+    const int kept = settings.mode == TrailMode::trail ? 0 : 1;
+    const int keeps_all = settings.mode == TrailMode::stc_cut_trail ? 0 : 1;
     return last_.keep_if(events, start, [=](const Event& event, Stamp now, LastEvent* last) {
       const bool is_on = event.polarity() == Polarity::on;
       // Random polarities would mislead branches.
-      const bool follows = ((is_on == last->is_on()) & (now - last->stamp() < threshold)) != 0;
-      const bool is_second = (follows & !last->follows()) != 0;
-      *last = LastEvent(now, follows, is_on);
-      return ((follows != keeps_first) & (keeps_others | is_second)) != 0;
+      const int follows = static_cast<int>(is_on == last->is_on()) &
+                          static_cast<int>(now - last->stamp() < threshold);
+      const int is_second = follows & static_cast<int>(!last->follows());
+      *last = LastEvent(now, follows != 0, is_on);
+      return (static_cast<int>(follows == kept) & (keeps_all | is_second)) != 0;
     });
   }
 
