@@ -4,12 +4,11 @@ import contextlib
 import hashlib
 import json
 import os
-import struct
 import tempfile
-import zlib
 
 import gst_eventcamera as ec
 import numpy as np
+from event_streams import png_of
 from gst_eventcamera.dataset import pictures_of
 from gst_eventcamera.pipeline import Gst, events_of
 from gst_eventcamera.recipe import TENSORS
@@ -246,7 +245,7 @@ def simulate(video, path):
         raise Refused("too short: nothing is left of it after the filters")
     if array:
         array.close()
-    return figures.described(len(frames.times)), png_of(figures.busiest()), frames.warnings(), sorted(decoders)
+    return figures.described(len(frames.times)), png_of(picture_of(figures.busiest())), frames.warnings(), sorted(decoders)
 
 
 def versions():
@@ -254,8 +253,8 @@ def versions():
     return {"eventsim": plugin.get_version() if plugin else "", "gstreamer": Gst.version_string()}
 
 
-def png_of(events):
-    """A picture of events: ON blue, OFF red, on white; as PNG."""
+def picture_of(events):
+    """Events by row and column: ON blue, OFF red, on white."""
     side = max(-(-events.width // PREVIEW_SIDE), -(-events.height // PREVIEW_SIDE), 1)
     width, height = -(-events.width // side), -(-events.height // side)
     place = (events["y"] // side).astype(np.int64) * width + events["x"] // side
@@ -263,11 +262,4 @@ def png_of(events):
     # A cell is in full colour with an event per column of it.
     on, off = (np.minimum(count / side, 1).reshape(height, width) for count in (on, off))
     colours = 1 - np.stack([on, np.maximum(on, off), off], axis=-1)
-    rows = np.round(colours * 255).astype(np.uint8).reshape(height, -1)
-    packed = zlib.compress(np.pad(rows, ((0, 0), (1, 0))).tobytes())  # each row begins with its filter, none
-
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
-            + chunk(b"IDAT", packed) + chunk(b"IEND", b""))
+    return np.round(255 * colours)

@@ -16,7 +16,7 @@ import sys
 from dataclasses import dataclass
 
 # First, since it says which packages are missing.
-from event_streams import GLib, Gst, Sensor, Span, compare, read_mask, read_recording, read_video, samples_of
+from event_streams import GLib, Gst, Sensor, Span, compare, png_of, read_mask, read_recording, read_video
 import numpy as np
 from plugins import find_plugins
 
@@ -120,14 +120,7 @@ def print_table(real, simulated, rows):
 
 def picture(counts, most):
     """A map of events per pixel as a PNG in a data URI; the square root of the count is the brightness."""
-    grey = (255 * np.sqrt(np.minimum(counts / most, 1))).astype(np.uint8)
-    height, width = grey.shape
-    rows = np.zeros((height, (width + 3) // 4 * 4), np.uint8)  # GStreamer's strides
-    rows[:, :width] = grey
-    pixels = ("pixels", f"video/x-raw,format=GRAY8,width={width},height={height},framerate=0/1",
-              [Gst.Buffer.new_wrapped(rows.tobytes())])
-    encoded, = [sample.get_buffer().extract_dup(0, sample.get_buffer().get_size())
-                for sample in samples_of("appsrc name=pixels ! pngenc ! appsink name=out sync=false", [pixels])]
+    encoded = png_of(255 * np.sqrt(np.minimum(counts / most, 1)))
     return "data:image/png;base64," + base64.b64encode(encoded).decode()
 
 

@@ -117,6 +117,18 @@ def samples_of(description, feeds=()):
         yield from pipeline.samples()
 
 
+def png_of(pixels):
+    """Grey values by row and column, or red, green and blue of each, from 0 to 255, as PNG."""
+    height, width, *colours = pixels.shape
+    rows = pixels.astype(np.uint8).reshape(height, -1)
+    rows = np.pad(rows, ((0, 0), (0, -rows.shape[1] % 4)))  # as GStreamer pads them
+    caps = f"video/x-raw,format={'RGB' if colours else 'GRAY8'},width={width},height={height},framerate=0/1"
+    encoded, = [sample.get_buffer() for sample in samples_of(
+        "appsrc name=pixels ! pngenc ! appsink name=out sync=false",
+        [("pixels", caps, [Gst.Buffer.new_wrapped(rows.tobytes())])])]
+    return encoded.extract_dup(0, encoded.get_size())
+
+
 # reading
 
 

@@ -2,6 +2,7 @@
 #include "gst/base/buffer_bytes.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <new>
 #include <utility>
 
@@ -10,6 +11,16 @@ GstBuffer* copied_buffer(std::span<const std::byte> bytes) {
   if (memory == nullptr) throw std::bad_alloc();
   std::ranges::copy(bytes, memory);
   return gst_buffer_new_wrapped(memory, bytes.size());
+}
+
+GstBuffer* owning_buffer(std::vector<std::uint8_t> bytes) {
+  using Bytes = std::vector<std::uint8_t>;
+  auto owner = std::make_unique<Bytes>(std::move(bytes));
+  const gsize size = owner->size();
+  auto* const data = owner->data();
+  return gst_buffer_new_wrapped_full(
+      GST_MEMORY_FLAG_READONLY, data, size, 0, size, owner.release(),
+      [](gpointer vector) { const std::unique_ptr<Bytes> last(static_cast<Bytes*>(vector)); });
 }
 
 MappedBytes::MappedBytes(GstElement* element, OwnedBuffer buffer)

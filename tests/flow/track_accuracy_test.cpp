@@ -7,11 +7,10 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
-#include <opencv2/video/tracking.hpp>
 #include <random>
 
 #include "src/flow/lucas_kanade/point_tracker.hpp"
-#include "src/flow/opencv.hpp"
+#include "tests/flow/opencv_tracks.hpp"
 #include "tests/reference/diff.hpp"
 #include "tests/reference/sparse.hpp"
 
@@ -96,22 +95,6 @@ Flow true_flow(const Sequence& sequence, const Point& point) {
     to = {to.x + from.x - back.x, to.y + from.y - back.y};
   }
   return {static_cast<float>(to.x - from.x), static_cast<float>(to.y - from.y)};
-}
-
-std::vector<Track> opencv_tracks(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
-                                 const std::vector<Point>& points) {
-  std::vector<cv::Point2f> starts;
-  for (const auto& point : points)
-    starts.emplace_back(static_cast<float>(point.x), static_cast<float>(point.y));
-  std::vector<cv::Point2f> ends;
-  std::vector<unsigned char> status;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(opencv_picture(from.view()), opencv_picture(to.view()), starts, ends,
-                           status, error, {15, 15}, 3, {3, 10, 0.03});
-  std::vector<Track> tracks;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    tracks.push_back({{ends[i].x - starts[i].x, ends[i].y - starts[i].y}, status[i] != 0});
-  return tracks;
 }
 
 struct Errors {

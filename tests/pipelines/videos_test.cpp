@@ -11,7 +11,6 @@
 #include <fstream>
 #include <memory>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 
 #include "gst/eventcamera/eventcamera.h"
 #include "src/flow/dense_flow.hpp"
@@ -23,6 +22,7 @@
 #include "src/simulate/diff_simulator.hpp"
 #include "src/simulate/sparse_simulator.hpp"
 #include "tests/flow/opencv_dis.hpp"
+#include "tests/flow/opencv_tracks.hpp"
 #include "tests/pipelines/video_frames.hpp"
 #include "tests/reference/dense.hpp"
 #include "tests/reference/diff.hpp"
@@ -146,22 +146,6 @@ cv::Mat min_slopes(const Image<std::uint8_t>& picture) {
   cv::Mat slopes;
   cv::sqrt(cv::max((xx + yy - root) / 2, 0), slopes);
   return slopes;
-}
-
-std::vector<Track> opencv_tracks(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
-                                 const std::vector<Point>& points) {
-  std::vector<cv::Point2f> starts;
-  for (const auto& point : points)
-    starts.emplace_back(static_cast<float>(point.x), static_cast<float>(point.y));
-  std::vector<cv::Point2f> ends;
-  std::vector<unsigned char> status;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(opencv_picture(from.view()), opencv_picture(to.view()), starts, ends,
-                           status, error, {15, 15}, 3, {3, 10, 0.03});
-  std::vector<Track> tracks;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    tracks.push_back({{ends[i].x - starts[i].x, ends[i].y - starts[i].y}, status[i] != 0});
-  return tracks;
 }
 
 /// Mean difference between the 9x9 pixels around the start of a track and around its end.

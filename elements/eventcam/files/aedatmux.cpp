@@ -41,6 +41,7 @@
 
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/authors.hpp"
+#include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
@@ -195,12 +196,7 @@ static void warn(GstAedatMux* self, const char* what, const std::string& cause) 
 /// Pushes `bytes` downstream.
 static GstFlowReturn push_bytes(GstAedatMux* self, Bytes bytes, bool header = false) {
   if (bytes.empty()) return GST_FLOW_OK;
-  auto owner = std::make_unique<Bytes>(std::move(bytes));
-  const gsize size = owner->size();
-  guint8* const data = owner->data();
-  GstBuffer* const buffer = gst_buffer_new_wrapped_full(
-      GST_MEMORY_FLAG_READONLY, data, size, 0, size, owner.release(),
-      [](gpointer vector) { const std::unique_ptr<Bytes> last(static_cast<Bytes*>(vector)); });
+  GstBuffer* const buffer = owning_buffer(std::move(bytes));
   if (header) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_HEADER);
   return gst_aggregator_finish_buffer(GST_AGGREGATOR(self), buffer);
 }

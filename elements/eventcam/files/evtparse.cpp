@@ -49,6 +49,7 @@
 #include <vector>
 
 #include "elements/eventcam/files/evtformat.hpp"
+#include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
@@ -142,7 +143,7 @@ struct State {
   std::vector<WordScanner::Piece> pieces{};
   std::vector<guint8> rows{};  ///< of a buffer with padded rows
   ArrivalClock clock{};
-  std::optional<GstSegment> segment{};  ///< of the output
+  ArrivalSegment segment{0};  ///< of the output
   bool is_mapping_new = false;
   GstClockTime last_arrival = GST_CLOCK_TIME_NONE;
   guint64 last_offset = GST_BUFFER_OFFSET_NONE;
@@ -157,7 +158,7 @@ struct Private {
   // Accessed by the streaming thread only, or while there is none.
   std::optional<Input> input;  ///< of the last caps
   GstSegment upstream = {};
-  guint32 segment_seqnum = GST_SEQNUM_INVALID;
+  guint32 segment_seqnum = gst_util_seqnum_next();
   std::optional<State> state;
   WarnOnce warn_of_no_words{GST_CAT_DEFAULT};
   RepeatLevel loss_level;
@@ -203,6 +204,12 @@ static Input input_of(const GstCaps* caps) {
   return input;
 }
 
+template <class Work>
+static auto reported(GstEvtParse* self, const Work& work) {
+  return guarded(
+      self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."}, work);
+}
+
 /// Begins a stream. False, after an error, if its words are unknown.
 static bool start_stream(GstEvtParse* self) {
   auto& priv = *self->priv;
@@ -221,8 +228,7 @@ static bool start_stream(GstEvtParse* self) {
         ("format=%d width=%d height=%d", settings.format, sensor.width, sensor.height));
     return false;
   }
-  const auto report = Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."};
-  return guarded(self, report, [&] {
+  return reported(self, [&] {
     // The legacy order of EVT21 ends here.
     const auto words = *format == EvtFormat::evt21_legacy ? EvtFormat::evt21 : *format;
     const auto* const name =
@@ -251,39 +257,24 @@ static GstClockTime nanoseconds(Microseconds t) {
 static void push_segment(GstEvtParse* self, GstClockTime start) {
   auto& priv = *self->priv;
   auto& state = *priv.state;
-  GstSegment next;
-  gst_segment_init(&next, GST_FORMAT_TIME);
-  next.start = next.position = next.time = start;
+  GstClockTime arrival = GST_CLOCK_TIME_NONE;
   state.is_mapping_new = false;
   if (const auto offset = state.clock.offset()) {
     const auto running = static_cast<GstClockTimeDiff>(start) + *offset;
-    next.base = static_cast<GstClockTime>(std::max<GstClockTimeDiff>(running, 0));
+    arrival = static_cast<GstClockTime>(std::max<GstClockTimeDiff>(running, 0));
     state.is_mapping_new = running < 0;
-  } else if (state.segment) {
-    next.base =
-        gst_segment_to_running_time(&*state.segment, GST_FORMAT_TIME, state.segment->position);
   }
+  const bool is_correction = state.segment.has_begun();
+  const auto mapped = state.segment.begin(priv.src, priv.segment_seqnum, start, arrival, start);
   GST_DEBUG_OBJECT(self, "the camera's %" GST_TIME_FORMAT " is running time %" GST_TIME_FORMAT,
-                   GST_TIME_ARGS(start), GST_TIME_ARGS(next.base));
-  {
-    const auto stats = priv.stats.lock();
-    stats->clock_offset = static_cast<gint64>(next.base) - static_cast<gint64>(start);
-    stats->clock_corrections += state.segment ? 1 : 0;
-  }
-  state.segment = next;
-  GstEvent* const event = gst_event_new_segment(&next);
-  if (priv.segment_seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(event, priv.segment_seqnum);
-  gst_pad_push_event(priv.src, event);
+                   GST_TIME_ARGS(start), GST_TIME_ARGS(mapped));
+  const auto stats = priv.stats.lock();
+  stats->clock_offset = GST_CLOCK_DIFF(start, mapped);
+  stats->clock_corrections += is_correction ? 1 : 0;
 }
 
 static GstBuffer* buffer_of(WordScanner::Piece&& piece) {
-  auto words = std::make_unique<std::vector<guint8>>(std::move(piece.words));
-  auto* const memory = words.get();
-  GstBuffer* const buffer = gst_buffer_new_wrapped_full(
-      GST_MEMORY_FLAG_READONLY, memory->data(), memory->size(), 0, memory->size(), words.release(),
-      [](gpointer data) {
-        const std::unique_ptr<std::vector<guint8>> owned(static_cast<std::vector<guint8>*>(data));
-      });
+  GstBuffer* const buffer = owning_buffer(std::move(piece.words));
   GST_BUFFER_PTS(buffer) = nanoseconds(piece.start);
   GST_BUFFER_DURATION(buffer) = nanoseconds(piece.end - piece.start);
   if (piece.is_discontinuous) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
@@ -298,9 +289,9 @@ static GstFlowReturn push_pieces(GstEvtParse* self) {
   for (auto& piece : state.pieces) {
     if (result != GST_FLOW_OK) break;
     const auto start = nanoseconds(piece.start);
-    if (!state.segment || state.is_mapping_new || start < state.segment->position)
+    if (state.is_mapping_new || !state.segment.continues(start, GST_CLOCK_TIME_NONE))
       push_segment(self, start);
-    state.segment->position = std::max(state.segment->position, nanoseconds(piece.end));
+    state.segment.reach(nanoseconds(piece.end));
     GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " bytes of events at %" GST_TIME_FORMAT,
                    piece.words.size(), GST_TIME_ARGS(start));
     result = gst_pad_push(priv.src, buffer_of(std::move(piece)));
@@ -369,7 +360,8 @@ static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
   const auto& state = *priv.state;
   const auto offset = state.clock.offset();
   // The first may hold what the camera kept before the start.
-  if (!offset || !state.segment || state.pieces.empty() || !GST_CLOCK_TIME_IS_VALID(arrival))
+  if (!offset || !state.segment.has_begun() || state.pieces.empty() ||
+      !GST_CLOCK_TIME_IS_VALID(arrival))
     return;
   const auto first = static_cast<gint64>(nanoseconds(state.pieces.front().start)) + *offset;
   const auto length = std::clamp<gint64>(static_cast<gint64>(arrival) - first, 0, GST_SECOND);
@@ -418,12 +410,6 @@ static GstFlowReturn take_transfer(GstEvtParse* self, GstBuffer* buffer,
   note_losses(self, before, lost);
   note_transfer(self, arrival);
   return push_pieces(self);
-}
-
-template <class Work>
-static GstFlowReturn reported(GstEvtParse* self, const Work& work) {
-  return guarded(
-      self, Report{GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for the events."}, work);
 }
 
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
@@ -505,7 +491,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
     priv.state.reset();
     priv.input.reset();
     gst_segment_init(&priv.upstream, GST_FORMAT_UNDEFINED);
-    priv.segment_seqnum = GST_SEQNUM_INVALID;
+    priv.segment_seqnum = gst_util_seqnum_next();
     priv.warn_of_no_words.reset();
     priv.loss_level.reset();
   }
@@ -575,12 +561,9 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
           "stats", "Statistics",
           "Counts since the start: buffers received; bytes and events passed on; lost-buffers, "
           "which the driver dropped; lost-bytes, which are not valid here, and lost-events in "
-          "them; "
-          "gaps in the output. The mapping of the camera's clock: clock-offset (int64, ns), "
-          "running "
-          "time minus the camera's; clock-drift (double, ppm), by which the camera's clock is "
-          "slow; "
-          "clock-corrections, the number of changes of the offset",
+          "them; gaps in the output. The mapping of the camera's clock: clock-offset (int64, ns), "
+          "running time minus the camera's; clock-drift (double, ppm), by which the camera's clock "
+          "is slow; clock-corrections, the number of changes of the offset",
           GST_TYPE_STRUCTURE, static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);

@@ -42,8 +42,8 @@
 #include <utility>
 #include <vector>
 
-#include "elements/eventcam/network/arrival_segment.hpp"
 #include "elements/eventcam/network/datagram_properties.hpp"
+#include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"

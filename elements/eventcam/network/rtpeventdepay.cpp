@@ -49,8 +49,8 @@
 #include <string_view>
 #include <utility>
 
-#include "elements/eventcam/network/arrival_segment.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
+#include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"

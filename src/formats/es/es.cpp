@@ -33,13 +33,27 @@ class Rows {
   int step_;
 };
 
-/// An event is a byte with the microseconds since the last event and `flag_bits` flags, followed by
-/// x and y with 16 bits each. If all bits of the microseconds are set, it is that byte alone.
-template <int flag_bits>
-class EsEventDecoder final : public UnitDecoder {
+/// Base of the decoders; the only state is the time.
+class EsEventDecoder : public UnitDecoder {
  public:
   EsEventDecoder(SensorSize size, EsOrigin origin)
       : bounds_(size, max_side), rows_(size.height, origin) {}
+
+  State state() const override { return {static_cast<Microseconds>(t_), 0}; }
+  void restore(const State& state) override { t_ = static_cast<std::uint64_t>(state.clock); }
+
+ protected:
+  Bounds bounds_;
+  Rows rows_;
+  std::uint64_t t_ = 0;
+};
+
+/// An event is a byte with the microseconds since the last event and `flag_bits` flags, followed by
+/// x and y with 16 bits each. If all bits of the microseconds are set, it is that byte alone.
+template <int flag_bits>
+class EsPolarityDecoder final : public EsEventDecoder {
+ public:
+  using EsEventDecoder::EsEventDecoder;
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
@@ -82,23 +96,14 @@ class EsEventDecoder final : public UnitDecoder {
     batch.skipped(exposures);
     return from;
   }
-
-  State state() const override { return {static_cast<Microseconds>(t_), 0}; }
-  void restore(const State& state) override { t_ = static_cast<std::uint64_t>(state.clock); }
-
- private:
-  Bounds bounds_;
-  Rows rows_;
-  std::uint64_t t_ = 0;
 };
 
 /// An event is a byte with the microseconds since the last event, x and y with 16 bits each, and
 /// red, green and blue. The two largest numbers are a byte alone. A change of colour has no
 /// polarity: it is ON, and its colour is skipped.
-class EsColourDecoder final : public UnitDecoder {
+class EsColourDecoder final : public EsEventDecoder {
  public:
-  EsColourDecoder(SensorSize size, EsOrigin origin)
-      : bounds_(size, max_side), rows_(size.height, origin) {}
+  using EsEventDecoder::EsEventDecoder;
 
   const std::uint8_t* read(const std::uint8_t* from, const std::uint8_t* to,
                            Batch& batch) override {
@@ -125,14 +130,6 @@ class EsColourDecoder final : public UnitDecoder {
     }
     return from;
   }
-
-  State state() const override { return {static_cast<Microseconds>(t_), 0}; }
-  void restore(const State& state) override { t_ = static_cast<std::uint64_t>(state.clock); }
-
- private:
-  Bounds bounds_;
-  Rows rows_;
-  std::uint64_t t_ = 0;
 };
 
 class EsDecoder final : public UnitStreamDecoder {
@@ -154,10 +151,10 @@ class EsDecoder final : public UnitStreamDecoder {
                           little_endian<std::uint16_t>(at + 6)};
     switch (at[3]) {
       case dvs:
-        begin_events<EsEventDecoder<1>>(size);
+        begin_events<EsPolarityDecoder<1>>(size);
         break;
       case atis:
-        begin_events<EsEventDecoder<2>>(size);
+        begin_events<EsPolarityDecoder<2>>(size);
         break;
       case generic:
         throw UnsupportedFormat("unsupported Event Stream of generic events: they have no pixel");

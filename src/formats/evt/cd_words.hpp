@@ -2,10 +2,12 @@
 // Layouts of the words of EVT2, EVT2.1 and EVT4.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "src/core/event.hpp"
 #include "src/formats/decoded.hpp"
+#include "src/formats/evt/raw.hpp"
 
 namespace eventcamera {
 
@@ -71,6 +73,12 @@ namespace evt21 {
 
 inline constexpr CdTypes types{
     .time_high = 0x8, .trigger = 0xa, .ignored = 1U << evt2::others | 1U << evt2::continued};
+
+/// Between little-endian words and, for EVT21-legacy, those with the upper half first.
+template <EvtFormat format>
+constexpr std::uint64_t in_order(std::uint64_t word) {
+  return format == EvtFormat::evt21_legacy ? std::rotl(word, 32) : word;
+}
 
 }  // namespace evt21
 

@@ -231,12 +231,8 @@ struct Evt21 {
   static constexpr CdTypes types = evt21::types;
   static constexpr bool has_steady_time = false;
 
-  static constexpr Word in_order(Word word) {
-    return format == EvtFormat::evt21_legacy ? std::rotl(word, 32) : word;
-  }
-
   static constexpr Word word(CdWord upper, std::uint32_t lower = 0) {
-    return in_order(std::uint64_t{upper.bits} << 32 | lower);
+    return evt21::in_order<format>(std::uint64_t{upper.bits} << 32 | lower);
   }
 
   static std::size_t put(std::span<const AbsoluteEvent> events, std::uint64_t time,
@@ -261,7 +257,7 @@ class Evt21Decoder final : public CdDecoder<evt21::types> {
     const auto* const full = batch.full();
     std::uint64_t outside = 0;
     for (; to - from >= 8 && event < full; from += 8) {
-      const auto bits = Evt21<format>::in_order(little_endian<std::uint64_t>(from));
+      const auto bits = evt21::in_order<format>(little_endian<std::uint64_t>(from));
       const CdWord upper{static_cast<std::uint32_t>(bits >> 32)};
       if (upper.type() <= evt2::cd_on)
         event = read_masked(upper, static_cast<std::uint32_t>(bits), event, outside);

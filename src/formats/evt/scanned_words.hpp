@@ -45,7 +45,7 @@ class ScannedCdWords {
 
   /// The word in the order that decoders take.
   static constexpr Word in_order(Word word) {
-    return format == EvtFormat::evt21_legacy ? std::rotl(word, 32) : word;
+    return static_cast<Word>(evt21::in_order<format>(word));
   }
 
   static constexpr bool is_end_marker(Word word) {

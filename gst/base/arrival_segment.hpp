@@ -7,7 +7,8 @@
 #include <cstdlib>
 #include <optional>
 
-/// Segment that maps a sender's times to the running times at which they arrive.
+/// Segment that maps the times of a sender, or of a camera, to the running times at which they
+/// arrive.
 class ArrivalSegment {
  public:
   /// The mapping follows drifts of more than `max_drift`.
@@ -24,9 +25,10 @@ class ArrivalSegment {
   }
 
   /// Pushes a segment from `start`, which arrived at this running time; if that is unknown, it
-  /// begins where the last one ended. Without stream time, that is the running time.
-  void begin(GstPad* src, guint32 seqnum, GstClockTime start, GstClockTime arrival,
-             GstClockTime stream_time) {
+  /// begins where the last one ended. Without stream time, that is the running time. Returns the
+  /// running time of `start`.
+  GstClockTime begin(GstPad* src, guint32 seqnum, GstClockTime start, GstClockTime arrival,
+                     GstClockTime stream_time) {
     GstSegment next;
     gst_segment_init(&next, GST_FORMAT_TIME);
     next.start = next.position = start;
@@ -39,7 +41,11 @@ class ArrivalSegment {
     GstEvent* const event = gst_event_new_segment(&next);
     gst_event_set_seqnum(event, seqnum);
     gst_pad_push_event(src, event);
+    return next.base;
   }
+
+  /// True if there is a segment.
+  bool has_begun() const { return segment_.has_value(); }
 
   /// Sets the end of the received data.
   void reach(GstClockTime end) { segment_->position = std::max(segment_->position, end); }
