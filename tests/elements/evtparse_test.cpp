@@ -340,6 +340,18 @@ TEST(EvtParse, SaysWhatIsMissing) {
   EXPECT_EQ(wrong.warning(), "");
 }
 
+TEST(EvtParse, SaysAtTheEndThatNothingWereWords) {
+  // A time that none follows is kept until the end.
+  Harness parse("evtparse format=EVT2" + std::string(size));
+  gst_harness_set_src_caps_str(parse.get(), "application/octet-stream");
+  std::vector<guint8> bytes(100'000);
+  bytes[3] = 0x80;
+  parse.push(gst_buffer_new_memdup(bytes.data(), bytes.size()));
+  EXPECT_EQ(parse.warning(), "");
+  gst_harness_push_event(parse.get(), gst_event_new_eos());
+  EXPECT_NE(parse.warning().find("are no words of this format"), std::string::npos);
+}
+
 TEST(EvtParse, KeepsTriggers) {
   const auto sent = some_events(2'000);
   const std::vector<Trigger> triggers{{sent[500].t, 2, true}, {sent[1500].t + 3, 2, false}};

@@ -430,6 +430,7 @@ static void end_stream(GstEvtParse* self) {
     const auto before = scanner.counts();
     scanner.finish(priv.state->pieces);
     add(priv.stats.lock()->words, before, scanner.counts());
+    note_losses(self, before, 0);
     return push_pieces(self);
   });
 }
