@@ -14,8 +14,9 @@ namespace eventcamera {
 /// count from the bottom.
 enum class EsOrigin : std::uint8_t { bottom_left, top_left };
 
-/// Decodes Event Stream 2.0 as written by its authors' library sepia: streams of DVS events, of ATIS
-/// events, of which exposures are skipped, and of colour events, as ON events without their colours.
+/// Decodes Event Stream 2.0 as written by its authors' library sepia: streams of DVS events, of
+/// ATIS events, of which exposures are skipped, and of colour events, as ON events without their
+/// colours.
 std::unique_ptr<Decoder> make_event_stream_decoder(EsOrigin origin = EsOrigin::bottom_left);
 
 /// Encodes DVS events. The format fills pauses with a byte per 127 microseconds. Throws
