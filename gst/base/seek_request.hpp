@@ -10,6 +10,10 @@ class SeekRequest {
 
   /// True for a seek in time with a positive rate.
   bool plays_on_from_time() const { return format_ == GST_FORMAT_TIME && rate_ > 0; }
+  /// True if a position counts from the end of the file.
+  bool counts_from_end() const {
+    return start_type_ == GST_SEEK_TYPE_END || stop_type_ == GST_SEEK_TYPE_END;
+  }
   bool flushes() const { return (flags_ & GST_SEEK_FLAG_FLUSH) != 0; }
   double rate() const { return rate_; }
   GstFormat format() const { return format_; }

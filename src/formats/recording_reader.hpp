@@ -188,6 +188,9 @@ class RecordingReader {
   void learn_streams();
 
   bool survey();
+  std::optional<Item> survey_item();
+  bool find_events();
+  bool find_first_items();
   void note(const EventItem& item);
   void note(const FrameItem& item);
   void note(const TriggerItem& /*item*/) {}

@@ -80,6 +80,7 @@ class EventReader {
     GstClockTime buffer_duration = default_buffer_duration;
     GstSegment segment = {};  ///< relative to the origin; its position is that of the output
     GstClockTime duration = GST_CLOCK_TIME_NONE;
+    bool is_duration_exact = false;
     eventcamera::RecordingReader::Counts counts;
     std::optional<Restart> restart;  ///< push mode: pending seek
     guint64 pushed_bytes = 0;        ///< offset in the file
@@ -134,13 +135,14 @@ class EventReader {
 
   void note_progress();
   void log_dropped(guint64 outside, guint64 late, guint64 stray, GstClockTime position);
-  void set_duration(GstClockTime duration);
+  void learn_duration();
   GstClockTime duration();
   void tell_left_out();
   void warn_of_nothing();
   void warn_of_dropped();
 
   bool can_seek();
+  static GstClockTime limit_of(const SeekRequest& request, const Shared& shared);
   bool seek(GstEvent* event);
   bool seek_pulling(const SeekRequest& request);
   bool seek_pushed(const Restart& restart, gdouble rate);

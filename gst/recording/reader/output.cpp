@@ -25,7 +25,7 @@ GstFlowReturn EventReader::step() {
 
 /// New streams are known.
 GstFlowReturn EventReader::push(const RecordingReader::Start& /*start*/) {
-  if (const auto length = recording_->duration()) set_duration(nanoseconds(*length));
+  learn_duration();
   GST_DEBUG_OBJECT(element_,
                    "%" G_GSIZE_FORMAT " streams, origin %" GST_TIME_FORMAT
                    ", duration %" GST_TIME_FORMAT,

@@ -104,8 +104,17 @@ void EventReader::warn_of_dropped() {
                text_of(counts.late) + " late, " + text_of(counts.stray) + " at stray times");
 }
 
-void EventReader::set_duration(GstClockTime duration) {
-  if (std::exchange(shared_.lock()->duration, duration) != duration)
+void EventReader::learn_duration() {
+  const auto length = recording_->duration();
+  if (!length) return;
+  const auto duration = nanoseconds(*length);
+  GstClockTime before = GST_CLOCK_TIME_NONE;
+  {
+    const auto shared = shared_.lock();
+    shared->is_duration_exact = recording_->is_duration_exact();
+    before = std::exchange(shared->duration, duration);
+  }
+  if (before != duration)
     gst_element_post_message(element_, gst_message_new_duration_changed(GST_OBJECT(element_)));
 }
 

@@ -45,7 +45,7 @@ GstFlowReturn EventReader::pull() {
   if (recording_->at_end()) {
     warn_of_nothing();
     warn_of_dropped();
-    if (const auto length = recording_->duration()) set_duration(nanoseconds(*length));
+    learn_duration();
   }
   return result == GST_FLOW_OK ? GST_FLOW_EOS : result;
 }

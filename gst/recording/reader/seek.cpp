@@ -25,6 +25,13 @@ bool EventReader::can_seek() {
   return seekable != FALSE;
 }
 
+/// Duration that ends a segment. If it is an estimate, it may be too short, and only serves to
+/// count from the end.
+GstClockTime EventReader::limit_of(const SeekRequest& request, const Shared& shared) {
+  return shared.is_duration_exact || request.counts_from_end() ? shared.duration
+                                                               : GST_CLOCK_TIME_NONE;
+}
+
 bool EventReader::seek(GstEvent* event) {
   const SeekRequest request(event);
   if (!request.plays_on_from_time() || !can_seek()) {
@@ -42,7 +49,7 @@ bool EventReader::seek(GstEvent* event) {
     is_pulling = shared->is_pulling;
     recording = shared->recording;
     restart.segment = shared->segment;
-    restart.segment.duration = shared->duration;
+    restart.segment.duration = limit_of(request, *shared);
   }
   if (!request.apply(restart.segment)) return false;
   restart.seqnum = request.seqnum();
@@ -82,7 +89,7 @@ bool EventReader::seek_pulling(const SeekRequest& request) {
   GstSegment segment;
   {
     const auto shared = shared_.lock();
-    shared->segment.duration = shared->duration;
+    shared->segment.duration = limit_of(request, *shared);
     request.apply(shared->segment);  // from the position at which output has stopped
     shared->counts = {};
     segment = shared->segment;
