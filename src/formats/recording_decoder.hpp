@@ -148,6 +148,12 @@ class RecordingDecoder {
   /// True if the file states that a stream has no items.
   virtual bool is_empty(std::size_t /*stream*/) const { return false; }
 
+  /// False if the next items may belong to further streams.
+  virtual bool knows_all_streams() const { return true; }
+
+  /// Where to restart for the first item of a stream, if the file states it.
+  virtual std::optional<SeekPoint> first_of(std::size_t /*stream*/) const { return std::nullopt; }
+
   /// What the file has and the decoder does not read, for users, such as "topics /a, /b"; empty if
   /// there is nothing that another setting would read.
   virtual std::string left_out() const { return {}; }

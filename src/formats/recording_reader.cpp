@@ -156,23 +156,65 @@ bool RecordingReader::survey() {
   held_.clear();
   held_size_ = 0;
   while (!is_surveyed()) {
-    const auto item = next_item();
+    const auto item = survey_item();
     if (!item && !finished_) return false;
     if (!item) break;
-    std::visit([this](const auto& some) { note(some); }, *item);
     hold(*item);
   }
+  const bool has_read_on = find_events();
   if (finished_) finish_chunkers();
   const bool is_whole = finished_;
   const auto last = decoder_->last_time();
+  const bool has_moved = find_first_items();
   if (source_->failed()) return false;
   begin();
   learn_duration(last, is_whole);
-  if (start_ > 0)
+  if (start_ > 0 || has_read_on || has_moved)
     restart(seek_point_before(start_), start_, stop_);
   else
     begin_segment(start_, stop_);
   return true;
+}
+
+std::optional<Item> RecordingReader::survey_item() {
+  const auto item = next_item();
+  if (item) std::visit([this](const auto& some) { note(some); }, *item);
+  return item;
+}
+
+/// Reads on to the first events if the file may have some. True if it read anything.
+bool RecordingReader::find_events() {
+  const auto has_events = [](const Stream& stream) {
+    return stream.info.kind == StreamKind::events && stream.first;
+  };
+  bool has_read = false;
+  while (!decoder_->knows_all_streams() && std::ranges::none_of(streams_, has_events) &&
+         survey_item())
+    has_read = true;
+  return has_read;
+}
+
+/// Reads the first items of streams that begin later, where the file states where. True if it did.
+bool RecordingReader::find_first_items() {
+  bool has_moved = false;
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    if (!is_shown(streams_[i].info.kind) || streams_[i].first) continue;
+    const auto start = decoder_->first_of(i);
+    if (!start) continue;
+    {
+      const auto lock = reading();
+      decoder_->restart(*start);
+    }
+    has_moved = true;
+    finished_ = false;
+    position_ = start->position;
+    while (!streams_[i].first && position_ - start->position < max_surveyed_bytes && survey_item())
+      continue;
+    if (streams_[i].info.kind != StreamKind::events) continue;
+    streams_[i].chunker.finish();
+    note(EventItem{i, {}});
+  }
+  return has_moved;
 }
 
 bool RecordingReader::is_surveyed() const {

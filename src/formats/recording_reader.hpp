@@ -24,7 +24,8 @@ namespace eventcamera {
 ///
 /// The first items are held until the time origin is known. In pull mode the start of the file, up
 /// to 16 MiB or 4 million events, is surveyed first: this gives an exact or estimated duration, and
-/// the sensor size if the file does not state it.
+/// the sensor size if the file does not state it. Streams that begin later are then looked for: by
+/// the index of the file or, without one, by reading on until there are events.
 ///
 ///     recording.push(bytes);  // or open(), once
 ///     while (const auto output = recording.next()) ...
@@ -150,6 +151,7 @@ class RecordingReader {
 
   /// Duration of the file, if known: stored in it, measured or estimated.
   std::optional<Microseconds> duration() const { return duration_; }
+  bool is_duration_exact() const { return duration_is_exact_; }
 
   /// End of the returned items, in time since the origin.
   Microseconds position() const { return newest_; }

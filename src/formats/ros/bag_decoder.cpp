@@ -188,6 +188,17 @@ void BagDecoder::restart(const SeekPoint& seek_point) {
   events_due_ = finished_ = false;
 }
 
+bool BagDecoder::knows_all_streams() const {
+  if (!file_) return false;
+  if (file_->last_logged()) return true;
+  const auto commas = static_cast<std::size_t>(std::ranges::count(wanted_, ','));
+  return !wanted_.empty() && streams_.size() + 1 >= commas;
+}
+
+std::optional<SeekPoint> BagDecoder::first_of(std::size_t stream) const {
+  return file_ ? file_->first_of(stream) : std::nullopt;
+}
+
 std::optional<Microseconds> BagDecoder::last_time() {
   if (delay_ && std::exchange(last_time_due_, false)) last_time_ = decoded_last_time();
   return last_time_;

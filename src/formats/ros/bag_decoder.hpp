@@ -34,6 +34,8 @@ class BagDecoder final : public RecordingDecoder {
   std::optional<SeekPoint> seek_point_before(Microseconds t) const override;
   void restart(const SeekPoint& seek_point) override;
   std::optional<Microseconds> last_time() override;
+  bool knows_all_streams() const override;
+  std::optional<SeekPoint> first_of(std::size_t stream) const override;
   std::string format_name() const override { return format_name_; }
   std::string left_out() const override;
 

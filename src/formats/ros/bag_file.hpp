@@ -64,6 +64,9 @@ class BagFile {
 
   virtual void restart(const SeekPoint& seek_point) = 0;
 
+  /// Where to restart for the first message of a topic, if the file states it.
+  virtual std::optional<SeekPoint> first_of(std::size_t topic) const = 0;
+
   /// Time of the last message, if the file states it.
   virtual std::optional<Microseconds> last_logged() const = 0;
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -35,6 +37,12 @@ class ChunkIndex {
     }
   }
 
+  /// Takes a chunk with messages of a topic from the index of a file.
+  void set_topic(std::size_t topic, std::uint64_t position) {
+    auto& first = first_.try_emplace(topic, SeekPoint{before_all, position}).first->second;
+    first.position = std::min(first.position, position);
+  }
+
   /// Records that a chunk or a message was reached, if no index was set.
   void reached(std::uint64_t position) {
     if (indexed_.empty() && read_.due(position)) read_.note({latest_, position});
@@ -52,6 +60,12 @@ class ChunkIndex {
     return *(later - 1);
   }
 
+  /// Where to begin for the first message of a topic, if the index says it.
+  std::optional<SeekPoint> first_of(std::size_t topic) const {
+    const auto first = first_.find(topic);
+    return first == first_.end() ? std::nullopt : std::optional(first->second);
+  }
+
   /// Continues at a seek point.
   void restart(const SeekPoint& seek_point) { latest_ = seek_point.t; }
 
@@ -61,7 +75,8 @@ class ChunkIndex {
  private:
   static constexpr auto before_all = std::numeric_limits<Microseconds>::min();
 
-  std::vector<SeekPoint> indexed_;  ///< the chunks of the index; t: the latest before them
+  std::vector<SeekPoint> indexed_;          ///< the chunks of the index; t: the latest before them
+  std::map<std::size_t, SeekPoint> first_;  ///< chunks of the index, by topic
   std::optional<Microseconds> last_;
   SeekPoints read_;  ///< if there is no index
   Microseconds latest_ = before_all;

@@ -28,6 +28,9 @@ class ChunkedBagFile : public BagFile {
   std::optional<BagMessage> next() final;
   std::optional<SeekPoint> seek_point_before(Microseconds logged) const final;
   void restart(const SeekPoint& seek_point) final;
+  std::optional<SeekPoint> first_of(std::size_t topic) const final {
+    return index_.first_of(topic);
+  }
   std::optional<Microseconds> last_logged() const final { return index_.last(); }
 
  protected:

@@ -15,6 +15,8 @@ constexpr const char* all_messages =
     "SELECT id, topic_id, timestamp, data FROM messages WHERE id >= ? ORDER BY id";
 constexpr const char* message_after =
     "SELECT id, timestamp FROM messages WHERE id >= ? ORDER BY id LIMIT 1";
+constexpr const char* first_message_of =
+    "SELECT id FROM messages WHERE topic_id = ? ORDER BY id LIMIT 1";
 constexpr const char* last_message = "SELECT id, timestamp FROM messages ORDER BY id DESC LIMIT 1";
 constexpr std::int64_t before_all = std::numeric_limits<std::int64_t>::min();
 
@@ -111,6 +113,20 @@ std::optional<SeekPoint> Db3File::seek_point_before(Microseconds logged) const {
       earlier = middle + 1;
   }
   return SeekPoint{.t = logged, .position = static_cast<std::uint64_t>(earlier)};
+}
+
+std::optional<SeekPoint> Db3File::first_of(std::size_t topic) const {
+  std::optional<SeekPoint> first;
+  if (!is_opened_) return first;
+  for (const auto& [id, known] : topics_) {
+    if (known != topic) continue;
+    auto rows = database_->query(first_message_of, id);
+    if (!rows.next()) continue;
+    const auto position = static_cast<std::uint64_t>(rows.integer(0));
+    if (!first || position < first->position)
+      first = SeekPoint{.t = before_all, .position = position};
+  }
+  return first;
 }
 
 void Db3File::restart(const SeekPoint& seek_point) {

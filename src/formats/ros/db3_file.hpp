@@ -32,6 +32,7 @@ class Db3File final : public BagFile {
   std::optional<BagMessage> next() override;
   std::optional<SeekPoint> seek_point_before(Microseconds logged) const override;
   void restart(const SeekPoint& seek_point) override;
+  std::optional<SeekPoint> first_of(std::size_t topic) const override;
   std::optional<Microseconds> last_logged() const override { return last_logged_; }
 
  private:

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <utility>
 
 #include "src/formats/ros/bag_magic.hpp"
@@ -86,6 +87,7 @@ void McapFile::read_index(ByteSource& source) {
   if (source.read(summary_at, bytes) != bytes.size()) return;
 
   std::vector<ChunkIndex::Chunk> chunks;
+  std::map<std::uint16_t, std::uint64_t> first;  // chunk of each channel
   ByteCursor records(bytes);
   while (!records.rest().empty()) {
     const auto record_at = summary_at + records.position();
@@ -98,8 +100,19 @@ void McapFile::read_index(ByteSource& source) {
     content.number<std::uint64_t>();  // first time
     const auto last = microseconds(content.number<std::uint64_t>());
     const auto position = content.number<std::uint64_t>();
-    if (!content.failed()) chunks.push_back({position, last});
+    content.number<std::uint64_t>();  // its size
+    ByteCursor indexes(content.sized_bytes<std::uint32_t>());
+    if (content.failed()) continue;
+    chunks.push_back({position, last});
+    while (!indexes.failed() && !indexes.rest().empty()) {
+      auto& chunk = first.try_emplace(indexes.number<std::uint16_t>(), position).first->second;
+      chunk = std::min(chunk, position);
+      indexes.number<std::uint64_t>();  // where the index of its messages is
+    }
   }
+  for (const auto& [channel, position] : first)
+    if (const auto known = channels_.find(channel); known != channels_.end() && known->second)
+      index_.set_topic(*known->second, position);
   index_.set(std::move(chunks), mcap_magic.size());
 }
 

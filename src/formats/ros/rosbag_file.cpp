@@ -119,8 +119,14 @@ void RosbagFile::read_index(ByteSource& source) {
     if (whole.header.op() == Op::connection) take_record(record, 0);
     const auto position = whole.header.number<std::uint64_t>("chunk_pos");
     const auto last = whole.header.time("end_time");
-    if (whole.header.op() == Op::chunk_info && position && last)
-      chunks.push_back({*position, *last});
+    if (whole.header.op() != Op::chunk_info || !position || !last) continue;
+    chunks.push_back({*position, *last});
+    ByteCursor counts(whole.data);
+    while (!counts.failed() && !counts.rest().empty()) {
+      const auto known = connections_.find(counts.number<std::uint32_t>());
+      counts.number<std::uint32_t>();  // of its messages
+      if (known != connections_.end() && known->second) index_.set_topic(*known->second, *position);
+    }
   }
   index_.set(std::move(chunks), rosbag_magic.size());
 }
