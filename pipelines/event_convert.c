@@ -27,21 +27,22 @@
 typedef struct {
   const char* media_type;
   const char* element;
+  gboolean has_streams; /* a pad for each: events_0, video_0, ... */
 } Reader;
 
 static const Reader readers[] = {
-    {"application/x-prophesee-raw", "evtdec name=reader"},
-    {"application/x-prophesee-dat", "eventdatdec name=reader"},
-    {"application/x-es", "eventesdec name=reader"},
-    {"application/x-atis-bin", "eventatisdec name=reader"},
-    {"application/x-event-csv", "eventcsvdec name=reader"},
-    {"application/x-npy", "eventnpydec name=reader"},
-    {"application/x-npz", "eventnpzdec name=reader"},
-    {"application/x-aedat", "aedatdemux name=reader reader.events_0"},
-    {"application/x-hdf5", "eventhdf5dec name=reader"},
-    {"application/x-mcap", "eventmcapdec name=reader reader.events_0"},
-    {"application/x-rosbag", "eventbagdec name=reader reader.events_0"},
-    {"application/x-rosbag2-db3", "eventbagdec name=reader reader.events_0"},
+    {"application/x-prophesee-raw", "evtdec", FALSE},
+    {"application/x-prophesee-dat", "eventdatdec", FALSE},
+    {"application/x-es", "eventesdec", FALSE},
+    {"application/x-atis-bin", "eventatisdec", FALSE},
+    {"application/x-event-csv", "eventcsvdec", FALSE},
+    {"application/x-npy", "eventnpydec", FALSE},
+    {"application/x-npz", "eventnpzdec", FALSE},
+    {"application/x-aedat", "aedatdemux", TRUE},
+    {"application/x-hdf5", "eventhdf5dec", FALSE},
+    {"application/x-mcap", "eventmcapdec", TRUE},
+    {"application/x-rosbag", "eventbagdec", TRUE},
+    {"application/x-rosbag2-db3", "eventbagdec", TRUE},
 };
 
 typedef struct {
@@ -323,37 +324,65 @@ static void set_location(GstElement* pipeline, const char* name, const char* pat
   gst_object_unref(element);
 }
 
-/* Links the first video stream of a file to a writer that takes it: one that begins before the
- * header is written. Runs in the streaming thread, before data of the stream flows. */
-static void link_frames(GstElement* reader, GstPad* pad, gpointer writer) {
-  GstObject* pipeline = gst_element_get_parent(reader);
-  GstElement* queue;
-  GstPad* sink;
-  gchar* name = gst_pad_get_name(pad);
-  if (strcmp(name, "video_0") == 0) {
-    queue = gst_element_factory_make("queue", NULL);
-    gst_bin_add(GST_BIN(pipeline), queue);
-    if (gst_element_link_pads(queue, "src", GST_ELEMENT(writer), "video_0")) {
-      sink = gst_element_get_static_pad(queue, "sink");
-      gst_pad_link(pad, sink);
-      gst_object_unref(sink);
-      gst_element_sync_state_with_parent(queue);
-    } else {
-      gst_bin_remove(GST_BIN(pipeline), queue);
-    }
-  }
-  g_free(name);
-  gst_object_unref(pipeline);
-}
-
-/* Converts frames along with the events. The muxer waits for the later of both, so the queue of
- * events is limited by time alone: a video stream without frames lags by half a second at most. */
-static void convert_frames(GstElement* pipeline, GstElement* queue) {
-  GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
-  GstElement* writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
+/* A queue limited by time alone. Events and frames may be apart by half a second, and the muxer
+ * waits for the later of both: for a silent stream, until it lags by half a second or more. */
+static void limit_by_time(GstElement* queue) {
   g_object_set(queue, "max-size-buffers", 0, "max-size-bytes", 0, "max-size-time", 2 * GST_SECOND,
                NULL);
-  g_signal_connect(reader, "pad-added", G_CALLBACK(link_frames), writer);
+}
+
+/* Links a pad of the reader to a queue. */
+static void link_queue(GstPad* pad, GstElement* queue) {
+  GstPad* sink = gst_element_get_static_pad(queue, "sink");
+  gst_pad_link(pad, sink);
+  gst_object_unref(sink);
+}
+
+/* Links the first video stream to the muxer. */
+static void link_frames(GstElement* reader, GstElement* muxer, GstElement* events) {
+  GstPad* pad = gst_element_get_static_pad(reader, "video_0");
+  GstObject* pipeline;
+  GstElement* queue;
+  if (pad == NULL) return;
+  pipeline = gst_element_get_parent(reader);
+  queue = gst_element_factory_make("queue", NULL);
+  limit_by_time(events);
+  limit_by_time(queue);
+  gst_bin_add(GST_BIN(pipeline), queue);
+  gst_element_link_pads(queue, "src", muxer, "video_0");
+  link_queue(pad, queue);
+  gst_element_sync_state_with_parent(queue);
+  gst_object_unref(pipeline);
+  gst_object_unref(pad);
+}
+
+/* Links the streams of a file once they are known. Runs in the streaming thread, before data
+ * flows. `muxer` takes frames, too, unless it is NULL. */
+static void link_streams(GstElement* reader, gpointer muxer) {
+  GstPad* pad = gst_element_get_static_pad(reader, "events_0");
+  GstElement* pipeline;
+  GstElement* queue;
+  if (pad == NULL) {
+    GST_ELEMENT_ERROR(reader, STREAM, WRONG_TYPE, ("The file has no events to convert."),
+                      ("no stream of events among %u streams", reader->numsrcpads));
+    return;
+  }
+  pipeline = GST_ELEMENT(gst_element_get_parent(reader));
+  queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
+  if (muxer != NULL) link_frames(reader, GST_ELEMENT(muxer), queue);
+  link_queue(pad, queue);
+  gst_object_unref(queue);
+  gst_object_unref(pipeline);
+  gst_object_unref(pad);
+}
+
+static void link_when_known(GstElement* pipeline, const Format* to) {
+  GstElement* reader = gst_bin_get_by_name(GST_BIN(pipeline), "reader");
+  GstElement* writer = gst_bin_get_by_name(GST_BIN(pipeline), "writer");
+  /* Frames are not cropped, so they would not match the events. */
+  const gboolean takes_frames =
+      crop_text == NULL && strcmp(to->media_type, "application/x-aedat") == 0;
+  g_signal_connect(reader, "no-more-pads", G_CALLBACK(link_streams), takes_frames ? writer : NULL);
   gst_object_unref(writer);
   gst_object_unref(reader);
 }
@@ -548,8 +577,8 @@ static GstElement* make_pipeline(const char* in, const Reader* from, const char*
   GError* error = NULL;
   GstElement* queue;
   GstPad* pad;
-  gchar* line =
-      g_strdup_printf("filesrc name=in ! %s ! queue name=events ! %s", from->element, to->writer);
+  gchar* line = g_strdup_printf("filesrc name=in ! %s name=reader %s queue name=events ! %s",
+                                from->element, from->has_streams ? "" : "!", to->writer);
   GstElement* pipeline = gst_parse_launch_full(line, NULL, GST_PARSE_FLAG_FATAL_ERRORS, &error);
   g_free(line);
   if (pipeline == NULL) {
@@ -571,11 +600,8 @@ static GstElement* make_pipeline(const char* in, const Reader* from, const char*
   gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_FLUSH, count_events,
                     events, NULL);
   gst_object_unref(pad);
-  /* Frames are not cropped, so they would not match the events. */
-  if (crop_text == NULL && strstr(from->element, "reader.events_0") != NULL &&
-      strcmp(to->media_type, "application/x-aedat") == 0)
-    convert_frames(pipeline, queue);
   gst_object_unref(queue);
+  if (from->has_streams) link_when_known(pipeline, to);
   return pipeline;
 }
 

@@ -366,4 +366,5 @@ def main():
     write_bag(folder / "prophesee-no-index.bag", ros1, topics, "lz4", index=False)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -218,6 +218,21 @@ for bag in evt3.mcap:x-mcap evt3.bag:x-rosbag evt3.db3:x-rosbag2-db3; do
 done
 [ "$(wc -l <evt3.mcap.csv)" = 6001 ] || fail "evt3.mcap has $(wc -l <evt3.mcap.csv) lines"
 
+# Streams that begin apart. Without an index, only images that begin with the events are found.
+/usr/bin/python3 "$SOURCE/tests/formats/apart_bags.py" .
+for bag in late-*.bag late-*.mcap late-*.db3; do
+  [[ $bag == late-images-no-index* ]] && continue
+  convert "$bag" apart.aedat4 2>left-out
+  if grep . left-out; then fail "$bag is not converted whole"; fi
+  convert apart.aedat4 apart.csv 2>left-out
+  grep -q ": left out: 24 frames$" left-out || fail "frames of $bag: $(cat left-out)"
+  name=${bag%%.*}
+  cmp "${name%-no-index}.lines" apart.csv || fail "$bag has other events"
+  convert --from=0.9 --to=1.1 "$bag" apart.csv
+  [ "$(grep -vc t apart.csv)" = 200 ] || fail "a part of $bag has $(grep -vc t apart.csv) events"
+  rm "$bag"
+done
+
 # Frames come along where they can; what is left out is said.
 timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=40 ! video/x-raw,format=GRAY8,framerate=25/1 ! tee name=t  t. ! queue ! eventsim-frame ! application/x-event-camera ! mux.  t. ! queue ! mux.  aedatmux name=mux ! filesink location=framed.aedat4
 convert framed.aedat4 framed.csv 2>left-out
@@ -331,6 +346,8 @@ refused "not an HDF5 file" words.h5 out.dat
 )
 TMPDIR=/nowhere refused "temporary file in /nowhere: No such file" ball.raw nowhere.npz
 refused "No such file" nowhere.raw out.dat
+refused "no events to convert" images.bag out.dat
+refused "no events to convert" images.bag out.aedat4
 refused "the same file" ball.raw ./ball.raw
 head -c 100001 ball.raw >short.raw
 convert short.raw short.dat 2>warnings
