@@ -28,6 +28,12 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 #define ROS_ELEMENTS(X)
 #endif
 
+#ifdef HAVE_V4L2
+#define PROVIDERS(X) X(eventcameraprovider)
+#else
+#define PROVIDERS EVENTSIM_NONE
+#endif
+
 // clang-format off
 #define ELEMENTS(X)                                                                        \
   AEDAT_ELEMENTS(X) HDF5_ELEMENTS(X) NPZ_ELEMENTS(X) ROS_ELEMENTS(X)                       \
@@ -45,4 +51,4 @@ const char* const event_pool_type_name = "GstRecordedEventPool";
 
 EVENTSIM_PLUGIN(eventcam,
                 "Event streams: read, write, filter, merge, draw, measure and send events",
-                ELEMENTS, TYPE_FINDERS)
+                ELEMENTS, TYPE_FINDERS, PROVIDERS)

@@ -9,5 +9,5 @@ const char* const event_pool_type_name = "GstEventPool";
 #define ELEMENTS(X) \
   X(eventsim_frame) X(eventsim_dense) X(eventsim_sparse) X(eventsim_diff) X(eventsim_dvs)
 
-EVENTSIM_PLUGIN(eventsim, "Simulators of event cameras: video to events", ELEMENTS,
-                EVENTSIM_NO_TYPE_FINDERS)
+EVENTSIM_PLUGIN(eventsim, "Simulators of event cameras: video to events", ELEMENTS, EVENTSIM_NONE,
+                EVENTSIM_NONE)

@@ -9,4 +9,4 @@ const char* const event_pool_type_name = "GstGLEventPool";
 #define ELEMENTS(X) X(gleventsim_frame) X(gleventsim_dense) X(gleventsim_sparse) X(gleventsim_diff)
 
 EVENTSIM_PLUGIN(eventsimgl, "Simulators of event cameras on the GPU: video to events", ELEMENTS,
-                EVENTSIM_NO_TYPE_FINDERS)
+                EVENTSIM_NONE, EVENTSIM_NONE)

@@ -40,7 +40,6 @@
 #include <gst/video/video.h>
 
 #include <algorithm>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <span>
@@ -62,6 +61,7 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/formats/evt/word_scanner.hpp"
 #include "src/wire/arrival_clock.hpp"
+#include "src/wire/event_camera.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(evt_parse_debug);
 #define GST_CAT_DEFAULT evt_parse_debug
@@ -87,19 +87,6 @@ const GEnumValue word_formats[] = {
     {static_cast<int>(EvtFormat::evt3), "16-bit words", "EVT3"},
     {static_cast<int>(EvtFormat::evt4), "32-bit words, vectors of events", "EVT4"},
     {0, nullptr, nullptr},
-};
-
-/// Formats of V4L2, as Prophesee's drivers name them; upstream Linux has none. With GREY, which is
-/// GRAY8 here, the camera has to be asked.
-struct FourCC {
-  const char* code;
-  EvtFormat format;
-};
-constexpr FourCC fourccs[] = {
-    {"PSEE", EvtFormat::evt2},
-    {"PSE1", EvtFormat::evt21_legacy},
-    {"PSE2", EvtFormat::evt21},
-    {"PSE3", EvtFormat::evt3},
 };
 
 /// User-settable values.
@@ -186,9 +173,8 @@ static Guarded<Settings>& settings_of(GObject* object) {
 /* negotiation */
 
 static std::optional<EvtFormat> format_named(const char* name) {
-  const auto* const found = std::ranges::find_if(
-      fourccs, [&](const FourCC& fourcc) { return g_strcmp0(fourcc.code, name) == 0; });
-  return found != std::end(fourccs) ? found->format : evt_format_named(name);
+  const auto format = eventcamera::words_of_fourcc(name != nullptr ? name : "");
+  return format ? format : evt_format_named(name);
 }
 
 static Input input_of(const GstCaps* caps) {
@@ -229,16 +215,12 @@ static bool start_stream(GstEvtParse* self) {
     return false;
   }
   return reported(self, [&] {
-    // The legacy order of EVT21 ends here.
-    const auto words = *format == EvtFormat::evt21_legacy ? EvtFormat::evt21 : *format;
-    const auto* const name =
-        std::ranges::find(word_formats, static_cast<int>(words), &GEnumValue::value)->value_nick;
     priv.state.emplace(State{.scanner = make_word_scanner(*format, sensor, input.framing),
                              .framing = input.framing});
     const OwnedCaps caps(gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING,
-                                             name, "width", G_TYPE_INT, sensor.width, "height",
-                                             G_TYPE_INT, sensor.height, "framerate",
-                                             GST_TYPE_FRACTION, 0, 1, nullptr));
+                                             evt_format_name(*format), "width", G_TYPE_INT,
+                                             sensor.width, "height", G_TYPE_INT, sensor.height,
+                                             "framerate", GST_TYPE_FRACTION, 0, 1, nullptr));
     GST_DEBUG_OBJECT(self, "reading %s as %" GST_PTR_FORMAT,
                      input.framing == Framing::padded ? "padded buffers" : "loose bytes",
                      caps.get());
