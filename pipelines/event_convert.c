@@ -199,6 +199,7 @@ static const Reader* reader_of(const char* media_type) {
 /* The reader of a file, by its content, or by its extension if the content is ambiguous. Prints
  * an error and returns NULL if there is none. */
 static const Reader* find_reader(const char* path) {
+  static const char matlab[] = "MATLAB 5.0 MAT-file";
   static guint8 start[1 << 14];
   const Format* format = format_of(path);
   const Reader* reader = NULL;
@@ -217,7 +218,10 @@ static const Reader* find_reader(const char* path) {
     gst_caps_unref(caps);
   }
   if (reader == NULL && format != NULL) reader = reader_of(format->media_type);
-  if (reader == NULL)
+  if (reader == NULL && size > strlen(matlab) && memcmp(start, matlab, strlen(matlab)) == 0)
+    PRINT_ERROR("%s: files of MATLAB are not read; docs/formats.md has a line that exports them\n",
+                path);
+  else if (reader == NULL)
     PRINT_ERROR("%s: neither its content nor its extension matches a known format; see --help\n",
                 path);
   return reader;

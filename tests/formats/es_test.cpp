@@ -70,6 +70,7 @@ TEST(EventStream, IsAnErrorThatSaysWhy) {
   EXPECT_NE(error({'E', 'v', 'i'}), "");
   EXPECT_NE(error(file(1, {}, 1)).find("1.0"), std::string::npos);
   EXPECT_NE(error(file(0, {})).find("generic"), std::string::npos);
+  EXPECT_NE(error(file(0, {})).find("Export them"), std::string::npos);
   EXPECT_NE(error(file(9, {})).find('9'), std::string::npos);
   auto no_rows = file(1, {});
   no_rows[18] = no_rows[19] = 0;

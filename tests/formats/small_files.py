@@ -1,13 +1,16 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Writes files of formats that are only read here, from their descriptions alone, and the events in
-them as text:
+them as text; and a file of MATLAB:
 
     small_files.py DIRECTORY"""
 import random
 import struct
 import sys
 from pathlib import Path
+
+import numpy as np
+import scipy.io
 
 
 def events(count, width, height):
@@ -59,6 +62,12 @@ def colour(some, height):
         last = t
 
 
+def matlab(path, some):
+    """As the functions of N-MNIST for MATLAB return them: all counts from 1, and ON is 2."""
+    t, x, y, p = np.array(some, float).T
+    scipy.io.savemat(path, {"TD": {"x": x + 1, "y": y + 1, "p": p + 1, "ts": t}})
+
+
 def write(folder, name, content, some):
     (folder / name).write_bytes(content)
     lines = ["t,x,y,p"] + [",".join(map(str, event)) for event in some]
@@ -69,6 +78,7 @@ def main():
     folder = Path(sys.argv[1])
     small = list(events(2000, 34, 34))
     write(folder, "n-mnist.bin", n_mnist(small), small)
+    matlab(folder / "n-mnist.mat", small)
     large = list(events(2000, 128, 128))
     write(folder, "first.aedat", aedat1(large), large)
     write(folder, "atis.es", event_stream(2, 128, 128, atis(large, 128)), large)

@@ -37,6 +37,11 @@ for name in n-mnist.bin first.aedat atis.es colour.es; do
 done
 gst-typefind-1.0 n-mnist.bin | grep -q " - application/x-atis-bin" || fail "n-mnist.bin is not recognised"
 
+# A file of MATLAB, by the line of the documentation.
+eval "$(grep "^python3 .*loadmat" "$SOURCE/docs/formats.md" | sed 's#^#/usr/bin/#')"
+convert n-mnist.npz matlab.csv
+cmp n-mnist.bin.lines matlab.csv || fail "n-mnist.mat has other events"
+
 # From each format to each.
 for in in "${!types[@]}"; do
   for out in "${!types[@]}"; do
@@ -368,6 +373,7 @@ refused "not an HDF5 file" words.h5 out.dat
 )
 TMPDIR=/nowhere refused "temporary file in /nowhere: No such file" ball.raw nowhere.npz
 refused "No such file" nowhere.raw out.dat
+refused "files of MATLAB are not read.*docs/formats.md" n-mnist.mat out.dat
 refused "no events to convert" images.bag out.dat
 refused "no events to convert" images.bag out.aedat4
 refused "the same file" ball.raw ./ball.raw

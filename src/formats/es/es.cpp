@@ -157,7 +157,10 @@ class EsDecoder final : public UnitStreamDecoder {
         begin_events<EsPolarityDecoder<2>>(size);
         break;
       case generic:
-        throw UnsupportedFormat("unsupported Event Stream of generic events: they have no pixel");
+        throw UnsupportedFormat(
+            "unsupported Event Stream of generic events: they have no pixels, and only the program "
+            "that wrote them knows what their bytes mean. Export them with that program, such as "
+            "to text of the columns t, x, y, p");
       case colour:
         begin_events<EsColourDecoder>(size);
         break;
