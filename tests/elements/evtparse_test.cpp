@@ -103,6 +103,20 @@ TEST(EvtParse, ReadsPaddedBuffersOfV4l2) {
   EXPECT_EQ(reading.stat("decoder", "corrupt-places"), 0U);
 }
 
+TEST(EvtParse, SurvivesImpossibleTimes) {
+  const auto sent = some_events(20'000);
+  Camera camera(EvtFormat::evt3);
+  Reading reading(padded_caps, "format=EVT3" + std::string(size));
+  for (int i = 0; i < 80; ++i) {
+    const GstClockTime impossible[] = {0, GST_CLOCK_TIME_NONE, G_MAXUINT64 - 1, G_MAXINT64,
+                                       GstClockTime{1} << 62};
+    const auto pts = i % 4 == 3 ? impossible[i / 4 % 5] : (i + 1) * 10 * GST_MSECOND;
+    reading.push(padded(camera.next(sent, 3'010'000 + 10'000 * i), pts, static_cast<guint64>(i)));
+  }
+  EXPECT_TRUE(reading.finish()) << reading.error;
+  EXPECT_EQ(reading.events.size(), sent.size());
+}
+
 TEST(EvtParse, CountsTheBuffersThatTheDriverDropped) {
   const auto sent = some_events(20'000);
   Camera camera(EvtFormat::evt3);

@@ -79,6 +79,12 @@ constexpr int max_side = 2048;
 /// Value of `format`: that of the caps.
 constexpr int format_of_caps = -1;
 
+/// Later times are errors; up to it, nanoseconds can be added and subtracted.
+constexpr Microseconds latest = Microseconds{1} << 52;
+
+/// A camera that was silent for longer may have started over.
+constexpr GstClockTime longest_gap = 24 * 3600 * GST_SECOND;
+
 const GEnumValue word_formats[] = {
     {format_of_caps, "That of the caps", "auto"},
     {static_cast<int>(EvtFormat::evt2), "32-bit words, one event each", "EVT2"},
@@ -288,8 +294,10 @@ static GstFlowReturn push_pieces(GstEvtParse* self) {
 static GstClockTime arrival_of(const Private& priv, GstBuffer* buffer) {
   const auto pts = GST_BUFFER_PTS(buffer);
   // Sources of bytes stamp with running time.
-  if (priv.upstream.format != GST_FORMAT_TIME) return pts;
-  return gst_segment_to_running_time(&priv.upstream, GST_FORMAT_TIME, pts);
+  const auto arrival = priv.upstream.format == GST_FORMAT_TIME
+                           ? gst_segment_to_running_time(&priv.upstream, GST_FORMAT_TIME, pts)
+                           : pts;
+  return arrival <= nanoseconds(latest) ? arrival : GST_CLOCK_TIME_NONE;
 }
 
 /// Number of buffers that the driver dropped before this one.
@@ -374,9 +382,14 @@ static GstFlowReturn take_transfer(GstEvtParse* self, GstBuffer* buffer,
                                  .is_discontinuous = GST_BUFFER_IS_DISCONT(buffer) || lost > 0,
                                  .elapsed = {}};
   if (GST_CLOCK_TIME_IS_VALID(arrival) && GST_CLOCK_TIME_IS_VALID(last_arrival) &&
-      arrival >= last_arrival)
+      arrival >= last_arrival && arrival - last_arrival <= longest_gap)
     transfer.elapsed = static_cast<Microseconds>((arrival - last_arrival) / GST_USECOND);
   state.scanner->scan(transfer, state.pieces);
+  if (!state.pieces.empty() && state.pieces.back().end > latest) {
+    GST_ELEMENT_ERROR(self, STREAM, DECODE, ("The clock of the camera has jumped too far."),
+                      ("it is at %" G_GINT64_FORMAT " us", state.pieces.back().end));
+    return GST_FLOW_ERROR;
+  }
   if (!state.pieces.empty() && GST_CLOCK_TIME_IS_VALID(arrival)) {
     const bool after_gap = std::ranges::any_of(state.pieces, &WordScanner::Piece::is_discontinuous);
     state.is_mapping_new |= state.clock.arrive(
