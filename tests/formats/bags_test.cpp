@@ -93,7 +93,7 @@ class Bags : public testing::Test {
   static void SetUpTestSuite() {
     folder = std::filesystem::temp_directory_path() / ("bags-" + std::to_string(getpid()));
     std::filesystem::create_directory(folder);
-    const auto command = std::string("/usr/bin/python3 " BAG_FILES " ") + folder.string();
+    const auto command = std::string("/usr/bin/python3 '" BAG_FILES "' '") + folder.string() + "'";
     ASSERT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
     const auto event_bytes = bytes_of(folder / "events.bin");
     for (std::span<const std::uint8_t> rest = event_bytes; !rest.empty();) {
@@ -466,8 +466,8 @@ TEST(Mcap, IsAsSpecified) {
     for (const auto compression :
          {BagCompression::none, BagCompression::lz4, BagCompression::zstd}) {
       save(path.string() + ".mcap", encoded({{346, 260}, format, compression}, events));
-      const auto command =
-          "/usr/bin/python3 " BAG_CHECK " " + path.string() + ".mcap " + path.string() + ".bin";
+      const auto command = "/usr/bin/python3 '" BAG_CHECK "' '" + path.string() + ".mcap' '" +
+                           path.string() + ".bin'";
       EXPECT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c)
     }
   std::filesystem::remove(path.string() + ".mcap");
