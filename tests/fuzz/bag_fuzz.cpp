@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Bags: pushed in pieces, and with random access.
+// Bags: pushed in pieces, with random access, and played.
 #include <limits>
 #include <memory>
 
+#include "src/formats/recording_reader.hpp"
 #include "src/formats/ros/bag_decoder.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 #include "tests/fuzz/item_sums.hpp"
@@ -63,11 +64,35 @@ void read_with_index(std::span<const std::uint8_t> bytes) {
   }
 }
 
+/// Plays a file, whose streams may begin anywhere, and a part of it.
+void play(std::span<const std::uint8_t> bytes) {
+  constexpr Microseconds chunk_length = 10'000;
+  MemoryBytes source({bytes.begin(), bytes.end()});
+  RecordingReader recording([] { return std::make_unique<BagDecoder>(""); }, chunk_length);
+  recording.open(source);
+  const auto play_on = [&] {
+    while (const auto output = recording.next()) {
+      const auto* const chunk = std::get_if<RecordingReader::Chunk>(&*output);
+      if (chunk == nullptr) continue;
+      const auto size = recording.streams()[chunk->stream].info.size;
+      for (const auto& event : chunk->events)
+        require(event.x < size.width && event.y() < size.height, "events are within the sensor");
+    }
+  };
+  try {
+    play_on();
+    recording.seek(recording.position() / 2, std::nullopt);
+    play_on();
+  } catch (const UnsupportedFormat&) {
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(data, size);
   require_same_however_cut(bytes, [&](Pieces pieces) { return sums_of(bytes, pieces); });
   read_with_index(bytes);
+  play(bytes);
   return 0;
 }
