@@ -26,6 +26,9 @@
  * An event waits in the camera until its transfer is complete. Live sinks wait for the longest of
  * the transfers so far, and at least for #GstEvtParse:latency.
  *
+ * The device provider `eventcameraprovider` lists cameras with V4L2 drivers of Prophesee, and
+ * creates v4l2src and evtparse for them; see docs/cameras.md.
+ *
  * ## Example launch lines
  * |[
  * gst-launch-1.0 v4l2src device=/dev/video0 ! video/x-raw,format=GRAY8,width=4096,height=391 !
