@@ -147,6 +147,36 @@ TEST_F(Bags, HaveTheirEventsAndFrames) {
   }
 }
 
+TEST_F(Bags, SayInTheirIndexWhereTopicsBegin) {
+  for (const auto& name : names()) {
+    SCOPED_TRACE(name);
+    const auto bytes = bytes_of(folder / name);
+    MemoryBytes source(bytes);
+    BagDecoder decoder("");
+    const bool reads_itself = decoder.open(source);
+    const bool has_index = name.find("-no-") == std::string::npos;
+    EXPECT_EQ(decoder.knows_all_streams(), has_index);
+    ASSERT_TRUE(!has_index || decoder.streams().size() == 2U);
+    for (std::size_t i = 0; i < decoder.streams().size(); ++i) {
+      const auto first = decoder.first_of(i);
+      ASSERT_EQ(first.has_value(), has_index);
+      if (!first) continue;
+      decoder.restart(*first);
+      if (!reads_itself)
+        decoder.push(std::span(bytes).subspan(static_cast<std::size_t>(first->position)));
+      std::optional<Microseconds> t;
+      while (const auto item = t ? std::nullopt : decoder.next()) {
+        const auto* const events = std::get_if<EventItem>(&*item);
+        const auto* const frame = std::get_if<FrameItem>(&*item);
+        if (events != nullptr && events->stream == i) t = events->events.front().t;
+        if (frame != nullptr && frame->stream == i) t = frame->frame.t;
+      }
+      const bool of_events = decoder.streams()[i].kind == StreamKind::events;
+      EXPECT_EQ(t, of_events ? expected.events.front().t : expected.frames.front().t);
+    }
+  }
+}
+
 TEST_F(Bags, HaveTheTopicsThatAreChosen) {
   const std::string name = "evt3-lz4.mcap";
   const auto bytes = bytes_of(folder / name);
