@@ -328,11 +328,12 @@ static void set_location(GstElement* pipeline, const char* name, const char* pat
   gst_object_unref(element);
 }
 
-/* A queue limited by time alone. Events and frames may be apart by half a second, and the muxer
- * waits for the later of both: for a silent stream, until it lags by half a second or more. */
+/* Limits a queue by time: events and frames may be apart by half a second, and the muxer waits for
+ * the later of both, for a silent stream until it lags by half a second or more. The limit of
+ * bytes is only reached by files whose times do not go on. */
 static void limit_by_time(GstElement* queue) {
-  g_object_set(queue, "max-size-buffers", 0, "max-size-bytes", 0, "max-size-time", 2 * GST_SECOND,
-               NULL);
+  g_object_set(queue, "max-size-buffers", 0, "max-size-bytes", 1U << 30, "max-size-time",
+               2 * GST_SECOND, NULL);
 }
 
 /* Links a pad of the reader to a queue. */
