@@ -314,9 +314,15 @@ struct TwoInputs {
   Owned<GstHarness> second;
 };
 
+/// Flushes all inputs of an element, as a seek does: by events of one number.
 inline void flush(std::initializer_list<GstHarness*> inputs) {
-  for (auto* h : inputs) gst_harness_push_event(h, gst_event_new_flush_start());
-  for (auto* h : inputs) gst_harness_push_event(h, gst_event_new_flush_stop(TRUE));
+  const auto seqnum = gst_util_seqnum_next();
+  const auto push = [&](GstEvent* event, GstHarness* h) {
+    gst_event_set_seqnum(event, seqnum);
+    gst_harness_push_event(h, event);
+  };
+  for (auto* h : inputs) push(gst_event_new_flush_start(), h);
+  for (auto* h : inputs) push(gst_event_new_flush_stop(TRUE), h);
 }
 
 /// Pushes a segment that starts at 0.

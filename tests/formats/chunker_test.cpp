@@ -269,10 +269,10 @@ TEST(Chunker, KeepsLabelsWithTheirEvents) {
   std::size_t labelled = 0;
   while (const auto interval = chunker.next()) {
     ASSERT_EQ(interval->labels.size(), interval->events.size());
-    for (std::size_t i = 0; i < interval->events.size(); ++i) {
-      const auto expected = static_cast<std::uint16_t>(interval->events[i].x + 7);
-      ASSERT_EQ(interval->labels[i], (Label{.object_class = expected, .cause = Cause::leak}));
-    }
+    const auto of_event = [](const Event& event) {
+      return Label{.object_class = static_cast<std::uint16_t>(event.x + 7), .cause = Cause::leak};
+    };
+    ASSERT_TRUE(std::ranges::equal(interval->labels, interval->events, {}, {}, of_event));
     labelled += interval->labels.size();
   }
   EXPECT_EQ(labelled, count);

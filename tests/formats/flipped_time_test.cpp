@@ -91,7 +91,7 @@ TEST_P(FlippedTime, CostsTheEventsUpToTheNextTime) {
   for (const Microseconds start : {Microseconds{0}, Microseconds{3'600'000'000}}) {
     record(start);
     const auto times = times_in(file_, words);
-    for (int i = 0; i < 200; ++i) {
+    for (int i = 0; i < 60; ++i) {
       const auto at = times[random() % (times.size() - 2)];
       const auto bit = static_cast<unsigned>(random()) % words.time_bits;
       expect_few_differences(at + words.upper_byte - (words.time_bits + 3) / 8 + bit / 8, bit % 8);
@@ -103,7 +103,7 @@ TEST_P(FlippedTime, OrTypeCostsFewEvents) {
   const Words& words = GetParam();
   std::mt19937 random(5);
   record(0);
-  for (int i = 0; i < 400; ++i) {
+  for (int i = 0; i < 120; ++i) {
     const auto word = random() % (file_.size() / words.bytes - 100);
     expect_few_differences(word * words.bytes + words.upper_byte, 4 + random() % 4);
   }
