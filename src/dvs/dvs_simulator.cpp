@@ -2,9 +2,12 @@
 #include "src/dvs/dvs_simulator.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -17,6 +20,7 @@
 #include "src/dvs/moving_light.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/readout.hpp"
+#include "src/dvs/state_bytes.hpp"
 #include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
 
@@ -34,6 +38,27 @@ bool have_same_traits(const DvsSettings& a, const DvsSettings& b) {
 bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
   return a.linear_light == b.linear_light && a.exposure_compensation == b.exposure_compensation &&
          a.response == b.response && a.log_eps == b.log_eps;
+}
+
+/// A state begins with this; the last one is the version of its format.
+constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '1'};
+
+/// Hash of all settings, whose number the compiler checks.
+std::uint64_t hash_of(const DvsSettings& settings) {
+  const auto& [denoise, linear_light, exposure_compensation, response, log_eps, upsampling,
+               max_interpolated_frames, cutoff_frequency, dark_light, positive_threshold,
+               negative_threshold, threshold_sigma, threshold_jitter, leak_rate, leak_spread,
+               shot_noise_rate, hot_pixels, dead_pixels, adaptation, adaptation_time,
+               refractory_period, refractory_reset, exposure_pulse, exposure_lead, pixel_latency,
+               pixel_latency_jitter, max_rate, seed] = settings;
+  StateWriter writer;
+  const auto add = [&](const auto&... values) { (writer.value(values, is_anything), ...); };
+  add(denoise, linear_light, exposure_compensation, response, log_eps, upsampling,
+      max_interpolated_frames, cutoff_frequency, dark_light, positive_threshold, negative_threshold,
+      threshold_sigma, threshold_jitter, leak_rate, leak_spread, shot_noise_rate, hot_pixels,
+      dead_pixels, adaptation, adaptation_time, refractory_period, refractory_reset, exposure_pulse,
+      exposure_lead, pixel_latency, pixel_latency_jitter, max_rate, seed);
+  return checksum_of(writer.finish());
 }
 
 /// Limit of the gain since the first frame, in case many estimates err in the same direction.
@@ -64,7 +89,62 @@ class PixelSimulator final : public DvsSimulator {
  public:
   explicit PixelSimulator(const LumaFormat& format) : DvsSimulator(format) {}
 
+  std::vector<std::uint8_t> state() override {
+    StateWriter writer;
+    pass_origin(writer, current_);
+    pass(writer);
+    return writer.finish();
+  }
+
+  void restore(std::span<const std::uint8_t> state) override {
+    last_time_.reset();
+    StateReader reader(state);
+    pass_origin(reader, settings_);
+    adopt(settings_);
+    pass(reader);
+    reader.finish();
+    responses_ = responses(current_, luma_bits(current_), gain_);
+    finder_.reset();
+  }
+
  private:
+  /// Passes what a state belongs to.
+  template <class State>
+  void pass_origin(State& state, const DvsSettings& settings) const {
+    const auto expect = [&](auto expected, const char* fault) {
+      auto value = expected;
+      state.value(value, is_anything);
+      if (value != expected) throw std::runtime_error(fault);
+    };
+    expect(state_magic, "it is not a state that this version writes");
+    expect(format().width, "its frames have another width");
+    expect(format().height, "its frames have another height");
+    expect(format().bits, "its frames have another bit depth");
+    expect(hash_of(settings), "it is of other properties");
+  }
+
+  /// Passes everything else. What is derived from settings, gain and frames is not in a state.
+  template <class State>
+  void pass(State& state) {
+    Nanoseconds time = last_time_.value_or(0);
+    state.value(time, is_within<Nanoseconds>(0, std::numeric_limits<Nanoseconds>::max()));
+    state.value(sub_interval_count_, is_anything);
+    state.value(clock_, is_within(0.0, max_state_clock));
+    state.value(gain_, is_within(1 / max_total_gain, max_total_gain));
+    state.image(last_, is_anything);
+    pulse_.pass(state);
+    pixels_.pass(state);
+    fired_.pass(state, format().width, format().height);
+    std::uint8_t has_readout = readout_ ? 1 : 0;
+    state.value(has_readout, is_within<std::uint8_t>(0, 1));
+    if constexpr (State::is_reading) {
+      readout_.reset();
+      if (has_readout == 1) readout_.emplace(format().width, format().height);
+      last_time_ = time;
+    }
+    if (readout_) readout_->pass(state);
+  }
+
   bool needs_flow() const override { return settings_.upsampling == Upsampling::motion; }
 
   void start(const LumaView& frame) override {

@@ -6,6 +6,8 @@
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/label.hpp"
+#include "src/core/thread_pool.hpp"
+#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -35,6 +37,21 @@ class IntervalEvents {
 
   /// Drops the deferred events.
   void reset() { deferred_.clear(); }
+
+  /// Passes the deferred events of a sensor of this size to a StateWriter or StateReader.
+  template <class State>
+  void pass(State& state, int width, int height) {
+    deferred_.resize(static_cast<std::size_t>(band_count(height)));
+    for (int band = 0; band < band_count(height); ++band) {
+      const BandRows rows(band, height);
+      auto& deferred = deferred_[static_cast<std::size_t>(band)];
+      deferred.resize(state.count(deferred.size(), sizeof(double) + sizeof(Event)));
+      for (auto& [t, event] : deferred) {
+        state.value(t, is_within(0.0, max_state_time));
+        state.value(event, is_event_within({0, rows.first, width, rows.last}));
+      }
+    }
+  }
 
   /// Adds an event `t` microseconds after the start of the interval, instead of its own time.
   /// Different bands may be added from different threads.

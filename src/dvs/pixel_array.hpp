@@ -12,6 +12,7 @@
 #include "src/core/label.hpp"
 #include "src/dvs/adaptation.hpp"
 #include "src/dvs/light_response.hpp"
+#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -149,6 +150,10 @@ class PixelArray {
   /// budgets.
   void settle(int y, const DvsSettings& settings, const Random& random);
 
+  /// Passes all pixels to a StateWriter or StateReader, except the leak, which is drawn.
+  template <class State>
+  void pass(State& state);
+
  private:
   Image<float> target_;
   Image<float> signal_;
@@ -161,5 +166,29 @@ class PixelArray {
   Image<ThresholdGrowth> growth_;
   std::optional<Image<Cause>> last_cause_;
 };
+
+template <class State>
+void PixelArray::pass(State& state) {
+  constexpr auto max_level = static_cast<float>(max_state_level);
+  constexpr auto is_level = is_within(-max_level, max_level);
+  constexpr auto is_threshold = [](float threshold) {
+    return std::isinf(threshold) ? threshold > 0 : is_within(1e-4F, max_level)(threshold);
+  };
+  std::uint8_t has_causes = keeps_causes() ? 1 : 0;
+  state.value(has_causes, is_within<std::uint8_t>(0, 1));
+  if constexpr (State::is_reading) keep_causes(has_causes == 1);
+  state.image(target_, is_level);
+  state.image(signal_, is_level);
+  state.image(reference_, is_level);
+  state.image(positive_, is_threshold);
+  state.image(negative_, is_threshold);
+  state.image(refractory_left_, is_within(0.0F, static_cast<float>(max_state_time)));
+  state.image(noise_budget_, is_anything);
+  state.image(growth_, [](const ThresholdGrowth& growth) {
+    return is_within(0.0, max_state_clock)(growth.time) &&
+           is_within(0.0, max_state_level)(growth.value);
+  });
+  if (last_cause_) state.image(*last_cause_, is_within(Cause::unknown, Cause::exposure_pulse));
+}
 
 }  // namespace eventcamera

@@ -7,6 +7,7 @@
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/label.hpp"
+#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -30,6 +31,10 @@ class Readout {
   void pass(std::span<const Event> in, double duration, double events_per_second,
             EventBuckets& out);
 
+  /// Passes the waiting events to a StateWriter or StateReader.
+  template <class State>
+  void pass(State& state);
+
  private:
   static constexpr int none = -1;
 
@@ -43,6 +48,7 @@ class Readout {
     int count = 0;
   };
 
+  /// Its pixel must lie on the sensor.
   void admit(const Event& event);
   void serve(int row, std::uint32_t t, std::vector<Event>& out);
 
@@ -61,5 +67,24 @@ class Readout {
   std::vector<std::uint8_t> waits_;  ///< by pixel: 1 if its event is waiting
   double idle_from_ = 0;             ///< microseconds after the start of the interval
 };
+
+template <class State>
+void Readout::pass(State& state) {
+  if constexpr (State::is_reading) reset();
+  state.value(idle_from_, is_within(0.0, max_state_time));
+  // In the order in which they are read, which admits them again.
+  std::vector<Event> events;
+  for (std::size_t i = 0; i < queue_count_; ++i) {
+    const int row = row_queue_[(queue_first_ + i) % row_queue_.size()];
+    for (int place = rows_[static_cast<std::size_t>(row)].first; place != none;
+         place = waiting_[static_cast<std::size_t>(place)].next)
+      events.push_back(waiting_[static_cast<std::size_t>(place)].event);
+  }
+  events.resize(state.count(events.size(), sizeof(Event)));
+  for (auto& event : events)
+    state.value(event, is_event_within({0, 0, width_, static_cast<int>(rows_.size())}));
+  if constexpr (State::is_reading)
+    for (const auto& event : events) admit(event);
+}
 
 }  // namespace eventcamera

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "src/dvs/dvs_settings.hpp"
+#include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
 
@@ -33,6 +34,13 @@ class ExposurePulse {
 
   /// Aborts the current pulse.
   void reset() { height_ = 0; }
+
+  /// Passes the current pulse to a StateWriter or StateReader.
+  template <class State>
+  void pass(State& state) {
+    state.value(height_, is_within(0.0, max_state_level));
+    state.value(falls_in_, is_within(0.0, max_state_time));
+  }
 
  private:
   std::vector<PulseEdge> edges_;
