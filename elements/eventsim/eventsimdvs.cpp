@@ -35,6 +35,12 @@
  * in pixels. A tensor has the timestamp of its frame. Where one is missing, or has another duration
  * than the interval because frames were skipped, the flow is found as without the pad.
  *
+ * A long video can be simulated in segments, as if it were one, also on different machines: with
+ * #GstEventSimDvs:final-state, the state of all pixels is written to a file at the end of a
+ * segment, and with #GstEventSimDvs:initial-state, the next one continues from it. Frames keep the
+ * timestamps that they have in the whole video; those up to the time of the state are skipped, so
+ * the next segment may begin earlier than needed.
+ *
  * ## Example launch lines
  * |[
  * gst-launch-1.0 v4l2src ! eventsim-dvs preset=davis346 ! videoconvert ! autovideosink
@@ -56,6 +62,7 @@
 #include <variant>
 
 #include "elements/eventsim/camera_profile.hpp"
+#include "gst/base/named_file.hpp"
 #include "gst/base/types.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "src/dvs/dvs_settings.hpp"
@@ -299,6 +306,8 @@ struct Choice {
   Given profiled;     ///< override the preset
   std::string fault;  ///< why the profile could not be read, if so
   Given overriding;   ///< override both
+  std::string initial_state;
+  std::string final_state;
 
   DvsSettings settings() const {
     auto settings = eventcamera::settings_of(preset);
@@ -368,6 +377,19 @@ static void install_properties(GObjectClass* klass) {
           "",
           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
                                    GST_PARAM_MUTABLE_READY)));
+  properties.add(
+      &Choice::initial_state,
+      g_param_spec_string("initial-state", "Initial state",
+                          "File of the state to continue from, which final-state wrote: frames up "
+                          "to its time are skipped, and the next events are those of a video "
+                          "without a cut. Read when a stream begins, as after a seek; all other "
+                          "properties and the size of the frames must be the same",
+                          "", property_flags));
+  properties.add(&Choice::final_state,
+                 g_param_spec_string("final-state", "Final state",
+                                     "File that the state of all pixels is written to at the end "
+                                     "of the stream; one that exists is replaced",
+                                     "", property_flags));
   for (std::size_t i = 0; i < std::size(table); ++i) {
     const auto add = [&](auto member) {
       properties.add([i](Choice& choice, const GValue* value) { choice.overriding.take(i, value); },
@@ -382,6 +404,39 @@ static void install_properties(GObjectClass* klass) {
 
 static void configure(eventcamera::IntervalSimulator& simulator, GObject* object) {
   static_cast<DvsSimulator&>(simulator).set(choice_of(object).copy().settings());
+}
+
+static void restore(eventcamera::IntervalSimulator& simulator, GObject* object) {
+  const auto location = choice_of(object).copy().initial_state;
+  if (location.empty()) return;
+  auto& dvs_simulator = static_cast<DvsSimulator&>(simulator);
+  try {
+    const auto bytes = read_bytes(location, dvs_simulator.max_state_size());
+    dvs_simulator.restore({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  } catch (const std::runtime_error& error) {
+    throw VideoSimulatorError(
+        {GST_RESOURCE_ERROR_READ,
+         "Cannot continue from the state \"" + location + "\": " + error.what() +
+             ". Write one with final-state, with the same properties and size of frames."},
+        "initial-state");
+  }
+}
+
+static void save(eventcamera::IntervalSimulator& simulator, GObject* object) {
+  const auto location = choice_of(object).copy().final_state;
+  if (location.empty()) return;
+  const auto bytes = static_cast<DvsSimulator&>(simulator).state();
+  GError* error = nullptr;
+  if (g_file_set_contents(location.c_str(), reinterpret_cast<const gchar*>(bytes.data()),
+                          static_cast<gssize>(bytes.size()), &error) != FALSE)
+    return;
+  const std::string cause = error->message;
+  g_error_free(error);
+  throw VideoSimulatorError(
+      {GST_RESOURCE_ERROR_WRITE, "Cannot write the state to \"" + location +
+                                     "\". Give final-state a file in a folder that can be "
+                                     "written, with enough space."},
+      cause);
 }
 
 static std::string fault_of(GObject* object) {
@@ -401,6 +456,8 @@ static const EventSimulatorMethod dvs = {
     .make_settings = []() -> std::shared_ptr<void> { return std::make_shared<Guarded<Choice>>(); },
     .install_properties = install_properties,
     .configure = configure,
+    .restore = restore,
+    .save = save,
     .fault = fault_of,
 };
 GST_ELEMENT_REGISTER_DEFINE(eventsim_dvs, "eventsim-dvs", GST_RANK_NONE, event_simulator_type(dvs))

@@ -84,6 +84,8 @@ struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
   bool backwards = false;                       ///< the segment was rejected: its rate is negative
   bool discontinuous = false;                   ///< the next buffer is discontinuous
+  bool begins = true;                           ///< no frame of the timeline has arrived
+  std::optional<Nanoseconds> continues_from;    ///< time of the state that was restored, if it was
   GstFlowReturn flow = GST_FLOW_OK;             ///< result of the last push
   FrameClock clock;                             ///< for frames without a PTS
   WarnOnce warn_of_times{GST_CAT_DEFAULT};
@@ -423,7 +425,8 @@ static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
 /// skipped. May throw.
 static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
-  if (GST_BUFFER_IS_DISCONT(buffer)) {
+  const bool continues = std::exchange(priv_of(self).stream.continues_from, {}).has_value();
+  if (GST_BUFFER_IS_DISCONT(buffer) && !continues) {
     start_over(self);
     priv_of(self).stream.discontinuous = true;
   }
@@ -682,12 +685,31 @@ static bool give_flow(GstEventSimulator* self, Nanoseconds start, Nanoseconds en
   return true;
 }
 
+/// Restores the state that a timeline continues from, if any, before its first frame. Returns true
+/// if that state has seen this frame. May throw.
+static bool is_before_state(GstEventSimulator* self, GstBuffer* frame) {
+  auto& stream = priv_of(self).stream;
+  auto& simulator = priv_of(self).state->simulator();
+  if (std::exchange(stream.begins, false) && method_of(self).restore != nullptr) {
+    configure(self);
+    method_of(self).restore(simulator, G_OBJECT(self));
+    stream.continues_from = simulator.last_time();
+  }
+  const GstClockTime pts = GST_BUFFER_PTS(frame);
+  if (!stream.continues_from || pts > static_cast<GstClockTime>(*stream.continues_from))
+    return false;
+  GST_LOG_OBJECT(self, "skipping the frame at %" GST_TIME_FORMAT ": the state is later",
+                 GST_TIME_ARGS(pts));
+  return true;
+}
+
 /// Processes a frame and outputs the interval that it ends, if any. May throw.
 static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
   auto& stream = priv_of(self).stream;
   auto& state = *priv_of(self).state;
   sync_controlled_properties(self, GST_BUFFER_PTS(in.get()));
   check_interlacing(self, in.get());
+  if (is_before_state(self, in.get())) return;
   if (!check_time(self, in.get()) || !begin_work(self, in.get())) return;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in.get()));
   const auto start = state.simulator().last_time();
@@ -742,6 +764,8 @@ static void start_timeline(GstEventSimulator* self) {
   if (state) state->frames->drop();
   priv_of(self).stream.flow = GST_FLOW_OK;
   start_over(self);
+  priv_of(self).stream.begins = true;
+  priv_of(self).stream.continues_from.reset();
   for (auto* companion : companions_of(self)) companion->begin();
   priv_of(self).stream.clock.start_over();
   priv_of(self).qos.lock()->start_over();
@@ -782,6 +806,14 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   if (flow == GST_FLOW_OK)
     flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
                        static_cast<GstClockTime>(end - start));
+}
+
+/// Saves the state at the end of a stream, if the element has to.
+static void save_state(GstEventSimulator* self) {
+  const auto& state = priv_of(self).state;
+  const auto save = method_of(self).save;
+  if (save != nullptr && state && state->simulator().last_time())
+    reported(self, [&] { save(state->simulator(), G_OBJECT(self)); });
 }
 
 /// Handles a GAP from upstream: holds the last frame until one frame duration before the end of the
@@ -835,6 +867,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       break;
     case GST_EVENT_EOS:
       for (auto* companion : companions_of(self)) companion->end();
+      save_state(self);
       break;
     default:
       break;
