@@ -155,6 +155,13 @@ GstEventCameraLabelMeta* gst_buffer_add_event_camera_label_meta(GstBuffer* buffe
   return meta;
 }
 
+GstEventCameraLabelMeta* gst_buffer_add_event_camera_label_bytes(GstBuffer* buffer, GBytes* bytes) {
+  g_return_val_if_fail(bytes != nullptr, nullptr);
+  gsize size = 0;
+  const auto* labels = static_cast<const GstEventCameraLabel*>(g_bytes_get_data(bytes, &size));
+  return gst_buffer_add_event_camera_label_meta(buffer, labels, size / sizeof(GstEventCameraLabel));
+}
+
 GstEventCameraLabelMeta* gst_buffer_get_event_camera_label_meta(GstBuffer* buffer) {
   g_return_val_if_fail(GST_IS_BUFFER(buffer), nullptr);
 

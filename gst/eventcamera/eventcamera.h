@@ -300,6 +300,22 @@ GstEventCameraLabelMeta* gst_buffer_add_event_camera_label_meta(GstBuffer* buffe
                                                                 gsize n_labels);
 
 /**
+ * gst_buffer_add_event_camera_label_bytes:
+ * @buffer: a writable buffer of an event stream of format XYTP, without labels
+ * @bytes: a label for each event in the buffer, 4 bytes each, in the layout of #GstEventCameraLabel
+ *
+ * Adds labels to a buffer, for languages that write structures as bytes, such as those of
+ * gst_event_camera_label_meta_get_bytes().
+ *
+ * Returns: (transfer none) (nullable): the labels, which belong to @buffer; %NULL if there is not
+ *     enough memory
+ *
+ * Since: 0.1
+ */
+GST_EVENT_CAMERA_API
+GstEventCameraLabelMeta* gst_buffer_add_event_camera_label_bytes(GstBuffer* buffer, GBytes* bytes);
+
+/**
  * gst_buffer_get_event_camera_label_meta:
  * @buffer: a buffer of an event stream of format XYTP
  *

@@ -91,7 +91,7 @@ TEST_F(LabelMeta, IsIgnoredUnlessItHasALabelForEachEvent) {
   EXPECT_EQ(gst_buffer_get_event_camera_label_meta(part.get()), nullptr);
 }
 
-TEST_F(LabelMeta, IsReadAsBytes) {
+TEST_F(LabelMeta, IsReadAndWrittenAsBytes) {
   const auto buffer = labelled_buffer();
   GBytes* bytes =
       gst_event_camera_label_meta_get_bytes(gst_buffer_get_event_camera_label_meta(buffer.get()));
@@ -99,6 +99,12 @@ TEST_F(LabelMeta, IsReadAsBytes) {
   const unsigned char expected[] = {3, 0, 3, 0};
   EXPECT_EQ(
       std::memcmp(static_cast<const char*>(g_bytes_get_data(bytes, nullptr)) + 12, expected, 4), 0);
+  const harness::Buffer other(gst_buffer_new_allocate(nullptr, 8 * count, nullptr));
+  gst_buffer_add_event_camera_label_bytes(other.get(), bytes);
+  const auto* added = gst_buffer_get_event_camera_label_meta(other.get());
+  ASSERT_NE(added, nullptr);
+  EXPECT_EQ(std::memcmp(added->labels, g_bytes_get_data(bytes, nullptr), g_bytes_get_size(bytes)),
+            0);
   g_bytes_unref(bytes);
 }
 
