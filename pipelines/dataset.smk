@@ -1,23 +1,58 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The workflow that event-dataset runs: a job for each video, in the folder of the data set. A job writes its
-# record last and at once; event-dataset removes the records of videos that have to be made again.
+# The workflow that event-dataset runs: a job for each video, in the folder of the data set, and before it one
+# for each of its segments, if it has any. A job writes its record last and at once; event-dataset removes the
+# records of videos that have to be made again.
 import json
 
 with open(config["jobs"], encoding="utf-8") as file:
-    paths = json.load(file)
+    videos = json.load(file)
+
+
+def segments_of(name):
+    joints = videos[name]["joints"]
+    return [f"{config['segments']}/{name}.d/{number}.json" for number in range(len(joints) + 1 if joints else 0)]
+
+
+def segment_before(wildcards):
+    number = int(wildcards.number)
+    return segments_of(wildcards.name)[number - 1 : number] if videos[wildcards.name]["in-order"] else []
+
+
+def arguments(wildcards):
+    """The file, and where it is cut."""
+    path, joints = (videos[wildcards.name][key] for key in ("path", "joints"))
+    return [path, "--joints", *map(str, joints)] if joints else [path]
 
 
 rule all:
     input:
-        lambda _: [f"{config['records']}/{name}.json" for name in paths],
+        lambda _: [f"{config['records']}/{name}.json" for name in videos],
+
+
+rule segment:
+    input:
+        segment_before,
+    output:
+        config["segments"] + "/{name}.d/{number}.json",
+    wildcard_constraints:
+        number=r"\d+",
+    params:
+        arguments=arguments,
+    log:
+        config["segments"] + "/{name}.d/{number}.log",
+    shell:
+        "{config[command]} --segment-number {wildcards.number} --video {wildcards.name:q} {params.arguments:q}"
+        " >{log:q} 2>&1"
 
 
 rule video:
+    input:
+        lambda wildcards: segments_of(wildcards.name),
     output:
         config["records"] + "/{name}.json",
     params:
-        path=lambda wildcards: paths[wildcards.name],
+        arguments=arguments,
     log:
         "logs/{name}.log",
     shell:
-        "{config[command]} --video {wildcards.name:q} {params.path:q} >{log:q} 2>&1"
+        "{config[command]} --video {wildcards.name:q} {params.arguments:q} >{log:q} 2>&1"

@@ -170,9 +170,9 @@ def path_in(output, folder, name, extension):
     return path
 
 
-def record_of(video, output, keep=True):
+def record_of(video, output, keep=True, segments=None):
     """Simulates a video, and returns its record. The file of events is complete or not there, whenever the
-    process is killed; without `keep`, only its hash is."""
+    process is killed; without `keep`, only its hash is. Its segments, if given, have been simulated before."""
     record = {"name": video.name, "state": state_of(video.path),
               "input": {"path": os.path.relpath(video.path, os.path.dirname(video.recipe.path)),
                         "sha256": hash_of(video.path)},
@@ -182,7 +182,7 @@ def record_of(video, output, keep=True):
     with tempfile.TemporaryDirectory(dir=unfinished) as folder:
         path = os.path.join(folder, "events")
         try:
-            figures, picture, warnings, decoders = simulate(video, path)
+            figures, picture, warnings, decoders = simulate(video, path, segments)
         except Refused as reason:
             return record | {"refused": str(reason)}
         except ec.PipelineError as failure:
@@ -207,24 +207,22 @@ def write_record(path, record):
     os.replace(file.name, path)
 
 
-def simulate(video, path):
-    """Writes the events, or tensors, of a video. Returns figures, a picture, warnings, and the decoders."""
-    frames, figures, decoders = Frames(), Figures(), set()
+def simulate(video, path, segments):
+    """Writes the events, or tensors, of a video or of all its segments. Returns figures, a picture, warnings,
+    and the decoders."""
+    figures = Figures()
     is_tensors = video.recipe.output == TENSORS
     writer = f"eventtensor {video.recipe.tensors} ! {TENSOR_CAPS} ! appsink name=tensors sync=false async=false"
     if not is_tensors:
         writer = f"{WRITERS['.' + video.recipe.output]} {SAME_BYTES.get(video.recipe.output, '')} async=false"
 
-    def note(element):
-        factory = element.get_factory()
-        if factory and "Decoder" in factory.get_metadata("klass"):
-            decoders.add(f"{factory.get_name()} {factory.get_plugin().get_version()}")
-
+    rest = f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}"
     # One thread, since there is a job for each processor.
-    with video.playing(f"tee name=events ! queue ! {writer}  events. ! queue ! {SINK}", threads=1) as pipeline:
-        pipeline.on_element(note)
+    with segments.playing(rest) if segments else video.playing(rest, threads=1) as pipeline:
+        frames, decoders = (segments.frames, segments.decoders) if segments else (Frames(), decoders_of(pipeline))
         pipeline.gaps_as_buffers()
-        frames.watch(pipeline.element("decoded").get_static_pad("sink"))
+        if not segments:
+            frames.watch(pipeline.element("decoded").get_static_pad("sink"))
         array = None
         if is_tensors:
             array = NpyFile(path)
@@ -237,15 +235,33 @@ def simulate(video, path):
         for tensor in pipeline.samples("tensors") if array else ():
             array.append(tensor_of(tensor))
         pipeline.wait()
-        duration = 0.0
-        with contextlib.suppress(ec.PipelineError):
-            duration = pipeline.duration()
+        duration = segments.duration if segments else duration_of(pipeline)
     frames.check(video.recipe.min_frames, duration)
     if figures.chunks == 0:
         raise Refused("too short: nothing is left of it after the filters")
     if array:
         array.close()
     return figures.described(len(frames.times)), png_of(picture_of(figures.busiest())), frames.warnings(), sorted(decoders)
+
+
+def decoders_of(pipeline):
+    """A set that gets the decoders that the pipeline adds."""
+    decoders = set()
+
+    def note(element):
+        factory = element.get_factory()
+        if factory and "Decoder" in factory.get_metadata("klass"):
+            decoders.add(f"{factory.get_name()} {factory.get_plugin().get_version()}")
+
+    pipeline.on_element(note)
+    return decoders
+
+
+def duration_of(pipeline):
+    """In seconds; 0 if not known."""
+    with contextlib.suppress(ec.PipelineError):
+        return pipeline.duration()
+    return 0.0
 
 
 def versions():

@@ -9,7 +9,10 @@ The folder beside the recipe, of its name, gets the events, a manifest of all ha
 statistics and a page of pictures. A second call makes only what is missing or has changed. "verify" makes
 the events again, keeps none, and compares their hashes with those of the manifest."""
 import argparse
+import concurrent.futures
+import contextlib
 import fcntl
+import glob
 import json
 import os
 import re
@@ -20,6 +23,7 @@ import sys
 import time
 
 try:
+    import dataset_segments
     import gst_eventcamera as ec
     from dataset_report import write_reports
     from dataset_video import extension_of, hash_of, making_of, path_in, record_of, state_of, write_record
@@ -73,17 +77,22 @@ def options():
                         " a name that Snakemake knows")
     parser.add_argument("--part", type=part_of_all, default=(1, 1), metavar="K/N",
                         help="make only the K-th of N parts, such as 3/100, for data sets of more than 10,000 videos")
+    parser.add_argument("--segment", type=int, default=300, metavar="SECONDS",
+                        help="a video of two or more segments of this length is simulated in a job for each; the"
+                        " events are the same (default: %(default)s, 0 = never)")
     parser.add_argument("--manifest", metavar="FILE",
                         help="the manifest that verify compares with (default: that of the folder)")
     parser.add_argument("--video", nargs=2, metavar=("NAME", "FILE"), help="make one video only, as the jobs do")
+    parser.add_argument("--joints", nargs="+", type=int, default=[], help=argparse.SUPPRESS)
+    parser.add_argument("--segment-number", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
                         help="print the version and exit")
     chosen = parser.parse_args()
     chosen.verify = chosen.words[0] == "verify" and len(chosen.words) > 1
     if len(chosen.words) != 1 + chosen.verify:
         parser.error(f"give one recipe, not {' '.join(chosen.words)}")
-    if chosen.cores < 1 or chosen.retries < 0:
-        parser.error("--cores is at least 1, and --retries at least 0")
+    if chosen.cores < 1 or chosen.retries < 0 or chosen.segment < 0:
+        parser.error("--cores is at least 1, --retries and --segment at least 0")
     chosen.recipe = chosen.words[-1]
     chosen.output = os.path.abspath(chosen.output or os.path.splitext(chosen.recipe)[0])
     return chosen
@@ -161,12 +170,32 @@ def profile_folder(profile):
     return own if os.path.isfile(os.path.join(own, "config.yaml")) and os.sep not in profile else profile
 
 
+def segments_root(chosen):
+    return "verified-segments" if chosen.verify else "segments"
+
+
+def segments_folder(chosen, name):
+    return dataset_segments.folder_of(chosen.output, segments_root(chosen), name)
+
+
+def job_of(chosen, video):
+    """What the workflow has to know of a video. Segments of another input or recipe are removed."""
+    joints = dataset_segments.joints_of(video, chosen.segment)
+    if joints and (hindrance := dataset_segments.hindrance(video)):
+        print(f"{video.name}: in one job, not in segments: {hindrance}", file=sys.stderr)
+        joints = []
+    dataset_segments.remove_others(video, segments_folder(chosen, video.name), joints)
+    return {"path": os.path.abspath(video.path), "joints": joints, "in-order": dataset_segments.has_state(video)}
+
+
 def make(chosen, videos, lock):
-    """Runs a job for each video. Those that fail leave no record."""
+    """Runs a job for each video, or for each of its segments and then one that joins them. Those that fail
+    leave no record."""
     output, command = chosen.output, [os.path.realpath(__file__)]
     jobs = os.path.join(output, ".jobs-{}-of-{}.json".format(*chosen.part))
-    with open(jobs, "w", encoding="utf-8") as file:
-        json.dump({video.name: os.path.abspath(video.path) for video in videos}, file)
+    with concurrent.futures.ThreadPoolExecutor(chosen.cores) as pool, open(jobs, "w", encoding="utf-8") as file:
+        found = pool.map(lambda video: job_of(chosen, video), videos)
+        json.dump({video.name: job for video, job in zip(videos, found)}, file)
     command += ["verify"] * chosen.verify + [os.path.abspath(chosen.recipe), "--output", output]
     where = ["--cores", str(chosen.cores)]
     if chosen.profile:
@@ -175,7 +204,8 @@ def make(chosen, videos, lock):
         ["snakemake", "--snakefile", os.path.join(HERE, "dataset.smk"), "--directory", output, *where,
          "--nolock", "--keep-going", "--rerun-incomplete", "--retries", str(chosen.retries), "--nocolor",
          "--rerun-triggers", "mtime", "--drop-metadata", "--scheduler", "greedy",
-         "--config", f"jobs={jobs}", f"records={records_folder(chosen)}", f"command={shlex.join(command)}"],
+         "--config", f"jobs={jobs}", f"records={records_folder(chosen)}",
+         f"segments={segments_root(chosen)}", f"command={shlex.join(command)}"],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=[lock.fileno()])
     progress = Progress(len(videos))
     try:
@@ -184,7 +214,7 @@ def make(chosen, videos, lock):
                 log.write(line)
                 log.flush()
                 if step := STEP.match(line):
-                    progress.tell(int(step[1]))
+                    progress.tell(int(step[1]) * len(videos) // (int(step[2]) - 1))
     finally:
         progress.end()
         snakemake.wait()  # it ends its jobs at Ctrl-C
@@ -195,14 +225,14 @@ def records_folder(chosen):
     return "verified" if chosen.verify else "records"
 
 
-def failure_of(output, name):
-    """The last line that a job wrote."""
-    try:
-        with open(os.path.join(output, "logs", f"{name}.log"), encoding="utf-8", errors="replace") as file:
-            lines = file.read().strip().splitlines()
-    except FileNotFoundError:
-        lines = []
-    return lines[-1] if lines else "its job did not start or was killed; see snakemake.log"
+def failure_of(chosen, name):
+    """The last line that the jobs of a video wrote."""
+    logs = glob.glob(glob.escape(segments_folder(chosen, name)) + "/*.log")
+    for path in [*sorted(logs), os.path.join(chosen.output, "logs", f"{name}.log")]:
+        with contextlib.suppress(FileNotFoundError), open(path, encoding="utf-8", errors="replace") as file:
+            if lines := file.read().strip().splitlines():
+                return lines[-1]
+    return "its job did not start or was killed; see snakemake.log"
 
 
 def tell(kind, lines):
@@ -223,8 +253,27 @@ def records_of(chosen, videos):
 def make_one(chosen, recipe):
     name, path = chosen.video
     video = ec.DatasetVideo(recipe, name, path)
-    record = record_of(video, chosen.output, keep=not chosen.verify)
-    write_record(path_in(chosen.output, records_folder(chosen), name, "json"), record)
+    folder, segments, notes = segments_folder(chosen, name), None, {}
+    if chosen.segment_number is not None:
+        dataset_segments.make_segment(video, folder, chosen.joints, chosen.segment_number)
+        return
+    if chosen.joints:
+        try:
+            segments = dataset_segments.Segments(video, folder, chosen.joints)
+        except dataset_segments.Doubt as doubt:
+            notes = {"whole": f"made as a whole, not in segments: {doubt}"}
+    record = record_of(video, chosen.output, keep=not chosen.verify, segments=segments)
+    write_record(path_in(chosen.output, records_folder(chosen), name, "json"), record | notes)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def remove_segments(chosen, videos):
+    """Of videos that are made, in case a job was killed before it did so."""
+    for video in videos:
+        folder = segments_folder(chosen, video.name)
+        shutil.rmtree(folder, ignore_errors=True)
+        with contextlib.suppress(OSError):  # other segments are there, or none have been
+            os.removedirs(os.path.dirname(folder))
 
 
 def selected(chosen, videos):
@@ -243,13 +292,16 @@ def make_all(chosen, recipe):
         stale = stale_videos(mine, records_of(chosen, mine), chosen.output)
         status = make(chosen, stale, lock) if stale else 0
         records = records_of(chosen, videos)
+        remove_segments(chosen, [video for video in mine if records[video.name]])
         write_reports(chosen.output, recipe, videos, records)
     refused = [f"{name}: {record['refused']}" for name, record in records.items() if record and "refused" in record]
     failed = [video.name for video in stale if not records[video.name]]
     tell("warning", [f"{name}: {warning}" for name, record in records.items() if record
                      for warning in record.get("warnings", ())])
+    tell("note", [f"{video.name}: {records[video.name]['whole']}" for video in stale
+                  if "whole" in (records[video.name] or {})])
     tell("refused", refused)
-    tell("failed", [f"{name}: {failure_of(chosen.output, name)}" for name in failed])
+    tell("failed", [f"{name}: {failure_of(chosen, name)}" for name in failed])
     made = sum(1 for video in stale if records[video.name] and "written" in records[video.name])
     absent = sum(1 for record in records.values() if not record) - len(failed)
     print(f"{len(videos)} videos: {made} made, {len(mine) - len(stale)} unchanged, {len(refused)} refused,"
@@ -270,16 +322,18 @@ def verify_all(chosen, recipe):
     present = [video for video in videos if video.name in expected]
     os.makedirs(chosen.output, exist_ok=True)
     with locked(chosen.output, chosen.part) as lock:
-        shutil.rmtree(os.path.join(chosen.output, "verified"), ignore_errors=True)
+        for folder in records_folder(chosen), segments_root(chosen):
+            shutil.rmtree(os.path.join(chosen.output, folder), ignore_errors=True)
         if present:
             make(chosen, present, lock)
         records = records_of(chosen, present)
+        remove_segments(chosen, [video for video in present if records[video.name]])
     differences = [f"{name}: not among the videos" for name in expected
                    if chosen.part == (1, 1) and name not in records]
     differences += [f"{video.name}: not in the manifest" for video in videos
                     if video.name not in expected and video.name not in manifest.get("refused", {})]
     for name, record in records.items():
-        difference = difference_of(expected[name], record) if record else failure_of(chosen.output, name)
+        difference = difference_of(expected[name], record) if record else failure_of(chosen, name)
         if difference:
             differences.append(f"{name}: {difference}")
     tell("different", differences)

@@ -8,6 +8,7 @@ import functools
 import os
 import re
 import tempfile
+from types import MappingProxyType
 from typing import Iterator, Mapping, Optional, Sequence, overload
 
 import numpy as np
@@ -60,14 +61,18 @@ class DatasetVideo:
             yield from map(events_of, pipeline.samples())
 
     @contextlib.contextmanager
-    def playing(self, rest: str, threads: int = 0) -> Iterator[Pipeline]:
+    def playing(self, rest: str, threads: int = 0, more: Mapping[str, Value] = MappingProxyType({}),
+                filters: bool = True) -> Iterator[Pipeline]:
         """A pipeline in which the elements `rest` take the events. Its element `decoded` gets the frames.
 
-        threads: of the simulator, 0 = one per processor; the events do not depend on it."""
+        threads: of the simulator, 0 = one per processor; the events do not depend on it.
+        more: further properties of the simulator.
+        filters: whether the events pass the filters of the recipe."""
         recipe = self.recipe
-        line = self.line
+        parameters = {**self.parameters, **more}
         if threads > 0 and "n-threads" in property_limits(recipe.simulator):
-            line = recipe.line({**self.parameters, "n-threads": threads})
+            parameters["n-threads"] = threads
+        line = recipe.line(parameters, filters)
         with contextlib.ExitStack() as stack:
             if recipe.window:
                 source = "appsrc name=window format=time"

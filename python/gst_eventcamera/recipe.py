@@ -170,10 +170,11 @@ class Recipe:
                 return value
         raise RecipeError(f"parameters: {parameter} is hardly ever within {low:g} to {high:g}")
 
-    def line(self, parameters: Mapping[str, Value]) -> str:
-        """The elements from frames to events, as gst-launch-1.0 takes them."""
+    def line(self, parameters: Mapping[str, Value], filters: bool = True) -> str:
+        """The elements from frames to events, or to those before the filters, as gst-launch-1.0 takes them."""
         values = [f"{name}={_written(value)}" for name, value in parameters.items()]
-        return " ! ".join(filter(None, [self.frames, " ".join([self.simulator, *values]), self.filters]))
+        elements = [self.frames, " ".join([self.simulator, *values]), self.filters if filters else ""]
+        return " ! ".join(filter(None, elements))
 
     def part_of(self, name: str) -> str:
         """The part of the data set that a video belongs to, such as "train"; empty without split."""

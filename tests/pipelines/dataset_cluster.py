@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """event-dataset --profile slurm: a controller and two nodes of Slurm on this machine make the same files as one
-process, also if the daemon of a node is killed on the way."""
+process, also of videos in segments, and if the daemon of a node is killed on the way."""
 
 import getpass
 import itertools
@@ -60,13 +60,14 @@ PartitionName=all Nodes=ALL Default=YES
 
 
 def cut_clips(folder):
-    """Of a dozen frames each."""
+    """Of a dozen frames each, and a longer one of each video."""
     for video in VIDEOS:
         with Pipeline(f"filesrc location={quoted(video)} ! decodebin ! videoconvert ! videoscale ! {FRAMES}"
                       " ! appsink name=out sync=false max-buffers=4") as decoder:
             buffers = (sample.get_buffer().copy_deep() for sample in decoder.samples())
             for number in range(CLIPS // len(VIDEOS)):
                 write_clip(f"{folder}/{os.path.basename(video)[:4]}-{number:02}.mkv", itertools.islice(buffers, 12))
+            write_clip(f"{folder}/{os.path.basename(video)[:4]}-long.mkv", itertools.islice(buffers, 60))
 
 
 def write_clip(path, buffers):
@@ -153,7 +154,8 @@ def main(folder):
 
     slurm = Slurm(f"{folder}/slurm")
     try:
-        program = subprocess.Popen([PROGRAM, recipe, "--output", f"{folder}/cluster", "--profile", "slurm"])
+        program = subprocess.Popen([PROGRAM, recipe, "--output", f"{folder}/cluster", "--profile", "slurm",
+                                    "--segment", "1"])
         while slurm.states()["node2"] not in ("allocated", "mixed"):
             assert program.poll() is None, "no job ran on node2"
             time.sleep(0.1)
@@ -164,9 +166,11 @@ def main(folder):
     finally:
         slurm.stop()
     local = hashes(f"{folder}/local")
-    assert len(local) == CLIPS
+    assert len(local) == CLIPS + len(VIDEOS)
     assert hashes(f"{folder}/cluster") == local
-    print(f"the {CLIPS} files are the same")
+    with open(f"{folder}/cluster/snakemake.log", encoding="utf-8") as log:
+        assert log.read().count("rule segment:") >= 2 * len(VIDEOS)
+    print(f"the {len(local)} files are the same")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ sys.path.insert(0, os.path.join(os.environ["BUILD"], "pipelines"))
 
 import gst_eventcamera as ec
 import numpy as np
+import dataset_segments
 from dataset_video import hash_of, record_of
 from gst_eventcamera.recipe import OUTPUTS, Distribution, uniform_number
 
@@ -253,6 +254,99 @@ class Outputs(unittest.TestCase):
         self.assertEqual([record["figures"][key] for key in ("width", "height", "frames")], [30, 20, 37])
         there = np.concatenate(list(window))
         self.assertGreater(len(there), 100)
+
+
+class Segments(unittest.TestCase):
+    """Videos of four seconds, in segments of one."""
+
+    JOINTS = [1, 2, 3]
+
+    def make_video(self, folder, framerate=25):
+        path = path_of(f"{folder}/videos/coded.mp4")
+        launch(f"videotestsrc pattern=ball motion=sweep num-buffers={4 * framerate + 8}"
+               f" ! video/x-raw,format=I420,width=64,height=48,framerate={framerate}/1"
+               f" ! x264enc key-int-max=40 ! mp4mux ! filesink {shlex.quote('location=' + path)}")
+        return path
+
+    def segmented(self, video):
+        """The folder of the segments of a video, all of which are made."""
+        folder = dataset_segments.folder_of(path_of("segments/made"), "segments", video.name)
+        shutil.rmtree(folder, ignore_errors=True)
+        for number in range(len(self.JOINTS) + 1):
+            dataset_segments.make_segment(video, folder, self.JOINTS, number)
+        return folder
+
+    def video(self, text, framerate=25):
+        self.make_video("segments", framerate)
+        return ec.Dataset(recipe_of("segments", f"videos: videos/*\n{text}"))[0]
+
+    def test_are_those_of_the_whole(self):
+        for simulator, output in {
+            "eventsim-dvs preset=davis346 label=true\nfilters: eventdenoise": "h5",
+            "eventsim-dvs preset=gen4 upsampling=motion exposure-compensation=true pixel-latency=50000000": "aedat4",
+            "eventsim-frame\nframes: videoscale ! video/x-raw,width=40\nfilters: eventhotpixel": "raw",
+            "eventsim-dense": "npz",
+            "eventsim-sparse": "mcap",
+            "eventsim-diff": "tensors\ntensors: bins=3 frame-count=7",
+        }.items():
+            with self.subTest(simulator):
+                video = self.video(f"simulator: {simulator}\noutput: {output}")
+                self.assertEqual(dataset_segments.joints_of(video, 1), self.JOINTS)
+                self.assertEqual(dataset_segments.hindrance(video), "")
+                segments = dataset_segments.Segments(video, self.segmented(video), self.JOINTS)
+                joined = record_of(video, path_of("segments/made"), segments=segments)
+                self.assertEqual(joined, record_of(video, path_of("segments/whole")))
+                self.assertGreater(joined["figures"]["events"], 1000)
+
+    def test_are_made_in_jobs_that_go_on_after_a_kill(self):
+        self.make_video("jobs")
+        recipe = recipe_of("jobs", RECIPE.replace("**/*.mkv", "*"))
+        second = path_of("jobs/recipe/segments/coded.d/1.json")
+        program = subprocess.Popen([PROGRAM, recipe, "--segment", "1"], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL, start_new_session=True)
+        while not os.path.exists(second):
+            self.assertIsNone(program.poll())
+            time.sleep(0.02)
+        os.killpg(program.pid, signal.SIGKILL)
+        program.wait()
+        self.assertIn("1 made", event_dataset(recipe, "--segment", "1"))
+        with open(path_of("jobs/recipe/snakemake.log"), encoding="utf-8") as file:
+            self.assertRegex(file.read(), r"segment +[1-3] ")
+        self.assertFalse(os.path.exists(path_of("jobs/recipe/segments")))
+        segmented = load("jobs", "manifest.json")
+        self.assertIn("1 videos of the manifest compared, 0 differences",
+                      event_dataset("verify", recipe, "--segment", "1"))
+        shutil.rmtree(path_of("jobs/recipe"))
+        event_dataset(recipe)
+        self.assertEqual(load("jobs", "manifest.json"), segmented)
+
+    def test_that_do_not_join_are_made_as_a_whole(self):
+        video = self.video("simulator: eventsim-diff\noutput: npz")
+        folder = self.segmented(video)
+        with open(f"{folder}/2.json", encoding="utf-8") as file:
+            record = json.load(file)
+        record["before"][-1][1] = "0"
+        with open(f"{folder}/2.json", "w", encoding="utf-8") as file:
+            json.dump(record, file)
+        event_dataset(video.recipe.path, "--output", path_of("segments/made"), "--video", video.name, video.path,
+                      "--joints", *map(str, self.JOINTS))
+        with open(path_of("segments/made/records/coded.json"), encoding="utf-8") as file:
+            made = json.load(file)
+        self.assertEqual(made.pop("whole"), "made as a whole, not in segments: a seek leads to other frames")
+        self.assertEqual(made, record_of(video, path_of("segments/whole")))
+
+    def test_are_not_made_where_they_could_differ(self):
+        for text, reason in {
+            "simulator: eventsim-dvs\nframes: videorate": "videorate, in frames, may remember frames",
+            "simulator: eventsim-dvs final-state=/x": "it sets a state of its own",
+            "simulator: identity": "identity cannot continue a segment",
+        }.items():
+            self.assertEqual(dataset_segments.hindrance(self.video(text)), reason)
+        video = self.video("simulator: eventsim-dvs", framerate=3)
+        with self.assertRaisesRegex(dataset_segments.Doubt, "a second of it has fewer than 4 frames"):
+            dataset_segments.Segments(video, self.segmented(video), self.JOINTS)
+        self.assertEqual(dataset_segments.joints_of(video, 300), [])
+        self.assertEqual(dataset_segments.joints_of(video, 0), [])
 
 
 class Recipes(unittest.TestCase):
