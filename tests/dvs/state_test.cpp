@@ -36,7 +36,7 @@ Image<Pixel> frame_of(const LumaFormat& format, int i) {
 }
 
 Nanoseconds time_of(int i) {
-  return 5'000'000'123 + i * 33'333'333LL + i % 3 * 1'234'567;
+  return 5'000'000'123 + i * 33'333'333LL + i % 3 * 1'234'567LL;
 }
 
 template <class Pixel>
