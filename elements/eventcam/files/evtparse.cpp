@@ -86,7 +86,7 @@ constexpr int format_of_caps = -1;
 constexpr Microseconds latest = Microseconds{1} << 52;
 
 /// A camera that was silent for longer may have started over.
-constexpr GstClockTime longest_gap = 24 * 3600 * GST_SECOND;
+constexpr GstClockTime longest_gap = GST_SECOND * 3600 * 24;
 
 const GEnumValue word_formats[] = {
     {format_of_caps, "That of the caps", "auto"},
