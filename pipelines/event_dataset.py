@@ -164,10 +164,13 @@ def locked(output, part):
     return lock
 
 
-def profile_folder(profile):
-    """Our own profiles by their names; Snakemake finds others."""
+def profile_options(profile):
+    """Our own profiles by their names; Snakemake finds others. It gives a shell the path of a profile's
+    program without quotes."""
     own = os.path.join(HERE, profile)
-    return own if os.path.isfile(os.path.join(own, "config.yaml")) and os.sep not in profile else profile
+    if os.sep in profile or not os.path.isfile(os.path.join(own, "config.yaml")):
+        return ["--profile", profile]
+    return ["--profile", own, "--cluster-status", shlex.quote(os.path.join(own, "status"))]
 
 
 def segments_root(chosen):
@@ -197,9 +200,7 @@ def make(chosen, videos, lock):
         found = pool.map(lambda video: job_of(chosen, video), videos)
         json.dump({video.name: job for video, job in zip(videos, found)}, file)
     command += ["verify"] * chosen.verify + [os.path.abspath(chosen.recipe), "--output", output]
-    where = ["--cores", str(chosen.cores)]
-    if chosen.profile:
-        where = ["--profile", profile_folder(chosen.profile)]
+    where = profile_options(chosen.profile) if chosen.profile else ["--cores", str(chosen.cores)]
     snakemake = subprocess.Popen(
         ["snakemake", "--snakefile", os.path.join(HERE, "dataset.smk"), "--directory", output, *where,
          "--nolock", "--keep-going", "--rerun-incomplete", "--retries", str(chosen.retries), "--nocolor",

@@ -144,7 +144,7 @@ def hashes(folder):
         return {one["name"]: one["written"]["sha256"] for one in json.load(file)["videos"]}
 
 
-def main(folder):
+def main(folder, slurm_folder):
     os.mkdir(f"{folder}/clips")
     cut_clips(f"{folder}/clips")
     recipe = f"{folder}/recipe.yaml"
@@ -152,7 +152,7 @@ def main(folder):
         file.write(RECIPE)
     subprocess.run([PROGRAM, recipe, "--output", f"{folder}/local"], check=True)
 
-    slurm = Slurm(f"{folder}/slurm")
+    slurm = Slurm(slurm_folder)
     try:
         program = subprocess.Popen([PROGRAM, recipe, "--output", f"{folder}/cluster", "--profile", "slurm",
                                     "--segment", "1"])
@@ -177,5 +177,6 @@ if __name__ == "__main__":
     if not all(map(os.path.exists, VIDEOS)) or not shutil.which("sbatch"):
         print("no videos in ../shared/data, or no Slurm")
         sys.exit(77)
-    with tempfile.TemporaryDirectory() as scratch:
-        main(scratch)
+    # The paths of Slurm's own files cannot have blanks.
+    with tempfile.TemporaryDirectory() as scratch, tempfile.TemporaryDirectory(dir="/tmp") as slurm_scratch:
+        main(scratch, slurm_scratch)

@@ -240,7 +240,7 @@ class Outputs(unittest.TestCase):
     def test_of_pictures_and_moving_windows(self):
         folder = path_of("pictures/films/first/")
         launch("videotestsrc pattern=ball num-buffers=11 ! video/x-raw,width=66,height=50 ! jpegenc"
-               f" ! multifilesink location={folder}%d.jpg")  # 2.jpg comes before 10.jpg
+               f" ! multifilesink {shlex.quote(f'location={folder}%d.jpg')}")  # 2.jpg comes before 10.jpg
         text = "simulator: eventsim-dvs\noutput: npz\nframerate: 30000/1001\n"
         film = ec.Dataset(recipe_of("pictures", text + "videos: films/*"))[0]
         chunks = list(film)
