@@ -45,13 +45,17 @@ class TopicDecoder {
  protected:
   explicit TopicDecoder(Corruption& corruption) : corruption_(corruption) {}
 
-  /// Takes the size of the first message that has a valid one.
+  /// Takes the size of the first message, if it is valid; that of a later one might not hold the
+  /// events before it.
   void take_size(std::uint32_t width, std::uint32_t height);
 
   Corruption& corruption_;
   Decoded decoded_;
   std::optional<Frame> frame_;
   SensorSize size_;
+
+ private:
+  bool size_taken_ = false;
 };
 
 /// Content of the messages of a type; `other` if it is not decoded.
