@@ -62,6 +62,7 @@
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
+#include "src/formats/chunker.hpp"
 #include "src/formats/evt/word_scanner.hpp"
 #include "src/wire/arrival_clock.hpp"
 #include "src/wire/event_camera.hpp"
@@ -70,6 +71,7 @@ GST_DEBUG_CATEGORY_STATIC(evt_parse_debug);
 #define GST_CAT_DEFAULT evt_parse_debug
 
 using eventcamera::ArrivalClock;
+using eventcamera::Chunker;
 using eventcamera::EvtFormat;
 using eventcamera::Framing;
 using eventcamera::Microseconds;
@@ -81,9 +83,6 @@ constexpr int max_side = 2048;
 
 /// Value of `format`: that of the caps.
 constexpr int format_of_caps = -1;
-
-/// Later times are errors; up to it, nanoseconds can be added and subtracted.
-constexpr Microseconds latest = Microseconds{1} << 52;
 
 /// A camera that was silent for longer may have started over.
 constexpr GstClockTime longest_gap = GST_SECOND * 3600 * 24;
@@ -300,7 +299,7 @@ static GstClockTime arrival_of(const Private& priv, GstBuffer* buffer) {
   const auto arrival = priv.upstream.format == GST_FORMAT_TIME
                            ? gst_segment_to_running_time(&priv.upstream, GST_FORMAT_TIME, pts)
                            : pts;
-  return arrival <= nanoseconds(latest) ? arrival : GST_CLOCK_TIME_NONE;
+  return arrival <= nanoseconds(Chunker::max_time) ? arrival : GST_CLOCK_TIME_NONE;
 }
 
 /// Number of buffers that the driver dropped before this one.
@@ -388,7 +387,7 @@ static GstFlowReturn take_transfer(GstEvtParse* self, GstBuffer* buffer,
       arrival >= last_arrival && arrival - last_arrival <= longest_gap)
     transfer.elapsed = static_cast<Microseconds>((arrival - last_arrival) / GST_USECOND);
   state.scanner->scan(transfer, state.pieces);
-  if (!state.pieces.empty() && state.pieces.back().end > latest) {
+  if (!state.pieces.empty() && state.pieces.back().end > Chunker::max_time) {
     GST_ELEMENT_ERROR(self, STREAM, DECODE, ("The clock of the camera has jumped too far."),
                       ("it is at %" G_GINT64_FORMAT " us", state.pieces.back().end));
     return GST_FLOW_ERROR;

@@ -54,12 +54,6 @@ static const EventFileFormat::Variants evt_variants = {
     .default_value = static_cast<int>(EvtFormat::evt3),
 };
 
-static const char* evt_name(int format) {
-  for (const auto* value = evt_formats; value->value_nick != nullptr; ++value)
-    if (value->value == format) return value->value_nick;
-  return nullptr;
-}
-
 static std::unique_ptr<eventcamera::Encoder> make_evt(SensorSize size,
                                                       EventFileFormat::Choice choice,
                                                       const GstCaps* caps) {
@@ -74,7 +68,8 @@ static GstCaps* fixate_evt(const GstEventCameraInfo& info, int variant, GstCaps*
   caps = gst_caps_make_writable(caps);
   GstStructure* structure = gst_caps_get_structure(caps, 0);
   if (gst_structure_has_name(structure, GST_EVENT_CAMERA_MEDIA_TYPE)) {
-    gst_structure_fixate_field_string(structure, "format", evt_name(variant));
+    gst_structure_fixate_field_string(structure, "format",
+                                      evt_format_name(static_cast<EvtFormat>(variant)));
     gst_structure_fixate_field_nearest_int(structure, "width", info.width);
     gst_structure_fixate_field_nearest_int(structure, "height", info.height);
     if (gst_structure_has_field(structure, "framerate"))

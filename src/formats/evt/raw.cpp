@@ -16,7 +16,7 @@ namespace {
 struct Name {
   EvtFormat format;
   std::string_view version;
-  std::string_view name;
+  const char* name;
   std::string_view options;
 };
 
@@ -94,12 +94,21 @@ std::string header_text(EvtFormat format, SensorSize size) {
   const auto& written = *std::ranges::find(names, format, &Name::format);
   // OpenEB selects its plugin by the integrators; other readers only look at "evt" or "geometry".
   return "% camera_integrator_name Prophesee\n% evt " + std::string(written.version) +
-         "\n% format " + std::string(written.name) + std::string(written.options) +
-         ";height=" + height + ";width=" + width + "\n% geometry " + width + "x" + height +
+         "\n% format " + written.name + std::string(written.options) + ";height=" + height +
+         ";width=" + width + "\n% geometry " + width + "x" + height +
          "\n% plugin_integrator_name Prophesee\n% end\n";
 }
 
 }  // namespace
+
+const char* evt_format_name(EvtFormat format) {
+  return std::ranges::find(names, format, &Name::format)->name;
+}
+
+std::optional<EvtFormat> evt_format_named(std::string_view name) {
+  const auto* const known = std::ranges::find(names, name, &Name::name);
+  return known != std::end(names) ? std::optional(known->format) : std::nullopt;
+}
 
 std::unique_ptr<Decoder> make_prophesee_raw_decoder() {
   return std::make_unique<RawDecoder>();

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string_view>
 
 #include "src/core/sensor_size.hpp"
 #include "src/formats/decoder.hpp"
@@ -11,6 +13,12 @@ namespace eventcamera {
 
 /// Formats of the words in a RAW file.
 enum class EvtFormat { evt2, evt21, evt21_legacy, evt3, evt4 };
+
+/// Name of a format, such as "EVT3". It does not tell the order of the halves of EVT21 words.
+const char* evt_format_name(EvtFormat format);
+
+/// Format with this name; EVT21 has little-endian words.
+std::optional<EvtFormat> evt_format_named(std::string_view name);
 
 /// Decodes Prophesee RAW files ("RAW file format"): a text header, and words of the format that it
 /// names.
