@@ -71,6 +71,17 @@ def event_dataset(*words, status=0):
     return done.stdout
 
 
+def kill_once_there_is(file, *words):
+    """Kills the program, and its jobs, when it has made this file."""
+    program = subprocess.Popen([PROGRAM, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                               start_new_session=True)
+    while not os.path.exists(file):
+        assert program.poll() is None, f"{words} ended with status {program.returncode}"
+        time.sleep(0.02)
+    os.killpg(program.pid, signal.SIGKILL)
+    program.wait()
+
+
 def load(folder, name):
     with open(path_of(f"{folder}/recipe/{name}"), encoding="utf-8") as file:
         return json.load(file)
@@ -173,13 +184,7 @@ class DataSets(unittest.TestCase):
             make_video(f"killed/videos/{number}.mkv")
         recipe = recipe_of("killed")
         first = path_of("killed/recipe/records/0.json")
-        program = subprocess.Popen([PROGRAM, recipe, "--cores", "1"], stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.DEVNULL, start_new_session=True)
-        while not os.path.exists(first):
-            self.assertIsNone(program.poll())
-            time.sleep(0.02)
-        os.killpg(program.pid, signal.SIGKILL)
-        program.wait()
+        kill_once_there_is(first, recipe, "--cores", "1")
         before = os.stat(first).st_mtime_ns
         missing = sum(not os.path.exists(path_of(f"killed/recipe/records/{number}.json")) for number in range(4))
         self.assertGreater(missing, 0)
@@ -302,13 +307,7 @@ class Segments(unittest.TestCase):
         self.make_video("jobs")
         recipe = recipe_of("jobs", RECIPE.replace("**/*.mkv", "*"))
         second = path_of("jobs/recipe/segments/coded.d/1.json")
-        program = subprocess.Popen([PROGRAM, recipe, "--segment", "1"], stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.DEVNULL, start_new_session=True)
-        while not os.path.exists(second):
-            self.assertIsNone(program.poll())
-            time.sleep(0.02)
-        os.killpg(program.pid, signal.SIGKILL)
-        program.wait()
+        kill_once_there_is(second, recipe, "--segment", "1")
         self.assertIn("1 made", event_dataset(recipe, "--segment", "1"))
         with open(path_of("jobs/recipe/snakemake.log"), encoding="utf-8") as file:
             self.assertRegex(file.read(), r"segment +[1-3] ")
