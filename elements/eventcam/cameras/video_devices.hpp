@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "src/wire/event_camera.hpp"
+#include "src/camera/event_camera.hpp"
 
 struct FoundDevice {
   std::string path;

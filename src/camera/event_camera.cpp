@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-#include "src/wire/event_camera.hpp"
+#include "src/camera/event_camera.hpp"
 
 #include <algorithm>
 #include <iterator>

@@ -62,10 +62,10 @@
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
+#include "src/camera/arrival_clock.hpp"
+#include "src/camera/event_camera.hpp"
 #include "src/formats/chunker.hpp"
 #include "src/formats/evt/word_scanner.hpp"
-#include "src/wire/arrival_clock.hpp"
-#include "src/wire/event_camera.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(evt_parse_debug);
 #define GST_CAT_DEFAULT evt_parse_debug
