@@ -287,7 +287,7 @@ TEST(ExposureCompensation, EqualsTheReferenceOnEveryTarget) {
         for (int x = 0; x < columns; ++x) {
           const double luma = frames.back().at(x, y) / 4095.0;
           if (i == 0)
-            pixels.emplace_back(settings, luma, 0);
+            pixels.emplace_back(settings, pixels.size(), luma);
           else
             for (const auto& event : (pixel++)->push(luma, 2000, gain))
               expected[{x, y}].push_back(event);

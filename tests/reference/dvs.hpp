@@ -12,6 +12,7 @@
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
 #include "src/dvs/dvs_settings.hpp"
+#include "src/dvs/pixel_array.hpp"
 #include "src/flow/dense_flow.hpp"
 
 /// Reference equations of the physical pixel, implemented literally, in double precision and in
@@ -189,72 +190,108 @@ class Esim {
   Image<int> levels_;
 };
 
-/// One pixel without noise and mismatch, evaluated every microsecond.
+/// One pixel, with the simulator's random numbers, evaluated every microsecond.
 ///   light      I = luma / G, or ((luma + 0.055)/1.055)^2.4 / G, G the gain of the exposure
-///   saturated  a luma of 235/255 or more with G != 1 keeps the L of the frame before if that is
-///   more response   log: ln(eps + I); lin-log: x ln(20)/20 or ln(x), x = 255 I; linear: ln(255) I
+///   saturated  a luma of 235/255 or more with G != 1 keeps the L of the frame before if larger
+///   response   log: ln(eps + I); lin-log: x ln(20)/20 or ln(x), x = 255 I; linear: ln(255) I
 ///   input      L(t), a straight line from frame to frame
-///   low pass   dV/dt = 2 pi f (I + d)/(1 + d) (L(t) - V), I of the later frame in 8 bits, I at
-///   most 1 leak       dR/dt = -rate C+ events     ON where V - R >= (1 + G) C+, OFF where R - V >=
-///   (1 + G) C- adaptation G grows by a with each event; dG/dt = -a / T down to 0 afterwards R = R
-///   +- (1 + G) C, G before the event (level), or R = V when the refractory period ends (signal)
-///   cause      what moves V - R fastest towards the threshold as it is crossed: light dV/dt, the
-///   leak -dR/dt, or the fall of the threshold, which has the cause of the last event; light if
-///   none
+///   brightness b = (I + d)/(1 + d), I of the later frame in 8 bits, at most 1
+///   low pass   dV/dt = 2 pi f b (L(t) - V)
+///   leak       dR/dt = -rate C+, and of a hot pixel more
+///   pulse      all V rise within 100 us, by P, and fall within 100 us, 800 us later;
+///              it begins `exposure_lead` before each frame, but at least 100 us
+///   noise      N = rate (1 - 3/4 b) per second; an event of either polarity where the integral
+///              of N reaches the next of numbers that are drawn with mean 1, exponentially
+///   events     ON where V - R >= (1 + G) C+, OFF where R - V >= (1 + G) C-
+///   adaptation G grows by a with each event; dG/dt = -a / T down to 0 afterwards
+///   reset      level: R = R +- (1 + G) C, G before the event, and after noise R = V;
+///              signal: R = V when the refractory period ends
+///   cause      what moves V - R fastest towards the threshold as it is crossed: light, dV/dt;
+///              the pulse, dP/dt; the leak, -dR/dt; or the fall of the threshold, which has the
+///              cause of the last event; light if none
+/// Draw k of interval i has the number 2^16 i + k, so noise needs intervals that are not divided.
 class DvsPixel {
  public:
-  DvsPixel(const DvsSettings& settings, double luma, double leaked)
-      : settings_(settings), input_(response(light(luma))), signal_(input_) {
-    reference_ = signal_ - leaked;
-  }
+  DvsPixel(const DvsSettings& settings, std::uint64_t number, double luma)
+      : settings_(settings),
+        number_(number),
+        random_(settings.seed),
+        traits_(Mismatch(settings, random_).of(number)),
+        leak_cause_(Mismatch(settings, random_).is_hot(number) ? Cause::hot_pixel : Cause::leak),
+        input_(response(light(luma))),
+        signal_(input_),
+        reference_(
+            input_ -
+            Mismatch(settings, random_).leaked(number, traits_, settings.shot_noise_rate / 1e6)),
+        noise_left_(random_.exponential(number, Random::Purpose::first_noise)) {}
 
   /// Events until the next frame, `microseconds` later.
   /// Its exposure is `gain` times that of the first frame.
   std::vector<TimedEvent> push(double luma, int microseconds, double gain = 1) {
     std::vector<TimedEvent> events;
+    std::uint64_t draw = interval_++ << 16;
     const double last = input_;
     double next = response(light(luma) / gain);
     if (gain != 1 && 255 * luma >= 235) next = std::max(next, last);
     const double dark = settings_.dark_light;
     const double shade = std::min(std::floor(luma * 65535 / 256), 255.0) / 255;
-    const double bandwidth = 2 * std::numbers::pi * settings_.cutoff_frequency / 1e6 *
-                             (std::min(light(shade) / gain, 1.0) + dark) / (1 + dark);
+    const double brightness = (std::min(light(shade) / gain, 1.0) + dark) / (1 + dark);
+    const double bandwidth = 2 * std::numbers::pi * settings_.cutoff_frequency / 1e6 * brightness;
+    const double noise = settings_.shot_noise_rate / 1e6 * (1 - 0.75 * brightness);
+    const double lead = std::max(in_microseconds(settings_.exposure_lead), 100.0);
+    if (now_ + microseconds - lead >= std::max(pulse_ + 1000, now_))
+      next_pulse_ = now_ + microseconds - lead;
     // Sampled every microsecond, the line is exact to the resolution of events.
     for (int i = 1; i <= microseconds; ++i, ++now_) {
       const double last_signal = signal_;
       input_ = last + (next - last) * i / microseconds;
       signal_ = settings_.cutoff_frequency > 0 ? input_ + (signal_ - input_) * std::exp(-bandwidth)
                                                : input_;
-      const double leak = settings_.leak_rate / 1e6 * settings_.positive_threshold;
-      reference_ -= leak;
+      if (now_ >= next_pulse_) pulse_ = next_pulse_;
+      const double rise = pulse_at(now_ + 1) - pulse_at(now_);
+      // A falling reference is equivalent to a rising signal.
+      reference_ -= traits_.leak + rise;
       const double last_growth = growth_;
       growth_ = std::max(
           0.0, growth_ - settings_.adaptation / in_microseconds(settings_.adaptation_time));
       const bool is_refractory = now_ + 1 < ready_;
+      noise_left_ -= noise;
+      const bool is_noise = noise_left_ <= 0;
+      if (is_noise) noise_left_ += random_.exponential(number_, Random::Purpose::event, draw++);
       if (settings_.refractory_reset == RefractoryReset::signal && is_refractory) {
         reference_ = signal_;
         continue;
       }
-      const double positive = (1 + growth_) * settings_.positive_threshold;
-      const double negative = (1 + growth_) * settings_.negative_threshold;
-      const bool is_on = signal_ - reference_ >= positive;
-      if (!is_on && reference_ - signal_ < negative) continue;
-      reference_ += is_on ? positive : -negative;
+      const auto fire = [&](bool is_on, Cause cause) {
+        last_cause_ = cause;
+        growth_ += settings_.adaptation;
+        if (!std::isinf(traits_.positive_threshold))
+          events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off, cause});
+        ready_ = now_ + 1 + in_microseconds(settings_.refractory_period);
+        if (settings_.refractory_reset == RefractoryReset::signal) reference_ = signal_;
+      };
+      if (is_noise && !is_refractory) {
+        reference_ = signal_;
+        fire(random_.coin(number_, Random::Purpose::event, draw++), Cause::shot_noise);
+        continue;
+      }
+      const bool is_on = signal_ - reference_ >= (1 + growth_) * traits_.positive_threshold;
+      const double threshold = is_on ? traits_.positive_threshold : traits_.negative_threshold;
+      if (!is_on && reference_ - signal_ < (1 + growth_) * threshold) continue;
+      reference_ += (is_on ? 1 : -1) * (1 + growth_) * threshold;
       if (is_refractory) continue;
-      const double by_light = std::max(0.0, is_on ? signal_ - last_signal : last_signal - signal_);
-      const double by_leak = is_on ? leak : 0;
-      const double by_fall = growth_ > 0
-                                 ? (last_growth - growth_) * (is_on ? settings_.positive_threshold
-                                                                    : settings_.negative_threshold)
-                                 : 0;
-      if (by_leak > by_light && by_leak >= by_fall)
-        last_cause_ = Cause::leak;
-      else if (by_light >= by_fall)
-        last_cause_ = Cause::light;
-      growth_ += settings_.adaptation;
-      events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off, last_cause_});
-      ready_ = now_ + 1 + in_microseconds(settings_.refractory_period);
-      if (settings_.refractory_reset == RefractoryReset::signal) reference_ = signal_;
+      const double sign = is_on ? 1 : -1;
+      const double by_light = sign * (signal_ - last_signal);
+      const double by_leak = sign * traits_.leak;
+      const double by_pulse = sign * rise;
+      const double by_fall = growth_ > 0 ? (last_growth - growth_) * threshold : 0;
+      const double fastest = std::max({0.0, by_light, by_leak, by_pulse, by_fall});
+      if (by_light >= fastest || fastest == 0)
+        fire(is_on, Cause::light);
+      else if (by_pulse >= fastest)
+        fire(is_on, Cause::exposure_pulse);
+      else
+        fire(is_on, by_fall >= fastest ? last_cause_ : leak_cause_);
     }
     input_ = next;
     return events;
@@ -273,14 +310,27 @@ class DvsPixel {
     return x <= 20 ? x * std::log(20) / 20 : std::log(x);
   }
 
+  double pulse_at(double time) const {
+    return settings_.exposure_pulse * (std::clamp((time - pulse_) / 100, 0.0, 1.0) -
+                                       std::clamp((time - pulse_ - 900) / 100, 0.0, 1.0));
+  }
+
   DvsSettings settings_;
+  std::uint64_t number_;
+  Random random_;
+  PixelTraits traits_;
+  Cause leak_cause_;
   double input_;
   double signal_;
-  double reference_ = 0;
+  double reference_;
+  double noise_left_;
+  std::uint64_t interval_ = 0;
   Cause last_cause_ = Cause::unknown;
   double now_ = 0;
   double ready_ = 0;
   double growth_ = 0;
+  double pulse_ = -1000;       ///< when the last pulse began
+  double next_pulse_ = -1000;  ///< when the next one begins
 };
 
 }  // namespace eventcamera::reference
