@@ -55,7 +55,8 @@ LabelledEvents ScaleFilter::filter(LabelledEvents events, Microseconds start, un
     if constexpr (counts) {
       const unsigned count = counts_[place] + 1U;
       is_due = count >= min_events;
-      counts_[place] = static_cast<std::uint16_t>(is_due ? 0 : count);
+      // Random pixels would mislead a branch.
+      counts_[place] = static_cast<std::uint16_t>(count & (static_cast<unsigned>(is_due) - 1U));
     }
     auto& last_kept = last_kept_[place];
     const bool is_kept = (static_cast<int>(is_due) & static_cast<int>(last_kept != moment)) != 0;
