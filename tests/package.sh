@@ -117,7 +117,8 @@ install=$(sed -n 's/^apt install /apt-get install -q -y --install-recommends /p'
 eval "${install:?}"
 source /tmp/pages/scratch_folder.sh
 source /tmp/pages/run_lines.sh
-ln -s /usr/share/doc/gir1.2-gsteventcamera-1.0/examples pipelines
+mkdir pipelines
+ln -s /usr/share/doc/{gir1.2-gsteventcamera-1.0,python3-gst-eventcamera}/examples/* pipelines/
 run_lines /tmp/pages/README.md /tmp/pages/applications.md /tmp/pages/network.md
 for file in ball.npz out.raw out.h5 events.npy; do
   [ -s $file ] || fail "$file is missing or empty"
