@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <utility>
+#include <cstdlib>
+
+#include "src/core/max_side.hpp"
 
 #ifndef EVENTCAMERA_BLENDED_LUMA
 #define EVENTCAMERA_BLENDED_LUMA
@@ -32,117 +34,147 @@ HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 namespace {
 
-/// Pixels that are sampled together.
+/// Pixels whose samples are near each other.
 constexpr int block = 8;
 
-/// Displacements of a block along one axis, in 1/65536 of a pixel per step, and their range.
-struct BlockMotion {
-  HWY_ALIGN Motion of[block];
-  Motion min;
-  Motion max;
+/// Blocks that a vector holds, and are sampled together.
+#if HWY_TARGET == HWY_SCALAR || HWY_HAVE_SCALABLE
+constexpr int max_blocks = 1;
+#else
+constexpr int max_blocks = std::min(4, HWY_MAX_BYTES / 16);
+#endif
+constexpr int max_pixels = max_blocks * block;
 
-  /// Range of positions after k steps, in whole pixels from the block's own.
-  int first_pixel(int k) const { return (k * (k < 0 ? max : min) + 512) >> 16; }
-  int last_pixel(int k) const { return (k * (k < 0 ? min : max) + 512) >> 16; }
+using Words4 = hn::CappedTag<std::int32_t, 4>;
+
+/// Positions of pixels along one axis and their displacements per step, in 1/65536 of a pixel.
+struct AxisMotion {
+  HWY_ALIGN std::int32_t start[max_pixels];  ///< and half of 1/64 pixel, for rounding
+  HWY_ALIGN Motion of[max_pixels];
+  HWY_ALIGN std::int32_t block_start[4] = {};
+  HWY_ALIGN Motion min[4] = {};  ///< by block
+  HWY_ALIGN Motion max[4] = {};
+
+  void find_ranges(int blocks) {
+    const Words4 words;
+    for (int i = 0; i < blocks; ++i) {
+      const Motion* here = of + i * block;
+      auto least = hn::Load(words, here);
+      auto most = least;
+      for (std::size_t k = hn::Lanes(words); k < block; k += hn::Lanes(words)) {
+        least = hn::Min(least, hn::Load(words, here + k));
+        most = hn::Max(most, hn::Load(words, here + k));
+      }
+      block_start[i] = start[i * block];
+      min[i] = hn::GetLane(hn::MinOfLanes(words, least));
+      max[i] = hn::GetLane(hn::MaxOfLanes(words, most));
+    }
+  }
+
+  /// Whether the pixels of each block stay less than a block apart for `steps` steps.
+  bool stay_alike(int blocks, int steps) const {
+    std::int64_t widest = 0;
+    for (int i = 0; i < blocks; ++i)
+      widest = std::max(widest, std::int64_t{max[i]} - std::int64_t{min[i]});
+    return widest * steps <= (block - 1) << 16;
+  }
+
+  /// Whether those of the first block are less than a block apart after k steps.
+  bool are_alike(int k) const {
+    const auto pixel = [&](Motion motion) { return (k * motion + 512) >> 16; };
+    return std::abs(pixel(max[0]) - pixel(min[0])) < block;
+  }
 };
 
-/// Motion of `count` pixels; the others move like the first.
+/// Motion of the pixels of some blocks.
 struct BlockMotions {
-  BlockMotion x;
-  BlockMotion y;
+  AxisMotion x;
+  AxisMotion y;
 
-  BlockMotions(const Flow* flow, int count, int steps) {
-    for (int i = 0; i < block; ++i) {
-      const Flow& here = flow[i < count ? i : 0];
-      x.of[i] = motion_per_step(here.x, steps);
-      y.of[i] = motion_per_step(here.y, steps);
+  /// Of `count` pixels from (left, top) on; the others move like the first.
+  BlockMotions(const Flow* flow, int left, int top, int count, int blocks, int steps) {
+    const hn::CappedTag<float, block> floats;
+    const hn::RebindToSigned<decltype(floats)> words;
+    HWY_ALIGN Flow flows[max_pixels];
+    std::copy_n(flow, count, flows);
+    std::fill(flows + count, flows + blocks * block, flow[0]);
+    const auto longest = hn::Set(floats, static_cast<float>(max_side));
+    const auto scale = hn::Set(floats, 65536.0F / static_cast<float>(steps));
+    const auto per_step = [&](hn::Vec<decltype(floats)> motion) {  // motion_per_step()
+      const auto clamped = hn::Max(hn::Min(motion, longest), hn::Neg(longest));
+      return hn::NearestInt(hn::IfThenElseZero(hn::Eq(motion, motion), hn::Mul(clamped, scale)));
+    };
+    const auto first_x = hn::Set(words, (left << 16) + 512);
+    const auto first_y = hn::Set(words, (top << 16) + 512);
+    for (int i = 0; i < blocks * block; i += static_cast<int>(hn::Lanes(floats))) {
+      hn::Vec<decltype(floats)> dx;
+      hn::Vec<decltype(floats)> dy;
+      hn::LoadInterleaved2(floats, &flows[i].x, dx, dy);
+      hn::Store(per_step(dx), words, x.of + i);
+      hn::Store(per_step(dy), words, y.of + i);
+      hn::Store(hn::Add(first_x, hn::ShiftLeft<16>(hn::Iota(words, i))), words, x.start + i);
+      hn::Store(first_y, words, y.start + i);
     }
-    x.min = *std::min_element(x.of, x.of + block);
-    x.max = *std::max_element(x.of, x.of + block);
-    y.min = *std::min_element(y.of, y.of + block);
-    y.max = *std::max_element(y.of, y.of + block);
+    x.find_ranges(blocks);
+    y.find_ranges(blocks);
   }
 
-  /// Whether Sampler can sample after k steps.
-  bool are_alike(int k) const {
-    return x.last_pixel(k) - x.first_pixel(k) < block && y.last_pixel(k) - y.first_pixel(k) < block;
+  bool stay_alike(int blocks, int steps) const {
+    return x.stay_alike(blocks, steps) && y.stay_alike(blocks, steps);
   }
+  bool are_alike(int k) const { return x.are_alike(k) && y.are_alike(k); }
 };
 
 /// Blends a block of pixels one by one.
-void blend_apart(const Warp<std::uint8_t>& warp, int left, int y, const BlockMotions& motions,
-                 int j, std::uint16_t* out) {
-  const auto place = [&](int i, int k) {
-    return std::pair(((left + i) << 16) + k * motions.x.of[i], (y << 16) + k * motions.y.of[i]);
+void blend_apart(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
+                 std::uint16_t* out) {
+  const auto sample_of = [&](const ImageView<std::uint8_t>& picture, int i, int k) {
+    return sample(picture, motions.x.start[i] - 512 + k * motions.x.of[i],
+                  motions.y.start[i] - 512 + k * motions.y.of[i]);
   };
-  for (int i = 0; i < block; ++i) {
-    const auto [x, last_y] = place(i, -j);
-    const auto [next_x, next_y] = place(i, warp.steps - j);
-    out[i] = blended_luma(sample(warp.last, x, last_y), sample(warp.now, next_x, next_y),
+  for (int i = 0; i < block; ++i)
+    out[i] = blended_luma(sample_of(warp.last, i, -j), sample_of(warp.now, i, warp.steps - j),
                           blend_weight(j, warp.steps));
-  }
 }
 
 #if HWY_TARGET == HWY_SCALAR
 
-void blend_block(const Warp<std::uint8_t>& warp, int left, int y, const BlockMotions& motions,
-                 int j, std::uint16_t* out) {
-  blend_apart(warp, left, y, motions, j, out);
+template <int blocks>
+void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
+                  std::uint16_t* out) {
+  blend_apart(warp, motions, j, out);
 }
 
 #else
 
-using Bytes = hn::FixedTag<std::uint8_t, std::size_t{2} * block>;
-using Shorts = hn::FixedTag<std::int16_t, block>;
-using Shades = hn::FixedTag<std::uint16_t, block>;
-using Words = hn::FixedTag<std::int32_t, block / 2>;
-using HalfShorts = hn::Half<Shorts>;
-
-/// A value of each pixel of a block.
-struct BlockWords {
-  hn::Vec<Words> low;
-  hn::Vec<Words> high;
-};
-
-/// Positions after k steps along one axis, in 1/64 of a pixel from motion.first_pixel(k), which is
-/// at most `block` pixels away.
-HWY_INLINE hn::Vec<Shorts> positions(const BlockMotion& motion, int k) {
-  const auto steps = hn::Set(Words(), k);
-  const auto half = hn::Set(Words(), 512);
-  const auto origin = hn::Set(Words(), motion.first_pixel(k) * 64);
-  const auto position = [&](const Motion* of) {
-    const auto moved = hn::Mul(hn::Load(Words(), of), steps);
-    return hn::DemoteTo(HalfShorts(), hn::Sub(hn::ShiftRight<10>(hn::Add(moved, half)), origin));
-  };
-  return hn::Combine(Shorts(), position(motion.of + block / 2), position(motion.of));
-}
-
-/// Bilinear samples, the same as those of sample() in warp.hpp, of blocks whose pixels move alike:
-/// all of them are in the same few 16 bytes of a few rows.
+/// Bilinear samples, the same as those of sample() in warp.hpp, of blocks whose pixels are alike:
+/// those of a block are in the same 16 bytes of a few rows.
+template <int blocks>
 class Sampler {
  public:
+  using Bytes = hn::FixedTag<std::uint8_t, std::size_t{16} * blocks>;
+  using Shorts = hn::Repartition<std::int16_t, Bytes>;
+  using Shades = hn::Repartition<std::uint16_t, Bytes>;
+  using Words = hn::Repartition<std::int32_t, Bytes>;
+
+  /// Values of the first and the last four pixels of each block.
+  struct Values {
+    hn::Vec<Words> low;
+    hn::Vec<Words> high;
+  };
+
   explicit Sampler(const ImageView<std::uint8_t>& picture) : picture_(picture) {}
 
-  /// Samples of the block at (left, y) after k steps, in 1/4096 of a grey level.
-  HWY_INLINE BlockWords at(int left, int y, const BlockMotions& motions, int k) const {
+  /// Samples after k steps, in 1/4096 of a grey level.
+  HWY_INLINE Values at(const BlockMotions& motions, int k) const {
     const Shorts shorts;
-    const auto zero = hn::Zero(shorts);
     const auto fraction = hn::Set(shorts, 63);
-    // Vectors are relative to the pixel (first_x, first_y).
-    const int to_x = left + motions.x.first_pixel(k);
-    const int to_y = y + motions.y.first_pixel(k);
-    const int first_x = std::clamp(to_x, 0, picture_.width - 1);
-    const int first_y = std::clamp(to_y, 0, picture_.height - 1);
-    const auto clamped = [&](hn::Vec<Shorts> position, int offset, int end) {
-      const auto moved = hn::Add(
-          position, hn::Set(shorts, static_cast<std::int16_t>(std::clamp(offset, -64, 64) * 64)));
-      const auto last = hn::Set(shorts, static_cast<std::int16_t>(std::min(end, 64) * 64));
-      return hn::Min(hn::Max(moved, zero), last);
-    };
-    const auto x = clamped(hn::Add(positions(motions.x, k), hn::ShiftLeft<6>(hn::Iota(shorts, 0))),
-                           to_x - first_x, picture_.width - 1 - first_x);
-    const auto position_y =
-        clamped(positions(motions.y, k), to_y - first_y, picture_.height - 1 - first_y);
+    HWY_ALIGN std::int32_t first_x[4];
+    HWY_ALIGN std::int32_t first_y[4];
+    const auto left = first_pixels(motions.x, k, picture_.width, first_x);
+    const auto top = first_pixels(motions.y, k, picture_.height, first_y);
+    const auto x = positions(motions.x, k, picture_.width, first_x);
+    const auto y = positions(motions.y, k, picture_.height, first_y);
 
     // Bytes of the left and right neighbours.
     const auto column = hn::ShiftRight<6>(x);
@@ -150,75 +182,176 @@ class Sampler {
         Bytes(), hn::Add(hn::Or(column, hn::ShiftLeft<8>(column)), hn::Set(shorts, 256)));
     const auto right = hn::And(x, fraction);
     // In 1/64 of a grey level.
-    const auto row_at = [&](int row) {
-      const auto* pixels = picture_.row(std::min(first_y + row, picture_.height - 1)) + first_x;
+    const auto row_at = [&](int row) HWY_ATTR {
       const auto pairs =
-          hn::BitCast(Shades(), hn::TableLookupBytes(hn::LoadU(Bytes(), pixels), places));
+          hn::BitCast(Shades(), hn::TableLookupBytes(pixels_at(left, top, row), places));
       const auto a = hn::BitCast(shorts, hn::And(pairs, hn::Set(Shades(), 255)));
       const auto b = hn::BitCast(shorts, hn::ShiftRight<8>(pairs));
       return hn::Add(hn::ShiftLeft<6>(a), hn::Mul(hn::Sub(b, a), right));
     };
-    const auto row = hn::ShiftRight<6>(position_y);
+    const auto row = hn::ShiftRight<6>(y);
     auto upper = row_at(0);
     auto lower = row_at(1);
     auto next = lower;
-    const int rows = motions.y.last_pixel(k) - motions.y.first_pixel(k);
-    for (int i = 1; i <= rows; ++i) {
-      const auto is_here = hn::Eq(row, hn::Set(shorts, static_cast<std::int16_t>(i)));
-      const auto below = row_at(i + 1);
-      upper = hn::IfThenElse(is_here, next, upper);
-      lower = hn::IfThenElse(is_here, below, lower);
+    for (int i = 0;; ++i) {
+      const auto is_below = hn::Gt(row, hn::Set(shorts, static_cast<std::int16_t>(i)));
+      if (hn::AllFalse(shorts, is_below)) break;
+      const auto below = row_at(i + 2);
+      upper = hn::IfThenElse(is_below, next, upper);
+      lower = hn::IfThenElse(is_below, below, lower);
       next = below;
     }
-    const auto down = hn::And(position_y, fraction);
+    const auto down = hn::And(y, fraction);
     const auto rise = hn::Sub(lower, upper);
     const auto low_bits = hn::Mul(rise, down);
     const auto high_bits = hn::MulHigh(rise, down);
-    const auto from_upper = [&](hn::Vec<HalfShorts> half, hn::Vec<Shorts> product) {
-      return hn::Add(hn::ShiftLeft<6>(hn::PromoteTo(Words(), half)), hn::BitCast(Words(), product));
+    // `wide` is upper in the upper halves of words.
+    const auto sum = [](hn::Vec<Shorts> wide, hn::Vec<Shorts> product) HWY_ATTR {
+      return hn::Add(hn::ShiftRight<10>(hn::BitCast(Words(), wide)), hn::BitCast(Words(), product));
     };
-    return {from_upper(hn::LowerHalf(upper), hn::InterleaveLower(shorts, low_bits, high_bits)),
-            from_upper(hn::UpperHalf(HalfShorts(), upper),
-                       hn::InterleaveUpper(shorts, low_bits, high_bits))};
+    const auto zero = hn::Zero(shorts);
+    return {sum(hn::InterleaveLower(shorts, zero, upper),
+                hn::InterleaveLower(shorts, low_bits, high_bits)),
+            sum(hn::InterleaveUpper(shorts, zero, upper),
+                hn::InterleaveUpper(shorts, low_bits, high_bits))};
   }
 
  private:
+  /// First pixel along an axis that each block reads.
+  static HWY_INLINE hn::Vec<Words4> first_pixels(const AxisMotion& motion, int k, int size,
+                                                 std::int32_t* first) {
+    const Words4 words;
+    const auto slowest = hn::Load(words, k < 0 ? motion.max : motion.min);
+    const auto moved =
+        hn::Add(hn::Load(words, motion.block_start), hn::Mul(slowest, hn::Set(words, k)));
+    const auto pixels =
+        hn::Min(hn::Max(hn::ShiftRight<16>(moved), hn::Zero(words)), hn::Set(words, size - 1));
+    hn::Store(pixels, words, first);
+    return pixels;
+  }
+
+  /// Positions along an axis, in 1/64 of a pixel from the first one of their block.
+  static HWY_INLINE hn::Vec<Shorts> positions(const AxisMotion& motion, int k, int size,
+                                              const std::int32_t* first) {
+    const Words words;
+    const hn::Half<Shorts> half;
+    const auto end = hn::Set(words, (size - 1) * 64);
+    const auto firsts = hn::LoadDup128(words, first);
+    const auto part = [&](std::size_t i) HWY_ATTR {
+      const auto moved = hn::Add(hn::Load(words, motion.start + i),
+                                 hn::Mul(hn::Load(words, motion.of + i), hn::Set(words, k)));
+      const auto position = hn::Min(hn::Max(hn::ShiftRight<10>(moved), hn::Zero(words)), end);
+      const auto own = hn::TableLookupBytes(
+          firsts, hn::BitCast(words, hn::Load(Bytes(), word_of_block.of + 4 * i)));
+      return hn::DemoteTo(half, hn::Sub(position, hn::ShiftLeft<6>(own)));
+    };
+    return hn::Combine(Shorts(), part(hn::MaxLanes(words)), part(0));
+  }
+
+  /// 16 bytes of each block, `row` rows below its first one.
+  HWY_INLINE hn::Vec<Bytes> pixels_at(hn::Vec<Words4> left, hn::Vec<Words4> top, int row) const {
+    const Words4 words;
+    const auto last = hn::Set(words, picture_.height - 1);
+    const auto stride = hn::Set(words, static_cast<std::int32_t>(picture_.stride));
+    HWY_ALIGN std::int32_t places[4];
+    hn::Store(hn::Add(hn::Mul(hn::Min(hn::Add(top, hn::Set(words, row)), last), stride), left),
+              words, places);
+    return gather(Bytes(), places);
+  }
+
+  /// 16 bytes at each of these places.
+  template <class Tag>
+  HWY_INLINE hn::Vec<Tag> gather(Tag tag, const std::int32_t* places) const {
+    constexpr std::size_t count = hn::MaxLanes(Tag()) / 16;
+    if constexpr (count == 1) {
+      return hn::LoadU(tag, picture_.row(0) + *places);
+    } else {
+      const hn::Half<Tag> half;
+      return hn::Combine(tag, gather(half, places + count / 2), gather(half, places));
+    }
+  }
+
+  /// Bytes of the word of each pixel's block.
+  static constexpr auto word_of_block = [] {
+    struct alignas(64) Table {
+      std::uint8_t of[max_pixels * 4];
+    };
+    Table table{};
+    for (int i = 0; i < max_pixels * 4; ++i)
+      table.of[i] = static_cast<std::uint8_t>(i / (4 * block) * 4 + i % 4);
+    return table;
+  }();
+
   const ImageView<std::uint8_t>& picture_;
 };
 
 /// Vector version of blended_luma().
-HWY_INLINE hn::Vec<Words> blended(hn::Vec<Words> earlier, hn::Vec<Words> later,
+template <class Words>
+HWY_INLINE hn::Vec<Words> blended(Words words, hn::Vec<Words> earlier, hn::Vec<Words> later,
                                   hn::Vec<Words> weight) {
   const auto sum = hn::Add(hn::ShiftLeft<8>(earlier), hn::Mul(hn::Sub(later, earlier), weight));
-  const auto grey = hn::ShiftRight<8>(hn::Add(sum, hn::Set(Words(), 1 << 7)));
+  const auto grey = hn::ShiftRight<8>(hn::Add(sum, hn::Set(words, 1 << 7)));
   return hn::ShiftRight<12>(
-      hn::Add(hn::Add(hn::ShiftLeft<8>(grey), grey), hn::Set(Words(), 1 << 11)));
+      hn::Add(hn::Add(hn::ShiftLeft<8>(grey), grey), hn::Set(words, 1 << 11)));
 }
 
-/// Blends a block whose pixels move alike.
-void blend_block(const Warp<std::uint8_t>& warp, int left, int y, const BlockMotions& motions,
-                 int j, std::uint16_t* out) {
-  const hn::Half<Shades> half;
-  const auto weight = hn::Set(Words(), blend_weight(j, warp.steps));
-  const auto earlier = Sampler(warp.last).at(left, y, motions, -j);
-  const auto later = Sampler(warp.now).at(left, y, motions, warp.steps - j);
-  hn::StoreU(hn::DemoteTo(half, blended(earlier.low, later.low, weight)), half, out);
-  hn::StoreU(hn::DemoteTo(half, blended(earlier.high, later.high, weight)), half, out + block / 2);
+/// Blends blocks whose pixels are alike.
+template <int blocks>
+void blend_blocks(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
+                  std::uint16_t* out) {
+  using Picture = Sampler<blocks>;
+  const typename Picture::Words words;
+  const typename Picture::Bytes bytes;
+  const auto weight = hn::Set(words, blend_weight(j, warp.steps));
+  const auto earlier = Picture(warp.last).at(motions, -j);
+  const auto later = Picture(warp.now).at(motions, warp.steps - j);
+  const auto low = blended(words, earlier.low, later.low, weight);
+  const auto high = blended(words, earlier.high, later.high, weight);
+  // The first four pixels of a block are in the lower halves of words, the others in the upper.
+  HWY_ALIGN static constexpr std::uint8_t in_order[16] = {0, 1, 4, 5, 8,  9,  12, 13,
+                                                          2, 3, 6, 7, 10, 11, 14, 15};
+  const auto both = hn::BitCast(bytes, hn::Or(low, hn::ShiftLeft<16>(high)));
+  hn::StoreU(hn::BitCast(typename Picture::Shades(),
+                         hn::TableLookupBytes(both, hn::LoadDup128(bytes, in_order))),
+             typename Picture::Shades(), out);
 }
 
 #endif
 
+/// Moves the pixels of some blocks, of which `count` are in the run.
+template <int blocks>
+void move_blocks(const Warp<std::uint8_t>& warp, const Flow* flow, int left, int y, int count,
+                 std::uint16_t* out, std::ptrdiff_t stride) {
+  const BlockMotions motions(flow, left, y, count, blocks, warp.steps);
+  if (motions.stay_alike(blocks, warp.steps - 1)) {
+    for (int j = 1; j < warp.steps; ++j, out += stride) blend_blocks<blocks>(warp, motions, j, out);
+    return;
+  }
+  if constexpr (blocks > 1) {
+    for (int i = 0; i < count; i += block)
+      move_blocks<1>(warp, flow + i, left + i, y, block, out + i, stride);
+  } else {
+    for (int j = 1; j < warp.steps; ++j, out += stride) {
+      if (motions.are_alike(-j) && motions.are_alike(warp.steps - j))
+        blend_blocks<1>(warp, motions, j, out);
+      else
+        blend_apart(warp, motions, j, out);
+    }
+  }
+}
+
 void move_light_8(const Warp<std::uint8_t>& warp, const ImageView<Flow>& flow, const Run& run,
                   std::uint16_t* out, std::ptrdiff_t stride) {
-  for (int left = run.first; left < run.last; left += block, out += block) {
-    const BlockMotions motions(flow.row(run.y) + left, run.last - left, warp.steps);
-    std::uint16_t* row = out;
-    for (int j = 1; j < warp.steps; ++j, row += stride) {
-      if (motions.are_alike(-j) && motions.are_alike(warp.steps - j))
-        blend_block(warp, left, run.y, motions, j, row);
-      else
-        blend_apart(warp, left, run.y, motions, j, row);
-    }
+  for (int left = run.first; left < run.last;) {
+    const Flow* here = flow.row(run.y) + left;
+    const int rest = run.last - left;
+    const int count = rest >= max_pixels ? max_pixels : std::min(rest, block);
+    if (count == max_pixels)
+      move_blocks<max_blocks>(warp, here, left, run.y, count, out, stride);
+    else
+      move_blocks<1>(warp, here, left, run.y, count, out, stride);
+    left += count;
+    out += count;
   }
 }
 
