@@ -46,10 +46,22 @@ class EventBuckets {
   /// Like reset(), for an interval of `duration` microseconds whose events are added in any order.
   void reset_slices(std::uint32_t duration, int bands);
 
-  /// Adds an event to its time slice. Different bands may be added from different threads.
-  void add(int band, const Event& event) {
-    bucket(static_cast<int>(event.t >> *slice_bits_) + 1, band).push_back(event);
-  }
+  /// The time slices of a band. Different bands may be added to from different threads.
+  class BandSlices {
+   public:
+    BandSlices(EventBuckets& buckets, int band)
+        : first_(&buckets.at(1, band)), bands_(buckets.bands_), slice_bits_(*buckets.slice_bits_) {}
+
+    /// Adds an event to its slice.
+    void add(const Event& event) const {
+      first_[std::size_t{event.t >> slice_bits_} * bands_].events.push_back(event);
+    }
+
+   private:
+    Bucket* first_;
+    std::size_t bands_;
+    int slice_bits_;
+  };
 
   int bands() const { return static_cast<int>(bands_); }
 

@@ -243,7 +243,7 @@ class PixelSimulator final : public DvsSimulator {
     begin_plans(duration, 1, is_exposed);
     make_plan(1);
     const bool is_widened = luma_bits(current_) != format().bits;
-    for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
+    for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
       for (int y = rows.first; y < rows.last; ++y) {
         const void* luma = now_.row(y);
         if (is_widened) {
@@ -251,8 +251,9 @@ class PixelSimulator final : public DvsSimulator {
           luma = scratch.luma.data();
         }
         const Run run{y, 0, format().width};
+        const PixelRow pixels = pixels_.row(y);
         for (std::size_t i = 0; i < plans_[1].sub_intervals.size(); ++i)
-          advance_run({luma, luma}, run, plans_[1], i, scratch, events);
+          advance_run({luma, luma}, run, pixels, plans_[1], i, scratch, events);
       }
     });
   }
@@ -265,7 +266,7 @@ class PixelSimulator final : public DvsSimulator {
     for (int row = 0; row < tiles_.rows(); ++row)
       for (int column = 0; column < tiles_.columns(); ++column)
         make_plan(tiles_.at(column, row).steps);
-    for_each_band([&](const BandRows& rows, Scratch& scratch, const BandEvents& events) {
+    for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
       scratch.moving.resize(static_cast<std::size_t>(max_steps) * moving_stride);
       for (int top = rows.first; top < rows.last; top += MotionTiles::height) {
         const auto tile_at = [&](int x) {
@@ -273,13 +274,14 @@ class PixelSimulator final : public DvsSimulator {
         };
         // Row by row, which leaves the events of a microsecond in raster order.
         for (int y = top; y < std::min(top + MotionTiles::height, rows.last); ++y) {
+          const PixelRow pixels = pixels_.row(y);
           for (int left = 0; left < format().width;) {
             const auto tile = tile_at(left);
             int right = left + MotionTiles::width;
             while (tile.steps == 1 && right < format().width && tile_at(right).steps == 1)
               right += MotionTiles::width;
             right = std::min(right, format().width);
-            advance_moving({y, left, right}, tile, flow, scratch, events);
+            advance_moving({y, left, right}, pixels, tile, flow, scratch, events);
             left = right;
           }
         }
@@ -288,15 +290,15 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   /// Advances a run of a tile through the interval.
-  void advance_moving(const Run& run, const MotionTiles::Tile& tile, const ImageView<Flow>& flow,
-                      Scratch& scratch, const BandEvents& events) {
+  void advance_moving(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
+                      const ImageView<Flow>& flow, Scratch& scratch,
+                      const IntervalEvents::Band& events) {
     const void* now = scratch.luma.data();
     widen(now_.row(run.y) + run.first, run.width(), scratch.luma.data());
     const bool has_bandwidth = current_.cutoff_frequency > 0;
     if (tile.steps > 1) {
       if (!has_bandwidth && gain_ == 1 &&
-          rest_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now},
-                   pixels_.row(run.y), run))
+          rest_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now}, pixels, run))
         return;
       move_light(Warp<Pixel>{last_.view(), now_.view(), tile.steps}, flow, run,
                  scratch.moving.data(), moving_stride);
@@ -307,7 +309,7 @@ class PixelSimulator final : public DvsSimulator {
       const void* luma = step < tile.steps
                              ? scratch.moving.data() + std::ptrdiff_t{step - 1} * moving_stride
                              : now;
-      advance_run({luma, has_bandwidth ? luma : now}, run, plan, i, scratch, events);
+      advance_run({luma, has_bandwidth ? luma : now}, run, pixels, plan, i, scratch, events);
     }
   }
 
@@ -379,13 +381,12 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   /// Advances a run of pixels through sub-interval i of a plan.
-  void advance_run(const RunLuma& luma, const Run& run, const Plan& plan, std::size_t i,
-                   Scratch& scratch, const BandEvents& events) {
+  void advance_run(const RunLuma& luma, const Run& run, const PixelRow& pixels, const Plan& plan,
+                   std::size_t i, Scratch& scratch, const IntervalEvents::Band& events) {
     const SubInterval& sub_interval = plan.sub_intervals[i];
     const ShadeTables& tables = *plan.tables[i];
     auto& candidates = scratch.candidates;
     candidates.count = 0;
-    const PixelRow pixels = pixels_.row(run.y);
     filter_run(filter_of(sub_interval, tables), luma, pixels, run, candidates);
     if (candidates.count == 0) return;
     const RowToSolve solved{current_, random_,    sub_interval, tables,
@@ -464,7 +465,7 @@ class PixelSimulator final : public DvsSimulator {
       auto& scratch = scratch_[static_cast<std::size_t>(thread)];
       scratch.candidates.resize(format().width);
       scratch.luma.resize(static_cast<std::size_t>(format().width) + max_lanes);
-      body(BandRows(band, format().height), scratch, BandEvents{fired_, band});
+      body(BandRows(band, format().height), scratch, IntervalEvents::Band(fired_, band));
     });
   }
 

@@ -14,6 +14,12 @@ namespace eventcamera {
 /// Collects the events of an interval, which bands of rows add in any order. Events past its end
 /// are deferred to the next interval.
 class IntervalEvents {
+  struct DeferredEvent {
+    double t;  ///< microseconds after the start of the next interval
+    Event event;
+  };
+  struct alignas(64) Deferred : std::vector<DeferredEvent> {};
+
  public:
   /// Begins an interval of `duration` microseconds with the deferred events of the last one. Events
   /// are written to `events`, with_cause().
@@ -24,7 +30,8 @@ class IntervalEvents {
     deferred_.resize(static_cast<std::size_t>(bands));
     for (int band = 0; band < bands; ++band) {
       due_.swap(deferred_[static_cast<std::size_t>(band)]);
-      for (const auto& [t, event] : due_) add(band, t, event);
+      const Band here(*this, band);
+      for (const auto& [t, event] : due_) here.add(t, event);
       due_.clear();
     }
   }
@@ -53,38 +60,39 @@ class IntervalEvents {
     }
   }
 
-  /// Adds an event `t` microseconds after the start of the interval, instead of its own time.
-  /// Different bands may be added from different threads.
-  void add(int band, double t, Event event) {
-    if (t > duration_) {
-      deferred_[static_cast<std::size_t>(band)].push_back({t - duration_, event});
-      return;
+  /// One band of rows. Different bands may be added to from different threads.
+  class Band {
+   public:
+    Band(IntervalEvents& events, int band)
+        : duration_(events.duration_),
+          slices_(*events.events_, band),
+          deferred_(&events.deferred_[static_cast<std::size_t>(band)]) {}
+
+    void add(double t, int x, int y, Polarity polarity, Cause cause) const {
+      add(t, with_cause(Event::at(x, y, 0, polarity), cause));
     }
-    event.t = static_cast<std::uint32_t>(t);
-    events_->add(band, event);
-  }
+
+    /// Adds an event `t` microseconds after the start of the interval, instead of its own time.
+    void add(double t, Event event) const {
+      if (t > duration_) {
+        deferred_->push_back({t - duration_, event});
+        return;
+      }
+      event.t = static_cast<std::uint32_t>(t);
+      slices_.add(event);
+    }
+
+   private:
+    double duration_;
+    EventBuckets::BandSlices slices_;
+    Deferred* deferred_;
+  };
 
  private:
-  struct DeferredEvent {
-    double t;  ///< microseconds after the start of the next interval
-    Event event;
-  };
-  struct alignas(64) Deferred : std::vector<DeferredEvent> {};
-
   double duration_ = 0;
   EventBuckets* events_ = nullptr;
   std::vector<Deferred> deferred_;  ///< by band
   Deferred due_;                    ///< deferred to the interval that begins
-};
-
-/// Adds the events of one band of rows.
-struct BandEvents {
-  IntervalEvents& events;
-  int band;
-
-  void add(double t, int x, int y, Polarity polarity, Cause cause) const {
-    events.add(band, t, with_cause(Event::at(x, y, 0, polarity), cause));
-  }
 };
 
 }  // namespace eventcamera

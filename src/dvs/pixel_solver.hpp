@@ -99,7 +99,7 @@ struct RowToSolve {
   const ShadeTables& tables;
   const PixelRow& pixels;
   const Candidates& candidates;
-  const BandEvents& events;
+  const IntervalEvents::Band& events;
   double start;  ///< of the sub-interval, microseconds since the first frame
 
   bool has_labels() const { return pixels.last_cause != nullptr; }

@@ -116,7 +116,7 @@ TEST(EventBuckets, OfTimeSlicesAreSortedByAnyNumberOfThreads) {
         const int y = band * rows + static_cast<int>(random() % rows);
         expected.push_back(
             Event::at(static_cast<int>(random() % width), y, time(random), Polarity::on));
-        buckets.add(band, expected.back());
+        EventBuckets::BandSlices(buckets, band).add(expected.back());
       }
       ASSERT_EQ(buckets.size(), expected.size());
       std::ranges::sort(expected, {},
