@@ -57,7 +57,7 @@ struct AxisMotion {
 
   void find_ranges(int blocks) {
     const Words4 words;
-    for (int i = 0; i < blocks; ++i) {
+    for (std::ptrdiff_t i = 0; i < blocks; ++i) {
       const Motion* here = of + i * block;
       auto least = hn::Load(words, here);
       auto most = least;
@@ -97,7 +97,7 @@ struct BlockMotions {
     const hn::RebindToSigned<decltype(floats)> words;
     HWY_ALIGN Flow flows[max_pixels];
     std::copy_n(flow, count, flows);
-    std::fill(flows + count, flows + blocks * block, flow[0]);
+    std::fill(flows + count, flows + std::ptrdiff_t{blocks} * block, flow[0]);
     const auto longest = hn::Set(floats, static_cast<float>(max_side));
     const auto scale = hn::Set(floats, 65536.0F / static_cast<float>(steps));
     const auto per_step = [&](hn::Vec<decltype(floats)> motion) {  // motion_per_step()
