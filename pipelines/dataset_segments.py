@@ -131,7 +131,8 @@ class SegmentFrames(Frames):
         if time == Gst.CLOCK_TIME_NONE:
             self.doubt = "a frame has no time"
         elif self.end is not None and time >= self.end:
-            pad.push_event(Gst.Event.new_eos())
+            # The sink pad refuses what follows; the source pad would take a late tag for an error.
+            pad.send_event(Gst.Event.new_eos())
             return Gst.PadProbeReturn.DROP
         elif buffer.has_flags(Gst.BufferFlags.DISCONT) and (self.before or self.times):
             self.doubt = "its frames are not one stream"
@@ -199,7 +200,7 @@ def _simulate(video, folder, number, frames, file):
     with video.playing(SINK, threads=1, more=more, filters=False) as pipeline:
         decoders = decoders_of(pipeline)
         pipeline.gaps_as_buffers()
-        frames.watch(pipeline.element("decoded").get_static_pad("src"))
+        frames.watch(pipeline.element("decoded").get_static_pad("sink"))
         if number > 0:
             pipeline.set_state(Gst.State.PAUSED)
             if has_state(video):
