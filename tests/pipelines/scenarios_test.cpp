@@ -144,11 +144,17 @@ class Playback {
   Playback& operator=(const Playback&) = delete;
 
   /// Does not wait, except for playbin3, which may deadlock when it is stopped while it finds the
-  /// type of a file (GStreamer 1.22).
+  /// type of a file, and at times never starts on a busy machine (GStreamer 1.22): then it has to
+  /// start again.
   void set(GstState state) {
     old_buffers_ = stream_.buffers();
-    EXPECT_NE(gst_element_set_state(pipeline_.get(), state), GST_STATE_CHANGE_FAILURE);
-    if (is_player_) gst_element_get_state(pipeline_.get(), nullptr, nullptr, 60 * GST_SECOND);
+    const auto change = [&] {
+      EXPECT_NE(gst_element_set_state(pipeline_.get(), state), GST_STATE_CHANGE_FAILURE);
+      return !is_player_ || gst_element_get_state(pipeline_.get(), nullptr, nullptr,
+                                                  20 * GST_SECOND) != GST_STATE_CHANGE_ASYNC;
+    };
+    for (int restarts = 5; !change() && restarts > 0; --restarts)
+      gst_element_set_state(pipeline_.get(), GST_STATE_NULL);
   }
 
   void reach(GstState state) {
