@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -19,12 +20,17 @@ class Batch {
  public:
   /// Maximum number of events in one unit.
   static constexpr std::size_t events_per_unit = 32;
+  /// Maximum number of events per byte, that of EVT3 vectors.
+  static constexpr std::size_t events_per_byte = 6;
 
   explicit Batch(Corruption& corruption) : corruption_(corruption) {}
 
-  /// Places the batch behind the events of `out`, to which close() adds it.
-  void open(Decoded& out) {
-    constexpr std::size_t size = 4096;
+  /// Places the batch behind the events of `out`, to which close() adds it. It has room for the
+  /// events of so many bytes at most: to get memory takes longer than to decode a few bytes.
+  void open(Decoded& out, std::size_t bytes) {
+    constexpr std::size_t max_size = 4096;
+    const auto size =
+        std::min(max_size, events_per_unit + events_per_byte * std::min(bytes, max_size));
     out_ = &out;
     begin_ = out.events.size();
     out.events.resize(begin_ + size);

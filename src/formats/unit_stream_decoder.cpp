@@ -95,10 +95,11 @@ std::size_t UnitStreamDecoder::read_units(std::span<const std::uint8_t> bytes, D
       const auto state = decoder_->state();
       seek_points_.note({latest_, position_, state.clock, state.rest});
     }
-    batch_.open(out);
+    const auto count = std::min(to - from, max_batch);
+    batch_.open(out, static_cast<std::size_t>(count));
     batch_.start = from;
     batch_.start_position = position_;
-    const auto* reached = decoder_->read(from, from + std::min(to - from, max_batch), batch_);
+    const auto* reached = decoder_->read(from, from + count, batch_);
     latest_ = std::max(latest_, latest_of(batch_.close()));
     if (reached == from) return bytes.size() - static_cast<std::size_t>(to - from);
     position_ += static_cast<std::uint64_t>(reached - from);

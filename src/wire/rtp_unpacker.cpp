@@ -153,7 +153,7 @@ bool RtpUnpacker::decode_evt3(std::span<const std::uint8_t> words) {
   const auto* from = words.data();
   const auto* const to = from + words.size();
   while (from != to) {
-    batch.open(words_);
+    batch.open(words_, static_cast<std::size_t>(to - from));
     from = decoder_->read(from, to, batch);
     for (const auto& event : batch.close())
       if (!decode(static_cast<std::uint64_t>(event.t), event.x, event.y_p)) return false;

@@ -118,9 +118,10 @@ class DatDecoder final : public UnitStreamDecoder {
     Corruption ignored;
     Batch batch(ignored);
     const auto* from = bytes.data();
-    while (from != bytes.data() + bytes.size()) {
-      batch.open(out);
-      from = decoder->read(from, bytes.data() + bytes.size(), batch);
+    const auto* const to = from + bytes.size();
+    while (from != to) {
+      batch.open(out, static_cast<std::size_t>(to - from));
+      from = decoder->read(from, to, batch);
       batch.close();
     }
   }

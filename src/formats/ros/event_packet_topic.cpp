@@ -71,7 +71,7 @@ class EvtPackets {
 
   /// `offset` of the clocks is set with the first event, and then kept.
   bool next(Decoded& out, std::optional<std::uint64_t>& offset) {
-    batch_.open(out);
+    batch_.open(out, rest_.size());
     batch_.start = rest_.data();
     batch_.start_position = position_;
     const auto* const read = words_->read(rest_.data(), rest_.data() + rest_.size(), batch_);
