@@ -16,7 +16,11 @@ namespace eventcamera {
 
 namespace {
 
-constexpr std::size_t first_content = std::size_t{256} << 10;
+/// Limits of the first memory for the content of frames, and how many times as large as the frame
+/// it is between them.
+constexpr std::size_t min_content = std::size_t{4} << 10;
+constexpr std::size_t max_first_content = std::size_t{256} << 10;
+constexpr std::size_t expected_ratio = 4;
 constexpr std::uint32_t lz4_magic = 0x184D2204;
 constexpr std::uint32_t zstd_magic = 0xFD2FB528;
 constexpr int zstd_high_level = 9;
@@ -58,7 +62,7 @@ std::optional<FrameDecompressor::Content> FrameDecompressor::decompress_lz4(
   std::size_t used = 0;
   std::size_t filled = 0;
   while (true) {
-    if (filled == content_.size() && !grow(limit)) return std::nullopt;
+    if (filled == content_.size() && !grow(payload.size(), limit)) return std::nullopt;
     auto to = content_.size() - filled;
     auto from = payload.size() - used;
     const auto result = LZ4F_decompress(lz4_.get(), content_.data() + filled, &to,
@@ -78,7 +82,7 @@ std::optional<FrameDecompressor::Content> FrameDecompressor::decompress_zstd(
   if (ZSTD_isError(used) != 0) return std::nullopt;
   if (!zstd_) zstd_.reset(ZSTD_createDCtx());
   if (!zstd_) throw std::bad_alloc();
-  if (content_.empty()) grow(limit);
+  if (content_.empty()) grow(payload.size(), limit);
   // Decompresses in one call, so that the output serves as window: the streaming decoder would
   // allocate a window of the size stated in the frame. Starts over if the output is too small.
   while (true) {
@@ -88,13 +92,16 @@ std::optional<FrameDecompressor::Content> FrameDecompressor::decompress_zstd(
       if (size > limit) return std::nullopt;
       return Content{{content_.data(), size}, used};
     }
-    if (ZSTD_getErrorCode(size) != ZSTD_error_dstSize_tooSmall || !grow(limit)) return std::nullopt;
+    if (ZSTD_getErrorCode(size) != ZSTD_error_dstSize_tooSmall || !grow(payload.size(), limit))
+      return std::nullopt;
   }
 }
 
-bool FrameDecompressor::grow(std::size_t limit) {
+bool FrameDecompressor::grow(std::size_t payload, std::size_t limit) {
   if (content_.size() >= limit) return false;
-  content_.resize(std::min(limit, std::max(first_content, 2 * content_.size())));
+  const auto expected = std::clamp(std::min(payload, max_first_content) * expected_ratio,
+                                   min_content, max_first_content);
+  content_.resize(std::min(limit, std::max(expected, 2 * content_.size())));
   return true;
 }
 

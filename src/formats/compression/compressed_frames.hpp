@@ -40,7 +40,7 @@ class FrameDecompressor {
  private:
   std::optional<Content> decompress_lz4(std::span<const std::uint8_t> payload, std::size_t limit);
   std::optional<Content> decompress_zstd(std::span<const std::uint8_t> payload, std::size_t limit);
-  bool grow(std::size_t limit);
+  bool grow(std::size_t payload, std::size_t limit);
 
   std::unique_ptr<LZ4F_dctx_s, CompressionDeleter> lz4_;
   std::unique_ptr<ZSTD_DCtx_s, CompressionDeleter> zstd_;

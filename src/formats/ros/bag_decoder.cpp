@@ -235,7 +235,8 @@ std::optional<Microseconds> BagDecoder::decoded_last_time() {
     }
   };
   constexpr std::uint64_t max_read = std::uint64_t{1} << 26;
-  std::vector<std::uint8_t> bytes(std::size_t{1} << 18);
+  constexpr std::uint64_t max_piece = std::uint64_t{1} << 18;
+  std::vector<std::uint8_t> bytes(reads_itself ? 0 : std::min(max_piece, source_->size()));
   const auto end = start->position + max_read;
   for (auto position = start->position; !reads_itself && position < end;) {
     const auto count = source_->read(position, bytes);
