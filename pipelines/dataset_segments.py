@@ -200,7 +200,8 @@ def _simulate(video, folder, number, frames, file):
     with video.playing(SINK, threads=1, more=more, filters=False) as pipeline:
         decoders = decoders_of(pipeline)
         pipeline.gaps_as_buffers()
-        frames.watch(pipeline.element("decoded").get_static_pad("sink"))
+        # A sink pad, behind the conversion: its frames begin with their luma.
+        frames.watch(pipeline.element("decoded").get_static_pad("src").get_peer())
         if number > 0:
             pipeline.set_state(Gst.State.PAUSED)
             if has_state(video):
