@@ -241,7 +241,6 @@ class PixelSimulator final : public DvsSimulator {
   void advance_straight(double duration, bool is_exposed) {
     finder_.reset();  // its last frame is outdated
     begin_plans(duration, 1, is_exposed);
-    make_plan(1);
     const bool is_widened = luma_bits(current_) != format().bits;
     for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
       for (int y = rows.first; y < rows.last; ++y) {

@@ -7,23 +7,6 @@
 
 #include "src/core/max_side.hpp"
 
-#ifndef EVENTCAMERA_BLENDED_LUMA
-#define EVENTCAMERA_BLENDED_LUMA
-namespace eventcamera {
-namespace {
-
-/// 16-bit luma of two samples of 8-bit frames, in 1/4096 of a grey level; `weight` is that of the
-/// later one.
-std::uint16_t blended_luma(std::int32_t earlier, std::int32_t later, int weight) {
-  const std::int32_t sum = earlier * 256 + (later - earlier) * weight;
-  const std::int32_t grey = (sum + (1 << 7)) >> 8;
-  return static_cast<std::uint16_t>((grey * 257 + (1 << 11)) >> 12);
-}
-
-}  // namespace
-}  // namespace eventcamera
-#endif
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/moving_light.cpp"
 #include <hwy/foreach_target.h>
@@ -91,8 +74,8 @@ struct BlockMotions {
   AxisMotion x;
   AxisMotion y;
 
-  /// Of `count` pixels from (left, top) on; the others move like the first.
-  BlockMotions(const Flow* flow, int left, int top, int count, int blocks, int steps) {
+  /// Of `count` pixels of a row, from `left` on; the others move like the first.
+  BlockMotions(const Flow* flow, int left, int row, int count, int blocks, int steps) {
     const hn::CappedTag<float, block> floats;
     const hn::RebindToSigned<decltype(floats)> words;
     HWY_ALIGN Flow flows[max_pixels];
@@ -105,7 +88,7 @@ struct BlockMotions {
       return hn::NearestInt(hn::IfThenElseZero(hn::Eq(motion, motion), hn::Mul(clamped, scale)));
     };
     const auto first_x = hn::Set(words, (left << 16) + 512);
-    const auto first_y = hn::Set(words, (top << 16) + 512);
+    const auto first_y = hn::Set(words, (row << 16) + 512);
     for (int i = 0; i < blocks * block; i += static_cast<int>(hn::Lanes(floats))) {
       hn::Vec<decltype(floats)> dx;
       hn::Vec<decltype(floats)> dy;
@@ -124,6 +107,14 @@ struct BlockMotions {
   }
   bool are_alike(int k) const { return x.are_alike(k) && y.are_alike(k); }
 };
+
+/// 16-bit luma of two samples of 8-bit frames, in 1/4096 of a grey level; `weight` is that of the
+/// later one.
+std::uint16_t blended_luma(std::int32_t earlier, std::int32_t later, int weight) {
+  const std::int32_t sum = earlier * 256 + (later - earlier) * weight;
+  const std::int32_t grey = (sum + (1 << 7)) >> 8;
+  return static_cast<std::uint16_t>((grey * 257 + (1 << 11)) >> 12);
+}
 
 /// Blends a block of pixels one by one.
 void blend_apart(const Warp<std::uint8_t>& warp, const BlockMotions& motions, int j,
