@@ -182,9 +182,10 @@ def make_segment(video, folder, joints, number):
             record |= _simulate(video, folder, number, frames, file)
         except (Doubt, ec.PipelineError) as reason:
             record["doubt"] = str(reason)
-    os.replace(file.name, os.path.join(folder, f"{number}.events"))
-    record |= {"doubt": record.get("doubt", frames.doubt), "times": frames.times, "corrupted": frames.corrupted,
-               "before": frames.before, "last": frames.last}
+    events = os.path.join(folder, f"{number}.events")
+    os.replace(file.name, events)
+    record |= {"size": os.path.getsize(events), "doubt": record.get("doubt", frames.doubt), "times": frames.times,
+               "corrupted": frames.corrupted, "before": frames.before, "last": frames.last}
     write_record(os.path.join(folder, f"{number}.json"), record)
 
 
@@ -253,6 +254,8 @@ class Segments:
                 raise Doubt("the input has changed")
             if record["doubt"]:
                 raise Doubt(record["doubt"])
+            if not os.path.exists(self._paths[number]) or os.path.getsize(self._paths[number]) != record["size"]:
+                raise Doubt(f"the events of segment {number} are missing or cut off")
             if record["caps"] != self._records[0]["caps"] or not record["times"]:
                 raise Doubt(f"segment {number} has no events of the same caps")
         for before, after in zip(self._records, self._records[1:]):

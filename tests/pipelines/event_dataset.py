@@ -334,6 +334,14 @@ class Segments(unittest.TestCase):
         self.assertEqual(made.pop("whole"), "made as a whole, not in segments: a seek leads to other frames")
         self.assertEqual(made, record_of(video, path_of("segments/whole")))
 
+    def test_are_not_joined_without_all_their_events(self):
+        video = self.video("simulator: eventsim-diff")
+        folder = self.segmented(video)
+        for spoil in (lambda path: os.truncate(path, 100), os.remove):
+            spoil(f"{folder}/1.events")
+            with self.assertRaisesRegex(dataset_segments.Doubt, "the events of segment 1 are missing or cut off"):
+                dataset_segments.Segments(video, folder, self.JOINTS)
+
     def test_are_not_made_where_they_could_differ(self):
         for text, reason in {
             "simulator: eventsim-dvs\nframes: videorate": "videorate, in frames, may remember frames",
