@@ -191,17 +191,19 @@ class Esim {
 };
 
 /// One pixel, with the simulator's random numbers, evaluated every microsecond.
-///   light      I = luma / G, or ((luma + 0.055)/1.055)^2.4 / G, G the gain of the exposure
-///   saturated  a luma of 235/255 or more with G != 1 keeps the L of the frame before if larger
+/// Luma is a share of white, 0 to 1; pixels have numbers in raster order.
+///   light      I = luma / g, or with the sRGB transfer function inverted: luma/12.92 / g up to
+///              0.04045, ((luma + 0.055)/1.055)^2.4 / g above; g is the gain of the exposure
+///   saturated  a luma of 235/255 or more with g != 1 keeps the L of the frame before if larger
 ///   response   log: ln(eps + I); lin-log: x ln(20)/20 or ln(x), x = 255 I; linear: ln(255) I
 ///   input      L(t), a straight line from frame to frame
 ///   brightness b = (I + d)/(1 + d), I of the later frame in 8 bits, at most 1
 ///   low pass   dV/dt = 2 pi f b (L(t) - V)
 ///   leak       dR/dt = -rate C+, and of a hot pixel more
-///   pulse      all V rise within 100 us, by P, and fall within 100 us, 800 us later;
-///              it begins `exposure_lead` before each frame, but at least 100 us
-///   noise      N = rate (1 - 3/4 b) per second; an event of either polarity where the integral
-///              of N reaches the next of numbers that are drawn with mean 1, exponentially
+///   pulse      V rises by P over 100 us, stays for 800 us, and falls over 100 us; it begins
+///              `exposure_lead` before each frame, but at least 100 us
+///   noise      N = rate (1 - 3/4 b) per second; an event of random polarity each time the integral
+///              of N has grown by a number drawn from the exponential distribution with mean 1
 ///   events     ON where V - R >= (1 + G) C+, OFF where R - V >= (1 + G) C-
 ///   adaptation G grows by a with each event; dG/dt = -a / T down to 0 afterwards
 ///   reset      level: R = R +- (1 + G) C, G before the event, and after noise R = V;
