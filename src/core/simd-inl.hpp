@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "src/core/set_bits.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
 
@@ -33,6 +35,38 @@ hn::Vec<Tag> load_first(Tag tag, const T* from, int count) {
   std::copy_n(from, count, elements);
   return hn::Load(tag, elements);
 }
+
+/// Moves the lanes of a mask to the front; what follows them is undefined. For 4 and 8 bytes. With
+/// GCC 12, hn::Compress() copies its table to the stack each time, except where it needs none.
+template <class Tag>
+class FirstLanes {
+ public:
+  using Vector = hn::Vec<Tag>;
+  using Integers = hn::RebindToSigned<Tag>;
+
+  explicit FirstLanes(hn::Mask<Tag> mask) : mask_(mask) {
+    if constexpr (hn::MaxLanes(Tag()) <= 8) {
+      const auto* lanes = set_bits.of[bits_of(Tag(), mask)];
+      const hn::Rebind<std::int32_t, Tag> words;
+      const auto numbers = hn::PromoteTo(words, hn::LoadU(hn::Rebind<std::uint8_t, Tag>(), lanes));
+      if constexpr (sizeof(hn::TFromD<Tag>) == 8)
+        indices_ = hn::IndicesFromVec(Tag(), hn::PromoteTo(Integers(), numbers));
+      else
+        indices_ = hn::IndicesFromVec(Tag(), numbers);
+    }
+  }
+
+  HWY_INLINE Vector operator()(Vector vector) const {
+    if constexpr (hn::MaxLanes(Tag()) <= 8)
+      return hn::TableLookupLanes(vector, indices_);
+    else
+      return hn::Compress(vector, mask_);
+  }
+
+ private:
+  hn::Mask<Tag> mask_;
+  decltype(hn::IndicesFromVec(Tag(), hn::Zero(Integers()))) indices_;
+};
 
 /// Picks lanes from two vectors of floats that follow each other in memory.
 template <class Floats>

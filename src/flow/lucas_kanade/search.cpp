@@ -516,8 +516,8 @@ class Blocks {
     hn::Store(cell_y, floats, cell_y_ + i);
     hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
     // A whole vector fits, because at most i are queued.
-    hn::StoreU(hn::Compress(hn::Iota(ints, i), hn::RebindMask(ints, moved)), ints,
-               moved_ + moved_count_);
+    const FirstLanes<decltype(ints)> first_lanes(hn::RebindMask(ints, moved));
+    hn::StoreU(first_lanes(hn::Iota(ints, i)), ints, moved_ + moved_count_);
     moved_count_ += static_cast<int>(hn::CountTrue(floats, moved));
   }
 
