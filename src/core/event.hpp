@@ -52,20 +52,30 @@ inline std::span<const Event> events_until(std::span<const Event> events, Micros
 inline constexpr unsigned coordinate_bits = 0x3fff;
 
 /// Order of simulated events: by time, then in raster order.
-inline bool is_before(const Event& a, const Event& b) {
+inline constexpr auto is_before = [](const Event& a, const Event& b) {
   const auto place = [](const Event& event) {
     return std::uint64_t{event.t} << 32 | (event.y_p & coordinate_bits) << 16 |
            (event.x & coordinate_bits);
   };
   return place(a) < place(b);
-}
+};
 
 /// Sorts events with is_before(). Events of different spans of 2^span_bits microseconds must
 /// already be in order.
 inline void sort_within_spans(std::span<Event> events, int span_bits) {
+  constexpr std::ptrdiff_t near = 32;  // cheaper to move an event by than to sort its span
   for (auto next = events.begin();;) {
     next = std::is_sorted_until(next, events.end(), is_before);
     if (next == events.end()) return;
+    const auto nearest = next - std::min(near, next - events.begin());
+    auto place = next;
+    while (place != nearest && is_before(*next, place[-1])) --place;
+    if (place != nearest) {
+      const Event event = *next;
+      std::move_backward(place, next, next + 1);
+      *place = event;
+      continue;
+    }
     const auto is_elsewhere = [span = next->t >> span_bits, span_bits](const Event& event) {
       return event.t >> span_bits != span;
     };
