@@ -2,40 +2,37 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 
 #include "src/dvs/dvs_settings.hpp"
 
 namespace eventcamera {
 
-/// Growth of a pixel's thresholds as a fraction of them, at a time in microseconds since the first
-/// frame.
-struct ThresholdGrowth {
-  double time = 0;
-  double value = 0;
-};
-
 /// Adaptation of thresholds: each event raises both thresholds of its pixel by a fraction, and the
-/// growth falls at a constant rate. At strong edges, which are many thresholds high, pixels of real
-/// cameras fire fewer events than their contrast is worth (docs/methods.md).
+/// growth falls at a constant rate. So the time until it is gone says how large it is, and each
+/// event makes that longer by the adaptation time. At strong edges, which are many thresholds high,
+/// pixels of real cameras fire fewer events than their contrast is worth (docs/methods.md). Times
+/// are microseconds on any common clock.
 class Adaptation {
  public:
   explicit Adaptation(const DvsSettings& settings)
-      : step_(settings.adaptation), rate_(step_ / in_microseconds(settings.adaptation_time)) {}
+      : duration_(in_microseconds(settings.adaptation_time)),
+        rate_(settings.adaptation / duration_) {}
 
-  bool is_on() const { return step_ > 0; }
+  bool is_on() const { return rate_ > 0; }
 
-  /// Growth by an event.
-  double step() const { return step_; }
   /// Fall of the growth per microsecond.
   double rate() const { return rate_; }
+  /// Time by which an event prolongs the growth.
+  double duration() const { return duration_; }
 
-  double at(double time, const ThresholdGrowth& growth) const {
-    return std::max(0.0, growth.value - rate_ * (time - growth.time));
-  }
+  /// Growth at a time, as a fraction of the thresholds, if it ends at `end`.
+  double growth(double time, double end) const { return rate_ * std::max(0.0, end - time); }
+
+  /// End of the growth after an event at a time.
+  double prolonged(double time, double end) const { return std::max(time, end) + duration_; }
 
  private:
-  double step_;
+  double duration_;
   double rate_;
 };
 

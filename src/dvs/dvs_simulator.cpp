@@ -41,7 +41,7 @@ bool have_same_response(const DvsSettings& a, const DvsSettings& b) {
 }
 
 /// A state begins with this; the last one is the version of its format.
-constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '1'};
+constexpr std::array<char, 8> state_magic{'D', 'V', 'S', 'S', 'T', 'A', 'T', '2'};
 
 /// Hash of all settings, whose number the compiler checks.
 std::uint64_t hash_of(const DvsSettings& settings) {
@@ -388,9 +388,10 @@ class PixelSimulator final : public DvsSimulator {
     candidates.count = 0;
     filter_run(filter_of(sub_interval, tables), luma, pixels, run, candidates);
     if (candidates.count == 0) return;
-    const RowToSolve solved{current_, random_,    sub_interval, tables,
-                            pixels,   candidates, events,       clock_ + sub_interval.begin};
-    switch (solver_for(current_)) {
+    const RowToSolve solved{current_,     dynamics_, random_,
+                            sub_interval, tables,    pixels,
+                            candidates,   events,    clock_ + sub_interval.begin};
+    switch (solver_) {
       case Solver::pixels:
         return solve_pixels(solved);
       case Solver::lines:
@@ -428,6 +429,8 @@ class PixelSimulator final : public DvsSimulator {
       for_each_row(threads(), format().height,
                    [&](int y) { pixels_.draw_traits(y, settings, random_); });
     current_ = settings;
+    dynamics_ = PixelDynamics(settings);
+    solver_ = solver_for(settings);
   }
 
   /// Changes settings mid-stream. Pixels keep their state unless its units changed.
@@ -472,6 +475,8 @@ class PixelSimulator final : public DvsSimulator {
   Image<Pixel> now_{format().width, format().height};
   PixelArray pixels_{format().width, format().height};
   DvsSettings current_;  ///< applied to the pixels
+  PixelDynamics dynamics_{current_};
+  Solver solver_ = solver_for(current_);
   Random random_{0};
   std::optional<ExposureGain> exposure_gain_;
   double gain_ = 1;               ///< of the exposure since the first frame

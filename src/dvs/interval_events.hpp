@@ -68,6 +68,11 @@ class IntervalEvents {
           slices_(*events.events_, band),
           deferred_(&events.deferred_[static_cast<std::size_t>(band)]) {}
 
+    double duration() const { return duration_; }
+
+    /// Adds an event within the interval.
+    void add(const Event& event) const { slices_.add(event); }
+
     void add(double t, int x, int y, Polarity polarity, Cause cause) const {
       add(t, with_cause(Event::at(x, y, 0, polarity), cause));
     }

@@ -88,7 +88,7 @@ PixelArray::PixelArray(int width, int height)
       leak_(width, height),
       refractory_left_(width, height),
       noise_budget_(width, height),
-      growth_(width, height) {}
+      growth_end_(width, height) {}
 
 PixelRow PixelArray::row(int y) {
   return {y,
@@ -101,14 +101,14 @@ PixelRow PixelArray::row(int y) {
           leak_.row(y),
           refractory_left_.row(y),
           noise_budget_.row(y),
-          growth_.row(y),
+          growth_end_.row(y),
           last_cause_ ? last_cause_->row(y) : nullptr};
 }
 
 void PixelArray::keep_causes(bool are_kept) {
   last_cause_.reset();
   if (!are_kept) return;
-  last_cause_.emplace(width(), growth_.height());
+  last_cause_.emplace(width(), growth_end_.height());
   for (int y = 0; y < last_cause_->height(); ++y)
     std::fill_n(last_cause_->row(y), width(), Cause::unknown);
 }
@@ -135,7 +135,7 @@ void PixelArray::settle(int y, const DvsSettings& settings, const Random& random
     pixels.reference[x] =
         static_cast<float>(pixels.target[x] - mismatch.leaked(number, traits, noise_rate));
     pixels.refractory_left[x] = 0;
-    if (pixels.growth[x].value != 0) pixels.growth[x] = {};
+    if (pixels.growth_end[x] != 0) pixels.growth_end[x] = 0;
     pixels.noise_budget[x] = draw_noise_budget(random, number, Purpose::first_noise, 0);
   }
 }

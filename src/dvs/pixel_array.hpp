@@ -10,7 +10,6 @@
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
-#include "src/dvs/adaptation.hpp"
 #include "src/dvs/light_response.hpp"
 #include "src/dvs/state_bytes.hpp"
 
@@ -128,8 +127,8 @@ struct PixelRow {
   float* leak;                  ///< fall of the reference per microsecond
   float* refractory_left;       ///< microseconds until the pixel can fire again; 0 = now
   std::uint32_t* noise_budget;  ///< expected shot noise until the next noise event, 1/noise_unit
-  ThresholdGrowth* growth;      ///< as of the last event
-  Cause* last_cause;            ///< of the last event; null if events have no labels
+  double* growth_end;  ///< end of the thresholds' growth, microseconds since the first frame
+  Cause* last_cause;   ///< of the last event; null if events have no labels
 };
 
 class PixelArray {
@@ -163,7 +162,7 @@ class PixelArray {
   Image<float> leak_;
   Image<float> refractory_left_;
   Image<std::uint32_t> noise_budget_;
-  Image<ThresholdGrowth> growth_;
+  Image<double> growth_end_;
   std::optional<Image<Cause>> last_cause_;
 };
 
@@ -184,10 +183,7 @@ void PixelArray::pass(State& state) {
   state.image(negative_, is_threshold);
   state.image(refractory_left_, is_within(0.0F, static_cast<float>(max_state_time)));
   state.image(noise_budget_, is_anything);
-  state.image(growth_, [](const ThresholdGrowth& growth) {
-    return is_within(0.0, max_state_clock)(growth.time) &&
-           is_within(0.0, max_state_level)(growth.value);
-  });
+  state.image(growth_end_, is_within(0.0, max_state_clock));
   if (last_cause_) state.image(*last_cause_, is_within(Cause::unknown, Cause::exposure_pulse));
 }
 

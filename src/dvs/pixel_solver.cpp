@@ -6,22 +6,8 @@
 #include <limits>
 #include <optional>
 
-#include "src/dvs/adaptation.hpp"
-
 namespace eventcamera {
 namespace {
-
-/// Times of DvsSettings in microseconds.
-struct Delays {
-  explicit Delays(const DvsSettings& settings)
-      : refractory_period(in_microseconds(settings.refractory_period)),
-        latency(in_microseconds(settings.pixel_latency)),
-        latency_jitter(in_microseconds(settings.pixel_latency_jitter)) {}
-
-  double refractory_period;
-  double latency;
-  double latency_jitter;
-};
 
 /// Signal and noise of one pixel within a sub-interval.
 struct PixelLight {
@@ -33,11 +19,11 @@ struct PixelLight {
 /// One pixel in one sub-interval. Times are microseconds after its start.
 class Pixel {
  public:
-  Pixel(const RowToSolve& row, const Delays& delays, int x, const PixelLight& light)
+  Pixel(const RowToSolve& row, int x, const PixelLight& light)
       : row_(row),
         settings_(row.settings),
-        delays_(delays),
-        adaptation_(row.settings),
+        dynamics_(row.dynamics),
+        adaptation_(row.dynamics.adaptation),
         start_(row.start),
         random_(row.random),
         sub_interval_(row.sub_interval),
@@ -53,7 +39,7 @@ class Pixel {
         ready_(pixels_.refractory_left[x]),
         released_(ready_),
         held_(settings_.refractory_reset == RefractoryReset::signal && ready_ > 0),
-        growth_(settings_.adaptation > 0 ? pixels_.growth[x] : ThresholdGrowth{}),
+        growth_end_(adaptation_.is_on() ? pixels_.growth_end[x] : 0),
         noise_{light.expected_noise, static_cast<double>(pixels_.noise_budget[x])} {
     // A falling reference is equivalent to a rising signal.
     above_leak_.slope += leak_;
@@ -72,9 +58,9 @@ class Pixel {
         held_ = false;
       }
       const double noise = noise_.next(end_.t);
-      const auto crossing = settings_.adaptation > 0 ? first_crossing(crossings, now)
-                                                     : crossings.first(reference_ - negative_,
-                                                                       reference_ + positive_, now);
+      const auto crossing = adaptation_.is_on() ? first_crossing(crossings, now)
+                                                : crossings.first(reference_ - negative_,
+                                                                  reference_ + positive_, now);
       if (noise <= (crossing ? crossing->point.t : end_.t)) {
         if (noise > now.t) now = at(noise);
         make_noise(now, noise);
@@ -105,9 +91,9 @@ class Pixel {
 
   /// First crossing of levels that approach the reference while the growth of the thresholds falls.
   std::optional<Crossing> first_crossing(const Crossings& crossings, TrajectoryPoint from) const {
-    const double growth = adaptation_.at(start_ + from.t, growth_);
-    if (growth > 0) {
-      const TrajectoryPoint faded = at(std::min(from.t + growth / adaptation_.rate(), end_.t));
+    if (growth_end_ > start_ + from.t) {
+      const double growth = adaptation_.growth(start_ + from.t, growth_end_);
+      const TrajectoryPoint faded = at(std::min(growth_end_ - start_, end_.t));
       const auto on = crossing(positive_, growth, from, faded);
       const auto off = crossing(-negative_, growth, from, faded);
       if (on && (!off || on->point.t <= off->point.t)) return on;
@@ -138,7 +124,7 @@ class Pixel {
 
   void cross(const Crossing& crossing) {
     const double threshold = crossing.polarity == Polarity::on ? positive_ : -negative_;
-    const double growth = adaptation_.at(start_ + crossing.point.t, growth_);
+    const double growth = adaptation_.growth(start_ + crossing.point.t, growth_end_);
     reference_ += threshold * (1 + growth);
     if (crossing.point.t < ready_) return;
     auto cause = Cause::unknown;
@@ -152,15 +138,14 @@ class Pixel {
 
   /// Emits an event and starts the refractory period.
   void fire(double crossed, Polarity polarity, Cause cause) {
-    if (adaptation_.is_on())
-      growth_ = {start_ + crossed, adaptation_.at(start_ + crossed, growth_) + adaptation_.step()};
-    double t = crossed + delays_.latency;
-    if (delays_.latency_jitter > 0) {
+    growth_end_ = adaptation_.prolonged(start_ + crossed, growth_end_);
+    double t = crossed + dynamics_.latency;
+    if (dynamics_.latency_jitter > 0) {
       const double jitter = random_.normal(number_, Random::Purpose::event, draw_++);
-      t = std::max(crossed, t + delays_.latency_jitter * jitter);
+      t = std::max(crossed, t + dynamics_.latency_jitter * jitter);
     }
     if (!std::isinf(positive_)) row_.add_event(x_, t, polarity, cause);
-    released_ = t + delays_.refractory_period;
+    released_ = t + dynamics_.refractory_period;
     ready_ = std::max(released_, t + min_gap);
     held_ = settings_.refractory_reset == RefractoryReset::signal;
     if (settings_.threshold_jitter > 0 && !std::isinf(positive_)) {
@@ -178,13 +163,13 @@ class Pixel {
     const double left = (held_ ? released_ : ready_) - end_.t;
     pixels_.refractory_left[x_] = static_cast<float>(std::max(0.0, left));
     pixels_.noise_budget[x_] = noise_.left();
-    if (settings_.adaptation > 0) pixels_.growth[x_] = growth_;
+    if (adaptation_.is_on()) pixels_.growth_end[x_] = growth_end_;
   }
 
   const RowToSolve& row_;
   const DvsSettings& settings_;
-  const Delays& delays_;
-  const Adaptation adaptation_;
+  const PixelDynamics& dynamics_;
+  const Adaptation& adaptation_;
   double start_;  ///< of the sub-interval, microseconds since the first frame
   const Random& random_;
   const SubInterval& sub_interval_;
@@ -202,124 +187,25 @@ class Pixel {
   double ready_;     ///< earliest time of the next event
   double released_;  ///< end of the refractory period
   bool held_;        ///< in reset until released_
-  ThresholdGrowth growth_;
+  double growth_end_;
   ShotNoise noise_;
 };
 
 }  // namespace
 
 void solve_pixels(const RowToSolve& row) {
-  const Delays delays(row.settings);
   for (std::size_t i = 0; i < row.candidates.count; ++i) {
     const int x = row.candidates.x[i];
     const auto shade = static_cast<std::size_t>(row.candidates.shade[i]);
-    const double last_target = row.candidates.last_target[i];
+    const double last_target = row.candidates.column(Candidates::last_target)[i];
     const double target = row.pixels.target[x];
     const double duration = row.sub_interval.duration;
-    const auto signal = row.settings.cutoff_frequency > 0
-                            ? Trajectory::low_pass(row.candidates.last_signal[i], last_target,
-                                                   target, duration, row.tables.bandwidth[shade])
-                            : Trajectory::line(last_target, target, duration);
-    Pixel(row, delays, x, {signal, row.pixels.signal[x], row.tables.expected_noise[shade]}).solve();
-  }
-}
-
-void solve_lines(const RowToSolve& row) {
-  const auto& [begin, duration, step, share, rise, number] = row.sub_interval;
-  const PixelRow& pixels = row.pixels;
-  const double gap = std::max(in_microseconds(row.settings.refractory_period), min_gap);
-  for (std::size_t i = 0; i < row.candidates.count; ++i) {
-    const int x = row.candidates.x[i];
-    const double first = row.candidates.last_target[i];
-    const double fall = pixels.leak[x] * duration + rise;
-    const double change = pixels.target[x] + fall - first;
-    double reference = pixels.reference[x];
-    const bool rises = change == 0 ? first > reference : change > 0;
-    const double step_to_next = rises ? pixels.positive[x] : -pixels.negative[x];
-    const double last = first + change + (rises ? rounding : -rounding);
-    double ready = pixels.refractory_left[x];
-    int happened = 0;
-    for (; happened < max_events; ++happened) {
-      const double level = reference + step_to_next;
-      if (rises ? level > last : level < last) break;
-      reference = level;
-      const double t = change == 0 ? 0 : std::clamp((level - first) / change, 0.0, 1.0) * duration;
-      if (t < ready) continue;
-      const auto polarity = rises ? Polarity::on : Polarity::off;
-      auto cause = Cause::unknown;
-      if (row.has_labels())
-        cause = row.cause_of_crossing(x, polarity, (change - fall) / duration, 0);
-      row.add_event(x, t, polarity, cause);
-      ready = t + gap;
-    }
-    if (happened == max_events) reference = first + change;
-    pixels.reference[x] = static_cast<float>(reference - fall);
-    pixels.refractory_left[x] = static_cast<float>(std::max(0.0, ready - duration));
-  }
-}
-
-void solve_adaptive_lines(const RowToSolve& row) {
-  const auto& [begin, duration, step, share, rise, number] = row.sub_interval;
-  const PixelRow& pixels = row.pixels;
-  const Adaptation adaptation(row.settings);
-  const double rate = adaptation.rate();
-  const double fading_time = 1 / rate;
-  const double gap = std::max(in_microseconds(row.settings.refractory_period), min_gap);
-  for (std::size_t i = 0; i < row.candidates.count; ++i) {
-    const int x = row.candidates.x[i];
-    const double first = row.candidates.last_target[i];
-    const double fall = pixels.leak[x] * duration + rise;
-    const double last = pixels.target[x] + fall;
-    const double slope = (last - first) / duration;
-    const double thresholds[] = {pixels.positive[x], -pixels.negative[x]};
-    const double inverse[] = {1 / thresholds[0], 1 / thresholds[1]};
-    double reference = pixels.reference[x];
-    double ready = pixels.refractory_left[x];
-    double growth = adaptation.at(row.start, pixels.growth[x]);
-    double t = 0;
-    int happened = 0;
-    for (; happened < max_events; ++happened) {
-      // The first crossing of either level.
-      double next = std::numeric_limits<double>::infinity();
-      double threshold = 0;
-      const double value = first + slope * t - reference;
-      const double left = duration - t;
-      const double fading = std::min(growth * fading_time, left);
-      for (const int level : {0, 1}) {
-        // In units of the threshold: by how much the signal is beyond the level without growth.
-        const double beyond = value * inverse[level] - 1;
-        const double speed = slope * inverse[level];
-        const double margin = rounding * std::abs(inverse[level]);
-        double wait = std::numeric_limits<double>::infinity();
-        if (beyond >= growth)
-          wait = 0;
-        else if (beyond + (speed + rate) * fading >= growth - margin)
-          wait = std::min((growth - beyond) / (speed + rate), fading);
-        else if (fading < left && beyond + speed * left >= -margin)
-          wait = std::min(-beyond / speed, left);
-        if (wait < next) {
-          next = wait;
-          threshold = thresholds[level];
-        }
-      }
-      if (threshold == 0) break;
-      growth = std::max(0.0, growth - rate * next);
-      t += next;
-      reference += threshold * (1 + growth);
-      if (t < ready) continue;
-      const auto polarity = threshold > 0 ? Polarity::on : Polarity::off;
-      auto cause = Cause::unknown;
-      if (row.has_labels())
-        cause = row.cause_of_crossing(x, polarity, slope - fall / duration,
-                                      growth > 0 ? std::abs(threshold) * rate : 0);
-      row.add_event(x, t, polarity, cause);
-      growth += adaptation.step();
-      pixels.growth[x] = {row.start + t, growth};
-      ready = t + gap;
-    }
-    if (happened == max_events) reference = last;
-    pixels.reference[x] = static_cast<float>(reference - fall);
-    pixels.refractory_left[x] = static_cast<float>(std::max(0.0, ready - duration));
+    const auto signal =
+        row.settings.cutoff_frequency > 0
+            ? Trajectory::low_pass(row.candidates.column(Candidates::last_signal)[i], last_target,
+                                   target, duration, row.tables.bandwidth[shade])
+            : Trajectory::line(last_target, target, duration);
+    Pixel(row, x, {signal, row.pixels.signal[x], row.tables.expected_noise[shade]}).solve();
   }
 }
 

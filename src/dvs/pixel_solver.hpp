@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "src/dvs/adaptation.hpp"
 #include "src/dvs/interval_events.hpp"
 #include "src/dvs/light_response.hpp"
 #include "src/dvs/moving_light.hpp"
@@ -18,30 +19,40 @@ namespace eventcamera {
 /// Maximum vector length in floats; rows of luma values are padded by this.
 inline constexpr int max_lanes = 16;
 
-/// Pixels of a row in which something may happen, and their light, by column.
-struct Candidates {
+/// Pixels of a row in which something may happen.
+class Candidates {
+ public:
+  /// Values of each of them: of the sub-interval, and, like those of PixelRow, at its start.
+  enum Column : std::size_t {
+    target,  ///< at the end of the sub-interval
+    signal,
+    last_target,
+    last_signal,
+    reference,
+    positive,
+    negative,
+    leak,
+    refractory_left,
+    columns
+  };
+
   std::size_t count = 0;
   std::vector<std::int32_t> x;
   std::vector<std::int32_t> shade;
-  std::vector<float> last_target;  ///< at the start of the sub-interval
-  std::vector<float> last_signal;
 
-  void add(int column, int its_shade, float target, float signal) {
-    x[count] = column;
-    shade[count] = its_shade;
-    last_target[count] = target;
-    last_signal[count] = signal;
-    ++count;
-  }
+  float* column(Column column) { return memory_.data() + column * x.size(); }
+  const float* column(Column column) const { return memory_.data() + column * x.size(); }
 
   /// Makes space for a row, padded for vectors.
   void resize(int width) {
     const auto size = static_cast<std::size_t>(width) + max_lanes;
     x.resize(size);
     shade.resize(size);
-    last_target.resize(size);
-    last_signal.resize(size);
+    memory_.resize(columns * size);
   }
+
+ private:
+  std::vector<float> memory_;
 };
 
 /// Parameters of filter_run(), shared by all pixels in a sub-interval.
@@ -91,9 +102,26 @@ inline constexpr int max_events = 512;
 /// Minimum time between two events of a pixel, microseconds: the resolution of event times.
 inline constexpr double min_gap = 1;
 
+/// How pixels with these settings behave over time, in microseconds.
+struct PixelDynamics {
+  explicit PixelDynamics(const DvsSettings& settings)
+      : adaptation(settings),
+        refractory_period(in_microseconds(settings.refractory_period)),
+        gap(std::max(refractory_period, min_gap)),
+        latency(in_microseconds(settings.pixel_latency)),
+        latency_jitter(in_microseconds(settings.pixel_latency_jitter)) {}
+
+  Adaptation adaptation;
+  double refractory_period;
+  double gap;  ///< minimum time between two events without latency
+  double latency;
+  double latency_jitter;
+};
+
 /// Candidates of a row to be advanced through a sub-interval.
 struct RowToSolve {
   const DvsSettings& settings;
+  const PixelDynamics& dynamics;
   const Random& random;
   const SubInterval& sub_interval;
   const ShadeTables& tables;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <algorithm>
-#include <bit>
 
 #include "src/dvs/exposure_gain.hpp"
 #include "src/dvs/pixel_solver.hpp"
@@ -53,6 +52,11 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
   const float* leaks = pixels.leak;
   const float* refractory_lefts = pixels.refractory_left;
   std::uint32_t* noise_budgets = pixels.noise_budget;
+  std::size_t found = candidates.count;
+  std::int32_t* found_x = candidates.x.data();
+  std::int32_t* found_shades = candidates.shade.data();
+  float* found_values = candidates.column(Candidates::Column{});
+  const std::size_t found_stride = candidates.x.size();
 
   for (int x = run.first; x < run.last; x += lanes, lumas += lanes, shades += lanes) {
     const int count = std::min(lanes, run.last - x);
@@ -69,7 +73,8 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     }
     if (is_partial) target = hn::Add(last_target, hn::Mul(hn::Sub(target, last_target), share));
     // A rise of all signals is equivalent to a fall of all references.
-    const auto leaked = hn::Add(hn::Mul(hn::LoadU(floats, leaks + x), duration), rise);
+    const auto leak = hn::LoadU(floats, leaks + x);
+    const auto leaked = hn::Add(hn::Mul(leak, duration), rise);
 
     auto last_signal = last_target;
     auto signal = target;
@@ -97,9 +102,11 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     const auto last = hn::Sub(signal, next_reference);
     const auto max = hn::Add(hn::Max(first, last), margin);
     const auto min = hn::Sub(hn::Min(first, last), margin);
-    auto happens = hn::Or(hn::Ge(max, hn::LoadU(floats, positives + x)),
-                          hn::Le(min, hn::Neg(hn::LoadU(floats, negatives + x))));
-    happens = hn::Or(happens, hn::Gt(hn::LoadU(floats, refractory_lefts + x), zero));
+    const auto positive = hn::LoadU(floats, positives + x);
+    const auto negative = hn::LoadU(floats, negatives + x);
+    const auto refractory_left = hn::LoadU(floats, refractory_lefts + x);
+    auto happens = hn::Or(hn::Ge(max, positive), hn::Le(min, hn::Neg(negative)));
+    happens = hn::Or(happens, hn::Gt(refractory_left, zero));
     auto noise_budget = hn::Zero(counts);
     if (row_filter.has_noise) {
       const auto noise = hn::GatherIndex(counts, tables.noise.data(), shade);
@@ -120,17 +127,28 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     hn::BlendedStore(next_reference, others, floats, references + x);
     if (row_filter.has_noise)
       hn::BlendedStore(noise_budget, hn::RebindMask(counts, others), counts, noise_budgets + x);
-    HWY_ALIGN float last_targets[max_lanes];
-    HWY_ALIGN float last_signals[max_lanes];
-    HWY_ALIGN std::int32_t shades_here[max_lanes];
-    hn::Store(last_target, floats, last_targets);
-    hn::Store(last_signal, floats, last_signals);
-    hn::Store(shade, words, shades_here);
-    for (auto bits = bits_of(floats, happens); bits != 0; bits &= bits - 1) {
-      const int i = std::countr_zero(bits);
-      candidates.add(x + i, shades_here[i], last_targets[i], last_signals[i]);
-    }
+    const FirstLanes<Floats> first_lanes(happens);
+    const auto keep_integers = [&](std::int32_t* column, hn::Vec<Words> values) HWY_ATTR {
+      const auto kept = first_lanes(hn::BitCast(floats, values));
+      hn::StoreU(hn::BitCast(words, kept), words, column + found);
+    };
+    const auto keep = [&](Candidates::Column column, hn::Vec<Floats> values) HWY_ATTR {
+      hn::StoreU(first_lanes(values), floats, found_values + column * found_stride + found);
+    };
+    keep_integers(found_x, hn::Iota(words, x));
+    keep_integers(found_shades, shade);
+    keep(Candidates::target, target);
+    keep(Candidates::signal, signal);
+    keep(Candidates::last_target, last_target);
+    keep(Candidates::last_signal, last_signal);
+    keep(Candidates::reference, reference);
+    keep(Candidates::positive, positive);
+    keep(Candidates::negative, negative);
+    keep(Candidates::leak, leak);
+    keep(Candidates::refractory_left, refractory_left);
+    found += hn::CountTrue(floats, happens);
   }
+  candidates.count = found;
 }
 
 void filter_luma(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,

@@ -3,7 +3,6 @@
 #include <bit>
 #include <cmath>
 
-#include "src/core/set_bits.hpp"
 #include "src/dvs/pixel_solver.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -68,13 +67,6 @@ HWY_INLINE Values logarithms(Values x) {
   for (int i = 13; i > 0; i -= 2) sum = hn::Add(hn::Mul(sum, s2), all(1.0 / i));
   return hn::Add(hn::Mul(hn::Add(exponent, all(0.5)), all(0.6931471805599453)),
                  hn::Mul(hn::Add(s, s), sum));
-}
-
-/// Indices that move the lanes of a mask to the front.
-HWY_INLINE auto first_lanes(std::uint64_t mask) {
-  const hn::RebindToSigned<Doubles> integers;
-  const auto lanes = hn::LoadU(hn::Rebind<std::uint8_t, Doubles>(), set_bits.of[mask]);
-  return hn::IndicesFromVec(Doubles(), hn::PromoteTo(integers, hn::PromoteTo(Words(), lanes)));
 }
 
 struct Points {
@@ -175,7 +167,7 @@ class RowSolver {
         unsolved_(unsolved),
         duration_(row.sub_interval.duration),
         has_bandwidth_(row.settings.cutoff_frequency > 0),
-        gap_(std::max(in_microseconds(row.settings.refractory_period), min_gap)) {}
+        gap_(row.dynamics.gap) {}
 
   void solve() {
     begin();
@@ -207,23 +199,18 @@ class RowSolver {
     const Doubles doubles;
     const Words words;
     const auto& candidates = row_.candidates;
-    const auto& pixels = row_.pixels;
     const auto within = hn::FirstN(words, count_ - i);
-    const auto x = hn::IfThenElseZero(within, hn::LoadU(words, candidates.x.data() + i));
     const auto shade = hn::IfThenElseZero(within, hn::LoadU(words, candidates.shade.data() + i));
-    const auto gather = [&](const float* row) {
-      return hn::PromoteTo(doubles, hn::GatherIndex(Floats(), row, x));
-    };
-    const auto load = [&](const std::vector<float>& values) {
-      return hn::PromoteTo(doubles, hn::LoadU(Floats(), values.data() + i));
+    const auto load = [&](Candidates::Column column) {
+      return hn::PromoteTo(doubles, hn::LoadU(Floats(), candidates.column(column) + i));
     };
     const auto store = [&](Column column, const Values& values) {
       hn::StoreU(values, doubles, unsolved_.column(column) + i);
     };
     const auto duration = all(duration_);
-    const auto from = load(candidates.last_target);
-    const auto fall = hn::Add(gather(pixels.leak), all(row_.sub_interval.rise / duration_));
-    const auto light_slope = hn::Div(hn::Sub(gather(pixels.target), from), duration);
+    const auto from = load(Candidates::last_target);
+    const auto fall = hn::Add(load(Candidates::leak), all(row_.sub_interval.rise / duration_));
+    const auto light_slope = hn::Div(hn::Sub(load(Candidates::target), from), duration);
     auto value = from;
     auto offset = from;
     auto bandwidth = all(0);
@@ -231,13 +218,13 @@ class RowSolver {
     if (has_bandwidth_) {
       bandwidth = hn::GatherIndex(doubles, row_.tables.bandwidth.data(),
                                   hn::PromoteTo(hn::RebindToSigned<Doubles>(), shade));
-      value = load(candidates.last_signal);
+      value = load(Candidates::last_signal);
       offset = hn::Sub(from, hn::Div(light_slope, bandwidth));
       sign = hn::CopySign(sign, hn::Sub(value, offset));
     }
-    const auto end = hn::Add(gather(pixels.signal), hn::Mul(fall, duration));
-    const auto positive = gather(pixels.positive);
-    const auto negative = gather(pixels.negative);
+    const auto end = hn::Add(load(Candidates::signal), hn::Mul(fall, duration));
+    const auto positive = load(Candidates::positive);
+    const auto negative = load(Candidates::negative);
     const auto is_upright = hn::Gt(sign, all(0));
     store(Column::index, hn::Add(hn::Iota(doubles, 0), all(static_cast<double>(i))));
     store(Column::sign, sign);
@@ -247,10 +234,10 @@ class RowSolver {
     store(Column::offset, hn::Mul(sign, offset));
     store(Column::slope, hn::Mul(sign, hn::Add(light_slope, fall)));
     store(Column::bandwidth, bandwidth);
-    store(Column::reference, hn::Mul(sign, gather(pixels.reference)));
+    store(Column::reference, hn::Mul(sign, load(Candidates::reference)));
     store(Column::to_far, hn::IfThenElse(is_upright, positive, negative));
     store(Column::to_near, hn::IfThenElse(is_upright, negative, positive));
-    store(Column::ready, gather(pixels.refractory_left));
+    store(Column::ready, load(Candidates::refractory_left));
   }
 
   /// Finds the next event of each pixel; stores pixels that have none.
@@ -348,11 +335,9 @@ class RowSolver {
          bits &= bits - 1)
       store(i + static_cast<std::size_t>(std::countr_zero(bits)));
 
-    // hn::CompressStore() is slow on some targets.
-    const auto kept_lanes = first_lanes(bits_of(doubles, happens));
+    const FirstLanes<Doubles> kept_lanes(happens);
     const auto keep = [&](Column column, const Values& values) {
-      hn::StoreU(hn::TableLookupLanes(values, kept_lanes), doubles,
-                 unsolved_.column(column) + kept);
+      hn::StoreU(kept_lanes(values), doubles, unsolved_.column(column) + kept);
     };
     const auto next_noise = load(Column::next_noise);
     keep(Column::index, load(Column::index));

@@ -177,7 +177,7 @@ TEST(State, IsRefusedIfDamaged) {
   longer.push_back(0);
   EXPECT_EQ(fault_of(sealed(longer), format, settings), "it is too long");
   auto other = state;
-  other[7] = '2';
+  other[7] = '0';
   EXPECT_EQ(fault_of(sealed(other), format, settings),
             "it is not a state that this version writes");
 }

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include <algorithm>
+#include <bit>
+
+#include "src/dvs/pixel_solver.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/dvs/line_solver.cpp"
+#include <hwy/foreach_target.h>
+// Compiled once per SIMD target.
+#include "src/core/simd-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+using Doubles = hn::CappedTag<double, max_lanes / 2>;
+using Floats = hn::Rebind<float, Doubles>;
+using Words = hn::Rebind<std::int32_t, Doubles>;
+using Bits = hn::RebindToUnsigned<Doubles>;
+using Values = hn::Vec<Doubles>;
+using Mask = hn::Mask<Doubles>;
+
+Values all(double value) {
+  return hn::Set(Doubles(), value);
+}
+
+/// A vector of candidates.
+class Pixels {
+ public:
+  /// Candidates from `first` on.
+  void begin(const RowToSolve& row, std::size_t first) {
+    first_ = first;
+    count_ = std::min(row.candidates.count - first, hn::Lanes(Doubles()));
+  }
+
+  /// Index of the first one.
+  std::size_t first() const { return first_; }
+  Mask exist() const { return hn::FirstN(Doubles(), count_); }
+
+  /// Their columns; 0 past the last candidate.
+  auto x(const RowToSolve& row) const {
+    const auto x = hn::LoadU(Words(), row.candidates.x.data() + first_);
+    const auto existing = hn::IfThenElseZero(hn::FirstN(Words(), count_), x);
+    return hn::PromoteTo(hn::RebindToSigned<Doubles>(), existing);
+  }
+
+  Values load(const RowToSolve& row, Candidates::Column column) const {
+    return hn::PromoteTo(Doubles(), hn::LoadU(Floats(), row.candidates.column(column) + first_));
+  }
+  Values load(const RowToSolve& row, const double* values) const {
+    return hn::GatherIndex(Doubles(), values, x(row));
+  }
+
+  /// Fall of the references within the sub-interval.
+  Values fall(const RowToSolve& row) const {
+    return hn::Add(hn::Mul(load(row, Candidates::leak), all(row.sub_interval.duration)),
+                   all(row.sub_interval.rise));
+  }
+
+  void store(const RowToSolve& row, Values stored, float* values) const {
+    HWY_ALIGN float lanes[max_lanes];
+    hn::Store(hn::DemoteTo(Floats(), stored), Floats(), lanes);
+    store(row, lanes, values);
+  }
+  void store(const RowToSolve& row, Values stored, double* values) const {
+    HWY_ALIGN double lanes[max_lanes];
+    hn::Store(stored, Doubles(), lanes);
+    store(row, lanes, values);
+  }
+
+  /// Stores what is left of refractory periods, if any is or was.
+  void rest(const RowToSolve& row, Values ready) const {
+    const auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval.duration)));
+    const auto is_or_was = hn::Gt(hn::Max(left, load(row, Candidates::refractory_left)), all(0));
+    if (hn::AllFalse(Doubles(), hn::And(is_or_was, exist()))) return;
+    store(row, left, row.pixels.refractory_left);
+  }
+
+ private:
+  template <class T>
+  void store(const RowToSolve& row, const T* stored, T* values) const {
+    const std::int32_t* x = row.candidates.x.data() + first_;
+    for (std::size_t lane = 0; lane < count_; ++lane) values[x[lane]] = stored[lane];
+  }
+
+  std::size_t first_;
+  std::size_t count_;
+};
+
+/// Vectors of candidates that are solved in turns: a processor overlaps their operations, which
+/// those from one crossing of a pixel to the next cannot be.
+constexpr std::size_t max_vectors = 16;
+
+/// Adds events of vectors of pixels.
+class Events {
+ public:
+  explicit Events(const RowToSolve& row)
+      : row_(row),
+        begin_(row.sub_interval.begin),
+        end_(row.events.duration()),
+        place_of_row_(static_cast<std::uint64_t>(row.pixels.y) << 48) {}
+
+  /// Adds an event at the time `t` of each pixel in `fire`. Its threshold is falling if the pixel
+  /// is in `fading`.
+  void add(const Pixels& pixels, Mask fire, Mask on, Mask fading, Values t) {
+    const Doubles doubles;
+    const Bits bits;
+    // 2^52 + n has n in its lowest bits.
+    const auto time = hn::Floor(hn::Min(hn::Add(all(begin_), t), all(end_)));
+    const auto microseconds =
+        hn::And(hn::BitCast(bits, hn::Add(time, all(0x1p52))), hn::Set(bits, 0xffffffff));
+    const auto x = hn::ShiftLeft<32>(hn::BitCast(bits, pixels.x(row_)));
+    const auto place = hn::Or(x, hn::Set(bits, place_of_row_));
+    const auto polarity =
+        hn::IfThenElseZero(hn::RebindMask(bits, on), hn::Set(bits, std::uint64_t{1} << 63));
+    const auto events = hn::Or(hn::Or(microseconds, place), polarity);
+    if (HWY_UNLIKELY(row_.has_labels())) return add_with_causes(pixels, fire, fading, events);
+    hn::StoreU(FirstLanes<Bits>(hn::RebindMask(bits, fire))(events), bits, events_ + count_);
+    count_ += hn::CountTrue(doubles, fire);
+  }
+
+  /// Must be called after each turn.
+  void flush() {
+    for (std::size_t i = 0; i < count_; ++i) row_.events.add(std::bit_cast<Event>(events_[i]));
+    count_ = 0;
+  }
+
+ private:
+  void add_with_causes(const Pixels& pixels, Mask fire, Mask fading, hn::Vec<Bits> events) const {
+    const Doubles doubles;
+    HWY_ALIGN std::uint64_t words[max_lanes];
+    hn::Store(events, Bits(), words);
+    const auto fading_bits = bits_of(doubles, fading);
+    for (auto bits = bits_of(doubles, fire); bits != 0; bits &= bits - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
+      const auto event = std::bit_cast<Event>(words[lane]);
+      const int x = event.x;
+      const bool is_on = event.polarity() == Polarity::on;
+      const double threshold = is_on ? row_.pixels.positive[x] : row_.pixels.negative[x];
+      const bool falls = (fading_bits >> lane & 1) != 0;
+      const double fall = falls ? threshold * row_.dynamics.adaptation.rate() : 0;
+      const float* last_targets = row_.candidates.column(Candidates::last_target);
+      const double rise = double{row_.pixels.target[x]} - last_targets[pixels.first() + lane];
+      const auto cause =
+          row_.cause_of_crossing(x, event.polarity(), rise / row_.sub_interval.duration, fall);
+      row_.pixels.last_cause[x] = cause;
+      row_.events.add(with_cause(event, cause));
+    }
+  }
+
+  const RowToSolve& row_;
+  double begin_;
+  double end_;
+  std::uint64_t place_of_row_;
+  std::size_t count_ = 0;
+  std::uint64_t events_[(max_vectors + 1) * max_lanes / 2];
+};
+
+/// Signals that are straight lines, of a vector of pixels.
+class Lines {
+ public:
+  // Not defaulted: GCC 12 compiles a defaulted constructor without the target's instructions.
+  Lines() {}  // NOLINT(*-member-init,*-use-equals-default)
+
+  void begin(const RowToSolve& row, std::size_t candidate) {
+    const auto zero = all(0);
+    pixels_.begin(row, candidate);
+    fall_ = pixels_.fall(row);
+    const auto first = pixels_.load(row, Candidates::last_target);
+    const auto reference = pixels_.load(row, Candidates::reference);
+    const auto change = hn::Sub(hn::Add(pixels_.load(row, Candidates::target), fall_), first);
+    is_constant_ = hn::Eq(change, zero);
+    rises_ = hn::Or(hn::Gt(change, zero), hn::And(is_constant_, hn::Gt(first, reference)));
+    first_ = upright(first);
+    rise_ = upright(change);
+    threshold_ = hn::IfThenElse(rises_, pixels_.load(row, Candidates::positive),
+                                pixels_.load(row, Candidates::negative));
+    reference_ = upright(reference);
+    ready_ = pixels_.load(row, Candidates::refractory_left);
+    crosses_ = pixels_.exist();
+  }
+
+  /// Finds the next crossing of each pixel. Returns false if there is none.
+  bool advance(const RowToSolve& row, Events& events) {
+    const Doubles doubles;
+    const auto zero = all(0);
+    const auto level = hn::Add(reference_, threshold_);
+    crosses_ = hn::And(crosses_, hn::Le(level, hn::Add(last(), all(rounding))));
+    if (hn::AllFalse(doubles, crosses_)) return false;
+    const auto share = hn::Min(hn::Max(hn::Div(hn::Sub(level, first_), rise_), zero), all(1));
+    const auto t =
+        hn::IfThenElse(is_constant_, zero, hn::Mul(share, all(row.sub_interval.duration)));
+    const auto fires = hn::And(crosses_, hn::Ge(t, ready_));
+    reference_ = hn::IfThenElse(crosses_, level, reference_);
+    ready_ = hn::IfThenElse(fires, hn::Add(t, all(row.dynamics.gap)), ready_);
+    events.add(pixels_, fires, rises_, hn::FirstN(doubles, 0), t);
+    return true;
+  }
+
+  void end(const RowToSolve& row) const {
+    const auto reference = upright(hn::IfThenElse(crosses_, last(), reference_));
+    pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
+    pixels_.rest(row, ready_);
+  }
+
+ private:
+  /// Turns signals that fall upside down, and back.
+  Values upright(Values value) const { return hn::IfThenElse(rises_, value, hn::Neg(value)); }
+  Values last() const { return hn::Add(first_, rise_); }
+
+  Pixels pixels_;
+  Mask rises_;
+  Mask is_constant_;
+  Mask crosses_;  ///< in all passes so far
+  Values fall_;   ///< of the references
+  Values first_;  ///< signals at the start of the sub-interval
+  Values rise_;   ///< of the signals, including the fall of the references
+  Values threshold_;
+  Values reference_;
+  Values ready_;  ///< earliest time of the next event
+};
+
+/// Growth of the thresholds of a vector of pixels, as a fraction of them. It falls to 0, or until
+/// the sub-interval ends.
+struct Growth {
+  Values first;
+  Values last;  ///< after the fall
+  Values rate;  ///< of the fall, per microsecond
+  Values fall;  ///< duration of the fall, microseconds
+  Values left;  ///< until the sub-interval ends
+};
+
+/// Time until signals that start at `value`, and have this slope, reach thresholds; infinite if
+/// they do not.
+HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growth& growth) {
+  const auto one = all(1);
+  const auto margin = all(rounding);
+  const auto level = hn::Mul(threshold, hn::Add(one, growth.first));
+  const auto last_level = hn::Mul(threshold, hn::Add(one, growth.last));
+  const auto value_after = [&](Values t) HWY_ATTR { return hn::Add(value, hn::Mul(slope, t)); };
+  const auto is_beyond = hn::Ge(value, level);
+  const auto meets = hn::Ge(value_after(growth.fall), hn::Sub(last_level, margin));
+  const auto reaches = hn::And(hn::Lt(growth.fall, growth.left),
+                               hn::Ge(value_after(growth.left), hn::Sub(threshold, margin)));
+  const auto way = hn::Sub(hn::IfThenElse(meets, level, threshold), value);
+  const auto approach = hn::Add(slope, hn::Mul(threshold, growth.rate));
+  const auto time = hn::Div(way, hn::IfThenElse(meets, approach, slope));
+  const auto limit = hn::IfThenElse(meets, growth.fall, growth.left);
+  const auto found = hn::IfThenElseZero(hn::Not(is_beyond), hn::Min(hn::Max(time, all(0)), limit));
+  return hn::IfThenElse(hn::Or(is_beyond, hn::Or(meets, reaches)), found, hn::Inf(Doubles()));
+}
+
+/// Like Lines, with adaptation.
+class AdaptiveLines {
+ public:
+  // Not defaulted, like that of Lines.
+  AdaptiveLines() {}  // NOLINT(*-member-init,*-use-equals-default)
+
+  void begin(const RowToSolve& row, std::size_t candidate) {
+    pixels_.begin(row, candidate);
+    fall_ = pixels_.fall(row);
+    first_ = pixels_.load(row, Candidates::last_target);
+    last_ = hn::Add(pixels_.load(row, Candidates::target), fall_);
+    slope_ = hn::Div(hn::Sub(last_, first_), all(row.sub_interval.duration));
+    positive_ = pixels_.load(row, Candidates::positive);
+    negative_ = pixels_.load(row, Candidates::negative);
+    reference_ = pixels_.load(row, Candidates::reference);
+    ready_ = pixels_.load(row, Candidates::refractory_left);
+    growth_end_ = hn::Sub(pixels_.load(row, row.pixels.growth_end), all(row.start));
+    t_ = all(0);
+    crosses_ = pixels_.exist();
+  }
+
+  /// Finds the next crossing of each pixel. Returns false if there is none.
+  bool advance(const RowToSolve& row, Events& events) {
+    const Doubles doubles;
+    const auto& adaptation = row.dynamics.adaptation;
+    const auto rate = all(adaptation.rate());
+    const auto value = hn::Sub(hn::Add(first_, hn::Mul(slope_, t_)), reference_);
+    const auto left = hn::Sub(all(row.sub_interval.duration), t_);
+    const auto growth_left = hn::Max(hn::Sub(growth_end_, t_), all(0));
+    const auto fall = hn::Min(growth_left, left);
+    const Growth growth{hn::Mul(rate, growth_left), hn::Mul(rate, hn::Sub(growth_left, fall)), rate,
+                        fall, left};
+    const auto on_wait = wait(value, slope_, positive_, growth);
+    const auto off_wait = wait(hn::Neg(value), hn::Neg(slope_), negative_, growth);
+    const auto is_on = hn::Le(on_wait, off_wait);
+    const auto least = hn::IfThenElse(is_on, on_wait, off_wait);
+    crosses_ = hn::And(crosses_, hn::Lt(least, hn::Inf(doubles)));
+    if (hn::AllFalse(doubles, crosses_)) return false;
+    t_ = hn::IfThenElse(crosses_, hn::Add(t_, least), t_);
+    const auto threshold = hn::IfThenElse(is_on, positive_, hn::Neg(negative_));
+    const auto growth_here = hn::Mul(rate, hn::Max(hn::Sub(growth_end_, t_), all(0)));
+    const auto level = hn::Add(reference_, hn::Mul(threshold, hn::Add(all(1), growth_here)));
+    reference_ = hn::IfThenElse(crosses_, level, reference_);
+    const auto fires = hn::And(crosses_, hn::Ge(t_, ready_));
+    events.add(pixels_, fires, is_on, hn::Gt(growth_end_, t_), t_);
+    const auto prolonged = hn::Add(hn::Max(t_, growth_end_), all(adaptation.duration()));
+    growth_end_ = hn::IfThenElse(fires, prolonged, growth_end_);
+    ready_ = hn::IfThenElse(fires, hn::Add(t_, all(row.dynamics.gap)), ready_);
+    return true;
+  }
+
+  void end(const RowToSolve& row) const {
+    const auto reference = hn::IfThenElse(crosses_, last_, reference_);
+    pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
+    pixels_.rest(row, ready_);
+    pixels_.store(row, hn::Add(all(row.start), growth_end_), row.pixels.growth_end);
+  }
+
+ private:
+  Pixels pixels_;
+  Mask crosses_;  ///< in all passes so far
+  Values fall_;   ///< of the references
+  Values first_;  ///< signals at the start of the sub-interval
+  Values last_;   ///< at its end, with the fall of the references
+  Values slope_;
+  Values positive_;
+  Values negative_;
+  Values reference_;
+  Values ready_;  ///< earliest time of the next event
+  Values growth_end_;
+  Values t_;  ///< of the last crossing
+};
+
+/// Finds a crossing of each vector in turn, and then the next ones.
+template <class Signals>
+void solve_in_turns(const RowToSolve& row) {
+  Events events(row);
+  Signals signals[max_vectors];
+  std::size_t crossing[max_vectors];
+  const std::size_t lanes = hn::Lanes(Doubles());
+  for (std::size_t first = 0; first < row.candidates.count; first += max_vectors * lanes) {
+    const std::size_t vectors =
+        std::min((row.candidates.count - first + lanes - 1) / lanes, max_vectors);
+    for (std::size_t i = 0; i < vectors; ++i) {
+      signals[i].begin(row, first + i * lanes);
+      crossing[i] = i;
+    }
+    std::size_t left = vectors;
+    for (int event = 0; event < max_events && left > 0; ++event) {
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < left; ++i) {
+        crossing[kept] = crossing[i];
+        if (signals[crossing[i]].advance(row, events)) ++kept;
+      }
+      events.flush();
+      left = kept;
+    }
+    for (std::size_t i = 0; i < vectors; ++i) signals[i].end(row);
+  }
+}
+
+void solve(const RowToSolve& row) {
+  solve_in_turns<Lines>(row);
+}
+
+void solve_adaptive(const RowToSolve& row) {
+  solve_in_turns<AdaptiveLines>(row);
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace eventcamera {
+
+HWY_EXPORT(solve);
+HWY_EXPORT(solve_adaptive);
+
+void solve_lines(const RowToSolve& row) {
+  HWY_DYNAMIC_DISPATCH(solve)(row);
+}
+
+void solve_adaptive_lines(const RowToSolve& row) {
+  HWY_DYNAMIC_DISPATCH(solve_adaptive)(row);
+}
+
+}  // namespace eventcamera
+#endif  // HWY_ONCE
