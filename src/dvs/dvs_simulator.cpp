@@ -72,11 +72,14 @@ struct alignas(64) Scratch {
   Candidates candidates;
   UnsolvedPixels unsolved;
   std::vector<std::uint16_t> luma;    ///< a row, padded for vectors
-  std::vector<std::uint16_t> moving;  ///< a row of a tile for each blended frame, padded
+  std::vector<std::uint16_t> moving;  ///< a run for each blended frame, padded
 };
 
+/// Longest run of pixels that move, so that all its blended frames stay in a cache.
+constexpr int max_moving = 8 * MotionTiles::width;
+
 /// Elements from one row of Scratch::moving to the next.
-constexpr int moving_stride = MotionTiles::width + max_lanes;
+constexpr int moving_stride = max_moving + max_lanes;
 
 /// An interval in a number of steps.
 struct Plan {
@@ -268,46 +271,56 @@ class PixelSimulator final : public DvsSimulator {
     for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
       scratch.moving.resize(static_cast<std::size_t>(max_steps) * moving_stride);
       for (int top = rows.first; top < rows.last; top += MotionTiles::height) {
-        const auto tile_at = [&](int x) {
+        const auto tile_at = [&](int x) -> const MotionTiles::Tile& {
           return tiles_.at(x / MotionTiles::width, top / MotionTiles::height);
         };
-        // Row by row, which leaves the events of a microsecond in raster order.
+        // Row by row, which leaves the events of a microsecond nearly in raster order.
         for (int y = top; y < std::min(top + MotionTiles::height, rows.last); ++y) {
           const PixelRow pixels = pixels_.row(y);
-          for (int left = 0; left < format().width;) {
-            const auto tile = tile_at(left);
-            int right = left + MotionTiles::width;
-            while (tile.steps == 1 && right < format().width && tile_at(right).steps == 1)
-              right += MotionTiles::width;
-            right = std::min(right, format().width);
-            advance_moving({y, left, right}, pixels, tile, flow, scratch, events);
-            left = right;
+          widen(now_.row(y), format().width, scratch.luma.data());
+          Run run{y, 0, 0};  // of tiles with these steps
+          int steps = 1;
+          for (int left = 0; left < format().width; left += MotionTiles::width) {
+            const auto& tile = tile_at(left);
+            const int right = std::min(left + MotionTiles::width, format().width);
+            const bool is_resting = rests({y, left, right}, pixels, tile, scratch);
+            const bool is_full = steps > 1 && run.width() == max_moving;
+            if (is_resting || is_full || tile.steps != steps) {
+              advance_moving(run, pixels, steps, flow, scratch, events);
+              run.first = is_resting ? right : left;
+              steps = tile.steps;
+            }
+            run.last = right;
           }
+          advance_moving(run, pixels, steps, flow, scratch, events);
         }
       }
     });
   }
 
-  /// Advances a run of a tile through the interval.
-  void advance_moving(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
+  /// Advances a run of a tile through the interval if it moves, but none of its pixels can fire.
+  bool rests(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
+             const Scratch& scratch) const {
+    if (tile.steps == 1 || current_.cutoff_frequency > 0 || gain_ != 1) return false;
+    const void* now = scratch.luma.data() + run.first;
+    return rest_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now}, pixels, run);
+  }
+
+  /// Advances a run of tiles with these steps through the interval.
+  void advance_moving(const Run& run, const PixelRow& pixels, int steps,
                       const ImageView<Flow>& flow, Scratch& scratch,
                       const IntervalEvents::Band& events) {
-    const void* now = scratch.luma.data();
-    widen(now_.row(run.y) + run.first, run.width(), scratch.luma.data());
+    if (run.width() == 0) return;
+    if (steps > 1)
+      move_light(Warp<Pixel>{last_.view(), now_.view(), steps}, flow, run, scratch.moving.data(),
+                 moving_stride);
+    const void* now = scratch.luma.data() + run.first;
     const bool has_bandwidth = current_.cutoff_frequency > 0;
-    if (tile.steps > 1) {
-      if (!has_bandwidth && gain_ == 1 &&
-          rest_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now}, pixels, run))
-        return;
-      move_light(Warp<Pixel>{last_.view(), now_.view(), tile.steps}, flow, run,
-                 scratch.moving.data(), moving_stride);
-    }
-    const Plan& plan = plans_[static_cast<std::size_t>(tile.steps)];
+    const Plan& plan = plans_[static_cast<std::size_t>(steps)];
     for (std::size_t i = 0; i < plan.sub_intervals.size(); ++i) {
       const int step = plan.sub_intervals[i].step;
-      const void* luma = step < tile.steps
-                             ? scratch.moving.data() + std::ptrdiff_t{step - 1} * moving_stride
-                             : now;
+      const void* luma =
+          step < steps ? scratch.moving.data() + std::ptrdiff_t{step - 1} * moving_stride : now;
       advance_run({luma, has_bandwidth ? luma : now}, run, pixels, plan, i, scratch, events);
     }
   }
