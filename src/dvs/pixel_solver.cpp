@@ -108,14 +108,20 @@ class Pixel {
   std::optional<Crossing> crossing(double threshold, double growth, TrajectoryPoint from,
                                    TrajectoryPoint to) const {
     if (std::isinf(threshold)) return std::nullopt;
-    // A falling level is equivalent to a rising signal.
+    const double level = reference_ + threshold * (1 + growth);
     const double rise = threshold * adaptation_.rate();
+    if (above_leak_.lag == 0) {  // most straight lines stay below the falling one
+      const double sign = threshold > 0 ? 1 : -1;
+      const double last_level = level - rise * (to.t - from.t);
+      if (sign * (from.value - level) < 0 && sign * (to.value - last_level) < -rounding)
+        return std::nullopt;
+    }
+    // A falling level is equivalent to a rising signal.
     auto signal = above_leak_;
     signal.slope += rise;
     signal.offset -= rise * from.t;
     const Crossings crossings(signal, {to.t, to.value + rise * (to.t - from.t)});
     constexpr double never = std::numeric_limits<double>::infinity();
-    const double level = reference_ + threshold * (1 + growth);
     auto found =
         threshold > 0 ? crossings.first(-never, level, from) : crossings.first(level, never, from);
     if (found) found->point.value -= rise * (found->point.t - from.t);
