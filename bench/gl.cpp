@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Time per frame of the simulators on the GPU, in its parts, beside those on the CPU: the three
-// scenes, scaled to each size. Prints a table.
+// Time per frame of the simulators on the GPU, in its parts, beside those on the CPU: the first
+// clip of each scene, scaled to each size. Prints a table.
 //   meson devenv -C build-bench bench/gl_bench [WIDTHxHEIGHT...]
 #include <gst/app/gstappsrc.h>
 #include <gst/gst.h>

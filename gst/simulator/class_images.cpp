@@ -50,7 +50,8 @@ std::string size_of(const GstVideoInfo& video) {
 GstVideoInfo format_of(const CompanionPad::Item& image, const GstVideoInfo& video) {
   GstVideoInfo format;
   const bool is_known = gst_video_info_from_caps(&format, image.caps.get()) != FALSE;
-  if (!is_known || size_of(format) != size_of(video))
+  if (!is_known || GST_VIDEO_INFO_WIDTH(&format) != GST_VIDEO_INFO_WIDTH(&video) ||
+      GST_VIDEO_INFO_HEIGHT(&format) != GST_VIDEO_INFO_HEIGHT(&video))
     throw VideoSimulatorError({GST_CORE_ERROR_NEGOTIATION,
                                "The class images have " + (is_known ? size_of(format) : "unknown") +
                                    " pixels, and the video " + size_of(video) +

@@ -21,8 +21,8 @@
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/readout.hpp"
 #include "src/dvs/state_bytes.hpp"
-#include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
+#include "src/simulate/frame_flow.hpp"
 
 namespace eventcamera {
 namespace {
@@ -107,7 +107,7 @@ class PixelSimulator final : public DvsSimulator {
     pass(reader);
     reader.finish();
     responses_ = responses(current_, luma_bits(current_), gain_);
-    finder_.reset();
+    frame_flow_.forget();
   }
 
  private:
@@ -152,7 +152,7 @@ class PixelSimulator final : public DvsSimulator {
 
   void start(const LumaView& frame) override {
     keep(frame, last_);
-    finder_.reset();
+    frame_flow_.forget();
     sub_interval_count_ = 0;
     clock_ = 0;
     fired_.reset();
@@ -206,7 +206,7 @@ class PixelSimulator final : public DvsSimulator {
     responses_ = responses(current_, luma_bits(current_), gain_);
     if (current_.upsampling == Upsampling::linear) return;
     expose(last_, format().bits, current_.linear_light, gain, threads());
-    finder_.reset();  // knows it as it was
+    frame_flow_.forget();  // knows it as it was
   }
 
   /// Returns the duration of the interval in microseconds.
@@ -236,13 +236,13 @@ class PixelSimulator final : public DvsSimulator {
     const bool is_limited = current_.max_rate > 0;
     sorted_.resize(unread_.size());
     unread_.write_to(sorted_.data(), threads());
-    readout_->pass(sorted_, duration, is_limited ? current_.max_rate : unlimited, events);
+    readout_->read(sorted_, duration, is_limited ? current_.max_rate : unlimited, events);
     if (!is_limited) readout_.reset();  // no events are waiting any more
   }
 
   /// Advances all pixels with linear interpolation.
   void advance_straight(double duration, bool is_exposed) {
-    finder_.reset();  // its last frame is outdated
+    frame_flow_.forget();  // it is not told of this frame
     begin_plans(duration, 1, is_exposed);
     const bool is_widened = luma_bits(current_) != format().bits;
     for_each_band([&](const BandRows& rows, Scratch& scratch, const IntervalEvents::Band& events) {
@@ -371,15 +371,11 @@ class PixelSimulator final : public DvsSimulator {
 
   ImageView<Flow> find_flow() {
     if (given_flow_) {
-      finder_.reset();  // its last frame is outdated
+      frame_flow_.forget();
       return *given_flow_;
     }
-    if (!finder_) finder_.emplace(FlowMethod::dis_lq, format().width, format().height);
-    const auto luma = [this](const Image<Pixel>& frame) {
-      return LumaView{format(), frame.view().data, frame.stride()};
-    };
     const Box changed = changed_box(last_.view(), now_.view(), 0);
-    return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), changed, threads());
+    return frame_flow_.find(FlowMethod::dis_lq, format().bits, last_, now_, changed, threads());
   }
 
   RowFilter filter_of(const SubInterval& sub_interval, const ShadeTables& tables) const {
@@ -511,9 +507,7 @@ class PixelSimulator final : public DvsSimulator {
   std::optional<Readout> readout_;
   std::vector<Scratch> scratch_;  ///< by thread
 
-  std::optional<RegionOfInterestFlow> finder_;
-  Grey8 last_grey_;
-  Grey8 grey_;
+  FrameFlow frame_flow_;
   MotionTiles tiles_;
 };
 

@@ -4,19 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "src/dvs/run.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "src/simulate/warp.hpp"
 
 namespace eventcamera {
-
-/// Pixels [first, last) of a row.
-struct Run {
-  int y;
-  int first;
-  int last;
-
-  int width() const { return last - first; }
-};
 
 /// Writes the luma of a run of pixels that move along the flow: a row for each blended frame j = 1
 /// ... steps - 1, at out + (j - 1) * stride. 8-bit frames (which must be views of Images) are

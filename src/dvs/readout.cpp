@@ -21,7 +21,7 @@ void Readout::reset() {
   idle_from_ = 0;
 }
 
-void Readout::pass(std::span<const Event> in, double duration, double events_per_second,
+void Readout::read(std::span<const Event> in, double duration, double events_per_second,
                    EventBuckets& out) {
   const double time_per_event = 1e6 / events_per_second;
   out.reset(1, 1);

@@ -28,7 +28,7 @@ class Readout {
 
   /// Admits the sorted events of an interval of `duration` microseconds, with_cause(), and fills
   /// `out` with those read out within it; the others wait for the next interval.
-  void pass(std::span<const Event> in, double duration, double events_per_second,
+  void read(std::span<const Event> in, double duration, double events_per_second,
             EventBuckets& out);
 
   /// Passes the waiting events to a StateWriter or StateReader.

@@ -2,12 +2,10 @@
 #include "src/simulate/dense_simulator.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
-#include "src/core/luma.hpp"
-#include "src/flow/region_of_interest_flow.hpp"
 #include "src/simulate/difference.hpp"
+#include "src/simulate/frame_flow.hpp"
 #include "src/simulate/interpolation.hpp"
 
 namespace eventcamera {
@@ -26,7 +24,7 @@ class InterpolatingSimulator final : public DenseSimulator {
 
   void start(const LumaView& frame) override {
     last_.assign(frame.as<Pixel>());
-    finder_.reset();
+    frame_flow_.forget();
   }
 
   void simulate(const LumaView& frame, const StepTimes& steps, const Settings& settings,
@@ -46,25 +44,18 @@ class InterpolatingSimulator final : public DenseSimulator {
   /// them.
   ImageView<Flow> find_flow(const Thresholds& thresholds) {
     if (given_flow_) {
-      finder_.reset();  // its last frame is outdated
+      frame_flow_.forget();
       return *given_flow_;
     }
-    if (!finder_ || finder_->method() != flow_)
-      finder_.emplace(flow_, format().width, format().height);
-    const auto luma = [this](const Image<Pixel>& frame) {
-      return LumaView{format(), frame.view().data, frame.stride()};
-    };
     const Box changed =
         changed_box(last_.view(), now_.view(), std::min(thresholds.positive, thresholds.negative));
-    return finder_->find(last_grey_.of(luma(last_)), grey_.of(luma(now_)), changed, threads());
+    return frame_flow_.find(flow_, format().bits, last_, now_, changed, threads());
   }
 
   Image<Pixel> last_;
   Image<Pixel> now_;
   InterpolationKernel kernel_;
-  std::optional<RegionOfInterestFlow> finder_;
-  Grey8 last_grey_;
-  Grey8 grey_;
+  FrameFlow frame_flow_;
 };
 
 }  // namespace
