@@ -170,7 +170,7 @@ class DvsSimulator final : public Simulator {
         between_(format.width, format.height),
         denoised_(format.width, format.height) {
     if (settings.upsampling == Upsampling::motion)
-      flow_.emplace(FlowMethod::dis_lq, format.width, format.height);
+      flow_.emplace(FlowMethod::dis_mq, format.width, format.height);
   }
 
  private:

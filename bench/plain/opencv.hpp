@@ -31,12 +31,13 @@ class OpenCvFlow {
  public:
   OpenCvFlow(FlowMethod method, int width, int height) : method_(method) {
     if (method == FlowMethod::farneback) return;
-    const bool high = method != FlowMethod::dis_lq;
+    const bool high = method == FlowMethod::dis_hq;
     const int patch = high ? 8 : 4;
     dis_->setPatchSize(patch);
     dis_->setPatchStride(high ? 4 : 3);
     dis_->setGradientDescentIterations(high ? 32 : 8);
-    dis_->setFinestScale(high ? 1 : std::max(0, coarsest_scale(width, height, patch) - 2));
+    const int third = std::max(0, coarsest_scale(width, height, patch) - 2);
+    dis_->setFinestScale(high ? 1 : method == FlowMethod::dis_mq ? std::min(third, 3) : third);
     dis_->setUseSpatialPropagation(false);
   }
 

@@ -375,7 +375,7 @@ class PixelSimulator final : public DvsSimulator {
       return *given_flow_;
     }
     const Box changed = changed_box(last_.view(), now_.view(), 0);
-    return frame_flow_.find(FlowMethod::dis_lq, format().bits, last_, now_, changed, threads());
+    return frame_flow_.find(FlowMethod::dis_mq, format().bits, last_, now_, changed, threads());
   }
 
   RowFilter filter_of(const SubInterval& sub_interval, const ShadeTables& tables) const {

@@ -39,12 +39,13 @@ struct Flow {
   float y;
 };
 
-/// Dense-flow algorithms.
+/// Dense-flow algorithms. The property `flow` has the values of those that it offers.
 enum class FlowMethod {
   dis_lq,      ///< DIS, low quality and fast: patches of 4 at strides of 3, 8 iterations, 3 scales
   dis_hq,      ///< DIS, high quality: patches of 8 at strides of 4, 32 iterations
   farneback,   ///< Farneback: up to 4 levels, window 15, 3 iterations, polynomials of 5 pixels
   opencv_dis,  ///< OpenCV's DIS with the parameters of dis_hq; only in builds with OpenCV
+  dis_mq,      ///< dis_lq with more scales: down to an eighth of the size in large frames
 };
 
 /// Dense optical flow between 8-bit images of any size. Each image is used twice, first as the

@@ -12,6 +12,8 @@ std::unique_ptr<DenseFlow> make_dense_flow(FlowMethod method) {
   switch (method) {
     case FlowMethod::dis_lq:
       return std::make_unique<DisFlow>(DisFlow::low);
+    case FlowMethod::dis_mq:
+      return std::make_unique<DisFlow>(DisFlow::medium);
     case FlowMethod::dis_hq:
       return std::make_unique<DisFlow>(DisFlow::high);
     case FlowMethod::farneback:

@@ -780,7 +780,7 @@ TEST_P(AlongMotion, EqualsTheReference) {
   std::vector<TimedEvent> expected;
   std::set<int> steps_seen;
   Image<std::uint8_t> last;
-  const auto finder = make_dense_flow(FlowMethod::dis_lq);
+  const auto finder = make_dense_flow(FlowMethod::dis_mq);
   ThreadPool threads;
   for (int i = 0; i < 3; ++i) {
     // A square crosses a texture that hardly moves, and an area that is flat.

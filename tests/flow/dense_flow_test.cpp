@@ -40,13 +40,16 @@ struct Method {
   std::unique_ptr<DenseFlow> make() const { return make_dense_flow(method); }
   Image<Flow> reference(const Picture& from, const Picture& to) const {
     if (method == FlowMethod::farneback) return reference::farneback(from, to);
-    return reference::dis(padded(from), padded(to),
-                          method == FlowMethod::dis_lq ? DisFlow::low : DisFlow::high);
+    const auto quality = method == FlowMethod::dis_lq   ? DisFlow::low
+                         : method == FlowMethod::dis_mq ? DisFlow::medium
+                                                        : DisFlow::high;
+    return reference::dis(padded(from), padded(to), quality);
   }
 };
 
 // A search of DIS may stop a step earlier or later where its error hardly changes.
 constexpr Method methods[] = {{"dis_lq", FlowMethod::dis_lq, 1e-3, 0.05},
+                              {"dis_mq", FlowMethod::dis_mq, 1e-3, 0.05},
                               {"dis_hq", FlowMethod::dis_hq, 1e-3, 0.05},
                               {"farneback", FlowMethod::farneback, 1e-4, 1e-4},
                               {"opencv_dis", FlowMethod::opencv_dis, 0.02, 0.5}};
@@ -90,6 +93,26 @@ TEST_P(EveryFlow, EqualsItsReferenceOnEveryTarget) {
   EXPECT_LT(error.max, method.max_error);
   targets::for_each(
       [&](const char* target) { EXPECT_TRUE(equal(flow_of(from, to), best)) << "on " << target; });
+}
+
+/// Where it has more scales than dis_lq. Coarse scales would make noise of a fine texture.
+TEST(DisMediumQuality, EqualsItsReferenceInLargePictures) {
+  const auto picture = [](double left, double top) {
+    const auto texture = scene::texture<std::uint8_t>(200, 70, 8, left, top);
+    Picture large(800, 280);
+    for (int y = 0; y < large.height(); ++y)
+      for (int x = 0; x < large.width(); ++x) large.at(x, y) = texture.at(x / 4, y / 4);
+    return large;
+  };
+  const auto from = picture(0, 0);
+  const auto to = picture(-1.5, 0.75);
+  ASSERT_LT(DisFlow::medium.finest_scale(800, 280), DisFlow::low.finest_scale(800, 280));
+  ThreadPool threads;
+  const auto flow =
+      copy(make_dense_flow(FlowMethod::dis_mq)->find(from.view(), to.view(), threads));
+  const auto error = difference(flow, reference::dis(from, to, DisFlow::medium));
+  EXPECT_LT(error.mean, 1e-3);
+  EXPECT_LT(error.max, 0.05);
 }
 
 TEST_P(EveryFlow, IsNothingBetweenEqualPictures) {
@@ -154,7 +177,9 @@ TEST_P(EveryMethod, PointsFromTheEarlierFrameToTheLater) {
       y += flow.row(v)[u].y;
     }
   }
-  const double error = GetParam().method == FlowMethod::dis_lq ? 0.8 : 0.2;
+  const auto method = GetParam().method;
+  const bool is_coarse = method == FlowMethod::dis_lq || method == FlowMethod::dis_mq;
+  const double error = is_coarse ? 0.8 : 0.2;
   EXPECT_NEAR(x / (160 * 240), 3, error);
   EXPECT_NEAR(y / (160 * 240), -2, error);
 }

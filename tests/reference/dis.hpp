@@ -337,7 +337,7 @@ inline Image<Flow> dis(const Grey& from, const Grey& to, const DisFlow::Quality&
   const int coarsest = static_cast<int>(
       std::min(std::floor(std::log2(std::max(width, height) / (4.0 * quality.patch)) + 0.5),
                std::log2(std::min(width, height) / quality.patch)));
-  const int finest = quality.scales == 0 ? 1 : std::max(0, coarsest - quality.scales + 1);
+  const int finest = std::min(quality.max_finest, std::max(0, coarsest - quality.scales + 1));
   std::vector<std::pair<Grey, Grey>> levels;
   for (int scale = finest; scale <= coarsest; ++scale) {
     const int factor = levels.empty() ? 1 << finest : 2;

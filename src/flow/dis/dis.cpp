@@ -40,7 +40,7 @@ int DisFlow::Quality::coarsest_scale(int width, int height) const {
 }
 
 int DisFlow::Quality::finest_scale(int width, int height) const {
-  return scales == 0 ? 1 : std::max(0, coarsest_scale(width, height) - scales + 1);
+  return std::clamp(coarsest_scale(width, height) - scales + 1, 0, max_finest);
 }
 
 DisFlow::Level::Level(const AreaShrink& shrink_, const Quality& quality)

@@ -20,16 +20,19 @@ class DisFlow final : public DenseFlow {
     int patch;   ///< side, 4 or 8 pixels
     int stride;  ///< patch * (1 - overlap), rounded down
     int iterations;
-    int scales;  ///< number of pyramid levels; 0 = from the coarsest to half the size
+    int scales;      ///< minimum number of pyramid levels
+    int max_finest;  ///< limit of finest_scale()
 
     /// Number of times an image is halved for the coarsest level. There, the largest displacement
     /// to be found, a quarter of the longer side, is about one patch, and the shorter side at least
     /// one patch.
     int coarsest_scale(int width, int height) const;
+    /// Number of times an image is halved for the finest level.
     int finest_scale(int width, int height) const;
   };
-  static constexpr Quality low = {4, 3, 8, 3};
-  static constexpr Quality high = {8, 4, 32, 0};
+  static constexpr Quality low = {4, 3, 8, 3, 31};
+  static constexpr Quality medium = {4, 3, 8, 3, 3};
+  static constexpr Quality high = {8, 4, 32, 1, 1};
 
   /// Smaller images are padded, by replicating their border, to this width and height.
   static constexpr int min_side = 64;
