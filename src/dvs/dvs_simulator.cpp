@@ -283,7 +283,7 @@ class PixelSimulator final : public DvsSimulator {
           for (int left = 0; left < format().width; left += MotionTiles::width) {
             const auto& tile = tile_at(left);
             const int right = std::min(left + MotionTiles::width, format().width);
-            const bool is_resting = rests({y, left, right}, pixels, tile, scratch);
+            const bool is_resting = rest({y, left, right}, pixels, tile, scratch);
             const bool is_full = steps > 1 && run.width() == max_moving;
             if (is_resting || is_full || tile.steps != steps) {
               advance_moving(run, pixels, steps, flow, scratch, events);
@@ -298,9 +298,10 @@ class PixelSimulator final : public DvsSimulator {
     });
   }
 
-  /// Advances a run of a tile through the interval if it moves, but none of its pixels can fire.
-  bool rests(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
-             const Scratch& scratch) const {
+  /// Advances a run of a tile that moves through the interval if none of its pixels can fire.
+  /// Otherwise returns false.
+  bool rest(const Run& run, const PixelRow& pixels, const MotionTiles::Tile& tile,
+            const Scratch& scratch) const {
     if (tile.steps == 1 || current_.cutoff_frequency > 0 || gain_ != 1) return false;
     const void* now = scratch.luma.data() + run.first;
     return rest_run(filter_of(whole_, *whole_tables_), range_of(tile), {now, now}, pixels, run);

@@ -68,6 +68,7 @@ class IntervalEvents {
           slices_(*events.events_, band),
           deferred_(&events.deferred_[static_cast<std::size_t>(band)]) {}
 
+    /// Duration of the interval, microseconds.
     double duration() const { return duration_; }
 
     /// Adds an event within the interval.
