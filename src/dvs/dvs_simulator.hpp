@@ -23,7 +23,7 @@ class DvsSimulator : public Simulator {
   /// are the same. There must have been a frame.
   virtual std::vector<std::uint8_t> state() = 0;
 
-  /// Limit of the size of a state, bytes: a pixel has about 50, and 16 for each event that is late.
+  /// Limit of the size of a state, bytes: a pixel has about 40, and 16 for each event that is late.
   std::size_t max_state_size() const {
     return (std::size_t{1} << 20) + std::size_t{1024} * static_cast<std::size_t>(format().width) *
                                         static_cast<std::size_t>(format().height);

@@ -53,10 +53,6 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
   const float* refractory_lefts = pixels.refractory_left;
   std::uint32_t* noise_budgets = pixels.noise_budget;
   std::size_t found = candidates.count;
-  std::int32_t* found_x = candidates.x.data();
-  std::int32_t* found_shades = candidates.shade.data();
-  float* found_values = candidates.column(Candidates::Column{});
-  const std::size_t found_stride = candidates.x.size();
 
   for (int x = run.first; x < run.last; x += lanes, lumas += lanes, shades += lanes) {
     const int count = std::min(lanes, run.last - x);
@@ -133,10 +129,10 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
       hn::StoreU(hn::BitCast(words, kept), words, column + found);
     };
     const auto keep = [&](Candidates::Column column, hn::Vec<Floats> values) HWY_ATTR {
-      hn::StoreU(first_lanes(values), floats, found_values + column * found_stride + found);
+      hn::StoreU(first_lanes(values), floats, candidates.column(column) + found);
     };
-    keep_integers(found_x, hn::Iota(words, x));
-    keep_integers(found_shades, shade);
+    keep_integers(candidates.x.data(), hn::Iota(words, x));
+    keep_integers(candidates.shade.data(), shade);
     keep(Candidates::target, target);
     keep(Candidates::signal, signal);
     keep(Candidates::last_target, last_target);
