@@ -34,6 +34,8 @@ WindowQueue::Skipped WindowQueue::add(std::span<const Event> events, Microsecond
   const auto clipped = std::ranges::find_if(
       events, [&](const Event& event) { return base + event.t >= start / microsecond; });
   events = events.subspan(static_cast<std::size_t>(clipped - events.begin()));
+  start_ = of_intervals() ? std::max(start, reached_.value_or(start)) : start_.value_or(start);
+  validator_.pass(*start_ / microsecond);
   const std::size_t before = events_.size();
   const auto fitting = events.first(std::min(events.size(), max_events - (before - first_)));
   events_.resize(before + fitting.size());
@@ -47,12 +49,9 @@ WindowQueue::Skipped WindowQueue::add(std::span<const Event> events, Microsecond
   skipped.excess = events.size() - fitting.size();
   events_.erase(out, events_.end());
 
-  if (!start_) start_ = start;
-  Nanoseconds reached = std::max(reached_.value_or(end), end);
-  if (!events_.empty()) reached = std::max(reached, events_.back().t * microsecond);
-  reached_ = reached;
-  if (settings_.events == 0 && settings_.duration == 0)
-    intervals_.push_back({start, end, events_.size()});
+  end = std::max(end, reached_.value_or(end));
+  if (of_intervals()) intervals_.push_back({*start_, end, events_.size()});
+  reached_ = events_.empty() ? end : std::max(end, events_.back().t * microsecond);
   return skipped;
 }
 

@@ -54,8 +54,9 @@ class WindowQueue {
       : settings_(settings), validator_(width, height) {}
 
   /// Adds an interval, and those of its events that are not before `start`; their times are
-  /// relative to `base`. Late events count as events of the end of the last window. Afterwards,
-  /// call next() until there is no more window. Throws std::bad_alloc.
+  /// relative to `base`. Late events count as events of the end of the last window, or interval
+  /// where windows consist of intervals. Afterwards, call next() until there is no more window.
+  /// Throws std::bad_alloc.
   Skipped add(std::span<const Event> events, Microseconds base, Nanoseconds start, Nanoseconds end);
 
   /// Returns the next window if it is complete.
@@ -77,6 +78,7 @@ class WindowQueue {
     std::size_t last;  ///< past its last event
   };
 
+  bool of_intervals() const { return settings_.events == 0 && settings_.duration == 0; }
   void drop_returned();
   std::size_t index_at(Nanoseconds time) const;
   std::optional<Window> next_by_time();
@@ -89,7 +91,7 @@ class WindowQueue {
   std::vector<AbsoluteEvent> events_;
   std::size_t first_ = 0;             ///< of the events in the next window
   std::size_t returned_ = 0;          ///< past the last event that was in a window
-  std::optional<Nanoseconds> start_;  ///< of the next window by time
+  std::optional<Nanoseconds> start_;  ///< of the next window by time, or of the last interval
   std::optional<Nanoseconds> reached_;
   std::deque<Interval> intervals_;  ///< of the next window of intervals
 };

@@ -88,6 +88,15 @@ TEST_F(PairsOfIntervals, EndWithAShortOne) {
   EXPECT_EQ(found, (std::vector<Found>{{0, 2 * ms, {0, 1}}, {2 * ms, 3 * ms, {2}}}));
 }
 
+/// An interval that steps back begins where the last one ended, and so do its events.
+TEST_F(PairsOfIntervals, NeverGoBack) {
+  queue.add({}, 0, 2 * ms, 3 * ms);
+  queue.add(std::vector{Event::at(0, 0, 0, Polarity::on)}, 1000, 1 * ms, 2 * ms);
+  const auto window = queue.next();
+  EXPECT_EQ(found_of(*window), (Found{2 * ms, 3 * ms, {0}}));
+  EXPECT_EQ(window->events.front().t, 3000);
+}
+
 struct ByTime : Windows {
   ByTime() : Windows({.duration = 10 * ms}) {}
 };
@@ -115,6 +124,14 @@ TEST_F(ByTime, KeepLateEventsAtTheEndOfTheLast) {
   add(0, 10 * ms, {1'000});
   add(5 * ms, 20 * ms, {7'000, 15'000});
   EXPECT_EQ(found, (std::vector<Found>{{0, 10 * ms, {0}}, {10 * ms, 20 * ms, {1, 2}}}));
+}
+
+TEST_F(ByTime, NeverBeginAfterTheirFirstEvent) {
+  queue.add({}, 0, 2 * ms, 3 * ms);
+  queue.add(std::vector{Event::at(0, 0, 0, Polarity::on)}, 1000, 1 * ms, 12 * ms);
+  const auto window = queue.next();
+  EXPECT_EQ(found_of(*window), (Found{2 * ms, 12 * ms, {0}}));
+  EXPECT_EQ(window->events.front().t, 2000);
 }
 
 TEST_F(ByTime, LeaveOutWhatIsBeforeTheStart) {
