@@ -406,8 +406,9 @@ class PixelSimulator final : public DvsSimulator {
         return solve_pixels(solved);
       case Solver::lines:
         return solve_lines(solved);
-      case Solver::adaptive_lines:
-        return solve_adaptive_lines(solved);
+      case Solver::varying_thresholds:
+        if (current_.shot_noise_rate > 0) solve_noisy_pixels(solved, candidates);
+        return solve_varying_thresholds(solved);
       case Solver::row:
         return solve_row(solved, scratch.unsolved);
     }

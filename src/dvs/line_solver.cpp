@@ -9,6 +9,7 @@
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
+#include "src/dvs/random-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -67,6 +68,17 @@ class Pixels {
     HWY_ALIGN double lanes[max_lanes];
     hn::Store(stored, Doubles(), lanes);
     store(row, lanes, values);
+  }
+
+  /// Stores the values of some of them.
+  void store(const RowToSolve& row, Mask some, Values stored, float* values) const {
+    HWY_ALIGN float lanes[max_lanes];
+    hn::Store(hn::DemoteTo(Floats(), stored), Floats(), lanes);
+    const std::int32_t* x = row.candidates.x.data() + first_;
+    for (auto bits = bits_of(Doubles(), some); bits != 0; bits &= bits - 1) {
+      const int lane = std::countr_zero(bits);
+      values[x[lane]] = lanes[lane];
+    }
   }
 
   /// Stores what is left of refractory periods, if any is or was.
@@ -251,11 +263,11 @@ HWY_INLINE Values wait(Values value, Values slope, Values threshold, const Growt
   return hn::IfThenElse(hn::Or(is_beyond, hn::Or(meets, reaches)), found, hn::Inf(Doubles()));
 }
 
-/// Like Lines, with adaptation.
-class AdaptiveLines {
+/// Like Lines, with thresholds that vary: by adaptation, and by jitter without mismatch.
+class VaryingThresholds {
  public:
   // Not defaulted, like that of Lines.
-  AdaptiveLines() {}  // NOLINT(*-member-init,*-use-equals-default)
+  VaryingThresholds() {}  // NOLINT(*-member-init,*-use-equals-default)
 
   void begin(const RowToSolve& row, std::size_t candidate) {
     pixels_.begin(row, candidate);
@@ -270,6 +282,7 @@ class AdaptiveLines {
     growth_end_ = hn::Sub(pixels_.load(row, row.pixels.growth_end), all(row.start));
     t_ = all(0);
     crosses_ = pixels_.exist();
+    if (row.dynamics.threshold_jitter > 0) begin_draws(row);
   }
 
   /// Finds the next crossing of each pixel. Returns false if there is none.
@@ -299,6 +312,7 @@ class AdaptiveLines {
     const auto prolonged = hn::Add(hn::Max(t_, growth_end_), all(adaptation.duration()));
     growth_end_ = hn::IfThenElse(fires, prolonged, growth_end_);
     ready_ = hn::IfThenElse(fires, hn::Add(t_, all(row.dynamics.gap)), ready_);
+    if (row.dynamics.threshold_jitter > 0) draw_thresholds(row.dynamics, fires);
     return true;
   }
 
@@ -306,10 +320,38 @@ class AdaptiveLines {
     const auto reference = hn::IfThenElse(crosses_, last_, reference_);
     pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
     pixels_.rest(row, ready_);
-    pixels_.store(row, hn::Add(all(row.start), growth_end_), row.pixels.growth_end);
+    if (row.dynamics.adaptation.is_on())
+      pixels_.store(row, hn::Add(all(row.start), growth_end_), row.pixels.growth_end);
+    if (row.dynamics.threshold_jitter > 0) {
+      pixels_.store(row, drawn_, positive_, row.pixels.positive);
+      pixels_.store(row, drawn_, negative_, row.pixels.negative);
+    }
   }
 
  private:
+  void begin_draws(const RowToSolve& row) {
+    const Bits bits;
+    const auto numbers =
+        hn::Add(hn::BitCast(bits, pixels_.x(row)), hn::Set(bits, row.pixels.first_number));
+    random_ = RandomSeries<Doubles>(row.random, numbers, Random::Purpose::event);
+    draw_ = hn::Set(bits, row.sub_interval.number * draws_per_sub_interval);
+    drawn_ = hn::FirstN(Doubles(), 0);
+  }
+
+  /// Draws the thresholds after the events of these pixels.
+  void draw_thresholds(const PixelDynamics& dynamics, Mask fire) {
+    const auto [first, second] = random_.normals(draw_);
+    const auto drawn = [&](Values normal, double mean) HWY_ATTR {
+      const auto threshold = hn::Add(all(mean), hn::Mul(all(dynamics.threshold_jitter), normal));
+      return hn::Max(threshold, all(min_threshold_of(mean)));
+    };
+    positive_ = hn::IfThenElse(fire, drawn(first, dynamics.thresholds.positive), positive_);
+    negative_ = hn::IfThenElse(fire, drawn(second, dynamics.thresholds.negative), negative_);
+    drawn_ = hn::Or(drawn_, fire);
+    const Bits bits;
+    draw_ = hn::IfThenElse(hn::RebindMask(bits, fire), hn::Add(draw_, hn::Set(bits, 1)), draw_);
+  }
+
   Pixels pixels_;
   Mask crosses_;  ///< in all passes so far
   Values fall_;   ///< of the references
@@ -322,6 +364,9 @@ class AdaptiveLines {
   Values ready_;  ///< earliest time of the next event
   Values growth_end_;
   Values t_;  ///< of the last crossing
+  RandomSeries<Doubles> random_;
+  hn::Vec<Bits> draw_;  ///< counter of the next random number
+  Mask drawn_;          ///< pixels whose thresholds were drawn
 };
 
 /// Finds a crossing of each vector in turn, and then the next ones.
@@ -356,8 +401,8 @@ void solve(const RowToSolve& row) {
   solve_in_turns<Lines>(row);
 }
 
-void solve_adaptive(const RowToSolve& row) {
-  solve_in_turns<AdaptiveLines>(row);
+void solve_varying(const RowToSolve& row) {
+  solve_in_turns<VaryingThresholds>(row);
 }
 
 }  // namespace
@@ -368,14 +413,14 @@ HWY_AFTER_NAMESPACE();
 namespace eventcamera {
 
 HWY_EXPORT(solve);
-HWY_EXPORT(solve_adaptive);
+HWY_EXPORT(solve_varying);
 
 void solve_lines(const RowToSolve& row) {
   HWY_DYNAMIC_DISPATCH(solve)(row);
 }
 
-void solve_adaptive_lines(const RowToSolve& row) {
-  HWY_DYNAMIC_DISPATCH(solve_adaptive)(row);
+void solve_varying_thresholds(const RowToSolve& row) {
+  HWY_DYNAMIC_DISPATCH(solve_varying)(row);
 }
 
 }  // namespace eventcamera

@@ -9,35 +9,29 @@ namespace {
 
 using Purpose = Random::Purpose;
 
-/// A threshold of 0 would fire forever.
-constexpr double min_threshold = 1e-3;
-
-/// Minimum threshold under mismatch, as a fraction of the mean.
-constexpr double min_share = 0.1;
-
 /// Range of the additional leak rate of hot pixels, log-uniform.
 constexpr double min_hot_hz = 10;
 constexpr double max_hot_hz = 1000;
 
-double bounded(double threshold, double mean) {
-  return std::max({threshold, min_share * mean, min_threshold});
-}
-
 }  // namespace
 
-double Mismatch::fixed_threshold(std::uint64_t pixel, Polarity polarity) const {
-  const bool is_on = polarity == Polarity::on;
-  const double mean = is_on ? settings_.positive_threshold : settings_.negative_threshold;
-  if (settings_.threshold_sigma <= 0) return std::max(mean, min_threshold);
-  const auto purpose = is_on ? Purpose::positive_threshold : Purpose::negative_threshold;
-  return bounded(mean + settings_.threshold_sigma * random_.normal(pixel, purpose), mean);
+ContrastThresholds Mismatch::fixed_thresholds(std::uint64_t pixel) const {
+  const auto mean = mean_thresholds(settings_);
+  if (settings_.threshold_sigma <= 0) return mean;
+  const auto drawn = [&](double threshold, Purpose purpose) {
+    const double deviation = settings_.threshold_sigma * random_.normals(pixel, purpose).first;
+    return std::max(threshold + deviation, min_threshold_of(threshold));
+  };
+  return {drawn(mean.positive, Purpose::positive_threshold),
+          drawn(mean.negative, Purpose::negative_threshold)};
 }
 
-double Mismatch::next_threshold(std::uint64_t pixel, Polarity polarity,
-                                std::uint64_t counter) const {
-  const double mean = fixed_threshold(pixel, polarity);
-  return bounded(mean + settings_.threshold_jitter * random_.normal(pixel, Purpose::event, counter),
-                 mean);
+ContrastThresholds Mismatch::next_thresholds(std::uint64_t pixel, std::uint64_t counter) const {
+  const auto mean = fixed_thresholds(pixel);
+  const auto [first, second] = random_.normals(pixel, Purpose::event, counter);
+  const double jitter = settings_.threshold_jitter;
+  return {std::max(mean.positive + jitter * first, min_threshold_of(mean.positive)),
+          std::max(mean.negative + jitter * second, min_threshold_of(mean.negative))};
 }
 
 double Mismatch::defect_of(std::uint64_t pixel) const {
@@ -54,13 +48,13 @@ PixelTraits Mismatch::of(std::uint64_t pixel) const {
   constexpr double never = std::numeric_limits<double>::infinity();
   if (defect_of(pixel) < settings_.dead_pixels) return {never, never, 0};
 
-  const double positive = fixed_threshold(pixel, Polarity::on);
-  const double negative = fixed_threshold(pixel, Polarity::off);
+  const auto [positive, negative] = fixed_thresholds(pixel);
   double leak_rate = settings_.leak_rate;
   if (settings_.leak_spread > 0 && leak_rate > 0) {
     // Keeps the mean over all pixels at the configured rate.
     const double spread = settings_.leak_spread * std::numbers::ln10;
-    leak_rate *= std::exp(spread * random_.normal(pixel, Purpose::leak) - spread * spread / 2);
+    leak_rate *=
+        std::exp(spread * random_.normals(pixel, Purpose::leak).first - spread * spread / 2);
   }
   if (is_hot(pixel))
     leak_rate +=

@@ -4,74 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <optional>
 
 #include "src/core/event.hpp"
 #include "src/core/image.hpp"
 #include "src/core/label.hpp"
 #include "src/dvs/light_response.hpp"
+#include "src/dvs/random.hpp"
 #include "src/dvs/state_bytes.hpp"
 
 namespace eventcamera {
-
-/// Stateless random numbers: each is a hash of seed, pixel, purpose and counter, so it does not
-/// depend on the order in which pixels are processed. The hash applies the finalizer of SplitMix64
-/// once for each of the four.
-class Random {
- public:
-  /// Use of a number; numbers for different purposes are independent.
-  enum class Purpose : std::uint64_t {
-    positive_threshold = 1,
-    negative_threshold,
-    leak,
-    leak_phase,
-    defect,
-    heat,
-    first_noise,
-    event,  ///< everything that happens to a pixel over time
-  };
-
-  explicit Random(std::uint64_t seed) : key_(mixed(seed + 0x9e3779b97f4a7c15)) {}
-
-  std::uint64_t bits(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
-    return mixed(mixed(mixed(key_ + pixel) + static_cast<std::uint64_t>(purpose)) + counter);
-  }
-
-  bool coin(std::uint64_t pixel, Purpose purpose, std::uint64_t counter) const {
-    return (bits(pixel, purpose, counter) >> 63) != 0;
-  }
-
-  /// In (0, 1).
-  double uniform(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
-    return to_uniform(bits(pixel, purpose, counter));
-  }
-
-  /// With mean and standard deviation 1.
-  double exponential(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
-    return -std::log(uniform(pixel, purpose, counter));
-  }
-
-  /// With mean 0 and standard deviation 1 (Box and Muller).
-  double normal(std::uint64_t pixel, Purpose purpose, std::uint64_t counter = 0) const {
-    const std::uint64_t first = bits(pixel, purpose, counter);
-    return std::sqrt(-2 * std::log(to_uniform(first))) *
-           std::cos(2 * std::numbers::pi * to_uniform(mixed(first + 1)));
-  }
-
- private:
-  static double to_uniform(std::uint64_t bits) {
-    return (static_cast<double>(bits >> 11) + 0.5) * 0x1p-53;
-  }
-
-  static std::uint64_t mixed(std::uint64_t z) {
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-    return z ^ (z >> 31);
-  }
-
-  std::uint64_t key_;
-};
 
 /// Draws the noise budget of a pixel: the expected shot noise until its next noise event,
 /// 1/noise_unit. Shot noise is a Poisson process whose rate depends on the light: its next event
@@ -90,6 +32,25 @@ struct PixelTraits {
   double leak;  ///< fall of the reference per microsecond
 };
 
+struct ContrastThresholds {
+  double positive;
+  double negative;
+};
+
+/// A threshold of 0 would fire forever.
+inline constexpr double min_threshold = 1e-3;
+
+/// Minimum threshold of pixels that vary around a mean.
+inline double min_threshold_of(double mean) {
+  return std::max(mean / 10, min_threshold);
+}
+
+/// Thresholds without mismatch.
+inline ContrastThresholds mean_thresholds(const DvsSettings& settings) {
+  return {std::max(settings.positive_threshold, min_threshold),
+          std::max(settings.negative_threshold, min_threshold)};
+}
+
 /// Differences between pixels, determined by the seed.
 class Mismatch {
  public:
@@ -99,8 +60,8 @@ class Mismatch {
   PixelTraits of(std::uint64_t pixel) const;
   bool is_hot(std::uint64_t pixel) const;
 
-  /// Threshold after event `counter`, if thresholds vary between events.
-  double next_threshold(std::uint64_t pixel, Polarity polarity, std::uint64_t counter) const;
+  /// Thresholds after event `counter`, if they vary between events.
+  ContrastThresholds next_thresholds(std::uint64_t pixel, std::uint64_t counter) const;
 
   /// Fall of the reference before the first frame, if noise of this rate (1/us) resets it and the
   /// camera has been on for a long time.
@@ -108,7 +69,7 @@ class Mismatch {
 
  private:
   double defect_of(std::uint64_t pixel) const;
-  double fixed_threshold(std::uint64_t pixel, Polarity polarity) const;
+  ContrastThresholds fixed_thresholds(std::uint64_t pixel) const;
 
   const DvsSettings& settings_;
   const Random& random_;

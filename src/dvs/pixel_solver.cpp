@@ -147,7 +147,7 @@ class Pixel {
     growth_end_ = adaptation_.prolonged(start_ + crossed, growth_end_);
     double t = crossed + dynamics_.latency;
     if (dynamics_.latency_jitter > 0) {
-      const double jitter = random_.normal(number_, Random::Purpose::event, draw_++);
+      const double jitter = random_.normals(number_, Random::Purpose::event, draw_++).first;
       t = std::max(crossed, t + dynamics_.latency_jitter * jitter);
     }
     if (!std::isinf(positive_)) row_.add_event(x_, t, polarity, cause);
@@ -155,9 +155,9 @@ class Pixel {
     ready_ = std::max(released_, t + min_gap);
     held_ = settings_.refractory_reset == RefractoryReset::signal;
     if (settings_.threshold_jitter > 0 && !std::isinf(positive_)) {
-      const Mismatch mismatch(settings_, random_);
-      positive_ = mismatch.next_threshold(number_, Polarity::on, draw_++);
-      negative_ = mismatch.next_threshold(number_, Polarity::off, draw_++);
+      const auto next = Mismatch(settings_, random_).next_thresholds(number_, draw_++);
+      positive_ = next.positive;
+      negative_ = next.negative;
     }
   }
 
@@ -197,32 +197,54 @@ class Pixel {
   ShotNoise noise_;
 };
 
+/// Solves candidate i.
+void solve_pixel(const RowToSolve& row, std::size_t i) {
+  const int x = row.candidates.x[i];
+  const auto shade = static_cast<std::size_t>(row.candidates.shade[i]);
+  const double last_target = row.candidates.column(Candidates::last_target)[i];
+  const double target = row.pixels.target[x];
+  const double duration = row.sub_interval.duration;
+  const auto signal =
+      row.settings.cutoff_frequency > 0
+          ? Trajectory::low_pass(row.candidates.column(Candidates::last_signal)[i], last_target,
+                                 target, duration, row.tables.bandwidth[shade])
+          : Trajectory::line(last_target, target, duration);
+  Pixel(row, x, {signal, row.pixels.signal[x], row.tables.expected_noise[shade]}).solve();
+}
+
 }  // namespace
 
 void solve_pixels(const RowToSolve& row) {
-  for (std::size_t i = 0; i < row.candidates.count; ++i) {
-    const int x = row.candidates.x[i];
-    const auto shade = static_cast<std::size_t>(row.candidates.shade[i]);
-    const double last_target = row.candidates.column(Candidates::last_target)[i];
-    const double target = row.pixels.target[x];
-    const double duration = row.sub_interval.duration;
-    const auto signal =
-        row.settings.cutoff_frequency > 0
-            ? Trajectory::low_pass(row.candidates.column(Candidates::last_signal)[i], last_target,
-                                   target, duration, row.tables.bandwidth[shade])
-            : Trajectory::line(last_target, target, duration);
-    Pixel(row, x, {signal, row.pixels.signal[x], row.tables.expected_noise[shade]}).solve();
+  for (std::size_t i = 0; i < row.candidates.count; ++i) solve_pixel(row, i);
+}
+
+void solve_noisy_pixels(const RowToSolve& row, Candidates& candidates) {
+  for (std::size_t i = 0; i < candidates.count;) {
+    auto& budget = row.pixels.noise_budget[candidates.x[i]];
+    const auto shade = static_cast<std::size_t>(candidates.shade[i]);
+    const ShotNoise noise{row.tables.expected_noise[shade], static_cast<double>(budget)};
+    if (noise.next(row.sub_interval.duration) == never) {
+      budget = noise.left();
+      ++i;
+    } else {
+      solve_pixel(row, i);
+      candidates.remove(i);
+    }
   }
 }
 
 Solver solver_for(const DvsSettings& settings) {
+  const bool has_lines = settings.cutoff_frequency == 0;
   const bool has_side_effects = settings.pixel_latency > 0 || settings.pixel_latency_jitter > 0 ||
-                                settings.threshold_jitter > 0 ||
                                 settings.refractory_reset == RefractoryReset::signal;
+  const bool has_jitter = settings.threshold_jitter > 0;
+  if (settings.adaptation > 0 || has_jitter) {
+    const bool has_many_means = has_jitter && settings.threshold_sigma > 0;
+    const bool is_fast = has_lines && !has_side_effects && !has_many_means;
+    return is_fast ? Solver::varying_thresholds : Solver::pixels;
+  }
   if (has_side_effects) return Solver::pixels;
-  const bool has_lines = settings.cutoff_frequency == 0 && settings.shot_noise_rate == 0;
-  if (settings.adaptation > 0) return has_lines ? Solver::adaptive_lines : Solver::pixels;
-  return has_lines ? Solver::lines : Solver::row;
+  return has_lines && settings.shot_noise_rate == 0 ? Solver::lines : Solver::row;
 }
 
 }  // namespace eventcamera

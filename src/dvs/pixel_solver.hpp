@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -42,6 +43,15 @@ class Candidates {
 
   float* column(Column column) { return memory_.data() + column * x.size(); }
   const float* column(Column column) const { return memory_.data() + column * x.size(); }
+
+  /// The last candidate takes the place of candidate i.
+  void remove(std::size_t i) {
+    --count;
+    x[i] = x[count];
+    shade[i] = shade[count];
+    for (std::size_t first = 0; first < memory_.size(); first += x.size())
+      memory_[first + i] = memory_[first + count];
+  }
 
   /// Makes space for a row, padded for vectors.
   void resize(int width) {
@@ -106,12 +116,16 @@ inline constexpr double min_gap = 1;
 struct PixelDynamics {
   explicit PixelDynamics(const DvsSettings& settings)
       : adaptation(settings),
+        thresholds(mean_thresholds(settings)),
+        threshold_jitter(settings.threshold_jitter),
         refractory_period(in_microseconds(settings.refractory_period)),
         gap(std::max(refractory_period, min_gap)),
         latency(in_microseconds(settings.pixel_latency)),
         latency_jitter(in_microseconds(settings.pixel_latency_jitter)) {}
 
   Adaptation adaptation;
+  ContrastThresholds thresholds;  ///< means
+  double threshold_jitter;
   double refractory_period;
   double gap;  ///< minimum time between two events without latency
   double latency;
@@ -199,16 +213,20 @@ class UnsolvedPixels {
 /// period and latency.
 void solve_pixels(const RowToSolve& row);
 
+/// Solves the candidates in which shot noise fires, one at a time, and removes them. The noise of
+/// the others is done afterwards.
+void solve_noisy_pixels(const RowToSolve& row, Candidates& candidates);
+
 /// Solvers: solve_pixels(), or a faster one for settings that allow it.
-enum class Solver { pixels, lines, adaptive_lines, row };
+enum class Solver { pixels, lines, varying_thresholds, row };
 Solver solver_for(const DvsSettings& settings);
 
 /// Like solve_pixels(), for signals that are straight lines, and events that are crossings without
 /// side effects except the refractory period.
 void solve_lines(const RowToSolve& row);
 
-/// Like solve_lines(), with adaptation.
-void solve_adaptive_lines(const RowToSolve& row);
+/// Like solve_lines(), with thresholds that vary: by adaptation, and by jitter without mismatch.
+void solve_varying_thresholds(const RowToSolve& row);
 
 /// Like solve_pixels(), for events without side effects except the refractory period; many pixels
 /// at a time.

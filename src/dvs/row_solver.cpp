@@ -10,6 +10,7 @@
 #include <hwy/foreach_target.h>
 // Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
+#include "src/dvs/elementary-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -24,49 +25,6 @@ using Mask = hn::Mask<Doubles>;
 
 Values all(double value) {
   return hn::Set(Doubles(), value);
-}
-
-/// exp(-x), like decay() of trajectory.hpp.
-HWY_INLINE Values decays(Values x) {
-  const Doubles doubles;
-  const Bits bits;
-  const auto to_integers = all(0x1.8p52);
-  x = hn::Min(x, all(700));
-  const auto shifted = hn::Add(hn::Mul(x, all(1.4426950408889634)), to_integers);
-  const auto r = hn::Sub(hn::Mul(hn::Sub(shifted, to_integers), all(0.6931471805599453)), x);
-  const auto r2 = hn::Mul(r, r);
-  const auto r4 = hn::Mul(r2, r2);
-  const auto line = [&](double a, double b) { return hn::Add(all(a), hn::Mul(r, all(b))); };
-  const auto low = hn::Add(hn::Add(all(1), r), hn::Mul(r2, line(1.0 / 2, 1.0 / 6)));
-  const auto middle = hn::Add(line(1.0 / 24, 1.0 / 120), hn::Mul(r2, line(1.0 / 720, 1.0 / 5040)));
-  const auto high = hn::Add(line(1.0 / 40320, 1.0 / 362880), hn::Mul(r2, all(1.0 / 3628800)));
-  const auto mantissa = hn::Add(low, hn::Mul(r4, hn::Add(middle, hn::Mul(r4, high))));
-  const auto exponent = hn::Sub(hn::Set(bits, std::uint64_t{1023} << 52),
-                                hn::ShiftLeft<52>(hn::BitCast(bits, shifted)));
-  return hn::Mul(mantissa, hn::BitCast(doubles, exponent));
-}
-
-/// ln(x) for normal x > 0, with a relative error of 1e-11.
-HWY_INLINE Values logarithms(Values x) {
-  const Doubles doubles;
-  const Bits bits;
-  const auto word = hn::BitCast(bits, x);
-  // 2^52 + e has the exponent e in its lowest bits.
-  const auto exponent = hn::Sub(
-      hn::BitCast(doubles,
-                  hn::Or(hn::ShiftRight<52>(word), hn::Set(bits, std::uint64_t{0x433} << 52))),
-      all(0x1p52 + 1023));
-  const auto mantissa =
-      hn::BitCast(doubles, hn::Or(hn::And(word, hn::Set(bits, (std::uint64_t{1} << 52) - 1)),
-                                  hn::Set(bits, std::uint64_t{1023} << 52)));
-  // ln((1 + s) / (1 - s)) = 2 (s + s^3 / 3 + s^5 / 5 ...), of the mantissa over sqrt(2).
-  const auto root = all(1.4142135623730951);
-  const auto s = hn::Div(hn::Sub(mantissa, root), hn::Add(mantissa, root));
-  const auto s2 = hn::Mul(s, s);
-  auto sum = all(1.0 / 15);
-  for (int i = 13; i > 0; i -= 2) sum = hn::Add(hn::Mul(sum, s2), all(1.0 / i));
-  return hn::Add(hn::Mul(hn::Add(exponent, all(0.5)), all(0.6931471805599453)),
-                 hn::Mul(hn::Add(s, s), sum));
 }
 
 struct Points {

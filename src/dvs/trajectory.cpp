@@ -10,7 +10,7 @@ TrajectoryPoint Crossings::turn_after(TrajectoryPoint from) const {
   const double final_lag = trajectory_.slope / trajectory_.bandwidth;
   const double ratio = lag_at(from) / final_lag;
   if (!(ratio > 1)) return from;  // due to rounding
-  const double t = from.t + std::log(ratio) / trajectory_.bandwidth;
+  const double t = from.t + logarithm(ratio) / trajectory_.bandwidth;
   return t < end_.t ? TrajectoryPoint{t, trajectory_.offset + trajectory_.slope * t + final_lag}
                     : end_;
 }

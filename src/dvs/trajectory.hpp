@@ -2,33 +2,12 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
-#include <cstdint>
 #include <optional>
 
 #include "src/core/event.hpp"
+#include "src/dvs/elementary.hpp"
 
 namespace eventcamera {
-
-/// exp(-x) for x >= 0 with a relative error of 1e-12: identical on every machine, branch-free and
-/// inline.
-inline double decay(double x) {
-  constexpr double log2_e = 1.4426950408889634;
-  constexpr double ln_2 = 0.6931471805599453;
-  constexpr double to_integers = 0x1.8p52;  // doubles of this magnitude are integers
-  x = std::min(x, 700.0);                   // beyond, the result is close to 0
-  const double shifted = x * log2_e + to_integers;
-  const double r = (shifted - to_integers) * ln_2 - x;  // |r| <= ln_2 / 2
-  const double r2 = r * r;
-  const double r4 = r2 * r2;
-  const double low = (1 + r) + r2 * (1.0 / 2 + r * (1.0 / 6));
-  const double middle = (1.0 / 24 + r * (1.0 / 120)) + r2 * (1.0 / 720 + r * (1.0 / 5040));
-  const double high = (1.0 / 40320 + r * (1.0 / 362880)) + r2 * (1.0 / 3628800);
-  const double mantissa = low + r4 * (middle + r4 * high);
-  // The lowest bits of `shifted` are the power of 1/2.
-  const auto exponent = (std::uint64_t{1023} << 52) - (std::bit_cast<std::uint64_t>(shifted) << 52);
-  return mantissa * std::bit_cast<double>(exponent);
-}
 
 /// Signal of a pixel over the time t in a sub-interval, microseconds: offset + slope t + lag
 /// exp(-bandwidth t).

@@ -205,6 +205,7 @@ class Esim {
 ///   noise      N = rate (1 - 3/4 b) per second; an event of random polarity each time the integral
 ///              of N has grown by a number drawn from the exponential distribution with mean 1
 ///   events     ON where V - R >= (1 + G) C+, OFF where R - V >= (1 + G) C-
+///   jitter     C+ and C- are drawn anew after each event
 ///   adaptation G grows by a with each event; dG/dt = -a / T down to 0 afterwards
 ///   reset      level: R = R +- (1 + G) C, G before the event, and after noise R = V;
 ///              signal: R = V when the refractory period ends
@@ -267,8 +268,14 @@ class DvsPixel {
       const auto fire = [&](bool is_on, Cause cause) {
         last_cause_ = cause;
         growth_ += settings_.adaptation;
-        if (!std::isinf(traits_.positive_threshold))
+        if (!std::isinf(traits_.positive_threshold)) {
           events.push_back({now_ + 1, 0, 0, is_on ? Polarity::on : Polarity::off, cause});
+          if (settings_.threshold_jitter > 0) {
+            const auto drawn = Mismatch(settings_, random_).next_thresholds(number_, draw++);
+            traits_.positive_threshold = drawn.positive;
+            traits_.negative_threshold = drawn.negative;
+          }
+        }
         ready_ = now_ + 1 + in_microseconds(settings_.refractory_period);
         if (settings_.refractory_reset == RefractoryReset::signal) reference_ = signal_;
       };
