@@ -2,22 +2,20 @@
 #include "src/dvs/readout.hpp"
 
 #include <algorithm>
-#include <utility>
+#include <cstring>
 
 namespace eventcamera {
 
 Readout::Readout(int width, int height)
     : width_(width),
+      waiting_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
       rows_(static_cast<std::size_t>(height)),
-      row_queue_(static_cast<std::size_t>(height)),
-      waits_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
+      row_queue_(static_cast<std::size_t>(height)) {}
 
 void Readout::reset() {
-  waiting_.clear();
-  free_ = none;
+  std::fill(waiting_.begin(), waiting_.end(), Waiting{0});
   std::fill(rows_.begin(), rows_.end(), Row{});
   queue_first_ = queue_count_ = 0;
-  std::fill(waits_.begin(), waits_.end(), std::uint8_t{0});
   idle_from_ = 0;
 }
 
@@ -48,38 +46,50 @@ void Readout::read(std::span<const Event> in, double duration, double events_per
 }
 
 void Readout::admit(const Event& event) {
-  if (std::exchange(waits(event), 1) != 0) return;
-  int place = free_;
-  if (place == none) {
-    place = static_cast<int>(waiting_.size());
-    waiting_.push_back({});
-  } else {
-    free_ = waiting_[static_cast<std::size_t>(place)].next;
-  }
-  waiting_[static_cast<std::size_t>(place)] = {event, none};
-  const int y = without_cause(event).y();
-  auto& row = rows_[static_cast<std::size_t>(y)];
+  const Event pixel = without_cause(event);
+  const int x = pixel.x;
+  auto& waiting = waiting_[place_of(x, pixel.y())];
+  if (waiting != 0) return;
+  const auto cause = static_cast<unsigned>(cause_of(event)) << cause_shift;
+  const auto on = event.polarity() == Polarity::on ? on_bit : Waiting{0};
+  waiting = static_cast<Waiting>(waits_bit | on | cause);
+  auto& row = rows_[static_cast<std::size_t>(pixel.y())];
   if (row.count++ == 0) {
-    row.first = place;
-    row_queue_[(queue_first_ + queue_count_++) % row_queue_.size()] = y;
+    row_queue_[(queue_first_ + queue_count_++) % row_queue_.size()] = pixel.y();
+    row.first = x;
+    row.last = x + 1;
   } else {
-    waiting_[static_cast<std::size_t>(row.last)].next = place;
+    row.first = std::min(row.first, x);
+    row.last = std::max(row.last, x + 1);
   }
-  row.last = place;
+}
+
+void Readout::append(int y, std::uint32_t t, std::vector<Event>& out) const {
+  const auto& row = rows_[static_cast<std::size_t>(y)];
+  const Waiting* waiting = waiting_.data() + place_of(0, y);
+  constexpr int block = sizeof(std::uint64_t);  // of pixels, most of which have no event
+  for (int x = row.first, left = row.count; left > 0;) {
+    std::uint64_t here = 0;
+    if (x + block <= row.last) std::memcpy(&here, waiting + x, block);
+    if (x + block <= row.last && here == 0) {
+      x += block;
+      continue;
+    }
+    if (waiting[x] != 0) {
+      const auto polarity = (waiting[x] & on_bit) != 0 ? Polarity::on : Polarity::off;
+      const auto cause = static_cast<Cause>((waiting[x] & cause_bits) >> cause_shift);
+      out.push_back(with_cause(Event::at(x, y, t, polarity), cause));
+      --left;
+    }
+    ++x;
+  }
 }
 
 void Readout::serve(int y, std::uint32_t t, std::vector<Event>& out) {
+  append(y, t, out);
   auto& row = rows_[static_cast<std::size_t>(y)];
-  for (int place = row.first; place != none;) {
-    auto& waiting = waiting_[static_cast<std::size_t>(place)];
-    waits(waiting.event) = 0;
-    waiting.event.t = t;
-    out.push_back(waiting.event);
-    const int next = waiting.next;
-    waiting.next = free_;
-    free_ = place;
-    place = next;
-  }
+  auto* waiting = waiting_.data() + place_of(0, y);
+  std::fill(waiting + row.first, waiting + row.last, Waiting{0});
   row = {};
 }
 

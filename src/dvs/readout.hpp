@@ -20,7 +20,7 @@ class Readout {
 
   /// Drops the causes of the waiting events.
   void drop_causes() {
-    for (auto& waiting : waiting_) waiting.event = without_cause(waiting.event);
+    for (auto& waiting : waiting_) waiting &= ~cause_bits;
   }
 
   /// Drops the waiting events.
@@ -36,36 +36,38 @@ class Readout {
   void pass(State& state);
 
  private:
-  static constexpr int none = -1;
+  /// Event of a pixel that waits; 0 if none. The time is that of the readout, and not kept.
+  using Waiting = std::uint8_t;
+  static constexpr Waiting waits_bit = 1;
+  static constexpr Waiting on_bit = 2;
+  static constexpr int cause_shift = 2;
+  static constexpr Waiting cause_bits = 7 << cause_shift;
 
-  struct WaitingEvent {
-    Event event;
-    int next;  ///< next entry of the same list
-  };
+  /// Columns [first, last) of a row hold its `count` waiting events.
   struct Row {
-    int first = none;
-    int last = none;
+    int first = 0;
+    int last = 0;
     int count = 0;
   };
 
   /// Its pixel must lie on the sensor.
   void admit(const Event& event);
-  void serve(int row, std::uint32_t t, std::vector<Event>& out);
+  /// Appends the waiting events of a row, with the time `t`.
+  void append(int y, std::uint32_t t, std::vector<Event>& out) const;
+  void serve(int y, std::uint32_t t, std::vector<Event>& out);
 
-  std::uint8_t& waits(const Event& event) {
-    const Event pixel = without_cause(event);
-    return waits_[static_cast<std::size_t>(pixel.y()) * static_cast<std::size_t>(width_) + pixel.x];
+  std::size_t place_of(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(x);
   }
 
   int width_;
-  std::vector<WaitingEvent> waiting_;  ///< linked lists: one per row, and one of free entries
-  int free_ = none;
+  std::vector<Waiting> waiting_;  ///< by pixel
   std::vector<Row> rows_;
   std::vector<int> row_queue_;  ///< ring of the rows with waiting events
   std::size_t queue_first_ = 0;
   std::size_t queue_count_ = 0;
-  std::vector<std::uint8_t> waits_;  ///< by pixel: 1 if its event is waiting
-  double idle_from_ = 0;             ///< microseconds after the start of the interval
+  double idle_from_ = 0;  ///< microseconds after the start of the interval
 };
 
 template <class State>
@@ -76,9 +78,7 @@ void Readout::pass(State& state) {
   std::vector<Event> events;
   for (std::size_t i = 0; i < queue_count_; ++i) {
     const int row = row_queue_[(queue_first_ + i) % row_queue_.size()];
-    for (int place = rows_[static_cast<std::size_t>(row)].first; place != none;
-         place = waiting_[static_cast<std::size_t>(place)].next)
-      events.push_back(waiting_[static_cast<std::size_t>(place)].event);
+    append(row, 0, events);
   }
   events.resize(state.count(events.size(), sizeof(Event)));
   for (auto& event : events)
