@@ -14,8 +14,8 @@ namespace eventcamera {
 /// Events added at once.
 static constexpr std::size_t block_size = 512;
 
-Chunker::Chunker(Microseconds length, Microseconds start)
-    : length_(length), first_(start), given_start_(true), start_(start) {}
+Chunker::Chunker(Microseconds length, Microseconds start, Microseconds origin)
+    : length_(length), first_(start), origin_(origin), given_start_(true), start_(start) {}
 
 void Chunker::push(std::span<const AbsoluteEvent> events) {
   // Fast path: nearly always the events are in order and can be added in blocks.
@@ -62,7 +62,10 @@ void Chunker::place(const AbsoluteEvent& event) {
     dropped_.stray += ahead_.size();
     ahead_.clear();
   }
-  if (first_ && event.t < *first_ && given_start_) return;
+  if (first_ && event.t < *first_ && given_start_) {
+    dropped_.late += static_cast<std::uint64_t>(event.t < origin_);
+    return;
+  }
   if (latest_ == never || event.t > latest_ + settled)
     ahead_.push_back(event);
   else
@@ -71,7 +74,8 @@ void Chunker::place(const AbsoluteEvent& event) {
 
 void Chunker::keep(const AbsoluteEvent& event) {
   if (event.t < start_) {
-    dropped_.late += static_cast<std::uint64_t>(!given_start_ || event.t >= *first_);
+    const bool is_ignored = given_start_ && event.t < *first_ && event.t >= origin_;
+    dropped_.late += static_cast<std::uint64_t>(!is_ignored);
     return;
   }
   auto& cell = cell_of(event.t);

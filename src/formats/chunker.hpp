@@ -44,8 +44,9 @@ class Chunker {
   /// The first interval begins at the first event.
   explicit Chunker(Microseconds length) : length_(length) {}
 
-  /// The first interval begins at `start`; earlier events are ignored.
-  Chunker(Microseconds length, Microseconds start);
+  /// The first interval begins at `start`; earlier events are ignored from `origin` on, and late
+  /// before it.
+  Chunker(Microseconds length, Microseconds start, Microseconds origin);
 
   /// Whether the next events carry labels, which are then returned with them.
   void keep_labels(bool kept) { keeps_labels_ = kept; }
@@ -94,6 +95,7 @@ class Chunker {
 
   Microseconds length_;
   std::optional<Microseconds> first_;
+  Microseconds origin_ = never;
   bool given_start_ = false;
   bool keeps_labels_ = false;
   Microseconds start_ = never;    ///< start of the next interval, once first_ is known

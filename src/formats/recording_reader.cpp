@@ -375,7 +375,8 @@ void RecordingReader::begin_segment(Microseconds start, std::optional<Microsecon
   for (auto& stream : streams_) {
     stream.position = start;
     stream.outside = 0;
-    stream.chunker = begun_ ? Chunker(chunk_length_, origin_ + start) : Chunker(chunk_length_);
+    stream.chunker =
+        begun_ ? Chunker(chunk_length_, origin_ + start, origin_) : Chunker(chunk_length_);
   }
 }
 
@@ -400,7 +401,7 @@ void RecordingReader::start_chunker(Stream& stream) {
   const bool from_first_event =
       clock_ == Clock::stream || (start_ == 0 && (!begun_ || stream.first == origin_));
   stream.chunker =
-      from_first_event ? Chunker(chunk_length_) : Chunker(chunk_length_, origin_ + start_);
+      from_first_event ? Chunker(chunk_length_) : Chunker(chunk_length_, origin_ + start_, origin_);
 }
 
 std::optional<RecordingReader::Output> RecordingReader::next() {

@@ -225,12 +225,26 @@ TEST(Chunker, CutsAnOverfullIntervalWithoutLoss) {
 TEST(Chunker, LeavesOutWhatIsBeforeItsStart) {
   std::vector<AbsoluteEvent> events;
   for (Microseconds t = 0; t < 100'000; t += 100) events.push_back(at(t));
-  Chunker chunker(length, 42'000);
+  Chunker chunker(length, 42'000, 0);
   const auto cuts = slice(chunker, events);
   ASSERT_FALSE(cuts.empty());
   EXPECT_EQ(cuts.front().start, 42'000);
   EXPECT_EQ(joined(cuts).size(), 580U);
   EXPECT_EQ(chunker.dropped().late, 0U);
+}
+
+/// Of a clock that starts over.
+TEST(Chunker, CountsWhatIsBeforeTheOrigin) {
+  std::vector<AbsoluteEvent> events;
+  for (Microseconds t = 50'000; t < 150'000; t += 100) events.push_back(at(t));
+  for (Microseconds t = 0; t < 70'000; t += 100) events.push_back(at(t));
+  for (const Microseconds start : {50'000, 100'000}) {
+    Chunker chunker(length, start, 50'000);
+    const auto cuts = slice(chunker, events);
+    EXPECT_EQ(joined(cuts).size(), static_cast<std::size_t>(150'000 - start) / 100);
+    // Before the start of a seek, events from the origin on are ignored.
+    EXPECT_EQ(chunker.dropped().late, start == 50'000 ? 700U : 500U);
+  }
 }
 
 TEST(Chunker, HandsOutWhatIsReachedAtOnce) {
