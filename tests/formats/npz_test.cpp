@@ -103,7 +103,9 @@ TEST(Npz, WhatIsWrongIsToldAndWhatIsWholeIsRead) {
   const auto events = events_of(50'000);
   auto shorter = columns_of_events(events);
   shorter[2] = columns_of_events(events_of(100))[2];
-  EXPECT_EQ(read(archive(shorter, true)).events.size(), 100U);
+  const auto cut = read(archive(shorter, true));
+  EXPECT_EQ(cut.events.size(), 100U);
+  EXPECT_EQ(cut.corruption.places, 1U);
 
   auto claims = columns_of_events(events);
   for (auto& [name, bytes] : claims) {

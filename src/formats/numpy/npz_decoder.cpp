@@ -77,12 +77,12 @@ class WholeArray final : public Elements {
 class JoinedColumns final : public Elements {
  public:
   explicit JoinedColumns(std::vector<ArrayFile> arrays) : arrays_(std::move(arrays)) {
-    header_.count = std::numeric_limits<std::uint64_t>::max();
     for (std::size_t i = 0; i < arrays_.size(); ++i) {
       auto& field = header_.fields[i] = arrays_[i].header.columns.front();
       field.offset = header_.element_bytes;
       header_.element_bytes += field.bytes;
-      header_.count = std::min(header_.count, arrays_[i].header.count);
+      // More than there are if an array is shorter, which NpyDecoder reports.
+      header_.count = std::max(header_.count, arrays_[i].header.count);
     }
   }
 
