@@ -14,12 +14,12 @@ guint64 upstream_bytes(GstPad* sink) {
   return known && size > 0 ? static_cast<guint64>(size) : 0;
 }
 
-/// Returns null at the end of the file and if reading fails.
+/// Returns null at the end of the file and if reading fails, or ends because upstream got EOS.
 GstBuffer* PadBytes::pull(std::uint64_t position, std::size_t size) noexcept {
   GstBuffer* buffer = nullptr;
   const GstFlowReturn result =
       gst_pad_pull_range(sink_, position, static_cast<guint>(size), &buffer);
-  if (result != GST_FLOW_EOS) flow_ = result;
+  if (result != GST_FLOW_EOS || position < upstream_bytes(sink_)) flow_ = result;
   return result == GST_FLOW_OK ? buffer : nullptr;
 }
 

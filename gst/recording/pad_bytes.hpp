@@ -21,7 +21,7 @@ class PadBytes final : public eventcamera::ByteSource {
   std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override;
   bool failed() const noexcept override { return flow_ != GST_FLOW_OK; }
 
-  /// Reason for a failed read.
+  /// Reason for a failed read; GST_FLOW_EOS if upstream was stopped before the end of the file.
   GstFlowReturn flow() const { return flow_; }
 
   /// Clears a failed read.

@@ -20,7 +20,12 @@ void EventReader::loop(gpointer data) {
   gst_pad_pause_task(self.sink_);
   if (result == GST_FLOW_FLUSHING) return;
   auto* const element = self.element_;
-  if (result != GST_FLOW_EOS) wait_until_added(element);
+  const bool is_unbegun = result == GST_FLOW_EOS && !self.has_no_more_pads_;
+  if (result != GST_FLOW_EOS || is_unbegun) wait_until_added(element);
+  if (is_unbegun)
+    post_message(element, GST_MESSAGE_ERROR,
+                 {GST_STREAM_ERROR_FAILED, "Stopped before the recording began."},
+                 "EOS while its start was read");
   if (result == GST_FLOW_NOT_LINKED)
     post_message(element, GST_MESSAGE_ERROR, not_linked(), "streaming stopped, reason not-linked");
   else if (result != GST_FLOW_EOS && result != GST_FLOW_ERROR)
