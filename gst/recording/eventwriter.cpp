@@ -170,22 +170,6 @@ static gboolean sink_query(GstPad* pad, GstObject* parent, GstQuery* query) {
   }
 }
 
-static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
-  const auto& priv = priv_of(self);
-  GstCaps* caps = nullptr;
-  gst_event_parse_caps(event, &caps);
-  GstEventCameraInfo info;
-  if (!gst_event_camera_info_from_caps(&info, caps)) {
-    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
-    return FALSE;
-  }
-  if (priv.state && priv.state->info.width == info.width && priv.state->info.height == info.height)
-    return TRUE;
-  if (priv.state && priv.state->written && !priv.writable.accepts({info.width, info.height}))
-    return FALSE;
-  return reported(self, [&] { return negotiate(self, info); }) == GST_FLOW_OK;
-}
-
 /* data */
 
 /// Maximum bytes per buffer.
@@ -350,10 +334,20 @@ static GstFlowReturn push_patch(GstEventWriter* self, eventcamera::FilePatch pat
   return push_bytes(self, GST_CLOCK_TIME_NONE, GST_CLOCK_TIME_NONE);
 }
 
+/// A stream without buffers may have no segment.
+static void ensure_segment(GstPad* src) {
+  if (GstEvent* const sticky = gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0))
+    return gst_event_unref(sticky);
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  gst_pad_push_event(src, gst_event_new_segment(&segment));
+}
+
 static void end_file(GstEventWriter* self) {
   auto& priv = priv_of(self);
   if (!priv.state) return;
   priv.writable.end_file();
+  ensure_segment(priv.src);
   reported(self, [&] {
     GstFlowReturn result = push_header(self, GST_CLOCK_TIME_NONE);
     if (result != GST_FLOW_OK) return result;
@@ -366,6 +360,31 @@ static void end_file(GstEventWriter* self) {
     auto patch = priv.state->encoder->patch();
     return result == GST_FLOW_OK && patch ? push_patch(self, *std::move(patch)) : result;
   });
+}
+
+/// False for words without a header, which have the sensor's size in their caps and may follow
+/// those of another sensor.
+static bool is_file(const State& state) {
+  return gst_structure_has_name(gst_caps_get_structure(state.caps.get(), 0),
+                                GST_EVENT_CAMERA_MEDIA_TYPE) == FALSE;
+}
+
+static gboolean take_caps(GstEventWriter* self, GstEvent* event) {
+  const auto& priv = priv_of(self);
+  GstCaps* caps = nullptr;
+  gst_event_parse_caps(event, &caps);
+  GstEventCameraInfo info;
+  if (!gst_event_camera_info_from_caps(&info, caps)) {
+    GST_ERROR_OBJECT(self, "%" GST_PTR_FORMAT " are not event caps", caps);
+    return FALSE;
+  }
+  if (priv.state && priv.state->info.width == info.width && priv.state->info.height == info.height)
+    return TRUE;
+  if (priv.state && priv.state->written) {
+    if (is_file(*priv.state) && !priv.writable.accepts({info.width, info.height})) return FALSE;
+    end_file(self);
+  }
+  return reported(self, [&] { return negotiate(self, info); }) == GST_FLOW_OK;
 }
 
 /// After a flush: filesink has truncated the file, and a decoder expects a header.

@@ -68,6 +68,28 @@ TEST_P(EveryWord, FollowsGapsAndFlushes) {
   EXPECT_EQ(pull_events(reader), std::vector{moved});
 }
 
+TEST_P(EveryWord, FollowsASizeThatChanges) {
+  Writer writer("evtenc", std::string("application/x-event-camera, format=") + GetParam());
+  Reader reader("evtdec", caps);
+  const auto pass = [&](const AbsoluteEvent& event) {
+    writer.write(event, event.t);
+    Buffer words = writer.pull();
+    ASSERT_TRUE(words);
+    gst_harness_set_src_caps_str(reader.get(), writer.out_caps().c_str());
+    reader.push(words.release());
+  };
+  const auto first = AbsoluteEvent::at(300, 4, 10'000, Polarity::on);
+  const auto second = AbsoluteEvent::at(60, 40, 50'000, Polarity::off);
+  pass(first);
+  gst_harness_set_src_caps_str(
+      writer.get(), "application/x-event-camera, format=XYTP, width=64, height=48, framerate=30/1");
+  pass(second);
+  EXPECT_EQ(writer.error(), "");
+  gst_harness_push_event(reader.get(), gst_event_new_eos());
+  EXPECT_EQ(pull_events(reader), (std::vector{first, second}));
+  EXPECT_NE(reader.out_caps().find("width=(int)64"), std::string::npos);
+}
+
 TEST_P(EveryWord, FillBuffersOfALimitedSize) {
   constexpr gsize max_size = 100;
   Writer writer("evtenc mtu=100", caps);

@@ -108,6 +108,17 @@ TEST_P(EveryFormat, IsWrittenAnewAfterAFlush) {
   EXPECT_EQ(h.left_out(), "");
 }
 
+TEST_P(EveryFormat, IsWrittenWithoutAnyBuffer) {
+  Harness h(format().writer);
+  gst_harness_set_sink_caps_str(h.get(), format().caps.c_str());
+  const Owned<GstCaps> caps(gst_caps_from_string(events_caps.c_str()));
+  gst_harness_push_event(h.get(), gst_event_new_stream_start("empty"));
+  gst_harness_push_event(h.get(), gst_event_new_caps(caps.get()));
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  EXPECT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
+  EXPECT_EQ(h.error(), "");
+}
+
 TEST_P(EveryFormat, IsOfOneSize) {
   Writer h(format());
   h.write(AbsoluteEvent::at(5, 5, 1000, Polarity::on), 0);
