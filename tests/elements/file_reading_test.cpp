@@ -92,7 +92,7 @@ TEST_P(EveryFormat, IsEmptyWhereThereAreNoEvents) {
             std::string::npos);
   EXPECT_TRUE(h.pull_event(GST_EVENT_SEGMENT));
   EXPECT_TRUE(h.pull_event(GST_EVENT_EOS));
-  EXPECT_EQ(h.warning(), "The file has a header, but no events.");
+  EXPECT_EQ(h.warning(), "The file has no events.");
   EXPECT_EQ(h.error(), "");
 }
 
