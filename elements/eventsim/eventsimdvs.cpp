@@ -426,17 +426,15 @@ static void save(eventcamera::IntervalSimulator& simulator, GObject* object) {
   const auto location = choice_of(object).copy().final_state;
   if (location.empty()) return;
   const auto bytes = static_cast<DvsSimulator&>(simulator).state();
-  GError* error = nullptr;
-  if (g_file_set_contents(location.c_str(), reinterpret_cast<const gchar*>(bytes.data()),
-                          static_cast<gssize>(bytes.size()), &error) != FALSE)
-    return;
-  const std::string cause = error->message;
-  g_error_free(error);
-  throw VideoSimulatorError(
-      {GST_RESOURCE_ERROR_WRITE, "Cannot write the state to \"" + location +
-                                     "\". Give final-state a file in a folder that can be "
-                                     "written, with enough space."},
-      cause);
+  try {
+    write_bytes(location, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  } catch (const std::runtime_error& error) {
+    throw VideoSimulatorError(
+        {GST_RESOURCE_ERROR_WRITE, "Cannot write the state to \"" + location +
+                                       "\". Give final-state a file in a folder that can be "
+                                       "written, with enough space."},
+        error.what());
+  }
 }
 
 static std::string fault_of(GObject* object) {

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/named_file.hpp"
 
+#include <glib.h>
+
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <system_error>
 
@@ -27,4 +30,23 @@ std::string read_bytes(const std::string& location, std::size_t max_size) {
   }
   if (std::ferror(file.get()) != 0) throw std::system_error(errno, std::generic_category());
   return bytes;
+}
+
+void write_bytes(const std::string& location, std::string_view bytes) {
+  std::error_code none;
+  const auto status = std::filesystem::symlink_status(location, none);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(location.c_str(), "wb"));
+    if (!file || std::fwrite(bytes.data(), 1, bytes.size(), file.get()) != bytes.size() ||
+        std::fflush(file.get()) != 0)
+      throw std::system_error(errno, std::generic_category());
+    return;
+  }
+  GError* error = nullptr;
+  if (g_file_set_contents(location.c_str(), bytes.data(), static_cast<gssize>(bytes.size()),
+                          &error))
+    return;
+  const std::string cause = error->message;
+  g_error_free(error);
+  throw std::runtime_error(cause);
 }

@@ -6,10 +6,15 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 /// Reads a file of at most `max_size` bytes, a multiple of 1024. Throws std::runtime_error with the
 /// reason if it cannot be read or is larger.
 std::string read_bytes(const std::string& location, std::size_t max_size);
+
+/// Writes a file, as a whole or not at all if it is a regular one. A link is followed, and a device
+/// gets the bytes. Throws std::runtime_error with the reason.
+void write_bytes(const std::string& location, std::string_view bytes);
 
 /// Returns parse(bytes) of the file that a property `location` names. An exception becomes a
 /// std::runtime_error that says that `what` cannot be read from there, and why.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventsim-dvs in segments: with the state that one leaves behind, the next makes the events that
 // the whole video has.
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -118,6 +119,15 @@ TEST(Segments, ReportAStateThatCannotBeWritten) {
   push_frames(h, 0, 2);
   gst_harness_push_event(h.get(), gst_event_new_eos());
   EXPECT_NE(h.error().find("Cannot write the state to \"/nowhere/state\""), std::string::npos);
+}
+
+TEST(Segments, LeaveADeviceInItsPlace) {
+  Harness h("eventsim-dvs final-state=/dev/null");
+  start(h);
+  push_frames(h, 0, 2);
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  EXPECT_EQ(h.error(), "");
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
 }
 
 }  // namespace

@@ -56,13 +56,11 @@ std::vector<PixelPosition> read_hot_pixels(const std::string& location) {
 }
 
 void write_hot_pixels(const std::string& location, const std::vector<PixelPosition>& pixels) {
-  const std::string text = eventcamera::pixel_list_text(pixels);
-  GError* error = nullptr;
-  if (g_file_set_contents(location.c_str(), text.data(), static_cast<gssize>(text.size()), &error))
-    return;
-  const std::string cause = error->message;
-  g_error_free(error);
-  throw std::runtime_error("cannot write the hot pixels \"" + location + "\": " + cause);
+  try {
+    write_bytes(location, eventcamera::pixel_list_text(pixels));
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error("cannot write the hot pixels \"" + location + "\": " + error.what());
+  }
 }
 
 class HotPixels final : public EventFilterOf<HotPixelFilter, Settings> {

@@ -10,6 +10,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "gst/base/named_file.hpp"
+
 using eventcamera::CauseCounts;
 using eventcamera::interval_shares;
 using eventcamera::StreamFigures;
@@ -19,7 +21,6 @@ namespace {
 struct Unref {
   void operator()(JsonNode* node) const { json_node_unref(node); }
   void operator()(JsonGenerator* generator) const { g_object_unref(generator); }
-  void operator()(GError* error) const { g_error_free(error); }
   void operator()(gchar* text) const { g_free(text); }
 };
 template <class Type>
@@ -80,13 +81,7 @@ void write_json(const GstStructure* structure, const std::string& path) {
   json_generator_set_root(generator.get(), root.get());
   gsize length = 0;
   const Owned<gchar> text(json_generator_to_data(generator.get(), &length));
-  const std::string line = std::string(text.get(), length) + "\n";
-  GError* error = nullptr;
-  if (!g_file_set_contents_full(path.c_str(), line.data(), static_cast<gssize>(line.size()),
-                                G_FILE_SET_CONTENTS_NONE, 0666, &error)) {
-    const Owned<GError> owned(error);
-    throw std::runtime_error(owned->message);
-  }
+  write_bytes(path, std::string(text.get(), length) + "\n");
 }
 
 }  // namespace
