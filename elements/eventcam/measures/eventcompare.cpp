@@ -102,6 +102,7 @@ class EventCompare final : public EventAggregator {
   bool waits_for_reference() const;
   void forget();
   bool begin();
+  bool has_one_size() const;
   void compare(StreamRole role, GstBuffer* buffer);
   GstFlowReturn take_next();
   void conclude();
@@ -283,6 +284,13 @@ GstFlowReturn EventCompare::aggregate(bool) {
     conclude();
     return GST_FLOW_EOS;
   }
+  return has_one_size() ? take_next() : GST_FLOW_NOT_NEGOTIATED;
+}
+
+/* negotiation, states */
+
+/// False, after an error message, if both sensors are known and differ.
+bool EventCompare::has_one_size() const {
   const auto& reference = sensors_[StreamRole::reference];
   const auto& candidate = sensors_[StreamRole::candidate];
   if (reference && candidate && *reference != *candidate) {
@@ -291,21 +299,24 @@ GstFlowReturn EventCompare::aggregate(bool) {
                        "pixels, the candidate %d x %d; scale one of them.",
                        reference->width, reference->height, candidate->width, candidate->height),
                       ("width or height differ in the caps of the two sink pads"));
-    return GST_FLOW_NOT_NEGOTIATED;
+    return false;
   }
-  return take_next();
+  return true;
 }
-
-/* negotiation, states */
 
 bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
   const Sensor next{info.width, info.height};
-  if (sensor != next) forget();
+  if (sensor == next) return true;
+  const bool has_begun = comparison_.has_value();
+  if (has_begun && !concluded_) conclude();
+  forget();
   sensor = next;
-  return true;
+  // At once, because aggregate() waits for both streams, and a source whose size changes may wait
+  // for one of them. Before the comparison, caps may change until there are events.
+  return !has_begun || has_one_size();
 }
 
 void EventCompare::stop() {
