@@ -24,3 +24,10 @@ inline bool plays_events(gpointer element, const GstSegment& segment, const char
   }
   return true;
 }
+
+/// The same of a SEGMENT event.
+inline bool plays_events(gpointer element, GstEvent* event, const char* verb) {
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(event, &segment);
+  return plays_events(element, *segment, verb);
+}

@@ -213,6 +213,37 @@ TEST_F(StatsTest, GoesOnWhereTimeGoesBackAndWherePtsAreMissing) {
   EXPECT_NEAR(number_in(structure_of(message), "rate"), 100, 1e-9);
 }
 
+TEST_F(StatsTest, WritesToALinkAndADevice) {
+  const auto measure = [](const std::string& location) {
+    Harness h("eventstats location=" + in_quotes(location));
+    h.caps(small_sensor);
+    h.push(buffer_of(0, {Event::at(1, 0, 5, Polarity::on)}, 10 * ms));
+    gst_harness_push_event(h.get(), gst_event_new_eos());
+    return h.error();
+  };
+  const auto file = path("f.json");
+  std::filesystem::create_symlink("f.json", path("link"));
+  for (int times = 0; times < 2; ++times) {
+    EXPECT_EQ(measure(path("link")), "");
+    EXPECT_TRUE(std::filesystem::is_symlink(path("link")));
+    EXPECT_TRUE(std::filesystem::remove(file));
+  }
+  EXPECT_EQ(measure("/dev/null"), "");
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  EXPECT_NE(measure("/dev/full"), "");
+}
+
+TEST_F(StatsTest, RefusesEventsWithoutTimes) {
+  for (const std::string element : {"eventstats", "rtpeventpay", "eventdatagrampay"}) {
+    Harness h(element);
+    h.caps(small_sensor, "ANY");
+    push_segment(h.get(), GST_FORMAT_BYTES);
+    const auto error = h.error();
+    EXPECT_NE(error.find("this stream has no timestamps"), std::string::npos)
+        << element << ": " << error;
+  }
+}
+
 /// Sets an element to PAUSED and returns its error.
 std::string refusal_of(const std::string& launch) {
   gst_init(nullptr, nullptr);
@@ -422,6 +453,20 @@ TEST_F(CompareTest, RefusesSensorsOfTwoSizes) {
       gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
   ASSERT_TRUE(message);
   EXPECT_NE(text_of(message.get()).find("8 x 4 pixels, the candidate 9 x 4"), std::string::npos);
+}
+
+/// At once, because a source whose size changes may wait for one of the streams itself.
+TEST_F(CompareTest, ReportsAndRefusesAChangeOfSize) {
+  make();
+  begin();
+  for (auto* h : {reference, candidate})
+    gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+  gst_harness_set_src_caps_str(reference,
+                               "application/x-event-camera, format=XYTP, width=9, height=4");
+  const Owned<GstMessage> error(
+      gst_bus_timed_pop_filtered(compare->bus.get(), 5 * GST_SECOND, GST_MESSAGE_ERROR));
+  ASSERT_TRUE(error);
+  EXPECT_NE(text_of(error.get()).find("9 x 4 pixels, the candidate 8 x 4"), std::string::npos);
 }
 
 TEST_F(CompareTest, BeginsAnewAfterAFlush) {

@@ -47,6 +47,7 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event_validator.hpp"
 #include "src/core/sensor_size.hpp"
@@ -253,6 +254,10 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
     case GST_EVENT_GAP:
       take_gap(self, event);
       break;
+    case GST_EVENT_SEGMENT:
+      if (plays_events(self, event, "measure")) break;
+      gst_event_unref(event);
+      return FALSE;
     case GST_EVENT_EOS:
       conclude(self, self->priv->settings.copy());
       break;

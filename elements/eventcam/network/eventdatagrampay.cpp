@@ -40,6 +40,7 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "src/wire/datagram_packer.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_datagram_pay_debug);
@@ -267,6 +268,10 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       take_gap(self, event);
       break;
     case GST_EVENT_SEGMENT:  // the times of waiting events are those of the last one
+      flush(self);
+      if (plays_events(self, event, "send")) break;
+      gst_event_unref(event);
+      return FALSE;
     case GST_EVENT_EOS:
       GST_DEBUG_OBJECT(pad, "sending what waits before %s", GST_EVENT_TYPE_NAME(event));
       flush(self);

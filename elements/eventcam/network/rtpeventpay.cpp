@@ -41,6 +41,7 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -300,6 +301,11 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
         priv.state->pending.clear();
       }
       break;
+    case GST_EVENT_SEGMENT:
+      reported(self, [&] { send(self); });
+      if (plays_events(self, event, "send")) break;
+      gst_event_unref(event);
+      return FALSE;
     case GST_EVENT_EOS:
       GST_DEBUG_OBJECT(self, "the stream ends");
       [[fallthrough]];
