@@ -111,6 +111,26 @@ TEST_F(OverlayTest, GoesOnThroughGapsAndPastTheEndOfEvents) {
   EXPECT_EQ(rest, nullptr);
 }
 
+TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
+  begin("width=8, height=4");
+  gst_harness_push_event(video.get(), gst_event_new_gap(0, 40 * ms));  // before any frame
+  push_events(0, {});
+  push_frame(40 * ms);
+  push_events(40 * ms, {});
+  EXPECT_EQ(drawn(), Places{});
+  gst_harness_push_event(video.get(), gst_event_new_gap(80 * ms, 40 * ms));
+  push_events(80 * ms, {Event::at(1, 0, 5, Polarity::on)});
+  push_frame(120 * ms);
+  push_events(120 * ms, {});
+  EXPECT_EQ(drawn(), Places{});
+  EXPECT_EQ(last_pts, 120 * ms);
+  GstClockTime start = GST_CLOCK_TIME_NONE;
+  while (const Owned<GstEvent> event{gst_harness_try_pull_event(video.get())})
+    if (GST_EVENT_TYPE(event.get()) == GST_EVENT_GAP)
+      gst_event_parse_gap(event.get(), &start, nullptr);
+  EXPECT_EQ(start, 80 * ms);
+}
+
 TEST_F(OverlayTest, GoesOnThroughGapsWithoutCaps) {
   gst_harness_set_src_caps_str(video.get(),
                                "video/x-raw, format=GRAY8, width=8, height=4, framerate=25/1");
