@@ -62,6 +62,15 @@ static bool would_seek(GstAggregatorPad* pad, const SeekRequest& request) {
   return seekable && request.apply(segment);
 }
 
+/// Sends an event to all sink pads. Returns true if each upstream takes it.
+static gboolean forward(GstAggregator* element, GstEvent* event) {
+  bool taken = true;
+  for (const auto& pad : sink_pads(element))
+    taken &= gst_pad_push_event(GST_PAD(pad.get()), gst_event_ref(event)) != FALSE;
+  gst_event_unref(event);
+  return taken ? TRUE : FALSE;
+}
+
 /// Answers a caps query on a pad whose buffers are passed through: the caps that downstream
 /// accepts.
 static void answer_caps_of_passed(GstAggregator* aggregator, GstAggregatorPad* pad,
@@ -149,12 +158,22 @@ struct EventAggregatorFunctions {
       gst_event_unref(event);
       return FALSE;
     }
+    if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE && pad == self.main_pad_)
+      guard(self, [&] {
+        self.drain();
+        return GST_FLOW_OK;
+      });
     return PARENT_AGGREGATOR_CLASS->sink_event(element, pad, event);
   }
 
   static gboolean src_event(GstAggregator* element, GstEvent* event) {
     if (GST_EVENT_TYPE(event) == GST_EVENT_SEEK) {
       const SeekRequest request(event);
+      if (of(element).main_pad_ == nullptr && !request.flushes()) {
+        GST_WARNING_OBJECT(element, "does not flush: refused %" GST_PTR_FORMAT, event);
+        gst_event_unref(event);
+        return FALSE;
+      }
       for (const auto& pad : sink_pads(element)) {
         if (would_seek(pad.get(), request)) continue;
         GST_WARNING_OBJECT(pad.get(), "upstream would refuse: refused %" GST_PTR_FORMAT, event);
@@ -162,6 +181,8 @@ struct EventAggregatorFunctions {
         return FALSE;
       }
       GST_DEBUG_OBJECT(element, "forwarding %" GST_PTR_FORMAT, event);
+      // GstAggregator would apply it to its segment at once, before that of the main pad is there.
+      if (!request.flushes()) return forward(element, event);
     }
     return PARENT_AGGREGATOR_CLASS->src_event(element, event);
   }

@@ -15,9 +15,9 @@
 /// GstEventAggregator owns one, which lives as long as the element.
 ///
 /// One sink pad is the main pad: its segment is that of the output, and its upstream answers
-/// seeking queries. If pads are requested there is none; the subclass sets the segment, and
-/// upstream of the first pad answers. A seek is forwarded to all pads, or to none if one of them
-/// would refuse it.
+/// seeking queries. If pads are requested there is none; the subclass sets the segment, upstream of
+/// the first pad answers, and a seek must flush, because pads reach it at different times. A seek
+/// is forwarded to all pads, or to none if one of them would refuse it.
 ///
 /// Called from the source pad's thread only, or while there is none.
 class EventAggregator {
@@ -48,6 +48,8 @@ class EventAggregator {
   virtual bool take_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
   /// Handles a new segment of the main pad, before the pad stores it. May throw.
   virtual void take_segment(const GstSegment&) {}
+  /// Pushes what waits for more input of the main pad, at the end of its segment. May throw.
+  virtual void drain() {}
   /// Like GstAggregatorClass::aggregate. May throw.
   virtual GstFlowReturn aggregate(bool timed_out) = 0;
   /// Like GstAggregatorClass::get_next_time: when to continue without further input from live

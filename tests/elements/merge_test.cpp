@@ -408,6 +408,17 @@ TEST(Merge, SeeksInAllRecordings) {
   EXPECT_EQ(sorted(player.events), sorted(expected));
 }
 
+/// Streams reach it at different times.
+TEST(Merge, RefusesASeekThatDoesNotFlush) {
+  const Recordings recordings;
+  Player player("eventmerge name=m  " + recordings.a.source() + "evtdec ! m.sink_0  " +
+                recordings.b.source() + "evtdec ! m.sink_1  m.");
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED)) << player.error;
+  EXPECT_FALSE(gst_element_seek(player["m"], 1, GST_FORMAT_TIME, GST_SEEK_FLAG_NONE,
+                                GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_NONE, -1));
+  EXPECT_TRUE(player.play()) << player.error;
+}
+
 TEST(Merge, WaitsForTheSecondStream) {
   const Owned<GstHarness> first(gst_harness_new_with_padnames("eventmerge", "sink_0", "src"));
   gst_harness_set_live(first.get(), FALSE);

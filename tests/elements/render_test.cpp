@@ -204,6 +204,16 @@ TEST_F(Render, DrawsWhatThereIsAtTheEnd) {
   expect(finish(), {{0, 100 * ms, accumulated(column(1))}});
 }
 
+TEST_F(Render, DrawsWhatThereIsAtTheEndOfASegment) {
+  begin(grey_at("10/1"));
+  push(0, column(1));
+  gst_harness_push_event(h.get(), gst_event_new_segment_done(GST_FORMAT_TIME, 40 * ms));
+  const Buffer picture(gst_harness_pull(h.get()));
+  ASSERT_TRUE(picture);
+  EXPECT_TRUE(bytes_of(picture.get()) == accumulated(column(1)));
+  EXPECT_TRUE(finish().empty());
+}
+
 TEST_F(Render, EndsWithoutEvents) {
   begin(grey_at("10/1"));
   EXPECT_TRUE(finish().empty());

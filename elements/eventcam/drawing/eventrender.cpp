@@ -156,6 +156,7 @@ class EventRender final : public EventAggregator {
   void release_memory() override { state_.reset(); }
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   void take_segment(const GstSegment& segment) override;
+  void drain() override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
 
@@ -178,7 +179,6 @@ class EventRender final : public EventAggregator {
   GstFlowReturn draw(const EventInterval& events, GstBuffer* buffer);
   GstFlowReturn push_picture(const EventInterval& events, const EventInterval& picture);
   GstFlowReturn push_next_picture();
-  void drain();
 
   std::mutex mutex_;           // guards earliest_; make no calls while holding it
   GstClockTime earliest_ = 0;  // running time before which pictures are too late
