@@ -124,6 +124,13 @@ TEST_F(Tensor, EndsWithAShortWindow) {
   EXPECT_FALSE(h->pull());
 }
 
+TEST_F(Tensor, EndsWithTheSegment) {
+  begin("accumulation-time=25000000");
+  push_columns(0, 0);
+  gst_harness_push_event(h->get(), gst_event_new_segment_done(GST_FORMAT_TIME, 10 * ms));
+  expect_tensor(0, 10 * ms, 0, 2);
+}
+
 TEST_F(Tensor, GoesOnThroughGaps) {
   begin("accumulation-time=10000000");
   push_columns(0, 0);

@@ -427,6 +427,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
         return FALSE;
       }
       break;
+    case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
       drain(self);
       break;
