@@ -414,9 +414,11 @@ static GstFlowReturn aggregate(GstAggregator* aggregator, gboolean /*timeout*/) 
       [&] { return write_some(self); });
 }
 
-/// Live pipelines wait for other pads until the running time of the earliest buffer.
+/// Live pipelines wait for other pads until the running time of the earliest buffer, once the file
+/// has begun or can begin.
 static GstClockTime get_next_time(GstAggregator* aggregator) {
   auto* self = GST_AEDAT_MUX(aggregator);
+  if (!self->priv->state.encoder && !is_known(self)) return GST_CLOCK_TIME_NONE;
   GstClockTime time = GST_CLOCK_TIME_NONE;
   return earliest_pad(self, &time) ? time : GST_CLOCK_TIME_NONE;
 }
