@@ -24,7 +24,7 @@
     return registered;                                                                     \
   }                                                                                        \
   GST_PLUGIN_DEFINE(GST_VERSION_MAJOR, GST_VERSION_MINOR, name, description, plugin_init,  \
-                    PACKAGE_VERSION, "LGPL", PACKAGE, EVENTSIM_AUTHORS)
+                    PACKAGE_VERSION, "LGPL", PACKAGE, "Unknown package origin")
 // clang-format on
 
 #define EVENTSIM_NONE(X)
