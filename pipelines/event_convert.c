@@ -196,6 +196,16 @@ static const Reader* reader_of(const char* media_type) {
   return NULL;
 }
 
+/* False, with an error printed, for a pipe or device: what is read from it to recognise it would be
+ * lost. Opening a pipe might wait forever, so this looks before. Files that are missing, and
+ * directories, have errors of their own. */
+static gboolean can_read_twice(const char* path) {
+  struct stat in;
+  if (stat(path, &in) != 0 || S_ISREG(in.st_mode) || S_ISDIR(in.st_mode)) return TRUE;
+  PRINT_ERROR("%s is not a regular file; save it to a file first\n", path);
+  return FALSE;
+}
+
 /* The reader of a file, by its content, or by its extension if the content is ambiguous. Prints
  * an error and returns NULL if there is none. */
 static const Reader* find_reader(const char* path) {
@@ -204,8 +214,11 @@ static const Reader* find_reader(const char* path) {
   const Format* format = format_of(path);
   const Reader* reader = NULL;
   GstCaps* caps;
-  FILE* file = fopen(path, "rb");
-  const gsize size = file != NULL ? fread(start, 1, sizeof start, file) : 0;
+  FILE* file;
+  gsize size;
+  if (!can_read_twice(path)) return NULL;
+  file = fopen(path, "rb");
+  size = file != NULL ? fread(start, 1, sizeof start, file) : 0;
   if (file == NULL || ferror(file)) {
     PRINT_ERROR("%s: %s\n", path, g_strerror(errno));
     if (file != NULL) fclose(file);
@@ -230,8 +243,13 @@ static const Reader* find_reader(const char* path) {
 /* True if files can be written in this format. */
 static gboolean can_write(const char* path, const Format* format) {
   struct stat out;
-  if (stat(path, &out) == 0 && S_ISDIR(out.st_mode)) {
+  const gboolean exists = stat(path, &out) == 0;
+  if (exists && S_ISDIR(out.st_mode)) {
     PRINT_ERROR("%s is a directory; name a file in it\n", path);
+    return FALSE;
+  }
+  if (exists && !S_ISREG(out.st_mode)) {
+    PRINT_ERROR("%s is not a regular file, and would be replaced; name a file\n", path);
     return FALSE;
   }
   if (format == NULL) {

@@ -357,7 +357,16 @@ refused "only to reading files that may lack a sensor size" --width=320 ball.es 
 refused "--height: " --height=tall ball.csv other.raw
 printf '1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n' >unclear.txt
 refused "set time-unit" unclear.txt out.dat
-refused "neither its content nor its extension" /dev/null out.dat
+touch nothing
+refused "neither its content nor its extension" nothing out.dat
+# Pipes and devices are neither read in part nor replaced.
+mkfifo pipe.raw
+ln -s /dev/null device.dat
+refused "pipe.raw is not a regular file; save it to a file first" pipe.raw out.dat
+refused "is not a regular file; save it to a file first" <(cat ball.raw) out.dat
+refused "pipe.raw is not a regular file, and would be replaced" ball.raw pipe.raw
+refused "device.dat is not a regular file, and would be replaced" ball.raw device.dat
+if [ ! -p pipe.raw ] || [ ! -L device.dat ]; then fail "a pipe or a link to a device is replaced"; fi
 mkdir folder.raw
 refused "is a directory" ball.raw folder.raw
 refused "Is a directory" folder.raw out.dat
