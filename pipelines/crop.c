@@ -5,10 +5,12 @@
 #include <stdio.h>
 
 gboolean region_from_text(Region* region, const char* text) {
-  int end = 0;
-  return sscanf(text, "%5ux%5u+%5u+%5u%n", &region->width, &region->height, &region->x, &region->y,
-                &end) == 4 &&
-         text[end] == '\0' && region->width > 0 && region->height > 0 &&
+  /* Alone, sscanf() would take signs and spaces. */
+  static const char form[] = "^[0-9]{1,5}x[0-9]{1,5}[+][0-9]{1,5}[+][0-9]{1,5}\\z";
+  return g_regex_match_simple(form, text, 0, 0) &&
+         sscanf(text, "%5ux%5u+%5u+%5u", &region->width, &region->height, &region->x, &region->y) ==
+             4 &&
+         region->width > 0 && region->height > 0 &&
          region->x + region->width <= GST_EVENT_CAMERA_MAX_SIDE &&
          region->y + region->height <= GST_EVENT_CAMERA_MAX_SIDE;
 }

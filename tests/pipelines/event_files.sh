@@ -345,7 +345,9 @@ refused "ball.raw and ball.csv would both become outputs/ball.dat" --output-dire
 refused "the same file" --output-directory=. ball.raw
 refused "less than --to" --from=2 --to=1 ball.raw out.dat
 refused "less than --to" --from=-1 ball.raw out.dat
-refused "needs WIDTHxHEIGHT" --crop=100x80 ball.raw out.dat
+for region in 100x80 1x1+-1+0 +10x+10+0+0 "10x10+ 1+0" "10x10+0+0 "; do
+  refused "needs WIDTHxHEIGHT" --crop="$region" ball.raw out.dat
+done
 refused "region 100x80+250+60 is not within the sensor" --crop=100x80+250+60 ball.raw out.dat
 refused "choose one of EVT2 EVT21 EVT2.1 EVT3 EVT4" ball.raw other.raw --format=EVT5
 refused "does not apply to .dat" ball.raw ball.dat --format=rpg
