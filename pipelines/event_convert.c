@@ -442,6 +442,15 @@ static void print_left_out(const char* in, GstElement* pipeline) {
   gst_structure_free(read);
 }
 
+/* Warns that the part of `in` had no events. */
+static void print_empty(const char* in, GstElement* pipeline) {
+  gint64 duration = 0;
+  PRINT_ERROR("%s: warning: no events in this part", in);
+  if (gst_element_query_duration(pipeline, GST_FORMAT_TIME, &duration))
+    PRINT_ERROR("; the recording lasts %.6g s", (gdouble)duration / GST_SECOND);
+  PRINT_ERROR("\n");
+}
+
 /* Runs in the streaming thread, while the main thread prints. */
 static GstPadProbeReturn count_events(GstPad* pad, GstPadProbeInfo* info, gpointer events) {
   (void)pad;
@@ -461,6 +470,11 @@ static gint64 nanoseconds(gdouble seconds) {
 /* True if only a part of the time is converted. */
 static gboolean is_trimmed(void) {
   return from_seconds > 0 || to_seconds < G_MAXDOUBLE;
+}
+
+/* True if only a part of the time or of the sensor is converted. */
+static gboolean is_part(void) {
+  return is_trimmed() || crop_text != NULL;
 }
 
 /* Makes a reader that knows its file start over at the first time and end at the last, and plays.
@@ -563,6 +577,7 @@ static gboolean run(const char* in, GstElement* pipeline, const guint64* events)
   }
   clear_progress();
   if (ok) print_left_out(in, pipeline);
+  if (ok && !interrupted && *events == 0 && is_part()) print_empty(in, pipeline);
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(bus);
   return ok;

@@ -300,6 +300,13 @@ cmp expected.csv region.csv || fail "region.raw has other events"
 convert --crop=100x80+50+60 framed.aedat4 region.aedat4 2>left-out
 grep -q ": left out: 40 frames$" left-out || fail "frames are cropped: $(cat left-out)"
 
+# A part without events is empty, with a warning.
+for part in --from=100 --crop=1x1+0+0; do
+  convert $part ball.raw empty.csv 2>warnings
+  grep -q "ball.raw: warning: no events in this part; the recording lasts 1\.9[0-9]* s" warnings || fail "$part: $(cat warnings)"
+  [ "$(wc -l <empty.csv)" -le 1 ] || fail "$part has events"
+done
+
 # Several files, to a directory that is made.
 mkdir inputs
 cp ball.raw inputs/a.raw
