@@ -20,6 +20,8 @@ from .recordings import WRITERS
 Value = float | int | str | bool
 
 MAX_RECIPE = 1 << 20  # bytes
+MAX_NUMBER = 64  # characters
+NUMBERS = {"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"}
 MAX_SEED = 2**64 - 1
 MAX_DRAWS = 1000
 PICTURES = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png"}
@@ -27,6 +29,7 @@ TENSORS = "tensors"
 OUTPUTS = sorted(extension[1:] for extension in WRITERS) + [TENSORS]
 KEYS = {"seed", "videos", "framerate", "window", "frames", "simulator", "parameters", "filters", "output", "tensors",
         "split", "group", "min-frames"}
+FRAMERATE = re.compile(r"[0-9]{1,20}([./][0-9]{1,20})?")
 DISTRIBUTIONS = {"uniform": "[minimum, maximum]", "log-uniform": "[minimum, maximum], both above 0",
                  "normal": "[mean, standard deviation]", "choice": "a list of values"}
 
@@ -36,7 +39,13 @@ class RecipeError(ValueError):
 
 
 class _Loader(yaml.SafeLoader):
-    """Refuses keys that are given twice."""
+    """Refuses keys that are given twice, and numbers that are too large to calculate with."""
+
+    def construct_scalar(self, node: yaml.ScalarNode) -> Any:
+        if node.tag in NUMBERS and len(node.value) > MAX_NUMBER:
+            raise RecipeError(f"line {node.start_mark.line + 1}: a number has {len(node.value)} characters;"
+                              f" write at most {MAX_NUMBER}")
+        return super().construct_scalar(node)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         names = [key.value for key, _ in node.value]
@@ -165,7 +174,9 @@ class Recipe:
                 value = float(value) * float(drawn[distribution.relative_to])
             elif distribution.kind == "choice":
                 return value
-            value = int(rounded(float(value))) if isinstance(low, int) else rounded(float(value))
+            value = rounded(float(value))
+            if isinstance(low, int) and math.isfinite(value):
+                value = int(value)
             if low <= value <= high:
                 return value
         raise RecipeError(f"parameters: {parameter} is hardly ever within {low:g} to {high:g}")
@@ -288,9 +299,11 @@ def _text(recipe: Mapping[str, Any], key: str) -> str:
 def _framerate(recipe: Mapping[str, Any]) -> Optional[Fraction]:
     if "framerate" not in recipe:
         return None
+    text = str(recipe["framerate"])
     try:
-        framerate = Fraction(str(recipe["framerate"]))
-    except (ValueError, ZeroDivisionError):
+        # Without exponents: that of 1e500000000 would take all memory.
+        framerate = Fraction(text if FRAMERATE.fullmatch(text) else 0)
+    except ZeroDivisionError:
         framerate = Fraction(0)
     if not 0 < framerate <= 1_000_000 or framerate.denominator >= 2**31 or framerate.numerator >= 2**31:
         raise RecipeError(f"framerate: {recipe['framerate']!r} is not frames per second, such as 30 or 30000/1001")

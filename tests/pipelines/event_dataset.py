@@ -382,7 +382,8 @@ class Recipes(unittest.TestCase):
         self.expect("seed: True is not a whole number", base + "seed: true")
         self.expect("output: avi is none of aedat4, csv", base + "output: avi")
         self.expect("tensors: only for output: tensors", base + "tensors: bins=5")
-        self.expect("framerate: '30/0' is not frames per second", base + "framerate: 30/0")
+        for wrong in ("30/0", "1e500000000", "1/1e500000000", "-25"):
+            self.expect("is not frames per second", base + f"framerate: {wrong}")
         self.expect("window: give width, height and distance", base + "framerate: 9\nwindow: {width: 3}")
         self.expect("window: give a framerate", base + "window: {width: 3, height: 3, distance: 3}")
         self.expect("split: the shares add up to 0.9", base + "split: {train: 0.9}")
@@ -407,6 +408,10 @@ class Recipes(unittest.TestCase):
         }.items():
             self.expect(error, base + f"parameters:\n  {value}")
         self.expect("uniform needs", base + "parameters:\n  leak-rate: {uniform: [.nan, .inf]}")
+        self.expect("hardly ever within", base + "parameters:\n  refractory-period: {normal: [1, 1.0e+308]}")
+        for number in ("9" * 400, "0x" + "f" * 10_000, "1" + ":59" * 300_000):
+            self.expect(f"line 3: a number has {len(number)} characters", base + f"seed: {number}")
+            self.expect("line 4: a number has", base + f"parameters:\n  leak-rate: {{uniform: [0, {number}]}}")
         self.expect("is also set by simulator", base.replace("dvs", "dvs seed=1") + "parameters: {seed: 2}")
         shutil.copy(path_of("recipes/videos/ball.mkv"), path_of("recipes/videos/ball.mp4"))
         self.expect("have the same name, ball; rename one", base)
