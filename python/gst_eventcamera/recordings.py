@@ -29,6 +29,8 @@ WRITERS = {
     ".hdf5": "eventhdf5sink name=file format=metavision",
 }
 
+# Latest time of an event that readers of files accept, in microseconds: 142 years.
+MAX_TIME = 1 << 52
 # Microseconds of the buffers that are written.
 BUFFER = 10_000
 # Bytes that may wait to be written, and nanoseconds between two looks at them.
@@ -182,11 +184,11 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
     """Writes events to a file, whose extension selects the format: .raw (EVT3), .dat, .es, .csv, .txt, .npy,
     .npz, .aedat4, .mcap (ROS 2), .h5 (DSEC) or .hdf5 (Metavision).
 
-    events: an array with the fields t (microseconds, at least 0, sorted), x, y and p; shape (events,).
+    events: an array with the fields t (microseconds, from 0 to 2**52, sorted), x, y and p; shape (events,).
     width, height: of the sensor, in pixels; may be left out for Events of a known sensor.
 
-    Raises ValueError for events that are not sorted or outside the sensor, or an unknown extension, and
-    PipelineError if the file cannot be written."""
+    Raises ValueError for events that are not sorted, too late or outside the sensor, or an unknown extension,
+    and PipelineError if the file cannot be written."""
     extension = os.path.splitext(path)[1].lower()
     if extension not in WRITERS:
         raise ValueError(f"{os.fspath(path)}: the extension must be one of {' '.join(WRITERS)}")
@@ -214,6 +216,8 @@ def _check(events: np.ndarray, width: int, height: int) -> None:
     t = events["t"]
     if len(events) > 0 and (t[0] < 0 or np.any(t[1:] < t[:-1])):
         raise ValueError("events must be sorted by time, from 0 on")
+    if len(events) > 0 and not t[-1] <= MAX_TIME:
+        raise ValueError(f"the last event is at {t[-1]} us; times must be at most 2**52 us, 142 years")
     if len(events) > 0 and (np.max(events["x"]) >= width or np.max(events["y"]) >= height):
         raise ValueError(f"there are events outside the sensor of {width}x{height} pixels")
 

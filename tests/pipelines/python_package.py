@@ -79,6 +79,14 @@ class Recordings(unittest.TestCase):
                 if extension != "csv":  # text has no size
                     self.assertGreaterEqual(read.width, WIDTH)
 
+    def test_latest_times_come_back(self):
+        events = self.events[:3].copy()
+        events["t"] = 2**52 - np.array([9, 5, 0])
+        for extension in ("csv", "npz", "h5"):
+            path = path_of(f"late.{extension}")
+            ec.write(path, events, WIDTH, HEIGHT)
+            self.assertEqual(list(ec.read(path)["t"]), list(events["t"]))
+
     def test_reads_exactly(self):
         read = ec.read(self.path)
         self.assertTrue(same(read, self.events))
@@ -263,6 +271,10 @@ class Failures(unittest.TestCase):
         self.expect(ValueError, "extension", lambda: ec.write(path_of("x.mp4"), events))
         self.expect(ValueError, "sorted", lambda: ec.write(path_of("x.raw"), events[::-1]))
         self.expect(ValueError, "outside", lambda: ec.write(path_of("x.raw"), events, 10, 10))
+        late = events.copy()
+        for t in (2**52 + 1, 2**62, 2**63 - 1):
+            late["t"][-1] = t
+            self.expect(ValueError, "at most 2**52", lambda: ec.write(path_of("x.raw"), late))
         self.expect(ValueError, "sorted", lambda: ec.voxel_grid(events[::-1]))
         self.expect(ValueError, "outside", lambda: ec.voxel_grid(events, 5, 10, 10))
         self.expect(ValueError, "257 bins", lambda: ec.voxel_grid(events, 257))
