@@ -243,8 +243,13 @@ def compare(sensor, recorded, simulated, span, picture=None):
     """The figures of eventcompare over a time span."""
     caps = (f"application/x-event-camera,format=XYTP,width={sensor.width},height={sensor.height},"
             "framerate=0/1")
-    feeds = [(name, caps, [buffer_of(span.of(events), span.start, span.end - span.start)])
-             for name, events in (("recorded", recorded), ("simulated", simulated))]
+    # A span that includes the time 0 starts before it, but a PTS cannot be negative.
+    shift = max(0, -span.start)
+    feeds = []
+    for name, events in (("recorded", recorded), ("simulated", simulated)):
+        part = span.of(events).copy()
+        part["t"] += shift
+        feeds.append((name, caps, [buffer_of(part, span.start + shift, span.end - span.start)]))
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "figures.json")
         drawn = f" map={quoted(picture)}" if picture else ""

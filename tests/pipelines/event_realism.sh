@@ -45,6 +45,23 @@ done
 realism real1.raw real2.raw --video scene.mkv --from 0.1 --to 0.4 --html page.html >table
 grep -q "change of the logarithm of the light" page.html || fail "the page has no response to the light"
 
+# Times from 0 on: no event is left out, and all figures are those of later times.
+"$BUILD/pipelines/event-convert" real1.raw real1.csv
+for start in 0 1000; do
+  awk -F, -v OFS=, -v start=$start 'NR == 2 { shift = start - $1 } NR > 1 { $1 += shift } { print }' real1.csv >from.csv
+  "$BUILD/pipelines/event-convert" --width=161 --height=90 from.csv from.raw
+  realism from.raw from.raw >from$start.table
+done
+cmp from0.table from1000.table || fail "a comparison from the time 0 on is another"
+PYTHONPATH=$BUILD/pipelines:$PYTHONPATH /usr/bin/python3 - <<'PYTHON' || fail "the event at the time 0 is not compared"
+import numpy as np
+from event_streams import Sensor, Span, compare
+
+events = np.array([(0, 1, 1, True), (5, 2, 1, False), (9, 3, 2, True)], "i8,u2,u2,?")
+events.dtype.names = "txyp"
+assert compare(Sensor(4, 4), events, events, Span(-1, 9))["reference"]["events"] == 3
+PYTHON
+
 # Events outside a mask do not count.
 printf 'P5 161 90 255\n' >none.pgm
 head -c $((161 * 90)) /dev/zero >>none.pgm
