@@ -19,8 +19,8 @@ import time
 from dataclasses import dataclass, field
 
 # First, since it says which packages are missing.
-from event_streams import (GLib, Gst, Span, compare, counts, delayed, read_mask, read_recording, read_video,
-                           simulate, until)
+from event_streams import (GLib, Gst, Span, compare, counts, delayed, expect_writable, read_mask, read_recording,
+                           read_video, simulate, until)
 import numpy as np
 from plugins import find_plugins
 
@@ -487,6 +487,8 @@ def main():
     find_plugins()
     if chosen.profile and chosen.element.split()[:1] != [PROFILED]:
         raise RuntimeError(f"only {PROFILED} has profiles; add --element {PROFILED}")
+    for path in filter(None, (chosen.profile, chosen.map)):
+        expect_writable(path)
     progress = Progress()
     start = getattr(chosen, "from")
     ends = [end for end in (chosen.to, chosen.measure_to) if end is not None]
@@ -516,14 +518,18 @@ def main():
     recorded = visible
     element = calibrate(until(video, span.end), recorded, span, chosen.element, progress)
     progress.end()
-    figures = compare(video, recorded, simulate(video, element), measured, chosen.map)
-    if chosen.profile:
-        write_profile(chosen.profile, element, chosen.video, chosen.recording)
+    simulated = simulate(video, element)
+    figures = compare(video, recorded, simulated, measured)
     if lag != 0:
         print(f"Frames show the scene {lag * 1000:.1f} ms later than their timestamps.")
     if hidden >= 0.005:
         print(f"{100 * hidden:.0f} % of the recorded events are left out: the frames are overexposed there.")
-    print(describe(element, figures))
+    print(describe(element, figures), flush=True)
+    # After the result, so that it stays if a disk is full.
+    if chosen.profile:
+        write_profile(chosen.profile, element, chosen.video, chosen.recording)
+    if chosen.map:
+        compare(video, recorded, simulated, measured, chosen.map)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,8 @@ import sys
 from dataclasses import dataclass
 
 # First, since it says which packages are missing.
-from event_streams import GLib, Gst, Sensor, Span, compare, png_of, read_mask, read_recording, read_video
+from event_streams import (GLib, Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
+                           read_video)
 import numpy as np
 from plugins import find_plugins
 
@@ -176,12 +177,16 @@ def interval_curve(sensor, events):
     return 10 ** ((edges[:-1] + edges[1:]) / 2), share / max(share.sum(), 1)
 
 
-def travels_of(video, span):
-    """How far the logarithm of each pixel rises, and falls, in the frames of a time span."""
+def travels_of(path, sensor, span):
+    """How far the logarithm of each pixel rises, and falls, in the frames of a time span of a video."""
+    video = read_video(path, 0, float("inf"))
+    if (video.width, video.height) != (sensor.width, sensor.height):
+        raise RuntimeError(f"{path} has {video.width} x {video.height} pixels, the recording has"
+                           f" {sensor.width} x {sensor.height}")
     greys = [np.log(video.luma(frame) + 1) for frame in video.frames
              if span.start <= frame.time // 1000 <= span.end]
     if len(greys) < 2:
-        raise RuntimeError("the video has fewer than two frames in the compared time")
+        raise RuntimeError(f"{path} has fewer than two frames in the compared time")
     changes = np.diff(greys, axis=0)
     return np.maximum(changes, 0).sum(axis=0), np.maximum(-changes, 0).sum(axis=0)
 
@@ -197,7 +202,8 @@ def response_curve(sensor, events, travels):
             for i in range(1, len(edges)) if (bins == i).sum() >= 20]
 
 
-def charts_of(sensor, real, simulated, video, span):
+def charts_of(sensor, real, simulated, travels):
+    """The curves of the page; of the response to the light if it is known how far that travels."""
     streams = [real] + simulated
     rates = []
     for i, stream in enumerate(streams):
@@ -207,8 +213,7 @@ def charts_of(sensor, real, simulated, video, span):
     charts = [chart("Event rate", "seconds", "events per second", rates),
               chart("Times between successive events of a pixel", "microseconds", "share",
                     [interval_curve(sensor, stream.events) for stream in streams], (True, False))]
-    if video is not None:
-        travels = travels_of(video, span)
+    if travels is not None:
         charts.append(chart("Response", "change of the logarithm of the light", "events per pixel and polarity",
                             [np.transpose(response_curve(sensor, stream.events, travels)) for stream in streams],
                             (True, True)))
@@ -296,6 +301,8 @@ def main():
     Gst.init(None)
     chosen = options()
     find_plugins()
+    if chosen.html:
+        expect_writable(chosen.html)
     sensor = Sensor()
     streams = []
     for path in [chosen.real] + chosen.simulated:
@@ -311,18 +318,13 @@ def main():
     real, *simulated = streams
     if len(real.events) == 0:
         raise RuntimeError(f"{chosen.real}: no events in the compared time")
+    travels = travels_of(chosen.video, sensor, span) if chosen.html and chosen.video else None
     for stream in simulated:
         stream.figures = compare(sensor, real.events, stream.events, span)
     rows = table_of(sensor, real, simulated)
     print_table(real, simulated, rows)
     if chosen.html:
-        video = None
-        if chosen.video:
-            video = read_video(chosen.video, 0, float("inf"))
-            if (video.width, video.height) != (sensor.width, sensor.height):
-                raise RuntimeError(f"{chosen.video} has {video.width} x {video.height} pixels, the recording has"
-                                   f" {sensor.width} x {sensor.height}")
-        page = page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, video, span))
+        page = page_of(sensor, real, simulated, rows, charts_of(sensor, real, simulated, travels))
         with open(chosen.html, "w", encoding="utf-8") as file:
             file.write(page)
 

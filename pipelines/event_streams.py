@@ -100,6 +100,17 @@ class Span:
         return (self.end - self.start) / 1e6
 
 
+# options
+
+
+def expect_writable(path):
+    """Raises the error before the work whose result will be written there."""
+    folder = os.path.dirname(path) or "."
+    place = path if os.path.exists(path) else folder
+    if os.path.isdir(path) or not os.path.isdir(folder) or not os.access(place, os.W_OK):
+        raise RuntimeError(f"{path} cannot be written; name a file in a folder that exists and that you may write to")
+
+
 # pipelines
 
 

@@ -87,6 +87,11 @@ hidden=$(sed -n 's/^\([0-9]*\) % of the recorded events are left out: the frames
 [ "${hidden:-0}" -gt 10 ] || fail "${hidden:-0} % of the events are where the video is overexposed"
 awk '/map correlation/ { exit !($3 > 0.9) }' found || fail "events are compared where the video is overexposed"
 
+# The result is printed even if a disk is full.
+ln -s /dev/full full.png
+if calibrate scene.mkv recorded.raw --element eventsim-frame --to 0.3 --map full.png >found; then fail "a full disk was written to"; fi
+grep -q "map correlation" found || fail "the result is lost: $(cat found)"
+
 # Errors say what is wrong.
 refused() { # WORDS ARGUMENT...
   local words=$1
@@ -94,11 +99,16 @@ refused() { # WORDS ARGUMENT...
   if timeout 60 "$BUILD/pipelines/event-calibrate" "$@" 2>errors; then fail "event-calibrate $* succeeded"; fi
   cat errors
   grep -q "$words" errors || fail "the error does not say \"$words\""
+  ! grep -q "trial" errors || fail "the error comes after the search"
 }
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
 refused "only eventsim-dvs has profiles" scene.mkv recorded.raw --element eventsim-frame --profile frame.profile
 refused "nowhere.mkv" nowhere.mkv recorded.raw
 GST_PLUGIN_PATH= GST_PLUGIN_SYSTEM_PATH=/nowhere GST_REGISTRY=none.bin \
   refused "plugin eventcam.*meson devenv -C build -w \\." scene.mkv recorded.raw
+for option in --profile --map; do
+  refused "nowhere/file cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option nowhere/file
+  refused "\. cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option .
+done
 refused "do not overlap in time" scene.mkv recorded.raw --element eventsim-frame --from 5
 echo "all thresholds were recovered"

@@ -72,14 +72,18 @@ awk -F, -v OFS=, 'NR > 1 { $1 += 100000000 } { print }' dense.csv >later.csv
 refused() { # WORDS ARGUMENT...
   local words=$1
   shift
-  if realism "$@"; then fail "it succeeded"; fi
-  cat errors
+  if realism "$@" >table; then fail "it succeeded"; fi
+  cat table errors
   grep -q "$words" errors || fail "the error does not say \"$words\""
   ! grep -q Traceback errors || fail "the error is a traceback"
+  ! grep -q "map correlation" table || fail "the error comes after the comparison"
 }
 refused "none.png\|no events where the mask is white" real1.raw real2.raw --mask none.png
 refused "large.raw: it has 320 x 240 pixels, more than" real1.raw large.raw
 refused "empty.raw: no events" real1.raw empty.raw
 refused "do not overlap in time" real1.raw later.csv
 refused "nowhere.raw" real1.raw nowhere.raw
-refused "page.html" real1.raw real2.raw --html nowhere/page.html
+refused "nowhere/page.html cannot be written; name a file" real1.raw real2.raw --html nowhere/page.html
+"$GST_LAUNCH" -q videotestsrc num-buffers=4 ! video/x-raw,width=320,height=240 ! matroskamux ! filesink location=large.mkv
+refused "large.mkv has 320 x 240 pixels, the recording has 161 x 90" real1.raw real2.raw --video large.mkv --html page.html
+refused "scene.mkv has fewer than two frames" real1.raw real2.raw --video scene.mkv --html page.html --to 0.03
