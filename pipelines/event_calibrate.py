@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 # First, since it says which packages are missing.
 from event_streams import (GLib, Gst, Span, compare, counts, delayed, expect_writable, read_mask, read_recording,
-                           read_video, simulate, until)
+                           read_video, seconds, simulate, until)
 import numpy as np
 from plugins import find_plugins
 
@@ -428,18 +428,28 @@ def describe(name, figures):
                     for side, name in (("reference", "recorded"), ("candidate", "simulated")))])
 
 
+def element_of(text):
+    if not text.strip():
+        raise argparse.ArgumentTypeError("name a simulator and its properties, such as eventsim-dense")
+    return text
+
+
+def lag_of(text):
+    return text if text == "find" else seconds(text, signed=True)
+
+
 def options():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("video")
     parser.add_argument("recording")
-    parser.add_argument("--element", default="eventsim-dense",
+    parser.add_argument("--element", type=element_of, default="eventsim-dense",
                         help="a simulator and its properties (default: eventsim-dense)")
     for name, what in (("from", "start of the calibration"), ("to", "end of the calibration"),
                        ("measure-from", "start of the comparison"),
                        ("measure-to", "end of the comparison")):
-        parser.add_argument("--" + name, type=float, metavar="SECONDS", help=what)
-    parser.add_argument("--lag", default="0", metavar="SECONDS|find",
+        parser.add_argument("--" + name, type=seconds, metavar="SECONDS", help=what)
+    parser.add_argument("--lag", type=lag_of, default=0.0, metavar="SECONDS|find",
                         help="time from the timestamp of a frame to the moment that it shows; \"find\""
                         " estimates it (default: 0)")
     parser.add_argument("--mask", metavar="PICTURE",
@@ -507,7 +517,7 @@ def main():
         span = span_of(video, recorded, 0, start, chosen.to)
         lag = find_lag(until(video, span.end), recorded, span, chosen.element, progress)
     else:
-        lag = float(chosen.lag)
+        lag = chosen.lag
     video = delayed(video, lag)
     span = span_of(video, recorded, lag, start, chosen.to)
     measured = span

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 # First, since it says which packages are missing.
 from event_streams import (GLib, Gst, Sensor, Span, compare, expect_writable, png_of, read_mask, read_recording,
-                           read_video)
+                           read_video, seconds)
 import numpy as np
 from plugins import find_plugins
 
@@ -271,8 +271,8 @@ def options():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("real")
     parser.add_argument("simulated", nargs="+")
-    parser.add_argument("--from", type=float, metavar="SECONDS", help="start of the comparison")
-    parser.add_argument("--to", type=float, metavar="SECONDS", help="end of the comparison")
+    parser.add_argument("--from", type=seconds, metavar="SECONDS", help="start of the comparison")
+    parser.add_argument("--to", type=seconds, metavar="SECONDS", help="end of the comparison")
     parser.add_argument("--mask", metavar="PICTURE",
                         help="a picture that is white where pixels of the camera can fire; events elsewhere"
                         " are left out of all streams")

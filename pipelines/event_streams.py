@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Videos and recordings as NumPy arrays: reading them, simulating one from the other, and comparing two."""
+import argparse
 import json
+import math
 import os
 import sys
 import tempfile
@@ -25,6 +27,9 @@ PAST_FRAMES = 5
 
 # Grey levels below white from which on a pixel counts as overexposed, of 255.
 WHITE_MARGIN = 5
+
+# Times in seconds are below, so that they are clock times of GStreamer in nanoseconds.
+MAX_SECONDS = 1e9
 
 
 @dataclass
@@ -103,6 +108,18 @@ class Span:
 # options
 
 
+def seconds(text, signed=False):
+    """The type of an option that is a time."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) < MAX_SECONDS or (value < 0 and not signed):
+        lowest = "" if signed else "from 0 on, "
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds {lowest}below 1e9")
+    return value
+
+
 def expect_writable(path):
     """Raises the error before the work whose result will be written there."""
     folder = os.path.dirname(path) or "."
@@ -150,11 +167,15 @@ def read_pictures(path, start, end):
         with open(path, encoding="utf-8") as file:
             for line in file:
                 if line.strip() and not line.startswith("#"):
-                    seconds, name = line.split(maxsplit=1)
-                    entries.append((round(float(seconds) * 1e9),
+                    time, name = line.split(maxsplit=1)
+                    if not abs(float(time)) < MAX_SECONDS:
+                        raise RuntimeError(f"{path}: {time} is not the time of a picture; give seconds below 1e9")
+                    entries.append((round(float(time) * 1e9),
                                     os.path.join(os.path.dirname(path), name.strip())))
     except (UnicodeDecodeError, ValueError):
         return None
+    if not entries:
+        raise RuntimeError(f"{path}: no pictures; give a line \"seconds picture\" for each")
     times = [time for time, _ in entries]
     start, end = (time + times[0] for time in (start, end))
     first = max([i for i, time in enumerate(times) if time <= start], default=0)

@@ -99,6 +99,7 @@ refused() { # WORDS ARGUMENT...
   if timeout 60 "$BUILD/pipelines/event-calibrate" "$@" 2>errors; then fail "event-calibrate $* succeeded"; fi
   cat errors
   grep -q "$words" errors || fail "the error does not say \"$words\""
+  ! grep -q Traceback errors || fail "the error is a traceback"
   ! grep -q "trial" errors || fail "the error comes after the search"
 }
 refused "no element" scene.mkv recorded.raw --element eventsim-nothing
@@ -106,6 +107,22 @@ refused "only eventsim-dvs has profiles" scene.mkv recorded.raw --element events
 refused "nowhere.mkv" nowhere.mkv recorded.raw
 GST_PLUGIN_PATH= GST_PLUGIN_SYSTEM_PATH=/nowhere GST_REGISTRY=none.bin \
   refused "plugin eventcam.*meson devenv -C build -w \\." scene.mkv recorded.raw
+touch empty.txt
+printf '# no pictures\n\n' >comments.txt
+for list in empty.txt comments.txt; do refused "$list: no pictures; give a line" $list recorded.raw; done
+for time in inf 1e300 nan; do
+  echo "$time 00.png" >times.txt
+  refused "times.txt: $time is not the time of a picture" times.txt recorded.raw
+done
+for element in "" " "; do refused "name a simulator" scene.mkv recorded.raw --element "$element"; done
+for option in --from --to --measure-from --measure-to; do
+  for wrong in -5 nan inf 1e20 soon; do
+    refused "argument $option: '$wrong' is not a number of seconds from 0 on" scene.mkv recorded.raw $option $wrong
+  done
+done
+for wrong in nan inf 1e20 soon; do
+  refused "argument --lag: '$wrong' is not a number of seconds" scene.mkv recorded.raw --lag $wrong
+done
 for option in --profile --map; do
   refused "nowhere/file cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option nowhere/file
   refused "\. cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option .

@@ -87,3 +87,8 @@ refused "nowhere/page.html cannot be written; name a file" real1.raw real2.raw -
 "$GST_LAUNCH" -q videotestsrc num-buffers=4 ! video/x-raw,width=320,height=240 ! matroskamux ! filesink location=large.mkv
 refused "large.mkv has 320 x 240 pixels, the recording has 161 x 90" real1.raw real2.raw --video large.mkv --html page.html
 refused "scene.mkv has fewer than two frames" real1.raw real2.raw --video scene.mkv --html page.html --to 0.03
+for wrong in -5 nan inf 1e20 soon; do
+  refused "argument --from: '$wrong' is not a number of seconds" real1.raw real2.raw --from $wrong
+done
+touch empty.txt
+refused "empty.txt: no pictures; give a line" real1.raw real2.raw --video empty.txt --html page.html
