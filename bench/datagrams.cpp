@@ -9,7 +9,6 @@
 #include <benchmark/benchmark.h>
 
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "bench/codec_timing.hpp"

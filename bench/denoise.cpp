@@ -10,7 +10,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <string>
 #include <vector>
 
 #include "src/filter/denoise_filter.hpp"

@@ -8,8 +8,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <optional>
-#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>

@@ -4,7 +4,6 @@
 #include <png.h>
 
 #include <stdexcept>
-#include <string>
 
 namespace eventcamera {
 namespace {

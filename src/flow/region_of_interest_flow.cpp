@@ -2,7 +2,6 @@
 #include "src/flow/region_of_interest_flow.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 namespace eventcamera {
 namespace {

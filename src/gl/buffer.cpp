@@ -2,6 +2,7 @@
 #include "src/gl/buffer.hpp"
 
 #include <cstring>
+#include <string>
 #include <vector>
 
 namespace eventcamera::gl {

@@ -2,6 +2,7 @@
 #include "src/gl/context.hpp"
 
 #include <cstdio>
+#include <string>
 #include <string_view>
 
 namespace eventcamera::gl {

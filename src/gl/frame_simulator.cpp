@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/gl/frame_simulator.hpp"
 
-#include <utility>
-
 #include "src/gl/difference.hpp"
 
 namespace eventcamera::gl {

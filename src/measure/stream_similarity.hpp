@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <array>
-
 #include "src/core/event.hpp"
 #include "src/measure/event_matcher.hpp"
 #include "src/measure/event_rates.hpp"

@@ -2,7 +2,6 @@
 #include "src/render/overlay.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 

@@ -2,11 +2,9 @@
 // The causes of simulated events.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <span>
 #include <vector>
 
 #include "src/dvs/dvs_simulator.hpp"

@@ -10,7 +10,6 @@
 #include <sys/sysmacros.h>
 
 #include <cstdarg>
-#include <cstring>
 #include <map>
 #include <memory>
 #include <optional>

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 #include <string>
-#include <vector>
 
 #include "src/core/thread_pool.hpp"
 #include "src/flow/region_of_interest_flow.hpp"

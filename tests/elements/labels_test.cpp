@@ -2,7 +2,6 @@
 // Labels of simulated events on their way: from eventsim-dvs to measures and files.
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <numeric>
 #include <string>
 #include <vector>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventtensor: windows, times, caps and content of tensors.
-#include <cstring>
 
 #include "src/core/event.hpp"
 #include "src/tensor/event_tensor.hpp"

@@ -5,7 +5,7 @@
 #include <png.h>
 
 #include <array>
-#include <memory>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 

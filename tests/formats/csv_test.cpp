@@ -3,7 +3,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <numeric>
 
 #include "src/formats/text/csv_decoder.hpp"
 #include "src/formats/text/csv_encoder.hpp"

@@ -5,7 +5,6 @@
 #include <zip.h>
 
 #include <cstdint>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
-#include <numeric>
 
 #include "src/formats/numpy/npz_decoder.hpp"
 #include "src/formats/numpy/npz_encoder.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include <cstdint>
 #include <stdexcept>
-#include <string_view>
 
 #include "src/filter/pixel_mask.hpp"
 

@@ -6,7 +6,6 @@
 #include <limits>
 #include <random>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 

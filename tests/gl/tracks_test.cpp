@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <bit>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "src/gl/diff_simulator.hpp"

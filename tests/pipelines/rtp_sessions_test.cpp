@@ -11,7 +11,6 @@
 #include <chrono>
 #include <fstream>
 #include <functional>
-#include <memory>
 #include <mutex>
 #include <sstream>
 #include <string>

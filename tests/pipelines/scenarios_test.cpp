@@ -4,7 +4,6 @@
 // the order of events that GStreamer requires.
 #include <atomic>
 #include <optional>
-#include <tuple>
 
 #include "tests/elements/recording_files.hpp"
 

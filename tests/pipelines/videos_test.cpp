@@ -9,7 +9,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <opencv2/imgproc.hpp>
 
 #include "gst/eventcamera/eventcamera.h"

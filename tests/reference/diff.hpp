@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <span>
 
 #include "tests/reference/differences.hpp"
 

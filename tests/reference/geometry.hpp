@@ -2,7 +2,6 @@
 // What filters that move events do, one event at a time.
 #pragma once
 
-#include <cmath>
 #include <map>
 #include <optional>
 #include <tuple>

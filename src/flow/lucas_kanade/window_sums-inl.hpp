@@ -8,7 +8,6 @@
 #define EVENTCAMERA_WINDOW_SUMS_INL
 #endif
 
-#include <array>
 #include <cstddef>
 
 #include "src/core/simd-inl.hpp"

@@ -4,8 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
-#include <string>
 
 #include "src/core/event.hpp"
 #include "src/formats/recording_decoder.hpp"

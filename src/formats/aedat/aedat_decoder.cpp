@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <string_view>
-#include <utility>
 
 #include "src/formats/aedat/aedat2_decoder.hpp"
 #include "src/formats/aedat/aedat3_decoder.hpp"

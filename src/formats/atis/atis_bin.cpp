@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/atis/atis_bin.hpp"
 
-#include <algorithm>
-#include <bit>
 #include <set>
 
 #include "src/formats/unit_decoder.hpp"

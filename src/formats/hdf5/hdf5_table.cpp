@@ -2,6 +2,7 @@
 #include "src/formats/hdf5/hdf5_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <iterator>
 #include <string>

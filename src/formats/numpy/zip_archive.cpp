@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/formats/numpy/zip_archive.hpp"
 
-#include <algorithm>
-
 #include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {

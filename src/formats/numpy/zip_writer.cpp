@@ -3,7 +3,6 @@
 #include "src/formats/numpy/zip_writer.hpp"
 
 #include <cstddef>
-#include <utility>
 
 #include "src/formats/byte_appender.hpp"
 

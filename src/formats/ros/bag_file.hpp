@@ -9,7 +9,6 @@
 #include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "src/core/event.hpp"
 #include "src/formats/byte_source.hpp"

@@ -2,7 +2,6 @@
 #include "src/formats/ros/chunked_bag_file.hpp"
 
 #include <algorithm>
-#include <string>
 
 #include "src/formats/magic.hpp"
 #include "src/formats/unsupported_format.hpp"

@@ -2,7 +2,6 @@
 #include "src/formats/ros/sqlite_database.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <new>
 
 #include "src/formats/unsupported_format.hpp"

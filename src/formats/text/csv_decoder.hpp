@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "src/formats/decoded.hpp"
 #include "src/formats/decoder.hpp"
