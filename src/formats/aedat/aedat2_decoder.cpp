@@ -252,7 +252,6 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
   const auto x = layout_->x(address);
   const auto y = layout_->y(address);
   const auto polarity = layout_->is_on(address) ? Polarity::on : Polarity::off;
-  newest_ = std::max(newest_, t);
   out.events.push_back(
       is_mirrored_ ? AbsoluteEvent::at(x, y, t, polarity)
                    : AbsoluteEvent::at(size_.width - 1 - x, size_.height - 1 - y, t, polarity));

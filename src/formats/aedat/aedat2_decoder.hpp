@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 
@@ -72,7 +71,6 @@ class Aedat2Decoder final : public Decoder {
   bool scanning_ = false;             ///< searching for the next valid records
   std::int64_t wraps_ = 0;            ///< sum of the wraps so far
   std::optional<std::int32_t> last_;  ///< time of the latest record, as stored
-  Microseconds newest_ = std::numeric_limits<Microseconds>::min();  ///< time of the latest event
 };
 
 }  // namespace eventcamera

@@ -231,7 +231,6 @@ void Aedat3Decoder::append(const std::uint8_t* event, Decoded& out) {
   if ((data & valid) == 0) return;
   const auto t = packet_.overflow | little_endian<std::int32_t>(event + 4);
   if (packet_.type == polarity) {
-    newest_ = std::max(newest_, t);
     out.events.push_back(AbsoluteEvent::at(x_of(data), y_of(data), t,
                                            (data & on) != 0 ? Polarity::on : Polarity::off));
     return;

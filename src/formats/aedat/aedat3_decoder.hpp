@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <string>
 
 #include "src/formats/aedat/aedat_header.hpp"
@@ -44,7 +43,6 @@ class Aedat3Decoder final : public Decoder {
   bool header_read_ = false;
   bool scanning_ = false;  ///< searching for the next packet
   Packet packet_;
-  Microseconds newest_ = std::numeric_limits<Microseconds>::min();
 };
 
 }  // namespace eventcamera

@@ -116,7 +116,6 @@ void Aedat4Decoder::resume(std::uint64_t position) {
   finished_ = false;
   scanning_ = false;
   table_reported_ = false;
-  std::fill(newest_.begin(), newest_.end(), std::numeric_limits<Microseconds>::min());
 }
 
 bool Aedat4Decoder::read_header() {
@@ -153,7 +152,6 @@ bool Aedat4Decoder::read_header() {
     streams_ = std::move(info.streams);
     listed_ = info.whole && !streams_.empty();
   }
-  newest_.assign(streams_.size(), std::numeric_limits<Microseconds>::min());
   packets_at_ = before + size;
   if (header->data_table_position() >= static_cast<std::int64_t>(packets_at_)) {
     table_at_ = static_cast<std::uint64_t>(header->data_table_position());
@@ -467,9 +465,8 @@ std::span<const AbsoluteEvent> Aedat4Decoder::checked_events(std::size_t count) 
   const auto limit = limit_of(streams_[elements_.stream].size);
   const auto width = limit.width;
   const auto height = limit.height;
-  auto& newest = newest_[elements_.stream];
   const auto* const from = elements_.data;
-  auto last = newest;
+  auto last = std::numeric_limits<Microseconds>::min();
   bool sound = true;
   for (std::size_t i = 0; i < count; ++i) {
     const auto* const bytes = from + i * event_size;
@@ -478,10 +475,7 @@ std::span<const AbsoluteEvent> Aedat4Decoder::checked_events(std::size_t count) 
     last = event.t;
     events_[i] = event;
   }
-  if (sound && is_time(events_[0].t) && is_time(last)) {
-    newest = last;
-    return {events_.data(), count};
-  }
+  if (sound && is_time(events_[0].t) && is_time(last)) return {events_.data(), count};
 
   std::size_t kept = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -492,7 +486,6 @@ std::span<const AbsoluteEvent> Aedat4Decoder::checked_events(std::size_t count) 
     } else if (event.x >= width || row_at(bytes) >= height) {
       ++corruption_.outside;
     } else {
-      newest = std::max(newest, event.t);
       events_[kept++] = event;
     }
   }
@@ -526,7 +519,6 @@ std::optional<std::size_t> Aedat4Decoder::stream_of(int id) const {
 /// Adds a stream that is not listed in the header.
 std::size_t Aedat4Decoder::add_stream(int id, StreamKind kind) {
   streams_.push_back({id, kind, {}, {}});
-  newest_.push_back(std::numeric_limits<Microseconds>::min());
   return streams_.size() - 1;
 }
 

@@ -113,7 +113,6 @@ class Aedat4Decoder final : public RecordingDecoder {
   bool table_reported_ = false;
   Aedat4Compression compression_ = Aedat4Compression::none;
   std::vector<StreamInfo> streams_;
-  std::vector<Microseconds> newest_;  ///< time of the latest event, by stream
   FrameDecompressor decompressor_;
 
   std::size_t packet_ = 0;  ///< size of the packet being returned
