@@ -367,10 +367,7 @@ const char* Aedat4Decoder::read_content(std::span<const std::uint8_t> content, i
   const auto stream = stream_of(id);
   if (stream && streams_[*stream].kind != kind)
     return "a packet of a different kind than its stream";
-  if (kind == StreamKind::other) {
-    ++skipped_.packets;
-    return nullptr;
-  }
+  if (kind == StreamKind::other) return nullptr;
   std::optional<aedat4::Elements> elements = aedat4::Elements{};
   if (kind == StreamKind::frames) {
     if (const char* const corruption = read_frame(content)) return corruption;
@@ -392,10 +389,7 @@ const char* Aedat4Decoder::read_frame(std::span<const std::uint8_t> content) {
   if (packet == nullptr) return broken_packet;
   const auto format = static_cast<PixelFormat>(packet->format());
   const auto pixel = bytes_per_pixel(format);
-  if (pixel == 0) {
-    ++skipped_.frames;
-    return nullptr;
-  }
+  if (pixel == 0) return nullptr;  // an unknown format
   const auto pixels = aedat4::elements_of(packet->pixels());
   if (packet->width() <= 0 || packet->height() <= 0 ||
       pixels.count != std::size_t{1} * packet->width() * packet->height() * pixel)

@@ -55,19 +55,6 @@ class Aedat4Decoder final : public RecordingDecoder {
   /// Position of the packet table, if the header states one.
   std::optional<std::uint64_t> table_at() const { return table_at_; }
 
-  /// Position of that field in the header.
-  std::uint64_t table_field_at() const { return table_field_at_; }
-
-  /// Position where a table was found while reading, if any.
-  std::optional<std::uint64_t> table_found_at() const { return table_found_at_; }
-
-  /// Numbers of valid items that are not returned.
-  struct Skipped {
-    std::uint64_t frames = 0;   ///< with an unknown pixel format
-    std::uint64_t packets = 0;  ///< of unknown kinds
-  };
-  const Skipped& skipped() const { return skipped_; }
-
  private:
   enum class Place { more, end, packet, table, noise };
 
@@ -105,9 +92,9 @@ class Aedat4Decoder final : public RecordingDecoder {
   bool listed_ = false;    ///< the header lists all streams
   std::uint64_t packets_at_ = 0;
   std::optional<std::uint64_t> table_at_;
-  std::uint64_t table_field_at_ = 0;
-  std::optional<std::uint64_t> table_found_at_;
-  ByteSource* source_ = nullptr;  ///< set by open()
+  std::uint64_t table_field_at_ = 0;             ///< of that position in the header
+  std::optional<std::uint64_t> table_found_at_;  ///< while reading
+  ByteSource* source_ = nullptr;                 ///< set by open()
   std::vector<Aedat4TableEntry> table_;
   bool table_missing_ = false;  ///< although the header states one
   bool table_reported_ = false;
@@ -124,7 +111,6 @@ class Aedat4Decoder final : public RecordingDecoder {
 
   std::size_t credit_;  ///< remaining work for searching corrupt packets
   Corruption corruption_;
-  Skipped skipped_;
 };
 
 }  // namespace eventcamera
