@@ -7,12 +7,15 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 
 #include "bench/codec_timing.hpp"
+#include "src/formats/byte_source.hpp"
 #include "src/formats/hdf5/ecf.hpp"
-#include "src/formats/hdf5/hdf5_decoder.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
@@ -130,10 +133,12 @@ void add_hdf5(const std::string& name, Hdf5Format format, Hdf5Writer::Compressio
   };
   benchmark::RegisterBenchmark((name + "/read").c_str(), [=](benchmark::State& state) {
     write();
+    std::ifstream file(path, std::ios::binary);
+    MemoryBytes bytes({std::istreambuf_iterator<char>(file), {}});
     Events out;
     bench::measure(state, events(), [&] {
       out.clear();
-      Hdf5Decoder reader(path);
+      Hdf5Reader reader(bytes);
       while (reader.read(10'000, out) > 0) {
       }
     });

@@ -6,7 +6,8 @@
 #include <fstream>
 #include <random>
 
-#include "src/formats/hdf5/hdf5_decoder.hpp"
+#include "src/formats/byte_source.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "tests/elements/pipeline.hpp"
 
@@ -14,8 +15,8 @@ namespace {
 
 using namespace harness;
 using eventcamera::AbsoluteEvent;
-using eventcamera::Hdf5Decoder;
 using eventcamera::Hdf5Format;
+using eventcamera::Hdf5Reader;
 using eventcamera::Hdf5Writer;
 using eventcamera::Microseconds;
 using eventcamera::Polarity;
@@ -62,6 +63,11 @@ class Folder {
   std::filesystem::path path_;
 };
 
+std::vector<std::uint8_t> contents(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
 class Hdf5 : public testing::TestWithParam<const char*> {
  protected:
   bool is_dsec() const { return std::string(GetParam()).starts_with("dsec"); }
@@ -82,7 +88,8 @@ INSTANTIATE_TEST_SUITE_P(, Hdf5, testing::Values("dsec", "metavision"),
                          [](const auto& test) { return test.param; });
 
 Events read(const std::string& path) {
-  Hdf5Decoder reader(path);
+  eventcamera::MemoryBytes bytes(contents(path));
+  Hdf5Reader reader(bytes);
   Events events;
   while (reader.read(10'000, events) > 0) continue;
   EXPECT_EQ(reader.corruption().places, 0U) << reader.corruption().first;
@@ -229,7 +236,8 @@ TEST(Hdf5Elements, KeepTriggers) {
     ASSERT_TRUE(player.play()) << player.error;
     EXPECT_TRUE(read(out) == events);
     std::vector<Trigger> found;
-    Hdf5Decoder reader(out);
+    eventcamera::MemoryBytes bytes(contents(out));
+    Hdf5Reader reader(bytes);
     while (reader.read_triggers(1000, found) > 0) continue;
     const bool has_triggers = layout == "metavision";
     EXPECT_EQ(found, has_triggers ? triggers : std::vector<Trigger>());

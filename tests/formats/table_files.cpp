@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "src/formats/hdf5/hdf5_decoder.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "src/formats/hdf5/hdf5_writer.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"
 #include "src/formats/numpy/npy_encoder.hpp"
@@ -79,7 +79,8 @@ void read_file(const std::string& kind, const std::string& file, const std::stri
   Decoded out;
   Corruption corruption;
   if (kind == "hdf5") {
-    Hdf5Decoder reader(file);
+    MemoryBytes bytes(load(file));
+    Hdf5Reader reader(bytes);
     while (reader.read(10'000, out.events) > 0) {
     }
     corruption = reader.corruption();

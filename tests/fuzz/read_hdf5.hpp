@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/formats/byte_source.hpp"
-#include "src/formats/hdf5/hdf5_decoder.hpp"
+#include "src/formats/hdf5/hdf5_reader.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace fuzz {
@@ -10,7 +10,7 @@ namespace fuzz {
 /// Reads part of a file, seeks, and reads again.
 inline void read_hdf5(std::span<const std::uint8_t> bytes) {
   try {
-    Hdf5Decoder reader(
+    Hdf5Reader reader(
         std::make_unique<MemoryBytes>(std::vector<std::uint8_t>(bytes.begin(), bytes.end())));
     // A few compressed bytes can be many events.
     constexpr std::size_t most = 100'000;

@@ -1,83 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <filesystem>
 #include <memory>
-#include <optional>
 
-#include "src/formats/byte_source.hpp"
-#include "src/formats/event_table.hpp"
-#include "src/formats/hdf5/hdf5_format.hpp"
 #include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
 
-class Hdf5Table;
-class Hdf5Triggers;
-
-/// Reads the events of an HDF5 file of any known layout. Skips corrupt rows.
-class Hdf5Decoder {
- public:
-  struct TimeRange {
-    Microseconds first, last;
-  };
-
-  /// Throws UnsupportedFormat, or std::runtime_error if the file cannot be opened.
-  explicit Hdf5Decoder(const std::filesystem::path& path);
-  explicit Hdf5Decoder(std::unique_ptr<ByteSource> bytes);
-  /// `bytes` must outlive the reader.
-  explicit Hdf5Decoder(ByteSource& bytes);
-  ~Hdf5Decoder();
-  Hdf5Decoder(const Hdf5Decoder&) = delete;
-  Hdf5Decoder& operator=(const Hdf5Decoder&) = delete;
-
-  Hdf5Format format() const { return format_; }
-
-  /// Sensor size; 0x0 if not stated in the file.
-  SensorSize size() const { return size_; }
-
-  /// True if events carry labels.
-  bool has_labels() const { return has_labels_; }
-
-  /// Number of events.
-  std::uint64_t count() const;
-
-  /// Times of the first and last event; nothing if there are none.
-  std::optional<TimeRange> time_range() const;
-
-  /// Appends up to `count` events, fewer only at the end, and returns their number.
-  std::size_t read(std::size_t count, std::vector<AbsoluteEvent>& out);
-
-  /// The same for triggers, which only the Metavision layout has.
-  std::size_t read_triggers(std::size_t count, std::vector<Trigger>& out);
-
-  /// Goes to the first event and the first trigger at `t` or later.
-  void seek(Microseconds t);
-
-  const Corruption& corruption() const { return corruption_; }
-
- private:
-  struct File;
-  explicit Hdf5Decoder(File file);
-
-  void fill();
-
-  std::unique_ptr<File> file_;
-  Hdf5Format format_ = Hdf5Format::dsec;
-  SensorSize size_;
-  bool has_labels_ = false;
-  std::unique_ptr<Hdf5Table> table_;
-  std::unique_ptr<Hdf5Triggers> triggers_;
-  RowValidator validator_;
-  Corruption corruption_;
-
-  std::uint64_t row_ = 0;              ///< next row to read
-  std::vector<AbsoluteEvent> events_;  ///< events read; the first taken_ were returned
-  std::size_t taken_ = 0;
-  std::optional<Microseconds> not_before_;  ///< set until an event was found
-};
-
-/// Creates a reader for HDF5 files. A pushed file is collected in memory, up to 256 MiB, and read
+/// Creates a decoder for HDF5 files. A pushed file is collected in memory, up to 256 MiB, and read
 /// at its end, because HDF5 needs random access.
 std::unique_ptr<RecordingDecoder> make_hdf5_decoder();
 
