@@ -291,9 +291,10 @@ void write_events(benchmark::State& state, int count) {
   const auto events = random_events(count, picture_width, picture_height);
   std::vector<Event> in(events.size());
   std::vector<Event> out(events.size());
-  events.write_to(in.data());
+  ThreadPool threads;
+  events.write_to(in.data(), threads);
   by_turns(
-      state, "memcpy", 1, [&] { events.write_to(out.data()); },
+      state, "memcpy", 1, [&] { events.write_to(out.data(), threads); },
       [&] { std::memcpy(out.data(), in.data(), in.size() * sizeof(Event)); });
 }
 
@@ -304,11 +305,12 @@ void draw_events(benchmark::State& state, int count, const PixelLayout& layout) 
   std::vector<std::byte> in(size);
   std::vector<std::byte> out(size);
   Accumulator accumulator(picture_width, picture_height);
+  ThreadPool threads;
   by_turns(
       state, "memcpy", 1,
       [&] {
-        accumulator.add(events);
-        accumulator.draw(palette(PaletteName::dark), layout, out.data(), stride);
+        accumulator.add(events, threads);
+        accumulator.draw(palette(PaletteName::dark), layout, out.data(), stride, threads);
       },
       [&] { std::memcpy(out.data(), in.data(), size); });
 }

@@ -32,7 +32,7 @@ Intervals intervals_of(const Scene& scene) {
     auto& [buckets, buffer] = intervals.emplace_back();
     buckets = *push(clip[1], frame_time);
     buffer.resize(buckets.size());
-    buckets.write_to(buffer.data());
+    buckets.write_to(buffer.data(), simulator->threads());
   }
   return intervals;
 }
@@ -68,8 +68,9 @@ void time_copying_events(benchmark::State& state, const Intervals& intervals) {
 void time_writing_events(benchmark::State& state, const Intervals& intervals) {
   auto out = buffer_for(intervals);
   benchmark::DoNotOptimize(out.data());
+  ThreadPool threads;
   time_intervals(state, intervals, [&](const Interval& interval) {
-    if (interval.buckets.size() <= out.size()) interval.buckets.write_to(out.data());
+    if (interval.buckets.size() <= out.size()) interval.buckets.write_to(out.data(), threads);
   });
 }
 
@@ -87,9 +88,10 @@ void time_drawing(benchmark::State& state, const Intervals& intervals, const Pic
   std::vector<std::byte> out(static_cast<std::size_t>(stride * frame.height()));
   benchmark::DoNotOptimize(out.data());
   Accumulator accumulator(frame.width(), frame.height());
+  ThreadPool threads;
   time_intervals(state, intervals, [&](const Interval& interval) {
     accumulator.add(interval.buffer);
-    accumulator.draw(palette(PaletteName::dark), layout, out.data(), stride);
+    accumulator.draw(palette(PaletteName::dark), layout, out.data(), stride, threads);
   });
 }
 

@@ -47,10 +47,6 @@ std::size_t EventBuckets::size() const {
   return size_of(buckets_);
 }
 
-void EventBuckets::write_to(Event* out) const {
-  write_part(0, size(), out);
-}
-
 void EventBuckets::write_to(Event* out, ThreadPool& threads) const {
   constexpr std::size_t worth_a_thread = 16'384;
   const std::size_t events = size();

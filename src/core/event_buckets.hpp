@@ -69,7 +69,6 @@ class EventBuckets {
   std::size_t size() const;
 
   /// Writes size() events, sorted by time, then in raster order.
-  void write_to(Event* out) const;
   void write_to(Event* out, ThreadPool& threads) const;
 
   /// Passes all events of a band to visit(std::span<const Event>), step by step, in several calls.

@@ -133,10 +133,6 @@ void Accumulator::add(std::span<const Event> events) {
         static_cast<std::uint8_t>(1 + static_cast<int>(event.polarity()));
 }
 
-void Accumulator::add(const EventBuckets& events) {
-  for (int band = 0; band < events.bands(); ++band) add_band(events, band);
-}
-
 void Accumulator::add(const EventBuckets& events, ThreadPool& threads) {
   threads.for_each(events.bands(), [&](int band, int) { add_band(events, band); });
 }
@@ -144,13 +140,6 @@ void Accumulator::add(const EventBuckets& events, ThreadPool& threads) {
 /// Adds one band at a time, so that its rows stay in the cache from step to step.
 void Accumulator::add_band(const EventBuckets& events, int band) {
   events.visit_band(band, [this](std::span<const Event> part) { add(part); });
-}
-
-void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
-                       std::ptrdiff_t stride) {
-  const KindTables kinds(palette, layout);
-  for (int band = 0; band < band_count(fired_.height()); ++band) HWY_DYNAMIC_DISPATCH(draw_band)
-  (fired_, band, kinds, layout.bytes, reinterpret_cast<std::uint8_t*>(out), stride);
 }
 
 void Accumulator::draw(const Palette& palette, const PixelLayout& layout, std::byte* out,

@@ -7,6 +7,7 @@
 
 #include "src/core/event_buckets.hpp"
 #include "src/core/image.hpp"
+#include "src/core/thread_pool.hpp"
 #include "src/render/palette.hpp"
 
 namespace eventcamera {
@@ -18,12 +19,9 @@ class Accumulator {
 
   /// Adds events, which must all lie inside the picture.
   void add(std::span<const Event> events);
-  void add(const EventBuckets& events);
   void add(const EventBuckets& events, ThreadPool& threads);
 
   /// Draws the accumulated events and starts over. `stride` in bytes.
-  void draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
-            std::ptrdiff_t stride);
   void draw(const Palette& palette, const PixelLayout& layout, std::byte* out,
             std::ptrdiff_t stride, ThreadPool& threads);
 

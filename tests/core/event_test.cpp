@@ -34,7 +34,8 @@ TEST(EventBuckets, ReadStepByStepAndBandByBand) {
   buckets.bucket(1, 0).push_back(Event::at(1, 0, 1, Polarity::off));
   ASSERT_EQ(buckets.size(), 3U);
   Event events[3];
-  buckets.write_to(events);
+  ThreadPool threads;
+  buckets.write_to(events, threads);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(events[i].x, i + 1);
   buckets.reset(1, 1);
   EXPECT_EQ(buckets.size(), 0U);
@@ -54,8 +55,8 @@ TEST(EventBuckets, AreCopiedAlikeByAnyNumberOfThreads) {
   const auto count = static_cast<std::size_t>(x);
   ASSERT_EQ(buckets.size(), count);
   std::vector<Event> expected(count);
-  buckets.write_to(expected.data());
   ThreadPool threads;
+  buckets.write_to(expected.data(), threads);
   for (const int most : {1, 2, 0}) {
     threads.set_threads(most);
     std::vector<Event> events(count);

@@ -32,10 +32,11 @@ std::vector<Event> column(int x) {
 
 std::string accumulated(const std::vector<Event>& events) {
   eventcamera::Accumulator accumulator(width, height);
+  eventcamera::ThreadPool threads;
   accumulator.add(events);
   std::string picture(width * height, '\0');
   accumulator.draw(eventcamera::palette(eventcamera::PaletteName::dark), {},
-                   reinterpret_cast<std::byte*>(picture.data()), width);
+                   reinterpret_cast<std::byte*>(picture.data()), width, threads);
   return picture;
 }
 

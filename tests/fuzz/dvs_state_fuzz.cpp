@@ -41,7 +41,7 @@ std::span<const Event> push(DvsSimulator& simulator, int number, Nanoseconds tim
   const auto* made =
       simulator.push({format, frame.data(), format.width}, time, {.threads = 1, .labels = true});
   events.resize(made != nullptr ? made->size() : 0);
-  if (made != nullptr) made->write_to(events.data());
+  if (made != nullptr) made->write_to(events.data(), simulator.threads());
   return events;
 }
 

@@ -158,11 +158,12 @@ TEST_P(EveryApi, FollowsChangedPixelsAsTheCpuDoes) {
 std::vector<std::uint8_t> drawn(const EventBuckets* events, const Palette& palette,
                                 const LumaFormat& format) {
   Accumulator accumulator(format.width, format.height);
-  if (events != nullptr) accumulator.add(*events);
+  ThreadPool threads;
+  if (events != nullptr) accumulator.add(*events, threads);
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(format.width) *
                                    static_cast<std::size_t>(format.height) * 4);
   accumulator.draw(palette, {.bytes = 4}, reinterpret_cast<std::byte*>(pixels.data()),
-                   std::ptrdiff_t{format.width} * 4);
+                   std::ptrdiff_t{format.width} * 4, threads);
   return pixels;
 }
 

@@ -341,7 +341,7 @@ std::vector<Event> events_of(Simulator& simulator,
     const auto* made = simulator.push(luma, static_cast<Nanoseconds>(i) * interval, settings);
     if (made == nullptr) continue;
     events.resize(made->size());
-    made->write_to(events.data());
+    made->write_to(events.data(), simulator.threads());
   }
   return events;
 }
@@ -501,7 +501,7 @@ Agreement agreement_of(const std::vector<Image<std::uint8_t>>& frames, FlowMetho
     const auto* made = simulator->push(luma, static_cast<Nanoseconds>(i) * 40'000'000, settings);
     if (made == nullptr) continue;
     std::vector<Event> events(made->size());
-    made->write_to(events.data());
+    made->write_to(events.data(), simulator->threads());
     add_agreement(frames[i - 1], frames[i], events, agreement);
   }
   return agreement;

@@ -22,7 +22,8 @@ std::vector<int> draw(const PixelLayout& layout, PaletteName name) {
   accumulator.add(few_events);
   const int stride = 3 * layout.bytes + 5;
   std::vector<std::byte> out(static_cast<std::size_t>(stride) * 2, std::byte{7});
-  accumulator.draw(palette(name), layout, out.data(), stride);
+  ThreadPool threads;
+  accumulator.draw(palette(name), layout, out.data(), stride, threads);
   std::vector<int> bytes;
   for (const auto byte : out) bytes.push_back(std::to_integer<int>(byte));
   return bytes;
@@ -54,8 +55,9 @@ TEST(Accumulator, BeginsAnewAfterDrawing) {
   Accumulator accumulator(3, 2);
   accumulator.add(few_events);
   std::vector<std::byte> out(6);
-  accumulator.draw(palette(PaletteName::grey), {}, out.data(), 3);
-  accumulator.draw(palette(PaletteName::grey), {}, out.data(), 3);
+  ThreadPool threads;
+  accumulator.draw(palette(PaletteName::grey), {}, out.data(), 3, threads);
+  accumulator.draw(palette(PaletteName::grey), {}, out.data(), 3, threads);
   EXPECT_TRUE(std::ranges::all_of(out, [](std::byte b) { return b == std::byte{128}; }));
 }
 
@@ -120,12 +122,13 @@ void expect_pictures_as_drawn_plainly() {
         const auto events = events_by_chance(width, height, share);
         const auto& colours = palette(PaletteName::red_blue);
         Accumulator accumulator(width, height);
+        ThreadPool threads;
         std::vector<std::byte> out(static_cast<std::size_t>(stride * height), std::byte{7});
-        accumulator.add(events);
-        accumulator.draw(colours, layout, out.data(), stride);
+        accumulator.add(events, threads);
+        accumulator.draw(colours, layout, out.data(), stride, threads);
         ASSERT_EQ(out, plainly_drawn(events, width, height, stride, colours, layout))
             << width << " pixels of " << layout.bytes << " bytes, share " << share;
-        accumulator.draw(colours, layout, out.data(), stride);
+        accumulator.draw(colours, layout, out.data(), stride, threads);
         ASSERT_EQ(out, plainly_drawn({}, width, height, stride, colours, layout))
             << "the second of " << width << " pixels of " << layout.bytes << " bytes";
       }
@@ -143,18 +146,18 @@ TEST(Accumulator, DrawsTheSameWithAnyNumberOfThreads) {
       for (int x = step + y; x < width; x += step)
         events.bucket(step, y / rows_per_band)
             .push_back(Event::at(x, y, step, x % 3 == 0 ? Polarity::on : Polarity::off));
-  const auto draw_with = [&](auto&&... threads) {
+  ThreadPool threads;
+  const auto drawn = [&] {
     Accumulator accumulator(width, height);
-    accumulator.add(events, threads...);
+    accumulator.add(events, threads);
     std::vector<std::byte> out(std::size_t{width} * height);
-    accumulator.draw(palette(PaletteName::grey), {}, out.data(), width, threads...);
+    accumulator.draw(palette(PaletteName::grey), {}, out.data(), width, threads);
     return out;
   };
-  const auto expected = draw_with();
-  ThreadPool threads;
+  const auto expected = drawn();
   for (const int most : {1, 2, 0}) {
     threads.set_threads(most);
-    EXPECT_EQ(draw_with(threads), expected) << most << " threads";
+    EXPECT_EQ(drawn(), expected) << most << " threads";
   }
 }
 

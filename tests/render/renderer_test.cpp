@@ -117,7 +117,9 @@ TEST(Renderer, DrawsAnIntervalAsTheAccumulatorDoes) {
       accumulator.add(events);
       const std::ptrdiff_t stride = width * layout.bytes + 3;
       Picture picture(static_cast<std::size_t>(stride * height), 7);
-      accumulator.draw(palette(name), layout, reinterpret_cast<std::byte*>(picture.data()), stride);
+      ThreadPool threads;
+      accumulator.draw(palette(name), layout, reinterpret_cast<std::byte*>(picture.data()), stride,
+                       threads);
       EXPECT_EQ(draw(renderer, 5'000'000, 5'033'333, layout), picture);
     }
   }

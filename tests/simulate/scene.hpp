@@ -79,7 +79,8 @@ inline LumaView luma(const Image<std::uint8_t>& picture) {
 
 inline std::vector<Event> copy(const eventcamera::EventBuckets& buckets) {
   std::vector<Event> events(buckets.size());
-  buckets.write_to(events.data());
+  eventcamera::ThreadPool threads;
+  buckets.write_to(events.data(), threads);
   return events;
 }
 
