@@ -13,7 +13,8 @@ namespace eventcamera {
 
 /// Simulates a physical pixel array: logarithmic response, photoreceptor bandwidth, reference
 /// level, threshold mismatch, leak, shot noise, refractory period, readout. Each threshold crossing
-/// has its own time. Thresholds come from DvsSettings; only `threads` of Settings is used.
+/// has its own time. Thresholds come from DvsSettings; only `threads` and `labels` of Settings are
+/// used.
 class DvsSimulator : public Simulator {
  public:
   /// Applies to the next frames.

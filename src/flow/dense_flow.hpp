@@ -27,8 +27,8 @@
 // Bouguet, Pyramidal implementation of the Lucas Kanade feature tracker, Intel 2000
 //   pyramid.cpp                   scales
 //   scharr_gradients.cpp          image gradients g
-//   texture.cpp                   pixels whose sum(g g^T) may suffice for tracking
-//   search.cpp                    sum(g g^T) d = sum(g (I - J)) over a window, iterated
+//   search.cpp                    sum(g g^T) d = sum(g (I - J)) over a window, iterated, where
+//                                 sum(g g^T) suffices
 //   point_tracker.cpp             scales and points
 
 namespace eventcamera {

@@ -19,8 +19,7 @@ using Floats = hn::CappedTag<float, 16>;
 using Words = hn::RebindToUnsigned<Floats>;
 using SignedWords = hn::RebindToSigned<Floats>;
 
-/// Passes vectors of values, the last one filled up with zeros, and where they begin, to `take`,
-/// which returns what store() writes there.
+/// Writes converted(vector) for each vector of values; the last one is filled up with zeros.
 template <class Out, class Convert>
 void convert(const float* values, std::size_t count, Out* out, const Convert& converted) {
   const Floats floats;

@@ -9,8 +9,8 @@ namespace eventcamera {
 
 class Aedat4Decoder;
 
-/// Decodes AEDAT 4, 3.1 and 2.0, according to the first line of the file. The older versions are
-/// read as a single stream of events (and triggers).
+/// Decodes AEDAT 4, 3.1, 2.0 and 1.0, according to the first line of the file. The older versions
+/// are read as a single stream of events (and triggers).
 class AedatDecoder final : public RecordingDecoder {
  public:
   /// `assumed` is the sensor size to use if an AEDAT 2.0 file does not state it.
