@@ -19,7 +19,7 @@ std::pair<int, int> covered(int at, int sensor, int picture) {
 
 }  // namespace
 
-Overlay::Overlay(Size sensor, Size picture)
+Overlay::Overlay(SensorSize sensor, SensorSize picture)
     : sensor_(sensor),
       picture_(picture),
       validator_(sensor.width, sensor.height),

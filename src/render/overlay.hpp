@@ -8,24 +8,18 @@
 #include "src/core/event.hpp"
 #include "src/core/event_validator.hpp"
 #include "src/core/image.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/render/event_window.hpp"
 #include "src/render/palette.hpp"
 
 namespace eventcamera {
-
-struct Size {
-  int width;
-  int height;
-
-  friend bool operator==(const Size&, const Size&) = default;
-};
 
 /// Draws the events of a time window over video frames, scaled to their size. Events and frames
 /// must be passed in time order.
 class Overlay {
  public:
   /// Throws std::bad_alloc, like add().
-  Overlay(Size sensor, Size picture);
+  Overlay(SensorSize sensor, SensorSize picture);
 
   /// Like Renderer::add().
   std::size_t add(std::span<const Event> events, Microseconds start);
@@ -38,8 +32,8 @@ class Overlay {
  private:
   void mark(int x, int y, std::uint8_t kind);
 
-  Size sensor_;
-  Size picture_;
+  SensorSize sensor_;
+  SensorSize picture_;
   EventValidator validator_;
   EventWindow window_;
   bool has_drawn_ = false;

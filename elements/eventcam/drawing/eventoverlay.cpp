@@ -39,7 +39,7 @@ GST_DEBUG_CATEGORY_STATIC(event_overlay_debug);
 using eventcamera::Microseconds;
 using eventcamera::Overlay;
 using eventcamera::PaletteName;
-using eventcamera::Size;
+using eventcamera::SensorSize;
 
 namespace {
 
@@ -78,7 +78,7 @@ class EventOverlay final : public EventAggregator {
 
   // Accessed by the source pad's thread only, or while there is none.
   std::optional<GstVideoInfo> video_;
-  std::optional<Size> sensor_;
+  std::optional<SensorSize> sensor_;
   std::optional<Overlay> overlay_;  // set once both are known
   gsize taken_ = 0;                 // number of processed events of the first queued buffer
   GstClockTime known_ = 0;          // running time up to which events are complete
@@ -190,7 +190,7 @@ GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& inter
                                        bool timed_out) {
   if (interval) {
     if (sensor_ && !overlay_) {
-      const Size frame{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
+      const SensorSize frame{GST_VIDEO_INFO_WIDTH(&*video_), GST_VIDEO_INFO_HEIGHT(&*video_)};
       GST_DEBUG_OBJECT(element(), "drawing the events of %dx%d pixels on frames of %dx%d",
                        sensor_->width, sensor_->height, frame.width, frame.height);
       overlay_.emplace(*sensor_, frame);
@@ -252,7 +252,7 @@ bool EventOverlay::take_video_caps(const GstCaps* caps) {
 bool EventOverlay::take_event_caps(const GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
-  const Size sensor{info.width, info.height};
+  const SensorSize sensor{info.width, info.height};
   if (sensor_ != sensor) overlay_.reset();
   sensor_ = sensor;
   return true;
