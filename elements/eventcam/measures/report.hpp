@@ -7,10 +7,10 @@
 #include <string>
 
 #include "gst/base/properties.hpp"
+#include "src/core/event.hpp"
 #include "src/measure/cause_counts.hpp"
 #include "src/measure/event_statistics.hpp"
-#include "src/render/map_picture.hpp"
-#include "src/simulate/simulator.hpp"
+#include "src/render/rgb_picture.hpp"
 
 /// Files that an element writes its results to; none if a path is empty.
 struct ReportFiles {
