@@ -176,9 +176,9 @@ class DatDecoder final : public UnitStreamDecoder {
     begin(make_decoder_(size), size);
   }
 
-  template <class RecordingDecoder>
+  template <class RecordDecoder>
   static std::unique_ptr<UnitDecoder> make(SensorSize size) {
-    return std::make_unique<RecordingDecoder>(size);
+    return std::make_unique<RecordDecoder>(size);
   }
 
   /// Sensor of the first camera, whose files do not state the size.
