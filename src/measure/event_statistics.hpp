@@ -43,8 +43,6 @@ class IntervalHistogram {
     ++count_;
   }
 
-  std::uint64_t count() const { return count_; }
-
   /// Returns the `share` quantile, `share` in [0, 1], as the middle of its bin; 0 without
   /// intervals.
   Microseconds quantile(double share) const;
@@ -53,8 +51,6 @@ class IntervalHistogram {
   /// of one must be moved on average to become the other's. 0 if either has none. Intervals of 0
   /// count as half a microsecond.
   double distance_to(const IntervalHistogram& other) const;
-
-  void clear() { *this = {}; }
 
  private:
   static constexpr unsigned step_bits = 5;  ///< log2 of the bins per octave

@@ -27,8 +27,6 @@ class MovingPoints {
     block.dy[lane] = point.dy;
   }
 
-  std::size_t size() const { return size_; }
-
   /// Computes the positions after j steps as indices of the pixels of an image whose rows are
   /// `stride` pixels apart. Valid as long as `memory` is not changed.
   std::span<const std::int32_t> at(int j, int stride, std::vector<std::int32_t>& memory) const;

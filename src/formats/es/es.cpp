@@ -164,7 +164,6 @@ class EsDecoder final : public UnitStreamDecoder {
       case colour:
         begin_events<EsColourDecoder>(size);
         break;
-      case amd:
       default:
         throw UnsupportedFormat("unsupported Event Stream type " + std::to_string(at[3]));
     }
