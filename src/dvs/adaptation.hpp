@@ -8,10 +8,10 @@
 namespace eventcamera {
 
 /// Adaptation of thresholds: each event raises both thresholds of its pixel by a fraction, and the
-/// growth falls at a constant rate. So the time until it is gone says how large it is, and each
-/// event makes that longer by the adaptation time. At strong edges, which are many thresholds high,
-/// pixels of real cameras fire fewer events than their contrast is worth (docs/methods.md). Times
-/// are microseconds on any common clock.
+/// growth falls at a constant rate. The growth is stored as the time at which it ends; each event
+/// moves that by the adaptation time. At strong edges, which are many thresholds high, pixels of
+/// real cameras fire fewer events than their contrast is worth (docs/methods.md). Times are
+/// microseconds on any common clock.
 class Adaptation {
  public:
   explicit Adaptation(const DvsSettings& settings)

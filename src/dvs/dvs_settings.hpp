@@ -58,7 +58,7 @@ struct DvsSettings {
   double dead_pixels = 0;      ///< fraction of all pixels
 
   double adaptation = 0;                     ///< growth of the thresholds by an event, a fraction
-  Nanoseconds adaptation_time = 10'000'000;  ///< in which the growth by an event is gone
+  Nanoseconds adaptation_time = 10'000'000;  ///< time in which the growth from one event fades
 
   Nanoseconds refractory_period = 0;
   RefractoryReset refractory_reset = RefractoryReset::level;

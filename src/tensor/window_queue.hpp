@@ -44,7 +44,7 @@ class WindowQueue {
     std::span<const AbsoluteEvent> events;  ///< valid until add() or reset()
   };
 
-  /// Numbers of events that an interval had in vain.
+  /// Dropped events of an interval, by reason.
   struct Skipped {
     std::size_t outside = 0;  ///< of the sensor
     std::size_t excess = 0;   ///< more than max_events in a window

@@ -51,7 +51,7 @@ bool RtpUnpacker::decode(const RtpPacket& packet) {
     header_ = *header;
     is_valid = decode_events(packet.payload.subspan(RtpPayloadHeader::size));
   }
-  // A late packet is behind the events of its interval.
+  // A late packet precedes the events of its interval.
   if (is_valid && is_of_interval(packet) && position_->packets_before(packet) >= 0)
     is_valid = continues_interval();
   if (is_valid && is_of_second_sender(packet)) {

@@ -21,7 +21,7 @@ constexpr std::int64_t large_step = 60'000'000;
 /// Number of consecutive valid records after which scanning stops.
 constexpr std::size_t sound_records = 8;
 /// Number of valid records that must follow an odd one for it to be skipped alone.
-constexpr std::size_t records_behind = 4;
+constexpr std::size_t records_after = 4;
 
 std::string lowercase(std::string_view text) {
   std::string lower(text);
@@ -169,16 +169,16 @@ void Aedat2Decoder::read_records(Decoded& out) {
 
 /// Handles a record with an odd address or time. False if more bytes are needed.
 bool Aedat2Decoder::read_odd_record(Decoded& out) {
-  const auto wanted = record_size_ * (1 + records_behind);
+  const auto wanted = record_size_ * (1 + records_after);
   if (queue_.size() < wanted && !finished_) return false;
   const auto bytes = queue_.peek(std::min(queue_.size(), wanted));
-  const auto behind = std::min(wanted, bytes.size()) / record_size_ - 1;
+  const auto after = std::min(wanted, bytes.size()) / record_size_ - 1;
   const auto record = record_at(bytes.data());
-  bool sound_behind = true;
-  for (std::size_t i = 1; i <= behind; ++i)
-    sound_behind &= within_sensor(record_at(bytes.data() + i * record_size_).address);
+  bool sound_after = true;
+  for (std::size_t i = 1; i <= after; ++i)
+    sound_after &= within_sensor(record_at(bytes.data() + i * record_size_).address);
   const bool within = within_sensor(record.address);
-  if (!sound_behind) {
+  if (!sound_after) {
     corruption_.note(queue_.position(), "no AEDAT records here");
     queue_.consume(1);
     scanning_ = true;
@@ -186,7 +186,7 @@ bool Aedat2Decoder::read_odd_record(Decoded& out) {
   }
   if (!within)
     ++corruption_.outside;
-  else if (behind > 0 && !far(record_at(bytes.data() + record_size_).t))
+  else if (after > 0 && !far(record_at(bytes.data() + record_size_).t))
     corruption_.note(queue_.position(), "timestamp far from those around it");
   else
     append(record, out);

@@ -18,7 +18,7 @@ constexpr std::int32_t max_overflow = 1 << 29;
 /// Of a sensor of unknown size; more than any camera of this format had, so that corruption shows.
 constexpr int widest = 8192;
 /// Number of valid events that must follow an invalid one for it to be skipped alone.
-constexpr std::uint64_t events_behind = 4;
+constexpr std::uint64_t events_after = 4;
 
 enum Type : int { special = 0, polarity = 1, last_type = 31 };
 
@@ -161,17 +161,17 @@ bool Aedat3Decoder::read_events(Decoded& out) {
 
   // Invalid event: either it is corrupt, or this packet is short and the next one starts here, or
   // bytes are missing and the data is misaligned.
-  const auto behind = std::min<std::uint64_t>(packet_.events - 1, events_behind);
-  const auto wanted = std::max(packet_header_size, (1 + behind) * event_size);
+  const auto after = std::min<std::uint64_t>(packet_.events - 1, events_after);
+  const auto wanted = std::max(packet_header_size, (1 + after) * event_size);
   if (queue_.size() < wanted && !finished_) return false;
   const auto next = queue_.peek(std::min(queue_.size(), wanted));
-  bool sound_behind = true;
-  for (std::size_t k = 1; k <= behind && (k + 1) * event_size <= next.size(); ++k)
-    sound_behind &= !is_odd(next.data() + k * event_size);
+  bool sound_after = true;
+  for (std::size_t k = 1; k <= after && (k + 1) * event_size <= next.size(); ++k)
+    sound_after &= !is_odd(next.data() + k * event_size);
   if (next.size() >= packet_header_size && begins_packet(next.data())) {
     corruption_.note(queue_.position(), "AEDAT 3.1 packet shorter than its header says");
     packet_ = {};
-  } else if (!sound_behind) {
+  } else if (!sound_after) {
     corruption_.note(queue_.position(), "no AEDAT 3.1 events here");
     packet_ = {};
     scanning_ = true;

@@ -281,16 +281,16 @@ bool Hdf5Dataset::read_stored(const hsize_t* offset, std::size_t most,
   if (filters_.empty()) {
     // The library reads as many bytes as the file's index states, without reporting the number
     // beforehand, but not more than the file has. Untouched pages of this buffer take no memory.
-    if (!room_) {
+    if (!scratch_) {
       const auto max_bytes = std::min<std::uint64_t>(file_bytes_, UINT32_MAX);
-      room_.reset(static_cast<std::uint8_t*>(
+      scratch_.reset(static_cast<std::uint8_t*>(
           std::calloc(std::max<std::size_t>(max_bytes, chunk_bytes_), 1)));
-      if (!room_) throw std::bad_alloc();
+      if (!scratch_) throw std::bad_alloc();
     }
     if (chunk_bytes_ > most ||
-        H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, room_.get()) < 0)
+        H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset, &left_out, scratch_.get()) < 0)
       return false;
-    out.assign(room_.get(), room_.get() + chunk_bytes_);
+    out.assign(scratch_.get(), scratch_.get() + chunk_bytes_);
     return true;
   }
   hsize_t bytes = 0;

@@ -100,8 +100,8 @@ class Hdf5Dataset {
   struct Free {
     void operator()(std::uint8_t* bytes) const { std::free(bytes); }
   };
-  std::unique_ptr<std::uint8_t, Free> room_;  ///< for chunks of unknown size
-  std::vector<std::uint8_t> loaded_;          ///< rows of one row of chunks
+  std::unique_ptr<std::uint8_t, Free> scratch_;  ///< for chunks of unknown size
+  std::vector<std::uint8_t> loaded_;             ///< rows of one row of chunks
   std::optional<std::uint64_t> loaded_block_;
 };
 

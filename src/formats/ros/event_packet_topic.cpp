@@ -11,7 +11,7 @@ namespace eventcamera {
 
 namespace {
 
-/// Field of event_camera_msgs/EventPacket (github.com/ros-event-camera/event_camera_msgs).
+/// Fields of event_camera_msgs/EventPacket (github.com/ros-event-camera/event_camera_msgs).
 struct EventPacket {
   std::uint64_t stamp;  ///< ROS time of the first event, nanoseconds
   std::uint32_t height;
