@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/dvs/line_solver.hpp"
+
 #include <algorithm>
 #include <bit>
 
-#include "src/dvs/pixel_solver.hpp"
+#include "src/dvs/shot_noise.hpp"
+#include "src/dvs/trajectory.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/line_solver.cpp"
@@ -82,7 +85,7 @@ class Pixels {
   }
 
   /// Stores what is left of refractory periods, if any is or was.
-  void rest(const RowToSolve& row, Values ready) const {
+  void store_refractory_left(const RowToSolve& row, Values ready) const {
     const auto left = hn::Max(all(0), hn::Sub(ready, all(row.sub_interval.duration)));
     const auto is_or_was = hn::Gt(hn::Max(left, load(row, Candidates::refractory_left)), all(0));
     if (hn::AllFalse(Doubles(), hn::And(is_or_was, exist()))) return;
@@ -213,7 +216,7 @@ class Lines {
   void end(const RowToSolve& row) const {
     const auto reference = upright(hn::IfThenElse(crosses_, last(), reference_));
     pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
-    pixels_.rest(row, ready_);
+    pixels_.store_refractory_left(row, ready_);
   }
 
  private:
@@ -319,7 +322,7 @@ class VaryingThresholds {
   void end(const RowToSolve& row) const {
     const auto reference = hn::IfThenElse(crosses_, last_, reference_);
     pixels_.store(row, hn::Sub(reference, fall_), row.pixels.reference);
-    pixels_.rest(row, ready_);
+    pixels_.store_refractory_left(row, ready_);
     if (row.dynamics.adaptation.is_on())
       pixels_.store(row, hn::Add(all(row.start), growth_end_), row.pixels.growth_end);
     if (row.dynamics.threshold_jitter > 0) {

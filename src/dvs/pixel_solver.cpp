@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
+
+#include "src/dvs/shot_noise.hpp"
+#include "src/dvs/trajectory.hpp"
 
 namespace eventcamera {
 namespace {
@@ -121,7 +123,6 @@ class Pixel {
     signal.slope += rise;
     signal.offset -= rise * from.t;
     const Crossings crossings(signal, {to.t, to.value + rise * (to.t - from.t)});
-    constexpr double never = std::numeric_limits<double>::infinity();
     auto found =
         threshold > 0 ? crossings.first(-never, level, from) : crossings.first(level, never, from);
     if (found) found->point.value -= rise * (found->point.t - from.t);

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/dvs/row_filter.hpp"
+
 #include <algorithm>
 
 #include "src/dvs/exposure_gain.hpp"
-#include "src/dvs/pixel_solver.hpp"
+#include "src/dvs/trajectory.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/row_filter.cpp"

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+#include "src/dvs/row_solver.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
-#include "src/dvs/pixel_solver.hpp"
+#include "src/dvs/trajectory.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dvs/row_solver.cpp"

@@ -14,9 +14,11 @@
 
 #include "src/dvs/dvs_settings.hpp"
 #include "src/dvs/elementary.hpp"
+#include "src/dvs/line_solver.hpp"
 #include "src/dvs/pixel_array.hpp"
 #include "src/dvs/pixel_solver.hpp"
 #include "src/dvs/random.hpp"
+#include "src/dvs/row_solver.hpp"
 #include "src/dvs/trajectory.hpp"
 #include "src/flow/dense_flow.hpp"
 #include "tests/core/targets.hpp"

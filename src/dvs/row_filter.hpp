@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "src/dvs/light_response.hpp"
+#include "src/dvs/pixel_array.hpp"
+#include "src/dvs/run.hpp"
+#include "src/dvs/sub_intervals.hpp"
+
+namespace eventcamera {
+
+/// Maximum vector length in floats; rows of luma values are padded by this.
+inline constexpr int max_lanes = 16;
+
+/// Pixels of a row in which something may happen.
+class Candidates {
+ public:
+  /// Values of each of them: of the sub-interval, and, like those of PixelRow, at its start.
+  enum Column : std::size_t {
+    target,  ///< at the end of the sub-interval
+    signal,
+    last_target,
+    last_signal,
+    reference,
+    positive,
+    negative,
+    leak,
+    refractory_left,
+    columns
+  };
+
+  std::size_t count = 0;
+  std::vector<std::int32_t> x;
+  std::vector<std::int32_t> shade;
+
+  float* column(Column column) { return memory_.data() + column * x.size(); }
+  const float* column(Column column) const { return memory_.data() + column * x.size(); }
+
+  /// The last candidate takes the place of candidate i.
+  void remove(std::size_t i) {
+    --count;
+    x[i] = x[count];
+    shade[i] = shade[count];
+    for (std::size_t first = 0; first < memory_.size(); first += x.size())
+      memory_[first + i] = memory_[first + count];
+  }
+
+  /// Makes space for a row, padded for vectors.
+  void resize(int width) {
+    const auto size = static_cast<std::size_t>(width) + max_lanes;
+    x.resize(size);
+    shade.resize(size);
+    memory_.resize(columns * size);
+  }
+
+ private:
+  std::vector<float> memory_;
+};
+
+/// Parameters of filter_run(), shared by all pixels in a sub-interval.
+struct RowFilter {
+  const SubInterval& sub_interval;
+  const ShadeTables& tables;
+  const std::vector<float>& responses;  ///< by luma value
+  int luma_bits;
+  bool has_bandwidth;
+  bool has_noise;
+  bool keeps_saturated;  ///< saturated pixels keep a higher target
+};
+
+/// Luma of a run of pixels, from the first of them on: std::uint8_t if it has 8 bits, std::uint16_t
+/// otherwise.
+struct RunLuma {
+  const void* target;  ///< towards which the light moves
+  const void* shade;   ///< that bandwidth and noise depend on
+};
+
+/// Advances a run of pixels through a sub-interval: targets and signals of all pixels; references
+/// and noise budgets of those that cannot fire, which are most. The others become `candidates`. The
+/// decision has a margin for float rounding, and is the same on every processor. A run that does
+/// not end with the row must be a multiple of max_lanes pixels wide.
+void filter_run(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
+                const Run& run, Candidates& candidates);
+
+/// What light does at most during an interval, in units of the response.
+struct LightRange {
+  float darkest;
+  float brightest;
+  float max_rise;  ///< of all signals, beyond the light
+  float max_fall;
+};
+
+/// Advances a run of pixels without bandwidth through a whole interval, for which `row_filter` and
+/// `luma` are, if none of them can fire in it, whatever the light does within its range. Otherwise
+/// returns false, and leaves them as they are.
+bool rest_run(const RowFilter& row_filter, const LightRange& range, const RunLuma& luma,
+              const PixelRow& pixels, const Run& run);
+
+}  // namespace eventcamera
