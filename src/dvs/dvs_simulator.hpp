@@ -9,6 +9,24 @@
 #include "src/dvs/dvs_settings.hpp"
 #include "src/simulate/simulator.hpp"
 
+// Guide to this folder: which file does what from frames to events, in this order. The equations
+// are in docs/methods.md.
+//
+//   denoise.cpp           removes the noise of the frame camera
+//   exposure_gain.cpp     finds how its exposure changed the light, which is divided out
+//   motion_tiles.cpp      number of steps between two frames, of at most a pixel, for each tile
+//   sub_intervals.cpp     divides the interval into steps, and where exposure pulses begin and end
+//   moving_light.cpp      luma of moving pixels at each step; light_response.hpp: its response
+//   row_filter.cpp        advances pixels that cannot fire, which are most; the others, candidates,
+//                         are solved: they get the exact times of their events
+//   pixel_solver.cpp      solves one at a time, with crossings (trajectory.cpp), adaptation.hpp,
+//                         shot_noise.hpp, latency and refractory period; chooses the solver
+//   line_solver.cpp       the same for many straight lines at a time
+//   row_solver.cpp        the same for many signals with bandwidth or shot noise at a time
+//   interval_events.hpp   collects the events, and defers those past the interval
+//   readout.cpp           reads them out row by row at a limited rate
+// Pixels have the state and the mismatch of pixel_array.cpp, and random numbers of random.hpp.
+
 namespace eventcamera {
 
 /// Simulates a physical pixel array: logarithmic response, photoreceptor bandwidth, reference
