@@ -21,8 +21,8 @@
 //                         are solved: they get the exact times of their events
 //   pixel_solver.cpp      solves one at a time, with crossings (trajectory.cpp), adaptation.hpp,
 //                         shot_noise.hpp, latency and refractory period; chooses the solver
-//   line_solver.cpp       the same for many straight lines at a time
-//   row_solver.cpp        the same for many signals with bandwidth or shot noise at a time
+//   line_solver.cpp       the same for many straight lines at a time, without latency
+//   row_solver.cpp        the same for many pixels at a time whose thresholds do not vary
 //   interval_events.hpp   collects the events, and defers those past the interval
 //   readout.cpp           reads them out row by row at a limited rate
 // Pixels have the state and the mismatch of pixel_array.cpp, and random numbers of random.hpp.

@@ -6,7 +6,7 @@
 namespace eventcamera {
 
 /// Like solve_pixels(), for signals that are straight lines, and events that are crossings without
-/// side effects except the refractory period.
+/// latency, after which the reference is the level.
 void solve_lines(const RowToSolve& row);
 
 /// Like solve_lines(), with thresholds that vary: by adaptation, and by jitter without mismatch.

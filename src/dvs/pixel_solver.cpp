@@ -244,8 +244,8 @@ Solver solver_for(const DvsSettings& settings) {
     const bool is_fast = has_lines && !has_side_effects && !has_many_means;
     return is_fast ? Solver::varying_thresholds : Solver::pixels;
   }
-  if (has_side_effects) return Solver::pixels;
-  return has_lines && settings.shot_noise_rate == 0 ? Solver::lines : Solver::row;
+  const bool is_simple = has_lines && !has_side_effects && settings.shot_noise_rate == 0;
+  return is_simple ? Solver::lines : Solver::row;
 }
 
 }  // namespace eventcamera

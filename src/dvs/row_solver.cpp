@@ -13,6 +13,7 @@
 // Compiled once per SIMD target.
 #include "src/core/simd-inl.hpp"
 #include "src/dvs/elementary-inl.hpp"
+#include "src/dvs/random-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace eventcamera::HWY_NAMESPACE {
@@ -120,6 +121,9 @@ struct Trajectories {
   }
 };
 
+/// Column::released of pixels that are not held.
+constexpr double not_held = -1;
+
 class RowSolver {
  public:
   RowSolver(const RowToSolve& row, UnsolvedPixels& unsolved)
@@ -127,7 +131,7 @@ class RowSolver {
         unsolved_(unsolved),
         duration_(row.sub_interval.duration),
         has_bandwidth_(row.settings.cutoff_frequency > 0),
-        gap_(row.dynamics.gap) {}
+        holds_(row.settings.refractory_reset == RefractoryReset::signal) {}
 
   void solve() {
     begin();
@@ -197,7 +201,10 @@ class RowSolver {
     store(Column::reference, hn::Mul(sign, load(Candidates::reference)));
     store(Column::to_far, hn::IfThenElse(is_upright, positive, negative));
     store(Column::to_near, hn::IfThenElse(is_upright, negative, positive));
-    store(Column::ready, load(Candidates::refractory_left));
+    const auto ready = load(Candidates::refractory_left);
+    store(Column::ready, ready);
+    if (holds_)
+      store(Column::released, hn::IfThenElse(hn::Gt(ready, all(0)), ready, all(not_held)));
   }
 
   /// Finds the next event of each pixel; stores pixels that have none.
@@ -212,20 +219,31 @@ class RowSolver {
     const auto load = [&](Column column) {
       return hn::LoadU(doubles, unsolved_.column(column) + i);
     };
-    const auto within = hn::FirstN(doubles, count_ - i);
+    const auto exist = hn::FirstN(doubles, count_ - i);
     const Trajectories trajectories{load(Column::offset), load(Column::slope),
                                     load(Column::bandwidth)};
-    const Points now{load(Column::t), load(Column::value)};
+    Points now{load(Column::t), load(Column::value)};
     const Points end{all(duration_), load(Column::end)};
-    const auto reference = load(Column::reference);
+    auto reference = load(Column::reference);
     const auto to_far = load(Column::to_far);
     const auto to_near = load(Column::to_near);
     const auto ready = load(Column::ready);
     const auto noise = load(Column::next_noise);
     const auto sign = load(Column::sign);
+    // A reset holds the reference at the signal until it is released, which may be after the end.
+    const auto released = holds_ ? load(Column::released) : all(not_held);
+    const auto stays_held = hn::Gt(released, end.t);
+    const auto is_released = hn::And(hn::Ge(released, all(0)), hn::Not(stays_held));
+    if (!hn::AllFalse(doubles, is_released)) {
+      now.value = hn::IfThenElse(is_released, trajectories.at(released, now), now.value);
+      now.t = hn::IfThenElse(is_released, released, now.t);
+      reference = hn::IfThenElse(is_released, now.value, reference);
+      hn::StoreU(reference, doubles, unsolved_.column(Column::reference) + i);
+    }
     const auto far = hn::Add(reference, to_far);
     const auto near = hn::Sub(reference, to_near);
     const auto margin = all(rounding);
+    const auto within = hn::And(exist, hn::Not(stays_held));
 
     // Like Crossings::first().
     const auto is_far = hn::Ge(now.value, far);
@@ -269,29 +287,36 @@ class RowSolver {
     const auto is_noise =
         hn::And(within, hn::Le(noise, hn::IfThenElse(crosses, t, all(duration_))));
     const auto happens = hn::Or(crosses, is_noise);
+    auto is_ready = hn::Ge(t, ready);
     if (!hn::AllFalse(doubles, is_noise)) {
-      t = hn::IfThenElse(is_noise, noise, t);
+      is_ready =
+          hn::Or(hn::And(is_noise, hn::Ge(noise, ready)), hn::And(hn::Not(is_noise), is_ready));
+      t = hn::IfThenElse(is_noise, hn::Max(noise, now.t), t);
       value = hn::IfThenElse(is_noise, trajectories.at(t, now), value);
-      next_reference = hn::IfThenElse(is_noise, hn::IfThenElse(hn::Ge(t, ready), value, reference),
-                                      next_reference);
+      next_reference =
+          hn::IfThenElse(is_noise, hn::IfThenElse(is_ready, value, reference), next_reference);
     }
-    const auto fires = hn::And(happens, hn::Ge(t, ready));
+    const auto fires = hn::And(happens, is_ready);
     const auto is_off = hn::Xor(crosses_near, hn::Lt(sign, all(0)));
 
     const auto noise_bits = bits_of(doubles, is_noise);
     const auto fire_bits = bits_of(doubles, fires);
     const auto on_bits = ~bits_of(doubles, is_off);
+    const auto emitted = emissions(i, t, noise_bits);
     HWY_ALIGN double times[max_lanes];
+    HWY_ALIGN double emission_times[max_lanes];
     hn::Store(t, doubles, times);
+    hn::Store(emitted, doubles, emission_times);
     for (auto bits = fire_bits | noise_bits; bits != 0; bits &= bits - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
       const auto is_set = [lane](std::uint64_t mask) { return (mask >> lane & 1) != 0; };
       if (is_set(noise_bits))
-        make_noise(i + lane, times[lane], is_set(fire_bits));
+        make_noise(i + lane, emission_times[lane], is_set(fire_bits));
       else
-        cross(i + lane, times[lane], is_set(on_bits));
+        cross(i + lane, times[lane], emission_times[lane], is_set(on_bits));
+      if (has_latency_jitter() && is_set(fire_bits)) ++unsolved_.draws[index_of(i + lane)];
     }
-    for (auto bits = bits_of(doubles, hn::And(within, hn::Not(happens))); bits != 0;
+    for (auto bits = bits_of(doubles, hn::And(exist, hn::Not(happens))); bits != 0;
          bits &= bits - 1)
       store(i + static_cast<std::size_t>(std::countr_zero(bits)));
 
@@ -312,9 +337,34 @@ class RowSolver {
     keep(Column::to_far, to_far);
     keep(Column::to_near, to_near);
     keep(Column::next_noise, next_noise);
-    keep(Column::ready, hn::IfThenElse(fires, hn::Add(t, all(gap_)), ready));
+    const auto rested = hn::Add(emitted, all(row_.dynamics.refractory_period));
+    keep(Column::ready,
+         hn::IfThenElse(fires, hn::Max(rested, hn::Add(emitted, all(min_gap))), ready));
+    if (holds_) keep(Column::released, hn::IfThenElse(fires, rested, all(not_held)));
     return hn::CountTrue(doubles, happens);
   }
+
+  /// Times at which events are emitted that are due at `t`: later by the latency.
+  Values emissions(std::size_t i, Values t, std::uint64_t noise_bits) {
+    const auto& dynamics = row_.dynamics;
+    if (dynamics.latency == 0 && !has_latency_jitter()) return t;
+    const auto emitted = hn::Add(t, all(dynamics.latency));
+    if (!has_latency_jitter()) return emitted;
+    const Bits bits;
+    HWY_ALIGN std::uint64_t numbers[max_lanes / 2] = {};
+    HWY_ALIGN std::uint64_t counters[max_lanes / 2] = {};
+    for (std::size_t lane = 0; lane < std::min(lanes(), count_ - i); ++lane) {
+      numbers[lane] = row_.pixels.first_number + static_cast<std::uint64_t>(x_of(i + lane));
+      // Noise draws its successor and its polarity before.
+      counters[lane] = unsolved_.draws[index_of(i + lane)] + 2 * (noise_bits >> lane & 1);
+    }
+    const RandomSeries<Doubles> random(row_.random, hn::Load(bits, numbers),
+                                       Random::Purpose::event);
+    const auto normal = random.normals(hn::Load(bits, counters)).first;
+    return hn::Max(t, hn::Add(emitted, hn::Mul(all(dynamics.latency_jitter), normal)));
+  }
+
+  bool has_latency_jitter() const { return row_.dynamics.latency_jitter > 0; }
 
   static HWY_INLINE Values secants(Values level, const Points& a, const Points& b) {
     const auto share = hn::Div(hn::Sub(level, a.value), hn::Sub(b.value, a.value));
@@ -327,7 +377,7 @@ class RowSolver {
   int x_of(std::size_t i) { return row_.candidates.x[index_of(i)]; }
 
   /// Adds the event of a crossing by a pixel whose columns still are those before it.
-  void cross(std::size_t i, double t, bool is_on) {
+  void cross(std::size_t i, double t, double emitted, bool is_on) {
     const int x = x_of(i);
     const auto polarity = is_on ? Polarity::on : Polarity::off;
     auto cause = Cause::unknown;
@@ -335,7 +385,7 @@ class RowSolver {
       const double light = slope_at(i, t) - fall_of(x);
       cause = row_.cause_of_crossing(x, polarity, light, 0);
     }
-    row_.add_event(x, t, polarity, cause);
+    row_.add_event(x, emitted, polarity, cause);
   }
 
   /// Slope of a signal relative to its reference, at a time after that of its columns.
@@ -349,7 +399,7 @@ class RowSolver {
   /// Fall of the reference per microsecond.
   double fall_of(int x) const { return row_.pixels.leak[x] + row_.sub_interval.rise / duration_; }
 
-  void make_noise(std::size_t i, double t, bool fires) {
+  void make_noise(std::size_t i, double emitted, bool fires) {
     const auto index = index_of(i);
     const int x = x_of(i);
     const auto number = row_.pixels.first_number + static_cast<std::uint64_t>(x);
@@ -360,7 +410,7 @@ class RowSolver {
     if (!fires) return;
     const bool is_on = row_.random.coin(number, Random::Purpose::event, draw++);
     if (!std::isinf(row_.pixels.positive[x]))
-      row_.add_event(x, t, is_on ? Polarity::on : Polarity::off,
+      row_.add_event(x, emitted, is_on ? Polarity::on : Polarity::off,
                      row_.has_labels() ? Cause::shot_noise : Cause::unknown);
   }
 
@@ -371,17 +421,18 @@ class RowSolver {
     const double reference =
         unsolved_.column(Column::sign)[i] * unsolved_.column(Column::reference)[i];
     pixels.reference[x] = static_cast<float>(reference - fall_of(x) * duration_);
-    pixels.refractory_left[x] =
-        static_cast<float>(std::max(0.0, unsolved_.column(Column::ready)[i] - duration_));
-    pixels.noise_budget[x] = unsolved_.noise[index].left();
+    const bool stays_held = holds_ && unsolved_.column(Column::released)[i] > duration_;
+    const double ready = unsolved_.column(stays_held ? Column::released : Column::ready)[i];
+    pixels.refractory_left[x] = static_cast<float>(std::max(0.0, ready - duration_));
+    auto& noise = unsolved_.noise[index];
+    noise.skip(row_.random, row_.pixels.first_number + static_cast<std::uint64_t>(x),
+               unsolved_.draws[index]);
+    pixels.noise_budget[x] = noise.left();
   }
 
   /// Stores a pixel that has reached max_events.
   void give_up(std::size_t i) {
-    const auto index = index_of(i);
-    const auto x = static_cast<std::uint64_t>(row_.candidates.x[index]);
     unsolved_.column(Column::reference)[i] = unsolved_.column(Column::end)[i];
-    unsolved_.noise[index].skip(row_.random, row_.pixels.first_number + x, unsolved_.draws[index]);
     store(i);
   }
 
@@ -389,7 +440,7 @@ class RowSolver {
   UnsolvedPixels& unsolved_;
   double duration_;
   bool has_bandwidth_;
-  double gap_;             ///< minimum time between two events of a pixel
+  bool holds_;             ///< the refractory period holds the reference at the signal
   std::size_t count_ = 0;  ///< pixels in the columns
 };
 

@@ -26,9 +26,10 @@ class UnsolvedPixels {
     slope,
     bandwidth,
     reference,
-    to_far,   ///< from the reference to the far level
-    to_near,  ///< from the near level to the reference
-    ready,    ///< earliest time of the next event
+    to_far,    ///< from the reference to the far level
+    to_near,   ///< from the near level to the reference
+    ready,     ///< earliest time of the next event
+    released,  ///< end of the reset that holds the reference; before 0 if none does
     next_noise,
     columns
   };
@@ -50,8 +51,7 @@ class UnsolvedPixels {
   std::vector<double> memory_;
 };
 
-/// Like solve_pixels(), for events without side effects except the refractory period; many pixels
-/// at a time.
+/// Like solve_pixels(), for thresholds that do not vary; many pixels at a time.
 void solve_row(const RowToSolve& row, UnsolvedPixels& unsolved);
 
 }  // namespace eventcamera

@@ -277,16 +277,24 @@ TEST(Solvers, AreEqualOnAllTargets) {
         });
       });
     }
-    for (const double noise_hz : {0.0, 30.0}) {
-      for (const double cutoff_frequency : {0.0, 3.0, 30.0, 3000.0}) {
-        auto others = settings;
-        others.cutoff_frequency = cutoff_frequency;
-        others.shot_noise_rate = noise_hz;
-        const auto expected = solved(others, width, solve_pixels);
-        expect_equal_on_all_targets(expected, [&] {
-          UnsolvedPixels unsolved;
-          return solved(others, width, [&](const RowToSolve& row) { solve_row(row, unsolved); });
-        });
+    auto held = settings;
+    held.refractory_reset = RefractoryReset::signal;
+    auto late = settings;
+    late.pixel_latency = 300'000;
+    auto jittery = held;
+    jittery.pixel_latency = 300'000;
+    jittery.pixel_latency_jitter = 100'000;
+    for (const auto& base : {settings, held, late, jittery}) {
+      for (const double noise_hz : {0.0, 30.0}) {
+        for (const double cutoff_frequency : {0.0, 3.0, 30.0, 3000.0}) {
+          auto others = base;
+          others.cutoff_frequency = cutoff_frequency;
+          others.shot_noise_rate = noise_hz;
+          expect_equal_on_all_targets(solved(others, width, solve_pixels), [&] {
+            UnsolvedPixels unsolved;
+            return solved(others, width, [&](const RowToSolve& row) { solve_row(row, unsolved); });
+          });
+        }
       }
     }
   }
