@@ -77,8 +77,7 @@ void EventReader::warn_of_nothing() {
   const bool is_empty = std::ranges::none_of(
       recording_->streams(), [](const auto& stream) { return stream.first.has_value(); });
   if (!is_empty || is_timed()) return;
-  post_message(element_, GST_MESSAGE_WARNING,
-               {GST_STREAM_ERROR_DECODE, "The file has no events."},
+  post_message(element_, GST_MESSAGE_WARNING, {GST_STREAM_ERROR_DECODE, "The file has no events."},
                recording_->format_name());
 }
 
