@@ -10,7 +10,7 @@
  *
  * Streams are merged by their timestamps, which do not change: recordings of two cameras with one
  * clock stay synchronized. The output has the segment of the stream that starts first. Events of
- * one microsecond are in the order of the pads. Labels stay with their events.
+ * one microsecond are in the order of the pads. Labels stay with their events. A seek must flush.
  *
  * Readers of recordings are linked to the pads in any order: name the pads, as in `m.sink_1`, to
  * place their sensors. The output starts once #GstEventMerge:min-streams streams are linked, and an
