@@ -63,25 +63,19 @@ class Pixels {
   }
 
   void store(const RowToSolve& row, Values stored, float* values) const {
-    HWY_ALIGN float lanes[max_lanes];
-    hn::Store(hn::DemoteTo(Floats(), stored), Floats(), lanes);
-    store(row, lanes, values);
+    store(row, exist(), stored, values);
   }
   void store(const RowToSolve& row, Values stored, double* values) const {
     HWY_ALIGN double lanes[max_lanes];
     hn::Store(stored, Doubles(), lanes);
-    store(row, lanes, values);
+    store(row, exist(), lanes, values);
   }
 
   /// Stores the values of some of them.
   void store(const RowToSolve& row, Mask some, Values stored, float* values) const {
     HWY_ALIGN float lanes[max_lanes];
     hn::Store(hn::DemoteTo(Floats(), stored), Floats(), lanes);
-    const std::int32_t* x = row.candidates.x.data() + first_;
-    for (auto bits = bits_of(Doubles(), some); bits != 0; bits &= bits - 1) {
-      const int lane = std::countr_zero(bits);
-      values[x[lane]] = lanes[lane];
-    }
+    store(row, some, lanes, values);
   }
 
   /// Stores what is left of refractory periods, if any is or was.
@@ -94,9 +88,12 @@ class Pixels {
 
  private:
   template <class T>
-  void store(const RowToSolve& row, const T* stored, T* values) const {
+  void store(const RowToSolve& row, Mask some, const T* stored, T* values) const {
     const std::int32_t* x = row.candidates.x.data() + first_;
-    for (std::size_t lane = 0; lane < count_; ++lane) values[x[lane]] = stored[lane];
+    for (auto bits = bits_of(Doubles(), some); bits != 0; bits &= bits - 1) {
+      const int lane = std::countr_zero(bits);
+      values[x[lane]] = stored[lane];
+    }
   }
 
   std::size_t first_;
@@ -285,7 +282,7 @@ class VaryingThresholds {
     growth_end_ = hn::Sub(pixels_.load(row, row.pixels.growth_end), all(row.start));
     t_ = all(0);
     crosses_ = pixels_.exist();
-    if (row.dynamics.threshold_jitter > 0) begin_draws(row);
+    if (row.settings.threshold_jitter > 0) begin_draws(row);
   }
 
   /// Finds the next crossing of each pixel. Returns false if there is none.
@@ -315,7 +312,7 @@ class VaryingThresholds {
     const auto prolonged = hn::Add(hn::Max(t_, growth_end_), all(adaptation.duration()));
     growth_end_ = hn::IfThenElse(fires, prolonged, growth_end_);
     ready_ = hn::IfThenElse(fires, hn::Add(t_, all(row.dynamics.gap)), ready_);
-    if (row.dynamics.threshold_jitter > 0) draw_thresholds(row.dynamics, fires);
+    if (row.settings.threshold_jitter > 0) draw_thresholds(row, fires);
     return true;
   }
 
@@ -325,7 +322,7 @@ class VaryingThresholds {
     pixels_.store_refractory_left(row, ready_);
     if (row.dynamics.adaptation.is_on())
       pixels_.store(row, hn::Add(all(row.start), growth_end_), row.pixels.growth_end);
-    if (row.dynamics.threshold_jitter > 0) {
+    if (row.settings.threshold_jitter > 0) {
       pixels_.store(row, drawn_, positive_, row.pixels.positive);
       pixels_.store(row, drawn_, negative_, row.pixels.negative);
     }
@@ -342,14 +339,15 @@ class VaryingThresholds {
   }
 
   /// Draws the thresholds after the events of these pixels.
-  void draw_thresholds(const PixelDynamics& dynamics, Mask fire) {
+  void draw_thresholds(const RowToSolve& row, Mask fire) {
     const auto [first, second] = random_.normals(draw_);
     const auto drawn = [&](Values normal, double mean) HWY_ATTR {
-      const auto threshold = hn::Add(all(mean), hn::Mul(all(dynamics.threshold_jitter), normal));
+      const auto threshold =
+          hn::Add(all(mean), hn::Mul(all(row.settings.threshold_jitter), normal));
       return hn::Max(threshold, all(min_threshold_of(mean)));
     };
-    positive_ = hn::IfThenElse(fire, drawn(first, dynamics.thresholds.positive), positive_);
-    negative_ = hn::IfThenElse(fire, drawn(second, dynamics.thresholds.negative), negative_);
+    positive_ = hn::IfThenElse(fire, drawn(first, row.dynamics.thresholds.positive), positive_);
+    negative_ = hn::IfThenElse(fire, drawn(second, row.dynamics.thresholds.negative), negative_);
     drawn_ = hn::Or(drawn_, fire);
     const Bits bits;
     draw_ = hn::IfThenElse(hn::RebindMask(bits, fire), hn::Add(draw_, hn::Set(bits, 1)), draw_);

@@ -26,7 +26,6 @@ struct PixelDynamics {
   explicit PixelDynamics(const DvsSettings& settings)
       : adaptation(settings),
         thresholds(mean_thresholds(settings)),
-        threshold_jitter(settings.threshold_jitter),
         refractory_period(in_microseconds(settings.refractory_period)),
         gap(std::max(refractory_period, min_gap)),
         latency(in_microseconds(settings.pixel_latency)),
@@ -34,7 +33,6 @@ struct PixelDynamics {
 
   Adaptation adaptation;
   ContrastThresholds thresholds;  ///< means
-  double threshold_jitter;
   double refractory_period;
   double gap;  ///< minimum time between two events without latency
   double latency;

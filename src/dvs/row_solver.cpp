@@ -287,10 +287,8 @@ class RowSolver {
     const auto is_noise =
         hn::And(within, hn::Le(noise, hn::IfThenElse(crosses, t, all(duration_))));
     const auto happens = hn::Or(crosses, is_noise);
-    auto is_ready = hn::Ge(t, ready);
+    const auto is_ready = hn::Ge(hn::IfThenElse(is_noise, noise, t), ready);
     if (!hn::AllFalse(doubles, is_noise)) {
-      is_ready =
-          hn::Or(hn::And(is_noise, hn::Ge(noise, ready)), hn::And(hn::Not(is_noise), is_ready));
       t = hn::IfThenElse(is_noise, hn::Max(noise, now.t), t);
       value = hn::IfThenElse(is_noise, trajectories.at(t, now), value);
       next_reference =
@@ -337,10 +335,11 @@ class RowSolver {
     keep(Column::to_far, to_far);
     keep(Column::to_near, to_near);
     keep(Column::next_noise, next_noise);
-    const auto rested = hn::Add(emitted, all(row_.dynamics.refractory_period));
-    keep(Column::ready,
-         hn::IfThenElse(fires, hn::Max(rested, hn::Add(emitted, all(min_gap))), ready));
-    if (holds_) keep(Column::released, hn::IfThenElse(fires, rested, all(not_held)));
+    keep(Column::ready, hn::IfThenElse(fires, hn::Add(emitted, all(row_.dynamics.gap)), ready));
+    if (holds_) {
+      const auto rested = hn::Add(emitted, all(row_.dynamics.refractory_period));
+      keep(Column::released, hn::IfThenElse(fires, rested, all(not_held)));
+    }
     return hn::CountTrue(doubles, happens);
   }
 
