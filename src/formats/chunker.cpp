@@ -15,7 +15,7 @@ namespace eventcamera {
 static constexpr std::size_t block_size = 512;
 
 Chunker::Chunker(Microseconds length, Microseconds start, Microseconds origin)
-    : length_(length), first_(start), origin_(origin), given_start_(true), start_(start) {}
+    : length_(length), first_(start), origin_(origin), start_(start) {}
 
 void Chunker::push(std::span<const AbsoluteEvent> events) {
   // Fast path: nearly always the events are in order and can be added in blocks.
@@ -62,22 +62,22 @@ void Chunker::place(const AbsoluteEvent& event) {
     dropped_.stray += ahead_.size();
     ahead_.clear();
   }
-  if (first_ && event.t < *first_ && given_start_) {
-    dropped_.late += static_cast<std::uint64_t>(event.t < origin_);
-    return;
-  }
-  if (latest_ == never || event.t > latest_ + settled)
+  if (first_ && event.t < *first_)
+    drop_early(event);
+  else if (latest_ == never || event.t > latest_ + settled)
     ahead_.push_back(event);
   else
     keep(event);
 }
 
+/// Drops an event before the next interval.
+void Chunker::drop_early(const AbsoluteEvent& event) {
+  const bool is_ignored = origin_ && event.t >= *origin_ && event.t < *first_;
+  dropped_.late += static_cast<std::uint64_t>(!is_ignored);
+}
+
 void Chunker::keep(const AbsoluteEvent& event) {
-  if (event.t < start_) {
-    const bool is_ignored = given_start_ && event.t < *first_ && event.t >= origin_;
-    dropped_.late += static_cast<std::uint64_t>(!is_ignored);
-    return;
-  }
+  if (event.t < start_) return drop_early(event);
   auto& cell = cell_of(event.t);
   const auto t = static_cast<std::uint32_t>(event.t - cell.start);
   cell.is_sorted &= cell.events.empty() || t >= cell.events.back().t;

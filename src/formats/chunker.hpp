@@ -85,6 +85,7 @@ class Chunker {
 
   std::size_t keep_sorted(std::span<const AbsoluteEvent> events);
   void place(const AbsoluteEvent& event);
+  void drop_early(const AbsoluteEvent& event);
   void keep(const AbsoluteEvent& event);
   void believe_ahead();
   Cell& cell_of(Microseconds t);
@@ -95,8 +96,7 @@ class Chunker {
 
   Microseconds length_;
   std::optional<Microseconds> first_;
-  Microseconds origin_ = never;
-  bool given_start_ = false;
+  std::optional<Microseconds> origin_;  ///< if the start is given
   bool keeps_labels_ = false;
   Microseconds start_ = never;    ///< start of the next interval, once first_ is known
   Microseconds latest_ = never;   ///< latest time of kept events
