@@ -31,3 +31,11 @@ inline GstPad* add_pad(GstElement* element, const char* name) {
   gst_element_add_pad(element, pad);
   return pad;
 }
+
+/// True once a segment was sent from a source pad.
+inline bool has_segment(GstPad* src) {
+  GstEvent* const segment = gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0);
+  if (segment == nullptr) return false;
+  gst_event_unref(segment);
+  return true;
+}

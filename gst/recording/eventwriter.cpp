@@ -336,8 +336,7 @@ static GstFlowReturn push_patch(GstEventWriter* self, eventcamera::FilePatch pat
 
 /// A stream without buffers may have no segment.
 static void ensure_segment(GstPad* src) {
-  if (GstEvent* const sticky = gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0))
-    return gst_event_unref(sticky);
+  if (has_segment(src)) return;
   GstSegment segment;
   gst_segment_init(&segment, GST_FORMAT_TIME);
   gst_pad_push_event(src, gst_event_new_segment(&segment));

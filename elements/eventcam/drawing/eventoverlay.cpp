@@ -178,9 +178,7 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
 /// it sends with the first frame, a gap has no meaning.
 GstFlowReturn EventOverlay::push_gap(GstBuffer* gap) {
   GstPad* const src = GST_AGGREGATOR_SRC_PAD(element());
-  GstEvent* const segment = gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0);
-  if (segment == nullptr) return GST_FLOW_OK;
-  gst_event_unref(segment);
+  if (!has_segment(src)) return GST_FLOW_OK;
   gst_pad_push_event(src, gst_event_new_gap(GST_BUFFER_PTS(gap), GST_BUFFER_DURATION(gap)));
   return GST_FLOW_OK;
 }

@@ -247,11 +247,12 @@ bool EventCompare::waits_for_reference() const {
          !is_over(StreamRole::reference);
 }
 
-/// Starts the comparison once both sensors are known. Returns true if it is running. May throw.
+/// Starts the comparison once both sensors, of one size, are known. Returns true if it is running.
+/// May throw.
 bool EventCompare::begin() {
   const auto& reference = sensors_[StreamRole::reference];
   const auto& candidate = sensors_[StreamRole::candidate];
-  if (!reference || !candidate || *reference != *candidate) return false;
+  if (!reference || !candidate) return false;
   if (!comparison_) {
     GST_DEBUG_OBJECT(element(), "comparing sensors of %dx%d pixels", reference->width,
                      reference->height);

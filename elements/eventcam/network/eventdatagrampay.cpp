@@ -268,14 +268,12 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       take_gap(self, event);
       break;
     case GST_EVENT_SEGMENT:  // the times of waiting events are those of the last one
-      flush(self);
-      if (plays_events(self, event, "send")) break;
-      gst_event_unref(event);
-      return FALSE;
     case GST_EVENT_EOS:
       GST_DEBUG_OBJECT(pad, "sending what waits before %s", GST_EVENT_TYPE_NAME(event));
       flush(self);
-      break;
+      if (GST_EVENT_TYPE(event) == GST_EVENT_EOS || plays_events(self, event, "send")) break;
+      gst_event_unref(event);
+      return FALSE;
     case GST_EVENT_FLUSH_STOP:
       GST_DEBUG_OBJECT(pad, "flushed: dropping events that wait");
       if (self->priv->packer) self->priv->packer->flush([](const Datagram&) {});
