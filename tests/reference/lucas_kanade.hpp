@@ -111,7 +111,8 @@ inline void search(const Image<std::uint8_t>& from, const Image<std::uint8_t>& t
     const Flow move{(xy * down - yy * across) * (1 / determinant),
                     (xy * across - xx * down) * (1 / determinant)};
     flow = {flow.x + move.x, flow.y + move.y};
-    if (move.x * move.x + move.y * move.y <= 0.03F * 0.03F) break;
+    const float square = move.x * move.x + move.y * move.y;
+    if (square <= 0.03F * 0.03F || (i >= 4 && square > 2.0F * 2.0F)) break;
     if (i > 0 && std::abs(move.x + before.x) < 0.01F && std::abs(move.y + before.y) < 0.01F) {
       flow = {flow.x - move.x / 2, flow.y - move.y / 2};
       break;

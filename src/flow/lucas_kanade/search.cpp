@@ -30,6 +30,9 @@ using Ints = hn::RebindToSigned<Floats>;
 
 constexpr int max_moves = 11;
 constexpr float min_move = 0.03F;
+/// A search that moves by more than max_late_move after early_moves has nothing to converge to.
+constexpr int early_moves = 4;
+constexpr float max_late_move = 2.0F;
 /// Two successive moves that cancel to within this distance oscillate: the search ends halfway.
 constexpr float turning_back = 0.01F;
 /// Minimum eigenvalue of the mean gradient matrix (structure tensor) for a block to be trackable.
@@ -356,7 +359,7 @@ class Blocks {
         const auto active = hn::Ne(hn::Load(floats, active_ + i), hn::Zero(floats));
         if (hn::AllFalse(floats, active)) continue;
         any = true;
-        move(i, active, round > 0);
+        move(i, active, round);
       }
       if (!any) break;
     }
@@ -523,7 +526,7 @@ class Blocks {
 
   /// Moves a vector of blocks by one Gauss-Newton step.
   template <class Mask>
-  void move(int i, Mask active, bool has_before) {
+  void move(int i, Mask active, int round) {
     const Floats floats;
     const Ints ints;
     const auto flow_x = hn::Load(floats, flow_x_ + i);
@@ -561,9 +564,11 @@ class Blocks {
     const auto move_y = hn::Mul(hn::Sub(hn::Mul(xy, x), hn::Mul(xx, y)), inverse);
     auto to_x = hn::Add(flow_x, move_x);
     auto to_y = hn::Add(flow_y, move_y);
-    auto stops = hn::Le(hn::Add(hn::Mul(move_x, move_x), hn::Mul(move_y, move_y)),
-                        hn::Set(floats, min_move * min_move));
-    if (has_before) {
+    const auto square = hn::Add(hn::Mul(move_x, move_x), hn::Mul(move_y, move_y));
+    auto stops = hn::Le(square, hn::Set(floats, min_move * min_move));
+    if (round >= early_moves)
+      stops = hn::Or(stops, hn::Gt(square, hn::Set(floats, max_late_move * max_late_move)));
+    if (round > 0) {
       const auto limit = hn::Set(floats, turning_back);
       const auto turns = hn::AndNot(
           stops, hn::And(hn::Lt(hn::Abs(hn::Add(move_x, hn::Load(floats, before_x_ + i))), limit),

@@ -106,7 +106,8 @@ void main() {
     vec2 move = vec2(xy * mismatch.y - yy * mismatch.x, xy * mismatch.x - xx * mismatch.y) *
                 (1.0 / determinant);
     flow += move;
-    if (dot(move, move) <= 0.03 * 0.03) break;
+    float square = dot(move, move);
+    if (square <= 0.03 * 0.03 || (i >= 4 && square > 2.0 * 2.0)) break;
     if (i > 0 && all(lessThan(abs(move + before), vec2(0.01)))) {
       flow -= move / 2.0;
       break;
