@@ -15,7 +15,6 @@ try:
 
     gi.require_version("GstVideo", "1.0")
     from gi.repository import GLib, GstVideo  # noqa: F401
-    from gst_eventcamera.events import joined
     from gst_eventcamera.pipeline import Gst, Pipeline, events_of, quoted
     from gst_eventcamera.recordings import buffer_of
     from gst_eventcamera.sources import LUMA, SINK
@@ -236,7 +235,7 @@ def read_recording(path, sensor):
             chunks = list(ec.live(f"filesrc location={quoted(path)} ! eventcsvdec"
                                   f" ! application/x-event-camera,width={sensor.width},height={sensor.height}"
                                   " ! identity"))
-            events = joined(chunks, sensor.width, sensor.height, 0, 0)
+            events = ec.join(chunks)
         else:
             events = ec.read(path)
     except ec.PipelineError as error:
@@ -246,6 +245,10 @@ def read_recording(path, sensor):
     if events.width > sensor.width or events.height > sensor.height:
         raise RuntimeError(f"{path}: it has {events.width} x {events.height} pixels, more than the {sensor.width} x"
                            f" {sensor.height} that it is compared with")
+    if (events.width, events.height) != (sensor.width, sensor.height):
+        # Where a file does not tell it, the size is that of the smallest known sensor with these events.
+        print(f"warning: {path} has {events.width} x {events.height} pixels, what it is compared with has {sensor.width}"
+              f" x {sensor.height}; this is right only if the file does not tell its size", file=sys.stderr)
     return events
 
 
@@ -266,7 +269,7 @@ def simulate(video, element):
     parts = map(events_of, samples_of(
         f"appsrc name=frames format=time ! {element} ! application/x-event-camera ! appsink name=out sync=false",
         [("frames", video.caps, buffers)]))
-    events = joined(list(parts), video.width, video.height, 0, 0)
+    events = ec.join(parts)
     events["t"] -= origin
     return video.visible(video.of_camera(events))
 

@@ -10,9 +10,8 @@ import gst_eventcamera as ec
 import numpy as np
 
 try:
-    chunks = list(ec.live(sys.argv[1]))
-    events = np.concatenate(chunks)
-    print(f"{len(events)} events of a {chunks[0].width}x{chunks[0].height} sensor, {events['p'].sum()} ON")
+    events = ec.join(ec.live(sys.argv[1]))
+    print(f"{len(events)} events of a {events.width}x{events.height} sensor, {events['p'].sum()} ON")
     np.save(sys.argv[2], events)
 except (ec.PipelineError, OSError) as failure:
     sys.exit(f"error: {failure}")

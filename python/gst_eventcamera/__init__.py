@@ -15,12 +15,12 @@ Events are structured arrays with the fields t (int64, microseconds), x, y (uint
 Failures of pipelines are raised as PipelineError with the text of the element that failed.
 """
 from .dataset import Dataset, DatasetVideo
-from .events import EVENT, Events
+from .events import EVENT, Events, join
 from .pipeline import PipelineError
 from .recipe import Recipe, RecipeError
 from .recordings import Stream, read, stream, write
 from .sources import live, simulate
 from .tensors import tensors, voxel_grid
 
-__all__ = ["Dataset", "DatasetVideo", "EVENT", "Events", "PipelineError", "Recipe", "RecipeError", "Stream", "live",
-           "read", "simulate", "stream", "tensors", "voxel_grid", "write"]
+__all__ = ["Dataset", "DatasetVideo", "EVENT", "Events", "PipelineError", "Recipe", "RecipeError", "Stream", "join",
+           "live", "read", "simulate", "stream", "tensors", "voxel_grid", "write"]

@@ -2,7 +2,7 @@
 """Arrays of events."""
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import Any, Iterable, Optional
 
 import numpy as np
 
@@ -70,25 +70,31 @@ class Events(np.ndarray):
         self.__dict__.update(attributes)
 
     def between(self, start: float, end: float) -> Events:
-        """The events with start <= t < end, in seconds; a view, found by binary search."""
+        """The events with start <= t < end; a view, found by binary search. In seconds of the times in the
+        array, which are those of the recording and need not begin at 0."""
         bounds = np.searchsorted(self["t"], [round(start * 1e6), round(end * 1e6)])
         part = self[bounds[0]:bounds[1]]
         part.start, part.end = start, end
         return part
 
 
-def joined(parts: list[Events], width: int, height: int, start: float, end: float) -> Events:
-    """One array of all parts; the part itself if there is one."""
+def join(chunks: Iterable[Events]) -> Events:
+    """One array of chunks that follow each other: from the start of the first to the end of the last, with
+    labels if all events have them. The chunk itself if there is only one.
+
+    np.concatenate() would lose the size of the sensor, the times and the labels."""
+    parts = list(chunks)
     if len(parts) == 1:
-        events = parts[0]
-        events.start, events.end = start, end
-        return events
-    events = Events(sum(len(part) for part in parts), width, height, start, end)
-    if parts:
-        np.concatenate(parts, out=events)
-        if all(part.cause is not None for part in parts):
-            events.cause = np.concatenate([part.cause for part in parts])
-            events.object_class = np.concatenate([part.object_class for part in parts])
+        return parts[0]
+    if not parts:
+        return Events(0)
+    first = parts[0]
+    events = Events(sum(map(len, parts)), first.width, first.height, first.start, parts[-1].end)
+    np.concatenate(parts, out=events)
+    filled = [part for part in parts if len(part) > 0]
+    if filled and all(part.cause is not None for part in filled):
+        events.cause = np.concatenate([part.cause for part in filled])
+        events.object_class = np.concatenate([part.object_class for part in filled])
     return events
 
 

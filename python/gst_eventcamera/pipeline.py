@@ -108,8 +108,9 @@ class Pipeline:
         while change == Gst.StateChangeReturn.ASYNC and state != Gst.State.PLAYING:
             change = self._pipeline.get_state(MAX_WAIT)[0]
             self.raise_error()
-        self.raise_error()
-        if change == Gst.StateChangeReturn.FAILURE:
+        failed = change == Gst.StateChangeReturn.FAILURE
+        self.raise_error(wait=MAX_WAIT if failed else 0)
+        if failed:
             raise PipelineError("the pipeline does not start")
 
     def seek(self, start: float, end: Optional[float]) -> None:

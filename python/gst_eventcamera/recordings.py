@@ -2,16 +2,18 @@
 """Recordings of events: read, played window by window, and written."""
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
+import itertools
 import math
 import os
 from typing import Iterator, Optional, overload
 
 import numpy as np
 
-from .events import Events, joined
-from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, quoted, sensor_size
+from .events import Events, join
+from .pipeline import EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, events_of, quoted, sensor_size
 from .sources import SINK
 
 # Elements that write a file, by its extension.
@@ -117,21 +119,27 @@ class Stream:
             size = (0, 0)
 
             limit = math.inf if self.end is None else self._windows(self.end - self.start)
+            end = math.inf
 
             def complete(last: float) -> Iterator[Events]:
                 """The windows before number `last`."""
                 nonlocal index
                 while index < min(last, limit):
                     start = (origin or 0) + index * window
-                    yield joined(parts[:], *size, start / 1e6, (start + window) / 1e6)
+                    events = join(parts) if parts else Events(0, *size)
+                    events.start, events.end = start / 1e6, min(start + window, end) / 1e6
                     parts.clear()
+                    yield events
                     index += 1
 
             for sample in pipeline.samples():
                 events = events_of(sample)
                 size = events.width, events.height
                 first = round(events.start * 1e6)
-                origin = first if origin is None else origin
+                if origin is None:
+                    origin = first
+                    if self.end is not None:
+                        end = origin + round((self.end - self.start) * 1e6)
                 yield from complete((first - origin) // window)
                 if index >= limit:
                     return
@@ -142,12 +150,19 @@ class Stream:
             if parts:
                 yield from complete(index + 1)
 
-    def _open(self) -> Pipeline:
-        pipeline = Pipeline(f"filesrc location={quoted(self.path)} ! decodebin caps={EVENT_CAPS}"
-                            f" expose-all-streams=false ! {EVENT_CAPS} ! {SINK}")
-        pipeline.on_element(self._configure)
-        pipeline.gaps_as_buffers()
-        return pipeline
+    @contextlib.contextmanager
+    def _open(self) -> Iterator[Pipeline]:
+        try:
+            with Pipeline(f"filesrc location={quoted(self.path)} ! decodebin name=decoder caps={EVENT_CAPS}"
+                          f" expose-all-streams=false ! {EVENT_CAPS} ! {SINK}") as pipeline:
+                pipeline.on_element(self._configure)
+                pipeline.gaps_as_buffers()
+                yield pipeline
+        except PipelineError as error:
+            if error.element not in ("decoder", "typefind"):
+                raise
+            raise PipelineError(f"{self.path} is not a recording of events. If it is a video, ec.simulate() makes events"
+                                " of it.", error.element) from None
 
     def _configure(self, element: Gst.Element) -> None:
         if element.find_property("buffer-duration"):
@@ -174,10 +189,11 @@ def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = 
     Shape (events,), 16 bytes each; times are those of the file. Raises PipelineError if the file cannot be
     read or has no events to read."""
     part = Stream(os.fspath(path), window=1, start=start, end=end)
-    chunks = list(part)
-    if not chunks:
-        return Events(0, part.width, part.height)
-    return joined(chunks, chunks[0].width, chunks[0].height, chunks[0].start, chunks[-1].end)
+    events = join(part)
+    if events.width == 0:
+        events.width, events.height = part.width, part.height
+    events.end = events.start + part.duration
+    return events
 
 
 def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, height: int = 0) -> None:
@@ -185,6 +201,7 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
     .npz, .aedat4, .mcap (ROS 2), .h5 (DSEC) or .hdf5 (Metavision).
 
     events: an array with the fields t (microseconds, from 0 to 2**52, sorted), x, y and p; shape (events,).
+        Labels of Events are written, too, if the format has them: .npz.
     width, height: of the sensor, in pixels; may be left out for Events of a known sensor.
 
     Raises ValueError for events that are not sorted, too late or outside the sensor, or an unknown extension,
@@ -220,22 +237,37 @@ def _check(events: np.ndarray, width: int, height: int) -> None:
         raise ValueError(f"the last event is at {t[-1]} us; times must be at most 2**52 us, 142 years")
     if len(events) > 0 and (np.max(events["x"]) >= width or np.max(events["y"]) >= height):
         raise ValueError(f"there are events outside the sensor of {width}x{height} pixels")
+    for labels in _labels(events):
+        if len(labels) != len(events):
+            raise ValueError(f"there are {len(events)} events, but {len(labels)} labels")
+
+
+def _labels(events: np.ndarray) -> list[np.ndarray]:
+    """Causes and object classes, or nothing."""
+    cause, object_class = getattr(events, "cause", None), getattr(events, "object_class", None)
+    return [] if cause is None or object_class is None else [cause, object_class]
 
 
 def _buffers(events: np.ndarray) -> Iterator[Gst.Buffer]:
     """The events in buffers of a grid, those without events left out."""
     t = np.asarray(events["t"])
-    cuts = np.flatnonzero(t[1:] // BUFFER != t[:-1] // BUFFER) + 1
-    for part in np.split(np.asarray(events), cuts) if len(events) > 0 else []:
+    cuts = [0, *(np.flatnonzero(t[1:] // BUFFER != t[:-1] // BUFFER) + 1), len(events)]
+    for first, last in itertools.pairwise(cuts) if len(events) > 0 else []:
+        part = events[first:last]
         yield buffer_of(part, int(part["t"][0]) // BUFFER * BUFFER, BUFFER)
 
 
 def buffer_of(events: np.ndarray, start: int, duration: int) -> Gst.Buffer:
-    """A buffer of a stream that covers so many microseconds from `start` on, with the events of this time."""
+    """A buffer of a stream that covers so many microseconds from `start` on, with the events of this time and
+    their labels."""
     packed = np.empty(len(events), XYTP)
     packed["t"] = events["t"] - start
     packed["x"] = events["x"]
     packed["y_p"] = events["y"] | np.where(events["p"], 0x8000, 0).astype("<u2")
     buffer = Gst.Buffer.new_wrapped(packed.tobytes())
     buffer.pts, buffer.duration = start * 1000, duration * 1000
+    if labels := _labels(events):
+        fields = np.zeros(len(events), LABEL)
+        fields["cause"], fields["object_class"] = labels
+        GstEventCamera.buffer_add_event_camera_label_bytes(buffer, GLib.Bytes.new(fields.tobytes()))
     return buffer

@@ -153,6 +153,47 @@ class Recordings(unittest.TestCase):
         self.assertEqual(list(events[1:].cause), [int(GstEventCamera.Cause.LEAK), 0])
         self.assertIsNone(self.events.cause)
 
+    def test_tells_the_time_that_it_read(self):
+        late = self.events.copy()
+        late["t"] += 7_139_845
+        path = path_of("late.raw")
+        ec.write(path, late)
+        last = late["t"][-1] / 1e6
+        whole, part = ec.read(path), ec.read(path, 0, 0.5)
+        self.assertAlmostEqual(whole.start, 7.139845)
+        self.assertAlmostEqual(whole.end, last, places=5)
+        self.assertAlmostEqual(part.end, 7.639845)
+        self.assertAlmostEqual(ec.read(path, 1.9, 9).end, last, places=5)
+        self.assertAlmostEqual(list(ec.stream(path, window=0.03).between(0, 0.5))[-1].end, 7.639845)
+
+    def labelled(self, count):
+        events = random_events(count, 30_000)
+        events.cause = (np.arange(count) % 5).astype(np.uint8)
+        events.object_class = np.arange(count).astype(np.uint16)
+        return events
+
+    def test_writes_labels(self):
+        events = self.labelled(3000)
+        path = path_of("labels.npz")
+        ec.write(path, events)
+        read = ec.read(path)
+        self.assertTrue(same(read, events))
+        self.assertTrue(np.array_equal(read.cause, events.cause))
+        self.assertTrue(np.array_equal(read.object_class, events.object_class))
+        events.cause = events.cause[1:]
+        with self.assertRaisesRegex(ValueError, "3000 events, but 2999 labels"):
+            ec.write(path, events)
+
+    def test_joins_chunks(self):
+        events = self.labelled(3000)
+        gap = ec.Events(0, WIDTH, HEIGHT)
+        whole = ec.join(chunk for chunk in (events[:1000], gap, events[1000:]))
+        self.assertTrue(same(whole, events))
+        self.assertEqual((whole.width, whole.height), (WIDTH, HEIGHT))
+        self.assertTrue(np.array_equal(whole.object_class, events.object_class))
+        self.assertIsNone(ec.join([events, self.events]).cause)
+        self.assertEqual(len(ec.join([])), 0)
+
     def test_copies_are_complete(self):
         events = random_events(100, 1000)
         events.start, events.end = 1.0, 2.0
