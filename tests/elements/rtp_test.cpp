@@ -697,6 +697,17 @@ TEST(RtpEventDepay, StartsOverWithItsSender) {
   EXPECT_EQ(stat_of(h.element(), "lost-events"), 0U);
 }
 
+TEST(RtpEventDepay, WarnsOnceOfASenderOfAnotherFormat) {
+  std::vector<Interval> intervals;
+  for (int i = 0; i < 20; ++i)
+    intervals.push_back({i * 10'000'000, 10'000'000, {Event::at(i, 2, 500, Polarity::on)}});
+  Depayloader h("XYTP");
+  for (const auto& packet : packets_of(intervals, "format=EVT3")) h.take(packet.get());
+  EXPECT_GT(stat_of(h.element(), "rejected-packets"), 1U);
+  EXPECT_NE(h.warning().find("Set width, height and format"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
+}
+
 TEST(RtpEventDepay, WarnsOnceOfASecondSender) {
   std::vector<Interval> intervals;
   for (int i = 0; i < 20; ++i)

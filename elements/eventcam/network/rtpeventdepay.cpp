@@ -103,7 +103,7 @@ struct Private {
   GstPadChainFunction chain = nullptr;              ///< of the base class
   bool was_processed = false;                       ///< the base class passed on the last packet
   WarnOnce warn_of_second_sender{GST_CAT_DEFAULT};
-  RepeatLevel rejected_level;
+  WarnOnce warn_of_rejected{GST_CAT_DEFAULT};
   RepeatLevel late_level;
 
   Guarded<RtpStatistics> statistics;
@@ -177,11 +177,13 @@ static Report no_memory(const std::exception&) {
   return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory to receive events."};
 }
 
-static void log_rejected(GstRtpEventDepay* self, guint number) {
-  const auto level = self->priv->rejected_level.next();
-  GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
-                    "rejected packet number %u: corrupt, or of another sensor, format or sender",
-                    number);
+static void warn_of_rejected(GstRtpEventDepay* self, guint number) {
+  self->priv->warn_of_rejected(
+      self,
+      {GST_STREAM_ERROR_DECODE,
+       "Rejected a packet: it is corrupt, or of another sensor or format. Set width, height and "
+       "format in the caps to those of the sender; stats counts the rejected packets."},
+      "packet number " + std::to_string(number));
 }
 
 static void warn_of_second_sender(GstRtpEventDepay* self, guint number) {
@@ -253,9 +255,10 @@ static void update_statistics(GstRtpEventDepay* self, guint number) {
   if (counted.lost_packets > before.lost_packets)
     GST_DEBUG_OBJECT(self, "lost %" G_GUINT64_FORMAT " packets before number %u",
                      guint64{counted.lost_packets - before.lost_packets}, number);
-  if (counted.rejected_packets > before.rejected_packets) log_rejected(self, number);
   if (counted.second_sender_packets > before.second_sender_packets)
     warn_of_second_sender(self, number);
+  else if (counted.rejected_packets > before.rejected_packets)
+    warn_of_rejected(self, number);
   if (counted.late_packets > before.late_packets) log_late(self, number);
 }
 
@@ -395,7 +398,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
     auto& priv = *GST_RTP_EVENT_DEPAY(element)->priv;
     priv.state.reset();
     priv.warn_of_second_sender.reset();
-    priv.rejected_level.reset();
+    priv.warn_of_rejected.reset();
     priv.late_level.reset();
     *priv.statistics.lock() = {};
   }
