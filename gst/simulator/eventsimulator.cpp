@@ -520,27 +520,21 @@ static void check_interlacing(GstEventSimulator* self, GstBuffer* frame) {
       std::string("interlace-mode=") + gst_video_interlace_mode_to_string(mode));
 }
 
-/// Name of a query that a simulator upstream answers if it draws its events.
-static constexpr const char* draws_query = "event-simulator-draws";
-
-/// Warns if the video already shows drawn events, such as those of another simulator upstream.
+/// Warns if the video already shows drawn events, of a recording or of another simulator.
 static void check_input(GstEventSimulator* self) {
-  GstQuery* query = gst_query_new_custom(GST_QUERY_CUSTOM, gst_structure_new_empty(draws_query));
+  GstQuery* query = new_drawn_events_query();
   if (gst_pad_peer_query(GST_BASE_TRANSFORM_SINK_PAD(self), query))
     priv_of(self).stream.warn_of_drawn_input(
         self,
         {GST_STREAM_ERROR_FORMAT,
-         "The video already shows events drawn by a simulator upstream. To feed one video to two "
-         "simulators, insert a tee before both."},
-        std::string("answered upstream: ") + draws_query);
+         "The video shows events that were drawn upstream, not a scene. A recording of events "
+         "needs no simulator. To feed one video to two simulators, insert a tee before both."},
+        "an element upstream answered that it draws events");
   gst_query_unref(query);
 }
 
-/// True if this is that query, and the events are drawn here.
-static bool draws_for(GstBaseTransform* transform, GstQuery* query) {
-  if (GST_QUERY_TYPE(query) != GST_QUERY_CUSTOM) return false;
-  const GstStructure* asked = gst_query_get_structure(query);
-  if (asked == nullptr || !gst_structure_has_name(asked, draws_query)) return false;
+/// True if the events are drawn here.
+static bool draws(GstBaseTransform* transform) {
   GstCaps* caps = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SRC_PAD(transform));
   const bool draws = caps != nullptr && event_simulator_draws(caps);
   gst_clear_caps(&caps);
@@ -901,7 +895,7 @@ static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
 }
 
 static gboolean query(GstBaseTransform* transform, GstPadDirection direction, GstQuery* query) {
-  if (direction == GST_PAD_SRC && draws_for(transform, query)) return TRUE;
+  if (direction == GST_PAD_SRC && is_drawn_events_query(query) && draws(transform)) return TRUE;
   const bool is_serialized =
       (gst_query_type_get_flags(GST_QUERY_TYPE(query)) & GST_QUERY_TYPE_SERIALIZED) != 0;
   if (direction == GST_PAD_SINK && is_serialized) finish_intervals(GST_EVENT_SIMULATOR(transform));

@@ -281,6 +281,8 @@ warnings() { # ARGUMENT...
 }
 warnings videotestsrc num-buffers=3 ! eventsim-diff ! queue ! videoconvert ! eventsim-dense ! fakesink | grep -q "insert a tee before both" ||
   fail "no warning about events of drawn events"
+warnings filesrc location=out.raw ! decodebin ! eventsim-dense ! fakesink | grep -q "A recording of events needs no simulator" ||
+  fail "no warning about events of a drawn recording"
 [ -z "$(warnings videotestsrc num-buffers=3 ! tee name=t  t. ! queue ! eventsim-diff ! videoconvert ! fakesink  t. ! queue ! eventsim-dense ! fakesink)" ] ||
   fail "a warning of two simulators side by side"
 

@@ -552,6 +552,11 @@ static gboolean src_event(GstAggregator* element, GstEvent* event) {
   return TRUE;
 }
 
+static gboolean src_query(GstAggregator* element, GstQuery* query) {
+  if (is_drawn_events_query(query)) return TRUE;
+  return GST_AGGREGATOR_CLASS(gst_event_render_parent_class)->src_query(element, query);
+}
+
 static GstCaps* fixate_src_caps(GstAggregator*, GstCaps* caps) {
   caps = gst_caps_make_writable(caps);
   gst_structure_fixate_field_nearest_fraction(gst_caps_get_structure(caps, 0), "framerate", 30, 1);
@@ -579,6 +584,7 @@ static void gst_event_render_class_init(GstEventRenderClass* klass) {
 
   GstAggregatorClass* aggregator_class = GST_AGGREGATOR_CLASS(klass);
   aggregator_class->src_event = src_event;
+  aggregator_class->src_query = src_query;
   aggregator_class->fixate_src_caps = fixate_src_caps;
   aggregator_class->decide_allocation = decide_allocation;
   aggregator_class->update_src_caps = [](GstAggregator* element, GstCaps* caps, GstCaps** result) {
