@@ -5,7 +5,7 @@ video as a real camera recorded of the same scene; for eventsim-dvs also its res
 denoising, adaptation, threshold jitter, refractory period and exposure pulses. Prints them, and how
 similar the two streams then are. Both streams are compared where the frames are not overexposed.
 
-    event-calibrate drive.mp4 drive.raw --element eventsim-dense --to 2
+    event-calibrate drive.mp4 drive.raw --lag find --profile camera.profile --to 2
 
 VIDEO is anything that GStreamer decodes, or a text file of lines "seconds picture"; RECORDING is
 any event file that this project reads. Both need the same pixels and the same clock. --from and
@@ -314,7 +314,10 @@ def calibrate(video, recorded, span, element, progress):
     # From a pixel without these stages and from one with all of them, since they depend on each other.
     starts = [chosen | {name: values[i] for name, values in stages.items()} for i in (0, 2)]
     climbed = (choices.climb(start, axes | stages, choices.rating) for start in starts)
-    return choices.calibrated(choices.pruned(max(climbed, key=choices.rating), stages))
+    best = choices.pruned(max(climbed, key=choices.rating), stages)
+    if best.get("exposure-pulse") == 0:
+        best.pop("exposure-lead", None)
+    return choices.calibrated(best)
 
 
 def fit_thresholds(video, recorded, span, element, progress):
@@ -443,8 +446,8 @@ def options():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("video")
     parser.add_argument("recording")
-    parser.add_argument("--element", type=element_of, default="eventsim-dense",
-                        help="a simulator and its properties (default: eventsim-dense)")
+    parser.add_argument("--element", type=element_of, default=PROFILED,
+                        help=f"a simulator and its properties (default: {PROFILED})")
     for name, what in (("from", "start of the calibration"), ("to", "end of the calibration"),
                        ("measure-from", "start of the comparison"),
                        ("measure-to", "end of the comparison")):
@@ -496,7 +499,7 @@ def main():
     chosen = options()
     find_plugins()
     if chosen.profile and chosen.element.split()[:1] != [PROFILED]:
-        raise RuntimeError(f"only {PROFILED} has profiles; add --element {PROFILED}")
+        raise RuntimeError(f"only {PROFILED} has profiles, {chosen.element.split()[0]} has none")
     for path in filter(None, (chosen.profile, chosen.map)):
         expect_writable(path)
     progress = Progress()

@@ -64,7 +64,8 @@ class Progress:
 
 def options():
     parser = argparse.ArgumentParser(
-        prog="event-dataset", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+        prog="event-dataset", usage="%(prog)s [verify] RECIPE [option ...]", description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="+", metavar="[verify] RECIPE", help="a file of YAML")
     parser.add_argument("-o", "--output", metavar="FOLDER",
                         help="folder of the data set (default: that of the recipe's name, beside it)")
@@ -219,6 +220,8 @@ def make(chosen, videos, lock):
     finally:
         progress.end()
         snakemake.wait()  # it ends its jobs at Ctrl-C
+        with contextlib.suppress(OSError):  # another part uses it, or a job was killed
+            os.rmdir(os.path.join(output, "unfinished"))
     return snakemake.returncode
 
 

@@ -21,8 +21,8 @@ class VoxelGrids(IterableDataset):
         self.recordings = recordings
 
     def __iter__(self):
-        worker = get_worker_info()
-        for path in self.recordings[worker.id::worker.num_workers]:
+        worker = get_worker_info()  # None without workers
+        for path in self.recordings[worker.id::worker.num_workers] if worker else self.recordings:
             for chunk in ec.stream(path, window=0.03):
                 yield torch.from_numpy(ec.voxel_grid(chunk, BINS))
 

@@ -35,7 +35,7 @@ constexpr Event without_cause(Event event) {
 
 /// Label of an event, in the layout of GstEventCameraLabel.
 struct Label {
-  std::uint16_t object_class = 0;  ///< class of the object that the pixel saw, 0 = none
+  std::uint16_t object_class = 0;  ///< class of the object that the pixel saw, 0 = unknown
   Cause cause = Cause::unknown;
   std::uint8_t reserved = 0;
 
