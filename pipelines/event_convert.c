@@ -8,6 +8,7 @@
  */
 #define _XOPEN_SOURCE 700 /* for realpath() */
 #include <errno.h>
+#include <fcntl.h>
 #include <gst/base/gsttypefindhelper.h>
 #include <gst/gst.h>
 #include <signal.h>
@@ -333,9 +334,22 @@ static gboolean same_file(const char* a, const char* b) {
          of_a.st_ino == of_b.st_ino;
 }
 
-/* Writes to a temporary file next to OUT, so that only a complete file replaces an existing one. */
-static gchar* unfinished(const char* path) {
-  return g_strconcat(path, ".part", NULL);
+/* Creates a file next to OUT to write to, so that only a complete file replaces an existing one.
+ * NULL on failure. */
+static gchar* create_part(const char* path) {
+  int i;
+  for (i = 1; i < 1000; ++i) {
+    gchar* part = i == 1 ? g_strconcat(path, ".part", NULL) : g_strdup_printf("%s.part%d", path, i);
+    const int file = open(part, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file >= 0) {
+      close(file);
+      return part;
+    }
+    g_free(part);
+    if (errno != EEXIST) break;
+  }
+  PRINT_ERROR("%s cannot be written: %s\n", path, g_strerror(errno));
+  return NULL;
 }
 
 /* Sets the location of the element `name`, or of the writer if it is the sink itself. */
@@ -518,18 +532,27 @@ static void clear_progress(void) {
   if (isatty(STDERR_FILENO)) PRINT_ERROR("\r\033[K");
 }
 
-/* Prints an error or a warning with its cause: the debug text, after the code location. */
+/* Prints an error, a warning or a note with its cause: the debug text, after the code location. */
 static void print_message(const char* in, GstMessage* message) {
-  const gboolean fatal = GST_MESSAGE_TYPE(message) == GST_MESSAGE_ERROR;
+  const char* kind;
   GError* error = NULL;
   gchar* debug = NULL;
   const gchar* cause;
-  if (fatal)
-    gst_message_parse_error(message, &error, &debug);
-  else
-    gst_message_parse_warning(message, &error, &debug);
+  switch (GST_MESSAGE_TYPE(message)) {
+    case GST_MESSAGE_ERROR:
+      kind = "error";
+      gst_message_parse_error(message, &error, &debug);
+      break;
+    case GST_MESSAGE_WARNING:
+      kind = "warning";
+      gst_message_parse_warning(message, &error, &debug);
+      break;
+    default:
+      kind = "note";
+      gst_message_parse_info(message, &error, &debug);
+  }
   clear_progress();
-  PRINT_ERROR("%s: %s: %s\n", in, fatal ? "error" : "warning", error->message);
+  PRINT_ERROR("%s: %s: %s\n", in, kind, error->message);
   cause = debug != NULL ? strchr(debug, '\n') : NULL;
   if (cause != NULL && cause[1] != '\0') PRINT_ERROR("  %s\n", cause + 1);
   g_free(debug);
@@ -557,9 +580,10 @@ static gboolean run(const char* in, GstElement* pipeline, const guint64* events)
       ending = TRUE;
       gst_element_send_event(pipeline, gst_event_new_eos());
     }
-    GstMessage* message = gst_bus_timed_pop_filtered(
-        bus, GST_SECOND,
-        GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING | GST_MESSAGE_ASYNC_DONE);
+    GstMessage* message =
+        gst_bus_timed_pop_filtered(bus, GST_SECOND,
+                                   GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING |
+                                       GST_MESSAGE_INFO | GST_MESSAGE_ASYNC_DONE);
     if (message == NULL) {
       print_progress(pipeline, __atomic_load_n(events, __ATOMIC_RELAXED));
       continue;
@@ -569,7 +593,7 @@ static gboolean run(const char* in, GstElement* pipeline, const guint64* events)
       trimming = FALSE;
       ended = !ok;
     } else {
-      ended = GST_MESSAGE_TYPE(message) != GST_MESSAGE_WARNING;
+      ended = (GST_MESSAGE_TYPE(message) & (GST_MESSAGE_EOS | GST_MESSAGE_ERROR)) != 0;
       ok = GST_MESSAGE_TYPE(message) != GST_MESSAGE_ERROR;
       if (GST_MESSAGE_TYPE(message) != GST_MESSAGE_EOS) print_message(in, message);
     }
@@ -647,14 +671,18 @@ static GstElement* make_pipeline(const char* in, const Reader* from, const char*
 static int write_file(const char* in, const Reader* from, const char* path, const Format* to) {
   guint64 events = 0;
   int status = 0;
-  gchar* part = unfinished(path);
-  GstElement* pipeline = make_pipeline(in, from, part, to, &events, &status);
+  gchar* part = create_part(path);
+  GstElement* pipeline;
+  if (part == NULL) return 1;
+  pipeline = make_pipeline(in, from, part, to, &events, &status);
   if (pipeline != NULL) {
     gboolean ok = run(in, pipeline, &events);
     gst_object_unref(pipeline);
     ok = finish(part, path, ok);
     if (ok) printf("%" G_GUINT64_FORMAT " events from %s to %s\n", events, in, path);
     status = ok ? 0 : 1;
+  } else {
+    remove(part);
   }
   g_free(part);
   return status;
@@ -719,7 +747,7 @@ static int convert_all(void) {
     PRINT_ERROR("%s: %s\n", output_directory, g_strerror(errno));
     status = 1;
   } else {
-    for (gsize i = 0; status < 2 && files[i] != NULL && !interrupted; ++i) {
+    for (gsize i = 0; files[i] != NULL && !interrupted; ++i) {
       const int outcome = convert(files[i], outputs[i]);
       status = MAX(status, outcome);
     }

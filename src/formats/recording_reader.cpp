@@ -551,6 +551,7 @@ void RecordingReader::set_shift(Microseconds first) {
 
 std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
   while (true) {
+    if (const auto silence = next_silence()) return silence;
     for (; next_stream_ < streams_.size(); ++next_stream_) {
       auto& stream = streams_[next_stream_];
       if (!stream.shown) continue;
@@ -562,16 +563,24 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
         counts_.events += chunk.events.size();
         return chunk;
       }
-      const auto silent_until = newest_ - max_lag;
-      if (stream.info.kind == StreamKind::frames && silent_until - stream.position >= max_lag) {
-        const auto start = stream.position;
-        if (advance(stream, start, silent_until))
-          return Chunk{next_stream_, start, silent_until - start, {}};
-      }
     }
     if (newest_ == caught_up_) return std::nullopt;
     catch_up();
   }
+}
+
+/// A gap in a stream of frames that lags far behind the newest item, so that others need not wait
+/// for it long.
+std::optional<RecordingReader::Chunk> RecordingReader::next_silence() {
+  const auto silent_until = newest_ - max_lag;
+  for (auto& stream : streams_) {
+    const auto start = stream.position;
+    if (stream.shown && stream.info.kind == StreamKind::frames && silent_until - start >= max_lag &&
+        advance(stream, start, silent_until))
+      return Chunk{
+          static_cast<std::size_t>(&stream - streams_.data()), start, silent_until - start, {}};
+  }
+  return std::nullopt;
 }
 
 /// Clips a chunk at the end of the segment.

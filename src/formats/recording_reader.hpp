@@ -217,6 +217,7 @@ class RecordingReader {
   template <class Sample>
   std::span<const Sample> taken_before(Microseconds end, WaitingItems<Sample>& waiting);
   std::optional<Chunk> next_chunk();
+  std::optional<Chunk> next_silence();
   void cut_at_stop(Chunk& chunk) const;
   void catch_up();
   bool advance(Stream& stream, Microseconds start, Microseconds end);

@@ -5,7 +5,8 @@
     apart_bags.py DIRECTORY
 
 In late-events.*, more images than fit into a queue or into what a reader keeps come first; in
-late-images.*, three seconds of events; images.bag has only images."""
+late-images.*, three seconds of events; in late-again.*, images pause for four seconds; images.bag has
+only images."""
 import sys
 from pathlib import Path
 
@@ -31,10 +32,10 @@ def events_message(fields, events):
 
 
 def messages(serialization, events, images, side):
-    """Events at the given times, 100 a message, and square images."""
+    """Events at the given times, 400 a message, and square images."""
     found = [("/camera/image", t + DELAY, image(serialization(), t, side)) for t in images]
-    for first in range(0, len(events), 100):
-        some = events[first:first + 100]
+    for first in range(0, len(events), 400):
+        some = events[first:first + 400]
         found.append(("/camera/events", some[0][0] + DELAY, events_message(serialization(), some)))
     return sorted(found, key=lambda message: message[1])
 
@@ -59,6 +60,7 @@ def main():
     images = [START + 40_000 * i for i in range(24)]
     write(folder, "late-events", events_from(800_000, 600), images, 1024)
     write(folder, "late-images", events_from(0, 4000), [t + 3_000_000 for t in images], 64)
+    write(folder, "late-again", events_from(0, 8000), images[:12] + [t + 4_500_000 for t in images[12:]], 64)
     bag_files.write_bag(folder / "images.bag", messages(Ros1, [], images, 64), TOPICS, index=False)
 
 

@@ -238,6 +238,7 @@ for bag in evt3.mcap:x-mcap evt3.bag:x-rosbag evt3.db3:x-rosbag2-db3; do
   gst-typefind-1.0 "$file" | grep -q " - application/${bag#*:}" || fail "$file is not recognised"
   convert "$file" "$file.aedat4" 2>left-out
   if grep "left out" left-out; then fail "frames of $file are left out"; fi
+  grep -q "$file: note: The file also has topics /second/events" left-out || fail "nobody tells of /second/events in $file"
   convert "$file.aedat4" "$file.csv"
   cmp evt3.mcap.csv "$file.csv" || fail "$file has other events"
   timeout 60 gst-play-1.0 -q --no-interactive --videosink=fakesink "$file" >played 2>&1 || fail "gst-play-1.0: $(cat played)"
@@ -368,6 +369,17 @@ printf '1000 2 3 1\n2000 4 5 0\n3000 6 7 1\n' >unclear.txt
 refused "set time-unit" unclear.txt out.dat
 touch nothing
 refused "neither its content nor its extension" nothing out.dat
+# A failure does not stop the others.
+mkdir -p outputs/ball.csv
+cp ball.raw other-ball.raw
+refused "outputs/ball.csv is a directory" --output-directory=outputs --extension=csv ball.raw other-ball.raw
+[ -s outputs/other-ball.csv ] || fail "a failure stopped the other conversions"
+# Files of others are left alone, whatever their names.
+cp ball.raw rest.raw.part
+convert rest.raw.part rest.raw
+cmp ball.raw rest.raw.part || fail "the input rest.raw.part was written to"
+[ -s rest.raw ] || fail "rest.raw was not written"
+[ ! -e rest.raw.part2 ] || fail "rest.raw.part2 is left"
 # Pipes and devices are neither read in part nor replaced.
 mkfifo pipe.raw
 ln -s /dev/null device.dat

@@ -168,6 +168,21 @@ static GstClockTime running_time(GstAggregatorPad* pad, GstBuffer* buffer) {
   return gst_segment_to_running_time(&segment, GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
 }
 
+/// True if a buffer stands for a gap.
+static bool is_silent(GstBuffer* buffer) {
+  return gst_buffer_get_size(buffer) == 0;
+}
+
+/// Time that a buffer is written at: its start, but the end of a gap, until which its pad has
+/// nothing to wait for.
+static GstClockTime due_time(GstAggregatorPad* pad, GstBuffer* buffer) {
+  const GstClockTime running = running_time(pad, buffer);
+  if (!GST_CLOCK_TIME_IS_VALID(running)) return 0;
+  return is_silent(buffer) && GST_BUFFER_DURATION_IS_VALID(buffer)
+             ? running + GST_BUFFER_DURATION(buffer)
+             : running;
+}
+
 /// Returns the pad with the earliest next buffer; a buffer without a time comes first, and events
 /// come before a frame of the same time. Null if no pad has a buffer.
 static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
@@ -175,8 +190,7 @@ static Pad earliest_pad(GstAedatMux* self, GstClockTime* time) {
   for (Pad& pad : sink_pads(self)) {
     const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(pad.get()));
     if (!buffer) continue;
-    const GstClockTime running = running_time(pad.get(), buffer.get());
-    const GstClockTime from = GST_CLOCK_TIME_IS_VALID(running) ? running : 0;
+    const GstClockTime from = due_time(pad.get(), buffer.get());
     if (earliest && from > *time) continue;
     if (earliest && from == *time && kind_of(pad.get()) != Kind::events) continue;
     *time = from;
@@ -354,7 +368,7 @@ static GstFlowReturn write_next(GstAedatMux* self) {
   }
   Bytes out = waiting_items(self);
   const Microseconds t = file_time(state, running);
-  const bool silent = gst_buffer_get_size(buffer.get()) == 0;
+  const bool silent = is_silent(buffer.get());
   if (!silent && kind_of(pad.get()) == Kind::events)
     write_events(self, buffer.get(), t, out);
   else if (!silent)
