@@ -99,10 +99,10 @@ def join(chunks: Iterable[Events]) -> Events:
 
 
 def packed_events(events: np.ndarray) -> np.ndarray:
-    """A contiguous array of EVENT; the array itself if it is one. Fields are taken by name."""
+    """A contiguous array of EVENT; the array itself if it is one. Fields are taken by name; p is ON if above 0."""
     if events.dtype == EVENT and events.flags.c_contiguous:
         return events
     packed = np.empty(len(events), EVENT)
     for name in EVENT.names or ():
-        packed[name] = events[name]
+        packed[name] = events[name] > 0 if name == "p" else events[name]
     return packed

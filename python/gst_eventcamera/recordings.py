@@ -8,6 +8,7 @@ import functools
 import itertools
 import math
 import os
+import uuid
 from typing import Iterator, Optional, overload
 
 import numpy as np
@@ -109,31 +110,26 @@ class Stream:
 
     def __iter__(self) -> Iterator[Events]:
         window = round(self.window * 1e6)
-        with self._open() as pipeline:
-            if self.start > 0 or self.end is not None:
-                pipeline.set_state(Gst.State.PAUSED)
-                pipeline.seek(self.start, self.end)
-            origin: Optional[int] = None
-            index = 0
-            parts: list[Events] = []
-            size = (0, 0)
+        origin: Optional[int] = None
+        index = 0
+        parts: list[Events] = []
+        size = (0, 0)
+        limit = math.inf if self.end is None else self._windows(self.end - self.start)
+        end = math.inf
 
-            limit = math.inf if self.end is None else self._windows(self.end - self.start)
-            end = math.inf
+        def complete(last: float) -> Iterator[Events]:
+            """The windows before number `last`."""
+            nonlocal index
+            while index < min(last, limit):
+                start = (origin or 0) + index * window
+                events = join(parts) if parts else Events(0, *size)
+                events.start, events.end = start / 1e6, min(start + window, end) / 1e6
+                parts.clear()
+                yield events
+                index += 1
 
-            def complete(last: float) -> Iterator[Events]:
-                """The windows before number `last`."""
-                nonlocal index
-                while index < min(last, limit):
-                    start = (origin or 0) + index * window
-                    events = join(parts) if parts else Events(0, *size)
-                    events.start, events.end = start / 1e6, min(start + window, end) / 1e6
-                    parts.clear()
-                    yield events
-                    index += 1
-
-            for sample in pipeline.samples():
-                events = events_of(sample)
+        with contextlib.closing(self._chunks()) as chunks:
+            for events in chunks:
                 size = events.width, events.height
                 first = round(events.start * 1e6)
                 if origin is None:
@@ -149,6 +145,14 @@ class Stream:
                     yield from complete((round(events.end * 1e6) - origin) // window)
             if parts:
                 yield from complete(index + 1)
+
+    def _chunks(self) -> Iterator[Events]:
+        """The events of each buffer, of at most a window; empty for a gap, which may be long."""
+        with self._open() as pipeline:
+            if self.start > 0 or self.end is not None:
+                pipeline.set_state(Gst.State.PAUSED)
+                pipeline.seek(self.start, self.end)
+            yield from map(events_of, pipeline.samples())
 
     @contextlib.contextmanager
     def _open(self) -> Iterator[Pipeline]:
@@ -189,7 +193,7 @@ def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = 
     Shape (events,), 16 bytes each; times are those of the file. Raises PipelineError if the file cannot be
     read or has no events to read."""
     part = Stream(os.fspath(path), window=1, start=start, end=end)
-    events = join(part)
+    events = join(part._chunks())
     if events.width == 0:
         events.width, events.height = part.width, part.height
     events.end = events.start + part.duration
@@ -200,12 +204,13 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
     """Writes events to a file, whose extension selects the format: .raw (EVT3), .dat, .es, .csv, .txt, .npy,
     .npz, .aedat4, .mcap (ROS 2), .h5 (DSEC) or .hdf5 (Metavision).
 
-    events: an array with the fields t (microseconds, from 0 to 2**52, sorted), x, y and p; shape (events,).
+    events: an array with the fields t (microseconds, from 0 to 2**52, sorted), x, y and p (ON if above 0); shape
+        (events,).
         Labels of Events are written, too, if the format has them: .npz.
     width, height: of the sensor, in pixels; may be left out for Events of a known sensor.
 
-    Raises ValueError for events that are not sorted, too late or outside the sensor, or an unknown extension,
-    and PipelineError if the file cannot be written."""
+    Only a complete file replaces an existing one. Raises ValueError for events that are not sorted, too late or
+    outside the sensor, or an unknown extension, and PipelineError if the file cannot be written."""
     extension = os.path.splitext(path)[1].lower()
     if extension not in WRITERS:
         raise ValueError(f"{os.fspath(path)}: the extension must be one of {' '.join(WRITERS)}")
@@ -213,8 +218,8 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
     if width < 1 or height < 1:
         raise ValueError("give the width and height of the sensor")
     _check(events, width, height)
-    with Pipeline(f"appsrc name=in format=time ! {WRITERS[extension]}") as pipeline:
-        pipeline.element("file").set_property("location", os.fspath(path))
+    with _replacing(path) as part, Pipeline(f"appsrc name=in format=time ! {WRITERS[extension]}") as pipeline:
+        pipeline.element("file").set_property("location", part)
         source = pipeline.element("in")
         source.set_property("caps", Gst.Caps.from_string(
             f"{EVENT_CAPS},width={width},height={height},framerate=0/1"))
@@ -229,13 +234,39 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
         pipeline.wait()
 
 
+@contextlib.contextmanager
+def _replacing(path: str | os.PathLike[str]) -> Iterator[str]:
+    """A path to write to, whose file then replaces that of `path`, or is removed on failure. Devices and pipes are
+    written to as they are."""
+    target = os.path.realpath(path)
+    if os.path.exists(target) and not os.path.isfile(target):
+        yield target
+        return
+    part = f"{target}.{uuid.uuid4().hex[:8]}.part"
+    try:
+        with open(part, "xb"):
+            pass
+    except OSError as error:
+        raise PipelineError(f"{os.fspath(path)} cannot be written: {error.strerror}") from None
+    try:
+        yield part
+        os.replace(part, target)
+    except BaseException:
+        os.remove(part)
+        raise
+
+
 def _check(events: np.ndarray, width: int, height: int) -> None:
+    for name in "txy":
+        if not np.issubdtype(events[name].dtype, np.integer):
+            raise ValueError(f"{name} is {events[name].dtype}; it must be whole numbers, of an integer type")
     t = events["t"]
     if len(events) > 0 and (t[0] < 0 or np.any(t[1:] < t[:-1])):
         raise ValueError("events must be sorted by time, from 0 on")
     if len(events) > 0 and not t[-1] <= MAX_TIME:
         raise ValueError(f"the last event is at {t[-1]} us; times must be at most 2**52 us, 142 years")
-    if len(events) > 0 and (np.max(events["x"]) >= width or np.max(events["y"]) >= height):
+    if any(len(events) > 0 and (np.min(events[name]) < 0 or np.max(events[name]) >= size)
+           for name, size in (("x", width), ("y", height))):
         raise ValueError(f"there are events outside the sensor of {width}x{height} pixels")
     for labels in _labels(events):
         if len(labels) != len(events):
@@ -263,8 +294,8 @@ def buffer_of(events: np.ndarray, start: int, duration: int) -> Gst.Buffer:
     packed = np.empty(len(events), XYTP)
     packed["t"] = events["t"] - start
     packed["x"] = events["x"]
-    packed["y_p"] = events["y"] | np.where(events["p"], 0x8000, 0).astype("<u2")
-    buffer = Gst.Buffer.new_wrapped(packed.tobytes())
+    packed["y_p"] = events["y"] | np.where(events["p"] > 0, 0x8000, 0)
+    buffer = Gst.Buffer.new_wrapped(packed.tobytes()) if len(events) > 0 else Gst.Buffer.new()
     buffer.pts, buffer.duration = start * 1000, duration * 1000
     if labels := _labels(events):
         fields = np.zeros(len(events), LABEL)

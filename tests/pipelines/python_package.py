@@ -21,6 +21,7 @@ if not os.path.exists(os.path.join(os.environ["GI_TYPELIB_PATH"], "GstEventCamer
 import gst_eventcamera as ec
 import numpy as np
 from gst_eventcamera import pipeline as internals
+from gst_eventcamera import recordings
 from gst_eventcamera.pipeline import Gst, GstEventCamera
 
 FOLDER = tempfile.TemporaryDirectory()
@@ -184,6 +185,38 @@ class Recordings(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "3000 events, but 2999 labels"):
             ec.write(path, events)
 
+    def test_replaces_files_by_complete_ones_only(self):
+        path = path_of("kept.npy")
+        ec.write(path, self.events)
+        events = np.zeros(3, [("t", "<i8"), ("x", "<i4"), ("y", "<f4"), ("p", "<i1")])
+        with self.assertRaisesRegex(ValueError, "y is float32"):
+            ec.write(path, events, WIDTH, HEIGHT)
+        with self.assertRaises(ec.PipelineError):
+            ec.write("/nowhere/events.raw", self.events)
+        with unittest.mock.patch.dict(recordings.WRITERS, {".npy": "eventnpyenc ! identity error-after=2 ! filesink name=file"}):
+            with self.assertRaises(ec.PipelineError):
+                ec.write(path, self.events)
+        self.assertTrue(same(ec.read(path), self.events))
+        self.assertFalse([name for name in os.listdir(FOLDER.name) if name.endswith(".part")])
+
+    def test_refuses_pixels_before_the_first_and_knows_signs(self):
+        events = np.zeros(3, [("t", "<i8"), ("x", "<i4"), ("y", "<i4"), ("p", "<i1")])
+        events["p"] = -1, 1, -1
+        path = path_of("signs.raw")
+        ec.write(path, events, WIDTH, HEIGHT)
+        self.assertEqual(list(ec.read(path)["p"]), [False, True, False])
+        self.assertEqual(ec.voxel_grid(events, 1, WIDTH, HEIGHT).sum(), -1)
+        events["x"] = -1
+        with self.assertRaisesRegex(ValueError, "outside the sensor"):
+            ec.write(path, events, WIDTH, HEIGHT)
+
+    def test_reads_over_a_silence_of_decades(self):
+        events = self.events[:3].copy()
+        events["t"] = 0, 10, 2**50
+        path = path_of("decades.csv")
+        ec.write(path, events)
+        self.assertTrue(same(ec.read(path), events))
+
     def test_joins_chunks(self):
         events = self.labelled(3000)
         gap = ec.Events(0, WIDTH, HEIGHT)
@@ -291,7 +324,7 @@ class Failures(unittest.TestCase):
         self.expect(ec.PipelineError, 'no element "nothing"', lambda: list(ec.live("videotestsrc ! nothing")))
         self.expect(ec.PipelineError, "can't handle caps application/x-event-camera",
                     lambda: list(ec.live("videotestsrc num-buffers=3")))
-        self.expect(ec.PipelineError, "Could not open file", lambda: ec.write("/nowhere/out.raw", random_events(9, 9)))
+        self.expect(ec.PipelineError, "No such file or directory", lambda: ec.write("/nowhere/out.raw", random_events(9, 9)))
         self.expect(ec.PipelineError, "2048x2048 pixels",
                     lambda: ec.write(path_of("wide.raw"), random_events(9, 9, pixels=(3000, 9))))
 
