@@ -67,11 +67,23 @@ void Db3File::read_topics() {
   }
   if (rows.failed() || first.failed() || last.failed())
     corruption_.note(0, "a database with a corrupt page");
-  messages_ = std::make_unique<SqliteRows>(database_->query(all_messages, before_all));
+  read_from(before_all);
+}
+
+void Db3File::read_from(std::int64_t id) {
+  messages_ = std::make_unique<SqliteRows>(database_->query(all_messages, id));
+  last_read_.reset();
 }
 
 std::optional<BagMessage> Db3File::next() {
   while (messages_ && messages_->next()) {
+    const auto id = messages_->integer(0);
+    if (last_read_ && id <= *last_read_) {  // a few pages could refer to each other for ever
+      corruption_.note(0, "a database with a page in two places");
+      messages_.reset();
+      break;
+    }
+    last_read_ = id;
     const auto topic = topics_.find(messages_->integer(1));
     if (topic == topics_.end()) corruption_.note(0, "a message without a topic");
     if (topic == topics_.end() || !topic->second) continue;
@@ -130,8 +142,7 @@ std::optional<SeekPoint> Db3File::first_of(std::size_t topic) const {
 }
 
 void Db3File::restart(const SeekPoint& seek_point) {
-  messages_ = std::make_unique<SqliteRows>(
-      database_->query(all_messages, static_cast<std::int64_t>(seek_point.position)));
+  read_from(static_cast<std::int64_t>(seek_point.position));
 }
 
 }  // namespace eventcamera

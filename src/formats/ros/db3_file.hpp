@@ -37,6 +37,7 @@ class Db3File final : public BagFile {
 
  private:
   void read_topics();
+  void read_from(std::int64_t id);
   std::optional<std::span<const std::uint8_t>> content_of(std::span<const std::uint8_t> data);
 
   std::vector<std::uint8_t> collected_;    ///< in push mode
@@ -46,6 +47,7 @@ class Db3File final : public BagFile {
   bool is_opened_ = false;                ///< with random access
   std::map<std::int64_t, std::optional<std::size_t>> topics_;
   std::optional<Microseconds> last_logged_;
+  std::optional<std::int64_t> last_read_;  ///< ID of the last message: they rise
   std::int64_t first_id_ = 0;
   std::int64_t last_id_ = 0;
   FrameDecompressor decompressor_;
