@@ -501,7 +501,7 @@ def main():
     if chosen.profile and chosen.element.split()[:1] != [PROFILED]:
         raise RuntimeError(f"only {PROFILED} has profiles, {chosen.element.split()[0]} has none")
     for path in filter(None, (chosen.profile, chosen.map)):
-        expect_writable(path)
+        expect_writable(path, filter(None, (chosen.video, chosen.recording, chosen.mask)))
     progress = Progress()
     start = getattr(chosen, "from")
     ends = [end for end in (chosen.to, chosen.measure_to) if end is not None]

@@ -688,6 +688,18 @@ static int write_file(const char* in, const Reader* from, const char* path, cons
   return status;
 }
 
+/* Messages of a bag of ROS 2 that SQLite has not yet moved to the file are in a journal beside it.
+ */
+static void warn_of_journal(const char* in) {
+  gchar* journal = g_strconcat(in, "-wal", NULL);
+  struct stat found;
+  if (g_str_has_suffix(in, ".db3") && stat(journal, &found) == 0 && found.st_size > 0)
+    PRINT_ERROR(
+        "%s: warning: messages in %s are not read; run: sqlite3 %s 'PRAGMA wal_checkpoint'\n", in,
+        journal, in);
+  g_free(journal);
+}
+
 /* Returns the exit status. */
 static int convert(const char* in, const char* out) {
   const Format* to = format_of(out);
@@ -704,6 +716,7 @@ static int convert(const char* in, const char* out) {
   }
   path = target_of(out);
   if (path == NULL) return 1;
+  warn_of_journal(in);
   status = write_file(in, from, path, to);
   g_free(path);
   return status;

@@ -302,7 +302,7 @@ def main():
     chosen = options()
     find_plugins()
     if chosen.html:
-        expect_writable(chosen.html)
+        expect_writable(chosen.html, filter(None, [chosen.real, *chosen.simulated, chosen.mask]))
     sensor = Sensor()
     streams = []
     for path in [chosen.real] + chosen.simulated:

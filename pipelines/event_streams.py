@@ -119,8 +119,11 @@ def seconds(text, signed=False):
     return value
 
 
-def expect_writable(path):
-    """Raises the error before the work whose result will be written there."""
+def expect_writable(path, inputs):
+    """Raises the error before the work whose result will be written there, instead of one of the inputs."""
+    for read in inputs:
+        if os.path.exists(path) and os.path.exists(read) and os.path.samefile(path, read):
+            raise RuntimeError(f"{path} is read, so it cannot be written; name another file")
     folder = os.path.dirname(path) or "."
     place = path if os.path.exists(path) else folder
     if os.path.isdir(path) or not os.path.isdir(folder) or not os.access(place, os.W_OK):

@@ -127,5 +127,6 @@ for option in --profile --map; do
   refused "nowhere/file cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option nowhere/file
   refused "\. cannot be written; name a file" scene.mkv recorded.raw --element eventsim-dvs $option .
 done
+refused "recorded.raw is read, so it cannot be written" scene.mkv recorded.raw --map ./recorded.raw
 refused "do not overlap in time" scene.mkv recorded.raw --element eventsim-frame --from 5
 echo "all thresholds were recovered"

@@ -246,6 +246,10 @@ for bag in evt3.mcap:x-mcap evt3.bag:x-rosbag evt3.db3:x-rosbag2-db3; do
 done
 [ "$(wc -l <evt3.mcap.csv)" = 6001 ] || fail "evt3.mcap has $(wc -l <evt3.mcap.csv) lines"
 
+printf x >evt3.db3-wal
+convert evt3.db3 evt3.npy 2>left-out
+grep -q "evt3.db3: warning: messages in evt3.db3-wal are not read" left-out || fail "nobody tells of evt3.db3-wal"
+
 # Streams that begin apart. Without an index, only images that begin with the events are found.
 /usr/bin/python3 "$SOURCE/tests/formats/apart_bags.py" .
 for bag in late-*.bag late-*.mcap late-*.db3; do
