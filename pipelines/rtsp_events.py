@@ -22,12 +22,15 @@ except (ImportError, ValueError) as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gi gir1.2-gst-plugins-base-1.0"
              " gir1.2-gst-rtsp-server-1.0")
 
-from capture import Capture, find_elements, host_of, option_parser  # noqa: E402
+from capture import Capture, described, find_elements, host_of, option_parser  # noqa: E402
 
 ELEMENTS = ["vp8enc", "rtpvp8pay"]
 
-# The leaky queues drop frames if a simulator or an encoder is too slow.
-FRAMES = "appsrc name=frames is-live=true format=time"
+# What every simulator and the encoder take.
+CAPTURED = "videoconvert ! video/x-raw,format=I420"
+# The appsrc drops frames while a client pauses, and the queues if a simulator or an encoder is too slow.
+FRAMES = ("appsrc name=frames is-live=true format=time leaky-type=downstream max-buffers=2 max-bytes=0"
+          " max-time=0")
 QUEUE = "queue leaky=downstream max-size-buffers=2"
 EVENTS = f"{QUEUE} ! {{simulator}} ! application/x-event-camera ! rtpeventpay"
 # RTSP clients cannot request a key frame, so there is one every second.
@@ -46,14 +49,16 @@ class Server:
     """RTSP server: clients of a path share its media, and all media share the camera."""
 
     def __init__(self, device, simulator):
-        self._capture = Capture(device, "identity")
+        self._capture = Capture(device, CAPTURED)
         self._server = GstRtspServer.RTSPServer()
         permissions = GstRtspServer.RTSPPermissions.new()
         for permission in ("media.factory.access", "media.factory.construct"):
             permissions.add_permission_for_role(VIEWER, permission, True)
-        for path, launch in MEDIA.items():
+        for path, media in MEDIA.items():
+            launch = media.format(simulator=simulator)
+            Gst.parse_launch_full(launch, None, Gst.ParseFlags.FATAL_ERRORS)  # now, not for the first client
             factory = GstRtspServer.RTSPMediaFactory()
-            factory.set_launch(f"( {launch.format(simulator=simulator)} )")
+            factory.set_launch(f"( {launch} )")
             factory.set_shared(True)
             factory.set_permissions(permissions)
             factory.connect("media-configure", self._feed)
@@ -63,7 +68,7 @@ class Server:
         auth = GstRtspServer.RTSPAuth.new()
         token = GstRtspServer.RTSPToken.new()
         token.set_string("media.factory.role", VIEWER)
-        if user:
+        if user is not None:
             auth.set_supported_methods(GstRtsp.RTSPAuthMethod.DIGEST)
             auth.add_digest(user, password, token)
         else:
@@ -94,7 +99,11 @@ class Server:
     def _feed(self, _, media):
         element = media.get_element()
         frames = element.get_by_name("frames")
-        self._capture.attach(frames, element.get_parent())
+        pipeline = element.get_parent()
+        bus = pipeline.get_bus()
+        bus.enable_sync_message_emission()  # the media takes messages from the bus
+        bus.connect("sync-message::error", lambda _, message: print(f"error: {described(message)}", file=sys.stderr))
+        self._capture.attach(frames, pipeline)
         media.connect("unprepared", lambda _: self._capture.detach(frames))
 
 
@@ -107,10 +116,12 @@ def main():
     chosen = parser.parse_args()
     if (chosen.user is None) != (chosen.password is None):
         parser.error("--user and --password need each other")
+    if chosen.user == "":
+        parser.error("--user is empty")
     Gst.init(None)
     find_elements(ELEMENTS, "gstreamer1.0-plugins-good")
     server = Server(chosen.device, chosen.simulator)
-    if chosen.user or chosen.certificate:
+    if chosen.user is not None or chosen.certificate:
         server.protect(chosen.user, chosen.password, chosen.certificate)
     server.run(chosen.address, chosen.port, "rtsps" if chosen.certificate else "rtsp")
 

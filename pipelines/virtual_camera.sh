@@ -37,6 +37,10 @@ while [ $# -gt 0 ]; do
       if [ "$1" = --simulator ]; then
         read -ra simulator <<<"$2"
       else
+        if [ ! -e "$2" ]; then
+          echo "error: there is no camera $2" >&2
+          exit 1
+        fi
         # By default v4l2src selects the largest frames, which many cameras deliver only a few times a second.
         camera=(v4l2src device="$2" !
           "video/x-raw,width=[1,640],height=[1,480];image/jpeg,width=[1,640],height=[1,480]" ! decodebin)
@@ -63,7 +67,17 @@ if ! has pipewiresink; then
   echo "error: GStreamer has no pipewiresink; on Debian, install: gstreamer1.0-pipewire" >&2
   exit 1
 fi
-echo "PipeWire offers the camera \"Event camera\" until Ctrl-C"
+if ! has "${simulator[0]-}"; then
+  echo "error: no simulator \"${simulator[*]}\"" >&2
+  exit 1
+fi
+remote=${PIPEWIRE_REMOTE:-pipewire-0}
+if [[ $remote != /* ]]; then remote=${PIPEWIRE_RUNTIME_DIR:-${XDG_RUNTIME_DIR:-/run/user/$(id -u)}}/$remote; fi
+if [ ! -S "$remote" ]; then
+  echo "error: PipeWire is not running, since there is no $remote; start it: systemctl --user start pipewire" >&2
+  exit 1
+fi
+echo "Offering the camera \"Event camera\" to PipeWire until Ctrl-C"
 # pipewiresink 0.3.65 offers buffers without memory if the allocation query reaches it, and crashes if an application
 # connects before the first picture. It lists the camera when caps arrive, and funnel holds them back until then.
 # A leaky queue would reset the simulator at each dropped frame, with an empty picture.

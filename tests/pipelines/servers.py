@@ -29,6 +29,11 @@ class ServerProcess:
     def descriptors(self):
         return len(os.listdir(f"/proc/{self.process.pid}/fd"))
 
+    def memory(self):
+        """Resident, in megabytes."""
+        with open(f"/proc/{self.process.pid}/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
+
     def interrupt(self):
         """Presses Ctrl-C."""
         self.process.send_signal(signal.SIGINT)

@@ -36,6 +36,16 @@ timeout 60 "$GST_LAUNCH" -q pipewiresrc target-object=event-camera num-buffers=1
 # The ball moves on a white background.
 [ "$(tail -c $((320 * 240)) pictures | od -An -v -tu1 -w1 | sort -u | wc -l)" -gt 2 ] || fail "the last picture is empty"
 
+refused() { # WORDS ARGUMENT...
+  local words=$1
+  shift
+  if timeout 60 "$BUILD/pipelines/virtual-camera" "$@" 2>refusal; then fail "virtual-camera $* ran"; fi
+  grep -q "$words" refusal || fail "it says $(cat refusal)"
+}
+refused "there is no camera /nowhere" --device /nowhere
+refused 'no simulator "nosuch' --simulator "nosuch palette=light"
+XDG_RUNTIME_DIR=/nowhere refused "PipeWire is not running, since there is no /nowhere/pipewire-0"
+
 if "$BUILD/pipelines/virtual-camera" --device 2>usage; then fail "--device needs a value"; fi
 grep -q -- "--device DEVICE" usage || fail "the usage is $(cat usage)"
 if GST_PLUGIN_PATH= GST_REGISTRY=$work/none.bin "$BUILD/pipelines/virtual-camera" 2>missing; then fail "there are no simulators"; fi
