@@ -21,7 +21,7 @@ def segment_before(wildcards):
 def arguments(wildcards):
     """The file, and where it is cut."""
     path, joints = (videos[wildcards.name][key] for key in ("path", "joints"))
-    return [path, "--joints", *map(str, joints)] if joints else [path]
+    return [f"--file={path}", *(["--joints", *map(str, joints)] if joints else [])]
 
 
 rule all:
@@ -41,7 +41,7 @@ rule segment:
     log:
         config["segments"] + "/{name}.d/{number}.log",
     shell:
-        "{config[command]} --segment-number {wildcards.number} --video {wildcards.name:q} {params.arguments:q}"
+        "{config[command]} --segment-number {wildcards.number} --video={wildcards.name:q} {params.arguments:q}"
         " >{log:q} 2>&1"
 
 
@@ -55,4 +55,4 @@ rule video:
     log:
         "logs/{name}.log",
     shell:
-        "{config[command]} --video {wildcards.name:q} {params.arguments:q} >{log:q} 2>&1"
+        "{config[command]} --video={wildcards.name:q} {params.arguments:q} >{log:q} 2>&1"

@@ -83,7 +83,8 @@ def options():
                         " events are the same (default: %(default)s, 0 = never)")
     parser.add_argument("--manifest", metavar="FILE",
                         help="the manifest that verify compares with (default: that of the folder)")
-    parser.add_argument("--video", nargs=2, metavar=("NAME", "FILE"), help="make one video only, as the jobs do")
+    parser.add_argument("--video", metavar="NAME", help="make one video only, as the jobs do; needs --file")
+    parser.add_argument("--file", help="the file of that video")
     parser.add_argument("--joints", nargs="+", type=int, default=[], help=argparse.SUPPRESS)
     parser.add_argument("--segment-number", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--version", action="version", version="%(prog)s @VERSION@",
@@ -92,6 +93,8 @@ def options():
     chosen.verify = chosen.words[0] == "verify" and len(chosen.words) > 1
     if len(chosen.words) != 1 + chosen.verify:
         parser.error(f"give one recipe, not {' '.join(chosen.words)}")
+    if (chosen.video is None) != (chosen.file is None):
+        parser.error("--video and --file need each other")
     if chosen.cores < 1 or chosen.retries < 0 or chosen.segment < 0:
         parser.error("--cores is at least 1, --retries and --segment at least 0")
     chosen.recipe = chosen.words[-1]
@@ -247,16 +250,28 @@ def tell(kind, lines):
 
 
 def records_of(chosen, videos):
-    return {video.name: read_json(os.path.join(chosen.output, records_folder(chosen), f"{video.name}.json"))
-            for video in videos}
+    found = {video.name: read_json(os.path.join(chosen.output, records_folder(chosen), f"{video.name}.json"))
+             for video in videos}
+    return {name: record if is_record(record) else None for name, record in found.items()}
+
+
+def is_record(record):
+    """True if it has what is looked up in it."""
+    def has(part, *keys):
+        return isinstance(part, dict) and all(key in part for key in keys)
+
+    return (has(record, "name", "split", "input", "making") and has(record["input"], "sha256")
+            and has(record["making"], "line")
+            and ("refused" in record or has(record, "written", "figures", "versions")
+                 and has(record["written"], "path", "size", "sha256")))
 
 
 # the commands
 
 
 def make_one(chosen, recipe):
-    name, path = chosen.video
-    video = ec.DatasetVideo(recipe, name, path)
+    name = chosen.video
+    video = ec.DatasetVideo(recipe, name, chosen.file)
     folder, segments, notes = segments_folder(chosen, name), None, {}
     if chosen.segment_number is not None:
         dataset_segments.make_segment(video, folder, chosen.joints, chosen.segment_number)
@@ -285,9 +300,18 @@ def selected(chosen, videos):
     return [video for video in videos if int(uniform_number(video.name, "part") * count) == number - 1]
 
 
+def expect_own_folder(output, videos):
+    """The folder of a data set is written to and cleaned up, so that of its videos must be another."""
+    folder = os.path.realpath(output)
+    for video in videos:
+        if os.path.commonpath([folder, os.path.realpath(video.path)]) == folder:
+            raise RuntimeError(f"{output} has {video.path}, a video of the recipe; choose another folder with --output")
+
+
 def make_all(chosen, recipe):
     """The exit status."""
     videos = list(ec.Dataset(recipe))
+    expect_own_folder(chosen.output, videos)
     os.makedirs(chosen.output, exist_ok=True)
     with locked(chosen.output, chosen.part) as lock:
         if chosen.part == (1, 1):
@@ -318,12 +342,14 @@ def make_all(chosen, recipe):
 def verify_all(chosen, recipe):
     """The exit status."""
     manifest = read_json(chosen.manifest or os.path.join(chosen.output, "manifest.json"))
-    if not manifest or not isinstance(manifest.get("videos"), list):
+    if (not isinstance(manifest, dict) or not isinstance(manifest.get("videos"), list)
+            or not all(map(is_record, manifest["videos"])) or not isinstance(manifest.get("refused", {}), dict)):
         raise RuntimeError(f"{chosen.manifest or chosen.output}: no manifest; make the data set first, or give one"
                            " with --manifest")
     expected = {one["name"]: one for one in manifest["videos"]}
     videos = selected(chosen, ec.Dataset(recipe))
     present = [video for video in videos if video.name in expected]
+    expect_own_folder(chosen.output, videos)
     os.makedirs(chosen.output, exist_ok=True)
     with locked(chosen.output, chosen.part) as lock:
         for folder in records_folder(chosen), segments_root(chosen):

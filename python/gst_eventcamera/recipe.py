@@ -8,6 +8,7 @@ import hashlib
 import math
 import os
 import re
+import reprlib
 import statistics
 from fractions import Fraction
 from typing import Any, Iterator, Mapping, Optional
@@ -143,6 +144,8 @@ class Recipe:
             for match in sorted(matches):
                 path = os.path.join(folder, match)
                 if os.path.isdir(path) and not any(map(is_picture, os.listdir(path))):
+                    continue
+                if os.path.exists(path) and not os.path.isdir(path) and not os.path.isfile(path):  # such as a pipe
                     continue
                 name = match if os.path.isdir(path) else os.path.splitext(match)[0]
                 _check_name(name)
@@ -286,27 +289,27 @@ def _expect_keys(where: str, given: Mapping[Any, Any], known: set[str]) -> None:
 def _expect_number(where: str, value: Any, low: float, high: float, whole: bool = False) -> None:
     kinds: tuple[type, ...] = (int,) if whole else (int, float)
     if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
-        raise RecipeError(f"{where}: {value!r} is not a {'whole ' if whole else ''}number from {low:g} to {high:g}")
+        raise RecipeError(f"{where}: {reprlib.repr(value)} is not a {'whole ' if whole else ''}number from {low:g} to {high:g}")
 
 
 def _text(recipe: Mapping[str, Any], key: str) -> str:
     value = recipe.get(key, "")
     if not isinstance(value, str):
-        raise RecipeError(f"{key}: {value!r} is not text")
+        raise RecipeError(f"{key}: {reprlib.repr(value)} is not text")
     return value.strip()
 
 
 def _framerate(recipe: Mapping[str, Any]) -> Optional[Fraction]:
     if "framerate" not in recipe:
         return None
-    text = str(recipe["framerate"])
+    text = str(recipe["framerate"]) if isinstance(recipe["framerate"], (int, float, str)) else ""
     try:
         # Without exponents: that of 1e500000000 would take all memory.
         framerate = Fraction(text if FRAMERATE.fullmatch(text) else 0)
     except ZeroDivisionError:
         framerate = Fraction(0)
     if not 0 < framerate <= 1_000_000 or framerate.denominator >= 2**31 or framerate.numerator >= 2**31:
-        raise RecipeError(f"framerate: {recipe['framerate']!r} is not frames per second, such as 30 or 30000/1001")
+        raise RecipeError(f"framerate: {reprlib.repr(recipe['framerate'])} is not frames per second, such as 30 or 30000/1001")
     return framerate
 
 
@@ -341,7 +344,7 @@ def _parameters(recipe: Mapping[str, Any], simulator: str) -> dict[str, Value | 
                 _expect_number(where, value, *limits[name])
             parameters[name] = value
         else:
-            raise RecipeError(f"{where}: {value!r} is neither a value nor a distribution")
+            raise RecipeError(f"{where}: {reprlib.repr(value)} is neither a value nor a distribution")
     for name, value in parameters.items():
         other = parameters.get(value.relative_to, "") if isinstance(value, Distribution) and value.relative_to else 1
         if isinstance(other, (str, bool)) or getattr(other, "relative_to", None) or (
@@ -358,7 +361,7 @@ def _distribution(where: str, given: Mapping[Any, Any], limits: tuple[float, flo
         raise RecipeError(f"{where}: give one of {', '.join(DISTRIBUTIONS)}")
     kind, values = kinds[0], given[kinds[0]]
     relative_to = given.get("relative-to")
-    needs = RecipeError(f"{where}: {kind} needs {DISTRIBUTIONS[kind]}, not {values!r}")
+    needs = RecipeError(f"{where}: {kind} needs {DISTRIBUTIONS[kind]}, not {reprlib.repr(values)}")
     if not isinstance(values, list) or not values or not all(isinstance(one, (int, float, str)) for one in values):
         raise needs
     numbers = [one for one in values if isinstance(one, (int, float)) and not isinstance(one, bool)]
@@ -401,6 +404,24 @@ def _check_elements(recipe: Recipe) -> None:
         lines.append(f"eventtensor {recipe.tensors}")
     try:
         for line in lines:
+            for element in line.split(" ! "):
+                _expect_limits(element)
             Pipeline(f"fakesrc ! {line} ! fakesink")
     except PipelineError as error:
         raise RecipeError(str(error)) from None
+
+
+def _expect_limits(element: str) -> None:
+    """Of the numbers that an element's description sets, which GStreamer would ignore."""
+    name, *settings = element.split()
+    if not settings or not Gst.ElementFactory.find(name):  # such as caps
+        return
+    limits = property_limits(name)
+    for key, _, value in (setting.partition("=") for setting in settings):
+        try:
+            number = float(value)
+        except ValueError:
+            continue
+        low, high = limits.get(key, (-math.inf, math.inf))
+        if not low <= number <= high:
+            raise RecipeError(f"{name} {key}={value}: it must be from {low:g} to {high:g}")

@@ -179,6 +179,21 @@ class DataSets(unittest.TestCase):
         self.assertEqual(sorted(hashes("bad")), ["good", "uneven"])
         self.assertEqual(sorted(load("bad", "manifest.json")["refused"]), ["cut", "noise", "short"])
 
+    def test_are_of_files_only_and_apart_from_them(self):
+        video = make_video("odd/videos/-dash.mkv")
+        os.mkfifo(path_of("odd/videos/pipe.mkv"))
+        recipe = recipe_of("odd")
+        self.assertIn("1 videos: 1 made", event_dataset(recipe))
+        self.assertIn("choose another folder", event_dataset(recipe, "--output", os.path.dirname(video), status=1))
+        for record in ("5", "{}", '{"written": {}}'):
+            with open(path_of("odd/recipe/records/-dash.json"), "w", encoding="utf-8") as file:
+                file.write(record)
+            self.assertIn("1 videos: 1 made", event_dataset(recipe))
+        for manifest in ('"x"', '{"videos": [1]}', '{"videos": [{"name": "a"}]}'):
+            with open(path_of("odd/manifest.json"), "w", encoding="utf-8") as file:
+                file.write(manifest)
+            self.assertIn("no manifest", event_dataset("verify", recipe, "--manifest", path_of("odd/manifest.json"), status=1))
+
     def test_go_on_after_a_kill(self):
         for number in range(4):
             make_video(f"killed/videos/{number}.mkv")
@@ -327,7 +342,7 @@ class Segments(unittest.TestCase):
         record["before"][-1][1] = "0"
         with open(f"{folder}/2.json", "w", encoding="utf-8") as file:
             json.dump(record, file)
-        event_dataset(video.recipe.path, "--output", path_of("segments/made"), "--video", video.name, video.path,
+        event_dataset(video.recipe.path, "--output", path_of("segments/made"), "--video", video.name, "--file", video.path,
                       "--joints", *map(str, self.JOINTS))
         with open(path_of("segments/made/records/coded.json"), encoding="utf-8") as file:
             made = json.load(file)
@@ -378,6 +393,10 @@ class Recipes(unittest.TestCase):
         self.expect('no property "colour"', base.replace("dvs", "dvs colour=red"))
         self.expect('no element "eventdim"', base + "filters: eventdim")
         self.expect('no property "bin"', base + "output: tensors\ntensors: bin=5")
+        self.expect("eventsim-dvs leak-rate=-5: it must be from 0 to", base.replace("dvs", "dvs leak-rate=-5"))
+        self.expect("eventtensor bins=100000: it must be from 1 to", base + "output: tensors\ntensors: bins=100000")
+        aliases = "".join(f"&a{i} [{', '.join([f'*a{i - 1}'] * 9) if i else 1}], " for i in range(9))
+        self.expect("[[...], [...]", base + f"seed: [{aliases}]")
         self.expect("seed: -1 is not a whole number from 0 to", base + "seed: -1")
         self.expect("seed: True is not a whole number", base + "seed: true")
         self.expect("output: avi is none of aedat4, csv", base + "output: avi")
