@@ -509,7 +509,10 @@ std::unique_ptr<VideoSimulator> make_texture_simulator(GObject* element, const G
     const std::string cause = error != nullptr ? error->message : "unknown";
     g_clear_error(&error);
     throw VideoSimulatorError(
-        {GST_RESOURCE_ERROR_NOT_FOUND, "Cannot create an OpenGL context." + advice_of(self)},
+        {GST_RESOURCE_ERROR_NOT_FOUND,
+         "Cannot create an OpenGL context. Without a screen, set the environment variable "
+         "GST_GL_WINDOW=egl-device, which other elements of OpenGL need, too." +
+             advice_of(self)},
         cause);
   }
   return std::make_unique<TextureVideoSimulator>(self, context, video, make);
