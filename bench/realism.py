@@ -42,8 +42,13 @@ ROWS = {
     "diff": "eventsim-diff",
     "`eventsim-dvs`": "eventsim-dvs",
 }
+# As docs/which-simulator.md recommends.
+RECOMMENDED = "eventsim-dvs upsampling=motion response=log log-eps=0.05 denoise=4 adaptation=0.05"
 # Of these, only the thresholds are fitted.
-PRESETS = {f"`{element}`": element for element in ("eventsim-dvs preset=esim", "eventsim-dvs preset=v2e-noisy")}
+PRESETS = {f"`{element}`": element for element in ("eventsim-dvs preset=esim", "eventsim-dvs preset=v2e-noisy")} | {
+    "`eventsim-dvs`, recommended": RECOMMENDED,
+    "`eventsim-dvs`, recommended, straight lines": RECOMMENDED.replace("upsampling=motion", "upsampling=linear"),
+}
 CALIBRATED = "`eventsim-dvs`"
 # What each stage of the calibrated element contributes: the same without it, with thresholds that fit again.
 WITHOUT = {

@@ -14,6 +14,10 @@ struct Unref {
   void operator()(GstPad* pad) const { gst_object_unref(pad); }
 };
 
+struct UnrefObject {
+  void operator()(gpointer object) const { g_object_unref(object); }
+};
+
 using OwnedBuffer = std::unique_ptr<GstBuffer, Unref>;
 using OwnedBufferPool = std::unique_ptr<GstBufferPool, Unref>;
 using OwnedCaps = std::unique_ptr<GstCaps, Unref>;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Events in datagrams of other tools: packed, unpacked, through sockets, and beside hostile ones.
+#include <gst/net/gstnetaddressmeta.h>
 #include <pthread.h>
 
 #include <algorithm>
@@ -491,6 +492,29 @@ TEST(Depayloader, MapsTheSendersTimeToTheArrival) {
   EXPECT_EQ(gst_segment_to_running_time(segment, GST_FORMAT_TIME, 5 * GST_SECOND), 2 * GST_SECOND);
   EXPECT_EQ(gst_segment_to_stream_time(segment, GST_FORMAT_TIME, 5 * GST_SECOND), 5 * GST_SECOND);
   EXPECT_FALSE(h.pull_event(GST_EVENT_SEGMENT));
+}
+
+TEST(Depayloader, ReceivesOneOfTwoSenders) {
+  Depay h("format=t32-x16-y15-on1");
+  const auto send = [&](guint16 port, guint32 t, GstClockTime arrival) {
+    GstBuffer* buffer = t32(t, 0, arrival);
+    GInetAddress* host = g_inet_address_new_loopback(G_SOCKET_FAMILY_IPV4);
+    GSocketAddress* address = g_inet_socket_address_new(host, port);
+    gst_buffer_add_net_address_meta(buffer, address);
+    g_object_unref(address);
+    g_object_unref(host);
+    h.push(buffer);
+  };
+  for (guint i = 0; i < 10; ++i) {
+    send(1000, 5'000'000 + 10'000 * i, (2000 + 10 * i) * GST_MSECOND);
+    send(2000, 9'000'000 + 10'000 * i, (2001 + 10 * i) * GST_MSECOND);
+  }
+  EXPECT_EQ(gst_harness_buffers_received(h.get()), 10U);
+  EXPECT_EQ(stat_of(h.element(), "rejected-packets"), 10U);
+  EXPECT_NE(h.warning().find("second sender"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
+  send(2000, 9'500'000, 4000 * GST_MSECOND);  // the first one has left
+  EXPECT_EQ(gst_harness_buffers_received(h.get()), 11U);
 }
 
 TEST(Depayloader, FollowsASenderWhoseClockDrifts) {

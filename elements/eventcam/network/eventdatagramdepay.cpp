@@ -20,7 +20,7 @@
  * A datagram that is malformed, or has an event outside the sensor, is rejected as a whole. One
  * that is older than an earlier one is dropped, so events are sorted. After a loss, which only the
  * sequence number of jAER reveals, the next buffer is flagged DISCONT.
- * #GstEventDatagramDepay:stats counts all of these.
+ * #GstEventDatagramDepay:stats counts all of these, and those of a second sender as rejected.
  *
  * jAER's addresses are read as those of a DVS128 if the sensor has 128x128 pixels, else as those of
  * a DAVIS. Samples of frames and of the IMU are skipped.
@@ -42,6 +42,7 @@
 #include <utility>
 #include <vector>
 
+#include "elements/eventcam/network/current_sender.hpp"
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "gst/base/arrival_segment.hpp"
 #include "gst/base/authors.hpp"
@@ -78,6 +79,7 @@ static_assert(min_gap + eventcamera::max_datagram_span <= G_MAXUINT32, "wraps ti
 struct State {
   DatagramSettings settings;
   std::unique_ptr<DatagramUnpacker> unpacker;
+  CurrentSender sender{};
   std::vector<AbsoluteEvent> events{};  ///< of the current datagram
   GstSegment upstream{};                ///< of arrival times
   guint32 segment_seqnum = gst_util_seqnum_next();
@@ -101,6 +103,7 @@ struct Private {
   // Accessed by the streaming thread only, or while there is none.
   std::optional<State> state;
   WarnOnce warn_of_rejected{GST_CAT_DEFAULT};
+  WarnOnce warn_of_second_sender{GST_CAT_DEFAULT};
   RepeatLevel late_level;
 };
 
@@ -207,6 +210,21 @@ static void reject(GstEventDatagramDepay* self, const char* fault, gsize size,
   g_free(cause);
 }
 
+/// Counts a datagram of another sender, whose times and pixels are not those of the current one.
+static void reject_second_sender(GstEventDatagramDepay* self, GstClockTime arrival) {
+  ++self->priv->counts.lock()->rejected;
+  gchar* cause =
+      g_strdup_printf("a datagram at running time %" GST_TIME_FORMAT " is from another address",
+                      GST_TIME_ARGS(arrival));
+  self->priv->warn_of_second_sender(
+      self,
+      {GST_RESOURCE_ERROR_BUSY,
+       "Rejected the datagrams of a second sender, until the first is silent for a second; stats "
+       "counts them. Let each sender use a port of its own."},
+      cause);
+  g_free(cause);
+}
+
 static void log_late(GstEventDatagramDepay* self, GstClockTime arrival) {
   const auto level = self->priv->late_level.next();
   GST_CAT_LEVEL_LOG(GST_CAT_DEFAULT, level, self,
@@ -252,7 +270,7 @@ static GstClockTime arrival_of(const State& state, GstBuffer* buffer) {
 static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto* self = GST_EVENT_DATAGRAM_DEPAY(parent);
   OwnedBuffer buffer(taken);
-  const auto& state = self->priv->state;
+  auto& state = self->priv->state;
   if (!state) return GST_FLOW_FLUSHING;
   const auto arrival = arrival_of(*state, taken);
   if (!GST_CLOCK_TIME_IS_VALID(arrival) && state->settings.format == DatagramFormat::spif) {
@@ -261,6 +279,10 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
                        "do-timestamp=true on the source, or format=spif-timestamps."),
                       ("a buffer has no PTS in a segment of times"));
     return GST_FLOW_ERROR;
+  }
+  if (!state->sender.sent(taken, arrival)) {
+    reject_second_sender(self, arrival);
+    return GST_FLOW_OK;
   }
   const bool discont = GST_BUFFER_IS_DISCONT(taken);
   const MappedBytes bytes(GST_ELEMENT(self), std::move(buffer));
@@ -344,6 +366,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     self->priv->state.reset();
     self->priv->warn_of_rejected.reset();
+    self->priv->warn_of_second_sender.reset();
     self->priv->late_level.reset();
   }
   return result;
