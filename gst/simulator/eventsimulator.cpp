@@ -3,7 +3,6 @@
 
 #include <gst/video/video.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <new>
@@ -28,8 +27,9 @@
 #include "gst/simulator/companion_pad.hpp"
 #include "gst/simulator/flow_tensor.hpp"
 #include "gst/simulator/frame_clock.hpp"
+#include "gst/simulator/interval_latency.hpp"
+#include "gst/simulator/properties.hpp"
 #include "gst/simulator/qos.hpp"
-#include "src/simulate/learnt_latency.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 #define GST_CAT_DEFAULT event_simulator_debug
@@ -37,25 +37,8 @@ GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 using eventcamera::EventBuckets;
 using eventcamera::IntervalSimulator;
 using eventcamera::Nanoseconds;
-using eventcamera::PaletteName;
 
 namespace {
-
-constexpr guint max_interpolated_frames = 255;
-constexpr guint default_interpolated_frames = 10;
-
-/// Maximum interval, and maximum processing time, in the latency.
-constexpr Nanoseconds max_latency = GST_SECOND;
-
-/// Default processing-deadline of sinks: processing time that they already add to the latency. More
-/// is reported in multiples of it.
-constexpr Nanoseconds processing_deadline = 20 * GST_MSECOND;
-
-/// User-settable values, copied once per buffer.
-struct Settings {
-  eventcamera::Settings simulation;
-  PaletteName palette = PaletteName::dark;
-};
 
 /// State from caps to stop.
 struct State {
@@ -65,18 +48,6 @@ struct State {
   eventcamera::Image<eventcamera::Flow> flow{};  ///< that was given, if any
 
   IntervalSimulator& simulator() const { return frames->simulator(); }
-};
-
-/// Delay from the start of an interval to its output.
-struct Latency {
-  eventcamera::LearntLatency interval;
-  eventcamera::LearntLatency processing;
-  Nanoseconds downstream = 0;  ///< of elements downstream that do not report it
-
-  Latency() { processing.expect(0); }
-  GstClockTime total() const {
-    return static_cast<GstClockTime>(interval.value() + processing.value() + downstream);
-  }
 };
 
 /// State from start to stop, independent of caps.
@@ -98,11 +69,11 @@ struct Stream {
 }  // namespace
 
 struct GstEventSimulatorPrivate {
-  Guarded<Settings> settings;
+  Guarded<SimulatorSettings> settings;
   std::shared_ptr<void> method_settings;
 
   Guarded<SimulatorQos> qos;
-  Guarded<Latency> latency;  // make no calls while holding its lock
+  Guarded<IntervalLatency> latency;  // make no calls while holding its lock
   CompanionPad class_images{"class images", GST_CAT_DEFAULT};
   CompanionPad flow_tensors{"flow tensors", GST_CAT_DEFAULT};
 
@@ -137,91 +108,12 @@ static void configure(GstEventSimulator* self) {
     configure(priv_of(self).state->simulator(), G_OBJECT(self));
 }
 
-/* properties */
-
-static Guarded<Settings>& settings_of(GObject* object) {
+Guarded<SimulatorSettings>& simulator_settings_of(GObject* object) {
   return priv_of(GST_EVENT_SIMULATOR(object)).settings;
 }
 
-static constexpr auto property_flags = static_cast<GParamFlags>(
-    G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
-
-static constexpr auto controllable_flags =
-    static_cast<GParamFlags>(property_flags | GST_PARAM_CONTROLLABLE);
-
-static void install_thresholds(GObjectClass* klass, double grey_levels) {
-  Properties<settings_of> properties(klass);
-  properties.add(
-      [](Settings& settings) -> double& { return settings.simulation.positive_threshold; },
-      g_param_spec_double("positive-threshold", "Positive threshold",
-                          "Contrast threshold of ON events: brightness must rise by more than "
-                          "this (8-bit grey levels at any bit depth)",
-                          0, 255, grey_levels, controllable_flags));
-  properties.add(
-      [](Settings& settings) -> double& { return settings.simulation.negative_threshold; },
-      g_param_spec_double("negative-threshold", "Negative threshold",
-                          "Contrast threshold of OFF events: brightness must fall by more than "
-                          "this (8-bit grey levels at any bit depth, a magnitude)",
-                          0, 255, grey_levels, controllable_flags));
-}
-
-static void install_interpolated_frames(GObjectClass* klass) {
-  Properties<settings_of>(klass).add(
-      [](Settings& settings) -> int& { return settings.simulation.interpolated_frames; },
-      g_param_spec_uint("interpolated-frames", "Interpolated frames",
-                        "Number of frames to interpolate between two frames of the video; "
-                        "events take those frames' timestamps (at most one frame per microsecond)",
-                        0, max_interpolated_frames, default_interpolated_frames, property_flags));
-}
-
-static void install_label(GObjectClass* klass) {
-  Properties<settings_of>(klass).add(
-      [](Settings& settings) -> bool& { return settings.simulation.labels; },
-      g_param_spec_boolean("label", "Label",
-                           "Label each event with its cause: light, leak, shot noise, hot pixel or "
-                           "exposure pulse. Implied by the pad label_sink, which adds classes. "
-                           "Events drawn as video have no labels",
-                           FALSE, property_flags));
-}
-
-static void install_base_properties(GObjectClass* klass) {
-  Properties<settings_of> properties(klass);
-  properties.add([](Settings& settings) -> int& { return settings.simulation.threads; },
-                 g_param_spec_uint("n-threads", "Threads",
-                                   "Maximum number of threads (0 = one per processor); the events "
-                                   "do not depend on it",
-                                   0, G_MAXINT, 0, property_flags));
-  properties.add(
-      &Settings::palette,
-      g_param_spec_enum("palette", "Palette", "Colours of event frames (accumulated-event video)",
-                        palette_type(), static_cast<int>(PaletteName::dark), property_flags));
-}
-
-static Guarded<SimulatorQos>& qos_of(GObject* object) {
+Guarded<SimulatorQos>& simulator_qos_of(GObject* object) {
   return priv_of(GST_EVENT_SIMULATOR(object)).qos;
-}
-
-/// Overrides the property `qos` of GstBaseTransform, whose default is off.
-static void install_qos_properties(GObjectClass* klass) {
-  Properties<qos_of> properties(klass);
-  properties.add(
-      [](SimulatorQos& qos, const GValue* value) { qos.enable(g_value_get_boolean(value)); },
-      [](SimulatorQos& qos, GValue* value) { g_value_set_boolean(value, qos.is_enabled()); },
-      g_param_spec_boolean("qos", "QoS",
-                           "Skip whole frames, without processing them, if downstream is late; the "
-                           "next interval is longer. By default on for events drawn as video, off "
-                           "for events",
-                           TRUE,
-                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                    GST_PARAM_MUTABLE_PLAYING)));
-  properties.add(
-      [](SimulatorQos&, const GValue*) {},
-      [](SimulatorQos& qos, GValue* value) { g_value_take_boxed(value, qos.stats()); },
-      g_param_spec_boxed("stats", "Statistics",
-                         "Counters since start: frames (processed), skipped-frames (due to qos), "
-                         "processing-time (of all processed frames, ns)",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
 }
 
 /* time */
@@ -240,13 +132,6 @@ static void change_latency(GstEventSimulator* self, const Change& change) {
   if (after == before) return;
   GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(after));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
-}
-
-/// Adapts the latency to an interval: the framerate in the caps may be missing or wrong.
-static void learn_latency(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
-  change_latency(self, [&](Latency& latency) {
-    latency.interval.add(end, std::min(end - start, max_latency));
-  });
 }
 
 /// Starts processing a frame. Returns false if the frame is skipped instead.
@@ -270,11 +155,7 @@ static void end_work(GstEventSimulator* self, Nanoseconds time,
     work = qos->end_work(GST_BASE_TRANSFORM(self), work_began);
     downstream = qos->downstream_latency();
   }
-  change_latency(self, [&](Latency& latency) {
-    latency.processing.add(time,
-                           std::min(work, max_latency) / processing_deadline * processing_deadline);
-    latency.downstream = downstream;
-  });
+  change_latency(self, [&](IntervalLatency& latency) { latency.add_work(time, work, downstream); });
 }
 
 static std::optional<Nanoseconds> work_began(GstEventSimulator* self) {
@@ -358,7 +239,7 @@ void event_simulator_push_interval(GObject* element, Interval interval,
   if (events->size() > 0) flow = write_events(self, *events, frame.get(), start, end, out);
   frame.reset();  // upstream may need it while downstream blocks
   end_work(self, end, began);
-  learn_latency(self, start, end);
+  change_latency(self, [&](IntervalLatency& latency) { latency.add_interval(start, end); });
   if (events->size() == 0)
     flow = push_gap(self, start, end, GST_SEQNUM_INVALID);
   else if (flow == GST_FLOW_OK)
@@ -421,9 +302,9 @@ static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
   return source != Source::nowhere;
 }
 
-/// Validates the time of a frame and prepares the simulator for it. False if the frame must be
-/// skipped. May throw.
-static bool check_time(GstEventSimulator* self, GstBuffer* buffer) {
+/// Takes the time of a frame: forgets the frames that it does not continue. False if the frame must
+/// be skipped. May throw.
+static bool accept_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
   const bool continues = std::exchange(priv_of(self).stream.continues_from, {}).has_value();
   if (GST_BUFFER_IS_DISCONT(buffer) && !continues) {
@@ -579,8 +460,8 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   // Pictures have the time of their frame, intervals that of the previous frame.
   const GstClockTime duration = state->draws ? 0 : frame_duration(video);
   if (duration > 0 || state->draws)
-    change_latency(self, [duration](Latency& latency) {
-      latency.interval.expect(static_cast<Nanoseconds>(duration));
+    change_latency(self, [duration](IntervalLatency& latency) {
+      latency.expect(static_cast<Nanoseconds>(duration));
     });
   priv_of(self).qos.lock()->take_output(state->draws);
   return TRUE;
@@ -588,7 +469,7 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
 
 /// Ensures that there is a state. Errors drop it while the pads keep their caps; if the application
 /// continues, it is recreated from these. False if that fails.
-static bool is_ready(GstEventSimulator* self) {
+static bool ensure_state(GstEventSimulator* self) {
   if (priv_of(self).state) return true;
   auto* transform = GST_BASE_TRANSFORM(self);
   GstCaps* in = gst_pad_get_current_caps(GST_BASE_TRANSFORM_SINK_PAD(transform));
@@ -611,8 +492,8 @@ static void sync_controlled_properties(GstEventSimulator* self, GstClockTime tim
 
 /// Draws the events since the last frame (none for a first frame). The picture replaces the frame,
 /// at its `time`. May throw.
-static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& settings, Nanoseconds time,
-                                OwnedBuffer in) {
+static GstFlowReturn draw_frame(GstEventSimulator* self, const SimulatorSettings& settings,
+                                Nanoseconds time, OwnedBuffer in) {
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
   OwnedBuffer picture;
@@ -632,12 +513,12 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const Settings& setting
 }
 
 /// Settings for the interval that ends at `end`, up to which class images and flow advance.
-static Settings begin_interval(GstEventSimulator* self, Nanoseconds end) {
+static SimulatorSettings begin_interval(GstEventSimulator* self, Nanoseconds end) {
   if (const auto time =
           running_time_of(GST_BASE_TRANSFORM(self)->segment, static_cast<GstClockTime>(end)))
     for (auto* companion : companions_of(self)) companion->advance(*time);
   configure(self);
-  Settings settings = priv_of(self).settings.copy();
+  SimulatorSettings settings = priv_of(self).settings.copy();
   if (priv_of(self).class_images.pad()) settings.simulation.labels = true;
   if (priv_of(self).state->draws) settings.simulation.labels = false;
   return settings;
@@ -673,25 +554,27 @@ static bool give_flow(GstEventSimulator* self, Nanoseconds start, Nanoseconds en
     return true;
   }
   const auto [width, height, bits] = FrameLuma::format_of(state.video);
-  if (state.flow.width() != width) state.flow = {width, height};
+  if (state.flow.width() == 0) state.flow = {width, height};  // not yet allocated
   copy_flow(found->back(), state.flow);
   state.simulator().give_flow(state.flow.view());
   return true;
 }
 
-/// Restores the state that a timeline continues from, if any, before its first frame. Returns true
-/// if that state has seen this frame. May throw.
-static bool is_before_state(GstEventSimulator* self, GstBuffer* frame) {
+/// Restores the state that a timeline continues from, if any, before its first frame. May throw.
+static void restore_at_first_frame(GstEventSimulator* self) {
   auto& stream = priv_of(self).stream;
   auto& simulator = priv_of(self).state->simulator();
-  if (std::exchange(stream.begins, false) && method_of(self).restore != nullptr) {
-    configure(self);
-    method_of(self).restore(simulator, G_OBJECT(self));
-    stream.continues_from = simulator.last_time();
-  }
+  if (!std::exchange(stream.begins, false) || method_of(self).restore == nullptr) return;
+  configure(self);
+  method_of(self).restore(simulator, G_OBJECT(self));
+  stream.continues_from = simulator.last_time();
+}
+
+/// True if the state that was restored has seen this frame.
+static bool is_before_state(GstEventSimulator* self, GstBuffer* frame) {
+  const auto& continues_from = priv_of(self).stream.continues_from;
   const GstClockTime pts = GST_BUFFER_PTS(frame);
-  if (!stream.continues_from || pts > static_cast<GstClockTime>(*stream.continues_from))
-    return false;
+  if (!continues_from || pts > static_cast<GstClockTime>(*continues_from)) return false;
   GST_LOG_OBJECT(self, "skipping the frame at %" GST_TIME_FORMAT ": the state is later",
                  GST_TIME_ARGS(pts));
   return true;
@@ -703,11 +586,12 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
   auto& state = *priv_of(self).state;
   sync_controlled_properties(self, GST_BUFFER_PTS(in.get()));
   check_interlacing(self, in.get());
+  restore_at_first_frame(self);
   if (is_before_state(self, in.get())) return;
-  if (!check_time(self, in.get()) || !begin_work(self, in.get())) return;
+  if (!accept_time(self, in.get()) || !begin_work(self, in.get())) return;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in.get()));
   const auto start = state.simulator().last_time();
-  const Settings settings = begin_interval(self, end);
+  const SimulatorSettings settings = begin_interval(self, end);
   if (start && !give_flow(self, *start, end)) {
     stream.flow = GST_FLOW_FLUSHING;
     return;
@@ -730,7 +614,7 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   // Since output was pushed outside of this function, downstream may have been relinked.
   if (flow != GST_FLOW_EOS && flow != GST_FLOW_ERROR) {
     flow = GST_FLOW_OK;
-    if (!is_ready(self)) return GST_FLOW_NOT_NEGOTIATED;
+    if (!ensure_state(self)) return GST_FLOW_NOT_NEGOTIATED;
     if (give_pts(self, in)) reported(self, [&] { take_frame(self, std::move(in)); });
   }
   return std::exchange(flow, GST_FLOW_OK);
@@ -820,7 +704,7 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   auto& state = priv_of(self).state;
   const auto start = state ? state->simulator().last_time() : std::nullopt;
   if (!start || state->draws) return true;
-  const auto frame = static_cast<GstClockTime>(priv_of(self).latency.lock()->interval.value());
+  const auto frame = static_cast<GstClockTime>(priv_of(self).latency.lock()->duration());
   const GstClockTime rest =
       GST_CLOCK_TIME_IS_VALID(duration) && duration > frame ? duration - frame : 0;
   if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
@@ -980,7 +864,6 @@ static void gst_event_simulator_class_init(GstEventSimulatorClass* klass) {
   object_class->constructed = constructed;
   object_class->finalize = finalize;
   install_base_properties(object_class);
-  install_qos_properties(object_class);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->request_new_pad = request_new_pad;
