@@ -3,6 +3,7 @@
 // processor.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -28,25 +29,34 @@ INSTANTIATE_TEST_SUITE_P(, EverySize,
                                          Size{16, 16}, Size{17, 33}, Size{63, 65}, Size{131, 70},
                                          Size{150, 260}));
 
+void expect_levels(const Pyramid& pyramid, Image<std::uint8_t> expected, const char* target) {
+  for (const auto& level : pyramid.levels()) {
+    ASSERT_EQ(level.width(), expected.width());
+    ASSERT_EQ(level.height(), expected.height());
+    const reference::Mirrored mirrored{expected};
+    for (int y = -16; y < expected.height() + 16; ++y) {
+      for (int x = -16; x < expected.width() + 16; ++x) {
+        ASSERT_EQ(level.row(y)[x], mirrored(x, y)) << target << " " << x << "," << y;
+      }
+    }
+    expected = reference::halved(expected);
+  }
+}
+
 TEST_P(EverySize, PyramidsEqualTheReference) {
   const auto [width, height] = GetParam();
-  const auto picture = scene::noise<std::uint8_t>(width, height, 8, 3);
   ThreadPool threads;
   threads.set_threads(0);
   targets::for_each([&](const char* target) {
     Pyramid pyramid;
-    pyramid.build(picture.view(), threads);
-    auto expected = picture;
-    for (const auto& level : pyramid.levels()) {
-      ASSERT_EQ(level.width(), expected.width());
-      ASSERT_EQ(level.height(), expected.height());
-      const reference::Mirrored mirrored{expected};
-      for (int y = -16; y < expected.height() + 16; ++y) {
-        for (int x = -16; x < expected.width() + 16; ++x) {
-          ASSERT_EQ(level.row(y)[x], mirrored(x, y)) << target << " " << x << "," << y;
-        }
-      }
-      expected = reference::halved(expected);
+    // Rows turn black, stay so, and are used again.
+    for (const auto& [first, last] :
+         {std::pair{0, height}, {height / 3, height / 2}, {0, 0}, {0, 0}, {height / 2, height}}) {
+      auto picture = scene::noise<std::uint8_t>(width, height, 8, 3);
+      for (int y = 0; y < height; ++y)
+        if (y < first || y >= last) std::fill_n(picture.row(y), width, std::uint8_t{0});
+      pyramid.build(picture.view(), threads);
+      ASSERT_NO_FATAL_FAILURE(expect_levels(pyramid, picture, target));
     }
   });
 }

@@ -363,7 +363,8 @@ TEST(Events, AreThoseOfOpenCvsFlows) {
   const auto frames = frames_of(video(driving), 38, 640, 480);
   ASSERT_GE(frames.size(), 37U);
   constexpr int n = 20;
-  constexpr double other_tracks = 0.9;  // PointTracker's are more accurate
+  // PointTracker's are more accurate, and end where OpenCV's wander.
+  constexpr double other_tracks = 0.88;
   const StepTimes steps(interval, n + 1);
   const LumaFormat format{640, 480, 8};
   for (const std::size_t i : {2U, 12U, 22U, 32U}) {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
+#include <numeric>
 #include <utility>
 
 namespace eventcamera {
@@ -61,6 +63,10 @@ int PointTracker::Blocks::first_row() const {
 int PointTracker::Blocks::last_row() const {
   const auto is_used = [](std::uint64_t row) { return row != 0; };
   return static_cast<int>(rows_.rend() - std::find_if(rows_.rbegin(), rows_.rend(), is_used)) - 1;
+}
+
+std::uint64_t PointTracker::Blocks::columns() const {
+  return std::accumulate(rows_.begin(), rows_.end(), std::uint64_t{0}, std::bit_or());
 }
 
 void PointTracker::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
@@ -131,14 +137,18 @@ void PointTracker::search(std::size_t level, int left, int top, Region& region) 
   top >>= level;
   const int first_row = blocks.first_row();
   const int last_row = blocks.last_row();
-  region.gradients.compute(
-      last_.levels()[level],
-      {left - Tile::before, top + block_side_ * first_row - Tile::before,
-       left + block_side_ * side + Tile::after, top + block_side_ * last_row + 1 + Tile::after});
   const int apart = blocks_apart();
   const int tile_side = apart * Tile::side;
+  const auto columns = blocks.columns();
+  const int first_column = std::countr_zero(columns) / tile_side * tile_side;
+  const int end_column =
+      std::min(side, (63 - std::countl_zero(columns)) / tile_side * tile_side + tile_side);
+  region.gradients.compute(last_.levels()[level], {left + block_side_ * first_column - Tile::before,
+                                                   top + block_side_ * first_row - Tile::before,
+                                                   left + block_side_ * end_column + Tile::after,
+                                                   top + block_side_ * last_row + 1 + Tile::after});
   for (int y = first_row / tile_side * tile_side; y <= last_row; y += tile_side)
-    for (int x = 0; x < side; x += tile_side)
+    for (int x = first_column; x < end_column; x += tile_side)
       for (int below = 0; below < apart; ++below)
         for (int beside = 0; beside < apart; ++beside)
           search_tile_at(level, left, top, x + beside, y + below, region);

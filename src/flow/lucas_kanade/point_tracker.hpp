@@ -67,6 +67,8 @@ class PointTracker {
     /// First and last row with blocks; there must be one.
     int first_row() const;
     int last_row() const;
+    /// Columns with blocks, of any row: bit x.
+    std::uint64_t columns() const;
 
     /// Track of a pixel of the region, interpolated between blocks, which are 2x2 pixels.
     Track between(int x, int y) const;

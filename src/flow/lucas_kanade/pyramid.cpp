@@ -2,6 +2,7 @@
 #include "src/flow/lucas_kanade/pyramid.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/pyramid.cpp"
@@ -114,29 +115,52 @@ void reflect_ends(Image<std::uint8_t>& picture) {
 void Pyramid::shape(int width, int height) {
   if (!levels_.empty() && levels_[0].width() == width && levels_[0].height() == height) return;
   levels_.clear();
+  is_black_.clear();
   while (levels_.empty() || (std::min(width, height) > min_side && levels_.size() < max_levels)) {
     levels_.emplace_back(width, height, margin);
+    is_black_.emplace_back(static_cast<std::size_t>(height), std::uint8_t{0});
     width = (width + 1) / 2;
     height = (height + 1) / 2;
   }
 }
 
+/// Computes the rows of a level: make_row(y) writes one, unless it is black, and returns whether it
+/// is.
+template <class MakeRow>
+void Pyramid::build_level(std::size_t level, ThreadPool& threads, const MakeRow& make_row) {
+  auto& picture = levels_[level];
+  auto& is_black = is_black_[level];
+  for_each_row(threads, picture.height(), [&](int y) {
+    auto& was_black = is_black[static_cast<std::size_t>(y)];
+    const bool black = make_row(y);
+    if (black && was_black != 0) return;
+    was_black = black ? 1 : 0;
+    if (black) std::fill_n(picture.row(y), picture.width(), std::uint8_t{0});
+    reflect_sides(picture, y);
+  });
+  reflect_ends(picture);
+}
+
 void Pyramid::build(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
   shape(picture.width, picture.height);
-  auto& base = levels_[0];
-  for_each_row(threads, picture.height, [&](int y) {
-    base.assign_row(y, picture.row(y));
-    reflect_sides(base, y);
+  build_level(0, threads, [&](int y) {
+    const auto* row = picture.row(y);
+    const auto rest = static_cast<std::size_t>(picture.width) - 1;
+    if (row[0] == 0 && std::memcmp(row, row + 1, rest) == 0) return true;
+    levels_[0].assign_row(y, row);
+    return false;
   });
-  reflect_ends(base);
   for (std::size_t level = 1; level < levels_.size(); ++level) {
     const auto& from = levels_[level - 1];
-    auto& to = levels_[level];
-    for_each_row(threads, to.height(), [&](int y) {
-      HWY_DYNAMIC_DISPATCH(halve_row)(from, y, to.row(y), to.width());
-      reflect_sides(to, y);
+    const auto& above = is_black_[level - 1];
+    build_level(level, threads, [&](int y) {
+      bool black = true;
+      for (int i = 2 * y - 2; i <= 2 * y + 2; ++i)
+        black &= above[static_cast<std::size_t>(reflected(i, from.height()))] != 0;
+      if (!black)
+        HWY_DYNAMIC_DISPATCH(halve_row)(from, y, levels_[level].row(y), levels_[level].width());
+      return black;
     });
-    reflect_ends(to);
   }
 }
 

@@ -19,15 +19,18 @@ class Pyramid {
   static constexpr int min_side = 15;
 
   /// Computes the levels of an image of any size; reuses the memory of the last one if the size is
-  /// the same.
+  /// the same, and leaves rows alone that were and stay black.
   void build(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
 
   const std::vector<Image<std::uint8_t>>& levels() const { return levels_; }
 
  private:
   void shape(int width, int height);
+  template <class MakeRow>
+  void build_level(std::size_t level, ThreadPool& threads, const MakeRow& make_row);
 
   std::vector<Image<std::uint8_t>> levels_;
+  std::vector<std::vector<std::uint8_t>> is_black_;  ///< 1 for each row of a level that is 0
 };
 
 }  // namespace eventcamera

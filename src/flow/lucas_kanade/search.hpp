@@ -34,8 +34,8 @@ struct Search {
 
 /// Lucas-Kanade on one level (Lucas and Kanade 1981; Bouguet 2001): moves a window towards the
 /// minimum of its squared difference, at most 11 times, until a move is shorter than 0.03 pixels,
-/// undoes the last one, or is longer than 2 pixels after 4 others. Needs the gradients of `from` in all windows. At most one search per block,
-/// in raster order.
+/// undoes the last one, or is longer than 2 pixels after 4 others. Needs the gradients of `from` in
+/// all windows. At most one search per block, in raster order.
 ///
 /// The window sum that determines a move is bilinear in the window's position, so it is
 /// interpolated between the integer sums at the four pixels around it. The window is summed once
