@@ -293,7 +293,8 @@ def span_of(streams, start, end):
     if first >= last:
         raise RuntimeError("the streams do not overlap in time: "
                            + ", ".join(f"{stream.name} lasts from {stream.events['t'][0] / 1e6:.6f} to"
-                                       f" {stream.events['t'][-1] / 1e6:.6f} s" for stream in streams))
+                                       f" {stream.events['t'][-1] / 1e6:.6f} s" for stream in streams)
+                           + ". A .raw file that is written begins at 0; .npz and .aedat4 keep times.")
     return Span(first - 1, last)
 
 
