@@ -206,7 +206,7 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
 
     events: an array with the fields t (microseconds, from 0 to 2**52, sorted), x, y and p (ON if above 0); shape
         (events,).
-        Labels of Events are written, too, if the format has them: .npz.
+        Labels of Events are written, too, if the format has them: .npz, .h5 and .csv.
     width, height: of the sensor, in pixels; may be left out for Events of a known sensor.
 
     Only a complete file replaces an existing one. Raises ValueError for events that are not sorted, too late or
@@ -218,7 +218,10 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
     if width < 1 or height < 1:
         raise ValueError("give the width and height of the sensor")
     _check(events, width, height)
-    with _replacing(path) as part, Pipeline(f"appsrc name=in format=time ! {WRITERS[extension]}") as pipeline:
+    writer = WRITERS[extension]
+    if extension == ".csv" and _labels(events):
+        writer = writer.replace("eventcsvenc", "eventcsvenc format=labels")
+    with _replacing(path) as part, Pipeline(f"appsrc name=in format=time ! {writer}") as pipeline:
         pipeline.element("file").set_property("location", part)
         source = pipeline.element("in")
         source.set_property("caps", Gst.Caps.from_string(

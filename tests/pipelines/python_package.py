@@ -80,6 +80,11 @@ class Recordings(unittest.TestCase):
                 if extension != "csv":  # text has no size
                     self.assertGreaterEqual(read.width, WIDTH)
 
+    def test_writes_the_formats_of_event_convert(self):
+        done = subprocess.run([os.path.join(os.environ["BUILD"], "pipelines", "event-convert"), "a.raw", "b.none"],
+                              stderr=subprocess.PIPE, text=True, check=False)
+        self.assertEqual(set(done.stderr.split("known are ")[1].split()), set(recordings.WRITERS))
+
     def test_latest_times_come_back(self):
         events = self.events[:3].copy()
         events["t"] = 2**52 - np.array([9, 5, 0])
@@ -175,12 +180,13 @@ class Recordings(unittest.TestCase):
 
     def test_writes_labels(self):
         events = self.labelled(3000)
-        path = path_of("labels.npz")
-        ec.write(path, events)
-        read = ec.read(path)
-        self.assertTrue(same(read, events))
-        self.assertTrue(np.array_equal(read.cause, events.cause))
-        self.assertTrue(np.array_equal(read.object_class, events.object_class))
+        for extension in ("npz", "h5", "csv"):
+            path = path_of(f"labels.{extension}")
+            ec.write(path, events)
+            read = ec.read(path)
+            self.assertTrue(same(read, events))
+            self.assertTrue(np.array_equal(read.cause, events.cause), extension)
+            self.assertTrue(np.array_equal(read.object_class, events.object_class), extension)
         events.cause = events.cause[1:]
         with self.assertRaisesRegex(ValueError, "3000 events, but 2999 labels"):
             ec.write(path, events)
