@@ -239,7 +239,8 @@ void event_simulator_push_interval(GObject* element, Interval interval,
   if (events->size() > 0) flow = write_events(self, *events, frame.get(), start, end, out);
   frame.reset();  // upstream may need it while downstream blocks
   end_work(self, end, began);
-  change_latency(self, [&](IntervalLatency& latency) { latency.add_interval(start, end); });
+  change_latency(
+      self, [&](IntervalLatency& latency) { latency.add_interval(interval.start, interval.end); });
   if (events->size() == 0)
     flow = push_gap(self, start, end, GST_SEQNUM_INVALID);
   else if (flow == GST_FLOW_OK)
