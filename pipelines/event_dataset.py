@@ -133,7 +133,7 @@ def reason_to_make(video, record, output):
         return "its events are not those that were written"
     if record["making"] != making_of(video):
         return "the recipe has changed"
-    if record["state"] != state_of(video.path) and record["input"]["sha256"] != hash_of(video.path):
+    if record.get("state") != state_of(video.path) and record["input"]["sha256"] != hash_of(video.path):
         return "the input has changed since the manifest"
     return ""
 

@@ -289,7 +289,8 @@ def _expect_keys(where: str, given: Mapping[Any, Any], known: set[str]) -> None:
 def _expect_number(where: str, value: Any, low: float, high: float, whole: bool = False) -> None:
     kinds: tuple[type, ...] = (int,) if whole else (int, float)
     if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
-        raise RecipeError(f"{where}: {reprlib.repr(value)} is not a {'whole ' if whole else ''}number from {low:g} to {high:g}")
+        number = "whole number" if whole else "number"
+        raise RecipeError(f"{where}: {reprlib.repr(value)} is not a {number} from {low:g} to {high:g}")
 
 
 def _text(recipe: Mapping[str, Any], key: str) -> str:
@@ -309,7 +310,8 @@ def _framerate(recipe: Mapping[str, Any]) -> Optional[Fraction]:
     except ZeroDivisionError:
         framerate = Fraction(0)
     if not 0 < framerate <= 1_000_000 or framerate.denominator >= 2**31 or framerate.numerator >= 2**31:
-        raise RecipeError(f"framerate: {reprlib.repr(recipe['framerate'])} is not frames per second, such as 30 or 30000/1001")
+        raise RecipeError(f"framerate: {reprlib.repr(recipe['framerate'])} is not frames per second, such as 30 or"
+                          " 30000/1001")
     return framerate
 
 

@@ -14,7 +14,8 @@ from typing import Iterator, Optional, overload
 import numpy as np
 
 from .events import Events, join
-from .pipeline import EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, events_of, quoted, sensor_size
+from .pipeline import (
+    EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, events_of, quoted, sensor_size)
 from .sources import SINK
 
 # Elements that write a file, by its extension.

@@ -192,7 +192,8 @@ class DataSets(unittest.TestCase):
         for manifest in ('"x"', '{"videos": [1]}', '{"videos": [{"name": "a"}]}'):
             with open(path_of("odd/manifest.json"), "w", encoding="utf-8") as file:
                 file.write(manifest)
-            self.assertIn("no manifest", event_dataset("verify", recipe, "--manifest", path_of("odd/manifest.json"), status=1))
+            self.assertIn("no manifest", event_dataset("verify", recipe, "--manifest", path_of("odd/manifest.json"),
+                                                       status=1))
 
     def test_go_on_after_a_kill(self):
         for number in range(4):

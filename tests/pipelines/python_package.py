@@ -199,9 +199,9 @@ class Recordings(unittest.TestCase):
             ec.write(path, events, WIDTH, HEIGHT)
         with self.assertRaises(ec.PipelineError):
             ec.write("/nowhere/events.raw", self.events)
-        with unittest.mock.patch.dict(recordings.WRITERS, {".npy": "eventnpyenc ! identity error-after=2 ! filesink name=file"}):
-            with self.assertRaises(ec.PipelineError):
-                ec.write(path, self.events)
+        failing = "eventnpyenc ! identity error-after=2 ! filesink name=file"
+        with unittest.mock.patch.dict(recordings.WRITERS, {".npy": failing}), self.assertRaises(ec.PipelineError):
+            ec.write(path, self.events)
         self.assertTrue(same(ec.read(path), self.events))
         self.assertFalse([name for name in os.listdir(FOLDER.name) if name.endswith(".part")])
 
