@@ -107,61 +107,95 @@ def threshold_limits(element):
     return spec.minimum, spec.maximum, spec.default_value
 
 
+class ThresholdSearch:
+    """Finds the thresholds at which a simulator generates as many ON and OFF events as there are in `goal`, both
+    at once, from the values `first`: secant steps in a log-log plot as long as they at least halve the error,
+    else bisection."""
+
+    def __init__(self, goal, limits, first, precision):
+        minimum, self.maximum, default = limits
+        self.minimum = max(minimum, default / 100)
+        self.goal, self.precision = goal, precision
+        self.low, self.high = np.full(2, self.minimum), np.full(2, min(self.maximum, default * 20))
+        self.next = np.sqrt(self.low * self.high) if first is None else first
+        self.trusts_slope = first is not None  # the usual one, after the first trial
+        # The best threshold of each polarity need not be the best pair: an event of one polarity also resets the
+        # reference level for the other.
+        self.each, self.each_error = np.full(2, default), np.full(2, np.inf)
+        self.best, self.best_error = np.full(2, default), np.full(2, np.inf)
+        self.before = None  # thresholds and log ratios of the last trial
+        self.rounds = 0
+
+    def is_closed(self):
+        """True if the bounds leave only the best threshold of each polarity to try."""
+        return (self.high / self.low < 1 + self.precision).all()
+
+    def pair(self):
+        """The thresholds to try next."""
+        return self.each.copy() if self.is_closed() else self.next
+
+    def take(self, made):
+        """Takes the numbers of events at these thresholds. True if the search ends."""
+        thresholds, closed = self.pair(), self.is_closed()
+        log_ratio = np.log(np.maximum(made, 0.5) / self.goal)
+        self._keep(thresholds, np.abs(log_ratio))
+        if np.abs(log_ratio).max() < self.precision:
+            return True
+        if closed:
+            self.rounds += 1
+            if self.best_error.max() < 0.01 or self.rounds == MAX_ROUNDS:
+                return True
+            self._restart()
+        else:
+            more = made > self.goal
+            self.low, self.high = np.where(more, thresholds, self.low), np.where(more, self.high, thresholds)
+        self._step(thresholds, log_ratio)
+        return False
+
+    def _keep(self, thresholds, error):
+        self.each = np.where(error < self.each_error, thresholds, self.each)
+        self.each_error = np.minimum(error, self.each_error)
+        if error.sum() < self.best_error.sum():
+            self.best, self.best_error = thresholds, error
+
+    def _restart(self):
+        """Around the best pair."""
+        self.low, self.high = np.maximum(self.best / 1.3, self.minimum), np.minimum(self.best * 1.3, self.maximum)
+        self.each, self.each_error = self.best, self.best_error
+        self.before = None
+
+    def _step(self, thresholds, log_ratio):
+        slope, converging = np.full(2, USUAL_SLOPE), np.full(2, self.trusts_slope)
+        self.trusts_slope = False
+        if self.before is not None:
+            before, log_before = self.before
+            with np.errstate(divide="ignore", invalid="ignore"):
+                slope = (log_ratio - log_before) / np.log(thresholds / before)
+            converging = (np.abs(log_ratio) < np.abs(log_before) / 2) & (slope > -6) & (slope < -0.3)
+            slope = np.where(converging, slope, USUAL_SLOPE)
+        self.before = thresholds, log_ratio
+        step = thresholds * np.exp(-log_ratio / slope)
+        within = converging & (step > self.low) & (step < self.high)
+        self.next = np.where(within, step, np.sqrt(self.low * self.high))
+
+
 def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None, precision=PRECISION):
     """The thresholds at which the simulator generates as many ON and OFF events within the spans as the
-    recording has, by a search for both at once, from the values `first`: secant steps in a log-log plot
-    as long as they at least halve the error, else bisection."""
+    recording has."""
     goal = sum(counts(span.of(recorded)) for span in spans)
     if goal.min() == 0:
         raise RuntimeError("the recording has no events, or events of only one polarity")
-    minimum, maximum, default = threshold_limits(setting.element)
-    minimum = max(minimum, default / 100)
-    low = np.full(2, minimum)
-    high = np.full(2, min(maximum, default * 20))
-    thresholds = np.sqrt(low * high) if first is None else first
-    each, each_error = np.full(2, default), np.full(2, np.inf)
-    best, best_error = np.full(2, default), np.full(2, np.inf)
-    before, log_before = thresholds, None
-    rounds = 0
+    search = ThresholdSearch(goal, threshold_limits(setting.element), first, precision)
     for trial in range(MAX_TRIALS):
-        closed = (high / low < 1 + precision).all()
-        if closed:
-            thresholds = each.copy()
+        thresholds = search.pair()
         simulated = simulated_by(setting.with_thresholds(thresholds))
         made = sum(counts(span.of(simulated)) for span in spans)
-        log_ratio = np.log(np.maximum(made, 0.5) / goal)
-        error = np.abs(log_ratio)
         progress.tell(f"{setting}: trial {trial + 1}, thresholds {thresholds[0]:.4g} and"
                       f" {thresholds[1]:.4g}, {made[0] / goal[0]:.3f} of the ON and"
                       f" {made[1] / goal[1]:.3f} of the OFF events")
-        each = np.where(error < each_error, thresholds, each)
-        each_error = np.minimum(error, each_error)
-        if error.sum() < best_error.sum():
-            best, best_error = thresholds, error
-        if error.max() < precision:
+        if search.take(made):
             break
-        if closed:
-            # The best threshold of each polarity need not be the best pair: an event of one polarity
-            # also resets the reference level for the other.
-            rounds += 1
-            if best_error.max() < 0.01 or rounds == MAX_ROUNDS:
-                break
-            low, high = np.maximum(best / 1.3, minimum), np.minimum(best * 1.3, maximum)
-            each, each_error = best, best_error
-            log_before = None
-        else:
-            more = made > goal
-            low, high = np.where(more, thresholds, low), np.where(more, high, thresholds)
-        slope, converging = np.full(2, USUAL_SLOPE), np.full(2, first is not None and trial == 0)
-        if log_before is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                slope = (log_ratio - log_before) / np.log(thresholds / before)
-            converging = (error < np.abs(log_before) / 2) & (slope > -6) & (slope < -0.3)
-            slope = np.where(converging, slope, USUAL_SLOPE)
-        before, log_before = thresholds, log_ratio
-        step = thresholds * np.exp(-log_ratio / slope)
-        thresholds = np.where(converging & (step > low) & (step < high), step, np.sqrt(low * high))
-    return best
+    return search.best
 
 
 def likeness(figures):
@@ -341,12 +375,12 @@ def find_exposure_lead(video, recorded, span):
     width = 100
     longest = max(frame - before for before, frame in zip(times, times[1:]))
     leads = np.concatenate([frame - events for frame, events in seen])
-    counts, edges = np.histogram(leads, np.arange(0, longest + width, width))
-    burst = int(np.argmax(counts))
-    if counts[burst] < 50 * len(seen) or counts[burst] < 10 * np.median(counts):
+    heights, edges = np.histogram(leads, np.arange(0, longest + width, width))
+    burst = int(np.argmax(heights))
+    if heights[burst] < 50 * len(seen) or heights[burst] < 10 * np.median(heights):
         return None
     # The burst begins at its earliest events, which have the longest lead.
-    while burst + 1 < len(counts) and counts[burst + 1] > counts.max() / 4:
+    while burst + 1 < len(heights) and heights[burst + 1] > heights.max() / 4:
         burst += 1
     return int(edges[burst + 1]) * 1000
 
