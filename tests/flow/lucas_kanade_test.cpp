@@ -44,7 +44,8 @@ void expect_levels(const Pyramid& pyramid, Image<std::uint8_t> expected, const c
 }
 
 TEST_P(EverySize, PyramidsEqualTheReference) {
-  const auto [width, height] = GetParam();
+  const int width = GetParam().width;
+  const int height = GetParam().height;
   ThreadPool threads;
   threads.set_threads(0);
   targets::for_each([&](const char* target) {
