@@ -363,8 +363,8 @@ TEST(Events, AreThoseOfOpenCvsFlows) {
   const auto frames = frames_of(video(driving), 38, 640, 480);
   ASSERT_GE(frames.size(), 37U);
   constexpr int n = 20;
-  // PointTracker's are more accurate, and end where OpenCV's wander.
-  constexpr double other_tracks = 0.88;
+  constexpr double other_tracks = 0.9;   // PointTracker's are more accurate
+  constexpr double ended_tracks = 0.89;  // and end where OpenCV's wander
   const StepTimes steps(interval, n + 1);
   const LumaFormat format{640, 480, 8};
   for (const std::size_t i : {2U, 12U, 22U, 32U}) {
@@ -376,7 +376,7 @@ TEST(Events, AreThoseOfOpenCvsFlows) {
     expect_partners(
         "sparse", events_of(*make_sparse_simulator(format), {&last, &now}, 6, n),
         reference::sparse(last, now, points, opencv_tracks(last, now, points), steps, {6, 6}), 640,
-        480, steps, other_tracks);
+        480, steps, ended_tracks);
     const auto d_last = reference::difference_frame(before, last, {19, 19});
     const auto d_now = reference::difference_frame(last, now, {19, 19});
     const auto tracked = [&](int sign) {
