@@ -76,7 +76,10 @@ class Stream:
     @property
     def duration(self) -> float:
         """Of the part, in seconds."""
-        whole = self._properties[2]
+        return self._length(self._properties[2])
+
+    def _length(self, whole: float) -> float:
+        """Of the part, of a recording of so many seconds."""
         return max(0.0, min(whole, math.inf if self.end is None else self.end) - self.start)
 
     def between(self, start: float, end: Optional[float] = None) -> Stream:
@@ -150,10 +153,13 @@ class Stream:
     def _chunks(self) -> Iterator[Events]:
         """The events of each buffer, of at most a window; empty for a gap, which may be long."""
         with self._open() as pipeline:
-            if self.start > 0 or self.end is not None:
-                pipeline.set_state(Gst.State.PAUSED)
-                pipeline.seek(self.start, self.end)
-            yield from map(events_of, pipeline.samples())
+            yield from self._play(pipeline)
+
+    def _play(self, pipeline: Pipeline) -> Iterator[Events]:
+        if self.start > 0 or self.end is not None:
+            pipeline.set_state(Gst.State.PAUSED)
+            pipeline.seek(self.start, self.end)
+        yield from map(events_of, pipeline.samples())
 
     @contextlib.contextmanager
     def _open(self) -> Iterator[Pipeline]:
@@ -194,10 +200,11 @@ def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = 
     Shape (events,), 16 bytes each; times are those of the file. Raises PipelineError if the file cannot be
     read or has no events to read."""
     part = Stream(os.fspath(path), window=1, start=start, end=end)
-    events = join(part._chunks())
-    if events.width == 0:
-        events.width, events.height = part.width, part.height
-    events.end = events.start + part.duration
+    with part._open() as pipeline:
+        events = join(part._play(pipeline))
+        if events.width == 0:
+            events.width, events.height = sensor_size(pipeline.caps())
+        events.end = events.start + part._length(pipeline.duration())
     return events
 
 
