@@ -337,8 +337,7 @@ static gboolean same_file(const char* a, const char* b) {
 /* Creates a file next to OUT to write to, so that only a complete file replaces an existing one.
  * NULL on failure. */
 static gchar* create_part(const char* path) {
-  int i;
-  for (i = 1; i < 1000; ++i) {
+  for (int i = 1; i < 1000; ++i) {
     gchar* part = i == 1 ? g_strconcat(path, ".part", NULL) : g_strdup_printf("%s.part%d", path, i);
     const int file = open(part, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (file >= 0) {

@@ -54,11 +54,11 @@ class Server:
         permissions = GstRtspServer.RTSPPermissions.new()
         for permission in ("media.factory.access", "media.factory.construct"):
             permissions.add_permission_for_role(VIEWER, permission, True)
-        for path, media in MEDIA.items():
-            launch = media.format(simulator=simulator)
-            Gst.parse_launch_full(launch, None, Gst.ParseFlags.FATAL_ERRORS)  # now, not for the first client
+        # Errors are for the user now, not for the first client.
+        Gst.parse_launch_full(MEDIA["/both"].format(simulator=simulator), None, Gst.ParseFlags.FATAL_ERRORS)
+        for path, launch in MEDIA.items():
             factory = GstRtspServer.RTSPMediaFactory()
-            factory.set_launch(f"( {launch} )")
+            factory.set_launch(f"( {launch.format(simulator=simulator)} )")
             factory.set_shared(True)
             factory.set_permissions(permissions)
             factory.connect("media-configure", self._feed)
