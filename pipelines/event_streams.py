@@ -248,7 +248,7 @@ def read_recording(path, sensor):
     if events.width > sensor.width or events.height > sensor.height:
         raise RuntimeError(f"{path}: it has {events.width} x {events.height} pixels, more than the {sensor.width} x"
                            f" {sensor.height} that it is compared with")
-    if (events.width, events.height) != (sensor.width, sensor.height):
+    if len(events) > 0 and (events.width, events.height) != (sensor.width, sensor.height):
         # Where a file does not tell it, the size is that of the smallest known sensor with these events.
         print(f"warning: {path} has {events.width} x {events.height} pixels, what it is compared with has {sensor.width}"
               f" x {sensor.height}; this is right only if the file does not tell its size", file=sys.stderr)
