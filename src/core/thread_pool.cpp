@@ -30,6 +30,7 @@ void ThreadPool::set_threads(int threads) {
   const int wanted = threads == 0 ? processors : std::clamp(threads, 1, processors);
   if (wanted == this->threads()) return;
   join_workers();
+  shares_ = std::vector<Share>(static_cast<std::size_t>(wanted));
   for (int thread = 1; thread < wanted; ++thread)
     workers_.emplace_back([this, thread] { work(thread); });
 }
@@ -48,8 +49,12 @@ void ThreadPool::join_workers() {
 void ThreadPool::run(int count, Round round, const void* body) {
   round_ = round;
   body_ = body;
-  count_ = count;
-  next_ = 0;
+  int first = 0;
+  for (std::size_t i = 0; i < shares_.size(); ++i) {
+    shares_[i].next = first;
+    first += (count - first) / static_cast<int>(shares_.size() - i);
+    shares_[i].end = first;
+  }
   if (workers_.empty() || count < 2) {
     take_rounds(0);
   } else {
@@ -88,9 +93,13 @@ bool ThreadPool::close() {
 
 void ThreadPool::take_rounds(int thread) {
   try {
-    for (int i = next_++; i < count_; i = next_++) round_(body_, i, thread);
+    const auto own = static_cast<std::size_t>(thread);
+    for (std::size_t i = 0; i < shares_.size(); ++i) {
+      auto& share = shares_[(own + i) % shares_.size()];
+      for (int k = share.next++; k < share.end; k = share.next++) round_(body_, k, thread);
+    }
   } catch (...) {
-    next_ = count_;
+    for (auto& share : shares_) share.next = share.end;
     const std::lock_guard lock(mutex_);
     thrown_ = std::current_exception();
   }
