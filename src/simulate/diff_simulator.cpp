@@ -24,13 +24,15 @@ struct Kept {
 
 /// One polarity of the last two difference frames.
 struct Part {
-  Part(int width, int height) : picture(width, height, 1) {
+  Part(int width, int height)
+      : picture(width, height, 1), is_black(static_cast<std::size_t>(height), 1) {
     now.first.assign(static_cast<std::size_t>(band_count(height)) + 1, 0);
   }
 
   Kept last;
   Kept now;
-  Image<std::uint8_t> picture;  ///< `now` as an 8-bit image, 0 for pixels not kept
+  Image<std::uint8_t> picture;         ///< `now` as an 8-bit image, 0 for pixels not kept
+  std::vector<std::uint8_t> is_black;  ///< 1 for each row of the picture without a kept pixel
   PointTracker tracker{1};
 
   /// Makes `now` the last difference frame, and starts a new one with empty bands.
@@ -49,8 +51,11 @@ struct Part {
 
   /// Removes the last frame's pixels of a band from the picture.
   void clear(std::size_t band) {
-    for (std::size_t i = last.first[band]; i < last.first[band + 1]; ++i)
-      picture.at(last.places[i].x, last.places[i].y) = 0;
+    for (std::size_t i = last.first[band]; i < last.first[band + 1]; ++i) {
+      const auto& place = last.places[i];
+      picture.at(place.x, place.y) = 0;
+      is_black[static_cast<std::size_t>(place.y)] = 1;
+    }
   }
 
   void keep(std::size_t i, const Point& place, int difference, int shift) {
@@ -58,11 +63,12 @@ struct Part {
     now.differences[i] = difference;
     picture.at(place.x, place.y) =
         static_cast<std::uint8_t>(std::max(1, std::abs(difference) >> shift));
+    is_black[static_cast<std::size_t>(place.y)] = 0;
   }
 
   /// Prepares to track to this difference frame and, in the next interval, from it.
   void push(ThreadPool& threads) {
-    if (!now.places.empty()) tracker.push(picture.view(), threads);
+    if (!now.places.empty()) tracker.push(picture.view(), threads, is_black);
   }
 
   /// True if a pixel of this difference frame is kept within one pixel of `place`.
@@ -170,7 +176,6 @@ class DiffSimulator final : public Simulator {
       fire_between(steps, events);
     }
     has_difference_ = true;
-    last_.assign(now);
   }
 
   /// Keeps D(i) = I(i) - I(i-1) at pixels that fired, separately for each polarity.
@@ -203,6 +208,8 @@ class DiffSimulator final : public Simulator {
             off_.keep(off++, place, difference, shift);
         }
       });
+      const BandRows rows(i, now.height);
+      for (int y = rows.first; y < rows.last; ++y) last_.assign_row(y, now.row(y));
     });
   }
 

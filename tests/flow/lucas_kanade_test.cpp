@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "tests/core/targets.hpp"
@@ -54,11 +55,18 @@ TEST_P(EverySize, PyramidsEqualTheReference) {
     for (const auto& [first, last] :
          {std::pair{0, height}, {height / 3, height / 2}, {0, 0}, {0, 0}, {height / 2, height}}) {
       auto picture = scene::noise<std::uint8_t>(width, height, 8, 3);
-      for (int y = 0; y < height; ++y)
-        if (y < first || y >= last) std::fill_n(picture.row(y), width, std::uint8_t{0});
-      pyramid.build(picture.view(), threads);
+      std::vector<std::uint8_t> is_black(static_cast<std::size_t>(height), 0);
+      for (int y = 0; y < height; ++y) {
+        if (y >= first && y < last) continue;
+        std::fill_n(picture.row(y), width, std::uint8_t{0});
+        is_black[static_cast<std::size_t>(y)] = 1;
+      }
+      pyramid.build(picture.view(), threads, is_black);
       ASSERT_NO_FATAL_FAILURE(expect_levels(pyramid, picture, target));
     }
+    const auto noise = scene::noise<std::uint8_t>(width, height, 8, 4);
+    pyramid.build(noise.view(), threads);
+    ASSERT_NO_FATAL_FAILURE(expect_levels(pyramid, noise, target));
   });
 }
 

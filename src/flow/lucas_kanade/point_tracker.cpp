@@ -69,9 +69,10 @@ std::uint64_t PointTracker::Blocks::columns() const {
   return std::accumulate(rows_.begin(), rows_.end(), std::uint64_t{0}, std::bit_or());
 }
 
-void PointTracker::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
+void PointTracker::push(const ImageView<std::uint8_t>& picture, ThreadPool& threads,
+                        std::span<const std::uint8_t> is_black) {
   std::swap(last_, next_);
-  next_.build(picture, threads);
+  next_.build(picture, threads, is_black);
 }
 
 std::span<const Track> PointTracker::track(std::span<const Point> points, ThreadPool& threads) {
@@ -103,10 +104,12 @@ void PointTracker::follow(std::span<const Point> points, int left, int top, Regi
   const int side = block_side_ * region_side;
   std::array<std::span<const Point>, std::size_t{max_block_side} * region_side> rows;
   const int bottom = std::min(top + side, static_cast<int>(rows_.size()) - 1);
+  if (rows_[static_cast<std::size_t>(top)] == rows_[static_cast<std::size_t>(bottom)]) return;
   bool any = false;
   for (int y = top; y < bottom; ++y) {
     const auto first = rows_[static_cast<std::size_t>(y)];
     const auto row = points.subspan(first, rows_[static_cast<std::size_t>(y) + 1] - first);
+    if (row.empty()) continue;
     const auto at = [](const Point& p, int x) { return p.x < x; };
     const auto begin = std::lower_bound(row.begin(), row.end(), left, at);
     const auto end = std::lower_bound(begin, row.end(), left + side, at);

@@ -40,7 +40,9 @@ class PointTracker {
   explicit PointTracker(int block_side) : block_side_(block_side) {}
 
   /// Makes `picture` the image tracked to, and the previous one the image tracked from.
-  void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
+  /// `is_black`, if not empty, is 1 for each row that is known to be 0.
+  void push(const ImageView<std::uint8_t>& picture, ThreadPool& threads,
+            std::span<const std::uint8_t> is_black = {});
 
   /// Tracks points of the last image, unique and in raster order, into the next. Needs two push()
   /// first. Returns a track per point, valid until the next call; the same for any number of

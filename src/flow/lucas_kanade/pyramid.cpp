@@ -2,7 +2,6 @@
 #include "src/flow/lucas_kanade/pyramid.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/flow/lucas_kanade/pyramid.cpp"
@@ -97,16 +96,17 @@ void reflect_sides(Image<std::uint8_t>& picture, int y) {
   for (int i = 0; i < Pyramid::margin; ++i) row[width + i] = row[reflected(width + i, width)];
 }
 
-void reflect_ends(Image<std::uint8_t>& picture) {
+/// Copies row y, with its margin, to the rows above and below the image that it is reflected to.
+void reflect_row(Image<std::uint8_t>& picture, int y) {
   const int height = picture.height();
   constexpr int margin = Pyramid::margin;
-  const auto copy_row = [&](int to) {
-    std::copy_n(picture.row(reflected(to, height)) - margin, picture.width() + 2 * margin,
-                picture.row(to) - margin);
+  const auto copy_to = [&](int to) {
+    std::copy_n(picture.row(y) - margin, picture.width() + 2 * margin, picture.row(to) - margin);
   };
+  if (y > margin && y < height - 1 - margin) return;
   for (int i = 1; i <= margin; ++i) {
-    copy_row(-i);
-    copy_row(height - 1 + i);
+    if (reflected(-i, height) == y) copy_to(-i);
+    if (reflected(height - 1 + i, height) == y) copy_to(height - 1 + i);
   }
 }
 
@@ -137,17 +137,16 @@ void Pyramid::build_level(std::size_t level, ThreadPool& threads, const MakeRow&
     was_black = black ? 1 : 0;
     if (black) std::fill_n(picture.row(y), picture.width(), std::uint8_t{0});
     reflect_sides(picture, y);
+    reflect_row(picture, y);
   });
-  reflect_ends(picture);
 }
 
-void Pyramid::build(const ImageView<std::uint8_t>& picture, ThreadPool& threads) {
+void Pyramid::build(const ImageView<std::uint8_t>& picture, ThreadPool& threads,
+                    std::span<const std::uint8_t> is_black) {
   shape(picture.width, picture.height);
   build_level(0, threads, [&](int y) {
-    const auto* row = picture.row(y);
-    const auto rest = static_cast<std::size_t>(picture.width) - 1;
-    if (row[0] == 0 && std::memcmp(row, row + 1, rest) == 0) return true;
-    levels_[0].assign_row(y, row);
+    if (!is_black.empty() && is_black[static_cast<std::size_t>(y)] != 0) return true;
+    levels_[0].assign_row(y, picture.row(y));
     return false;
   });
   for (std::size_t level = 1; level < levels_.size(); ++level) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "src/core/image.hpp"
@@ -19,8 +20,10 @@ class Pyramid {
   static constexpr int min_side = 15;
 
   /// Computes the levels of an image of any size; reuses the memory of the last one if the size is
-  /// the same, and leaves rows alone that were and stay black.
-  void build(const ImageView<std::uint8_t>& picture, ThreadPool& threads);
+  /// the same. `is_black`, if not empty, is 1 for each row that is known to be 0; what these leave
+  /// black on any level takes no time.
+  void build(const ImageView<std::uint8_t>& picture, ThreadPool& threads,
+             std::span<const std::uint8_t> is_black = {});
 
   const std::vector<Image<std::uint8_t>>& levels() const { return levels_; }
 
