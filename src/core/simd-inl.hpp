@@ -10,7 +10,9 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <numeric>
 
 #include "src/core/set_bits.hpp"
 
@@ -34,6 +36,18 @@ hn::Vec<Tag> load_first(Tag tag, const T* from, int count) {
   HWY_ALIGN T elements[hn::MaxLanes(tag)] = {};
   std::copy_n(from, count, elements);
   return hn::Load(tag, elements);
+}
+
+/// Lanes first, first + 1, ... hn::Iota() computes them one after another in memory.
+template <class Tag>
+HWY_INLINE hn::Vec<Tag> iota(Tag tag, hn::TFromD<Tag> first) {
+  using T = hn::TFromD<Tag>;
+  HWY_ALIGN static constexpr auto numbers = [] {
+    std::array<T, hn::MaxLanes(Tag())> lanes{};
+    std::iota(lanes.begin(), lanes.end(), T{0});
+    return lanes;
+  }();
+  return hn::Add(hn::Load(tag, numbers.data()), hn::Set(tag, first));
 }
 
 /// Moves the lanes of a mask to the front; what follows them is undefined. For 4 and 8 bytes. With

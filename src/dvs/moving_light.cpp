@@ -95,7 +95,7 @@ struct BlockMotions {
       hn::LoadInterleaved2(floats, &flows[i].x, dx, dy);
       hn::Store(per_step(dx), words, x.of + i);
       hn::Store(per_step(dy), words, y.of + i);
-      hn::Store(hn::Add(first_x, hn::ShiftLeft<16>(hn::Iota(words, i))), words, x.start + i);
+      hn::Store(hn::Add(first_x, hn::ShiftLeft<16>(iota(words, i))), words, x.start + i);
       hn::Store(first_y, words, y.start + i);
     }
     x.find_ranges(blocks);

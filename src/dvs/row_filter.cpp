@@ -133,7 +133,7 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     const auto keep = [&](Candidates::Column column, hn::Vec<Floats> values) HWY_ATTR {
       hn::StoreU(first_lanes(values), floats, candidates.column(column) + found);
     };
-    keep_integers(candidates.x.data(), hn::Iota(words, x));
+    keep_integers(candidates.x.data(), iota(words, x));
     keep_integers(candidates.shade.data(), shade);
     keep(Candidates::target, target);
     keep(Candidates::signal, signal);

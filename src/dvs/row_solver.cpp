@@ -190,7 +190,7 @@ class RowSolver {
     const auto positive = load(Candidates::positive);
     const auto negative = load(Candidates::negative);
     const auto is_upright = hn::Gt(sign, all(0));
-    store(Column::index, hn::Add(hn::Iota(doubles, 0), all(static_cast<double>(i))));
+    store(Column::index, iota(doubles, static_cast<double>(i)));
     store(Column::sign, sign);
     store(Column::t, all(0));
     store(Column::value, hn::Mul(sign, value));

@@ -141,7 +141,7 @@ struct MovingPixels {
   Vector dy;
 
   MovingPixels(const ImageView<Flow>& flow, int left, int row, int steps)
-      : x(hn::ShiftLeft<16>(hn::Iota(Words(), left))), y(hn::Set(Words(), row << 16)) {
+      : x(hn::ShiftLeft<16>(iota(Words(), left))), y(hn::Set(Words(), row << 16)) {
     const int count = std::min(static_cast<int>(hn::Lanes(Floats())), flow.width - left);
     const float* flows = &flow.row(row)[left].x;
     HWY_ALIGN float tail[2 * hn::MaxLanes(Floats())] = {};

@@ -138,7 +138,7 @@ class Linearisation {
     const Ints ints;
     const hn::Rebind<std::uint8_t, Floats> bytes;
     const int lanes = static_cast<int>(hn::Lanes(floats));
-    const auto iota = hn::Mul(hn::Iota(floats, 0.0F), set(2.0F));
+    const auto every_second = hn::Mul(iota(floats, 0), set(2.0F));
     const std::uint8_t* here = from_.row(y);
     const auto stride = static_cast<std::int32_t>(to_.stride());
     const std::uint8_t* data = to_.row(0);
@@ -147,7 +147,7 @@ class Linearisation {
     float* mean = scratch_.mean.row(parity, ring(y));
     float* change = scratch_.change.row(parity, ring(y));
     for (int k = 0; k < flow_.x.count(parity); k += lanes) {
-      const auto start = hn::Add(iota, set(static_cast<float>(2 * k + parity)));
+      const auto start = hn::Add(every_second, set(static_cast<float>(2 * k + parity)));
       const auto to_x = place(hn::Add(start, load(flow_x + k)), to_.width());
       const auto to_y = place(hn::Add(set(static_cast<float>(y)), load(flow_y + k)), to_.height());
       const auto cell_x = hn::Floor(to_x);

@@ -69,7 +69,7 @@ struct Targets {
   HWY_INLINE Targets(const PolynomialExpansion& to, Vector dx, Vector dy, int x, int y) {
     const Floats floats;
     const auto zero = hn::Zero(floats);
-    const auto to_x = hn::Add(hn::Iota(floats, static_cast<float>(x)), dx);
+    const auto to_x = hn::Add(iota(floats, static_cast<float>(x)), dx);
     const auto to_y = hn::Add(hn::Set(floats, static_cast<float>(y)), dy);
     const auto right_end = hn::Set(floats, static_cast<float>(to.width() - 1));
     const auto lower_end = hn::Set(floats, static_cast<float>(to.height() - 1));

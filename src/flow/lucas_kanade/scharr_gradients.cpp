@@ -35,7 +35,7 @@ void gradient_row(const Image<std::uint8_t>& picture, int y, int left, int right
     const auto smooth = [&](int row) {
       return weigh(hn::Add(load(row, x - 1), load(row, x + 1)), load(row, x));
     };
-    const auto column = hn::Iota(values, static_cast<std::int16_t>(x));
+    const auto column = iota(values, static_cast<std::int16_t>(x));
     const auto within = hn::And(hn::Lt(hn::Set(values, -1), column), hn::Lt(column, width));
     const auto dx = weigh(hn::Add(difference(y - 1), difference(y + 1)), difference(y));
     const auto dy = hn::Sub(smooth(y + 1), smooth(y - 1));

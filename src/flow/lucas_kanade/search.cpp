@@ -520,7 +520,7 @@ class Blocks {
     hn::Store(hn::IfThenElseZero(active, hn::Set(floats, 1.0F)), floats, active_ + i);
     // A whole vector fits, because at most i are queued.
     const FirstLanes<decltype(ints)> first_lanes(hn::RebindMask(ints, moved));
-    hn::StoreU(first_lanes(hn::Iota(ints, i)), ints, moved_ + moved_count_);
+    hn::StoreU(first_lanes(iota(ints, i)), ints, moved_ + moved_count_);
     moved_count_ += static_cast<int>(hn::CountTrue(floats, moved));
   }
 
