@@ -8,22 +8,38 @@ SeekRequest::SeekRequest(GstEvent* event) : seqnum_(gst_event_get_seqnum(event))
                        &stop_);
 }
 
-/// Start or stop of the segment after the seek, computed as in gst_segment_do_seek().
-static guint64 place(GstSeekType type, gint64 asked, guint64 kept, guint64 duration) {
-  const bool is_known = GST_CLOCK_TIME_IS_VALID(duration);
-  if (type == GST_SEEK_TYPE_SET && asked < 0) return GST_CLOCK_TIME_NONE;
-  if (type == GST_SEEK_TYPE_SET) kept = static_cast<guint64>(asked);
-  if (type == GST_SEEK_TYPE_END && is_known)
-    kept = static_cast<guint64>(std::max<gint64>(static_cast<gint64>(duration) + asked, 0));
-  return is_known && GST_CLOCK_TIME_IS_VALID(kept) ? std::min(kept, duration) : kept;
+namespace {
+
+/// Start or stop of a segment after a seek.
+struct Edge {
+  GstSeekType type;  ///< GST_SEEK_TYPE_SET, or GST_SEEK_TYPE_NONE if it stays
+  guint64 position;  ///< within the duration, if that is known
+};
+
+/// `unset` is the position that -1 stands for.
+Edge edge_of(GstSeekType type, gint64 asked, guint64 kept, guint64 unset, guint64 duration) {
+  const bool has_duration = GST_CLOCK_TIME_IS_VALID(duration);
+  const auto distance =
+      asked < 0 ? guint64{0} - static_cast<guint64>(asked) : static_cast<guint64>(asked);
+  Edge edge{GST_SEEK_TYPE_SET, kept};
+  if (type == GST_SEEK_TYPE_SET)
+    edge.position = asked < 0 ? unset : distance;
+  else if (type == GST_SEEK_TYPE_END && has_duration)
+    edge.position = asked < 0 ? duration - std::min(duration, distance) : duration;
+  else
+    edge.type = GST_SEEK_TYPE_NONE;
+  if (has_duration && GST_CLOCK_TIME_IS_VALID(edge.position))
+    edge.position = std::min(edge.position, duration);
+  return edge;
 }
 
+}  // namespace
+
 bool SeekRequest::apply(GstSegment& segment) const {
-  // gst_segment_do_seek() asserts start <= stop.
-  const auto start = place(start_type_, start_, segment.start, segment.duration);
-  const auto stop = place(stop_type_, stop_, segment.stop, segment.duration);
-  if (start > stop) return false;  // GST_CLOCK_TIME_NONE (no stop) is the largest value
-  return gst_segment_do_seek(&segment, rate_, format_, flags_, start_type_,
-                             static_cast<guint64>(start_), stop_type_, static_cast<guint64>(stop_),
-                             nullptr) != FALSE;
+  const auto start = edge_of(start_type_, start_, segment.start, 0, segment.duration);
+  const auto stop = edge_of(stop_type_, stop_, segment.stop, GST_CLOCK_TIME_NONE, segment.duration);
+  // gst_segment_do_seek() asserts this. GST_CLOCK_TIME_NONE (no stop) is the largest value.
+  if (start.position > stop.position) return false;
+  return gst_segment_do_seek(&segment, rate_, format_, flags_, start.type, start.position,
+                             stop.type, stop.position, nullptr) != FALSE;
 }

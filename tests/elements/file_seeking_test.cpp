@@ -53,6 +53,29 @@ TEST_P(EveryFormat, IsPulledAndSoughtIn) {
   }
 }
 
+TEST_P(EveryFormat, SeeksToBothEnds) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  Player player(file.source() + format().reader);
+  struct Seek {
+    GstSeekType start_type;
+    gint64 start;
+    gint64 stop;
+    Events found;
+  };
+  for (const auto& [start_type, start, stop, found] :
+       {Seek{GST_SEEK_TYPE_SET, -1, GST_SECOND, between(events, 0, GST_SECOND)},
+        Seek{GST_SEEK_TYPE_END, -20 * GST_SECOND, GST_SECOND, between(events, 0, GST_SECOND)},
+        Seek{GST_SEEK_TYPE_END, G_MININT64, -1, events},
+        Seek{GST_SEEK_TYPE_END, G_MAXINT64, -1, {}}}) {
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+    ASSERT_TRUE(gst_element_seek(player.get(), 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH, start_type,
+                                 start, GST_SEEK_TYPE_SET, stop));
+    ASSERT_TRUE(player.play()) << player.error;
+    EXPECT_EQ(player.events, found) << start;
+  }
+}
+
 TEST_P(EveryFormat, KeepsItsPlaceWhenTheRateChanges) {
   const auto events = some_events();
   const TemporaryFile file(file_of(format(), events));
