@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/named_file.hpp"
 #include "pipelines/plugin.h"
 #include "src/render/thumbnail.hpp"
 
@@ -203,7 +204,7 @@ int main(int argc, char** argv) {
   if (!find_plugin()) return 1;
   const char* in = options.files[0];
   try {
-    draw_recording(in, options.size).draw().write_png(options.files[1]);
+    write_bytes(options.files[1], draw_recording(in, options.size).draw().png());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: %s\n", in, error.what());
     return 1;

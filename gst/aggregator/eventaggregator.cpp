@@ -216,11 +216,14 @@ struct EventAggregatorFunctions {
     });
   }
 
-  static gboolean start(GstAggregator* element) { return of(element).start() ? TRUE : FALSE; }
+  static gboolean start(GstAggregator* element) {
+    auto& self = of(element);
+    return guard(self, [&] { return self.start(); }) ? TRUE : FALSE;
+  }
 
   static gboolean stop(GstAggregator* element) {
     auto& self = of(element);
-    self.stop();
+    guard(self, [&] { self.stop(); });
     self.main_caps_.reset();
     self.faults_.reset();
     return TRUE;

@@ -35,9 +35,9 @@ class EventAggregator {
   EventAggregator(const EventAggregator&) = delete;
   EventAggregator& operator=(const EventAggregator&) = delete;
 
-  /// False, after reporting why, if the element cannot start.
+  /// False, after reporting why, if the element cannot start. May throw.
   virtual bool start() { return true; }
-  /// Drops all state.
+  /// Drops all state. May throw.
   virtual void stop() = 0;
   /// Drops all pending events, because the next input is discontinuous. May throw.
   virtual void flush() = 0;

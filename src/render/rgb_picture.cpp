@@ -3,33 +3,25 @@
 
 #include <png.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <memory>
 #include <stdexcept>
-#include <system_error>
 
 namespace eventcamera {
-namespace {
 
-struct Close {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-
-}  // namespace
-
-void RgbPicture::write_png(const std::string& path) const {
-  std::unique_ptr<std::FILE, Close> file(std::fopen(path.c_str(), "wb"));
-  if (!file) throw std::system_error(errno, std::generic_category(), path);
+std::string RgbPicture::png() const {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(width_);
   image.height = static_cast<png_uint_32>(height_);
   image.format = PNG_FORMAT_RGB;
-  if (png_image_write_to_stdio(&image, file.get(), 0, pixels_.data(), 0, nullptr) == 0)
-    throw std::runtime_error(path + ": " + image.message);
-  if (std::fclose(file.release()) != 0)
-    throw std::system_error(errno, std::generic_category(), path);
+  const auto write = [&](void* bytes, png_alloc_size_t& size) {
+    if (png_image_write_to_memory(&image, bytes, &size, 0, pixels_.data(), 0, nullptr) == 0)
+      throw std::runtime_error(image.message);
+  };
+  std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(image), '\0');
+  png_alloc_size_t size = bytes.size();
+  write(bytes.data(), size);
+  bytes.resize(size);
+  return bytes;
 }
 
 }  // namespace eventcamera

@@ -24,8 +24,8 @@ class RgbPicture {
   std::uint8_t* row(int y) { return pixels_.data() + offset(y); }
   const std::uint8_t* row(int y) const { return pixels_.data() + offset(y); }
 
-  /// Writes a PNG file. Throws std::runtime_error with the reason.
-  void write_png(const std::string& path) const;
+  /// The bytes of a PNG file. Throws std::runtime_error with the reason.
+  std::string png() const;
 
  private:
   std::size_t offset(int y) const {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <random>
 #include <set>
@@ -435,14 +434,7 @@ TEST(MapPicture, ShowsMoreEventsBrighterAndSaysWhatCannotBeWritten) {
   EXPECT_EQ(colour(7, 1), (std::vector{255, 255, 255}));
   EXPECT_EQ(colour(8, 1), (std::vector{32, 64, 224}));
   EXPECT_GT(colour(6, 0)[0], colour(6, 0)[2]);
-
-  const auto directory = std::filesystem::temp_directory_path() / "measure_test";
-  std::filesystem::create_directories(directory);
-  const auto path = directory / "map.png";
-  pair.write_png(path);
-  EXPECT_GT(std::filesystem::file_size(path), 50U);
-  std::filesystem::remove_all(directory);
-  EXPECT_THROW(pair.write_png(path), std::runtime_error);
+  EXPECT_EQ(pair.png().substr(1, 3), "PNG");
 }
 
 }  // namespace

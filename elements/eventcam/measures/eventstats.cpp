@@ -40,7 +40,6 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
-#include <string>
 
 #include "elements/eventcam/measures/report.hpp"
 #include "gst/base/authors.hpp"
@@ -50,7 +49,6 @@
 #include "gst/base/played_segment.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event_validator.hpp"
-#include "src/core/sensor_size.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/render/map_picture.hpp"
 
@@ -132,6 +130,15 @@ static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_STATS(object)->priv->settings;
 }
 
+/// Runs `work`; reports any exception.
+template <class Work>
+static auto reported(gpointer self, const Work& work) {
+  static const Report report{
+      GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+      "Not enough memory to count these events; free memory, or lower the resolution."};
+  return guarded(self, report, work);
+}
+
 /* figures */
 
 static GstStructure* figures_of(const Part& part, Nanoseconds end, bool cumulative) {
@@ -150,6 +157,7 @@ static void post(GstEventStats* self, GstStructure* structure) {
 }
 
 /// Reports the statistics of the whole stream; those of an empty stream if no caps were received.
+/// May throw.
 static void conclude(GstEventStats* self, const ReportFiles& files) {
   Measurement nothing(1, 1);
   auto& measurement = self->priv->measurement ? *self->priv->measurement : nothing;
@@ -160,14 +168,10 @@ static void conclude(GstEventStats* self, const ReportFiles& files) {
          [&] { return eventcamera::draw_map(measurement.cumulative.statistics.map()); });
 }
 
-/// Starts measuring a sensor of this size.
-static bool measure(GstEventStats* self, int width, int height) {
-  const Report report{GST_RESOURCE_ERROR_NO_SPACE_LEFT,
-                      "Not enough memory to count the events of " +
-                          eventcamera::in_pixels({width, height}) +
-                          "; free memory, or lower the resolution."};
+/// Starts measuring a sensor of this size. May throw.
+static void measure(GstEventStats* self, int width, int height) {
   GST_DEBUG_OBJECT(self, "counting the events of %dx%d pixels", width, height);
-  return guarded(self, report, [&] { self->priv->measurement.emplace(width, height); });
+  self->priv->measurement.emplace(width, height);
 }
 
 /* events */
@@ -193,12 +197,13 @@ static void cover(GstEventStats* self, Nanoseconds start, Nanoseconds end) {
 }
 
 static void post_if_due(GstEventStats* self, Measurement& measurement) {
-  const auto interval = static_cast<Nanoseconds>(self->priv->settings.copy().interval);
+  const auto interval = static_cast<Nanoseconds>(self->priv->settings.lock()->interval);
   if (interval == 0 || measurement.recent.covered < interval) return;
   post(self, figures_of(measurement.recent, *measurement.end, false));
   measurement.recent.restart();
 }
 
+/// May throw.
 static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buffer,
                   Nanoseconds start) {
   const MappedEvents mapped(buffer);
@@ -223,19 +228,22 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   auto& measurement = self->priv->measurement;
   const auto interval = interval_of(buffer);
   if (!interval) {
-    self->priv->faults.warn(self, EventFault::no_pts, buffer);
+    self->priv->faults.warn(self, interval_fault(buffer), buffer);
     return GST_FLOW_OK;
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
   const Nanoseconds start = stream_time(transform->segment, interval->start);
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at stream time %" GST_STIME_FORMAT,
                  gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent), GST_STIME_ARGS(start));
-  cover(self, start, stream_time(transform->segment, interval->end));
-  count(self, *measurement, buffer, start);
-  post_if_due(self, *measurement);
-  return GST_FLOW_OK;
+  return reported(self, [&] {
+    cover(self, start, stream_time(transform->segment, interval->end));
+    count(self, *measurement, buffer, start);
+    post_if_due(self, *measurement);
+    return GST_FLOW_OK;
+  });
 }
 
+/// May throw.
 static void take_gap(GstEventStats* self, GstEvent* event) {
   auto& measurement = self->priv->measurement;
   GstClockTime start = 0;
@@ -252,18 +260,18 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto* self = GST_EVENT_STATS(transform);
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_GAP:
-      take_gap(self, event);
+      reported(self, [&] { take_gap(self, event); });
       break;
     case GST_EVENT_SEGMENT:
       if (plays_events(self, event, "measure")) break;
       gst_event_unref(event);
       return FALSE;
     case GST_EVENT_EOS:
-      conclude(self, self->priv->settings.copy());
+      reported(self, [&] { conclude(self, self->priv->settings.copy()); });
       break;
     case GST_EVENT_FLUSH_STOP:
       if (const auto& measurement = self->priv->measurement)
-        measure(self, measurement->width, measurement->height);
+        reported(self, [&] { measure(self, measurement->width, measurement->height); });
       break;
     default:
       break;
@@ -281,19 +289,24 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps*) {
   if (measurement && measurement->width == info.width && measurement->height == info.height)
     return TRUE;
   // Each sensor size is measured separately.
-  if (measurement) conclude(self, {});
-  return measure(self, info.width, info.height) ? TRUE : FALSE;
+  const bool is_measured = reported(self, [&] {
+    if (measurement) conclude(self, {});
+    measure(self, info.width, info.height);
+  });
+  return is_measured ? TRUE : FALSE;
 }
 
 static gboolean start(GstBaseTransform* transform) {
   auto* self = GST_EVENT_STATS(transform);
-  return can_report(self, self->priv->settings.copy()) ? TRUE : FALSE;
+  return reported(self, [&] { return can_report(self, self->priv->settings.copy()); }) ? TRUE
+                                                                                       : FALSE;
 }
 
 static gboolean stop(GstBaseTransform* transform) {
   auto* self = GST_EVENT_STATS(transform);
   auto& priv = *self->priv;
-  if (priv.measurement && !priv.measurement->concluded) conclude(self, self->priv->settings.copy());
+  if (priv.measurement && !priv.measurement->concluded)
+    reported(self, [&] { conclude(self, priv.settings.copy()); });
   priv.measurement.reset();
   priv.faults.reset();
   return TRUE;

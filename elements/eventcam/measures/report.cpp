@@ -8,7 +8,6 @@
 #include <exception>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 
 #include "gst/base/named_file.hpp"
 
@@ -132,7 +131,7 @@ void report(gpointer element, const ReportFiles& files, GstStructure* figures,
             const std::function<eventcamera::RgbPicture()>& draw) {
   try {
     if (!files.location.empty()) write_json(figures, files.location);
-    if (!files.map.empty()) draw().write_png(files.map);
+    if (!files.map.empty()) write_bytes(files.map, draw().png());
   } catch (const std::exception& error) {
     GST_ELEMENT_ERROR(element, RESOURCE, WRITE,
                       ("Cannot write the statistics; check the folder and the free space."),
