@@ -66,8 +66,8 @@ struct EventInterval {
 /// Resolution of event times; times closer than this count as equal.
 inline constexpr GstClockTime event_resolution = GST_USECOND;
 
-/// Interval of a buffer of events. Without a duration it ends at the last event; without a PTS
-/// there is none.
+/// Interval of a buffer of events. Without a duration it ends at the last event. None without a
+/// PTS, or with one of more than 292 years.
 std::optional<EventInterval> interval_of(GstBuffer* buffer);
 
 /// Labels of the events of a buffer; they may be changed if it is writable. Empty if it has none.
@@ -81,6 +81,11 @@ void truncate_events(GstBuffer* buffer, gsize count);
 
 /// Reason for skipping events of a buffer.
 enum class EventFault { no_pts, pts_too_large, partial_event, beyond_sensor, unsorted };
+
+/// Why a buffer has no interval, or one that is too late for its use.
+inline EventFault interval_fault(GstBuffer* buffer) {
+  return GST_BUFFER_PTS_IS_VALID(buffer) ? EventFault::pts_too_large : EventFault::no_pts;
+}
 
 /// Posts warnings about events that an element skips, once per fault and stream.
 class EventFaults {

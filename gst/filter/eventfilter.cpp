@@ -114,9 +114,8 @@ static Microseconds continued(gpointer self, LabelledEvents events, Microseconds
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
   auto& priv = priv_of(transform);
   if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
-  if (!GST_BUFFER_PTS_IS_VALID(buffer)) return reject(transform, EventFault::no_pts, buffer);
   const auto interval = interval_of(buffer);
-  if (!interval) return reject(transform, EventFault::pts_too_large, buffer);
+  if (!interval) return reject(transform, interval_fault(buffer), buffer);
   if (gst_buffer_get_size(buffer) % sizeof(GstEventCameraEvent) != 0)
     return reject(transform, EventFault::partial_event, buffer);
 

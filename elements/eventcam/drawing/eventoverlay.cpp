@@ -130,7 +130,7 @@ bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
   const auto interval = interval_of(buffer);
   const auto running = interval ? running_interval(events_pad_, *interval) : std::nullopt;
   if (!interval)
-    warn(EventFault::no_pts, buffer);
+    warn(interval_fault(buffer), buffer);
   else if (!running)
     GST_LOG_OBJECT(events_pad_, "outside the segment: dropped %" GST_PTR_FORMAT, buffer);
   if (running) {

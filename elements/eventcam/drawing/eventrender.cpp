@@ -242,7 +242,7 @@ bool EventRender::approach(GstBuffer* buffer, const EventInterval& interval) {
 GstFlowReturn EventRender::take_buffer(GstBuffer* buffer) {
   const auto interval = interval_of(buffer);
   if (!interval) {
-    warn(EventFault::no_pts, buffer);
+    warn(interval_fault(buffer), buffer);
     drop_buffer();
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }

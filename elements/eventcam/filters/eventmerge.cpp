@@ -174,8 +174,7 @@ bool EventMerge::load(const OwnedAggregatorPad& pad) {
         return true;
       }
     } else {
-      warn(GST_BUFFER_PTS_IS_VALID(buffer.get()) ? EventFault::pts_too_large : EventFault::no_pts,
-           buffer.get());
+      warn(interval_fault(buffer.get()), buffer.get());
     }
     gst_aggregator_pad_drop_buffer(pad.get());
   }

@@ -218,7 +218,7 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   const auto interval = interval_of(buffer);
   const MappedEvents mapped(buffer);
   if (!interval || !mapped) {
-    warn(interval ? EventFault::partial_event : EventFault::no_pts, buffer);
+    warn(interval ? EventFault::partial_event : interval_fault(buffer), buffer);
     return;
   }
   GST_LOG_OBJECT(pads_[role], "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT,

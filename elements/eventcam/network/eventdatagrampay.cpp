@@ -157,7 +157,9 @@ static GstFlowReturn pack(GstEventDatagramPay* self, const Work& work) {
     if (priv.packer) work(*priv.packer, [&](const Datagram& datagram) { keep(priv, datagram); });
     set_timer(priv);
   });
-  return packed ? push(priv) : GST_FLOW_ERROR;
+  if (packed) return push(priv);
+  priv.datagrams.clear();
+  return GST_FLOW_ERROR;
 }
 
 static GstFlowReturn flush(GstEventDatagramPay* self) {
@@ -209,7 +211,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   if (!priv.packer) return GST_FLOW_NOT_NEGOTIATED;
   const auto interval = interval_of(taken);
   if (!interval) {
-    priv.faults.warn(self, EventFault::no_pts, taken);
+    priv.faults.warn(self, interval_fault(taken), taken);
     return GST_FLOW_OK;
   }
   const MappedEvents mapped(taken);

@@ -254,10 +254,9 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   constexpr guint max_csrc_count = 15;
   priv.csrc_count = static_cast<guint8>(
       std::min(gst_rtp_base_payload_get_source_count(payload, taken), max_csrc_count));
-  if (!GST_BUFFER_PTS_IS_VALID(taken)) return reject(self, EventFault::no_pts, taken);
   const auto interval = interval_of(taken);
   if (!interval || interval->start > static_cast<GstClockTime>(eventcamera::max_rtp_start))
-    return reject(self, EventFault::pts_too_large, taken);
+    return reject(self, interval_fault(taken), taken);
   const MappedEvents mapped(taken);
   if (!mapped) return reject(self, EventFault::partial_event, taken);
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),

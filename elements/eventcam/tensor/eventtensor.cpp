@@ -276,7 +276,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   if (gap_result != GST_FLOW_OK) return gap_result;
   const auto interval = interval_of(taken);
   if (!interval || interval->end > max_time) {
-    priv.faults.warn(self, interval ? EventFault::pts_too_large : EventFault::no_pts, taken);
+    priv.faults.warn(self, interval_fault(taken), taken);
     return GST_FLOW_OK;
   }
   const MappedEvents mapped(taken);
