@@ -437,11 +437,13 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   const auto luma = FrameLuma::format_of(video);
   const auto failure = [&](const std::exception& error) -> Report {
     state.reset();
+    if (is_a<std::bad_alloc>(error))
+      return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for frames of " +
+                                                    std::to_string(luma.width) + "x" +
+                                                    std::to_string(luma.height) + " pixels."};
     if (const auto* known = dynamic_cast<const VideoSimulatorError*>(&error))
       return known->report();
-    return {GST_RESOURCE_ERROR_NO_SPACE_LEFT, "Not enough memory for frames of " +
-                                                  std::to_string(luma.width) + "x" +
-                                                  std::to_string(luma.height) + " pixels."};
+    return {GST_STREAM_ERROR_FAILED, "Cannot simulate this video."};
   };
   const bool made = guarded(self, failure, [&] {
     if (!state || FrameLuma::format_of(state->video) != luma) {
