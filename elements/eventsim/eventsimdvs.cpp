@@ -335,12 +335,9 @@ static Guarded<Choice>& choice_of(GObject* object) {
   return event_simulator_settings<Choice>(object);
 }
 
-static constexpr auto property_flags = static_cast<GParamFlags>(
-    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
-
 template <class Value>
 static GParamSpec* spec_of(const Setting& s, Value value) {
-  const auto flags = static_cast<GParamFlags>(property_flags | s.over_time);
+  const auto flags = static_cast<GParamFlags>(mutable_playing_flags | s.over_time);
   if constexpr (std::is_same_v<Value, double>)
     return g_param_spec_double(s.name, s.nick, s.blurb, s.min, s.max, value, flags);
   else if constexpr (std::is_same_v<Value, int>)
@@ -365,7 +362,7 @@ static void install_properties(GObjectClass* klass) {
       g_param_spec_enum("preset", "Preset",
                         "Camera model: sets all properties of the pixel, except those that are set "
                         "explicitly, before or after",
-                        preset_type(), static_cast<int>(defaults.preset), property_flags));
+                        preset_type(), static_cast<int>(defaults.preset), mutable_playing_flags));
   properties.add(
       [klass](Choice& choice, const GValue* value) { choice.take_profile(value, klass); },
       [](Choice& choice, GValue* value) { write_value(choice.profile, value); },
@@ -374,9 +371,7 @@ static void install_properties(GObjectClass* klass) {
           "File of settings that event-calibrate fitted to a camera, which override "
           "those of the preset, but not those that are set explicitly, before or "
           "after",
-          "",
-          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                   GST_PARAM_MUTABLE_READY)));
+          "", mutable_ready_flags));
   properties.add(
       &Choice::initial_state,
       g_param_spec_string("initial-state", "Initial state",
@@ -384,12 +379,12 @@ static void install_properties(GObjectClass* klass) {
                           "to its time are skipped, and the next events are those of a video "
                           "without a cut. Read when a stream begins, as after a seek; all other "
                           "properties and the size of the frames must be the same",
-                          "", property_flags));
+                          "", mutable_playing_flags));
   properties.add(&Choice::final_state,
                  g_param_spec_string("final-state", "Final state",
                                      "File that the state of all pixels is written to at the end "
                                      "of the stream; one that exists is replaced",
-                                     "", property_flags));
+                                     "", mutable_playing_flags));
   for (std::size_t i = 0; i < std::size(table); ++i) {
     const auto add = [&](auto member) {
       properties.add([i](Choice& choice, const GValue* value) { choice.overriding.take(i, value); },

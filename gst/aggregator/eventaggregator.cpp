@@ -52,14 +52,9 @@ std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime tim
 /// True if the element upstream of a pad would accept a seek. GstAggregator flushes before it
 /// forwards a seek, and never resumes if that fails.
 static bool would_seek(GstAggregatorPad* pad, const SeekRequest& request) {
-  if (!request.plays_on_from_time()) return false;
-  GstQuery* query = gst_query_new_seeking(GST_FORMAT_TIME);
-  gboolean seekable = FALSE;
-  if (gst_pad_peer_query(GST_PAD(pad), query))
-    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
-  gst_query_unref(query);
   GstSegment segment = segment_of(pad);
-  return seekable && request.apply(segment);
+  return request.plays_on_from_time() && peer_can_seek(GST_PAD(pad), GST_FORMAT_TIME) &&
+         request.apply(segment);
 }
 
 /// Sends an event to all sink pads. Returns true if each upstream takes it.

@@ -32,6 +32,21 @@ inline GstPad* add_pad(GstElement* element, const char* name) {
   return pad;
 }
 
+/// True if the peer of a pad can seek in this format.
+inline bool peer_can_seek(GstPad* pad, GstFormat format) {
+  GstQuery* const query = gst_query_new_seeking(format);
+  gboolean seekable = FALSE;
+  if (gst_pad_peer_query(pad, query))
+    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
+  gst_query_unref(query);
+  return seekable != FALSE;
+}
+
+/// Pushes an event; returns why it was refused, if it was.
+inline GstFlowReturn push_event(GstPad* src, GstEvent* event) {
+  return gst_pad_push_event(src, event) ? GST_FLOW_OK : gst_pad_get_last_flow_return(src);
+}
+
 /// True once a segment was sent from a source pad.
 inline bool has_segment(GstPad* src) {
   GstEvent* const segment = gst_pad_get_sticky_event(src, GST_EVENT_SEGMENT, 0);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <glib-object.h>
+#include <gst/gst.h>
 
 #include <functional>
 #include <memory>
@@ -10,6 +10,13 @@
 #include <utility>
 
 #include "gst/base/guarded.hpp"
+
+/// Flags of properties that may change in the states NULL and READY.
+inline constexpr auto mutable_ready_flags =
+    static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
+/// Flags of properties that may change at any time.
+inline constexpr auto mutable_playing_flags = static_cast<GParamFlags>(
+    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 
 // Types of properties besides strings: numbers, enums and booleans.
 #define FOR_EACH_PROPERTY_TYPE(X) \
@@ -84,6 +91,18 @@ inline void install_property(GObjectClass* klass, PropertyAccess functions, GPar
   g_object_class_install_property(klass, number, spec);
 }
 
+/// For class_init: installs the read-only property "stats". `make` returns a new structure.
+inline void install_stats(GObjectClass* klass, const std::function<GstStructure*(GObject*)>& make,
+                          const char* blurb) {
+  const auto get = [make](GObject* object, GValue* value) {
+    g_value_take_boxed(value, make(object));
+  };
+  install_property(
+      klass, {nullptr, get},
+      g_param_spec_boxed("stats", "Statistics", blurb, GST_TYPE_STRUCTURE,
+                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+}
+
 /// For class_init: installs properties that are fields of the settings. `settings_of` returns the
 /// Guarded settings of an object. A class may have properties in several settings.
 template <auto settings_of>
@@ -114,11 +133,6 @@ class Properties {
         {[set](GObject* object, const GValue* value) { set(*settings_of(object).lock(), value); },
          [get](GObject* object, GValue* value) { get(*settings_of(object).lock(), value); }},
         spec);
-  }
-
-  /// Adds a read-only property that is not in the settings.
-  void add_read_only(void (*get)(GObject*, GValue*), GParamSpec* spec) {
-    install_property(klass_, {nullptr, get}, spec);
   }
 
  private:

@@ -155,9 +155,9 @@ static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** ou
   const GstFlowReturn result = PARENT_TRANSFORM_CLASS->generate_output(transform, out);
   if (result != GST_FLOW_OK || *out == nullptr || gst_buffer_get_size(*out) > 0) return result;
   const OwnedBuffer empty(std::exchange(*out, nullptr));
-  GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(transform);
-  GstEvent* gap = gst_event_new_gap(GST_BUFFER_PTS(empty.get()), GST_BUFFER_DURATION(empty.get()));
-  return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
+  return push_event(
+      GST_BASE_TRANSFORM_SRC_PAD(transform),
+      gst_event_new_gap(GST_BUFFER_PTS(empty.get()), GST_BUFFER_DURATION(empty.get())));
 }
 
 /// Copies nothing but the buffer's head: its memory is copied on write.
@@ -217,12 +217,11 @@ static gboolean stop(GstBaseTransform* transform) {
 
 /* type */
 
-static void get_stats(GObject* object, GValue* value) {
+static GstStructure* stats_of(GObject* object) {
   const Counters counters = priv_of(object).counters.copy();
-  g_value_take_boxed(
-      value, gst_structure_new("application/x-event-filter-stats", "events", G_TYPE_UINT64,
-                               counters.received, "dropped-events", G_TYPE_UINT64, counters.dropped,
-                               "rejected-events", G_TYPE_UINT64, counters.rejected, nullptr));
+  return gst_structure_new("application/x-event-filter-stats", "events", G_TYPE_UINT64,
+                           counters.received, "dropped-events", G_TYPE_UINT64, counters.dropped,
+                           "rejected-events", G_TYPE_UINT64, counters.rejected, nullptr);
 }
 
 static void finalize(GObject* object) {
@@ -239,14 +238,9 @@ static void gst_event_filter_init(GstEventFilter* self) {
 static void gst_event_filter_class_init(GstEventFilterClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  install_property(
-      object_class, {nullptr, get_stats},
-      g_param_spec_boxed("stats", "Statistics",
-                         "Counts of events since the start: events that came in, dropped-events "
-                         "that the filter left out, rejected-events that were outside the sensor "
-                         "or out of order",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  install_stats(object_class, stats_of,
+                "Counts of events since the start: events that came in, dropped-events that the "
+                "filter left out, rejected-events that were outside the sensor or out of order");
   add_pad_templates(GST_ELEMENT_CLASS(klass), EVENT_CAPS, EVENT_CAPS);
 
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);

@@ -86,10 +86,6 @@ Inside& filter_inside(gpointer element) {
   return static_cast<Inside&>(gst_event_filter_inside(GST_EVENT_FILTER(element)));
 }
 
-/// Flags of properties of filters, which may change at any time.
-inline constexpr auto event_filter_property_flags = static_cast<GParamFlags>(
-    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
-
 /// Defines and registers the type of an element with an EventFilter of class `Inside`, which must
 /// have a member `settings`. The type's class_init must follow.
 #define DEFINE_EVENT_FILTER(Type, type, OBJECT, Inside, element)                     \

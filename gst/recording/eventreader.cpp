@@ -8,6 +8,7 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/types.hpp"
 #include "gst/recording/frame_buffer.hpp"
 #include "gst/recording/reader/event_reader.hpp"
 
@@ -71,31 +72,23 @@ static void gst_event_reader_class_init(GstEventReaderClass* klass) {
   object_class->constructed = constructed;
   object_class->finalize = finalize;
   GST_ELEMENT_CLASS(klass)->change_state = change_state;
-  install_property(
-      object_class,
-      {[](GObject* object, const GValue* value) {
-         event_reader_of(object).set_buffer_duration(g_value_get_uint64(value));
-       },
-       [](GObject* object, GValue* value) {
-         g_value_set_uint64(value, event_reader_of(object).buffer_duration());
-       }},
-      g_param_spec_uint64("buffer-duration", "Buffer duration",
-                          "Duration of a buffer of events (nanoseconds, in whole microseconds)",
-                          GST_USECOND, 10 * GST_SECOND, default_buffer_duration,
-                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                   GST_PARAM_MUTABLE_READY)));
-  install_property(
-      object_class,
-      {nullptr, [](GObject* object,
-                   GValue* value) { g_value_take_boxed(value, event_reader_of(object).stats()); }},
-      g_param_spec_boxed("stats", "Statistics",
-                         "Counts since the start or the last seek: events, triggers, frames and "
-                         "imu-samples read; corrupt-places where bytes were skipped; and what was "
-                         "dropped: outside-events, outside the sensor; late-items, after their "
-                         "buffer was sent; stray-items, at an impossible time. skipped-items "
-                         "are no changes of a pixel: exposures and colours of an Event Stream",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  install_property(object_class,
+                   {[](GObject* object, const GValue* value) {
+                      event_reader_of(object).set_buffer_duration(g_value_get_uint64(value));
+                    },
+                    [](GObject* object, GValue* value) {
+                      g_value_set_uint64(value, event_reader_of(object).buffer_duration());
+                    }},
+                   g_param_spec_uint64(
+                       "buffer-duration", "Buffer duration",
+                       "Duration of a buffer of events (nanoseconds, in whole microseconds)",
+                       GST_USECOND, 10 * GST_SECOND, default_buffer_duration, mutable_ready_flags));
+  install_stats(
+      object_class, [](GObject* object) { return event_reader_of(object).stats(); },
+      "Counts since the start or the last seek: events, triggers, frames and imu-samples read; "
+      "corrupt-places where bytes were skipped; and what was dropped: outside-events, outside the "
+      "sensor; late-items, after their buffer was sent; stray-items, at an impossible time. "
+      "skipped-items counts exposures and colours of an Event Stream, which are not events");
   gst_type_mark_as_plugin_api(GST_TYPE_EVENT_READER, static_cast<GstPluginAPIFlags>(0));
 }
 
@@ -124,15 +117,7 @@ Guarded<FormatSettings>& format_settings_of(GObject* reader) {
 }
 
 GType event_reader_type(const RecordingFormat& format) {
-  const GType known = g_type_from_name(format.type_name);
-  if (known != G_TYPE_INVALID) return known;
-  GTypeInfo info = {};
-  info.class_size = sizeof(GstEventReaderClass);
-  info.class_init = format_class_init;
-  info.class_data = &format;
-  info.instance_size = sizeof(GstEventReader);
-  return g_type_register_static(GST_TYPE_EVENT_READER, format.type_name, &info,
-                                static_cast<GTypeFlags>(0));
+  return row_type(GST_TYPE_EVENT_READER, format.type_name, format_class_init, &format);
 }
 
 /* life */

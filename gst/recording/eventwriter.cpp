@@ -319,7 +319,7 @@ static GstFlowReturn push_patch(GstEventWriter* self, eventcamera::FilePatch pat
   auto& priv = priv_of(self);
   GST_DEBUG_OBJECT(self, "completing the header: %" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT,
                    patch.bytes.size(), patch.position);
-  if (!can_seek_bytes(priv.src)) {
+  if (!peer_can_seek(priv.src, GST_FORMAT_BYTES)) {
     GST_ELEMENT_WARNING(self, STREAM, ENCODE,
                         ("The file header lacks the number of events. Write to a sink that can "
                          "seek, such as filesink, to complete it."),
@@ -489,25 +489,21 @@ static void gst_event_writer_class_init(GstEventWriterClass* klass) {
 /// Installs the enum property that is stored in `choice`.
 template <std::atomic<int> GstEventWriterPrivate::*choice>
 static void install_choice(GObjectClass* klass, const EventFileFormat::Variants& variants) {
-  install_property(
-      klass,
-      {[](GObject* object, const GValue* value) {
-         priv_of(GST_EVENT_WRITER(object)).*choice = g_value_get_enum(value);
-       },
-       [](GObject* object, GValue* value) {
-         g_value_set_enum(value, priv_of(GST_EVENT_WRITER(object)).*choice);
-       }},
-      g_param_spec_enum(variants.property, variants.nick, variants.blurb, variants.type(),
-                        variants.default_value,
-                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                 GST_PARAM_MUTABLE_READY)));
+  install_property(klass,
+                   {[](GObject* object, const GValue* value) {
+                      priv_of(GST_EVENT_WRITER(object)).*choice = g_value_get_enum(value);
+                    },
+                    [](GObject* object, GValue* value) {
+                      g_value_set_enum(value, priv_of(GST_EVENT_WRITER(object)).*choice);
+                    }},
+                   g_param_spec_enum(variants.property, variants.nick, variants.blurb,
+                                     variants.type(), variants.default_value, mutable_ready_flags));
 }
 
 static void format_class_init(gpointer klass, gpointer data) {
   const auto& format = *static_cast<const EventFileFormat*>(data);
   GST_EVENT_WRITER_CLASS(klass)->format = &format;
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
   if (format.variants != nullptr)
     install_choice<&GstEventWriterPrivate::variant>(object_class, *format.variants);
   if (format.compressions != nullptr)
@@ -524,14 +520,11 @@ static void format_class_init(gpointer klass, gpointer data) {
         g_param_spec_uint("mtu", "MTU",
                           "Maximum size of a buffer of words in bytes, such as the payload of a "
                           "network packet; words are never split",
-                          64, G_MAXUINT, G_MAXUINT,
-                          static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_PLAYING)));
-  install_property(object_class,
-                   {nullptr,
-                    [](GObject* object, GValue* value) {
-                      g_value_take_boxed(value, priv_of(GST_EVENT_WRITER(object)).writable.stats());
-                    }},
-                   WritableEvents::stats_spec());
+                          64, G_MAXUINT, G_MAXUINT, mutable_playing_flags));
+  install_stats(
+      object_class,
+      [](GObject* object) { return priv_of(GST_EVENT_WRITER(object)).writable.stats(); },
+      WritableEvents::stats_blurb);
   auto* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_template(
       element_class, "sink", GST_PAD_SINK,

@@ -7,9 +7,6 @@
 #include "gst/eventcamera/eventcamera.h"
 #include "src/formats/unsupported_format.hpp"
 
-static constexpr auto flags =
-    static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY);
-
 eventcamera::TableSettings FormatSettings::table() const {
   eventcamera::TableSettings settings;
   if (time_unit > 0) settings.unit = static_cast<eventcamera::TimeUnit>(time_unit - 1);
@@ -29,13 +26,13 @@ void add_sensor_size(FormatProperties& properties) {
                                    "Width of the sensor in pixels, for files that do not state it; "
                                    "needs height. 0: that of the smallest known sensor that events "
                                    "fit into",
-                                   0, GST_EVENT_CAMERA_MAX_SIDE, 0, flags));
+                                   0, GST_EVENT_CAMERA_MAX_SIDE, 0, mutable_ready_flags));
   properties.add([](FormatSettings& settings) -> int& { return settings.sensor.height; },
                  g_param_spec_uint("height", "Height",
                                    "Height of the sensor in pixels, for files that do not state "
                                    "it; needs width. 0: that of the smallest known sensor that "
                                    "events fit into",
-                                   0, GST_EVENT_CAMERA_MAX_SIDE, 0, flags));
+                                   0, GST_EVENT_CAMERA_MAX_SIDE, 0, mutable_ready_flags));
 }
 
 void add_topics(FormatProperties& properties) {
@@ -44,7 +41,7 @@ void add_topics(FormatProperties& properties) {
       g_param_spec_string("topics", "Topics",
                           "Topics of events and images to read, separated by commas; empty = the "
                           "first topic of events in the file, and all of images",
-                          "", flags));
+                          "", mutable_ready_flags));
 }
 
 static GType time_unit_type() {
@@ -65,12 +62,12 @@ void add_table_properties(FormatProperties& properties) {
                  g_param_spec_enum("time-unit", "Time unit",
                                    "Unit of the times in the file; needed if the file is "
                                    "refused because its time unit is ambiguous",
-                                   time_unit_type(), 0, flags));
+                                   time_unit_type(), 0, mutable_ready_flags));
   properties.add(
       &FormatSettings::column_order,
       g_param_spec_string("column-order", "Column order",
                           "Meaning of the columns: one letter t, x, y or p each, - for "
                           "others, as in xytp; empty = as stated in the file, or detected from "
                           "its first rows",
-                          "", flags));
+                          "", mutable_ready_flags));
 }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "gst/base/event_buffer.hpp"
+#include "gst/base/pads.hpp"
 
 using eventcamera::SensorSize;
 
@@ -125,7 +126,5 @@ GstFlowReturn ReaderPad::push(std::span<const eventcamera::Event> events,
 }
 
 GstFlowReturn ReaderPad::push_gap(GstClockTime pts, GstClockTime duration) {
-  return gst_pad_push_event(pad_, gst_event_new_gap(pts, duration))
-             ? GST_FLOW_OK
-             : gst_pad_get_last_flow_return(pad_);
+  return push_event(pad_, gst_event_new_gap(pts, duration));
 }

@@ -17,15 +17,6 @@ static std::string text_of(SensorSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-bool can_seek_bytes(GstPad* src) {
-  GstQuery* query = gst_query_new_seeking(GST_FORMAT_BYTES);
-  gboolean seekable = FALSE;
-  if (gst_pad_peer_query(src, query))
-    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
-  gst_query_unref(query);
-  return seekable != FALSE;
-}
-
 void WritableEvents::begin_file(SensorSize sensor) {
   sensor_ = sensor;
   latest_ = 0;
@@ -123,14 +114,6 @@ GstStructure* WritableEvents::stats() {
                            written.events, "triggers", G_TYPE_UINT64, written.triggers, "frames",
                            G_TYPE_UINT64, written.frames, "imu-samples", G_TYPE_UINT64,
                            written.imu_samples, nullptr);
-}
-
-GParamSpec* WritableEvents::stats_spec() {
-  return g_param_spec_boxed("stats", "Statistics",
-                            "Counts of what was written to the file: events, triggers, frames and "
-                            "imu-samples",
-                            GST_TYPE_STRUCTURE,
-                            static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS));
 }
 
 Report WritableEvents::failure(const std::exception& error, const Report& otherwise) {

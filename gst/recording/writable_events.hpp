@@ -14,9 +14,6 @@
 #include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
 
-/// True if downstream of a source pad can seek in bytes.
-bool can_seek_bytes(GstPad* src);
-
 /// Numbers of items in a file that is being written.
 struct Written {
   guint64 events = 0;
@@ -80,7 +77,8 @@ class WritableEvents {
 
   /// The property stats of the element: what was written.
   GstStructure* stats();
-  static GParamSpec* stats_spec();
+  static constexpr auto stats_blurb =
+      "Counts of what was written to the file: events, triggers, frames and imu-samples";
 
   /// Report for an exception from writing: `otherwise`, unless memory is short or the format cannot
   /// hold the stream.

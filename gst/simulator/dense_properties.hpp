@@ -10,9 +10,6 @@
 
 /// Properties of the simulators that interpolate frames with dense optical flow.
 
-inline constexpr auto dense_property_flags = static_cast<GParamFlags>(
-    G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
-
 inline constexpr GEnumValue farneback_flow = {static_cast<int>(eventcamera::FlowMethod::farneback),
                                               "Farneback", "farneback"};
 
@@ -27,7 +24,7 @@ inline GParamSpec* interpolation_property(eventcamera::Interpolation interpolati
   };
   return g_param_spec_enum("interpolation", "Interpolation", "Frame interpolation method",
                            enum_type("GstEventSimInterpolation", values),
-                           static_cast<int>(interpolation), dense_property_flags);
+                           static_cast<int>(interpolation), mutable_playing_flags);
 }
 
 /// Settings of such a simulator. `method` is the default.
@@ -49,7 +46,7 @@ struct DenseSettings {
     properties.add(
         &DenseSettings::flow,
         g_param_spec_enum("flow", "Flow", "Optical flow method, for the motion between frames",
-                          flows, static_cast<int>(defaults.flow), dense_property_flags));
+                          flows, static_cast<int>(defaults.flow), mutable_playing_flags));
     properties.add(&DenseSettings::interpolation, interpolation_property(defaults.interpolation));
   }
 };

@@ -172,11 +172,10 @@ static void end_frame(GstEventSimulator* self) {
 /// Pushes a GAP for an interval without events.
 static GstFlowReturn push_gap(GstEventSimulator* self, Nanoseconds start, Nanoseconds end,
                               guint32 seqnum) {
-  GstPad* pad = GST_BASE_TRANSFORM_SRC_PAD(self);
   GstEvent* gap =
       gst_event_new_gap(static_cast<GstClockTime>(start), static_cast<GstClockTime>(end - start));
   if (seqnum != GST_SEQNUM_INVALID) gst_event_set_seqnum(gap, seqnum);
-  return gst_pad_push_event(pad, gap) ? GST_FLOW_OK : gst_pad_get_last_flow_return(pad);
+  return push_event(GST_BASE_TRANSFORM_SRC_PAD(self), gap);
 }
 
 /// Sets the timestamps and flags of an output buffer, and pushes it.

@@ -79,17 +79,11 @@ static void install_qos_properties(GObjectClass* klass) {
                            "Skip whole frames, without processing them, if downstream is late; the "
                            "next interval is longer. By default on for events drawn as video, off "
                            "for events",
-                           TRUE,
-                           static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                    GST_PARAM_MUTABLE_PLAYING)));
-  properties.add(
-      [](SimulatorQos&, const GValue*) {},
-      [](SimulatorQos& qos, GValue* value) { g_value_take_boxed(value, qos.stats()); },
-      g_param_spec_boxed("stats", "Statistics",
-                         "Counters since start: frames (processed), skipped-frames (due to qos), "
-                         "processing-time (of all processed frames, ns)",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+                           TRUE, mutable_playing_flags));
+  install_stats(
+      klass, [](GObject* object) { return simulator_qos_of(object).lock()->stats(); },
+      "Counters since start: frames (processed), skipped-frames (due to qos), processing-time (of "
+      "all processed frames, ns)");
 }
 
 void install_base_properties(GObjectClass* klass) {

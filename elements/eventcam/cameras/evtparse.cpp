@@ -531,38 +531,32 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
   object_class->finalize = finalize;
 
   Properties<settings_of> properties(object_class);
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                  GST_PARAM_MUTABLE_READY);
-  properties.add(
-      &Settings::format,
-      g_param_spec_enum("format", "Format", "Format of the camera's words",
-                        enum_type("GstEvtParseFormat", word_formats), format_of_caps, flags));
+  properties.add(&Settings::format,
+                 g_param_spec_enum("format", "Format", "Format of the camera's words",
+                                   enum_type("GstEvtParseFormat", word_formats), format_of_caps,
+                                   mutable_ready_flags));
   properties.add(
       &Settings::width,
       g_param_spec_uint("width", "Width", "Width of the sensor (pixels); 0 = that of the caps", 0,
-                        max_side, 0, flags));
+                        max_side, 0, mutable_ready_flags));
   properties.add(
       &Settings::height,
       g_param_spec_uint("height", "Height", "Height of the sensor (pixels); 0 = that of the caps",
-                        0, max_side, 0, flags));
+                        0, max_side, 0, mutable_ready_flags));
   properties.add(
       &Settings::latency,
       g_param_spec_uint64("latency", "Latency",
                           "Least time that live sinks wait for an event; they wait longer if a "
                           "transfer takes longer (ns)",
-                          0, GST_SECOND, Settings().latency, flags));
-  properties.add_read_only(
-      [](GObject* object, GValue* value) {
-        g_value_take_boxed(value, structure_of(GST_EVT_PARSE(object)->priv->stats.copy()));
-      },
-      g_param_spec_boxed(
-          "stats", "Statistics",
-          "Counts since the start: buffers received; bytes and events passed on; lost-buffers, "
-          "which the driver dropped; lost-bytes, which are not valid here, and lost-events in "
-          "them; gaps in the output. The mapping of the camera's clock: clock-offset (int64, ns), "
-          "running time minus the camera's; clock-drift (double, ppm), by which the camera's clock "
-          "is slow; clock-corrections, the number of changes of the offset",
-          GST_TYPE_STRUCTURE, static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+                          0, GST_SECOND, Settings().latency, mutable_ready_flags));
+  install_stats(
+      object_class,
+      [](GObject* object) { return structure_of(GST_EVT_PARSE(object)->priv->stats.copy()); },
+      "Counts since the start: buffers received; bytes and events passed on; lost-buffers, which "
+      "the driver dropped; lost-bytes, which are not valid here, and lost-events in them; gaps in "
+      "the output. The mapping of the camera's clock: clock-offset (int64, ns), running time minus "
+      "the camera's; clock-drift (double, ppm), by which the camera's clock is slow; "
+      "clock-corrections, the number of changes of the offset");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;

@@ -278,23 +278,21 @@ DEFINE_EVENT_AGGREGATOR(GstEventOverlay, gst_event_overlay, EVENT_OVERLAY, Event
                         eventoverlay, GST_RANK_NONE, "events drawn over video")
 
 static void gst_event_overlay_class_init(GstEventOverlayClass* klass) {
-  constexpr auto flags = static_cast<GParamFlags>(
-      G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
   const Settings defaults;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
   properties.add(&Settings::palette,
-                 g_param_spec_enum("palette", "Palette",
-                                   "Colours of pixels with ON events, OFF events, and both",
-                                   palette_type(), static_cast<int>(defaults.palette), flags));
+                 g_param_spec_enum(
+                     "palette", "Palette", "Colours of pixels with ON events, OFF events, and both",
+                     palette_type(), static_cast<int>(defaults.palette), mutable_playing_flags));
   properties.add(&Settings::opacity,
                  g_param_spec_double("opacity", "Opacity",
                                      "Opacity of drawn events (0 = invisible, 1 = opaque)", 0, 1,
-                                     defaults.opacity, flags));
-  properties.add(
-      &Settings::accumulation_time,
-      g_param_spec_uint64("accumulation-time", "Accumulation time",
-                          "Time for which an event is shown (ns; 0 = one frame)", 0,
-                          std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
+                                     defaults.opacity, mutable_playing_flags));
+  properties.add(&Settings::accumulation_time,
+                 g_param_spec_uint64("accumulation-time", "Accumulation time",
+                                     "Time for which an event is shown (ns; 0 = one frame)", 0,
+                                     std::numeric_limits<gint64>::max(), defaults.accumulation_time,
+                                     mutable_playing_flags));
 
 #define DRAWN_VIDEO_CAPS                                               \
   "video/x-raw, format = (string) " DRAWN_VIDEO_FORMATS ", " SIZE_CAPS \

@@ -40,6 +40,7 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/properties.hpp"
+#include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
 #include "gst/drawing/drawn_video.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -479,36 +480,30 @@ void EventRender::stop() {
 DEFINE_EVENT_AGGREGATOR(GstEventRender, gst_event_render, EVENT_RENDER, EventRender, eventrender,
                         GST_RANK_PRIMARY, "events drawn as video")
 
-static GType gst_event_render_mode_get_type() {
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {static_cast<gint>(RenderMode::accumulate), "Polarities that fired within a window",
-         "accumulate"},
-        {static_cast<gint>(RenderMode::decay), "Exponentially decaying sum of ON minus OFF",
-         "decay"},
-        {static_cast<gint>(RenderMode::time_surface), "Age and polarity of the last event",
-         "time-surface"},
-        {static_cast<gint>(RenderMode::count), "ON minus OFF within a window", "count"},
-        {0, nullptr, nullptr},
-    };
-    return g_enum_register_static("GstEventRenderMode", values);
-  }();
-  return type;
+static GType event_render_mode_type() {
+  static const GEnumValue values[] = {
+      {static_cast<gint>(RenderMode::accumulate), "Polarities that fired within a window",
+       "accumulate"},
+      {static_cast<gint>(RenderMode::decay), "Exponentially decaying sum of ON minus OFF", "decay"},
+      {static_cast<gint>(RenderMode::time_surface), "Age and polarity of the last event",
+       "time-surface"},
+      {static_cast<gint>(RenderMode::count), "ON minus OFF within a window", "count"},
+      {0, nullptr, nullptr},
+  };
+  return enum_type("GstEventRenderMode", values);
 }
 
 static void install_properties(GObjectClass* object_class) {
-  constexpr auto flags = static_cast<GParamFlags>(
-      G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
   const Settings defaults;
   Properties<settings_of> properties(object_class);
-  properties.add(&Settings::mode, g_param_spec_enum("mode", "Mode", "What a picture shows",
-                                                    gst_event_render_mode_get_type(),
-                                                    static_cast<gint>(defaults.mode), flags));
+  properties.add(&Settings::mode,
+                 g_param_spec_enum("mode", "Mode", "What a picture shows", event_render_mode_type(),
+                                   static_cast<gint>(defaults.mode), mutable_playing_flags));
   properties.add(
       &Settings::palette,
       g_param_spec_enum("palette", "Palette",
                         "Colours of the picture; viridis and magma show magnitude, not polarity",
-                        palette_type(), static_cast<int>(defaults.palette), flags));
+                        palette_type(), static_cast<int>(defaults.palette), mutable_playing_flags));
   properties.add(
       &Settings::accumulation_time,
       g_param_spec_uint64(
@@ -517,30 +512,33 @@ static void install_properties(GObjectClass* object_class) {
           "time-surface (ns; 0 = for accumulate and count, one frame, or as long as event-count "
           "and "
           "area-event-count allow; for the others, 100 ms)",
-          0, std::numeric_limits<gint64>::max(), defaults.accumulation_time, flags));
+          0, std::numeric_limits<gint64>::max(), defaults.accumulation_time,
+          mutable_playing_flags));
   properties.add(
       &Settings::event_count,
       g_param_spec_uint("event-count", "Event count",
                         "Maximum number of events in the window of accumulate and count (events; "
                         "0 = no limit)",
-                        0, eventcamera::RecentEvents::max_size, defaults.event_count, flags));
+                        0, eventcamera::RecentEvents::max_size, defaults.event_count,
+                        mutable_playing_flags));
   properties.add(
       &Settings::area_event_count,
       g_param_spec_uint("area-event-count", "Area event count",
                         "Maximum number of events per area in the window of accumulate and count: "
                         "the busiest area determines its length (events; 0 = no limit)",
-                        0, eventcamera::RecentEvents::max_size, defaults.area_event_count, flags));
-  properties.add(&Settings::area_size,
-                 g_param_spec_uint("area-size", "Area size",
-                                   "Side of the squares that area-event-count counts in (pixels)",
-                                   1, eventcamera::max_side, defaults.area_size, flags));
+                        0, eventcamera::RecentEvents::max_size, defaults.area_event_count,
+                        mutable_playing_flags));
+  properties.add(
+      &Settings::area_size,
+      g_param_spec_uint("area-size", "Area size",
+                        "Side of the squares that area-event-count counts in (pixels)", 1,
+                        eventcamera::max_side, defaults.area_size, mutable_playing_flags));
   properties.add(
       &Settings::full_scale,
       g_param_spec_double("full-scale", "Full scale",
                           "Number of events of a pixel shown in full colour by decay and count "
                           "(events)",
-                          0.1, 1e6, defaults.full_scale, flags));
-  gst_type_mark_as_plugin_api(gst_event_render_mode_get_type(), static_cast<GstPluginAPIFlags>(0));
+                          0.1, 1e6, defaults.full_scale, mutable_playing_flags));
 }
 
 /// Consumes QoS events, because upstream would skip events.

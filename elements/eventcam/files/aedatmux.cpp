@@ -256,7 +256,7 @@ static GstFlowReturn begin_file(GstAedatMux* self) {
   settings.source = state.source;
   settings.frames = std::ranges::any_of(
       sink_pads(self), [](const Pad& pad) { return kind_of(pad.get()) != Kind::events; });
-  settings.table = can_seek_bytes(GST_AGGREGATOR_SRC_PAD(self));
+  settings.table = peer_can_seek(GST_AGGREGATOR_SRC_PAD(self), GST_FORMAT_BYTES);
   settings.compression = self->priv->settings.copy().compression;
   settings.triggers = state.triggers.has_value();
   settings.imu_samples = state.imu_samples.has_value();
@@ -591,14 +591,10 @@ static void gst_aedat_mux_class_init(GstAedatMuxClass* klass) {
   properties.add(
       &Settings::compression,
       g_param_spec_enum("compression", "Compression", "Compression of the file", compression_type(),
-                        static_cast<int>(Settings().compression),
-                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                 GST_PARAM_MUTABLE_READY)));
-  properties.add_read_only(
-      +[](GObject* object, GValue* value) {
-        g_value_take_boxed(value, GST_AEDAT_MUX(object)->priv->writable.stats());
-      },
-      WritableEvents::stats_spec());
+                        static_cast<int>(Settings().compression), mutable_ready_flags));
+  install_stats(
+      object_class, [](GObject* object) { return GST_AEDAT_MUX(object)->priv->writable.stats(); },
+      WritableEvents::stats_blurb);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   const auto add_sinks = [&](const char* name, const char* caps) {

@@ -260,34 +260,34 @@ static void gst_event_hdf5_sink_init(GstEventHdf5Sink* self) {
 static void gst_event_hdf5_sink_class_init(GstEventHdf5SinkClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                  GST_PARAM_MUTABLE_READY);
   const Settings defaults;
   Properties<settings_of> properties(object_class);
-  properties.add(&Settings::location,
-                 g_param_spec_string("location", "Location",
-                                     "File to write; an existing file is overwritten", "", flags));
-  properties.add(&Settings::format,
-                 g_param_spec_enum("format", "Format", "Format of the events in the file",
-                                   format_type(), static_cast<int>(defaults.format), flags));
+  properties.add(
+      &Settings::location,
+      g_param_spec_string("location", "Location", "File to write; an existing file is overwritten",
+                          "", mutable_ready_flags));
+  properties.add(
+      &Settings::format,
+      g_param_spec_enum("format", "Format", "Format of the events in the file", format_type(),
+                        static_cast<int>(defaults.format), mutable_ready_flags));
   properties.add(
       &Settings::compression,
       g_param_spec_enum("compression", "Compression",
                         "Compression of format=dsec: gzip for small files, none for speed. "
                         "format=metavision ignores it, since it always uses ECF",
-                        compression_type(), static_cast<int>(defaults.compression), flags));
+                        compression_type(), static_cast<int>(defaults.compression),
+                        mutable_ready_flags));
   properties.add(
       &Settings::commit_interval,
       g_param_spec_uint64("commit-interval", "Commit interval",
                           "Time between two states of the file that survive if the process is "
                           "killed (ns of the clock; 0 = none before the end, and the same events "
                           "in the same buffers make the same bytes)",
-                          0, G_MAXINT64, defaults.commit_interval, flags));
-  properties.add_read_only(
-      +[](GObject* object, GValue* value) {
-        g_value_take_boxed(value, GST_EVENT_HDF5_SINK(object)->priv->writable.stats());
-      },
-      WritableEvents::stats_spec());
+                          0, G_MAXINT64, defaults.commit_interval, mutable_ready_flags));
+  install_stats(
+      object_class,
+      [](GObject* object) { return GST_EVENT_HDF5_SINK(object)->priv->writable.stats(); },
+      WritableEvents::stats_blurb);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_template(element_class, "sink", GST_PAD_SINK, EVENT_CAPS);

@@ -138,10 +138,8 @@ static const RecordingFormat es = {
     .add_properties =
         [](FormatProperties& properties) {
           properties.add(&FormatSettings::variant,
-                         g_param_spec_enum(
-                             "origin", ES_ORIGIN_NICK, ES_ORIGIN_BLURB, es_origin_type(), 0,
-                             static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                      GST_PARAM_MUTABLE_READY)));
+                         g_param_spec_enum("origin", ES_ORIGIN_NICK, ES_ORIGIN_BLURB,
+                                           es_origin_type(), 0, mutable_ready_flags));
         },
     .make_decoder = [](const GstCaps*,
                        const FormatSettings& settings) -> std::unique_ptr<RecordingDecoder> {

@@ -48,36 +48,37 @@ static void gst_event_anti_flicker_class_init(GstEventAntiFlickerClass* klass) {
   using Settings = FlickerFilter::Settings;
   constexpr guint min_frequency = 50;
   constexpr guint max_frequency = 520;
-  constexpr auto flags = event_filter_property_flags;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
   properties.add(&Settings::mode,
                  g_param_spec_enum("mode", "Mode", "What to do with flicker", mode_type(),
-                                   static_cast<int>(Settings().mode), flags));
+                                   static_cast<int>(Settings().mode), mutable_playing_flags));
   properties.add(&Settings::min_frequency,
                  g_param_spec_uint("min-frequency", "Minimum frequency",
                                    "Lower end of the band of flicker (Hz)", min_frequency,
-                                   max_frequency, Settings().min_frequency, flags));
+                                   max_frequency, Settings().min_frequency, mutable_playing_flags));
   properties.add(&Settings::max_frequency,
                  g_param_spec_uint("max-frequency", "Maximum frequency",
                                    "Upper end of the band of flicker (Hz); a lower one than "
                                    "min-frequency counts as that",
-                                   min_frequency, max_frequency, Settings().max_frequency, flags));
+                                   min_frequency, max_frequency, Settings().max_frequency,
+                                   mutable_playing_flags));
   properties.add(&Settings::duty_cycle,
                  g_param_spec_double("duty-cycle", "Duty cycle",
                                      "Share of a period from the first ON event to the first OFF "
                                      "event",
-                                     0.01, 0.99, Settings().duty_cycle, flags));
-  properties.add(
-      &Settings::start_threshold,
-      g_param_spec_uint("start-threshold", "Start threshold",
-                        "Count of phases at which a pixel begins to flicker", 1,
-                        FlickerFilter::max_threshold, Settings().start_threshold, flags));
+                                     0.01, 0.99, Settings().duty_cycle, mutable_playing_flags));
+  properties.add(&Settings::start_threshold,
+                 g_param_spec_uint("start-threshold", "Start threshold",
+                                   "Count of phases at which a pixel begins to flicker", 1,
+                                   FlickerFilter::max_threshold, Settings().start_threshold,
+                                   mutable_playing_flags));
   properties.add(
       &Settings::stop_threshold,
       g_param_spec_uint("stop-threshold", "Stop threshold",
                         "Count of phases below which a pixel no longer flickers; a higher "
                         "one than start-threshold counts as that",
-                        1, FlickerFilter::max_threshold, Settings().stop_threshold, flags));
+                        1, FlickerFilter::max_threshold, Settings().stop_threshold,
+                        mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Anti-flicker filter", "Filter",
                                         "Drops the events of flickering lamps", EVENTSIM_AUTHORS);
 }

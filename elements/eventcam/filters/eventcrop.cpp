@@ -65,7 +65,7 @@ static void gst_event_crop_class_init(GstEventCropClass* klass) {
   Properties<settings_of> properties(object_class);
   const auto add = [&](auto field, const char* name, const char* nick, const char* blurb) {
     properties.add(field, g_param_spec_uint(name, nick, blurb, 0, eventcamera::max_side, 0,
-                                            event_filter_property_flags));
+                                            mutable_playing_flags));
   };
   add(&Settings::left, "left", "Left", "Columns to cut off at the left (pixels)");
   add(&Settings::right, "right", "Right", "Columns to cut off at the right (pixels)");

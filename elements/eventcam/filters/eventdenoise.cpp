@@ -53,35 +53,36 @@ static GType method_type() {
 
 static void gst_event_denoise_class_init(GstEventDenoiseClass* klass) {
   using Settings = DenoiseFilter::Settings;
-  constexpr auto flags = event_filter_property_flags;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(&Settings::method,
-                 g_param_spec_enum("method", "Method", "How noise is told from signal",
-                                   method_type(), static_cast<int>(Settings().method), flags));
+  properties.add(
+      &Settings::method,
+      g_param_spec_enum("method", "Method", "How noise is told from signal", method_type(),
+                        static_cast<int>(Settings().method), mutable_playing_flags));
   properties.add(&Settings::correlation_time,
                  g_param_spec_uint64("correlation-time", "Correlation time",
                                      "Maximum time between events that support each other (ns; "
                                      "0 = the default of the method)",
                                      0, DenoiseFilter::max_correlation_time,
-                                     Settings().correlation_time, flags));
+                                     Settings().correlation_time, mutable_playing_flags));
   properties.add(&Settings::min_neighbours,
                  g_param_spec_uint("min-neighbours", "Minimum neighbours",
                                    "Neighbours that must support an event (stcf)", 1, 8,
-                                   Settings().min_neighbours, flags));
-  properties.add(&Settings::match_polarity,
-                 g_param_spec_boolean("match-polarity", "Match polarity",
-                                      "Whether only events of equal polarity support each other "
-                                      "(baf, stcf)",
-                                      Settings().match_polarity ? TRUE : FALSE, flags));
+                                   Settings().min_neighbours, mutable_playing_flags));
+  properties.add(
+      &Settings::match_polarity,
+      g_param_spec_boolean("match-polarity", "Match polarity",
+                           "Whether only events of equal polarity support each other "
+                           "(baf, stcf)",
+                           Settings().match_polarity ? TRUE : FALSE, mutable_playing_flags));
   properties.add(
       &Settings::threshold,
       g_param_spec_double("threshold", "Threshold", "Minimum support by neighbours (time-kernel)",
-                          0, 24, Settings().threshold, flags));
+                          0, 24, Settings().threshold, mutable_playing_flags));
   properties.add(&Settings::search_distance,
                  g_param_spec_uint("search-distance", "Search distance",
                                    "Maximum distance of a supporting event, across plus down "
                                    "(pixels; dwf)",
-                                   0, 100, Settings().search_distance, flags));
+                                   0, 100, Settings().search_distance, mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event denoiser", "Filter",
                                         "Drops events that are noise", EVENTSIM_AUTHORS);
 }

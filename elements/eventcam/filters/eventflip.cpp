@@ -122,7 +122,7 @@ static void gst_event_flip_class_init(GstEventFlipClass* klass) {
   properties.add(&Settings::direction,
                  g_param_spec_enum("video-direction", "Direction", "How to flip or rotate",
                                    GST_TYPE_VIDEO_ORIENTATION_METHOD, Settings().direction,
-                                   event_filter_property_flags));
+                                   mutable_playing_flags));
   object_class->notify = [](GObject* object, GParamSpec*) {
     gst_base_transform_reconfigure_src(GST_BASE_TRANSFORM(object));
   };

@@ -104,33 +104,30 @@ DEFINE_EVENT_FILTER(GstEventHotPixel, gst_event_hot_pixel, EVENT_HOT_PIXEL, HotP
                     eventhotpixel)
 
 static void gst_event_hot_pixel_class_init(GstEventHotPixelClass* klass) {
-  constexpr auto flags = event_filter_property_flags;
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::location,
-      g_param_spec_string("location", "Location",
-                          "Text file of hot pixels, read at the start and, with learn, "
-                          "written on stop if others were found",
-                          nullptr,
-                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                   GST_PARAM_MUTABLE_READY)));
+  properties.add(&Settings::location,
+                 g_param_spec_string("location", "Location",
+                                     "Text file of hot pixels, read at the start and, with learn, "
+                                     "written on stop if others were found",
+                                     "", mutable_ready_flags));
   properties.add(&Settings::learn,
                  g_param_spec_boolean("learn", "Learn",
                                       "Whether to find hot pixels; else they are those of the file",
-                                      Settings().learn ? TRUE : FALSE, flags));
-  properties.add(&Settings::learning_period,
-                 g_param_spec_uint64("learning-period", "Learning period",
-                                     "Time after which hot pixels are found anew (ns)", GST_MSECOND,
-                                     3600 * GST_SECOND, Settings().learning_period, flags));
+                                      Settings().learn ? TRUE : FALSE, mutable_playing_flags));
+  properties.add(
+      &Settings::learning_period,
+      g_param_spec_uint64("learning-period", "Learning period",
+                          "Time after which hot pixels are found anew (ns)", GST_MSECOND,
+                          3600 * GST_SECOND, Settings().learning_period, mutable_playing_flags));
   properties.add(&Settings::min_rate,
                  g_param_spec_double("min-rate", "Minimum rate",
                                      "Minimum event rate of a hot pixel (events/s)", 0, 1e6,
-                                     Settings().min_rate, flags));
+                                     Settings().min_rate, mutable_playing_flags));
   properties.add(&Settings::ratio,
                  g_param_spec_double("ratio", "Ratio",
                                      "Minimum event rate of a hot pixel, as a multiple of the "
                                      "median of its neighbours",
-                                     1, 1e6, Settings().ratio, flags));
+                                     1, 1e6, Settings().ratio, mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Hot pixel filter", "Filter",
                                         "Drops the events of hot pixels", EVENTSIM_AUTHORS);
 }

@@ -217,12 +217,8 @@ GstFlowReturn EventMerge::push_gap(GstClockTime start, GstClockTime duration) {
   if (duration == 0) return GST_FLOW_OK;
   GST_LOG_OBJECT(element(), "no events at %" GST_TIME_FORMAT " for %" GST_TIME_FORMAT,
                  GST_TIME_ARGS(start), GST_TIME_ARGS(duration));
-  if (segment_sent_) {
-    GstPad* const src = GST_AGGREGATOR_SRC_PAD(element());
-    return gst_pad_push_event(src, gst_event_new_gap(start, duration))
-               ? GST_FLOW_OK
-               : gst_pad_get_last_flow_return(src);
-  }
+  if (segment_sent_)
+    return push_event(GST_AGGREGATOR_SRC_PAD(element()), gst_event_new_gap(start, duration));
   // GstAggregator sends the segment with a buffer only.
   OwnedBuffer empty(gst_buffer_new());
   GST_BUFFER_PTS(empty.get()) = start;
@@ -476,19 +472,11 @@ static void gst_event_merge_class_init(GstEventMergeClass* klass) {
       g_param_spec_uint("min-streams", "Minimum streams",
                         "Number of streams that are waited for before the output starts; live "
                         "sources are waited for no longer than the latency",
-                        1, G_MAXUINT, Settings().min_streams,
-                        static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                 GST_PARAM_MUTABLE_READY)));
-  properties.add_read_only(
-      +[](GObject* object, GValue* value) {
-        g_value_take_boxed(value, inside_of<EventMerge>(object).stats());
-      },
-      g_param_spec_boxed("stats", "Statistics",
-                         "Counts: events (merged), late-events (dropped, because they arrived too "
-                         "late) and rejected-events (dropped, because they are outside of their "
-                         "sensor, or not sorted)",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+                        1, G_MAXUINT, Settings().min_streams, mutable_ready_flags));
+  install_stats(
+      G_OBJECT_CLASS(klass), [](GObject* object) { return inside_of<EventMerge>(object).stats(); },
+      "Counts: events (merged), late-events (dropped, because they arrived too late) and "
+      "rejected-events (dropped, because they are outside of their sensor, or not sorted)");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_template(element_class, "sink_%u", GST_PAD_SINK, EVENT_CAPS, GST_PAD_REQUEST,

@@ -39,10 +39,10 @@ static void gst_event_polarity_class_init(GstEventPolarityClass* klass) {
   properties.add(
       &Settings::keep,
       g_param_spec_enum("keep", "Keep", "Polarity of the events that are kept", kept_type(),
-                        static_cast<int>(Settings().keep), event_filter_property_flags));
+                        static_cast<int>(Settings().keep), mutable_playing_flags));
   properties.add(&Settings::invert,
                  g_param_spec_boolean("invert", "Invert", "Whether ON becomes OFF, and OFF ON",
-                                      FALSE, event_filter_property_flags));
+                                      FALSE, mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event polarity", "Filter",
                                         "Keeps one polarity, or exchanges both", EVENTSIM_AUTHORS);
 }

@@ -35,12 +35,12 @@ static void gst_event_rate_control_class_init(GstEventRateControlClass* klass) {
       &Settings::max_rate,
       g_param_spec_uint64("max-rate", "Maximum rate", "Limit of events per second (0 = no limit)",
                           0, G_GUINT64_CONSTANT(1'000'000'000'000), Settings().max_rate,
-                          event_filter_property_flags));
+                          mutable_playing_flags));
   properties.add(
       &Settings::reference_period,
       g_param_spec_uint64("reference-period", "Reference period",
                           "Time over which events are counted (ns)", 10 * GST_USECOND, GST_SECOND,
-                          Settings().reference_period, event_filter_property_flags));
+                          Settings().reference_period, mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event rate control", "Filter",
                                         "Limits the event rate", EVENTSIM_AUTHORS);
 }

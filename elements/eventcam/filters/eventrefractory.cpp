@@ -33,7 +33,7 @@ static void gst_event_refractory_class_init(GstEventRefractoryClass* klass) {
       g_param_spec_uint64("refractory-period", "Refractory period",
                           "Minimum time between two events of a pixel (ns; 0 = keep all events)", 0,
                           eventcamera::max_filter_time, Settings().refractory_period,
-                          event_filter_property_flags));
+                          mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Refractory period", "Filter",
                                         "Drops events of a pixel that follow another too soon",
                                         EVENTSIM_AUTHORS);

@@ -73,7 +73,7 @@ static void gst_event_scale_class_init(GstEventScaleClass* klass) {
                                    "Number of events of a polarity at a pixel of the output for "
                                    "which it fires once, at the time of the last one (events)",
                                    1, ScaleFilter::max_min_events, Settings().min_events,
-                                   event_filter_property_flags));
+                                   mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event scaler", "Filter",
                                         "Scales the sensor", EVENTSIM_AUTHORS);
   GstBaseTransformClass* transform_class = GST_BASE_TRANSFORM_CLASS(klass);

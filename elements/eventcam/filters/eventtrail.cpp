@@ -48,12 +48,12 @@ static void gst_event_trail_class_init(GstEventTrailClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
   properties.add(&Settings::mode,
                  g_param_spec_enum("mode", "Mode", "Part of a burst to keep", mode_type(),
-                                   static_cast<int>(Settings().mode), event_filter_property_flags));
+                                   static_cast<int>(Settings().mode), mutable_playing_flags));
   properties.add(
       &Settings::threshold,
       g_param_spec_uint64("threshold", "Threshold",
                           "Time after an event at which a new burst begins (ns)", GST_MSECOND,
-                          100 * GST_MSECOND, Settings().threshold, event_filter_property_flags));
+                          100 * GST_MSECOND, Settings().threshold, mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event trail filter", "Filter",
                                         "Keeps one event of each burst of a pixel",
                                         EVENTSIM_AUTHORS);

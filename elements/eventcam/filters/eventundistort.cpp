@@ -79,14 +79,11 @@ DEFINE_EVENT_FILTER(GstEventUndistort, gst_event_undistort, EVENT_UNDISTORT, Und
 
 static void gst_event_undistort_class_init(GstEventUndistortClass* klass) {
   Properties<settings_of> properties(G_OBJECT_CLASS(klass));
-  properties.add(
-      &Settings::location,
-      g_param_spec_string("location", "Location",
-                          "YAML file with the calibration of the camera, read when a "
-                          "stream begins",
-                          nullptr,
-                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                   GST_PARAM_MUTABLE_READY)));
+  properties.add(&Settings::location,
+                 g_param_spec_string("location", "Location",
+                                     "YAML file with the calibration of the camera, read when a "
+                                     "stream begins",
+                                     "", mutable_ready_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Event undistortion", "Filter",
                                         "Undoes the distortion of a lens", EVENTSIM_AUTHORS);
 }

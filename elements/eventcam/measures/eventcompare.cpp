@@ -57,6 +57,7 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/eventcamera/eventcamera.h"
+#include "src/core/sensor_size.hpp"
 #include "src/measure/stream_comparison.hpp"
 #include "src/render/map_picture.hpp"
 
@@ -67,18 +68,11 @@ using eventcamera::both_roles;
 using eventcamera::CauseCounts;
 using eventcamera::Classification;
 using eventcamera::PerRole;
+using eventcamera::SensorSize;
 using eventcamera::StreamComparison;
 using eventcamera::StreamRole;
 
 namespace {
-
-/// A sensor's size.
-struct Sensor {
-  int width;
-  int height;
-
-  friend bool operator==(const Sensor&, const Sensor&) = default;
-};
 
 const char* name_of(StreamRole role) {
   return role == StreamRole::reference ? "reference" : "candidate";
@@ -110,7 +104,7 @@ class EventCompare final : public EventAggregator {
   const PerRole<GstAggregatorPad*> pads_{pad("reference"), pad("candidate")};
 
   // Accessed by the source pad's thread only, or while there is none.
-  PerRole<std::optional<Sensor>> sensors_;
+  PerRole<std::optional<SensorSize>> sensors_;
   std::optional<StreamComparison> comparison_;  // set once both sensors are known
   PerRole<CauseCounts> causes_;                 // of the labelled events in it
   bool concluded_ = true;                       // no events since the last report
@@ -296,9 +290,9 @@ bool EventCompare::has_one_size() const {
   const auto& candidate = sensors_[StreamRole::candidate];
   if (reference && candidate && *reference != *candidate) {
     GST_ELEMENT_ERROR(element(), STREAM, FORMAT,
-                      ("Cannot compare sensors of different sizes: the reference has %d x %d "
-                       "pixels, the candidate %d x %d; scale one of them.",
-                       reference->width, reference->height, candidate->width, candidate->height),
+                      ("Cannot compare sensors of different sizes: the reference has %s, the "
+                       "candidate %s; scale one of them.",
+                       in_pixels(*reference).c_str(), in_pixels(*candidate).c_str()),
                       ("width or height differ in the caps of the two sink pads"));
     return false;
   }
@@ -309,7 +303,7 @@ bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return false;
   auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
-  const Sensor next{info.width, info.height};
+  const SensorSize next{info.width, info.height};
   if (sensor == next) return true;
   const bool has_begun = comparison_.has_value();
   if (has_begun && !concluded_) conclude();

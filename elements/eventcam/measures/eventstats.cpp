@@ -335,8 +335,7 @@ static void gst_event_stats_class_init(GstEventStatsClass* klass) {
       g_param_spec_uint64("interval", "Interval",
                           "Time between statistics messages, in stream time (ns; 0 = at EOS only)",
                           0, std::numeric_limits<gint64>::max(), Settings().interval,
-                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                   GST_PARAM_MUTABLE_PLAYING)));
+                          mutable_playing_flags));
   add_report_properties(properties, "PNG file of the events per pixel, written at EOS or on stop");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);

@@ -21,13 +21,12 @@ struct ReportFiles {
 /// For class_init: adds the properties location and map, for settings derived from ReportFiles.
 template <class Properties>
 void add_report_properties(Properties& properties, const char* map_blurb) {
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                  GST_PARAM_MUTABLE_READY);
-  properties.add(
-      &ReportFiles::location,
-      g_param_spec_string("location", "Location",
-                          "JSON file of the statistics, written at EOS or on stop", "", flags));
-  properties.add(&ReportFiles::map, g_param_spec_string("map", "Map", map_blurb, "", flags));
+  properties.add(&ReportFiles::location,
+                 g_param_spec_string("location", "Location",
+                                     "JSON file of the statistics, written at EOS or on stop", "",
+                                     mutable_ready_flags));
+  properties.add(&ReportFiles::map,
+                 g_param_spec_string("map", "Map", map_blurb, "", mutable_ready_flags));
 }
 
 /// Converts a timestamp of a segment to stream time.

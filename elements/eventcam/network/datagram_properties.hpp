@@ -52,23 +52,21 @@ inline GType datagram_byte_order_type() {
 template <auto settings_of>
 void add_datagram_properties(Properties<settings_of>& properties) {
   using eventcamera::DatagramSettings;
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                  GST_PARAM_MUTABLE_READY);
   constexpr DatagramSettings defaults;
   properties.add(
       &DatagramSettings::format,
       g_param_spec_enum("format", "Format", "Format of the datagrams", datagram_format_type(),
-                        static_cast<int>(defaults.format), flags));
-  properties.add(
-      &DatagramSettings::byte_order,
-      g_param_spec_enum("byte-order", "Byte order",
-                        "Byte order of SPIF; the other formats define their own",
-                        datagram_byte_order_type(), static_cast<int>(defaults.byte_order), flags));
+                        static_cast<int>(defaults.format), mutable_ready_flags));
+  properties.add(&DatagramSettings::byte_order,
+                 g_param_spec_enum("byte-order", "Byte order",
+                                   "Byte order of SPIF; the other formats define their own",
+                                   datagram_byte_order_type(),
+                                   static_cast<int>(defaults.byte_order), mutable_ready_flags));
   properties.add(
       &DatagramSettings::has_sequence_number,
       g_param_spec_boolean("sequence-number", "Sequence number",
                            "Datagrams of jAER start with a sequence number, which reveals losses",
-                           defaults.has_sequence_number, flags));
+                           defaults.has_sequence_number, mutable_ready_flags));
 }
 
 /// Counts of datagrams. Losses are known only if datagrams have a sequence number.
@@ -80,17 +78,3 @@ struct DatagramCounts {
   guint64 late = 0;
   guint64 rejected = 0;
 };
-
-/// Adds the property `stats`, a structure of these counts.
-template <auto counts_of>
-void add_datagram_stats(GObjectClass* klass, const char* blurb,
-                        GstStructure* (*structure_of)(const DatagramCounts&)) {
-  Properties<counts_of> properties(klass);
-  properties.add(
-      [](DatagramCounts&, const GValue*) {},
-      [structure_of](const DatagramCounts& counts, GValue* value) {
-        g_value_take_boxed(value, structure_of(counts));
-      },
-      g_param_spec_boxed("stats", "Statistics", blurb, GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
-}

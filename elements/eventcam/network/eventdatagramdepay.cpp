@@ -396,34 +396,33 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
 
   Properties<settings_of> properties(object_class);
   add_datagram_properties(properties);
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                  GST_PARAM_MUTABLE_READY);
   properties.add(
       &DatagramSettings::width,
       g_param_spec_uint("width", "Width", "Width of the sender's sensor (pixels); required", 0,
-                        eventcamera::max_side, 0, flags));
+                        eventcamera::max_side, 0, mutable_ready_flags));
   properties.add(
       &DatagramSettings::height,
       g_param_spec_uint("height", "Height", "Height of the sender's sensor (pixels); required", 0,
-                        eventcamera::max_side, 0, flags));
+                        eventcamera::max_side, 0, mutable_ready_flags));
   properties.add(
       &Settings::latency,
       g_param_spec_uint64("latency", "Latency",
                           "Maximum delay of events relative to the first one; live sinks wait for "
                           "it (ns)",
-                          0, 10 * GST_SECOND, Settings().latency, flags));
-  add_datagram_stats<counts_of>(
+                          0, 10 * GST_SECOND, Settings().latency, mutable_ready_flags));
+  install_stats(
       object_class,
-      "Counters since the start: packets, events and bytes received; lost packets, if they have a "
-      "sequence number; late packets, older than earlier ones and dropped; rejected packets, "
-      "malformed or with events outside the sensor",
-      [](const DatagramCounts& counts) {
+      [](GObject* object) {
+        const DatagramCounts counts = counts_of(object).copy();
         return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
                                  counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
                                  G_TYPE_UINT64, counts.bytes, "lost-packets", G_TYPE_UINT64,
                                  counts.lost, "late-packets", G_TYPE_UINT64, counts.late,
                                  "rejected-packets", G_TYPE_UINT64, counts.rejected, nullptr);
-      });
+      },
+      "Counters since the start: packets, events and bytes received; lost packets, if they have a "
+      "sequence number; late packets, older than earlier ones and dropped; rejected packets, "
+      "malformed or with events outside the sensor");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;

@@ -341,16 +341,16 @@ static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
       g_param_spec_uint64("max-latency", "Maximum latency",
                           "Maximum time for which an event waits for others to fill its datagram "
                           "(ns; 0 = send each buffer at once)",
-                          0, GST_SECOND, Settings().max_latency,
-                          static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                                   GST_PARAM_MUTABLE_PLAYING)));
-  add_datagram_stats<counts_of>(
-      object_class, "Counters since the start: packets, events and bytes packed",
-      [](const DatagramCounts& counts) {
+                          0, GST_SECOND, Settings().max_latency, mutable_playing_flags));
+  install_stats(
+      object_class,
+      [](GObject* object) {
+        const DatagramCounts counts = counts_of(object).copy();
         return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
                                  counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
                                  G_TYPE_UINT64, counts.bytes, nullptr);
-      });
+      },
+      "Counters since the start: packets, events and bytes packed");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;

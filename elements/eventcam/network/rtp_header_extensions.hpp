@@ -23,10 +23,6 @@ class RtpHeaderExtensions {
   }
 
  private:
-  struct UnrefObject {
-    void operator()(gpointer object) const { gst_object_unref(object); }
-  };
-
   /// RFC 8285: maximum identifier and size of elements with a header of one byte, and maximum size
   /// of those with two.
   static constexpr guint max_short_id = 14;

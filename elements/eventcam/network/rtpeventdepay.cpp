@@ -407,7 +407,7 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static void get_stats(GObject* object, GValue* value) {
+static GstStructure* stats_of(GObject* object) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_DEPAYLOAD);
   const auto counted = *GST_RTP_EVENT_DEPAY(object)->priv->statistics.lock();
   gst_structure_set(
@@ -416,7 +416,7 @@ static void get_stats(GObject* object, GValue* value) {
       G_TYPE_UINT64, guint64{counted.lost_packets}, "lost-events", G_TYPE_UINT64,
       guint64{counted.lost_events}, "late-packets", G_TYPE_UINT64, guint64{counted.late_packets},
       "rejected-packets", G_TYPE_UINT64, guint64{counted.rejected_packets}, nullptr);
-  g_value_take_boxed(value, stats);
+  return stats;
 }
 
 static void finalize(GObject* object) {
@@ -435,11 +435,7 @@ static void gst_rtp_event_depay_init(GstRtpEventDepay* self) {
 static void gst_rtp_event_depay_class_init(GstRtpEventDepayClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  install_property(
-      object_class, {nullptr, get_stats},
-      g_param_spec_boxed("stats", "Statistics", "Counters of packets and events received and lost",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+  install_stats(object_class, stats_of, "Counters of packets and events received and lost");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_templates(element_class, RTP_EVENT_CAPS, EVENT_CAPS);

@@ -369,13 +369,13 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static void get_stats(GObject* object, GValue* value) {
+static GstStructure* stats_of(GObject* object) {
   GstStructure* stats = base_rtp_stats(object, GST_TYPE_RTP_BASE_PAYLOAD);
   const auto sent = *GST_RTP_EVENT_PAY(object)->priv->sent.lock();
   gst_structure_set(stats, "packets", G_TYPE_UINT64, guint64{sent.packets}, "bytes", G_TYPE_UINT64,
                     guint64{sent.bytes}, "events", G_TYPE_UINT64, guint64{sent.events},
                     "rejected-events", G_TYPE_UINT64, guint64{sent.rejected}, nullptr);
-  g_value_take_boxed(value, stats);
+  return stats;
 }
 
 static void finalize(GObject* object) {
@@ -403,25 +403,19 @@ static void gst_rtp_event_pay_class_init(GstRtpEventPayClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
 
-  constexpr auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS);
   Properties<settings_of> properties(object_class);
-  properties.add(&Settings::format,
-                 g_param_spec_enum("format", "Format",
-                                   "Format of the events in packets; read when the stream begins",
-                                   format_type(), static_cast<int>(Settings().format),
-                                   static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_READY)));
+  properties.add(
+      &Settings::format,
+      g_param_spec_enum("format", "Format",
+                        "Format of the events in packets; read when the stream begins",
+                        format_type(), static_cast<int>(Settings().format), mutable_ready_flags));
   properties.add(&Settings::max_latency,
                  g_param_spec_uint64(
                      "max-latency", "Maximum latency",
                      "Maximum time for which an event waits for others to fill its packet (ns; "
                      "0 = send each buffer at once)",
-                     0, GST_SECOND, Settings().max_latency,
-                     static_cast<GParamFlags>(flags | GST_PARAM_MUTABLE_PLAYING)));
-  properties.add_read_only(
-      get_stats,
-      g_param_spec_boxed("stats", "Statistics", "Counters of packets and events sent",
-                         GST_TYPE_STRUCTURE,
-                         static_cast<GParamFlags>(G_PARAM_READABLE | G_PARAM_STATIC_STRINGS)));
+                     0, GST_SECOND, Settings().max_latency, mutable_playing_flags));
+  install_stats(object_class, stats_of, "Counters of packets and events sent");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   add_pad_templates(element_class, EVENT_CAPS, RTP_EVENT_CAPS ", payload = (int) [ 96, 127 ]");

@@ -506,52 +506,52 @@ static GType normalization_type() {
 }
 
 static void install_properties(GObjectClass* klass) {
-  const auto flags = static_cast<GParamFlags>(G_PARAM_READWRITE | G_PARAM_STATIC_STRINGS |
-                                              GST_PARAM_MUTABLE_READY);
   const auto number_of = [](auto value) { return static_cast<gint>(value); };
   Properties<settings_of> properties(klass);
-  properties.add(
-      &Settings::representation,
-      g_param_spec_enum("representation", "Representation", "What a tensor shows",
-                        representation_type(), number_of(Settings().representation), flags));
-  properties.add(&Settings::bins,
-                 g_param_spec_uint("bins", "Bins", "Channels of a voxel grid", 1,
-                                   GST_EVENT_CAMERA_MAX_BINS, Settings().bins, flags));
+  properties.add(&Settings::representation,
+                 g_param_spec_enum("representation", "Representation", "What a tensor shows",
+                                   representation_type(), number_of(Settings().representation),
+                                   mutable_ready_flags));
+  properties.add(&Settings::bins, g_param_spec_uint("bins", "Bins", "Channels of a voxel grid", 1,
+                                                    GST_EVENT_CAMERA_MAX_BINS, Settings().bins,
+                                                    mutable_ready_flags));
   properties.add(&Settings::decay,
                  g_param_spec_enum("decay", "Decay", "How the values of a time surface decrease",
-                                   decay_type(), number_of(Settings().decay), flags));
-  properties.add(&Settings::time_constant,
-                 g_param_spec_uint64("time-constant", "Time constant",
-                                     "Time constant of the decay of a time surface (ns)",
-                                     GST_USECOND, max_time, Settings().time_constant, flags));
+                                   decay_type(), number_of(Settings().decay), mutable_ready_flags));
   properties.add(
-      &Settings::normalization,
-      g_param_spec_enum("normalization", "Normalization", "How the values of a tensor are scaled",
-                        normalization_type(), number_of(Settings().normalization), flags));
+      &Settings::time_constant,
+      g_param_spec_uint64("time-constant", "Time constant",
+                          "Time constant of the decay of a time surface (ns)", GST_USECOND,
+                          max_time, Settings().time_constant, mutable_ready_flags));
+  properties.add(&Settings::normalization,
+                 g_param_spec_enum("normalization", "Normalization",
+                                   "How the values of a tensor are scaled", normalization_type(),
+                                   number_of(Settings().normalization), mutable_ready_flags));
   properties.add(&Settings::type,
                  g_param_spec_enum("data-type", "Data type", "Type of the numbers in a tensor",
                                    enum_type("GstEventTensorDataType", data_types()),
-                                   number_of(Settings().type), flags));
+                                   number_of(Settings().type), mutable_ready_flags));
   properties.add(&Settings::event_count,
                  g_param_spec_uint("event-count", "Event count",
                                    "Number of events in a window (0 = not limited by count)", 0,
                                    static_cast<guint>(WindowQueue::max_events),
-                                   Settings().event_count, flags));
+                                   Settings().event_count, mutable_ready_flags));
   properties.add(&Settings::accumulation_time,
                  g_param_spec_uint64(
                      "accumulation-time", "Accumulation time",
                      "Length of a window without event-count (ns, at least 1000; 0 = frame-count "
                      "buffers)",
-                     0, max_gap, Settings().accumulation_time, flags));
-  properties.add(&Settings::frame_count,
-                 g_param_spec_uint("frame-count", "Frame count",
-                                   "Number of buffers in a window without event-count and "
-                                   "accumulation-time, such as intervals between frames",
-                                   1, max_frame_count, Settings().frame_count, flags));
+                     0, max_gap, Settings().accumulation_time, mutable_ready_flags));
+  properties.add(
+      &Settings::frame_count,
+      g_param_spec_uint("frame-count", "Frame count",
+                        "Number of buffers in a window without event-count and "
+                        "accumulation-time, such as intervals between frames",
+                        1, max_frame_count, Settings().frame_count, mutable_ready_flags));
   properties.add(
       &Settings::overlap,
       g_param_spec_double("overlap", "Overlap", "Share of a window that the next one repeats", 0,
-                          0.99, Settings().overlap, flags));
+                          0.99, Settings().overlap, mutable_ready_flags));
 }
 
 static void finalize(GObject* object) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /// Seeks in pull mode and in push mode.
+#include "gst/base/pads.hpp"
 #include "gst/recording/reader/event_reader.hpp"
 
 #define GST_CAT_DEFAULT event_reader_debug
@@ -16,13 +17,7 @@ gboolean EventReader::src_event(GstPad* pad, GstEvent* event) {
 }
 
 bool EventReader::can_seek() {
-  if (shared_.lock()->is_pulling) return true;
-  GstQuery* const query = gst_query_new_seeking(GST_FORMAT_BYTES);
-  gboolean seekable = FALSE;
-  if (gst_pad_peer_query(sink_, query))
-    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, nullptr);
-  gst_query_unref(query);
-  return seekable != FALSE;
+  return shared_.lock()->is_pulling || peer_can_seek(sink_, GST_FORMAT_BYTES);
 }
 
 /// Duration that ends a segment. If it is an estimate, it may be too short, and only serves to
