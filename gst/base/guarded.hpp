@@ -2,7 +2,6 @@
 #pragma once
 
 #include <mutex>
-#include <utility>
 
 /// A value that is accessible only while its lock is held:
 ///

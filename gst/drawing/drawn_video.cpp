@@ -41,7 +41,7 @@ GType palette_type() {
 
 /// True if a meta of type `api` depends neither on the colours of the pixels nor on their memory
 /// layout.
-static bool stays_true(GType api) {
+static bool remains_valid(GType api) {
   constexpr std::string_view kept[] = {GST_META_TAG_VIDEO_STR, GST_META_TAG_VIDEO_SIZE_STR,
                                        GST_META_TAG_VIDEO_ORIENTATION_STR};
   for (auto tags = gst_meta_api_type_get_tags(api); tags != nullptr && *tags != nullptr; ++tags)
@@ -53,7 +53,7 @@ void keep_metas(GstBuffer* frame, GstBuffer* picture) {
   const auto keep = [](GstBuffer* from, GstMeta** meta, gpointer to) -> gboolean {
     const GstMetaInfo* info = (*meta)->info;
     GstMetaTransformCopy whole = {.region = FALSE, .offset = 0, .size = static_cast<gsize>(-1)};
-    if (info->transform_func != nullptr && stays_true(info->api))
+    if (info->transform_func != nullptr && remains_valid(info->api))
       info->transform_func(static_cast<GstBuffer*>(to), *meta, from, _gst_meta_transform_copy,
                            &whole);
     return TRUE;

@@ -520,7 +520,7 @@ std::unique_ptr<VideoSimulator> make_texture_simulator(GObject* element, const G
 
 /* allocation */
 
-/// Proposes nothing, because upstream's textures may be of another context.
+/// Proposes no pool, because upstream's textures may be of another context.
 static gboolean propose_allocation(GstBaseTransform* self, GstQuery* decide, GstQuery* query) {
   gst_query_add_allocation_meta(query, GST_GL_SYNC_META_API_TYPE, nullptr);
   return PARENT_TRANSFORM_CLASS->propose_allocation(self, decide, query);

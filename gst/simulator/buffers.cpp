@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulator/buffers.hpp"
 
-#include <algorithm>
 #include <new>
 
 #include "gst/base/event_buffer.hpp"

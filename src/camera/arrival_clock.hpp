@@ -27,19 +27,19 @@ class ArrivalClock {
     if (!offset_ || is_early || is_another) {
       if (!offset_ || is_another) first_ = {};
       begin_epoch(arrival);
-      last_least_ = never;
-      least_ = offset;
+      last_min_offset_ = never;
+      min_offset_ = offset;
       offset_ = offset;
       return true;
     }
-    least_ = std::min(least_, offset);
+    min_offset_ = std::min(min_offset_, offset);
     if (arrival - epoch_ < epoch_length) return false;
-    const auto least = std::min(least_, last_least_);
+    const auto min_offset = std::min(min_offset_, last_min_offset_);
     note_drift(arrival);
-    last_least_ = least_;
+    last_min_offset_ = min_offset_;
     begin_epoch(arrival);
-    if (least - *offset_ <= max_error) return false;
-    offset_ = least;
+    if (min_offset - *offset_ <= max_error) return false;
+    offset_ = min_offset;
     return true;
   }
 
@@ -54,30 +54,30 @@ class ArrivalClock {
   static constexpr Nanoseconds max_jitter = 100'000'000;
   static constexpr Nanoseconds never = std::numeric_limits<Nanoseconds>::max();
 
-  /// Least offset of an epoch, and its end.
+  /// Minimum offset of an epoch, and its end.
   struct Epoch {
     Nanoseconds end = 0;
-    Nanoseconds least = never;
+    Nanoseconds min_offset = never;
   };
 
   void begin_epoch(Nanoseconds arrival) {
     epoch_ = arrival;
-    least_ = never;
+    min_offset_ = never;
   }
 
   void note_drift(Nanoseconds arrival) {
-    if (first_.least == never) {
-      first_ = {arrival, least_};
+    if (first_.min_offset == never) {
+      first_ = {arrival, min_offset_};
       return;
     }
-    drift_ = 1e6 * static_cast<double>(least_ - first_.least) /
+    drift_ = 1e6 * static_cast<double>(min_offset_ - first_.min_offset) /
              static_cast<double>(arrival - first_.end);
   }
 
   std::optional<Nanoseconds> offset_;
-  Nanoseconds epoch_ = 0;           ///< its start
-  Nanoseconds least_ = never;       ///< least offset of this epoch
-  Nanoseconds last_least_ = never;  ///< and of the one before
+  Nanoseconds epoch_ = 0;                ///< its start
+  Nanoseconds min_offset_ = never;       ///< of this epoch
+  Nanoseconds last_min_offset_ = never;  ///< and of the one before
   Epoch first_;
   double drift_ = 0;
 };

@@ -233,7 +233,7 @@ class PixelSimulator final : public DvsSimulator {
   }
 
   void finish(double duration, EventBuckets& events) {
-    sub_interval_count_ += longest_plan_;
+    sub_interval_count_ += max_sub_intervals_;
     clock_ += duration;
     if (!readout_) return;
     const bool is_limited = current_.max_rate > 0;
@@ -349,7 +349,7 @@ class PixelSimulator final : public DvsSimulator {
     constexpr std::size_t max_tables = 1000;  // of varying frame times
     if (tables_.size() > max_tables) tables_.clear();
     whole_tables_ = tables_of(duration);
-    longest_plan_ = 0;
+    max_sub_intervals_ = 0;
     plans_.resize(static_cast<std::size_t>(max_steps) + 1);
     for (auto& plan : plans_) plan.sub_intervals.clear();
     make_plan(1);
@@ -363,7 +363,7 @@ class PixelSimulator final : public DvsSimulator {
     plan.tables.clear();
     for (const auto& sub_interval : plan.sub_intervals)
       plan.tables.push_back(tables_of(sub_interval.duration));
-    longest_plan_ = std::max(longest_plan_, plan.sub_intervals.size());
+    max_sub_intervals_ = std::max(max_sub_intervals_, plan.sub_intervals.size());
   }
 
   const ShadeTables* tables_of(double duration) {
@@ -503,7 +503,7 @@ class PixelSimulator final : public DvsSimulator {
   float max_fall_ = 0;
   std::map<double, ShadeTables> tables_;  ///< by duration, microseconds
   std::vector<Plan> plans_;               ///< by number of steps
-  std::size_t longest_plan_ = 0;          ///< sub-intervals
+  std::size_t max_sub_intervals_ = 0;     ///< sub-intervals
   std::uint64_t sub_interval_count_ = 0;  ///< before this interval
   double clock_ = 0;                      ///< its start, microseconds since the first frame
   IntervalEvents fired_;

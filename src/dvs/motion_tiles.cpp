@@ -77,7 +77,7 @@ void MotionTiles::measure(const ImageView<Pixel>& last, const ImageView<Pixel>& 
       const Box box{column * width, row * height, std::min((column + 1) * width, flow.width),
                     std::min((row + 1) * height, flow.height)};
       const auto range = flow_range(flow, box);
-      const auto longest = std::min(range.longest(), static_cast<float>(max_side));
+      const auto longest = std::min(range.max_length(), static_cast<float>(max_side));
       auto& tile = tiles[column];
       tile = {std::clamp(static_cast<int>(std::ceil(longest)), 1, max_steps),
               std::numeric_limits<Pixel>::max(), 0};

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <concepts>
 #include <cstdint>
 #include <cstring>
 #include <span>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include "src/filter/filter.hpp"
@@ -29,10 +30,10 @@ class FlickerFilter {
   struct Settings {
     FlickerMode mode = FlickerMode::band_stop;
     unsigned min_frequency = 50;   ///< Hz, at least 1
-    unsigned max_frequency = 520;  ///< Hz; a lower one than min_frequency counts as that
+    unsigned max_frequency = 520;  ///< Hz; raised to min_frequency if lower
     double duty_cycle = 0.5;       ///< share of ON phases, between 0 and 1
     unsigned start_threshold = 6;  ///< 1 to max_threshold
-    unsigned stop_threshold = 4;   ///< from 1; a higher one than start_threshold counts as that
+    unsigned stop_threshold = 4;   ///< from 1; lowered to start_threshold if higher
   };
 
   explicit FlickerFilter(SensorSize sensor) : pixels_(sensor) {}
@@ -72,7 +73,7 @@ class FlickerFilter {
     Phase(const Settings& settings, double share)
         : min_(static_cast<Stamp>(share * 1e6 /
                                   std::max(settings.max_frequency, settings.min_frequency))),
-          max_(static_cast<Stamp>(share * 1e6 / settings.min_frequency)) {}
+          max_(static_cast<Stamp>(std::ceil(share * 1e6 / settings.min_frequency))) {}
     bool fits(Stamp length) const { return length >= min_ && length <= max_; }
 
    private:

@@ -9,7 +9,7 @@
 namespace eventcamera {
 
 /// LabelledEvents::keep_if() for a filter that looks something up for each event: calls
-/// prefetch(event), early enough to load it into the cache, where that of random pixels is not.
+/// prefetch(event) ahead of time, because the data of a random pixel is rarely in the cache.
 template <class Prefetch, class Keep>
 LabelledEvents keep_if_prefetched(LabelledEvents events, Prefetch prefetch, Keep keep) {
   constexpr std::size_t distance = 32;

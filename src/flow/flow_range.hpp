@@ -15,12 +15,12 @@ struct FlowRange {
     float min;
     float max;
 
-    float longest() const { return std::max(max, -min); }
+    float max_length() const { return std::max(max, -min); }
   };
   Axis x;
   Axis y;
 
-  float longest() const { return std::max(x.longest(), y.longest()); }
+  float max_length() const { return std::max(x.max_length(), y.max_length()); }
 };
 
 /// Returns the range of the flow in a box within the frame. NaN counts as 0.

@@ -80,7 +80,7 @@ class UnitDecoder {
   };
 
   /// Size of the longest unit, in bytes.
-  static constexpr std::size_t longest = 8;
+  static constexpr std::size_t max_size = 8;
 
   virtual ~UnitDecoder() = default;
   UnitDecoder(const UnitDecoder&) = delete;

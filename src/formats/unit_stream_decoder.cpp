@@ -55,7 +55,7 @@ void UnitStreamDecoder::decode(std::span<const std::uint8_t> bytes, Decoded& out
   } else if (!rest_.empty()) {
     // Complete the unit that the last bytes began.
     const auto before = rest_.size();
-    const auto more = std::min(bytes.size(), UnitDecoder::longest);
+    const auto more = std::min(bytes.size(), UnitDecoder::max_size);
     rest_.insert(rest_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(more));
     const auto read = read_units(rest_, out);
     if (read == 0) return;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Labels of simulated events on their way: from eventsim-dvs to measures and files.
-#include <algorithm>
 #include <array>
 #include <numeric>
 #include <string>

@@ -183,20 +183,28 @@ TEST(Flicker, TakesAnEmptyBandAndInvertedThresholdsAsTheNearestValid) {
 }
 
 TEST(Flicker, DropsALampInTheBand) {
-  const auto kept = [](double frequency, double duty_cycle) {
+  const auto kept_in = [](unsigned min_frequency, double frequency, double duty_cycle,
+                          double sought_duty_cycle) {
     const Events events = lamp(frequency, duty_cycle, 1'000'000);
     eventcamera::FlickerFilter core(sensor);
-    return static_cast<double>(
-               filtered(core, events,
-                        {.min_frequency = 90, .max_frequency = 130, .duty_cycle = 0.5}, 100)
-                   .size()) /
+    return static_cast<double>(filtered(core, events,
+                                        {.min_frequency = min_frequency,
+                                         .max_frequency = 130,
+                                         .duty_cycle = sought_duty_cycle},
+                                        100)
+                                   .size()) /
            static_cast<double>(events.size());
+  };
+  const auto kept = [&](double frequency, double duty_cycle) {
+    return kept_in(90, frequency, duty_cycle, 0.5);
   };
   EXPECT_LT(kept(100, 0.5), 0.05);
   EXPECT_LT(kept(120, 0.5), 0.05);
   EXPECT_EQ(kept(100, 0.1), 1);
   EXPECT_EQ(kept(60, 0.5), 1);
   EXPECT_EQ(kept(300, 0.5), 1);
+  for (int tenths = 1; tenths <= 9; ++tenths)
+    EXPECT_LT(kept_in(100, 100, tenths / 10.0, tenths / 10.0), 0.05) << tenths;
 }
 
 TEST(HotPixels, AreThoseOfTheReference) {

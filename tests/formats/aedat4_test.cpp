@@ -547,7 +547,7 @@ TEST(Aedat4, BombsAreCappedAndSkipped) {
   const auto events = some_events(1000);
   for (const auto compression : {Aedat4Compression::lz4, Aedat4Compression::zstd}) {
     auto bytes = encoded({{346, 260}, "", compression, false, false}, events);
-    const std::vector<std::uint8_t> zeros(aedat4_largest_packet + 1);
+    const std::vector<std::uint8_t> zeros(aedat4_max_packet + 1);
     Bytes bomb(compression == Aedat4Compression::lz4
                    ? LZ4F_compressFrameBound(zeros.size(), nullptr)
                    : ZSTD_compressBound(zeros.size()));

@@ -149,7 +149,7 @@ inline Events flicker(const Events& events, const Flicker& sought, bool keeps_fl
       const double share =
           first.polarity() == eventcamera::Polarity::on ? sought.duty_cycle : 1 - sought.duty_cycle;
       const bool fits = length >= std::floor(share * period_of(sought.max_frequency)) &&
-                        length <= std::floor(share * period_of(sought.min_frequency));
+                        length <= std::ceil(share * period_of(sought.min_frequency));
       count = std::clamp(count + (fits ? 1 : -1), 0, 7);
       flickers = count >= (flickers ? sought.stop_threshold : sought.start_threshold);
       first = event;

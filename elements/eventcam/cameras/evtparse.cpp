@@ -85,7 +85,7 @@ constexpr int max_side = 2048;
 constexpr int format_of_caps = -1;
 
 /// A camera that was silent for longer may have started over.
-constexpr GstClockTime longest_gap = GST_SECOND * 3600 * 24;
+constexpr GstClockTime max_gap = GST_SECOND * 3600 * 24;
 
 const GEnumValue word_formats[] = {
     {format_of_caps, "That of the caps", "auto"},
@@ -119,7 +119,7 @@ struct Stats {
   gint64 clock_offset = 0;
   double clock_drift = 0;
   guint64 clock_corrections = 0;
-  GstClockTime longest_transfer = 0;
+  GstClockTime max_transfer = 0;
 };
 
 void add(WordScanner::Counts& sum, const WordScanner::Counts& before,
@@ -339,11 +339,12 @@ static void note_losses(GstEvtParse* self, const WordScanner::Counts& before, gu
                       buffers, guint64{counts.lost_bytes - before.lost_bytes},
                       guint64{counts.lost_events - before.lost_events});
   if (counts.lost_bytes > std::max<guint64>(counts.bytes, max_skipped))
-    priv.warn_of_no_words(self,
-                          {GST_STREAM_ERROR_DECODE,
-                           "Most of what the camera sends are no words of this format. Set format, "
-                           "width and height to those of the camera."},
-                          std::to_string(counts.lost_bytes) + " bytes are not valid");
+    priv.warn_of_no_words(
+        self,
+        {GST_STREAM_ERROR_DECODE,
+         "Most of the camera's data is not valid in this format. Set format, width "
+         "and height to those of the camera."},
+        std::to_string(counts.lost_bytes) + " bytes are not valid");
 }
 
 /// Widens the latency to that of the longest transfer.
@@ -357,14 +358,14 @@ static void note_transfer(GstEvtParse* self, GstClockTime arrival) {
     return;
   const auto first = static_cast<gint64>(nanoseconds(state.pieces.front().start)) + *offset;
   const auto length = std::clamp<gint64>(static_cast<gint64>(arrival) - first, 0, GST_SECOND);
-  const auto least = priv.settings.copy().latency;
+  const auto min_latency = priv.settings.copy().latency;
   bool has_grown = false;
   {
     const auto stats = priv.stats.lock();
     const auto longest = static_cast<GstClockTime>(length);
-    has_grown = longest > std::max(least, stats->longest_transfer);
-    // In steps, so that sinks adapt seldom.
-    if (has_grown) stats->longest_transfer = longest + longest / 8;
+    has_grown = longest > std::max(min_latency, stats->max_transfer);
+    // With a margin, so that the latency rarely changes.
+    if (has_grown) stats->max_transfer = longest + longest / 8;
   }
   if (!has_grown) return;
   GST_DEBUG_OBJECT(self, "a transfer takes %" GST_TIME_FORMAT, GST_TIME_ARGS(length));
@@ -384,7 +385,7 @@ static GstFlowReturn take_transfer(GstEvtParse* self, GstBuffer* buffer,
                                  .is_discontinuous = GST_BUFFER_IS_DISCONT(buffer) || lost > 0,
                                  .elapsed = {}};
   if (GST_CLOCK_TIME_IS_VALID(arrival) && GST_CLOCK_TIME_IS_VALID(last_arrival) &&
-      arrival >= last_arrival && arrival - last_arrival <= longest_gap)
+      arrival >= last_arrival && arrival - last_arrival <= max_gap)
     transfer.elapsed = static_cast<Microseconds>((arrival - last_arrival) / GST_USECOND);
   state.scanner->scan(transfer, state.pieces);
   if (!state.pieces.empty() && state.pieces.back().end > Chunker::max_time) {
@@ -472,9 +473,8 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
 static gboolean src_query(GstPad* pad, GstObject* parent, GstQuery* query) {
   auto& priv = *GST_EVT_PARSE(parent)->priv;
   if (GST_QUERY_TYPE(query) == GST_QUERY_LATENCY)
-    return answer_latency(
-        GST_CAT_DEFAULT, priv.sink, query,
-        std::max(priv.settings.copy().latency, priv.stats.copy().longest_transfer));
+    return answer_latency(GST_CAT_DEFAULT, priv.sink, query,
+                          std::max(priv.settings.copy().latency, priv.stats.copy().max_transfer));
   return gst_pad_query_default(pad, parent, query);
 }
 
@@ -546,7 +546,7 @@ static void gst_evt_parse_class_init(GstEvtParseClass* klass) {
   properties.add(
       &Settings::latency,
       g_param_spec_uint64("latency", "Latency",
-                          "Least time that live sinks wait for an event; they wait longer if a "
+                          "Minimum time that live sinks wait for an event; they wait longer if a "
                           "transfer takes longer (ns)",
                           0, GST_SECOND, Settings().latency, mutable_ready_flags));
   install_stats(

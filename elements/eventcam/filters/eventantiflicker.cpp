@@ -58,8 +58,8 @@ static void gst_event_anti_flicker_class_init(GstEventAntiFlickerClass* klass) {
                                    max_frequency, Settings().min_frequency, mutable_playing_flags));
   properties.add(&Settings::max_frequency,
                  g_param_spec_uint("max-frequency", "Maximum frequency",
-                                   "Upper end of the band of flicker (Hz); a lower one than "
-                                   "min-frequency counts as that",
+                                   "Upper end of the band of flicker (Hz); raised to "
+                                   "min-frequency if lower",
                                    min_frequency, max_frequency, Settings().max_frequency,
                                    mutable_playing_flags));
   properties.add(&Settings::duty_cycle,
@@ -75,8 +75,8 @@ static void gst_event_anti_flicker_class_init(GstEventAntiFlickerClass* klass) {
   properties.add(
       &Settings::stop_threshold,
       g_param_spec_uint("stop-threshold", "Stop threshold",
-                        "Count of phases below which a pixel no longer flickers; a higher "
-                        "one than start-threshold counts as that",
+                        "Count of phases below which a pixel no longer flickers; lowered to "
+                        "start-threshold if higher",
                         1, FlickerFilter::max_threshold, Settings().stop_threshold,
                         mutable_playing_flags));
   gst_element_class_set_static_metadata(GST_ELEMENT_CLASS(klass), "Anti-flicker filter", "Filter",

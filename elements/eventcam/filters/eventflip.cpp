@@ -5,8 +5,8 @@
  * @short_description: flips and rotates the sensor
  *
  * Flips or rotates the sensor in one of eight ways, like videoflip, and changes its size in the
- * caps if columns become rows. Other applications may know it as a #GstVideoDirection. The methods
- * `auto` and `custom` leave events as they are.
+ * caps if columns become rows. It implements #GstVideoDirection, so applications can control it
+ * like videoflip. The methods `auto` and `custom` leave events as they are.
  *
  * Events keep their order; those of one microsecond are therefore no longer in raster order.
  *

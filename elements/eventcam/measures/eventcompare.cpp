@@ -49,7 +49,6 @@
  * compare.reference  t. ! queue ! compare.candidate
  * ]|
  */
-#include <algorithm>
 #include <optional>
 
 #include "elements/eventcam/measures/report.hpp"

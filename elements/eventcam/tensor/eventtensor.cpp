@@ -51,7 +51,6 @@
 #include <gst/gst.h>
 
 #include <algorithm>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -111,7 +110,7 @@ struct Settings {
   gdouble overlap = 0;
 };
 
-TensorSettings tensor_settings(const Settings& settings) {
+TensorSettings tensor_settings_of(const Settings& settings) {
   return {.representation = settings.representation,
           .bins = static_cast<int>(settings.bins),
           .decay = settings.decay,
@@ -121,7 +120,7 @@ TensorSettings tensor_settings(const Settings& settings) {
           .type = settings.type};
 }
 
-WindowSettings window_settings(const Settings& settings) {
+WindowSettings window_settings_of(const Settings& settings) {
   const auto accumulation_time =
       settings.accumulation_time > 0 ? std::max(settings.accumulation_time, event_resolution) : 0;
   return {.events = settings.event_count,
@@ -134,14 +133,14 @@ WindowSettings window_settings(const Settings& settings) {
 struct State {
   State(const GstEventCameraInfo& input, const Settings& settings)
       : info(input),
-        tensor_of(tensor_settings(settings)),
-        windows_of(window_settings(settings)),
-        tensor(input.width, input.height, tensor_of),
-        windows(input.width, input.height, windows_of) {}
+        tensor_settings(tensor_settings_of(settings)),
+        window_settings(window_settings_of(settings)),
+        tensor(input.width, input.height, tensor_settings),
+        windows(input.width, input.height, window_settings) {}
 
   GstEventCameraInfo info;
-  TensorSettings tensor_of;
-  WindowSettings windows_of;
+  TensorSettings tensor_settings;
+  WindowSettings window_settings;
   EventTensor tensor;
   WindowQueue windows;
 };
@@ -204,7 +203,7 @@ static GstFlowReturn push_tensor(GstEventTensor* self, const WindowQueue::Window
   GST_BUFFER_FLAG_UNSET(acquired, GST_BUFFER_FLAG_DISCONT);
   if (std::exchange(priv.discontinuous, false))
     GST_BUFFER_FLAG_SET(acquired, GST_BUFFER_FLAG_DISCONT);
-  add_tensor_meta(acquired, tensor.shape(), priv.state->tensor_of);
+  add_tensor_meta(acquired, tensor.shape(), priv.state->tensor_settings);
   GST_LOG_OBJECT(
       self, "tensor of %" G_GSIZE_FORMAT " events from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
       window.events.size(), GST_TIME_ARGS(static_cast<GstClockTime>(window.start)),
@@ -296,7 +295,7 @@ static bool take_gap(GstEventTensor* self, GstEvent* event) {
   GstClockTime start = 0;
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
-  if (!priv.state || priv.state->windows_of.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
+  if (!priv.state || priv.state->window_settings.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
       start > max_time || duration > max_time - start)
     return false;
   priv.gap_result = guarded(self, no_memory, [&] {
@@ -309,7 +308,7 @@ static bool take_gap(GstEventTensor* self, GstEvent* event) {
 
 /// Framerate of the tensors: 0/1 if it varies or is not a fraction of integers.
 static std::pair<gint, gint> framerate_of(const State& state) {
-  const auto& windows = state.windows_of;
+  const auto& windows = state.window_settings;
   gint n = 0;
   gint d = 1;
   if (windows.events > 0) return {n, d};
@@ -326,7 +325,7 @@ static std::pair<gint, gint> framerate_of(const State& state) {
 
 /// Time from the start of a window to its end, as far as it is known.
 static GstClockTime latency_of(const State& state) {
-  const auto& windows = state.windows_of;
+  const auto& windows = state.window_settings;
   if (windows.events > 0) return 0;
   if (windows.duration > 0) return static_cast<GstClockTime>(windows.duration);
   if (state.info.fps_n <= 0) return 0;
@@ -339,7 +338,7 @@ static const GEnumValue* data_types() {
   static const GEnumValue values[] = {
       {static_cast<gint>(ElementType::float32), "32-bit floating point", "float32"},
       {static_cast<gint>(ElementType::float16), "16-bit floating point", "float16"},
-      {static_cast<gint>(ElementType::uint8), "unsigned bytes", "uint8"},
+      {static_cast<gint>(ElementType::uint8), "Unsigned bytes", "uint8"},
       {0, nullptr, nullptr}};
   return values;
 }
@@ -352,7 +351,7 @@ static OwnedCaps caps_of(const State& state) {
   return OwnedCaps(gst_caps_new_simple(
       "other/tensors", "format", G_TYPE_STRING, "static", "num_tensors", G_TYPE_INT, 1,
       "dimensions", G_TYPE_STRING, dimensions.c_str(), "types", G_TYPE_STRING,
-      data_types()[static_cast<int>(state.tensor_of.type)].value_nick, "framerate",
+      data_types()[static_cast<int>(state.tensor_settings.type)].value_nick, "framerate",
       GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
 }
 
@@ -361,8 +360,9 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   auto& priv = *self->priv;
   const Settings settings = priv.settings.copy();
   priv.state.reset();
-  const auto tensor_of = tensor_settings(settings);
-  const auto bytes = EventTensor::memory({info.width, info.height, tensor_of}, tensor_of);
+  const auto tensor_settings = tensor_settings_of(settings);
+  const auto bytes =
+      EventTensor::memory({info.width, info.height, tensor_settings}, tensor_settings);
   if (bytes > max_tensor_bytes) {
     GST_ELEMENT_ERROR(
         self, STREAM, FORMAT,
@@ -477,11 +477,11 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 static GType representation_type() {
   static const GEnumValue values[] = {
       {static_cast<gint>(Representation::voxel_grid),
-       "polarities, shared out to the two nearest of several instants", "voxel-grid"},
-      {static_cast<gint>(Representation::histogram), "numbers of OFF and of ON events",
+       "Polarities, shared out to the two nearest of several instants", "voxel-grid"},
+      {static_cast<gint>(Representation::histogram), "Numbers of OFF and of ON events",
        "histogram"},
       {static_cast<gint>(Representation::time_surface),
-       "decayed age of the last OFF and the last ON event", "time-surface"},
+       "Decayed age of the last OFF and the last ON event", "time-surface"},
       {static_cast<gint>(Representation::event_frame), "ON minus OFF events", "event-frame"},
       {0, nullptr, nullptr}};
   return enum_type("GstEventTensorRepresentation", values);
@@ -497,10 +497,10 @@ static GType decay_type() {
 
 static GType normalization_type() {
   static const GEnumValue values[] = {
-      {static_cast<gint>(Normalization::none), "as counted", "none"},
+      {static_cast<gint>(Normalization::none), "As counted", "none"},
       {static_cast<gint>(Normalization::mean_std),
-       "nonzero values get the mean 0 and the standard deviation 1, as for E2VID", "mean-std"},
-      {static_cast<gint>(Normalization::max), "the largest magnitude becomes 1", "max"},
+       "Nonzero values get the mean 0 and the standard deviation 1, as for E2VID", "mean-std"},
+      {static_cast<gint>(Normalization::max), "The largest magnitude becomes 1", "max"},
       {0, nullptr, nullptr}};
   return enum_type("GstEventTensorNormalization", values);
 }

@@ -163,7 +163,7 @@ class EventReader {
   guint64 corrupt_places_ = 0;        ///< already signalled by DISCONT and a warning
   WarnOnce warn_of_corruption_{event_reader_debug};
   WarnOnce warn_of_assumption_{event_reader_debug};
-  std::string told_left_out_;  ///< already told
+  std::string told_left_out_;  ///< the last note on it that was posted
   RepeatLevel dropped_level_;
 
   std::vector<std::unique_ptr<ReaderPad>> pads_;

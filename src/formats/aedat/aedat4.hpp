@@ -45,7 +45,7 @@ constexpr std::size_t aedat4_packet_header = 8;
 
 /// Size limit of payloads, compressed and decompressed. An uncompressed colour frame of 4096x2304
 /// pixels fits.
-constexpr std::size_t aedat4_largest_packet = std::size_t{64} << 20;
+constexpr std::size_t aedat4_max_packet = std::size_t{64} << 20;
 
 /// Times beyond this, in either direction, are corrupt: 36,000 years.
 constexpr Microseconds aedat4_last_time = Microseconds{1} << 60;

@@ -239,7 +239,7 @@ Aedat4Decoder::Place Aedat4Decoder::place_at(std::size_t offset) {
 bool Aedat4Decoder::begins_packet(std::span<const std::uint8_t> bytes) const {
   const auto id = little_endian<std::int32_t>(bytes.data());
   const auto size = little_endian<std::uint32_t>(bytes.data() + 4);
-  if (size < payload_head || size > aedat4_largest_packet) return false;
+  if (size < payload_head || size > aedat4_max_packet) return false;
   if (listed_ ? !stream_of(id) : id < 0 || id >= max_unlisted_streams) return false;
   const auto payload = bytes.subspan(aedat4_packet_header);
   if (compression_ != Aedat4Compression::none) return begins_frame(codec_of(compression_), payload);
@@ -292,7 +292,7 @@ bool Aedat4Decoder::read_packet() {
   std::size_t used = 0;
   if (compression_ != Aedat4Compression::none) {
     const auto decompressed = decompressor_.decompress(
-        codec_of(compression_), bytes.subspan(aedat4_packet_header, size), aedat4_largest_packet);
+        codec_of(compression_), bytes.subspan(aedat4_packet_header, size), aedat4_max_packet);
     if (decompressed) {
       content = decompressed->bytes;
       used = decompressed->used;

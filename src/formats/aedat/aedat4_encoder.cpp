@@ -60,7 +60,7 @@ void Aedat4Encoder::encode(const Frame& frame, std::vector<std::uint8_t>& out) {
   const auto row = static_cast<std::size_t>(frame.width) *
                    static_cast<std::size_t>(bytes_per_pixel(frame.format));
   if (!is_side(frame.width) || !is_side(frame.height) ||
-      row * static_cast<std::size_t>(frame.height) > aedat4_largest_packet / 2)
+      row * static_cast<std::size_t>(frame.height) > aedat4_max_packet / 2)
     throw std::invalid_argument("frame too large for AEDAT4");
   flush(out);
   builder_->Clear();

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
-#include <limits>
 
 #include "src/core/max_side.hpp"
 #include "src/formats/numpy/npy_decoder.hpp"

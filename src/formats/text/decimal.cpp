@@ -78,9 +78,10 @@ std::optional<Decimal> read_decimal(std::string_view text, int power) {
   if (digits >= most && !whole) return std::nullopt;
   if (digits > most) return std::nullopt;
   const auto next = static_cast<double>(digits) + 1;
-  constexpr double most_unsure = 0.0005;  // three more digits are always believed
-  const bool is_next = scale - rest <= scale * std::min(next * 0x1p-53, most_unsure);
-  const bool is_this = rest <= scale * std::min(static_cast<double>(digits) * 0x1p-53, most_unsure);
+  constexpr double max_uncertainty = 0.0005;  // three more digits are always believed
+  const bool is_next = scale - rest <= scale * std::min(next * 0x1p-53, max_uncertainty);
+  const bool is_this =
+      rest <= scale * std::min(static_cast<double>(digits) * 0x1p-53, max_uncertainty);
   const bool up = negative ? !whole && !is_this : is_next;
   const auto value = static_cast<std::int64_t>(digits + (up ? 1 : 0));
   return Decimal{negative ? -value : value, whole, has_fraction};
