@@ -42,6 +42,16 @@ GstSegment segment_of(GstAggregatorPad* pad) {
   return segment;
 }
 
+GstFlowReturn EventAggregator::pass(OwnedBuffer buffer) {
+  if (!is_gap(buffer.get())) return gst_aggregator_finish_buffer(element_, buffer.release());
+  // Without a segment, which GstAggregator sends with the first buffer, a gap has no meaning.
+  GstPad* const src = GST_AGGREGATOR_SRC_PAD(element_);
+  if (has_segment(src))
+    gst_pad_push_event(
+        src, gst_event_new_gap(GST_BUFFER_PTS(buffer.get()), GST_BUFFER_DURATION(buffer.get())));
+  return GST_FLOW_OK;
+}
+
 std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time) {
   const GstSegment segment = segment_of(pad);
   const guint64 running = gst_segment_to_running_time(&segment, GST_FORMAT_TIME, time);

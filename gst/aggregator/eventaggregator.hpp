@@ -63,6 +63,9 @@ class EventAggregator {
   /// The main pad; null if pads are requested.
   GstAggregatorPad* main_pad() const { return main_pad_; }
 
+  /// Pushes a buffer, or the GAP event for which GstAggregator has queued it.
+  GstFlowReturn pass(OwnedBuffer buffer);
+
   /// Warns about skipped events.
   void warn(EventFault fault, GstBuffer* buffer) { faults_.warn(element_, fault, buffer); }
 
@@ -79,6 +82,11 @@ class EventAggregator {
 /// Segment of a pad. It starts at 0 if none was received, because live sources send theirs with the
 /// first buffer.
 GstSegment segment_of(GstAggregatorPad* pad);
+
+/// True if GstAggregator has queued a buffer in place of a GAP event.
+inline bool is_gap(GstBuffer* buffer) {
+  return GST_BUFFER_FLAG_IS_SET(buffer, GST_BUFFER_FLAG_GAP) && gst_buffer_get_size(buffer) == 0;
+}
 
 /// Running time of `time` on a pad; none outside its segment.
 std::optional<GstClockTime> running_time(GstAggregatorPad* pad, GstClockTime time);

@@ -3,6 +3,8 @@
 #include <gst/app/gstappsrc.h>
 
 #include <algorithm>
+#include <atomic>
+#include <ctime>
 #include <tuple>
 
 #include "src/core/label.hpp"
@@ -424,7 +426,9 @@ TEST(Merge, WaitsForTheSecondStream) {
   gst_harness_set_live(first.get(), FALSE);
   gst_harness_set_src_caps_str(first.get(), small);
   gst_harness_push(first.get(), buffer_of(0, {on(1, 0, 1)}, 10 * ms));
-  g_usleep(100'000);
+  const std::clock_t before = std::clock();
+  g_usleep(300'000);
+  EXPECT_LT(std::clock() - before, CLOCKS_PER_SEC / 10) << "it waits without a pause";
   EXPECT_EQ(gst_harness_buffers_in_queue(first.get()), 0U);
   const Owned<GstHarness> second(gst_harness_new_with_element(first->element, "sink_1", nullptr));
   gst_harness_set_live(second.get(), FALSE);
@@ -433,6 +437,14 @@ TEST(Merge, WaitsForTheSecondStream) {
   const Buffer buffer(gst_harness_pull(first.get()));
   ASSERT_TRUE(buffer);
   EXPECT_EQ(events_of(buffer.get()).size(), 2U);
+}
+
+TEST(Merge, GoesOnWithALiveStreamAlone) {
+  Player player(
+      "videotestsrc is-live=true pattern=ball num-buffers=15 ! video/x-raw, width=64, height=48, "
+      "framerate=50/1 ! eventsim-frame ! queue ! m.sink_0  eventmerge name=m");
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_GT(player.events.size(), 100U);
 }
 
 TEST(Merge, MergesLiveStreams) {
@@ -453,7 +465,7 @@ TEST(Merge, MergesLiveStreams) {
 TEST(Merge, GoesOnWithoutALateLiveStream) {
   Player player(
       "videotestsrc is-live=true pattern=ball ! video/x-raw, width=64, height=48, "
-      "framerate=50/1 ! eventsim-frame ! queue ! m.sink_0  appsrc name=late is-live=true "
+      "framerate=10/1 ! eventsim-frame ! queue ! m.sink_0  appsrc name=late is-live=true "
       "format=time "
       "caps=\"application/x-event-camera, format=XYTP, width=8, height=4\" ! queue ! m.sink_1  "
       "eventmerge "
@@ -464,6 +476,31 @@ TEST(Merge, GoesOnWithoutALateLiveStream) {
     return done();
   };
   ASSERT_TRUE(wait_until([&] { return player.stat("m", "events") > 100; }));
+  // Buffers keep the latency that is reported, however late the other stream is.
+  struct Lateness {
+    GstElement* pipeline;
+    std::atomic<GstClockTimeDiff> min = G_MAXINT64;
+  } lateness{player.get()};
+  GstPad* const src = gst_element_get_static_pad(player["m"], "src");
+  const auto measure = +[](GstPad*, GstPadProbeInfo* info, gpointer data) {
+    auto& found = *static_cast<Lateness*>(data);
+    const GstClockTime now = gst_element_get_current_running_time(found.pipeline);
+    found.min = std::min(found.min.load(),
+                         GST_CLOCK_DIFF(GST_BUFFER_PTS(GST_PAD_PROBE_INFO_BUFFER(info)), now));
+    return GST_PAD_PROBE_OK;
+  };
+  const gulong probe =
+      gst_pad_add_probe(src, GST_PAD_PROBE_TYPE_BUFFER, measure, &lateness, nullptr);
+  EXPECT_TRUE(wait_until([&] { return lateness.min < G_MAXINT64; }));
+  g_usleep(300'000);
+  gst_pad_remove_probe(src, probe);
+  GstQuery* const query = gst_query_new_latency();
+  ASSERT_TRUE(gst_pad_query(src, query));
+  GstClockTime latency = 0;
+  gst_query_parse_latency(query, nullptr, &latency, nullptr);
+  gst_query_unref(query);
+  EXPECT_LT(lateness.min, static_cast<GstClockTimeDiff>(latency + 50 * GST_MSECOND));
+  gst_object_unref(src);
   gst_app_src_push_buffer(GST_APP_SRC(player["late"]), buffer_of(0, {on(1, 1, 1)}, 10 * ms));
   EXPECT_TRUE(wait_until([&] { return player.stat("m", "late-events") == 1; }));
   const auto before = player.stat("m", "events");

@@ -71,7 +71,6 @@ class EventOverlay final : public EventAggregator {
   bool take_buffer(GstBuffer* buffer, GstClockTime end);
   bool take_events_until(GstClockTime end);
   GstFlowReturn draw(const EventInterval& interval, GstBuffer* buffer);
-  GstFlowReturn push_gap(GstBuffer* gap);
   GstFlowReturn take_frame(const std::optional<EventInterval>& interval, bool timed_out);
 
   GstAggregatorPad* const events_pad_ = pad("event_sink");
@@ -174,15 +173,6 @@ GstFlowReturn EventOverlay::draw(const EventInterval& interval, GstBuffer* buffe
   return GST_FLOW_OK;
 }
 
-/// Sends the GAP event for which GstAggregator has queued an empty buffer. Without a segment, which
-/// it sends with the first frame, a gap has no meaning.
-GstFlowReturn EventOverlay::push_gap(GstBuffer* gap) {
-  GstPad* const src = GST_AGGREGATOR_SRC_PAD(element());
-  if (!has_segment(src)) return GST_FLOW_OK;
-  gst_pad_push_event(src, gst_event_new_gap(GST_BUFFER_PTS(gap), GST_BUFFER_DURATION(gap)));
-  return GST_FLOW_OK;
-}
-
 /// Draws on the first queued frame and pushes it. May throw.
 GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& interval,
                                        bool timed_out) {
@@ -196,8 +186,7 @@ GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& inter
     if (!take_events_until(interval->end) && !timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
   OwnedBuffer out(gst_buffer_make_writable(gst_aggregator_pad_pop_buffer(main_pad())));
-  if (GST_BUFFER_FLAG_IS_SET(out.get(), GST_BUFFER_FLAG_GAP) && gst_buffer_get_size(out.get()) == 0)
-    return push_gap(out.get());
+  if (is_gap(out.get())) return pass(std::move(out));
   GST_LOG_OBJECT(main_pad(),
                  "frame at %" GST_TIME_FORMAT "; events are known until %" GST_TIME_FORMAT,
                  GST_TIME_ARGS(GST_BUFFER_PTS(out.get())), GST_TIME_ARGS(known_));
@@ -205,7 +194,7 @@ GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& inter
     const GstFlowReturn result = draw(*interval, out.get());
     if (result != GST_FLOW_OK) return result;
   }
-  return gst_aggregator_finish_buffer(element(), out.release());
+  return pass(std::move(out));
 }
 
 GstFlowReturn EventOverlay::aggregate(bool timed_out) {

@@ -109,6 +109,7 @@ class EventMerge final : public EventAggregator {
   Guarded<std::map<std::string, SensorPosition>> released;
 
  private:
+  bool wait_for_streams(std::size_t linked);
   bool load(const OwnedAggregatorPad& pad);
   bool load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer, Microseconds length);
   void raise_latency(GstClockTime needed);
@@ -125,10 +126,33 @@ class EventMerge final : public EventAggregator {
   GstClockTime latency_ = 0;
   bool segment_chosen_ = false;
   bool segment_sent_ = false;
+  gint64 waiting_since_ = 0;  // for streams, monotonic time in microseconds; 0 = it does not
   WarnOnce warn_of_late_{GST_CAT_DEFAULT};
+  WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
 
 /* input */
+
+/// Pauses, since GstAggregator does not wait for pads that are not there. True once live streams
+/// have been waited for long enough.
+bool EventMerge::wait_for_streams(std::size_t linked) {
+  constexpr gint64 pause = 10'000;
+  constexpr gint64 patience = G_USEC_PER_SEC;  // streams of a bin that decodes come late
+  const GstClockTime latency = gst_aggregator_get_latency(element());
+  const GstClockTime now = gst_element_get_current_running_time(GST_ELEMENT(element()));
+  if (GST_CLOCK_TIME_IS_VALID(latency) && GST_CLOCK_TIME_IS_VALID(now) &&
+      now >= next_time() + latency)
+    return true;
+  if (waiting_since_ == 0) waiting_since_ = g_get_monotonic_time();
+  if (g_get_monotonic_time() - waiting_since_ > patience)
+    warn_of_missing_(element(),
+                     {GST_CORE_ERROR_PAD,
+                      "Waiting for another stream to merge: link one, or set "
+                      "min-streams to the number of streams."},
+                     std::to_string(linked) + " pads are linked");
+  g_usleep(pause);
+  return false;
+}
 
 /// A live stream arrives so much later than the interval that it covers starts.
 void EventMerge::raise_latency(GstClockTime needed) {
@@ -270,7 +294,10 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
       waiting = true;
   }
   if (inputs.empty() && !waiting) return GST_FLOW_EOS;
-  if (!segment_chosen_ && pads.size() < settings.copy().min_streams) waiting = true;
+  if (!segment_chosen_ && pads.size() < settings.copy().min_streams) {
+    waiting = true;
+    if (!inputs.empty()) timed_out = timed_out || wait_for_streams(pads.size());
+  }
   if (inputs.empty() || (waiting && !timed_out)) return GST_AGGREGATOR_FLOW_NEED_DATA;
   if (!std::exchange(segment_chosen_, true)) choose_segment(pads);
   const auto interval = merger_.next(inputs);
@@ -286,7 +313,8 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
   return result;
 }
 
-/// Live streams are waited for until the end of the shortest interval that is known.
+/// Live streams are waited for until the latency, which covers an interval, has passed since the
+/// start of the first interval that is known.
 GstClockTime EventMerge::next_time() {
   GstClockTime next = GST_CLOCK_TIME_NONE;
   for (const auto& pad : numbered_pads(element())) {
@@ -294,7 +322,7 @@ GstClockTime EventMerge::next_time() {
     const auto interval = buffer ? interval_of(buffer.get()) : std::nullopt;
     if (!buffer) continue;
     const auto start = interval ? running_time(pad.get(), interval->start) : std::nullopt;
-    next = std::min(next, start ? *start + (interval->end - interval->start) : 0);
+    next = std::min(next, start.value_or(0));
   }
   return next;
 }
@@ -365,6 +393,7 @@ void EventMerge::flush() {
   merger_.restart();
   segment_chosen_ = false;
   segment_sent_ = false;
+  waiting_since_ = 0;
 }
 
 void EventMerge::stop() {
@@ -374,6 +403,7 @@ void EventMerge::stop() {
   latency_ = 0;
   gst_aggregator_set_latency(element(), latency_, latency_);
   warn_of_late_.reset();
+  warn_of_missing_.reset();
   *counts_.lock() = {};
 }
 

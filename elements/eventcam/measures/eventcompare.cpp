@@ -270,7 +270,7 @@ GstFlowReturn EventCompare::take_next() {
     if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
     if (comparing && behind == StreamRole::candidate) compare(StreamRole::candidate, buffer.get());
   }
-  return gst_aggregator_finish_buffer(element(), gst_aggregator_pad_pop_buffer(main_pad()));
+  return pass(OwnedBuffer(gst_aggregator_pad_pop_buffer(main_pad())));
 }
 
 GstFlowReturn EventCompare::aggregate(bool) {
@@ -304,6 +304,12 @@ bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   auto& sensor = sensors_[pad == main_pad() ? StreamRole::candidate : StreamRole::reference];
   const SensorSize next{info.width, info.height};
   if (sensor == next) return true;
+  for (GstAggregatorPad* other : {pads_[StreamRole::reference], pads_[StreamRole::candidate]})
+    if (!gst_pad_is_linked(GST_PAD(other)))
+      GST_ELEMENT_WARNING(
+          element(), CORE, PAD,
+          ("Nothing to compare with: link a stream to the pad \"%s\".", GST_OBJECT_NAME(other)),
+          ("the pad \"%s\" is not linked", GST_OBJECT_NAME(other)));
   const bool has_begun = comparison_.has_value();
   if (has_begun && !concluded_) conclude();
   forget();
