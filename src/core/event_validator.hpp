@@ -6,7 +6,7 @@
 #include <limits>
 #include <span>
 
-#include "src/core/event.hpp"
+#include "src/core/label.hpp"
 
 namespace eventcamera {
 
@@ -17,17 +17,21 @@ class EventValidator {
 
   /// Calls take() for each event; event times are relative to `start`. An event that is earlier
   /// than the previous one, or than passed(), gets that time; events outside the sensor are
-  /// dropped. Returns the number of dropped events.
+  /// dropped. `labels` has one for each event, or is empty. Returns the number of dropped events.
   template <class Take>
-  std::size_t take(std::span<const Event> events, Microseconds start, const Take& take) {
+  std::size_t take(std::span<const Event> events, Microseconds start, const Take& take,
+                   std::span<const Label> labels = {}) {
     std::size_t dropped = 0;
-    for (const auto& event : events) {
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const Event& event = events[i];
       if (event.x >= width_ || event.y() >= height_) {
         ++dropped;
         continue;
       }
       earliest_ = std::max(earliest_, start + event.t);
-      take(AbsoluteEvent{earliest_, event.x, event.y_p});
+      AbsoluteEvent taken{earliest_, event.x, event.y_p};
+      if (!labels.empty()) set_label(taken, labels[i]);
+      take(taken);
     }
     return dropped;
   }

@@ -48,6 +48,11 @@ constexpr Label label_of(const AbsoluteEvent& event) {
   return {.object_class = event.object_class, .cause = event.cause};
 }
 
+constexpr void set_label(AbsoluteEvent& event, const Label& label) {
+  event.object_class = label.object_class;
+  event.cause = label.cause;
+}
+
 /// Sorted events of an interval and, if they are labelled, a label for each.
 struct LabelledEvents {
   std::span<Event> events;

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
-#include <span>
 
 #include "src/core/label.hpp"
 
@@ -19,11 +18,9 @@ class CauseCounts {
                                         Cause::shot_noise, Cause::hot_pixel, Cause::exposure_pulse};
 
   /// Causes that this version does not know count as unknown.
-  void add(std::span<const Label> labels) {
-    for (const auto& label : labels) {
-      const auto cause = static_cast<std::size_t>(label.cause);
-      ++counts_[cause < causes.size() ? cause : 0];
-    }
+  void add(Cause cause) {
+    const auto index = static_cast<std::size_t>(cause);
+    ++counts_[index < causes.size() ? index : 0];
   }
 
   std::uint64_t operator[](Cause cause) const { return counts_[static_cast<std::size_t>(cause)]; }

@@ -31,14 +31,16 @@ Nanoseconds StreamComparison::end() const {
 }
 
 std::size_t StreamComparison::add(StreamRole role, std::span<const Event> events, Nanoseconds start,
-                                  Nanoseconds end) {
+                                  Nanoseconds end, std::span<const Label> labels) {
   auto& arriving = arriving_[role];
   if (!arriving.start) {
     arriving.start = start;
     arriving.end = start;
   }
+  arriving.is_labelled |= !labels.empty();
   const std::size_t skipped = arriving.validator.take(
-      events, start / 1000, [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); });
+      events, start / 1000, [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); },
+      labels);
   arriving.end = std::max(arriving.end, end);
   if (this->start()) take_until(this->end() / 1000);
   return skipped;
@@ -72,6 +74,7 @@ void StreamComparison::take_until(Microseconds end) {
     similarity_.add(role, event);
     if (role == StreamRole::reference) ceiling_.add(event);
     rates_.add(role, event.t);
+    if (arriving_[role].is_labelled) causes_[role].add(event.cause);
   }
   for (const auto role : both_roles) {
     // Not in every call, because a long buffer may be processed in many short pieces.

@@ -8,6 +8,8 @@
 
 #include "src/core/event.hpp"
 #include "src/core/event_validator.hpp"
+#include "src/core/label.hpp"
+#include "src/measure/cause_counts.hpp"
 #include "src/measure/event_rates.hpp"
 #include "src/measure/event_statistics.hpp"
 #include "src/measure/noise_ceiling.hpp"
@@ -34,20 +36,24 @@ class StreamComparison {
   /// The stream that lags behind; its events are needed next.
   StreamRole behind() const;
 
-  /// Adds the sorted events of [start, end] of one stream, with times relative to `start`. Returns
-  /// the number of events skipped because they lie outside the sensor.
+  /// Adds the sorted events of [start, end] of one stream, with times relative to `start`, and
+  /// their labels, if they have any. Returns the number of events skipped because they lie outside
+  /// the sensor.
   std::size_t add(StreamRole role, std::span<const Event> events, Nanoseconds start,
-                  Nanoseconds end);
+                  Nanoseconds end, std::span<const Label> labels = {});
 
   ComparisonFigures figures() const;
   const EventMap& map(StreamRole role) const { return similarity_.statistics(role).map(); }
   const RateCurve& rates() const { return rates_; }
+  /// Causes of the events in the time that both streams cover; none if they are not labelled.
+  const CauseCounts& causes(StreamRole role) const { return causes_[role]; }
 
  private:
   struct Arriving {
     EventValidator validator;
     std::vector<AbsoluteEvent> waiting{};  ///< events waiting for the other stream
     std::size_t taken = 0;  ///< number of events at the front of `waiting` already processed
+    bool is_labelled = false;
     std::optional<Nanoseconds> start{};
     Nanoseconds end = 0;
   };
@@ -62,6 +68,7 @@ class StreamComparison {
   StreamSimilarity similarity_;
   NoiseCeiling ceiling_;
   RateCurve rates_;
+  PerRole<CauseCounts> causes_;
   bool begun_ = false;
 };
 

@@ -399,6 +399,24 @@ TEST(Comparison, HasNothingToSayOfStreamsThatDoNotMeet) {
   EXPECT_EQ(figures.streams[StreamRole::candidate].events, 0U);
 }
 
+TEST(Comparison, CountsCausesInTheCommonTimeOnly) {
+  StreamComparison comparison(4, 4);
+  std::vector<Event> events;
+  for (std::uint32_t t = 500; t < 20'000; t += 1000)
+    events.push_back(Event::at(1, 1, t, Polarity::on));
+  const std::vector<Label> light(events.size(), {.cause = Cause::light});
+  comparison.add(StreamRole::reference, events, 0, 20'000'000, light);
+  EXPECT_EQ(comparison.causes(StreamRole::reference).all(), 0U);
+  comparison.add(StreamRole::candidate, std::span(events).first(10), 5'000'000, 15'000'000,
+                 std::span(light).first(10));
+  for (const auto role : both_roles) {
+    EXPECT_EQ(comparison.causes(role)[Cause::light], 10U);
+    EXPECT_EQ(comparison.causes(role).all(), 10U);
+  }
+  comparison.add(StreamRole::candidate, std::span(events).first(10), 20'000'000, 30'000'000);
+  EXPECT_EQ(comparison.causes(StreamRole::reference).all(), 15U);
+}
+
 TEST(Comparison, SurvivesEventsBeyondThePictureAndOutOfOrder) {
   StreamComparison comparison(4, 4);
   const std::vector events = {Event::at(4, 0, 5, Polarity::on), Event::at(0, 4, 5, Polarity::on),

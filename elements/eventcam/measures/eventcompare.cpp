@@ -64,7 +64,6 @@ GST_DEBUG_CATEGORY_STATIC(event_compare_debug);
 #define GST_CAT_DEFAULT event_compare_debug
 
 using eventcamera::both_roles;
-using eventcamera::CauseCounts;
 using eventcamera::Classification;
 using eventcamera::PerRole;
 using eventcamera::SensorSize;
@@ -84,7 +83,7 @@ class EventCompare final : public EventAggregator {
 
   bool start() override { return can_report(element(), settings.copy()); }
   void stop() override;
-  void flush() override { forget(); }
+  void flush() override { comparison_.reset(); }
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   GstFlowReturn aggregate(bool timed_out) override;
 
@@ -93,7 +92,6 @@ class EventCompare final : public EventAggregator {
  private:
   bool is_over(StreamRole role) const;
   bool waits_for_reference() const;
-  void forget();
   bool begin();
   bool has_one_size() const;
   void compare(StreamRole role, GstBuffer* buffer);
@@ -105,7 +103,6 @@ class EventCompare final : public EventAggregator {
   // Accessed by the source pad's thread only, or while there is none.
   PerRole<std::optional<SensorSize>> sensors_;
   std::optional<StreamComparison> comparison_;  // set once both sensors are known
-  PerRole<CauseCounts> causes_;                 // of the labelled events in it
   bool concluded_ = true;                       // no events since the last report
 };
 
@@ -161,7 +158,7 @@ GstStructure* structure_of(const Classification& classification) {
                            G_TYPE_DOUBLE, classification.precision, nullptr);
 }
 
-GstStructure* structure_of(const StreamComparison& comparison, const PerRole<CauseCounts>& causes) {
+GstStructure* structure_of(const StreamComparison& comparison) {
   const auto figures = comparison.figures();
   GstStructure* structure =
       gst_structure_new("eventcompare", "start", G_TYPE_INT64, gint64{figures.start}, "end",
@@ -169,7 +166,7 @@ GstStructure* structure_of(const StreamComparison& comparison, const PerRole<Cau
   for (const auto role : both_roles) {
     GstStructure* stream = gst_structure_new_empty(name_of(role));
     put_figures(stream, figures.streams[role]);
-    put_causes(stream, causes[role]);
+    put_causes(stream, comparison.causes(role));
     put_structure(structure, name_of(role), stream);
   }
   const auto& similarity = figures.similarity;
@@ -183,8 +180,8 @@ GstStructure* structure_of(const StreamComparison& comparison, const PerRole<Cau
   put_structure(ceiling, "matches", matches_of(figures.ceiling.matches));
   put_structure(structure, "noise-ceiling", ceiling);
   put_structure(structure, "rate-curve", curve_of(comparison.rates()));
-  const auto& reference = causes[StreamRole::reference];
-  const auto& candidate = causes[StreamRole::candidate];
+  const auto& reference = comparison.causes(StreamRole::reference);
+  const auto& candidate = comparison.causes(StreamRole::candidate);
   if (reference.all() > 0 && candidate.all() > 0)
     put_structure(structure, "classification",
                   structure_of(Classification::of(reference, candidate)));
@@ -198,7 +195,7 @@ void EventCompare::conclude() {
   const auto& comparison = comparison_ ? *comparison_ : nothing;
   GST_DEBUG_OBJECT(element(), "concluding%s",
                    comparison_ ? "" : ": the caps of one of the streams never came");
-  report(element(), settings.copy(), structure_of(comparison, causes_), [&] {
+  report(element(), settings.copy(), structure_of(comparison), [&] {
     return eventcamera::draw_maps(comparison.map(StreamRole::reference),
                                   comparison.map(StreamRole::candidate));
   });
@@ -220,14 +217,8 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   const GstSegment segment = segment_of(pads_[role]);
   const auto skipped =
       comparison_->add(role, mapped.events(), stream_time(segment, interval->start),
-                       stream_time(segment, interval->end));
-  causes_[role].add(labels_of(buffer));
+                       stream_time(segment, interval->end), labels_of(buffer));
   if (skipped > 0) warn(EventFault::beyond_sensor, buffer);
-}
-
-void EventCompare::forget() {
-  comparison_.reset();
-  causes_ = {};
 }
 
 bool EventCompare::is_over(StreamRole role) const {
@@ -312,7 +303,7 @@ bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
           ("the pad \"%s\" is not linked", GST_OBJECT_NAME(other)));
   const bool has_begun = comparison_.has_value();
   if (has_begun && !concluded_) conclude();
-  forget();
+  flush();
   sensor = next;
   // At once, because aggregate() waits for both streams, and a source whose size changes may wait
   // for one of them. Before the comparison, caps may change until there are events.
@@ -321,7 +312,7 @@ bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
 
 void EventCompare::stop() {
   if (comparison_ && !concluded_) conclude();
-  forget();
+  flush();
   sensors_ = {};
 }
 

@@ -211,15 +211,18 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
     self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
+  const auto labels = labels_of(buffer);
   const std::size_t skipped = measurement.validator.take(
-      mapped.events(), start / 1000, [&](const eventcamera::AbsoluteEvent& event) {
+      mapped.events(), start / 1000,
+      [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
         const auto interval = measurement.last_times.take(event);
-        measurement.cumulative.statistics.add(event, interval);
-        measurement.recent.statistics.add(event, interval);
-      });
-  for (auto* part : {&measurement.cumulative, &measurement.recent})
-    part->causes.add(labels_of(buffer));
+        for (auto* part : {&measurement.cumulative, &measurement.recent}) {
+          part->statistics.add(event, interval);
+          if (!labels.empty()) part->causes.add(event.cause);
+        }
+      },
+      labels);
   if (skipped > 0) self->priv->faults.warn(self, EventFault::beyond_sensor, buffer);
 }
 
