@@ -10,29 +10,40 @@
 
 namespace eventcamera {
 
-LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
-                                      const Settings& settings) {
+void HotPixelFilter::follow(const Settings& settings) {
   const Microseconds period = settings.learning_period / 1000;
-  if (settings.learn && learning_end_ == never && !events.events.empty())
-    learning_end_ = start + events.events.front().t + period;
-  if (!settings.learn) learning_end_ = never;
   const auto min_count = static_cast<std::uint32_t>(std::clamp(
       std::ceil(settings.min_rate * static_cast<double>(period) / 1e6), 1.0, double{count_bits}));
+  if (settings.learn == learns_ && period == period_ && min_count == min_count_) return;
+  forget();
+  learns_ = settings.learn;
+  period_ = period;
+  min_count_ = min_count;
+}
+
+LabelledEvents HotPixelFilter::filter(LabelledEvents events, Microseconds start,
+                                      const Settings& settings) {
+  follow(settings);
+  if (learns_ && learning_end_ == never && !events.events.empty())
+    learning_end_ = start + events.events.front().t + period_;
   const auto pixel_of = [origin = reinterpret_cast<std::byte*>(pixels_.row(0)),
                          stride = pixels_.stride()](const Event& event) {
     return reinterpret_cast<std::uint32_t*>(origin + event.y() * stride) + event.x;
   };
   const auto prefetch = [pixel_of](const Event& event) { __builtin_prefetch(pixel_of(event), 1); };
+  const std::uint32_t counted = learns_ ? 1 : 0;
+  const std::uint32_t min_count = min_count_;
   Microseconds end = learning_end_;
   return keep_if_prefetched(events, prefetch, [&](const Event& event) {
     const Microseconds time = start + event.t;
     if (time >= end) [[unlikely]] {
-      learn(settings);
+      learn(settings.ratio);
       // Periods without any event say nothing of hot pixels.
-      learning_end_ += (1 + (time - learning_end_) / period) * period;
+      learning_end_ += (1 + (time - learning_end_) / period_) * period_;
       end = learning_end_;
     }
-    const std::uint32_t pixel = ++*pixel_of(event);
+    std::uint32_t& pixel = *pixel_of(event);
+    pixel += counted;
     if ((pixel & count_bits) == min_count) [[unlikely]]
       frequent_.push_back({event.x, static_cast<std::uint16_t>(event.y())});
     return (pixel & hot_bit) == 0;
@@ -53,11 +64,10 @@ std::uint32_t HotPixelFilter::median_around(int x, int y) const {
   return *middle;
 }
 
-void HotPixelFilter::learn(const Settings& settings) {
+void HotPixelFilter::learn(double ratio) {
   std::vector<PixelPosition> hot;
   for (const auto& [x, y] : frequent_)
-    if ((pixels_.at(x, y) & count_bits) >= settings.ratio * median_around(x, y))
-      hot.push_back({x, y});
+    if ((pixels_.at(x, y) & count_bits) >= ratio * median_around(x, y)) hot.push_back({x, y});
   std::ranges::sort(hot, {}, [](const auto& pixel) { return std::pair(pixel.y, pixel.x); });
   clear_counts();
   set_hot_pixels(std::move(hot));

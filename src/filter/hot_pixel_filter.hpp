@@ -41,7 +41,8 @@ class HotPixelFilter {
   static constexpr std::uint32_t hot_bit = std::uint32_t{1} << 31;
   static constexpr std::uint32_t count_bits = hot_bit - 1;
 
-  void learn(const Settings& settings);
+  void follow(const Settings& settings);
+  void learn(double ratio);
   void clear_counts();
   std::uint32_t median_around(int x, int y) const;
 
@@ -49,8 +50,12 @@ class HotPixelFilter {
   Image<std::uint32_t> pixels_;
   std::vector<PixelPosition> frequent_;  ///< that fired at the minimum rate or more
   std::vector<PixelPosition> hot_;
-  Microseconds learning_end_ = never;
   static constexpr Microseconds never = std::numeric_limits<Microseconds>::max();
+  Microseconds learning_end_ = never;
+  // Settings of the learning period; when they change, another one begins.
+  bool learns_ = false;
+  Microseconds period_ = 0;
+  std::uint32_t min_count_ = 0;
 };
 static_assert(Filter<HotPixelFilter>);
 

@@ -12,8 +12,8 @@ namespace eventcamera {
 
 /// Limits the event rate. Every n-th event is kept, with n from the number of events in the last
 /// reference period or so far in this one, so what is dropped is spread over the picture and over
-/// the period. A flood that begins within a period keeps more events than its share; later periods
-/// pay back, at most half of theirs.
+/// the period. A flood that begins within a period keeps up to half more events than its share;
+/// later periods pay back, at most half of theirs.
 class RateFilter {
  public:
   struct Settings {
@@ -34,8 +34,9 @@ class RateFilter {
       ++received_;
       // One is added for each event that may pass.
       share_ += std::min(1.0, budget_ / std::max(expected_, received_));
-      const bool is_kept = share_ >= 1;
-      share_ -= is_kept ? 1 : 0;
+      const bool is_due = share_ >= 1;
+      share_ -= is_due ? 1 : 0;
+      const bool is_kept = is_due && kept_ < budget_ + allowed / 2;
       kept_ += is_kept ? 1 : 0;
       return is_kept;
     });

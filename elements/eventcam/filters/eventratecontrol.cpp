@@ -7,8 +7,8 @@
  * Drops events where more than #GstEventRateControl:max-rate arrive. Every n-th event is kept, so
  * what is left is spread over the picture and over time. n follows from the events of the last
  * #GstEventRateControl:reference-period, or of this one if there are already more. The first period
- * of a flood keeps more than its share; the next ones pay back, so the average is at most
- * #GstEventRateControl:max-rate. Where events come in bursts, as from simulators that put all
+ * of a flood keeps up to half more than its share; the next ones pay back, so the average is at
+ * most #GstEventRateControl:max-rate. Where events come in bursts, as from simulators that put all
  * events of a frame at one time, the reference period should be at least the time between bursts.
  *
  * Nothing is delayed. The property `stats` counts what was dropped. The rate is forgotten after a
