@@ -163,6 +163,26 @@ TEST(Flip, FollowsEveryChange) {
     }
 }
 
+/// A direction that is set after the caps were negotiated, here by downstream, is that of the next
+/// buffer.
+TEST(Flip, KeepsTheEventsOfTheBufferAtAChange) {
+  Harness h("eventflip video-direction=90r");
+  GstPad* const src = gst_element_get_static_pad(h.element(), "src");
+  const auto change = +[](GstPad*, GstPadProbeInfo* info, gpointer element) {
+    if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_CAPS)
+      g_object_set(element, "video-direction", GST_VIDEO_ORIENTATION_IDENTITY, nullptr);
+    return GST_PAD_PROBE_OK;
+  };
+  const gulong probe =
+      gst_pad_add_probe(src, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, change, h.element(), nullptr);
+  h.caps(sensor);
+  EXPECT_EQ(passed(h, {on(1, 0)}).size(), 1U);
+  gst_pad_remove_probe(src, probe);
+  gst_object_unref(src);
+  EXPECT_EQ(passed(h, {on(1, 0)}), (Pixels{{1, 0}}));
+  EXPECT_EQ(stat_of(h.element(), "dropped-events"), 0U);
+}
+
 TEST(Scale, HasTheSizeOfTheCapsDownstream) {
   Harness h("eventscale");
   h.caps(sensor, "application/x-event-camera, width=4, height=2");

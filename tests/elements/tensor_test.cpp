@@ -203,6 +203,15 @@ TEST_F(Tensor, FollowsNewCaps) {
   EXPECT_NE(h->out_caps().find("dimensions=(string)64:48:1:1"), std::string::npos);
 }
 
+TEST_F(Tensor, GoesOnWithCapsOfTheSameSize) {
+  begin("accumulation-time=50000000");
+  push_columns(0, 2);
+  gst_harness_set_src_caps_str(
+      h->get(), "application/x-event-camera, format=XYTP, width=32, height=24, framerate=50/1");
+  push_columns(3, 4);
+  expect_tensor(0, 50 * ms, 0, 10);
+}
+
 TEST_F(Tensor, RefusesToBeHuge) {
   h.emplace("eventtensor bins=256");
   gst_harness_set_src_caps_str(

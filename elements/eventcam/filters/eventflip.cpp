@@ -60,13 +60,15 @@ class Flip final : public EventFilter {
   void start(SensorSize in, SensorSize out) override {
     in_ = in;
     out_ = out;
+    orientation_ = {.transpose = in != out};
   }
   void stop() override {}
   LabelledEvents filter(LabelledEvents events, Microseconds /*start*/) override {
-    const Orientation orientation = orientation_of(settings.copy().direction);
-    // Set after the caps were negotiated: the next buffer has others.
-    if (orientation.size(in_) != out_) return {};
-    return FlipFilter(in_, orientation).filter(events);
+    // One that was set after the caps were negotiated may have to wait for those of the next
+    // buffer.
+    const Orientation wanted = orientation_of(settings.copy().direction);
+    if (wanted.size(in_) == out_) orientation_ = wanted;
+    return FlipFilter(in_, orientation_).filter(events);
   }
   void forget() override {}
 
@@ -75,6 +77,7 @@ class Flip final : public EventFilter {
  private:
   SensorSize in_;
   SensorSize out_;
+  Orientation orientation_;
 };
 
 }  // namespace

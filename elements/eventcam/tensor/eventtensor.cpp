@@ -381,8 +381,13 @@ static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
   gst_event_parse_caps(event, &caps);
   GstEventCameraInfo info;
   if (!gst_event_camera_info_from_caps(&info, caps)) return FALSE;
-  drain(self);
-  if (!guarded(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
+  if (priv.state && priv.state->info.width == info.width &&
+      priv.state->info.height == info.height) {
+    priv.state->info = info;
+  } else {
+    drain(self);
+    if (!guarded(self, no_memory, [&] { return make_state(self, info); })) return FALSE;
+  }
   *priv.latency.lock() = latency_of(*priv.state);
   const OwnedCaps out = caps_of(*priv.state);
   GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
