@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/aggregator/eventaggregator.hpp"
 
+#include <memory>
 #include <new>
 #include <string>
+#include <utility>
 
 #include "gst/base/errors.hpp"
 #include "gst/base/played_segment.hpp"
@@ -12,7 +14,7 @@ GST_DEBUG_CATEGORY_STATIC(event_aggregator_debug);
 #define GST_CAT_DEFAULT event_aggregator_debug
 
 struct GstEventAggregatorPrivate {
-  EventAggregator* inside;
+  std::unique_ptr<EventAggregator> inside;
 };
 
 G_DEFINE_ABSTRACT_TYPE_WITH_CODE(GstEventAggregator, gst_event_aggregator, GST_TYPE_AGGREGATOR,
@@ -235,17 +237,18 @@ struct EventAggregatorFunctions {
   }
 };
 
-static GstEventAggregatorPrivate& private_of(GstEventAggregator* self) {
-  return *static_cast<GstEventAggregatorPrivate*>(gst_event_aggregator_get_instance_private(self));
+static GstEventAggregatorPrivate& priv_of(gpointer self) {
+  return *static_cast<GstEventAggregatorPrivate*>(
+      gst_event_aggregator_get_instance_private(GST_EVENT_AGGREGATOR(self)));
 }
 
 void gst_event_aggregator_set_inside(GstEventAggregator* self,
                                      std::unique_ptr<EventAggregator> inside) {
-  private_of(self).inside = inside.release();
+  priv_of(self).inside = std::move(inside);
 }
 
 EventAggregator& gst_event_aggregator_inside(GstEventAggregator* self) {
-  return *private_of(self).inside;
+  return *priv_of(self).inside;
 }
 
 void gst_event_aggregator_add_pads(GstEventAggregator* self) {
@@ -273,11 +276,12 @@ static GstIterator* iterate_linked_pads(GstPad*, GstObject* element) {
 }
 
 static void finalize(GObject* object) {
-  delete &gst_event_aggregator_inside(GST_EVENT_AGGREGATOR(object));
+  std::destroy_at(&priv_of(object));
   G_OBJECT_CLASS(gst_event_aggregator_parent_class)->finalize(object);
 }
 
 static void gst_event_aggregator_init(GstEventAggregator* self) {
+  new (&priv_of(self)) GstEventAggregatorPrivate;
   gst_pad_set_iterate_internal_links_function(GST_AGGREGATOR_SRC_PAD(self), iterate_linked_pads);
 }
 
