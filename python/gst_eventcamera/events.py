@@ -99,10 +99,16 @@ def join(chunks: Iterable[Events]) -> Events:
 
 
 def packed_events(events: np.ndarray) -> np.ndarray:
-    """A contiguous array of EVENT; the array itself if it is one. Fields are taken by name; p is ON if above 0."""
+    """A contiguous array of EVENT; the array itself if it is one. Fields are taken by name; p is ON if above 0.
+    Raises ValueError for times and pixels that the fields of EVENT cannot hold."""
     if events.dtype == EVENT and events.flags.c_contiguous:
         return events
     packed = np.empty(len(events), EVENT)
-    for name in EVENT.names or ():
-        packed[name] = events[name] > 0 if name == "p" else events[name]
+    packed["p"] = events["p"] > 0
+    for name in ("t", "x", "y"):
+        with np.errstate(invalid="ignore"):  # not a number, which differs from all
+            packed[name] = events[name]
+        if not np.array_equal(packed[name], events[name]):
+            limits = np.iinfo(EVENT[name])
+            raise ValueError(f"{name} must be whole numbers from {limits.min} to {limits.max}")
     return packed

@@ -157,6 +157,16 @@ def sensor_size(caps: Gst.Caps) -> tuple[int, int]:
     return info.width, info.height
 
 
+def given_size(events: np.ndarray, width: int, height: int) -> tuple[int, int]:
+    """Width and height of the sensor; those of Events where they are 0. Raises ValueError unless they are integers
+    from 1 to 16384."""
+    sides = width or getattr(events, "width", 0), height or getattr(events, "height", 0)
+    if not all(isinstance(side, (int, np.integer)) and 1 <= side <= GstEventCamera.MAX_SIDE for side in sides):
+        raise ValueError(f"the sensor has {sides[0]}x{sides[1]} pixels; give a width and height from 1 to"
+                         f" {GstEventCamera.MAX_SIDE}")
+    return int(sides[0]), int(sides[1])
+
+
 def events_of(sample: Gst.Sample) -> Events:
     """The events of a buffer, written to the array in one pass."""
     buffer = sample.get_buffer()

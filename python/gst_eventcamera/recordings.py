@@ -15,7 +15,8 @@ import numpy as np
 
 from .events import Events, join
 from .pipeline import (
-    EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, events_of, quoted, sensor_size)
+    EVENT_CAPS, LABEL, GLib, Gst, GstEventCamera, Pipeline, PipelineError, events_of, given_size, quoted,
+    sensor_size)
 from .sources import SINK
 
 # Elements that write a file, by its extension.
@@ -215,16 +216,14 @@ def write(path: str | os.PathLike[str], events: np.ndarray, width: int = 0, heig
     events: an array with the fields t (microseconds, from 0 to 2**52, sorted), x, y and p (ON if above 0); shape
         (events,).
         Labels of Events are written, too, if the format has them: .npz, .h5 and .csv.
-    width, height: of the sensor, in pixels; may be left out for Events of a known sensor.
+    width, height: of the sensor, in pixels, 1 to 16384; may be left out for Events of a known sensor.
 
     Only a complete file replaces an existing one. Raises ValueError for events that are not sorted, too late or
     outside the sensor, or an unknown extension, and PipelineError if the file cannot be written."""
     extension = os.path.splitext(path)[1].lower()
     if extension not in WRITERS:
         raise ValueError(f"{os.fspath(path)}: the extension must be one of {' '.join(WRITERS)}")
-    width, height = width or getattr(events, "width", 0), height or getattr(events, "height", 0)
-    if width < 1 or height < 1:
-        raise ValueError("give the width and height of the sensor")
+    width, height = given_size(events, width, height)
     _check(events, width, height)
     writer = WRITERS[extension]
     if extension == ".csv" and _labels(events):
@@ -305,7 +304,8 @@ def buffer_of(events: np.ndarray, start: int, duration: int) -> Gst.Buffer:
     packed = np.empty(len(events), XYTP)
     packed["t"] = events["t"] - start
     packed["x"] = events["x"]
-    packed["y_p"] = events["y"] | np.where(events["p"] > 0, 0x8000, 0)
+    packed["y_p"] = events["y"]
+    packed["y_p"] |= (events["p"] > 0) * np.uint16(0x8000)
     buffer = Gst.Buffer.new_wrapped(packed.tobytes()) if len(events) > 0 else Gst.Buffer.new()
     buffer.pts, buffer.duration = start * 1000, duration * 1000
     if labels := _labels(events):

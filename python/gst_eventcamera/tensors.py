@@ -7,7 +7,7 @@ from typing import Iterator
 import numpy as np
 
 from .events import packed_events
-from .pipeline import Gst, GstEventCamera, Pipeline
+from .pipeline import Gst, GstEventCamera, Pipeline, given_size
 from .sources import SINK
 
 TENSOR_CAPS = "other/tensors,format=(string)static,num_tensors=1"
@@ -19,13 +19,14 @@ def voxel_grid(events: np.ndarray, bins: int = 5, width: int = 0, height: int = 
 
     events: an array with the fields t, x, y and p, sorted by t; shape (events,).
     bins: 1 to 256.
-    width, height: of the sensor, in pixels; may be left out for Events of a known sensor.
+    width, height: of the sensor, in pixels, 1 to 16384; may be left out for Events of a known sensor.
 
     Returns float32 of shape (bins, height, width), the same as eventtensor makes of a window of these
-    events. Raises ValueError for events that are not sorted or outside the sensor."""
-    width, height = width or getattr(events, "width", 0), height or getattr(events, "height", 0)
-    if width < 1 or height < 1 or not 1 <= bins <= GstEventCamera.MAX_BINS:
-        raise ValueError(f"no voxel grid of {bins} bins, {height} rows and {width} columns")
+    events. Raises ValueError for events that are not sorted or outside the sensor, and for fields that are not whole
+    numbers."""
+    width, height = given_size(events, width, height)
+    if not isinstance(bins, (int, np.integer)) or not 1 <= bins <= GstEventCamera.MAX_BINS:
+        raise ValueError(f"no voxel grid of {bins} bins; give 1 to {GstEventCamera.MAX_BINS}")
     packed = packed_events(events)
     grid = np.empty((bins, height, width), np.float32)
     if not GstEventCamera.voxel_grid(packed.ctypes.data, len(packed), width, height, bins, grid.ctypes.data):

@@ -191,6 +191,12 @@ class Recordings(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "3000 events, but 2999 labels"):
             ec.write(path, events)
 
+    def test_writes_fields_of_any_integer_type(self):
+        events = np.zeros(3, [("t", "<u8"), ("x", "<u8"), ("y", "<u8"), ("p", "<u8")])
+        events["y"], events["p"] = (1, 2, 3), (0, 1, 1)
+        ec.write(path_of("unsigned.raw"), events, np.int64(WIDTH), np.uint16(HEIGHT))
+        self.assertTrue(same(ec.read(path_of("unsigned.raw")), events))
+
     def test_replaces_files_by_complete_ones_only(self):
         path = path_of("kept.npy")
         ec.write(path, self.events)
@@ -318,6 +324,16 @@ class Tensors(unittest.TestCase):
             tonic[name] = events[name]
         self.assertTrue(np.array_equal(ec.voxel_grid(tonic, 3, WIDTH, HEIGHT), ec.voxel_grid(events, 3)))
 
+    def test_numbers_are_whole_and_of_the_sensor(self):
+        events = np.zeros(3, [("t", "<f8"), ("x", "<i4"), ("y", "<i4"), ("p", "<i1")])
+        events["t"] = 0, 1, 2
+        self.assertEqual(ec.voxel_grid(events, 1, WIDTH, HEIGHT).sum(), -3)
+        for name, value in (("t", 2.5), ("t", float("nan")), ("t", float("inf")), ("x", 65536), ("y", -1)):
+            wrong = events.copy()
+            wrong[name][2] = value
+            with self.assertRaisesRegex(ValueError, f"{name} must be whole numbers"):
+                ec.voxel_grid(wrong, 1, WIDTH, HEIGHT)
+
 
 class Failures(unittest.TestCase):
     def expect(self, error, text, work):
@@ -357,7 +373,11 @@ class Failures(unittest.TestCase):
             self.expect(ValueError, "at most 2**52", lambda: ec.write(path_of("x.raw"), late))
         self.expect(ValueError, "sorted", lambda: ec.voxel_grid(events[::-1]))
         self.expect(ValueError, "outside", lambda: ec.voxel_grid(events, 5, 10, 10))
-        self.expect(ValueError, "257 bins", lambda: ec.voxel_grid(events, 257))
+        for bins in (0, 257, 2.5):
+            self.expect(ValueError, f"{bins} bins", lambda: ec.voxel_grid(events, bins))
+        for width in (16385, -1, 2.5, "9"):
+            self.expect(ValueError, "from 1 to 16384", lambda: ec.voxel_grid(events, 1, width))
+            self.expect(ValueError, "from 1 to 16384", lambda: ec.write(path_of("x.npz"), events, height=width))
         self.expect(ValueError, "window", lambda: ec.stream("x", window=0))
 
 
