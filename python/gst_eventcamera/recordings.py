@@ -48,12 +48,13 @@ XYTP = np.dtype([("t", "<u4"), ("x", "<u2"), ("y_p", "<u2")])
 class Stream:
     """Windows of a recording, in order: iterate over it, take its len(), index it, or slice it.
 
-    window: length of a window in seconds, from 1e-6 to 10, in whole microseconds.
-    start, end: the part of the recording in seconds from its first event, end exclusive; None = to its end.
+    window: length of a window in seconds, from 1e-6 to 10, rounded to whole microseconds.
+    start, end: the part of the recording in seconds from its first event, end exclusive; None = to its end. A part
+        past the end is empty.
 
     Iterating yields an Events array a window, empty where nothing happened; only one is in memory. The
     window that the recording ends in is the last one. Indexing and slices seek in the file. Raises
-    PipelineError if the file cannot be read."""
+    PipelineError if the file cannot be read, and ValueError for other lengths and parts."""
 
     path: str
     window: float = 0.033
@@ -63,6 +64,10 @@ class Stream:
     def __post_init__(self) -> None:
         if not 1e-6 <= self.window <= 10:
             raise ValueError(f"window is {self.window} s; it must be from 1e-6 to 10 s")
+        _expect_part(self.start, self.end)
+        object.__setattr__(self, "window", round(self.window * 1e6) / 1e6)
+        object.__setattr__(self, "start", min(self.start, MAX_TIME / 1e6))
+        object.__setattr__(self, "end", None if self.end is None else min(self.end, MAX_TIME / 1e6))
 
     @property
     def width(self) -> int:
@@ -84,10 +89,12 @@ class Stream:
         return max(0.0, min(whole, math.inf if self.end is None else self.end) - self.start)
 
     def between(self, start: float, end: Optional[float] = None) -> Stream:
-        """The part from `start` to `end`, in seconds after the start of this one."""
-        limit = math.inf if self.end is None else self.end
-        last = min(limit, math.inf if end is None else self.start + end)
-        return dataclasses.replace(self, start=self.start + start, end=None if last == math.inf else last)
+        """The part from `start` to `end`, in seconds after the start of this one. Raises ValueError unless
+        0 <= start <= end."""
+        _expect_part(start, end)
+        first = self.start + start
+        lasts = [last for last in (self.end, None if end is None else self.start + end) if last is not None]
+        return dataclasses.replace(self, start=first, end=max(first, min(lasts)) if lasts else None)
 
     def _windows(self, seconds: float) -> int:
         """The number of windows that begin within so many seconds."""
@@ -188,6 +195,11 @@ class Stream:
             return (*sensor_size(pipeline.caps()), pipeline.duration())
 
 
+def _expect_part(start: float, end: Optional[float]) -> None:
+    if not start >= 0 or (end is not None and not end >= start):
+        raise ValueError(f"no part from {start} s to {'the end' if end is None else f'{end} s'}: give 0 <= start <= end")
+
+
 def stream(path: str | os.PathLike[str], window: float = 0.033) -> Stream:
     """The windows of a recording, of `window` seconds each, from a file of any format that GStreamer plays.
 
@@ -198,8 +210,8 @@ def stream(path: str | os.PathLike[str], window: float = 0.033) -> Stream:
 def read(path: str | os.PathLike[str], start: float = 0, end: Optional[float] = None) -> Events:
     """All events of a recording, or those with start <= time < end, in seconds from its first event.
 
-    Shape (events,), 16 bytes each; times are those of the file. Raises PipelineError if the file cannot be
-    read or has no events to read."""
+    Shape (events,), 16 bytes each; times are those of the file. A part past the end is empty. Raises PipelineError
+    if the file cannot be read or has no events to read, and ValueError unless 0 <= start <= end."""
     part = Stream(os.fspath(path), window=1, start=start, end=end)
     with part._open() as pipeline:
         events = join(part._play(pipeline))

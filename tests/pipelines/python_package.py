@@ -129,6 +129,27 @@ class Recordings(unittest.TestCase):
         with self.assertRaises(IndexError):
             stream[len(stream)]
 
+    def test_windows_are_whole_microseconds(self):
+        stream = ec.stream(self.path, window=1 / 30)
+        windows = list(stream)
+        self.assertEqual(stream.window, 0.033333)
+        for i in (1, 17, len(stream) - 1):
+            self.assertTrue(same(stream[i], windows[i]), i)
+        self.assertTrue(all(same(a, b) for a, b in zip(stream[20:40], windows[20:40], strict=True)))
+
+    def test_parts(self):
+        stream = ec.stream(self.path, window=0.05)
+        for start, end in ((-1, None), (0, -1), (1, 0.5), (float("nan"), None), (0, float("nan"))):
+            for part in (lambda: ec.read(self.path, start, end), lambda: stream[3:].between(start, end)):
+                with self.assertRaisesRegex(ValueError, "0 <= start <= end"):
+                    part()
+        for start, end in ((9, None), (9, 10), (1, 1), (1e30, None), (float("inf"), None)):
+            part = ec.read(self.path, start, end)
+            self.assertEqual((len(part), part.width, part.height), (0, WIDTH, HEIGHT))
+            self.assertEqual((len(stream.between(start, end)), list(stream.between(start, end))), (0, []))
+        self.assertEqual(list(stream[:3].between(1, 2)), [])
+        self.assertTrue(same(ec.read(self.path, 1.5, float("inf")), self.events.between(1.5, 9)))
+
     def test_learns_the_duration_once(self):
         stream = ec.stream(self.path, window=0.05)
         with unittest.mock.patch.object(internals.Pipeline, "duration", autospec=True,
