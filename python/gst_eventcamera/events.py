@@ -45,8 +45,19 @@ class Events(np.ndarray):
             return self.view(np.ndarray)[index]
         part = super().__getitem__(index)
         if self.cause is not None and self.object_class is not None and isinstance(part, Events):
-            part.cause, part.object_class = self.cause[index], self.object_class[index]
+            is_fields = isinstance(index, list) and any(isinstance(name, str) for name in index)
+            rows = slice(None) if is_fields else index
+            part.cause, part.object_class = self.cause[rows], self.object_class[rows]
         return part
+
+    def sort(self, *args: Any, **kwargs: Any) -> None:
+        """In place, with the labels."""
+        if self.cause is None or self.object_class is None:
+            super().sort(*args, **kwargs)
+            return
+        places = self.view(np.ndarray).argsort(*args, **kwargs)
+        for values in (self.view(np.ndarray), self.cause, self.object_class):
+            values[:] = values[places]
 
     def copy(self, order: Any = "C") -> Events:
         events = super().copy(order)

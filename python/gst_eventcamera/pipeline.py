@@ -178,5 +178,5 @@ def events_of(sample: Gst.Sample) -> Events:
         raise PipelineError("a buffer of events cannot be read")
     if labels := GstEventCamera.buffer_get_event_camera_label_meta(buffer) if count > 0 else None:
         fields = np.frombuffer(labels.get_bytes().get_data(), LABEL)
-        events.cause, events.object_class = fields["cause"], fields["object_class"]
+        events.cause, events.object_class = fields["cause"].copy(), fields["object_class"].copy()
     return events

@@ -212,6 +212,25 @@ class Recordings(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "3000 events, but 2999 labels"):
             ec.write(path, events)
 
+    def test_sorts_and_selects_labels(self):
+        events = self.labelled(3000)
+        events["t"] = np.random.default_rng(1).permutation(3000)
+        order = np.argsort(events["t"])
+        copied, sorted_in_place = np.sort(events, order="t"), events.copy()
+        sorted_in_place.sort(order="t")
+        for result in (copied, sorted_in_place):
+            self.assertTrue(same(result, events[order]))
+            self.assertTrue(np.array_equal(result.cause, events.cause[order]))
+            self.assertTrue(np.array_equal(result.object_class, events.object_class[order]))
+        pixels = events[["x", "y"]]
+        self.assertEqual(pixels.dtype.names, ("x", "y"))
+        self.assertIs(pixels.cause.base, events.cause)
+        labelled = ec.join(ec.live("videotestsrc num-buffers=3 ! eventsim-dvs label=true"))
+        expected = np.sort(labelled[::-1], order="t")
+        labelled[::-1].sort(order="t")  # in the memory of the whole
+        self.assertTrue(same(labelled, expected[::-1]))
+        self.assertTrue(np.array_equal(labelled.cause, expected[::-1].cause))
+
     def test_writes_fields_of_any_integer_type(self):
         events = np.zeros(3, [("t", "<u8"), ("x", "<u8"), ("y", "<u8"), ("p", "<u8")])
         events["y"], events["p"] = (1, 2, 3), (0, 1, 1)
