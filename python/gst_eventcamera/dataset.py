@@ -14,8 +14,8 @@ from typing import Iterator, Mapping, Optional, Sequence, overload
 import numpy as np
 
 from .events import Events
-from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, quoted
-from .recipe import PICTURES, TENSORS, Recipe, Value, Window, is_picture, property_limits
+from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, property_limits, quoted
+from .recipe import PICTURES, TENSORS, Recipe, Value, Window, is_picture
 from .sources import LUMA, SINK
 from .tensors import TENSOR_CAPS, tensor_of
 

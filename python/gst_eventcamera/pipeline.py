@@ -2,6 +2,7 @@
 """Running GStreamer pipelines, with failures as exceptions."""
 from __future__ import annotations
 
+import math
 import os
 from typing import Callable, Iterator, Optional
 
@@ -147,6 +148,34 @@ class Pipeline:
         """Returns when all sinks of a playing pipeline have reached the end."""
         while not self._ended:
             self.raise_error(MAX_WAIT)
+
+
+def property_limits(element: str) -> dict[str, tuple[float, float]]:
+    """The minimum and maximum of each property of an element, which its properties may follow, integers if it
+    takes only these; infinite for those that have none. Raises PipelineError if there is no such element."""
+    name = element.split()[0]
+    made = Gst.ElementFactory.make(name)
+    if made is None:
+        raise PipelineError(f"there is no element \"{name}\"")
+    return {spec.name: (getattr(spec, "minimum", -math.inf), getattr(spec, "maximum", math.inf))
+            for spec in made.list_properties()}
+
+
+def expect_limits(elements: str) -> None:
+    """Raises PipelineError if a property is set to a number beyond its limits, which GStreamer ignores."""
+    element = ""
+    limits: dict[str, tuple[float, float]] = {}
+    for word in elements.split():
+        name, equals, value = word.partition("=")
+        if not equals:  # an element, unless it is caps or an exclamation mark
+            element, limits = word, property_limits(word) if Gst.ElementFactory.find(word) else {}
+        low, high = limits.get(name, (-math.inf, math.inf))
+        try:
+            number = float(value)
+        except ValueError:
+            continue
+        if not low <= number <= high and math.isfinite(low):
+            raise PipelineError(f"{element} {word}: it must be from {low:g} to {high:g}")
 
 
 def sensor_size(caps: Gst.Caps) -> tuple[int, int]:

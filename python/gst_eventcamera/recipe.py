@@ -15,7 +15,7 @@ from typing import Any, Iterator, Mapping, Optional
 
 import yaml
 
-from .pipeline import Gst, Pipeline, PipelineError, quoted
+from .pipeline import Gst, Pipeline, PipelineError, expect_limits, property_limits, quoted
 from .recordings import WRITERS
 
 Value = float | int | str | bool
@@ -206,16 +206,6 @@ def is_picture(name: str) -> bool:
     return os.path.splitext(name)[1].lower() in PICTURES
 
 
-def property_limits(simulator: str) -> dict[str, tuple[float, float]]:
-    """The minimum and maximum of each property of the first element, integers if it takes only these;
-    infinite for those that have none."""
-    element = Gst.ElementFactory.make(simulator.split()[0])
-    if element is None:
-        raise RecipeError(f"simulator: there is no element \"{simulator.split()[0]}\"")
-    return {spec.name: (getattr(spec, "minimum", -math.inf), getattr(spec, "maximum", math.inf))
-            for spec in element.list_properties()}
-
-
 def _written(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
@@ -266,6 +256,8 @@ def _checked(path: str, recipe: Any) -> Recipe:
         raise RecipeError("simulator: give an element and its properties, such as \"eventsim-dvs preset=davis346\"")
     if "!" in texts["simulator"]:
         raise RecipeError("simulator: give one element; others belong to frames, before it, or filters, after it")
+    if not Gst.ElementFactory.find(texts["simulator"].split()[0]):
+        raise RecipeError(f"simulator: there is no element \"{texts['simulator'].split()[0]}\"")
     checked = Recipe(path, seed, tuple(patterns), texts["simulator"], output, _framerate(recipe), _window(recipe),
                      texts["frames"], _parameters(recipe, texts["simulator"]), texts["filters"], texts["tensors"],
                      _split(recipe), texts["group"], min_frames)
@@ -406,24 +398,7 @@ def _check_elements(recipe: Recipe) -> None:
         lines.append(f"eventtensor {recipe.tensors}")
     try:
         for line in lines:
-            for element in line.split(" ! "):
-                _expect_limits(element)
+            expect_limits(line)
             Pipeline(f"fakesrc ! {line} ! fakesink")
     except PipelineError as error:
         raise RecipeError(str(error)) from None
-
-
-def _expect_limits(element: str) -> None:
-    """Of the numbers that an element's description sets, which GStreamer would ignore."""
-    name, *settings = element.split()
-    if not settings or not Gst.ElementFactory.find(name):  # such as caps
-        return
-    limits = property_limits(name)
-    for key, _, value in (setting.partition("=") for setting in settings):
-        try:
-            number = float(value)
-        except ValueError:
-            continue
-        low, high = limits.get(key, (-math.inf, math.inf))
-        if not low <= number <= high:
-            raise RecipeError(f"{name} {key}={value}: it must be from {low:g} to {high:g}")

@@ -6,7 +6,7 @@ import os
 from typing import Iterator
 
 from .events import Events
-from .pipeline import EVENT_CAPS, Pipeline, events_of, quoted
+from .pipeline import EVENT_CAPS, Pipeline, events_of, expect_limits, quoted
 
 SINK = "appsink name=out sync=false max-buffers=4"
 
@@ -28,8 +28,9 @@ def simulate(video: str | os.PathLike[str], simulator: str = "eventsim-dvs denoi
     simulator: an element and its properties, such as "eventsim-dvs preset=davis346 seed=7"; further
         elements may follow it, such as "eventsim-dvs ! eventdenoise".
 
-    Only the current array is in memory. Raises PipelineError if the file cannot be read or an element or
-    property does not exist."""
+    Only the current array is in memory. Raises PipelineError if the file cannot be read, an element or property
+    does not exist, or a number is not within the limits of its property."""
+    expect_limits(simulator)
     return _chunks(f"filesrc location={quoted(video)} ! decodebin ! videoconvert ! {LUMA} ! {simulator}")
 
 

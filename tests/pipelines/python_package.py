@@ -389,6 +389,8 @@ class Failures(unittest.TestCase):
         self.expect(ec.PipelineError, "No such file or directory", lambda: ec.write("/nowhere/out.raw", random_events(9, 9)))
         self.expect(ec.PipelineError, "2048x2048 pixels",
                     lambda: ec.write(path_of("wide.raw"), random_events(9, 9, pixels=(3000, 9))))
+        self.expect(ec.PipelineError, "eventsim-dvs denoise=-3: it must be from 0 to 255",
+                    lambda: ec.simulate("/nowhere", "identity ! eventsim-dvs denoise=-3"))
 
     def test_of_writing_many_events_are_exceptions(self):
         full = path_of("full.raw")
