@@ -56,7 +56,8 @@ class Pipeline:
 
     def __init__(self, description: str) -> None:
         try:
-            self._pipeline = Gst.parse_launch(description)
+            # Without the flag, what could be made of a wrong description would leak.
+            self._pipeline = Gst.parse_launch_full(description, None, Gst.ParseFlags.FATAL_ERRORS)
         except GLib.Error as error:
             raise PipelineError(error.message) from None
         self._bus = self._pipeline.get_bus()

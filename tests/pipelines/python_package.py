@@ -399,6 +399,15 @@ class Failures(unittest.TestCase):
         self.expect(ec.PipelineError, "2048x2048 pixels",
                     lambda: ec.write(path_of("wide.raw"), random_events(3_000_000, 3_000_000, pixels=(3000, 9))))
 
+    def test_leave_nothing_open(self):
+        def fail():
+            with self.assertRaises(ec.PipelineError):
+                list(ec.live("videotestsrc ! nothing"))
+            return len(os.listdir("/proc/self/fd"))
+
+        fail()
+        self.assertEqual(fail(), fail())
+
     def test_tell_what_to_install(self):
         missing = subprocess.run([sys.executable, "-c", "import gst_eventcamera"], capture_output=True, text=True,
                                  env=os.environ | {"GI_TYPELIB_PATH": "/nowhere"})
