@@ -27,6 +27,9 @@ LABEL = np.dtype([("object_class", "<u2"), ("cause", "u1"), ("reserved", "u1")])
 # Python handles Ctrl-C only between calls, so none waits longer.
 MAX_WAIT = Gst.SECOND // 10
 
+# The process that plays pipelines. One that it forks has GStreamer's state without its threads.
+_playing_process: Optional[int] = None
+
 
 class PipelineError(RuntimeError):
     """A pipeline failed; the text is that of the element: what failed, on what, what to do.
@@ -105,7 +108,13 @@ class Pipeline:
         self._ended |= message is not None
 
     def set_state(self, state: Gst.State) -> None:
-        """Returns when it is reached; at once for PLAYING."""
+        """Returns when it is reached; at once for PLAYING. Raises PipelineError in a process that was forked from
+        one that has played pipelines."""
+        global _playing_process
+        if _playing_process not in (None, os.getpid()):
+            raise PipelineError("GStreamer's threads do not survive a fork; start this process with the method"
+                                " \"spawn\", as DataLoader(multiprocessing_context=\"spawn\") does")
+        _playing_process = os.getpid()
         change = self._pipeline.set_state(state)
         while change == Gst.StateChangeReturn.ASYNC and state != Gst.State.PLAYING:
             change = self._pipeline.get_state(MAX_WAIT)[0]

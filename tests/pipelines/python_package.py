@@ -408,6 +408,15 @@ class Failures(unittest.TestCase):
         fail()
         self.assertEqual(fail(), fail())
 
+    def test_of_forked_processes_are_exceptions(self):
+        path = path_of("forked.npz")
+        ec.write(path, random_events(9, 9))
+        with multiprocessing.get_context("fork").Pool(1) as pool:
+            with self.assertRaisesRegex(ec.PipelineError, "spawn"):
+                pool.apply_async(ec.read, (path,)).get(timeout=60)
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            self.assertEqual(len(pool.apply(ec.read, (path,))), 9)
+
     def test_tell_what_to_install(self):
         missing = subprocess.run([sys.executable, "-c", "import gst_eventcamera"], capture_output=True, text=True,
                                  env=os.environ | {"GI_TYPELIB_PATH": "/nowhere"})
