@@ -12,15 +12,16 @@
     for video in ec.Dataset("recipe.yaml"): ...
 
 Events are structured arrays with the fields t (int64, microseconds), x, y (uint16) and p (bool, True = ON).
-Failures of pipelines are raised as PipelineError with the text of the element that failed.
+Failures of pipelines are raised as PipelineError with the text of the element that failed. What an element warns
+of, such as corrupt data that it skips, is a PipelineWarning.
 """
 from .dataset import Dataset, DatasetVideo
 from .events import EVENT, Events, join
-from .pipeline import PipelineError
+from .pipeline import PipelineError, PipelineWarning
 from .recipe import Recipe, RecipeError
 from .recordings import Stream, read, stream, write
 from .sources import live, simulate
 from .tensors import tensors, voxel_grid
 
-__all__ = ["Dataset", "DatasetVideo", "EVENT", "Events", "PipelineError", "Recipe", "RecipeError", "Stream", "join",
-           "live", "read", "simulate", "stream", "tensors", "voxel_grid", "write"]
+__all__ = ["Dataset", "DatasetVideo", "EVENT", "Events", "PipelineError", "PipelineWarning", "Recipe", "RecipeError",
+           "Stream", "join", "live", "read", "simulate", "stream", "tensors", "voxel_grid", "write"]

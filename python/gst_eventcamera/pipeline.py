@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import sys
+import warnings
 from typing import Callable, Iterator, Optional
 
 import gi
@@ -41,16 +43,26 @@ class PipelineError(RuntimeError):
         self.element = element
 
 
+class PipelineWarning(UserWarning):
+    """An element goes on after a failure, such as a reader that skips corrupt data; the text is that of the
+    element."""
+
+
 def quoted(path: str | os.PathLike[str]) -> str:
     """A path as the value of a property in a pipeline description."""
     return '"' + os.fspath(path).replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _error_of(message: Gst.Message) -> PipelineError:
-    error, cause = message.parse_error()
-    detail = cause.splitlines()[-1] if cause else ""
-    element = message.src.get_name()
-    return PipelineError(f"{element}: {error.message} ({detail})", element)
+def _text_of(message: Gst.Message, error: GLib.Error, cause: Optional[str]) -> str:
+    return f"{message.src.get_name()}: {error.message} ({cause.splitlines()[-1] if cause else ''})"
+
+
+def _warn(text: str) -> None:
+    """Of the line that calls the package."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back and frame.f_globals.get("__package__") == __package__:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, PipelineWarning, stacklevel=level)
 
 
 class Pipeline:
@@ -66,6 +78,7 @@ class Pipeline:
         self._bus = self._pipeline.get_bus()
         self._sink = self._pipeline.get_by_name("out")
         self._ended = False
+        self._error: Optional[PipelineError] = None
 
     def __enter__(self) -> Pipeline:
         return self
@@ -100,12 +113,23 @@ class Pipeline:
         pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, replace)
 
     def raise_error(self, wait: int = 0) -> None:
-        """Raises what an element has reported, or reports within `wait` nanoseconds, if anything; forgets all
-        other messages but that of the end."""
-        message = self._bus.timed_pop_filtered(wait, Gst.MessageType.ERROR | Gst.MessageType.EOS)
-        if message and message.type == Gst.MessageType.ERROR:
-            raise _error_of(message)
-        self._ended |= message is not None
+        """Raises what an element has reported, or reports within `wait` nanoseconds, if anything."""
+        self._take_messages(wait)
+        if self._error:
+            raise self._error
+
+    def _take_messages(self, wait: int = 0) -> None:
+        """Keeps the first error and that the end is reached, warns of warnings, and forgets all other messages."""
+        kinds = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
+        while message := self._bus.timed_pop_filtered(wait, kinds):
+            if message.type == Gst.MessageType.WARNING:
+                _warn(_text_of(message, *message.parse_warning()))
+                continue
+            wait = 0
+            if message.type == Gst.MessageType.EOS:
+                self._ended = True
+            elif not self._error:
+                self._error = PipelineError(_text_of(message, *message.parse_error()), message.src.get_name())
 
     def set_state(self, state: Gst.State) -> None:
         """Returns when it is reached; at once for PLAYING. Raises PipelineError in a process that was forked from
@@ -149,6 +173,7 @@ class Pipeline:
         self.set_state(Gst.State.PLAYING)
         while not source.is_eos():
             if sample := source.try_pull_sample(MAX_WAIT):
+                self._take_messages()
                 yield sample
             else:
                 self.raise_error()

@@ -3,6 +3,7 @@
 """The Python package gst_eventcamera: reading, streaming, seeking, simulating, writing, tensors, failures."""
 
 import copy
+import itertools
 import multiprocessing
 import os
 import signal
@@ -23,6 +24,7 @@ import numpy as np
 from gst_eventcamera import pipeline as internals
 from gst_eventcamera import recordings
 from gst_eventcamera.pipeline import Gst, GstEventCamera
+from gst_eventcamera.sources import SINK
 
 FOLDER = tempfile.TemporaryDirectory()
 WIDTH, HEIGHT = 346, 260
@@ -399,6 +401,26 @@ class Failures(unittest.TestCase):
         self.expect(ec.PipelineError, "2048x2048 pixels",
                     lambda: ec.write(path_of("wide.raw"), random_events(3_000_000, 3_000_000, pixels=(3000, 9))))
 
+    def test_of_elements_that_go_on_are_warnings(self):
+        path = path_of("corrupt.dat")
+        ec.write(path, random_events(30_000, 300_000))
+        os.truncate(path, os.path.getsize(path) - 3)
+        for read in (ec.read, lambda path: list(ec.stream(path))):
+            with self.assertWarnsRegex(ec.PipelineWarning, "Corrupt data at byte .* ends within an event") as caught:
+                read(path)
+            self.assertEqual(caught.filename, __file__)
+        events = random_events(3, 10)
+        events["t"] = 0, 1, 86_400_000_000
+        with self.assertWarnsRegex(ec.PipelineWarning, "pause of 86399 s"):
+            ec.write(path_of("pause.es"), events)
+
+    def test_come_after_all_samples(self):
+        samples = 0
+        with self.assertRaisesRegex(ec.PipelineError, "identity"):
+            for _ in ec.live("videotestsrc num-buffers=9 ! eventsim-frame ! identity error-after=6"):
+                samples += 1
+        self.assertEqual(samples, 5)
+
     def test_leave_nothing_open(self):
         def fail():
             with self.assertRaises(ec.PipelineError):
@@ -407,6 +429,14 @@ class Failures(unittest.TestCase):
 
         fail()
         self.assertEqual(fail(), fail())
+
+    def test_do_not_wait_behind_other_messages(self):
+        with internals.Pipeline("videotestsrc num-buffers=100 ! video/x-raw,width=32,height=32,framerate=1000/1"
+                                f" ! eventsim-frame ! eventstats interval=1 ! {SINK}") as pipeline:
+            for _ in itertools.islice(pipeline.samples(), 90):
+                pass
+            messages = sum(1 for _ in iter(pipeline._bus.pop, None))
+        self.assertLess(messages, 50)
 
     def test_of_forked_processes_are_exceptions(self):
         path = path_of("forked.npz")
