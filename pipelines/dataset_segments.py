@@ -17,7 +17,9 @@ import tempfile
 import gi
 import gst_eventcamera as ec
 import numpy as np
-from dataset_video import Frames, decoders_of, duration_of, making_of, state_of, versions, write_record
+from dataset_video import decoders_of, making_of, state_of, versions, write_record
+from gst_eventcamera.dataset import duration_of
+from gst_eventcamera.frames import Frames
 from gst_eventcamera.pipeline import EVENT_CAPS, GLib, Gst, GstEventCamera, Pipeline, quoted
 from gst_eventcamera.sources import SINK
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Simulates one video of a data set, and records what it was made from: hashes, parameters, figures, versions."""
-import contextlib
 import hashlib
 import json
 import os
@@ -9,7 +8,8 @@ import tempfile
 import gst_eventcamera as ec
 import numpy as np
 from event_streams import png_of
-from gst_eventcamera.dataset import pictures_of
+from gst_eventcamera.dataset import duration_of, pictures_of
+from gst_eventcamera.frames import Frames
 from gst_eventcamera.pipeline import Gst, events_of
 from gst_eventcamera.recipe import TENSORS
 from gst_eventcamera.recordings import WRITERS
@@ -20,49 +20,10 @@ from gst_eventcamera.tensors import TENSOR_CAPS, tensor_of
 SAME_BYTES = {"h5": "commit-interval=0", "hdf5": "commit-interval=0"}
 PREVIEW_SIDE = 160  # pixels
 MAX_KEPT = 16  # arrays of events
-# A video that lasts so much less than its file says, in seconds and as a share, was cut off.
-CUT_OFF = 1.0, 0.1
-# Intervals between frames may differ so much from their median; containers round times to milliseconds.
-STEADY = 0.25
 
 
 class Refused(Exception):
     """A video cannot be simulated, and trying again makes no difference."""
-
-
-class Frames:
-    """What is to know of the frames of a video, from their times and flags."""
-
-    def __init__(self):
-        self.times = []
-        self.corrupted = 0
-
-    def watch(self, pad):
-        def look(_, info):
-            buffer = info.get_buffer()
-            self.times.append(buffer.pts)
-            self.corrupted += bool(buffer.get_flags() & Gst.BufferFlags.CORRUPTED)
-            return Gst.PadProbeReturn.OK
-
-        pad.add_probe(Gst.PadProbeType.BUFFER, look)
-
-    def check(self, min_frames, duration):
-        """The duration is that of the file, in seconds, 0 if not known."""
-        count = len(self.times)
-        if self.corrupted > 0:
-            raise Refused(f"corrupt: {self.corrupted} of {count} frames are damaged")
-        if count < min_frames:
-            raise Refused(f"too short: {count} frames of at least {min_frames}")
-        missing = duration - (self.times[-1] - self.times[0]) / 1e9
-        if missing > CUT_OFF[0] and missing > CUT_OFF[1] * duration:
-            raise Refused(f"corrupt: its frames end {missing:.1f} s before the {duration:.1f} s of the file")
-
-    def warnings(self):
-        intervals = np.diff(np.array(self.times, np.int64)) / 1e6
-        if np.ptp(intervals) > 2 * STEADY * np.median(intervals):
-            return [f"variable framerate: its frames are {intervals.min():.0f} to {intervals.max():.0f} ms apart;"
-                    " the times of the events follow them"]
-        return []
 
 
 class NpyFile:
@@ -236,7 +197,8 @@ def simulate(video, path, segments):
             array.append(tensor_of(tensor))
         pipeline.wait()
         duration = segments.duration if segments else duration_of(pipeline)
-    frames.check(video.recipe.min_frames, duration)
+    if fault := video.fault(frames, duration):
+        raise Refused(fault)
     if figures.chunks == 0:
         raise Refused("too short: nothing is left of it after the filters")
     if array:
@@ -255,13 +217,6 @@ def decoders_of(pipeline):
 
     pipeline.on_element(note)
     return decoders
-
-
-def duration_of(pipeline):
-    """In seconds; 0 if not known."""
-    with contextlib.suppress(ec.PipelineError):
-        return pipeline.duration()
-    return 0.0
 
 
 def versions():

@@ -14,6 +14,7 @@ from typing import Iterator, Mapping, Optional, Sequence, overload
 import numpy as np
 
 from .events import Events
+from .frames import Frames
 from .pipeline import EVENT_CAPS, Gst, Pipeline, PipelineError, events_of, property_limits, quoted
 from .recipe import PICTURES, TENSORS, Recipe, Value, Window, is_picture
 from .sources import LUMA, SINK
@@ -23,7 +24,8 @@ from .tensors import TENSOR_CAPS, tensor_of
 @dataclasses.dataclass(frozen=True)
 class DatasetVideo:
     """A video of a data set. Iterating over it simulates it, and yields what the recipe's output holds: an
-    Events array for each two frames, or tensors of shape (channels, height, width). Raises PipelineError.
+    Events array for each two frames, or tensors of shape (channels, height, width). Raises PipelineError if the
+    video cannot be read; at its end, also if it is corrupt or has fewer frames than the recipe asks for.
 
     name: its path below the first folder of the pattern that has a wildcard, without extension.
     path: of the file, or of the folder of pictures."""
@@ -50,7 +52,7 @@ class DatasetVideo:
     def __iter__(self) -> Iterator[Events] | Iterator[np.ndarray]:
         if self.recipe.output == TENSORS:
             with self.playing(f"eventtensor {self.recipe.tensors} ! {TENSOR_CAPS} ! {SINK}") as pipeline:
-                yield from map(tensor_of, pipeline.samples())
+                yield from map(tensor_of, self._samples(pipeline))
         else:
             yield from self.events()
 
@@ -58,7 +60,21 @@ class DatasetVideo:
         """An array for each two frames, whatever the recipe's output is."""
         with self.playing(SINK) as pipeline:
             pipeline.gaps_as_buffers()
-            yield from map(events_of, pipeline.samples())
+            yield from map(events_of, self._samples(pipeline))
+
+    def _samples(self, pipeline: Pipeline) -> Iterator[Gst.Sample]:
+        """Plays to the end. Raises PipelineError if the video cannot be used."""
+        frames = Frames()
+        frames.watch(pipeline.element("decoded").get_static_pad("sink"))
+        yield from pipeline.samples()
+        if fault := self.fault(frames, duration_of(pipeline)):
+            raise PipelineError(f"{self.name}: {fault}")
+
+    def fault(self, frames: Frames, duration: float) -> str:
+        """Why a video of these frames cannot be used, such as "corrupt: 2 of 90 frames are damaged"; empty if it can.
+        The duration is that of the file, in seconds, 0 if not known."""
+        pictures = len(pictures_of(self.path)) if os.path.isdir(self.path) else 0
+        return frames.fault(self.recipe.min_frames, duration, pictures)
 
     @contextlib.contextmanager
     def playing(self, rest: str, threads: int = 0, more: Mapping[str, Value] = MappingProxyType({}),
@@ -123,6 +139,13 @@ def pictures_of(folder: str) -> list[str]:
     in_order = sorted(names, key=lambda name: [(int(part), "") if part.isdecimal() else (0, part)
                                                for part in re.split(r"(\d+)", name)])
     return [os.path.join(folder, name) for name in in_order]
+
+
+def duration_of(pipeline: Pipeline) -> float:
+    """In seconds; 0 if not known."""
+    with contextlib.suppress(PipelineError):
+        return pipeline.duration()
+    return 0.0
 
 
 def _framerate(recipe: Recipe) -> str:

@@ -179,6 +179,29 @@ class DataSets(unittest.TestCase):
         self.assertIn("5 videos: 2 made, 0 unchanged, 3 refused, 0 failed", printed)
         self.assertEqual(sorted(hashes("bad")), ["good", "uneven"])
         self.assertEqual(sorted(load("bad", "manifest.json")["refused"]), ["cut", "noise", "short"])
+        for output in ("npz", "tensors"):
+            videos = {video.name: video for video in ec.Dataset(recipe_of("bad", RECIPE.replace("npz", output)))}
+            self.assertGreater(len(list(videos["uneven"])), 0)
+            for name, fault in {"cut": "cut: corrupt: its frames end 2.* s before the 4.0 s of the file",
+                                "short": "short: too short: 1 frames of at least 2", "noise": "type"}.items():
+                with self.assertRaisesRegex(ec.PipelineError, fault):
+                    list(videos[name])
+
+    def test_report_pictures_that_cannot_be_decoded(self):
+        text = "simulator: eventsim-dvs\noutput: npz\nframerate: 25\n"
+        for kind, encoder in (("png", "pngenc"), ("jpg", "jpegenc")):
+            folder = path_of(f"broken/films/{kind}/")
+            launch("videotestsrc pattern=ball num-buffers=6 ! video/x-raw,width=64,height=48"
+                   f" ! {encoder} ! multifilesink {shlex.quote(f'location={folder}%d.{kind}')}")
+            for number in (1, 2, 4):
+                with open(f"{folder}{number}.{kind}", "wb") as file:
+                    file.write(b"no picture")
+        recipe = recipe_of("broken", text + "videos: films/*")
+        printed = event_dataset(recipe, status=1)
+        for video in ec.Dataset(recipe):
+            self.assertIn(f"refused: {video.name}: corrupt: 3 of its 6 pictures can be decoded\n", printed)
+            with self.assertRaisesRegex(ec.PipelineError, f"{video.name}: corrupt: 3 of its 6 pictures can be decoded"):
+                list(video)
 
     def test_are_of_files_only_and_apart_from_them(self):
         video = make_video("odd/videos/-dash.mkv")

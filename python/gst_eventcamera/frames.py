@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The frames that a video is decoded to: whether they are all there, and undamaged."""
+from __future__ import annotations
+
+import numpy as np
+
+from .pipeline import Gst
+
+# A video that lasts so much less than its file says, in seconds and as a share, was cut off.
+CUT_OFF = 1.0, 0.1
+# Intervals between frames may differ so much from their median; containers round times to milliseconds.
+STEADY = 0.25
+
+
+class Frames:
+    """What is to know of the frames of a video, from their times and flags.
+
+    times: PTS of the frames, in nanoseconds.
+    corrupted: how many have the flag CORRUPTED."""
+
+    def __init__(self) -> None:
+        self.times: list[int] = []
+        self.corrupted = 0
+
+    def watch(self, pad: Gst.Pad) -> None:
+        def look(_: Gst.Pad, info: Gst.PadProbeInfo) -> Gst.PadProbeReturn:
+            buffer = info.get_buffer()
+            self.times.append(buffer.pts)
+            self.corrupted += bool(buffer.get_flags() & Gst.BufferFlags.CORRUPTED)
+            return Gst.PadProbeReturn.OK
+
+        pad.add_probe(Gst.PadProbeType.BUFFER, look)
+
+    def fault(self, min_frames: int, duration: float, pictures: int) -> str:
+        """Why the video cannot be used, such as "corrupt: 2 of 90 frames are damaged"; empty if it can.
+
+        duration: that of the file, in seconds; 0 if not known.
+        pictures: number of pictures in the folder; 0 if it is a file."""
+        count = len(self.times)
+        if pictures > 0 and count != pictures:
+            return f"corrupt: {count} of its {pictures} pictures can be decoded"
+        if self.corrupted > 0:
+            return f"corrupt: {self.corrupted} of {count} frames are damaged"
+        if count < min_frames:
+            return f"too short: {count} frames of at least {min_frames}"
+        missing = duration - (self.times[-1] - self.times[0]) / 1e9
+        if missing > CUT_OFF[0] and missing > CUT_OFF[1] * duration:
+            return f"corrupt: its frames end {missing:.1f} s before the {duration:.1f} s of the file"
+        return ""
+
+    def warnings(self) -> list[str]:
+        """What is unusual of a video that can be used."""
+        intervals = np.diff(np.array(self.times, np.int64)) / 1e6
+        if np.ptp(intervals) > 2 * STEADY * np.median(intervals):
+            return [f"variable framerate: its frames are {intervals.min():.0f} to {intervals.max():.0f} ms apart;"
+                    " the times of the events follow them"]
+        return []
