@@ -101,7 +101,7 @@ class DatasetVideo:
                 f"{source} ! videoconvert name=decoded ! {LUMA} ! identity ! {line} ! identity ! {EVENT_CAPS}"
                 f" ! {rest}"))
             if recipe.window:
-                _feed(pipeline, _moving_window(self.path, recipe.window), recipe)
+                _feed(pipeline, _moving_window(_scaled_picture(self.path, recipe.window), recipe.window), recipe)
             yield pipeline
 
 
@@ -168,17 +168,24 @@ def _numbered_pictures(path: str, folder: str, recipe: Recipe) -> str:
     return f"multifilesrc location={numbered} caps=\"{kinds.pop()},{_framerate(recipe)}\" ! decodebin"
 
 
-def _moving_window(path: str, window: Window) -> Iterator[np.ndarray]:
-    """The window in each of its places on a picture, which is scaled and cropped to hold them all."""
+def _scaled_picture(path: str, window: Window) -> np.ndarray:
+    """A picture, scaled and cropped to hold the window in each of its places."""
     width, height = window.width + window.distance, window.height + window.distance
     with Pipeline(f"filesrc location={quoted(path)} ! decodebin ! videoconvert"
                   f" ! aspectratiocrop aspect-ratio={width}/{height} ! videoscale"
                   f" ! video/x-raw,format=GRAY8,width={width},height={height},pixel-aspect-ratio=1/1 ! {SINK}"
                   ) as pipeline:
-        buffer = next(pipeline.samples()).get_buffer()
-        rows = np.frombuffer(buffer.extract_dup(0, buffer.get_size()), np.uint8).reshape(height, -1)
+        sample = next(pipeline.samples(), None)
+    if sample is None:
+        raise PipelineError(f"{path} has no picture that can be decoded")
+    buffer = sample.get_buffer()
+    return np.frombuffer(buffer.extract_dup(0, buffer.get_size()), np.uint8).reshape(height, -1)
+
+
+def _moving_window(picture: np.ndarray, window: Window) -> Iterator[np.ndarray]:
+    """The window in each of its places on a scaled picture."""
     for left, top in window.corners():
-        yield rows[top:top + window.height, left:left + window.width]
+        yield picture[top:top + window.height, left:left + window.width]
 
 
 def _feed(pipeline: Pipeline, frames: Iterator[np.ndarray], recipe: Recipe) -> None:

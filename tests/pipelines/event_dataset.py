@@ -203,6 +203,13 @@ class DataSets(unittest.TestCase):
             with self.assertRaisesRegex(ec.PipelineError, f"{video.name}: corrupt: 3 of its 6 pictures can be decoded"):
                 list(video)
 
+        recipe = recipe_of("broken", text + "window: {width: 30, height: 20, distance: 9}\nvideos: films/*/1.*")
+        printed = event_dataset(recipe, status=1)
+        for video in ec.Dataset(recipe):
+            self.assertIn(f"refused: {video.name}: corrupt or not supported: ", printed)
+            with self.assertRaises(ec.PipelineError):
+                list(video)
+
     def test_are_of_files_only_and_apart_from_them(self):
         video = make_video("odd/videos/-dash.mkv")
         os.mkfifo(path_of("odd/videos/pipe.mkv"))
