@@ -56,9 +56,11 @@ gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps
 
 GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info) {
   g_return_val_if_fail(info != nullptr, nullptr);
+  const bool has_framerate = info->fps_d != 0;
   return gst_caps_new_simple(GST_EVENT_CAMERA_MEDIA_TYPE, "format", G_TYPE_STRING, "XYTP", "width",
                              G_TYPE_INT, info->width, "height", G_TYPE_INT, info->height,
-                             "framerate", GST_TYPE_FRACTION, info->fps_n, info->fps_d, nullptr);
+                             "framerate", GST_TYPE_FRACTION, has_framerate ? info->fps_n : 0,
+                             has_framerate ? info->fps_d : 1, nullptr);
 }
 
 gboolean gst_event_camera_map(GstEventCameraMap* map, GstBuffer* buffer) {

@@ -136,7 +136,7 @@ gboolean gst_event_camera_info_from_caps(GstEventCameraInfo* info, const GstCaps
 
 /**
  * gst_event_camera_info_to_caps:
- * @info: sensor size and framerate
+ * @info: sensor size and framerate; a framerate whose denominator is 0 counts as 0/1
  *
  * Returns: (transfer full): the caps of an event stream of format XYTP
  *
@@ -152,6 +152,9 @@ GstCaps* gst_event_camera_info_to_caps(const GstEventCameraInfo* info);
  * @start: the time at which t is 0, in microseconds: floor(PTS / 1000)
  *
  * The events of a mapped buffer.
+ *
+ * PyGObject takes @events for an array of pointers, and crashes: use gst_event_camera_unpack() or
+ * gst_buffer_extract_dup().
  *
  * Since: 0.1
  */
@@ -247,6 +250,9 @@ struct _GstEventCameraLabel {
  * A copy of a buffer has a copy of its labels, and a copy of a part has the labels of the events in
  * it. Elements that drop or reorder events do the same to the labels. The API has the tag `events`:
  * elements that turn events into anything else drop it.
+ *
+ * PyGObject takes @labels for an array of pointers, and crashes: use
+ * gst_event_camera_label_meta_get_bytes().
  *
  * Since: 0.1
  */

@@ -357,6 +357,11 @@ TEST(EventCamera, ReadsAndWritesCaps) {
   GstEventCameraInfo back;
   ASSERT_TRUE(gst_event_camera_info_from_caps(&back, caps.get()));
   EXPECT_EQ(back.height, 480);
+  info.fps_d = 0;
+  caps.reset(gst_event_camera_info_to_caps(&info));
+  ASSERT_TRUE(gst_event_camera_info_from_caps(&back, caps.get()));
+  EXPECT_EQ(back.fps_n, 0);
+  EXPECT_EQ(back.fps_d, 1);
   EXPECT_TRUE(read("application/x-event-camera,format=XYTP,width=1,height=1", &info));
   EXPECT_EQ(info.fps_n, 0);
   EXPECT_EQ(info.fps_d, 1);
