@@ -76,6 +76,21 @@ TEST_P(EveryFormat, SeeksToBothEnds) {
   }
 }
 
+/// The segment of a seek may arrive when the next seek is already on its way.
+TEST_P(EveryFormat, FollowsTheLastOfTwoSeeks) {
+  const auto events = some_events();
+  const TemporaryFile file(file_of(format(), events));
+  Player player(file.source() + "queue ! " + format().reader);
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(player.seek(100 * GST_MSECOND));
+    ASSERT_TRUE(player.seek(GST_SECOND, 1'100 * GST_MSECOND));
+    ASSERT_TRUE(player.play()) << player.error;
+    ASSERT_EQ(player.events, between(events, GST_SECOND, 1'100 * GST_MSECOND));
+    ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  }
+}
+
 TEST_P(EveryFormat, KeepsItsPlaceWhenTheRateChanges) {
   const auto events = some_events();
   const TemporaryFile file(file_of(format(), events));

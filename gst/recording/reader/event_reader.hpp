@@ -47,6 +47,7 @@ struct Restart {
   GstSegment segment = {};
   std::optional<eventcamera::SeekPoint> seek_point;  ///< unset: the start of the file
   guint32 seqnum = GST_SEQNUM_INVALID;
+  guint32 superseded = GST_SEQNUM_INVALID;  ///< the seek that was pending before this one
 };
 
 /// Implementation of the element: connects an eventcamera::RecordingReader to pads, events, queries
@@ -145,7 +146,7 @@ class EventReader {
   static GstClockTime limit_of(const SeekRequest& request, const Shared& shared);
   bool seek(GstEvent* event);
   bool seek_pulling(const SeekRequest& request);
-  bool seek_pushed(const Restart& restart, gdouble rate);
+  bool seek_pushed(Restart restart, gdouble rate);
 
   GstElement* element_;
   GstPad* sink_;

@@ -178,7 +178,8 @@ gboolean EventReader::take_segment(GstEvent* event) {
   }
   const guint32 seqnum = gst_event_get_seqnum(event);
   gst_event_unref(event);
-  const bool is_sought = restart && restart->seek_point.value_or(SeekPoint{}).position == start;
+  const bool is_sought = restart && restart->seek_point.value_or(SeekPoint{}).position == start &&
+                         seqnum != restart->superseded;
   if (restart && !is_sought && seqnum != restart->seqnum) {
     // The segment belongs to an earlier seek; the pending one will flush what follows.
     flow_ = GST_FLOW_FLUSHING;

@@ -105,13 +105,17 @@ bool EventReader::seek_pulling(const SeekRequest& request) {
 
 /// Forwards a seek as a seek in bytes. Upstream flushes and sends a BYTES segment, which completes
 /// the seek.
-bool EventReader::seek_pushed(const Restart& restart, gdouble rate) {
+bool EventReader::seek_pushed(Restart restart, gdouble rate) {
   GstEvent* const event = with_seqnum(
       gst_event_new_seek(rate, GST_FORMAT_BYTES, GST_SEEK_FLAG_FLUSH, GST_SEEK_TYPE_SET,
                          static_cast<gint64>(restart.seek_point.value_or(SeekPoint{}).position),
                          GST_SEEK_TYPE_NONE, -1),
       restart.seqnum);
-  shared_.lock()->restart = restart;
+  {
+    const auto shared = shared_.lock();
+    if (shared->restart) restart.superseded = shared->restart->seqnum;
+    shared->restart = restart;
+  }
   if (gst_pad_push_event(sink_, event)) return true;
   shared_.lock()->restart.reset();
   return false;
