@@ -90,7 +90,13 @@ void CompanionPad::forget() {
   change([&] {
     items_.clear();
     known_ = never;
+    is_segment_done_ = false;
   });
+}
+
+/// Buffers may follow those of a segment that is done, as in a loop.
+void CompanionPad::begin_segment() {
+  if (std::exchange(is_segment_done_, false)) known_ = never;
 }
 
 OwnedPad CompanionPad::pad() {
@@ -159,6 +165,7 @@ void CompanionPad::take_event(GstEvent* event) {
       gst_event_copy_segment(event, &segment_);
       // As from byte sources: the timestamps count from 0.
       if (segment_.format != GST_FORMAT_TIME) gst_segment_init(&segment_, GST_FORMAT_TIME);
+      change([&] { begin_segment(); });
       break;
     case GST_EVENT_GAP: {
       GstClockTime start = GST_CLOCK_TIME_NONE;
@@ -169,6 +176,12 @@ void CompanionPad::take_event(GstEvent* event) {
         change([&] { known_ = std::max(known_, *end - resolution); });
       break;
     }
+    case GST_EVENT_SEGMENT_DONE:
+      change([&] {
+        is_segment_done_ = true;
+        known_ = forever;
+      });
+      break;
     case GST_EVENT_EOS:
       change([&] { known_ = forever; });
       break;
@@ -211,13 +224,16 @@ void CompanionPad::set_flushing(bool is_flushing) {
 }
 
 void CompanionPad::begin() {
-  change([&] { position_ = never; });
+  change([&] {
+    position_ = never;
+    begin_segment();
+  });
 }
 
-void CompanionPad::advance(Nanoseconds time) {
+void CompanionPad::advance(Nanoseconds start, Nanoseconds time) {
   change([&] {
-    while (items_.size() > 1 && items_[1].time <= position_) items_.pop_front();
-    position_ = time;
+    while (items_.size() > 1 && items_[1].time <= start) items_.pop_front();
+    position_ = std::max(position_, time);
   });
 }
 

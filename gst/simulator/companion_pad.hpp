@@ -58,10 +58,12 @@ class CompanionPad {
   void set_flushing(bool is_flushing);
   /// Time starts over.
   void begin();
-  /// The next frame is at `time`: buffers for the frames before the last one are no longer needed.
-  void advance(Nanoseconds time);
+  /// The video has reached `time`. Of the buffers up to `start`, only the last is still needed.
+  void advance(Nanoseconds start, Nanoseconds time);
   /// No frames follow.
-  void end() { advance(forever); }
+  void end() { advance(forever, forever); }
+  /// No frames follow in this segment.
+  void end_segment() { advance(forever, forever - 1); }
   /// Waits until the buffers up to `until` are known. Returns the last one that is not after
   /// `from`, and all later ones up to `until`; nullopt if the stream is flushing.
   std::optional<std::vector<Item>> items(Nanoseconds from, Nanoseconds until);
@@ -88,6 +90,7 @@ class CompanionPad {
   GstFlowReturn push(GstElement* element, OwnedBuffer buffer);
   void take_event(GstEvent* event);
   void forget();
+  void begin_segment();
 
   const char* content_;
 
@@ -104,6 +107,7 @@ class CompanionPad {
   bool is_stopped_ = true;
   bool is_flushing_ = false;
   bool is_video_flushing_ = false;
+  bool is_segment_done_ = false;
   std::deque<Item> items_;        ///< in order of time
   Nanoseconds known_ = never;     ///< all buffers before this time are queued
   Nanoseconds position_ = never;  ///< of the video

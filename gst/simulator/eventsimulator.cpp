@@ -514,11 +514,20 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const SimulatorSettings
   return result;
 }
 
-/// Settings for the interval that ends at `end`, up to which class images and flow advance.
-static SimulatorSettings begin_interval(GstEventSimulator* self, Nanoseconds end) {
-  if (const auto time =
-          running_time_of(GST_BASE_TRANSFORM(self)->segment, static_cast<GstClockTime>(end)))
-    for (auto* companion : companions_of(self)) companion->advance(*time);
+/// Lets class images and flow follow the video up to a time, also past frames that are skipped.
+/// What the interval since the last frame may need is kept.
+static void advance_companions(GstEventSimulator* self, GstClockTime time) {
+  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
+  const auto& state = *priv_of(self).state;
+  const auto last = state.draws ? std::nullopt : state.simulator().last_time();
+  const auto from = running_time_of(
+      segment, std::min(time, static_cast<GstClockTime>(last.value_or(Nanoseconds{G_MAXINT64}))));
+  const auto until = running_time_of(segment, time);
+  if (from && until)
+    for (auto* companion : companions_of(self)) companion->advance(*from, *until);
+}
+
+static SimulatorSettings begin_interval(GstEventSimulator* self) {
   configure(self);
   SimulatorSettings settings = priv_of(self).settings.copy();
   if (priv_of(self).class_images.pad()) settings.simulation.labels = true;
@@ -562,8 +571,9 @@ static bool give_flow(GstEventSimulator* self, Nanoseconds start, Nanoseconds en
   return true;
 }
 
-/// Restores the state that a timeline continues from, if any, before its first frame. May throw.
-static void restore_at_first_frame(GstEventSimulator* self) {
+/// Restores the state that a timeline continues from, if any, before its first frame or GAP. May
+/// throw.
+static void restore_at_start(GstEventSimulator* self) {
   auto& stream = priv_of(self).stream;
   auto& simulator = priv_of(self).state->simulator();
   if (!std::exchange(stream.begins, false) || method_of(self).restore == nullptr) return;
@@ -588,12 +598,13 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
   auto& state = *priv_of(self).state;
   sync_controlled_properties(self, GST_BUFFER_PTS(in.get()));
   check_interlacing(self, in.get());
-  restore_at_first_frame(self);
+  restore_at_start(self);
+  advance_companions(self, GST_BUFFER_PTS(in.get()));
   if (is_before_state(self, in.get())) return;
   if (!accept_time(self, in.get()) || !begin_work(self, in.get())) return;
   const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in.get()));
   const auto start = state.simulator().last_time();
-  const SimulatorSettings settings = begin_interval(self, end);
+  const SimulatorSettings settings = begin_interval(self);
   if (start && !give_flow(self, *start, end)) {
     stream.flow = GST_FLOW_FLUSHING;
     return;
@@ -672,8 +683,7 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   auto& state = *priv_of(self).state;
   const Nanoseconds start = *state.simulator().last_time();
   sync_controlled_properties(self, static_cast<GstClockTime>(end));
-  const EventBuckets* events =
-      state.simulator().hold_until(end, begin_interval(self, end).simulation);
+  const EventBuckets* events = state.simulator().hold_until(end, begin_interval(self).simulation);
   priv_of(self).stream.handed_out_until = end;
   auto& flow = priv_of(self).stream.flow;
   if (events == nullptr || events->size() == 0) {
@@ -686,6 +696,19 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
   if (flow == GST_FLOW_OK)
     flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
                        static_cast<GstClockTime>(end - start));
+}
+
+/// Warns if a stream that continues from a state ended before it.
+static void warn_of_no_progress(GstEventSimulator* self) {
+  const auto& state = priv_of(self).state;
+  auto& stream = priv_of(self).stream;
+  if (!state || !stream.continues_from || state->simulator().last_time() != stream.continues_from)
+    return;
+  stream.warn_of_times(self,
+                       {GST_STREAM_ERROR_FORMAT,
+                        "No events: all frames are before the state that initial-state names. Give "
+                        "them the timestamps that they have in the whole video."},
+                       "the state is that at " + std::to_string(*stream.continues_from) + " ns");
 }
 
 /// Saves the state at the end of a stream, if the element has to.
@@ -704,7 +727,12 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   GstClockTime duration = GST_CLOCK_TIME_NONE;
   gst_event_parse_gap(event, &pts, &duration);
   auto& state = priv_of(self).state;
-  const auto start = state ? state->simulator().last_time() : std::nullopt;
+  if (!state) return true;
+  reported(self, [&] { restore_at_start(self); });
+  if (!state) return false;  // after an error
+  const bool has_end = GST_CLOCK_TIME_IS_VALID(duration) && pts <= G_MAXINT64;
+  advance_companions(self, pts + (has_end ? std::min(duration, G_MAXINT64 - pts) : 0));
+  const auto start = state->simulator().last_time();
   if (!start || state->draws) return true;
   const auto frame = static_cast<GstClockTime>(priv_of(self).latency.lock()->duration());
   const GstClockTime rest =
@@ -747,7 +775,11 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       break;
     case GST_EVENT_EOS:
       for (auto* companion : companions_of(self)) companion->end();
+      warn_of_no_progress(self);
       save_state(self);
+      break;
+    case GST_EVENT_SEGMENT_DONE:
+      for (auto* companion : companions_of(self)) companion->end_segment();
       break;
     default:
       break;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/elements/pipeline.hpp"
+#include "tests/elements/recording_files.hpp"
 
 namespace {
 
@@ -209,6 +210,41 @@ TEST_F(ClassImages, EndWithTheVideo) {
   EXPECT_EQ(push_image(80 * ms, 3), GST_FLOW_EOS);
 }
 
+/// As when a seek with the flag SEGMENT plays a loop: the buffers of one stream are not waited for,
+/// nor do those of the other wait, until the next segment.
+TEST_F(ClassImages, EndWithTheSegment) {
+  begin();
+  push_image(0, 1);
+  push_frame(0);
+  gst_harness_push_event(images.get(), gst_event_new_segment_done(GST_FORMAT_TIME, 80 * ms));
+  push_frame(40 * ms);
+  EXPECT_FALSE(events().empty());
+  gst_harness_push_event(video.get(), gst_event_new_segment_done(GST_FORMAT_TIME, 80 * ms));
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.base = 80 * ms;
+  for (auto* h : {images.get(), video.get()})
+    gst_harness_push_event(h, gst_event_new_segment(&segment));
+  push_frame(0);
+  push_image(0, 5);
+  push_image(20 * ms, 6);
+  std::thread pushing([this] { push_image(40 * ms, 7); });
+  push_frame(40 * ms);
+  pushing.join();
+  expect_change(events(), 20'000, 5, 6);
+}
+
+TEST_F(ClassImages, DoNotWaitForAGap) {
+  begin();
+  gst_harness_push_event(video.get(), gst_event_new_gap(0, 400 * ms));  // before the first frame
+  for (const int at : {0, 100, 200, 300})
+    EXPECT_EQ(push_image(static_cast<GstClockTime>(at) * ms, 1), GST_FLOW_OK);
+  push_frame(400 * ms);
+  gst_harness_push_event(video.get(), gst_event_new_gap(440 * ms, 400 * ms));
+  for (const int at : {400, 500, 600, 700})
+    EXPECT_EQ(push_image(static_cast<GstClockTime>(at) * ms, 1), GST_FLOW_OK);
+}
+
 TEST_F(ClassImages, AreForgottenByAFlush) {
   begin();
   push_image(0, 1);
@@ -240,6 +276,23 @@ TEST(ClassImagesInPipelines, DoNotKeepAPipelineFromStopping) {
   pipeline.set(GST_STATE_PLAYING);
   g_usleep(100'000);  // the video waits for images
   pipeline.set(GST_STATE_NULL);
+}
+
+/// Both come from one tee, so images that wait for skipped frames would keep the video from coming.
+TEST(ClassImagesInPipelines, DoNotWaitForFramesThatAreSkipped) {
+  const auto state = recording_files::Folder::path("state");
+  const std::string tee =
+      "video/x-raw,width=64,height=48 ! tee name=t  t. ! queue ! dvs.sink  t. ! queue ! "
+      "dvs.label_sink";
+  Pipeline first("eventsim-dvs name=dvs final-state=" + in_quotes(state) + " ! fakesink  " +
+                 "videotestsrc pattern=ball num-buffers=100 ! " + tee);
+  first.set(GST_STATE_PLAYING);
+  ASSERT_TRUE(first.wait()) << first.error;
+  // All but the last frames lie before the state.
+  Pipeline second("eventsim-dvs name=dvs initial-state=" + in_quotes(state) + " ! fakesink  " +
+                  "videotestsrc pattern=ball num-buffers=110 ! " + tee);
+  second.set(GST_STATE_PLAYING);
+  EXPECT_TRUE(second.wait()) << second.error;
 }
 
 TEST(ClassImagesInPipelines, PadCanBeReleasedWhilePlaying) {

@@ -72,6 +72,44 @@ TEST(Segments, JoinWithoutASeam) {
   EXPECT_EQ(joined, whole);
 }
 
+TEST(Segments, JoinWithoutASeamAtAGap) {
+  const auto gap = [](Harness& h) {
+    gst_harness_push_event(h.get(),
+                           gst_event_new_gap(GST_SECOND + 80 * GST_MSECOND, 200 * GST_MSECOND));
+  };
+  std::vector<Output> whole;
+  Harness one(noisy);
+  start(one);
+  push_frames(one, 0, 2);
+  gap(one);
+  push_frames(one, 7, 9);
+  pull_all(one, whole);
+
+  std::vector<Output> joined;
+  Harness first(noisy + "final-state=" + in_quotes(state()));
+  start(first);
+  push_frames(first, 0, 2);
+  gst_harness_push_event(first.get(), gst_event_new_eos());
+  pull_all(first, joined);
+  Harness second(noisy + "initial-state=" + in_quotes(state()));
+  start(second);
+  gap(second);
+  push_frames(second, 7, 9);
+  pull_all(second, joined);
+  EXPECT_EQ(joined, whole);
+}
+
+TEST(Segments, WarnIfAllFramesAreBeforeTheState) {
+  for (const bool has_state : {false, true}) {
+    Harness h(noisy + "final-state=" + in_quotes(state()) +
+              (has_state ? " initial-state=" + in_quotes(state()) : ""));
+    start(h);
+    push_frames(h, 0, 4);
+    gst_harness_push_event(h.get(), gst_event_new_eos());
+    EXPECT_EQ(h.warning().starts_with("No events: all frames are before the state"), has_state);
+  }
+}
+
 TEST(Segments, ContinueAgainAfterASeek) {
   {
     Harness h(noisy + "final-state=" + in_quotes(state()));
