@@ -106,7 +106,7 @@ class PixelSimulator final : public DvsSimulator {
     last_time_.reset();
     StateReader reader(state);
     pass_origin(reader, settings_);
-    adopt(settings_);
+    adopt(settings_, true);
     pass(reader);
     reader.finish();
     responses_ = responses(current_, luma_bits(current_), gain_);
@@ -162,7 +162,7 @@ class PixelSimulator final : public DvsSimulator {
     if (readout_) readout_->reset();
     if (gain_ != 1) responses_.clear();  // of another exposure
     keep_causes();
-    adopt(settings_);
+    adopt(settings_, true);
     settle();
   }
 
@@ -428,7 +428,7 @@ class PixelSimulator final : public DvsSimulator {
     return luma_bits(settings) == format().bits ? 1 : 257;
   }
 
-  void adopt(const DvsSettings& settings) {
+  void adopt(const DvsSettings& settings, bool restarts) {
     const bool is_first = responses_.empty();
     const bool starts_over = is_first || !have_same_response(settings, current_);
     if (starts_over) {
@@ -439,9 +439,17 @@ class PixelSimulator final : public DvsSimulator {
       responses_ = responses(settings, luma_bits(settings), gain_);
     tables_.clear();
     random_ = Random(settings.seed);
-    if (is_first || !have_same_traits(settings, current_) || current_.threshold_jitter > 0)
-      for_each_row(threads(), format().height,
-                   [&](int y) { pixels_.draw_traits(y, settings, random_); });
+    // Thresholds that events have drawn stay until time or the jitter ends.
+    const bool had_jitter = current_.threshold_jitter > 0;
+    const bool redraws =
+        is_first || restarts || settings.threshold_jitter == 0 || settings.seed != current_.seed;
+    if (is_first || !have_same_traits(settings, current_) || (had_jitter && redraws))
+      for_each_row(threads(), format().height, [&](int y) {
+        if (redraws || !had_jitter)
+          pixels_.draw_traits(y, settings, random_);
+        else
+          pixels_.change_traits(y, current_, settings, random_);
+      });
     current_ = settings;
     dynamics_ = PixelDynamics(settings);
     solver_ = solver_for(settings);
@@ -451,7 +459,7 @@ class PixelSimulator final : public DvsSimulator {
   void change_to(const DvsSettings& settings) {
     const bool is_comparable = have_same_response(settings, current_);
     const bool had_bandwidth = current_.cutoff_frequency > 0;
-    adopt(settings);
+    adopt(settings, false);
     if (!is_comparable)
       settle();
     else if (!had_bandwidth)

@@ -2,6 +2,7 @@
 #include "src/dvs/pixel_array.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace eventcamera {
@@ -114,6 +115,27 @@ void PixelArray::draw_traits(int y, const DvsSettings& settings, const Random& r
     const auto traits = mismatch.of(pixels.first_number + static_cast<std::uint64_t>(x));
     pixels.positive[x] = static_cast<float>(traits.positive_threshold);
     pixels.negative[x] = static_cast<float>(traits.negative_threshold);
+    pixels.leak[x] = static_cast<float>(traits.leak);
+  }
+}
+
+void PixelArray::change_traits(int y, const DvsSettings& from, const DvsSettings& to,
+                               const Random& random) {
+  const Mismatch before(from, random);
+  const Mismatch after(to, random);
+  const PixelRow pixels = row(y);
+  const auto move = [](float& threshold, double old_fixed, double fixed) {
+    const double moved = std::isinf(threshold) || std::isinf(fixed)
+                             ? fixed
+                             : std::max(threshold + fixed - old_fixed, min_threshold_of(fixed));
+    threshold = static_cast<float>(moved);
+  };
+  for (int x = 0; x < width(); ++x) {
+    const auto number = pixels.first_number + static_cast<std::uint64_t>(x);
+    const auto old_traits = before.of(number);
+    const auto traits = after.of(number);
+    move(pixels.positive[x], old_traits.positive_threshold, traits.positive_threshold);
+    move(pixels.negative[x], old_traits.negative_threshold, traits.negative_threshold);
     pixels.leak[x] = static_cast<float>(traits.leak);
   }
 }

@@ -105,6 +105,9 @@ class PixelArray {
 
   /// Draws the thresholds and leak of a row of pixels.
   void draw_traits(int y, const DvsSettings& settings, const Random& random);
+  /// The same for settings of the same seed that change while events draw thresholds anew: these
+  /// move by as much as those that were drawn first.
+  void change_traits(int y, const DvsSettings& from, const DvsSettings& to, const Random& random);
 
   /// Resets a row as if its target had been constant for a long time, and draws its initial noise
   /// budgets.

@@ -893,6 +893,28 @@ TEST_P(AlongMotion, EqualsTheReference) {
   expect_near(playback.events, expected, 0.002, 0.97, 5);
 }
 
+TEST(Dvs, KeepsThresholdsThatEventsHaveDrawnWhenSettingsChange) {
+  const auto events_with = [](const auto& change) {
+    DvsSettings settings{
+        .positive_threshold = 0.3, .negative_threshold = 0.3, .threshold_jitter = 0.1};
+    Playback playback({30, 20, 8}, settings);
+    for (int i = 0; i < 60; ++i) {
+      change(settings, i % 2);
+      playback.set(settings);
+      playback.push(flat(30, 20, 4 * i), 8, i * Nanoseconds{1'000'000});
+    }
+    return playback.events;
+  };
+  const auto expected = events_with([](DvsSettings&, int) {});
+  EXPECT_GT(expected.size(), 30U * 20U * 10U);
+  expect_near(events_with([](DvsSettings& s, int odd) { s.exposure_lead = 1000 * odd; }), expected,
+              0, 0.9999, 0);
+  expect_near(events_with([](DvsSettings& s, int odd) { s.leak_rate = 1e-9 * odd; }), expected,
+              0.001, 0.99, 2);
+  expect_near(events_with([](DvsSettings& s, int odd) { s.positive_threshold = 0.3 + 1e-9 * odd; }),
+              expected, 0.001, 0.99, 2);
+}
+
 TEST(Dvs, TakesSettingsFromFrameToFrame) {
   Playback playback({30, 20, 8}, DvsSettings{});
   Nanoseconds time = 0;
