@@ -129,12 +129,14 @@ std::optional<Chunker::Interval> Chunker::next() {
   const auto end = grid_before(start_) + length_;
   if (finished_) {
     if (waiting_ == 0) return std::nullopt;
-    due = latest_ + 1;
+    due = latest_ + 1;  // the last interval ends with the last event
   } else if (end > due && waiting_ < max_events) {
     return std::nullopt;
   }
-  // The last interval ends with the last event.
-  if (end > due) return hand_out(finished_ ? due : std::min(end, middle()));
+  if (end > due) {
+    const auto cut = finished_ ? due : std::min(end, middle());
+    return cut > start_ ? hand_out(cut) : hand_out_part(waiting_ / 2);
+  }
   const auto silent_until = grid_before(cells_.empty() ? due : std::min(due, cells_.front().start));
   return hand_out(std::max(end, silent_until));
 }
@@ -145,7 +147,7 @@ Microseconds Chunker::middle() {
   const auto half = waiting_ / 2;
   if (cell.events.size() <= half) return cell.end;
   sort(cell);
-  return std::max(cell.start + cell.events[half].t, start_ + 1);
+  return cell.start + cell.events[half].t;
 }
 
 void Chunker::sort(Cell& cell) {
@@ -188,6 +190,21 @@ Chunker::Interval Chunker::hand_out(Microseconds end) {
   interval.events = returned_;
   interval.labels = returned_labels_;
   return interval;
+}
+
+/// The first events of a single time, of which more may follow: an interval without a duration.
+Chunker::Interval Chunker::hand_out_part(std::size_t count) {
+  auto& cell = cells_.front();
+  const auto part = static_cast<std::ptrdiff_t>(count);
+  returned_.assign(cell.events.begin(), cell.events.begin() + part);
+  cell.events.erase(cell.events.begin(), cell.events.begin() + part);
+  returned_labels_.clear();
+  if (!cell.labels.empty()) {
+    returned_labels_.assign(cell.labels.begin(), cell.labels.begin() + part);
+    cell.labels.erase(cell.labels.begin(), cell.labels.begin() + part);
+  }
+  waiting_ -= count;
+  return {start_, 0, returned_, returned_labels_};
 }
 
 }  // namespace eventcamera

@@ -30,7 +30,7 @@ class Chunker {
 
   struct Interval {
     Microseconds start;
-    Microseconds duration;
+    Microseconds duration;  ///< 0 if it has a single time, of which more events may follow
     /// Sorted, with times from the start; valid until next(). None: a silence, of any length.
     std::span<const Event> events;
     std::span<const Label> labels;  ///< as many as events, or none
@@ -92,6 +92,7 @@ class Chunker {
   Microseconds middle();
   static void sort(Cell& cell);
   Interval hand_out(Microseconds end);
+  Interval hand_out_part(std::size_t count);
   Microseconds grid_before(Microseconds t) const { return t - (t - *first_) % length_; }
 
   Microseconds length_;

@@ -167,22 +167,53 @@ TEST(Chunker, RefusesImpossibleTimes) {
 }
 
 TEST(Chunker, BoundsTheEventsOfAnInterval) {
-  Chunker chunker(length);
-  // More than a million pixels can fire within one microsecond.
-  std::vector<AbsoluteEvent> events(1 << 16, at(7));
-  std::vector<Cut> cuts;
-  std::size_t largest = 0;
-  chunker.push(std::vector{at(0)});
-  for (int i = 0; i < 100; ++i) {
-    chunker.push(events);
-    while (const auto interval = chunker.next()) {
-      EXPECT_LE(interval->start + interval->duration, 8);
-      largest = std::max(largest, interval->events.size());
+  // More than a million pixels can fire within one microsecond, and some clocks stand still.
+  constexpr std::size_t count = 100 << 16;
+  constexpr Microseconds last = 20'000;
+  const auto number_of = [](const AbsoluteEvent& event) {
+    return static_cast<std::size_t>(event.x) << 14 | static_cast<std::size_t>(event.y());
+  };
+  for (const Microseconds start : {0, 7}) {
+    for (const bool is_labelled : {false, true}) {
+      Chunker chunker(length);
+      chunker.keep_labels(is_labelled);
+      std::size_t taken = 0;
+      std::size_t misplaced = 0;
+      Microseconds reached = 0;
+      const auto take = [&] {
+        while (const auto interval = chunker.next()) {
+          ASSERT_EQ(interval->start, reached);
+          reached += interval->duration;
+          ASSERT_LE(interval->events.size(), Chunker::max_events);
+          ASSERT_EQ(interval->labels.size(), is_labelled ? interval->events.size() : 0);
+          for (std::size_t i = 0; i < interval->events.size(); ++i, ++taken) {
+            const auto& event = interval->events[i];
+            const AbsoluteEvent absolute{interval->start + event.t, event.x, event.y_p};
+            const auto t = taken == 0 ? 0 : taken <= count ? start : last;
+            misplaced += absolute.t != t || number_of(absolute) != taken ||
+                         (is_labelled && interval->labels[i].object_class != event.x);
+          }
+        }
+      };
+      std::vector<AbsoluteEvent> events;
+      for (std::size_t i = 0; i < count + 2; ++i) {
+        const auto t = i == 0 ? 0 : i <= count ? start : last;
+        auto& event = events.emplace_back(
+            at(t, static_cast<int>(i >> 14), static_cast<int>(i & ((1 << 14) - 1))));
+        event.object_class = event.x;
+        if (events.size() < (1 << 16) && i <= count) continue;
+        chunker.push(events);
+        events.clear();
+        take();
+      }
+      chunker.finish();
+      take();
+      EXPECT_EQ(taken, count + 2);
+      EXPECT_EQ(misplaced, 0U);
+      EXPECT_EQ(reached, last + 1);
+      EXPECT_EQ(chunker.dropped().late, 0U);
     }
   }
-  chunker.finish();
-  take_whole(chunker, cuts);
-  EXPECT_GT(chunker.dropped().late, 0U);  // once the microsecond was returned
 }
 
 TEST(Chunker, CutsAnOverfullIntervalWithoutLoss) {

@@ -2,6 +2,7 @@
 // Cuts events at arbitrary times into intervals. Four bytes are an event or a command.
 #include "src/formats/chunker.hpp"
 
+#include <algorithm>
 #include <optional>
 
 #include "src/formats/little_endian.hpp"
@@ -26,11 +27,12 @@ std::uint64_t take(Chunker& chunker, std::optional<Microseconds>& end) {
   std::uint64_t count = 0;
   while (const auto interval = chunker.next()) {
     require(!end || interval->start == *end, "an interval begins where the last one ended");
-    require(interval->duration > 0, "an interval is not empty");
+    require(interval->duration > 0 || !interval->events.empty(), "an interval is not empty");
     end = interval->start + interval->duration;
     const Event* before = nullptr;
     for (const auto& event : interval->events) {
-      require(event.t < interval->duration, "events are within their interval");
+      require(event.t < std::max<Microseconds>(interval->duration, 1),
+              "events are within their interval");
       require(before == nullptr || before->t < event.t ||
                   (before->t == event.t && number_of(*before) < number_of(event)),
               "events are sorted, and those of a time are in the order in which they came");
