@@ -18,6 +18,7 @@ Chunker::Chunker(Microseconds length, Microseconds start, Microseconds origin)
     : length_(length), first_(start), origin_(origin), start_(start) {}
 
 void Chunker::push(std::span<const AbsoluteEvent> events) {
+  paused_ &= events.empty();
   // Fast path: nearly always the events are in order and can be added in blocks.
   while (!events.empty()) {
     const auto kept = keep_sorted(events.first(std::min(events.size(), block_size)));
@@ -101,6 +102,11 @@ void Chunker::reach(Microseconds t) {
   if (!ahead_.empty() && ahead_.front().t < reached_ + settled) believe_ahead();
 }
 
+void Chunker::pause(Microseconds t) {
+  if (!ahead_.empty() && ahead_.front().t < t) believe_ahead();
+  paused_ = true;
+}
+
 void Chunker::finish() {
   if (!ahead_.empty()) believe_ahead();
   finished_ = true;
@@ -130,12 +136,14 @@ std::optional<Chunker::Interval> Chunker::next() {
   if (finished_) {
     if (waiting_ == 0) return std::nullopt;
     due = latest_ + 1;  // the last interval ends with the last event
+  } else if (paused_ && waiting_ > 0) {
+    due = std::max(due, latest_);
   } else if (end > due && waiting_ < max_events) {
     return std::nullopt;
   }
   if (end > due) {
-    const auto cut = finished_ ? due : std::min(end, middle());
-    return cut > start_ ? hand_out(cut) : hand_out_part(waiting_ / 2);
+    const auto cut = finished_ || paused_ ? due : std::min(end, middle());
+    return cut > start_ ? hand_out(cut) : hand_out_part(paused_ ? waiting_ : waiting_ / 2);
   }
   const auto silent_until = grid_before(cells_.empty() ? due : std::min(due, cells_.front().start));
   return hand_out(std::max(end, silent_until));
@@ -203,6 +211,7 @@ Chunker::Interval Chunker::hand_out_part(std::size_t count) {
     returned_labels_.assign(cell.labels.begin(), cell.labels.begin() + part);
     cell.labels.erase(cell.labels.begin(), cell.labels.begin() + part);
   }
+  if (cell.events.empty()) cells_.pop_front();
   waiting_ -= count;
   return {start_, 0, returned_, returned_labels_};
 }

@@ -51,10 +51,14 @@ class Chunker {
   /// Whether the next events carry labels, which are then returned with them.
   void keep_labels(bool kept) { keeps_labels_ = kept; }
 
+  /// Ends a pause.
   void push(std::span<const AbsoluteEvent> events);
 
   /// Declares that nothing earlier than `t` will follow.
   void reach(Microseconds t);
+
+  /// Declares a pause up to `t`: the events that wait are returned. Earlier ones may still follow.
+  void pause(Microseconds t);
 
   /// Declares the end of the events.
   void finish();
@@ -102,6 +106,7 @@ class Chunker {
   Microseconds start_ = never;    ///< start of the next interval, once first_ is known
   Microseconds latest_ = never;   ///< latest time of kept events
   Microseconds reached_ = never;  ///< nothing earlier will follow
+  bool paused_ = false;
   bool finished_ = false;
 
   std::deque<Cell> cells_;       ///< those with events, in order of time

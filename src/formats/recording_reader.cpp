@@ -17,6 +17,8 @@ constexpr std::size_t max_held = std::size_t{1} << 26;
 constexpr Microseconds max_hold = 1'000'000;
 /// A stream lagging by more than this is treated as silent.
 constexpr Microseconds max_lag = 500'000;
+/// Minimum length of a gap of such a stream. Queues of a second do not fill before.
+constexpr Microseconds min_gap = 250'000;
 /// Wrap period of the EVT3 clock, the shortest of all; those of the other formats are multiples of
 /// it.
 constexpr Microseconds clock_range = Microseconds{1} << 24;
@@ -68,7 +70,7 @@ void RecordingReader::interrupt() {
   shift_.reset();
   for (auto& stream : streams_) start_chunker(stream);
   next_stream_ = 0;
-  newest_ = caught_up_ = 0;
+  newest_ = 0;
   triggers_.clear();
   imu_samples_.clear();
 }
@@ -364,7 +366,7 @@ void RecordingReader::restart(const std::optional<SeekPoint>& seek_point, Micros
 
 /// Prepares for items at `start` or later: those held, and those that the decoder reads next.
 void RecordingReader::begin_segment(Microseconds start, std::optional<Microseconds> stop) {
-  start_ = newest_ = caught_up_ = start;
+  start_ = newest_ = start;
   stop_ = stop;
   finishing_ = drained_ = false;
   held_next_ = next_stream_ = 0;
@@ -550,35 +552,46 @@ void RecordingReader::set_shift(Microseconds first) {
 }
 
 std::optional<RecordingReader::Chunk> RecordingReader::next_chunk() {
-  while (true) {
-    if (const auto silence = next_silence()) return silence;
-    for (; next_stream_ < streams_.size(); ++next_stream_) {
-      auto& stream = streams_[next_stream_];
-      if (!stream.shown) continue;
-      while (const auto interval = stream.chunker.next()) {
-        Chunk chunk{next_stream_, interval->start - origin_ + shift_.value_or(0),
-                    interval->duration, interval->events, interval->labels};
-        cut_at_stop(chunk);
-        if (!advance(stream, chunk.start, chunk.start + chunk.duration)) continue;
-        counts_.events += chunk.events.size();
-        return chunk;
-      }
-    }
-    if (newest_ == caught_up_) return std::nullopt;
-    catch_up();
-  }
+  if (const auto gap = next_gap()) return gap;
+  for (; next_stream_ < streams_.size(); ++next_stream_)
+    if (const auto chunk = next_chunk(next_stream_)) return chunk;
+  return std::nullopt;
 }
 
-/// A gap in a stream of frames that lags far behind the newest item, so that others need not wait
-/// for it long.
-std::optional<RecordingReader::Chunk> RecordingReader::next_silence() {
-  const auto silent_until = newest_ - max_lag;
-  for (auto& stream : streams_) {
+std::optional<RecordingReader::Chunk> RecordingReader::next_chunk(std::size_t index) {
+  auto& stream = streams_[index];
+  if (!stream.shown) return std::nullopt;
+  while (const auto interval = stream.chunker.next()) {
+    Chunk chunk{index, interval->start - origin_ + shift_.value_or(0), interval->duration,
+                interval->events, interval->labels};
+    cut_at_stop(chunk);
+    const auto end = chunk.start + chunk.duration;
+    if (chunk.events.empty()) {
+      // Part of it may have been returned as a gap.
+      chunk.start = std::max(chunk.start, stream.position);
+      chunk.duration = end - chunk.start;
+      if (chunk.duration <= 0) continue;
+    }
+    if (!advance(stream, chunk.start, end)) continue;
+    counts_.events += chunk.events.size();
+    return chunk;
+  }
+  return std::nullopt;
+}
+
+/// A gap in a stream that lags far behind the newest item, so that others need not wait for it
+/// long; before it, the events that wait. Its later items are still returned: the streams of some
+/// files are written one after the other.
+std::optional<RecordingReader::Chunk> RecordingReader::next_gap() {
+  const auto silent_until = newest_ - std::max(max_lag, chunk_length_);
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    auto& stream = streams_[i];
+    if (!stream.shown || silent_until - stream.position < min_gap) continue;
+    stream.chunker.pause(origin_ + silent_until);
+    if (const auto chunk = next_chunk(i)) return chunk;
     const auto start = stream.position;
-    if (stream.shown && stream.info.kind == StreamKind::frames && silent_until - start >= max_lag &&
-        advance(stream, start, silent_until))
-      return Chunk{
-          static_cast<std::size_t>(&stream - streams_.data()), start, silent_until - start, {}};
+    if (silent_until > start && advance(stream, start, silent_until))
+      return Chunk{i, start, silent_until - start, {}};
   }
   return std::nullopt;
 }
@@ -591,16 +604,6 @@ void RecordingReader::cut_at_stop(Chunk& chunk) const {
       chunk.events, [&](const Event& event) { return event.t < chunk.duration; });
   chunk.events = {chunk.events.begin(), end};
   if (!chunk.labels.empty()) chunk.labels = chunk.labels.first(chunk.events.size());
-}
-
-/// Treats event streams that lag far behind the newest item as silent.
-void RecordingReader::catch_up() {
-  caught_up_ = newest_;
-  for (auto& stream : streams_)
-    if (stream.shown && stream.info.kind == StreamKind::events &&
-        stream.position < newest_ - max_lag)
-      stream.chunker.reach(origin_ + newest_ - max_lag);
-  next_stream_ = 0;
 }
 
 /// Records that a stream was returned up to `end`. False if `start` is past the segment.

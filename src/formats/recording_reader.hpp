@@ -50,7 +50,7 @@ class RecordingReader {
     SizeFrom size_from = SizeFrom::file;
     unsigned number = 0;                 ///< index among streams of its kind
     bool shown = false;                  ///< it has items, or may have some
-    Microseconds position = 0;           ///< earliest start of its next item
+    Microseconds position = 0;           ///< end of its items and gaps so far
     std::uint64_t outside = 0;           ///< events outside a size not stated in the file
     std::optional<Microseconds> first;   ///< earliest time in the surveyed part of the file
     std::optional<Microseconds> latest;  ///< latest time in it
@@ -217,9 +217,9 @@ class RecordingReader {
   template <class Sample>
   std::span<const Sample> taken_before(Microseconds end, WaitingItems<Sample>& waiting);
   std::optional<Chunk> next_chunk();
-  std::optional<Chunk> next_silence();
+  std::optional<Chunk> next_chunk(std::size_t index);
+  std::optional<Chunk> next_gap();
   void cut_at_stop(Chunk& chunk) const;
-  void catch_up();
   bool advance(Stream& stream, Microseconds start, Microseconds end);
   void set_shift(Microseconds first);
   void finish_chunkers();
@@ -259,7 +259,6 @@ class RecordingReader {
   WaitingItems<ImuSample> imu_samples_;
   std::size_t next_stream_ = 0;  ///< next stream to ask for a chunk
   Microseconds newest_ = 0;      ///< maximum position of all streams
-  Microseconds caught_up_ = 0;   ///< newest_ at the last catch_up()
   Corruption before_;            ///< the decoder's corruption at its last restart
   Counts counts_;                ///< without those that decoder and chunkers count
 };

@@ -120,7 +120,7 @@ class AedatPlayer : public Pipeline {
     EXPECT_LE(GST_BUFFER_DURATION(buffer), 10 * GST_MSECOND);
     append_events(buffer, track.events);
     for (const auto& event : harness::events_of(buffer))
-      EXPECT_LT(event.t, GST_BUFFER_DURATION(buffer) / 1000);
+      EXPECT_LE(event.t, GST_BUFFER_DURATION(buffer) / 1000);
   }
 
   static void see(Track& track, GstEvent* event) {

@@ -295,6 +295,28 @@ TEST(Chunker, HandsOutWhatIsReachedAtOnce) {
   EXPECT_EQ(silence->duration, 20'000);
 }
 
+TEST(Chunker, HandsOutWhatWaitsInAPause) {
+  const std::vector before{at(0), at(3'000), at(3'000, 5)};
+  const std::vector after{at(3'000, 7), at(3'001), at(40'000), at(50'000), at(60'000)};
+  Chunker chunker(length);
+  chunker.push(before);
+  std::vector<Cut> cuts;
+  take_whole(chunker, cuts);
+  EXPECT_TRUE(cuts.empty());
+  chunker.pause(1'000'000);
+  take_whole(chunker, cuts);
+  EXPECT_EQ(joined(cuts), before);
+  chunker.push(after);
+  take_whole(chunker, cuts);
+  EXPECT_LT(joined(cuts).size(), before.size() + after.size());
+  chunker.finish();
+  take_whole(chunker, cuts);
+  auto all = before;
+  all.insert(all.end(), after.begin(), after.end());
+  EXPECT_EQ(joined(cuts), all);
+  EXPECT_EQ(chunker.dropped().late, 0U);
+}
+
 TEST(Chunker, KeepsLabelsWithTheirEvents) {
   // Out of order, and so many that intervals are cut in two.
   std::mt19937 random(5);

@@ -67,6 +67,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       case 2:
         chunker.reach(static_cast<Microseconds>(t + step));
         break;
+      case 3:
+        chunker.pause(static_cast<Microseconds>(t + step));
+        break;
       default:
         t += step;
         events.push_back(numbered(pushed + events.size(), t));
