@@ -10,6 +10,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <gst/base/gsttypefindhelper.h>
+#include <gst/eventcamera/eventcamera.h>
 #include <gst/gst.h>
 #include <signal.h>
 #include <stdio.h>
@@ -392,17 +393,30 @@ static void link_frames(GstElement* reader, GstElement* muxer, GstElement* event
   gst_object_unref(pad);
 }
 
+/* Counts the pads of events. */
+static gboolean count_streams(GstElement* reader, GstPad* pad, gpointer count) {
+  (void)reader;
+  *(guint*)count += g_str_has_prefix(GST_PAD_NAME(pad), "events_");
+  return TRUE;
+}
+
 /* Links the streams of a file once they are known. Runs in the streaming thread, before data
  * flows. `muxer` takes frames, too, unless it is NULL. */
 static void link_streams(GstElement* reader, gpointer muxer) {
   GstPad* pad = gst_element_get_static_pad(reader, "events_0");
   GstElement* pipeline;
   GstElement* queue;
+  guint streams = 0;
   if (pad == NULL) {
     GST_ELEMENT_ERROR(reader, STREAM, WRONG_TYPE, ("The file has no events to convert."),
                       ("no stream of events among %u streams", reader->numsrcpads));
     return;
   }
+  gst_element_foreach_src_pad(reader, count_streams, &streams);
+  if (streams > 1)
+    GST_ELEMENT_WARNING(reader, STREAM, DEMUX,
+                        ("Only the first of %u streams of events is converted.", streams),
+                        ("the others are those of the pads events_1 and on"));
   pipeline = GST_ELEMENT(gst_element_get_parent(reader));
   queue = gst_bin_get_by_name(GST_BIN(pipeline), "events");
   if (muxer != NULL) link_frames(reader, GST_ELEMENT(muxer), queue);

@@ -281,6 +281,32 @@ cmp framed.aedat4.frames again.aedat4.frames || fail "again.aedat4 has other fra
 convert again.aedat4 again.csv
 cmp framed.csv again.csv || fail "again.aedat4 has other events"
 
+# Of several streams of events, one is converted; the user is told.
+timeout 60 "$GST_LAUNCH" -q filesrc location=framed.aedat4 ! aedatdemux name=d  d.events_0 ! queue ! mux.  d.video_0 ! queue ! mux.  aedatmux name=mux compression=none ! fdsink >plain-framed.aedat4
+/usr/bin/python3 - plain-framed.aedat4 two.aedat4 <<'PYTHON'
+import struct
+import sys
+
+data = open(sys.argv[1], "rb").read()
+start = 14  # after the version
+start += 4 + struct.unpack_from("<I", data, start)[0]
+events = []
+at = start
+while at < len(data):
+    stream, size = struct.unpack_from("<ii", data, at)
+    if stream == 0:
+        events.append(data[at + 4:at + 8 + size])
+    at += 8 + size
+with open(sys.argv[2], "wb") as two:
+    two.write(data[:start].replace(b"FRME", b"EVTS"))
+    for stream in 0, 1:
+        for packet in events:
+            two.write(struct.pack("<i", stream) + packet)
+PYTHON
+convert two.aedat4 two.csv 2>left-out
+grep -q "two.aedat4: warning: Only the first of 2 streams of events is converted" left-out || fail "the user is told: $(cat left-out)"
+cmp framed.csv two.csv || fail "two.csv has other events"
+
 # Parts of a recording: from 0.5 s after its first event to before 1 s.
 awk -F, 'NR == 2 { start = $1 } NR == 1 || ($1 >= start + 500000 && $1 < start + 1000000)' ball.csv >expected.csv
 [ "$(wc -l <expected.csv)" -gt 10000 ] || fail "the part has $(wc -l <expected.csv) lines"
