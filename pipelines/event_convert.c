@@ -445,8 +445,20 @@ static GstStructure* stats_of(GstElement* pipeline, const char* name) {
   return stats;
 }
 
+/* What is converted. */
+typedef struct {
+  guint64 events;
+  gboolean labelled; /* some events have labels */
+} Content;
+
+/* True if a format keeps labels. */
+static gboolean keeps_labels(const Format* to) {
+  return strcmp(to->extension, ".npz") == 0 || strcmp(to->extension, ".h5") == 0 ||
+         g_strcmp0(properties[0].value, "labels") == 0;
+}
+
 /* Prints what OUT cannot store of `in`. */
-static void print_left_out(const char* in, GstElement* pipeline) {
+static void print_left_out(const char* in, GstElement* pipeline, gboolean labels) {
   static const struct {
     const char* field;
     const char* name;
@@ -463,6 +475,7 @@ static void print_left_out(const char* in, GstElement* pipeline) {
       g_string_append_printf(text, "%s%" G_GUINT64_FORMAT " %s", text->len > 0 ? ", " : "",
                              of_in - of_out, kinds[i].name);
   }
+  if (labels) g_string_append(text, text->len > 0 ? ", labels" : "labels");
   if (text->len > 0) PRINT_ERROR("%s: left out: %s\n", in, text->str);
   g_string_free(text, TRUE);
   gst_structure_free(written);
@@ -479,13 +492,18 @@ static void print_empty(const char* in, GstElement* pipeline) {
 }
 
 /* Runs in the streaming thread, while the main thread prints. */
-static GstPadProbeReturn count_events(GstPad* pad, GstPadProbeInfo* info, gpointer events) {
+static GstPadProbeReturn count_events(GstPad* pad, GstPadProbeInfo* info, gpointer data) {
+  Content* content = data;
   (void)pad;
-  if ((info->type & GST_PAD_PROBE_TYPE_BUFFER) != 0)
-    __atomic_add_fetch((guint64*)events, gst_buffer_get_size(GST_PAD_PROBE_INFO_BUFFER(info)) / 8,
-                       __ATOMIC_RELAXED);
-  else if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_FLUSH_STOP)
-    __atomic_store_n((guint64*)events, 0, __ATOMIC_RELAXED); /* the file starts over */
+  if ((info->type & GST_PAD_PROBE_TYPE_BUFFER) != 0) {
+    GstBuffer* buffer = GST_PAD_PROBE_INFO_BUFFER(info);
+    __atomic_add_fetch(&content->events, gst_buffer_get_size(buffer) / 8, __ATOMIC_RELAXED);
+    if (gst_buffer_get_event_camera_label_meta(buffer) != NULL)
+      __atomic_store_n(&content->labelled, TRUE, __ATOMIC_RELAXED);
+  } else if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_FLUSH_STOP) {
+    __atomic_store_n(&content->events, 0, __ATOMIC_RELAXED); /* the file starts over */
+    __atomic_store_n(&content->labelled, FALSE, __ATOMIC_RELAXED);
+  }
   return GST_PAD_PROBE_OK;
 }
 
@@ -581,7 +599,8 @@ static void interrupt(int number) {
 }
 
 /* Runs until the file is written. FALSE on failure. */
-static gboolean run(const char* in, GstElement* pipeline, const guint64* events) {
+static gboolean run(const char* in, const Format* to, GstElement* pipeline,
+                    const Content* content) {
   GstBus* bus = gst_element_get_bus(pipeline);
   gboolean trimming = is_trimmed();
   gboolean ended = FALSE;
@@ -598,7 +617,7 @@ static gboolean run(const char* in, GstElement* pipeline, const guint64* events)
                                    GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING |
                                        GST_MESSAGE_INFO | GST_MESSAGE_ASYNC_DONE);
     if (message == NULL) {
-      print_progress(pipeline, __atomic_load_n(events, __ATOMIC_RELAXED));
+      print_progress(pipeline, __atomic_load_n(&content->events, __ATOMIC_RELAXED));
       continue;
     }
     if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_ASYNC_DONE) {
@@ -613,8 +632,8 @@ static gboolean run(const char* in, GstElement* pipeline, const guint64* events)
     gst_message_unref(message);
   }
   clear_progress();
-  if (ok) print_left_out(in, pipeline);
-  if (ok && !interrupted && *events == 0 && is_part()) print_empty(in, pipeline);
+  if (ok) print_left_out(in, pipeline, content->labelled && !keeps_labels(to));
+  if (ok && !interrupted && content->events == 0 && is_part()) print_empty(in, pipeline);
   gst_element_set_state(pipeline, GST_STATE_NULL);
   gst_object_unref(bus);
   return ok;
@@ -645,10 +664,10 @@ static gchar* target_of(const char* path) {
   return target;
 }
 
-/* A pipeline that reads `in` and writes `part`, and counts its events. NULL, and the exit status,
+/* A pipeline that reads `in` and writes `part`, and tells its content. NULL, and the exit status,
  * on failure. */
 static GstElement* make_pipeline(const char* in, const Reader* from, const char* part,
-                                 const Format* to, guint64* events, int* status) {
+                                 const Format* to, Content* content, int* status) {
   GError* error = NULL;
   GstElement* queue;
   GstPad* pad;
@@ -673,7 +692,7 @@ static GstElement* make_pipeline(const char* in, const Reader* from, const char*
   pad = gst_element_get_static_pad(queue, "src");
   if (crop_text != NULL) crop_events(pad, &region);
   gst_pad_add_probe(pad, GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_FLUSH, count_events,
-                    events, NULL);
+                    content, NULL);
   gst_object_unref(pad);
   gst_object_unref(queue);
   if (from->has_streams) link_when_known(pipeline, to);
@@ -682,17 +701,17 @@ static GstElement* make_pipeline(const char* in, const Reader* from, const char*
 
 /* Returns the exit status. */
 static int write_file(const char* in, const Reader* from, const char* path, const Format* to) {
-  guint64 events = 0;
+  Content content = {0, FALSE};
   int status = 0;
   gchar* part = create_part(path);
   GstElement* pipeline;
   if (part == NULL) return 1;
-  pipeline = make_pipeline(in, from, part, to, &events, &status);
+  pipeline = make_pipeline(in, from, part, to, &content, &status);
   if (pipeline != NULL) {
-    gboolean ok = run(in, pipeline, &events);
+    gboolean ok = run(in, to, pipeline, &content);
     gst_object_unref(pipeline);
     ok = finish(part, path, ok);
-    if (ok) printf("%" G_GUINT64_FORMAT " events from %s to %s\n", events, in, path);
+    if (ok) printf("%" G_GUINT64_FORMAT " events from %s to %s\n", content.events, in, path);
     status = ok ? 0 : 1;
   } else {
     remove(part);

@@ -307,6 +307,19 @@ convert two.aedat4 two.csv 2>left-out
 grep -q "two.aedat4: warning: Only the first of 2 streams of events is converted" left-out || fail "the user is told: $(cat left-out)"
 cmp framed.csv two.csv || fail "two.csv has other events"
 
+# Labels come along where they can.
+timeout 60 "$GST_LAUNCH" -q videotestsrc pattern=ball num-buffers=20 ! eventsim-dvs label=true ! eventnpzenc ! filesink location=labelled.npz
+for ending in npz h5 csv; do
+  format=()
+  [ $ending = csv ] && format=(--format=labels)
+  convert "${format[@]}" labelled.npz "labels.$ending" 2>left-out
+  if grep "left out" left-out; then fail "labels are left out of labels.$ending"; fi
+done
+for ending in csv raw hdf5 aedat4; do
+  convert labelled.npz "unlabelled.$ending" 2>left-out
+  grep -q "labelled.npz: left out: labels$" left-out || fail "nobody tells of labels that unlabelled.$ending lacks"
+done
+
 # Parts of a recording: from 0.5 s after its first event to before 1 s.
 awk -F, 'NR == 2 { start = $1 } NR == 1 || ($1 >= start + 500000 && $1 < start + 1000000)' ball.csv >expected.csv
 [ "$(wc -l <expected.csv)" -gt 10000 ] || fail "the part has $(wc -l <expected.csv) lines"
