@@ -248,8 +248,9 @@ static void encode_triggers(GstEventWriter* self, Microseconds t) {
   for (const auto& trigger : state.triggers.take_before(t)) {
     if (trigger.t < state.last || !state.encoder->encode_trigger(trigger, priv.bytes)) {
       GST_LOG_OBJECT(self,
-                     "left out a trigger at %" G_GINT64_FORMAT " us: late, or the format has none",
-                     gint64{trigger.t});
+                     "left out a trigger of input %u at %" G_GINT64_FORMAT
+                     " us: late, or the format has none",
+                     unsigned{trigger.id}, gint64{trigger.t});
       continue;
     }
     state.last = trigger.t;

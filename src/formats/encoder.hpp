@@ -38,7 +38,7 @@ class Encoder {
   virtual void label(std::span<const Label> /*labels*/) {}
 
   /// Appends an encoded trigger, which is not earlier than anything before it. False if the format
-  /// has no triggers.
+  /// has no triggers, or none of this input.
   bool encode_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) {
     put_header(out);
     return append_trigger(trigger, out);

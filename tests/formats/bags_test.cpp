@@ -500,6 +500,7 @@ TEST(Mcap, KeepsTriggersWithEvt3) {
   EXPECT_EQ(contents.events, events);
   EXPECT_EQ(contents.triggers, triggers);
   EXPECT_FALSE(make_mcap_encoder({hd, BagEvents::mono})->encode_trigger(triggers[0], bytes));
+  EXPECT_FALSE(make_mcap_encoder({.size = hd})->encode_trigger({1000, 16, true}, bytes));
 }
 
 TEST(Mcap, IsAsSpecified) {

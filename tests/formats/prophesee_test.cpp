@@ -158,6 +158,21 @@ TEST(Written, Evt3KeepsTimeAliveThroughSilence) {
   EXPECT_EQ(bytes.size() / 2, 4U + 20'000'000 / 4096 + 2U);
 }
 
+TEST(Written, TriggersAreOfInputsThatTheWordsCanName) {
+  for (const auto format : {EvtFormat::evt2, EvtFormat::evt21, EvtFormat::evt21_legacy,
+                            EvtFormat::evt3, EvtFormat::evt4}) {
+    const std::uint16_t last = format == EvtFormat::evt3 ? 15 : 31;
+    const auto encoder = make_evt_encoder(format, vga);
+    Bytes bytes;
+    EXPECT_TRUE(encoder->encode_trigger({5, last, true}, bytes));
+    const auto before = bytes;
+    for (const int id : {last + 1, 63, 65535})
+      EXPECT_FALSE(encoder->encode_trigger({6, static_cast<std::uint16_t>(id), true}, bytes));
+    EXPECT_EQ(bytes, before);
+    EXPECT_EQ(read(format, bytes).decoded.triggers, (std::vector<Trigger>{{5, last, true}}));
+  }
+}
+
 TEST(Written, HeadersAreThese) {
   const auto text = [](EvtFormat format) {
     const auto bytes = encode(*make_prophesee_raw_encoder(format, {1280, 720}), {});

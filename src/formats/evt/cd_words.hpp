@@ -38,14 +38,17 @@ struct CdWord {
             static_cast<std::uint16_t>(y() | (type() & 1) << 15)};
   }
 
+  static constexpr std::uint16_t max_trigger_id = 31;
+
   static constexpr CdWord of_trigger(std::uint32_t type, std::uint64_t time,
                                      const Trigger& trigger) {
-    return {at(type, time, 0, 0).bits | (trigger.id & 31U) << 8 | (trigger.rising ? 1U : 0U)};
+    return {at(type, time, 0, 0).bits | std::uint32_t{trigger.id} << 8 |
+            (trigger.rising ? 1U : 0U)};
   }
 
   constexpr Trigger trigger(std::uint64_t time) const {
     return {static_cast<Microseconds>(time + time_low()),
-            static_cast<std::uint16_t>(bits >> 8 & 31), (bits & 1) != 0};
+            static_cast<std::uint16_t>(bits >> 8 & max_trigger_id), (bits & 1) != 0};
   }
 };
 

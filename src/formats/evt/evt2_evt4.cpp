@@ -105,6 +105,7 @@ class CdEncoder final : public Encoder {
   }
 
   bool append_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) override {
+    if (trigger.id > CdWord::max_trigger_id) return false;
     Words words(out);
     words.reserve(words_at_once);
     if (gaps_.written(trigger.t) >> 6 != time_high_) put_time_high(trigger.t, words);

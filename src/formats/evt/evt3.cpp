@@ -188,6 +188,7 @@ class Evt3Encoder final : public Encoder {
   }
 
   bool append_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) override {
+    if (trigger.id > Evt3Words::max_trigger_id) return false;
     WordWriter<std::uint16_t> words(out);
     words.reserve(words_at_once);
     const auto time = written(trigger.t, words);

@@ -81,10 +81,12 @@ class Evt3Words {
     return vector.events;
   }
 
+  static constexpr std::uint16_t max_trigger_id = 15;
+
   /// Writes the edge of a trigger at `time`.
   void write_trigger(const Trigger& trigger, std::uint64_t time, WordWriter<std::uint16_t>& words) {
     reach(time, words);
-    words.put(word(evt3::ext_trigger, (trigger.id & 15U) << 8 | (trigger.rising ? 1U : 0U)));
+    words.put(word(evt3::ext_trigger, std::uint32_t{trigger.id} << 8 | (trigger.rising ? 1U : 0U)));
   }
 
  private:

@@ -153,7 +153,7 @@ class McapEncoder final : public Encoder {
   }
 
   bool append_trigger(const Trigger& trigger, std::vector<std::uint8_t>& out) override {
-    if (settings_.events != BagEvents::evt3) return false;
+    if (settings_.events != BagEvents::evt3 || trigger.id > Evt3Words::max_trigger_id) return false;
     begin_or_continue(trigger.t, out);
     WordWriter<std::uint16_t> words(chunk_);
     words.reserve(packet_words(trigger.t));
