@@ -73,6 +73,23 @@ TEST(Dat, FollowsWrapsAndKeepsDisorder) {
                                               2 * lap + 1}));
 }
 
+TEST(Dat, KeepsDisorderAcrossAWrap) {
+  const auto decoder = make_dat_decoder();
+  const auto decoded = decode(*decoder, file(version_2, 0x0c,
+                                             {{0xffffffff, 0},
+                                              {2, 0},
+                                              {0xfffffffe, 0},
+                                              {3, 0},
+                                              {0xffff0000, 0},
+                                              {0xffff0001, 0},
+                                              {4, 0}}));
+  std::vector<Microseconds> times;
+  for (const auto& event : decoded.events) times.push_back(event.t);
+  const auto lap = Microseconds{1} << 32;
+  EXPECT_EQ(times, (std::vector<Microseconds>{lap - 1, lap + 2, lap - 2, lap + 3, lap - 0x10000,
+                                              lap - 0xffff, lap + 4}));
+}
+
 TEST(Dat, IsAnErrorThatSaysWhy) {
   const auto error = [](const std::vector<std::uint8_t>& bytes) {
     return recordings::refusal(*make_dat_decoder(), bytes);
@@ -120,6 +137,8 @@ TEST(Dat, IsWrittenWithTimesThatItsReadersCanTell) {
   EXPECT_EQ(read_again({0, 70 * minute, 104 * minute}, 0), (Times{0, 70 * minute, 104 * minute}));
   EXPECT_EQ(read_again({60 * minute, 100 * minute, 101 * minute}, 40 * minute),
             (Times{60 * minute, 60 * minute, 61 * minute}));
+  EXPECT_EQ(read_again({1, lap - 2, lap + 1}, lap - 3), (Times{1, 1, 4}));
+  EXPECT_EQ(read_again({1, lap - 1'000'001, lap + 1}, 0), (Times{1, lap - 1'000'001, lap + 1}));
   EXPECT_EQ(read_again({5, 80 * minute, 80 * minute + 1}, 80 * minute - 5), (Times{5, 5, 6}));
 }
 
