@@ -178,6 +178,57 @@ TEST_F(Hdf5, SeeksToTheFirstEventNotBefore) {
   }
 }
 
+void write_numbers(hid_t file, const char* name, std::vector<hsize_t> extent,
+                   const std::vector<std::uint32_t>& numbers) {
+  const hid_t space = H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr);
+  const hid_t creation = H5Pcreate(H5P_LINK_CREATE);
+  H5Pset_create_intermediate_group(creation, 1);
+  const hid_t data =
+      H5Dcreate2(file, name, H5T_STD_U32LE, space, creation, H5P_DEFAULT, H5P_DEFAULT);
+  EXPECT_GE(H5Dwrite(data, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data()), 0);
+  H5Dclose(data);
+  H5Pclose(creation);
+  H5Sclose(space);
+}
+
+TEST_F(Hdf5, TimesOf32BitsWrapWithoutAnIndex) {
+  constexpr std::size_t count = 30'000;
+  constexpr Microseconds step = 500'000;  // four hours: three wraps
+  Events events;
+  std::vector<std::uint32_t> columns[4];
+  std::vector<std::uint32_t> rows;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto t = static_cast<Microseconds>(i) * step;
+    events.push_back(AbsoluteEvent::at(static_cast<int>(i % 300), static_cast<int>(i % 200), t,
+                                       i % 2 == 0 ? Polarity::off : Polarity::on));
+    const std::array numbers{static_cast<std::uint32_t>(t), static_cast<std::uint32_t>(i % 300),
+                             static_cast<std::uint32_t>(i % 200),
+                             static_cast<std::uint32_t>(i % 2)};
+    for (std::size_t column = 0; column < 4; ++column) columns[column].push_back(numbers[column]);
+    rows.insert(rows.end(), numbers.begin(), numbers.end());
+  }
+  for (const bool of_v2e : {false, true}) {
+    const hid_t file = H5Fcreate(path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    constexpr const char* names[] = {"events/t", "events/x", "events/y", "events/p"};
+    if (of_v2e)
+      write_numbers(file, "events", {count, 4}, rows);
+    else
+      for (std::size_t column = 0; column < 4; ++column)
+        write_numbers(file, names[column], {count}, columns[column]);
+    H5Fclose(file);
+    Hdf5Reader reader(in_memory(contents(path())));
+    ASSERT_TRUE(reader.time_range());
+    EXPECT_EQ(reader.time_range()->first, 0);
+    EXPECT_EQ(reader.time_range()->last, events.back().t);
+    EXPECT_TRUE(read_all(reader) == events);
+    for (const std::size_t first : {29'999U, 8'589U, 8'590U, 8'591U, 20'000U, 100U, 0U}) {
+      reader.seek(events[first].t);
+      const auto found = read_all(reader);
+      EXPECT_TRUE(std::ranges::equal(found, std::span(events).subspan(first))) << first;
+    }
+  }
+}
+
 TEST_F(Hdf5, TriggersComeBack) {
   std::vector<Trigger> triggers;
   for (int i = 0; i < 40'000; ++i)

@@ -107,11 +107,9 @@ class NumberTable : public Hdf5Table {
   }
 
   std::optional<Microseconds> time_at(std::uint64_t row) override {
-    std::vector<std::int64_t> numbers;
     Microseconds t = 0;
-    if (row >= rows_ || !t_dataset().read(row, 1, numbers) ||
-        __builtin_add_overflow(numbers[t_column()], offset_ + lap_of(row), &t))
-      return std::nullopt;
+    const auto number = row < rows_ ? time_number(row) : std::nullopt;
+    if (!number || __builtin_add_overflow(*number, offset_ + lap_of(row), &t)) return std::nullopt;
     return t;
   }
 
@@ -129,14 +127,49 @@ class NumberTable : public Hdf5Table {
   /// First row after the chunk of this row.
   virtual std::uint64_t chunk_end(std::uint64_t row) const = 0;
 
-  /// Sum of the wraps of a 32-bit clock before a row.
-  virtual Microseconds lap_of(std::uint64_t /*row*/) { return 0; }
+  /// Sum of the wraps of a 32-bit clock up to a row.
+  virtual Microseconds lap_of(std::uint64_t row) {
+    if (!wraps_) return 0;
+    if (!wrap_rows_) wrap_rows_ = find_wraps();
+    return lap * (std::ranges::upper_bound(*wrap_rows_, row) - wrap_rows_->begin());
+  }
 
   Microseconds offset_ = 0;
   bool wraps_ = false;  ///< times have 32 bits and wrap after 71 minutes
   std::vector<std::int64_t> t_, x_, y_, p_, cause_, object_class_;
 
  private:
+  /// Time of a row as the file has it.
+  std::optional<std::int64_t> time_number(std::uint64_t row) {
+    std::vector<std::int64_t> numbers;
+    if (!t_dataset().read(row, 1, numbers)) return std::nullopt;
+    return numbers[t_column()];
+  }
+
+  /// Finds the rows where the clock wraps by sampling the file at rows that must be less than about
+  /// half an hour apart.
+  std::vector<std::uint64_t> find_wraps() {
+    constexpr std::uint64_t max_samples = 256;
+    const auto steps = std::clamp<std::uint64_t>(rows_, 2, max_samples) - 1;
+    std::vector<std::uint64_t> found;
+    std::uint64_t last_row = 0;
+    std::optional<std::int64_t> last;
+    for (std::uint64_t i = 0; i <= steps; ++i) {
+      const auto row = i < steps ? i * (rows_ / steps) : rows_ - 1;
+      const auto number = time_number(row);
+      if (!number) continue;
+      if (last && *number < *last - half_lap)
+        found.push_back(last_row + first_row(row - last_row, [&](std::uint64_t at) {
+                          const auto between = time_number(last_row + at);
+                          return between && *between >= *last - half_lap;
+                        }));
+      last_row = row;
+      last = number;
+    }
+    return found;
+  }
+
+  std::optional<std::vector<std::uint64_t>> wrap_rows_;  ///< once they are needed
   std::uint64_t next_row_ = 0;
   Microseconds lap_ = 0;
   std::int64_t last_ = 0;
@@ -213,7 +246,8 @@ class DsecTable final : public NumberTable {
 
   Microseconds lap_of(std::uint64_t row) override {
     constexpr std::uint64_t lap_milliseconds = lap / 1000;
-    if (!wraps_ || !index_ || index_->rows() <= lap_milliseconds) return 0;
+    if (!index_) return NumberTable::lap_of(row);
+    if (!wraps_ || index_->rows() <= lap_milliseconds) return 0;
     const auto milliseconds = first_row(index_->rows(), [&](std::uint64_t at) {
       const auto indexed_row = indexed(at);
       return indexed_row && *indexed_row <= row;
