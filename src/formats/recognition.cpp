@@ -53,6 +53,23 @@ std::optional<Recognised> by_magic(Bytes bytes) {
   return std::nullopt;
 }
 
+bool are_digits(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+/// True for a number such as 3.0.
+bool is_version(std::string_view text) {
+  const auto dot = std::min(text.find('.'), text.size());
+  return are_digits(text.substr(0, dot)) && dot < text.size() && are_digits(text.substr(dot + 1));
+}
+
+/// True for a name of words and their options, such as "EVT3;height=720;width=1280".
+bool names_words(std::string_view format) {
+  constexpr std::string_view evt = "EVT";
+  const auto name = format.substr(0, format.find(';'));
+  return name.starts_with(evt) && are_digits(name.substr(evt.size()));
+}
+
 /// Recognises RAW and DAT, which start with lines "% key value". RAW names its words there; in DAT,
 /// the type and size of its events follow.
 std::optional<Recognised> by_text_header(Bytes bytes) {
@@ -60,7 +77,7 @@ std::optional<Recognised> by_text_header(Bytes bytes) {
   PropheseeHeader header;
   while (const auto line = header.take(bytes, false)) {
     bytes = bytes.subspan(line);
-    if (!header.value("evt").empty() || header.value("format").starts_with("EVT"))
+    if (is_version(header.value("evt")) || names_words(header.value("format")))
       return Recognised{FileKind::prophesee_raw};
   }
   constexpr std::uint8_t types[] = {0x00, 0x0c, 0x0e};

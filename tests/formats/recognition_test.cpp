@@ -40,6 +40,8 @@ TEST(Recognition, KnowsFilesByTheirFirstBytes) {
   EXPECT_EQ(recognise("% evt 3.0\n"), Recognised{FileKind::prophesee_raw});
   EXPECT_EQ(recognise("% date 1\n% format EVT4;height=1;width=1\n"),
             Recognised{FileKind::prophesee_raw});
+  EXPECT_EQ(recognise("% format EVT3\n"), Recognised{FileKind::prophesee_raw});
+  EXPECT_EQ(recognise("% evt is a comment\n% evt 2.1\r\n"), Recognised{FileKind::prophesee_raw});
   EXPECT_EQ(recognise("% Version 2\n% end\n\x0c\x08"),
             (Recognised{FileKind::prophesee_dat, 0, false}));
   EXPECT_EQ(recognise(lines_of_events), Recognised{FileKind::csv});
@@ -50,6 +52,8 @@ TEST(Recognition, KnowsFilesByTheirFirstBytes) {
 TEST(Recognition, LeavesOtherFilesAlone) {
   for (const auto text :
        {""sv, "#!AER-DAT5.0"sv, "#!AER-DAT4"sv, "Event Strea"sv, "% "sv, "% a comment\n"sv,
+        "% evt is a comment\n"sv, "% evt 3\n"sv, "% evt .0\n"sv, "% evt 3.\n"sv,
+        "% format EVT analysis\n"sv, "% format EVT\n"sv, "% format EVT3 analysis\n"sv,
         "% Version 2\n% end\n\x0c\x10"sv, "% Version 2\n% end\n\x0c"sv, "A text of words.\n"sv,
         "1,2,100,1\n3,4,200,0\n"sv, "1,2,100,1\n3,4,200,0\n5,6,300,1\nfour\n"sv,
         "1,2,100,1\n3,4,200,0\n5,6,300,1\n\0"sv})
