@@ -114,6 +114,24 @@ TEST(Aedat3, AnEventOutsideIsDropped) {
   EXPECT_EQ(decoder.corruption().places, 0U);
 }
 
+TEST(Aedat3, EventsOutsideAreDroppedAlone) {
+  for (const std::size_t most : {100, 30}) {
+    std::vector<AbsoluteEvent> events(60, AbsoluteEvent::at(1, 2, 3, Polarity::on));
+    auto expected = events;
+    for (const auto i : {9, 10, 11, 13, 59}) {
+      events[static_cast<std::size_t>(i)] = AbsoluteEvent::at(346, 2, 3, Polarity::on);
+      expected.pop_back();
+    }
+    const auto bytes = aedat_files::aedat3(events, "DAVIS346", most);
+    for (const std::size_t piece : {std::size_t{1} << 20, std::size_t{1}}) {
+      Aedat3Decoder decoder;
+      EXPECT_TRUE(decoded(decoder, bytes, piece).events == expected);
+      EXPECT_EQ(decoder.corruption().outside, 5U);
+      EXPECT_EQ(decoder.corruption().places, 0U) << decoder.corruption().first;
+    }
+  }
+}
+
 TEST(Aedat3, RandomCorruptionEndsAndIsTheSameForAnySplit) {
   std::mt19937 random(5);
   const auto events = random_events::make(davis346, 1000, 6, 0, {hour});

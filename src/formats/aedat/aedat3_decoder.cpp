@@ -160,7 +160,8 @@ bool Aedat3Decoder::read_events(Decoded& out) {
   if (!odd) return true;
 
   // Invalid event: either it is corrupt, or this packet is short and the next one starts here, or
-  // bytes are missing and the data is misaligned.
+  // bytes are missing and the data is misaligned. Events outside the sensor may follow each other;
+  // then, the next packet starts where this one ends.
   const auto after = std::min<std::uint64_t>(packet_.events - 1, events_after);
   const auto wanted = std::max(packet_header_size, (1 + after) * event_size);
   if (queue_.size() < wanted && !finished_) return false;
@@ -171,12 +172,19 @@ bool Aedat3Decoder::read_events(Decoded& out) {
   if (next.size() >= packet_header_size && begins_packet(next.data())) {
     corruption_.note(queue_.position(), "AEDAT 3.1 packet shorter than its header says");
     packet_ = {};
-  } else if (!sound_after) {
+    return true;
+  }
+  if (!sound_after && !packet_.is_intact) {
+    const auto is_intact = is_packet_intact();
+    if (!is_intact) return false;
+    packet_.is_intact = *is_intact;
+  }
+  if (!sound_after && !packet_.is_intact) {
     corruption_.note(queue_.position(), "no AEDAT 3.1 events here");
     packet_ = {};
     scanning_ = true;
   } else {
-    if (little_endian<std::int32_t>(next.data() + 4) < 0)
+    if (little_endian<std::int32_t>(queue_.peek(event_size).data() + 4) < 0)
       corruption_.note(queue_.position(), "event with a negative timestamp");
     else
       ++corruption_.outside;
@@ -184,6 +192,16 @@ bool Aedat3Decoder::read_events(Decoded& out) {
     queue_.consume(event_size);
   }
   return true;
+}
+
+/// True if another packet, or the end of the file, follows where the packet ends. Nothing if more
+/// bytes are needed.
+std::optional<bool> Aedat3Decoder::is_packet_intact() {
+  const auto size = static_cast<std::size_t>(packet_.events * event_size + packet_.rest);
+  const auto next = queue_.peek(size + packet_header_size);
+  if (!next.empty()) return begins_packet(next.data() + size);
+  if (!finished_) return std::nullopt;
+  return queue_.size() == size;
 }
 
 /// Skips to the next likely packet of events. False if more bytes are needed.

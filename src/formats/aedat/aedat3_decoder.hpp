@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "src/formats/aedat/aedat_header.hpp"
@@ -25,6 +26,7 @@ class Aedat3Decoder final : public Decoder {
     std::uint64_t events = 0;  ///< number of 8-byte events to read
     std::uint64_t rest = 0;    ///< number of bytes to skip after them
     Microseconds overflow = 0;
+    bool is_intact = false;  ///< another packet, or the end of the file, is known to follow it
   };
 
   bool read_header();
@@ -32,6 +34,7 @@ class Aedat3Decoder final : public Decoder {
   void read_packets(Decoded& out);
   bool read_packet_header();
   bool read_events(Decoded& out);
+  std::optional<bool> is_packet_intact();
   bool scan();
   bool begins_packet(const std::uint8_t* bytes) const;
   bool is_odd(const std::uint8_t* event) const;
