@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Event files of every format are read as they were written, however they come.
+#include <gst/base/gsttypefindhelper.h>
+
 #include <tuple>
 
 #include "tests/elements/event_files.hpp"
@@ -80,6 +82,18 @@ TEST_P(EveryFormat, CutsByBufferTime) {
   int buffers = 0;
   while (h.pull()) ++buffers;
   EXPECT_EQ(buffers, 10);
+}
+
+TEST(Typefinders, LookAtAllOfAShortFile) {
+  gst_init(nullptr, nullptr);
+  // Three lines are needed; the largest power of two has but two.
+  const std::string text =
+      "1700000000.000001,100,100,1\n1700000000.000002,100,100,0\n1700000000.000003,100,100,1\n";
+  const Owned<GstCaps> caps(gst_type_find_helper_for_data(
+      nullptr, reinterpret_cast<const guint8*>(text.data()), text.size(), nullptr));
+  ASSERT_TRUE(caps);
+  EXPECT_STREQ(gst_structure_get_name(gst_caps_get_structure(caps.get(), 0)),
+               "application/x-event-csv");
 }
 
 TEST_P(EveryFormat, IsEmptyWhereThereAreNoEvents) {

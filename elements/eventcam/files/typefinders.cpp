@@ -11,11 +11,14 @@ using eventcamera::FileKind;
 static std::span<const guint8> first_bytes(GstTypeFind* find) {
   constexpr guint64 max_bytes = eventcamera::max_recognised_bytes;
   const guint64 length = gst_type_find_get_length(find);
-  // The length may be unknown, and a peek past the end returns nothing, so try shorter ones.
-  for (auto count = static_cast<guint>(length > 0 ? std::min(length, max_bytes) : max_bytes);
-       count > 0; count /= 2)
-    if (const guint8* bytes = gst_type_find_peek(find, 0, count)) return {bytes, count};
-  return {};
+  const auto limit = static_cast<guint>(length > 0 ? std::min(length, max_bytes) : max_bytes);
+  // The length may be unknown, and a peek past the end returns nothing, so extend it by halves.
+  std::span<const guint8> bytes;
+  for (guint step = limit; step > 0 && bytes.size() < limit; step /= 2) {
+    const auto count = static_cast<guint>(bytes.size()) + step;
+    if (const guint8* peeked = gst_type_find_peek(find, 0, count)) bytes = {peeked, count};
+  }
+  return bytes;
 }
 
 template <FileKind kind>
