@@ -430,8 +430,7 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
       return output;
     } else {
       drained_ = true;
-      if (source_ != nullptr && newest_ > start_ && !std::exchange(duration_is_exact_, true))
-        duration_ = newest_;
+      if (newest_ > start_ && !std::exchange(duration_is_exact_, true)) duration_ = newest_;
     }
   }
 }

@@ -84,6 +84,17 @@ TEST_P(EveryFormat, CutsByBufferTime) {
   EXPECT_EQ(buffers, 10);
 }
 
+TEST_P(EveryFormat, TellsItsDurationOncePushed) {
+  const TemporaryFile file(file_of(format(), some_events()));
+  Player player(file.source() + "queue ! " + format().reader);
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  if (format().is_archive) {
+    EXPECT_EQ(player.duration(), GST_CLOCK_TIME_NONE);
+  }
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_EQ(player.duration(), 3'999'951 * GST_USECOND);
+}
+
 TEST(Typefinders, LookAtAllOfAShortFile) {
   gst_init(nullptr, nullptr);
   // Three lines are needed; the largest power of two has but two.

@@ -117,7 +117,8 @@ void EventReader::learn_duration() {
     gst_element_post_message(element_, gst_message_new_duration_changed(GST_OBJECT(element_)));
 }
 
-/// In push mode the duration is extrapolated from the bytes received so far.
+/// In push mode the duration is extrapolated from the bytes received so far. Once all are, the
+/// position says nothing: formats that are read as a whole have hardly begun.
 GstClockTime EventReader::duration() {
   guint64 pushed = 0;
   GstClockTime position = 0;
@@ -128,7 +129,7 @@ GstClockTime EventReader::duration() {
     position = shared->segment.position;
   }
   const guint64 size = upstream_bytes(sink_);
-  if (size == 0 || pushed == 0 || position == 0) return GST_CLOCK_TIME_NONE;
+  if (pushed == 0 || pushed >= size || position == 0) return GST_CLOCK_TIME_NONE;
   return gst_util_uint64_scale(position, size, pushed);
 }
 

@@ -131,6 +131,7 @@ void EventReader::take_end() {
     recording_->finish();
     GstFlowReturn result = hand_out();
     if (result == GST_FLOW_OK && output_due_) result = begin_output();
+    if (!is_timed()) learn_duration();
     warn_of_nothing();
     warn_of_dropped();
     return result;
