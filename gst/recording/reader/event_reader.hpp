@@ -143,7 +143,7 @@ class EventReader {
   void warn_of_dropped();
 
   bool can_seek();
-  static GstClockTime limit_of(const SeekRequest& request, const Shared& shared);
+  GstClockTime limit_of(const SeekRequest& request);
   bool seek(GstEvent* event);
   bool seek_pulling(const SeekRequest& request);
   bool seek_pushed(Restart restart, gdouble rate);

@@ -22,9 +22,10 @@ bool EventReader::can_seek() {
 
 /// Duration that ends a segment. If it is an estimate, it may be too short, and only serves to
 /// count from the end.
-GstClockTime EventReader::limit_of(const SeekRequest& request, const Shared& shared) {
-  return shared.is_duration_exact || request.counts_from_end() ? shared.duration
-                                                               : GST_CLOCK_TIME_NONE;
+GstClockTime EventReader::limit_of(const SeekRequest& request) {
+  if (request.counts_from_end()) return duration();
+  const auto shared = shared_.lock();
+  return shared->is_duration_exact ? shared->duration : GST_CLOCK_TIME_NONE;
 }
 
 bool EventReader::seek(GstEvent* event) {
@@ -32,6 +33,11 @@ bool EventReader::seek(GstEvent* event) {
   if (!request.plays_on_from_time() || !can_seek()) {
     GST_INFO_OBJECT(element_, "refused to seek at rate %g in %s", request.rate(),
                     gst_format_get_name(request.format()));
+    return false;
+  }
+  const GstClockTime limit = limit_of(request);
+  if (request.counts_from_end() && !GST_CLOCK_TIME_IS_VALID(limit)) {
+    GST_INFO_OBJECT(element_, "refused to seek from the end: it is not known yet");
     return false;
   }
   Restart restart;
@@ -44,7 +50,7 @@ bool EventReader::seek(GstEvent* event) {
     is_pulling = shared->is_pulling;
     recording = shared->recording;
     restart.segment = shared->segment;
-    restart.segment.duration = limit_of(request, *shared);
+    restart.segment.duration = limit;
   }
   if (!request.apply(restart.segment)) return false;
   restart.seqnum = request.seqnum();
@@ -81,10 +87,11 @@ bool EventReader::seek_pulling(const SeekRequest& request) {
     gst_pad_pause_task(sink_);
   GST_PAD_STREAM_LOCK(sink_);
   if (request.flushes()) send_all(gst_event_new_flush_stop(TRUE));
+  const GstClockTime limit = limit_of(request);
   GstSegment segment;
   {
     const auto shared = shared_.lock();
-    shared->segment.duration = limit_of(request, *shared);
+    shared->segment.duration = limit;
     request.apply(shared->segment);  // from the position at which output has stopped
     shared->counts = {};
     segment = shared->segment;
