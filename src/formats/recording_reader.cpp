@@ -430,7 +430,8 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
       return output;
     } else {
       drained_ = true;
-      if (newest_ > start_ && !std::exchange(duration_is_exact_, true)) duration_ = newest_;
+      if (!stop_ && newest_ > start_ && !std::exchange(duration_is_exact_, true))
+        duration_ = newest_;
     }
   }
 }
@@ -608,16 +609,15 @@ void RecordingReader::cut_at_stop(Chunk& chunk) const {
 /// Records that a stream was returned up to `end`. False if `start` is past the segment.
 bool RecordingReader::advance(Stream& stream, Microseconds start, Microseconds end) {
   stream.position = std::max(stream.position, end);
-  newest_ = std::max(newest_, end);
+  newest_ = std::max(newest_, std::min(end, stop_.value_or(end)));
   return !stop_ || start < *stop_;
 }
 
 bool RecordingReader::is_past_stop() const {
   if (!stop_ || !begun_) return false;
-  if (newest_ - max_lag >= *stop_) return true;
-  return std::ranges::all_of(streams_, [this](const Stream& stream) {
-    return !stream.shown || stream.position >= *stop_;
-  });
+  for (std::size_t i = 0; i < streams_.size(); ++i)
+    if (streams_[i].shown && streams_[i].position < *stop_ && !decoder_->is_empty(i)) return false;
+  return true;
 }
 
 void RecordingReader::finish_chunkers() {

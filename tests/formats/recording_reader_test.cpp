@@ -309,6 +309,15 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
         end[stream] = std::max(end[stream], start + duration);
       }
     }
+
+    MemoryBytes source(bytes);
+    RecordingReader reader([] { return std::make_unique<AedatDecoder>(); }, chunk_length);
+    reader.open(source);
+    reader.seek(200'000, 400'000);
+    Outcome part;
+    part.take_all(reader);
+    EXPECT_EQ(part.events(reader.origin()), from(some_events(), 2'200'000, 2'400'000));
+    EXPECT_EQ(part.pictures.size(), 2U);
   }
 }
 
