@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A file of n bytes costs no reader, player or statistic more than 300 MB + 50 n; two cost a comparison
+"""A file of n bytes costs no reader, player or statistic more than 400 MB + 50 n; two cost a comparison
 twice as much.
 
 The files are tiny, and state or suggest a sensor of up to 16384x16384 pixels, or expand to millions
@@ -121,7 +121,7 @@ def main():
                         for chain, line in CHAINS.items()}
             commands["thumbnail"] = [THUMBNAIL, path, path + ".png"]
             for what, command in commands.items():
-                bound = max(" ".join(command).count("location="), 1) * (300e6 + 50 * size)
+                bound = max(" ".join(command).count("location="), 1) * (400e6 + 50 * size)
                 code, peak = peak_of(command)
                 report = f"{name}, {size} bytes, {what}: {peak / 1e6:.0f} of {bound / 1e6:.0f} MB"
                 print(report, flush=True)
