@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <new>
-#include <string>
 #include <utility>
 
 #include "gst/base/errors.hpp"
@@ -101,12 +100,7 @@ struct EventAggregatorFunctions {
   static auto guard(EventAggregator& self, const Work& work) {
     const auto report = [&self](const std::exception& error) -> Report {
       self.release_memory();
-      const std::string verb = self.role_.verb;
-      if (is_a<std::bad_alloc>(error))
-        return {GST_RESOURCE_ERROR_NO_SPACE_LEFT,
-                "Not enough memory to " + verb +
-                    " these events; free memory, or lower the resolution."};
-      return {GST_STREAM_ERROR_FAILED, "Cannot " + verb + " these events."};
+      return events_report(self.role_.verb, error);
     };
     return guarded(self.element_, report, work);
   }

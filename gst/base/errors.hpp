@@ -5,6 +5,7 @@
 
 #include <concepts>
 #include <exception>
+#include <new>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -116,4 +117,13 @@ auto guarded(gpointer element, const MakeReport& report, const Work& work,
 template <class Exception>
 bool is_a(const std::exception& error) {
   return dynamic_cast<const Exception*>(&error) != nullptr;
+}
+
+/// Report for an exception from what an element does with events: "count".
+inline Report events_report(const std::string& verb, const std::exception& error) {
+  if (is_a<std::bad_alloc>(error))
+    return {
+        GST_RESOURCE_ERROR_NO_SPACE_LEFT,
+        "Not enough memory to " + verb + " these events; free memory, or lower the resolution."};
+  return {GST_STREAM_ERROR_FAILED, "Cannot " + verb + " these events."};
 }

@@ -527,6 +527,7 @@ static void advance_companions(GstEventSimulator* self, GstClockTime time) {
     for (auto* companion : companions_of(self)) companion->advance(*from, *until);
 }
 
+/// Configures the simulator for the next interval, and returns the settings of that.
 static SimulatorSettings begin_interval(GstEventSimulator* self) {
   configure(self);
   SimulatorSettings settings = priv_of(self).settings.copy();

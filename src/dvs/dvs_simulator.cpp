@@ -441,14 +441,14 @@ class PixelSimulator final : public DvsSimulator {
     random_ = Random(settings.seed);
     // Thresholds that events have drawn stay until time or the jitter ends.
     const bool had_jitter = current_.threshold_jitter > 0;
-    const bool redraws =
-        is_first || restarts || settings.threshold_jitter == 0 || settings.seed != current_.seed;
-    if (is_first || !have_same_traits(settings, current_) || (had_jitter && redraws))
+    const bool keeps_drawn =
+        had_jitter && settings.threshold_jitter > 0 && !restarts && settings.seed == current_.seed;
+    if (is_first || !have_same_traits(settings, current_) || (had_jitter && !keeps_drawn))
       for_each_row(threads(), format().height, [&](int y) {
-        if (redraws || !had_jitter)
-          pixels_.draw_traits(y, settings, random_);
-        else
+        if (keeps_drawn)
           pixels_.change_traits(y, current_, settings, random_);
+        else
+          pixels_.draw_traits(y, settings, random_);
       });
     current_ = settings;
     dynamics_ = PixelDynamics(settings);
@@ -511,7 +511,7 @@ class PixelSimulator final : public DvsSimulator {
   float max_fall_ = 0;
   std::map<double, ShadeTables> tables_;  ///< by duration, microseconds
   std::vector<Plan> plans_;               ///< by number of steps
-  std::size_t max_sub_intervals_ = 0;     ///< sub-intervals
+  std::size_t max_sub_intervals_ = 0;     ///< of a plan
   std::uint64_t sub_interval_count_ = 0;  ///< before this interval
   double clock_ = 0;                      ///< its start, microseconds since the first frame
   IntervalEvents fired_;

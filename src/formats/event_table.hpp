@@ -85,8 +85,7 @@ class RowValidator {
     }
     out.push_back(
         {t, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y | (on ? 0x8000 : 0))});
-    out.back().object_class = label.object_class;
-    out.back().cause = label.cause;
+    set_label(out.back(), label);
   }
 
  private:

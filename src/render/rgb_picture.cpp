@@ -13,13 +13,10 @@ std::string RgbPicture::png() const {
   image.width = static_cast<png_uint_32>(width_);
   image.height = static_cast<png_uint_32>(height_);
   image.format = PNG_FORMAT_RGB;
-  const auto write = [&](void* bytes, png_alloc_size_t& size) {
-    if (png_image_write_to_memory(&image, bytes, &size, 0, pixels_.data(), 0, nullptr) == 0)
-      throw std::runtime_error(image.message);
-  };
   std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(image), '\0');
   png_alloc_size_t size = bytes.size();
-  write(bytes.data(), size);
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels_.data(), 0, nullptr) == 0)
+    throw std::runtime_error(image.message);
   bytes.resize(size);
   return bytes;
 }

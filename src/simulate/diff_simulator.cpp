@@ -178,7 +178,7 @@ class DiffSimulator final : public Simulator {
     has_difference_ = true;
   }
 
-  /// Keeps D(i) = I(i) - I(i-1) at pixels that fired, separately for each polarity.
+  /// Keeps D(i) = I(i) - I(i-1) at pixels that fired, separately for each polarity, and then I(i).
   void keep_difference(const ImageView<Pixel>& now, int last_step, EventBuckets& events) {
     on_.begin_next();
     off_.begin_next();

@@ -133,9 +133,7 @@ static Guarded<Settings>& settings_of(GObject* object) {
 /// Runs `work`; reports any exception.
 template <class Work>
 static auto reported(gpointer self, const Work& work) {
-  static const Report report{
-      GST_RESOURCE_ERROR_NO_SPACE_LEFT,
-      "Not enough memory to count these events; free memory, or lower the resolution."};
+  const auto report = [](const std::exception& error) { return events_report("count", error); };
   return guarded(self, report, work);
 }
 
