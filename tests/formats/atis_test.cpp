@@ -43,6 +43,19 @@ TEST(AtisBin, AddsOverflowsAndWraps) {
                          AbsoluteEvent::at(1, 2, overflow + 0x800005, Polarity::on)}));
 }
 
+TEST(AtisBin, KeepsDisorderAcrossAWrap) {
+  const auto decoder = make_atis_bin_decoder(n_mnist);
+  const auto decoded = decode(*decoder, Bytes{1, 2,   0xff, 0xff, 0xff,  //
+                                              1, 2,   0x80, 0,    2,     // a wrap
+                                              1, 2,   0xff, 0xff, 0xfe,  // from before it
+                                              0, 240, 0,    0,    0,     // an overflow
+                                              1, 2,   0x80, 0,    3});
+  constexpr Microseconds overflow = 8192;
+  std::vector<Microseconds> times;
+  for (const auto& event : decoded.events) times.push_back(event.t);
+  EXPECT_EQ(times, (std::vector<Microseconds>{0x7fffff, 0x800002, 0x7ffffe, overflow + 0x800003}));
+}
+
 TEST(AtisBin, CountsEventsOutsideTheSensorAndATruncatedOne) {
   const auto decoder = make_atis_bin_decoder(n_mnist);
   const auto decoded =

@@ -191,31 +191,37 @@ void write_numbers(hid_t file, const char* name, std::vector<hsize_t> extent,
   H5Sclose(space);
 }
 
+/// Writes events with times of 32 bits as columns, or as the rows of v2e.
+void write_wrapping(const std::filesystem::path& path, const Events& events, bool of_v2e) {
+  std::vector<std::uint32_t> columns[4];
+  std::vector<std::uint32_t> rows;
+  for (const auto& event : events) {
+    const std::array<std::uint32_t, 4> numbers{static_cast<std::uint32_t>(event.t), event.x,
+                                               static_cast<std::uint32_t>(event.y()),
+                                               event.polarity() == Polarity::on ? 1U : 0U};
+    for (std::size_t column = 0; column < 4; ++column) columns[column].push_back(numbers[column]);
+    rows.insert(rows.end(), numbers.begin(), numbers.end());
+  }
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  constexpr const char* names[] = {"events/t", "events/x", "events/y", "events/p"};
+  if (of_v2e)
+    write_numbers(file, "events", {events.size(), 4}, rows);
+  else
+    for (std::size_t column = 0; column < 4; ++column)
+      write_numbers(file, names[column], {events.size()}, columns[column]);
+  H5Fclose(file);
+}
+
 TEST_F(Hdf5, TimesOf32BitsWrapWithoutAnIndex) {
   constexpr std::size_t count = 30'000;
   constexpr Microseconds step = 500'000;  // four hours: three wraps
   Events events;
-  std::vector<std::uint32_t> columns[4];
-  std::vector<std::uint32_t> rows;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto t = static_cast<Microseconds>(i) * step;
-    events.push_back(AbsoluteEvent::at(static_cast<int>(i % 300), static_cast<int>(i % 200), t,
+  for (std::size_t i = 0; i < count; ++i)
+    events.push_back(AbsoluteEvent::at(static_cast<int>(i % 300), static_cast<int>(i % 200),
+                                       static_cast<Microseconds>(i) * step,
                                        i % 2 == 0 ? Polarity::off : Polarity::on));
-    const std::array numbers{static_cast<std::uint32_t>(t), static_cast<std::uint32_t>(i % 300),
-                             static_cast<std::uint32_t>(i % 200),
-                             static_cast<std::uint32_t>(i % 2)};
-    for (std::size_t column = 0; column < 4; ++column) columns[column].push_back(numbers[column]);
-    rows.insert(rows.end(), numbers.begin(), numbers.end());
-  }
   for (const bool of_v2e : {false, true}) {
-    const hid_t file = H5Fcreate(path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-    constexpr const char* names[] = {"events/t", "events/x", "events/y", "events/p"};
-    if (of_v2e)
-      write_numbers(file, "events", {count, 4}, rows);
-    else
-      for (std::size_t column = 0; column < 4; ++column)
-        write_numbers(file, names[column], {count}, columns[column]);
-    H5Fclose(file);
+    write_wrapping(path(), events, of_v2e);
     Hdf5Reader reader(in_memory(contents(path())));
     ASSERT_TRUE(reader.time_range());
     EXPECT_EQ(reader.time_range()->first, 0);
@@ -226,6 +232,23 @@ TEST_F(Hdf5, TimesOf32BitsWrapWithoutAnIndex) {
       const auto found = read_all(reader);
       EXPECT_TRUE(std::ranges::equal(found, std::span(events).subspan(first))) << first;
     }
+  }
+}
+
+TEST_F(Hdf5, KeepsDisorderAcrossAWrap) {
+  constexpr auto lap = Microseconds{1} << 32;
+  Events events;
+  for (const auto t :
+       {lap - 1, lap + 2, lap - 2, lap + 3, lap - 0x10000, lap - 0xffff, lap + 4, lap + 5, lap - 3})
+    events.push_back(AbsoluteEvent::at(1, 2, t, Polarity::on));
+  for (const bool of_v2e : {false, true}) {
+    write_wrapping(path(), events, of_v2e);
+    Hdf5Reader reader(in_memory(contents(path())));
+    EXPECT_EQ(read_all(reader), events);
+    ASSERT_TRUE(reader.time_range());
+    EXPECT_EQ(reader.time_range()->last, lap - 3);
+    reader.seek(lap + 5);
+    EXPECT_EQ(read_all(reader), Events(events.end() - 2, events.end()));
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "src/formats/unit_decoder.hpp"
 #include "src/formats/unit_stream_decoder.hpp"
+#include "src/formats/unwrapped_clock.hpp"
 
 namespace eventcamera {
 namespace {
@@ -42,34 +43,31 @@ class AtisRecordDecoder final : public UnitDecoder {
     for (; to - from >= record_size && batch.end < batch.full(); from += record_size) {
       const auto record = Record::at(from);
       if (record.is_overflow()) {
-        passed_ += overflow_time;
+        overflows_ += overflow_time;
         continue;
       }
-      // A fall by more than half the range is a wrap; a smaller one is disorder.
-      constexpr std::uint32_t range = 1U << Record::time_bits;
-      if (record.time < last_ && last_ - record.time > range / 2) passed_ += range;
-      last_ = record.time;
+      const auto time = static_cast<std::uint64_t>(clock_.follow(record.time));
       if (!bounds_.contain(record.x, record.y)) {
         batch.outside(1);
         continue;
       }
-      *batch.end++ = {static_cast<Microseconds>(passed_ + record.time),
+      *batch.end++ = {static_cast<Microseconds>(overflows_ + time),
                       static_cast<std::uint16_t>(record.x),
                       static_cast<std::uint16_t>(record.y | (record.is_on ? 0x8000U : 0U))};
     }
     return from;
   }
 
-  State state() const override { return {static_cast<Microseconds>(passed_), last_}; }
+  State state() const override { return {clock_.time(), overflows_}; }
   void restore(const State& state) override {
-    passed_ = static_cast<std::uint64_t>(state.clock);
-    last_ = static_cast<std::uint32_t>(state.rest);
+    clock_.restore(state.clock);
+    overflows_ = state.rest;
   }
 
  private:
   Bounds bounds_;
-  std::uint64_t passed_ = 0;  ///< time of overflows and wraps
-  std::uint32_t last_ = 0;    ///< time of the last record
+  UnwrappedClock<Record::time_bits> clock_;
+  std::uint64_t overflows_ = 0;  ///< time of overflows
 };
 
 }  // namespace

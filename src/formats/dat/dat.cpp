@@ -10,6 +10,7 @@
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/unit_decoder.hpp"
 #include "src/formats/unit_stream_decoder.hpp"
+#include "src/formats/unwrapped_clock.hpp"
 #include "src/formats/word_writer.hpp"
 
 namespace eventcamera {
@@ -21,31 +22,7 @@ enum Type : std::uint8_t { event_2d = 0x00, event_cd = 0x0c, event_trigger = 0x0
 
 constexpr std::uint8_t record_size = 8;
 
-constexpr std::uint64_t max_timestamp = 0xffff'ffff;
-/// A rise by more than this, after a wrap, is disorder: an event of the second before the wrap.
-constexpr std::uint64_t max_rise = max_timestamp - 1'000'000;
-
-/// Unwraps timestamps of 32 bits. One that falls by more than half its range has wrapped; a smaller
-/// fall is disorder.
-class DatTime {
- public:
-  Microseconds follow(std::uint32_t timestamp) {
-    constexpr auto half = std::uint32_t{1} << 31;
-    const auto last = static_cast<std::uint32_t>(time_);
-    const bool wrapped = timestamp < last && last - timestamp > half;
-    const bool precedes_wrap =
-        timestamp > last && timestamp - last > max_rise && time_ > max_timestamp;
-    // Unsigned, because overflow must be well-defined for any file.
-    time_ += std::uint64_t{timestamp} - last + (std::uint64_t{wrapped} << 32) -
-             (std::uint64_t{precedes_wrap} << 32);
-    return time();
-  }
-  Microseconds time() const { return static_cast<Microseconds>(time_); }
-  void restore(Microseconds time) { time_ = static_cast<std::uint64_t>(time); }
-
- private:
-  std::uint64_t time_ = 0;
-};
+using DatTime = UnwrappedClock<32>;
 
 class DatRecordDecoder : public UnitDecoder {
  public:
@@ -219,7 +196,7 @@ class DatClock {
   }
 
   void leave_out(Microseconds t, std::uint64_t gap) {
-    const auto max_gap = begun_ ? max_rise : max_timestamp;
+    const auto max_gap = begun_ ? DatTime::max_rise : DatTime::range - 1;
     if (gap <= max_gap && at(t) > at(last_)) return;  // no wrap
     shift_ += gap;
     if (begun_) left_out_ += gap;

@@ -10,6 +10,7 @@
 #include "src/core/max_side.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_handle.hpp"
+#include "src/formats/unwrapped_clock.hpp"
 
 namespace eventcamera {
 
@@ -69,26 +70,21 @@ class NumberTable : public Hdf5Table {
 
   std::uint64_t read(std::uint64_t row, RowValidator& validator, std::vector<AbsoluteEvent>& out,
                      Corruption& corruption) override {
-    if (row != next_row_) {
-      lap_ = lap_of(row);
-      last_ = 0;
-    }
     auto end = block_end(row, rows_);
     const auto* unread = read_numbers(row, end - row);
     if (unread != nullptr) {
       end = std::min(end, chunk_end(row));
       unread = read_numbers(row, end - row);
     }
-    next_row_ = end;
     if (unread != nullptr) {
       note(corruption, *unread, row, "unreadable part of an HDF5 dataset");
       return end;
     }
+    if (wraps_ && row != next_row_) clock_.restore(unwrapped(row, t_.front()));
+    next_row_ = end;
     for (std::size_t i = 0; i < t_.size(); ++i) {
-      if (wraps_ && t_[i] < last_ - half_lap) lap_ += lap;
-      last_ = t_[i];
-      Microseconds t = 0;
-      if (__builtin_add_overflow(t_[i], offset_ + lap_, &t)) {
+      Microseconds t = wraps_ ? clock_.follow(static_cast<std::uint32_t>(t_[i])) : t_[i];
+      if (__builtin_add_overflow(t, offset_, &t)) {
         note(corruption, t_dataset(), row, "timestamp out of range");
         continue;
       }
@@ -109,13 +105,13 @@ class NumberTable : public Hdf5Table {
   std::optional<Microseconds> time_at(std::uint64_t row) override {
     Microseconds t = 0;
     const auto number = row < rows_ ? time_number(row) : std::nullopt;
-    if (!number || __builtin_add_overflow(*number, offset_ + lap_of(row), &t)) return std::nullopt;
+    if (!number || __builtin_add_overflow(unwrapped(row, *number), offset_, &t))
+      return std::nullopt;
     return t;
   }
 
  protected:
-  static constexpr Microseconds lap = std::int64_t{1} << 32;
-  static constexpr Microseconds half_lap = lap / 2;
+  using Clock = UnwrappedClock<32>;
 
   virtual Hdf5Dataset& t_dataset() = 0;
   virtual std::size_t t_column() const { return 0; }  ///< in the rows of t_dataset()
@@ -127,11 +123,12 @@ class NumberTable : public Hdf5Table {
   /// First row after the chunk of this row.
   virtual std::uint64_t chunk_end(std::uint64_t row) const = 0;
 
-  /// Sum of the wraps of a 32-bit clock up to a row.
-  virtual Microseconds lap_of(std::uint64_t row) {
-    if (!wraps_) return 0;
-    if (!wrap_rows_) wrap_rows_ = find_wraps();
-    return lap * (std::ranges::upper_bound(*wrap_rows_, row) - wrap_rows_->begin());
+  /// Time of the row with this number, before the offset is added.
+  virtual Microseconds unwrapped(std::uint64_t row, std::int64_t number) {
+    if (!wraps_) return number;
+    if (samples_.empty()) take_samples();
+    auto clock = std::prev(std::ranges::upper_bound(samples_, row, {}, &Sample::row))->clock;
+    return clock.follow(static_cast<std::uint32_t>(number));
   }
 
   Microseconds offset_ = 0;
@@ -146,33 +143,30 @@ class NumberTable : public Hdf5Table {
     return numbers[t_column()];
   }
 
-  /// Finds the rows where the clock wraps by sampling the file at rows that must be less than about
-  /// half an hour apart.
-  std::vector<std::uint64_t> find_wraps() {
+  /// Follows the clock through rows that must be less than about half an hour apart.
+  void take_samples() {
     constexpr std::uint64_t max_samples = 256;
     const auto steps = std::clamp<std::uint64_t>(rows_, 2, max_samples) - 1;
-    std::vector<std::uint64_t> found;
-    std::uint64_t last_row = 0;
-    std::optional<std::int64_t> last;
+    Clock clock;
+    samples_.push_back({0, clock});
     for (std::uint64_t i = 0; i <= steps; ++i) {
       const auto row = i < steps ? i * (rows_ / steps) : rows_ - 1;
       const auto number = time_number(row);
       if (!number) continue;
-      if (last && *number < *last - half_lap)
-        found.push_back(last_row + first_row(row - last_row, [&](std::uint64_t at) {
-                          const auto between = time_number(last_row + at);
-                          return between && *between >= *last - half_lap;
-                        }));
-      last_row = row;
-      last = number;
+      clock.follow(static_cast<std::uint32_t>(*number));
+      samples_.push_back({row, clock});
     }
-    return found;
   }
 
-  std::optional<std::vector<std::uint64_t>> wrap_rows_;  ///< once they are needed
+  /// The clock at a row.
+  struct Sample {
+    std::uint64_t row;
+    Clock clock;
+  };
+
+  std::vector<Sample> samples_;  ///< once they are needed
   std::uint64_t next_row_ = 0;
-  Microseconds lap_ = 0;
-  std::int64_t last_ = 0;
+  Clock clock_;  ///< before next_row_
 };
 
 /// Columns in a group of any name: the DSEC layout, and others without its index.
@@ -244,20 +238,17 @@ class DsecTable final : public NumberTable {
     return end;
   }
 
-  Microseconds lap_of(std::uint64_t row) override {
-    constexpr std::uint64_t lap_milliseconds = lap / 1000;
-    if (!index_) return NumberTable::lap_of(row);
-    if (!wraps_ || index_->rows() <= lap_milliseconds) return 0;
+  Microseconds unwrapped(std::uint64_t row, std::int64_t number) override {
+    if (!index_) return NumberTable::unwrapped(row, number);
+    constexpr auto lap = static_cast<Microseconds>(Clock::range);
+    if (!wraps_ || index_->rows() <= Clock::range / 1000) return number;
     const auto milliseconds = first_row(index_->rows(), [&](std::uint64_t at) {
       const auto indexed_row = indexed(at);
       return indexed_row && *indexed_row <= row;
     });
-    std::vector<std::int64_t> t;
-    if (milliseconds == 0 || milliseconds > INT64_MAX / 1000 || !t_dataset().read(row, 1, t))
-      return 0;
+    if (milliseconds == 0 || milliseconds > INT64_MAX / 1000) return number;
     const auto about = static_cast<Microseconds>((milliseconds - 1) * 1000);
-    const auto laps = (about - t[0] + half_lap) / lap;
-    return laps > 0 ? laps * lap : 0;
+    return number + std::max<Microseconds>((about - number + lap / 2) / lap, 0) * lap;
   }
 
  private:
