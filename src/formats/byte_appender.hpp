@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "src/formats/atis/atis_bin.hpp"
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 #include "src/formats/magic.hpp"
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/ros/bag_magic.hpp"

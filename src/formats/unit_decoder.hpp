@@ -9,9 +9,9 @@
 
 #include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
+#include "src/formats/byte_order.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/decoded.hpp"
-#include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
 

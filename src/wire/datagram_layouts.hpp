@@ -12,7 +12,7 @@
 
 #include "src/core/address_layout.hpp"
 #include "src/core/event.hpp"
-#include "src/wire/byte_order.hpp"
+#include "src/formats/byte_order.hpp"
 #include "src/wire/datagram_settings.hpp"
 #include "src/wire/wrapped_time.hpp"
 
@@ -141,9 +141,9 @@ class T64X16Y16On8 {
   Fault read(std::span<const std::uint8_t> bytes, Reading& in) const {
     if (bytes.size() % min_event_size != 0) return partial_event;
     for (; !bytes.empty(); bytes = bytes.subspan(min_event_size)) {
-      const auto t = load<std::uint64_t>(bytes.data(), std::endian::little);
-      const auto x = load<std::uint16_t>(&bytes[8], std::endian::little);
-      const auto y = load<std::uint16_t>(&bytes[10], std::endian::little);
+      const auto t = little_endian<std::uint64_t>(bytes.data());
+      const auto x = little_endian<std::uint16_t>(&bytes[8]);
+      const auto y = little_endian<std::uint16_t>(&bytes[10]);
       if (t > max_time) return time_range;
       if (bytes[12] > 1) return not_boolean;
       if (const auto* fault = in.add(static_cast<Microseconds>(t), x, y, bytes[12] == 1))
@@ -171,9 +171,9 @@ class T32X16Y15On1 {
   Fault read(std::span<const std::uint8_t> bytes, Reading& in) const {
     if (bytes.size() % min_event_size != 0) return partial_event;
     for (; !bytes.empty(); bytes = bytes.subspan(min_event_size)) {
-      const auto t = in.clock.at(load<std::uint32_t>(bytes.data(), std::endian::little));
-      const auto x = load<std::uint16_t>(&bytes[4], std::endian::little);
-      const auto y_on = load<std::uint16_t>(&bytes[6], std::endian::little);
+      const auto t = in.clock.at(little_endian<std::uint32_t>(bytes.data()));
+      const auto x = little_endian<std::uint16_t>(&bytes[4]);
+      const auto y_on = little_endian<std::uint16_t>(&bytes[6]);
       if (const auto* fault = in.add(t, x, y_on >> 1, (y_on & 1) != 0)) return fault;
     }
     return nullptr;
@@ -210,7 +210,7 @@ class EventStream {
   Fault read(std::span<const std::uint8_t> bytes, Reading& in) const {
     constexpr std::size_t header_size = 8;
     if (bytes.size() < header_size) return no_header;
-    auto t = load<std::uint64_t>(bytes.data(), std::endian::little);
+    auto t = little_endian<std::uint64_t>(bytes.data());
     if (t > max_time) return time_range;
     for (std::size_t at = header_size; at < bytes.size();) {
       const auto byte = bytes[at];
@@ -221,8 +221,8 @@ class EventStream {
       }
       if (bytes.size() - at < min_event_size) return partial_event;
       t += byte >> 1;
-      const auto x = load<std::uint16_t>(&bytes[at + 1], std::endian::little);
-      const auto row = load<std::uint16_t>(&bytes[at + 3], std::endian::little);
+      const auto x = little_endian<std::uint16_t>(&bytes[at + 1]);
+      const auto row = little_endian<std::uint16_t>(&bytes[at + 3]);
       if (const auto* fault =
               in.add(static_cast<Microseconds>(t), x, height_ - 1 - row, (byte & 1) != 0))
         return fault;

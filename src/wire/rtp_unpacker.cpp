@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "src/formats/byte_order.hpp"
 #include "src/formats/evt/words.hpp"
-#include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 #include "tests/formats/aedat_files.hpp"
 
 namespace aedat_recordings {

@@ -11,7 +11,7 @@
 
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/dvs/state_bytes.hpp"
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace {

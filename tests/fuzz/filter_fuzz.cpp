@@ -18,7 +18,7 @@
 #include "src/filter/scale_filter.hpp"
 #include "src/filter/trail_filter.hpp"
 #include "src/filter/undistort_filter.hpp"
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace {

@@ -5,6 +5,8 @@
 #include <cctype>
 #include <string_view>
 
+#include "src/formats/byte_order.hpp"
+
 namespace eventcamera {
 
 namespace {
@@ -28,11 +30,6 @@ std::string lowercase(std::string_view text) {
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return lower;
-}
-
-std::uint32_t big_endian(const std::uint8_t* bytes) {
-  return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 |
-         std::uint32_t{bytes[2]} << 8 | std::uint32_t{bytes[3]};
 }
 
 /// A size such as 640x480 in a line of a header.
@@ -258,9 +255,9 @@ void Aedat2Decoder::append(const Record& record, Decoded& out) {
 }
 
 Aedat2Decoder::Record Aedat2Decoder::record_at(const std::uint8_t* bytes) const {
-  const bool is_short = address_size_ == 2;
-  return {is_short ? std::uint32_t{bytes[0]} << 8 | bytes[1] : big_endian(bytes),
-          static_cast<std::int32_t>(big_endian(bytes + address_size_))};
+  constexpr auto big = std::endian::big;
+  return {address_size_ == 2 ? load<std::uint16_t>(bytes, big) : load<std::uint32_t>(bytes, big),
+          static_cast<std::int32_t>(load<std::uint32_t>(bytes + address_size_, big))};
 }
 
 }  // namespace eventcamera

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
 

@@ -10,8 +10,8 @@
 #include "src/core/max_side.hpp"
 #include "src/formats/aedat/aedat4_flatbuffer.hpp"
 #include "src/formats/aedat/aedat4_info_node.hpp"
+#include "src/formats/byte_order.hpp"
 #include "src/formats/chunker.hpp"
-#include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
 

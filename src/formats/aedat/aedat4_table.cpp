@@ -5,7 +5,7 @@
 
 #include "src/formats/aedat/aedat4_compression.hpp"
 #include "src/formats/aedat/aedat4_flatbuffer.hpp"
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
 

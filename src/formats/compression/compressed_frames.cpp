@@ -10,7 +10,7 @@
 #include <new>
 #include <stdexcept>
 
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
 

@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "src/formats/byte_order.hpp"
 #include "src/formats/evt/scanned_words.hpp"
-#include "src/formats/little_endian.hpp"
 
 namespace eventcamera {
 namespace {

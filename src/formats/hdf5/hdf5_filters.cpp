@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
 

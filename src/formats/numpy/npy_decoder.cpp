@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 #include "src/formats/table_sample.hpp"
 
 namespace eventcamera {

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <string>
 
-#include "src/formats/little_endian.hpp"
+#include "src/formats/byte_order.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
