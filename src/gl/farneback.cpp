@@ -10,7 +10,12 @@ namespace eventcamera::gl {
 namespace {
 
 constexpr std::size_t polynomial_size = PolynomialExpansion::coefficients * sizeof(float);
-constexpr std::size_t equations_size = 5 * sizeof(float);
+constexpr std::size_t equations_size = FlowUpdate::equations * sizeof(float);
+
+/// Number of pixels in the rows for which flow is found.
+std::size_t found_pixels(int width, int height) {
+  return pixel_count({width, FlowUpdate::rows(height)});
+}
 
 }  // namespace
 
@@ -21,10 +26,10 @@ FarnebackFlow::Level::Level(const Context& gl, const LumaFormat& format, int lev
       blur(gl),
       polynomials{Buffer(gl), Buffer(gl)},
       flow(gl) {
-  const std::size_t pixels = pixel_count({width, height});
   blur.assign(std::as_bytes(std::span(pyramid.kernel())));
-  for (auto& of_picture : polynomials) of_picture.reserve(pixels * polynomial_size);
-  flow.reserve(pixels * sizeof(Flow));
+  for (auto& of_picture : polynomials)
+    of_picture.reserve(pixel_count({width, height}) * polynomial_size);
+  flow.reserve(found_pixels(width, height) * sizeof(Flow));
 }
 
 FarnebackFlow::FarnebackFlow(const Context& gl, const LumaFormat& format)
@@ -37,14 +42,16 @@ FarnebackFlow::FarnebackFlow(const Context& gl, const LumaFormat& format)
       fit_(gl),
       no_flow_(gl),
       shrunk_(gl),
-      equations_of_pixels_(gl) {
+      equations_of_pixels_(gl),
+      flow_(gl) {
   const int levels = eventcamera::FarnebackFlow::level_count(format.width, format.height);
   for (int level = 0; level < levels; ++level) levels_.emplace_back(gl, format, level);
   const FitKernels kernels;
   fit_.assign(std::as_bytes(std::span(&kernels, 1)));
   no_flow_.assign_zeros(levels_.back().flow.size());
   shrunk_.reserve(pixel_count(format) * sizeof(float));
-  equations_of_pixels_.reserve(pixel_count(format) * equations_size);
+  equations_of_pixels_.reserve(found_pixels(format.width, format.height) * equations_size);
+  flow_.reserve(pixel_count(format) * sizeof(Flow));
 }
 
 void FarnebackFlow::push(const GreyFrame& picture) {
@@ -60,23 +67,29 @@ void FarnebackFlow::push(const GreyFrame& picture) {
 
 const Buffer& FarnebackFlow::find() const {
   const Level* coarser = nullptr;
+  int index = static_cast<int>(levels_.size());
   for (auto level = levels_.rbegin(); level != levels_.rend(); ++level) {
     const auto& [pyramid, width, height, blur, polynomials, flow] = *level;
-    const Groups rows{groups_of(64, width), height};
+    const int rows = FlowUpdate::rows(height);
+    const int groups = groups_of(64, width);
     if (coarser != nullptr)
-      upsample_.run(rows, {&coarser->flow, &flow},
-                    {coarser->width, coarser->height, width, height});
+      upsample_.run({groups, rows}, {&coarser->flow, &flow},
+                    {coarser->width, coarser->height, width, height, FlowUpdate::row_step, 2});
     const Buffer* before = coarser != nullptr ? &flow : &no_flow_;
-    for (int i = 0; i < eventcamera::FarnebackFlow::iterations; ++i) {
-      equations_.run(rows,
+    const int iterations = eventcamera::FarnebackFlow::iterations[--index];
+    for (int i = 0; i < iterations; ++i) {
+      equations_.run({groups, rows},
                      {&polynomials[1 - last_], &polynomials[last_], before, &equations_of_pixels_},
                      {width, height});
-      solve_.run({rows.x, groups_of(4, height)}, {&equations_of_pixels_, &flow}, {width, height});
+      solve_.run({groups, groups_of(4, rows)}, {&equations_of_pixels_, &flow}, {width, rows});
       before = &flow;
     }
     coarser = &*level;
   }
-  return levels_.front().flow;
+  const auto& finest = levels_.front();
+  upsample_.run({groups_of(64, finest.width), finest.height}, {&finest.flow, &flow_},
+                {finest.width, finest.height, finest.width, finest.height, 1, 1});
+  return flow_;
 }
 
 }  // namespace eventcamera::gl

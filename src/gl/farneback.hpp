@@ -29,7 +29,7 @@ class FarnebackFlow {
     int height;
     Buffer blur;            ///< weights
     Buffer polynomials[2];  ///< of the last two pictures
-    Buffer flow;
+    Buffer flow;            ///< of the rows that FlowUpdate finds
   };
 
   LumaFormat format_;
@@ -43,6 +43,7 @@ class FarnebackFlow {
   Buffer no_flow_;           ///< of the coarsest level
   Buffer shrunk_;            ///< picture of a level
   Buffer equations_of_pixels_;
+  Buffer flow_;   ///< of all rows
   int last_ = 0;  ///< index of the later polynomials
 };
 

@@ -178,7 +178,7 @@ void expect_similar_events(gl::DenseSimulator& ours, DenseSimulator& reference,
       EXPECT_GE(matched(events, wanted, step), 0.995);
       EXPECT_GE(matched(wanted, events, step), 0.995);
       EXPECT_NEAR(static_cast<double>(events.size()), static_cast<double>(wanted.size()),
-                  0.005 * static_cast<double>(wanted.size()));
+                  0.01 * static_cast<double>(wanted.size()));
     }
   }
 }

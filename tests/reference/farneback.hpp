@@ -149,7 +149,7 @@ struct Equations {
   }
   /// Solves the mean of `count` equations, slightly regularised.
   Flow solution(int count) const {
-    const double determinant = g_yy * g_xx - g_xy * g_xy + 1e-3 * count * count;
+    const double determinant = g_yy * g_xx - g_xy * g_xy + 1e-4 * count * count;
     return {static_cast<float>((g_yy * h_x - g_xy * h_y) / determinant),
             static_cast<float>((g_xx * h_y - g_xy * h_x) / determinant)};
   }
@@ -194,28 +194,34 @@ inline Equations equations(const Image<Polynomial>& from, const Image<Polynomial
           w2 * (a_xy * b_y + a_xx * b_x)};
 }
 
-/// One iteration: solves the equations of 15x15 pixels around each pixel, border replicated.
+/// One iteration: solves the equations of 15x7 pixels around each pixel of every other row, border
+/// replicated; these are 15 adjacent columns, and every other row. The rows between have the mean.
 inline Image<Flow> better_flow(const Image<Polynomial>& from, const Image<Polynomial>& to,
                                const Image<Flow>& flow) {
-  Image<Equations> of_pixel(flow.width(), flow.height());
-  for (int y = 0; y < flow.height(); ++y)
-    for (int x = 0; x < flow.width(); ++x)
-      of_pixel.at(x, y) = equations(from, to, flow.at(x, y), x, y);
-  Image<Flow> result(flow.width(), flow.height());
-  for (int y = 0; y < flow.height(); ++y) {
-    for (int x = 0; x < flow.width(); ++x) {
+  const int width = flow.width();
+  const int height = flow.height();
+  Image<Equations> of_pixel(width, height);
+  for (int y = 0; y < height; y += 2)
+    for (int x = 0; x < width; ++x) of_pixel.at(x, y) = equations(from, to, flow.at(x, y), x, y);
+  Image<Flow> result(width, height);
+  const int last_row = (height - 1) / 2 * 2;
+  for (int y = 0; y < height; y += 2) {
+    for (int x = 0; x < width; ++x) {
       Equations sum;
-      for (int v = -7; v <= 7; ++v)
+      for (int v = -6; v <= 6; v += 2)
         for (int u = -7; u <= 7; ++u)
-          sum += of_pixel.at(std::clamp(x + u, 0, flow.width() - 1),
-                             std::clamp(y + v, 0, flow.height() - 1));
-      result.at(x, y) = sum.solution(15 * 15);
+          sum += of_pixel.at(std::clamp(x + u, 0, width - 1), std::clamp(y + v, 0, last_row));
+      result.at(x, y) = sum.solution(15 * 7);
     }
   }
+  for (int y = 1; y < height; y += 2)
+    for (int x = 0; x < width; ++x)
+      result.at(x, y) = (result.at(x, y - 1) + result.at(x, std::min(y + 1, last_row))) * 0.5;
   return result;
 }
 
 inline Image<Flow> farneback(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to) {
+  constexpr int iterations[] = {2, 3, 4, 5};
   int coarsest = 0;
   while (coarsest < 3 && std::min(from.width(), from.height()) >= 32 << (coarsest + 1)) ++coarsest;
   Image<Flow> flow;
@@ -231,7 +237,7 @@ inline Image<Flow> farneback(const Image<std::uint8_t>& from, const Image<std::u
     }
     const auto here = expansion(last);
     const auto there = expansion(next);
-    for (int i = 0; i < 3; ++i) flow = better_flow(here, there, flow);
+    for (int i = 0; i < iterations[level]; ++i) flow = better_flow(here, there, flow);
   }
   return flow;
 }

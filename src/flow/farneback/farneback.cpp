@@ -11,7 +11,6 @@
 namespace eventcamera {
 namespace {
 
-constexpr int max_levels = 4;
 constexpr int min_side = 32;  ///< of a pyramid level
 
 /// Rows of the image at the edge of a band are blurred twice, for both bands, so bands must not be
@@ -41,13 +40,15 @@ struct Tiles {
 }  // namespace
 
 FarnebackFlow::Level::Level(int width, int height, int level)
-    : pyramid(width, height, level),
+    : iterations(FarnebackFlow::iterations[level]),
+      pyramid(width, height, level),
       last(pyramid.width(), pyramid.height()),
       next(pyramid.width(), pyramid.height()),
       update(pyramid.width(), pyramid.height()),
       flow(pyramid.width(), pyramid.height()) {}
 
 int FarnebackFlow::level_count(int width, int height) {
+  constexpr int max_levels = iterations.size();
   int count = 1;
   while (count < max_levels && std::min(width, height) >= min_side << count) ++count;
   return count;
@@ -120,14 +121,17 @@ ImageView<Flow> FarnebackFlow::flow(ThreadPool& threads) {
   return levels_.front().flow.view();
 }
 
-/// Computes columns [first, last) of a level's flow.
+/// Computes columns [first, last) of a level's flow: of every other row, and between these the
+/// mean.
 void FarnebackFlow::find_columns(const Level* coarser, Level& level, int first, int last,
                                  Scratch& scratch) {
-  constexpr int reach = FlowUpdate::reach;
-  constexpr int side = FlowUpdate::side;
+  constexpr int block_rows = FlowUpdate::window_rows;
+  constexpr int row_step = FlowUpdate::row_step;
   const int width = level.flow.width();
   const int height = level.flow.height();
+  const int row_count = FlowUpdate::rows(height);
   const auto stride = static_cast<std::size_t>(level.flow.stride()) / sizeof(Flow);
+  const int iterations = level.iterations;
   const auto first_of = [&](int iteration) {
     return std::max(0, first - FlowUpdate::margin * (iterations - iteration));
   };
@@ -135,20 +139,28 @@ void FarnebackFlow::find_columns(const Level* coarser, Level& level, int first, 
     return std::min(width, last + FlowUpdate::margin * (iterations - iteration));
   };
   // Each iteration follows the previous one at a distance of one block.
-  constexpr int kept_rows = 2 * side;
-  std::array<FlowRows, iterations + 1> rows;
+  constexpr int kept_rows = 2 * block_rows;
+  std::array<FlowRows, FarnebackFlow::iterations.back() + 1> rows;
   for (int i = 0; i < iterations; ++i)
     rows[i] = {scratch_of(scratch.flows[i], stride * std::size_t{kept_rows}),
                static_cast<std::ptrdiff_t>(stride), kept_rows};
-  rows[iterations] = {level.flow.row(0), static_cast<std::ptrdiff_t>(stride), height};
+  rows[iterations] = {level.flow.row(0), static_cast<std::ptrdiff_t>(stride * row_step), row_count};
   int started = 0;
+  int ended = 1;
   for (int block = 0; block < FlowUpdate::blocks(height) + iterations - 1; ++block) {
-    for (; started < std::min(height, block * side + reach + 1); ++started)
-      start_row(coarser, level, started, first_of(0), last_of(0), scratch, rows[0].row(started));
+    for (; started < std::min(row_count, block * block_rows + FlowUpdate::row_reach + 1); ++started)
+      start_row(coarser, level, started * row_step, first_of(0), last_of(0), scratch,
+                rows[0].row(started));
     for (int i = 1; i <= iterations; ++i)
       level.update.run(level.last, level.next, rows[i - 1], first_of(i), last_of(i),
                        block - (i - 1), scratch.updates[i - 1], rows[i]);
+    for (; ended < std::min(row_count, (block - (iterations - 1)) * block_rows + 1); ++ended)
+      blend_rows(rows[iterations].row(ended - 1) + first, rows[iterations].row(ended) + first, 0.5F,
+                 last - first, level.flow.row(ended * row_step - 1) + first);
   }
+  if (height % row_step == 0)
+    std::copy(level.flow.row(height - 2) + first, level.flow.row(height - 2) + last,
+              level.flow.row(height - 1) + first);
 }
 
 /// Initializes columns [first, last) of row y from the flow of the coarser level, or with 0.

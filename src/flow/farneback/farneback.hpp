@@ -15,7 +15,9 @@ namespace eventcamera {
 /// Farneback's method (SCIA 2003), coarse to fine; the flow between equal images is 0.
 class FarnebackFlow final : public DenseFlow {
  public:
-  static constexpr int iterations = 3;  ///< on each level
+  /// Iterations on each level, finest first. Most of the motion is found on the coarse ones, where
+  /// an iteration costs little.
+  static constexpr std::array iterations{2, 3, 4, 5};
 
   /// Number of pyramid levels of images of this size, each half as large as the one before.
   static int level_count(int width, int height);
@@ -27,6 +29,7 @@ class FarnebackFlow final : public DenseFlow {
   struct Level {
     Level(int width, int height, int level);
 
+    int iterations;
     PyramidLevel pyramid;
     PolynomialExpansion last;
     PolynomialExpansion next;
@@ -42,8 +45,8 @@ class FarnebackFlow final : public DenseFlow {
     std::array<std::vector<float>, 2 * PolynomialExpansion::reach + 1> rows;
     PolynomialExpansion::Scratch expansion;
     std::vector<Flow> coarser_row;
-    std::array<std::vector<Flow>, iterations> flows;  ///< before each iteration
-    std::array<FlowUpdate::Scratch, iterations> updates;
+    std::array<std::vector<Flow>, iterations.back()> flows;  ///< before each iteration
+    std::array<FlowUpdate::Scratch, iterations.back()> updates;
   };
 
   void start(int width, int height);

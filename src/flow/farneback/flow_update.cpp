@@ -24,7 +24,7 @@ using WordVector = hn::Vec<Words>;
 constexpr int coefficients = PolynomialExpansion::coefficients;
 constexpr std::ptrdiff_t group = PolynomialExpansion::group;
 constexpr int reach = FlowUpdate::reach;
-constexpr int side = FlowUpdate::side;
+constexpr int window_rows = FlowUpdate::window_rows;
 constexpr int strip = FlowUpdate::strip;
 /// Coefficients of the normal equations: symmetric 2x2 matrix and right-hand side.
 constexpr int equations = FlowUpdate::equations;
@@ -142,8 +142,8 @@ void complete_block(RowSums& sums) {
   const int lanes = static_cast<int>(hn::Lanes(floats));
   for (int equation = 0; equation < equations; ++equation) {
     for (int x = 0; x < strip; x += lanes) {
-      auto sum = hn::Load(floats, sums.rows[side - 1][equation] + x);
-      for (int row = side - 2; row >= 0; --row) {
+      auto sum = hn::Load(floats, sums.rows[window_rows - 1][equation] + x);
+      for (int row = window_rows - 2; row >= 0; --row) {
         float* at = sums.rows[row][equation] + x;
         sum = hn::Add(sum, hn::Load(floats, at));
         hn::Store(sum, floats, at);
@@ -156,14 +156,15 @@ void complete_block(RowSums& sums) {
 template <int width>
 using EquationRows = float[equations][width + 2 * row_padding];
 
-/// Sums over fifteen rows: those of a strip, preceded by the last ones of the strip to the left.
+/// Sums over the rows of a window: those of a strip, preceded by the last ones of the strip to the
+/// left.
 struct Window {
   static constexpr int before = row_padding;
   HWY_ALIGN EquationRows<before + strip> sums = {};
 };
 
 /// Adds the equations of columns [left, right) of image row y, as row `row` of the current block,
-/// and computes the sums over the last fifteen rows.
+/// and computes the sums over the last rows, as many as a window has.
 void add_row(const PolynomialExpansion& from, const PolynomialExpansion& to, const Flow* flow,
              int y, int left, int right, float row_weight, const float* column_weights, int row,
              RowSums& sums, Window& window) {
@@ -243,8 +244,9 @@ void solve(const EquationRows<strip>& sums, int width, Flow* flow) {
   const hn::Rebind<float, decltype(doubles)> floats;
   using Doubles = hn::Vec<decltype(doubles)>;
   const int lanes = static_cast<int>(hn::Lanes(doubles));
-  // Regularization: the flow is 0 where there is no texture.
-  const auto regular = hn::Set(doubles, 1e-3 * side * side * side * side);
+  // The flow is 0 where there is no texture.
+  constexpr int count = window_rows * FlowUpdate::window_columns;
+  const auto regular = hn::Set(doubles, FlowUpdate::regularization * count * count);
   for (int x = 0; x < width; x += lanes) {
     const auto sum = [&](int equation) {
       return hn::PromoteTo(doubles, hn::Load(floats, sums[equation] + x));
@@ -285,7 +287,8 @@ void solve_strip(Window& window, int left, int right, int first, int last, int w
     if (right == width) std::fill_n(end, reach, end[-1]);
     std::copy_n(end - before, before, edge);
     edge += before;
-    add_threes(row + (first - left) + before - reach, count + side - 3, threes[equation]);
+    add_threes(row + (first - left) + before - reach, count + FlowUpdate::window_columns - 3,
+               threes[equation]);
   }
   for (int equation = 0; equation < equations; ++equation)
     add_fives(threes[equation], count, sums[equation]);
@@ -296,14 +299,16 @@ void update_block(const PolynomialExpansion& from, const PolynomialExpansion& to
                   const FlowRows& flow, int first, int last, int block, const float* column_weights,
                   const float* row_weights, FlowUpdate::Scratch& scratch, const FlowRows& out) {
   constexpr int margin = FlowUpdate::margin;
+  constexpr int row_reach = FlowUpdate::row_reach;
   const int width = from.width();
-  const int start = block * side;
-  const int end = std::min(start + side, from.height() + 2 * reach);
+  const int rows = FlowUpdate::rows(from.height());
+  const int start = block * window_rows;
+  const int end = std::min(start + window_rows, rows + 2 * row_reach);
   const int begin = std::max(first - margin, 0) & -PolynomialExpansion::group;
   const int stop = std::min(last + margin, width);
   RowSums* sums =
       scratch_of(scratch.sums, static_cast<std::size_t>((stop - begin + strip - 1) / strip));
-  float* edges = scratch_of(scratch.edges, std::size_t{side} * equations * row_padding);
+  float* edges = scratch_of(scratch.edges, std::size_t{window_rows} * equations * row_padding);
   Window windows[2];
   for (int left = begin; left < stop; left += strip) {
     const int right = std::min(left + strip, stop);
@@ -314,15 +319,16 @@ void update_block(const PolynomialExpansion& from, const PolynomialExpansion& to
     // Solves each row after adding the next one's equations, when its sums have reached the cache.
     for (int i = start; i <= end; ++i) {
       if (i < end) {
-        const int y = std::clamp(i - reach, 0, from.height() - 1);  // the border is replicated
-        add_row(from, to, flow.row(y), y, left, right, row_weights[y], column_weights, i - start,
+        const int row = std::clamp(i - row_reach, 0, rows - 1);  // the border is replicated
+        const int y = row * FlowUpdate::row_step;
+        add_row(from, to, flow.row(row), y, left, right, row_weights[y], column_weights, i - start,
                 *sums, windows[i % 2]);
       }
       const int last_row = i - 1;
-      if (last_row < std::max(start, 2 * reach)) continue;
+      if (last_row < std::max(start, 2 * row_reach)) continue;
       solve_strip(windows[last_row % 2], left, right, solved_first, solved_last, width,
                   edges + std::ptrdiff_t{last_row - start} * equations * row_padding,
-                  out.row(last_row - 2 * reach));
+                  out.row(last_row - 2 * row_reach));
     }
     complete_block(*sums++);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Equations for the improved flow of each pixel, from the polynomials at both ends of its flow, like
-// those of src/flow/farneback/flow_update.
+// Equations for the improved flow of each pixel of every other row, from the polynomials at both ends
+// of its flow, like those of src/flow/farneback/flow_update.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer From { float from[]; };
@@ -19,11 +19,14 @@ float border_weight(int i, int size) {
 
 void main() {
   int x = int(gl_GlobalInvocationID.x);
-  int y = int(gl_WorkGroupID.y);
+  int row = int(gl_WorkGroupID.y);
   if (x >= width) return;
+  int y = 2 * row;
   int size = width * height;
   int at = y * width + x;
-  vec2 flow = flows[at];
+  int found_size = width * int(gl_NumWorkGroups.y);
+  int found_at = row * width + x;
+  vec2 flow = flows[found_at];
   float sums[5] =
       float[5](from[at], from[size + at], from[2 * size + at], from[3 * size + at], from[4 * size + at]);
   vec2 end = vec2(x, y) + flow;
@@ -55,9 +58,9 @@ void main() {
   a *= weight;
   a_xy *= weight;
   b *= weight;
-  equations[at] = a.x * a.x + a_xy * a_xy;
-  equations[size + at] = (a.x + a.y) * a_xy;
-  equations[2 * size + at] = a.y * a.y + a_xy * a_xy;
-  equations[3 * size + at] = a.x * b.x + a_xy * b.y;
-  equations[4 * size + at] = a_xy * b.x + a.y * b.y;
+  equations[found_at] = a.x * a.x + a_xy * a_xy;
+  equations[found_size + found_at] = (a.x + a.y) * a_xy;
+  equations[2 * found_size + found_at] = a.y * a.y + a_xy * a_xy;
+  equations[3 * found_size + found_at] = a.x * b.x + a_xy * b.y;
+  equations[4 * found_size + found_at] = a_xy * b.x + a.y * b.y;
 }
