@@ -8,6 +8,7 @@
 
 #include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_compression.hpp"
+#include "src/formats/aedat/aedat4_elements.hpp"
 #include "src/formats/aedat/aedat4_table.hpp"
 #include "src/formats/byte_queue.hpp"
 #include "src/formats/recording_decoder.hpp"
@@ -58,35 +59,28 @@ class Aedat4Decoder final : public RecordingDecoder {
  private:
   enum class Place { more, end, packet, table, noise };
 
-  /// Elements of a packet not returned yet.
-  struct Elements {
-    StreamKind kind = StreamKind::other;
-    const std::uint8_t* data = nullptr;
-    std::size_t count = 0;
-    std::size_t stream = 0;
+  /// Payload of a packet.
+  struct Payload {
+    std::span<const std::uint8_t> content;  ///< decompressed: a FlatBuffer
+    std::size_t used = 0;  ///< bytes of the payload that hold it; 0 if it does not decompress
   };
 
   bool read_header();
-  bool scan();
+  void take_header(std::span<const std::uint8_t> content);
+  bool find_packet();
   bool read_packet();
   Place place_at(std::size_t offset);
   bool begins_packet(std::span<const std::uint8_t> bytes) const;
-  bool has_sound_events(std::span<const std::uint8_t> content, int id) const;
-  const char* read_content(std::span<const std::uint8_t> content, int id);
-  const char* read_frame(std::span<const std::uint8_t> content);
+  bool is_compressed() const { return compression_ != Aedat4Compression::none; }
+  Payload unpacked(std::span<const std::uint8_t> payload);
+  const char* read_content(const Payload& payload, int id, Place after);
   std::optional<std::size_t> stream_of(int id) const;
-  std::size_t add_stream(int id, StreamKind kind);
   void read_table();
   void note_missing_table();
-  void skip_corrupt(std::size_t packet, std::size_t sound, std::size_t work, bool sound_after);
-  Item next_elements();
-  Item next_events();
-  std::span<const AbsoluteEvent> checked_events(std::size_t count);
-  template <class Table, class Element>
-  void read_tables(Element (*element_of)(const Table&), const char* corruption,
-                   std::vector<Element>& out);
+  void skip_corrupt(const Payload& payload, std::size_t size, Place after);
 
   ByteQueue queue_;
+  Corruption corruption_;
   bool finished_ = false;
   bool scanning_ = false;  ///< searching for the next packet
   bool listed_ = false;    ///< the header lists all streams
@@ -103,14 +97,10 @@ class Aedat4Decoder final : public RecordingDecoder {
   FrameDecompressor decompressor_;
 
   std::size_t packet_ = 0;  ///< size of the packet being returned
-  Elements elements_;
-  std::optional<FrameItem> frame_;
-  std::vector<AbsoluteEvent> events_;
-  std::vector<Trigger> triggers_;
-  std::vector<ImuSample> imu_samples_;
+  std::size_t stream_ = 0;  ///< its stream
+  Aedat4Elements elements_{corruption_};
 
   std::size_t credit_;  ///< remaining work for searching corrupt packets
-  Corruption corruption_;
 };
 
 }  // namespace eventcamera
