@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Finds the contrast thresholds at which a simulator generates as many ON and OFF events from a
 video as a real camera recorded of the same scene; for eventsim-dvs also its response, upsampling,
-denoising, adaptation, threshold jitter, refractory period and exposure pulses. Prints them, and how
-similar the two streams then are. Both streams are compared where the frames are not overexposed.
+denoising, adaptation, threshold jitter, refractory period and exposure pulses, and thresholds that fit
+the standard deviation over the pixels as well as the numbers. Prints them, and how similar the two
+streams then are. Both streams are compared where the frames are not overexposed.
 
     event-calibrate drive.mp4 drive.raw --lag find --profile camera.profile --to 2
 
@@ -59,6 +60,8 @@ RELATIVE_STAGES = {
 }
 # A stage of the pixel that gains less is turned off.
 MIN_GAIN = 0.002
+# Numbers of events differ from the recording's by no more than this factor if their deviation is off.
+MAX_BALANCE = 1.1
 # The element whose settings a profile holds.
 PROFILED = "eventsim-dvs"
 
@@ -179,10 +182,10 @@ class ThresholdSearch:
         self.next = np.where(within, step, np.sqrt(self.low * self.high))
 
 
-def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None, precision=PRECISION):
-    """The thresholds at which the simulator generates as many ON and OFF events within the spans as the
-    recording has."""
-    goal = sum(counts(span.of(recorded)) for span in spans)
+def find_thresholds(simulated_by, recorded, spans, setting, progress, first=None, precision=PRECISION, share=1.0):
+    """The thresholds at which the simulator generates this share of the ON and OFF events that the recording has
+    within the spans."""
+    goal = share * sum(counts(span.of(recorded)) for span in spans)
     if goal.min() == 0:
         raise RuntimeError("the recording has no events, or events of only one polarity")
     search = ThresholdSearch(goal, threshold_limits(setting.element), first, precision)
@@ -270,12 +273,19 @@ class Choices:
                                           self.thresholds, ROUGH_PRECISION)
         return part.of(self.simulated_by(setting.with_thresholds(self.thresholds)))
 
-    def calibrated(self, chosen):
-        """The element with thresholds that fit the whole span."""
+    def calibrated(self, chosen, share=1.0):
+        """The element with thresholds that fit the whole span, or this share of its events."""
         setting = self.setting(chosen)
         self.thresholds = find_thresholds(self.simulated_by, self.recorded, self.parts, setting, self.progress,
-                                          self.thresholds)
+                                          self.thresholds, share=share)
         return setting.with_thresholds(self.thresholds)
+
+    def balanced(self, chosen):
+        """The element with thresholds between those that fit the mean event rate and those that fit its standard
+        deviation over the pixels: one is as much too small as the other is too large."""
+        figures = compare(self.video, self.recorded, self.simulated_by(self.calibrated(chosen)), self.span)
+        mean, deviation = (figures["candidate"][field] / figures["reference"][field] for field in ("mean", "std-dev"))
+        return self.calibrated(chosen, np.clip(np.sqrt(mean / deviation), 1 / MAX_BALANCE, MAX_BALANCE))
 
     def best_response(self):
         """The best response along motion, and the values of what may be chosen of it."""
@@ -351,7 +361,7 @@ def calibrate(video, recorded, span, element, progress):
     best = choices.pruned(max(climbed, key=choices.rating), stages)
     if best.get("exposure-pulse") == 0:
         best.pop("exposure-lead", None)
-    return choices.calibrated(best)
+    return choices.balanced(best)
 
 
 def fit_thresholds(video, recorded, span, element, progress):

@@ -46,6 +46,12 @@ for simulator in "eventsim-dvs profile=camera.profile" "$element"; do
 done
 [ "$(sort -u sums | wc -l)" -eq 1 ] || fail "$(cat camera.profile) differs from $element"
 
+# Thresholds lie between those that fit the mean and those that fit the standard deviation.
+"$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 adaptation=0.5 adaptation-time=200000000 ! evtenc ! filesink location=recorded.raw
+calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0 threshold-jitter=0" --to 0.3 | tee found
+awk '$1 == "mean" { mean = $4 / $2 } $1 == "std." { deviation = $5 / $3 } END { exit !(mean < 0.98 && deviation > 1.02 && mean * deviation > 0.96 && mean * deviation < 1.04) }' found ||
+  fail "mean and standard deviation are not off by about the same factor"
+
 # Exposure pulses are found by their bursts of events.
 "$GST_LAUNCH" -q filesrc location=scene.mkv ! decodebin ! eventsim-dvs response=log log-eps=0.02 exposure-pulse=0.03 exposure-lead=9000000 ! evtenc ! filesink location=recorded.raw
 calibrate scene.mkv recorded.raw --element "eventsim-dvs response=log log-eps=0.02 upsampling=linear denoise=0 adaptation=0 refractory-period=0" --to 0.3 | tee found
