@@ -72,7 +72,7 @@ TEST(AedatMux, KeepsTheTimesOfAFileAndOfExposures) {
 }
 
 TEST(AedatMux, RefusesTwoStreamsOfAKind) {
-  const TemporaryFile in(aedat4(steady_events(300'000, 70)));
+  const TemporaryFile in(aedat4_file(steady_events(300'000, 70)));
   Pipeline pipeline(in.source() +
                     "aedatdemux ! tee name=t  t. ! queue ! m.  t. ! queue ! m.  aedatmux name=m ! "
                     "fakesink");
@@ -137,7 +137,7 @@ TEST(AedatMux, KeepsTriggersOfOtherFormats) {
 TEST(AedatMux, NeedsNoSeeking) {
   const auto events = steady_events(300'000, 70);
   // The branch of the tee continues as a stream.
-  const Content content(copied(TemporaryFile(aedat4(events)),
+  const Content content(copied(TemporaryFile(aedat4_file(events)),
                                "aedatdemux ! aedatmux ! aedatdemux ! aedatmux compression=none"));
   EXPECT_TRUE(content.events == events);
   EXPECT_EQ(content.streams.front().source, "a camera");

@@ -24,7 +24,7 @@ std::uint64_t place_of_corruption(const Bytes& bytes) {
 
 TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
   const auto events = steady_events(2'000'000, 50);
-  const auto whole = aedat4(events);
+  const auto whole = aedat4_file(events);
   std::set<Microseconds> times;
   for (const auto& event : events) times.insert(event.t);
   recordings::Random random(11);
@@ -64,7 +64,7 @@ TEST(AedatDemux, DeliversWhatIsWholeOfBrokenFiles) {
 
 TEST(AedatDemux, SaysWhereTheTableIsWrong) {
   const auto events = steady_events(2'000'000, 50);
-  const auto whole = aedat4(events);
+  const auto whole = aedat4_file(events);
   Aedat4Decoder decoder;
   decoder.push(whole);
   while (decoder.next()) continue;
@@ -109,7 +109,7 @@ TEST(AedatDemux, SaysWhereSomethingIsNotAedat) {
   const Bytes png{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
   Bytes old;
   aedat_files::add(old, "#!AER-DAT1.1\r\n#\r\n");
-  Bytes half = aedat4(steady_events(1'000, 10));
+  Bytes half = aedat4_file(steady_events(1'000, 10));
   half.resize(40);
   for (const auto& bytes : {png, old, half, Bytes{}, Bytes{'#'}}) {
     const TemporaryFile file(bytes);
@@ -131,7 +131,7 @@ GstMessageType decoded(const TemporaryFile& file, const std::string& between = "
 
 /// decodebin drops errors while it is adding an element, whose state it locks.
 TEST(AedatDemux, TellsDecodebinOfErrors) {
-  auto bytes = aedat4(steady_events(100'000, 70));
+  auto bytes = aedat4_file(steady_events(100'000, 70));
   bytes[17] = 0x7f;  // the size of the header
   const TemporaryFile file(bytes);
   for (int i = 0; i < 30; ++i) {
@@ -171,7 +171,7 @@ TEST(AedatDemux, SaysWhereAFileHasNoEvents) {
   EXPECT_FALSE(player.play());
   EXPECT_NE(player.error.find("neither events nor frames"), std::string::npos) << player.error;
   // There is a stream of events here, though it is empty.
-  const TemporaryFile silent(aedat4({}));
+  const TemporaryFile silent(aedat4_file({}));
   AedatPlayer other(silent.source());
   EXPECT_TRUE(other.play()) << other.error;
   EXPECT_EQ(other.track("events_0").eos, 1U);

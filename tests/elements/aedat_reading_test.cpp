@@ -19,9 +19,9 @@ TEST(AedatDemux, HandsOutTheEventsOfEveryVersion) {
   std::map<std::string, Bytes> files;
   for (const int compression : {0, 1, 2, 3, 4})
     files["4, compression " + std::to_string(compression)] =
-        aedat4(made, static_cast<Aedat4Compression>(compression));
-  files["4, without a table"] = aedat4(made, Aedat4Compression::lz4, false);
-  files["4, of today"] = aedat4(shifted(made, of_1970));
+        aedat4_file(made, static_cast<Aedat4Compression>(compression));
+  files["4, without a table"] = aedat4_file(made, Aedat4Compression::lz4, false);
+  files["4, of today"] = aedat4_file(shifted(made, of_1970));
   files["3"] = aedat_files::aedat3(made, "DAVIS346", 1000);
   files["3, camera unknown"] = aedat_files::aedat3(made, "a camera", 1000);
   files["2"] = aedat_files::aedat2_davis(made, sensor, "eu.seebetter.DAVIS346");
@@ -156,7 +156,7 @@ TEST(AedatDemux, TellsOfSilenceInFewWords) {
   Events events = steady_events(20'000, 100);
   const auto later = steady_events(20'000, 100, 3'600'000'000);
   events.insert(events.end(), later.begin(), later.end());
-  const TemporaryFile file(aedat4(events));
+  const TemporaryFile file(aedat4_file(events));
   AedatPlayer player(file.source());
   ASSERT_TRUE(player.play()) << player.error;
   const auto track = player.track("events_0");
@@ -220,7 +220,7 @@ TEST(AedatDemux, PlaysAgainAfterAStop) {
 /// After a flush in push mode, a demuxer starts over at the start of the file.
 TEST(AedatDemux, BeginsAnewAfterAFlush) {
   const auto events = steady_events(200'000, 100);
-  const auto bytes = aedat4(events);
+  const auto bytes = aedat4_file(events);
   Harness h(Harness::with_late_pad("aedatdemux"), "aedatdemux");
   gst_harness_set_src_caps_str(h.get(), "application/x-aedat, version=(int)4");
   const auto push = [&](std::size_t size) {

@@ -61,8 +61,9 @@ inline Bytes finished(Aedat4Encoder& encoder, Bytes bytes) {
   return bytes;
 }
 
-inline Bytes aedat4(const Events& events, Aedat4Compression compression = Aedat4Compression::lz4,
-                    bool table = true) {
+inline Bytes aedat4_file(const Events& events,
+                         Aedat4Compression compression = Aedat4Compression::lz4,
+                         bool table = true) {
   Aedat4Encoder encoder({sensor, "a camera", compression, false, table});
   Bytes bytes;
   encoder.encode(events, bytes);

@@ -14,8 +14,8 @@ using namespace aedat_recordings;
 TEST(AedatDemux, Seeks) {
   const auto events = steady_events(10'000'000, 200, of_1970);
   const std::map<std::string, Bytes> files{
-      {"by the table", aedat4(events)},
-      {"without a table", aedat4(events, Aedat4Compression::zstd, false)},
+      {"by the table", aedat4_file(events)},
+      {"without a table", aedat4_file(events, Aedat4Compression::zstd, false)},
       {"AEDAT 3", aedat_files::aedat3(shifted(events, -of_1970), "DAVIS346", 1000)}};
   for (const auto& [name, bytes] : files) {
     SCOPED_TRACE(name);
