@@ -7,6 +7,7 @@
 
 #include "src/core/max_side.hpp"
 #include "src/formats/aedat/aedat4.hpp"
+#include "src/formats/aedat/aedat4_flatbuffer.hpp"
 #include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
@@ -63,7 +64,7 @@ Aedat4Elements::Aedat4Elements(Corruption& corruption) : corruption_(corruption)
 }
 
 void Aedat4Elements::clear() {
-  rest_ = {};
+  count_ = 0;
   frame_.reset();
 }
 
@@ -79,7 +80,8 @@ const char* Aedat4Elements::read(StreamKind kind, std::span<const std::uint8_t> 
     elements = aedat4::verified_elements<aedat4::Tables<aedat4::Imu>>(content, "IMUS");
   if (!elements) return broken_packet;
   kind_ = kind;
-  rest_ = *elements;
+  data_ = elements->data;
+  count_ = elements->count;
   position_ = position;
   return nullptr;
 }
@@ -147,10 +149,10 @@ Item Aedat4Elements::next(std::size_t stream, SensorSize size) {
 
 /// A valid block takes a single pass.
 std::span<const AbsoluteEvent> Aedat4Elements::next_events(SensorSize size) {
-  const auto count = std::min(rest_.count, block);
-  const auto* const from = rest_.data;
-  rest_.data += count * event_size;
-  rest_.count -= count;
+  const auto count = std::min(count_, block);
+  const auto* const from = data_;
+  data_ += count * event_size;
+  count_ -= count;
   const auto limit = limit_of(size);
   const auto width = limit.width;
   const auto height = limit.height;
@@ -184,17 +186,18 @@ std::span<const AbsoluteEvent> Aedat4Elements::next_events(SensorSize size) {
 template <class Table, class Element>
 void Aedat4Elements::read_tables(Element (*element_of)(const Table&), const char* corruption,
                                  std::vector<Element>& out) {
-  const auto count = std::min(rest_.count, block);
+  const auto count = std::min(count_, block);
+  const aedat4::Elements tables{data_, count};
   out.clear();
   for (std::size_t i = 0; i < count; ++i) {
-    const auto* const table = rest_.table<Table>(i);
+    const auto* const table = tables.table<Table>(i);
     if (is_time(table->t()))
       out.push_back(element_of(*table));
     else
       corruption_.note(position_, corruption);
   }
-  rest_.data += count * sizeof(flatbuffers::uoffset_t);
-  rest_.count -= count;
+  data_ += count * sizeof(flatbuffers::uoffset_t);
+  count_ -= count;
 }
 
 }  // namespace eventcamera

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "src/formats/aedat/aedat4_flatbuffer.hpp"
 #include "src/formats/recording_decoder.hpp"
 
 namespace eventcamera {
@@ -24,7 +24,7 @@ class Aedat4Elements {
   const char* read(StreamKind kind, std::span<const std::uint8_t> content, std::uint64_t position);
 
   /// True once all elements were returned.
-  bool empty() const { return rest_.count == 0 && !frame_; }
+  bool empty() const { return count_ == 0 && !frame_; }
 
   /// Returns the next elements as those of `stream`, whose sensor has this size.
   Item next(std::size_t stream, SensorSize size);
@@ -44,7 +44,8 @@ class Aedat4Elements {
 
   Corruption& corruption_;
   StreamKind kind_ = StreamKind::other;
-  aedat4::Elements rest_;  ///< not returned yet
+  const std::uint8_t* data_ = nullptr;  ///< elements not returned yet
+  std::size_t count_ = 0;               ///< their number
   std::uint64_t position_ = 0;
   std::optional<Frame> frame_;
   std::vector<AbsoluteEvent> events_;
