@@ -2,14 +2,77 @@
 #include "src/dvs/motion_tiles.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
 #include "src/core/max_side.hpp"
 #include "src/flow/flow_range.hpp"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/dvs/motion_tiles.cpp"
+#include <hwy/foreach_target.h>
+// Compiled once per SIMD target.
+#include "src/core/simd-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace eventcamera::HWY_NAMESPACE {
+namespace {
+
+constexpr int columns_at_once = 64;
+
+/// Finds the least and largest luma of each cell of `side` columns, in these rows of a frame.
+template <class Pixel>
+void find_ranges(const ImageView<Pixel>& frame, int top, int bottom, int side,
+                 std::uint16_t* darkest, std::uint16_t* brightest) {
+  const hn::CappedTag<Pixel, columns_at_once> pixels;
+  const int lanes = static_cast<int>(hn::Lanes(pixels));
+  HWY_ALIGN Pixel low[columns_at_once];
+  HWY_ALIGN Pixel high[columns_at_once];
+  HWY_ALIGN Pixel end_of_row[columns_at_once];
+  for (int left = 0; left < frame.width; left += columns_at_once) {
+    const int count = std::min(columns_at_once, frame.width - left);
+    std::fill_n(low, columns_at_once, std::numeric_limits<Pixel>::max());
+    std::fill_n(high, columns_at_once, Pixel{0});
+    for (int y = top; y < bottom; ++y) {
+      const Pixel* luma = frame.row(y) + left;
+      if (count < columns_at_once) {
+        std::copy_n(luma, count, end_of_row);
+        std::fill(end_of_row + count, end_of_row + columns_at_once, luma[count - 1]);
+        luma = end_of_row;
+      }
+      for (int x = 0; x < columns_at_once; x += lanes) {
+        const auto here = hn::LoadU(pixels, luma + x);
+        hn::Store(hn::Min(hn::Load(pixels, low + x), here), pixels, low + x);
+        hn::Store(hn::Max(hn::Load(pixels, high + x), here), pixels, high + x);
+      }
+    }
+    for (int x = 0; x < count; x += side) {
+      *darkest++ = *std::min_element(low + x, low + x + side);
+      *brightest++ = *std::max_element(high + x, high + x + side);
+    }
+  }
+}
+
+void find_ranges_8(const ImageView<std::uint8_t>& frame, int top, int bottom, int side,
+                   std::uint16_t* darkest, std::uint16_t* brightest) {
+  find_ranges(frame, top, bottom, side, darkest, brightest);
+}
+
+void find_ranges_16(const ImageView<std::uint16_t>& frame, int top, int bottom, int side,
+                    std::uint16_t* darkest, std::uint16_t* brightest) {
+  find_ranges(frame, top, bottom, side, darkest, brightest);
+}
+
+}  // namespace
+}  // namespace eventcamera::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace eventcamera {
+
+HWY_EXPORT(find_ranges_8);
+HWY_EXPORT(find_ranges_16);
+
 namespace {
 
 /// Longest motion for which the luma on the way is worth looking up, in pixels.
@@ -26,28 +89,12 @@ void MotionTiles::Cells::measure(const ImageView<Pixel>& frame, ThreadPool& thre
     brightest = Image<std::uint16_t>(columns, rows);
   }
   threads.for_each(rows, [&](int row, int) {
-    constexpr int columns_at_once = 8 * side;
-    for (int left = 0; left < frame.width; left += columns_at_once) {
-      const int count = std::min(columns_at_once, frame.width - left);
-      std::array<Pixel, columns_at_once> low;
-      std::array<Pixel, columns_at_once> high;
-      low.fill(std::numeric_limits<Pixel>::max());
-      high.fill(0);
-      for (int y = row * side; y < std::min((row + 1) * side, frame.height); ++y) {
-        const Pixel* luma = frame.row(y) + left;
-        for (std::size_t x = 0; x < static_cast<std::size_t>(count); ++x) {
-          low[x] = std::min(low[x], luma[x]);
-          high[x] = std::max(high[x], luma[x]);
-        }
-      }
-      for (int x = 0; x < count; x += side) {
-        const auto first = static_cast<std::ptrdiff_t>(x);
-        darkest.at((left + x) / side, row) =
-            *std::min_element(low.begin() + first, low.begin() + first + side);
-        brightest.at((left + x) / side, row) =
-            *std::max_element(high.begin() + first, high.begin() + first + side);
-      }
-    }
+    const int top = row * side;
+    const int bottom = std::min(top + side, frame.height);
+    if constexpr (sizeof(Pixel) == 1) HWY_DYNAMIC_DISPATCH(find_ranges_8)
+    (frame, top, bottom, side, darkest.row(row), brightest.row(row));
+    else HWY_DYNAMIC_DISPATCH(find_ranges_16)(frame, top, bottom, side, darkest.row(row),
+                                              brightest.row(row));
   });
 }
 
@@ -103,3 +150,4 @@ template void MotionTiles::measure(const ImageView<std::uint16_t>&, const ImageV
                                    const ImageView<Flow>&, int, ThreadPool&);
 
 }  // namespace eventcamera
+#endif  // HWY_ONCE
