@@ -239,7 +239,9 @@ class DvsPixel {
     const double dark = settings_.dark_light;
     const double shade = std::min(std::floor(luma * 65535 / 256), 255.0) / 255;
     const double brightness = (std::min(light(shade) / gain, 1.0) + dark) / (1 + dark);
-    const double bandwidth = 2 * std::numbers::pi * settings_.cutoff_frequency / 1e6 * brightness;
+    const double decay =
+        std::exp(-2 * std::numbers::pi * settings_.cutoff_frequency / 1e6 * brightness);
+    const double growth_decay = settings_.adaptation / in_microseconds(settings_.adaptation_time);
     const double noise = settings_.shot_noise_rate / 1e6 * (1 - 0.75 * brightness);
     const double lead = std::max(in_microseconds(settings_.exposure_lead), 100.0);
     if (now_ + microseconds - lead >= std::max(pulse_ + 1000, now_))
@@ -248,15 +250,13 @@ class DvsPixel {
     for (int i = 1; i <= microseconds; ++i, ++now_) {
       const double last_signal = signal_;
       input_ = last + (next - last) * i / microseconds;
-      signal_ = settings_.cutoff_frequency > 0 ? input_ + (signal_ - input_) * std::exp(-bandwidth)
-                                               : input_;
+      signal_ = settings_.cutoff_frequency > 0 ? input_ + (signal_ - input_) * decay : input_;
       if (now_ >= next_pulse_) pulse_ = next_pulse_;
       const double rise = pulse_at(now_ + 1) - pulse_at(now_);
       // A falling reference is equivalent to a rising signal.
       reference_ -= traits_.leak + rise;
       const double last_growth = growth_;
-      growth_ = std::max(
-          0.0, growth_ - settings_.adaptation / in_microseconds(settings_.adaptation_time));
+      growth_ = std::max(0.0, growth_ - growth_decay);
       const bool is_refractory = now_ + 1 < ready_;
       noise_left_ -= noise;
       const bool is_noise = noise_left_ <= 0;
@@ -320,6 +320,7 @@ class DvsPixel {
   }
 
   double pulse_at(double time) const {
+    if (settings_.exposure_pulse == 0) return 0;
     return settings_.exposure_pulse * (std::clamp((time - pulse_) / 100, 0.0, 1.0) -
                                        std::clamp((time - pulse_ - 900) / 100, 0.0, 1.0));
   }
