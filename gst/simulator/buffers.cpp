@@ -22,6 +22,10 @@ static const GstBaseTransformClass* base_class() {
 static gboolean propose_allocation(GstBaseTransform* transform, GstQuery* decide, GstQuery* query) {
   gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE,
                                 nullptr);  // any stride is supported
+  GstAllocationParams params;
+  gst_allocation_params_init(&params);
+  params.align = 63;  // vectors of pixels do not straddle cache lines
+  gst_query_add_allocation_param(query, nullptr, &params);
   return base_class()->propose_allocation(transform, decide, query);
 }
 
