@@ -47,9 +47,7 @@ static std::optional<std::vector<Record>> records_of(GstEvent* event, const char
       g_bytes_get_data(static_cast<GBytes*>(g_value_get_boxed(value)), &size);
   records.resize(size / sizeof(Record));
   if (!records.empty()) std::memcpy(records.data(), data, records.size() * sizeof(Record));
-  std::erase_if(records, [](const Record& record) {
-    return record.t < -Chunker::max_time || record.t > Chunker::max_time;
-  });
+  std::erase_if(records, [](const Record& record) { return !Chunker::is_time(record.t); });
   return records;
 }
 

@@ -49,7 +49,7 @@ std::size_t Chunker::keep_sorted(std::span<const AbsoluteEvent> events) {
 }
 
 void Chunker::place(const AbsoluteEvent& event) {
-  if (event.t > max_time || event.t < -max_time) {
+  if (!is_time(event.t)) {
     ++dropped_.stray;
     return;
   }

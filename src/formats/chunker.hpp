@@ -25,6 +25,7 @@ class Chunker {
   static constexpr Microseconds settled = 10'000;
   /// Times beyond this, in either direction, are errors: 142 years.
   static constexpr Microseconds max_time = Microseconds{1} << 52;
+  static constexpr bool is_time(Microseconds t) { return t >= -max_time && t <= max_time; }
   /// Bounds the memory: an interval with more events is cut in two.
   static constexpr std::size_t max_events = std::size_t{1} << 22;
 

@@ -10,11 +10,6 @@ namespace eventcamera {
 
 namespace {
 
-/// Limit of the survey at the start of a file, in bytes.
-constexpr std::uint64_t max_surveyed_bytes = std::uint64_t{1} << 24;
-/// Limits of held items, in bytes of memory (4 million events) and in time.
-constexpr std::size_t max_held = std::size_t{1} << 26;
-constexpr Microseconds max_hold = 1'000'000;
 /// A stream lagging by more than this is treated as silent.
 constexpr Microseconds max_lag = 500'000;
 /// Minimum length of a gap of such a stream. Queues of a second do not fill before.
@@ -24,51 +19,32 @@ constexpr Microseconds min_gap = 250'000;
 constexpr Microseconds clock_range = Microseconds{1} << 24;
 constexpr Microseconds always = std::numeric_limits<Microseconds>::min();
 
-bool is_shown(StreamKind kind) {
-  return kind == StreamKind::events || kind == StreamKind::frames;
-}
-
-bool is_time(Microseconds t) {
-  return t >= -Chunker::max_time && t <= Chunker::max_time;
-}
-
 }  // namespace
 
 RecordingReader::RecordingReader(MakeDecoder make_decoder, Microseconds chunk_length, Clock clock)
-    : make_decoder_(std::move(make_decoder)),
+    : input_(std::move(make_decoder)),
       chunk_length_(chunk_length),
       clock_(clock),
-      decoder_(make_decoder_()) {
+      survey_(chunk_length) {
   learn_streams();
   if (clock_ == Clock::file) return;
   begun_ = true;
-  for (auto& stream : streams_) show(stream);
+  for (std::size_t i = 0; i < streams_.size(); ++i) show(i);
 }
 
 /* input */
 
 void RecordingReader::push(std::span<const std::uint8_t> bytes, std::optional<Interval> interval) {
-  const auto lock = reading();
-  decoder_->push(bytes);
+  input_.push(bytes);
   interval_ = interval;
-  finished_ = finishing_ = drained_ = false;
-}
-
-void RecordingReader::finish() {
-  const auto lock = reading();
-  decoder_->finish();
-  finished_ = true;
-}
-
-void RecordingReader::discard() {
-  const auto lock = reading();
-  while (decoder_->next()) continue;
+  finishing_ = drained_ = false;
 }
 
 void RecordingReader::interrupt() {
-  finished_ = finishing_ = drained_ = false;
+  input_.expect_more();
+  finishing_ = drained_ = false;
   shift_.reset();
-  for (auto& stream : streams_) start_chunker(stream);
+  for (std::size_t i = 0; i < streams_.size(); ++i) start_chunker(i);
   next_stream_ = 0;
   newest_ = 0;
   triggers_.clear();
@@ -82,43 +58,14 @@ bool RecordingReader::reach(Microseconds t) {
   return chunker.first().has_value();
 }
 
-/// Next item from the held items, else from the decoder.
 std::optional<Item> RecordingReader::next_item() {
-  if (begun_ && held_next_ < held_.size()) {
-    const auto& held = held_[held_next_++];
-    if (held.frame) return FrameItem{held.stream, *held.frame};
-    if (!held.triggers.empty()) return TriggerItem{held.stream, held.triggers};
-    if (!held.imu_samples.empty()) return ImuItem{held.stream, held.imu_samples};
-    return EventItem{held.stream, held.events};
-  }
-  if (begun_) held_.clear();
-  held_next_ = 0;
-  while (true) {
-    if (const auto item = read_item()) return item;
-    if (source_ == nullptr || finished_) return std::nullopt;
-    if (reads_itself_) {
-      finished_ = !source_->failed();
-      return std::nullopt;
-    }
-    const auto piece = source_->piece(position_);
-    if (!piece) return std::nullopt;
-    position_ += piece->size();
-    if (piece->empty())
-      finish();
-    else
-      push(*piece);
-  }
-}
-
-std::optional<Item> RecordingReader::read_item() {
-  const auto lock = reading();
-  const auto item = decoder_->next();
+  const auto item = input_.next();
   learn_streams();
   return item;
 }
 
 void RecordingReader::learn_streams() {
-  const auto& known = decoder_->streams();
+  const auto& known = input_.decoder().streams();
   for (std::size_t i = 0; i < std::min(known.size(), streams_.size()); ++i) {
     if (known[i].kind != streams_[i].info.kind)
       throw std::runtime_error("the file changed while it was read: its streams are different now");
@@ -135,207 +82,48 @@ void RecordingReader::learn_streams() {
     streams_.push_back({.info = known[i],
                         .number = static_cast<unsigned>(number),
                         .position = start_,
-                        .first = {},
-                        .latest = {},
-                        .first_frame = {},
                         .chunker = Chunker(chunk_length_)});
   }
 }
 
 /* the start of a file */
 
-/// Reads ahead to find the origin, the duration and sizes not stated in the file. What is read is
-/// held, unless output starts elsewhere. False if bytes cannot be read.
+/// Reads ahead. False if bytes cannot be read.
 bool RecordingReader::survey() {
-  {
-    const auto lock = reading();
-    decoder_ = make_decoder_();
-    reads_itself_ = decoder_->open(*source_);
-  }
+  input_.restart(std::nullopt);
   streams_.clear();
-  position_ = 0;
-  start_due_ = finished_ = false;
-  held_.clear();
-  held_size_ = 0;
-  while (!is_surveyed()) {
-    const auto item = survey_item();
-    if (!item && !finished_) return false;
-    if (!item) break;
-    hold(*item);
-  }
-  const bool has_read_on = find_events();
-  if (finished_) finish_chunkers();
-  const bool is_whole = finished_;
-  const auto last = decoder_->last_time();
-  const bool has_moved = find_first_items();
-  if (source_->failed()) return false;
+  start_due_ = false;
+  survey_ = RecordingSurvey(chunk_length_);
+  if (!survey_.read(input_)) return false;
+  learn_streams();
   begin();
-  learn_duration(last, is_whole);
-  if (start_ > 0 || has_read_on || has_moved)
+  duration_ = survey_.duration();
+  duration_is_exact_ = survey_.is_duration_exact();
+  if (start_ > 0 || survey_.has_moved())
     restart(seek_point_before(start_), start_, stop_);
   else
     begin_segment(start_, stop_);
   return true;
 }
 
-std::optional<Item> RecordingReader::survey_item() {
-  const auto item = next_item();
-  if (item) std::visit([this](const auto& some) { note(some); }, *item);
-  return item;
-}
-
-/// Reads on to the first events if the file may have some. True if it read anything.
-bool RecordingReader::find_events() {
-  const auto has_events = [](const Stream& stream) {
-    return stream.info.kind == StreamKind::events && stream.first;
-  };
-  bool has_read = false;
-  while (!decoder_->knows_all_streams() && std::ranges::none_of(streams_, has_events) &&
-         survey_item())
-    has_read = true;
-  return has_read;
-}
-
-/// Reads the first items of streams that begin later, where the file states where. True if it did.
-bool RecordingReader::find_first_items() {
-  bool has_moved = false;
-  for (std::size_t i = 0; i < streams_.size(); ++i) {
-    if (!is_shown(streams_[i].info.kind) || streams_[i].first) continue;
-    const auto start = decoder_->first_of(i);
-    if (!start) continue;
-    {
-      const auto lock = reading();
-      decoder_->restart(*start);
-    }
-    has_moved = true;
-    finished_ = false;
-    position_ = start->position;
-    while (!streams_[i].first && position_ - start->position < max_surveyed_bytes && survey_item())
-      continue;
-    if (streams_[i].info.kind != StreamKind::events) continue;
-    streams_[i].chunker.finish();
-    note(EventItem{i, {}});
-  }
-  return has_moved;
-}
-
-bool RecordingReader::is_surveyed() const {
-  if (held_size_ >= max_held || position_ >= max_surveyed_bytes) return true;
-  const bool sizes_known = std::ranges::all_of(streams_, [](const Stream& stream) {
-    return stream.info.kind != StreamKind::events || stream.info.size.width > 0;
-  });
-  const auto last = sizes_known && is_origin_known() ? decoder_->last_time() : std::nullopt;
-  return last && *last < Chunker::max_time;
-}
-
-void RecordingReader::note(const EventItem& item) {
-  auto& stream = streams_[item.stream];
-  stream.used.include(item.events);
-  // The chunker rejects erroneous times.
-  stream.chunker.push(item.events);
-  while (stream.chunker.next()) stream.is_sampled = true;
-  stream.first = stream.chunker.first();
-  if (stream.first) stream.latest = stream.chunker.latest();
-}
-
-void RecordingReader::note(const FrameItem& item) {
-  auto& stream = streams_[item.stream];
-  const auto t = item.frame.t;
-  if (!is_time(t)) return;
-  stream.first = std::min(stream.first.value_or(t), t);
-  stream.latest = std::max(stream.latest.value_or(t), t);
-  if (!stream.first_frame) stream.first_frame = item.frame;
-}
-
-void RecordingReader::hold(const Item& item) {
-  if (const auto* const events = std::get_if<EventItem>(&item)) {
-    held_.push_back({events->stream, {events->events.begin(), events->events.end()}, {}, {}});
-    held_size_ += sizeof(HeldItem) + events->events.size_bytes();
-  } else if (const auto* const some = std::get_if<FrameItem>(&item)) {
-    const auto& frame = some->frame;
-    auto& held = held_.emplace_back(HeldItem{
-        some->stream, {}, frame, {frame.pixels, frame.pixels + frame.height * frame.stride}});
-    held.frame->pixels = held.pixels.data();
-    held_size_ += sizeof(HeldItem) + held.pixels.size();
-  } else if (const auto* const triggers = std::get_if<TriggerItem>(&item)) {
-    const auto all = triggers->triggers;
-    held_.push_back({triggers->stream, {}, {}, {}, {all.begin(), all.end()}});
-    held_size_ += sizeof(HeldItem) + all.size_bytes();
-  } else if (const auto* const imu = std::get_if<ImuItem>(&item)) {
-    const auto all = imu->samples;
-    held_.push_back({imu->stream, {}, {}, {}, {}, {all.begin(), all.end()}});
-    held_size_ += sizeof(HeldItem) + all.size_bytes();
-  }
-}
-
-/// True if enough is known to begin: the first time of every stream, and enough events to guess
-/// unknown sensor sizes.
-bool RecordingReader::is_origin_known() const {
-  if (held_size_ >= max_held) return true;
-  bool awaited = false;
-  auto first = std::numeric_limits<Microseconds>::max();
-  auto last = always;
-  for (std::size_t i = 0; i < streams_.size(); ++i) {
-    const auto& stream = streams_[i];
-    if (!stream.first) {
-      awaited |= is_shown(stream.info.kind) && !decoder_->is_empty(i);
-      continue;
-    }
-    const bool of_events = stream.info.kind == StreamKind::events;
-    if (of_events && stream.info.size.width <= 0) {
-      // All bytes are there: hold on, to guess from as many events as possible.
-      if (finished_) return false;
-      awaited |= !stream.is_sampled;
-    }
-    first = std::min(first, *stream.first);
-    last = std::max(last, of_events ? *stream.latest : *stream.first);
-  }
-  return last >= first && (!awaited || last - first >= max_hold);
-}
-
 /// Makes the earliest time of all streams the origin, and shows the streams.
 void RecordingReader::begin() {
-  std::optional<Microseconds> origin;
-  for (const auto& stream : streams_)
-    if (stream.first) origin = std::min(origin.value_or(*stream.first), *stream.first);
-  {
-    const auto lock = reading();
-    origin_ = origin.value_or(0);
-  }
+  origin_ = survey_.origin().value_or(0);
   begun_ = true;
-  for (auto& stream : streams_) {
-    const bool is_stream_of_events = stream.info.kind == StreamKind::events &&
-                                     (stream.info.size != SensorSize{} || streams_.size() == 1);
-    if ((is_shown(stream.info.kind) && stream.first) || is_stream_of_events) show(stream);
+  input_.replay();
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    const auto& info = streams_[i].info;
+    const bool is_stream_of_events =
+        info.kind == StreamKind::events && (info.size != SensorSize{} || streams_.size() == 1);
+    if ((is_shown(info.kind) && survey_.stream(i).first) || is_stream_of_events) show(i);
   }
   if (!start_due_) throw UnsupportedFormat("the file has neither events nor frames");
-}
-
-/// `told` is the time of the last item if the file states it. Otherwise the duration follows from
-/// the surveyed part, exactly if that `is_whole`.
-void RecordingReader::learn_duration(std::optional<Microseconds> told, bool is_whole) {
-  auto last = origin_ - 1;
-  for (const auto& stream : streams_) last = std::max(last, stream.latest.value_or(last));
-  const auto surveyed = last + 1 - origin_;
-  const bool is_told = told && *told >= origin_ && *told < Chunker::max_time;
-  duration_is_exact_ = is_told || is_whole;
-  if (is_told) {
-    duration_ = *told + 1 - origin_;
-  } else if (is_whole) {
-    duration_ = surveyed;
-  } else if (!reads_itself_) {
-    const auto scale = static_cast<double>(std::max(source_->size(), position_)) /
-                       static_cast<double>(std::max<std::uint64_t>(position_, 1));
-    duration_ = static_cast<Microseconds>(
-        std::min(static_cast<double>(surveyed) * scale, static_cast<double>(Chunker::max_time)));
-  }
 }
 
 /* seeking */
 
 std::optional<SeekPoint> RecordingReader::seek_point_before(Microseconds start) const {
-  const auto lock = reading();
-  return decoder_->seek_point_before(start > 0 ? origin_ + start : always);
+  return input_.seek_point_before(start > 0 ? origin_ + start : always);
 }
 
 void RecordingReader::seek(Microseconds start, std::optional<Microseconds> stop) {
@@ -346,30 +134,18 @@ void RecordingReader::seek(Microseconds start, std::optional<Microseconds> stop)
 
 void RecordingReader::restart(const std::optional<SeekPoint>& seek_point, Microseconds start,
                               std::optional<Microseconds> stop) {
-  {
-    const auto lock = reading();
-    if (seek_point) {
-      decoder_->restart(*seek_point);
-      before_ = decoder_->corruption();
-    } else {
-      decoder_ = make_decoder_();
-      if (source_ != nullptr) reads_itself_ = decoder_->open(*source_);
-      before_ = {};
-    }
-  }
-  position_ = seek_point ? seek_point->position : 0;
-  finished_ = false;
-  held_.clear();
-  held_size_ = 0;
+  input_.restart(seek_point);
+  before_ = seek_point ? input_.decoder().corruption() : Corruption{};
+  if (!begun_) survey_ = RecordingSurvey(chunk_length_);
   begin_segment(start, stop);
 }
 
-/// Prepares for items at `start` or later: those held, and those that the decoder reads next.
+/// Prepares for items at `start` or later.
 void RecordingReader::begin_segment(Microseconds start, std::optional<Microseconds> stop) {
   start_ = newest_ = start;
   stop_ = stop;
   finishing_ = drained_ = false;
-  held_next_ = next_stream_ = 0;
+  next_stream_ = 0;
   output_due_.reset();
   triggers_.clear();
   imu_samples_.clear();
@@ -384,30 +160,34 @@ void RecordingReader::begin_segment(Microseconds start, std::optional<Microsecon
 
 /* output */
 
-void RecordingReader::show(Stream& stream) {
+void RecordingReader::show(std::size_t index) {
+  auto& stream = streams_[index];
+  const auto& surveyed = survey_.stream(index);
   stream.shown = true;
+  stream.first_frame = surveyed.first_frame;
   start_due_ = true;
   if (stream.info.kind != StreamKind::events) return;
   if (stream.info.size.width <= 0 || stream.info.size.height <= 0) {
-    stream.extent = stream.used.extent(stream.used.within() / 1000);
+    stream.extent = surveyed.used.extent(surveyed.used.within() / 1000);
     stream.info.size = sensor_with(stream.extent, stream.info.mirrored);
     stream.size_from = SizeFrom::assumption;
-    stream.is_implausible = stream.used.are_implausible(decoder_->corruption().outside);
+    stream.is_implausible = surveyed.used.are_implausible(corruption().outside);
   }
-  start_chunker(stream);
+  start_chunker(index);
 }
 
 /// Chunks begin at the start of the segment, except that those of words, and of the stream that
 /// defines the origin, begin at the first event.
-void RecordingReader::start_chunker(Stream& stream) {
+void RecordingReader::start_chunker(std::size_t index) {
   const bool from_first_event =
-      clock_ == Clock::stream || (start_ == 0 && (!begun_ || stream.first == origin_));
-  stream.chunker =
+      clock_ == Clock::stream ||
+      (start_ == 0 && (!begun_ || survey_.stream(index).first == origin()));
+  streams_[index].chunker =
       from_first_event ? Chunker(chunk_length_) : Chunker(chunk_length_, origin_ + start_, origin_);
 }
 
 std::optional<RecordingReader::Output> RecordingReader::next() {
-  if (source_ != nullptr && !begun_ && !survey()) return std::nullopt;
+  if (input_.is_pulling() && !begun_ && !survey()) return std::nullopt;
   while (true) {
     if (const auto output = next_output()) return output;
     if (drained_ || is_past_stop()) return std::nullopt;
@@ -415,14 +195,14 @@ std::optional<RecordingReader::Output> RecordingReader::next() {
       if (begun_) {
         std::visit([this](const auto& some) { take(some); }, *item);
       } else {
-        std::visit([this](const auto& some) { note(some); }, *item);
-        hold(*item);
-        if (is_origin_known()) begin();
+        survey_.take(*item);
+        input_.hold(*item);
+        if (survey_.is_origin_known(input_)) begin();
       }
-    } else if (!finished_) {
+    } else if (!input_.is_finished()) {
       return std::nullopt;
     } else if (!begun_) {
-      finish_chunkers();
+      survey_.finish(input_.decoder());
       begin();
     } else if (!std::exchange(finishing_, true)) {
       finish_chunkers();
@@ -477,8 +257,8 @@ void RecordingReader::take(const EventItem& item) {
   if (item.events.empty()) return;
   auto& stream = streams_[item.stream];
   if (!stream.shown) {
-    stream.used.include(item.events);
-    show(stream);
+    survey_.take_late(item);
+    show(item.stream);
   }
   auto events = item.events;
   if (stream.size_from != SizeFrom::file &&
@@ -516,13 +296,13 @@ void RecordingReader::grow(Stream& stream, std::span<const AbsoluteEvent> events
 void RecordingReader::take(const FrameItem& item) {
   auto& stream = streams_[item.stream];
   const auto t = item.frame.t;
-  if (!is_time(t)) {
+  if (!Chunker::is_time(t)) {
     ++counts_.stray;
     return;
   }
   if (!stream.shown) {
-    stream.first_frame = item.frame;
-    show(stream);
+    survey_.take_late(item);
+    show(item.stream);
   }
   if (t < origin_) {
     ++counts_.late;
@@ -616,25 +396,22 @@ bool RecordingReader::advance(Stream& stream, Microseconds start, Microseconds e
 bool RecordingReader::is_past_stop() const {
   if (!stop_ || !begun_) return false;
   for (std::size_t i = 0; i < streams_.size(); ++i)
-    if (streams_[i].shown && streams_[i].position < *stop_ && !decoder_->is_empty(i)) return false;
+    if (streams_[i].shown && streams_[i].position < *stop_ && !input_.decoder().is_empty(i))
+      return false;
   return true;
 }
 
 void RecordingReader::finish_chunkers() {
-  for (auto& stream : streams_) {
-    if (stream.info.kind != StreamKind::events || (begun_ && !stream.shown)) continue;
-    stream.chunker.finish();
-    if (!begun_) note(EventItem{static_cast<std::size_t>(&stream - streams_.data()), {}});
-  }
+  for (auto& stream : streams_)
+    if (stream.shown && stream.info.kind == StreamKind::events) stream.chunker.finish();
   next_stream_ = 0;
 }
 
 RecordingReader::Counts RecordingReader::counts() const {
   Counts counts = counts_;
-  const auto& corruption = decoder_->corruption();
-  counts.corrupt_places = corruption.places - before_.places;
-  counts.outside = corruption.outside - before_.outside;
-  counts.skipped = corruption.skipped - before_.skipped;
+  counts.corrupt_places = corruption().places - before_.places;
+  counts.outside = corruption().outside - before_.outside;
+  counts.skipped = corruption().skipped - before_.skipped;
   for (const auto& stream : streams_) {
     counts.outside += stream.outside;
     if (!begun_) continue;

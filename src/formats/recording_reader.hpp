@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <atomic>
 #include <cstdint>
-#include <functional>
-#include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,7 +10,8 @@
 #include <vector>
 
 #include "src/formats/chunker.hpp"
-#include "src/formats/recording_decoder.hpp"
+#include "src/formats/recording_input.hpp"
+#include "src/formats/recording_survey.hpp"
 #include "src/formats/sensor_sizes.hpp"
 #include "src/formats/waiting_items.hpp"
 
@@ -22,17 +21,15 @@ namespace eventcamera {
 /// IMU samples, timed from a common origin, the time of the first event or frame. Knows streams,
 /// duration and seek points, and counts items read and dropped.
 ///
-/// The first items are held until the time origin is known. In pull mode the start of the file, up
-/// to 16 MiB or 4 million events, is surveyed first: this gives an exact or estimated duration, and
-/// the sensor size if the file does not state it. Streams that begin later are then looked for: by
-/// the index of the file or, without one, by reading on until there are events.
+/// The first items are held until the time origin is known. In pull mode the start of the file is
+/// surveyed first: this gives an exact or estimated duration, and the sensor size if the file does
+/// not state it.
 ///
 ///     recording.push(bytes);  // or open(), once
 ///     while (const auto output = recording.next()) ...
 class RecordingReader {
  public:
-  /// Creates a decoder of the file, positioned at its start. May throw.
-  using MakeDecoder = std::function<std::unique_ptr<RecordingDecoder>()>;
+  using MakeDecoder = RecordingInput::MakeDecoder;
 
   /// Source of output times: the file's own times, or those of the buffers that carry encoded
   /// words.
@@ -48,17 +45,13 @@ class RecordingReader {
   struct Stream {
     StreamInfo info;
     SizeFrom size_from = SizeFrom::file;
-    unsigned number = 0;                 ///< index among streams of its kind
-    bool shown = false;                  ///< it has items, or may have some
-    Microseconds position = 0;           ///< end of its items and gaps so far
-    std::uint64_t outside = 0;           ///< events outside a size not stated in the file
-    std::optional<Microseconds> first;   ///< earliest time in the surveyed part of the file
-    std::optional<Microseconds> latest;  ///< latest time in it
-    std::optional<Frame> first_frame;    ///< format only: its pixels are no longer valid
-    UsedPixels used = {};                ///< in the surveyed part
-    bool is_implausible = false;         ///< no sensor is so large as an assumed one had to be
-    Extent extent = {};                  ///< of an assumed size
-    bool is_sampled = false;             ///< `used` covers at least one interval
+    unsigned number = 0;                    ///< index among streams of its kind
+    bool shown = false;                     ///< it has items, or may have some
+    Microseconds position = 0;              ///< end of its items and gaps so far
+    std::uint64_t outside = 0;              ///< events outside a size not stated in the file
+    std::optional<Frame> first_frame = {};  ///< format only: its pixels are no longer valid
+    bool is_implausible = false;            ///< no sensor is so large as an assumed one had to be
+    Extent extent = {};                     ///< of an assumed size
     Chunker chunker;
   };
 
@@ -97,19 +90,19 @@ class RecordingReader {
   void push(std::span<const std::uint8_t> bytes, std::optional<Interval> interval = std::nullopt);
 
   /// Push mode: marks the end of the bytes.
-  void finish();
+  void finish() { input_.finish(); }
 
   /// Words: nothing earlier than `t` will follow. False if no event was read yet.
   bool reach(Microseconds t);
 
   /// Reads the pushed bytes and drops their items.
-  void discard();
+  void discard() { input_.discard(); }
 
   /// Words: the next input is discontinuous.
   void interrupt();
 
   /// Pull mode: sets the source of bytes, which must outlive this object. Call before next().
-  void open(ByteSource& source) { source_ = &source; }
+  void open(ByteSource& source) { input_.open(source); }
 
   /// Returns the next item, valid until the next call. Nothing if more bytes are needed, if bytes
   /// cannot be read, and after the end. May throw.
@@ -141,10 +134,13 @@ class RecordingReader {
     streams_[stream].size_from = SizeFrom::user;
   }
 
-  std::string format_name() const { return decoder_->format_name(); }
+  std::string format_name() const { return input_.decoder().format_name(); }
 
   /// What the file has and is not read; see RecordingDecoder.
-  std::string left_out() const { return decoder_->left_out(); }
+  std::string left_out() const { return input_.decoder().left_out(); }
+
+  /// True if no events and frames were found before the Start.
+  bool is_empty() const { return !survey_.origin(); }
 
   /// Time in the file that output times count from; valid after a Start.
   Microseconds origin() const { return origin_; }
@@ -171,42 +167,17 @@ class RecordingReader {
   Counts counts() const;
 
   /// The first corruption of the file.
-  const Corruption& corruption() const { return decoder_->corruption(); }
+  const Corruption& corruption() const { return input_.decoder().corruption(); }
 
  private:
-  /// An item read before the origin was known.
-  struct HeldItem {
-    std::size_t stream;
-    std::vector<AbsoluteEvent> events;
-    std::optional<Frame> frame;
-    std::vector<std::uint8_t> pixels;
-    std::vector<Trigger> triggers = {};
-    std::vector<ImuSample> imu_samples = {};
-  };
-
-  std::unique_lock<std::mutex> reading() const { return std::unique_lock(mutex_); }
-  std::optional<Item> read_item();
   std::optional<Item> next_item();
   void learn_streams();
-
   bool survey();
-  std::optional<Item> survey_item();
-  bool find_events();
-  bool find_first_items();
-  void note(const EventItem& item);
-  void note(const FrameItem& item);
-  void note(const TriggerItem& /*item*/) {}
-  void note(const ImuItem& /*item*/) {}
-  void hold(const Item& item);
-  bool is_origin_known() const;
-  bool is_surveyed() const;
   void begin();
-  void learn_duration(std::optional<Microseconds> told, bool is_whole);
-
   void begin_segment(Microseconds start, std::optional<Microseconds> stop);
 
-  void show(Stream& stream);
-  void start_chunker(Stream& stream);
+  void show(std::size_t index);
+  void start_chunker(std::size_t index);
   void take(const EventItem& item);
   static void grow(Stream& stream, std::span<const AbsoluteEvent> events);
   void take(const FrameItem& item);
@@ -224,27 +195,17 @@ class RecordingReader {
   void set_shift(Microseconds first);
   void finish_chunkers();
 
-  MakeDecoder make_decoder_;
+  RecordingInput input_;
   Microseconds chunk_length_;
   Clock clock_;
-
-  mutable std::mutex mutex_;  ///< guards decoder_ and origin_ against seek_point_before()
-  std::unique_ptr<RecordingDecoder> decoder_;
-  Microseconds origin_ = 0;
-
-  ByteSource* source_ = nullptr;  ///< in pull mode
-  bool reads_itself_ = false;     ///< the decoder reads from the source
-  std::uint64_t position_ = 0;    ///< offset of the next byte to pull
+  RecordingSurvey survey_;
+  std::atomic<Microseconds> origin_ = 0;  ///< read by seek_point_before()
 
   std::vector<Stream> streams_;  ///< same indices as in the decoder
   bool begun_ = false;           ///< the origin is known
   bool start_due_ = false;
-  bool finished_ = false;   ///< no more bytes
-  bool finishing_ = false;  ///< no more items either
+  bool finishing_ = false;  ///< no more items
   bool drained_ = false;    ///< no more chunks either
-  std::vector<HeldItem> held_;
-  std::size_t held_next_ = 0;
-  std::size_t held_size_ = 0;  ///< in bytes
 
   Microseconds start_ = 0;
   std::optional<Microseconds> stop_;

@@ -20,9 +20,7 @@ class WaitingItems {
   /// Drops items at an erroneous time, and returns their number.
   std::size_t push(std::span<const Item> items) {
     const auto before = waiting_.size();
-    std::ranges::copy_if(items, std::back_inserter(waiting_), [](const Item& item) {
-      return item.t >= -Chunker::max_time && item.t <= Chunker::max_time;
-    });
+    std::ranges::copy_if(items, std::back_inserter(waiting_), Chunker::is_time, &Item::t);
     return before + items.size() - waiting_.size();
   }
 

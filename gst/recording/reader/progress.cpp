@@ -74,9 +74,7 @@ void EventReader::tell_left_out() {
 
 /// Posts a warning at the end of a file without events and frames.
 void EventReader::warn_of_nothing() {
-  const bool is_empty = std::ranges::none_of(
-      recording_->streams(), [](const auto& stream) { return stream.first.has_value(); });
-  if (!is_empty || is_timed()) return;
+  if (!recording_->is_empty() || is_timed()) return;
   post_message(element_, GST_MESSAGE_WARNING, {GST_STREAM_ERROR_DECODE, "The file has no events."},
                recording_->format_name());
 }
