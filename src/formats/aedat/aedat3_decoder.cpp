@@ -157,11 +157,13 @@ bool Aedat3Decoder::read_events(Decoded& out) {
   }
   packet_.events -= i;
   queue_.consume(i * event_size);
-  if (!odd) return true;
+  return !odd || read_odd_event();
+}
 
-  // Invalid event: either it is corrupt, or this packet is short and the next one starts here, or
-  // bytes are missing and the data is misaligned. Events outside the sensor may follow each other;
-  // then, the next packet starts where this one ends.
+/// Handles an invalid event: either it is corrupt, or this packet is short and the next one starts
+/// here, or bytes are missing and the data is misaligned. Events outside the sensor may follow each
+/// other; then, the next packet starts where this one ends. False if more bytes are needed.
+bool Aedat3Decoder::read_odd_event() {
   const auto after = std::min<std::uint64_t>(packet_.events - 1, events_after);
   const auto wanted = std::max(packet_header_size, (1 + after) * event_size);
   if (queue_.size() < wanted && !finished_) return false;

@@ -34,6 +34,7 @@ class Aedat3Decoder final : public Decoder {
   void read_packets(Decoded& out);
   bool read_packet_header();
   bool read_events(Decoded& out);
+  bool read_odd_event();
   std::optional<bool> is_packet_intact();
   bool scan();
   bool begins_packet(const std::uint8_t* bytes) const;

@@ -132,21 +132,37 @@ std::optional<NpyField> number_of(const Type& type, std::uint32_t offset) {
   }
 }
 
+/// Parses the name of a field, which a title may precede: 'x' or ('title', 'x').
+std::string_view read_name(Literal& literal) {
+  if (!literal.take('(')) return literal.string();
+  literal.string();
+  literal.expect(',');
+  const auto name = literal.string();
+  literal.expect(')');
+  return name;
+}
+
+/// Parses the rest of a shape: 3,) or 3, 4). Returns the product of its extents and `bytes`.
+std::uint64_t read_bytes(Literal& literal, std::uint64_t bytes) {
+  while (!literal.take(')')) {
+    const auto extent = literal.integer();
+    if (extent > max_element_bytes || (bytes *= extent) > max_element_bytes)
+      throw UnsupportedFormat("NumPy array elements too large");
+    if (!literal.take(',')) {
+      literal.expect(')');
+      break;
+    }
+  }
+  return bytes;
+}
+
 /// Parses fields: [('x', '<u2'), ('y', '<u2', (3,)), ('', '|V4'), (('title', 'p'), '|u1')].
 void read_fields(Literal& literal, NpyHeader& header) {
   std::array<bool, all_columns> known{};
   literal.expect('[');
   while (!literal.take(']')) {
     literal.expect('(');
-    std::string_view name;
-    if (literal.take('(')) {
-      literal.string();
-      literal.expect(',');
-      name = literal.string();
-      literal.expect(')');
-    } else {
-      name = literal.string();
-    }
+    const auto name = read_name(literal);
     literal.expect(',');
     if (!literal.starts_with_string())
       throw UnsupportedFormat("unsupported NumPy fields with fields of their own");
@@ -155,15 +171,7 @@ void read_fields(Literal& literal, NpyHeader& header) {
     bool one = true;
     if (literal.take(',') && literal.take('(')) {
       one = false;
-      while (!literal.take(')')) {
-        const auto extent = literal.integer();
-        if (extent > max_element_bytes || (bytes *= extent) > max_element_bytes)
-          throw UnsupportedFormat("NumPy array elements too large");
-        if (!literal.take(',')) {
-          literal.expect(')');
-          break;
-        }
-      }
+      bytes = read_bytes(literal, bytes);
       literal.take(',');
     }
     literal.expect(')');

@@ -19,49 +19,59 @@ int read_exponent(std::string_view digits) {
   return number;
 }
 
-}  // namespace
+/// digits * 10^power, as a text has it.
+struct Number {
+  bool negative = false;
+  std::uint64_t digits = 0;
+  int power = 0;
+  bool whole = true;  ///< no digits were cut off
+  bool has_fraction = false;
+};
 
-std::optional<Decimal> read_decimal(std::string_view text, int power) {
+/// Nothing if the text is not entirely a number.
+std::optional<Number> parsed(std::string_view text) {
   std::size_t at = 0;
   const auto more = [&] { return at < text.size(); };
-  bool negative = false;
-  if (more() && (text[at] == '-' || text[at] == '+')) negative = text[at++] == '-';
-
+  const auto take_sign = [&] {
+    const bool is_sign = more() && (text[at] == '-' || text[at] == '+');
+    return is_sign && text[at++] == '-';
+  };
+  Number number{.negative = take_sign()};
   // Up to 19 digits are exact in 64 bits.
   constexpr auto room = std::numeric_limits<std::uint64_t>::max() / 10 - 1;
-  std::uint64_t digits = 0;
-  bool whole = true;
   bool any = false;
-  bool in_fraction = false;
-  bool has_fraction = false;
   for (; more(); ++at) {
-    if (text[at] == '.' && !in_fraction) {
-      in_fraction = has_fraction = true;
+    if (text[at] == '.' && !number.has_fraction) {
+      number.has_fraction = true;
       continue;
     }
     if (!is_digit(text[at])) break;
     any = true;
-    if (digits <= room) {
-      digits = digits * 10 + static_cast<std::uint64_t>(text[at] - '0');
-      power -= in_fraction ? 1 : 0;
+    if (number.digits <= room) {
+      number.digits = number.digits * 10 + static_cast<std::uint64_t>(text[at] - '0');
+      number.power -= number.has_fraction ? 1 : 0;
     } else {
-      whole = whole && text[at] == '0';
-      power += in_fraction ? 0 : 1;
+      number.whole = number.whole && text[at] == '0';
+      number.power += number.has_fraction ? 0 : 1;
     }
   }
   if (!any) return std::nullopt;
   if (more() && (text[at] == 'e' || text[at] == 'E')) {
     ++at;
-    has_fraction = true;
-    bool down = false;
-    if (more() && (text[at] == '-' || text[at] == '+')) down = text[at++] == '-';
+    number.has_fraction = true;
+    const bool down = take_sign();
     const auto rest = text.substr(at);
     if (rest.empty() || !std::ranges::all_of(rest, is_digit)) return std::nullopt;
-    power += down ? -read_exponent(rest) : read_exponent(rest);
+    number.power += down ? -read_exponent(rest) : read_exponent(rest);
     at = text.size();
   }
   if (more()) return std::nullopt;
+  return number;
+}
 
+/// Nothing if the number is out of range.
+std::optional<Decimal> rounded_down(const Number& number) {
+  auto [negative, digits, power, whole, has_fraction] = number;
   constexpr auto most = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   for (; power > 0 && digits != 0; --power) {
     if (digits > most / 10) return std::nullopt;
@@ -85,6 +95,15 @@ std::optional<Decimal> read_decimal(std::string_view text, int power) {
   const bool up = negative ? !whole && !is_this : is_next;
   const auto value = static_cast<std::int64_t>(digits + (up ? 1 : 0));
   return Decimal{negative ? -value : value, whole, has_fraction};
+}
+
+}  // namespace
+
+std::optional<Decimal> read_decimal(std::string_view text, int power) {
+  auto number = parsed(text);
+  if (!number) return std::nullopt;
+  number->power += power;
+  return rounded_down(*number);
 }
 
 }  // namespace eventcamera
