@@ -131,32 +131,34 @@ void FarnebackFlow::find_columns(const Level* coarser, Level& level, int first, 
   const int height = level.flow.height();
   const int row_count = FlowUpdate::rows(height);
   const auto stride = static_cast<std::size_t>(level.flow.stride()) / sizeof(Flow);
-  const int iterations = level.iterations;
+  const int iteration_count = level.iterations;
   const auto first_of = [&](int iteration) {
-    return std::max(0, first - FlowUpdate::margin * (iterations - iteration));
+    return std::max(0, first - FlowUpdate::margin * (iteration_count - iteration));
   };
   const auto last_of = [&](int iteration) {
-    return std::min(width, last + FlowUpdate::margin * (iterations - iteration));
+    return std::min(width, last + FlowUpdate::margin * (iteration_count - iteration));
   };
   // Each iteration follows the previous one at a distance of one block.
   constexpr int kept_rows = 2 * block_rows;
   std::array<FlowRows, FarnebackFlow::iterations.back() + 1> rows;
-  for (int i = 0; i < iterations; ++i)
+  for (int i = 0; i < iteration_count; ++i)
     rows[i] = {scratch_of(scratch.flows[i], stride * std::size_t{kept_rows}),
                static_cast<std::ptrdiff_t>(stride), kept_rows};
-  rows[iterations] = {level.flow.row(0), static_cast<std::ptrdiff_t>(stride * row_step), row_count};
+  rows[iteration_count] = {level.flow.row(0), static_cast<std::ptrdiff_t>(stride * row_step),
+                           row_count};
   int started = 0;
   int ended = 1;
-  for (int block = 0; block < FlowUpdate::blocks(height) + iterations - 1; ++block) {
+  for (int block = 0; block < FlowUpdate::blocks(height) + iteration_count - 1; ++block) {
     for (; started < std::min(row_count, block * block_rows + FlowUpdate::row_reach + 1); ++started)
       start_row(coarser, level, started * row_step, first_of(0), last_of(0), scratch,
                 rows[0].row(started));
-    for (int i = 1; i <= iterations; ++i)
+    for (int i = 1; i <= iteration_count; ++i)
       level.update.run(level.last, level.next, rows[i - 1], first_of(i), last_of(i),
                        block - (i - 1), scratch.updates[i - 1], rows[i]);
-    for (; ended < std::min(row_count, (block - (iterations - 1)) * block_rows + 1); ++ended)
-      blend_rows(rows[iterations].row(ended - 1) + first, rows[iterations].row(ended) + first, 0.5F,
-                 last - first, level.flow.row(ended * row_step - 1) + first);
+    for (; ended < std::min(row_count, (block - (iteration_count - 1)) * block_rows + 1); ++ended)
+      blend_rows(rows[iteration_count].row(ended - 1) + first,
+                 rows[iteration_count].row(ended) + first, 0.5F, last - first,
+                 level.flow.row(ended * row_step - 1) + first);
   }
   if (height % row_step == 0)
     std::copy(level.flow.row(height - 2) + first, level.flow.row(height - 2) + last,
