@@ -31,6 +31,17 @@ class Literal {
     if (!take(mark)) fail();
   }
 
+  /// Calls element(), which must parse one, for each element of a list up to its `end`.
+  template <class Element>
+  void elements(char end, const Element& element) {
+    while (!take(end)) {
+      element();
+      if (take(',')) continue;
+      expect(end);
+      return;
+    }
+  }
+
   /// Parses a quoted string. Escapes are not needed for the expected strings.
   std::string_view string() {
     skip_blanks();
@@ -144,15 +155,11 @@ std::string_view read_name(Literal& literal) {
 
 /// Parses the rest of a shape: 3,) or 3, 4). Returns the product of its extents and `bytes`.
 std::uint64_t read_bytes(Literal& literal, std::uint64_t bytes) {
-  while (!literal.take(')')) {
+  literal.elements(')', [&] {
     const auto extent = literal.integer();
     if (extent > max_element_bytes || (bytes *= extent) > max_element_bytes)
       throw UnsupportedFormat("NumPy array elements too large");
-    if (!literal.take(',')) {
-      literal.expect(')');
-      break;
-    }
-  }
+  });
   return bytes;
 }
 
@@ -160,7 +167,7 @@ std::uint64_t read_bytes(Literal& literal, std::uint64_t bytes) {
 void read_fields(Literal& literal, NpyHeader& header) {
   std::array<bool, all_columns> known{};
   literal.expect('[');
-  while (!literal.take(']')) {
+  literal.elements(']', [&] {
     literal.expect('(');
     const auto name = read_name(literal);
     literal.expect(',');
@@ -190,11 +197,7 @@ void read_fields(Literal& literal, NpyHeader& header) {
     if (header.element_bytes + bytes > max_element_bytes)
       throw UnsupportedFormat("NumPy array elements too large");
     header.element_bytes += static_cast<std::uint32_t>(bytes);
-    if (!literal.take(',')) {
-      literal.expect(']');
-      break;
-    }
-  }
+  });
   for (const bool is_known : std::span(known).first(event_columns))
     if (!is_known) throw UnsupportedFormat("no fields t, x, y and p in the NumPy array");
 }
@@ -203,14 +206,10 @@ void read_fields(Literal& literal, NpyHeader& header) {
 std::vector<std::uint64_t> read_shape(Literal& literal) {
   std::vector<std::uint64_t> shape;
   literal.expect('(');
-  while (!literal.take(')')) {
+  literal.elements(')', [&] {
     if (shape.size() == 2) throw UnsupportedFormat("the NumPy array has more than two dimensions");
     shape.push_back(literal.integer());
-    if (!literal.take(',')) {
-      literal.expect(')');
-      break;
-    }
-  }
+  });
   return shape;
 }
 
@@ -241,7 +240,7 @@ NpyHeader read_npy_header(std::string_view dictionary) {
   std::optional<std::vector<std::uint64_t>> shape;
   Literal literal(dictionary);
   literal.expect('{');
-  while (!literal.take('}')) {
+  literal.elements('}', [&] {
     const auto key = literal.string();
     literal.expect(':');
     if (key == "descr" && !has_fields && !type) {
@@ -257,11 +256,7 @@ NpyHeader read_npy_header(std::string_view dictionary) {
     } else {
       Literal::fail();
     }
-    if (!literal.take(',')) {
-      literal.expect('}');
-      break;
-    }
-  }
+  });
   literal.expect_end();
   if ((!has_fields && !type) || !shape) Literal::fail();
   if (has_fields && shape->size() != 1)
