@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/base/plugin.hpp"
+#include "features.hpp"
 #include "gst/base/event_pool.hpp"
 
 const char* const event_pool_type_name = "GstRecordedEventPool";

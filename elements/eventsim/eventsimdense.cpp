@@ -23,6 +23,7 @@
  * ! vp8enc deadline=1 ! webmmux ! filesink location=events.webm
  * ]|
  */
+#include "features.hpp"
 #include "gst/simulator/dense_properties.hpp"
 #include "gst/simulator/eventsimulator.hpp"
 #include "src/simulate/dense_simulator.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/flow/dense_flow.hpp"
 
+#include "features.hpp"
 #include "src/flow/dis/dis.hpp"
 #include "src/flow/farneback/farneback.hpp"
 #ifdef HAVE_OPENCV

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // eventtensor: windows, times, caps and content of tensors.
 
+#include "features.hpp"
 #include "src/core/event.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "tests/elements/pipeline.hpp"

@@ -2,6 +2,7 @@
 /// The elements that read event files: a table of formats for GstEventReader.
 #include "elements/eventcam/files/es_origin.hpp"
 #include "elements/eventcam/files/evtformat.hpp"
+#include "features.hpp"
 #include "gst/recording/eventreader.hpp"
 #include "src/formats/atis/atis_bin.hpp"
 #include "src/formats/dat/dat.hpp"

@@ -4,6 +4,7 @@
 
 #include "elements/eventcam/files/es_origin.hpp"
 #include "elements/eventcam/files/evtformat.hpp"
+#include "features.hpp"
 #include "gst/base/types.hpp"
 #include "gst/recording/eventwriter.hpp"
 #include "src/formats/dat/dat.hpp"

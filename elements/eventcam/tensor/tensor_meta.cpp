@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "elements/eventcam/tensor/tensor_meta.hpp"
 
+#include "features.hpp"
 #ifdef HAVE_TENSOR_META
 
 #include <gst/analytics/analytics.h>
