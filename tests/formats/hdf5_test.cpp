@@ -241,15 +241,25 @@ TEST_F(Hdf5, KeepsDisorderAcrossAWrap) {
   for (const auto t :
        {lap - 1, lap + 2, lap - 2, lap + 3, lap - 0x10000, lap - 0xffff, lap + 4, lap + 5, lap - 3})
     events.push_back(AbsoluteEvent::at(1, 2, t, Polarity::on));
-  for (const bool of_v2e : {false, true}) {
-    write_wrapping(path(), events, of_v2e);
+  const auto expect_all = [&] {
     Hdf5Reader reader(in_memory(contents(path())));
     EXPECT_EQ(read_all(reader), events);
     ASSERT_TRUE(reader.time_range());
     EXPECT_EQ(reader.time_range()->last, lap - 3);
     reader.seek(lap + 5);
     EXPECT_EQ(read_all(reader), Events(events.end() - 2, events.end()));
-  }
+  };
+  write_wrapping(path(), events, true);
+  expect_all();
+  write_wrapping(path(), events, false);
+  expect_all();
+  // The first event at or after each millisecond.
+  std::vector<std::uint32_t> index(lap / 1000 + 1);
+  index.push_back(static_cast<std::uint32_t>(events.size()));
+  const hid_t file = H5Fopen(path().c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  write_numbers(file, "ms_to_idx", {index.size()}, index);
+  H5Fclose(file);
+  expect_all();
 }
 
 TEST_F(Hdf5, TriggersComeBack) {
