@@ -42,10 +42,24 @@ struct Report {
   std::string text;
 };
 
-/// Like GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, with code and text as values. Bytes of a file
-/// that are quoted in them and are not UTF-8 become U+FFFD.
+/// True if an element posts an error again, in the state in which it posted it before. A sticky
+/// event that was refused comes again before each buffer and event that follows.
+inline bool repeats_error(GstElement* element, const std::string& text) {
+  static const GQuark quark = g_quark_from_static_string("event-last-error");
+  GST_OBJECT_LOCK(element);
+  const auto error = std::to_string(element->state_cookie) + ": " + text;
+  const auto* const last = static_cast<const gchar*>(g_object_get_qdata(G_OBJECT(element), quark));
+  const bool repeats = last != nullptr && last == error;
+  if (!repeats) g_object_set_qdata_full(G_OBJECT(element), quark, g_strdup(error.c_str()), g_free);
+  GST_OBJECT_UNLOCK(element);
+  return repeats;
+}
+
+/// Like GST_ELEMENT_ERROR and GST_ELEMENT_WARNING, with code and text as values. Posts an error
+/// that repeats once. Bytes of a file that are quoted in them and are not UTF-8 become U+FFFD.
 inline void post_message(gpointer element, GstMessageType type, const Report& report,
                          const std::string& cause, CallSite at = CallSite()) {
+  if (type == GST_MESSAGE_ERROR && repeats_error(GST_ELEMENT(element), report.text)) return;
   gst_element_message_full(GST_ELEMENT(element), type, report.code.domain, report.code.code,
                            g_utf8_make_valid(report.text.c_str(), -1),
                            g_utf8_make_valid(cause.c_str(), -1), at.file, at.function, at.line);

@@ -53,7 +53,6 @@ struct State {
 /// State from start to stop, independent of caps.
 struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
-  bool backwards = false;                       ///< the segment was rejected: its rate is negative
   bool discontinuous = false;                   ///< the next buffer is discontinuous
   bool begins = true;                           ///< no frame of the timeline has arrived
   std::optional<Nanoseconds> continues_from;    ///< time of the state that was restored, if it was
@@ -666,9 +665,6 @@ static void start_timeline(GstEventSimulator* self) {
 static bool take_segment(GstEventSimulator* self, GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
-  auto& backwards = priv_of(self).stream.backwards;
-  if (segment->rate < 0 && backwards) return false;  // repeated segment
-  backwards = segment->rate < 0;
   if (!plays_events(self, *segment, "simulate")) return false;
   const GstSegment& current = GST_BASE_TRANSFORM(self)->segment;
   if (current.format != segment->format || current.rate != segment->rate ||

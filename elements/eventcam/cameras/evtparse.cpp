@@ -215,11 +215,11 @@ static bool start_stream(GstEvtParse* self) {
   if (settings.width > 0 && settings.height > 0) sensor = {settings.width, settings.height};
   if (!format || sensor.width < 1 || sensor.height < 1 || sensor.width > max_side ||
       sensor.height > max_side) {
-    GST_ELEMENT_ERROR(
-        self, RESOURCE, SETTINGS,
-        ("Cannot read this camera: its caps do not tell the format of its words and "
-         "the size of its sensor. Set format, width and height."),
-        ("format=%d width=%d height=%d", settings.format, sensor.width, sensor.height));
+    post_message(self, GST_MESSAGE_ERROR,
+                 {GST_RESOURCE_ERROR_SETTINGS,
+                  "Cannot read this camera: its caps do not tell the format of its words and the "
+                  "size of its sensor. Set format, width and height."},
+                 "format=" + std::to_string(settings.format) + ", " + in_pixels(sensor));
     return false;
   }
   return reported(self, [&] {

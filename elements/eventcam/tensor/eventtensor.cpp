@@ -66,6 +66,7 @@
 #include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
+#include "src/core/sensor_size.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
 
@@ -364,11 +365,12 @@ static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   const auto bytes =
       EventTensor::memory({info.width, info.height, tensor_settings}, tensor_settings);
   if (bytes > max_tensor_bytes) {
-    GST_ELEMENT_ERROR(
-        self, STREAM, FORMAT,
-        ("Cannot make tensors that take more than 1 GiB; lower bins or the resolution."),
-        ("%dx%d pixels and %u bins make %" G_GSIZE_FORMAT " bytes", info.width, info.height,
-         settings.bins, bytes));
+    post_message(self, GST_MESSAGE_ERROR,
+                 {GST_STREAM_ERROR_FORMAT,
+                  "Cannot make tensors that take more than 1 GiB; lower bins or the resolution."},
+                 eventcamera::in_pixels({info.width, info.height}) + " and " +
+                     std::to_string(settings.bins) + " bins make " + std::to_string(bytes) +
+                     " bytes");
     return false;
   }
   priv.state.emplace(info, settings);
