@@ -67,7 +67,10 @@ class EventAggregator {
   GstFlowReturn pass(OwnedBuffer buffer);
 
   /// Warns about skipped events.
-  void warn(EventFault fault, GstBuffer* buffer) { faults_.warn(element_, fault, buffer); }
+  template <class Fault>
+  void warn(const Fault& fault, GstBuffer* buffer) {
+    faults_.warn(element_, fault, buffer);
+  }
 
  private:
   friend struct EventAggregatorFunctions;

@@ -63,3 +63,9 @@ void EventFaults::warn(gpointer element, EventFault fault, GstBuffer* buffer) {
                    cause);
   g_free(cause);
 }
+
+void EventFaults::warn(gpointer element, const eventcamera::InvalidEvents& invalid,
+                       GstBuffer* buffer) {
+  if (invalid.outside > 0) warn(element, EventFault::beyond_sensor, buffer);
+  if (invalid.unsorted > 0) warn(element, EventFault::unsorted, buffer);
+}

@@ -9,6 +9,7 @@
 #include "gst/base/owned.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "src/core/event.hpp"
+#include "src/core/invalid_events.hpp"
 #include "src/core/label.hpp"
 #include "src/core/max_side.hpp"
 
@@ -63,6 +64,11 @@ struct EventInterval {
   GstClockTime end;
 };
 
+/// Length of an interval in microseconds, which no event of it is later than.
+inline eventcamera::Microseconds length_of(const EventInterval& interval) {
+  return static_cast<eventcamera::Microseconds>((interval.end - interval.start) / GST_USECOND);
+}
+
 /// Resolution of event times; times closer than this count as equal.
 inline constexpr GstClockTime event_resolution = GST_USECOND;
 
@@ -97,6 +103,7 @@ class EventFaults {
                   WarnOnce(category)} {}
 
   void warn(gpointer element, EventFault fault, GstBuffer* buffer);
+  void warn(gpointer element, const eventcamera::InvalidEvents& invalid, GstBuffer* buffer);
 
   /// For a new stream: warnings are posted again.
   void reset() {

@@ -141,8 +141,7 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
       counters->dropped += valid.events.size() - passed;
       counters->rejected += received - valid.events.size();
     }
-    if (invalid.outside > 0) priv.faults.warn(transform, EventFault::beyond_sensor, buffer);
-    if (invalid.unsorted > 0) priv.faults.warn(transform, EventFault::unsorted, buffer);
+    priv.faults.warn(transform, invalid, buffer);
     GST_LOG_OBJECT(transform,
                    "%" G_GSIZE_FORMAT " of %" G_GSIZE_FORMAT " events kept at %" GST_TIME_FORMAT,
                    passed, received, GST_TIME_ARGS(interval->start));

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <limits>
 #include <span>
 
+#include "src/core/invalid_events.hpp"
 #include "src/core/label.hpp"
 
 namespace eventcamera {
@@ -16,16 +16,18 @@ class EventValidator {
   EventValidator(int width, int height) : width_(width), height_(height) {}
 
   /// Calls take() for each event; event times are relative to `start`. An event that is earlier
-  /// than the previous one, or than passed(), gets that time; events outside the sensor are
-  /// dropped. `labels` has one for each event, or is empty. Returns the number of dropped events.
+  /// than the previous one, or than passed(), gets that time; events outside the sensor, and those
+  /// later than `max_t`, are dropped. `labels` has one for each event, or is empty. Returns what
+  /// was dropped.
   template <class Take>
-  std::size_t take(std::span<const Event> events, Microseconds start, const Take& take,
-                   std::span<const Label> labels = {}) {
-    std::size_t dropped = 0;
+  InvalidEvents take(std::span<const Event> events, Microseconds start, Microseconds max_t,
+                     const Take& take, std::span<const Label> labels = {}) {
+    InvalidEvents dropped;
     for (std::size_t i = 0; i < events.size(); ++i) {
       const Event& event = events[i];
-      if (event.x >= width_ || event.y() >= height_) {
-        ++dropped;
+      const bool is_outside = event.x >= width_ || event.y() >= height_;
+      if (is_outside || event.t > max_t) {
+        ++(is_outside ? dropped.outside : dropped.unsorted);
         continue;
       }
       earliest_ = std::max(earliest_, start + event.t);

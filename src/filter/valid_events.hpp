@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
+#include "src/core/invalid_events.hpp"
 #include "src/core/label.hpp"
 #include "src/core/sensor_size.hpp"
 
 namespace eventcamera {
-
-/// Events of a buffer that no filter may get.
-struct InvalidEvents {
-  std::size_t outside = 0;   ///< x or y past the sensor
-  std::size_t unsorted = 0;  ///< earlier than the previous event, or past the end of the buffer
-};
 
 /// Drops the events that are outside the sensor, and those that are earlier than one before them or
 /// later than `max_t`. Returns what is left.

@@ -30,17 +30,18 @@ Nanoseconds StreamComparison::end() const {
   return std::min(arriving_[StreamRole::reference].end, arriving_[StreamRole::candidate].end);
 }
 
-std::size_t StreamComparison::add(StreamRole role, std::span<const Event> events, Nanoseconds start,
-                                  Nanoseconds end, std::span<const Label> labels) {
+InvalidEvents StreamComparison::add(StreamRole role, std::span<const Event> events,
+                                    Nanoseconds start, Nanoseconds end,
+                                    std::span<const Label> labels) {
   auto& arriving = arriving_[role];
   if (!arriving.start) {
     arriving.start = start;
     arriving.end = start;
   }
   arriving.is_labelled |= !labels.empty();
-  const std::size_t skipped = arriving.validator.take(
-      events, start / 1000, [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); },
-      labels);
+  const auto skipped = arriving.validator.take(
+      events, start / 1000, (end - start) / 1000,
+      [&](const AbsoluteEvent& event) { arriving.waiting.push_back(event); }, labels);
   arriving.end = std::max(arriving.end, end);
   if (this->start()) take_until(this->end() / 1000);
   return skipped;

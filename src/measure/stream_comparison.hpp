@@ -37,10 +37,9 @@ class StreamComparison {
   StreamRole behind() const;
 
   /// Adds the sorted events of [start, end] of one stream, with times relative to `start`, and
-  /// their labels, if they have any. Returns the number of events skipped because they lie outside
-  /// the sensor.
-  std::size_t add(StreamRole role, std::span<const Event> events, Nanoseconds start,
-                  Nanoseconds end, std::span<const Label> labels = {});
+  /// their labels, if they have any. Returns what was skipped.
+  InvalidEvents add(StreamRole role, std::span<const Event> events, Nanoseconds start,
+                    Nanoseconds end, std::span<const Label> labels = {});
 
   ComparisonFigures figures() const;
   const EventMap& map(StreamRole role) const { return similarity_.statistics(role).map(); }

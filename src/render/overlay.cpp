@@ -26,8 +26,9 @@ Overlay::Overlay(SensorSize sensor, SensorSize picture)
       window_(sensor.width, sensor.height, {}),
       kinds_(picture.width, picture.height) {}
 
-std::size_t Overlay::add(std::span<const Event> events, Microseconds start) {
-  return validator_.take(events, start, [this](const AbsoluteEvent& event) { window_.add(event); });
+InvalidEvents Overlay::add(std::span<const Event> events, Microseconds start, Microseconds max_t) {
+  return validator_.take(events, start, max_t,
+                         [this](const AbsoluteEvent& event) { window_.add(event); });
 }
 
 void Overlay::mark(int x, int y, std::uint8_t kind) {

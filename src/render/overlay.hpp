@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "src/core/event.hpp"
@@ -22,7 +23,8 @@ class Overlay {
   Overlay(SensorSize sensor, SensorSize picture);
 
   /// Like Renderer::add().
-  std::size_t add(std::span<const Event> events, Microseconds start);
+  InvalidEvents add(std::span<const Event> events, Microseconds start,
+                    Microseconds max_t = std::numeric_limits<Microseconds>::max());
 
   /// Draws the events of (start, end], and of [start, end] the first time, over a frame; `opacity`
   /// from 0 to 1, `stride` in bytes.

@@ -78,10 +78,10 @@ void Renderer::reset() {
   has_drawn_ = false;
 }
 
-std::size_t Renderer::add(std::span<const Event> events, Microseconds start) {
+InvalidEvents Renderer::add(std::span<const Event> events, Microseconds start, Microseconds max_t) {
   return std::visit(
       [&](auto& memory) {
-        return validator_.take(events, start, [&](const AbsoluteEvent& event) {
+        return validator_.take(events, start, max_t, [&](const AbsoluteEvent& event) {
           memory.add(reduction_ == 1
                          ? event
                          : AbsoluteEvent::at(event.x / reduction_, event.y() / reduction_, event.t,

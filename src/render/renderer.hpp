@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <variant>
 #include <vector>
@@ -52,9 +53,10 @@ class Renderer {
   void reset();
 
   /// Adds sorted events whose times are relative to `start`. An event that is not later than the
-  /// last picture is drawn in the next one; events outside the sensor are skipped. Returns the
-  /// number of skipped events.
-  std::size_t add(std::span<const Event> events, Microseconds start);
+  /// last picture is drawn in the next one; events outside the sensor, and those later than
+  /// `max_t`, are skipped. Returns what was skipped.
+  InvalidEvents add(std::span<const Event> events, Microseconds start,
+                    Microseconds max_t = std::numeric_limits<Microseconds>::max());
 
   /// Draws the picture at `end`. The window for accumulate and count is (start, end], and [start,
   /// end] for the first picture. `stride` in bytes.

@@ -43,15 +43,14 @@ WindowQueue::Skipped WindowQueue::add(std::span<const Event> events, Microsecond
   Skipped skipped;
   // In a local, because the events written might alias members.
   auto validator = validator_;
-  skipped.outside =
-      validator.take(fitting, base, [&](const AbsoluteEvent& event) { *out++ = event; });
+  skipped.invalid = validator.take(fitting, base, end / microsecond - base,
+                                   [&](const AbsoluteEvent& event) { *out++ = event; });
   validator_ = validator;
   skipped.excess = events.size() - fitting.size();
   events_.erase(out, events_.end());
 
-  end = std::max(end, reached_.value_or(end));
-  if (of_intervals()) intervals_.push_back({*start_, end, events_.size()});
-  reached_ = events_.empty() ? end : std::max(end, events_.back().t * microsecond);
+  reached_ = std::max(end, reached_.value_or(end));
+  if (of_intervals()) intervals_.push_back({*start_, *reached_, events_.size()});
   return skipped;
 }
 

@@ -46,17 +46,17 @@ class WindowQueue {
 
   /// Dropped events of an interval, by reason.
   struct Skipped {
-    std::size_t outside = 0;  ///< of the sensor
-    std::size_t excess = 0;   ///< more than max_events in a window
+    InvalidEvents invalid{};
+    std::size_t excess = 0;  ///< more than max_events in a window
   };
 
   WindowQueue(int width, int height, const WindowSettings& settings)
       : settings_(settings), validator_(width, height) {}
 
-  /// Adds an interval, and those of its events that are not before `start`; their times are
-  /// relative to `base`. Late events count as events of the end of the last window, or interval
-  /// where windows consist of intervals. Afterwards, call next() until there is no more window.
-  /// Throws std::bad_alloc.
+  /// Adds an interval, and those of its events that are in [start, end]; their times are relative
+  /// to `base`. Late events count as events of the end of the last window, or interval where
+  /// windows consist of intervals. Afterwards, call next() until there is no more window. Throws
+  /// std::bad_alloc.
   Skipped add(std::span<const Event> events, Microseconds base, Nanoseconds start, Nanoseconds end);
 
   /// Returns the next window if it is complete.

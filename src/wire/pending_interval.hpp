@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "src/core/event.hpp"
+#include "src/core/invalid_events.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/wire/rtp_payload.hpp"
 
@@ -15,12 +16,6 @@ namespace eventcamera {
 /// Events to be sent: those of an interval, or of several consecutive intervals, joined.
 class PendingInterval {
  public:
-  /// Events that cannot be sent.
-  struct Rejected {
-    std::uint64_t outside = 0;   ///< outside the sensor
-    std::uint64_t unsorted = 0;  ///< earlier than the one before, or later than the interval
-  };
-
   explicit PendingInterval(SensorSize sensor) : sensor_(sensor) {}
 
   bool empty() const { return !is_open_; }
@@ -36,14 +31,14 @@ class PendingInterval {
 
   /// Adds an interval, which must start at the end of the pending one and not after max_rtp_start,
   /// with events relative to its start. Calls flush(), which must clear, whenever there are
-  /// max_rtp_interval_events.
+  /// max_rtp_interval_events. Returns what cannot be sent.
   template <class Flush>
-  Rejected add(Nanoseconds start, Nanoseconds end, std::span<const Event> events,
-               const Flush& flush) {
+  InvalidEvents add(Nanoseconds start, Nanoseconds end, std::span<const Event> events,
+                    const Flush& flush) {
     if (!is_open_) start_ = start;
     is_open_ = true;
     end_ = std::clamp(end, start, start_ + max_interval);
-    Rejected rejected;
+    InvalidEvents rejected;
     // What is added to the times of events, and their maximum.
     auto shift = microseconds(start) - microseconds(start_);
     const auto latest = microseconds(end_) - microseconds(start);

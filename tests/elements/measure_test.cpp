@@ -111,6 +111,22 @@ TEST_F(StatsTest, PassesEventsAndPostsFiguresOfIntervalsAndOfEverything) {
   EXPECT_EQ(text_in(path("map.png")).substr(1, 3), "PNG");
 }
 
+TEST_F(StatsTest, DoesNotCountEventsPastTheEndOfTheirBuffer) {
+  Harness h("eventstats interval=0");
+  h.caps(small_sensor);
+  for (const GstClockTime start : {0, 10, 20})
+    h.push(buffer_of(start * ms,
+                     {Event::at(1, 0, 5, Polarity::on), Event::at(2, 0, 900'000, Polarity::on)},
+                     10 * ms));
+  EXPECT_NE(h.warning().find("later than the end of their buffer"), std::string::npos);
+  gst_harness_push_event(h.get(), gst_event_new_eos());
+  const auto message = h.message(GST_MESSAGE_ELEMENT);
+  const auto* figures = structure_of(message);
+  ASSERT_TRUE(figures);
+  EXPECT_EQ(count_in(figures), 3U);
+  EXPECT_NEAR(static_cast<double>(count_in(figures, "interval-p50")), 10 * ms, 0.03 * 10 * ms);
+}
+
 TEST_F(StatsTest, WritesWhatHasComeWhereItIsStopped) {
   Harness h("eventstats location=" + in_quotes(path("f.json")) +
             " map=" + in_quotes(path("map.png")));

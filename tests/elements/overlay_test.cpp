@@ -83,6 +83,16 @@ TEST_F(OverlayTest, CutsBuffersOfEventsWhereFramesEnd) {
   EXPECT_EQ(drawn(), (Places{{2, 255}}));
 }
 
+TEST_F(OverlayTest, IsNotHeldUpByAnEventPastTheEndOfItsBuffer) {
+  begin("width=8, height=4");
+  push_frame(0);
+  push_events(0, {Event::at(1, 0, 0, Polarity::on), Event::at(2, 0, 900'000, Polarity::on)});
+  EXPECT_EQ(drawn(), (Places{{1, 255}}));
+  push_frame(40 * ms);
+  push_events(40 * ms, {Event::at(3, 0, 5, Polarity::on)});
+  EXPECT_EQ(drawn(), (Places{{3, 255}}));
+}
+
 TEST_F(OverlayTest, ScalesTheSensorToTheVideo) {
   begin("width=4, height=4");
   push_frame(0);

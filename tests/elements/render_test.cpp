@@ -107,6 +107,18 @@ TEST_F(Render, DrawsAnIntervalAsSimulatorsDo) {
                     {120 * ms, 40 * ms, accumulated(column(3))}});
 }
 
+TEST_F(Render, IsNotAheadOfTimeAfterAnEventPastTheEndOfItsBuffer) {
+  begin(grey_at("25/1"));
+  auto events = column(0);
+  events.push_back(Event::at(5, 5, 900'000, Polarity::on));
+  push(0, events);
+  for (int i = 1; i < 3; ++i) push(i * 40 * ms, column(i));
+  expect(finish(), {{0, 40 * ms, accumulated(column(0))},
+                    {40 * ms, 40 * ms, accumulated(column(1))},
+                    {80 * ms, 40 * ms, accumulated(column(2))}});
+  EXPECT_NE(h.warning().find("later than the end of their buffer"), std::string::npos);
+}
+
 /// Intervals of a third of 100 ms, with ends rounded down; all fire at their very end.
 TEST_F(Render, KeepsIntervalsApartThatAreRounded) {
   begin(grey_at("30/1"));

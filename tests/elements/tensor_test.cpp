@@ -131,6 +131,17 @@ TEST_F(Tensor, EndsWithTheSegment) {
   expect_tensor(0, 10 * ms, 0, 2);
 }
 
+TEST_F(Tensor, IsNotMovedByEventsPastTheEndOfTheirBuffer) {
+  begin("accumulation-time=20000000");
+  events = {{3'333, 0, Event::at(0, 1, 0, Polarity::on).y_p}};
+  h->push(buffer_of(
+      0, {Event::at(0, 1, 3'333, Polarity::on), Event::at(0, 2, 900'000, Polarity::on)}, 10 * ms));
+  EXPECT_NE(h->warning().find("later than the end of their buffer"), std::string::npos);
+  push_columns(1, 3);
+  expect_tensor(0, 20 * ms, 0, 3);
+  expect_tensor(20 * ms, 20 * ms, 3, 7);
+}
+
 TEST_F(Tensor, GoesOnThroughGaps) {
   begin("accumulation-time=10000000");
   push_columns(0, 0);

@@ -58,7 +58,7 @@ class Feed {
     for (; taken_ < stream_.size() && stream_[taken_].t <= until; ++taken_)
       events.push_back({static_cast<std::uint32_t>(stream_[taken_].t - at_), stream_[taken_].x,
                         stream_[taken_].y_p});
-    EXPECT_EQ(comparison.add(role_, events, at_ * 1000, until * 1000), 0U);
+    EXPECT_EQ(comparison.add(role_, events, at_ * 1000, until * 1000), InvalidEvents{});
     at_ = until;
   }
 
@@ -423,9 +423,10 @@ TEST(Comparison, SurvivesEventsBeyondThePictureAndOutOfOrder) {
                               Event::at(3, 3, 900, Polarity::on), Event::at(0, 0, 2, Polarity::on),
                               Event::at(0, 0, 4'000'000'000, Polarity::on)};
   for (const auto role : both_roles) {
-    EXPECT_EQ(comparison.add(role, events, 1'000'000, 2'000'000), 2U);
-    EXPECT_EQ(comparison.add(role, events, 0, 1'000'000), 2U);
-    EXPECT_EQ(comparison.add(role, events, -5'000'000, 9'000'000), 2U);
+    const InvalidEvents invalid{.outside = 2, .unsorted = 1};
+    EXPECT_EQ(comparison.add(role, events, 1'000'000, 2'000'000), invalid);
+    EXPECT_EQ(comparison.add(role, events, 0, 1'000'000), invalid);
+    EXPECT_EQ(comparison.add(role, events, -5'000'000, 9'000'000), invalid);
   }
   const auto figures = comparison.figures();
   EXPECT_EQ(figures.streams[StreamRole::reference].events,

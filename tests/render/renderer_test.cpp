@@ -239,9 +239,21 @@ TEST(Renderer, LeavesOutWhatLiesOutside) {
   for (const auto mode : modes) {
     const RenderSettings settings{.mode = mode, .limits = {.area_events = 5}};
     Renderer renderer(width, height, settings);
-    EXPECT_EQ(renderer.add(outside, 0), 3U);
+    EXPECT_EQ(renderer.add(outside, 0).outside, 3U);
     Renderer other(width, height, settings);
-    EXPECT_EQ(other.add({outside + 3, 1}, 0), 0U);
+    EXPECT_EQ(other.add({outside + 3, 1}, 0), InvalidEvents{});
+    EXPECT_EQ(draw(renderer, 0, 10), draw(other, 0, 10));
+  }
+}
+
+/// An event past the end of its buffer does not delay those that follow.
+TEST(Renderer, LeavesOutWhatIsPastTheEnd) {
+  const Event events[] = {Event::at(3, 2, 4, Polarity::on), Event::at(1, 2, 900'000, Polarity::on)};
+  for (const auto mode : modes) {
+    Renderer renderer(width, height, {.mode = mode});
+    EXPECT_EQ(renderer.add(events, 0, 10), (InvalidEvents{.unsorted = 1}));
+    Renderer other(width, height, {.mode = mode});
+    other.add({events, 1}, 0);
     EXPECT_EQ(draw(renderer, 0, 10), draw(other, 0, 10));
   }
 }
@@ -356,7 +368,7 @@ TEST(Renderer, DrawsAnEnormousSensorSmaller) {
   const Event events[] = {
       Event::at(0, 0, 1, Polarity::on), Event::at(16383, 16379, 2, Polarity::on),
       Event::at(600, 1205, 3, Polarity::off), Event::at(0, 16380, 4, Polarity::on)};
-  EXPECT_EQ(renderer.add(events, 0), 1U);
+  EXPECT_EQ(renderer.add(events, 0).outside, 1U);
   const auto picture = draw(renderer, 0, 10);
   const auto at = [&](int x, int y) {
     return picture[static_cast<std::size_t>(y * (renderer.width() + 3) + x)];

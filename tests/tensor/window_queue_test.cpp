@@ -114,6 +114,13 @@ TEST_F(ByTime, PartitionTheStream) {
                                        {43 * ms, 45 * ms, {4}}}));
 }
 
+TEST_F(ByTime, AreNotMovedByEventsPastTheEndOfTheirInterval) {
+  add(0, 10 * ms, {1'000, 900'000, 2'000});
+  const auto skipped = add(10 * ms, 20 * ms, {11'000, 20'001});
+  EXPECT_EQ(skipped.invalid, (InvalidEvents{.unsorted = 1}));
+  EXPECT_EQ(found, (std::vector<Found>{{0, 10 * ms, {0, 2}}, {10 * ms, 20 * ms, {3}}}));
+}
+
 TEST_F(ByTime, EndWithoutAnEmptyOne) {
   add(0, 14 * ms, {1'000});
   finish();
@@ -196,7 +203,7 @@ TEST_F(OverlappingByCount, ShareEvents) {
 TEST_F(ByTime, CountWhatTheySkip) {
   const std::vector events = {Event::at(100, 0, 0, Polarity::on), Event::at(0, 1, 0, Polarity::on),
                               Event::at(5, 0, 0, Polarity::on)};
-  EXPECT_EQ(queue.add(events, 0, 0, 1 * ms).outside, 2U);
+  EXPECT_EQ(queue.add(events, 0, 0, 1 * ms).invalid, (InvalidEvents{.outside = 2}));
 }
 
 TEST_F(ByTime, AreBounded) {

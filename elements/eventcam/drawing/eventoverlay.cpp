@@ -67,7 +67,7 @@ class EventOverlay final : public EventAggregator {
   bool take_video_caps(const GstCaps* caps);
   bool take_event_caps(const GstCaps* caps);
   std::optional<EventInterval> interval_of_frame(GstBuffer* frame) const;
-  bool take_events(GstBuffer* buffer, GstClockTime start, GstClockTime end);
+  bool take_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end);
   bool take_buffer(GstBuffer* buffer, GstClockTime end);
   bool take_events_until(GstClockTime end);
   GstFlowReturn draw(const EventInterval& interval, GstBuffer* buffer);
@@ -105,21 +105,23 @@ std::optional<EventInterval> EventOverlay::interval_of_frame(GstBuffer* frame) c
 
 /* events */
 
-/// Adds the events of a buffer up to running time `end`. Returns true if these were all. May throw.
-bool EventOverlay::take_events(GstBuffer* buffer, GstClockTime start, GstClockTime end) {
+/// Adds the events of a buffer, whose `interval` is in running time, up to running time `end`.
+/// Returns true if these were all. May throw.
+bool EventOverlay::take_events(GstBuffer* buffer, const EventInterval& interval, GstClockTime end) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
     warn(EventFault::partial_event, buffer);
     return true;
   }
-  const auto origin = static_cast<Microseconds>(start / 1000);
+  const auto origin = static_cast<Microseconds>(interval.start / 1000);
   const auto rest = mapped.events().subspan(std::min(taken_, mapped.events().size()));
   if (taken_ == 0)
     GST_LOG_OBJECT(events_pad_, "%" G_GSIZE_FORMAT " events at running time %" GST_TIME_FORMAT,
-                   rest.size(), GST_TIME_ARGS(start));
-  const auto due = events_until(rest, origin, static_cast<Microseconds>(end / 1000));
+                   rest.size(), GST_TIME_ARGS(interval.start));
+  const auto due =
+      end < interval.end ? events_until(rest, origin, static_cast<Microseconds>(end / 1000)) : rest;
   taken_ += due.size();
-  if (overlay_ && overlay_->add(due, origin) > 0) warn(EventFault::beyond_sensor, buffer);
+  if (overlay_) warn(overlay_->add(due, origin, length_of(interval)), buffer);
   return due.size() == rest.size();
 }
 
@@ -133,7 +135,7 @@ bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
   else if (!running)
     GST_LOG_OBJECT(events_pad_, "outside the segment: dropped %" GST_PTR_FORMAT, buffer);
   if (running) {
-    if (running->start >= end || !take_events(buffer, running->start, end)) return false;
+    if (running->start >= end || !take_events(buffer, *running, end)) return false;
     known_ = std::max(known_, running->end);
   }
   taken_ = 0;

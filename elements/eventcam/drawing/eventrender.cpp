@@ -170,7 +170,8 @@ class EventRender final : public EventAggregator {
  private:
   void start_over();
   bool approach(GstBuffer* buffer, const EventInterval& interval);
-  bool take_events(const MappedEvents& mapped, std::optional<GstClockTime> end, GstBuffer* buffer);
+  bool take_events(const MappedEvents& mapped, const EventInterval& interval,
+                   std::optional<GstClockTime> end, GstBuffer* buffer);
   GstFlowReturn take_buffer(GstBuffer* buffer);
   void drop_buffer();
   void begin_now();
@@ -197,17 +198,18 @@ class EventRender final : public EventAggregator {
 
 /// Adds the events of a buffer up to `end`, or all if there is none. Returns true if these were
 /// all. May throw.
-bool EventRender::take_events(const MappedEvents& mapped, std::optional<GstClockTime> end,
-                              GstBuffer* buffer) {
+bool EventRender::take_events(const MappedEvents& mapped, const EventInterval& interval,
+                              std::optional<GstClockTime> end, GstBuffer* buffer) {
   const auto rest = mapped.events().subspan(std::min(*taken_, mapped.events().size()));
   if (*taken_ == 0)
     GST_LOG_OBJECT(main_pad(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, rest.size(),
                    GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
-  const auto due =
-      end ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000)) : rest;
+  const auto due = end && *end < interval.end
+                       ? events_until(rest, mapped.start(), static_cast<Microseconds>(*end / 1000))
+                       : rest;
   *taken_ += due.size();
   state_->renderer.configure(core_settings(settings.copy()));
-  if (state_->renderer.add(due, mapped.start()) > 0) warn(EventFault::beyond_sensor, buffer);
+  warn(state_->renderer.add(due, mapped.start(), length_of(interval)), buffer);
   return due.size() == rest.size();
 }
 
@@ -258,7 +260,7 @@ GstFlowReturn EventRender::take_buffer(GstBuffer* buffer) {
       drop_buffer();
       return GST_AGGREGATOR_FLOW_NEED_DATA;
     }
-    all = take_events(mapped, due, buffer);
+    all = take_events(mapped, *interval, due, buffer);
   }
   known_ = std::max(known_, interval->end);
   if (due && (!all || interval->end + event_resolution > *due)) return push_next_picture();

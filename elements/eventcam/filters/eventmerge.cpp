@@ -177,8 +177,7 @@ bool EventMerge::load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer,
                  mapped.events().size(), GST_TIME_ARGS(GST_BUFFER_PTS(buffer)));
   const auto invalid = stream.input.load(mapped.events(), labels_of(buffer), stream.sensor, length);
   stream.loaded.reset(gst_buffer_ref(buffer));
-  if (invalid.outside > 0) warn(EventFault::beyond_sensor, buffer);
-  if (invalid.unsorted > 0) warn(EventFault::unsorted, buffer);
+  warn(invalid, buffer);
   counts_.lock()->rejected += invalid.outside + invalid.unsorted;
   if (!mapped.events().empty()) raise_latency(static_cast<GstClockTime>(length) * GST_USECOND);
   return true;

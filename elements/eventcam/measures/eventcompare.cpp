@@ -218,7 +218,7 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   const auto skipped =
       comparison_->add(role, mapped.events(), stream_time(segment, interval->start),
                        stream_time(segment, interval->end), labels_of(buffer));
-  if (skipped > 0) warn(EventFault::beyond_sensor, buffer);
+  warn(skipped, buffer);
 }
 
 bool EventCompare::is_over(StreamRole role) const {

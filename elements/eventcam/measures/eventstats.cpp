@@ -203,15 +203,15 @@ static void post_if_due(GstEventStats* self, Measurement& measurement) {
 
 /// May throw.
 static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buffer,
-                  Nanoseconds start) {
+                  Nanoseconds start, Nanoseconds end) {
   const MappedEvents mapped(buffer);
   if (!mapped) {
     self->priv->faults.warn(self, EventFault::partial_event, buffer);
     return;
   }
   const auto labels = labels_of(buffer);
-  const std::size_t skipped = measurement.validator.take(
-      mapped.events(), start / 1000,
+  const auto skipped = measurement.validator.take(
+      mapped.events(), start / 1000, (end - start) / 1000,
       [&](const eventcamera::AbsoluteEvent& event) {
         measurement.concluded = false;
         const auto interval = measurement.last_times.take(event);
@@ -221,7 +221,7 @@ static void count(GstEventStats* self, Measurement& measurement, GstBuffer* buff
         }
       },
       labels);
-  if (skipped > 0) self->priv->faults.warn(self, EventFault::beyond_sensor, buffer);
+  self->priv->faults.warn(self, skipped, buffer);
 }
 
 static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer) {
@@ -234,11 +234,12 @@ static GstFlowReturn transform_ip(GstBaseTransform* transform, GstBuffer* buffer
   }
   if (!measurement) return GST_FLOW_NOT_NEGOTIATED;
   const Nanoseconds start = stream_time(transform->segment, interval->start);
+  const Nanoseconds end = stream_time(transform->segment, interval->end);
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at stream time %" GST_STIME_FORMAT,
                  gst_buffer_get_size(buffer) / sizeof(GstEventCameraEvent), GST_STIME_ARGS(start));
   return reported(self, [&] {
-    cover(self, start, stream_time(transform->segment, interval->end));
-    count(self, *measurement, buffer, start);
+    cover(self, start, end);
+    count(self, *measurement, buffer, start, end);
     post_if_due(self, *measurement);
     return GST_FLOW_OK;
   });

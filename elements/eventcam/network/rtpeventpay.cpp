@@ -53,6 +53,7 @@ GST_DEBUG_CATEGORY_STATIC(rtp_event_pay_debug);
 #define GST_CAT_DEFAULT rtp_event_pay_debug
 
 using eventcamera::Event;
+using eventcamera::InvalidEvents;
 using eventcamera::Nanoseconds;
 using eventcamera::PendingInterval;
 using eventcamera::RtpEventFormat;
@@ -220,8 +221,8 @@ static bool is_due(GstRtpEventPay* self, Nanoseconds last_duration) {
 }
 
 /// Takes an interval, and sends what is due; returns what cannot be sent. May throw.
-static PendingInterval::Rejected take(GstRtpEventPay* self, EventInterval interval,
-                                      std::span<const Event> events) {
+static InvalidEvents take(GstRtpEventPay* self, EventInterval interval,
+                          std::span<const Event> events) {
   auto& priv = *self->priv;
   auto& pending = priv.state->pending;
   const auto start = static_cast<Nanoseconds>(interval.start);
@@ -262,10 +263,9 @@ static GstFlowReturn handle_buffer(GstRTPBasePayload* payload, GstBuffer* taken)
   GST_LOG_OBJECT(self, "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, mapped.events().size(),
                  GST_TIME_ARGS(interval->start));
   return reported(self, [&] {
-    const auto [outside, unsorted] = take(self, *interval, mapped.events());
-    priv.sent.lock()->rejected += outside + unsorted;
-    if (outside > 0) priv.faults.warn(self, EventFault::beyond_sensor, taken);
-    if (unsorted > 0) priv.faults.warn(self, EventFault::unsorted, taken);
+    const auto rejected = take(self, *interval, mapped.events());
+    priv.sent.lock()->rejected += rejected.outside + rejected.unsorted;
+    priv.faults.warn(self, rejected, taken);
   });
 }
 

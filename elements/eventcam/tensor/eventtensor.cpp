@@ -250,7 +250,7 @@ static GstFlowReturn add(GstEventTensor* self, std::span<const eventcamera::Even
   if (result != GST_FLOW_OK) return result;
   const auto skipped = priv.state->windows.add(events, base, static_cast<Nanoseconds>(start),
                                                static_cast<Nanoseconds>(interval.end));
-  if (skipped.outside > 0) priv.faults.warn(self, EventFault::beyond_sensor, buffer);
+  priv.faults.warn(self, skipped.invalid, buffer);
   if (skipped.excess > 0)
     priv.warn_of_excess(
         self,
