@@ -142,6 +142,16 @@ TEST_F(Tensor, IsNotMovedByEventsPastTheEndOfTheirBuffer) {
   expect_tensor(20 * ms, 20 * ms, 3, 7);
 }
 
+TEST_F(Tensor, IsDiscontinuousWhereItsEventsAre) {
+  begin("");
+  for (const GstClockTime start : {0, 10, 20}) {
+    GstBuffer* buffer = buffer_of(start * ms, column(0), 10 * ms);
+    if (start == 10) GST_BUFFER_FLAG_SET(buffer, GST_BUFFER_FLAG_DISCONT);
+    h->push(buffer);
+    EXPECT_EQ(GST_BUFFER_IS_DISCONT(h->pull().get()) != FALSE, start < 20) << start;
+  }
+}
+
 TEST_F(Tensor, GoesOnThroughGaps) {
   begin("accumulation-time=10000000");
   push_columns(0, 0);

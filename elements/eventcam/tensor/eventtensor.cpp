@@ -272,6 +272,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   auto& priv = *self->priv;
   const OwnedBuffer buffer(taken);
   if (!priv.state) return GST_FLOW_NOT_NEGOTIATED;
+  priv.discontinuous |= GST_BUFFER_IS_DISCONT(taken);
   const auto gap_result = std::exchange(priv.gap_result, GST_FLOW_OK);
   if (gap_result != GST_FLOW_OK) return gap_result;
   const auto interval = interval_of(taken);
