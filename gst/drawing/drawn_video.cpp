@@ -82,14 +82,26 @@ bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps) {
   guint max = 0;
   const bool offered = gst_query_get_n_allocation_pools(query) > 0;
   if (offered) gst_query_parse_nth_allocation_pool(query, 0, &pool, &size, &min, &max);
-  if (pool == nullptr) pool = gst_video_buffer_pool_new();
   size = MAX(size, static_cast<guint>(GST_VIDEO_INFO_SIZE(&drawn)));
 
-  GstStructure* config = gst_buffer_pool_get_config(pool);
-  gst_buffer_pool_config_set_params(config, caps, size, min, max);
-  if (gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr))
-    gst_buffer_pool_config_add_option(config, GST_BUFFER_POOL_OPTION_VIDEO_META);
-  gst_buffer_pool_set_config(pool, config);
+  const auto configure = [&] {
+    GstStructure* config = gst_buffer_pool_get_config(pool);
+    gst_buffer_pool_config_set_params(config, caps, size, min, max);
+    if (gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr))
+      gst_buffer_pool_config_add_option(config, GST_BUFFER_POOL_OPTION_VIDEO_META);
+    if (gst_buffer_pool_set_config(pool, config)) return true;
+    // A pool may change it, for example to have more buffers.
+    config = gst_buffer_pool_get_config(pool);
+    if (gst_buffer_pool_config_validate_params(config, caps, size, min, max))
+      return gst_buffer_pool_set_config(pool, config) != FALSE;
+    gst_structure_free(config);
+    return false;
+  };
+  if (pool == nullptr || !configure()) {
+    gst_clear_object(&pool);
+    pool = gst_video_buffer_pool_new();
+    configure();
+  }
   if (offered)
     gst_query_set_nth_allocation_pool(query, 0, pool, size, min, max);
   else

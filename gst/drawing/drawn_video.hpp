@@ -23,6 +23,7 @@ void keep_metas(GstBuffer* frame, GstBuffer* picture);
 GstQuery* new_drawn_events_query();
 bool is_drawn_events_query(GstQuery* query);
 
-/// For decide_allocation(): uses downstream's buffer pool if it offers one, else a new video pool.
+/// For decide_allocation(): uses downstream's buffer pool if it offers one that takes such buffers,
+/// else a new video pool.
 /// False if `caps` are not video.
 bool decide_on_drawn_pool(GstQuery* query, GstCaps* caps);

@@ -504,6 +504,53 @@ TEST_F(RenderLive, IsOnePictureLate) {
   EXPECT_EQ(gst_harness_query_latency(h.get()), 50 * ms);
 }
 
+/// Pool that has at least 3 buffers, and refuses a configuration until it is told so.
+struct PickyPool {
+  GstBufferPool parent;
+};
+
+gboolean take_picky_config(GstBufferPool* pool, GstStructure* config) {
+  GstCaps* caps = nullptr;
+  guint size = 0;
+  guint min = 0;
+  guint max = 0;
+  gst_buffer_pool_config_get_params(config, &caps, &size, &min, &max);
+  const bool is_enough = min >= 3;
+  if (!is_enough) gst_buffer_pool_config_set_params(config, caps, size, 3, max);
+  auto* const parent = GST_BUFFER_POOL_CLASS(g_type_class_peek(GST_TYPE_BUFFER_POOL));
+  return parent->set_config(pool, config) && is_enough ? TRUE : FALSE;
+}
+
+GstBufferPool* new_picky_pool() {
+  static const GType type = g_type_register_static_simple(
+      GST_TYPE_BUFFER_POOL, "PickyPool", sizeof(GstBufferPoolClass),
+      +[](gpointer klass, gpointer) {
+        static_cast<GstBufferPoolClass*>(klass)->set_config = take_picky_config;
+      },
+      sizeof(PickyPool), nullptr, static_cast<GTypeFlags>(0));
+  return GST_BUFFER_POOL(gst_object_ref_sink(g_object_new(type, nullptr)));
+}
+
+TEST_F(Render, DrawsIntoBuffersOfDownstreamAsItsPoolWants) {
+  GstBufferPool* const pool = new_picky_pool();
+  gst_pad_add_probe(
+      h->sinkpad, GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM,
+      [](GstPad*, GstPadProbeInfo* info, gpointer offered) {
+        auto* const query = GST_PAD_PROBE_INFO_QUERY(info);
+        if (GST_QUERY_TYPE(query) != GST_QUERY_ALLOCATION) return GST_PAD_PROBE_OK;
+        gst_query_add_allocation_pool(query, GST_BUFFER_POOL(offered), width * height, 0, 0);
+        return GST_PAD_PROBE_HANDLED;
+      },
+      pool, nullptr);
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  const auto picture = wait_for_picture();
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(picture->pool, pool);
+  EXPECT_TRUE(bytes_of(picture.get()) == accumulated(column(1)));
+  gst_object_unref(pool);
+}
+
 TEST_F(Render, IsFreedWhileInUse) {
   for (int buffers = 0; buffers < 4; ++buffers) {
     bool freed = false;
