@@ -250,6 +250,16 @@ TEST_F(Render, BeginsAnewAfterAFlush) {
   expect(finish(), {{5 * GST_SECOND, 100 * ms, accumulated(column(2))}});
 }
 
+TEST_F(Render, IsDiscontinuousAfterTwoFlushes) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  wait_for_picture();
+  for (int i = 0; i < 2; ++i) flush({h.get()});
+  segment(0);
+  push(0, column(2));
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(wait_for_picture().get()));
+}
+
 TEST_F(Render, DrainsAndBeginsAnewInAnotherSegment) {
   begin(grey_at("10/1"));
   push(0, column(1));

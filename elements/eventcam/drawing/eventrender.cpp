@@ -456,7 +456,7 @@ void EventRender::take_qos(GstEvent* event) {
 /// Forgets all events, because the next input is discontinuous. May throw.
 void EventRender::start_over() {
   if (state_) state_->renderer.reset();
-  discontinuous_ = times_.has_value();
+  discontinuous_ |= times_.has_value();
   times_.reset();
   taken_.reset();
   known_ = 0;
