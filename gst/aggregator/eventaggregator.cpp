@@ -108,7 +108,12 @@ struct EventAggregatorFunctions {
   static GstFlowReturn aggregate(GstAggregator* element, gboolean timed_out) {
     auto& self = of(element);
     if (timed_out) GST_LOG_OBJECT(element, "the latency is over: going on without further input");
-    return guard(self, [&] { return self.aggregate(timed_out != FALSE); });
+    const auto result = guard(self, [&] { return self.aggregate(timed_out != FALSE); });
+    // GstAggregator sends the segment, which precedes tags, with the first buffer.
+    if (has_segment(GST_AGGREGATOR_SRC_PAD(element)))
+      for (auto& tags : std::exchange(self.tags_, {}))
+        gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(element), tags.release());
+    return result;
   }
 
   static GstClockTime get_next_time(GstAggregator* element) { return of(element).next_time(); }
@@ -159,6 +164,8 @@ struct EventAggregatorFunctions {
       gst_event_unref(event);
       return FALSE;
     }
+    if (GST_EVENT_TYPE(event) == GST_EVENT_TAG && pad == self.main_pad_)
+      self.tags_.emplace_back(gst_event_ref(event));  // GstAggregator drops it
     if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE && pad == self.main_pad_)
       guard(self, [&] {
         self.drain();
@@ -226,6 +233,7 @@ struct EventAggregatorFunctions {
     auto& self = of(element);
     guard(self, [&] { self.stop(); });
     self.main_caps_.reset();
+    self.tags_.clear();
     self.faults_.reset();
     return TRUE;
   }

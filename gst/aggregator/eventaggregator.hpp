@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/event_buffer.hpp"
@@ -14,10 +15,10 @@
 /// Implementation of an element that combines event streams and video. Each subclass of
 /// GstEventAggregator owns one, which lives as long as the element.
 ///
-/// One sink pad is the main pad: its segment is that of the output, and its upstream answers
-/// seeking queries. If pads are requested there is none; the subclass sets the segment, upstream of
-/// the first pad answers, and a seek must flush, because pads reach it at different times. A seek
-/// is forwarded to all pads, or to none if one of them would refuse it.
+/// One sink pad is the main pad: its segment and its tags are those of the output, and its upstream
+/// answers seeking queries. If pads are requested there is none; the subclass sets the segment,
+/// upstream of the first pad answers, and a seek must flush, because pads reach it at different
+/// times. A seek is forwarded to all pads, or to none if one of them would refuse it.
 ///
 /// Called from the source pad's thread only, or while there is none.
 class EventAggregator {
@@ -79,6 +80,7 @@ class EventAggregator {
   Role role_;
   GstAggregatorPad* main_pad_;
   OwnedCaps main_caps_;
+  std::vector<OwnedEvent> tags_;  ///< of the main pad, to be sent
   EventFaults faults_;
 };
 

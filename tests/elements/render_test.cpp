@@ -260,6 +260,22 @@ TEST_F(Render, IsDiscontinuousAfterTwoFlushes) {
   EXPECT_TRUE(GST_BUFFER_IS_DISCONT(wait_for_picture().get()));
 }
 
+TEST_F(Render, PassesTags) {
+  begin(grey_at("25/1"));
+  gst_harness_push_event(
+      h.get(), gst_event_new_tag(gst_tag_list_new(GST_TAG_CONTAINER_FORMAT, "AEDAT", nullptr)));
+  push(0, column(1));
+  wait_for_picture();
+  const auto event = h.pull_event(GST_EVENT_TAG);
+  ASSERT_TRUE(event);
+  GstTagList* tags = nullptr;
+  gst_event_parse_tag(event.get(), &tags);
+  gchar* format = nullptr;
+  EXPECT_TRUE(gst_tag_list_get_string(tags, GST_TAG_CONTAINER_FORMAT, &format));
+  EXPECT_STREQ(format, "AEDAT");
+  g_free(format);
+}
+
 TEST_F(Render, DrainsAndBeginsAnewInAnotherSegment) {
   begin(grey_at("10/1"));
   push(0, column(1));
