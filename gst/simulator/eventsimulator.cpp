@@ -869,11 +869,16 @@ static gboolean stop(GstBaseTransform* transform) {
 
 /* type */
 
-/// Creates the method's settings here, because the method is not yet known in init.
+/// Makes the method's settings here, because the method is not yet known in init.
 static void constructed(GObject* object) {
   auto* self = GST_EVENT_SIMULATOR(object);
-  if (const auto make_settings = method_of(self).make_settings)
-    priv_of(self).method_settings = make_settings();
+  const auto& method = method_of(self);
+  if (method.threshold) {
+    const auto settings = priv_of(self).settings.lock();
+    settings->simulation.positive_threshold = *method.threshold;
+    settings->simulation.negative_threshold = *method.threshold;
+  }
+  if (method.make_settings != nullptr) priv_of(self).method_settings = method.make_settings();
   G_OBJECT_CLASS(parent_class)->constructed(object);
 }
 

@@ -6,18 +6,12 @@
 #include "gst/base/properties.hpp"
 #include "gst/drawing/drawn_video.hpp"
 
-using eventcamera::PaletteName;
-
 namespace {
 
 constexpr guint max_interpolated_frames = 255;
-constexpr guint default_interpolated_frames = 10;
-
-constexpr auto property_flags = static_cast<GParamFlags>(
-    G_PARAM_READWRITE | G_PARAM_CONSTRUCT | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_PLAYING);
 
 constexpr auto controllable_flags =
-    static_cast<GParamFlags>(property_flags | GST_PARAM_CONTROLLABLE);
+    static_cast<GParamFlags>(mutable_playing_flags | GST_PARAM_CONTROLLABLE);
 
 }  // namespace
 
@@ -43,7 +37,9 @@ void install_interpolated_frames(GObjectClass* klass) {
       g_param_spec_uint("interpolated-frames", "Interpolated frames",
                         "Number of frames to interpolate between two frames of the video; "
                         "events take those frames' timestamps (at most one frame per microsecond)",
-                        0, max_interpolated_frames, default_interpolated_frames, property_flags));
+                        0, max_interpolated_frames,
+                        static_cast<guint>(eventcamera::Settings().interpolated_frames),
+                        mutable_playing_flags));
 }
 
 void install_label(GObjectClass* klass) {
@@ -53,7 +49,7 @@ void install_label(GObjectClass* klass) {
                            "Label each event with its cause: light, leak, shot noise, hot pixel or "
                            "exposure pulse. Implied by the pad label_sink, which adds classes. "
                            "Events drawn as video have no labels",
-                           FALSE, property_flags));
+                           FALSE, mutable_playing_flags));
 }
 
 static void install_settings(GObjectClass* klass) {
@@ -62,11 +58,12 @@ static void install_settings(GObjectClass* klass) {
                  g_param_spec_uint("n-threads", "Threads",
                                    "Maximum number of threads (0 = one per processor); the events "
                                    "do not depend on it",
-                                   0, G_MAXINT, 0, property_flags));
+                                   0, G_MAXINT, 0, mutable_playing_flags));
   properties.add(
       &SimulatorSettings::palette,
       g_param_spec_enum("palette", "Palette", "Colours of event frames (accumulated-event video)",
-                        palette_type(), static_cast<int>(PaletteName::dark), property_flags));
+                        palette_type(), static_cast<int>(SimulatorSettings().palette),
+                        mutable_playing_flags));
 }
 
 /// Overrides the property `qos` of GstBaseTransform, whose default is off.
