@@ -24,6 +24,7 @@ from event_streams import (GLib, Gst, Span, compare, counts, delayed, expect_wri
                            read_video, seconds, simulate, until)
 import numpy as np
 from plugins import find_plugins
+from progress import Progress
 
 # Thresholds are found when the event counts are this close, relatively; those that only rate other
 # properties, when they are roughly. Where none are, because frames have whole grey levels, the search
@@ -64,23 +65,6 @@ MIN_GAIN = 0.002
 MAX_BALANCE = 1.1
 # The element whose settings a profile holds.
 PROFILED = "eventsim-dvs"
-
-
-class Progress:
-    """One line, overwritten, on a terminal; a line per step elsewhere."""
-
-    def __init__(self, quiet=False):
-        self.quiet = quiet
-        self.terminal = sys.stderr.isatty()
-
-    def tell(self, text):
-        if not self.quiet:
-            print(f"\r{text:<78}" if self.terminal else text, end="" if self.terminal else "\n",
-                  file=sys.stderr, flush=True)
-
-    def end(self):
-        if self.terminal and not self.quiet:
-            print(file=sys.stderr)
 
 
 @dataclass

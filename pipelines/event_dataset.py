@@ -29,6 +29,7 @@ try:
     from dataset_video import extension_of, hash_of, making_of, path_in, record_of, state_of, write_record
     from gst_eventcamera.recipe import uniform_number
     from plugins import find_plugins
+    from progress import Progress
 except ImportError as missing:
     sys.exit(f"error: {missing}\nOn Debian, install: python3-gst-eventcamera python3-yaml")
 
@@ -37,29 +38,23 @@ STEP = re.compile(r"^(\d+) of (\d+) steps")
 MAX_TOLD = 20  # lines about videos of a kind
 
 
-class Progress:
-    """One line, overwritten, on a terminal; a line per tenth of the videos elsewhere."""
+class VideosDone(Progress):
+    """Tells of each video on a terminal, of each tenth of the videos elsewhere."""
 
     def __init__(self, count):
+        super().__init__()
         self._count = count
         self._began = time.monotonic()
         self._told = 0
-        self._terminal = sys.stderr.isatty()
 
     def tell(self, done):
         done = min(done, self._count)
-        if not self._terminal and done * 10 // self._count == self._told:
+        if not self.on_terminal and done * 10 // self._count == self._told:
             return
         self._told = done * 10 // self._count
         left = (self._count - done) * (time.monotonic() - self._began) / max(done, 1)
-        text = (f"{done} of {self._count} videos, about {left // 3600:.0f}:{left // 60 % 60:02.0f}:{left % 60:02.0f}"
-                " left")
-        print(f"\r{text:<78}" if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr,
-              flush=True)
-
-    def end(self):
-        if self._terminal:
-            print(file=sys.stderr)
+        super().tell(f"{done} of {self._count} videos, about {left // 3600:.0f}:{left // 60 % 60:02.0f}:"
+                     f"{left % 60:02.0f} left")
 
 
 def options():
@@ -212,7 +207,7 @@ def make(chosen, videos, lock):
          "--config", f"jobs={jobs}", f"records={records_folder(chosen)}",
          f"segments={segments_root(chosen)}", f"command={shlex.join(command)}"],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=[lock.fileno()])
-    progress = Progress(len(videos))
+    progress = VideosDone(len(videos))
     try:
         with open(os.path.join(output, "snakemake.log"), "w", encoding="utf-8") as log:
             for line in snakemake.stdout:
