@@ -453,10 +453,32 @@ TEST_F(Render, LeavesOutPicturesThatComeTooLate) {
   gst_harness_push_upstream_event(
       h.get(), gst_event_new_qos(GST_QOS_TYPE_UNDERFLOW, 2, static_cast<gint64>(20 * ms), 40 * ms));
   for (int i = 1; i < 4; ++i) push(i * 40 * ms, column(i));
-  expect(finish(),
+  const auto pictures = finish();
+  expect(pictures,
          {{80 * ms, 40 * ms, accumulated(column(2))}, {120 * ms, 40 * ms, accumulated(column(3))}});
+  EXPECT_TRUE(GST_BUFFER_IS_DISCONT(pictures.front().get()));
   while (Owned<GstEvent> event{gst_harness_try_pull_upstream_event(h.get())})
     EXPECT_NE(GST_EVENT_TYPE(event.get()), GST_EVENT_QOS);
+  const auto skipped = h.message(GST_MESSAGE_QOS);
+  ASSERT_TRUE(skipped);
+  guint64 time = 0;
+  guint64 drawn = 0;
+  guint64 dropped = 0;
+  gst_message_parse_qos(skipped.get(), nullptr, &time, nullptr, nullptr, nullptr);
+  gst_message_parse_qos_stats(skipped.get(), nullptr, &drawn, &dropped);
+  EXPECT_EQ(time, 40 * ms);
+  EXPECT_EQ(drawn, 1U);
+  EXPECT_EQ(dropped, 1U);
+}
+
+TEST_F(Render, DrawsAsManyPicturesAsASinkThatThrottlesTakes) {
+  begin(grey_at("25/1"));
+  push(0, column(1));
+  wait_for_picture();
+  gst_harness_push_upstream_event(
+      h.get(), gst_event_new_qos(GST_QOS_TYPE_THROTTLE, 1, static_cast<gint64>(80 * ms), 0));
+  for (int i = 1; i < 3; ++i) push(i * 40 * ms, column(i));
+  expect(finish(), {{80 * ms, 40 * ms, accumulated(column(2))}});
 }
 
 /// Live source, and a clock controlled by the test.

@@ -175,7 +175,7 @@ class EventRender final : public EventAggregator {
   GstFlowReturn take_buffer(GstBuffer* buffer);
   void drop_buffer();
   void begin_now();
-  bool is_too_late(const EventInterval& picture);
+  bool skip(const EventInterval& picture);
   bool has_begun_picture() const;
   GstFlowReturn acquire_buffer(GstBuffer** buffer);
   GstFlowReturn draw(const EventInterval& events, GstBuffer* buffer);
@@ -192,6 +192,8 @@ class EventRender final : public EventAggregator {
   GstClockTime known_ = 0;           // time up to which events are complete
   std::optional<GstClockTime> waiting_since_;  // for the first event; running time
   bool discontinuous_ = false;                 // the next picture is discontinuous
+  guint64 drawn_ = 0;                          // number of pictures, for QoS messages
+  guint64 skipped_ = 0;
 };
 
 /* events */
@@ -310,11 +312,31 @@ GstClockTime EventRender::next_time() {
 
 /* pictures */
 
-/// True if sinks would drop the picture anyway.
-bool EventRender::is_too_late(const EventInterval& picture) {
+/// Skips a picture that sinks would drop anyway. False if it must be drawn.
+bool EventRender::skip(const EventInterval& picture) {
+  const GstSegment segment = segment_of(main_pad());
   const auto time = running_time(main_pad(), picture.start);
-  const std::lock_guard lock(mutex_);
-  return time && *time < earliest_;
+  GstClockTime earliest = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    earliest = earliest_;
+  }
+  if (!time || *time >= earliest) {
+    ++drawn_;
+    return false;
+  }
+  ++skipped_;
+  discontinuous_ = true;
+  GST_DEBUG_OBJECT(element(), "downstream is late: skipped the picture at %" GST_TIME_FORMAT,
+                   GST_TIME_ARGS(picture.start));
+  GstMessage* const message =
+      gst_message_new_qos(GST_OBJECT(element()), FALSE, *time,
+                          gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, picture.start),
+                          picture.start, picture.end - picture.start);
+  gst_message_set_qos_values(message, GST_CLOCK_DIFF(*time, earliest), 1, 1'000'000);
+  gst_message_set_qos_stats(message, GST_FORMAT_BUFFERS, drawn_, skipped_);
+  gst_element_post_message(GST_ELEMENT(element()), message);
+  return true;
 }
 
 GstFlowReturn EventRender::draw(const EventInterval& events, GstBuffer* buffer) {
@@ -349,11 +371,7 @@ GstFlowReturn EventRender::acquire_buffer(GstBuffer** buffer) {
 
 /// Draws the state at the end of an interval and pushes it. May throw.
 GstFlowReturn EventRender::push_picture(const EventInterval& events, const EventInterval& picture) {
-  if (is_too_late(picture)) {
-    GST_DEBUG_OBJECT(element(), "downstream is late: skipped the picture at %" GST_TIME_FORMAT,
-                     GST_TIME_ARGS(picture.start));
-    return GST_AGGREGATOR_FLOW_NEED_DATA;
-  }
+  if (skip(picture)) return GST_AGGREGATOR_FLOW_NEED_DATA;
   GstBuffer* acquired = nullptr;
   GstFlowReturn result = acquire_buffer(&acquired);
   if (result != GST_FLOW_OK) return result;
@@ -445,12 +463,15 @@ void EventRender::take_segment(const GstSegment& segment) {
 }
 
 void EventRender::take_qos(GstEvent* event) {
+  GstQOSType type = GST_QOS_TYPE_UNDERFLOW;
   GstClockTimeDiff late = 0;
   GstClockTime time = GST_CLOCK_TIME_NONE;
-  gst_event_parse_qos(event, nullptr, nullptr, &late, &time);
+  gst_event_parse_qos(event, &type, nullptr, &late, &time);
+  // Twice as late, to catch up; a throttle tells the time between pictures.
+  const GstClockTime factor = type == GST_QOS_TYPE_THROTTLE ? 1 : 2;
   const std::lock_guard lock(mutex_);
   if (GST_CLOCK_TIME_IS_VALID(time))
-    earliest_ = late > 0 ? time + 2 * static_cast<GstClockTime>(late) : 0;
+    earliest_ = late > 0 ? time + factor * static_cast<GstClockTime>(late) : 0;
 }
 
 /// Forgets all events, because the next input is discontinuous. May throw.
@@ -475,6 +496,7 @@ void EventRender::stop() {
   state_.reset();
   flush();
   discontinuous_ = false;
+  drawn_ = skipped_ = 0;
 }
 
 }  // namespace
