@@ -208,8 +208,10 @@ struct EventAggregatorFunctions {
 
   static gboolean sink_query(GstAggregator* element, GstAggregatorPad* pad, GstQuery* query) {
     const auto& self = of(element);
-    if (GST_QUERY_TYPE(query) != GST_QUERY_CAPS || pad != self.main_pad_ ||
-        !self.role_.passes_main_pad)
+    const bool is_passed = pad == self.main_pad_ && self.role_.passes_main_pad;
+    if (is_passed && GST_QUERY_TYPE(query) == GST_QUERY_ALLOCATION)
+      return gst_pad_peer_query(GST_AGGREGATOR_SRC_PAD(element), query);
+    if (!is_passed || GST_QUERY_TYPE(query) != GST_QUERY_CAPS)
       return PARENT_AGGREGATOR_CLASS->sink_query(element, pad, query);
     answer_caps_of_passed(element, pad, query);
     return TRUE;

@@ -93,6 +93,24 @@ TEST_F(OverlayTest, IsNotHeldUpByAnEventPastTheEndOfItsBuffer) {
   EXPECT_EQ(drawn(), (Places{{3, 255}}));
 }
 
+TEST_F(OverlayTest, LetsTheVideoUseTheMemoryOfDownstream) {
+  gst_pad_add_probe(
+      video->sinkpad, GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM,
+      [](GstPad*, GstPadProbeInfo* info, gpointer) {
+        auto* const query = GST_PAD_PROBE_INFO_QUERY(info);
+        if (GST_QUERY_TYPE(query) != GST_QUERY_ALLOCATION) return GST_PAD_PROBE_OK;
+        gst_query_add_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr);
+        return GST_PAD_PROBE_HANDLED;
+      },
+      nullptr, nullptr);
+  begin("width=8, height=4");
+  const Owned<GstCaps> caps(gst_pad_get_current_caps(video->srcpad));
+  GstQuery* const query = gst_query_new_allocation(caps.get(), TRUE);
+  EXPECT_TRUE(gst_pad_peer_query(video->srcpad, query));
+  EXPECT_TRUE(gst_query_find_allocation_meta(query, GST_VIDEO_META_API_TYPE, nullptr));
+  gst_query_unref(query);
+}
+
 TEST_F(OverlayTest, ScalesTheSensorToTheVideo) {
   begin("width=4, height=4");
   push_frame(0);
