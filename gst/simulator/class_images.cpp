@@ -60,7 +60,7 @@ GstVideoInfo format_of(const CompanionPad::Item& image, const GstVideoInfo& vide
   return format;
 }
 
-void set_classes(const Part& part, const CompanionPad::Item& image, const GstVideoInfo& video) {
+void set_class(const Part& part, const CompanionPad::Item& image, const GstVideoInfo& video) {
   const GstVideoInfo format = format_of(image, video);
   const VideoFrame mapped(format, image.buffer.get(), GST_MAP_READ);
   if (!mapped)
@@ -76,23 +76,29 @@ void set_classes(const Part& part, const CompanionPad::Item& image, const GstVid
 
 }  // namespace
 
-void set_classes(GstBuffer* events, const GstSegment& segment, const GstVideoInfo& video,
-                 const std::vector<CompanionPad::Item>& images) {
+GstFlowReturn ClassImages::set_classes(GstBuffer* events, const GstSegment& segment,
+                                       const GstVideoInfo& video, Nanoseconds start,
+                                       Nanoseconds end) {
+  const auto running_start = running_time_of(segment, static_cast<GstClockTime>(start));
+  const auto running_end = running_time_of(segment, static_cast<GstClockTime>(end));
+  if (!is_linked() || !running_start || !running_end) return GST_FLOW_OK;
+  const auto images = items(*running_start, *running_end);
+  if (!images) return GST_FLOW_FLUSHING;
   const MappedEvents mapped(events);
-  const GstClockTime start = GST_BUFFER_PTS(events);
-  const auto running_start = running_time_of(segment, start);
-  if (!mapped || !running_start) return;
-  const auto microsecond_of = [&](const CompanionPad::Item& image) {
+  if (!mapped) return GST_FLOW_OK;
+  constexpr Nanoseconds microsecond = GST_USECOND;
+  const auto microsecond_of = [&](const Item& image) {
     const auto delay =
         static_cast<Nanoseconds>(static_cast<double>(image.time - *running_start) * segment.rate);
-    return (static_cast<Nanoseconds>(start % GST_USECOND) + delay) / Nanoseconds{GST_USECOND};
+    return (start % microsecond + delay) / microsecond;
   };
   Part rest{mapped.events(), labels_of(events)};
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    if (i == 0) rest.before(microsecond_of(images[i]));  // they have no class
-    const auto end = i + 1 < images.size() ? microsecond_of(images[i + 1])
-                                           : std::numeric_limits<Nanoseconds>::max();
-    if (const Part part = rest.before(end); !part.events.empty())
-      set_classes(part, images[i], video);
+  for (std::size_t i = 0; i < images->size(); ++i) {
+    const auto& image = (*images)[i];
+    if (i == 0) rest.before(microsecond_of(image));  // they have no class
+    const auto until = i + 1 < images->size() ? microsecond_of((*images)[i + 1])
+                                              : std::numeric_limits<Nanoseconds>::max();
+    if (const Part part = rest.before(until); !part.events.empty()) set_class(part, image, video);
   }
+  return GST_FLOW_OK;
 }

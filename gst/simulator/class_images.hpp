@@ -3,8 +3,6 @@
 
 #include <gst/video/video.h>
 
-#include <vector>
-
 #include "gst/base/event_buffer.hpp"
 #include "gst/simulator/companion_pad.hpp"
 
@@ -13,8 +11,15 @@
   "video/x-raw, format = (string) { GRAY8, GRAY16_LE }, " SIZE_CAPS \
   ", framerate = (fraction) [ 0, max ]"
 
-/// Gives each event of a labelled buffer, which has a PTS of `segment`, the class of its pixel in
-/// the image in force at its time: the last of `images` that is not later. Throws
-/// VideoSimulatorError if an image does not fit the video.
-void set_classes(GstBuffer* events, const GstSegment& segment, const GstVideoInfo& video,
-                 const std::vector<CompanionPad::Item>& images);
+/// Pad that takes images of classes.
+class ClassImages : public CompanionPad {
+ public:
+  explicit ClassImages(GstDebugCategory* category) : CompanionPad("class images", category) {}
+
+  /// If a source of images is linked, gives each event of a labelled buffer, which covers an
+  /// interval of `segment`, the class of its pixel in the image in force at its time: the last one
+  /// that is not later. Waits for the images until `end`. Throws VideoSimulatorError if one does
+  /// not fit the video.
+  GstFlowReturn set_classes(GstBuffer* events, const GstSegment& segment, const GstVideoInfo& video,
+                            Nanoseconds start, Nanoseconds end);
+};

@@ -4,7 +4,6 @@
 #include <gst/video/video.h>
 
 #include <array>
-#include <cstdlib>
 #include <new>
 #include <optional>
 #include <string>
@@ -24,12 +23,11 @@
 #include "gst/simulator/buffers.hpp"
 #include "gst/simulator/caps.hpp"
 #include "gst/simulator/class_images.hpp"
-#include "gst/simulator/companion_pad.hpp"
+#include "gst/simulator/continuation.hpp"
 #include "gst/simulator/flow_tensor.hpp"
 #include "gst/simulator/frame_clock.hpp"
-#include "gst/simulator/interval_latency.hpp"
+#include "gst/simulator/frame_timing.hpp"
 #include "gst/simulator/properties.hpp"
-#include "gst/simulator/qos.hpp"
 
 GST_DEBUG_CATEGORY_STATIC(event_simulator_debug);
 #define GST_CAT_DEFAULT event_simulator_debug
@@ -44,8 +42,7 @@ namespace {
 struct State {
   GstVideoInfo video;  ///< input format
   std::unique_ptr<VideoSimulator> frames;
-  bool draws = false;                            ///< the output is video, not events
-  eventcamera::Image<eventcamera::Flow> flow{};  ///< that was given, if any
+  bool draws = false;  ///< the output is video, not events
 
   IntervalSimulator& simulator() const { return frames->simulator(); }
 };
@@ -54,13 +51,10 @@ struct State {
 struct Stream {
   std::optional<Nanoseconds> handed_out_until;  ///< end of the last interval of the segment
   bool discontinuous = false;                   ///< the next buffer is discontinuous
-  bool begins = true;                           ///< no frame of the timeline has arrived
-  std::optional<Nanoseconds> continues_from;    ///< time of the state that was restored, if it was
-  GstFlowReturn flow = GST_FLOW_OK;             ///< result of the last push
-  FrameClock clock;                             ///< for frames without a PTS
+  Continuation continuation;
+  GstFlowReturn flow = GST_FLOW_OK;  ///< result of the last push
+  FrameClock clock{GST_CAT_DEFAULT};
   WarnOnce warn_of_times{GST_CAT_DEFAULT};
-  WarnOnce warn_of_no_pts{GST_CAT_DEFAULT};
-  WarnOnce warn_of_no_flow{GST_CAT_DEFAULT};
   WarnOnce warn_of_interlacing{GST_CAT_DEFAULT};
   WarnOnce warn_of_drawn_input{GST_CAT_DEFAULT};
 };
@@ -68,13 +62,15 @@ struct Stream {
 }  // namespace
 
 struct GstEventSimulatorPrivate {
+  explicit GstEventSimulatorPrivate(GstEventSimulator* self)
+      : timing(GST_BASE_TRANSFORM(self), GST_CAT_DEFAULT) {}
+
   Guarded<SimulatorSettings> settings;
   std::shared_ptr<void> method_settings;
 
-  Guarded<SimulatorQos> qos;
-  Guarded<IntervalLatency> latency;  // make no calls while holding its lock
-  CompanionPad class_images{"class images", GST_CAT_DEFAULT};
-  CompanionPad flow_tensors{"flow tensors", GST_CAT_DEFAULT};
+  FrameTiming timing;
+  ClassImages class_images{GST_CAT_DEFAULT};
+  FlowTensors flow_tensors{GST_CAT_DEFAULT};
 
   // Accessed with the stream lock of the sink pad, or while there is no streaming thread.
   std::optional<State> state;
@@ -112,58 +108,7 @@ Guarded<SimulatorSettings>& simulator_settings_of(GObject* object) {
 }
 
 Guarded<SimulatorQos>& simulator_qos_of(GObject* object) {
-  return priv_of(GST_EVENT_SIMULATOR(object)).qos;
-}
-
-/* time */
-
-/// Changes the latency, and posts a message if it differs.
-template <class Change>
-static void change_latency(GstEventSimulator* self, const Change& change) {
-  GstClockTime before = 0;
-  GstClockTime after = 0;
-  {
-    const auto latency = priv_of(self).latency.lock();
-    before = latency->total();
-    change(*latency);
-    after = latency->total();
-  }
-  if (after == before) return;
-  GST_DEBUG_OBJECT(self, "latency is now %" GST_TIME_FORMAT, GST_TIME_ARGS(after));
-  gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
-}
-
-/// Starts processing a frame. Returns false if the frame is skipped instead.
-static bool begin_work(GstEventSimulator* self, GstBuffer* frame) {
-  const bool ends_interval = priv_of(self).state->simulator().last_time().has_value();
-  GstMessage* skipped =
-      priv_of(self).qos.lock()->begin(GST_BASE_TRANSFORM(self), frame, ends_interval);
-  if (skipped == nullptr) return true;
-  GST_DEBUG_OBJECT(self, "downstream is late: skipped %" GST_PTR_FORMAT, frame);
-  gst_element_post_message(GST_ELEMENT(self), skipped);
-  return false;
-}
-
-/// Ends the work on the frame of this time, and adapts the latency to its duration.
-static void end_work(GstEventSimulator* self, Nanoseconds time,
-                     std::optional<Nanoseconds> work_began) {
-  Nanoseconds work = 0;
-  Nanoseconds downstream = 0;
-  {
-    const auto qos = priv_of(self).qos.lock();
-    work = qos->end_work(GST_BASE_TRANSFORM(self), work_began);
-    downstream = qos->downstream_latency();
-  }
-  change_latency(self, [&](IntervalLatency& latency) { latency.add_work(time, work, downstream); });
-}
-
-static std::optional<Nanoseconds> work_began(GstEventSimulator* self) {
-  return priv_of(self).qos.lock()->began();
-}
-
-/// Ends the processing of a frame, after its output has been pushed.
-static void end_frame(GstEventSimulator* self) {
-  priv_of(self).qos.lock()->end(GST_BASE_TRANSFORM(self));
+  return priv_of(GST_EVENT_SIMULATOR(object)).timing.qos();
 }
 
 /* intervals out */
@@ -191,39 +136,29 @@ static GstFlowReturn push_buffer(GstEventSimulator* self, OwnedBuffer out, GstCl
   return gst_pad_push(GST_BASE_TRANSFORM_SRC_PAD(transform), out.release());
 }
 
-/// Gives the events of an interval their classes, if a source of class images is linked. May throw.
-static GstFlowReturn set_classes(GstEventSimulator* self, GstBuffer* out, Nanoseconds start,
-                                 Nanoseconds end) {
-  auto& class_images = priv_of(self).class_images;
-  const GstSegment& segment = GST_BASE_TRANSFORM(self)->segment;
-  const auto from = running_time_of(segment, static_cast<GstClockTime>(start));
-  const auto until = running_time_of(segment, static_cast<GstClockTime>(end));
-  if (!class_images.is_linked() || !from || !until) return GST_FLOW_OK;
-  const auto images = class_images.items(*from, *until);
-  if (!images) return GST_FLOW_FLUSHING;
-  GST_BUFFER_PTS(out) = static_cast<GstClockTime>(start);
-  set_classes(out, segment, priv_of(self).state->video, *images);
-  return GST_FLOW_OK;
-}
-
 /// Writes the events of an interval, and their labels, to a new buffer. `frame` ends it. May throw.
 static GstFlowReturn write_events(GstEventSimulator* self, const EventBuckets& events,
                                   GstBuffer* frame, Nanoseconds start, Nanoseconds end,
                                   OwnedBuffer& out) {
-  auto& simulator = priv_of(self).state->simulator();
+  auto* transform = GST_BASE_TRANSFORM(self);
+  auto& priv = priv_of(self);
+  auto& simulator = priv.state->simulator();
   const GstFlowReturn result =
-      event_simulator_write_events(GST_BASE_TRANSFORM(self), events, simulator, frame, out);
+      event_simulator_write_events(transform, events, simulator, frame, out);
   if (result != GST_FLOW_OK || !simulator.has_labels()) return result;
-  return set_classes(self, out.get(), start, end);
+  GST_BUFFER_PTS(out.get()) = static_cast<GstClockTime>(start);  // without it, none can be mapped
+  return priv.class_images.set_classes(out.get(), transform->segment, priv.state->video, start,
+                                       end);
 }
 
 void event_simulator_push_interval(GObject* element, Interval interval,
                                    const EventBuckets* events) {
   auto* self = GST_EVENT_SIMULATOR(element);
+  auto& timing = priv_of(self).timing;
   auto& [frame, start, end, began] = interval;
   if (events == nullptr) {
-    end_work(self, end, began);
-    end_frame(self);
+    timing.end_work(end, began);
+    timing.end();
     return;
   }
   GST_LOG_OBJECT(self,
@@ -236,15 +171,14 @@ void event_simulator_push_interval(GObject* element, Interval interval,
   OwnedBuffer out;
   if (events->size() > 0) flow = write_events(self, *events, frame.get(), start, end, out);
   frame.reset();  // upstream may need it while downstream blocks
-  end_work(self, end, began);
-  change_latency(
-      self, [&](IntervalLatency& latency) { latency.add_interval(interval.start, interval.end); });
+  timing.end_work(end, began);
+  timing.add_interval(start, end);
   if (events->size() == 0)
     flow = push_gap(self, start, end, GST_SEQNUM_INVALID);
   else if (flow == GST_FLOW_OK)
     flow = push_buffer(self, std::move(out), static_cast<GstClockTime>(start),
                        static_cast<GstClockTime>(end - start));
-  end_frame(self);
+  timing.end();
 }
 
 /* discontinuities */
@@ -276,36 +210,11 @@ static void warn_of_times(GstEventSimulator* self, const char* what) {
       "an interval needs a PTS at both ends");
 }
 
-/// Sets the PTS of a frame without one. False if it cannot be determined.
-static bool give_pts(GstEventSimulator* self, OwnedBuffer& frame) {
-  using Source = FrameClock::Source;
-  auto& stream = priv_of(self).stream;
-  const GstVideoInfo& video = priv_of(self).state->video;
-  const auto source = stream.clock.stamp(GST_BASE_TRANSFORM(self), video, frame);
-  if (source == Source::upstream) return true;
-  const char* text =
-      "The video has neither timestamps nor a framerate, so there are no events. Set the PTS of "
-      "its buffers, or a framerate in its caps.";
-  if (source == Source::arrival)
-    text =
-        "The video has no timestamps: using the arrival times of its frames. Set "
-        "do-timestamp=true on the source, or the PTS of its buffers.";
-  else if (source == Source::framerate)
-    text =
-        "The video has no timestamps: using its framerate. Set the PTS of its buffers if frames "
-        "are not evenly spaced.";
-  stream.warn_of_no_pts(self, {GST_STREAM_ERROR_FORMAT, text},
-                        "a buffer has no PTS; the framerate in the caps is " +
-                            std::to_string(GST_VIDEO_INFO_FPS_N(&video)) + "/" +
-                            std::to_string(GST_VIDEO_INFO_FPS_D(&video)));
-  return source != Source::nowhere;
-}
-
 /// Takes the time of a frame: forgets the frames that it does not continue. False if the frame must
 /// be skipped. May throw.
 static bool accept_time(GstEventSimulator* self, GstBuffer* buffer) {
   const GstClockTime pts = GST_BUFFER_PTS(buffer);
-  const bool continues = std::exchange(priv_of(self).stream.continues_from, {}).has_value();
+  const bool continues = priv_of(self).stream.continuation.continues();
   if (GST_BUFFER_IS_DISCONT(buffer) && !continues) {
     start_over(self);
     priv_of(self).stream.discontinuous = true;
@@ -460,11 +369,8 @@ static gboolean set_caps(GstBaseTransform* transform, GstCaps* in, GstCaps* out)
   check_input(self);
   // Pictures have the time of their frame, intervals that of the previous frame.
   const GstClockTime duration = state->draws ? 0 : frame_duration(video);
-  if (duration > 0 || state->draws)
-    change_latency(self, [duration](IntervalLatency& latency) {
-      latency.expect(static_cast<Nanoseconds>(duration));
-    });
-  priv_of(self).qos.lock()->take_output(state->draws);
+  if (duration > 0 || state->draws) priv_of(self).timing.expect(static_cast<Nanoseconds>(duration));
+  priv_of(self).timing.qos().lock()->take_output(state->draws);
   return TRUE;
 }
 
@@ -497,6 +403,7 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const SimulatorSettings
                                 Nanoseconds time, OwnedBuffer in) {
   auto* transform = GST_BASE_TRANSFORM(self);
   auto& state = *priv_of(self).state;
+  auto& timing = priv_of(self).timing;
   OwnedBuffer picture;
   GstFlowReturn result = event_simulator_make_picture(transform, in.get(), picture);
   if (result == GST_FLOW_OK) {
@@ -504,12 +411,12 @@ static GstFlowReturn draw_frame(GstEventSimulator* self, const SimulatorSettings
     state.frames->draw(std::move(in), time, settings.simulation,
                        eventcamera::palette(settings.palette), picture.get());
   }
-  end_work(self, time, work_began(self));
+  timing.end_work(time, timing.began());
   if (result != GST_FLOW_OK) return result;
-  priv_of(self).qos.lock()->extend(transform, picture.get(), frame_duration(state.video));
+  timing.qos().lock()->extend(transform, picture.get(), frame_duration(state.video));
   const GstClockTime duration = GST_BUFFER_DURATION(picture.get());
   result = push_buffer(self, std::move(picture), static_cast<GstClockTime>(time), duration);
-  end_frame(self);
+  timing.end();
   return result;
 }
 
@@ -535,77 +442,40 @@ static SimulatorSettings begin_interval(GstEventSimulator* self) {
   return settings;
 }
 
-/// True if a tensor is the flow of an interval: it starts with it, and ends with it if it has a
-/// duration, which it would not after frames were skipped.
-static bool is_flow_of(const CompanionPad::Item& tensor, Nanoseconds running_start,
-                       Nanoseconds duration) {
-  if (std::abs(tensor.time - running_start) >= Nanoseconds{event_resolution}) return false;
-  const GstClockTime own = GST_BUFFER_DURATION(tensor.buffer.get());
-  return !GST_CLOCK_TIME_IS_VALID(own) || (own < static_cast<GstClockTime>(duration) * 3 / 2 &&
-                                           own > static_cast<GstClockTime>(duration) / 2);
-}
-
-/// Gives the simulator the flow of an interval, if it needs one and a source is linked. False if
-/// the stream is flushing. May throw.
-static bool give_flow(GstEventSimulator* self, Nanoseconds start, Nanoseconds end) {
-  auto& tensors = priv_of(self).flow_tensors;
-  auto& state = *priv_of(self).state;
-  const auto time =
-      running_time_of(GST_BASE_TRANSFORM(self)->segment, static_cast<GstClockTime>(start));
-  if (!time || !tensors.is_linked() || !state.simulator().needs_flow()) return true;
-  const auto found = tensors.items(*time, *time);
-  if (!found) return false;
-  if (found->empty() || !is_flow_of(found->back(), *time, end - start)) {
-    priv_of(self).stream.warn_of_no_flow(
-        self,
-        {GST_STREAM_ERROR_FORMAT,
-         "The optical flow of a frame is missing: finding it here. Send the flow to the next frame "
-         "with the timestamp and the duration of each frame."},
-        "no matching buffer on flow_sink");
-    return true;
-  }
-  const auto [width, height, bits] = FrameLuma::format_of(state.video);
-  if (state.flow.width() == 0) state.flow = {width, height};  // not yet allocated
-  copy_flow(found->back(), state.flow);
-  state.simulator().give_flow(state.flow.view());
-  return true;
-}
-
 /// Restores the state that a timeline continues from, if any, before its first frame or GAP. May
 /// throw.
 static void restore_at_start(GstEventSimulator* self) {
-  auto& stream = priv_of(self).stream;
+  auto& continuation = priv_of(self).stream.continuation;
   auto& simulator = priv_of(self).state->simulator();
-  if (!std::exchange(stream.begins, false) || method_of(self).restore == nullptr) return;
+  if (!continuation.begins() || method_of(self).restore == nullptr) return;
   configure(self);
   method_of(self).restore(simulator, G_OBJECT(self));
-  stream.continues_from = simulator.last_time();
-}
-
-/// True if the state that was restored has seen this frame.
-static bool is_before_state(GstEventSimulator* self, GstBuffer* frame) {
-  const auto& continues_from = priv_of(self).stream.continues_from;
-  const GstClockTime pts = GST_BUFFER_PTS(frame);
-  if (!continues_from || pts > static_cast<GstClockTime>(*continues_from)) return false;
-  GST_LOG_OBJECT(self, "skipping the frame at %" GST_TIME_FORMAT ": the state is later",
-                 GST_TIME_ARGS(pts));
-  return true;
+  continuation.restored(simulator.last_time());
 }
 
 /// Processes a frame and outputs the interval that it ends, if any. May throw.
 static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
-  auto& stream = priv_of(self).stream;
-  auto& state = *priv_of(self).state;
-  sync_controlled_properties(self, GST_BUFFER_PTS(in.get()));
+  auto* transform = GST_BASE_TRANSFORM(self);
+  auto& priv = priv_of(self);
+  auto& stream = priv.stream;
+  auto& state = *priv.state;
+  const GstClockTime pts = GST_BUFFER_PTS(in.get());
+  sync_controlled_properties(self, pts);
   check_interlacing(self, in.get());
   restore_at_start(self);
-  advance_companions(self, GST_BUFFER_PTS(in.get()));
-  if (is_before_state(self, in.get())) return;
-  if (!accept_time(self, in.get()) || !begin_work(self, in.get())) return;
-  const auto end = static_cast<Nanoseconds>(GST_BUFFER_PTS(in.get()));
+  advance_companions(self, pts);
+  if (stream.continuation.is_after(pts)) {
+    GST_LOG_OBJECT(self, "skipping the frame at %" GST_TIME_FORMAT ": the state is later",
+                   GST_TIME_ARGS(pts));
+    return;
+  }
+  if (!accept_time(self, in.get())) return;
   const auto start = state.simulator().last_time();
+  if (!priv.timing.begin(in.get(), start.has_value())) return;
+  const auto end = static_cast<Nanoseconds>(pts);
   const SimulatorSettings settings = begin_interval(self);
-  if (start && !give_flow(self, *start, end)) {
+  if (start && !priv.flow_tensors.give(GST_ELEMENT(self), state.simulator(), transform->segment,
+                                       state.video, *start, end)) {
     stream.flow = GST_FLOW_FLUSHING;
     return;
   }
@@ -615,20 +485,22 @@ static void take_frame(GstEventSimulator* self, OwnedBuffer in) {
     return;
   }
   if (start) stream.handed_out_until = end;
-  state.frames->push({std::move(in), start.value_or(end), end, work_began(self)},
+  state.frames->push({std::move(in), start.value_or(end), end, priv.timing.began()},
                      settings.simulation);
 }
 
 static GstFlowReturn generate_output(GstBaseTransform* transform, GstBuffer** out) {
   auto* self = GST_EVENT_SIMULATOR(transform);
-  auto& flow = priv_of(self).stream.flow;
+  auto& stream = priv_of(self).stream;
+  auto& flow = stream.flow;
   *out = nullptr;  // output is pushed by the simulator, possibly later
   OwnedBuffer in(std::exchange(transform->queued_buf, nullptr));
   // Since output was pushed outside of this function, downstream may have been relinked.
   if (flow != GST_FLOW_EOS && flow != GST_FLOW_ERROR) {
     flow = GST_FLOW_OK;
     if (!ensure_state(self)) return GST_FLOW_NOT_NEGOTIATED;
-    if (give_pts(self, in)) reported(self, [&] { take_frame(self, std::move(in)); });
+    if (stream.clock.stamp(transform, priv_of(self).state->video, in))
+      reported(self, [&] { take_frame(self, std::move(in)); });
   }
   return std::exchange(flow, GST_FLOW_OK);
 }
@@ -655,11 +527,10 @@ static void start_timeline(GstEventSimulator* self) {
   if (state) state->frames->drop();
   priv_of(self).stream.flow = GST_FLOW_OK;
   start_over(self);
-  priv_of(self).stream.begins = true;
-  priv_of(self).stream.continues_from.reset();
+  priv_of(self).stream.continuation = {};
   for (auto* companion : companions_of(self)) companion->begin();
   priv_of(self).stream.clock.start_over();
-  priv_of(self).qos.lock()->start_over();
+  priv_of(self).timing.qos().lock()->start_over();
 }
 
 static bool take_segment(GstEventSimulator* self, GstEvent* event) {
@@ -699,13 +570,13 @@ static void hold_until(GstEventSimulator* self, Nanoseconds end, guint32 seqnum)
 static void warn_of_no_progress(GstEventSimulator* self) {
   const auto& state = priv_of(self).state;
   auto& stream = priv_of(self).stream;
-  if (!state || !stream.continues_from || state->simulator().last_time() != stream.continues_from)
-    return;
+  const auto from = stream.continuation.time();
+  if (!state || !from || state->simulator().last_time() != from) return;
   stream.warn_of_times(self,
                        {GST_STREAM_ERROR_FORMAT,
                         "No events: all frames are before the state that initial-state names. Give "
                         "them the timestamps that they have in the whole video."},
-                       "the state is that at " + std::to_string(*stream.continues_from) + " ns");
+                       "the state is that at " + std::to_string(*from) + " ns");
 }
 
 /// Saves the state at the end of a stream, if the element has to.
@@ -731,7 +602,7 @@ static bool take_gap(GstEventSimulator* self, GstEvent* event) {
   advance_companions(self, pts + (has_end ? std::min(duration, G_MAXINT64 - pts) : 0));
   const auto start = state->simulator().last_time();
   if (!start || state->draws) return true;
-  const auto frame = static_cast<GstClockTime>(priv_of(self).latency.lock()->duration());
+  const auto frame = static_cast<GstClockTime>(priv_of(self).timing.interval());
   const GstClockTime rest =
       GST_CLOCK_TIME_IS_VALID(duration) && duration > frame ? duration - frame : 0;
   if (pts > G_MAXINT64 || rest > G_MAXINT64 - pts) return false;
@@ -787,7 +658,7 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
 static gboolean src_event(GstBaseTransform* transform, GstEvent* event) {
   if (GST_EVENT_TYPE(event) == GST_EVENT_QOS) {
     // Not forwarded: only this element skips frames.
-    priv_of(GST_EVENT_SIMULATOR(transform)).qos.lock()->take_event(transform, event);
+    priv_of(GST_EVENT_SIMULATOR(transform)).timing.qos().lock()->take_event(transform, event);
     gst_event_unref(event);
     return TRUE;
   }
@@ -817,7 +688,7 @@ static gboolean query(GstBaseTransform* transform, GstPadDirection direction, Gs
   if (direction != GST_PAD_SRC || GST_QUERY_TYPE(query) != GST_QUERY_LATENCY)
     return PARENT_TRANSFORM_CLASS->query(transform, direction, query);
 
-  const GstClockTime latency = priv_of(GST_EVENT_SIMULATOR(transform)).latency.lock()->total();
+  const GstClockTime latency = priv_of(GST_EVENT_SIMULATOR(transform)).timing.latency();
   return answer_latency(GST_CAT_DEFAULT, GST_BASE_TRANSFORM_SINK_PAD(transform), query, latency);
 }
 
@@ -826,7 +697,8 @@ static GstPad* request_new_pad(GstElement* element, GstPadTemplate* pad_template
   auto& priv = priv_of(GST_EVENT_SIMULATOR(element));
   const bool is_of_labels =
       g_strcmp0(GST_PAD_TEMPLATE_NAME_TEMPLATE(pad_template), "label_sink") == 0;
-  return (is_of_labels ? priv.class_images : priv.flow_tensors).add_to(element, pad_template);
+  if (is_of_labels) return priv.class_images.add_to(element, pad_template);
+  return priv.flow_tensors.add_to(element, pad_template);
 }
 
 static void release_pad(GstElement* element, GstPad* pad) {
@@ -851,7 +723,7 @@ static gboolean start(GstBaseTransform* transform) {
       return FALSE;
     }
   }
-  const auto qos = priv_of(self).qos.lock();
+  const auto qos = priv_of(self).timing.qos().lock();
   qos->start_over();
   qos->reset_stats();
   return TRUE;
@@ -862,8 +734,9 @@ static gboolean stop(GstBaseTransform* transform) {
   GST_PAD_STREAM_LOCK(GST_BASE_TRANSFORM_SINK_PAD(self));  // see event_simulator_push_finished()
   priv_of(self).state.reset();
   priv_of(self).stream = {};
+  priv_of(self).flow_tensors.reset();
   GST_PAD_STREAM_UNLOCK(GST_BASE_TRANSFORM_SINK_PAD(self));
-  *priv_of(self).latency.lock() = {};
+  priv_of(self).timing.reset();
   return TRUE;
 }
 
@@ -888,7 +761,7 @@ static void finalize(GObject* object) {
 }
 
 static void gst_event_simulator_init(GstEventSimulator* self) {
-  std::construct_at(&priv_of(self));
+  std::construct_at(&priv_of(self), self);
   // SimulatorQos decides which frames are skipped.
   gst_base_transform_set_qos_enabled(GST_BASE_TRANSFORM(self), FALSE);
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <string>
 #include <string_view>
 
@@ -11,6 +12,8 @@
 
 using eventcamera::Flow;
 using eventcamera::Image;
+using eventcamera::IntervalSimulator;
+using eventcamera::Nanoseconds;
 
 /// True if these are the dimensions of a flow; further ones are 1.
 static bool are_dimensions(std::string_view dimensions, const std::string& of_flow) {
@@ -25,7 +28,8 @@ static float limited(float flow) {
   return std::isfinite(flow) ? std::clamp(flow, -longest, longest) : 0;
 }
 
-void copy_flow(const CompanionPad::Item& tensor, Image<Flow>& flow) {
+/// Copies a tensor of the size of `flow`.
+static void copy_flow(const CompanionPad::Item& tensor, Image<Flow>& flow) {
   const auto expected = "2:" + std::to_string(flow.width()) + ":" + std::to_string(flow.height());
   const char* dimensions =
       gst_structure_get_string(gst_caps_get_structure(tensor.caps.get(), 0), "dimensions");
@@ -52,4 +56,42 @@ void copy_flow(const CompanionPad::Item& tensor, Image<Flow>& flow) {
       return Flow{limited(pixel.x), limited(pixel.y)};
     });
   }
+}
+
+/// True if a tensor is the flow of an interval: it starts with it, and ends with it if it has a
+/// duration, which it would not after frames were skipped.
+static bool is_flow_of(const CompanionPad::Item& tensor, Nanoseconds running_start,
+                       Nanoseconds duration) {
+  if (std::abs(tensor.time - running_start) >= Nanoseconds{event_resolution}) return false;
+  const GstClockTime own = GST_BUFFER_DURATION(tensor.buffer.get());
+  return !GST_CLOCK_TIME_IS_VALID(own) || (own < static_cast<GstClockTime>(duration) * 3 / 2 &&
+                                           own > static_cast<GstClockTime>(duration) / 2);
+}
+
+bool FlowTensors::give(GstElement* element, IntervalSimulator& simulator, const GstSegment& segment,
+                       const GstVideoInfo& video, Nanoseconds start, Nanoseconds end) {
+  const auto time = running_time_of(segment, static_cast<GstClockTime>(start));
+  if (!time || !is_linked() || !simulator.needs_flow()) return true;
+  const auto found = items(*time, *time);
+  if (!found) return false;
+  if (found->empty() || !is_flow_of(found->back(), *time, end - start)) {
+    warn_of_no_flow_(
+        element,
+        {GST_STREAM_ERROR_FORMAT,
+         "The optical flow of a frame is missing: finding it here. Send the flow to the next frame "
+         "with the timestamp and the duration of each frame."},
+        "no matching buffer on flow_sink");
+    return true;
+  }
+  const int width = GST_VIDEO_INFO_WIDTH(&video);
+  const int height = GST_VIDEO_INFO_HEIGHT(&video);
+  if (flow_.width() != width || flow_.height() != height) flow_ = {width, height};
+  copy_flow(found->back(), flow_);
+  simulator.give_flow(flow_.view());
+  return true;
+}
+
+void FlowTensors::reset() {
+  flow_ = {};
+  warn_of_no_flow_.reset();
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/simulator/frame_clock.hpp"
 
+#include <string>
+
 #include "gst/base/video_frame.hpp"
 
 static bool has_live_source(GstBaseTransform* element) {
@@ -22,24 +24,32 @@ std::optional<GstClockTime> FrameClock::time_of_arrival(GstBaseTransform* elemen
   return position;
 }
 
-FrameClock::Source FrameClock::stamp(GstBaseTransform* element, const GstVideoInfo& video,
-                                     OwnedBuffer& frame) {
+bool FrameClock::stamp(GstBaseTransform* element, const GstVideoInfo& video, OwnedBuffer& frame) {
   const GstClockTime duration = frame_duration(video);
-  Source source = Source::upstream;
   GstClockTime time = GST_BUFFER_PTS(frame.get());
   if (!GST_CLOCK_TIME_IS_VALID(time)) {
+    const char* text =
+        "The video has neither timestamps nor a framerate, so there are no events. Set the PTS of "
+        "its buffers, or a framerate in its caps.";
     if (const auto arrival = time_of_arrival(element)) {
-      source = Source::arrival;
       time = *arrival;
+      text =
+          "The video has no timestamps: using the arrival times of its frames. Set "
+          "do-timestamp=true on the source, or the PTS of its buffers.";
     } else if (duration > 0) {
-      source = Source::framerate;
       time = next_.value_or(element->segment.start);
-    } else {
-      return Source::nowhere;
+      text =
+          "The video has no timestamps: using its framerate. Set the PTS of its buffers if frames "
+          "are not evenly spaced.";
     }
+    warn_of_no_pts_(element, {GST_STREAM_ERROR_FORMAT, text},
+                    "a buffer has no PTS; the framerate in the caps is " +
+                        std::to_string(GST_VIDEO_INFO_FPS_N(&video)) + "/" +
+                        std::to_string(GST_VIDEO_INFO_FPS_D(&video)));
+    if (!GST_CLOCK_TIME_IS_VALID(time)) return false;
     frame.reset(gst_buffer_make_writable(frame.release()));
     GST_BUFFER_PTS(frame.get()) = time;
   }
   next_ = time + duration;
-  return source;
+  return true;
 }
