@@ -143,8 +143,14 @@ class RecordingDecoder {
   /// Time of the last event or frame, if the file states it.
   virtual std::optional<Microseconds> last_time() { return std::nullopt; }
 
-  /// True if the file states that a stream has no items.
-  virtual bool is_empty(std::size_t /*stream*/) const { return false; }
+  /// Position from which on a stream has no items before `t`, if the file states it; 0 if it has
+  /// none at all.
+  virtual std::optional<std::uint64_t> end_of(std::size_t /*stream*/, Microseconds /*t*/) const {
+    return std::nullopt;
+  }
+
+  /// Position of what is read next, if the file states where streams end.
+  virtual std::uint64_t position() const { return 0; }
 
   /// False if the next items may belong to further streams.
   virtual bool knows_all_streams() const { return true; }

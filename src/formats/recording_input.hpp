@@ -60,6 +60,11 @@ class RecordingInput {
   /// As RecordingDecoder::seek_point_before(). May be called from any thread.
   std::optional<SeekPoint> seek_point_before(Microseconds t) const;
 
+  /// True if all items before this position in the file were returned.
+  bool has_passed(std::uint64_t position) const {
+    return held_.size() == 0 && decoder_->position() >= position;
+  }
+
   RecordingDecoder& decoder() { return *decoder_; }
   const RecordingDecoder& decoder() const { return *decoder_; }
 

@@ -150,8 +150,10 @@ void RecordingReader::begin_segment(Microseconds start, std::optional<Microsecon
   triggers_.clear();
   imu_samples_.clear();
   counts_ = {};
-  for (auto& stream : streams_) {
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    auto& stream = streams_[i];
     stream.position = start;
+    stream.end = begun_ && stop ? input_.decoder().end_of(i, origin_ + *stop) : std::nullopt;
     stream.outside = 0;
     stream.chunker =
         begun_ ? Chunker(chunk_length_, origin_ + start, origin_) : Chunker(chunk_length_);
@@ -359,19 +361,22 @@ std::optional<RecordingReader::Chunk> RecordingReader::next_chunk(std::size_t in
   return std::nullopt;
 }
 
-/// A gap in a stream that lags far behind the newest item, so that others need not wait for it
-/// long; before it, the events that wait. Its later items are still returned: the streams of some
-/// files are written one after the other.
+/// A gap in a stream that has ended before the end of the segment, or lags far behind the newest
+/// item, so that others need not wait for it long; before it, the events that wait. Later items of
+/// one that lags are still returned: the streams of some files are written one after the other.
 std::optional<RecordingReader::Chunk> RecordingReader::next_gap() {
-  const auto silent_until = newest_ - std::max(max_lag, chunk_length_);
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     auto& stream = streams_[i];
-    if (!stream.shown || silent_until - stream.position < min_gap) continue;
-    stream.chunker.pause(origin_ + silent_until);
+    if (!stream.shown) continue;
+    const bool has_ended = stream.end && input_.has_passed(*stream.end);
+    const auto until = has_ended ? *stop_ : newest_ - std::max(max_lag, chunk_length_);
+    if (until - stream.position < (has_ended ? 1 : min_gap)) continue;
+    stream.chunker.pause(origin_ + until);
     if (const auto chunk = next_chunk(i)) return chunk;
     const auto start = stream.position;
-    if (silent_until > start && advance(stream, start, silent_until))
-      return Chunk{i, start, silent_until - start, {}};
+    if (until <= start || (!has_ended && !advance(stream, start, until))) continue;
+    stream.position = until;
+    return Chunk{i, start, until - start, {}};
   }
   return std::nullopt;
 }
@@ -395,10 +400,9 @@ bool RecordingReader::advance(Stream& stream, Microseconds start, Microseconds e
 
 bool RecordingReader::is_past_stop() const {
   if (!stop_ || !begun_) return false;
-  for (std::size_t i = 0; i < streams_.size(); ++i)
-    if (streams_[i].shown && streams_[i].position < *stop_ && !input_.decoder().is_empty(i))
-      return false;
-  return true;
+  return std::ranges::all_of(streams_, [this](const Stream& stream) {
+    return !stream.shown || stream.position >= *stop_;
+  });
 }
 
 void RecordingReader::finish_chunkers() {

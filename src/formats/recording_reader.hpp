@@ -48,6 +48,7 @@ class RecordingReader {
     unsigned number = 0;                    ///< index among streams of its kind
     bool shown = false;                     ///< it has items, or may have some
     Microseconds position = 0;              ///< end of its items and gaps so far
+    std::optional<std::uint64_t> end = {};  ///< of its part of the segment in the file, if known
     std::uint64_t outside = 0;              ///< events outside a size not stated in the file
     std::optional<Frame> first_frame = {};  ///< format only: its pixels are no longer valid
     bool is_implausible = false;            ///< no sensor is so large as an assumed one had to be

@@ -85,7 +85,7 @@ bool RecordingSurvey::is_origin_known(const RecordingInput& input) {
   for (std::size_t i = 0; i < known.size(); ++i) {
     const auto& surveyed = stream(i);
     if (!surveyed.first) {
-      awaited |= is_shown(known[i].kind) && !input.decoder().is_empty(i);
+      awaited |= is_shown(known[i].kind) && input.decoder().end_of(i, Chunker::max_time) != 0;
       continue;
     }
     const bool of_events = known[i].kind == StreamKind::events;

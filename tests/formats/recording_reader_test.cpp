@@ -321,6 +321,67 @@ TEST(RecordingReader, ReadsStreamsThatAreWrittenOneAfterTheOther) {
   }
 }
 
+/// File that is read in small pieces, and tells how far.
+class WatchedBytes final : public ByteSource {
+ public:
+  explicit WatchedBytes(const Bytes& bytes) : bytes_(bytes) {}
+
+  std::uint64_t size() const override { return bytes_.size(); }
+  std::optional<std::size_t> read(std::uint64_t position,
+                                  std::span<std::uint8_t> out) noexcept override {
+    return bytes_.read(position, out);
+  }
+  std::optional<std::span<const std::uint8_t>> piece(std::uint64_t position) override {
+    const auto piece =
+        bytes_.piece(position)->first(std::min<std::uint64_t>(size() - position, 4096));
+    end = std::max(end, position + piece.size());
+    return piece;
+  }
+
+  std::uint64_t end = 0;
+
+ private:
+  MemoryBytes bytes_;
+};
+
+/// The index of the file tells that a stream has no more items in the segment.
+TEST(RecordingReader, DoesNotReadOnWhileAStreamIsSilent) {
+  const auto all = some_events();
+  struct Case {
+    std::size_t events;
+    int frames;  ///< one every 10 ms
+    Microseconds stop;
+  };
+  for (const auto& [count, frames, stop] :
+       {Case{all.size(), 3, 200'000}, Case{1'010, 300, 500'000}}) {
+    Aedat4Encoder encoder({sensor, "a camera", Aedat4Compression::none, true, true});
+    Bytes bytes;
+    const std::vector events(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
+    for (int i = 0; i < frames; ++i) {
+      const auto t = all.front().t + i * 10'000;
+      const Bytes pixels(64 * 48, static_cast<std::uint8_t>(i));
+      encoder.encode(from(events, t, t + 10'000), bytes);
+      encoder.encode({t, t, t, t, t, PixelFormat::grey8, 64, 48, 0, 0, pixels.data(), 64}, bytes);
+    }
+    encoder.encode(from(events, all.front().t + frames * 10'000, all.back().t + 1), bytes);
+    encoder.finish(bytes);
+    const auto patch = encoder.patch();
+    std::ranges::copy(patch->bytes, bytes.begin() + static_cast<std::ptrdiff_t>(patch->position));
+
+    WatchedBytes source(bytes);
+    RecordingReader reader([] { return std::make_unique<AedatDecoder>(); }, chunk_length);
+    reader.open(source);
+    reader.seek(0, stop);
+    Outcome outcome;
+    outcome.take_all(reader);
+    EXPECT_TRUE(reader.is_past_stop());
+    EXPECT_EQ(outcome.events(reader.origin()), from(events, all.front().t, all.front().t + stop));
+    EXPECT_EQ(outcome.pictures.size(),
+              static_cast<std::size_t>(std::min<Microseconds>(frames, stop / 10'000)));
+    EXPECT_LT(source.end, bytes.size() / 2);
+  }
+}
+
 TEST(RecordingReader, TriggersPrecedeTheChunkOfTheirInterval) {
   const auto events = some_events();
   std::vector<Trigger> triggers{{1'900'000, 3, true}};  // before the origin

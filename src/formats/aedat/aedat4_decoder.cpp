@@ -168,10 +168,13 @@ std::optional<Microseconds> Aedat4Decoder::last_time() {
   return last;
 }
 
-bool Aedat4Decoder::is_empty(std::size_t stream) const {
-  return !table_.empty() && std::ranges::none_of(table_, [&](const Aedat4TableEntry& entry) {
-    return entry.stream == streams_[stream].id;
-  });
+std::optional<std::uint64_t> Aedat4Decoder::end_of(std::size_t stream, Microseconds t) const {
+  if (table_.empty()) return std::nullopt;
+  std::uint64_t end = 0;
+  for (const auto& entry : table_)
+    if (entry.stream == streams_[stream].id && entry.start < t)
+      end = std::max(end, entry.position + 1);
+  return end;
 }
 
 Aedat4Decoder::Place Aedat4Decoder::place_at(std::size_t offset) {

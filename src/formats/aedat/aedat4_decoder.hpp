@@ -40,7 +40,8 @@ class Aedat4Decoder final : public RecordingDecoder {
   std::optional<SeekPoint> seek_point_before(Microseconds t) const override;
   void restart(const SeekPoint& seek_point) override { resume(seek_point.position); }
   std::optional<Microseconds> last_time() override;
-  bool is_empty(std::size_t stream) const override;
+  std::optional<std::uint64_t> end_of(std::size_t stream, Microseconds t) const override;
+  std::uint64_t position() const override { return queue_.position(); }
   std::string format_name() const override { return "AEDAT 4.0"; }
 
   /// Continues at `position`, the start of a packet. The header must have been read.

@@ -92,8 +92,12 @@ std::optional<Microseconds> AedatDecoder::last_time() {
   return reader_ ? reader_->last_time() : std::nullopt;
 }
 
-bool AedatDecoder::is_empty(std::size_t stream) const {
-  return reader_ && reader_->is_empty(stream);
+std::optional<std::uint64_t> AedatDecoder::end_of(std::size_t stream, Microseconds t) const {
+  return reader_ ? reader_->end_of(stream, t) : std::nullopt;
+}
+
+std::uint64_t AedatDecoder::position() const {
+  return reader_ ? reader_->position() : 0;
 }
 
 std::string AedatDecoder::format_name() const {

@@ -25,7 +25,8 @@ class AedatDecoder final : public RecordingDecoder {
   std::optional<SeekPoint> seek_point_before(Microseconds t) const override;
   void restart(const SeekPoint& seek_point) override;
   std::optional<Microseconds> last_time() override;
-  bool is_empty(std::size_t stream) const override;
+  std::optional<std::uint64_t> end_of(std::size_t stream, Microseconds t) const override;
+  std::uint64_t position() const override;
   std::string format_name() const override;
 
   /// The AEDAT 4 decoder; null if the file is not AEDAT 4, or not yet known to be.
