@@ -234,6 +234,23 @@ TEST_F(Tensor, GoesOnWithCapsOfTheSameSize) {
   expect_tensor(0, 50 * ms, 0, 10);
 }
 
+TEST_F(Tensor, TellsWhatToSetForTheTensorsThatDownstreamWants) {
+  const std::pair<const char*, const char*> wishes[] = {
+      {"types=uint8", "types=uint8 (set data-type)."},
+      {"dimensions=32:24:2:1",
+       "dimensions=32:24:2:1 (set representation or bins, or scale the events)."},
+      {"types=float16, framerate=30/1",
+       "types=float16 (set data-type), framerate=30/1 (set accumulation-time, frame-count or "
+       "overlap)."}};
+  for (const auto& [caps, wish] : wishes) {
+    h.emplace("eventtensor");
+    gst_harness_set_sink_caps_str(h->get(), (std::string("other/tensors, ") + caps).c_str());
+    gst_harness_set_src_caps_str(h->get(), events_caps.c_str());
+    EXPECT_EQ(h->push(buffer_of(0, column(0), 10 * ms)), GST_FLOW_NOT_NEGOTIATED);
+    EXPECT_EQ(h->error(), std::string("Downstream wants other tensors: ") + wish);
+  }
+}
+
 TEST_F(Tensor, RefusesToBeHuge) {
   h.emplace("eventtensor bins=256");
   gst_harness_set_src_caps_str(

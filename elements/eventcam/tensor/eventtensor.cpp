@@ -357,6 +357,41 @@ static OwnedCaps caps_of(const State& state) {
       GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
 }
 
+/// Fields of the caps, and what determines them.
+constexpr std::pair<const char*, const char*> advice[] = {
+    {"types", "set data-type"},
+    {"dimensions", "set representation or bins, or scale the events"},
+    {"framerate", "set accumulation-time, frame-count or overlap"}};
+
+/// The fields in which `wanted` differs from fixed caps, and what to do about it.
+static std::string wishes_of(GstCaps* wanted, GstCaps* made) {
+  std::string wishes;
+  if (gst_caps_get_size(wanted) == 0) return wishes;
+  for (const auto& [field, remedy] : advice) {
+    const auto* value = gst_structure_get_value(gst_caps_get_structure(wanted, 0), field);
+    if (value == nullptr ||
+        gst_value_intersect(nullptr, value,
+                            gst_structure_get_value(gst_caps_get_structure(made, 0), field)))
+      continue;
+    gchar* const text = gst_value_serialize(value);
+    wishes +=
+        (wishes.empty() ? ": " : ", ") + (std::string(field) + "=") + text + " (" + remedy + ")";
+    g_free(text);
+  }
+  return wishes;
+}
+
+/// False, after an error message, if downstream takes only other tensors.
+static bool are_wanted(GstEventTensor* self, GstCaps* caps) {
+  const OwnedCaps wanted(gst_pad_peer_query_caps(self->priv->src, nullptr));
+  if (gst_caps_can_intersect(wanted.get(), caps)) return true;
+  GST_ELEMENT_ERROR(
+      self, STREAM, FORMAT,
+      ("Downstream wants other tensors%s.", wishes_of(wanted.get(), caps).c_str()),
+      ("downstream takes %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps));
+  return false;
+}
+
 /// Starts over for a sensor. May throw.
 static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   auto& priv = *self->priv;
@@ -395,6 +430,7 @@ static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
   const OwnedCaps out = caps_of(*priv.state);
   GST_DEBUG_OBJECT(self, "events of %dx%d pixels become %" GST_PTR_FORMAT, info.width, info.height,
                    out.get());
+  if (!are_wanted(self, out.get())) return FALSE;
   const gboolean taken = gst_pad_push_event(priv.src, gst_event_new_caps(out.get()));
   gst_element_post_message(GST_ELEMENT(self), gst_message_new_latency(GST_OBJECT(self)));
   return taken;
