@@ -315,6 +315,46 @@ TEST_F(MergeTest, MergesByTimestamps) {
   EXPECT_EQ(segment.stop, GST_CLOCK_TIME_NONE);
 }
 
+TEST_F(MergeTest, IsDiscontinuousWhereAStreamIs) {
+  begin();
+  push(a(), 0, {on(1, 0, 1)});
+  push(b(), 0, {on(2, 0, 2)});
+  push(a(), 10 * ms, {on(1, 0, 1)});
+  GstBuffer* const discontinuous = buffer_of(25 * ms, {on(2, 0, 2)}, 5 * ms);
+  GST_BUFFER_FLAG_SET(discontinuous, GST_BUFFER_FLAG_DISCONT);
+  gst_harness_push(b(), discontinuous);
+  push(a(), 20 * ms, {on(1, 0, 1)});
+  push(a(), 30 * ms, {on(1, 0, 1)});
+  push(b(), 30 * ms, {on(2, 0, 2)});
+  for (const GstClockTime start : {0, 10, 20, 30}) {
+    const Buffer buffer(gst_harness_pull(a()));
+    ASSERT_TRUE(buffer);
+    EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), start * ms);
+    EXPECT_EQ(GST_BUFFER_IS_DISCONT(buffer.get()) != FALSE, start == 0 || start == 20) << start;
+  }
+}
+
+/// A GAP cannot tell it.
+TEST_F(MergeTest, IsDiscontinuousAfterAGapWhereAStreamIs) {
+  begin();
+  push(a(), 0, {on(1, 0, 1)});
+  push_gap(b(), 0);
+  GstBuffer* const discontinuous = buffer_of(10 * ms, {}, 10 * ms);
+  GST_BUFFER_FLAG_SET(discontinuous, GST_BUFFER_FLAG_DISCONT);
+  gst_harness_push(a(), discontinuous);
+  push_gap(b(), 10 * ms);
+  for (const GstClockTime start : {20, 30}) {
+    push(a(), start * ms, {on(1, 0, 1)});
+    push_gap(b(), start * ms);
+  }
+  for (const GstClockTime start : {0, 20, 30}) {
+    const Buffer buffer(gst_harness_pull(a()));
+    ASSERT_TRUE(buffer);
+    EXPECT_EQ(GST_BUFFER_PTS(buffer.get()), start * ms);
+    EXPECT_EQ(GST_BUFFER_IS_DISCONT(buffer.get()) != FALSE, start < 30) << start;
+  }
+}
+
 TEST_F(MergeTest, KeepsLabels) {
   begin();
   GstBuffer* const labelled = buffer_of(0, {on(1, 0, 1), on(2, 0, 3)}, 10 * ms);

@@ -10,7 +10,8 @@
  *
  * Streams are merged by their timestamps, which do not change: recordings of two cameras with one
  * clock stay synchronized. The output has the segment of the stream that starts first. Events of
- * one microsecond are in the order of the pads. Labels stay with their events. A seek must flush.
+ * one microsecond are in the order of the pads. Labels stay with their events. Where a stream is
+ * flagged DISCONT, so is the output. A seek must flush.
  *
  * Readers of recordings are linked to the pads in any order: name the pads, as in `m.sink_1`, to
  * place their sensors. The output starts once #GstEventMerge:min-streams streams are linked, and an
@@ -126,7 +127,8 @@ class EventMerge final : public EventAggregator {
   GstClockTime latency_ = 0;
   bool segment_chosen_ = false;
   bool segment_sent_ = false;
-  gint64 waiting_since_ = 0;  // for streams, monotonic time in microseconds; 0 = it does not
+  bool discontinuous_ = true;  // the next buffer is
+  gint64 waiting_since_ = 0;   // for streams, monotonic time in microseconds; 0 = it does not
   WarnOnce warn_of_late_{GST_CAT_DEFAULT};
   WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
@@ -188,6 +190,7 @@ bool EventMerge::load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer,
 bool EventMerge::load(const OwnedAggregatorPad& pad) {
   auto& stream = stream_of(pad);
   while (const OwnedBuffer buffer{gst_aggregator_pad_peek_buffer(pad.get())}) {
+    if (stream.loaded != buffer) stream.discontinuous |= GST_BUFFER_IS_DISCONT(buffer.get());
     if (const auto interval = interval_of(buffer.get())) {
       const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
       const auto end = static_cast<Microseconds>(interval->end / GST_USECOND);
@@ -248,6 +251,7 @@ GstFlowReturn EventMerge::push_gap(GstClockTime start, GstClockTime duration) {
   GST_BUFFER_DURATION(empty.get()) = duration;
   GST_BUFFER_FLAG_SET(empty.get(), GST_BUFFER_FLAG_GAP | GST_BUFFER_FLAG_DISCONT);
   segment_sent_ = true;
+  discontinuous_ = false;
   return gst_aggregator_finish_buffer(element(), empty.release());
 }
 
@@ -270,7 +274,8 @@ GstFlowReturn EventMerge::push(const MergedInterval& interval, EventMerger::Inpu
   gst_buffer_unmap(buffer.get(), &map);
   GST_BUFFER_PTS(buffer.get()) = start;
   GST_BUFFER_DURATION(buffer.get()) = duration;
-  if (!std::exchange(segment_sent_, true))
+  segment_sent_ = true;
+  if (std::exchange(discontinuous_, false))
     GST_BUFFER_FLAG_SET(buffer.get(), GST_BUFFER_FLAG_DISCONT);
   GST_LOG_OBJECT(element(), "%" G_GSIZE_FORMAT " events at %" GST_TIME_FORMAT, interval.events,
                  GST_TIME_ARGS(start));
@@ -301,6 +306,11 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
   if (!std::exchange(segment_chosen_, true)) choose_segment(pads);
   const auto interval = merger_.next(inputs);
   count(interval);
+  for (const auto& pad : pads) {
+    auto& stream = stream_of(pad);
+    if (stream.input.is_loaded() && stream.input.start() < interval.end)
+      discontinuous_ |= std::exchange(stream.discontinuous, false);
+  }
   const GstFlowReturn result = push(interval, inputs);
   for (const auto& pad : pads) {
     auto& stream = stream_of(pad);
@@ -388,10 +398,12 @@ void EventMerge::flush() {
   for (const auto& pad : numbered_pads(element())) {
     stream_of(pad).input.unload();
     stream_of(pad).loaded.reset();
+    stream_of(pad).discontinuous = false;
   }
   merger_.restart();
   segment_chosen_ = false;
   segment_sent_ = false;
+  discontinuous_ = true;
   waiting_since_ = 0;
 }
 

@@ -27,7 +27,8 @@ struct GstEventMergePadPrivate {
   eventcamera::SensorSize sensor;  ///< 0x0 before caps
   SensorPosition placed;           ///< position in the negotiated output
   eventcamera::MergeInput input;
-  OwnedBuffer loaded;  ///< queued buffer whose events `input` has
+  OwnedBuffer loaded;          ///< queued buffer whose events `input` has
+  bool discontinuous = false;  ///< its start, or that of a buffer dropped before it
 };
 
 struct _GstEventMergePad {
