@@ -105,6 +105,11 @@ class Harness {
       : Harness((gst_init(nullptr, nullptr), gst_harness_new_parse(with_upload(launch).c_str())),
                 launch) {}
 
+  /// For pads that are not the only ones of the element.
+  Harness(const char* element, const char* sink, const char* src)
+      : Harness((gst_init(nullptr, nullptr), gst_harness_new_with_padnames(element, sink, src)),
+                element) {}
+
   /// For elements whose source pad appears with its first output.
   static GstHarness* with_late_pad(const std::string& launch) {
     gst_init(nullptr, nullptr);
@@ -191,6 +196,13 @@ class Harness {
   }
 
   GstFlowReturn push(GstBuffer* buffer) { return gst_harness_push(h_.get(), buffer); }
+
+  /// Waits until an aggregator has handled the events that were pushed.
+  void wait_for_events() {
+    GstQuery* const query = gst_query_new_allocation(nullptr, FALSE);
+    gst_pad_peer_query(h_->srcpad, query);
+    gst_query_unref(query);
+  }
 
   /// The next output buffer, or null.
   Buffer pull() { return Buffer(gst_harness_try_pull(h_.get())); }

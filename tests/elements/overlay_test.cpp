@@ -190,6 +190,16 @@ TEST(LiveOverlay, GoesOnWhereNoEventsAreLinked) {
   EXPECT_EQ(pipeline.stat("sink", "rendered"), 10U);
 }
 
+TEST(Overlay, AsksOnceForTheEventsThatAreMissing) {
+  Harness h("eventoverlay", "video_sink", "src");
+  for (const char* size : {"width=8, height=4", "width=4, height=8"})
+    gst_harness_set_src_caps_str(
+        h.get(), (std::string("video/x-raw, format=GRAY8, framerate=25/1, ") + size).c_str());
+  h.wait_for_events();
+  EXPECT_NE(h.warning().find("link a source of events"), std::string::npos);
+  EXPECT_EQ(h.warning(), "");
+}
+
 TEST_F(OverlayTest, LeavesEventsBeyondTheSensorOut) {
   begin("width=8, height=4");
   push_frame(0);

@@ -81,6 +81,7 @@ class EventOverlay final : public EventAggregator {
   std::optional<Overlay> overlay_;  // set once both are known
   gsize taken_ = 0;                 // number of processed events of the first queued buffer
   GstClockTime known_ = 0;          // running time up to which events are complete
+  WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
 
 /* time */
@@ -230,11 +231,11 @@ bool EventOverlay::take_video_caps(const GstCaps* caps) {
   GST_DEBUG_OBJECT(element(), "latency %" GST_TIME_FORMAT ", one frame", GST_TIME_ARGS(latency));
   gst_aggregator_set_latency(element(), latency, latency);
   if (!gst_pad_is_linked(GST_PAD(events_pad_)))
-    GST_ELEMENT_WARNING(
-        element(), CORE, PAD,
-        ("No events to draw: link a source of events to the pad \"event_sink\". Until "
-         "then, video from a live source passes unchanged, and other video waits."),
-        ("the pad \"event_sink\" is not linked"));
+    warn_of_missing_(element(),
+                     {GST_CORE_ERROR_PAD,
+                      "No events to draw: link a source of events to the pad \"event_sink\". Until "
+                      "then, video from a live source passes unchanged, and other video waits."},
+                     "the pad \"event_sink\" is not linked");
   return true;
 }
 
@@ -261,6 +262,7 @@ void EventOverlay::stop() {
   flush();
   video_.reset();
   sensor_.reset();
+  warn_of_missing_.reset();
 }
 
 }  // namespace

@@ -104,6 +104,7 @@ class EventCompare final : public EventAggregator {
   PerRole<std::optional<SensorSize>> sensors_;
   std::optional<StreamComparison> comparison_;  // set once both sensors are known
   bool concluded_ = true;                       // no events since the last report
+  WarnOnce warn_of_missing_{GST_CAT_DEFAULT};
 };
 
 /* figures */
@@ -297,10 +298,11 @@ bool EventCompare::take_caps(GstAggregatorPad* pad, GstCaps* caps) {
   if (sensor == next) return true;
   for (GstAggregatorPad* other : {pads_[StreamRole::reference], pads_[StreamRole::candidate]})
     if (!gst_pad_is_linked(GST_PAD(other)))
-      GST_ELEMENT_WARNING(
-          element(), CORE, PAD,
-          ("Nothing to compare with: link a stream to the pad \"%s\".", GST_OBJECT_NAME(other)),
-          ("the pad \"%s\" is not linked", GST_OBJECT_NAME(other)));
+      warn_of_missing_(
+          element(),
+          {GST_CORE_ERROR_PAD, std::string("Nothing to compare with: link a stream to the pad \"") +
+                                   GST_OBJECT_NAME(other) + "\"."},
+          "the pad is not linked");
   const bool has_begun = comparison_.has_value();
   if (has_begun && !concluded_) conclude();
   flush();
@@ -314,6 +316,7 @@ void EventCompare::stop() {
   if (comparison_ && !concluded_) conclude();
   flush();
   sensors_ = {};
+  warn_of_missing_.reset();
 }
 
 }  // namespace
