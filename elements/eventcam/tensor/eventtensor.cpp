@@ -385,10 +385,13 @@ static std::string wishes_of(GstCaps* wanted, GstCaps* made) {
 static bool are_wanted(GstEventTensor* self, GstCaps* caps) {
   const OwnedCaps wanted(gst_pad_peer_query_caps(self->priv->src, nullptr));
   if (gst_caps_can_intersect(wanted.get(), caps)) return true;
-  GST_ELEMENT_ERROR(
-      self, STREAM, FORMAT,
-      ("Downstream wants other tensors%s.", wishes_of(wanted.get(), caps).c_str()),
-      ("downstream takes %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps));
+  gchar* const cause = gst_info_strdup_printf(
+      "downstream takes %" GST_PTR_FORMAT ", not %" GST_PTR_FORMAT, wanted.get(), caps);
+  post_message(self, GST_MESSAGE_ERROR,
+               {GST_STREAM_ERROR_FORMAT,
+                "Downstream wants other tensors" + wishes_of(wanted.get(), caps) + "."},
+               cause);
+  g_free(cause);
   return false;
 }
 
