@@ -91,10 +91,13 @@ void MotionTiles::Cells::measure(const ImageView<Pixel>& frame, ThreadPool& thre
   threads.for_each(rows, [&](int row, int) {
     const int top = row * side;
     const int bottom = std::min(top + side, frame.height);
-    if constexpr (sizeof(Pixel) == 1) HWY_DYNAMIC_DISPATCH(find_ranges_8)
-    (frame, top, bottom, side, darkest.row(row), brightest.row(row));
-    else HWY_DYNAMIC_DISPATCH(find_ranges_16)(frame, top, bottom, side, darkest.row(row),
-                                              brightest.row(row));
+    if constexpr (sizeof(Pixel) == 1) {
+      HWY_DYNAMIC_DISPATCH(find_ranges_8)
+      (frame, top, bottom, side, darkest.row(row), brightest.row(row));
+    } else {
+      HWY_DYNAMIC_DISPATCH(find_ranges_16)
+      (frame, top, bottom, side, darkest.row(row), brightest.row(row));
+    }
   });
 }
 

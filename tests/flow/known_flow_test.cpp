@@ -11,9 +11,9 @@
 #include <random>
 
 #include "src/flow/dense_flow.hpp"
-#include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "tests/flow/opencv_farneback.hpp"
 #include "tests/flow/opencv_tracks.hpp"
+#include "tests/flow/tracks_between.hpp"
 #include "tests/reference/diff.hpp"
 #include "tests/reference/sparse.hpp"
 
@@ -146,11 +146,7 @@ class TrackComparison {
   void add(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
            std::vector<Point> points) {
     std::erase_if(points, [&](const Point& p) { return !ends_inside(sequence_, p.x, p.y); });
-    PointTracker tracker(block_side_);
-    ThreadPool threads;
-    tracker.push(from.view(), threads);
-    tracker.push(to.view(), threads);
-    const auto ours = tracker.track(points, threads);
+    const auto ours = tracks_between(from, to, points, block_side_);
     const auto theirs = opencv_tracks(from, to, points);
     for (std::size_t i = 0; i < points.size(); ++i) {
       found_by_us_ += ours[i].found ? 1 : 0;

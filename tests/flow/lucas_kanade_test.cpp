@@ -11,6 +11,7 @@
 
 #include "src/flow/lucas_kanade/point_tracker.hpp"
 #include "tests/core/targets.hpp"
+#include "tests/flow/tracks_between.hpp"
 #include "tests/reference/lucas_kanade.hpp"
 #include "tests/simulate/scene.hpp"
 
@@ -169,11 +170,7 @@ TEST_P(EverySize, TracksEqualTheReference) {
     for (int x = 0; x < width; ++x)
       if ((x + 2) % 42 < 4 && (y + 2) % 65 < 3) points.push_back({x, y});
   for (const int block_side : {1, 2}) {
-    ThreadPool threads;
-    PointTracker tracker(block_side);
-    tracker.push(from.view(), threads);
-    tracker.push(to.view(), threads);
-    const auto tracks = tracker.track(points, threads);
+    const auto tracks = tracks_between(from, to, points, block_side);
     const auto expected = reference::tracks(from, to, points, block_side);
     for (std::size_t i = 0; i < points.size(); ++i) {
       SCOPED_TRACE(testing::Message()
@@ -219,13 +216,7 @@ TEST(PointTracker, DoesNotDependOnThreads) {
   for (int y = 0; y < 150; ++y)
     for (int x = 0; x < 200; ++x) points.push_back({x, y});
   const auto tracks = [&](int block_side, int count) {
-    ThreadPool threads;
-    threads.set_threads(count);
-    PointTracker tracker(block_side);
-    tracker.push(from.view(), threads);
-    tracker.push(to.view(), threads);
-    const auto found = tracker.track(points, threads);
-    return std::vector<Track>(found.begin(), found.end());
+    return tracks_between(from, to, points, block_side, count);
   };
   for (const int block_side : {1, 2}) {
     const auto one = tracks(block_side, 1);

@@ -23,6 +23,7 @@
 #include "tests/flow/opencv_dis.hpp"
 #include "tests/flow/opencv_farneback.hpp"
 #include "tests/flow/opencv_tracks.hpp"
+#include "tests/flow/tracks_between.hpp"
 #include "tests/pipelines/video_frames.hpp"
 #include "tests/reference/dense.hpp"
 #include "tests/reference/diff.hpp"
@@ -170,11 +171,7 @@ struct Residuals {
 
   void add(const Image<std::uint8_t>& from, const Image<std::uint8_t>& to,
            const std::vector<Point>& points) {
-    PointTracker tracker(block_side);
-    ThreadPool threads;
-    tracker.push(from.view(), threads);
-    tracker.push(to.view(), threads);
-    const auto found = tracker.track(points, threads);
+    const auto found = tracks_between(from, to, points, block_side);
     const auto theirs = opencv_tracks(from, to, points);
     const auto texture = min_slopes(from);
     for (std::size_t i = 0; i < points.size(); ++i) {
