@@ -140,16 +140,12 @@ struct EventAggregatorFunctions {
     return true;
   }
 
-  static bool take_segment(EventAggregator& self, GstAggregatorPad* pad, GstEvent* event) {
-    const GstSegment* segment = nullptr;
-    gst_event_parse_segment(event, &segment);
-    if (!plays_events(self.element_, *segment, self.role_.verb)) return false;
-    GST_DEBUG_OBJECT(pad, "%" GST_SEGMENT_FORMAT, segment);
-    if (pad == self.main_pad_) {
-      self.take_segment(*segment);
-      gst_aggregator_update_segment(self.element_, segment);
-    }
-    return true;
+  static void take_segment(EventAggregator& self, GstAggregatorPad* pad,
+                           const GstSegment& segment) {
+    GST_DEBUG_OBJECT(pad, "%" GST_SEGMENT_FORMAT, &segment);
+    if (pad != self.main_pad_) return;
+    self.take_segment(segment);
+    gst_aggregator_update_segment(self.element_, &segment);
   }
 
   static gboolean sink_event(GstAggregator* element, GstAggregatorPad* pad, GstEvent* event) {
@@ -159,10 +155,12 @@ struct EventAggregatorFunctions {
       gst_event_unref(event);
       return taken ? TRUE : FALSE;
     }
-    if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT &&
-        !guard(self, [&] { return take_segment(self, pad, event); })) {
-      gst_event_unref(event);
-      return FALSE;
+    if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT) {
+      if (!plays_events(element, event, self.role_.verb)) return FALSE;
+      if (!guard(self, [&] { take_segment(self, pad, segment_of(event)); })) {
+        gst_event_unref(event);
+        return FALSE;
+      }
     }
     if (GST_EVENT_TYPE(event) == GST_EVENT_TAG && pad == self.main_pad_)
       self.tags_.emplace_back(gst_event_ref(event));  // GstAggregator drops it

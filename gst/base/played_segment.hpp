@@ -8,29 +8,40 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
 
-/// True if events of a segment can be used: it has times, and a positive rate. Else posts an error
-/// message of `element`, which says what it cannot do: `verb` events, such as "merge".
-inline bool plays_events(gpointer element, const GstSegment& segment, const char* verb) {
-  const auto refuse = [&](const Report& report) {
-    gchar* const cause = gst_info_strdup_printf("segment %" GST_SEGMENT_FORMAT, &segment);
-    post_message(element, GST_MESSAGE_ERROR, report, cause);
-    g_free(cause);
-    return false;
-  };
-  if (segment.format != GST_FORMAT_TIME)
-    return refuse({GST_STREAM_ERROR_FORMAT,
-                   std::string("Cannot ") + verb + " " + gst_format_get_name(segment.format) +
-                       ": this stream has no timestamps. Insert a reader of event files upstream, "
-                       "such as decodebin " ASK_FOR_EVENTS "."});
-  if (segment.rate < 0)
-    return refuse({GST_STREAM_ERROR_FAILED,
-                   std::string("Cannot ") + verb + " events backwards; play at a positive rate."});
-  return true;
-}
-
-/// The same of a SEGMENT event.
-inline bool plays_events(gpointer element, GstEvent* event, const char* verb) {
+/// Segment of a SEGMENT event, which owns it.
+inline const GstSegment& segment_of(GstEvent* event) {
   const GstSegment* segment = nullptr;
   gst_event_parse_segment(event, &segment);
-  return plays_events(element, *segment, verb);
+  return *segment;
+}
+
+/// Posts an error message about a SEGMENT event, which it unrefs. Returns false.
+inline bool refuse_segment(gpointer element, GstEvent* event, const Report& report) {
+  gchar* const cause = gst_info_strdup_printf("segment %" GST_SEGMENT_FORMAT, &segment_of(event));
+  post_message(element, GST_MESSAGE_ERROR, report, cause);
+  g_free(cause);
+  gst_event_unref(event);
+  return false;
+}
+
+/// True if a SEGMENT event has a positive rate. Else posts an error message of `element`, which
+/// says what it cannot do: `verb` events, such as "merge"; and unrefs the event.
+inline bool plays_forwards(gpointer element, GstEvent* event, const char* verb) {
+  return segment_of(event).rate > 0 ||
+         refuse_segment(
+             element, event,
+             {GST_STREAM_ERROR_FAILED,
+              std::string("Cannot ") + verb + " events backwards; play at a positive rate."});
+}
+
+/// True if a SEGMENT event has times, and a positive rate. Else as plays_forwards().
+inline bool plays_events(gpointer element, GstEvent* event, const char* verb) {
+  const GstFormat format = segment_of(event).format;
+  if (format == GST_FORMAT_TIME) return plays_forwards(element, event, verb);
+  return refuse_segment(
+      element, event,
+      {GST_STREAM_ERROR_FORMAT,
+       std::string("Cannot ") + verb + " " + gst_format_get_name(format) +
+           ": this stream has no timestamps. Insert a reader of event files upstream, such as "
+           "decodebin " ASK_FOR_EVENTS "."});
 }

@@ -167,10 +167,8 @@ static GstFlowReturn prepare_output_buffer(GstBaseTransform*, GstBuffer* in, Gst
 
 static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   auto& priv = priv_of(transform);
-  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_events(transform, event, "filter")) {
-    gst_event_unref(event);
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_events(transform, event, "filter"))
     return FALSE;
-  }
   if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && priv.state) {
     reported(transform, [&] { priv.inside->forget(); });
     priv.state->passed = State{}.passed;

@@ -15,6 +15,7 @@
 #include "gst/base/errors.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/recording/sensor_events.hpp"
@@ -417,6 +418,9 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       gst_event_unref(event);
       return taken;
     }
+    case GST_EVENT_SEGMENT:
+      if (!plays_forwards(self, event, "write")) return FALSE;
+      break;
     case GST_EVENT_EOS:
       end_file(self);
       break;

@@ -533,16 +533,12 @@ static void start_timeline(GstEventSimulator* self) {
   priv_of(self).timing.qos().lock()->start_over();
 }
 
-static bool take_segment(GstEventSimulator* self, GstEvent* event) {
-  const GstSegment* segment = nullptr;
-  gst_event_parse_segment(event, &segment);
-  if (!plays_events(self, *segment, "simulate")) return false;
+static void take_segment(GstEventSimulator* self, const GstSegment& segment) {
   const GstSegment& current = GST_BASE_TRANSFORM(self)->segment;
-  if (current.format != segment->format || current.rate != segment->rate ||
-      current.base != segment->base || current.start != segment->start ||
-      current.time != segment->time)
+  if (current.format != segment.format || current.rate != segment.rate ||
+      current.base != segment.base || current.start != segment.start ||
+      current.time != segment.time)
     start_timeline(self);
-  return true;
 }
 
 /// Holds the last frame until `end` and pushes the events of that time, or a GAP if there are none.
@@ -620,10 +616,8 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
       event = segment_of_times(event);
-      if (!take_segment(self, event)) {
-        gst_event_unref(event);
-        return FALSE;
-      }
+      if (!plays_events(self, event, "simulate")) return FALSE;
+      take_segment(self, segment_of(event));
       break;
     case GST_EVENT_GAP:
       if (!take_gap(self, event)) {

@@ -13,9 +13,7 @@ using namespace aedat_recordings;
 
 /// The muxer with one sink pad.
 struct Mux : Harness {
-  Mux(const char* pad, const char* caps)
-      : Harness((gst_init(nullptr, nullptr), gst_harness_new_with_padnames("aedatmux", pad, "src")),
-                "aedatmux") {
+  Mux(const char* pad, const char* caps) : Harness("aedatmux", pad, "src") {
     gst_harness_set_src_caps_str(get(), caps);
   }
   Mux()
@@ -51,6 +49,13 @@ TEST(AedatMux, WritesTheTimesOfTheStream) {
                                     AbsoluteEvent::at(3, 4, 5'000'007, Polarity::on),
                                     AbsoluteEvent::at(345, 259, 5'019'999, Polarity::off)}));
   EXPECT_FALSE(content.has_table) << "nothing could seek to where the header tells of it";
+}
+
+TEST(AedatMux, RefusesToRunBackwards) {
+  Mux mux;
+  push_backwards_segment(mux.get());
+  mux.end();
+  EXPECT_EQ(mux.error(), "Cannot write events backwards; play at a positive rate.");
 }
 
 TEST(AedatMux, LeavesOutWhatDoesNotFit) {

@@ -31,12 +31,23 @@ constexpr Refusal refusals[] = {
     {"evtparse", "application/x-event-camera, format=EVT3, framerate=0/1",
      "Cannot read this camera"},
     {"rtpeventpay", large, "EVT3 words support sensors of 1x1 to 2048x2048 pixels"},
+    {"eventdatagramdepay width=32 height=24", "application/x-event-datagram",
+     "Cannot receive events backwards", -1},
     {"eventdatagrampay", events, "Cannot send events backwards", -1},
     {"eventpolarity", events, "Cannot filter events backwards", -1},
     {"eventsim-frame", "video/x-raw, format=GRAY8, width=4, height=2, framerate=25/1",
      "Cannot simulate events backwards", -1},
     {"eventstats", events, "Cannot measure events backwards", -1},
     {"eventtensor", events, "Cannot make tensors of events backwards", -1},
+    {"evtdec", "application/x-event-camera, format=EVT3, width=32, height=24",
+     "Cannot read events backwards", -1},
+    {"evtenc", events, "Cannot write events backwards", -1},
+    {"evtparse", "application/x-event-camera, format=EVT3, width=32, height=24, framerate=0/1",
+     "Cannot parse events backwards", -1},
+    {"rtpeventdepay",
+     "application/x-rtp, media=application, clock-rate=1000000, "
+     "encoding-name=X-EVENT-CAMERA, width=32, height=24",
+     "Cannot receive events backwards", -1},
     {"rtpeventpay", events, "Cannot send events backwards", -1},
 };
 

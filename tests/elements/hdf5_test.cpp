@@ -289,6 +289,14 @@ TEST_P(Hdf5, IsWrittenWithoutWhatCannotBe) {
   EXPECT_TRUE(read(path) == (Events{events[0], events[3]}));
 }
 
+TEST_P(Hdf5, IsNotWrittenBackwards) {
+  Sink sink("eventhdf5sink format=" + std::string(GetParam()) +
+            " location=" + in_quotes(folder_ / "out.h5"));
+  sink.caps(events_caps);
+  push_backwards_segment(sink.get());
+  EXPECT_EQ(sink.error(), "Cannot write events backwards; play at a positive rate.");
+}
+
 TEST_P(Hdf5, IsWrittenAnewAfterAFlush) {
   const auto path = folder_ / "out.h5";
   Sink sink("eventhdf5sink format=" + std::string(GetParam()) + " location=" + in_quotes(path));

@@ -59,6 +59,7 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -451,6 +452,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       return start_stream(self);
     }
     case GST_EVENT_SEGMENT:
+      if (!plays_forwards(self, event, "parse")) return FALSE;
       gst_event_copy_segment(event, &priv.upstream);
       priv.segment_seqnum = gst_event_get_seqnum(event);
       gst_event_unref(event);

@@ -46,6 +46,7 @@
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/base/video_frame.hpp"
@@ -483,6 +484,8 @@ static bool take_waiting(GstAedatMux* self, std::optional<std::vector<Sample>>&&
 static gboolean sink_event(GstAggregator* aggregator, GstAggregatorPad* pad, GstEvent* event) {
   auto* self = GST_AEDAT_MUX(aggregator);
   State& state = self->priv->state;
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_forwards(self, event, "write"))
+    return FALSE;
   if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
     GstCaps* caps = nullptr;
     gst_event_parse_caps(event, &caps);

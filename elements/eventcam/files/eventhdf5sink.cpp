@@ -30,6 +30,7 @@
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "gst/base/types.hpp"
 #include "gst/eventcamera/eventcamera.h"
@@ -228,6 +229,8 @@ static bool keep_up(GstEventHdf5Sink* self) {
 static gboolean event(GstBaseSink* sink, GstEvent* event) {
   auto* self = GST_EVENT_HDF5_SINK(sink);
   const State& state = self->priv->state;
+  if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_forwards(self, event, "write"))
+    return FALSE;
   bool done = true;
   if (GST_EVENT_TYPE(event) == GST_EVENT_EOS) done = end_file(self);
   if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP && state.info.width > 0)

@@ -265,9 +265,8 @@ static gboolean sink_event(GstBaseTransform* transform, GstEvent* event) {
       reported(self, [&] { take_gap(self, event); });
       break;
     case GST_EVENT_SEGMENT:
-      if (plays_events(self, event, "measure")) break;
-      gst_event_unref(event);
-      return FALSE;
+      if (!plays_events(self, event, "measure")) return FALSE;
+      break;
     case GST_EVENT_EOS:
       reported(self, [&] { conclude(self, self->priv->settings.copy()); });
       break;

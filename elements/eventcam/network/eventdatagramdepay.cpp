@@ -52,6 +52,7 @@
 #include "gst/base/latency.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "src/core/max_side.hpp"
 #include "src/wire/datagram_unpacker.hpp"
 
@@ -313,6 +314,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
   auto& state = self->priv->state;
   switch (GST_EVENT_TYPE(event)) {
     case GST_EVENT_SEGMENT:
+      if (!plays_forwards(self, event, "receive")) return FALSE;
       if (state) {
         gst_event_copy_segment(event, &state->upstream);
         state->segment_seqnum = gst_event_get_seqnum(event);

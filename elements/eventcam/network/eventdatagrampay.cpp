@@ -273,9 +273,9 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
     case GST_EVENT_EOS:
       GST_DEBUG_OBJECT(pad, "sending what waits before %s", GST_EVENT_TYPE_NAME(event));
       flush(self);
-      if (GST_EVENT_TYPE(event) == GST_EVENT_EOS || plays_events(self, event, "send")) break;
-      gst_event_unref(event);
-      return FALSE;
+      if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT && !plays_events(self, event, "send"))
+        return FALSE;
+      break;
     case GST_EVENT_FLUSH_STOP:
       GST_DEBUG_OBJECT(pad, "flushed: dropping events that wait");
       if (self->priv->packer) self->priv->packer->flush([](const Datagram&) {});

@@ -57,6 +57,7 @@
 #include "gst/base/guarded.hpp"
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/base/properties.hpp"
 #include "src/core/max_side.hpp"
 #include "src/wire/rtp_unpacker.hpp"
@@ -313,6 +314,7 @@ static gboolean handle_event(GstRTPBaseDepayload* depayload, GstEvent* event) {
       break;
     case GST_EVENT_SEGMENT:
       flush(self);
+      if (!plays_forwards(self, event, "receive")) return FALSE;
       self->priv->segment_seqnum = gst_event_get_seqnum(event);
       break;
     default:

@@ -302,9 +302,8 @@ static gboolean sink_event(GstRTPBasePayload* payload, GstEvent* event) {
       break;
     case GST_EVENT_SEGMENT:
       reported(self, [&] { send(self); });
-      if (plays_events(self, event, "send")) break;
-      gst_event_unref(event);
-      return FALSE;
+      if (!plays_events(self, event, "send")) return FALSE;
+      break;
     case GST_EVENT_EOS:
       GST_DEBUG_OBJECT(self, "the stream ends");
       [[fallthrough]];

@@ -439,18 +439,13 @@ static gboolean take_caps(GstEventTensor* self, GstEvent* event) {
   return taken;
 }
 
-/// Returns false if the segment cannot be used.
-static bool take_segment(GstEventTensor* self, GstEvent* event) {
+static void take_segment(GstEventTensor* self, const GstSegment& next) {
   auto& segment = self->priv->segment;
-  GstSegment next;
-  gst_event_copy_segment(event, &next);
-  if (!plays_events(self, next, "make tensors of")) return false;
   const bool continues = next.format == segment.format && next.rate == segment.rate &&
                          next.base == segment.base && next.start == segment.start &&
                          next.time == segment.time;
   if (!continues) drain(self);
   segment = next;
-  return true;
 }
 
 static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
@@ -469,10 +464,8 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       }
       break;
     case GST_EVENT_SEGMENT:
-      if (!take_segment(self, event)) {
-        gst_event_unref(event);
-        return FALSE;
-      }
+      if (!plays_events(self, event, "make tensors of")) return FALSE;
+      take_segment(self, segment_of(event));
       break;
     case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "gst/base/buffer_bytes.hpp"
+#include "gst/base/played_segment.hpp"
 #include "gst/eventcamera/eventcamera.h"
 #include "gst/recording/reader/event_reader.hpp"
 
@@ -159,17 +160,17 @@ bool EventReader::carries_words() const {
 
 /// Takes ownership of `event`.
 gboolean EventReader::take_segment(GstEvent* event) {
-  const GstSegment* segment = nullptr;
-  gst_event_parse_segment(event, &segment);
   drain();
-  const bool timed = segment->format == GST_FORMAT_TIME && carries_words();
-  const guint64 start = segment->start;
+  if (!plays_forwards(element_, event, "read")) return FALSE;
+  const GstSegment segment = segment_of(event);
+  const bool timed = segment.format == GST_FORMAT_TIME && carries_words();
+  const guint64 start = segment.start;
   bool was_timed = false;
   std::optional<Restart> restart;
   {
     const auto shared = shared_.lock();
     was_timed = std::exchange(shared->is_timed, timed);
-    shared->pushed_bytes = segment->format == GST_FORMAT_BYTES ? start : 0;
+    shared->pushed_bytes = segment.format == GST_FORMAT_BYTES ? start : 0;
     restart = shared->restart;
   }
   if (timed) {
