@@ -8,17 +8,11 @@
 namespace eventcamera {
 namespace {
 
-using Buckets = std::span<const EventBuckets::Bucket>;
-
-std::size_t size_of(Buckets buckets) {
-  std::size_t sum = 0;
-  for (const auto& bucket : buckets) sum += bucket.size();
-  return sum;
-}
-
-/// Writes the sorted events of a time slice of 2^slice_bits microseconds. A bin holds the events of
-/// a microsecond, or of more, so that there are at most a few times as many bins as events.
-void write_slice(Buckets bands, int slice_bits, std::span<Event> out) {
+/// Writes the sorted events of a time slice of 2^slice_bits microseconds, which visit_lists(visit)
+/// passes to visit(std::span<const Event>) in lists. A bin holds the events of a microsecond, or of
+/// more, so that there are at most a few times as many bins as events.
+template <class VisitLists>
+void write_slice(const VisitLists& visit_lists, int slice_bits, std::span<Event> out) {
   constexpr int max_bins_bits = 12;
   const int bins_bits = std::min(max_bins_bits, static_cast<int>(std::bit_width(4 * out.size())));
   const int bin_bits = std::max(0, slice_bits - bins_bits);
@@ -26,25 +20,46 @@ void write_slice(Buckets bands, int slice_bits, std::span<Event> out) {
   const auto bin_of = [&](const Event& event) { return event.t >> bin_bits & (bins - 1); };
   std::uint32_t starts[(1 << max_bins_bits) + 1];
   std::fill_n(starts, bins + 1, 0);
-  for (const auto& band : bands)
-    for (const auto& event : band.events) ++starts[bin_of(event) + 1];
+  std::size_t counted = 0;
+  visit_lists([&](std::span<const Event> list) {
+    for (const auto& event : list) {
+      ++starts[bin_of(event) + 1];
+      if (counted++ % (64 / sizeof(Event)) > 0) continue;  // once for each cache line
+      __builtin_prefetch(&event + 64);
+      __builtin_prefetch(out.data() + counted, 1, 2);  // to be written in any order
+    }
+  });
   std::partial_sum(starts, starts + bins, starts);
-  for (const auto& band : bands)
-    for (const auto& event : band.events) out[starts[bin_of(event)]++] = event;
+  visit_lists([&](std::span<const Event> list) {
+    for (const auto& event : list) out[starts[bin_of(event)]++] = event;
+  });
   sort_within_spans(out, bin_bits);
 }
 
 }  // namespace
 
 void EventBuckets::reset_slices(std::uint32_t duration, int bands) {
-  constexpr int max_slices_bits = 6;  // enough for threads to share
-  const int slice_bits = std::max(0, static_cast<int>(std::bit_width(duration)) - max_slices_bits);
-  reset(static_cast<int>(duration >> slice_bits) + 1, bands);
-  slice_bits_ = slice_bits;
+  reset(1, bands);
+  slice_bits_ = std::max(0, static_cast<int>(std::bit_width(duration)) - max_slices_bits);
+  slices_.resize(bands_);
+  for (auto& starts : slices_) starts.fill(0);
+}
+
+void EventBuckets::add_slices(int band, std::span<const Event> events) {
+  const auto slice_of = [this](const Event& event) { return event.t >> *slice_bits_; };
+  auto& starts = slices_[static_cast<std::size_t>(band)];
+  for (const auto& event : events) ++starts[slice_of(event) + 1];
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  auto ends = starts;
+  auto& sliced = bucket(1, band);
+  sliced.assign(events.begin(), events.end());  // faster than to resize it with zeros
+  for (const auto& event : events) sliced[ends[slice_of(event)]++] = event;
 }
 
 std::size_t EventBuckets::size() const {
-  return size_of(buckets_);
+  std::size_t sum = 0;
+  for (const auto& bucket : buckets_) sum += bucket.size();
+  return sum;
 }
 
 void EventBuckets::write_to(Event* out, ThreadPool& threads) const {
@@ -73,10 +88,17 @@ void EventBuckets::write_part(std::size_t first, std::size_t last, Event* out) c
 
 void EventBuckets::write_slices(std::size_t first, std::size_t last, Event* out) const {
   std::size_t before = 0;  // number of events in the slices so far
-  for (auto rest = Buckets(buckets_); !rest.empty(); rest = rest.subspan(bands_)) {
-    const auto slice = rest.first(bands_);
-    const std::size_t size = size_of(slice);
-    if (first <= before && before < last) write_slice(slice, *slice_bits_, {out + before, size});
+  for (std::size_t slice = 0; before < last && slice < (1 << max_slices_bits); ++slice) {
+    const auto visit_bands = [&](const auto& visit) {
+      for (std::size_t band = 0; band < bands_; ++band) {
+        const auto& starts = slices_[band];
+        visit(std::span(buckets_[band].events)
+                  .subspan(starts[slice], starts[slice + 1] - starts[slice]));
+      }
+    };
+    std::size_t size = 0;
+    visit_bands([&](std::span<const Event> events) { size += events.size(); });
+    if (first <= before && size > 0) write_slice(visit_bands, *slice_bits_, {out + before, size});
     before += size;
   }
 }

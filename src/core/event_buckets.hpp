@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -16,7 +17,8 @@ namespace eventcamera {
 /// Events of one interval as kernels produce them: a bucket per step and band of rows. With more
 /// than one band, a bucket holds the events of its rows only, so that threads can draw bands
 /// concurrently. Each thread fills its own buckets; written in order, they are the sorted events of
-/// the interval. Steps may also be time slices, whose events are sorted when they are written.
+/// the interval. Instead of steps, a band may have time slices, whose events are sorted when they
+/// are written.
 class EventBuckets {
  public:
   /// Either a list of events, or the pixels that fire in a step, which become events when they are
@@ -46,22 +48,9 @@ class EventBuckets {
   /// Like reset(), for an interval of `duration` microseconds whose events are added in any order.
   void reset_slices(std::uint32_t duration, int bands);
 
-  /// The time slices of a band. Different bands may be added to from different threads.
-  class BandSlices {
-   public:
-    BandSlices(EventBuckets& buckets, int band)
-        : first_(&buckets.at(1, band)), bands_(buckets.bands_), slice_bits_(*buckets.slice_bits_) {}
-
-    /// Adds an event to its slice.
-    void add(const Event& event) const {
-      first_[std::size_t{event.t >> slice_bits_} * bands_].events.push_back(event);
-    }
-
-   private:
-    Bucket* first_;
-    std::size_t bands_;
-    int slice_bits_;
-  };
+  /// Adds all events of a band to its time slices. Different bands may be added from different
+  /// threads.
+  void add_slices(int band, std::span<const Event> events);
 
   int bands() const { return static_cast<int>(bands_); }
 
@@ -89,9 +78,15 @@ class EventBuckets {
   void write_part(std::size_t first, std::size_t last, Event* out) const;
   void write_slices(std::size_t first, std::size_t last, Event* out) const;
 
+  static constexpr int max_slices_bits = 6;  ///< enough for threads to share
+
+  /// Indices in the only bucket of a band at which its time slices begin, and the end of the last.
+  struct alignas(64) SliceStarts : std::array<std::size_t, (1 << max_slices_bits) + 1> {};
+
   std::vector<Bucket> buckets_;
   std::size_t bands_ = 1;
-  std::optional<int> slice_bits_;  ///< steps are time slices of 2^slice_bits_ microseconds
+  std::optional<int> slice_bits_;    ///< bands have time slices of 2^slice_bits_ microseconds
+  std::vector<SliceStarts> slices_;  ///< by band
 };
 
 }  // namespace eventcamera

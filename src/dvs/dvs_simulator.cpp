@@ -74,6 +74,7 @@ constexpr double unlimited = 1e18;
 struct alignas(64) Scratch {
   Candidates candidates;
   UnsolvedPixels unsolved;
+  std::vector<Event> added;           ///< events of a band
   std::vector<std::uint16_t> luma;    ///< a row, padded for vectors
   std::vector<std::uint16_t> moving;  ///< a run for each blended frame, padded
 };
@@ -489,7 +490,9 @@ class PixelSimulator final : public DvsSimulator {
       auto& scratch = scratch_[static_cast<std::size_t>(thread)];
       scratch.candidates.resize(format().width);
       scratch.luma.resize(static_cast<std::size_t>(format().width) + max_lanes);
-      body(BandRows(band, format().height), scratch, IntervalEvents::Band(fired_, band));
+      const IntervalEvents::Band events(fired_, band, scratch.added);
+      body(BandRows(band, format().height), scratch, events);
+      events.end();
     });
   }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "src/core/event_buckets.hpp"
@@ -21,19 +22,12 @@ class IntervalEvents {
   struct alignas(64) Deferred : std::vector<DeferredEvent> {};
 
  public:
-  /// Begins an interval of `duration` microseconds with the deferred events of the last one. Events
-  /// are written to `events`, with_cause().
+  /// Begins an interval of `duration` microseconds. Events are written to `events`, with_cause().
   void begin(double duration, int bands, EventBuckets& events) {
     duration_ = duration;
     events_ = &events;
     events.reset_slices(static_cast<std::uint32_t>(duration), bands);
     deferred_.resize(static_cast<std::size_t>(bands));
-    for (int band = 0; band < bands; ++band) {
-      due_.swap(deferred_[static_cast<std::size_t>(band)]);
-      const Band here(*this, band);
-      for (const auto& [t, event] : due_) here.add(t, event);
-      due_.clear();
-    }
   }
 
   /// Drops the causes of the deferred events.
@@ -63,42 +57,65 @@ class IntervalEvents {
   /// One band of rows. Different bands may be added to from different threads.
   class Band {
    public:
-    Band(IntervalEvents& events, int band)
+    /// Begins with the deferred events of the last interval. Until end(), events are in `added`,
+    /// which is emptied first.
+    Band(IntervalEvents& events, int band, std::vector<Event>& added)
         : duration_(events.duration_),
-          slices_(*events.events_, band),
-          deferred_(&events.deferred_[static_cast<std::size_t>(band)]) {}
+          events_(*events.events_),
+          band_(band),
+          deferred_(events.deferred_[static_cast<std::size_t>(band)]),
+          added_(added) {
+      added_.clear();
+      std::size_t kept = 0;
+      for (const auto& [t, event] : deferred_) {
+        if (t > duration_)
+          deferred_[kept++] = {t - duration_, event};
+        else
+          add_within(t, event);
+      }
+      deferred_.resize(kept);
+    }
 
     /// Duration of the interval, microseconds.
     double duration() const { return duration_; }
 
-    /// Adds an event within the interval.
-    void add(const Event& event) const { slices_.add(event); }
+    /// Adds events within the interval.
+    void add(std::span<const Event> events) const {
+      added_.insert(added_.end(), events.begin(), events.end());
+    }
 
     void add(double t, int x, int y, Polarity polarity, Cause cause) const {
       add(t, with_cause(Event::at(x, y, 0, polarity), cause));
     }
 
     /// Adds an event `t` microseconds after the start of the interval, instead of its own time.
-    void add(double t, Event event) const {
-      if (t > duration_) {
-        deferred_->push_back({t - duration_, event});
-        return;
-      }
-      event.t = static_cast<std::uint32_t>(t);
-      slices_.add(event);
+    void add(double t, const Event& event) const {
+      if (t > duration_)
+        deferred_.push_back({t - duration_, event});
+      else
+        add_within(t, event);
     }
 
+    /// Must be called after the last event.
+    void end() const { events_.add_slices(band_, added_); }
+
    private:
+    void add_within(double t, Event event) const {
+      event.t = static_cast<std::uint32_t>(t);
+      added_.push_back(event);
+    }
+
     double duration_;
-    EventBuckets::BandSlices slices_;
-    Deferred* deferred_;
+    EventBuckets& events_;
+    int band_;
+    Deferred& deferred_;
+    std::vector<Event>& added_;
   };
 
  private:
   double duration_ = 0;
   EventBuckets* events_ = nullptr;
   std::vector<Deferred> deferred_;  ///< by band
-  Deferred due_;                    ///< deferred to the interval that begins
 };
 
 }  // namespace eventcamera

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 
 #include "src/dvs/shot_noise.hpp"
 #include "src/dvs/trajectory.hpp"
@@ -128,18 +129,20 @@ class Events {
         hn::IfThenElseZero(hn::RebindMask(bits, on), hn::Set(bits, std::uint64_t{1} << 63));
     const auto events = hn::Or(hn::Or(microseconds, place), polarity);
     if (HWY_UNLIKELY(row_.has_labels())) return add_with_causes(pixels, fire, fading, events);
-    hn::StoreU(FirstLanes<Bits>(hn::RebindMask(bits, fire))(events), bits, events_ + count_);
+    HWY_ALIGN std::uint64_t firing[max_lanes / 2];
+    hn::Store(FirstLanes<Bits>(hn::RebindMask(bits, fire))(events), bits, firing);
+    std::memcpy(events_ + count_, firing, hn::Lanes(bits) * sizeof(Event));
     count_ += hn::CountTrue(doubles, fire);
   }
 
   /// Must be called after each turn.
   void flush() {
-    for (std::size_t i = 0; i < count_; ++i) row_.events.add(std::bit_cast<Event>(events_[i]));
+    row_.events.add({events_, count_});
     count_ = 0;
   }
 
  private:
-  void add_with_causes(const Pixels& pixels, Mask fire, Mask fading, hn::Vec<Bits> events) const {
+  void add_with_causes(const Pixels& pixels, Mask fire, Mask fading, hn::Vec<Bits> events) {
     const Doubles doubles;
     HWY_ALIGN std::uint64_t words[max_lanes];
     hn::Store(events, Bits(), words);
@@ -157,7 +160,7 @@ class Events {
       const auto cause =
           row_.cause_of_crossing(x, event.polarity(), rise / row_.sub_interval.duration, fall);
       row_.pixels.last_cause[x] = cause;
-      row_.events.add(with_cause(event, cause));
+      events_[count_++] = with_cause(event, cause);
     }
   }
 
@@ -166,7 +169,7 @@ class Events {
   double end_;
   std::uint64_t place_of_row_;
   std::size_t count_ = 0;
-  std::uint64_t events_[(max_vectors + 1) * max_lanes / 2];
+  Event events_[(max_vectors + 1) * max_lanes / 2];
 };
 
 /// Signals that are straight lines, of a vector of pixels.

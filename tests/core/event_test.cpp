@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <random>
 #include <span>
@@ -111,14 +112,17 @@ TEST(EventBuckets, OfTimeSlicesAreSortedByAnyNumberOfThreads) {
       buckets.reset_slices(duration, bands);
       EXPECT_EQ(buckets.size(), 0U);
       std::vector<Event> expected;
+      std::array<std::vector<Event>, bands> added;
       std::uniform_int_distribution<std::uint32_t> time(0, duration);
       for (int i = 0; i < count; ++i) {
         const int band = static_cast<int>(random() % bands);
         const int y = band * rows + static_cast<int>(random() % rows);
         expected.push_back(
             Event::at(static_cast<int>(random() % width), y, time(random), Polarity::on));
-        EventBuckets::BandSlices(buckets, band).add(expected.back());
+        added.at(static_cast<std::size_t>(band)).push_back(expected.back());
       }
+      for (int band = 0; band < bands; ++band)
+        buckets.add_slices(band, added.at(static_cast<std::size_t>(band)));
       ASSERT_EQ(buckets.size(), expected.size());
       std::ranges::sort(expected, {},
                         [](const Event& event) { return std::tuple(event.t, event.y(), event.x); });

@@ -195,11 +195,14 @@ Solved solved(const DvsSettings& settings, int width, const Solve& solve) {
     for (const auto& [column, value] : values) candidates.column(column)[i] = value;
   }
   EventBuckets buckets;
-  IntervalEvents events;
-  events.begin(sub_interval.duration, 1, buckets);
+  IntervalEvents interval;
+  interval.begin(sub_interval.duration, 1, buckets);
+  std::vector<Event> added;
+  const IntervalEvents::Band events(interval, 0, added);
   const PixelDynamics dynamics(settings);
-  solve(RowToSolve{
-      settings, dynamics, random, sub_interval, tables, pixels, candidates, {events, 0}, 0});
+  solve(
+      RowToSolve{settings, dynamics, random, sub_interval, tables, pixels, candidates, events, 0});
+  events.end();
   Solved result;
   for (const auto& event : scene::copy(buckets)) {
     const int x = without_cause(event).x;
