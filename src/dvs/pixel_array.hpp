@@ -81,7 +81,7 @@ struct PixelRow {
   std::uint64_t first_number;  ///< number of the pixel at x = 0
 
   float* target;     ///< response to the current light
-  float* signal;     ///< output of the photoreceptor
+  float* signal;     ///< output of the photoreceptor; only kept if its bandwidth is limited
   float* reference;  ///< level that the signal is compared to
   float* positive;   ///< thresholds; infinite if the pixel is dead
   float* negative;

@@ -202,15 +202,19 @@ class Pixel {
 void solve_pixel(const RowToSolve& row, std::size_t i) {
   const int x = row.candidates.x[i];
   const auto shade = static_cast<std::size_t>(row.candidates.shade[i]);
-  const double last_target = row.candidates.column(Candidates::last_target)[i];
-  const double target = row.pixels.target[x];
+  const auto value = [&](Candidates::Column column) -> double {
+    return row.candidates.column(column)[i];
+  };
+  const double last_target = value(Candidates::last_target);
+  const double target = value(Candidates::target);
   const double duration = row.sub_interval.duration;
-  const auto signal =
-      row.settings.cutoff_frequency > 0
-          ? Trajectory::low_pass(row.candidates.column(Candidates::last_signal)[i], last_target,
-                                 target, duration, row.tables.bandwidth[shade])
-          : Trajectory::line(last_target, target, duration);
-  Pixel(row, x, {signal, row.pixels.signal[x], row.tables.expected_noise[shade]}).solve();
+  const bool has_bandwidth = row.settings.cutoff_frequency > 0;
+  const auto signal = has_bandwidth
+                          ? Trajectory::low_pass(value(Candidates::last_signal), last_target,
+                                                 target, duration, row.tables.bandwidth[shade])
+                          : Trajectory::line(last_target, target, duration);
+  const double last_signal = has_bandwidth ? value(Candidates::signal) : target;
+  Pixel(row, x, {signal, last_signal, row.tables.expected_noise[shade]}).solve();
 }
 
 }  // namespace

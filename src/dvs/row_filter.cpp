@@ -25,7 +25,7 @@ hn::Vec<Words> load_luma(const Pixel* luma) {
   return hn::PromoteTo(Words(), hn::LoadU(hn::Rebind<Pixel, Floats>(), luma));
 }
 
-template <class Pixel>
+template <class Pixel, bool has_bandwidth>
 void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
             const Run& run, Candidates& candidates) {
   const ShadeTables& tables = row_filter.tables;
@@ -41,13 +41,13 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
   const auto white = hn::Set(words, static_cast<std::int32_t>(row_filter.responses.size()) - 1);
   const auto below_saturated =
       hn::Set(words, saturated_luma(static_cast<int>(row_filter.responses.size()) - 1) - 1);
-  const bool needs_shade = row_filter.has_bandwidth || row_filter.has_noise;
+  const bool needs_shade = has_bandwidth || row_filter.has_noise;
   const int shade_shift = row_filter.luma_bits - 8;
   const auto duration = hn::Set(floats, static_cast<float>(row_filter.sub_interval.duration));
   const auto share = hn::Set(floats, static_cast<float>(row_filter.sub_interval.share));
   const auto rise = hn::Set(floats, static_cast<float>(row_filter.sub_interval.rise));
   float* targets = pixels.target;
-  float* signals = pixels.signal;
+  [[maybe_unused]] float* signals = pixels.signal;
   float* references = pixels.reference;
   const float* positives = pixels.positive;
   const float* negatives = pixels.negative;
@@ -77,7 +77,7 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     auto last_signal = last_target;
     auto signal = target;
     auto margin = hn::Set(floats, rounding);  // excess beyond the values at both ends
-    if (row_filter.has_bandwidth) {
+    if constexpr (has_bandwidth) {
       last_signal = hn::LoadU(floats, signals + x);
       const auto decay_factor = hn::GatherIndex(floats, tables.decay_factor.data(), shade);
       const auto mean_decay_factor =
@@ -115,7 +115,7 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     happens = hn::And(happens, hn::FirstN(floats, static_cast<std::size_t>(count)));
 
     hn::StoreU(target, floats, targets + x);
-    hn::StoreU(signal, floats, signals + x);
+    if constexpr (has_bandwidth) hn::StoreU(signal, floats, signals + x);
     if (HWY_LIKELY(hn::AllFalse(floats, happens))) {
       hn::StoreU(next_reference, floats, references + x);
       if (row_filter.has_noise) hn::StoreU(noise_budget, counts, noise_budgets + x);
@@ -136,9 +136,11 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
     keep_integers(candidates.x.data(), iota(words, x));
     keep_integers(candidates.shade.data(), shade);
     keep(Candidates::target, target);
-    keep(Candidates::signal, signal);
     keep(Candidates::last_target, last_target);
-    keep(Candidates::last_signal, last_signal);
+    if constexpr (has_bandwidth) {
+      keep(Candidates::signal, signal);
+      keep(Candidates::last_signal, last_signal);
+    }
     keep(Candidates::reference, reference);
     keep(Candidates::positive, positive);
     keep(Candidates::negative, negative);
@@ -151,10 +153,16 @@ void filter(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pi
 
 void filter_luma(const RowFilter& row_filter, const RunLuma& luma, const PixelRow& pixels,
                  const Run& run, Candidates& candidates) {
+  const auto filter_as = [&]<class Pixel>(Pixel) {
+    if (row_filter.has_bandwidth)
+      filter<Pixel, true>(row_filter, luma, pixels, run, candidates);
+    else
+      filter<Pixel, false>(row_filter, luma, pixels, run, candidates);
+  };
   if (row_filter.luma_bits == 8)
-    filter<std::uint8_t>(row_filter, luma, pixels, run, candidates);
+    filter_as(std::uint8_t());
   else
-    filter<std::uint16_t>(row_filter, luma, pixels, run, candidates);
+    filter_as(std::uint16_t());
 }
 
 template <class Pixel>
@@ -206,7 +214,6 @@ bool rest(const RowFilter& row_filter, const LightRange& range, const RunLuma& l
     const auto target = hn::GatherIndex(floats, row_filter.responses.data(), value);
     const auto leaked = hn::Add(hn::Mul(hn::LoadU(floats, pixels.leak + x), duration), rise);
     hn::StoreU(target, floats, pixels.target + x);
-    hn::StoreU(target, floats, pixels.signal + x);
     hn::StoreU(hn::Sub(hn::LoadU(floats, pixels.reference + x), leaked), floats,
                pixels.reference + x);
     if (row_filter.has_noise)

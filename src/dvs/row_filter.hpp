@@ -21,9 +21,9 @@ class Candidates {
   /// Values of each of them: of the sub-interval, and, like those of PixelRow, at its start.
   enum Column : std::size_t {
     target,  ///< at the end of the sub-interval
-    signal,
+    signal,  ///< with bandwidth only, otherwise the target
     last_target,
-    last_signal,
+    last_signal,  ///< with bandwidth only
     reference,
     positive,
     negative,

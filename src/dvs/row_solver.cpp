@@ -174,7 +174,8 @@ class RowSolver {
     const auto duration = all(duration_);
     const auto from = load(Candidates::last_target);
     const auto fall = hn::Add(load(Candidates::leak), all(row_.sub_interval.rise / duration_));
-    const auto light_slope = hn::Div(hn::Sub(load(Candidates::target), from), duration);
+    auto last_value = load(Candidates::target);
+    const auto light_slope = hn::Div(hn::Sub(last_value, from), duration);
     auto value = from;
     auto offset = from;
     auto bandwidth = all(0);
@@ -183,10 +184,11 @@ class RowSolver {
       bandwidth = hn::GatherIndex(doubles, row_.tables.bandwidth.data(),
                                   hn::PromoteTo(hn::RebindToSigned<Doubles>(), shade));
       value = load(Candidates::last_signal);
+      last_value = load(Candidates::signal);
       offset = hn::Sub(from, hn::Div(light_slope, bandwidth));
       sign = hn::CopySign(sign, hn::Sub(value, offset));
     }
-    const auto end = hn::Add(load(Candidates::signal), hn::Mul(fall, duration));
+    const auto end = hn::Add(last_value, hn::Mul(fall, duration));
     const auto positive = load(Candidates::positive);
     const auto negative = load(Candidates::negative);
     const auto is_upright = hn::Gt(sign, all(0));
