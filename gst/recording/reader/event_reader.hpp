@@ -130,6 +130,8 @@ class EventReader {
   GstFlowReturn refused_size(std::size_t stream);
   void send_segment(ReaderPad& pad);
   void interrupt_output();
+  void post_of_seek(GstMessage* message);
+  void tell_segment_start();
   void end_output(bool failed);
   gboolean forward(GstEvent* event);
   void push_to_pads(GstEvent* event);

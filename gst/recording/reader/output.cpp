@@ -277,6 +277,21 @@ void EventReader::interrupt_output() {
   output_due_ = true;
 }
 
+/// Posts a message of the seek that output follows.
+void EventReader::post_of_seek(GstMessage* message) {
+  if (seqnum_ != GST_SEQNUM_INVALID) gst_message_set_seqnum(message, seqnum_);
+  gst_element_post_message(element_, message);
+}
+
+/// Posts SEGMENT_START if a segment seek was requested: a bin posts SEGMENT_DONE once all elements
+/// that posted this have ended.
+void EventReader::tell_segment_start() {
+  const auto segment = shared_.lock()->segment;
+  if ((segment.flags & GST_SEGMENT_FLAG_SEGMENT) != 0)
+    post_of_seek(gst_message_new_segment_start(GST_OBJECT(element_), GST_FORMAT_TIME,
+                                               static_cast<gint64>(segment.position)));
+}
+
 /// Ends the streams with EOS, or the segment with SEGMENT_DONE if a segment seek was requested.
 void EventReader::end_output(bool failed) {
   const auto segment = shared_.lock()->segment;
@@ -286,10 +301,7 @@ void EventReader::end_output(bool failed) {
   }
   const auto position =
       static_cast<gint64>(GST_CLOCK_TIME_IS_VALID(segment.stop) ? segment.stop : segment.position);
-  GstMessage* const message =
-      gst_message_new_segment_done(GST_OBJECT(element_), GST_FORMAT_TIME, position);
-  if (seqnum_ != GST_SEQNUM_INVALID) gst_message_set_seqnum(message, seqnum_);
-  gst_element_post_message(element_, message);
+  post_of_seek(gst_message_new_segment_done(GST_OBJECT(element_), GST_FORMAT_TIME, position));
   push_to_pads(with_seqnum(gst_event_new_segment_done(GST_FORMAT_TIME, position), seqnum_));
 }
 

@@ -204,6 +204,7 @@ gboolean EventReader::take_segment(GstEvent* event) {
     shared->counts = {};
   }
   seqnum_ = restart->seqnum;
+  tell_segment_start();
   corrupt_places_ = 0;
   return guard([&] {
            if (!recording_) open_recording();
