@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "gst/aggregator/eventaggregator.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <new>
 #include <utility>
@@ -105,18 +106,51 @@ struct EventAggregatorFunctions {
     return guarded(self.element_, report, work);
   }
 
+  static void forget_segment_ends(EventAggregator& self) {
+    for (const auto& pad : sink_pads(self.element_)) forget_segment_end(pad.get());
+    self.segment_ended_ = false;
+  }
+
+  /// At the end of the output: EOS, or SEGMENT_DONE once all pads have reached the end of their
+  /// segments.
+  static GstFlowReturn end(EventAggregator& self) {
+    const auto pads = sink_pads(self.element_);
+    OwnedEvent done;
+    if (self.main_pad_ != nullptr)
+      done = segment_end_of(self.main_pad_);
+    else
+      for (const auto& pad : pads)
+        if (auto end = segment_end_of(pad.get())) done = std::move(end);
+    if (!done) return GST_FLOW_EOS;
+    self.segment_ended_ = true;
+    for (const auto& pad : pads)
+      while (next_buffer(pad.get())) gst_aggregator_pad_drop_buffer(pad.get());
+    if (!std::ranges::all_of(pads, [](const auto& pad) { return has_ended(pad.get()); }))
+      return GST_AGGREGATOR_FLOW_NEED_DATA;
+    GST_DEBUG_OBJECT(self.element_, "the segment of all inputs has ended");
+    for (const auto& pad : pads) gst_aggregator_pad_drop_buffer(pad.get());
+    flush(self.element_);
+    gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(self.element_), done.release());
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+
   static GstFlowReturn aggregate(GstAggregator* element, gboolean timed_out) {
     auto& self = of(element);
     if (timed_out) GST_LOG_OBJECT(element, "the latency is over: going on without further input");
-    const auto result = guard(self, [&] { return self.aggregate(timed_out != FALSE); });
+    const auto result = self.segment_ended_
+                            ? GST_FLOW_EOS
+                            : guard(self, [&] { return self.aggregate(timed_out != FALSE); });
     // GstAggregator sends the segment, which precedes tags, with the first buffer.
     if (has_segment(GST_AGGREGATOR_SRC_PAD(element)))
       for (auto& tags : std::exchange(self.tags_, {}))
         gst_pad_push_event(GST_AGGREGATOR_SRC_PAD(element), tags.release());
-    return result;
+    return result == GST_FLOW_EOS ? end(self) : result;
   }
 
-  static GstClockTime get_next_time(GstAggregator* element) { return of(element).next_time(); }
+  static GstClockTime get_next_time(GstAggregator* element) {
+    auto& self = of(element);
+    return self.segment_ended_ ? GST_CLOCK_TIME_NONE : self.next_time();
+  }
 
   static GstFlowReturn update_src_caps(GstAggregator* element, GstCaps*, GstCaps** result) {
     const auto& caps = of(element).main_caps_;
@@ -148,6 +182,12 @@ struct EventAggregatorFunctions {
     gst_aggregator_update_segment(self.element_, &segment);
   }
 
+  static GstFlowReturn sink_event_pre_queue(GstAggregator* element, GstAggregatorPad* pad,
+                                            GstEvent* event) {
+    if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE) event = gap_at_segment_end(pad, event);
+    return PARENT_AGGREGATOR_CLASS->sink_event_pre_queue(element, pad, event);
+  }
+
   static gboolean sink_event(GstAggregator* element, GstAggregatorPad* pad, GstEvent* event) {
     auto& self = of(element);
     if (GST_EVENT_TYPE(event) == GST_EVENT_CAPS) {
@@ -164,11 +204,8 @@ struct EventAggregatorFunctions {
     }
     if (GST_EVENT_TYPE(event) == GST_EVENT_TAG && pad == self.main_pad_)
       self.tags_.emplace_back(gst_event_ref(event));  // GstAggregator drops it
-    if (GST_EVENT_TYPE(event) == GST_EVENT_SEGMENT_DONE && pad == self.main_pad_)
-      guard(self, [&] {
-        self.drain();
-        return GST_FLOW_OK;
-      });
+    if (GST_EVENT_TYPE(event) == GST_EVENT_GAP) take_segment_end(pad, event);
+    if (GST_EVENT_TYPE(event) == GST_EVENT_FLUSH_STOP) forget_segment_end(pad);
     return PARENT_AGGREGATOR_CLASS->sink_event(element, pad, event);
   }
 
@@ -218,6 +255,7 @@ struct EventAggregatorFunctions {
   static GstFlowReturn flush(GstAggregator* element) {
     auto& self = of(element);
     GST_DEBUG_OBJECT(element, "flushed: dropping events that wait");
+    forget_segment_ends(self);
     return guard(self, [&] {
       self.flush();
       return GST_FLOW_OK;
@@ -232,6 +270,7 @@ struct EventAggregatorFunctions {
   static gboolean stop(GstAggregator* element) {
     auto& self = of(element);
     guard(self, [&] { self.stop(); });
+    forget_segment_ends(self);
     self.main_caps_.reset();
     self.tags_.clear();
     self.faults_.reset();
@@ -295,6 +334,7 @@ static void gst_event_aggregator_class_init(GstEventAggregatorClass* klass) {
   aggregator_class->aggregate = Functions::aggregate;
   aggregator_class->get_next_time = Functions::get_next_time;
   aggregator_class->update_src_caps = Functions::update_src_caps;
+  aggregator_class->sink_event_pre_queue = Functions::sink_event_pre_queue;
   aggregator_class->sink_event = Functions::sink_event;
   aggregator_class->src_event = Functions::src_event;
   aggregator_class->src_query = Functions::src_query;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "gst/aggregator/segment_end.hpp"
 #include "gst/aggregator/sink_pads.hpp"
 #include "gst/base/event_buffer.hpp"
 #include "gst/base/owned.hpp"
@@ -49,9 +50,8 @@ class EventAggregator {
   virtual bool take_caps(GstAggregatorPad* pad, GstCaps* caps) = 0;
   /// Handles a new segment of the main pad, before the pad stores it. May throw.
   virtual void take_segment(const GstSegment&) {}
-  /// Pushes what waits for more input of the main pad, at the end of its segment. May throw.
-  virtual void drain() {}
-  /// Like GstAggregatorClass::aggregate. May throw.
+  /// Like GstAggregatorClass::aggregate. Returns GST_FLOW_EOS once no more output follows because a
+  /// pad has_ended(). May throw.
   virtual GstFlowReturn aggregate(bool timed_out) = 0;
   /// Like GstAggregatorClass::get_next_time: when to continue without further input from live
   /// sources.
@@ -81,6 +81,7 @@ class EventAggregator {
   GstAggregatorPad* main_pad_;
   OwnedCaps main_caps_;
   std::vector<OwnedEvent> tags_;  ///< of the main pad, to be sent
+  bool segment_ended_ = false;    ///< that of the output; other pads may still be in theirs
   EventFaults faults_;
 };
 

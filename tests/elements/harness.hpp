@@ -343,6 +343,27 @@ inline void push_segment(GstHarness* h, GstFormat format = GST_FORMAT_TIME) {
   gst_harness_push_event(h, gst_event_new_segment(&segment));
 }
 
+/// Ends the segment, but not the stream.
+inline void end_segment(GstHarness* h, GstClockTime position = 0) {
+  gst_harness_push_event(
+      h, gst_event_new_segment_done(GST_FORMAT_TIME, static_cast<gint64>(position)));
+}
+
+/// Pushes a segment that plays on at this running time, as after a seek that does not flush.
+inline void play_on(GstHarness* h, GstClockTime running_time) {
+  GstSegment segment;
+  gst_segment_init(&segment, GST_FORMAT_TIME);
+  segment.base = running_time;
+  gst_harness_push_event(h, gst_event_new_segment(&segment));
+}
+
+/// Waits for the next output event of this type; drops other events before it.
+inline Owned<GstEvent> next_event(GstHarness* h, GstEventType type) {
+  while (Owned<GstEvent> event{gst_harness_pull_event(h)})
+    if (GST_EVENT_TYPE(event.get()) == type) return event;
+  return nullptr;
+}
+
 /// Pushes a segment with a negative rate.
 inline void push_backwards_segment(GstHarness* h) {
   GstSegment segment;

@@ -418,6 +418,24 @@ TEST_F(CompareTest, PassesTheCandidateOnWhereTheReferenceHasEnded) {
   EXPECT_EQ(passed.size(), 3U);
 }
 
+TEST_F(CompareTest, ComparesEachSegment) {
+  make();
+  begin();
+  for (const GstClockTime base : {0 * ms, 10 * ms}) {
+    for (auto* h : {reference, candidate}) {
+      play_on(h, base);
+      gst_harness_push(h, buffer_of(0, {Event::at(1, 1, 5, Polarity::on)}, 10 * ms));
+      end_segment(h);
+    }
+    ASSERT_TRUE(next_event(candidate, GST_EVENT_SEGMENT_DONE));
+    message_ = compare->message(GST_MESSAGE_ELEMENT);
+    const auto* figures = structure_of(message_);
+    ASSERT_TRUE(figures);
+    EXPECT_EQ(count_in(within(figures, "candidate")), 1U);
+    EXPECT_EQ(number_in(within(figures, "reference-matches"), "within-1ms"), 1);
+  }
+}
+
 TEST_F(CompareTest, EndsWithoutAnyEvent) {
   make("location=" + in_quotes(path("f.json")));
   begin();

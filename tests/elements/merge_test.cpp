@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <ctime>
+#include <future>
 #include <tuple>
 
 #include "src/core/label.hpp"
@@ -203,6 +205,55 @@ TEST_F(MergeTest, GoesOnWithoutAStreamThatEndsBeforeItBegins) {
   push(a(), 0, {on(1, 0, 1)});
   end(a());
   EXPECT_EQ(rest(), Events{on_at(1, 0, 1)});
+}
+
+TEST_F(MergeTest, EndsASegmentOnceAllStreamsHave) {
+  begin();
+  push(a(), 0, {on(1, 0, 0)});
+  end_segment(a());
+  push(b(), 0, {on(2, 0, 1)});
+  push(b(), 10 * ms, {on(3, 0, 2)});
+  for (const std::size_t size : {2, 1}) {
+    const Buffer buffer(gst_harness_pull(a()));
+    ASSERT_TRUE(buffer);
+    EXPECT_EQ(events_of(buffer.get()).size(), size);
+  }
+  while (const Owned<GstEvent> event{gst_harness_try_pull_event(a())})
+    EXPECT_NE(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT_DONE);
+  end_segment(b(), 20 * ms);
+  const auto done = next_event(a(), GST_EVENT_SEGMENT_DONE);
+  ASSERT_TRUE(done);
+  gint64 position = -1;
+  gst_event_parse_segment_done(done.get(), nullptr, &position);
+  EXPECT_EQ(position, gint64{20 * ms});
+
+  for (auto* input : {a(), b()}) play_on(input, 20 * ms);
+  push(a(), 0, {on(1, 0, 0)});
+  push(b(), 0, {on(2, 0, 1)});
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(1, 0, 0), on_at(2, 0, 1)}));
+  const auto segment = next_event(a(), GST_EVENT_SEGMENT);
+  ASSERT_TRUE(segment);
+  GstSegment played;
+  gst_event_copy_segment(segment.get(), &played);
+  EXPECT_EQ(played.base, 20 * ms);
+}
+
+TEST_F(MergeTest, GoesOnPastTheEndOfASegmentAfterAFlush) {
+  begin();
+  push(a(), 0, {on(1, 0, 0)});
+  push(b(), 0, {on(2, 0, 1)});
+  EXPECT_EQ(next_size(), "8x4");
+  output_ = {};
+  end_segment(a());
+  flush({a(), b()});
+  for (auto* input : {a(), b()}) push_segment(input);
+  push(a(), 0, {on(1, 0, 0)});
+  push(b(), 0, {on(2, 0, 1)});
+  end(a());
+  end(b());
+  EXPECT_EQ(rest(), (Events{on_at(1, 0, 0), on_at(2, 0, 1)}));
 }
 
 TEST_F(MergeTest, SendsGapsWhereNoStreamHasEvents) {
@@ -448,6 +499,39 @@ TEST(Merge, SeeksInAllRecordings) {
   expect(Recordings::read(recordings.b), 64);
   ASSERT_GT(expected.size(), 100U);
   EXPECT_EQ(sorted(player.events), sorted(expected));
+}
+
+TEST(Merge, EndsASegmentOfAllRecordings) {
+  const Recordings recordings;
+  Player player("eventmerge name=m  " + recordings.a.source() + "evtdec ! m.sink_0  " +
+                recordings.b.source() + "evtdec ! m.sink_1  m.");
+  ASSERT_TRUE(player.reaches(GST_STATE_PAUSED));
+  GstPad* const sink = gst_element_get_static_pad(player["sink"], "sink");
+  struct Segment {
+    const Player& player;
+    std::promise<std::size_t> end{};  // with the number of events
+  } segment{player};
+  gst_pad_add_probe(
+      sink, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      +[](GstPad*, GstPadProbeInfo* info, gpointer to) {
+        auto& played = *static_cast<Segment*>(to);
+        if (GST_EVENT_TYPE(GST_PAD_PROBE_INFO_EVENT(info)) == GST_EVENT_SEGMENT_DONE)
+          played.end.set_value(played.player.events.size());
+        return GST_PAD_PROBE_OK;
+      },
+      &segment, nullptr);
+  gst_object_unref(sink);
+  ASSERT_TRUE(player.seek(500 * ms, 700 * ms, GST_SEEK_FLAG_SEGMENT));
+  ASSERT_TRUE(player.play()) << player.error;
+  EXPECT_EQ(player.end, GST_MESSAGE_SEGMENT_DONE);
+  auto end = segment.end.get_future();
+  ASSERT_EQ(end.wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  Player all("eventmerge name=m  " + recordings.a.source() + "evtdec ! m.sink_0  " +
+             recordings.b.source() + "evtdec ! m.sink_1  m.");
+  ASSERT_TRUE(all.reaches(GST_STATE_PAUSED));
+  ASSERT_TRUE(all.seek(500 * ms, 700 * ms));
+  ASSERT_TRUE(all.play()) << all.error;
+  EXPECT_EQ(end.get(), all.events.size());
 }
 
 /// Streams reach it at different times.

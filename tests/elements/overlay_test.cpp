@@ -139,6 +139,34 @@ TEST_F(OverlayTest, GoesOnThroughGapsAndPastTheEndOfEvents) {
   EXPECT_EQ(rest, nullptr);
 }
 
+TEST_F(OverlayTest, EndsASegmentOnceBothHave) {
+  begin("width=8, height=4");
+  for (int i = 0; i < 2; ++i) {
+    push_frame(0);
+    push_events(0, {Event::at(1, 0, 5, Polarity::on)});
+    EXPECT_EQ(drawn(), (Places{{1, 255}}));
+    end_segment(events.get());
+    push_frame(40 * ms);
+    EXPECT_EQ(drawn(), Places{});
+    end_segment(video.get());
+    ASSERT_TRUE(next_event(video.get(), GST_EVENT_SEGMENT_DONE));
+
+    for (auto* h : {video.get(), events.get()}) play_on(h, 80 * ms);
+    end_segment(video.get());
+    push_events(0, {});
+    push_events(40 * ms, {});
+    end_segment(events.get());
+    ASSERT_TRUE(next_event(video.get(), GST_EVENT_SEGMENT_DONE));
+    for (auto* h : {video.get(), events.get()}) play_on(h, 160 * ms);
+  }
+  for (auto* h : {video.get(), events.get()}) gst_harness_push_event(h, gst_event_new_eos());
+  GstBuffer* rest = nullptr;
+  EXPECT_TRUE(gst_harness_pull_until_eos(video.get(), &rest));
+  EXPECT_EQ(rest, nullptr);
+  while (const Owned<GstEvent> event{gst_harness_try_pull_event(video.get())})
+    EXPECT_NE(GST_EVENT_TYPE(event.get()), GST_EVENT_SEGMENT_DONE);
+}
+
 TEST_F(OverlayTest, PassesGapsInTheVideoOn) {
   begin("width=8, height=4");
   gst_harness_push_event(video.get(), gst_event_new_gap(0, 40 * ms));  // before any frame

@@ -148,8 +148,8 @@ bool EventOverlay::take_buffer(GstBuffer* buffer, GstClockTime end) {
 /// throw.
 bool EventOverlay::take_events_until(GstClockTime end) {
   while (known_ + event_resolution <= end) {
-    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(events_pad_));
-    if (!buffer) return gst_aggregator_pad_is_eos(events_pad_);
+    const auto buffer = next_buffer(events_pad_);
+    if (!buffer) return has_ended(events_pad_);
     if (!take_buffer(buffer.get(), end)) return true;
   }
   return true;
@@ -201,19 +201,18 @@ GstFlowReturn EventOverlay::take_frame(const std::optional<EventInterval>& inter
 }
 
 GstFlowReturn EventOverlay::aggregate(bool timed_out) {
-  GstBuffer* frame = gst_aggregator_pad_peek_buffer(main_pad());
-  if (frame == nullptr)
-    return gst_aggregator_pad_is_eos(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
-  const auto interval = video_ ? interval_of_frame(frame) : std::nullopt;
-  gst_buffer_unref(frame);  // otherwise it would not be writable in place
+  auto frame = next_buffer(main_pad());
+  if (!frame) return has_ended(main_pad()) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
+  const auto interval = video_ ? interval_of_frame(frame.get()) : std::nullopt;
+  frame.reset();  // otherwise it would not be writable in place
   return video_ ? take_frame(interval, timed_out) : GST_FLOW_NOT_NEGOTIATED;
 }
 
 /// Time at which a live frame is pushed without waiting for events: at once if it has no time, and
 /// at the end of the video.
 GstClockTime EventOverlay::next_time() {
-  const OwnedBuffer frame(gst_aggregator_pad_peek_buffer(main_pad()));
-  if (!frame) return gst_aggregator_pad_is_eos(main_pad()) ? 0 : GST_CLOCK_TIME_NONE;
+  const auto frame = next_buffer(main_pad());
+  if (!frame) return has_ended(main_pad()) ? 0 : GST_CLOCK_TIME_NONE;
   if (!GST_BUFFER_PTS_IS_VALID(frame.get())) return 0;
   return running_time(main_pad(), GST_BUFFER_PTS(frame.get())).value_or(0);
 }

@@ -157,7 +157,6 @@ class EventRender final : public EventAggregator {
   void release_memory() override { state_.reset(); }
   bool take_caps(GstAggregatorPad* pad, GstCaps* caps) override;
   void take_segment(const GstSegment& segment) override;
-  void drain() override;
   GstFlowReturn aggregate(bool timed_out) override;
   GstClockTime next_time() override;
 
@@ -168,6 +167,7 @@ class EventRender final : public EventAggregator {
   Guarded<Settings> settings;
 
  private:
+  void drain();
   void start_over();
   bool approach(GstBuffer* buffer, const EventInterval& interval);
   bool take_events(const MappedEvents& mapped, const EventInterval& interval,
@@ -287,14 +287,12 @@ GstFlowReturn EventRender::aggregate(bool timed_out) {
   GstAggregatorPad* pad = main_pad();
   if (timed_out) waiting_since_.reset();  // if no picture can start yet, wait again
   if (!state_ || !state_->video) {
-    if (gst_aggregator_pad_is_eos(pad)) return GST_FLOW_EOS;
+    if (has_ended(pad)) return GST_FLOW_EOS;
     return gst_aggregator_pad_has_buffer(pad) ? GST_FLOW_NOT_NEGOTIATED
                                               : GST_AGGREGATOR_FLOW_NEED_DATA;
   }
-  if (const OwnedBuffer buffer{gst_aggregator_pad_peek_buffer(pad)})
-    return take_buffer(buffer.get());
-  if (gst_aggregator_pad_is_eos(pad))
-    return has_begun_picture() ? push_next_picture() : GST_FLOW_EOS;
+  if (const auto buffer = next_buffer(pad)) return take_buffer(buffer.get());
+  if (has_ended(pad)) return has_begun_picture() ? push_next_picture() : GST_FLOW_EOS;
   if (!timed_out) return GST_AGGREGATOR_FLOW_NEED_DATA;
   if (times_) return push_next_picture();
   begin_now();

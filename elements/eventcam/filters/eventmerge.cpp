@@ -189,7 +189,7 @@ bool EventMerge::load_events(const OwnedAggregatorPad& pad, GstBuffer* buffer,
 /// May throw.
 bool EventMerge::load(const OwnedAggregatorPad& pad) {
   auto& stream = stream_of(pad);
-  while (const OwnedBuffer buffer{gst_aggregator_pad_peek_buffer(pad.get())}) {
+  while (const auto buffer = next_buffer(pad.get())) {
     if (stream.loaded != buffer) stream.discontinuous |= GST_BUFFER_IS_DISCONT(buffer.get());
     if (const auto interval = interval_of(buffer.get())) {
       const auto start = static_cast<Microseconds>(interval->start / GST_USECOND);
@@ -294,7 +294,7 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
     }
     if (load(pad))
       inputs.push_back(&stream.input);
-    else if (!gst_aggregator_pad_is_eos(pad.get()))
+    else if (!has_ended(pad.get()))
       waiting = true;
   }
   if (inputs.empty() && !waiting) return GST_FLOW_EOS;
@@ -327,7 +327,7 @@ GstFlowReturn EventMerge::aggregate(bool timed_out) {
 GstClockTime EventMerge::next_time() {
   GstClockTime next = GST_CLOCK_TIME_NONE;
   for (const auto& pad : numbered_pads(element())) {
-    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(pad.get()));
+    const auto buffer = next_buffer(pad.get());
     const auto interval = buffer ? interval_of(buffer.get()) : std::nullopt;
     if (!buffer) continue;
     const auto start = interval ? running_time(pad.get(), interval->start) : std::nullopt;

@@ -6,8 +6,8 @@
  *
  * Compares the stream on the pad `candidate`, which it passes through, with the one on the pad
  * `reference`, over the time that both cover. The two are synchronized by stream time, and their
- * sensors must have the same size. At EOS of the candidate, or on stop, it posts an element message
- * `eventcompare`:
+ * sensors must have the same size. At EOS of the candidate, at the end of its segment in a segment
+ * seek, or on stop, it posts an element message `eventcompare`:
  *
  * - `start`, `end` (#gint64): the time covered by both, in stream time (ns);
  * - `reference`, `candidate` (#GstStructure): the statistics of each, as in #GstEventStats;
@@ -90,7 +90,6 @@ class EventCompare final : public EventAggregator {
   Guarded<ReportFiles> settings;
 
  private:
-  bool is_over(StreamRole role) const;
   bool waits_for_reference() const;
   bool begin();
   bool has_one_size() const;
@@ -222,14 +221,10 @@ void EventCompare::compare(StreamRole role, GstBuffer* buffer) {
   warn(skipped, buffer);
 }
 
-bool EventCompare::is_over(StreamRole role) const {
-  return gst_aggregator_pad_is_eos(pads_[role]) && !gst_aggregator_pad_has_buffer(pads_[role]);
-}
-
 /// True if the reference does not cover all that has been read of the candidate yet.
 bool EventCompare::waits_for_reference() const {
   return comparison_ && comparison_->behind() == StreamRole::reference &&
-         !is_over(StreamRole::reference);
+         !has_ended(pads_[StreamRole::reference]);
 }
 
 /// Starts the comparison once both sensors, of one size, are known. Returns true if it is running.
@@ -251,14 +246,14 @@ bool EventCompare::begin() {
 GstFlowReturn EventCompare::take_next() {
   const bool comparing = begin();
   const auto behind = comparing ? comparison_->behind() : StreamRole::candidate;
-  if (behind == StreamRole::reference && !is_over(StreamRole::reference)) {
+  if (behind == StreamRole::reference && !has_ended(pads_[StreamRole::reference])) {
     const OwnedBuffer buffer(gst_aggregator_pad_pop_buffer(pads_[StreamRole::reference]));
     if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
     compare(StreamRole::reference, buffer.get());
     return GST_FLOW_OK;
   }
   {
-    const OwnedBuffer buffer(gst_aggregator_pad_peek_buffer(main_pad()));
+    const auto buffer = next_buffer(main_pad());
     if (!buffer) return GST_AGGREGATOR_FLOW_NEED_DATA;
     if (comparing && behind == StreamRole::candidate) compare(StreamRole::candidate, buffer.get());
   }
@@ -266,7 +261,7 @@ GstFlowReturn EventCompare::take_next() {
 }
 
 GstFlowReturn EventCompare::aggregate(bool) {
-  if (is_over(StreamRole::candidate) && !waits_for_reference()) {
+  if (has_ended(main_pad()) && !waits_for_reference()) {
     conclude();
     return GST_FLOW_EOS;
   }

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/base/gstaggregator.h>
+
+#include "gst/base/owned.hpp"
+
+/// Ends of segments on sink pads. GstAggregator would pass SEGMENT_DONE on from each pad, and go on
+/// waiting for a buffer of the pad. Here a GAP event that carries it takes its place; GstAggregator
+/// queues a buffer for that, which stays the next one of the pad until all pads have ended.
+
+inline GQuark segment_end_quark() {
+  static const GQuark quark = g_quark_from_static_string("event-segment-end");
+  return quark;
+}
+
+inline void unref_event(gpointer event) {
+  gst_event_unref(GST_EVENT(event));
+}
+
+/// GAP event in place of a SEGMENT_DONE event, of which it takes ownership. Without a segment of
+/// times, the event itself.
+inline GstEvent* gap_at_segment_end(GstAggregatorPad* pad, GstEvent* done) {
+  const OwnedEvent sticky(gst_pad_get_sticky_event(GST_PAD(pad), GST_EVENT_SEGMENT, 0));
+  if (!sticky) return done;
+  const GstSegment* segment = nullptr;
+  gst_event_parse_segment(sticky.get(), &segment);
+  if (segment->format != GST_FORMAT_TIME) return done;
+  GstEvent* const gap = gst_event_new_gap(segment->start, GST_CLOCK_TIME_NONE);
+  gst_mini_object_set_qdata(GST_MINI_OBJECT(gap), segment_end_quark(), done, unref_event);
+  return gap;
+}
+
+/// Remembers the end of a segment that a GAP event of a pad stands for, if it does.
+inline void take_segment_end(GstAggregatorPad* pad, GstEvent* gap) {
+  gpointer const done = gst_mini_object_get_qdata(GST_MINI_OBJECT(gap), segment_end_quark());
+  if (done != nullptr)
+    g_object_set_qdata_full(G_OBJECT(pad), segment_end_quark(), gst_event_ref(GST_EVENT(done)),
+                            unref_event);
+}
+
+/// The SEGMENT_DONE event that a pad has reached, or null.
+inline OwnedEvent segment_end_of(GstAggregatorPad* pad) {
+  const auto ref = [](gpointer event, gpointer) -> gpointer {
+    return event != nullptr ? gst_event_ref(GST_EVENT(event)) : nullptr;
+  };
+  return OwnedEvent(
+      static_cast<GstEvent*>(g_object_dup_qdata(G_OBJECT(pad), segment_end_quark(), ref, nullptr)));
+}
+
+inline void forget_segment_end(GstAggregatorPad* pad) {
+  g_object_set_qdata(G_OBJECT(pad), segment_end_quark(), nullptr);
+}
+
+/// True if a pad has reached the end of its stream, or of a segment that is to be played alone.
+inline bool has_ended(GstAggregatorPad* pad) {
+  return segment_end_of(pad) ||
+         (gst_aggregator_pad_is_eos(pad) && !gst_aggregator_pad_has_buffer(pad));
+}
+
+/// The next buffer of a pad, which stays queued; null if there is none yet, or in its segment.
+inline OwnedBuffer next_buffer(GstAggregatorPad* pad) {
+  return OwnedBuffer(segment_end_of(pad) ? nullptr : gst_aggregator_pad_peek_buffer(pad));
+}
