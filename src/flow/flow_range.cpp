@@ -25,6 +25,7 @@ FlowRange range_of(const ImageView<Flow>& flow, const Box& box) {
     for (int i = 0; i < count; i += lanes) {
       const auto here = HWY_LIKELY(i + lanes <= count) ? hn::LoadU(floats, row + i)
                                                        : load_first(floats, row + i, count - i);
+      __builtin_prefetch(row + i + 2 * count);  // of the box after the next: rows are far apart
       const auto number = hn::IfThenElseZero(hn::Eq(here, here), here);
       lowest = hn::Min(lowest, number);
       highest = hn::Max(highest, number);
