@@ -22,7 +22,7 @@ enum class Response {
 /// Model of light between two frames.
 enum class Upsampling {
   linear,  ///< linear interpolation per pixel, in units of the response
-  motion,  ///< motion along the optical flow, in steps of at most one pixel
+  motion,  ///< motion along the optical flow, in steps of a pixel or a few
 };
 
 /// Reference level of a pixel after an event.

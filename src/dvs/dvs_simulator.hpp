@@ -14,7 +14,7 @@
 //
 //   denoise.cpp           removes the noise of the frame camera
 //   exposure_gain.cpp     finds how its exposure changed the light, which is divided out
-//   motion_tiles.cpp      number of steps between two frames, of at most a pixel, for each tile
+//   motion_tiles.cpp      number of steps between two frames for each tile
 //   sub_intervals.cpp     divides the interval into steps, and where exposure pulses begin and end
 //   moving_light.cpp      luma of moving pixels at each step; light_response.hpp: its response
 //   row_filter.cpp        advances pixels that cannot fire, which are most; the others, candidates,

@@ -78,6 +78,16 @@ namespace {
 /// Longest motion for which the luma on the way is worth looking up, in pixels.
 constexpr float far = 64;
 
+/// Steps of a tile whose longest motion is this many pixels. Between steps the luma is a straight
+/// line; where it bends, events err by a time in proportion to the motion, and to the inverse
+/// square of the steps. So from `fine` pixels on, steps grow with the square root of the motion,
+/// and the error stays the same.
+int steps_for(float longest, int max_steps) {
+  constexpr float fine = 4;
+  const float steps = longest <= fine ? longest : std::sqrt(fine * longest);
+  return std::clamp(static_cast<int>(std::ceil(steps)), 1, max_steps);
+}
+
 }  // namespace
 
 template <class Pixel>
@@ -129,8 +139,7 @@ void MotionTiles::measure(const ImageView<Pixel>& last, const ImageView<Pixel>& 
       const auto range = flow_range(flow, box);
       const auto longest = std::min(range.max_length(), static_cast<float>(max_side));
       auto& tile = tiles[column];
-      tile = {std::clamp(static_cast<int>(std::ceil(longest)), 1, max_steps),
-              std::numeric_limits<Pixel>::max(), 0};
+      tile = {steps_for(longest, max_steps), std::numeric_limits<Pixel>::max(), 0};
       if (longest > far) {
         std::swap(tile.darkest, tile.brightest);
         continue;

@@ -19,7 +19,7 @@ class MotionTiles {
   static_assert(rows_per_band % height == 0);
 
   struct Tile {
-    int steps;      ///< between two frames, of at most a pixel along each axis unless limited
+    int steps;      ///< between two frames, of a pixel along an axis; longer where much moves
     int darkest;    ///< least luma on the way of any pixel, in both frames
     int brightest;  ///< largest luma on that way
   };
