@@ -78,7 +78,7 @@ class EventBuckets {
   void write_part(std::size_t first, std::size_t last, Event* out) const;
   void write_slices(std::size_t first, std::size_t last, Event* out) const;
 
-  static constexpr int max_slices_bits = 6;  ///< enough for threads to share
+  static constexpr int max_slices_bits = 8;  ///< so many that a slice fits into a cache
 
   /// Indices in the only bucket of a band at which its time slices begin, and the end of the last.
   struct alignas(64) SliceStarts : std::array<std::size_t, (1 << max_slices_bits) + 1> {};
