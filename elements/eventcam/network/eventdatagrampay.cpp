@@ -270,6 +270,7 @@ static gboolean sink_event(GstPad* pad, GstObject* parent, GstEvent* event) {
       take_gap(self, event);
       break;
     case GST_EVENT_SEGMENT:  // the times of waiting events are those of the last one
+    case GST_EVENT_SEGMENT_DONE:
     case GST_EVENT_EOS:
       GST_DEBUG_OBJECT(pad, "sending what waits before %s", GST_EVENT_TYPE_NAME(event));
       flush(self);
