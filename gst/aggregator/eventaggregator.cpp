@@ -230,15 +230,29 @@ struct EventAggregatorFunctions {
     return PARENT_AGGREGATOR_CLASS->src_event(element, event);
   }
 
+  /// Range of the main pad, or of the first one. GstAggregator would always answer that seeking is
+  /// impossible.
+  static gboolean answer_seeking(const EventAggregator& self, GstQuery* query) {
+    const auto pads = sink_pads(self.element_);
+    if (pads.empty()) return FALSE;
+    auto* const pad = self.main_pad_ != nullptr ? self.main_pad_ : pads.front().get();
+    if (!gst_pad_peer_query(GST_PAD(pad), query)) return FALSE;
+    GstFormat format = GST_FORMAT_UNDEFINED;
+    gint64 start = -1;
+    gint64 end = -1;
+    gst_query_parse_seeking(query, &format, nullptr, &start, &end);
+    const bool all_can =
+        format == GST_FORMAT_TIME && std::ranges::all_of(pads, [](const auto& each) {
+          return peer_can_seek(GST_PAD(each.get()), GST_FORMAT_TIME);
+        });
+    gst_query_set_seeking(query, format, all_can ? TRUE : FALSE, start, end);
+    return TRUE;
+  }
+
   static gboolean src_query(GstAggregator* element, GstQuery* query) {
-    if (GST_QUERY_TYPE(query) == GST_QUERY_SEEKING) {
-      // GstAggregator would always answer that seeking is impossible.
-      GstAggregatorPad* const main = of(element).main_pad_;
-      if (main != nullptr) return gst_pad_peer_query(GST_PAD(main), query);
-      const auto pads = sink_pads(element);
-      return !pads.empty() && gst_pad_peer_query(GST_PAD(pads.front().get()), query) ? TRUE : FALSE;
-    }
-    return PARENT_AGGREGATOR_CLASS->src_query(element, query);
+    return GST_QUERY_TYPE(query) == GST_QUERY_SEEKING
+               ? answer_seeking(of(element), query)
+               : PARENT_AGGREGATOR_CLASS->src_query(element, query);
   }
 
   static gboolean sink_query(GstAggregator* element, GstAggregatorPad* pad, GstQuery* query) {

@@ -256,6 +256,36 @@ TEST_F(MergeTest, GoesOnPastTheEndOfASegmentAfterAFlush) {
   EXPECT_EQ(rest(), (Events{on_at(1, 0, 0), on_at(2, 0, 1)}));
 }
 
+/// A seek is forwarded to all streams, or refused.
+TEST_F(MergeTest, IsSeekableWhereAllStreamsAre) {
+  const auto make_seekable = [](GstHarness* input) {
+    gst_pad_set_query_function(
+        input->srcpad, +[](GstPad* pad, GstObject* parent, GstQuery* query) -> gboolean {
+          if (GST_QUERY_TYPE(query) != GST_QUERY_SEEKING)
+            return gst_pad_query_default(pad, parent, query);
+          GstFormat format = GST_FORMAT_UNDEFINED;
+          gst_query_parse_seeking(query, &format, nullptr, nullptr, nullptr);
+          gst_query_set_seeking(query, format, TRUE, 0, GST_SECOND);
+          return TRUE;
+        });
+  };
+  const auto is_seekable = [this](GstFormat format) {
+    GstQuery* const query = gst_query_new_seeking(format);
+    gboolean seekable = FALSE;
+    gint64 end = 0;
+    EXPECT_TRUE(gst_pad_peer_query(a()->sinkpad, query));
+    gst_query_parse_seeking(query, nullptr, &seekable, nullptr, &end);
+    EXPECT_EQ(end, gint64{GST_SECOND});
+    gst_query_unref(query);
+    return seekable != FALSE;
+  };
+  make_seekable(a());
+  EXPECT_FALSE(is_seekable(GST_FORMAT_TIME));
+  make_seekable(b());
+  EXPECT_TRUE(is_seekable(GST_FORMAT_TIME));
+  EXPECT_FALSE(is_seekable(GST_FORMAT_BYTES));
+}
+
 TEST_F(MergeTest, SendsGapsWhereNoStreamHasEvents) {
   begin();
   push(a(), 0, {on(1, 0, 1)});
