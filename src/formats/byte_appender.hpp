@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 
 namespace eventcamera {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 
 namespace eventcamera {
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include "src/core/byte_order.hpp"
 #include "src/formats/atis/atis_bin.hpp"
-#include "src/formats/byte_order.hpp"
 #include "src/formats/magic.hpp"
 #include "src/formats/prophesee_header.hpp"
 #include "src/formats/ros/bag_magic.hpp"

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "src/core/byte_order.hpp"
 #include "src/core/event.hpp"
 #include "src/core/sensor_size.hpp"
-#include "src/formats/byte_order.hpp"
 #include "src/formats/corruption.hpp"
 #include "src/formats/decoded.hpp"
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "src/core/address_layout.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/core/event.hpp"
-#include "src/formats/byte_order.hpp"
 #include "src/wire/datagram_settings.hpp"
 #include "src/wire/wrapped_time.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 #include "src/wire/rtp_payload.hpp"
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 
 namespace eventcamera {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/formats/evt/words.hpp"
 
 namespace eventcamera {

@@ -12,9 +12,9 @@
 #include <variant>
 #include <vector>
 
+#include "src/core/byte_order.hpp"
 #include "src/formats/aedat/aedat4_decoder.hpp"
 #include "src/formats/aedat/aedat4_encoder.hpp"
-#include "src/formats/byte_order.hpp"
 #include "tests/formats/aedat_files.hpp"
 
 namespace aedat_recordings {

@@ -12,7 +12,7 @@
 #include <memory>
 #include <string>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/formats/ros/bag_decoder.hpp"
 #include "src/formats/ros/mcap_encoder.hpp"
 #include "tests/formats/pieces.hpp"

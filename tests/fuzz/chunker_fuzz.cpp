@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace {

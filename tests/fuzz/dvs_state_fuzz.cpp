@@ -9,9 +9,9 @@
 #include <stdexcept>
 #include <vector>
 
+#include "src/core/byte_order.hpp"
 #include "src/dvs/dvs_simulator.hpp"
 #include "src/dvs/state_bytes.hpp"
-#include "src/formats/byte_order.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace {

@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "src/core/byte_order.hpp"
 #include "src/filter/camera_calibration.hpp"
 #include "src/filter/crop_filter.hpp"
 #include "src/filter/denoise_filter.hpp"
@@ -18,7 +19,6 @@
 #include "src/filter/scale_filter.hpp"
 #include "src/filter/trail_filter.hpp"
 #include "src/filter/undistort_filter.hpp"
-#include "src/formats/byte_order.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 
 namespace {

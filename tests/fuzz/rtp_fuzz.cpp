@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // RTP packets. The first byte is the format; each packet follows four bytes: marker (bit 0) and
 // SSRC, sequence number, and size of its payload.
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/wire/rtp_unpacker.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"
 

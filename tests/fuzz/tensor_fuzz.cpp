@@ -5,7 +5,7 @@
 #include <numeric>
 #include <vector>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
 #include "tests/fuzz/fuzz_decoder.hpp"

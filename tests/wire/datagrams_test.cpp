@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "tests/formats/random_events.hpp"
 
 namespace eventcamera {

@@ -5,7 +5,7 @@
 #include <cctype>
 #include <string_view>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 
 namespace eventcamera {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 
 namespace eventcamera {
 

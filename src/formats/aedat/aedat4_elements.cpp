@@ -5,10 +5,10 @@
 #include <limits>
 #include <utility>
 
+#include "src/core/byte_order.hpp"
 #include "src/core/max_side.hpp"
 #include "src/formats/aedat/aedat4.hpp"
 #include "src/formats/aedat/aedat4_flatbuffer.hpp"
-#include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
 

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
+#include "src/core/byte_order.hpp"
 #include "src/formats/aedat/aedat4_compression.hpp"
 #include "src/formats/aedat/aedat4_flatbuffer.hpp"
-#include "src/formats/byte_order.hpp"
 
 namespace eventcamera {
 

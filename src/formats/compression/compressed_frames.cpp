@@ -10,7 +10,7 @@
 #include <new>
 #include <stdexcept>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 
 namespace eventcamera {
 

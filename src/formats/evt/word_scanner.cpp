@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/formats/evt/scanned_words.hpp"
 
 namespace eventcamera {

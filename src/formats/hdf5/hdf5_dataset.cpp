@@ -9,7 +9,7 @@
 #include <limits>
 #include <new>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/formats/hdf5/ecf.hpp"
 #include "src/formats/hdf5/hdf5_filters.hpp"
 #include "src/formats/unsupported_format.hpp"

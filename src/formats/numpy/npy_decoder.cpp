@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/formats/table_sample.hpp"
 
 namespace eventcamera {

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <string>
 
-#include "src/formats/byte_order.hpp"
+#include "src/core/byte_order.hpp"
 #include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
