@@ -65,7 +65,7 @@
 GST_DEBUG_CATEGORY_STATIC(rtp_event_depay_debug);
 #define GST_CAT_DEFAULT rtp_event_depay_debug
 
-using eventcamera::max_side;
+using eventcamera::is_side;
 using eventcamera::RtpEventFormat;
 using eventcamera::RtpInterval;
 using eventcamera::RtpPacket;
@@ -343,7 +343,7 @@ static std::optional<int> side_of(const GstStructure* caps, const char* name) {
   } else if (gst_structure_get_int(caps, name, &side) == FALSE) {
     return std::nullopt;
   }
-  return side >= 1 && side <= max_side ? std::optional(side) : std::nullopt;
+  return is_side(side) ? std::optional(side) : std::nullopt;
 }
 
 static std::optional<RtpEventFormat> format_of(const GstStructure* caps) {

@@ -18,10 +18,6 @@ namespace {
 
 constexpr std::size_t max_events = 4096;
 
-bool is_side(int pixels) {
-  return pixels > 0 && pixels <= max_side;
-}
-
 }  // namespace
 
 /// FlatBufferBuilder is a class or an alias, depending on the version of FlatBuffers.

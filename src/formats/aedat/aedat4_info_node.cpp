@@ -34,7 +34,6 @@ const char* value_of(const pugi::xml_node& node, const char* key) {
 SensorSize size_of(const pugi::xml_node& info) {
   const auto width = number(value_of(info, "sizeX")).value_or(0);
   const auto height = number(value_of(info, "sizeY")).value_or(0);
-  const auto is_side = [](int side) { return side > 0 && side <= max_side; };
   return is_side(width) && is_side(height) ? SensorSize{width, height} : SensorSize{};
 }
 

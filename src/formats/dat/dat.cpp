@@ -242,7 +242,7 @@ std::unique_ptr<Decoder> make_dat_decoder() {
 }
 
 std::unique_ptr<Encoder> make_dat_encoder(SensorSize size) {
-  if (size.width < 1 || size.height < 1 || size.width > max_side || size.height > max_side)
+  if (!is_side(size.width) || !is_side(size.height))
     throw std::invalid_argument("DAT files support sensors of 1x1 to 16384x16384 pixels");
   return std::make_unique<DatEncoder>(size);
 }

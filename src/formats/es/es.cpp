@@ -172,7 +172,7 @@ class EsDecoder final : public UnitStreamDecoder {
 
   template <class EventDecoder>
   void begin_events(SensorSize size) {
-    if (size.width == 0 || size.height == 0 || size.width > max_side || size.height > max_side)
+    if (!is_side(size.width) || !is_side(size.height))
       throw UnsupportedFormat("Event Stream with an impossible sensor size of " +
                               std::to_string(size.width) + "x" + std::to_string(size.height));
     begin(std::make_unique<EventDecoder>(size, origin_), size);
@@ -245,7 +245,7 @@ std::unique_ptr<Decoder> make_event_stream_decoder(EsOrigin origin) {
 }
 
 std::unique_ptr<Encoder> make_event_stream_encoder(SensorSize size, EsOrigin origin) {
-  if (size.width < 1 || size.height < 1 || size.width > max_side || size.height > max_side)
+  if (!is_side(size.width) || !is_side(size.height))
     throw std::invalid_argument("Event Streams support sensors of 1x1 to 16384x16384 pixels");
   return std::make_unique<EsEncoder>(size, origin);
 }

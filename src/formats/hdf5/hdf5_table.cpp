@@ -43,9 +43,7 @@ SensorSize read_geometry(std::string_view text) {
   const auto width = std::from_chars(text.data(), end, size.width);
   if (width.ec != std::errc() || width.ptr == end || *width.ptr != 'x') return {};
   const auto height = std::from_chars(width.ptr + 1, end, size.height);
-  if (height.ec != std::errc() || size.width <= 0 || size.height <= 0 || size.width > max_side ||
-      size.height > max_side)
-    return {};
+  if (height.ec != std::errc() || !is_side(size.width) || !is_side(size.height)) return {};
   return size;
 }
 
@@ -58,8 +56,7 @@ void note(Corruption& corruption, const Hdf5Dataset& dataset, std::uint64_t row,
 SensorSize size_of_attributes(hid_t object) {
   const auto width = read_number_attribute(object, "width");
   const auto height = read_number_attribute(object, "height");
-  if (!width || !height || *width <= 0 || *height <= 0 || *width > max_side || *height > max_side)
-    return {};
+  if (!width || !height || !is_side(*width) || !is_side(*height)) return {};
   return {static_cast<int>(*width), static_cast<int>(*height)};
 }
 
@@ -391,8 +388,9 @@ std::unique_ptr<Hdf5Table> open_v2e(hid_t file) {
     const Hdf5Handle space(H5Dget_space(frame.get()), H5Sclose);
     hsize_t extent[3] = {};  // frames, rows, columns
     if (H5Sget_simple_extent_ndims(space.get()) == 3 &&
-        H5Sget_simple_extent_dims(space.get(), extent, nullptr) == 3 && extent[1] <= max_side &&
-        extent[2] <= max_side && extent[1] > 0 && extent[2] > 0)
+        H5Sget_simple_extent_dims(space.get(), extent, nullptr) == 3 &&
+        is_side(static_cast<std::int64_t>(extent[1])) &&
+        is_side(static_cast<std::int64_t>(extent[2])))
       size = {static_cast<int>(extent[2]), static_cast<int>(extent[1])};
   }
   const bool wraps = events.is_unsigned_32();

@@ -141,7 +141,7 @@ int extent_in(ZipArchive& archive, std::size_t index) {
     const auto count = entry.read(std::span(bytes).subspan(had));
     if (!count || had + *count != header.element_bytes) return 0;
     const auto extent = npy_integer(header.columns.front(), bytes.data()).value_or(0);
-    return extent > 0 && extent <= max_side ? static_cast<int>(extent) : 0;
+    return is_side(extent) ? static_cast<int>(extent) : 0;
   } catch (const UnsupportedFormat&) {
     return 0;
   }

@@ -60,7 +60,7 @@ class ImageDecoder final : public TopicDecoder {
     if (encoding == std::end(encodings) ||
         (is_big_endian && encoding->format == PixelFormat::grey16))
       return "an image in an encoding that is not supported";
-    if (width == 0 || height == 0 || width > max_side || height > max_side ||
+    if (!is_side(width) || !is_side(height) ||
         stride < width * static_cast<std::size_t>(bytes_per_pixel(encoding->format)) ||
         stride > pixels.size() / height)
       return "an image whose size does not match its pixels";

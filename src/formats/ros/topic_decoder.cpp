@@ -42,7 +42,6 @@ std::unique_ptr<TopicDecoder> make_topic_decoder(const BagTopic& topic, Corrupti
 }
 
 void TopicDecoder::take_size(std::uint32_t width, std::uint32_t height) {
-  const auto is_side = [](std::uint32_t side) { return side > 0 && side <= max_side; };
   if (!std::exchange(size_taken_, true) && is_side(width) && is_side(height))
     size_ = {static_cast<int>(width), static_cast<int>(height)};
 }
