@@ -7,6 +7,8 @@
 
 #include "src/formats/hdf5/hdf5_file.hpp"
 #include "src/formats/hdf5/hdf5_table.hpp"
+#include "src/formats/hdf5/hdf5_triggers.hpp"
+#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 

@@ -11,7 +11,6 @@
 #include "src/formats/event_table.hpp"
 #include "src/formats/hdf5/hdf5_dataset.hpp"
 #include "src/formats/hdf5/hdf5_format.hpp"
-#include "src/formats/unsupported_format.hpp"
 
 namespace eventcamera {
 
@@ -48,24 +47,6 @@ class Hdf5Table {
   SensorSize size_;
   bool has_labels_ = false;
   std::uint64_t rows_ = 0, claimed_rows_ = 0;
-};
-
-/// Triggers of the Metavision layout.
-class Hdf5Triggers {
- public:
-  /// Returns null if the file has none.
-  static std::unique_ptr<Hdf5Triggers> open(hid_t file);
-
-  /// Appends a bounded number of triggers from the next row on. False at the end.
-  bool read(std::size_t count, std::vector<Trigger>& out, Corruption& corruption);
-  void seek(Microseconds t);
-
- private:
-  explicit Hdf5Triggers(hid_t file);
-
-  Hdf5Dataset dataset_;
-  std::uint64_t row_ = 0;
-  std::vector<std::int64_t> numbers_;  ///< t, p and id of each row
 };
 
 }  // namespace eventcamera

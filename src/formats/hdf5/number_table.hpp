@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <vector>
+
+#include "src/formats/hdf5/hdf5_table.hpp"
+#include "src/formats/unwrapped_clock.hpp"
+
+namespace eventcamera {
+
+/// Base of layouts with events as plain numbers.
+class NumberTable : public Hdf5Table {
+ public:
+  std::uint64_t read(std::uint64_t row, RowValidator& validator, std::vector<AbsoluteEvent>& out,
+                     Corruption& corruption) override;
+  std::uint64_t row_before(Microseconds t) override;
+  std::optional<Microseconds> time_at(std::uint64_t row) override;
+
+ protected:
+  using Hdf5Table::Hdf5Table;
+  using Clock = UnwrappedClock<32>;
+
+  virtual Hdf5Dataset& t_dataset() = 0;
+  virtual std::size_t t_column() const { return 0; }  ///< in the rows of t_dataset()
+
+  /// Reads t_, x_, y_ and p_, and the labels, if there are any. Returns the dataset that could not
+  /// be read, or nullptr.
+  virtual const Hdf5Dataset* read_numbers(std::uint64_t row, std::uint64_t count) = 0;
+
+  /// First row after the chunk of this row.
+  virtual std::uint64_t chunk_end(std::uint64_t row) const = 0;
+
+  /// Time of the row with this number, before the offset is added.
+  virtual Microseconds unwrapped(std::uint64_t row, std::int64_t number);
+
+  Microseconds offset_ = 0;
+  bool wraps_ = false;  ///< times have 32 bits and wrap after 71 minutes
+  std::vector<std::int64_t> t_, x_, y_, p_, cause_, object_class_;
+
+ private:
+  /// The clock at a row.
+  struct Sample {
+    std::uint64_t row;
+    Clock clock;
+  };
+
+  std::optional<std::int64_t> time_number(std::uint64_t row);
+  void take_samples();
+
+  std::vector<Sample> samples_;  ///< once they are needed
+  std::uint64_t next_row_ = 0;
+  Clock clock_;  ///< before next_row_
+};
+
+}  // namespace eventcamera
