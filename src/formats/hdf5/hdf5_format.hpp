@@ -13,4 +13,7 @@ enum class Hdf5Format : std::uint8_t {
   mvsec,       ///< /davis/left/events, rows of x, y, t in seconds, p
 };
 
+/// Compression of the layouts that leave it open.
+enum class Hdf5Compression : std::uint8_t { none, gzip };
+
 }  // namespace eventcamera

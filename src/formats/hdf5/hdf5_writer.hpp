@@ -14,6 +14,8 @@
 
 namespace eventcamera {
 
+class Hdf5Layout;
+
 /// Writes events to an HDF5 file. All functions throw std::runtime_error if the file cannot be
 /// written, and std::invalid_argument if the layout does not support the data.
 ///
@@ -21,7 +23,7 @@ namespace eventcamera {
 /// commits, the same calls write the same bytes.
 class Hdf5Writer {
  public:
-  enum class Compression : std::uint8_t { none, gzip };
+  using Compression = Hdf5Compression;
 
   struct Settings {
     Hdf5Format format = Hdf5Format::dsec;         ///< dsec or metavision
@@ -29,8 +31,6 @@ class Hdf5Writer {
     SensorSize size;
     std::chrono::nanoseconds commit_interval = std::chrono::seconds{1};  ///< 0 = never
   };
-
-  class Layout;
 
   /// Overwrites an existing file.
   Hdf5Writer(const std::filesystem::path& path, const Settings& settings);
@@ -60,7 +60,7 @@ class Hdf5Writer {
   SensorSize size_;
   std::chrono::nanoseconds commit_interval_;
   std::unique_ptr<File> file_;
-  std::unique_ptr<Layout> layout_;
+  std::unique_ptr<Hdf5Layout> layout_;
   Microseconds latest_ = INT64_MIN;
   Clock::time_point committed_{};  ///< time of the last commit
 };

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "src/formats/hdf5/hdf5_format.hpp"
+#include "src/formats/hdf5/hdf5_handle.hpp"
+
+namespace eventcamera {
+
+/// Throws std::runtime_error unless the library has done what it was asked for.
+void require(bool done);
+
+Hdf5Handle make_group(hid_t file, const char* name);
+
+/// Creates the properties of a dataset, which does not tell when it was written.
+Hdf5Handle make_creation();
+
+/// Dataset with rows appended.
+class GrowingDataset {
+ public:
+  GrowingDataset(hid_t parent, const char* name, hid_t stored, hid_t memory, hsize_t chunk,
+                 Hdf5Compression compression, int filter = 0);
+
+  void append(const void* rows, hsize_t count);
+
+  /// Writes the last chunk, of `count` rows from `begin` on, already filtered.
+  void write_chunk(std::span<const std::uint8_t> chunk, hsize_t begin, hsize_t count);
+
+  void read(hsize_t first, hsize_t count, void* rows) const;
+
+  hid_t id() const { return dataset_.get(); }
+  hsize_t rows() const { return rows_; }
+
+ private:
+  void extend(hsize_t count);
+  Hdf5Handle select(hsize_t first, hsize_t count) const;
+
+  Hdf5Handle dataset_;
+  hid_t memory_;
+  hsize_t rows_ = 0;
+};
+
+/// Growing dataset of Row, written one chunk at a time, or flushed in between.
+template <class Row>
+class BufferedDataset : public GrowingDataset {
+ public:
+  BufferedDataset(hid_t parent, const char* name, hid_t stored, hid_t memory, hsize_t chunk,
+                  Hdf5Compression compression)
+      : GrowingDataset(parent, name, stored, memory, chunk, compression), chunk_(chunk) {}
+
+  void put(const Row& row) {
+    buffer_.push_back(row);
+    if (count() % chunk_ == 0) flush();
+  }
+
+  void flush() {
+    append(buffer_.data(), buffer_.size());
+    buffer_.clear();
+  }
+
+  /// Includes the rows in the buffer.
+  hsize_t count() const { return rows() + buffer_.size(); }
+
+ private:
+  hsize_t chunk_;
+  std::vector<Row> buffer_;
+};
+
+}  // namespace eventcamera
