@@ -2,7 +2,6 @@
 #include "src/formats/text/csv_decoder.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <charconv>
 #include <cstring>
 #include <limits>
@@ -17,9 +16,6 @@ namespace {
 constexpr std::size_t head_lines = 256;
 constexpr std::size_t max_head = 65536;
 constexpr std::size_t max_line = 4096;
-
-/// Maximum number of characters that read_plain_line() examines.
-constexpr std::ptrdiff_t plain_line_reach = 128;
 
 constexpr bool is_blank(char letter) {
   return letter == ' ' || letter == '\t' || letter == '\r';
@@ -88,45 +84,6 @@ TableNumber sample_of(std::string_view field) {
   const bool has_decimals = point != std::string_view::npos && field.size() - point > 2 &&
                             field.find_first_of("eE") == std::string_view::npos;
   return {value, has_decimals ? TableNumber::Form::decimals : TableNumber::Form::floating};
-}
-
-/// Digits at the front of eight characters, and their value.
-struct Digits {
-  unsigned count;
-  std::uint64_t value;
-};
-
-inline Digits read_digits(const char* at) {
-  std::uint64_t word;
-  std::memcpy(&word, at, sizeof word);
-  word ^= 0x3030303030303030;
-  // Non-digits are now above 9 and set the highest bit of their byte. Carries only affect later
-  // bytes, and only the first non-digit counts.
-  const auto others = ((word + 0x7676767676767676) | word) & 0x8080808080808080;
-  const auto count = static_cast<unsigned>(std::countr_zero(others)) / 8;
-  if (count == 0) return {0, 0};
-  word <<= 64 - 8 * count;  // moves the last digit to the last byte, with zeros before the first
-  // Combine neighbours to numbers of two, four and eight digits.
-  word = word * 10 + (word >> 8);
-  word = ((word & 0x000000ff000000ff) * 0x000f424000000064 +
-          ((word >> 16) & 0x000000ff000000ff) * 0x0000271000000001) >>
-         32;
-  return {count, word};
-}
-
-constexpr std::uint64_t powers_of_ten[] = {1,       10,        100,        1'000,      10'000,
-                                           100'000, 1'000'000, 10'000'000, 100'000'000};
-
-/// Reads up to 16 digits; false if there are none, or more.
-inline bool read_plain_integer(const char*& at, std::uint64_t& value) {
-  const auto digits = read_digits(at);
-  at += digits.count;
-  value = digits.value;
-  if (digits.count < 8) return digits.count > 0;
-  const auto more = read_digits(at);
-  at += more.count;
-  value = value * powers_of_ten[more.count] + more.value;
-  return more.count < 8;
 }
 
 }  // namespace
@@ -224,7 +181,8 @@ void CsvDecoder::read_head() {
   find_unit(sample);
   has_labels_ =
       std::ranges::any_of(columns_, [](auto column) { return column && *column > EventColumn::p; });
-  plain_ = columns_.size() == event_columns && !has_labels_;
+  if (columns_.size() == event_columns && !has_labels_)
+    plain_lines_.emplace(columns_, separator_, power_);
 }
 
 /// Returns true for header lines before the first event, and evaluates them.
@@ -371,13 +329,13 @@ void CsvDecoder::read_text(std::string_view text, Decoded& out) {
 /// Reads complete lines and returns `end`.
 const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out) {
   while (at < end) {
-    if (plain_) {
+    if (plain_lines_) {
       const char* const first = at;
-      while (end - at > plain_line_reach) {
-        Row row;
-        const char* const next = read_plain_line(at, row);
+      while (end - at > PlainLines::reach) {
+        PlainLines::Row row;
+        const char* const next = plain_lines_->read(at, row);
         if (next == nullptr) break;
-        validator_.take(row.t.value, row.x, row.y, row.on, out.events, corruption_);
+        validator_.take(row.t, row.x, row.y, row.on, out.events, corruption_);
         at = next;
       }
       position_ += static_cast<std::uint64_t>(at - first);
@@ -394,56 +352,6 @@ const char* CsvDecoder::read_lines(const char* at, const char* end, Decoded& out
     at = line_end + 1;
   }
   return end;
-}
-
-/// Fast path for typical lines: numbers without sign (except for the polarity), one separator, no
-/// blanks. Returns the start of the next line, or nullptr for any other line.
-const char* CsvDecoder::read_plain_line(const char* at, Row& row) const {
-  std::array<std::uint64_t, 4> values;
-  for (const auto& column : columns_) {
-    auto& value = values[static_cast<std::size_t>(*column)];
-    if (*column == EventColumn::p) {
-      const bool minus = *at == '-';
-      at += minus ? 1 : 0;
-      const auto digit = static_cast<unsigned char>(*at++ - '0');
-      if (digit > 1) return nullptr;
-      value = minus ? 0 : digit;
-    } else {
-      if (!read_plain_integer(at, value)) return nullptr;
-      if (*column == EventColumn::t) {
-        if (power_ == 6) {
-          if (value > 1'000'000'000'000) return nullptr;
-          value *= 1'000'000;
-          if (*at == '.') {
-            ++at;
-            const auto digits = read_digits(at);
-            at += digits.count;
-            if (digits.count == 8) at += read_digits(at).count;
-            const auto fraction = digits.value * powers_of_ten[8 - digits.count];
-            if (fraction % 100 == 99) return nullptr;  // may be a whole microsecond in a double
-            value += fraction / 100;
-          }
-        } else if (power_ == 3) {
-          if (value > 1'000'000'000'000) return nullptr;
-          value *= 1000;
-        } else if (power_ == -3) {
-          value /= 1000;
-        }
-      }
-    }
-    if (&column != &columns_.back() && *at++ != separator_) return nullptr;
-  }
-  if (*at == '\r') ++at;
-  if (*at++ != '\n') return nullptr;
-
-  const auto number = [&](EventColumn column) {
-    return static_cast<std::int64_t>(values[static_cast<std::size_t>(column)]);
-  };
-  row.t.value = number(EventColumn::t);
-  row.x = number(EventColumn::x);
-  row.y = number(EventColumn::y);
-  row.on = number(EventColumn::p) == 1;
-  return at;
 }
 
 void CsvDecoder::read_line(std::string_view line, Decoded& out) {

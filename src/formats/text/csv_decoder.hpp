@@ -11,6 +11,7 @@
 #include "src/formats/event_table.hpp"
 #include "src/formats/table_sample.hpp"
 #include "src/formats/text/decimal.hpp"
+#include "src/formats/text/plain_lines.hpp"
 
 namespace eventcamera {
 
@@ -63,7 +64,6 @@ class CsvDecoder final : public Decoder {
 
   void read_text(std::string_view text, Decoded& out);
   const char* read_lines(const char* at, const char* end, Decoded& out);
-  const char* read_plain_line(const char* at, Row& row) const;
   void read_line(std::string_view line, Decoded& out);
 
   TableSettings settings_;
@@ -73,11 +73,11 @@ class CsvDecoder final : public Decoder {
   bool line_begins_ = true;     ///< the next character is the first of a line
 
   Columns columns_;
-  bool has_names_ = false;        ///< the header has column names
-  std::optional<TimeUnit> unit_;  ///< time unit in the names
-  char separator_ = ',';          ///< separator in the first line
-  bool plain_ = false;            ///< four columns, so that read_plain_line() can be used
-  int power_ = 0;                 ///< power of ten from the time unit to microseconds
+  bool has_names_ = false;                 ///< the header has column names
+  std::optional<TimeUnit> unit_;           ///< time unit in the names
+  char separator_ = ',';                   ///< separator in the first line
+  int power_ = 0;                          ///< power of ten from the time unit to microseconds
+  std::optional<PlainLines> plain_lines_;  ///< if there are four columns
   RowValidator validator_;
 
   std::string rest_;  ///< start of an incomplete line
