@@ -3,6 +3,8 @@
 
 #include <gst/gst.h>
 
+#include <utility>
+
 #include "gst/base/owned.hpp"
 
 /// For class_init: adds the template of a pad. GstAggregator needs pads of its own type.
@@ -30,6 +32,19 @@ inline GstPad* add_pad(GstElement* element, const char* name) {
   GstPad* const pad = gst_pad_new_from_template(pad_template, name);
   gst_element_add_pad(element, pad);
   return pad;
+}
+
+/// For init: adds the pads "sink" and "src" of an element that decides the caps of its output.
+inline std::pair<GstPad*, GstPad*> add_pads(GstElement* element, GstPadChainFunction chain,
+                                            GstPadEventFunction sink_event,
+                                            GstPadQueryFunction src_query) {
+  GstPad* const sink = add_pad(element, "sink");
+  gst_pad_set_chain_function(sink, chain);
+  gst_pad_set_event_function(sink, sink_event);
+  GstPad* const src = add_pad(element, "src");
+  gst_pad_set_query_function(src, src_query);
+  gst_pad_use_fixed_caps(src);
+  return {sink, src};
 }
 
 /// True if the peer of a pad can seek in this format.

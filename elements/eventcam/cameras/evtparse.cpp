@@ -47,6 +47,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -509,12 +510,7 @@ static void gst_evt_parse_init(GstEvtParse* self) {
   self->priv = new Private;
   auto& priv = *self->priv;
   gst_segment_init(&priv.upstream, GST_FORMAT_UNDEFINED);
-  priv.sink = add_pad(GST_ELEMENT(self), "sink");
-  gst_pad_set_chain_function(priv.sink, chain);
-  gst_pad_set_event_function(priv.sink, sink_event);
-  priv.src = add_pad(GST_ELEMENT(self), "src");
-  gst_pad_set_query_function(priv.src, src_query);
-  gst_pad_use_fixed_caps(priv.src);
+  std::tie(priv.sink, priv.src) = add_pads(GST_ELEMENT(self), chain, sink_event, src_query);
 }
 
 static GstStructure* structure_of(const Stats& stats) {

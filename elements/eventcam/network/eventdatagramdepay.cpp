@@ -39,6 +39,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -384,12 +385,7 @@ static void finalize(GObject* object) {
 static void gst_event_datagram_depay_init(GstEventDatagramDepay* self) {
   self->priv = new Private;
   auto& priv = *self->priv;
-  priv.sink = add_pad(GST_ELEMENT(self), "sink");
-  gst_pad_set_chain_function(priv.sink, chain);
-  gst_pad_set_event_function(priv.sink, sink_event);
-  priv.src = add_pad(GST_ELEMENT(self), "src");
-  gst_pad_set_query_function(priv.src, src_query);
-  gst_pad_use_fixed_caps(priv.src);
+  std::tie(priv.sink, priv.src) = add_pads(GST_ELEMENT(self), chain, sink_event, src_query);
 }
 
 static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klass) {

@@ -29,6 +29,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "elements/eventcam/network/datagram_properties.hpp"
@@ -322,12 +323,7 @@ static void finalize(GObject* object) {
 static void gst_event_datagram_pay_init(GstEventDatagramPay* self) {
   self->priv = new Private;
   auto& priv = *self->priv;
-  priv.sink = add_pad(GST_ELEMENT(self), "sink");
-  gst_pad_set_chain_function(priv.sink, chain);
-  gst_pad_set_event_function(priv.sink, sink_event);
-  priv.src = add_pad(GST_ELEMENT(self), "src");
-  gst_pad_set_query_function(priv.src, src_query);
-  gst_pad_use_fixed_caps(priv.src);
+  std::tie(priv.sink, priv.src) = add_pads(GST_ELEMENT(self), chain, sink_event, src_query);
   announce_latency(GST_CAT_DEFAULT, self, "max-latency");
 }
 

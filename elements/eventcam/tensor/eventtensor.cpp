@@ -53,6 +53,7 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "elements/eventcam/tensor/tensor_meta.hpp"
@@ -603,12 +604,7 @@ static void gst_event_tensor_init(GstEventTensor* self) {
   self->priv = new Private;
   auto& priv = *self->priv;
   gst_segment_init(&priv.segment, GST_FORMAT_UNDEFINED);
-  priv.sink = add_pad(GST_ELEMENT(self), "sink");
-  gst_pad_set_chain_function(priv.sink, chain);
-  gst_pad_set_event_function(priv.sink, sink_event);
-  priv.src = add_pad(GST_ELEMENT(self), "src");
-  gst_pad_set_query_function(priv.src, src_query);
-  gst_pad_use_fixed_caps(priv.src);
+  std::tie(priv.sink, priv.src) = add_pads(GST_ELEMENT(self), chain, sink_event, src_query);
 }
 
 static void gst_event_tensor_class_init(GstEventTensorClass* klass) {
