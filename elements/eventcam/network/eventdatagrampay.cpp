@@ -34,6 +34,7 @@
 
 #include "elements/eventcam/network/datagram_properties.hpp"
 #include "elements/eventcam/network/flush_timer.hpp"
+#include "elements/eventcam/network/max_latency.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/buffer_bytes.hpp"
 #include "gst/base/errors.hpp"
@@ -55,9 +56,7 @@ using eventcamera::Microseconds;
 namespace {
 
 /// User-settable values.
-struct Settings : eventcamera::DatagramSettings {
-  GstClockTime max_latency = 5 * GST_MSECOND;
-};
+struct Settings : eventcamera::DatagramSettings, PayloaderSettings {};
 
 struct Private {
   Guarded<Settings> settings;
@@ -333,12 +332,7 @@ static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
 
   Properties<settings_of> properties(object_class);
   add_datagram_properties(properties);
-  properties.add(
-      &Settings::max_latency,
-      g_param_spec_uint64("max-latency", "Maximum latency",
-                          "Maximum time for which an event waits for others to fill its datagram "
-                          "(ns; 0 = send each buffer at once)",
-                          0, GST_SECOND, Settings().max_latency, mutable_playing_flags));
+  add_max_latency(properties);
   install_stats(
       object_class,
       [](GObject* object) {

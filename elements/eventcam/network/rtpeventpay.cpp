@@ -32,6 +32,7 @@
 #include <string>
 
 #include "elements/eventcam/network/flush_timer.hpp"
+#include "elements/eventcam/network/max_latency.hpp"
 #include "elements/eventcam/network/rtp_events.hpp"
 #include "elements/eventcam/network/rtp_header_extensions.hpp"
 #include "gst/base/authors.hpp"
@@ -63,9 +64,8 @@ using eventcamera::SensorSize;
 namespace {
 
 /// User-settable values.
-struct Settings {
+struct Settings : PayloaderSettings {
   RtpEventFormat format = RtpEventFormat::evt3;
-  GstClockTime max_latency = 5 * GST_MSECOND;
 };
 
 /// Stream of one sensor.
@@ -408,12 +408,7 @@ static void gst_rtp_event_pay_class_init(GstRtpEventPayClass* klass) {
       g_param_spec_enum("format", "Format",
                         "Format of the events in packets; read when the stream begins",
                         format_type(), static_cast<int>(Settings().format), mutable_ready_flags));
-  properties.add(&Settings::max_latency,
-                 g_param_spec_uint64(
-                     "max-latency", "Maximum latency",
-                     "Maximum time for which an event waits for others to fill its packet (ns; "
-                     "0 = send each buffer at once)",
-                     0, GST_SECOND, Settings().max_latency, mutable_playing_flags));
+  add_max_latency(properties);
   install_stats(object_class, stats_of, "Counters of packets and events sent");
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
