@@ -43,8 +43,8 @@ ROWS = {
     "diff": "eventsim-diff",
     "`eventsim-dvs`": "eventsim-dvs",
 }
-# As docs/which-simulator.md recommends.
-RECOMMENDED = "eventsim-dvs upsampling=motion response=log log-eps=0.05 denoise=4 adaptation=0.05"
+with open(os.path.join(os.path.dirname(__file__), "..", "docs", "which-simulator.md"), encoding="utf-8") as file:
+    RECOMMENDED = re.search("`(eventsim-dvs upsampling=motion .*?)`", file.read())[1]
 # Of these, only the thresholds are fitted.
 PRESETS = {f"`{element}`": element for element in ("eventsim-dvs preset=esim", "eventsim-dvs preset=v2e-noisy")} | {
     "`eventsim-dvs`, recommended": RECOMMENDED,
