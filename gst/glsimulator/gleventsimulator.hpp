@@ -31,13 +31,13 @@ using MakeGlSimulator = std::unique_ptr<eventcamera::gl::Simulator> (*)(
     const eventcamera::gl::Context& gl, const eventcamera::LumaFormat& format);
 
 /// Creates the simulator that `make` returns, in the context of a GstGLEventSimulator.
-std::unique_ptr<VideoSimulator> make_texture_simulator(GObject* element, const GstVideoInfo& video,
-                                                       MakeGlSimulator make);
+std::unique_ptr<VideoSimulator> in_gl_memory(GObject* element, const GstVideoInfo& video,
+                                             MakeGlSimulator make);
 
 /// For EventSimulatorMethod::create.
 template <auto make>
 std::unique_ptr<VideoSimulator> in_gl_memory(GObject* element, const GstVideoInfo& video) {
-  return make_texture_simulator(
+  return in_gl_memory(
       element, video,
       [](const eventcamera::gl::Context& gl, const eventcamera::LumaFormat& format)
           -> std::unique_ptr<eventcamera::gl::Simulator> { return make(gl, format); });

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/glsimulator/shared_context.hpp"
+
+#include <utility>
+
+#include "gst/base/errors.hpp"
+#include "gst/glsimulator/gl_display.hpp"
+
+std::string advice_of(GstElement* element) {
+  const auto* factory = gst_element_get_factory(element);
+  if (factory == nullptr) return " Use the element that runs on the CPU.";
+  return std::string(" Use ") + (GST_OBJECT_NAME(factory) + 2) + ", which runs on the CPU.";
+}
+
+/// Asks the neighbours and the application for an object, which take() then stores. Returns true if
+/// there is one. Must be called without the lock: neighbours may query this element.
+template <class Object>
+bool SharedContext::ask_for(const char* type, Object* SharedContext::*object) {
+  const auto is_known = [this, object] {
+    const std::lock_guard lock(mutex_);
+    return this->*object != nullptr;
+  };
+  GstQuery* query = gst_query_new_context(type);
+  for (GstPad* pad :
+       {GST_BASE_TRANSFORM_SRC_PAD(element_), GST_BASE_TRANSFORM_SINK_PAD(element_)}) {
+    GstContext* context = nullptr;
+    if (!is_known() && gst_pad_peer_query(pad, query)) {
+      gst_query_parse_context(query, &context);
+      if (context != nullptr) gst_element_set_context(element_, context);
+    }
+  }
+  gst_query_unref(query);
+  if (!is_known())
+    gst_element_post_message(element_, gst_message_new_need_context(GST_OBJECT(element_), type));
+  return is_known();
+}
+
+/// Makes a display, and shares it with the pipeline. False if there is none.
+bool SharedContext::provide_display() {
+  GstGLDisplay* display = gl_display();
+  if (display == nullptr) return false;
+  GstContext* context = gst_context_new(GST_GL_DISPLAY_CONTEXT_TYPE, TRUE);
+  gst_context_set_gl_display(context, display);
+  gst_object_unref(display);
+  gst_element_set_context(element_, context);
+  gst_element_post_message(element_, gst_message_new_have_context(GST_OBJECT(element_), context));
+  return true;
+}
+
+bool SharedContext::open() {
+  if (ask_for(GST_GL_DISPLAY_CONTEXT_TYPE, &SharedContext::display_) || provide_display()) {
+    ask_for("gst.gl.app_context", &SharedContext::other_);
+    return true;
+  }
+  post_message(element_, GST_MESSAGE_ERROR,
+               {GST_RESOURCE_ERROR_NOT_FOUND,
+                "OpenGL does not work here: there is no screen, no GPU and no software renderer "
+                "(Debian: libgl1-mesa-dri)." +
+                    advice_of(element_)},
+               "no GstGLDisplay has a context");
+  return false;
+}
+
+void SharedContext::close() {
+  const std::lock_guard lock(mutex_);
+  gst_clear_object(&context_);
+  gst_clear_object(&other_);
+  gst_clear_object(&display_);
+}
+
+void SharedContext::take(GstContext* context) {
+  const std::lock_guard lock(mutex_);
+  gst_gl_handle_set_context(element_, context, &display_, &other_);
+}
+
+bool SharedContext::answer(GstQuery* query) {
+  if (GST_QUERY_TYPE(query) != GST_QUERY_CONTEXT) return false;
+  const std::lock_guard lock(mutex_);
+  return gst_gl_handle_context_query(element_, query, display_, context_, other_) != FALSE;
+}
+
+GstGLContext* SharedContext::find(GError** error) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (context_ != nullptr) return context_;
+  }
+  GstGLContext* shared = nullptr;  // asked for without the lock: neighbours may query this element
+  gst_gl_query_local_gl_context(element_, GST_PAD_SRC, &shared);
+  if (shared == nullptr) gst_gl_query_local_gl_context(element_, GST_PAD_SINK, &shared);
+
+  const std::lock_guard lock(mutex_);
+  if (context_ == nullptr) std::swap(context_, shared);
+  if (context_ == nullptr) context_ = gl_context_of(display_, other_, error);
+  gst_clear_object(&shared);
+  return context_;
+}
+
+void SharedContext::forget(GstGLContext* context) {
+  const std::lock_guard lock(mutex_);
+  if (context_ != context) return;
+  GST_CAT_WARNING_OBJECT(category_, element_, "lost %" GST_PTR_FORMAT ", looking for another",
+                         context);
+  GST_OBJECT_LOCK(display_);
+  gst_gl_display_remove_context(display_, context);
+  GST_OBJECT_UNLOCK(display_);
+  gst_clear_object(&context_);
+  gst_pad_mark_reconfigure(GST_BASE_TRANSFORM_SRC_PAD(element_));  // its textures are lost, too
+}

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#include "gst/glsimulator/texture_simulator.hpp"
+
+#include <gst/gl/gstglfuncs.h>
+
+#include <algorithm>
+#include <exception>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "gst/base/owned.hpp"
+#include "gst/base/video_frame.hpp"
+#include "gst/glsimulator/later_look.hpp"
+#include "gst/glsimulator/mapped_texture.hpp"
+#include "gst/simulator/frame_luma.hpp"
+
+using eventcamera::EventBuckets;
+using eventcamera::LumaWeights;
+using eventcamera::Nanoseconds;
+
+namespace {
+
+/// Runs `work` in the thread of a context, and rethrows its exceptions. Returns false if the
+/// context no longer has a thread.
+template <class Work>
+bool run_in(GstGLContext* context, const Work& work) {
+  struct Call {
+    const Work& work;
+    bool has_run;
+    std::exception_ptr failure;
+  } call{work, false, nullptr};
+  const auto run = [](GstGLContext*, gpointer data) {
+    auto& this_call = *static_cast<Call*>(data);
+    this_call.has_run = true;
+    try {
+      this_call.work();
+    } catch (...) {
+      this_call.failure = std::current_exception();
+    }
+  };
+  gst_gl_context_thread_add(context, run, &call);
+  if (call.failure) std::rethrow_exception(call.failure);
+  return call.has_run;
+}
+
+/// Weights of the channels of the first texture in luma.
+void find_weights(const GstVideoInfo& video, int (&weights)[4]) {
+  const auto channel = [&](guint component) -> int& {
+    return weights[GST_VIDEO_INFO_COMP_POFFSET(&video, component)];
+  };
+  std::fill(std::begin(weights), std::end(weights), 0);
+  if (GST_VIDEO_INFO_IS_RGB(&video)) {
+    const auto luma = luma_weights_of(video);
+    channel(GST_VIDEO_COMP_R) = luma.red;
+    channel(GST_VIDEO_COMP_G) = luma.green;
+    channel(GST_VIDEO_COMP_B) = luma.blue;
+  } else {
+    channel(GST_VIDEO_COMP_Y) = LumaWeights::one;
+  }
+}
+
+/// A simulator on the GPU. The events of an interval are read while the GPU works on the next one,
+/// or as soon as they are ready, so at most one interval is awaited. Every frame, including first
+/// and drawn ones, is held until the GPU has read it.
+class TextureVideoSimulator final : public VideoSimulator {
+ public:
+  /// `context` is that of `shared`, which must outlive this object.
+  TextureVideoSimulator(GstElement* element, SharedContext& shared, GstGLContext* context,
+                        const GstVideoInfo& video, MakeGlSimulator make)
+      : element_(element),
+        shared_(shared),
+        later_look_(element),
+        context_(static_cast<GstGLContext*>(gst_object_ref(context))),
+        frame_{FrameLuma::format_of(video), 0, {}} {
+    set_video(video);
+    try {
+      run([&] {
+        gl_.emplace(
+            [context](const char* name) { return gst_gl_context_get_proc_address(context, name); });
+        simulator_ = make(*gl_, frame_.format);
+        const auto* functions = context_->gl_vtable;
+        GST_CAT_INFO_OBJECT(shared_.category(), element_, "%s, OpenGL %s",
+                            functions->GetString(GL_RENDERER), functions->GetString(GL_VERSION));
+      });
+    } catch (...) {
+      close();
+      throw;
+    }
+  }
+  ~TextureVideoSimulator() override { close(); }
+  TextureVideoSimulator(const TextureVideoSimulator&) = delete;
+  TextureVideoSimulator& operator=(const TextureVideoSimulator&) = delete;
+
+  void set_video(const GstVideoInfo& video) override {
+    video_ = video;
+    find_weights(video, frame_.weights);
+    gst_clear_object(&upload_);
+  }
+
+  void set_drawn_video(const GstVideoInfo& drawn) override { drawn_ = drawn; }
+
+  void push(Interval interval, const eventcamera::Settings& settings) override {
+    {
+      const OwnedBuffer uploaded = in_texture(interval.frame.get());
+      const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
+      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
+      frame_.texture = texture.name();
+      run([&] { simulator_->queue(frame_, interval.end, settings); });
+    }
+    await({std::move(interval), false});
+  }
+
+  void draw(OwnedBuffer frame, Nanoseconds time, const eventcamera::Settings& settings,
+            const eventcamera::Palette& palette, GstBuffer* picture) override {
+    {
+      const OwnedBuffer uploaded = in_texture(frame.get());
+      const MappedTexture texture(video_, uploaded.get(), context_, GST_MAP_READ);
+      if (!texture.fault().empty()) refuse(cannot_read(texture.fault()));
+      const MappedTexture drawn(drawn_, picture, context_, GST_MAP_WRITE);
+      if (!drawn.fault().empty()) refuse(cannot_draw(drawn.fault()));
+      frame_.texture = texture.name();
+      const eventcamera::gl::Picture out{
+          drawn.name(), eventcamera::pixels_by_kind(palette, pixel_layout_of(drawn_))};
+      run([&] { simulator_->draw(frame_, time, settings, out); });
+    }
+    // Makes readers of the picture in another context wait until it is drawn.
+    auto* sync = gst_buffer_get_gl_sync_meta(picture);
+    if (sync == nullptr) sync = gst_buffer_add_gl_sync_meta(context_, picture);
+    gst_gl_sync_meta_set_sync_point(sync, context_);
+    await({{.frame = std::move(frame)}, true});
+  }
+
+  void push_finished() override {
+    if (!awaited_) return;
+    bool is_ready = false;
+    run([&] { is_ready = simulator_->is_ready(); });
+    if (is_ready)
+      finish();
+    else
+      later_look_.schedule();
+  }
+
+  void finish() override {
+    if (!awaited_) return;
+    later_look_.cancel();
+    auto [interval, is_drawn] = *std::exchange(awaited_, std::nullopt);
+    const EventBuckets* events = nullptr;
+    run([&] { events = simulator_->read(); });
+    if (!is_drawn) event_simulator_push_interval(G_OBJECT(element_), std::move(interval), events);
+  }
+
+  void drop() override {
+    later_look_.cancel();
+    awaited_.reset();
+    simulator_->drop();
+  }
+
+  eventcamera::IntervalSimulator& simulator() override { return *simulator_; }
+
+ private:
+  struct Awaited {
+    Interval interval;
+    bool is_drawn;
+  };
+
+  /// Awaits the frame queued last, after pushing the previous interval.
+  void await(Awaited awaited) {
+    finish();
+    awaited_ = std::move(awaited);
+    push_finished();
+  }
+
+  /// Returns the frame as a texture; uploads it if it is in system memory.
+  OwnedBuffer in_texture(GstBuffer* buffer) {
+    if (gst_buffer_n_memory(buffer) > 0 && gst_is_gl_memory(gst_buffer_peek_memory(buffer, 0)))
+      return OwnedBuffer(gst_buffer_ref(buffer));
+    if (const VideoFrame mapped(video_, buffer, GST_MAP_READ); !mapped)  // GstGLUpload trusts it
+      throw cannot_read(mapped.fault());
+    if (upload_ == nullptr) {
+      upload_ = gst_gl_upload_new(context_);
+      const OwnedCaps from(gst_video_info_to_caps(&video_));
+      const OwnedCaps to(gst_caps_copy(from.get()));
+      gst_caps_set_features_simple(
+          to.get(), gst_caps_features_new(GST_CAPS_FEATURE_MEMORY_GL_MEMORY, nullptr));
+      gst_caps_set_simple(to.get(), "texture-target", G_TYPE_STRING, GST_GL_TEXTURE_TARGET_2D_STR,
+                          nullptr);
+      gst_gl_upload_set_caps(upload_, from.get(), to.get());
+    }
+    GstBuffer* uploaded = nullptr;
+    auto result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
+    if (result == GST_GL_UPLOAD_RECONFIGURE)  // it has selected an upload method
+      result = gst_gl_upload_perform_with_buffer(upload_, buffer, &uploaded);
+    if (result != GST_GL_UPLOAD_DONE)
+      refuse(cannot_read("it cannot be uploaded to an OpenGL texture"));
+    return OwnedBuffer(uploaded);
+  }
+
+  /// Throws the fault of a frame or a picture, or ContextLost if the context is the cause.
+  [[noreturn]] void refuse(const VideoSimulatorError& fault) {
+    run([] {});
+    throw fault;
+  }
+
+  /// Runs `work` in the context, which other elements share; turns OpenGL errors into messages.
+  template <class Work>
+  void run(const Work& work) {
+    try {
+      const bool has_run = run_in(context_, [&] {
+        if (gl_) gl_->forget_errors();
+        work();
+        gst_gl_context_clear_shader(context_);
+      });
+      if (!has_run) throw eventcamera::gl::ContextLost("the OpenGL context was destroyed");
+    } catch (const eventcamera::gl::Error& error) {
+      if (dynamic_cast<const eventcamera::gl::ContextLost*>(&error) != nullptr)
+        shared_.forget(context_);
+      gint major = 0;
+      gint minor = 0;
+      gst_gl_context_get_gl_version(context_, &major, &minor);
+      gchar* api = gst_gl_api_to_string(gst_gl_context_get_gl_api(context_));
+      const std::string version =
+          std::string(api) + " " + std::to_string(major) + "." + std::to_string(minor);
+      g_free(api);
+      throw VideoSimulatorError(
+          {GST_RESOURCE_ERROR_FAILED,
+           std::string("OpenGL cannot simulate: ") + error.what() + "." + advice_of(element_)},
+          version);
+    }
+  }
+
+  void close() {
+    const auto destroy = [this] {
+      simulator_.reset();
+      gl_.reset();
+    };
+    if (!run_in(context_, destroy)) {
+      if (gl_) gl_->abandon();
+      destroy();
+    }
+    gst_clear_object(&upload_);
+    gst_object_unref(context_);
+  }
+
+  GstElement* element_;
+  SharedContext& shared_;
+  LaterLook later_look_;
+  std::optional<Awaited> awaited_;
+  GstGLContext* context_;
+  GstVideoInfo video_;
+  GstVideoInfo drawn_{};
+  GstGLUpload* upload_ = nullptr;  ///< for video in system memory
+  eventcamera::gl::TextureFrame frame_;
+  std::optional<eventcamera::gl::Context> gl_;
+  std::unique_ptr<eventcamera::gl::Simulator> simulator_;
+};
+
+}  // namespace
+
+std::unique_ptr<VideoSimulator> make_texture_simulator(GstElement* element, SharedContext& shared,
+                                                       const GstVideoInfo& video,
+                                                       MakeGlSimulator make) {
+  GError* error = nullptr;
+  GstGLContext* context = shared.find(&error);
+  if (context == nullptr) {
+    const std::string cause = error != nullptr ? error->message : "unknown";
+    g_clear_error(&error);
+    throw VideoSimulatorError(
+        {GST_RESOURCE_ERROR_NOT_FOUND,
+         "Cannot create an OpenGL context. Without a screen, set the environment variable "
+         "GST_GL_WINDOW=egl-device, which other elements of OpenGL need, too." +
+             advice_of(element)},
+        cause);
+  }
+  return std::make_unique<TextureVideoSimulator>(element, shared, context, video, make);
+}
