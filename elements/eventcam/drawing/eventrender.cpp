@@ -32,10 +32,11 @@
 
 #include <algorithm>
 #include <limits>
-#include <mutex>
 #include <optional>
 #include <utility>
 
+#include "elements/eventcam/drawing/frame_times.hpp"
+#include "elements/eventcam/drawing/picture_qos.hpp"
 #include "gst/aggregator/eventaggregator.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/event_buffer.hpp"
@@ -105,38 +106,6 @@ Microseconds window_start(const Settings& settings, const EventInterval& interva
   return static_cast<Microseconds>(interval.start / 1000);
 }
 
-/// Successive intervals of pictures at a framerate.
-class FrameTimes {
- public:
-  FrameTimes(GstClockTime origin, const GstVideoInfo& video)
-      : origin_(origin),
-        fps_n_(static_cast<guint64>(GST_VIDEO_INFO_FPS_N(&video))),
-        fps_d_(static_cast<guint64>(GST_VIDEO_INFO_FPS_D(&video))) {}
-
-  /// Interval of the picture's events. Rounded up, so that intervals of other elements at the same
-  /// framerate, which are rounded down, end within it.
-  EventInterval events() const {
-    const auto at = [this](guint64 index) {
-      return origin_ + gst_util_uint64_scale_ceil(index, fps_d_ * GST_SECOND, fps_n_);
-    };
-    return {at(index_), at(index_ + 1)};
-  }
-  /// Timestamps of the picture's buffer.
-  EventInterval picture() const {
-    const auto at = [this](guint64 index) {
-      return origin_ + gst_util_uint64_scale(index, fps_d_ * GST_SECOND, fps_n_);
-    };
-    return {at(index_), at(index_ + 1)};
-  }
-  void next() { ++index_; }
-
- private:
-  GstClockTime origin_;
-  guint64 fps_n_;
-  guint64 fps_d_;
-  guint64 index_ = 0;
-};
-
 /// State from caps to stop.
 struct State {
   int width;  ///< of the sensor
@@ -162,9 +131,9 @@ class EventRender final : public EventAggregator {
 
   GstFlowReturn choose_caps(GstCaps* downstream, GstCaps** result) const;
   bool set_video(const GstCaps* caps);
-  void take_qos(GstEvent* event);
 
   Guarded<Settings> settings;
+  PictureQos qos;
 
  private:
   void drain();
@@ -182,9 +151,6 @@ class EventRender final : public EventAggregator {
   GstFlowReturn push_picture(const EventInterval& events, const EventInterval& picture);
   GstFlowReturn push_next_picture();
 
-  std::mutex mutex_;           // guards earliest_; make no calls while holding it
-  GstClockTime earliest_ = 0;  // running time before which pictures are too late
-
   // Accessed by the source pad's thread only, or while there is none.
   std::optional<State> state_;
   std::optional<FrameTimes> times_;  // interval of the next picture, once the first event is near
@@ -192,8 +158,6 @@ class EventRender final : public EventAggregator {
   GstClockTime known_ = 0;           // time up to which events are complete
   std::optional<GstClockTime> waiting_since_;  // for the first event; running time
   bool discontinuous_ = false;                 // the next picture is discontinuous
-  guint64 drawn_ = 0;                          // number of pictures, for QoS messages
-  guint64 skipped_ = 0;
 };
 
 /* events */
@@ -312,28 +276,16 @@ GstClockTime EventRender::next_time() {
 
 /// Skips a picture that sinks would drop anyway. False if it must be drawn.
 bool EventRender::skip(const EventInterval& picture) {
-  const GstSegment segment = segment_of(main_pad());
   const auto time = running_time(main_pad(), picture.start);
-  GstClockTime earliest = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    earliest = earliest_;
-  }
-  if (!time || *time >= earliest) {
-    ++drawn_;
-    return false;
-  }
-  ++skipped_;
+  if (!qos.is_late(time)) return false;
   discontinuous_ = true;
   GST_DEBUG_OBJECT(element(), "downstream is late: skipped the picture at %" GST_TIME_FORMAT,
                    GST_TIME_ARGS(picture.start));
-  GstMessage* const message =
-      gst_message_new_qos(GST_OBJECT(element()), FALSE, *time,
-                          gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, picture.start),
-                          picture.start, picture.end - picture.start);
-  gst_message_set_qos_values(message, GST_CLOCK_DIFF(*time, earliest), 1, 1'000'000);
-  gst_message_set_qos_stats(message, GST_FORMAT_BUFFERS, drawn_, skipped_);
-  gst_element_post_message(GST_ELEMENT(element()), message);
+  const GstSegment segment = segment_of(main_pad());
+  const GstClockTime stream_time =
+      gst_segment_to_stream_time(&segment, GST_FORMAT_TIME, picture.start);
+  gst_element_post_message(GST_ELEMENT(element()),
+                           qos.message(GST_ELEMENT(element()), picture, *time, stream_time));
   return true;
 }
 
@@ -449,7 +401,7 @@ bool EventRender::take_caps(GstAggregatorPad*, GstCaps* caps) {
   return true;
 }
 
-/* segments, QoS, states */
+/* segments, states */
 
 void EventRender::take_segment(const GstSegment& segment) {
   const GstSegment current = segment_of(main_pad());
@@ -458,18 +410,6 @@ void EventRender::take_segment(const GstSegment& segment) {
     return;
   drain();
   start_over();
-}
-
-void EventRender::take_qos(GstEvent* event) {
-  GstQOSType type = GST_QOS_TYPE_UNDERFLOW;
-  GstClockTimeDiff late = 0;
-  GstClockTime time = GST_CLOCK_TIME_NONE;
-  gst_event_parse_qos(event, &type, nullptr, &late, &time);
-  // Twice as late, to catch up; a throttle tells the time between pictures.
-  const GstClockTime factor = type == GST_QOS_TYPE_THROTTLE ? 1 : 2;
-  const std::lock_guard lock(mutex_);
-  if (GST_CLOCK_TIME_IS_VALID(time))
-    earliest_ = late > 0 ? time + factor * static_cast<GstClockTime>(late) : 0;
 }
 
 /// Forgets all events, because the next input is discontinuous. May throw.
@@ -483,10 +423,7 @@ void EventRender::start_over() {
 }
 
 void EventRender::flush() {
-  {
-    const std::lock_guard lock(mutex_);
-    earliest_ = 0;
-  }
+  qos.start_over();
   start_over();
 }
 
@@ -494,7 +431,7 @@ void EventRender::stop() {
   state_.reset();
   flush();
   discontinuous_ = false;
-  drawn_ = skipped_ = 0;
+  qos.reset_counts();
 }
 
 }  // namespace
@@ -567,7 +504,7 @@ static void install_properties(GObjectClass* object_class) {
 static gboolean src_event(GstAggregator* element, GstEvent* event) {
   if (GST_EVENT_TYPE(event) != GST_EVENT_QOS)
     return GST_AGGREGATOR_CLASS(gst_event_render_parent_class)->src_event(element, event);
-  inside_of<EventRender>(element).take_qos(event);
+  inside_of<EventRender>(element).qos.take_event(event);
   gst_event_unref(event);
   return TRUE;
 }

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+#pragma once
+
+#include <gst/video/video.h>
+
+#include "gst/base/event_buffer.hpp"
+
+/// Successive intervals of pictures at a framerate.
+class FrameTimes {
+ public:
+  FrameTimes(GstClockTime origin, const GstVideoInfo& video)
+      : origin_(origin),
+        fps_n_(static_cast<guint64>(GST_VIDEO_INFO_FPS_N(&video))),
+        fps_d_(static_cast<guint64>(GST_VIDEO_INFO_FPS_D(&video))) {}
+
+  /// Interval of the picture's events. Rounded up, so that intervals of other elements at the same
+  /// framerate, which are rounded down, end within it.
+  EventInterval events() const {
+    const auto at = [this](guint64 index) {
+      return origin_ + gst_util_uint64_scale_ceil(index, fps_d_ * GST_SECOND, fps_n_);
+    };
+    return {at(index_), at(index_ + 1)};
+  }
+  /// Timestamps of the picture's buffer.
+  EventInterval picture() const {
+    const auto at = [this](guint64 index) {
+      return origin_ + gst_util_uint64_scale(index, fps_d_ * GST_SECOND, fps_n_);
+    };
+    return {at(index_), at(index_ + 1)};
+  }
+  void next() { ++index_; }
+
+ private:
+  GstClockTime origin_;
+  guint64 fps_n_;
+  guint64 fps_d_;
+  guint64 index_ = 0;
+};
