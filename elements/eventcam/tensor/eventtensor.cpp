@@ -57,6 +57,7 @@
 #include <utility>
 
 #include "elements/eventcam/tensor/tensor_meta.hpp"
+#include "elements/eventcam/tensor/tensor_properties.hpp"
 #include "gst/base/authors.hpp"
 #include "gst/base/errors.hpp"
 #include "gst/base/event_buffer.hpp"
@@ -65,8 +66,6 @@
 #include "gst/base/owned.hpp"
 #include "gst/base/pads.hpp"
 #include "gst/base/played_segment.hpp"
-#include "gst/base/properties.hpp"
-#include "gst/base/types.hpp"
 #include "src/core/sensor_size.hpp"
 #include "src/tensor/event_tensor.hpp"
 #include "src/tensor/window_queue.hpp"
@@ -74,69 +73,24 @@
 GST_DEBUG_CATEGORY_STATIC(event_tensor_debug);
 #define GST_CAT_DEFAULT event_tensor_debug
 
-using eventcamera::Decay;
-using eventcamera::ElementType;
 using eventcamera::EventTensor;
 using eventcamera::Microseconds;
 using eventcamera::Nanoseconds;
-using eventcamera::Normalization;
-using eventcamera::Representation;
 using eventcamera::TensorSettings;
 using eventcamera::WindowQueue;
 using eventcamera::WindowSettings;
 
 namespace {
 
-/// Maximum gap between buffers that windows by time continue through; no interval is longer.
-constexpr GstClockTime max_gap = GstClockTime{G_MAXUINT32} * GST_USECOND;
-
-/// Times beyond this are not used: the ends of windows would not fit into 64 bits.
-constexpr GstClockTime max_time = GstClockTime{1} << 62;
-
 /// Maximum memory of a tensor and of what it is made from.
 constexpr gsize max_tensor_bytes = gsize{1} << 30;
 
-constexpr guint max_frame_count = 10'000;
-
-/// User-settable values, copied at caps.
-struct Settings {
-  Representation representation = Representation::voxel_grid;
-  guint bins = 5;
-  Decay decay = Decay::exponential;
-  GstClockTime time_constant = 50 * GST_MSECOND;
-  Normalization normalization = Normalization::none;
-  ElementType type = ElementType::float32;
-  guint event_count = 0;
-  GstClockTime accumulation_time = 0;
-  guint frame_count = 1;
-  gdouble overlap = 0;
-};
-
-TensorSettings tensor_settings_of(const Settings& settings) {
-  return {.representation = settings.representation,
-          .bins = static_cast<int>(settings.bins),
-          .decay = settings.decay,
-          .time_constant =
-              static_cast<Microseconds>(std::max(settings.time_constant / 1000, GstClockTime{1})),
-          .normalization = settings.normalization,
-          .type = settings.type};
-}
-
-WindowSettings window_settings_of(const Settings& settings) {
-  const auto accumulation_time =
-      settings.accumulation_time > 0 ? std::max(settings.accumulation_time, event_resolution) : 0;
-  return {.events = settings.event_count,
-          .duration = static_cast<Nanoseconds>(accumulation_time),
-          .intervals = settings.frame_count,
-          .overlap = settings.overlap};
-}
-
 /// State from caps to stop.
 struct State {
-  State(const GstEventCameraInfo& input, const Settings& settings)
+  State(const GstEventCameraInfo& input, const TensorProperties& settings)
       : info(input),
-        tensor_settings(tensor_settings_of(settings)),
-        window_settings(window_settings_of(settings)),
+        tensor_settings(settings.of_tensors()),
+        window_settings(settings.of_windows()),
         tensor(input.width, input.height, tensor_settings),
         windows(input.width, input.height, window_settings) {}
 
@@ -148,7 +102,7 @@ struct State {
 };
 
 struct Private {
-  Guarded<Settings> settings;
+  Guarded<TensorProperties> settings;
   Guarded<GstClockTime> latency;
   GstPad* sink = nullptr;
   GstPad* src = nullptr;
@@ -177,7 +131,7 @@ G_DEFINE_TYPE_WITH_CODE(GstEventTensor, gst_event_tensor, GST_TYPE_ELEMENT,
                                                 "windows of events as tensors"))
 GST_ELEMENT_REGISTER_DEFINE(eventtensor, "eventtensor", GST_RANK_NONE, gst_event_tensor_get_type())
 
-static Guarded<Settings>& settings_of(GObject* object) {
+static Guarded<TensorProperties>& settings_of(GObject* object) {
   return GST_EVENT_TENSOR(object)->priv->settings;
 }
 
@@ -233,7 +187,7 @@ static GstFlowReturn approach(GstEventTensor* self, const EventInterval& interva
   if (!last) return GST_FLOW_OK;
   const auto reached = static_cast<GstClockTime>(*last);
   const bool returns = interval.start + event_resolution < reached;
-  const bool leaps = interval.start > reached + max_gap;
+  const bool leaps = interval.start > reached + max_tensor_gap;
   if (!returns && !leaps) return GST_FLOW_OK;
   GST_DEBUG_OBJECT(self, "starting over: time %s from %" GST_TIME_FORMAT " to %" GST_TIME_FORMAT,
                    returns ? "goes back" : "leaps", GST_TIME_ARGS(reached),
@@ -277,7 +231,7 @@ static GstFlowReturn chain(GstPad*, GstObject* parent, GstBuffer* taken) {
   const auto gap_result = std::exchange(priv.gap_result, GST_FLOW_OK);
   if (gap_result != GST_FLOW_OK) return gap_result;
   const auto interval = interval_of(taken);
-  if (!interval || interval->end > max_time) {
+  if (!interval || interval->end > max_tensor_time) {
     priv.faults.warn(self, interval_fault(taken), taken);
     return GST_FLOW_OK;
   }
@@ -299,7 +253,7 @@ static bool take_gap(GstEventTensor* self, GstEvent* event) {
   GstClockTime duration = 0;
   gst_event_parse_gap(event, &start, &duration);
   if (!priv.state || priv.state->window_settings.events > 0 || !GST_CLOCK_TIME_IS_VALID(duration) ||
-      start > max_time || duration > max_time - start)
+      start > max_tensor_time || duration > max_tensor_time - start)
     return false;
   priv.gap_result = guarded(self, no_memory, [&] {
     return add(self, {}, 0, {start, start + duration}, nullptr);
@@ -337,15 +291,6 @@ static GstClockTime latency_of(const State& state) {
                                static_cast<guint64>(state.info.fps_n));
 }
 
-static const GEnumValue* data_types() {
-  static const GEnumValue values[] = {
-      {static_cast<gint>(ElementType::float32), "32-bit floating point", "float32"},
-      {static_cast<gint>(ElementType::float16), "16-bit floating point", "float16"},
-      {static_cast<gint>(ElementType::uint8), "Unsigned bytes", "uint8"},
-      {0, nullptr, nullptr}};
-  return values;
-}
-
 static OwnedCaps caps_of(const State& state) {
   const auto& shape = state.tensor.shape();
   const auto dimensions = std::to_string(shape.width) + ":" + std::to_string(shape.height) + ":" +
@@ -354,7 +299,7 @@ static OwnedCaps caps_of(const State& state) {
   return OwnedCaps(gst_caps_new_simple(
       "other/tensors", "format", G_TYPE_STRING, "static", "num_tensors", G_TYPE_INT, 1,
       "dimensions", G_TYPE_STRING, dimensions.c_str(), "types", G_TYPE_STRING,
-      data_types()[static_cast<int>(state.tensor_settings.type)].value_nick, "framerate",
+      tensor_data_types()[static_cast<int>(state.tensor_settings.type)].value_nick, "framerate",
       GST_TYPE_FRACTION, fps_n, fps_d, nullptr));
 }
 
@@ -399,9 +344,9 @@ static bool are_wanted(GstEventTensor* self, GstCaps* caps) {
 /// Starts over for a sensor. May throw.
 static bool make_state(GstEventTensor* self, const GstEventCameraInfo& info) {
   auto& priv = *self->priv;
-  const Settings settings = priv.settings.copy();
+  const TensorProperties settings = priv.settings.copy();
   priv.state.reset();
-  const auto tensor_settings = tensor_settings_of(settings);
+  const auto tensor_settings = settings.of_tensors();
   const auto bytes =
       EventTensor::memory({info.width, info.height, tensor_settings}, tensor_settings);
   if (bytes > max_tensor_bytes) {
@@ -515,86 +460,6 @@ static GstStateChangeReturn change_state(GstElement* element, GstStateChange tra
 
 /* type */
 
-static GType representation_type() {
-  static const GEnumValue values[] = {
-      {static_cast<gint>(Representation::voxel_grid),
-       "Polarities, shared out to the two nearest of several instants", "voxel-grid"},
-      {static_cast<gint>(Representation::histogram), "Numbers of OFF and of ON events",
-       "histogram"},
-      {static_cast<gint>(Representation::time_surface),
-       "Decayed age of the last OFF and the last ON event", "time-surface"},
-      {static_cast<gint>(Representation::event_frame), "ON minus OFF events", "event-frame"},
-      {0, nullptr, nullptr}};
-  return enum_type("GstEventTensorRepresentation", values);
-}
-
-static GType decay_type() {
-  static const GEnumValue values[] = {
-      {static_cast<gint>(Decay::exponential), "exp(-age / time-constant)", "exponential"},
-      {static_cast<gint>(Decay::linear), "1 - age / time-constant, at least 0", "linear"},
-      {0, nullptr, nullptr}};
-  return enum_type("GstEventTensorDecay", values);
-}
-
-static GType normalization_type() {
-  static const GEnumValue values[] = {
-      {static_cast<gint>(Normalization::none), "As counted", "none"},
-      {static_cast<gint>(Normalization::mean_std),
-       "Nonzero values get the mean 0 and the standard deviation 1, as for E2VID", "mean-std"},
-      {static_cast<gint>(Normalization::max), "The largest magnitude becomes 1", "max"},
-      {0, nullptr, nullptr}};
-  return enum_type("GstEventTensorNormalization", values);
-}
-
-static void install_properties(GObjectClass* klass) {
-  const auto number_of = [](auto value) { return static_cast<gint>(value); };
-  Properties<settings_of> properties(klass);
-  properties.add(&Settings::representation,
-                 g_param_spec_enum("representation", "Representation", "What a tensor shows",
-                                   representation_type(), number_of(Settings().representation),
-                                   mutable_ready_flags));
-  properties.add(&Settings::bins, g_param_spec_uint("bins", "Bins", "Channels of a voxel grid", 1,
-                                                    GST_EVENT_CAMERA_MAX_BINS, Settings().bins,
-                                                    mutable_ready_flags));
-  properties.add(&Settings::decay,
-                 g_param_spec_enum("decay", "Decay", "How the values of a time surface decrease",
-                                   decay_type(), number_of(Settings().decay), mutable_ready_flags));
-  properties.add(
-      &Settings::time_constant,
-      g_param_spec_uint64("time-constant", "Time constant",
-                          "Time constant of the decay of a time surface (ns)", GST_USECOND,
-                          max_time, Settings().time_constant, mutable_ready_flags));
-  properties.add(&Settings::normalization,
-                 g_param_spec_enum("normalization", "Normalization",
-                                   "How the values of a tensor are scaled", normalization_type(),
-                                   number_of(Settings().normalization), mutable_ready_flags));
-  properties.add(&Settings::type,
-                 g_param_spec_enum("data-type", "Data type", "Type of the numbers in a tensor",
-                                   enum_type("GstEventTensorDataType", data_types()),
-                                   number_of(Settings().type), mutable_ready_flags));
-  properties.add(&Settings::event_count,
-                 g_param_spec_uint("event-count", "Event count",
-                                   "Number of events in a window (0 = not limited by count)", 0,
-                                   static_cast<guint>(WindowQueue::max_events),
-                                   Settings().event_count, mutable_ready_flags));
-  properties.add(&Settings::accumulation_time,
-                 g_param_spec_uint64(
-                     "accumulation-time", "Accumulation time",
-                     "Length of a window without event-count (ns, at least 1000; 0 = frame-count "
-                     "buffers)",
-                     0, max_gap, Settings().accumulation_time, mutable_ready_flags));
-  properties.add(
-      &Settings::frame_count,
-      g_param_spec_uint("frame-count", "Frame count",
-                        "Number of buffers in a window without event-count and "
-                        "accumulation-time, such as intervals between frames",
-                        1, max_frame_count, Settings().frame_count, mutable_ready_flags));
-  properties.add(
-      &Settings::overlap,
-      g_param_spec_double("overlap", "Overlap", "Share of a window that the next one repeats", 0,
-                          0.99, Settings().overlap, mutable_ready_flags));
-}
-
 static void finalize(GObject* object) {
   delete GST_EVENT_TENSOR(object)->priv;
   G_OBJECT_CLASS(gst_event_tensor_parent_class)->finalize(object);
@@ -610,7 +475,8 @@ static void gst_event_tensor_init(GstEventTensor* self) {
 static void gst_event_tensor_class_init(GstEventTensorClass* klass) {
   GObjectClass* object_class = G_OBJECT_CLASS(klass);
   object_class->finalize = finalize;
-  install_properties(object_class);
+  Properties<settings_of> properties(object_class);
+  add_tensor_properties(properties);
 
   GstElementClass* element_class = GST_ELEMENT_CLASS(klass);
   element_class->change_state = change_state;
