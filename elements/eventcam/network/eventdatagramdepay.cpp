@@ -129,10 +129,6 @@ static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_DEPAY(object)->priv->settings;
 }
 
-static Guarded<DatagramCounts>& counts_of(GObject* object) {
-  return GST_EVENT_DATAGRAM_DEPAY(object)->priv->counts;
-}
-
 /* output */
 
 static GstClockTime nanoseconds(Microseconds t) {
@@ -411,7 +407,7 @@ static void gst_event_datagram_depay_class_init(GstEventDatagramDepayClass* klas
   install_stats(
       object_class,
       [](GObject* object) {
-        const DatagramCounts counts = counts_of(object).copy();
+        const DatagramCounts counts = GST_EVENT_DATAGRAM_DEPAY(object)->priv->counts.copy();
         return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
                                  counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
                                  G_TYPE_UINT64, counts.bytes, "lost-packets", G_TYPE_UINT64,

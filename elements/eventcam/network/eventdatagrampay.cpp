@@ -95,10 +95,6 @@ static Guarded<Settings>& settings_of(GObject* object) {
   return GST_EVENT_DATAGRAM_PAY(object)->priv->settings;
 }
 
-static Guarded<DatagramCounts>& counts_of(GObject* object) {
-  return GST_EVENT_DATAGRAM_PAY(object)->priv->counts;
-}
-
 /* datagrams */
 
 static Report report_of(const std::exception& error) {
@@ -336,7 +332,7 @@ static void gst_event_datagram_pay_class_init(GstEventDatagramPayClass* klass) {
   install_stats(
       object_class,
       [](GObject* object) {
-        const DatagramCounts counts = counts_of(object).copy();
+        const DatagramCounts counts = GST_EVENT_DATAGRAM_PAY(object)->priv->counts.copy();
         return gst_structure_new("application/x-event-datagram-stats", "packets", G_TYPE_UINT64,
                                  counts.packets, "events", G_TYPE_UINT64, counts.events, "bytes",
                                  G_TYPE_UINT64, counts.bytes, nullptr);
