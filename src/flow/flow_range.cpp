@@ -18,6 +18,7 @@ FlowRange range_of(const ImageView<Flow>& flow, const Box& box) {
   const Floats floats;
   const int lanes = static_cast<int>(hn::Lanes(floats));
   const int count = 2 * box.width();
+  const int ahead = 2 * count;  // of the box after the next: its rows are far apart
   auto lowest = hn::Zero(floats);
   auto highest = hn::Zero(floats);
   for (int y = box.top; y < box.bottom; ++y) {
@@ -25,7 +26,7 @@ FlowRange range_of(const ImageView<Flow>& flow, const Box& box) {
     for (int i = 0; i < count; i += lanes) {
       const auto here = HWY_LIKELY(i + lanes <= count) ? hn::LoadU(floats, row + i)
                                                        : load_first(floats, row + i, count - i);
-      __builtin_prefetch(row + i + 2 * count);  // of the box after the next: rows are far apart
+      __builtin_prefetch(row + i + ahead);
       const auto number = hn::IfThenElseZero(hn::Eq(here, here), here);
       lowest = hn::Min(lowest, number);
       highest = hn::Max(highest, number);
